@@ -1,8 +1,8 @@
 """Every name that a scenario or command line can use, declared once.
 
-Validation, command line, report and documentation look names up here; what a name stands for is imported when it
-is used. A registry also knows what installed packages add through entry points, and takes `module:Class` for
-anything that can be imported, `file.py:Class` for what is in a file in a folder of Python's path:
+Validation, command line, report and documentation look names up here. A class is imported when it is used. A registry
+also has the entry points of installed packages, and accepts `module:Class` for any importable class and `file.py:Class`
+for a class in a file in a folder of Python's path:
 
     [project.entry-points."airground_drake.policies"]
     orbit = "my_package.orbit:Orbit"
@@ -32,22 +32,22 @@ from airground_drake.base.files import sha256
 T = TypeVar("T")
 
 PLUGIN = "module:Class or file.py:Class"
-"""How anything that is not registered is named."""
+"""Form of the name of a class that is not registered."""
 _WORD = r"[^\W\d]\w*"
 PLUGIN_PATTERN = rf"^({_WORD}(\.{_WORD})*|([\w-]+/)*[\w-]+\.py):{_WORD}$"
-"""The same as a regular expression."""
+"""This form as a regular expression."""
 
 
 class Registry:
-    """Classes of one kind by name: the package's own, those of entry points, and `PLUGIN`."""
+    """Classes of one kind by name: the package's own, those of entry points, and those of the form `PLUGIN`."""
 
     def __init__(self, kind: str, plural: str, own: Mapping[str, str]) -> None:
-        """Declare the package's own.
+        """Declare the package's own classes.
 
         Args:
-            kind: what they are, for messages.
+            kind: singular, for messages.
             plural: last part of the entry points' group, `airground_drake.<plural>`.
-            own: `module:Class` by name, in the order in which they are listed.
+            own: `module:Class` by name, in the order of lists.
         """
         self.kind = kind
         self.group = f"airground_drake.{plural}"
@@ -55,7 +55,7 @@ class Registry:
         self._added: dict[str, type] = {}
 
     def __iter__(self) -> Iterator[str]:
-        """Every registered name: the package's own first, then those of entry points, sorted."""
+        """All registered names: the package's own, then those of entry points, sorted, then added ones."""
         yield from {**self._own, **dict.fromkeys(sorted(_entry_points(self.group))), **self._added}
 
     def __contains__(self, name: object) -> bool:
@@ -63,12 +63,12 @@ class Registry:
 
     @property
     def own(self) -> tuple[str, ...]:
-        """Names of what comes with the package."""
+        """Names of the package's own classes."""
         return tuple(self._own)
 
     @property
     def allowed(self) -> tuple[str, ...]:
-        """What may be written where a name is wanted: the names, and `PLUGIN`."""
+        """The registered names, and `PLUGIN`."""
         return (*self, PLUGIN)
 
     def accepts(self, name: str) -> bool:
@@ -80,32 +80,31 @@ class Registry:
         return name not in self._own and name not in self._added
 
     def says(self, name: str) -> str:
-        """One line about a registered class. Its module is read, not imported (packages above it are).
+        """The `summary = "..."` of a registered class, else the first line of its docstring; '' if it has neither.
 
-        Returns:
-            Its `summary` if it is a claim that has one, else the first line of its docstring; '' if there is neither.
+        Its module is read, not imported (packages above it are).
         """
-        if name in self._added:
-            return (self._added[name].__doc__ or "").strip().partition("\n")[0]
-        module, _, attribute = {**self._own, **_entry_points(self.group)}[name].partition(":")
+        module, _, attribute = {**self._own, **_entry_points(self.group)}.get(name, "").partition(":")
         with suppress(Exception):  # an installed package may raise anything
             spec = importlib.util.find_spec(module)
-            tree = ast.parse(Path(spec.origin or "").read_bytes()) if spec else ast.Module([], [])
-            for node in tree.body:
-                if isinstance(node, ast.ClassDef) and node.name == attribute:
-                    return _summary(node) or (ast.get_docstring(node) or "").partition("\n")[0]
+            tree = ast.parse(Path(spec.origin or "").read_bytes() if spec else b"")
+            (found,) = (node for node in tree.body if isinstance(node, ast.ClassDef) and node.name == attribute)
+            assigned = {ast.unparse(one.targets[0]): one.value for one in found.body if isinstance(one, ast.Assign)}
+            if summary := assigned.get("summary"):
+                return str(ast.literal_eval(summary))
+            return (ast.get_docstring(found) or "").partition("\n")[0]
         return ""
 
     def load(self, name: str, of: type[T]) -> type[T]:
-        """The class that a name stands for.
+        """Import a class.
 
         Args:
             name: registered, `module:Class`, or `file.py:Class`.
-            of: what it must be a subclass of (or a protocol that it must meet).
+            of: its base class, or a protocol that it must meet.
 
         Raises:
             UnknownNameError: if the name is not registered and not of the form of `PLUGIN`.
-            PluginError: if it cannot be imported, or is something else; says where it was looked for.
+            PluginError: if it cannot be imported, or is no such class; names the folders that were searched.
         """
         found: object = self._added.get(name)
         if found is None:
@@ -125,11 +124,11 @@ class Registry:
         return found
 
     def make(self, name: str, of: type[T], **parameters: Any) -> T:
-        """An object of the class that a name stands for.
+        """Make an object of a class.
 
         Raises:
             UnknownNameError: as `load`.
-            PluginError: as `load`, and if the class does not take these parameters; says which it takes.
+            PluginError: as `load`, and if the class refuses these parameters; names the parameters that it takes.
         """
         kind = self.load(name, of)
         try:
@@ -143,18 +142,15 @@ class Registry:
     @contextmanager
     def adding(self, name: str, what: type) -> Iterator[None]:
         """Register a class under a name within a block (in a notebook, a benchmark or a test)."""
-        before = self._added.get(name)
-        self._added[name] = what
+        before, self._added = self._added, {**self._added, name: what}
         try:
             yield
         finally:
-            del self._added[name]
-            if before is not None:
-                self._added[name] = before
+            self._added = before
 
 
 def _misfit(kind: type, parameters: Mapping[str, Any]) -> str:
-    """Why a class refuses these parameters, and which it takes; '' if it takes them, or has no signature."""
+    """Why a class refuses these parameters, and which it takes; '' if it accepts them, or has no signature."""
     try:
         signature = inspect.signature(kind)
     except (TypeError, ValueError):
@@ -174,11 +170,11 @@ def is_plugin(name: str) -> bool:
 
 
 def _imported(module: str) -> ModuleType:
-    """A module by its name, or by that of a file in a folder of Python's path, the last of these first.
+    """Import a module by its name, or by a file in a folder of Python's path (the last folder is searched first).
 
     Raises:
         ModuleNotFoundError: if it does not exist.
-        BaseException: whatever the module raises.
+        BaseException: any exception of the module.
     """
     if not module.endswith(".py"):
         return importlib.import_module(module)
@@ -189,7 +185,7 @@ def _imported(module: str) -> ModuleType:
 
 
 def _executed(path: Path) -> ModuleType:
-    """The module that a file is, under a name that no other file has."""
+    """Import a file, under a name that no other file has."""
     name = f"{path.stem}_{sha256(str(path).encode())[:12]}"
     if name not in sys.modules:
         spec = importlib.util.spec_from_file_location(name, path)
@@ -211,14 +207,6 @@ def _places() -> str:
     return ", ".join([*dict.fromkeys(added), "Python's own folders"])
 
 
-def _summary(of: ast.ClassDef) -> str:
-    """The text of `summary = "..."` in a class; '' if it has none."""
-    for node in of.body:
-        if isinstance(node, ast.Assign) and [ast.unparse(target) for target in node.targets] == ["summary"]:
-            return str(ast.literal_eval(node.value))
-    return ""
-
-
 @cache
 def _entry_points(group: str) -> dict[str, str]:
     """`module:Class` by name, of all installed packages."""
@@ -227,12 +215,12 @@ def _entry_points(group: str) -> dict[str, str]:
 
 @dataclass(frozen=True)
 class Method:
-    """One of the ways in which UAV and UGVs can be coupled.
+    """A way to couple UAV and UGVs.
 
     Attributes:
         id: as in scenario files.
         says: in words.
-        intervenes: whether the UAV proposes anything.
+        intervenes: whether the UAV makes proposals.
         gated: whether the UGVs decide about proposals, by (21)-(29) or by outcomes.
         intervention_on_top: priorities of (20); False: avoidance above the intervention.
     """
@@ -297,10 +285,10 @@ RETIRED_ROUTES = {
     "branch_and_bound": "mixed_integer, with gatekeeper.blocks: 10 for the same plans",
     "rollout": "mixed_integer, or method (d), which compares outcomes on the closed loop",
 }
-"""Routes of earlier versions, and what to write in their place."""
+"""Routes of earlier versions, and their successors."""
 
 UAV_TASKS = Registry("task", "uav_tasks", {"formation": "airground_drake.nsbc.tasks:FormationTask"})
-"""What the UAV does below obstacle avoidance: subclasses of `nsbc.task.Task`."""
+"""Tasks of the UAV below obstacle avoidance: subclasses of `nsbc.task.Task`."""
 
 SAMPLERS = Registry(
     "sampler",
@@ -311,7 +299,7 @@ SAMPLERS = Registry(
         "random": "airground_drake.campaign.search:Uniform",
     },
 )
-"""Where to look for violations: classes that are a `campaign.search.Sampler`."""
+"""Samplers of points in the search for violations: classes that meet `campaign.search.Sampler`."""
 
 RUN_CLAIMS = Registry(
     "claim",
@@ -330,13 +318,13 @@ RUN_CLAIMS = Registry(
         "COMM": "airground_drake.verify.runs.comm:Comm",
     },
 )
-"""Claims that are decided from one trace, in the order of the report: subclasses of `verify.claim.TraceClaim`."""
+"""Claims about one run, in the order of the report: subclasses of `verify.claim.TraceClaim`."""
 
 RETIRED_CLAIMS = {
     "GATE-SUR": "it is part of GATE-FEAS",
     "GATE-TIME": "decision times are measurements: runs.RUN.metrics.gatekeeper in report.json",
 }
-"""Claims of earlier versions, and what has become of them."""
+"""Claims of earlier versions, and their successors."""
 
 MODEL_CLAIMS = Registry(
     "claim",

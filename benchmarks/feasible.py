@@ -1,8 +1,8 @@
-"""Whether a team can reach its targets at all: planners that share nothing with what the benchmark judges.
+"""Whether a team can reach its targets at all: planners that share no code with the package.
 
-One UGV: the shortest path among discs, exact (tangents and arcs), so that its absence is a proof that start and target
-are separated. A team: prioritised search in time on a grid, in many orders. What it finds is checked in continuous time
-and is a joint plan; that it finds none proves nothing.
+One UGV: the shortest path among discs, exact (tangents and arcs), so that its absence proves that start and target are
+separated. A team: prioritised search in time on a grid, in many orders. A plan that it finds is checked in continuous
+time; a search without a plan proves nothing.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ CELL_M = 0.4
 """Spacing of the grid, m; a step goes to one of the four neighbours, or waits."""
 
 BEYOND_OBSTACLE_M, BEYOND_UGV_M = 0.1, 0.35
-"""What nodes of a plan keep beyond the safe distances, m. Between two nodes a robot may come nearer: two robots whose
+"""Margins of a plan's nodes beyond the safe distances, m. Between two nodes a robot may come nearer: two robots whose
 distance is 2.35 m before and after a step of 0.4 m each are never nearer than sqrt(2.35^2 - 0.4^2) = 2.31 m."""
 
 ORDERS = 30

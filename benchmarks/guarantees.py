@@ -1,10 +1,10 @@
-"""What the steps of every shipped run miss of the avoidance inequalities, and what distance follows: a table.
+"""Errors e of the avoidance inequalities in every shipped run, and the distances that they guarantee: a table.
 
     python benchmarks/guarantees.py [scenario ...]
 
-Of each run the pair that is promised the least, see SAFE-HYP: e, in metres per control period; what this costs of its
-safe distance, e / (A h); the distance that it is promised. Under method (d) also how many accepted interventions met
-the premise of LIVE-GATE.
+For each run the pair with the smallest guaranteed distance, see SAFE-HYP: e, in metres per control period; the loss of
+safe distance, e / (A h); the guaranteed distance. Under method (d) also how many accepted interventions met the premise
+of LIVE-GATE.
 """
 
 from __future__ import annotations

@@ -2,17 +2,18 @@
 
     python benchmarks/hostile.py --proposals 10000 --runs 300 --lies 300
 
-Solution level: UGVs at random safe places among obstacles, many exactly at the safe distance, with proposals of
-random position, speed, direction and course, a third of them aimed at what is nearest. Under method (d) each one
-is executed whether accepted or not; under (c) only if its gatekeeper accepts. Whole runs: case A with the
-policies `hostile`, `towards` and `noisy` of random parameters, a gatekeeper that accepts nearly anything (under method
-(d) one that takes every prediction for useful, as a lying map could make it), and obstacles that the UAV does not know.
-Distances are exact in continuous time. The time that a UAV steals is measured besides: the longest that a UGV executed
-interventions between two rests, against the bound of LIVE-WAIT.
+Decision level: UGVs at random safe places among obstacles, many exactly at the safe distance, get proposals of random
+position, speed, direction and course; a third of them lead to the nearest obstacle. Under method (d) each proposal is
+executed, accepted or not; under (c) only if its gatekeeper accepts.
 
-Lies: runs of case A under (d) with a UAV that lies in every part of its messages (`hostile_uav`), half of them before
-gatekeepers that believe every prediction, with patience of random numbers. A small evolutionary search looks for the
-tactics that steal the most of what the bound leaves.
+Whole runs: case A with the policies `hostile`, `towards` and `noisy` of random parameters, obstacles that the UAV does
+not know, and a gatekeeper that accepts nearly everything (under method (d) one that finds every prediction useful, as a
+lying map could make it). Distances are exact in continuous time. The time that a UAV steals is measured, too: the
+longest time for which a UGV executed interventions between two rests, against the bound of LIVE-WAIT.
+
+Lies: runs of case A under (d) with a UAV that lies in every part of its messages (`hostile_uav`), half of them with
+gatekeepers that believe every prediction, and with random patience. A small evolutionary search looks for the tactics
+that steal the largest share of the bound.
 """
 
 from __future__ import annotations
@@ -52,7 +53,7 @@ from airground_drake.world.world import Body
 STEPS = 30
 """Control periods for which a proposal is executed at decision level."""
 GENERATION, BEST = 20, 5
-"""Lies of a generation, and those of all before whose tactics the next one mutates."""
+"""Lies of a generation, and the best lies so far, whose tactics are mutated for the next one."""
 
 
 def attack(random: np.random.Generator, start: Array, centres: Array, t: float) -> Motion:
@@ -67,7 +68,7 @@ def attack(random: np.random.Generator, start: Array, centres: Array, t: float) 
 
 
 def at_decision_level(seed: int, proposals: int) -> tuple[float, int, int]:
-    """Worst margin under (d), m; proposals that (c) accepted; those of them that then came below d."""
+    """Worst margin under (d), m; number of proposals that (c) accepted; number of these with a distance below d."""
     random = np.random.default_rng(seed)
     scenario = load("case_a")[0]
     base, presets = make_world(scenario), make_presets(scenario)
@@ -160,7 +161,7 @@ def whole_run(seed: int) -> tuple[float, int, float, float, float]:
 
 @dataclass(frozen=True)
 class Lie:
-    """A run to be made with a lying UAV: its tactic, the seed of everything else, whether gatekeepers believe it."""
+    """A run with a lying UAV: its tactic, the seed of everything else, whether gatekeepers believe it."""
 
     tactic: Tactic
     seed: int
@@ -169,7 +170,7 @@ class Lie:
 
 @dataclass(frozen=True)
 class Told:
-    """What came of a lie: margin to d, m; time stolen and the bound of it, s; longest decision, s."""
+    """The result of a lie: margin to d, m; time stolen and its bound, s; longest decision, s."""
 
     lie: Lie
     margin_m: float
@@ -179,7 +180,7 @@ class Told:
 
     @property
     def share(self) -> float:
-        """Of the bound that was stolen."""
+        """Share of the bound that was stolen."""
         return self.stolen_s / self.bound_s
 
 
@@ -193,7 +194,7 @@ def told(lie: Lie) -> Told:
     scenario.intervention.period_s = float(random.choice([0.05, 0.1]))
     scenario.duration_s = max(20.0, 2.5 * (gate.tries * gate.longest_s + gate.rest_s))
     scenario.obstacles["obstacle_2"].known_to_uav = bool(random.integers(2))
-    body = float(random.choice([0.0, 1.0]))  # of the 2 m to an obstacle's centre so much are its own
+    body = float(random.choice([0.0, 1.0]))  # radius of an obstacle, a part of the 2 m to its centre
     scenario.safe_distance.obstacle_m -= body
     for obstacle in scenario.obstacles.values():
         obstacle.radius_m = body
@@ -221,7 +222,7 @@ def told(lie: Lie) -> Told:
 
 
 def search(pool: ProcessPoolExecutor, runs: int) -> list[Told]:
-    """Lies in generations: the first at random, then what stole the most, with parts of its tactic drawn again."""
+    """Lies in generations: the first at random, then mutants of the tactics that stole the most."""
     random = np.random.default_rng(0)
     found: list[Told] = []
     while len(found) < runs:
@@ -237,7 +238,7 @@ def search(pool: ProcessPoolExecutor, runs: int) -> list[Told]:
 
 
 def print_lies(found: list[Told]) -> None:
-    """The worst of all, the worst for each part of a tactic, and those that stole the most."""
+    """Print the worst lies: of all, for each part of a tactic, and those that stole the most."""
     print(f"{len(found)} runs with a lying UAV:")
     print(f"  (d) worst margin to d: {min(one.margin_m for one in found):.3g} m")
     above = sum(one.stolen_s > one.bound_s + 1e-9 for one in found)
@@ -278,7 +279,7 @@ def stolen_s(trace: Trace, ugv: str) -> float:
 
 
 def main() -> None:
-    """Run both attacks and print what came of them."""
+    """Run the attacks and print their results."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--proposals", type=int, default=10_000)
     parser.add_argument("--runs", type=int, default=300)
@@ -292,7 +293,7 @@ def main() -> None:
             worst, accepted, below = min(p[0] for p in parts), sum(p[1] for p in parts), sum(p[2] for p in parts)
             print(f"{20 * share} hostile proposals, each executed for {STEPS} control periods:")
             print(f"  (d) worst margin to d: {worst:.3g} m")
-            print(f"  (c) accepted {accepted}, of which {below} then came below d")
+            print(f"  (c) accepted {accepted}, and {below} of these then came below d")
         if options.runs:
             runs = np.array(list(pool.map(whole_run, range(options.runs), chunksize=5)))
             print(f"{options.runs} whole runs with a hostile UAV:")

@@ -1,7 +1,7 @@
 """A UAV that lies in every part of its messages, to keep UGVs from their own task, or to drive them into something.
 
-It needs no trigger to speak, speaks at every planning instant if it likes, and answers to nobody. What it does follows
-from a `Tactic`; `drawn` draws one, `mutated` changes a part of one.
+It may speak without a trigger, and at every planning instant. A `Tactic` says how it lies; `drawn` draws a tactic, and
+`mutated` changes a part of it.
 """
 
 from __future__ import annotations
@@ -42,21 +42,20 @@ class Tactic:
     """How the UAV lies.
 
     Attributes:
-        mapped: the map that it sends: the true one, that with every obstacle about a metre away, none, phantoms at
-            random, some on top of the UGV, a wall across its way out of its sight, or very many.
-        radii: of what is on it: true (0 for what is not there), none, half of that, 3 m more, very much more, or what
-            is no length at all.
-        motion: where the UGV is asked to be: where it is; on its way to the goal, then at rest short of it; to and fro;
-            far away; in what is nearest; always where it happens to be; towards its goal, at a crawl.
-        party: whether the proposal stands alone, or is said to be a part of a joint plan of all.
-        cause: whose trigger the proposal is said to be for: the UGV's own, without a word or by its name, that of
-            another one, by turns, of nobody, or of the UAV.
-        lasts_s: duration of the motion.
-        renew_s: a standing proposal is replaced after so long.
-        pause_s: silence after a refusal, and before a renewal.
-        forge: whether a replacement pretends to be the proposal that was answered (the same number and time of issue).
-        jitter_m: by which each proposal differs from the one before.
-        size_m: how far motions lead.
+        mapped: the map that it sends: the true map, every obstacle moved by about a metre, an empty map, random
+            phantoms, phantoms on top of the UGV, a wall across its way out of its sight, or very many phantoms.
+        radii: radii on the map: true (0 for phantoms), zero, half, 3 m more, very much more, or not a length.
+        motion: the motion that is proposed: stay; go towards the goal and stop short of it; to and fro; far away; into
+            the nearest obstacle or robot; always the current position; towards the goal at a crawl.
+        party: whether the proposal stands alone, or claims to be part of a joint plan of all.
+        cause: the trigger that the proposal claims to answer: the UGV's own (by default or by name), another UGV's,
+            both in turn, nobody's, or the UAV's.
+        lasts_s: duration of the motion, s.
+        renew_s: age at which a standing proposal is replaced, s.
+        pause_s: silence after a refusal and before a renewal, s.
+        forge: whether a replacement pretends to be the answered proposal (same number and time of issue).
+        jitter_m: difference of each proposal from the one before, m.
+        size_m: length of the motions, m.
     """
 
     mapped: str
@@ -91,7 +90,7 @@ class LyingPlanner(Planner):
     random: np.random.Generator
 
     def idle(self, memory: PlannerState, intervening: Sequence[bool]) -> bool:
-        """Speaks whether anybody is intervened on or not."""
+        """Never idle."""
         return False
 
     def plan(
@@ -104,7 +103,7 @@ class LyingPlanner(Planner):
         reports: Reports,
         standing: Sequence[bool] = (),
     ) -> PlannerState:
-        """Speak, whoever stands or has said what."""
+        """Speak, whatever the answers and reports."""
         return self._speak(memory, t, positions, answers)
 
     def _speak(self, memory: PlannerState, t: float, positions: Array, answers: Array) -> PlannerState:

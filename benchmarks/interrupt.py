@@ -1,4 +1,4 @@
-"""Kill reports at random moments and look at what is left.
+"""Kill reports at random moments, and check their folders.
 
     python benchmarks/interrupt.py --kills 100
 
@@ -69,7 +69,7 @@ def wait_until(true: Callable[[], bool], limit_s: float) -> bool:
 
 
 def trial(folder: Path, number: signal.Signals, delay_s: float, *, writing: bool) -> tuple[str, list[str]]:
-    """One kill: what became of the report, and everything that is wrong."""
+    """One kill: whether there is a report then, and all faults."""
     page = folder / "report.json"
     before = page.exists() and page.stat().st_mtime_ns
     process = report(folder)
@@ -96,7 +96,7 @@ def trial(folder: Path, number: signal.Signals, delay_s: float, *, writing: bool
 
 
 def main() -> int:
-    """Run the trials and print what came of them."""
+    """Run the trials and print their results."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--kills", type=int, default=100)
     parser.add_argument("--seed", type=int, default=0)

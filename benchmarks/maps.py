@@ -23,7 +23,7 @@ SAFE_M = 2.0
 """Safe distance d, m, of every pair of UGVs, and of UGVs and obstacles."""
 
 ROOM_M = 0.3
-"""What starts and targets have beyond the safe distance, m."""
+"""Margin of starts and targets beyond the safe distance, m."""
 
 PRESET_M_S, MAX_M_S, DETOUR_M_S = 1.0, 3.0, 2.5
 """Speeds of the preset trajectory, of the robot, and of the UAV's detours, m/s."""
@@ -69,7 +69,7 @@ def draw(seed: int, ugvs: int, density: float = 1.0, walls: bool = False) -> Cou
     """The course of a seed.
 
     For one UGV and density 1 there are 4 to 9 obstacles on a field 20 m long and 10 m wide; teams have as many per
-    area. Obstacles may overlap and may shut the UGVs in: whether there is a way is for `feasible` to say.
+    area. Obstacles may overlap and may shut the UGVs in: `feasible` finds out whether there is a way.
 
     Args:
         seed: of the course.

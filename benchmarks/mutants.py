@@ -34,19 +34,19 @@ from mutation.mutant import PACKAGE, Mutant
 ROOT = Path(__file__).resolve().parents[1]
 COPIED = (PACKAGE, "tests", "benchmarks", "docs", "pyproject.toml", "README.md")
 LONGEST_S = 900
-"""Time that a command may take, s: a mutant may run for ever."""
+"""Time limit of a command, s: a mutant may run for ever."""
 RUNS_STAY = ("check", "report", "verify")
-"""Folders of the code that judges: an edit there leaves the runs as they are."""
+"""Folders of the code that judges: an edit there changes no run."""
 
 
 @dataclass
 class Result:
-    """What became of a mutant.
+    """The result of a mutant.
 
     Attributes:
         name: of the mutant.
-        stage: what caught it: claim, checker, test, nothing.
-        by: the claims, rules or tests.
+        stage: what caught it: claim, checker, test or nothing.
+        by: the claims, rules or tests that caught it.
         changed: the probes whose runs differ from those of the unchanged package.
         seconds: how long it took.
         commit: of the code; empty if unknown.
@@ -136,7 +136,7 @@ class Copy:
 
 
 class Bench:
-    """The unchanged package, what its runs give, and copies to break."""
+    """The unchanged package, the results of its runs, and copies to break."""
 
     def __init__(self, folder: Path, mutants: Sequence[Mutant], jobs: int) -> None:
         """Copy the package, and run every probe once on it.
@@ -174,7 +174,7 @@ class Bench:
             copy.close()
 
     def judge(self, mutant: Mutant) -> Result:
-        """Make the edit in a free copy, and see what catches it."""
+        """Make the edit in a free copy, and find what catches it."""
         copy, started = self.copies.get(), time.perf_counter()
         result = Result(mutant.name, commit=self.commit)
         edited = copy.compiled_with(mutant.path)
@@ -203,7 +203,7 @@ class Bench:
         return ("test", [failed]) if mutant.tests and (failed := self._failing(mutant, copy)) else ("nothing", [])
 
     def _differences(self, found: list[list[str]], only: str = "") -> list[str]:
-        """What differs from the unchanged package; of one source, if it is named."""
+        """Differences from the unchanged package; only those of one source, if it is named."""
         by = []
         for source, where, status, rule in found:
             if only in ("", source) and status != self.baseline.get((source, where)):
@@ -211,7 +211,7 @@ class Bench:
         return by
 
     def _failing(self, mutant: Mutant, copy: Copy) -> str:
-        """The first test that fails on the copy and passes on the unchanged package; '' if there is none."""
+        """The first test that fails on the copy and passes on the unchanged package; '' if no test does."""
         options = ("-m", "", "-n", "0", "-x", "-v", "--no-header", "-p", "no:cacheprovider")
         done = copy.run(sys.executable, "-m", "pytest", *options, *mutant.tests)
         failed = re.findall(r"^(?:FAILED|ERROR) (.+?)(?: - .*)?$", done.stdout, flags=re.MULTILINE)

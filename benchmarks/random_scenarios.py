@@ -1,16 +1,12 @@
-"""Random scenarios: `python benchmarks/random_scenarios.py -n 500 [--crowded] [--only 17] [--rows FILE]`.
+"""Random scenarios: `python benchmarks/random_scenarios.py -n 500 [--only 17] [--rows FILE]`.
 
 Draws scenarios (1 to 6 UGVs, 0 to 12 obstacles, all methods, compositions, periods, triggers, thresholds, routes and
-policies), simulates those that are valid, and judges each run by its claims (cross-checked as signal temporal logic)
-and by the independent checker, which gets a report folder of the run. Nothing may stop the simulator, no claim may be
-an `error`, the checker must agree with every verdict about the run, method (d) keeps every safe distance to 1e-9 m, no
-two triggers are closer than the dwell, every trigger and release is where THR-TRIG has it, and commands, decisions and
-predictions are those of the laws. Prints each scenario that breaks one of these, by its number, which draws it again,
-and what was exercised. Exit code 1 if there is one. `--crowded` draws other scenarios: on half the extent, where robots
-and obstacles touch.
+policies), simulates the valid ones, and judges each run by its claims and by the independent checker, which gets a
+report folder of the run. The simulator must not stop, no claim may be an `error`, the checker must agree with every
+verdict about the run, and claims that hold for every scenario of a method must hold. Prints each scenario that breaks
+this, by its number, which draws it again, and how much was exercised. Exit code 1 if there is such a scenario.
 
-Proofs about the model are not made (they take longer than all the rest): the checker's line about the list of claims,
-which misses them, is left out, all its lines about the run count.
+Claims about the model are left out: they take longer than all the rest.
 """
 
 from __future__ import annotations
@@ -24,7 +20,6 @@ import time
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, field
-from functools import partial
 from itertools import combinations
 from pathlib import Path
 from typing import Any
@@ -47,23 +42,23 @@ from airground_drake.verify import Verdict, verify
 
 ALWAYS = ("ZENO-TRACE", "THR-TRIG", "EXEC")
 CERTIFIED = ("SAFE-TRACE", "SAFE-HYP")
-"""Claims that must hold in every run (with a dwell, for ZENO-TRACE), and in those of method (d)."""
+"""Claims that must hold in every run (ZENO-TRACE: with a dwell), and in every run of method (d)."""
 NEVER_REFUTED = ("GATE-FEAS", "GATE-MODEL", "LIVE-PROG", "COMM")
-"""Claims that need a proposal to be decided, but may not be refuted."""
+"""Claims that may be undecided without a proposal, but not refuted."""
 
 RUNS_PER_PROCESS = 20
-"""Then a process is replaced, whatever it has kept of what it ran."""
+"""Runs after which a process is replaced, to free its memory."""
 
 
 @dataclass
 class Row:
-    """What came of one scenario.
+    """The result of one scenario.
 
     Attributes:
         number: draws it again.
-        method: of its run; '' where the scenario is not valid.
+        method: of its run; '' if the scenario is not valid.
         invalid: key that validation refused.
-        wrong: what must not be.
+        wrong: faults, in words.
         seconds: wall-clock time.
         ugvs, obstacles: how many.
         trigger, route: as in the scenario.
@@ -89,8 +84,8 @@ class Row:
     statuses: dict[str, str] = field(default_factory=dict)
 
 
-def draw(number: int, *, crowded: bool = False) -> dict[str, Any]:
-    """A scenario, valid with a fair chance."""
+def draw(number: int) -> dict[str, Any]:
+    """Draw a scenario; many are valid."""
     rng = np.random.default_rng([20261121, number])
     n, m = int(rng.integers(1, 7)), int(rng.integers(0, 13))
     h = float(rng.choice([0.01, 0.025, 0.05, 0.1, 0.3]))
@@ -100,9 +95,7 @@ def draw(number: int, *, crowded: bool = False) -> dict[str, Any]:
     both = sum(sorted(radii)[-2:])
     apart = max(d, between) + both
     extent = 4.0 + 2.0 * (n + m) ** 0.5 * apart
-    if crowded:
-        extent *= 0.5
-    points = (_one_by_one if crowded else _apart)(rng, n + m, extent, apart)
+    points = _apart(rng, n + m, extent, apart)
     method = str(rng.choice(list(METHODS)))
     decision = _decision(rng, h)
     ugvs = {}
@@ -211,22 +204,12 @@ def _apart(rng: np.random.Generator, count: int, extent: float, least: float) ->
             return [place.tolist() for place in places]
 
 
-def _one_by_one(rng: np.random.Generator, count: int, extent: float, least: float) -> list[list[float]]:
-    """The same where there is hardly room: each is drawn until it is apart from those before it."""
-    places: list[list[float]] = []
-    while len(places) < count:
-        place = rng.uniform(-extent, extent, 2)
-        if all(np.linalg.norm(place - other) >= 1.01 * least for other in places):
-            places.append(place.tolist())
-    return places
-
-
-def judged(number: int, *, crowded: bool = False) -> Row:
-    """Draw, simulate, judge; whatever goes wrong is in the row."""
+def judged(number: int) -> Row:
+    """Draw, simulate, judge; faults are in the row."""
     started = time.perf_counter()
     row = Row(number)
     try:
-        scenario = from_data(draw(number, crowded=crowded), f"random {number}")
+        scenario = from_data(draw(number), f"random {number}")
     except ScenarioError as error:
         row.invalid = error.key
         return row
@@ -248,7 +231,7 @@ def judged(number: int, *, crowded: bool = False) -> Row:
 
 
 def tried(scenario: Scenario) -> tuple[Trace, list[Verdict], list[str]]:
-    """The one run of a scenario, its verdicts, and what must not be."""
+    """The run of a scenario, its verdicts, and its faults."""
     (name,) = scenario.runs
     of_run = simulate(scenario, name)
     verdicts = verify(of_run)
@@ -257,7 +240,7 @@ def tried(scenario: Scenario) -> tuple[Trace, list[Verdict], list[str]]:
 
 
 def _claims(scenario: Scenario, method: str, verdicts: Sequence[Verdict]) -> list[str]:
-    """Claims that are an error, or that must hold and do not."""
+    """Verdicts that are an error, and those that must hold and do not."""
     wrong = []
     dwells = scenario.decision.trigger == "automaton" and scenario.decision.min_inter_event_s > 0.0
     for verdict in verdicts:
@@ -271,7 +254,7 @@ def _claims(scenario: Scenario, method: str, verdicts: Sequence[Verdict]) -> lis
 
 
 def _checker(scenario: Scenario, of_run: Trace, verdicts: Sequence[Verdict]) -> list[str]:
-    """What the independent checker does not agree with, from files alone."""
+    """Disagreements of the independent checker, from files alone."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         trace.save(of_run, folder / "trace" / of_run.run)
@@ -284,10 +267,9 @@ def _checker(scenario: Scenario, of_run: Trace, verdicts: Sequence[Verdict]) -> 
 def main() -> int:
     """Draw, run, judge."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("-n", "--number", type=int, default=100, help="so many valid ones (default: %(default)s)")
+    parser.add_argument("-n", "--number", type=int, default=100, help="valid scenarios (default: %(default)s)")
     parser.add_argument("--first", type=int, default=0, help="number of the first scenario (default: %(default)s)")
     parser.add_argument("--only", type=int, help="this one")
-    parser.add_argument("--crowded", action="store_true", help="on half the extent")
     parser.add_argument("--jobs", type=int, help="processes (default: one for each processor)")
     parser.add_argument("--keep", type=Path, help="folder for the scenario files of those that fail")
     parser.add_argument("--rows", type=Path, help="file for a line of JSON per scenario, appended")
@@ -300,23 +282,22 @@ def main() -> int:
             print(f"scenario {row.number}, method ({row.method}): {line}", flush=True)
         if row.wrong and options.keep:
             options.keep.mkdir(parents=True, exist_ok=True)
-            data = draw(row.number, crowded=options.crowded)
-            text = yaml.safe_dump(resolved(from_data(data, "")), sort_keys=False)
+            text = yaml.safe_dump(resolved(from_data(draw(row.number), "")), sort_keys=False)
             (options.keep / f"random_{row.number}.yaml").write_text(text, encoding="utf-8")
         if options.rows:
             with options.rows.open("a", encoding="utf-8") as file:
                 file.write(json.dumps(asdict(row)) + "\n")
 
     if options.only is not None:
-        take(judged(options.only, crowded=options.crowded))
+        take(judged(options.only))
     else:
-        _many(options.first, options.number, options.jobs, partial(judged, crowded=options.crowded), take)
+        _many(options.first, options.number, options.jobs, take)
     print(summary(rows))
     return int(any(row.wrong for row in rows))
 
 
-def _many(first: int, wanted: int, jobs: int | None, judge: Callable[[int], Row], take: Callable[[Row], None]) -> None:
-    """Scenarios from this number on until so many were valid."""
+def _many(first: int, wanted: int, jobs: int | None, take: Callable[[Row], None]) -> None:
+    """Judge scenarios from a number on, until `wanted` were valid."""
     valid, number = 0, first
     fresh = multiprocessing.get_context("spawn")
     # multiprocessing's own pool: that of concurrent.futures hangs where processes are replaced (Python 3.11)
@@ -324,14 +305,14 @@ def _many(first: int, wanted: int, jobs: int | None, judge: Callable[[int], Row]
         while valid < wanted:
             batch = range(number, number + max(8, (wanted - valid) // 4))
             number = batch.stop
-            for row in pool.imap_unordered(judge, batch):
+            for row in pool.imap_unordered(judged, batch):
                 if valid < wanted:
                     take(row)
                     valid += not row.invalid
 
 
 def summary(rows: Sequence[Row]) -> str:
-    """How many, of what, and what happened in them."""
+    """Counts of scenarios, of their kinds and of their events."""
     valid = [row for row in rows if not row.invalid]
     margins = [row.margin_m for row in valid if row.method == "d" and row.margin_m is not None]
     lines = [

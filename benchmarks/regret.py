@@ -1,10 +1,11 @@
-"""What the plans of method (c) cost on the closed loop, where (23) is an approximation: a table.
+"""Costs of the plans of method (c) on the closed loop, where (23) is an approximation: a table.
 
     python benchmarks/regret.py [scenario ...] [--route relaxed]
 
-A plan that changes its mode adds velocities of two different ways. Here the plan of each decision, the constant ones
-and all plans of 6 blocks are rolled out on the closed loop. The regret of a plan is what it costs above the cheapest of
-the constant plans, and of all of them, in units of the cheaper constant plan's cost. The largest of a run is printed.
+A plan that changes its mode adds velocities of two different paths. Here the plan of each decision, the constant plans
+and all plans of 6 blocks are rolled out on the closed loop. The regret of a plan is its cost above the cheapest
+constant plan, and above the cheapest of all plans, in units of the cheaper constant plan's cost. The largest regrets of
+a run are printed.
 """
 
 from __future__ import annotations
@@ -19,12 +20,12 @@ from airground_drake.run.trace import Trace
 from airground_drake.scenarios.load import load
 from airground_drake.verify.runs.closed_loops import roll_out, stacked
 from airground_drake.verify.runs.gate_model import scene_of
-from airground_drake.verify.runs.gate_record import Row, rows_of
+from airground_drake.verify.runs.gate_record import DecisionRecord, rows_of
 
 BLOCKS = 6
-"""Of stages: all plans that are constant on blocks are rolled out."""
+"""Blocks of stages: all plans that are constant on blocks are rolled out."""
 MOST = 30
-"""Decisions of a run that are looked at, evenly spaced."""
+"""Most decisions of a run that are compared, evenly spaced."""
 
 
 def main() -> None:
@@ -44,7 +45,7 @@ def main() -> None:
         print(f"| {name} | {len(found)} | {most[0]:.3g} | {most[1]:.3g} |", flush=True)
 
 
-def regrets(trace: Trace, row: Row) -> tuple[float, float]:
+def regrets(trace: Trace, row: DecisionRecord) -> tuple[float, float]:
     """The regret of a decision's plan, against the constant plans and against all that are rolled out."""
     plans = [row["plan"], *plans_of_blocks(row.stages)]
     loops = stacked([scene_of(trace, row, plan) for plan in plans])

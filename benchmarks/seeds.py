@@ -1,9 +1,9 @@
 """The reproduction table over many seeds: `python benchmarks/seeds.py case_a case_b -n 50`.
 
-For each row of a scenario's reproduction table the paper's value, the median and the 5 % and 95 % quantiles over the
-seeds, and in how many of them it is within the tolerance. For each run the least margin to a safe distance over
-continuous time, and how often SAFE-TRACE, SAFE-HYP, LIVE-GOAL and GATE-OPT came out how: where all seeds agree, a
-scenario expects this verdict of methods (b) and (c), which guarantee none; elsewhere it admits either ("or refuted").
+For each row of a scenario's reproduction table: the paper's value, the median and the 5 % and 95 % quantiles over the
+seeds, and the number of seeds within the tolerance. For each run: the least margin to a safe distance over continuous
+time, and the counts of the verdicts of SAFE-TRACE, SAFE-HYP, LIVE-GOAL and GATE-OPT. Methods (b) and (c) guarantee no
+verdict: a scenario expects the verdict that all seeds agree on, and otherwise admits either ("or refuted").
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The parts of the documentation that follow from the code.
+"""The parts of the documentation that are generated from the code.
 
 `python docs/generate.py` writes what is committed; `docs/site.py` puts the rest into the site.
 """
@@ -52,7 +52,7 @@ _NUMBER = re.compile(r"(?<!` )(?<![\w\]])\((\d{1,2})[a-e]?\)(?:-\((\d{1,2})[a-e]
 
 
 def main() -> None:
-    """Write what is committed and follows from the code."""
+    """Write the generated pages that are committed."""
     for name, text in pages().items():
         files.write_text(DOCS / name, text)
 
@@ -102,7 +102,7 @@ def extending() -> str:
 
 
 def theorems() -> str:
-    """Each theorem: what it says, what it takes, and which claim checks that."""
+    """Each theorem: its statement, its hypotheses, and the claims that check these."""
     lines, file = [], ""
     for name, theorem in THEOREMS.items():
         if file != (file := name.partition(".")[0]):
@@ -199,7 +199,7 @@ def commands() -> str:
 
 
 def _argument(action: argparse.Action) -> str:
-    """An argument or option as it is written."""
+    """An argument or option, as on a command line."""
     choices = "{" + ",".join(map(str, action.choices)) + "}" if action.choices else ""
     value = action.metavar or choices or (action.dest.upper() if action.option_strings else action.dest)
     if not action.option_strings:

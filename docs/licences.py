@@ -1,4 +1,4 @@
-"""`python docs/licences.py`: the licences of everything that constraints.txt pins, from the packages' own metadata."""
+"""`python docs/licences.py`: the licences of all packages in constraints.txt, from the packages' own metadata."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def pinned() -> list[tuple[str, str]]:
 
 
 def licence(of: PackageMetadata) -> str:
-    """What a package says of its licence: an expression, else classifiers, else the first line of a text."""
+    """The licence that a package declares: an expression, else classifiers, else the first line of a text."""
     if expression := of.get("License-Expression"):
         return str(expression)
     names = [entry.split(" :: ")[-1] for entry in of.get_all("Classifier") or () if entry.startswith(PREFIX)]

@@ -1,11 +1,11 @@
-"""What the site has besides the pages here: a hook of `mkdocs build`.
+"""The parts of the site that are made when it is built: a hook of `mkdocs build`.
 
 Marks such as `<!-- claims: made when the site is built -->` are replaced by what `generate.py` makes of the code.
 
-Pages link to files of the repository as they would be found there. Each file that is linked to, and is none of these
-pages, becomes a page under `repository/`; links are turned accordingly. Formulas become MathML, which needs neither a
-script nor a network. With AIRGROUND_SAMPLES=1 the reports of all shipped scenarios are made (some minutes) and shown;
-AIRGROUND_SAMPLES=case_a,dwell makes these.
+Pages link to files of the repository by their paths there. Each linked file outside of these pages becomes a page under
+`repository/`, and links lead to it. Formulas become MathML, which needs neither a script nor a network. With
+AIRGROUND_SAMPLES=1 the reports of all shipped scenarios are made (some minutes) and shown; the value `case_a,dwell`
+makes only these.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from mkdocs.structure.pages import Page
 
 ROOT = Path(__file__).parent.parent
 OUTSIDE = "repository"
-"""Folder of the site for what is outside docs/."""
+"""Folder of the site for files outside docs/."""
 ALWAYS = ("CHANGELOG.md", "SECURITY.md", "examples/README.md")
 """Pages outside docs/ that the navigation of the site leads to."""
 LANGUAGES = {".py": "python", ".yaml": "yaml", ".toml": "toml", ".sh": "bash"}
@@ -63,7 +63,7 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
 
 
 def page_of(place: str) -> str:
-    """Where a file of the repository is on the site; a file that is no page and a folder are shown on one."""
+    """The page of the site that shows a file or a folder of the repository."""
     if place.startswith("docs/"):
         return place.removeprefix("docs/")
     return f"{OUTSIDE}/{place}" if place.endswith(".md") else f"{OUTSIDE}/{place}.md"
@@ -117,17 +117,8 @@ def samples(files: Files, config: MkDocsConfig) -> str:
     wanted = list(titles) if SAMPLES == "1" else SAMPLES.split(",")
     folder = Path(tempfile.mkdtemp())
     for name in wanted:
-        report = [
-            sys.executable,
-            "-m",
-            "airground_drake.report",
-            name,
-            "-o",
-            str(folder / name),
-            "--format",
-            "html,json",
-        ]
-        subprocess.run(report, check=True, stdout=subprocess.DEVNULL)
+        report = [sys.executable, "-m", "airground_drake.report", name, "-o", str(folder / name)]
+        subprocess.run([*report, "--format", "html,json"], check=True, stdout=subprocess.DEVNULL)
         place = f"samples/{name}/report.html"
         files.append(File.generated(config, place, abs_src_path=str(folder / name / "report.html")))
         lines.append(f"- [{titles[name]}]({place}) (`airground report {name}`)")

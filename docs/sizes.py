@@ -1,4 +1,4 @@
-"""`python docs/sizes.py`: the largest of what is installed with the package, in MB, from the packages' own lists."""
+"""`python docs/sizes.py`: sizes of the largest packages that the package needs, in MB, from their own lists."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def main() -> None:
             continue
         try:
             package = distribution(name)
-        except PackageNotFoundError:  # asked for elsewhere than here: another system, another Python
+        except PackageNotFoundError:  # needed on another system or another Python only
             continue
         found[name] = megabytes(package)
         to_look_at += [

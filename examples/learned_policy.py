@@ -24,7 +24,7 @@ SHAPES = ((2 * SEEN + 1, HIDDEN), (HIDDEN,), (HIDDEN, DRAWN))
 COUNT = sum(int(np.prod(shape)) for shape in SHAPES)
 LARGEST_WEIGHT = 4.0
 FAR_M, REACH_M, MARGIN_M = 30.0, 6.0, 0.1
-"""Where an obstacle is that is not there, how far corners go, and what is kept beyond the safe distance."""
+"""Place of a missing obstacle, reach of corners, and margin beyond the safe distance, m."""
 PRICE = 20.0
 """Of a metre that lacks, in lengths of the straight way."""
 

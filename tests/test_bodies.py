@@ -1,4 +1,4 @@
-"""Runs with bodies: radii are part of every distance, whoever keeps it, foresees it or judges it."""
+"""Runs with bodies: radii are part of every distance that is kept, predicted or judged."""
 
 from __future__ import annotations
 
@@ -13,8 +13,6 @@ from builders.misbuilt import neighbours
 
 from airground_drake.base.arrays import Array
 from airground_drake.gatekeeper.outcome_gatekeeper import OutcomeGatekeepers
-from airground_drake.report import metrics
-from airground_drake.run import events
 from airground_drake.run.simulation import simulate
 from airground_drake.run.trace import Trace
 from airground_drake.scenarios.load import load, validated
@@ -37,14 +35,13 @@ def scenario(*, points: bool = False) -> Scenario:
     return validated(found)
 
 
-@pytest.fixture(scope="module")
-def bodies() -> Trace:
-    """The run of bodies under method (d)."""
-    return simulate(scenario(), "d")
-
-
 def statuses(trace: Trace) -> dict[str, str]:
     return {verdict.claim.id: verdict.finding.status for verdict in verify(trace)}
+
+
+@pytest.fixture(scope="module")
+def bodies() -> Trace:
+    return simulate(scenario(), "d")
 
 
 def test_bodies_move_as_points_that_keep_as_much_more(bodies: Trace) -> None:
@@ -58,44 +55,16 @@ def test_bodies_move_as_points_that_keep_as_much_more(bodies: Trace) -> None:
         assert one.finding.status in ("holds", "refuted" if one.claim.id == "LIVE-GOAL" else "holds")
 
 
-def test_distances_are_of_surfaces_and_the_required_ones_of_centres(bodies: Trace) -> None:
-    nearest = metrics.of_run(bodies)["min_distance_m"]["ugv1"]["rock"]
-    assert nearest["safe_distance_m"] == 2.0
-    closest = metrics.closest_obstacle(bodies, "ugv1")
-    assert closest is not None
-    assert closest.value == nearest["value"] - 0.75
-    assert list(bodies.proposals["mapped_radius_m"].iloc[0]) == [ROCK]
-
-
-def larger(trace: Trace, name: str, by: float) -> Trace:
-    """The same signals of a scenario in which one body is larger."""
-    meta = deepcopy(trace.meta)
-    known = {**meta["scenario"]["ugvs"], **meta["scenario"]["obstacles"], "uav": meta["scenario"]["uav"]}
-    known[name]["radius_m"] += by
-    return replace(trace, meta=meta)
-
-
-@pytest.mark.parametrize("name", ["ugv1", "rock"])
-def test_larger_bodies_were_too_near(bodies: Trace, name: str) -> None:
-    found = statuses(larger(bodies, name, 0.01))
+@pytest.mark.parametrize(("kind", "name"), [("ugvs", "ugv1"), ("obstacles", "rock")])
+def test_larger_bodies_were_too_near(bodies: Trace, kind: str, name: str) -> None:
+    meta = deepcopy(bodies.meta)
+    meta["scenario"][kind][name]["radius_m"] += 0.01
+    found = statuses(replace(bodies, meta=meta))
     for claim in ("SAFE-TRACE", "SAFE-HYP", "EXEC", "GATE-MODEL"):
         assert found[claim] == "refuted", claim
 
 
-def test_a_collision_is_of_surfaces(bodies: Trace) -> None:
-    def collisions(of_run: Trace) -> list[dict[str, Any]]:
-        return [event for event in events.extract(of_run, ()) if event["kind"] == "collision"]
-
-    assert not collisions(bodies)
-    least = np.linalg.norm(bodies.position("ugv1") - [5.0, 0.0, 0.0], axis=1).min()
-    needed = least - bodies.scenario.safe_distance.collision_m - OWN - ROCK
-    assert not collisions(larger(bodies, "rock", needed - 1e-6))
-    assert collisions(larger(bodies, "rock", needed + 1e-6))
-    assert collisions(larger(bodies, "ugv1", needed + 1e-6))
-
-
 def points_in_mind(self: OutcomeGatekeepers, *args: Any) -> tuple[Array, Array]:
-    """What a gatekeeper knows that takes obstacles for points."""
     discs, distances = KNOWN(self, *args)
     return discs, np.full_like(distances, self._world.apart("ugv", "obstacle"))
 

@@ -8,28 +8,22 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-import yaml
 
 pytestmark = pytest.mark.slow
 
 NAMES = ("airground_drake", "cvc5", "joblib", "json", "multiprocessing", "numpy", "pandas", "pickle", "z3")
 HOSTILE = "import os\nopen(os.path.join(os.path.dirname(os.path.abspath(__file__)), 'ran'), 'a').write(__name__)\n"
-CAMPAIGN = {
-    "name": "few", "scenario": "minimal", "set": {"duration_s": 0.2}, "claims": ["SAFE-TRACE"],
-    "draw": {"seed": {"integer": [0, 9]}},
-}  # fmt: skip
+CAMPAIGN = "scenario: minimal\nset: {duration_s: 0.2}\nclaims: [SAFE-TRACE]\ndraw: {seed: {integer: [0, 9]}}\n"
 
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
-    """Modules that take the place of others, and a configuration with a cache from which numba would unpickle."""
-    hostile = tmp_path / "hostile"
-    hostile.mkdir()
+    """Modules with the names of others, and a configuration with a cache that numba would unpickle."""
     for name in NAMES:
-        (hostile / f"{name}.py").write_text(HOSTILE)
-    (hostile / ".numba_config.yaml").write_text(f"cache_dir: {hostile / 'cache'}\n")
-    (hostile / "few.yaml").write_text(yaml.safe_dump(CAMPAIGN))
-    return hostile
+        (tmp_path / f"{name}.py").write_text(HOSTILE)
+    (tmp_path / ".numba_config.yaml").write_text(f"cache_dir: {tmp_path / 'cache'}\n")
+    (tmp_path / "few.yaml").write_text(CAMPAIGN)
+    return tmp_path
 
 
 @pytest.mark.parametrize(

@@ -1,21 +1,22 @@
-"""Structure: names, pictures, and which module may import which."""
+"""Diagrams and their pictures; which module may import which."""
 
 from __future__ import annotations
 
 import ast
+import re
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 import pytest
-from pydrake.systems.framework import LeafSystem
 
 import airground_drake
 from airground_drake.geometry.motion import Motion
-from airground_drake.registry import METHODS
-from airground_drake.scenarios.load import load
-from airground_drake.systems import graphviz
+from airground_drake.scenarios.load import load, shipped
+from airground_drake.systems import DecisionBlock, graphviz, schematic
 from airground_drake.systems.components import stack_presets
-from airground_drake.systems.diagram import RECORDED, build_diagram
+from airground_drake.systems.diagram import build_diagram, make_monitor
+from airground_drake.world.world import World
 
 PACKAGE = Path(airground_drake.__file__).parent
 LAYERS = (
@@ -36,29 +37,9 @@ LAYERS = (
     ("campaign", "export"),
     ("commands", "__main__"),
 )
-"""Rooms, from left to right: a module imports from its own layer or from those before it."""
-
-
-def test_every_system_and_port_has_a_name() -> None:
-    diagram = build_diagram(load("case_a")[0], "d")
-    inside = {part.get_name(): [system.get_name() for system in part.GetSystems()] for part in diagram.GetSystems()}
-    assert inside == {
-        "decision_making": ["noise_source", "decision_noise", "decision_variable", "event_trigger"],
-        "task_planning": ["reference", "intervention_planner", "ugv_controller", "uav_controller"],
-        "optimisation": ["gatekeeper"],
-        "vehicles": [
-            "team_command", "velocity_disturbance", "team_velocity", "ugv1_plant", "ugv2_plant", "uav_plant",
-            "bodies",
-        ],
-    }  # fmt: skip
-    assert [diagram.get_output_port(i).get_name() for i in range(diagram.num_output_ports())] == list(RECORDED)
-    inputs = [diagram.get_input_port(i).get_name() for i in range(diagram.num_input_ports())]
-    assert inputs == [f"disturbance_{robot}" for robot in ("ugv1", "ugv2", "uav")]
-    for system in (system for part in diagram.GetSystems() for system in part.GetSystems()):
-        if isinstance(system, LeafSystem) and type(system).__module__.startswith("airground_drake"):
-            for i in range(system.num_input_ports()):
-                assert not system.get_input_port(i).get_name().startswith("u0")
-            assert type(system).__doc__
+"""Rooms: a module imports from its own layer or from those above it."""
+PAGE_PT = 785
+"""Width of a landscape page of A4 with margins of 1 cm."""
 
 
 def test_corners_of_two_presets_that_rounding_keeps_apart_are_one() -> None:
@@ -72,26 +53,54 @@ def test_corners_of_two_presets_that_rounding_keeps_apart_are_one() -> None:
     assert together.start_time() == 0.0
 
 
-@pytest.mark.parametrize("method", METHODS)
-def test_pictures_are_the_same_each_time(method: str) -> None:
+def edges(text: str) -> set[tuple[str, str]]:
+    """The wires of a picture, those from and to the vehicles as if these were one block."""
+    found = re.findall(r'^"([^"]*)" -> "([^"]*)"', text, re.MULTILINE)
+    told = [["vehicles" if end.endswith("_plant") or end == "bodies" else end for end in each] for each in found]
+    return {(source, target) for source, target in told if source != target}
+
+
+@pytest.mark.parametrize(("name", "method"), [("minimal", "a"), ("case_a", "b"), ("doorway", "c"), ("case_a", "d")])
+def test_the_picture_has_every_block_and_every_wire(name: str, method: str) -> None:
+    diagram = build_diagram(load(name)[0], method)
+    text, systems = graphviz.dot(diagram), schematic._systems(diagram)
+    unseen = {"noise_source", "team_command", "velocity_disturbance", "team_velocity"}
+    assert set(systems) - set(re.findall(r'^"([^"]*)" \[', text, re.MULTILINE)) == unseen
+    assert edges(text) == set(schematic.signals(diagram))
+    fed = [(end.system, end.port) for _, end in schematic._wires(diagram)]
+    outside = {diagram.get_input_port(i).get_name() for i in range(diagram.num_input_ports())}
+    inputs = [(each, i) for each, system in systems.items() for i in range(system.num_input_ports())]
+    assert sorted(fed) == sorted((e, i) for e, i in inputs if systems[e].get_input_port(i).get_name() not in outside)
+
+
+def test_a_block_of_ones_own_is_drawn_with_what_feeds_it() -> None:
+    class Model(DecisionBlock):
+        def __init__(self, world: World, presets: Sequence[Motion]) -> None:
+            super().__init__(world, presets)
+            self.DeclareVectorInputPort("uav_command", 3)
+
     scenario = load("case_a")[0]
-    one, two = (graphviz.dot(build_diagram(scenario, method)) for _ in range(2))
-    assert one == two
-    assert graphviz.svg(one) == graphviz.svg(two)
+    text = graphviz.dot(build_diagram(scenario, "d", decision_block=Model, monitor=make_monitor(scenario)))
+    assert ">Model<" in text
+    assert ("uav_controller", "decision_variable") in edges(text)
+    assert "beside it: monitor" in text
 
 
-def test_shipped_pictures_are_current() -> None:
+def test_pictures_fit_a_landscape_page() -> None:
+    for name in shipped():
+        width = re.search(r'bb="0,0,([\d.]+),', graphviz.dot(build_diagram(load(name)[0], "d")))
+        assert width, name
+        assert float(width[1]) <= PAGE_PT, name
+
+
+def test_shipped_pictures_are_current_and_an_outdated_one_is_noticed() -> None:
     folder = Path(__file__).parent.parent / "diagrams"
     pictures = graphviz.pictures()
     assert {path.name for path in folder.glob("*.*") if path.suffix in (".dot", ".svg")} == set(pictures)
     for name, content in pictures.items():
         assert graphviz.is_current(name, content, (folder / name).read_text(encoding="utf-8")), name
-
-
-def test_an_outdated_picture_is_noticed() -> None:
-    pictures = graphviz.pictures()
-    assert not graphviz.is_current("case_a.dot", pictures["case_a.dot"], pictures["case_b.dot"])
-    assert not graphviz.is_current("case_a.svg", pictures["case_a.svg"], pictures["case_b.svg"])
+        other = f"case_{'b' if 'case_a' in name else 'a'}{Path(name).suffix}"
+        assert not graphviz.is_current(name, content, pictures[other])
 
 
 def test_gatekeepers_know_of_interventions_only_what_is_sent() -> None:

@@ -18,15 +18,7 @@ from airground_drake.report.__main__ import main
 from airground_drake.scenarios.load import load
 
 ROOT = Path(__file__).parent.parent
-PAGES = sorted(
-    [
-        ROOT / "README.md",
-        ROOT / "CHANGELOG.md",
-        ROOT / "SECURITY.md",
-        *(ROOT / "docs").glob("*.md"),
-        ROOT / "examples" / "README.md",
-    ]
-)
+PAGES = sorted(path for folder in (".", "docs", "examples") for path in (ROOT / folder).glob("*.md"))
 EXAMPLES = ROOT / "examples"
 
 
@@ -42,7 +34,8 @@ def test_python_blocks_run(page: Path) -> None:
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
-def test_links_lead_somewhere(page: Path) -> None:
+def test_links_lead_somewhere_and_lines_are_short(page: Path) -> None:
+    assert max(map(len, page.read_text(encoding="utf-8").splitlines())) <= 120
     for target, anchor in re.findall(r"\]\((?!https?:)([^)#]+)#?([^)]*)\)", page.read_text(encoding="utf-8")):
         found = page.parent / target
         assert found.exists(), target
@@ -50,31 +43,13 @@ def test_links_lead_somewhere(page: Path) -> None:
         assert not anchor or anchor in {heading.lower().replace(" ", "-") for heading in headings}, anchor
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
-def test_lines_are_short_enough_to_read(page: Path) -> None:
-    assert max(map(len, page.read_text(encoding="utf-8").splitlines())) <= 120
-
-
-@pytest.mark.parametrize("name", ["README.md", "docs/index.md", "docs/verification.md"])
-def test_a_reader_learns_what_the_model_leaves_out(name: str) -> None:
-    text = (ROOT / name).read_text(encoding="utf-8")
-    assert "unicycles" in text
-    assert re.search(r"arrive instantly,\s+and\s+none\s+is\s+lost", text)
-
-
-def test_the_gallery_draws_a_run_and_names_the_command() -> None:
-    text = runpy.run_path(str(ROOT / "docs" / "generate.py"))["gallery"](["minimal"])
-    assert text.count("<polyline") == 2  # one UGV in two runs
-    assert "    airground report minimal\n" in text
-
-
-def test_the_readme_shows_the_scenario_that_init_writes() -> None:
+def test_generated_parts_are_current() -> None:
     shipped = (ROOT / "airground_drake" / "scenarios" / "minimal.yaml").read_text(encoding="utf-8")
     assert blocks(ROOT / "README.md", "yaml") == [re.sub(r"^#.*\n", "", shipped, flags=re.MULTILINE)]
-
-
-def test_what_follows_from_the_code_is_current() -> None:
     generate = runpy.run_path(str(ROOT / "docs" / "generate.py"))
+    gallery = generate["gallery"](["minimal"])
+    assert gallery.count("<polyline") == 2  # one UGV in two runs
+    assert "    airground report minimal\n" in gallery
     for name, text in generate["pages"]().items():
         assert (ROOT / "docs" / name).read_text(encoding="utf-8") == text, "run python docs/generate.py"
     marks = [mark for page in PAGES for mark in re.findall(r"<!-- (\w+): made", page.read_text(encoding="utf-8"))]
@@ -93,9 +68,8 @@ def test_the_tutorial_from_an_empty_folder(tmp_path: Path) -> None:
         script.append(f"cat > {name[1]} <<'END'\n{text}END" if language == "python" and name else text)
     options = "-p airground_drake.testing.plugin -p no:cacheprovider --hypothesis-profile=ci"  # draws the same again
     environment = {**os.environ, "PYTEST_ADDOPTS": options}
-    done = subprocess.run(
-        ["bash", "-c", "\n".join(script)], cwd=tmp_path, env=environment, capture_output=True, text=True, check=False
-    )
+    command = ["bash", "-c", "\n".join(script)]
+    done = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stdout + done.stderr
     assert "2 passed" in done.stdout
     events = json.loads((tmp_path / "second" / "report.json").read_text())["runs"]["d"]["events"]
@@ -116,9 +90,8 @@ def test_everything_that_can_be_added_works_from_a_folder_of_its_own(
 ) -> None:
     monkeypatch.syspath_prepend(str(EXAMPLES))
     assert load(str(EXAMPLES / "shelves.yaml"))[0].obstacles["shelf"].radius_m == 3.0
-    assert (
-        main([str(EXAMPLES / "mine.yaml"), "-o", str(tmp_path / "report"), "--format", "json", "--allow-plugins"]) == 0
-    )
+    options = ["-o", str(tmp_path / "report"), "--format", "json", "--allow-plugins"]
+    assert main([str(EXAMPLES / "mine.yaml"), *options]) == 0
     document = json.loads((tmp_path / "report" / "report.json").read_text())
     found = {claim["id"]: claim["status"] for claim in document["claims"]}
     assert (found["CORRIDOR"], found["STABLE"], found["SAFE-TRACE"]) == ("holds", "proved", "holds")

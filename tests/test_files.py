@@ -33,28 +33,29 @@ def test_a_full_disk_names_the_path_and_leaves_the_old_file(
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
     monkeypatch.setattr(os, call, full)
-    with pytest.raises(OSError, match=r"No space left on device.*file\.txt") as raised:
+    with pytest.raises(OSError, match=r"No space left on device.*file\.txt"):
         files.write_text(path, "new")
-    assert raised.value.errno == errno.ENOSPC
     assert path.read_text() == "old"
     assert os.listdir(tmp_path) == ["file.txt"]
 
 
-def test_what_a_killed_process_has_left_is_swept_and_nothing_else(tmp_path: Path) -> None:
+def test_the_temporary_files_of_a_killed_process_are_swept_and_nothing_else(tmp_path: Path) -> None:
     with subprocess.Popen([sys.executable, "-c", ""]) as ended:
         pass
-    folder = tmp_path / "trace" / "d"
-    folder.mkdir(parents=True)
-    left = folder / f".signals.parquet.{ended.pid}.abc_12.partial"
-    kept = [folder / f".signals.parquet.{os.getpid()}.abc_12.partial", folder / ".x.partial", folder / "a.1.b.partial"]
+    left = tmp_path / f".signals.parquet.{ended.pid}.abc_12.partial"
+    kept = [
+        tmp_path / f".signals.parquet.{os.getpid()}.abc_12.partial",
+        tmp_path / ".x.partial",
+        tmp_path / "a.1.b.partial",
+    ]
     for path in (left, *kept):
-        path.write_text("")
-    files.sweep(tmp_path)
+        path.touch()
+    files.sweep(tmp_path.parent)
     assert not left.exists()
     assert all(path.exists() for path in kept)
 
 
-def test_a_temporary_folder_of_a_killed_process_is_swept_and_no_other(
+def test_the_temporary_folder_of_a_killed_process_is_swept_and_no_other(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
@@ -63,7 +64,5 @@ def test_a_temporary_folder_of_a_killed_process_is_swept_and_no_other(
     subprocess.run([sys.executable, "-c", program], env={**os.environ, "TMPDIR": str(tmp_path)}, check=False)
     (left,) = tmp_path.iterdir()
     with files.temporary_folder() as mine, files.temporary_folder() as another:
-        assert not left.exists()
-        assert mine.is_dir()
-        assert another.is_dir()
+        assert (left.exists(), mine.is_dir(), another.is_dir()) == (False, True, True)
     assert os.listdir(tmp_path) == []

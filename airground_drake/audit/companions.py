@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from pydrake.solvers import ClarabelSolver, MathematicalProgram
 
-from airground_drake.audit.item import Item
+from airground_drake.audit.item import Item, item
 from airground_drake.base.arrays import Array
 from airground_drake.gatekeeper.outcome import Outcome
 from airground_drake.gatekeeper.outcome_gatekeeper import OutcomeGatekeepers
@@ -52,90 +52,81 @@ class Believing(OutcomeGatekeepers):
 
 def companion_findings() -> list[Item]:
     """Items 7, 10, 11 and 23 to 25."""
-    changes = "duration_s=13.0", "reproduction=[]", PAPERS_ROUTE
-    direct, gated = (_run("case_b", run, changes) for run in ("b", "c"))
+    direct, gated = (_run("case_b", run, "duration_s=13.0", PAPERS_ROUTE) for run in ("b", "c"))
     return [
         _sign(), _soft_gate(), _no_dynamics(gated), _method_b(direct, gated), _proper_tasks(direct), _literal_rule(),
     ]  # fmt: skip
 
 
-def _run(name: str, run: str, changes: tuple[str, ...] = ()) -> Trace:
-    return simulate(load(name, changes)[0], run)
+def _run(name: str, run: str, *changes: str) -> Trace:
+    return simulate(load(name, ("reproduction=[]", *changes))[0], run)
 
 
 def _sign() -> Item:
     """Item 7: UGV2's preset x with the printed and with the opposite sign."""
     evidence = {}
     for sign, x in (("printed", 1.3), ("ours", -1.3)):
-        points = f"[[{x}, 0.0, 0.0], [{x}, 13.0, 0.0], [-1.0, 13.0, 0.0]]"
-        changes = (f"ugvs.ugv2.preset.waypoints_m={points}", "reproduction=[]")
-        trace = _run("case_a", "a", changes)
+        change = f"ugvs.ugv2.preset.waypoints_m=[[{x}, 0.0, 0.0], [{x}, 13.0, 0.0], [-1.0, 13.0, 0.0]]"
+        trace = _run("case_a", "a", change)
+        way = trace.position("ugv2")
         evidence[sign] = {
             "preset_x_m": x,
-            "ends_at_m": trace.position("ugv2")[-1].tolist(),
-            "way_m": trace.position("ugv2")[thin(trace.position("ugv2")[:, :2], WAY_POINTS), :2].round(3).tolist(),
+            "ends_at_m": way[-1].tolist(),
+            "way_m": way[thin(way[:, :2], WAY_POINTS), :2].round(3).tolist(),
             "stalls_at_m": MEASURES["stall_position"](trace, "ugv2"),
             "arrives": bool(MEASURES["arrives"](trace, "ugv2")[0]),
-            "command": f"case_a with --set {changes[0]}, run a",
+            "command": f"case_a with --set {change}, run a",
         }
-    shown = bool(evidence["printed"]["stalls_at_m"]) and bool(evidence["ours"]["arrives"])
-    return {
-        "id": 7,
-        "where": "Table 1",
-        "finding": "The paper prints x = 1.3 m for UGV2's preset trajectory and says that UGV2 arrives on its own. "
+    return item(
+        7, "Table 1",
+        "The paper prints x = 1.3 m for UGV2's preset trajectory and says that UGV2 arrives on its own. "
         "With x = 1.3 m it stalls; with x = -1.3 m it arrives.",
-        "paper": {"x_m": 1.3, "arrives": evidence["printed"]["arrives"]},
-        "ours": {"x_m": -1.3, "arrives": evidence["ours"]["arrives"]},
-        "unit": "m",
-        "demonstrated": shown,
-        "evidence": evidence,
-    }
+        {"x_m": 1.3, "arrives": evidence["printed"]["arrives"]}, {"x_m": -1.3, "arrives": evidence["ours"]["arrives"]},
+        bool(evidence["printed"]["stalls_at_m"]) and bool(evidence["ours"]["arrives"]), evidence, unit="m",
+    )  # fmt: skip
 
 
 def _soft_gate() -> Item:
     """Item 10: (c) accepts an intervention although it predicts a distance below d; (d) makes it harmless."""
-    evidence: dict[str, Any] = {}
-    traces = {name: _run("soft_gate", name, (PAPERS_ROUTE,)) for name in ("c", "d")} | {
-        EVERYTHING: Recorder(load("soft_gate")[0], "d", make_gatekeepers=Believing.of).simulate()
+    scenario = load("soft_gate")[0]
+    d, gate = scenario.safe_distance.obstacle_m, scenario.gatekeeper
+    traces = {name: _run("soft_gate", name, PAPERS_ROUTE) for name in ("c", "d")} | {
+        EVERYTHING: Recorder(scenario, "d", make_gatekeepers=Believing.of).simulate()
     }
-    light = _run("soft_gate", "c", (PAPERS_ROUTE, "gatekeeper.error_weight_1_m2_s=1"))
+    light = _run("soft_gate", "c", PAPERS_ROUTE, "gatekeeper.error_weight_1_m2_s=1")
+    evidence: dict[str, Any] = {}
     for name, trace in (*traces.items(), (LIGHT, light)):
         nearest = closest_obstacle(trace, "ugv1")
-        accepted = trace.decisions[trace.decisions["decision"] == "accept"]
+        accepted = trace.decisions.loc[trace.decisions["decision"] == "accept", "predicted_clearance_m"]
         evidence[name] = {
             "accepted": len(accepted),
             "least_predicted_clearance_of_accepted_m": (
-                float(accepted["predicted_clearance_m"].min()) if len(accepted) and name in ("c", LIGHT) else None
+                float(accepted.min()) if len(accepted) and name in ("c", LIGHT) else None
             ),
             "min_distance_m": nearest[0] if nearest else None,
             "t_s": nearest[1] if nearest else None,
         }
-    scenario = load("soft_gate")[0]
-    d, gate = scenario.safe_distance.obstacle_m, scenario.gatekeeper
     paper, ours = evidence["c"], evidence[EVERYTHING]
     predicted = paper["least_predicted_clearance_of_accepted_m"]
-    return {
-        "id": 10,
-        "where": "(26d)-(26e)",
-        "finding": "The soft constraint is no safety guarantee: a large enough gain in task error outweighs its "
+    shown = predicted is not None and predicted < 0.0 and paper["min_distance_m"] < d
+    return item(
+        10, "(26d)-(26e)",
+        "The soft constraint is no safety guarantee: a large enough gain in task error outweighs its "
         "violation, and the gatekeeper accepts although it predicts the violation. Under (d) every distance stays at "
         "least d, even if each of these proposals is accepted and executed. The failure needs an error weight of "
         f"{gate.error_weight_1_m2_s:g} and a slack weight of {gate.slack_weight_1_m2_s:g}; with an error weight of "
         f"1 {'nothing is accepted' if not evidence[LIGHT]['accepted'] else 'it happens, too'}. The paper gives neither "
         "the weights nor a bound on them.",
-        "paper": {"min_distance_m": paper["min_distance_m"], "predicted_clearance_m": predicted},
-        "ours": {"min_distance_m": ours["min_distance_m"]},
-        "unit": "m",
-        "demonstrated": predicted is not None
-        and predicted < 0.0
-        and paper["min_distance_m"] < d
-        and ours["accepted"] > 0
-        and ours["min_distance_m"] >= d - 1e-9,
-        "evidence": evidence
-        | {"safe_distance_m": d, "command": f"airground report soft_gate --set {PAPERS_ROUTE}"}
-        | {"error_weight_1_m2_s": gate.error_weight_1_m2_s, "slack_weight_1_m2_s": gate.slack_weight_1_m2_s}
-        | {"distance_to_the_nearest_obstacle": _gaps(traces)},
-    }
+        {"min_distance_m": paper["min_distance_m"], "predicted_clearance_m": predicted},
+        {"min_distance_m": ours["min_distance_m"]},
+        shown and ours["accepted"] > 0 and ours["min_distance_m"] >= d - 1e-9,
+        {
+            **evidence, "safe_distance_m": d, "command": f"airground report soft_gate --set {PAPERS_ROUTE}",
+            "error_weight_1_m2_s": gate.error_weight_1_m2_s, "slack_weight_1_m2_s": gate.slack_weight_1_m2_s,
+            "distance_to_the_nearest_obstacle": _gaps(traces),
+        },
+        unit="m",
+    )  # fmt: skip
 
 
 def _gaps(traces: Mapping[str, Trace]) -> dict[str, list[float]]:
@@ -150,137 +141,117 @@ def _gaps(traces: Mapping[str, Trace]) -> dict[str, list[float]]:
 
 def _no_dynamics(trace: Trace) -> Item:
     """Item 11: (26) and (27) as printed have no kinematics: their optimum does not depend on the decision."""
-    first = trace.problems.iloc[0]
+    first, decision = trace.problems.iloc[0], trace.decisions.iloc[0]
     reference = np.asarray(first["reference_m"]).reshape(-1, 3)
-    stages, start = len(reference), np.asarray(first["initial_m"])
-    costs, errors = {}, {}
-    weight, dt = float(first["error_weight_1_m2_s"]), float(first["dt_s"])
-    printed_cost, states = _printed_optimum(reference, start, weight, dt)
-    errors["printed"] = states - reference
+    start, dt = np.asarray(first["initial_m"]), float(first["dt_s"])
+    states = {"printed": _printed_optimum(reference)}
     for name in ("accept", "refuse"):
-        moves = np.reshape(first[f"{name}_m_s"], (stages, 3))
-        errors[name] = start + dt * np.cumsum(moves, axis=0) - reference
-        costs[name] = {"printed": printed_cost, "with_23": float(weight * dt * np.sum(errors[name] ** 2))}
+        states[name] = start + dt * np.cumsum(np.reshape(first[f"{name}_m_s"], reference.shape), axis=0)
+    cost = {
+        name: float(float(first["error_weight_1_m2_s"]) * dt * np.sum((at - reference) ** 2))
+        for name, at in states.items()
+    }
+    costs = {name: {"printed": cost["printed"], "with_23": cost[name]} for name in ("accept", "refuse")}
     printed, ours = (abs(costs["accept"][kind] - costs["refuse"][kind]) for kind in ("printed", "with_23"))
-    decision = trace.decisions.iloc[0]
     with_slack = float(abs(decision["accept_throughout"] - decision["refuse_throughout"]))
-    return {
-        "id": 11,
-        "where": "(26), (27)",
-        "finding": "Neither (26) nor (27) lists the kinematics (23) among its constraints. As printed the states are "
+    errors = {f"{name}_m": np.linalg.norm(at - reference, axis=1).round(6).tolist() for name, at in states.items()}
+    return item(
+        11, "(26), (27)",
+        "Neither (26) nor (27) lists the kinematics (23) among its constraints. As printed the states are "
         "free. If only task errors count, they follow the reference exactly, and accepting costs as much as refusing. "
         f"With (23) the task errors of the two differ by {ours:.3f}. With the price of the slack, the costs (25) "
         f"differ by {with_slack:.0f}.",
-        "paper": {"cost_accept_minus_refuse": printed},
-        "ours": {"cost_accept_minus_refuse": ours, "cost_with_slack_accept_minus_refuse": with_slack},
-        "unit": "",
-        "demonstrated": printed < 1e-6 < ours,
-        "evidence": {
+        {"cost_accept_minus_refuse": printed},
+        {"cost_accept_minus_refuse": ours, "cost_with_slack_accept_minus_refuse": with_slack},
+        printed < 1e-6 < ours,
+        {
             "problem": "the first decision of case_b, run c; task errors only, but for with_slack",
-            "t_s": float(trace.decisions["t_s"].iloc[0]),
-            "cost": costs,
-            "task_error": {"t_s": (dt * np.arange(1, stages + 1)).round(6).tolist()}
-            | {f"{name}_m": np.linalg.norm(error, axis=1).round(6).tolist() for name, error in errors.items()},
+            "t_s": float(decision["t_s"]), "cost": costs,
+            "task_error": {"t_s": (dt * np.arange(1, len(reference) + 1)).round(6).tolist(), **errors},
         },
-    }
+    )  # fmt: skip
+
+
+def _printed_optimum(reference: Array) -> Array:
+    """States (N, 3), m, of least task error in (27) as printed, which ties them to nothing but the initial one."""
+    program = MathematicalProgram()
+    states = program.NewContinuousVariables(*reference.shape, "rho")
+    program.AddQuadraticErrorCost(np.eye(states.size), reference.ravel(), states.ravel())
+    result = ClarabelSolver().Solve(program)
+    return np.asarray(result.GetSolution(states)) if result.is_success() else np.full(reference.shape, np.nan)
 
 
 def _method_b(direct: Trace, gated: Trace) -> Item:
     """Item 23: method (b) with a gatekeeper, as in section 5.1, is method (c)."""
-    answer = gated.decisions.iloc[0]
-    nearest = {name: closest_obstacle(trace, "ugv1") for name, trace in (("without", direct), ("with", gated))}
+    answer, traces = gated.decisions.iloc[0], {"without": direct, "with": gated}
+    nearest = {name: closest_obstacle(trace, "ugv1") for name, trace in traces.items()}
     least = {name: round(found[0], 9) if found else None for name, found in nearest.items()}
-    triggers = {name: MEASURES["trigger_time"](trace, "ugv1") for name, trace in (("without", direct), ("with", gated))}
-    return {
-        "id": 23,
-        "where": "section 5, Figures 6 and 10",
-        "finding": "Method (b) is not the same in both cases. Section 5 introduces it with an effective intervention. "
+    triggers = {name: MEASURES["trigger_time"](trace, "ugv1") for name, trace in traces.items()}
+    return item(
+        23, "section 5, Figures 6 and 10",
+        "Method (b) is not the same in both cases. Section 5 introduces it with an effective intervention. "
         "In 5.1 the UGV accepts that 'after the MPC intervention task decision maker'. In 5.2 it executes a wrong one, "
         "and only method (c) has the decision maker. In our case B the UGV refuses with a gatekeeper and collides "
         "without one, after the same trigger, so (b) cannot have one there. Here (b) never has a gatekeeper.",
-        "paper": "5.1: (b) with the MPC; 5.2: (b) without",
-        "ours": {"distance_without_m": least["without"], "first_answer_with": str(answer["decision"])},
-        "unit": "",
-        "demonstrated": not len(direct.decisions) and answer["decision"] == "refuse"
+        "5.1: (b) with the MPC; 5.2: (b) without",
+        {"distance_without_m": least["without"], "first_answer_with": str(answer["decision"])},
+        not len(direct.decisions) and answer["decision"] == "refuse"
         and triggers["without"] == triggers["with"] and least["without"] is not None and least["without"] < 0.05,
-        "evidence": {
+        {
             "min_distance_m": least, "triggers_s": triggers, "answered_s": float(answer["t_s"]),
             "runs": "case_b, b (without) and c (with), 13 s", "sections 5.1 and 5.2": "by reading",
         },
-    }  # fmt: skip
+    )  # fmt: skip
 
 
 def _proper_tasks(direct: Trace) -> Item:
     """Item 24: the paper calls interventions proper and bidirectional, but no equation says so."""
-    asked = direct.proposals.iloc[0]
-    ends = np.asarray(asked["positions_m"]).reshape(-1, 3)[-1]
-    obstacle = np.asarray(load("case_b")[0].obstacles["sudden"].position_m)
-    away, d = float(np.linalg.norm(ends - obstacle)), load("case_b")[0].safe_distance.obstacle_m
-    return {
-        "id": 24,
-        "where": "sections 1, 3.2, 5.2 and 6",
-        "finding": "Section 6 says 'it is assumed that UAVs can give proper intervention tasks'. Assumption 1 only "
+    ends = np.asarray(direct.proposals.iloc[0]["positions_m"]).reshape(-1, 3)[-1]
+    scenario = load("case_b")[0]
+    obstacle = np.asarray(scenario.obstacles["sudden"].position_m)
+    away, d = float(np.linalg.norm(ends - obstacle)), scenario.safe_distance.obstacle_m
+    return item(
+        24, "sections 1, 3.2, 5.2 and 6",
+        "Section 6 says 'it is assumed that UAVs can give proper intervention tasks'. Assumption 1 only "
         "says that the UAV can give interventions, and the paper does not define 'proper'. Section 4 and case B are "
         "about an intervention that is not proper; in our case B it ends at the obstacle. Section 1 claims "
         "'bidirectional interventions'. No equation contains them: in (14), (20) and (23) the UAV intervenes on a UGV, "
         "and only the UGVs' positions go back to the UAV, in (9) and (15).",
-        "paper": "interventions are proper and bidirectional",
-        "ours": {"wrong_intervention_to_obstacle_m": away, "safe_distance_m": d},
-        "unit": "",
-        "demonstrated": away < d,
-        "evidence": {"ends_at_m": ends.tolist(), "obstacle_m": obstacle.tolist(), "rest": "by reading"},
-    }
+        "interventions are proper and bidirectional",
+        {"wrong_intervention_to_obstacle_m": away, "safe_distance_m": d},
+        away < d, {"ends_at_m": ends.tolist(), "obstacle_m": obstacle.tolist(), "rest": "by reading"},
+    )  # fmt: skip
 
 
 def _literal_rule() -> Item:
     """Item 25: if the first stage of each rounded plan is executed, no acceptance lasts."""
-    answers: dict[str, dict[str, list[Any]]] = {}
-    for name, duration_s in (("case_a", 18), ("case_b", 16)):
-        changes = f"duration_s={duration_s}.0", "reproduction=[]", PAPERS_ROUTE
-        answers[name] = {
-            kind: _answers(_run(name, run, changes)) for kind, run in (("literal", "c_literal"), ("ours", "c"))
+    answers = {
+        name: {
+            rule: _answers(_run(name, run, f"duration_s={duration_s}.0", PAPERS_ROUTE))
+            for rule, run in (("literal", "c_literal"), ("ours", "c"))
         }
-    reversals = {
-        rule: [
-            sum(b == "refuse" and a == "accept" for (_, a), (_, b) in pairwise(found[rule]))
-            for found in answers.values()
-        ]
-        for rule in ("literal", "ours")
+        for name, duration_s in (("case_a", 18), ("case_b", 16))
     }
-    return {
-        "id": 25,
-        "where": "(28)-(29), Figures 6 and 10",
-        "finding": "The paper's rule, taken literally, executes the first stage of the rounded plan at every sample. "
+    literal, ours = (
+        [sum((a, b) == ("accept", "refuse") for (_, a), (_, b) in pairwise(found[rule])) for found in answers.values()]
+        for rule in ("literal", "ours")
+    )
+    return item(
+        25, "(28)-(29), Figures 6 and 10",
+        "The paper's rule, taken literally, executes the first stage of the rounded plan at every sample. "
         "In both cases it takes an acceptance back about a second later and then accepts again, because the UGV's own "
         "task is cheaper for a moment. The paper describes one lasting acceptance in Figures 6 and 10. Here an answer "
         "changes only by a margin and after a dwell. The finding holds for our weights and speeds; the paper gives "
         "none.",
-        "paper": {"acceptances_taken_back": reversals["literal"]},
-        "ours": {"acceptances_taken_back": reversals["ours"]},
-        "unit": "",
-        "demonstrated": min(reversals["literal"]) > 0 and max(reversals["ours"]) == 0,
-        "evidence": {
-            "answers": answers,
-            "runs": "c_literal and c of case_a (18 s) and case_b (16 s)",
-            "figures": "by reading",
+        {"acceptances_taken_back": literal}, {"acceptances_taken_back": ours},
+        min(literal) > 0 and max(ours) == 0,
+        {
+            "answers": answers, "runs": "c_literal and c of case_a (18 s) and case_b (16 s)", "figures": "by reading",
         },
-    }  # fmt: skip
+    )  # fmt: skip
 
 
 def _answers(trace: Trace) -> list[tuple[float, str]]:
     """When UGV1 accepted or refused, s, and which."""
     kinds = "accept", "refuse"
     return [(round(e["t_s"], 9), e["kind"]) for e in trace.events if e["robot"] == "ugv1" and e["kind"] in kinds]
-
-
-def _printed_optimum(reference: Array, start: Array, weight: float, dt: float) -> tuple[float, Array]:
-    """Least task error of (27) as printed, and its states (N, 3): tied to nothing but the initial one."""
-    program = MathematicalProgram()
-    states = program.NewContinuousVariables(len(reference) + 1, 3, "rho")
-    program.AddBoundingBoxConstraint(start, start, states[0]).evaluator().set_description("(27b)")
-    free = states[1:].ravel()
-    hessian = 2.0 * weight * dt * np.eye(len(free))
-    program.AddQuadraticErrorCost(hessian / 2.0, reference.ravel(), free).evaluator().set_description("(25) task error")
-    result = ClarabelSolver().Solve(program)
-    found = max(0.0, float(result.get_optimal_cost())) if result.is_success() else float("nan")
-    return found, np.asarray(result.GetSolution(states[1:]))

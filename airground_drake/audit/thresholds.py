@@ -140,11 +140,8 @@ def _intensity(scenario: Scenario) -> Item:
     """Item 5: with sigma_j = 10 as the intensity of (15) the threshold is reached at once."""
     rule = TABLE_1
     zeta, noise = rule.zeta_m, rule.noise_m_sqrt_s
-    both = (zeta / noise) ** 2
-    exact = _exit_time(-zeta, zeta, 0.0, noise, 0.0)
-    half = (
-        zeta / (noise * float(norm.ppf(0.75)))
-    ) ** 2  # P[passed by t] = 2 (1 - Phi(zeta / (noise sqrt t))), by reflection
+    both, exact = (zeta / noise) ** 2, _exit_time(-zeta, zeta, 0.0, noise, 0.0)
+    half = (zeta / (noise * float(norm.ppf(0.75)))) ** 2  # P[passed by t] = 2 (1 - Phi(zeta / (noise sqrt t)))
     before = 2.0 * float(norm.sf(zeta / (noise * math.sqrt(REPORTED_TRIGGER_S))))
     return item(
         5, "Table 1, (15)",
@@ -165,7 +162,7 @@ def _intensity(scenario: Scenario) -> Item:
 
 def _zeno(proofs: Mapping[str, Finding]) -> Item:
     """Item 9: the bare threshold's triggers under refinement of the noise, and the bound of ours."""
-    refined = proofs["ZENO-REFINE"].evidence if "ZENO-REFINE" in proofs else {}
+    refined = proofs["ZENO-REFINE"].to_json()["evidence"] if "ZENO-REFINE" in proofs else {}
     found = {name: status(proofs, name) for name in ("ZENO-REFINE", "ZENO-PROOF")}
     shown = found == {"ZENO-REFINE": "supported", "ZENO-PROOF": "proved"}
     return item(

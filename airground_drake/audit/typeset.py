@@ -44,8 +44,14 @@ FORMULAS: dict[int, tuple[tuple[str, ...], tuple[str, ...]]] = {
     ),
     7: ((r"\rho_{rd,2} = [1.3, \; t, \; 0]",), (r"\rho_{rd,2} = [-1.3, \; t, \; 0]",)),
     8: (
-        (r"v = J^+ \dot\rho_d", r"v = J^+ (\dot\rho_d + \Lambda (\rho_d - \rho))"),
-        (r"v = J^+ \dot\sigma_d", r"v = J^+ (\dot\sigma_d + \Lambda (\sigma_d - \sigma))"),
+        (
+            r"v = J^+ \dot\rho_d, \quad (3 \times 1) (3 \times 1) \text{ is not defined}",
+            r"v = J^+ (\dot\rho_d + \Lambda (\rho_d - \rho))",
+        ),
+        (
+            r"v = J^+ \dot\sigma_d, \quad (3 \times 1) (1 \times 1) = 3 \times 1",
+            r"v = J^+ (\dot\sigma_d + \Lambda (\sigma_d - \sigma))",
+        ),
     ),
     9: (
         (r"\text{trigger whenever } x(t) \ge \zeta",),

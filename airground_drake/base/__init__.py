@@ -1,4 +1,4 @@
-"""What every room uses: errors, files, interruption, progress, processes side by side, parsers of command lines.
+"""Errors, files, interruption, progress, parallel processes and parsers of command lines, for every other room.
 
-Imports nothing of the other rooms.
+Imports no other room.
 """

@@ -1,4 +1,4 @@
-"""The array type that everything computes with."""
+"""The array type of all computations."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ Array = npt.NDArray[np.float64]
 """Numbers in binary64; every docstring gives the shape and the unit."""
 
 LARGEST = 1e9
-"""Of a number of a scenario and of a time or coordinate of a proposal, in size: products and quotients stay finite."""
+"""Largest size of a scenario's numbers and of a proposal's times and coordinates: their products stay finite."""
 ROUNDOFF = 2.0**-53
 """Unit roundoff u of binary64: every operation returns its exact result times 1 + e, |e| <= u."""
 

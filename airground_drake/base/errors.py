@@ -1,4 +1,4 @@
-"""Exceptions of the package; messages say what, where and what is allowed."""
+"""Exceptions of the package; messages name the fault, its place and the allowed values."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from traceback import walk_tb
 VALUE_WIDTH = 120
 """Longer values are cut in messages, characters."""
 FAULT_WIDTH = 300
-"""What third-party code says of its failure is cut after so many characters."""
+"""Longer messages of third-party code are cut, characters."""
 
 
 class AirgroundError(Exception):
@@ -17,7 +17,7 @@ class AirgroundError(Exception):
 
 
 class Fault(str):
-    """What is wrong, in words, where there is no single offending value to show."""
+    """A fault in words, if there is no single offending value to show."""
 
 
 class ScenarioError(AirgroundError):
@@ -39,35 +39,28 @@ class ScenarioError(AirgroundError):
 
 
 class LimitError(AirgroundError):
-    """A scenario that asks for more work than is allowed.
-
-    Attributes:
-        scenario: its name.
-        asked: for what, in words.
-        allowed: in words.
-    """
+    """A scenario that asks for more work than is allowed."""
 
     def __init__(self, scenario: str, asked: str, allowed: str) -> None:
-        """Build the one-line message from its parts."""
+        """Keep the parts, with which it is pickled: `asked` and `allowed` are amounts in words."""
         super().__init__(scenario, asked, allowed)
-        self.scenario, self.asked, self.allowed = scenario, asked, allowed
 
     def __str__(self) -> str:
         """One line."""
-        return one_line(f"{self.scenario} asks for about {self.asked}; allowed: {self.allowed}")
+        return one_line("{} asks for about {}; allowed: {}".format(*self.args))
 
 
 class FolderError(AirgroundError):
-    """A command cannot write to a folder or file, or would overwrite what is in it."""
+    """A command cannot write to a folder or file, or would overwrite its content."""
 
 
 class UnknownNameError(AirgroundError):
     """An unknown name of a run, a method, a route, a policy or a claim.
 
     Attributes:
-        kind: what it should name.
+        kind: what the name should stand for.
         name: as given.
-        allowed: names that there are.
+        allowed: names that exist.
     """
 
     def __init__(self, kind: str, name: object, allowed: Iterable[str]) -> None:
@@ -86,7 +79,7 @@ class PolicyError(AirgroundError):
 
 
 class ReportError(AirgroundError):
-    """A report is missing, or differs from what was written."""
+    """A report is missing, or was changed."""
 
 
 class ExportError(AirgroundError):
@@ -101,9 +94,9 @@ class SimulationError(AirgroundError):
     """A simulation that stopped before its end.
 
     Attributes:
-        run: which run of the scenario.
-        t: when, s.
-        what: the first line of what was raised.
+        run: name of the run.
+        t: simulated time, s.
+        what: first line of the exception.
     """
 
     def __init__(self, run: str, t: float, what: str) -> None:
@@ -121,7 +114,7 @@ class TraceError(AirgroundError):
 
 
 def short(text: str) -> str:
-    """A text as long as a message may quote: its beginning, if it is longer."""
+    """The text, cut to the length that a message may quote."""
     return text if len(text) <= VALUE_WIDTH else f"{text[: VALUE_WIDTH - 3]}..."
 
 
@@ -130,8 +123,8 @@ def described(error: BaseException, function: object = None) -> str:
 
     Args:
         error: the exception.
-        function: a function of that code. The line begins with the place in its file where the exception came from,
-            such as `boom.py:5`, if it came from there.
+        function: a function of that code. If the exception passed its file, the line begins with the place, such as
+            `boom.py:5`.
     """
     try:
         text = f"{_place(error, function)}{type(error).__name__}: {error}"[:FAULT_WIDTH]
@@ -141,12 +134,12 @@ def described(error: BaseException, function: object = None) -> str:
 
 
 def _place(error: BaseException, function: object) -> str:
-    """The last line of the function's file that the exception passed, and a space; '' if it passed none."""
+    """The last place in the function's file that the exception passed, and a space; '' if it did not pass it."""
     file = getattr(getattr(function, "__code__", None), "co_filename", None)
     lines = [line for frame, line in walk_tb(error.__traceback__) if frame.f_code.co_filename == file]
     return f"{PurePath(str(file)).name}:{lines[-1]} " if lines else ""
 
 
 def one_line(text: str) -> str:
-    """The text with everything escaped that would break a line, upset a terminal or turn the direction of writing."""
+    """The text with all characters escaped that break lines, control terminals or turn the direction of writing."""
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)

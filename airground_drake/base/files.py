@@ -23,42 +23,38 @@ if TYPE_CHECKING:
     import pandas as pd
 
 _PARTIAL = re.compile(r"\..*\.(?P<pid>\d+)\.[a-z0-9_]+\.partial")
-"""Name of a temporary file: the process that writes it is in it."""
+"""Name of a temporary file, with the process that writes it."""
 
 _TEMPORARY = "airground_drake."
-"""What the names of temporary folders begin with."""
+"""Prefix of the names of temporary folders."""
 
 _open: set[str] = set()
 """Temporary files and folders of this process."""
 
 
 LARGEST_FILE = 256_000_000
-"""Bytes of a file that is read: a run of an hour with ten robots has less."""
+"""Most bytes of a file that is read: a run of an hour with ten robots has fewer."""
 LARGEST_TEXT = 64_000_000
-"""Bytes of a text that is read, JSON among others."""
+"""Most bytes of a text that is read, such as JSON."""
 MOST_CELLS = 50_000_000
-"""Rows times columns of a table that is read, and numbers in its lists."""
+"""Most cells of a table that is read, or numbers in its lists."""
 MOST_UNPACKED = 1_000_000_000
-"""Bytes of a table once it is unpacked, and of its texts."""
+"""Most bytes of an unpacked table, or of its texts."""
 
 
 def open_regular(path: Path) -> BinaryIO:
     """Open a regular file, or a link to one, for reading.
 
     Raises:
-        OSError: if it cannot be opened, or is something else: a pipe may wait for ever, a device may never end.
+        OSError: if it cannot be opened, or is something else: reading a pipe may hang, a device may never end.
     """
-    if not stat.S_ISREG(os.stat(path).st_mode):  # not opened to find out: opening a device may do something
+    if not stat.S_ISREG(os.stat(path).st_mode):  # asked before it is opened: opening a device may have effects
         raise OSError(errno.EINVAL, "not a regular file", str(path))
     return open(path, "rb")
 
 
 def open_pipe(path: Path) -> BinaryIO:
-    """Open a file for reading, or a pipe such as `<(command)`; a pipe without a writer is empty.
-
-    Raises:
-        OSError: if it cannot be opened.
-    """
+    """Open a file for reading, or a pipe such as `<(command)`; a pipe without a writer is empty."""
     handle = os.open(path, os.O_RDONLY | os.O_NONBLOCK)  # does not wait for a writer
     os.set_blocking(handle, True)
     return open(handle, "rb")
@@ -90,28 +86,25 @@ def read_text(path: Path) -> str:
 def read_table(content: bytes) -> pd.DataFrame:
     """The table in a Parquet file that may be hostile: numbers, texts and lists of numbers.
 
-    Types and sizes that the file declares are checked before it is unpacked. A few bytes may stand for a long text in a
-    million rows: texts are counted before they are copied into their rows.
+    The declared types and sizes are checked before the file is unpacked. A few bytes may stand for a long text in a
+    million rows, so texts are counted before they are copied into their rows.
 
     Raises:
-        ValueError: if it cannot be read, has values of other types, or is larger than the limits.
+        ValueError: if it cannot be read, has values of other types, or exceeds the limits.
     """
     import pandas as pd
     import pyarrow as pa
     import pyarrow.compute as pc
     import pyarrow.parquet as pq
 
-    def is_number(kind: pa.DataType) -> bool:
-        of = (pa.types.is_floating, pa.types.is_integer, pa.types.is_boolean, pa.types.is_null)
-        return any(each(kind) for each in of)
-
+    numbers = (pa.types.is_floating, pa.types.is_integer, pa.types.is_boolean, pa.types.is_null)
     try:
         file = pq.ParquetFile(io.BytesIO(content))
         schema, about = file.schema_arrow, file.metadata
         texts = [field.name for field in schema if field.type in (pa.string(), pa.large_string())]
         for field in schema:
             kind = field.type.value_type if pa.types.is_list(field.type) else field.type
-            if not (is_number(kind) or field.name in texts):
+            if not (field.name in texts or any(is_kind(kind) for is_kind in numbers)):
                 raise ValueError(f"column {field.name!r} is of type {field.type}")
         chunks = [about.row_group(i).column(j) for i in range(about.num_row_groups) for j in range(about.num_columns)]
         _within("cells", max(about.num_rows * about.num_columns, sum(c.num_values for c in chunks)), MOST_CELLS)
@@ -132,10 +125,10 @@ def _within(what: str, count: int, most: int) -> None:
 
 
 def write_bytes(path: Path, data: bytes) -> None:
-    """Write a file atomically: to a temporary file beside it, on the disk, then rename. Creates parent folders.
+    """Write a file atomically: a temporary file beside it is synced to the disk, then renamed. Creates parent folders.
 
     Raises:
-        OSError: as the system reports it, with the path; the old file, if any, is then still there.
+        OSError: from the system, with the path; an old file is then unchanged.
     """
     try:
         if path.exists() and not path.is_file():  # the system would replace a device, too
@@ -161,7 +154,7 @@ def write_bytes(path: Path, data: bytes) -> None:
 
 
 def _sync(folder: Path) -> None:
-    """Make renames in a folder outlive a loss of power."""
+    """Sync a folder, so that renames in it survive a loss of power."""
     handle = os.open(folder, os.O_RDONLY)
     try:
         os.fsync(handle)
@@ -170,7 +163,7 @@ def _sync(folder: Path) -> None:
 
 
 def discard_partial() -> None:
-    """Remove the temporary files and folders of this process, because it ends at once."""
+    """Remove the temporary files and folders of this process, before it ends at once."""
     for name in tuple(_open):
         if os.path.isdir(name):
             shutil.rmtree(name, ignore_errors=True)
@@ -180,18 +173,14 @@ def discard_partial() -> None:
 
 @contextmanager
 def temporary_folder() -> Iterator[Path]:
-    """A folder that is removed with the block or this process; after a kill, by a later process.
-
-    Raises:
-        OSError: if it cannot be made.
-    """
+    """A folder that is removed at the end of the block or of this process; after a kill, by a later process."""
     sweep_temporary()
     made = Path(tempfile.mkdtemp(prefix=f".{_TEMPORARY}"))
     folder = made.with_name(made.name[1:])
     _open.update((str(made), str(folder)))
     lock = os.open(made, os.O_RDONLY)
     try:
-        with suppress(OSError):  # a file system without such locks: no process will remove it
+        with suppress(OSError):  # a file system without such locks: no process removes it
             fcntl.flock(lock, fcntl.LOCK_EX)
         made.rename(folder)  # `sweep_temporary` does not see it before it is locked
         yield folder
@@ -202,7 +191,7 @@ def temporary_folder() -> Iterator[Path]:
 
 
 def sweep_temporary() -> None:
-    """Remove the temporary folders of this user's killed processes: those that no process holds a lock on."""
+    """Remove this user's temporary folders that no process has locked: their processes were killed."""
     for path in Path(tempfile.gettempdir()).glob(f"{_TEMPORARY}*"):
         with suppress(OSError):
             lock = os.open(path, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)
@@ -220,11 +209,7 @@ def is_partial(path: Path) -> bool:
 
 
 def try_to_write(folder: Path) -> None:
-    """Write a file to a folder and remove it.
-
-    Raises:
-        OSError: as `write_bytes`.
-    """
+    """Write a file to a folder and remove it; OSError as `write_bytes`."""
     probe = folder / f".{os.getpid()}.probe"
     write_bytes(probe, b"\n")
     probe.unlink()
@@ -232,11 +217,7 @@ def try_to_write(folder: Path) -> None:
 
 @contextmanager
 def wanted(path: Path, what: str) -> Iterator[None]:
-    """While something is written to a path; `what` is wanted there.
-
-    Raises:
-        FolderError: if the system refuses; says where, why, and what is wanted.
-    """
+    """Turn an OSError of the block, which writes `what` to a path, into a FolderError with path, reason and `what`."""
     try:
         yield
     except OSError as error:
@@ -245,22 +226,14 @@ def wanted(path: Path, what: str) -> Iterator[None]:
 
 
 def make_folder(folder: Path, what: str) -> None:
-    """Create a folder for `what` if need be, and try to write to it.
-
-    Raises:
-        FolderError: if it cannot be created or written.
-    """
+    """Create a folder for `what` if it does not exist, and try to write to it; FolderError if that fails."""
     with wanted(folder, f"a folder for {what}"):
         folder.mkdir(parents=True, exist_ok=True)
         try_to_write(folder)
 
 
 def try_to_create(path: Path) -> None:
-    """Write a file that is not there yet, and remove it; its folder is created.
-
-    Raises:
-        FolderError: if it is there, or cannot be written.
-    """
+    """Write a new file, in a folder that is created, and remove it; FolderError if it exists or cannot be written."""
     if os.path.lexists(path):
         raise FolderError(one_line(f"{path} exists; name a file that does not"))
     with wanted(path, "a file that can be written"):
@@ -269,21 +242,15 @@ def try_to_create(path: Path) -> None:
 
 
 def sweep(folder: Path) -> None:
-    """Remove temporary files in and below a folder that killed processes have left."""
+    """Remove the temporary files of killed processes in and below a folder."""
     for path in folder.rglob(".*.partial"):
-        found = _PARTIAL.fullmatch(path.name)
-        if found and not _runs(int(found["pid"])):
-            path.unlink(missing_ok=True)
-
-
-def _runs(pid: int) -> bool:
-    try:
-        os.kill(pid, 0)
-    except (ProcessLookupError, OverflowError):
-        return False
-    except PermissionError:
-        pass
-    return pid > 0
+        if found := _PARTIAL.fullmatch(path.name):
+            try:
+                os.kill(int(found["pid"]), 0)
+            except (ProcessLookupError, OverflowError):
+                path.unlink(missing_ok=True)
+            except PermissionError:  # it runs, for another user
+                pass
 
 
 def write_text(path: Path, text: str) -> None:
@@ -292,11 +259,7 @@ def write_text(path: Path, text: str) -> None:
 
 
 def write_json(path: Path, value: Any) -> None:
-    """Write strict JSON (no NaN or infinity) atomically.
-
-    Raises:
-        ValueError: if the value holds a number that is not finite.
-    """
+    """Write strict JSON atomically; ValueError for NaN or infinity."""
     write_text(path, json.dumps(value, indent=1, allow_nan=False, ensure_ascii=False) + "\n")
 
 

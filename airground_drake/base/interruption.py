@@ -1,12 +1,12 @@
 """How SIGINT and SIGTERM end a command and its child processes at once.
 
-The stack is not unwound: an exception out of a signal handler may be lost in a callback, and `with` blocks wait for
-busy pools. The handler kills every process that descends from this one, removes this process's temporary files, prints
-one line, and leaves. If a process is killed itself, the processes that it has forked end with it.
+The stack is not unwound: an exception in a signal handler may be lost in a callback, and `with` blocks wait for busy
+pools. The handler kills all descendants of this process, removes its temporary files, prints one line, and exits. If a
+process is killed, the processes that it has forked end with it.
 
 On Linux a command works in a child of the process that was started (`begin`). The parent only waits. If the child is
-killed, the parent ends and removes what the child has left, and says so. If the parent is killed, the child gets
-SIGTERM.
+killed, the parent kills its descendants, removes its temporary files, and says so. If the parent is killed, the child
+gets SIGTERM.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ import select
 import signal
 import sys
 import threading
+import time
 import traceback
 from collections.abc import Callable
 from contextlib import suppress
@@ -29,22 +30,22 @@ from airground_drake.base import files
 from airground_drake.base.usage import EXIT_TOOL, refuse
 
 STOPPING = (signal.SIGINT, signal.SIGTERM)
-ROUNDS = 10
-"""Searches for descendants at most: one that is killed may just have begun another."""
+PATIENCE_S = 10.0
+"""How long killed descendants are waited for, s: on a busy machine they end later than they are killed."""
 
 CURRENT_FOLDER = {"PYTHONSAFEPATH": "1", "NUMBA_CACHE_DIR": "", "NUMBA_CACHE_LOCATOR_CLASSES": ""}
-"""Environment in which nothing in the current folder is executed. Child interpreters do not import from there, and
-numba's configuration file there does not choose a cache, from which numba would unpickle. The user's own settings stay.
+"""Environment in which nothing in the current folder is executed: child interpreters do not import from there, and
+numba's configuration file there cannot choose a cache, which numba would unpickle. The user's own settings stay.
 """
 
 _PR_SET_PDEATHSIG, _PR_SET_CHILD_SUBREAPER = 1, 36
 
 _exit_code: int | None = None
-"""End of a pipe to the parent that waits for this process: it believes an exit code only if it is told here, too."""
+"""Writing end of a pipe to the waiting parent, which accepts only an exit code that is also written there."""
 
 
 def begin() -> None:
-    """What a command does first, before the imports that take seconds: see this module."""
+    """Begin a command, before the imports that take seconds: see this module."""
     for name, value in CURRENT_FOLDER.items():
         os.environ.setdefault(name, value)
     _open_standard_streams()
@@ -56,7 +57,7 @@ def begin() -> None:
 def _go_on_in_a_child() -> None:
     """Return in a child process. The parent waits for it, cleans up after it, and leaves with its exit code.
 
-    The parent adopts orphans of the child's descendants, so that it finds all of them if the child is killed.
+    The parent adopts orphans among the child's descendants, and so finds all of them if the child is killed.
     """
     global _exit_code
     told, _exit_code = os.pipe()
@@ -96,7 +97,7 @@ def ended_how(code: int) -> str:
 
 
 def _exit(code: int) -> NoReturn:
-    """Leave at once, and tell the parent that this is meant."""
+    """Exit at once, and tell the parent the exit code."""
     if _exit_code is not None:
         with suppress(OSError):
             os.write(_exit_code, bytes([code % 256]))
@@ -105,14 +106,13 @@ def _exit(code: int) -> NoReturn:
 
 def end_on_signals() -> None:
     """From now on SIGINT and SIGTERM end this process with exit code 130 and 143, and its descendants with it."""
-    _open_standard_streams()
     owner = os.getpid()
-    stderr = os.dup(2)  # 2 itself may be pointed elsewhere while a C library is kept silent
+    stderr = os.dup(2)  # 2 itself may point elsewhere while a C library is kept silent
 
     def end(number: int, frame: FrameType | None) -> NoReturn:
         for each in STOPPING:
             signal.signal(each, signal.SIG_IGN)
-        if os.getpid() == owner:  # what was forked has inherited this handler
+        if os.getpid() == owner:  # forked processes have inherited this handler
             end_descendants()
             files.discard_partial()
             with suppress(OSError):
@@ -121,14 +121,13 @@ def end_on_signals() -> None:
         os._exit(128 + number)
 
     for each in STOPPING:
-        if signal.getsignal(each) is not signal.SIG_IGN:  # as for what `nohup` starts
+        if signal.getsignal(each) is not signal.SIG_IGN:  # `nohup` ignores them
             signal.signal(each, end)
-    forks = _Forks()
-    os.register_at_fork(before=forks.before, after_in_child=forks.in_child)
+    _end_forks_with_parent()
 
 
 def _open_standard_streams() -> None:
-    """Point closed ones to the null device: else the next file that is opened takes their place."""
+    """Point closed streams to the null device; otherwise the next file that is opened takes their place."""
     for name in ("stdin", "stdout", "stderr"):
         if getattr(sys, name) is None:
             nowhere = os.open(os.devnull, os.O_RDWR)  # the least descriptor that is free
@@ -137,9 +136,9 @@ def _open_standard_streams() -> None:
 
 
 def run(main: Callable[[], int]) -> NoReturn:
-    """Run a command and leave with its exit code; with 141 and no message if the output pipe is closed.
+    """Run a command and exit with its code; with 141 and no message if the output pipe is closed.
 
-    An unexpected exception is shown with its traceback, as a fault of the tool.
+    An unexpected exception is a fault of the tool and shown with its traceback.
     """
     try:
         code = main()
@@ -160,28 +159,30 @@ def run(main: Callable[[], int]) -> NoReturn:
 
 
 def leave(code: int) -> NoReturn:
-    """End this process at once, with its work done: an interpreter that shuts down has no signal handlers left."""
+    """Exit at once after the work is done: while an interpreter shuts down, it has no signal handlers."""
     for stream in (sys.stdout, sys.stderr):
-        with suppress(OSError, ValueError):  # a reader that has gone, a stream that is closed
+        with suppress(OSError, ValueError):  # a closed pipe or stream
             stream.flush()
     _exit(code)
 
 
 def _line(number: int, *, clear: bool) -> bytes:
-    """The message of an interruption; it replaces a line of progress, if there may be one."""
+    """The message of an interruption; on a terminal it replaces a line of progress."""
     before = "\r\033[K" if clear else ""
     return f"{before}error: interrupted ({signal.Signals(number).name})\n".encode()
 
 
 def end_descendants() -> None:
-    """Kill every process below this one that /proc shows."""
-    for _ in range(ROUNDS):
-        found = _descendants()
-        if not found:
-            return
+    """Kill every process below this one, until /proc shows none: one that is killed may have begun another.
+
+    A process keeps its locks until it has ended. Temporary folders are removed by these locks.
+    """
+    until = time.monotonic() + PATIENCE_S
+    while (found := _descendants()) and time.monotonic() < until:
         for pid in found:
             with suppress(ProcessLookupError, PermissionError):
                 os.kill(pid, signal.SIGKILL)
+        time.sleep(0.001)
 
 
 def _descendants() -> list[int]:
@@ -212,33 +213,33 @@ def _prctl(option: int, value: int) -> None:
 
 
 def end_with_pipe(reader: int) -> None:
-    """Have Linux kill this process as soon as the last writer of a pipe has gone.
+    """Have Linux kill this process when the last writer of a pipe has closed it.
 
-    The kernel sees to it, as in `end_with_parent`, but the pipe belongs to a process, not to one of its threads.
+    Unlike in `end_with_parent`, the pipe belongs to a process, not to one of its threads.
 
     Args:
-        reader: descriptor of the reading end of a pipe to which nothing is ever written.
+        reader: descriptor of the reading end of a pipe that nobody writes to.
     """
     if sys.platform == "linux":
         fcntl.fcntl(reader, fcntl.F_SETOWN, os.getpid())
         fcntl.fcntl(reader, fcntl.F_SETSIG, signal.SIGKILL)
         fcntl.fcntl(reader, fcntl.F_SETFL, os.O_ASYNC)
-        if select.select([reader], [], [], 0.0)[0]:  # it had gone before
+        if select.select([reader], [], [], 0.0)[0]:  # it was closed before
             os._exit(1)
 
 
-class _Forks:
-    """Makes forked processes end with the process that forked them."""
+def _end_forks_with_parent() -> None:
+    """Make processes that the main thread forks end with this one. Another thread may end before its process."""
+    parent, from_main = 0, False
 
-    def __init__(self) -> None:
-        self.parent, self.from_main = 0, False
+    def before() -> None:
+        nonlocal parent, from_main
+        parent, from_main = os.getpid(), threading.current_thread() is threading.main_thread()
 
-    def before(self) -> None:
-        self.parent, self.from_main = os.getpid(), threading.current_thread() is threading.main_thread()
-
-    def in_child(self) -> None:
-        """Only for forks by the main thread: another thread may end earlier than its process."""
-        if self.from_main:
+    def in_child() -> None:
+        if from_main:
             end_with_parent()
-            if os.getppid() != self.parent:
+            if os.getppid() != parent:
                 os._exit(1)
+
+    os.register_at_fork(before=before, after_in_child=in_child)

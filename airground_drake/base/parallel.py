@@ -1,7 +1,7 @@
 """Independent pieces of work in processes forked from this one, as many at a time as there are processors.
 
-A piece sees everything that existed before the first one began; only what it returns is kept. A process does several
-pieces, one after the other: they share what they import and load.
+A piece sees everything that existed before the first piece began; only its result is kept. A process does several
+pieces, one after the other, which share imports and loaded data.
 """
 
 from __future__ import annotations
@@ -24,11 +24,8 @@ from airground_drake.base.progress import SILENT, Progress
 
 T = TypeVar("T")
 
-MOST_JOBS = 1000
-"""Processes at a time that may be asked for: all of them begin at once."""
-
 _pieces: Sequence[Callable[[], object]] = ()
-"""The current work: forked processes inherit it, so that it need not be pickled."""
+"""The current work. Forked processes inherit it, so that it is not pickled."""
 
 
 def forks() -> bool:
@@ -37,7 +34,7 @@ def forks() -> bool:
 
 
 def one_thread_each() -> None:
-    """Numerical libraries that are not loaded yet get one thread: as many processes as processors will use them."""
+    """Give libraries that are loaded later one thread: as many processes as processors will use them."""
     for name in ("OMP", "OPENBLAS", "MKL", "BLIS", "NUMEXPR"):
         os.environ.setdefault(f"{name}_NUM_THREADS", "1")
 
@@ -49,10 +46,10 @@ def processors() -> int:
 
 @contextmanager
 def processes(jobs: int) -> Iterator[ProcessPoolExecutor]:
-    """A pool of so many processes. At the end of the block, those that still work are killed.
+    """A pool of `jobs` processes. Processes that still work at the end of the block are killed.
 
-    The first call forks them: they see everything that exists then. Where forking is not safe, they start empty. Calls
-    and results are pickled.
+    The first call forks them, and they see everything that exists then. Where forking is not safe, they start empty.
+    Calls and results are pickled.
     """
     before = set(multiprocessing.active_children())
     context = multiprocessing.get_context("fork" if forks() else "spawn")
@@ -74,18 +71,18 @@ def run_parallel(
     names: Sequence[str] = (),
     progress: Progress = SILENT,
 ) -> list[T]:
-    """What each piece returns, in their order.
+    """Do all pieces, and return their results in the same order.
 
     Args:
-        pieces: what they return is pickled. The longest come first, or the last one is waited for.
-        jobs: processes at a time; default: one for each processor. Where there is one, or one piece, or no fork, the
-            pieces are done here, one after the other.
+        pieces: their results are pickled. The longest should come first.
+        jobs: processes at a time; default: one for each processor. With one job, one piece or no fork, the pieces are
+            done in this process.
         names: of the pieces, for `progress`.
-        progress: is told of each piece that is done.
+        progress: receives each finished piece.
 
     Raises:
         AirgroundError: if a process dies.
-        Exception: the first that a piece raises.
+        Exception: the first exception of a piece.
     """
     global _pieces
     called = names or [""] * len(pieces)
@@ -106,12 +103,9 @@ def run_parallel(
 
 
 def start_in_process(work: Callable[[], T]) -> Callable[[], T]:
-    """Start some work in a process of its own; returns a function that waits for the result, to be called once.
+    """Start work in its own process; returns a function that waits for the result, to be called once.
 
-    With one processor, or without fork, the work is done when the result is asked for.
-
-    Raises:
-        AirgroundError: when it is waited for, if the process ends without having returned.
+    With one processor, or without fork, that function does the work. It raises an AirgroundError if the process dies.
     """
     if not forks() or processors() == 1:
         return work

@@ -1,4 +1,4 @@
-"""Progress of long work: its stages, how much of each is done, and how long its parts took."""
+"""Progress of long work: its stages, their finished shares, and the times of their parts."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from typing import Any
 
 SHOWN_S = 0.01
-"""What took less is not worth a line, s."""
+"""Shorter parts get no line, s."""
 _FORMAT = "{desc} {percentage:3.0f}% |{bar}| {n:.4g}/{total:.4g} {unit}, {elapsed}, {remaining} left{postfix}"
 _WITHOUT_AMOUNT = "{desc} {elapsed}"
 
@@ -19,23 +19,23 @@ class Progress:
     """Receives the progress of long work. This class shows nothing. Several threads may call it."""
 
     def stage(self, name: str, amount: float = 0.0, unit: str = "") -> None:
-        """A stage begins, the one before is over.
+        """Begin a stage, and end the stage before.
 
         Args:
-            name: what is done in it.
-            amount: how much is to be done; 0: unknown.
+            name: of the stage.
+            amount: of work in it; 0: unknown.
             unit: of the amount.
         """
 
     def advance(self, amount: float, what: str = "") -> None:
-        """So much more of the stage is done, the last of it on `what`."""
+        """Add an amount of finished work, the last of it on `what`."""
 
     def elapsed_s(self, what: str, seconds: float) -> None:
-        """A part of the stage is over."""
+        """Report the time of a part, s."""
 
     @contextmanager
     def item(self, what: str) -> Iterator[None]:
-        """One of the things that the stage counts."""
+        """Count and time the block as one unit of the stage."""
         started = time.perf_counter()
         yield
         self.elapsed_s(what, time.perf_counter() - started)
@@ -49,14 +49,14 @@ class ProgressBar(Progress):
     """Shows progress on standard error: a bar for the stage, a line for each part that took time, or both."""
 
     def __init__(self, *, bar: bool, lines: bool) -> None:
-        """A bar for the stage that is under way; lines for everything that took time."""
+        """Choose a bar for the current stage, lines for finished parts, or both."""
         self._shows_bar, self._shows_lines = bar, lines
         self._bar: Any = None
         self._stage, self._since = "", 0.0
         self._lock = threading.RLock()
 
     def stage(self, name: str, amount: float = 0.0, unit: str = "") -> None:
-        """Close the bar of the stage before, open the one of this."""
+        """Replace the bar of the stage before."""
         self.close()
         self._stage, self._since = name, time.perf_counter()
         if self._shows_bar:
@@ -70,7 +70,7 @@ class ProgressBar(Progress):
                 self._bar.update(amount)
 
     def elapsed_s(self, what: str, seconds: float) -> None:
-        """A line, if lines are wanted and it is worth one."""
+        """Print a line, if lines are wanted and the part was not too short."""
         if self._shows_lines and seconds >= SHOWN_S:
             with self._lock:
                 if self._bar is not None:
@@ -78,7 +78,7 @@ class ProgressBar(Progress):
                 print(f"{seconds:8.2f} s  {what}", file=sys.stderr, flush=True)
 
     def close(self) -> None:
-        """End the stage that is under way."""
+        """End the current stage."""
         with self._lock:
             if self._bar is not None:
                 self._bar.close()
@@ -99,7 +99,7 @@ def progress_bar(*, quiet: bool = False, verbose: bool = False) -> Iterator[Prog
 
 
 def _bar(name: str, amount: float, unit: str) -> Any:
-    """A bar of tqdm in one line that leaves nothing behind, without a thread of its own."""
+    """A bar of tqdm in one line that is erased at its end, without a thread of its own."""
     from tqdm import tqdm
 
     tqdm.monitor_interval = 0

@@ -1,23 +1,29 @@
-"""Parsers of command lines, the numbers that they take, and how a command says that it is not done."""
+"""Parsers of command lines, the values that their options take, and how a command refuses."""
 
 from __future__ import annotations
 
 import argparse
 import math
+import os
 import sys
 from collections.abc import Callable, Sequence
 from contextlib import suppress
+from pathlib import Path
 from typing import NoReturn
 
-from airground_drake.base.errors import one_line
+from airground_drake.base.errors import FolderError, LimitError, ScenarioError, UnknownNameError, one_line
 
 EXIT_USAGE, EXIT_TOOL = 2, 4
+REFUSALS = (ScenarioError, LimitError, FolderError, UnknownNameError)
+"""Mistakes of the user. Where a command does long work, other errors are faults of the tool."""
 MOST = 1e15
-"""Of numbers that an option takes."""
+"""Largest number that an option takes."""
+MOST_JOBS = 1000
+"""Most processes that a command starts at once."""
 
 
 def refuse(why: object, code: int = EXIT_USAGE) -> int:
-    """Say in one line why a command is not done, if standard error takes it; returns the exit code."""
+    """Print in one line why a command is not done, if standard error takes it; returns the exit code."""
     if isinstance(why, OSError) and why.filename is not None:
         why = f"{why.filename}: {why.strerror}"
     with suppress(OSError):
@@ -26,10 +32,10 @@ def refuse(why: object, code: int = EXIT_USAGE) -> int:
 
 
 class Parser(argparse.ArgumentParser):
-    """Says in one line what is wrong with a command line."""
+    """Refuses a bad command line in one line."""
 
     def error(self, message: str) -> NoReturn:
-        """Say so, and exit with 2."""
+        """Print the message, and exit with 2."""
         raise SystemExit(refuse(f"{message}; see {self.prog} --help"))
 
 
@@ -40,41 +46,66 @@ def overridable(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def parallel(parser: argparse.ArgumentParser) -> None:
+    """Add the options `--jobs` and `--quiet`."""
+    parser.add_argument(
+        "--jobs", type=whole(1, MOST_JOBS), metavar="N", help="processes (default: one for each processor)"
+    )
+    parser.add_argument("-q", "--quiet", action="store_true", help="no progress")
+
+
+def output_folder(text: str) -> Path:
+    """Parse the path of an output; `new/../b` becomes `b`: else writing would create `new` on the way."""
+    return Path(os.path.relpath(os.path.realpath(text)) if ".." in Path(text).parts else text)
+
+
+def output_file(text: str) -> Path:
+    """Parse the path of an output that is one file."""
+    if text.endswith("/"):
+        raise argparse.ArgumentTypeError(f"{text!r} is a folder; wanted: the name of a file")
+    return output_folder(text)
+
+
 def whole(least: int, most: float = math.inf) -> Callable[[str], int]:
-    """What takes an argument that is a whole number, `least` and `most` included."""
+    """Make the parser of a whole number; `least` and `most` are allowed."""
     up_to = "on" if most == math.inf else f"to {most}"
 
     def number(text: str) -> int:
-        try:
-            value = int(text)
-        except ValueError:
-            value = least - 1
-        if not least <= value <= most:
-            raise argparse.ArgumentTypeError(f"{text!r} is not allowed; wanted: a whole number from {least} {up_to}")
-        return value
+        with suppress(ValueError):
+            if least <= (value := int(text)) <= most:
+                return value
+        raise argparse.ArgumentTypeError(f"{text!r} is not allowed; wanted: a whole number from {least} {up_to}")
 
     return number
 
 
+def between(least: float, most: float) -> Callable[[str], float]:
+    """Make the parser of a number; `least` and `most` are allowed."""
+
+    def number(text: str) -> float:
+        with suppress(ValueError):
+            if least <= (value := float(text)) <= most:
+                return value
+        raise argparse.ArgumentTypeError(f"{text!r} is not allowed; wanted: a number from {least:g} to {most:g}")
+
+    return number
+
+
+def positive(text: str) -> float:
+    """Parse a number above 0, at most MOST."""
+    with suppress(ValueError):
+        if 0.0 < (value := float(text)) <= MOST:
+            return value
+    raise argparse.ArgumentTypeError(f"{text!r} is not allowed; wanted: a number above 0, at most {MOST:g}")
+
+
 def formats_of(allowed: Sequence[str]) -> Callable[[str], tuple[str, ...]]:
-    """What takes an argument that is a comma-separated list of formats."""
+    """Make the parser of a comma-separated list of formats."""
 
     def formats(text: str) -> tuple[str, ...]:
         chosen = tuple(text.split(","))
-        unknown = [name for name in chosen if name not in allowed]
-        if unknown:
+        if unknown := [name for name in chosen if name not in allowed]:
             raise argparse.ArgumentTypeError(f"{', '.join(unknown)!r} is not allowed; formats are {', '.join(allowed)}")
         return chosen
 
     return formats
-
-
-def positive(text: str) -> float:
-    """An argument that is a number above 0, at most MOST."""
-    try:
-        value = float(text)
-    except ValueError:
-        value = 0.0
-    if not 0.0 < value <= MOST:
-        raise argparse.ArgumentTypeError(f"{text!r} is not allowed; wanted: a number above 0, at most {MOST:g}")
-    return value

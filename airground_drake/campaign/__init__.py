@@ -1,8 +1,8 @@
-"""Campaigns: many runs of a scenario whose keys are drawn, and what can be concluded from them.
+"""Campaigns: many runs of a scenario with drawn keys, and conclusions from them.
 
     spec.yaml -> Spec -> draw(index) -> Scenario -> rows of verdicts -> Store -> evidence -> page
 
-`distributions.py` and `course.py` are pure functions of a draw's number, so that each draw can be made again alone;
-`spec.py` reads what is drawn; `work.py` does one draw; `pool.py` many, on this machine or on a cluster; `store.py`
-keeps finished draws through kills; `statistics.py` and `evidence.py` conclude; `page.py` shows.
+`distributions.py` and `course.py` are pure functions of a draw's number, so that each draw can be repeated alone.
+`spec.py` reads the file, `work.py` does one draw, `pool.py` does many, on this machine or on a cluster. `store.py`
+keeps finished draws through kills. `statistics.py` and `evidence.py` conclude, `page.py` shows the conclusions.
 """

@@ -1,11 +1,12 @@
-"""A campaign from beginning to end: judge the draws that are left, keep them, write the evidence."""
+"""A campaign from beginning to end: judge the draws that are not finished, store them, write the evidence."""
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator
 from functools import partial
 from importlib.metadata import version
+from itertools import groupby
+from operator import itemgetter
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +16,6 @@ from airground_drake.base.progress import SILENT, Progress
 from airground_drake.campaign.evidence import evidence, strict
 from airground_drake.campaign.page import page
 from airground_drake.campaign.pool import Pool
-from airground_drake.campaign.rows import Row
 from airground_drake.campaign.spec import Spec
 from airground_drake.campaign.stopping import InOrder, Stopping
 from airground_drake.campaign.store import Store
@@ -37,17 +37,17 @@ def conduct(
     limits: Limits = DEFAULT_LIMITS,
     progress: Progress = SILENT,
 ) -> dict[str, Any]:
-    """Do the rest of a campaign, and write the evidence and its page.
+    """Finish a campaign, and write the evidence and its page.
 
     Args:
-        spec: what is drawn.
-        folder: new or empty; with `resume`, one that has a part of the same campaign.
-        pool: does the work.
+        spec: the scenario and its distributions.
+        folder: new or empty; with `resume`, a folder with a part of the same campaign.
+        pool: judges the draws.
         number: of draws; default: all combinations of the grids.
-        resume: go on with what the folder has.
-        stopping: when to end early.
-        limits: what the scenario of a draw may ask for.
-        progress: is told how far it is.
+        resume: keep the draws that the folder has.
+        stopping: rule to end early.
+        limits: largest scenario, and longest time, of a draw.
+        progress: receives the progress.
 
     Returns:
         The evidence, strict JSON.
@@ -56,13 +56,13 @@ def conduct(
         ScenarioError: if third-party code is named that is not allowed.
         FolderError: if the folder cannot be used, or has draws beyond the number.
         LimitError: if the rows would be more than `MOST_ROWS`.
-        ValueError: if there is a rule to stop, and draws that are not independent.
-        OSError: if it cannot be written.
+        ValueError: if there is a stopping rule, and draws are not independent.
+        OSError: if the folder cannot be written.
     """
     if stopping is not None and spec.dependent:
         raise ValueError(f"--stop-when needs independent draws; not independent: {', '.join(spec.dependent)}")
     wanted = range(spec.combinations if number is None else number)
-    asked = wanted.stop * len(spec.runs or spec.base().runs) * len(spec.claims or tuple(RUN_CLAIMS))
+    asked = wanted.stop * len(spec.runs or spec.base()[0].runs) * len(spec.claims or tuple(RUN_CLAIMS))
     if asked > MOST_ROWS:
         allowed = f"{MOST_ROWS:g} rows, one for each draw, run and claim"
         raise LimitError(spec.name, f"{wanted.stop:.3g} draws ({asked:.3g} rows)", allowed)
@@ -73,7 +73,8 @@ def conduct(
         if (last := max(store.finished, default=0)) >= wanted.stop:
             raise FolderError(one_line(f"{folder} has draw {last}; allowed: -n {last + 1} or more"))
         rule = InOrder(stopping, wanted) if stopping is not None else None
-        met = rule is not None and any(rule.met(index, rows) for index, rows in _known(store))
+        known: Any = groupby(store.table().to_dict("records"), key=itemgetter("index"))
+        met = rule is not None and any(rule.met(index, list(rows)) for index, rows in known)
         left = [] if met else [index for index in wanted if index not in store.finished]
         progress.stage(spec.name, len(left), "draws")
         refuted = Counter[str]()
@@ -89,7 +90,7 @@ def conduct(
         store.close()
     stopped = rule.last if rule is not None else None
     of = {"name": spec.name, "title": spec.title, "spec": spec.source, "stopped": stopped}
-    if stopped is not None:  # what other processes had finished by then does not count
+    if stopped is not None:  # other processes may have finished later draws meanwhile
         table = table[table["index"] <= stopped]
     found: dict[str, Any] = strict(evidence(table, spec.marks, spec.dependent)) | of
     files.write_json(folder / EVIDENCE, found)
@@ -101,20 +102,11 @@ def _refuted(counts: Counter[str]) -> str:
     return "refuted: " + (", ".join(f"{claim} {count}" for claim, count in counts.most_common(3)) or "nothing")
 
 
-def _known(store: Store) -> Iterator[tuple[int, list[Row]]]:
-    """The draws that an earlier call has finished."""
-    for _, rows in store.table().groupby("index"):
-        yield (
-            int(rows["index"].iloc[0]),
-            [{str(name): value for name, value in row.items()} for row in rows.to_dict("records")],
-        )
-
-
 def _manifest(spec: Spec, limits: Limits) -> dict[str, Any]:
     return {
         "name": spec.name,
         "spec_sha256": spec.digest,
-        "scenario_sha256": spec.base_digest(),
+        "scenario_sha256": spec.base()[1],
         "package": version("airground_drake"),
         "drake": version("drake"),
         "limits": {name: value for name, value in limits._asdict().items() if name != "plugins"},

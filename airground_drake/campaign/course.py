@@ -17,14 +17,14 @@ TRIES = 10_000
 """Places that are tried before a field counts as full."""
 MOST_OBSTACLES = 10_000
 BEYOND_M = 0.3
-"""What starts and targets have beyond the safe distance, m."""
+"""Margin of starts and targets beyond the safe distance, m."""
 
 REPLACES = ("ugvs", "obstacles", "uav.start_m", "uav.target_m")
 """Keys of a scenario, dotted, that a course draws."""
 
 
 def _range(least: int, most: int) -> Callable[[object], tuple[int, int]]:
-    """Reads a whole number, or the least and largest one, within bounds."""
+    """Make the reader of a whole number or a range [least, most], within bounds."""
 
     def read(value: object) -> tuple[int, int]:
         low, high = value if isinstance(value, list) and len(value) == 2 else (value, value)
@@ -41,7 +41,7 @@ Obstacles = Annotated[tuple[int, int], PlainValidator(_range(0, MOST_OBSTACLES))
 
 @dataclass(frozen=True)
 class Course:
-    """What a random course is drawn from.
+    """Ranges and sizes that a random course is drawn from.
 
     Attributes:
         ugvs: least and largest number of UGVs.
@@ -64,16 +64,16 @@ class Course:
     hidden: Annotated[Number, Field(ge=0.0, le=1.0), BeforeValidator(as_float)] = 0.0
 
     def values(self, rng: np.random.Generator, obstacle_m: float, ugv_m: float, altitude_m: float) -> dict[str, Any]:
-        """The keys of a scenario that a course replaces, dotted: UGVs, obstacles, start and target of the UAV.
+        """Draw UGVs, obstacles, and the UAV's start and target; returns them by dotted key (REPLACES).
 
         Args:
             rng: of the draw.
             obstacle_m: safe distance of a UGV and an obstacle, m.
-            ugv_m: of two UGVs, m.
-            altitude_m: of the UAV, which starts and ends over the centroid of the UGVs.
+            ugv_m: safe distance of two UGVs, m.
+            altitude_m: of the UAV, m; it starts and ends over the centroid of the UGVs.
 
         Raises:
-            ValueError: if the field is too small for what is drawn.
+            ValueError: if the field is too small.
         """
         n, m = (int(rng.integers(low, high, endpoint=True)) for low, high in (self.ugvs, self.obstacles))
         eastward = rng.permutation(np.arange(n) % 2 == 0)
@@ -81,7 +81,7 @@ class Course:
         starts = self._apart(rng, side, ugv_m + BEYOND_M)
         targets = self._apart(rng, self.length_m - side, ugv_m + BEYOND_M)
         over = {"uav.start_m": starts.mean(axis=0), "uav.target_m": targets.mean(axis=0)}
-        below_m = float(np.sqrt(max(0.0, obstacle_m**2 - altitude_m**2)))  # what the UAV keeps from obstacles in plan
+        below_m = float(np.sqrt(max(0.0, obstacle_m**2 - altitude_m**2)))  # the UAV's horizontal distance to obstacles
         ends = np.concatenate([starts, targets, [*over.values()]])
         places = self._field(rng, m, ends, np.array([obstacle_m + BEYOND_M] * 2 * n + [below_m] * 2))
         hidden = rng.random(m) < self.hidden
@@ -100,7 +100,7 @@ class Course:
         return {"ugvs": ugvs, "obstacles": obstacles, **above}
 
     def _apart(self, rng: np.random.Generator, side: Array, least: float) -> Array:
-        """Places (n, 2), m, at these x, any two on the same side with at least that distance."""
+        """Draw places (n, 2), m, at these x; any two on the same side are at least that far apart."""
         places: list[Array] = []
         for x in side:
             for _ in range(TRIES):
@@ -113,7 +113,7 @@ class Course:
         return np.reshape(places, (-1, 2))
 
     def _field(self, rng: np.random.Generator, count: int, ends: Array, least: Array) -> Array:
-        """Places (count, 2), m, no nearer to starts and targets (k, 2), m, than that, (k,), m."""
+        """Draw places (count, 2), m, at least the distances (k,), m, away from the ends (k, 2), m."""
         places: list[Array] = []
         for _ in range(TRIES):
             if len(places) == count:

@@ -1,17 +1,17 @@
-"""What the rows of a campaign say: bounds for each claim, where it fails, what the draws cover, the worst runs."""
+"""Conclusions from the rows of a campaign: bounds for each claim, where it fails, the worst runs."""
 
 from __future__ import annotations
 
 import json
 import math
 from collections.abc import Mapping, Sequence
-from itertools import combinations
+from itertools import chain, combinations
 from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
 from pandas.api.types import is_numeric_dtype
-from scipy.stats import chi2_contingency, qmc
+from scipy.stats import chi2_contingency
 
 from airground_drake.base.arrays import Array
 from airground_drake.base.statuses import UNDECIDED
@@ -21,28 +21,26 @@ from airground_drake.campaign.statistics import CONFIDENCE, clopper_pearson, con
 WORST = 5
 """Runs of least margin that are listed for each claim."""
 BINS = 4
-"""Of a key, in maps of where a claim fails: quarters of its draws."""
+"""Parts of a key in maps of where a claim fails: quarters of its draws."""
 MOST_VALUES = 12
-"""Different texts of a key, such as lists of policies, in such maps."""
-NOTHING_TO_DO_WITH = "seed"
-"""A key that explains no failure: quarters of the seeds of the noise have nothing in common."""
+"""Most values of a key that is not a number, such as lists of policies, in these maps."""
+UNRELATED = "seed"
+"""A key that explains no failure: neighbouring seeds of the noise have nothing in common."""
 BY_CHANCE = 0.05
-"""A map is shown if differences as large are less likely than this where no key matters."""
-MOST_POINTS = 1000
-"""Draws that the discrepancy is computed from: its cost grows with their square."""
+"""A map is shown if chance alone makes such differences with less than this probability."""
 QUANTILES = (0.0, 0.01, 0.05, 0.25, 0.5, 0.75, 0.95, 0.99, 1.0)
 
 Json = dict[str, Any]
 
 
 class Counts(NamedTuple):
-    """Of one claim in one run of the scenario, over all draws that put it to the test.
+    """Counts of the runs of one claim, over all draws.
 
     Attributes:
-        tested: judged and exercised, or judged by a claim that does not count how often it was; or not finished.
+        tested: runs that could have refuted the claim, and unfinished ones.
         refuted: violations.
-        undecided: of these, or not finished; they count as violations in every upper bound.
-        idle: judged, but nothing could have refuted the claim: these are ignored.
+        undecided: tested runs without a decision; they count as violations in every upper bound.
+        idle: runs that could not have refuted the claim; these are ignored.
     """
 
     tested: int
@@ -52,7 +50,7 @@ class Counts(NamedTuple):
 
     @classmethod
     def of(cls, rows: pd.DataFrame, unfinished: int) -> Counts:
-        """From the rows of one claim and run, and how many more runs were not finished."""
+        """Count the rows of one claim and run; `unfinished` more runs have no such row."""
         tested = _tested(rows)
         status = rows.loc[tested, "status"]
         refuted, undecided = int((status == "refuted").sum()), int(status.isin(UNDECIDED).sum())
@@ -73,12 +71,12 @@ def _tested(rows: pd.DataFrame) -> pd.Series:
 
 
 def evidence(table: pd.DataFrame, marks: Mapping[str, float] | None = None, dependent: Sequence[str] = ()) -> Json:
-    """Everything that a campaign's page says, strict JSON.
+    """All conclusions, for the page of a campaign.
 
     Args:
         table: rows of `rows.COLUMNS`.
-        marks: values to be found in the distributions of `TIMES`, by column.
-        dependent: keys whose values are not independent from draw to draw; with any, claims have no intervals.
+        marks: values that are marked in the distributions of `TIMES`, by column.
+        dependent: keys whose values depend on other draws; with any, claims have no intervals.
     """
     first = table.drop_duplicates("index")
     judged = table[table["ended"] == JUDGED]
@@ -104,23 +102,22 @@ def evidence(table: pd.DataFrame, marks: Mapping[str, float] | None = None, depe
             key=lambda claim: tuple(not claim[name] for name in ("differs", "refuted", "undecided", "untested")),
         ),
         "times": [_times(str(run), rows, marks or {}) for run, rows in runs.groupby("run")],
-        "space": _space(drawn),
+        "keys": [str(key) for key in drawn.columns],
     }
 
 
 def drawn_keys(first: pd.DataFrame) -> pd.DataFrame:
-    """What was drawn, by index and key: numbers as they are, an entry of a list as key.0, other values as text."""
+    """The drawn values by index and key: numbers as they are, an entry of a list as key.0, other values as text."""
+
+    def entries(key: str, value: Any) -> Json:
+        if isinstance(value, list) and all(isinstance(each, int | float) for each in value):
+            return {f"{key}.{i}": each for i, each in enumerate(value)}
+        return {key: value if type(value) in (int, float) else json.dumps(value)}
+
     found = {}
     for index, text in zip(first["index"], first["drawn"], strict=True):
-        row: Json = {}
-        for key, value in json.loads(text).items():
-            if isinstance(value, list) and all(isinstance(each, int | float) for each in value):
-                row |= {f"{key}.{i}": each for i, each in enumerate(value)}
-            else:
-                row[key] = (
-                    value if isinstance(value, int | float) and not isinstance(value, bool) else json.dumps(value)
-                )
-        found[index] = row
+        pairs = (entries(key, value).items() for key, value in json.loads(text).items())
+        found[index] = dict(chain.from_iterable(pairs))
     return pd.DataFrame.from_dict(found, orient="index")
 
 
@@ -148,12 +145,8 @@ def _claim(rows: pd.DataFrame, unfinished: int, drawn: pd.DataFrame, *, bounded:
 
 
 def _times(run: str, rows: pd.DataFrame, marks: Mapping[str, float]) -> Json:
-    found: Json = {
-        "run": run,
-        "runs": len(rows),
-        "arrived": int(rows["arrived"].sum()),
-        "ugvs": int(rows["ugvs"].sum()),
-    }
+    sums = {name: int(rows[name].sum()) for name in ("arrived", "ugvs")}
+    found: Json = {"run": run, "runs": len(rows), **sums}
     for name in TIMES:
         values = rows[name].dropna().to_numpy()
         found[name] = {"count": len(values), "quantiles": _quantiles(values)}
@@ -168,11 +161,11 @@ def _quantiles(values: Array) -> dict[str, float]:
 
 
 def _where(violated: pd.Series, drawn: pd.DataFrame) -> Json | None:
-    """A map of the two keys by which violations differ most: of each pair of quarters, violations and runs.
+    """Count violations and runs in each pair of quarters of the two keys by which violations differ most.
 
-    None if chance may be why they differ: the least p-value of all pairs, times their number (Bonferroni), tells.
+    None if chance may explain the differences, by the least p-value of all pairs times their number (Bonferroni).
     """
-    keys = drawn.loc[violated.index].drop(columns=NOTHING_TO_DO_WITH, errors="ignore")
+    keys = drawn.loc[violated.index].drop(columns=UNRELATED, errors="ignore")
     parts = {str(key): part for key in keys if (part := _parts(keys[key])) is not None}
     tables = {
         pair: pd.crosstab([parts[key] for key in pair], violated.to_numpy())
@@ -193,46 +186,24 @@ def _where(violated: pd.Series, drawn: pd.DataFrame) -> Json | None:
 
 
 def _by_chance(table: Array) -> float:
-    """How likely differences as large are if the keys do not matter (chi-squared test)."""
+    """Probability of differences as large if the keys have no effect (chi-squared test)."""
     return float(chi2_contingency(table).pvalue) if min(table.shape) > 1 else 1.0
 
 
 def _parts(values: pd.Series) -> pd.Series | None:
-    """The quarter, or the value, that each draw of a key is in, as text; None if all are in one, or texts too many."""
+    """The quarter, or the value, of each draw of a key, as text; None if there is only one, or too many texts."""
     if not is_numeric_dtype(values) and values.nunique() > MOST_VALUES:
         return None
     if not is_numeric_dtype(values) or values.nunique() <= BINS:
         found = values.astype(str)
     else:
-        found = (
-            pd.qcut(values, BINS, duplicates="drop")
-            .map(lambda part: f"{part.left:.4g} to {part.right:.4g}")
-            .astype(str)
-        )
+        quarters = pd.qcut(values, BINS, duplicates="drop")
+        found = quarters.map(lambda part: f"{part.left:.4g} to {part.right:.4g}").astype(str)
     return found.reset_index(drop=True) if len(found.unique()) > 1 else None
 
 
-def _space(drawn: pd.DataFrame) -> Json:
-    """How evenly the numbers that were drawn fill the box that they span."""
-    numbers = drawn.select_dtypes("number").dropna(axis="columns").head(MOST_POINTS)
-    numbers = numbers.loc[:, numbers.max() > numbers.min()]
-    found: Json = {"keys": [str(key) for key in drawn.columns], "numbers": [str(key) for key in numbers.columns]}
-    if len(numbers) < 2 or not len(numbers.columns):
-        return found
-    low, high = numbers.min().to_numpy(float), numbers.max().to_numpy(float)
-    points = (numbers.to_numpy(float) - low) / (high - low)
-    random = np.random.default_rng(0).random(points.shape)
-    return found | {
-        "low": low.tolist(),
-        "high": high.tolist(),
-        "points": len(points),
-        "discrepancy": float(qmc.discrepancy(points)),
-        "discrepancy_of_random_points": float(qmc.discrepancy(random)),
-    }
-
-
 def strict(value: Any) -> Any:
-    """The value with None for numbers that are not finite, as JSON."""
+    """The value as strict JSON: None for numbers that are not finite."""
     if isinstance(value, dict):
         return {str(key): strict(each) for key, each in value.items()}
     if isinstance(value, list | tuple):

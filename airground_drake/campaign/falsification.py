@@ -1,9 +1,9 @@
-"""Looking for a violation: points of the unit cube that a sampler asks for are simulated and judged."""
+"""Search for a violation: simulate and judge the points of the unit cube that a sampler asks for."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
@@ -23,16 +23,17 @@ from airground_drake.campaign.work import rows_at, rows_of_scenario, trace_of
 from airground_drake.run.trace import Trace
 from airground_drake.scenarios.estimate import Limits
 from airground_drake.scenarios.load import from_data
+from airground_drake.scenarios.schema import Scenario
 
 
 @dataclass(frozen=True)
 class Search:
-    """What is looked for, and where: goes to the processes that look.
+    """A search; it is sent to the processes that simulate.
 
     Attributes:
-        spec: of the scenarios; the course, if there is one, is that of draw 0.
-        objective: what is made least.
-        limits: what a scenario may ask for.
+        spec: of the scenarios; a course is that of draw 0.
+        objective: is minimised.
+        limits: largest scenario and longest time.
     """
 
     spec: Spec
@@ -49,22 +50,22 @@ class Search:
 
     def fails(self, data: dict[str, Any]) -> bool:
         """Whether a scenario, as nested dicts and lists, is valid and a counterexample."""
-        try:
-            scenario = from_data(data, "smaller scenario")
-        except ScenarioError:
-            return False
-        return self._judge(rows_of_scenario(self.spec, scenario, self.limits))[1]
+        scenario = _valid(data)
+        return scenario is not None and self._judge(rows_of_scenario(self.spec, scenario, self.limits))[1]
 
     def trace(self, data: dict[str, Any]) -> Trace | None:
-        """Of the first run of a scenario; None if it is not valid, or cannot be simulated."""
-        try:
-            scenario = from_data(data, "smaller scenario")
-        except ScenarioError:
-            return None
-        return trace_of(self.spec, scenario, self.limits)
+        """The trace of a scenario's first run; None if it is not valid, or cannot be simulated."""
+        scenario = _valid(data)
+        return None if scenario is None else trace_of(self.spec, scenario, self.limits)
 
     def _judge(self, rows: list[Row]) -> tuple[float, bool]:
         return self.objective.value(rows), self.objective.found(rows)
+
+
+def _valid(data: dict[str, Any]) -> Scenario | None:
+    with suppress(ScenarioError):
+        return from_data(data, "smaller scenario")
+    return None
 
 
 @dataclass(frozen=True)
@@ -72,10 +73,10 @@ class Best:
     """The result of a search.
 
     Attributes:
-        tried: points.
-        value: the least of the objective; infinite if it was never measured.
-        point: where, (n,); (0,) if it was never measured.
-        found: whether it is a counterexample.
+        tried: number of points.
+        value: least objective; infinite if it was never measured.
+        point: its point, (n,); (0,) if it was never measured.
+        found: whether this is a counterexample.
     """
 
     tried: int
@@ -85,17 +86,17 @@ class Best:
 
 
 def falsify(search: Search, sampler: Sampler, number: int, pool: Pool, progress: Progress = SILENT) -> Best:
-    """Try points until there is a counterexample, or so many were tried.
+    """Try points until there is a counterexample, or `number` of them were tried.
 
     Args:
-        search: what is looked for.
-        sampler: where.
-        number: of points, at least; the last batch is finished.
-        pool: that does the work.
-        progress: is told how far it is.
+        search: judges a point.
+        sampler: chooses points.
+        number: least number of points; the last batch is finished.
+        pool: does the work.
+        progress: receives the progress.
 
     Raises:
-        PluginError: if the sampler raises, ends the process, or asks for what are no points.
+        PluginError: if the sampler raises, ends the process, or returns no points in [0, 1).
     """
     best = Best(0, np.inf, np.empty(0), False)
     while best.tried < number and not best.found:
@@ -105,7 +106,7 @@ def falsify(search: Search, sampler: Sampler, number: int, pool: Pool, progress:
         for k, judged in pool(partial(search.at, points), range(len(points))):
             if judged is not None:
                 values[k], found[k] = judged
-        with _of_others(sampler, "tell"):
+        with _guarded(sampler, "tell"):
             sampler.tell(points.copy(), values.copy())
         k = int(np.argmin(np.where(found, values, np.inf))) if found.any() else int(values.argmin())
         tried = best.tried + len(points)
@@ -118,12 +119,8 @@ def falsify(search: Search, sampler: Sampler, number: int, pool: Pool, progress:
 
 
 def _asked(sampler: Sampler, n: int) -> Array:
-    """The points (k, n) that a sampler, perhaps a third-party one, asks for.
-
-    Raises:
-        PluginError: if it raises, or these are not one or more points in [0, 1).
-    """
-    with _of_others(sampler, "ask"):
+    """The points (k, n) that a sampler asks for; PluginError if they are not one or more points in [0, 1)."""
+    with _guarded(sampler, "ask"):
         points = np.array(sampler.ask(), dtype=np.float64)
     if points.ndim != 2 or points.shape[1] != n or not len(points):
         raise PluginError(f"ask of sampler {_name(sampler)}: array {points.shape}, wanted (k, {n}), k at least 1")
@@ -133,8 +130,8 @@ def _asked(sampler: Sampler, n: int) -> Array:
 
 
 @contextmanager
-def _of_others(sampler: Sampler, what: str) -> Iterator[None]:
-    """Whatever a method of a sampler raises is a `PluginError` that names it."""
+def _guarded(sampler: Sampler, what: str) -> Iterator[None]:
+    """Turn an exception of a sampler's method into a `PluginError` that names the method."""
     try:
         yield
     except (Exception, SystemExit) as error:

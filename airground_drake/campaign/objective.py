@@ -14,12 +14,12 @@ FAILED = -1.0
 
 @dataclass(frozen=True)
 class Margin:
-    """The least margin of a claim; below 0, or refuted, is found."""
+    """The least margin of a claim; a refuted claim is a counterexample."""
 
     claim: str
 
     def value(self, rows: Sequence[Row]) -> float:
-        """Of the rows of a draw; infinite where nothing was measured."""
+        """The least margin in the rows of a draw; infinite without a measurement."""
         return min((self._of(row) for row in rows if row["claim"] == self.claim), default=math.inf)
 
     def found(self, rows: Sequence[Row]) -> bool:
@@ -34,22 +34,22 @@ class Margin:
 
 @dataclass(frozen=True)
 class Most:
-    """The largest value of a column of `rows.COLUMNS`, over the runs; above a limit, if one is given, is found."""
+    """The largest value of a column of `rows.COLUMNS`; a value above the limit is a counterexample."""
 
     column: str
     limit: float = math.inf
 
     def value(self, rows: Sequence[Row]) -> float:
-        """Of the rows of a draw, with the sign changed; infinite where nothing was measured."""
+        """The negated largest value in the rows of a draw; infinite without a measurement."""
         values = [-self._of(row) for row in rows if row["ended"] == JUDGED]
         return min((each for each in values if not math.isnan(each)), default=math.inf)
 
     def found(self, rows: Sequence[Row]) -> bool:
-        """Whether the limit is passed."""
+        """Whether the limit is exceeded."""
         return self.value(rows) < -self.limit
 
     def _of(self, row: Row) -> float:
-        """The value of a row; a UGV that does not arrive is later than all others."""
+        """The value of a row. A UGV that does not arrive counts as LATEST_S."""
         never = self.column == "arrival_s" and row["arrived"] < row["ugvs"]
         return LATEST_S if never else float(row[self.column])
 
@@ -57,4 +57,4 @@ class Most:
 Objective = Margin | Most
 
 LATEST_S = 1e9
-"""In place of infinity, which means that nothing was measured."""
+"""Time of an arrival that never happens, s; infinity would mean that nothing was measured."""

@@ -1,4 +1,4 @@
-"""campaign.html: one offline page that renders the evidence of a campaign; no JavaScript."""
+"""campaign.html: an offline page with the evidence of a campaign; no JavaScript."""
 
 from __future__ import annotations
 
@@ -27,28 +27,25 @@ SHOWN = ("SAFE-TRACE", "SAFE-HYP", "LIVE-GOAL")
 
 
 class Drawing(NamedTuple):
-    """A figure and what it shows."""
+    """A figure and its title."""
 
     title: str
     svg: Markup
 
 
 def page(found: dict[str, Any], table: pd.DataFrame) -> str:
-    """The page.
+    """Render the page.
 
     Args:
-        found: of `evidence.evidence`, with name, title, spec and stopped (the last draw that counts, or None).
-        table: the rows that it is of.
+        found: from `evidence.evidence`, with name, title, spec and stopped (the last draw that counts, or None).
+        table: the rows.
     """
-    return (
-        _environment()
-        .get_template("campaign.html.j2")
-        .render(found=found, told=told(found), separated=_separated(found), figures=_figures(found, table))
-    )
+    template = _environment().get_template("campaign.html.j2")
+    return template.render(found=found, told=told(found), separated=_separated(found), figures=_figures(found, table))
 
 
 def told(found: Mapping[str, Any]) -> list[Line]:
-    """What was found of each claim, with its bound; violations first, then what is open."""
+    """A sentence for each claim, with its bound: violations first, then open claims."""
     lines = []
     for claim in found["claims"]:
         what = f"{claim['claim']} in run {claim['run']}"
@@ -72,14 +69,14 @@ def told(found: Mapping[str, Any]) -> list[Line]:
 
 
 class Separation(NamedTuple):
-    """What separates failures from passes: in words, and drawn."""
+    """What separates failures from passes, in words and as a figure."""
 
     words: str
     drawing: Drawing
 
 
 def _separated(found: Mapping[str, Any]) -> list[Separation]:
-    """One for each claim whose violations depend on what was drawn."""
+    """One for each claim with violations that depend on a drawn key."""
     separations = list[Separation]()
     for claim in found["claims"]:
         if where := claim["fails_where"]:
@@ -97,7 +94,7 @@ def _cell(cell: Mapping[str, Any]) -> str:
 
 
 def _shares(cells: Sequence[Mapping[str, Any]]) -> str:
-    """A bar for each combination of values, the share of runs that fail, with the counts beside it."""
+    """A bar for each combination of values: the share of runs that fail, with the counts beside it."""
     with canvas.style():
         height_in = 0.6 + 0.22 * len(cells)
         figure = Figure(figsize=(canvas.FULL_IN, height_in))
@@ -134,7 +131,7 @@ def _figures(found: dict[str, Any], table: pd.DataFrame) -> list[Drawing]:
 
 
 def _histogram(values: Array, title: str, label: str, mark: float | None) -> tuple[str, str]:
-    """How often what was measured; a dashed line at the mark, if there is one."""
+    """A histogram, with its title; a dashed line at the mark, if there is one."""
     with canvas.style():
         figure = Figure(figsize=(canvas.WIDE_IN, 2.2))
         axes = figure.add_axes((0.16, 0.26, 0.8, 0.6))
@@ -148,15 +145,8 @@ def _histogram(values: Array, title: str, label: str, mark: float | None) -> tup
         axes.set_ylim(0.0, 1.08 * max(1, counts.max()))
         if mark is not None:
             axes.axvline(mark, color=canvas.ALARM, linestyle=(0, (4, 2)), linewidth=1.2)
-            axes.text(
-                mark,
-                1.0,
-                f" {mark:g}",
-                color=canvas.ALARM,
-                transform=axes.get_xaxis_transform(),
-                va="bottom",
-                ha="center",
-            )
+            above = axes.get_xaxis_transform()
+            axes.text(mark, 1.0, f" {mark:g}", color=canvas.ALARM, transform=above, va="bottom", ha="center")
         canvas.rule(axes, label, "runs")
         return title, canvas.svg(figure)
 

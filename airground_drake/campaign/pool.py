@@ -1,4 +1,4 @@
-"""Much of the same work, on the processors of this machine or on a Dask cluster."""
+"""The same work for many items, on the processors of this machine or on a Dask cluster."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from airground_drake.base.errors import AirgroundError, one_line
 from airground_drake.base.parallel import processes
 
 DEATHS = 2
-"""An item is given up when so many of its processes have died."""
+"""An item is given up after this many of its processes have died."""
 AHEAD = 4
-"""Items that are handed out beforehand for each process."""
+"""Items for each process that are handed out in advance."""
 
 T = TypeVar("T")
 
@@ -27,23 +27,23 @@ class Pool(Protocol):
     """Does the same work for many items."""
 
     def __call__(self, work: Callable[[int], T], items: Iterable[int]) -> Iterator[tuple[int, T | None]]:
-        """The result of each item, as it is finished; None if its process has died again and again.
+        """Yield each item with its result when it is finished; None if its process died each time.
 
         Args:
-            work: for one item; goes to other processes, and so is pickled.
-            items: numbers, none twice.
+            work: does one item; it is pickled.
+            items: different numbers.
         """
 
 
 @contextmanager
 def local(jobs: int) -> Iterator[Pool]:
-    """A pool of so many processes of this machine."""
+    """A pool of `jobs` processes on this machine."""
     with ExitStack() as alive:
         yield _Local(jobs, alive)
 
 
 class _Local:
-    """Processes that go on from one call to the next; all are replaced when one of them dies."""
+    """Processes that are kept between calls. When one dies, all are replaced."""
 
     def __init__(self, jobs: int, alive: ExitStack) -> None:
         self._jobs, self._alive = jobs, alive
@@ -52,8 +52,8 @@ class _Local:
     def __call__(self, work: Callable[[int], T], items: Iterable[int]) -> Iterator[tuple[int, T | None]]:
         """See `Pool`.
 
-        If a process dies, its pool ends the others, too. The items that were handed out are then done again, each in a
-        process of its own.
+        If a process dies, its pool ends the others, too. Items that were handed out are then done again, each in its
+        own process.
         """
         waiting, under_way = iter(items), dict[Future[T], int]()
         while True:
@@ -73,7 +73,7 @@ class _Local:
 
 
 def _submitted(pool: ProcessPoolExecutor, call: Callable[[], T]) -> Future[T]:
-    """The future of a call; failed already if a process of the pool has just died."""
+    """The future of a call; it has failed if a process of the pool has just died."""
     try:
         return pool.submit(call)
     except BrokenProcessPool as error:
@@ -83,12 +83,12 @@ def _submitted(pool: ProcessPoolExecutor, call: Callable[[], T]) -> Future[T]:
 
 
 def _lost(future: Future[T]) -> bool:
-    """Whether a process died before it had finished this."""
+    """Whether a process died before this was finished."""
     return isinstance(future.exception(), BrokenProcessPool)
 
 
 def _alone(call: Callable[[], T]) -> T | None:
-    """The result of a call in a process of its own, begun again if that dies; None if it always does."""
+    """The result of a call in its own process, tried DEATHS times; None if the process always dies."""
     for _ in range(DEATHS):
         with processes(1) as one:
             future = _submitted(one, call)
@@ -99,9 +99,9 @@ def _alone(call: Callable[[], T]) -> T | None:
 
 @contextmanager
 def cluster(scheduler: str, timeout_s: float = 10.0) -> Iterator[Pool]:
-    """The workers of a Dask cluster, each of which must have this package installed.
+    """A pool of the workers of a Dask cluster. Each worker needs this package.
 
-    Dask replaces workers that die, and gives up an item that has killed several.
+    Dask replaces workers that die, and gives up an item after several deaths.
 
     Raises:
         AirgroundError: if the scheduler cannot be reached, or Dask is not installed.
@@ -123,7 +123,7 @@ def cluster(scheduler: str, timeout_s: float = 10.0) -> Iterator[Pool]:
 def _on_cluster(
     dask: Any, client: Any, work: Callable[[int], T], items: Iterable[int]
 ) -> Iterator[tuple[int, T | None]]:
-    """See `Pool`. Names of items are unique to this client; workers may join at any time.
+    """See `Pool`. Names of items are unique to this client. Workers may join at any time.
 
     Raises:
         AirgroundError: if the scheduler is lost.
@@ -149,11 +149,7 @@ def _on_cluster(
 
 
 def _result(dask: Any, future: Any) -> Any:
-    """The result of a finished item; None if its workers have died.
-
-    Raises:
-        Exception: what the work has raised.
-    """
+    """The result of a finished item, or the exception of its work; None if its workers have died."""
     try:
         return future.result()
     except dask.scheduler.KilledWorker:

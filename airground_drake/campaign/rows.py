@@ -1,4 +1,4 @@
-"""The dataset of a campaign: a row is what a claim says of a run."""
+"""The dataset of a campaign: a row has the verdict of a claim on a run."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ COLUMNS: dict[str, str] = {
     "intervened_s": "float64", "wall_s": "float64",
     "drawn": "str", "digest": "str",
 }  # fmt: skip
-"""Columns of the dataset and their types: a row is what a claim says of a run; NaN where there is no such number.
+"""Columns of the dataset and their types; a number that does not exist is NaN.
 
-`ended` is `judged`, or what kept a draw from it, explained in `what`: `invalid` (no valid scenario), `stopped` (the
-simulation), `died` (its process); such a row has no claim, nor has that of a run that no claim is about. `drawn` is
-strict JSON: values by key; `digest` is of all rows of a draw (see `store`)."""
+`ended` is `judged`, or the reason why not, explained in `what`: `invalid` (no valid scenario), `stopped` (the
+simulation), `died` (its process). Such a row has no claim; the row of a run without claims has none, either. `drawn` is
+strict JSON: values by key. `digest` is the digest of all rows of a draw (see `store`)."""
 
 JUDGED, INVALID, STOPPED, DIED = "judged", "invalid", "stopped", "died"
 UNFINISHED = (STOPPED, DIED)
-"""Every claim of such a run is undecided; of all runs of a draw where a row names none."""
+"""Every claim of such a run is undecided; if the row names no run, every claim of the draw."""
 
 TIMES = ("first_trigger_s", "arrival_s", "intervened_s", "wall_s")
 """Columns whose distributions are shown, s."""
@@ -31,7 +31,7 @@ Row = dict[str, Any]
 
 
 def is_tested(status: str, exercised: float) -> bool:
-    """Whether something could have refuted the claim of a row; assumed where it was not counted (NaN)."""
+    """Whether something could have refuted the claim of a row; assumed if it was not counted (NaN)."""
     return outcome(status, exercised) != NOT_EXERCISED
 
 

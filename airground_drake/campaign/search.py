@@ -1,4 +1,4 @@
-"""Points of the unit cube, asked for and told about: at random, evenly, or by CMA-ES."""
+"""Samplers, which choose points of the unit cube: at random, evenly, or by CMA-ES."""
 
 from __future__ import annotations
 
@@ -12,20 +12,20 @@ from scipy.stats import qmc
 from airground_drake.base.arrays import Array
 
 BATCH = 16
-"""Points at a time, of samplers that do not learn."""
+"""Points at a time, for samplers that do not learn."""
 WORTHLESS = 1e6
-"""The value of points where nothing could be measured, for a strategy that takes finite values only."""
+"""Value of points without a measurement, for CMA-ES, which needs finite values."""
 
 
 @runtime_checkable
 class Sampler(Protocol):
-    """Where to look next; made for a number of dimensions and a seed."""
+    """Chooses where to look next. It is made from a number of dimensions and a seed."""
 
     def ask(self) -> Array:
-        """Points (k, n) in [0, 1)."""
+        """Return the next points (k, n) in [0, 1)."""
 
     def tell(self, points: Array, values: Array) -> None:
-        """The objective there, (k,): smaller is better, infinite means not measured."""
+        """Take the objective at these points, (k,): smaller is better, infinite means not measured."""
 
 
 class Uniform:
@@ -43,7 +43,7 @@ class Uniform:
         """Nothing is learnt."""
 
 
-class Halton:
+class Halton(Uniform):
     """Points of low discrepancy."""
 
     def __init__(self, dimensions: int, seed: int) -> None:
@@ -54,12 +54,9 @@ class Halton:
         """See `Sampler`."""
         return np.asarray(self._sequence.random(BATCH))
 
-    def tell(self, points: Array, values: Array) -> None:
-        """Nothing is learnt."""
-
 
 class CmaEs:
-    """Evolution strategy with covariance matrix adaptation (Hansen 2016), begun anew elsewhere when it settles."""
+    """Evolution strategy with covariance matrix adaptation (Hansen 2016), restarted elsewhere when it converges."""
 
     def __init__(self, dimensions: int, seed: int) -> None:
         """For points (n,)."""
@@ -67,7 +64,7 @@ class CmaEs:
         self._begin()
 
     def ask(self) -> Array:
-        """See `Sampler`; the strategy needs two dimensions, so that a single one has one without effect beside it."""
+        """See `Sampler`. The strategy needs two dimensions: if there is only one, a second has no effect."""
         self._asked = self._strategy.ask()
         return np.clip(np.array(self._asked)[:, : self._dimensions], 0.0, np.nextafter(1.0, 0.0))
 
@@ -79,7 +76,7 @@ class CmaEs:
 
     def _begin(self) -> None:
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # about packages for plots that it can do without
+            warnings.simplefilter("ignore")  # of missing packages for plots
             import cma
 
         self.restarts += 1

@@ -1,6 +1,6 @@
-"""From a counterexample to a small one: fewer robots and obstacles, a later start, an earlier end, rounder numbers.
+"""Make a counterexample small: fewer robots and obstacles, a later start, an earlier end, rounder numbers.
 
-Greedy: each change is kept if the scenario is still valid and still fails; until nothing more can go.
+Greedy: each change is kept if the scenario is still valid and still fails, until no change is left.
 """
 
 from __future__ import annotations
@@ -19,30 +19,30 @@ from airground_drake.run.trace import Trace
 DIGITS = (0, 1, 2, 3)
 """Decimals that numbers are rounded to, the fewest first."""
 SPARE_S = (0.25, 0.5, 1.0, 2.0, 5.0)
-"""What is left before the first trigger, or after the last event, s."""
+"""Time that is kept before the first trigger, or after the last event, s."""
 SEEDS = (1, 2, 3, 4)
-"""Of the noise, which are tried where a change draws other noise."""
+"""Seeds of the noise to try after a change that draws other noise."""
 ROUNDED = ("ugvs", "obstacles", "uav", "control", "decision", "duration_s")
-"""Keys under which numbers are made rounder."""
+"""Keys with numbers that are rounded."""
 
 Json = dict[str, Any]
 Fails = Callable[[Json], bool]
 """Whether a scenario is valid and fails, as before."""
 Traced = Callable[[Json], Trace | None]
-"""What comes of a scenario's run, if anything."""
+"""Simulates a scenario's run; None if it cannot be simulated."""
 
 
 def shrink(data: Json, fails: Fails, traced: Traced, tests: int) -> tuple[Json, int]:
-    """A smaller scenario that fails, too.
+    """Find a smaller scenario that fails, too.
 
     Args:
-        data: of a scenario that fails, as `scenarios.load.resolved` gives it; with a single run.
+        data: a scenario that fails, as `scenarios.load.resolved` returns it, with one run.
         fails: the test.
         traced: simulates the run; not counted.
-        tests: how often it may be used.
+        tests: how often `fails` may be called.
 
     Returns:
-        The smallest one found, and how many tests it took.
+        The smallest scenario found, and the number of tests.
     """
     steps = (
         _without_policies,
@@ -55,7 +55,7 @@ def shrink(data: Json, fails: Fails, traced: Traced, tests: int) -> tuple[Json, 
     left = tests
 
     def first(candidates: Iterator[Json]) -> Json | None:
-        """The first that fails, as long as tests are left."""
+        """The first candidate that fails, while tests are left."""
         nonlocal left
         for candidate in itertools.islice(candidates, left):
             left -= 1
@@ -82,7 +82,7 @@ def _without_robots(data: Json) -> Iterator[Json]:
 
 
 def _with_seeds(candidates: Iterator[Json]) -> Iterator[Json]:
-    """All with their own seed, then all with others."""
+    """All candidates with their own seed, then with other seeds."""
     own = list(candidates)
     yield from own
     for seed in SEEDS:
@@ -104,24 +104,15 @@ def _without_entries(data: Json, key: str) -> Iterator[Json]:
         yield smaller
 
 
-def _without_items(data: Json, *keys: str) -> Iterator[Json]:
-    def held(whole: Json) -> list[Any]:
-        found: Any = whole
-        for key in keys:
-            found = found[key]
-        return list(found)
-
-    for at in range(len(held(data))):
+def _without_items(data: Json, part: str, key: str) -> Iterator[Json]:
+    for at in range(len(data[part][key])):
         smaller = copy.deepcopy(data)
-        inner: Any = smaller
-        for key in keys[:-1]:
-            inner = inner[key]
-        del inner[keys[-1]][at]
+        del smaller[part][key][at]
         yield smaller
 
 
 def _later(traced: Traced, data: Json) -> Iterator[Json]:
-    """Begin shortly before the first trigger, where the robots are by then."""
+    """Begin shortly before the first trigger, at the robots' positions at that time."""
     yield from _with_seeds(_begun_later(traced, data))
 
 
@@ -134,11 +125,11 @@ def _begun_later(traced: Traced, data: Json) -> Iterator[Json]:
 
 
 BESIDE_M = 1e-3
-"""From where a preset has ended to the waypoint that makes one of it."""
+"""Length of a preset that has ended, m: its two waypoints must differ."""
 
 
 def _from(data: Json, trace: Trace, t: float) -> Json:
-    """The scenario from a time of its run on."""
+    """The scenario from a time t of its run on, s."""
     later = copy.deepcopy(data)
     row = int(np.searchsorted(trace.t, t))
     t = float(trace.t[row])
@@ -147,7 +138,7 @@ def _from(data: Json, trace: Trace, t: float) -> Json:
         motion = Motion.at_speed(waypoints, ugv["preset"]["speed_m_s"], start=0.0)
         here = trace.signals.loc[row, [f"{name}.ref_{axis}_m" for axis in "xyz"]].to_numpy(np.float64)
         ahead = motion.positions[motion.times > t + 1e-6]
-        if not len(ahead):  # where its preset has ended: two waypoints must differ
+        if not len(ahead):  # its preset has ended
             ahead = here[None] + [BESIDE_M, 0.0, 0.0]
         ugv["preset"]["waypoints_m"] = [here.tolist(), *ahead.tolist()]
         ugv["start_m"] = trace.position(name)[row].tolist()
@@ -158,7 +149,7 @@ def _from(data: Json, trace: Trace, t: float) -> Json:
 
 
 def _shorter(traced: Traced, data: Json) -> Iterator[Json]:
-    """End soon after the last event but arrivals, or in half the time; not before the first control period is over."""
+    """End soon after an event other than an arrival, or earlier by a share; at least one control period is left."""
     trace = traced(data)
     ends = [data["duration_s"] * share for share in (0.25, 0.5, 0.75, 0.9)]
     if trace is not None:
@@ -170,7 +161,7 @@ def _shorter(traced: Traced, data: Json) -> Iterator[Json]:
 
 
 def _rounder(data: Json) -> Iterator[Json]:
-    """All numbers at once, then those under each key, then one at a time."""
+    """Round all numbers at once, then the numbers under each key."""
     groups = [ROUNDED, *((key,) for key in ROUNDED)]
     for digits in DIGITS:
         for group in groups:

@@ -1,4 +1,4 @@
-"""What a campaign draws: a scenario, distributions over its keys, a seed.
+"""The file of a campaign: a scenario, distributions over its keys, a seed.
 
 name: case_a_drawn
 scenario: case_a              # shipped, or a path beside this file
@@ -25,7 +25,7 @@ from pydantic import BeforeValidator, ConfigDict, Field, PlainValidator, WithJso
 from airground_drake.base import files
 from airground_drake.base.errors import Fault, ScenarioError
 from airground_drake.campaign.course import REPLACES, Course
-from airground_drake.campaign.distributions import KINDS, RANDOM, Choice, Key, combinations, made, stream, values_of
+from airground_drake.campaign.distributions import GRID, HALTON, KINDS, Key, combinations, made, stream, values_of
 from airground_drake.campaign.rows import TIMES
 from airground_drake.registry import RUN_CLAIMS
 from airground_drake.scenarios import plugins
@@ -37,18 +37,17 @@ from airground_drake.scenarios.schema import Scenario
 from airground_drake.verify.finding import PLAIN_NAME
 
 COURSE = "course"
-"""Name of the random stream of maps and teams."""
+"""Name of the random numbers that maps and teams are drawn from."""
 NOT_JUDGED: dict[str, Any] = {"reproduction": [], "choices": []}
-"""Keys that say what is in the paper, and nothing about a drawn scenario."""
+"""Keys about the paper's numbers, which say nothing about a drawn scenario."""
 
 
 def _wanted(words: str, **bounds: Any) -> Any:
-    """What messages say of a key's value, besides its bounds."""
+    """The bounds of a key's value, and what messages say is wanted."""
     return Field(json_schema_extra={WANTED: words}, **bounds)
 
 
 def _key(given: object) -> Key:
-    """How a key is drawn."""
     if not isinstance(given, dict) or len(given) != 1:
         raise refused(given, f"wanted: one of {', '.join(KINDS)} and its parameters")
     ((kind, parameters),) = given.items()
@@ -74,11 +73,11 @@ class File:
         scenario: shipped name, or path.
         runs: of the scenario; empty: all.
         seed: of the draws.
-        fixed: overrides that every draw has.
+        fixed: overrides of every draw.
         drawn: distributions by dotted key.
         course: random maps and teams, if any.
         claims: identifiers of the claims to judge; empty: all about runs.
-        marks: values to be found in distributions of times, by column.
+        marks: values that are marked in the distributions of times, by column.
     """
 
     __pydantic_config__: ClassVar = ConfigDict(extra="forbid")
@@ -100,11 +99,11 @@ class File:
 
 @dataclass(frozen=True, kw_only=True)
 class Spec(File):
-    """A campaign as its file has it.
+    """A campaign.
 
     Attributes:
-        digest: SHA-256 of the file.
-        source: its path.
+        digest: SHA-256 of its file.
+        source: path of the file.
         data: content of the scenario's file when the campaign was read, without NOT_JUDGED.
     """
 
@@ -114,16 +113,16 @@ class Spec(File):
 
     @property
     def combinations(self) -> int:
-        """Draws after which all grids have been gone through once."""
+        """Number of combinations of all grids."""
         return combinations(self.drawn)
 
     @property
     def dependent(self) -> list[str]:
-        """Keys whose values in one draw depend on those in others: `halton` and `grid`."""
-        return [key for key, drawn in self.drawn.items() if drawn.how != RANDOM]
+        """Keys with values that are not independent from draw to draw: `halton` and `grid`."""
+        return [key for key, drawn in self.drawn.items() if drawn.kind in (HALTON, GRID)]
 
     def values(self, index: int) -> dict[str, Any]:
-        """What is drawn, by dotted key; `course` and its keys not among it."""
+        """The values of a draw by dotted key, without those of the course."""
         return values_of(self.drawn, self.seed, index)
 
     def draw(self, index: int) -> Scenario:
@@ -134,17 +133,13 @@ class Spec(File):
         """
         return self.scenario_of(self.values(index), index)
 
-    def base_digest(self) -> str:
-        """SHA-256 of the scenario's file and of what is the same in every draw."""
-        return load(self.scenario, NOT_JUDGED | dict(self.fixed))[1]
-
-    def base(self) -> Scenario:
-        """The scenario before anything is drawn.
+    def base(self) -> tuple[Scenario, str]:
+        """The scenario before anything is drawn, and the SHA-256 of its file and of `fixed`.
 
         Raises:
             ScenarioError: if it cannot be loaded.
         """
-        return load(self.scenario, NOT_JUDGED | dict(self.fixed))[0]
+        return load(self.scenario, NOT_JUDGED | dict(self.fixed))
 
     def scenario_of(self, values: Mapping[str, Any], index: int) -> Scenario:
         """The scenario with these values by dotted key, on the course of a draw; raises as `draw`."""
@@ -169,10 +164,10 @@ class Spec(File):
         Raises:
             ScenarioError: if any is named; says where, and how to allow it.
         """
-        plugins.refuse(self.base(), self.scenario)
+        plugins.refuse(self.base()[0], self.scenario)
         first = self.values(0)
         for key, drawn in self.drawn.items():
-            for value in drawn.distribution.values if isinstance(drawn.distribution, Choice) else ():
+            for value in drawn.choices:
                 try:
                     scenario = self.scenario_of(first | {key: value}, 0)
                 except ScenarioError:
@@ -185,7 +180,7 @@ class Spec(File):
 
 
 def load_spec(path: Path) -> Spec:
-    """Read a campaign, and see that it names keys, runs and claims that there are.
+    """Read a campaign, and check the names of keys, runs and claims in it.
 
     Raises:
         ScenarioError: if the file cannot be read, or something in it is not allowed.
@@ -224,7 +219,7 @@ def _check_overrides(spec: Spec, document: Document) -> None:
 
 def _check_names(spec: Spec, document: Document) -> None:
     """Refuse runs, claims and columns of times that do not exist."""
-    for key, names, allowed in (("runs", spec.runs, spec.base().runs), ("claims", spec.claims, RUN_CLAIMS)):
+    for key, names, allowed in (("runs", spec.runs, spec.base()[0].runs), ("claims", spec.claims, RUN_CLAIMS)):
         for index, name in enumerate(names):
             if name not in allowed:
                 raise _unknown(document.where(key, str(index)), key, name, allowed)
@@ -234,7 +229,7 @@ def _check_names(spec: Spec, document: Document) -> None:
 
 
 def _placed(error: ScenarioError, document: Document, part: str) -> ScenarioError:
-    """The error of an override, with the line of the spec that the override comes from."""
+    """The error of an override, with the line of the spec that has this override."""
     key = error.source.removeprefix("--set ").partition("=")[0]
     if (part, key) not in document.places:
         return error
@@ -246,11 +241,11 @@ def _unknown(source: str, key: str, name: str, allowed: Iterable[str]) -> Scenar
 
 
 def _identifier(name: str) -> str:
-    """A campaign's name as the beginning of a scenario's."""
+    """The name of a campaign as an identifier, with which the names of its scenarios begin."""
     plain = re.sub(r"\W", "_", name, flags=re.ASCII)
     return f"_{plain}" if plain[0].isdigit() else plain
 
 
 def _judged_part(scenario: str) -> dict[str, Any]:
     data = read(scenario)[0].data
-    return data | NOT_JUDGED if isinstance(data, dict) else {}  # `Spec.base` says what is wrong, and in which line
+    return data | NOT_JUDGED if isinstance(data, dict) else {}  # `Spec.base` refuses it, with the line

@@ -1,8 +1,7 @@
-"""How likely a violation is, from how many there were: bounds for any distribution.
+"""Bounds of the probability of a violation, for any distribution.
 
-k of n runs that put a claim to the test violated it; the runs are independent draws. Both intervals contain the
-probability p of a violation with the stated confidence: the first for an n fixed beforehand, the second for all n at
-once, so that a campaign may stop at any time.
+k of n independent runs violated a claim. Both intervals contain the probability p of a violation with the stated
+confidence: the first for an n fixed beforehand, the second for all n at once, so that a campaign may stop at any time.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""When a campaign may end early: `SAFE-TRACE < 1e-4`, as soon as the anytime-valid bound is below that."""
+"""Rules to end a campaign early: with `SAFE-TRACE < 1e-4`, when the anytime-valid bound is below 1e-4."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ _RULE = re.compile(r"\s*(?P<claim>[A-Za-z0-9_.-]+)\s*(?P<sign>[<>])\s*(?P<value>
 
 @dataclass
 class Stopping:
-    """Stop when a claim's probability of a violation is known to be below, or above, a value.
+    """Stop when the probability of a violation is known to be below, or above, a value.
 
     Attributes:
-        claim: its identifier.
-        below: whether the upper bound must be below `value`; otherwise the lower bound above.
-        value: of the probability.
+        claim: identifier.
+        below: whether the upper bound must be below `value`; otherwise the lower bound must be above it.
+        value: a probability.
     """
 
     claim: str
@@ -36,14 +36,14 @@ class Stopping:
 
     @classmethod
     def parse(cls, text: str, claims: Collection[str] = ()) -> Stopping:
-        """A rule from its text.
+        """Parse a rule.
 
         Args:
             text: such as 'SAFE-TRACE < 1e-4'.
-            claims: identifiers of those that are judged; empty: all about runs.
+            claims: identifiers of the claims that are judged; empty: all about runs.
 
         Raises:
-            ValueError: if it is not one of these.
+            ValueError: if the text is no rule.
             UnknownNameError: if no such claim is judged.
         """
         found = _RULE.fullmatch(text)
@@ -58,7 +58,7 @@ class Stopping:
         return cls(found["claim"], found["sign"] == "<", value)
 
     def met(self, rows: list[Row]) -> bool:
-        """Count the rows of one more draw; whether every run of the scenario now meets the rule."""
+        """Count the rows of one more draw; return whether every run of the scenario now meets the rule."""
         for row in rows:
             self._unfinished[row["run"]] += row["ended"] in UNFINISHED
             if row["claim"] != self.claim and not (row["run"] and row["ended"] in UNFINISHED):
@@ -79,18 +79,18 @@ class Stopping:
 
 
 class InOrder:
-    """Gives a rule the draws in the order of their numbers: that in which they end prefers those that are short."""
+    """Gives a rule the draws in the order of their numbers, since short draws finish first."""
 
     def __init__(self, rule: Stopping, wanted: Iterable[int]) -> None:
-        """Of these draws, by number."""
+        """Expect the draws with these numbers, in this order."""
         self._rule, self._wanted = rule, iter(wanted)
         self._next = next(self._wanted, None)
         self._waiting: dict[int, list[Row]] = {}
         self.last: int | None = None
-        """The draw with which the rule was met."""
+        """The draw that met the rule."""
 
     def met(self, index: int, rows: list[Row]) -> bool:
-        """One more draw has ended; whether those without a gap before them meet the rule now."""
+        """Take one more finished draw; return whether the draws without a gap before them meet the rule."""
         self._waiting[index] = rows
         while self.last is None and self._next in self._waiting:
             if self._rule.met(self._waiting.pop(self._next)):

@@ -1,7 +1,7 @@
 """The folder of a campaign: finished draws survive a kill and count once.
 
-    campaign.json     what is run; `--resume` needs the same
-    parts/*.parquet   finished draws, written whole or not at all: a dataset that any reader of Parquet takes
+    campaign.json     identifies the campaign; `--resume` needs the same
+    parts/*.parquet   finished draws, written whole or not at all: a dataset for any reader of Parquet
     journal.jsonl     draws finished since the last part, a line of strict JSON each
 
 A draw is finished when its line is in the journal. From time to time the journal becomes a part; if the command is
@@ -17,7 +17,7 @@ import json
 import math
 import os
 from collections.abc import Sequence
-from itertools import groupby
+from itertools import chain, groupby
 from pathlib import Path
 from typing import Any
 
@@ -34,19 +34,19 @@ _KINDS: dict[str, type] = {"int64": int, "float64": float, "str": str, "bool": b
 
 
 class Store:
-    """The open folder of a campaign; one command at a time has it."""
+    """The open folder of a campaign. One command at a time can open it."""
 
     def __init__(self, folder: Path, manifest: dict[str, Any], *, resume: bool) -> None:
-        """Open the folder, and read what is finished.
+        """Open the folder, and read the finished draws.
 
         Args:
-            folder: new or empty; with `resume`, one that has the same campaign.
-            manifest: what identifies the campaign, strict JSON.
-            resume: go on with what the folder has.
+            folder: new or empty; with `resume`, a folder of the same campaign.
+            manifest: identifies the campaign, strict JSON.
+            resume: keep the draws that the folder has.
 
         Raises:
-            FolderError: if the folder cannot be written, or has another campaign or something else, or another command
-                has it open, or rows that are not as they were written.
+            FolderError: if the folder cannot be written, has another campaign or something else, is open in another
+                command, or has rows that were changed.
             OSError: if it cannot be read.
         """
         files.make_folder(folder, "the campaign")
@@ -77,7 +77,7 @@ class Store:
         self.finished = {*there_already["index"].tolist(), *self._lately}
 
     def add(self, rows: Sequence[Row]) -> None:
-        """Keep the rows of a draw: when this returns, it is finished.
+        """Store the rows of a draw, which is then finished.
 
         Raises:
             OSError: if they cannot be written, with the path; the draw is then not finished.
@@ -88,7 +88,7 @@ class Store:
         sealed = _sealed(self._manifest, rows)
         left = (json.dumps(sealed, allow_nan=False) + "\n").encode()
         try:
-            while left:  # a nearly full disk takes a part of it, without an error
+            while left:  # a nearly full disk takes only a part of it, without an error
                 left = left[os.write(self._journal, left) :]
         except OSError as error:
             raise OSError(error.errno, error.strerror, str(self.folder / JOURNAL)) from None
@@ -98,10 +98,10 @@ class Store:
             self.flush()
 
     def flush(self) -> None:
-        """Make a part of the journal."""
+        """Turn the journal into a part."""
         if not self._lately:
             return
-        part = table_of([row for rows in self._lately.values() for row in rows])
+        part = table_of(list(chain.from_iterable(self._lately.values())))
         buffer = io.BytesIO()
         part.to_parquet(buffer, index=False)
         taken = [int(path.stem.removeprefix("part-")) for path in (self.folder / PARTS).glob("part-[0-9]*.parquet")]
@@ -113,12 +113,10 @@ class Store:
 
     def table(self) -> pd.DataFrame:
         """All rows of all finished draws, by index."""
-        lately = table_of([row for rows in self._lately.values() for row in rows])
-        both = pd.concat([*self._in_parts, lately], ignore_index=True)
-        return both.sort_values("index", kind="stable", ignore_index=True)
+        return _together(self._in_parts, self._lately)
 
     def close(self) -> None:
-        """Make a part of the rest of the journal, and release the folder."""
+        """Turn the rest of the journal into a part, and release the folder."""
         try:
             self.flush()
         finally:
@@ -129,19 +127,24 @@ def read(folder: Path) -> tuple[dict[str, Any], pd.DataFrame]:
     """The manifest of a campaign and all rows of its finished draws, also while it runs.
 
     Raises:
-        FolderError: if the folder has no campaign, or rows that are not as they were written.
+        FolderError: if the folder has no campaign, or rows that were changed.
     """
     manifest = _manifest(folder)
     if manifest is None:
         raise FolderError(one_line(f"{folder} has no campaign: no {MANIFEST} of ours"))
     parts = _read_parts(folder, manifest)
     lately, _ = _read_journal(folder / JOURNAL, manifest, set(parts["index"]))
-    both = pd.concat([parts, table_of([row for rows in lately.values() for row in rows])], ignore_index=True)
-    return manifest, both.sort_values("index", kind="stable", ignore_index=True)
+    return manifest, _together([parts], lately)
+
+
+def _together(parts: Sequence[pd.DataFrame], lately: dict[int, list[Row]]) -> pd.DataFrame:
+    """Rows of parts and of a journal, by index."""
+    both = pd.concat([*parts, table_of(list(chain.from_iterable(lately.values())))], ignore_index=True)
+    return both.sort_values("index", kind="stable", ignore_index=True)
 
 
 def _is_nothing(path: Path) -> bool:
-    """Whether a command that was killed before it wrote the manifest may have left this file."""
+    """Whether a command may have left this file when it was killed before it wrote the manifest."""
     return files.is_partial(path) or (path.name == JOURNAL and path.stat().st_size == 0)
 
 
@@ -183,7 +186,7 @@ def _read_part(path: Path) -> pd.DataFrame:
 
 
 def _read_journal(path: Path, manifest: dict[str, Any], known: set[int]) -> tuple[dict[int, list[Row]], int]:
-    """Rows by index, without those that are known, and the number of bytes up to the last whole line."""
+    """Rows by index, except known draws, and the number of bytes up to the last whole line."""
     found: dict[int, list[Row]] = {}
     whole = 0
     for line in path.read_bytes().splitlines(keepends=True) if path.exists() else ():
@@ -202,7 +205,7 @@ def _read_journal(path: Path, manifest: dict[str, Any], known: set[int]) -> tupl
 
 
 def _sealed(manifest: dict[str, Any], rows: Sequence[Row]) -> list[Row]:
-    """The rows of a draw as strict JSON (None for NaN), each with the digest of all of them and of the campaign."""
+    """The rows of a draw as strict JSON (None for NaN), each with a digest of the campaign and all of the rows."""
     plain = [[_plain(_KINDS[kind], row[name]) for name, kind in COLUMNS.items() if name != "digest"] for row in rows]
     digest = files.sha256(json.dumps([manifest, plain], sort_keys=True, allow_nan=False).encode())
     return [dict(zip(COLUMNS, [*row, digest], strict=True)) for row in plain]
@@ -213,7 +216,7 @@ def _plain(kind: type, value: Any) -> Any:
 
 
 def _as_written(path: Path, manifest: dict[str, Any], rows: Sequence[Any]) -> list[Row]:
-    """The rows of a draw; refused if they are not those that were written."""
+    """The rows of a draw; FolderError if they are not the rows that were written."""
     sealed = _sealed(manifest, rows)
     if [row["digest"] for row in sealed] != [row["digest"] for row in rows]:
         raise _changed(path, rows[0]["index"])

@@ -1,4 +1,4 @@
-"""One draw of a campaign: simulate its scenario, judge its runs, make rows of the verdicts."""
+"""One draw of a campaign: simulate its scenario, judge its runs, turn the verdicts into rows."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from airground_drake.verify import Verdict, verify
 
 
 class DrawOutOfTime(BaseException):
-    """A draw took longer than it may; neither an Exception nor an OutOfTime, which count as faults of policies."""
+    """A draw took too long. An Exception or an OutOfTime would count as a fault of a policy, so it is neither."""
 
 
 def rows_of(spec: Spec, index: int, limits: Limits) -> list[Row]:
@@ -35,7 +35,7 @@ def rows_of(spec: Spec, index: int, limits: Limits) -> list[Row]:
     Args:
         spec: of the campaign.
         index: of the draw.
-        limits: what its scenario may ask for; one that asks for more is `invalid`, one that takes longer `stopped`.
+        limits: a larger scenario is `invalid`, a draw that takes longer is `stopped`.
 
     Returns:
         A row for each run and claim, with the columns of `rows.COLUMNS`.
@@ -45,13 +45,13 @@ def rows_of(spec: Spec, index: int, limits: Limits) -> list[Row]:
 
 @cache
 def _keep_what_is_loaded() -> None:
-    """Exempt libraries and compiled code from garbage collection, once they are loaded."""
+    """Exempt loaded libraries and compiled code from garbage collection."""
     gc.collect()
     gc.freeze()
 
 
 def rows_at(spec: Spec, values: Mapping[str, Any], index: int, limits: Limits) -> list[Row]:
-    """The same for any values by dotted key, on the course of a draw."""
+    """Simulate and judge any values by dotted key, on the course of a draw."""
     common = blank() | {"index": index, "drawn": json.dumps(_strict(dict(values)), allow_nan=False)}
     try:
         scenario = spec.scenario_of(values, index)
@@ -70,7 +70,7 @@ def _strict(value: Any) -> Any:
 
 
 def rows_of_scenario(spec: Spec, scenario: Scenario, limits: Limits, common: Row | None = None) -> list[Row]:
-    """Simulate and judge the runs of a scenario by the claims of a campaign; `common`: what all rows have."""
+    """Simulate a scenario and judge it by the claims of a campaign; every row begins with `common`."""
     common = blank() if common is None else common
     try:
         with _within(spec, scenario, limits):
@@ -81,11 +81,11 @@ def rows_of_scenario(spec: Spec, scenario: Scenario, limits: Limits, common: Row
         return [common | {"ended": STOPPED, "what": str(error)}]
     finally:
         _keep_what_is_loaded()
-        gc.collect()  # Python does not see how large a diagram is, and would wait for hundreds
+        gc.collect()  # Python does not see the size of a diagram, and would wait for hundreds
 
 
 def trace_of(spec: Spec, scenario: Scenario, limits: Limits) -> Trace | None:
-    """The trace of a scenario's first run, within the same limits; None if it cannot be simulated."""
+    """The trace of a scenario's first run; None if it cannot be simulated within the limits."""
     try:
         with _within(spec, scenario, limits):
             return simulate(scenario, next(iter(scenario.runs)))
@@ -95,11 +95,11 @@ def trace_of(spec: Spec, scenario: Scenario, limits: Limits) -> Trace | None:
 
 @contextmanager
 def _within(spec: Spec, scenario: Scenario, limits: Limits) -> Iterator[None]:
-    """Find or refuse third-party code; stop what takes too long.
+    """Find or refuse third-party code; limit the time of the body.
 
     Raises:
-        AirgroundError: if the scenario asks for more than it may.
-        DrawOutOfTime: in the body.
+        AirgroundError: if the scenario is too large.
+        DrawOutOfTime: in the body, if it takes too long.
     """
     within(scenario, limits)
     with (
@@ -123,7 +123,7 @@ def _rows_of_run(scenario: Scenario, run: str, claims: Collection[str], common: 
 
 
 def died(index: int) -> list[Row]:
-    """The row of a draw whose process died again and again."""
+    """The row of a draw whose process died each time."""
     return [blank() | {"index": index, "ended": DIED, "what": "the process that simulated it died", "drawn": "{}"}]
 
 

@@ -28,8 +28,6 @@ LIMIT_S = 300.0
 """CPU time that a check may take, s. Checks of a run of minutes take seconds."""
 MOST_S = 1e6
 """Largest limit of the CPU time, s: far more does not fit a timer."""
-LONGEST_INTEGER = 10_000
-"""Bits of an integer that is written: Python refuses to write more than 4300 digits."""
 
 
 class UsageError(Exception):
@@ -158,25 +156,18 @@ def _counts(lines: Sequence[Line]) -> dict[str, int]:
 
 
 def _document(folder: Path, lines: Sequence[Line]) -> dict[str, Any]:
-    checks = [{key: _strict(value) for key, value in asdict(line).items()} for line in lines]
-    return {
-        "schema": SCHEMA,
-        "report": str(folder),
-        "checks": checks,
-        "summary": _counts(lines),
-    }
+    checks = [_strict(asdict(line)) for line in lines]
+    return {"schema": SCHEMA, "report": str(folder), "checks": checks, "summary": _counts(lines)}
 
 
 def _strict(value: Any) -> Any:
-    """Plain JSON; numbers that are not finite and other values that JSON does not have become text."""
+    """Plain JSON; numbers that are not finite, and values that JSON does not have, become text."""
     if isinstance(value, dict):
         return {str(key): _strict(item) for key, item in value.items()}
     if isinstance(value, (list, tuple)):
         return [_strict(item) for item in value]
     if isinstance(value, float) and not math.isfinite(value):
         return str(value)
-    if isinstance(value, int) and value.bit_length() > LONGEST_INTEGER:
-        return "an integer that is too long to be written"
     if value is None or isinstance(value, (str, int, float)):
         return value
     return str(value)

@@ -3,23 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from functools import lru_cache
-from itertools import pairwise, zip_longest
+from itertools import zip_longest
 from typing import NamedTuple
 
 import numpy as np
+import pandas as pd
 
-from .files import Json
-from .rules import SMALL, Array, Disagreement, close, holds, same
+from .rules import SMALL, Disagreement, close, holds, same
 from .run import OF_MPC, OF_OUTCOMES, OF_SOLUTIONS, Run
+from .safety import distances_m
 from .scenario import apart_m
 
 UNUSED = -1.0
-"""Value of a column of decisions that does not belong to the run's method."""
+"""Number in a column of decisions that the run's method does not use; an unused text is empty."""
 
 
 class Event(NamedTuple):
-    """An event that follows from the rest of a trace.
+    """An event without its position.
 
     Attributes:
         policy: of a proposal or an answer.
@@ -36,18 +36,9 @@ class Event(NamedTuple):
     obstacle: str = ""
     other: str = ""
 
-    @classmethod
-    def of(cls, recorded: Json) -> Event:
-        """A recorded event without its position, which has a rule of its own."""
-        said = {name: value for name, value in recorded.items() if name != "position_m"}
-        unknown = sorted(said.keys() - {*cls._fields})
-        holds("what is said of an event", not unknown, unknown, ", ".join(cls._fields), t_s=said["t_s"])
-        return cls(**{**said, "t_s": float(said["t_s"])})
 
-
-@lru_cache(maxsize=8)
 def check_events(run: Run) -> str:
-    """Apply the rules about events.
+    """Check the rules about events.
 
     Returns:
         What was found, in words.
@@ -55,24 +46,23 @@ def check_events(run: Run) -> str:
     Raises:
         Disagreement: if a rule is broken.
     """
-    _events_are_in_order(run)
     _events_follow_from_signals_and_decisions(run)
-    _events_are_where_their_robots_were(run)
+    for event in run.events:
+        about = f"{event['kind']} of {event['robot']}"
+        here = run.place_m(event["robot"], event["t_s"])
+        close("place of an event", event["position_m"], here, within=SMALL, about=about, t_s=event["t_s"])
     _nothing_is_executed_before_it_was_proposed(run)
     _decisions_are_on_proposals(run)
+    _unused_columns_are_empty(run)
     return f"{len(run.events)} events"
 
 
-def _events_are_in_order(run: Run) -> None:
-    for before, after in pairwise(run.events):
-        later = f"not before {before['t_s']}"
-        holds("events are in order", after["t_s"] >= before["t_s"], after["t_s"], later, t_s=after["t_s"])
-
-
 def _events_follow_from_signals_and_decisions(run: Run) -> None:
-    found = sorted([*_crossings(run), *_messages(run), *_answers(run), *_arrivals(run), *_collisions(run)])
-    recorded = sorted(Event.of(event) for event in run.events)
-    for theirs, ours in zip_longest(recorded, found):
+    recorded = [Event(**{name: value for name, value in each.items() if name != "position_m"}) for each in run.events]
+    t = np.array([event.t_s for event in recorded])
+    holds("events are in order", t[1:] >= t[:-1], t[1:], "not before the one above", t_s=t[1:])
+    found = [*_crossings(run), *_messages(run), *_answers(run), *_arrivals(run), *_collisions(run)]
+    for theirs, ours in zip_longest(sorted(recorded), sorted(found)):
         if theirs != ours:
             first = min(event for event in (theirs, ours) if event is not None)
             raise Disagreement("events follow from signals and decisions", theirs, ours, first.robot, first.t_s)
@@ -104,7 +94,7 @@ def _answers(run: Run) -> Iterator[Event]:
 
 
 def _arrivals(run: Run) -> Iterator[Event]:
-    """The row from which on a robot stays within the arrival tolerance of its target."""
+    """A robot arrives at the first row from which on it stays within the arrival tolerance of its target."""
     for robot, spec in run.robots.items():
         away = np.linalg.norm(run.position_m[robot] - np.array(spec["target_m"]), axis=1)
         outside = np.flatnonzero(away > run.scenario["arrival_tolerance_m"])
@@ -114,7 +104,7 @@ def _arrivals(run: Run) -> Iterator[Event]:
 
 
 def _collisions(run: Run) -> Iterator[Event]:
-    """Collisions with obstacles and other robots: surfaces are closer than the collision distance.
+    """Two bodies collide when their surfaces come closer than the collision distance.
 
     A collision has the time of the first row inside that distance. If a robot passes between two rows outside it, the
     collision has the time of the earlier of them.
@@ -125,51 +115,42 @@ def _collisions(run: Run) -> Iterator[Event]:
         if run.apart_m[pair.robot, pair.other] >= within:
             continue
         away = run.position_m[pair.robot] - run.position_m[pair.other]
-        near, passed = np.linalg.norm(away, axis=1) < within, _least_on_the_way(away) < within
-        for row in range(len(near)):
-            enters = near[row] and not (row and near[row - 1])
-            passes = row + 1 < len(near) and passed[row] and not near[row] and not near[row + 1]
-            if enters or passes:
-                hit = {"other" if pair.other in run.robots else "obstacle": pair.other}
-                yield Event(float(run.t_s[row]), pair.robot, "collision", **hit)
-
-
-def _least_on_the_way(away_m: Array) -> Array:
-    """Least length of relative positions (T, 3) on the straight line from each row to the next, (T - 1,)."""
-    begin, step = away_m[:-1], np.diff(away_m, axis=0)
-    length = np.maximum(np.square(step).sum(axis=1), np.finfo(np.float64).tiny)
-    share = np.clip(-(begin * step).sum(axis=1) / length, 0.0, 1.0)
-    return np.asarray(np.linalg.norm(begin + share[:, None] * step, axis=1))
-
-
-def _events_are_where_their_robots_were(run: Run) -> None:
-    for event in run.events:
-        here = run.place_m(event["robot"], event["t_s"])
-        about = f"{event['kind']} of {event['robot']}"
-        close("place of an event", event["position_m"], here, within=SMALL, about=about, t_s=event["t_s"])
+        near = np.linalg.norm(away, axis=1) < within
+        enters = near & ~np.append(False, near[:-1])
+        passes = np.append((distances_m(away) < within) & ~near[:-1] & ~near[1:], False)
+        hit = {"other" if pair.other in run.robots else "obstacle": pair.other}
+        for when in run.t_s[enters | passes]:
+            yield Event(float(when), pair.robot, "collision", **hit)
 
 
 def _nothing_is_executed_before_it_was_proposed(run: Run) -> None:
     for ugv in run.ugvs:
-        sent = run.times_s(ugv, "proposal")
-        earliest = sent[0] if len(sent) else np.inf
-        executed = run.t_s[run.executed(ugv)]
+        earliest = run.times_s(ugv, "proposal").min(initial=np.inf)
+        executed = run.t_s[run.column(f"{ugv}.accepted") != 0.0]
         what = "an intervention is executed after it was proposed"
         holds(what, executed >= earliest, executed, f"not before {earliest} s", about=ugv, t_s=executed)
 
 
 def _decisions_are_on_proposals(run: Run) -> None:
-    """Proposals have numbers; each decision is on one that was sent; the columns of the other method are unused."""
-    numbers = run.proposals["number"]
-    same("proposals are numbered as they are sent", numbers.tolist(), list(range(len(numbers))))
+    """Proposals are numbered in order, and each decision is on one of them."""
+    numbers = run.proposals["number"].tolist()
+    same("proposals are numbered as they are sent", numbers, list(range(len(numbers))))
     key = ["number", "robot", "issued_s", "policy"]
-    sent = set(run.proposals[key].itertuples(index=False, name=None))
-    unused = OF_OUTCOMES if run.method == "c" else OF_MPC
-    for row in run.decisions.to_dict("records"):
-        about, on = f"decision of {row['robot']}", tuple(row[name] for name in key)
-        holds("a decision is on a proposal", on in sent, str(on), "one that was sent", about=about, t_s=row["t_s"])
-        kept = OF_OUTCOMES[:-1] if run.method == "d" and row["reason"] == "kept" else ()  # nothing is weighed again
-        for name in (*unused, *kept):
-            same(f"column {name} is unused", row[name], UNUSED, about=about, t_s=row["t_s"])
-        for name in OF_SOLUTIONS if run.method == "d" else ():
-            same(f"column {name} is unused", row[name], "", about=about, t_s=row["t_s"])
+    sent = {*run.proposals[key].itertuples(index=False, name=None)}
+    for t_s, on in zip(run.decisions["t_s"], run.decisions[key].itertuples(index=False, name=None), strict=True):
+        holds("a decision is on a proposal", on in sent, str(on), "one that was sent", t_s=t_s)
+
+
+def _unused_columns_are_empty(run: Run) -> None:
+    """Each method fills its own columns; method (d) weighs no outcomes when it keeps a decision."""
+    every = run.decisions
+    kept = every[every["reason"] == "kept"]
+    unused: dict[str, list[tuple[pd.DataFrame, tuple[str, ...], float | str]]] = {
+        "c": [(every, OF_OUTCOMES, UNUSED)],
+        "d": [(every, OF_MPC, UNUSED), (every, OF_SOLUTIONS, ""), (kept, OF_OUTCOMES[:-1], UNUSED)],
+    }
+    for rows, names, value in unused.get(run.method, ()):
+        t_s = rows["t_s"].to_numpy()
+        for name in names:
+            recorded = rows[name].to_numpy()
+            holds("an unused column is empty", recorded == value, recorded, value, about=name, t_s=t_s)

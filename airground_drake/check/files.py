@@ -1,7 +1,4 @@
-"""Strict reading of the files of a report, which may be hostile: regular files in the folder, of bounded size.
-
-A content that was read before is not parsed again, so nothing that is returned here may be changed.
-"""
+"""Strict reading of the files of a report, which may be hostile: regular files in the folder, of bounded size."""
 
 from __future__ import annotations
 
@@ -12,7 +9,6 @@ import math
 import os
 import stat
 from collections import Counter
-from functools import lru_cache
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -25,7 +21,7 @@ from .rules import Disagreement, NotEstablished
 Json = dict[str, Any]
 
 LARGEST_FILE = 256_000_000
-"""Bytes of a file: a run of an hour with ten robots has less."""
+"""Bytes of a file: a run of an hour with ten robots has fewer."""
 LARGEST_JSON = 64_000_000
 """Bytes of a JSON file."""
 DEEPEST = 60
@@ -41,15 +37,15 @@ THRIFT = 10_000_000
 
 
 def is_plain(name: Any) -> bool:
-    """Whether it is a name of a file or folder without a path."""
+    """Whether a value is the name of a file or folder, without a path."""
     return isinstance(name, str) and name not in ("", ".", "..") and not {*"/\\\0"} & {*name} and name.isprintable()
 
 
 def names_in(folder: Path) -> list[str]:
-    """The paths of all files in a folder, with slashes, in order.
+    """The relative paths of all files in a folder, sorted.
 
     Raises:
-        NotEstablished: if one is no regular file, or there are too many.
+        NotEstablished: if one is not a regular file, or there are too many.
     """
     found: list[str] = []
     for place, folders, files in os.walk(folder):
@@ -57,11 +53,11 @@ def names_in(folder: Path) -> list[str]:
             path = os.path.join(place, name)
             mode = os.lstat(path).st_mode
             if not (stat.S_ISREG(mode) or stat.S_ISDIR(mode)):
-                raise NotEstablished("it has regular files and folders only", "it is neither", path)
+                raise NotEstablished("a report has regular files and folders only", "it is neither", path)
         inside = "" if place == os.fspath(folder) else f"{os.path.relpath(place, folder)}/"
         found += [inside + name for name in files]
         if len(found) > MOST_FILES:
-            raise NotEstablished("it has a number of files", f"more than {MOST_FILES}", str(folder))
+            raise NotEstablished("a report has few files", f"more than {MOST_FILES}", str(folder))
     return sorted(found)
 
 
@@ -90,29 +86,14 @@ def sha256(content: bytes) -> str:
     return hashlib.sha256(content).hexdigest()
 
 
-def canonical(value: Any) -> str:
-    """The text of a JSON value."""
-    return json.dumps(value, allow_nan=False)
-
-
 def read_json(path: Path) -> Any:
     """Strict JSON: no NaN, no infinity, no key twice.
 
     Raises:
-        NotEstablished: if the file cannot be read or is not JSON.
+        NotEstablished: if the file cannot be read, is not JSON, or is too large or too deep.
         Disagreement: if it is JSON that is not strict.
     """
-    return parse_json(read_bytes(path), path.name)
-
-
-@lru_cache(maxsize=64)
-def parse_json(content: bytes, name: str) -> Any:
-    """The value of a strict JSON text; `name` is what it is called in a refusal.
-
-    Raises:
-        NotEstablished: if it is not JSON, or too large or too deep.
-        Disagreement: if it is JSON that is not strict.
-    """
+    content, name = read_bytes(path), path.name
 
     def unique(found: list[tuple[str, Any]]) -> Json:
         value = dict(found)
@@ -145,7 +126,7 @@ def parse_json(content: bytes, name: str) -> Any:
 
 
 def _is_deep(value: Any) -> bool:
-    """Whether it is nested deeper than `DEEPEST`, level by level."""
+    """Whether a value is nested deeper than `DEEPEST`, level by level."""
     level = [value]
     for _ in range(DEEPEST + 1):
         nested = [each for each in level if isinstance(each, (dict, list))]
@@ -155,12 +136,11 @@ def _is_deep(value: Any) -> bool:
     return True
 
 
-@lru_cache(maxsize=64)
 def parse_table(content: bytes, name: str) -> pd.DataFrame:
     """The table in a Parquet file, rows numbered from 0: numbers, texts and lists of numbers.
 
-    Sizes and types in the header of the file are checked before the data are unpacked. Texts are read as dictionaries,
-    so that a text that is repeated a million times takes the room of one.
+    Sizes and types in the header of the file are checked before the data are unpacked. Texts are read as dictionaries:
+    a text that is repeated a million times is stored once.
 
     Raises:
         NotEstablished: if it is not a table, or too large.
@@ -184,15 +164,14 @@ def parse_table(content: bytes, name: str) -> pd.DataFrame:
         return table.astype(dict.fromkeys(texts, object))
     except NotEstablished:
         raise
-    except Exception as error:  # pyarrow raises what it likes
+    except Exception as error:  # pyarrow raises many types
         raise NotEstablished("the file is a table", f"{type(error).__name__}: {error}", name) from error
 
 
 def _is_plain_type(kind: pa.DataType) -> bool:
     """A number, a text, a list of numbers, or nothing."""
-    if pa.types.is_list(kind) or pa.types.is_large_list(kind):
-        return _is_number_type(kind.value_type)
-    return _is_number_type(kind) or _is_text_type(kind)
+    listed = pa.types.is_list(kind) or pa.types.is_large_list(kind)
+    return _is_number_type(kind.value_type if listed else kind) or _is_text_type(kind)
 
 
 def _is_text_type(kind: pa.DataType) -> bool:

@@ -1,4 +1,4 @@
-"""Limits that keep a hostile report from taking for ever: sizes of a scenario, and CPU time."""
+"""Limits of the work that a hostile report can cause: sizes of a scenario, and CPU time."""
 
 from __future__ import annotations
 
@@ -29,49 +29,38 @@ def is_of_a_size(scenario: Json) -> None:
     The rules that use a value find out whether it is missing or of another type.
 
     Raises:
-        NotEstablished: if one is not.
+        NotEstablished: if a number or a count is too large.
     """
-    for path, value in _numbers(scenario):
+    numbers = dict(_numbers(scenario))
+    for path, value in numbers.items():
         if not abs(value) <= LARGEST:
-            raise NotEstablished("the scenario is of a size", f"{value!r:.40}, {LARGEST:g} at most", path)
+            raise NotEstablished("the scenario is of a size", f"{value!r:.40}, {LARGEST:g} at most", ".".join(path))
+    looked_ahead = [numbers.get(("gatekeeper", name), 0.0) for name in ("horizon_s", "longest_s", "settling_s")]
+    time_s = numbers.get(("duration_s",), 0.0) + sum(looked_ahead)
+    periods_s = [value for path, value in numbers.items() if path[1:] == ("period_s",)]
+    bodies = [scenario.get(key) for key in ("ugvs", "obstacles")]
     counts = {
-        "samples": max(_samples(scenario), default=0.0),
-        "stages": _number(scenario, "gatekeeper", "stages") or 0.0,
-        "robots and obstacles": sum(len(scenario.get(key) or ()) for key in ("ugvs", "obstacles")),
+        "samples": max((time_s / period_s if period_s > 0.0 else math.inf for period_s in periods_s), default=0.0),
+        "stages": numbers.get(("gatekeeper", "stages"), 0.0),
+        "robots and obstacles": sum(len(each) for each in bodies if isinstance(each, dict)),
     }
     for name, count in counts.items():
         if not count <= MOST[name]:
             raise NotEstablished("the scenario is of a size", f"{count:.6g}, {MOST[name]} at most", name)
 
 
-def _numbers(value: Any, path: str = "") -> Iterator[tuple[str, float]]:
+def _numbers(value: Any, path: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, ...], float]]:
+    """Each number of a JSON value, with its path."""
     if isinstance(value, (dict, list)):
         for key, part in value.items() if isinstance(value, dict) else enumerate(value):
-            yield from _numbers(part, f"{path}.{key}".strip("."))
+            yield from _numbers(part, (*path, str(key)))
     elif isinstance(value, (int, float)):
         yield path, value
 
 
-def _number(scenario: Json, part: str, name: str) -> float | None:
-    given = scenario.get(part)
-    value = given.get(name) if isinstance(given, dict) else None
-    return value if isinstance(value, (int, float)) else None
-
-
-def _samples(scenario: Json) -> Iterator[float]:
-    """Number of instants in the duration of a scenario, for each of its periods; infinite if a period is 0."""
-    duration = scenario.get("duration_s")
-    looked_ahead = [_number(scenario, "gatekeeper", name) or 0.0 for name in ("horizon_s", "longest_s", "settling_s")]
-    time = sum(looked_ahead) + (duration if isinstance(duration, (int, float)) else 0.0)
-    for part in ("control", "intervention", "gatekeeper"):
-        period = _number(scenario, part, "period_s")
-        if period is not None:
-            yield time / period if period > 0.0 else math.inf
-
-
 @contextmanager
 def at_most_s(limit_s: float) -> Iterator[None]:
-    """Stop the block after so much CPU time. This works in the main thread, and not on Windows.
+    """Stop a block after so much CPU time; this works in the main thread, and not on Windows.
 
     Raises:
         NotEstablished: if the block takes longer.

@@ -13,7 +13,7 @@ import pandas as pd
 
 from .files import Json
 from .rules import SMALL, Array
-from .safety import gain_of, least_distance_m, lost_m, shortfall_m
+from .safety import distances_m, gain_of, lost_m, shortfall_m
 from .scenario import pairs_of, robots_of
 
 COLUMNS = ("t_s", "body", "x_m", "y_m", "z_m")
@@ -77,13 +77,14 @@ def judge(table: pd.DataFrame, scenario: Json) -> list[Judged]:
     found = []
     for pair in pairs_of(scenario):
         own, other = places[pair.robot], places[pair.other]
+        least_m = float(distances_m(own - other).min())
         missed = guarantee = None
         if period is not None:
             gain = gain_of(scenario, period)
             e = shortfall_m(own, other, pair, gain)
             short = max(0.0, pair.safe_m - float(np.linalg.norm(own[0] - other[0])))
             missed, guarantee = float(e), pair.safe_m - max(lost_m(e, gain, len(spacing)), short)
-        found.append(Judged(pair.robot, pair.other, pair.safe_m, least_distance_m(own, other), missed, guarantee))
+        found.append(Judged(pair.robot, pair.other, pair.safe_m, least_m, missed, guarantee))
     return sorted(found, key=lambda one: one.least_m - one.safe_m)
 
 

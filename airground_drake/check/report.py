@@ -26,11 +26,14 @@ DECIDED: Mapping[str, Callable[[Run], Found]] = {
     "ZENO-TRACE": zeno_trace,
     "THR-TRIG": thr_trig,
 }
-"""The claims that the checker decides by its own formulas; of the others it checks the expectation."""
+"""The claims that the checker decides by its own formulas; for the others it checks the expectation only."""
 
-
-EARLIER = ("airground_drake.report/1",)
-"""Schemas of reports by earlier versions."""
+SCHEMA = "airground_drake.report/2"
+SHAPE: Mapping[str, type] = {
+    **dict.fromkeys(("scenario", "provenance", "overall", "runs", "files"), dict),
+    **dict.fromkeys(("claims", "audit", "choices"), list),
+}
+"""Type of each part of report.json that the checker reads; lists have objects."""
 
 
 @dataclass(frozen=True)
@@ -38,14 +41,14 @@ class Line:
     """One check.
 
     Attributes:
-        claim: identifier of the claim, or what else was checked: report, trace, events, metrics.
+        claim: identifier of the claim, or what else was checked: report, files, trace, events.
         run: on which run; '' for the report and the model.
         outcome: AGREES, DISAGREES or OPEN.
         text: what was found, or why nothing was.
         rule: the rule that is broken or cannot be applied; '' if all agrees.
         about: the robot, pair, event, decision or file.
         t_s: when in the run; None where there is no time.
-        recorded: what the files say, of a broken rule.
+        recorded: what the files say, if a rule is broken.
         recomputed: what follows from them.
         by: who checked: "checker", "judged again" (the claims' own code), or "Coq".
     """
@@ -81,26 +84,28 @@ def check_report(folder: Path, limit_s: float = LIMIT_S) -> list[Line]:
 
 def _is_shaped_like_a_report(report: Any) -> None:
     """Refuse a document whose parts have other types than those of a report."""
-    if not isinstance(report, dict):
-        raise NotEstablished("it is a report", f"it is a {type(report).__name__}", "report.json")
-    if "mutants" in report or report.get("schema") in EARLIER:
-        why = "it is by an earlier version: make the report again (CHANGELOG.md)"
-        raise NotEstablished("it is a report of this version", why, "report.json")
-    for key in ("scenario", "provenance", "overall", "runs", "files"):
-        if not isinstance(report.get(key), dict):
-            raise NotEstablished("it is a report", f"its {key!r} is missing or is no object", "report.json")
-    for key in ("claims", "audit", "choices"):
-        listed = report.get(key)
-        if not isinstance(listed, list) or not all(isinstance(entry, dict) for entry in listed):
-            raise NotEstablished("it is a report", f"its {key!r} is missing or is no list of objects", "report.json")
+
+    def require(held: bool, why: str, rule: str = "it is a report") -> None:
+        if not held:
+            raise NotEstablished(rule, why, "report.json")
+
+    require(isinstance(report, dict), f"it is a {type(report).__name__}")
+    this_version = report.get("schema") == SCHEMA and "mutants" not in report
+    why = f"its schema is not {SCHEMA}: make the report again (CHANGELOG.md)"
+    require(this_version, why, "it is a report of this version")
+    for key, kind in SHAPE.items():
+        part: Any = report.get(key)
+        entries = part if isinstance(part, list) else []
+        require(
+            isinstance(part, kind) and all(isinstance(entry, dict) for entry in entries),
+            f"its {key!r} is missing or has another type",
+        )
     scenario = report["scenario"].get("resolved")
-    if not isinstance(scenario, dict) or not isinstance(scenario.get("runs"), dict):
-        raise NotEstablished("it is a report", "it has no resolved scenario with runs", "report.json")
-    if not all({"id", "run"} <= {*claim} for claim in report["claims"]):
-        raise NotEstablished("it is a report", "a claim has no id or no run", "report.json")
-    for name in (*scenario["runs"], *report["runs"], *(claim["id"] for claim in report["claims"])):
-        if not is_plain(name):
-            raise NotEstablished("it is a report", f"{name!r} is no name of a run or a claim", "report.json")
+    runs: Any = scenario.get("runs") if isinstance(scenario, dict) else None
+    require(isinstance(runs, dict), "it has no resolved scenario with runs")
+    require(all({"id", "run"} <= {*claim} for claim in report["claims"]), "a claim has no id or no run")
+    for name in (*runs, *report["runs"], *(claim["id"] for claim in report["claims"])):
+        require(is_plain(name), f"{name!r} cannot be the name of a run or a claim")
 
 
 def _lines(folder: Path, there: Sequence[str], report: Json, limit_s: float) -> Iterator[Line]:
@@ -116,7 +121,7 @@ def _lines(folder: Path, there: Sequence[str], report: Json, limit_s: float) -> 
 
     def loaded(name: str) -> Run:
         if name not in runs:
-            raise NotEstablished("the trace is one of the run", "it was refused")
+            raise NotEstablished("the trace can be used", "it was refused above")
         return runs[name]
 
     def events(name: str) -> str:
@@ -130,7 +135,7 @@ def _lines(folder: Path, there: Sequence[str], report: Json, limit_s: float) -> 
 
 
 def _judge(claim: Json, scenario: Json, loaded: Callable[[str], Run]) -> str:
-    """Compare a recorded verdict with the scenario's expectation and, of some claims, with the checker's own."""
+    """Compare a recorded verdict with the scenario's expectation and, for some claims, with the checker's own."""
     check_expectation(claim, scenario)
     name, status = claim["id"], claim["status"]
     if name not in DECIDED:
@@ -148,15 +153,13 @@ def _judge(claim: Json, scenario: Json, loaded: Callable[[str], Run]) -> str:
     _counted_as_here(claim, found)
     if found.margin is None or claim["margin"] is None:
         same("margin", claim["margin"], found.margin)
-    else:
-        close("margin", claim["margin"], found.margin, within=SMALL + 1e-6 * abs(found.margin))
-    if outcome_of(claim) == NOT_EXERCISED:
-        return f"{status}, nothing to check"
-    return status if found.margin is None else f"{status}, margin {found.margin:.6g} {claim['unit']}".rstrip()
+        return f"{status}, nothing to check" if outcome_of(claim) == NOT_EXERCISED else status
+    close("margin", claim["margin"], found.margin, within=SMALL + 1e-6 * abs(found.margin))
+    return f"{status}, margin {found.margin:.6g} {claim['unit']}".rstrip()
 
 
 def _counted_as_here(claim: Json, found: Found) -> None:
-    """Compare how often the claim was exercised, if it is counted here."""
+    """Compare how often the claim was exercised, if the checker counts that."""
     recorded, rule = claim["exercised"], "how often the claim was exercised"
     if found.exercised is None:
         return
@@ -165,31 +168,29 @@ def _counted_as_here(claim: Json, found: Found) -> None:
     holds(rule, possible, recorded, f"{least}" if least == most else f"{least} to {most}")
 
 
-def _attempt(limit_s: float, claim: str, run: str, check: Callable[[], str]) -> Line:
+def _attempt(limit_s: float, claim: str, run: Any, check: Callable[[], str]) -> Line:
     """The line of a check; an exception in it is not agreement."""
+    line = partial(Line, claim, str(run))
     try:
         with at_most_s(limit_s):
-            return Line(str(claim), str(run), AGREES, check())
+            return line(AGREES, check())
     except Disagreement as broken:
         when = "" if broken.t_s is None else f" at t = {broken.t_s:.9g} s"
-        about = f" ({broken.about})" if broken.about else ""
         values = f"recorded {_short(broken.recorded)}, recomputed {_short(broken.recomputed)}"
-        text = f"{broken.rule}{about}{when}: {values}"
+        text = f"{broken.rule}{_in_brackets(broken.about)}{when}: {values}"
         both = broken.recorded, broken.recomputed
-        return Line(str(claim), str(run), DISAGREES, text, broken.rule, broken.about, broken.t_s, *both)
+        return line(DISAGREES, text, broken.rule, broken.about, broken.t_s, *both)
     except NotEstablished as error:
-        about = f" ({error.about})" if error.about else ""
-        return Line(str(claim), str(run), OPEN, f"{error.rule}{about}: {error.why}", error.rule, error.about)
+        return line(OPEN, f"{error.rule}{_in_brackets(error.about)}: {error.why}", error.rule, error.about)
     except Exception as error:  # files can be wrong in more ways than can be listed
-        why = f"{type(error).__name__}: {error}".splitlines()[0]
-        return Line(
-            str(claim), str(run), OPEN, f"the files are well formed: {_short(why)}", "the files are well formed"
-        )
+        rule, why = "the files are well formed", f"{type(error).__name__}: {error}".splitlines()[0]
+        return line(OPEN, f"{rule}: {_short(why)}", rule)
+
+
+def _in_brackets(about: str) -> str:
+    return f" ({about})" if about else ""
 
 
 def _short(value: Any, most: int = 120) -> str:
-    try:
-        text = value if isinstance(value, str) else repr(value)
-    except ValueError:  # Python writes no integer of more than 4300 digits
-        text = f"a {type(value).__name__} that is too long to be written"
+    text = value if isinstance(value, str) else repr(value)
     return text if len(text) <= most else f"{text[:most]}..."

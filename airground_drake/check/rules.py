@@ -1,7 +1,6 @@
-"""Rules, and what is said of a broken one: the rule, where, when, and both values.
+"""Rules of the checker, and what is said when one is broken: its name, where and when, and both values.
 
-A rule is a call of `same`, `agrees`, `close`, `at_most` or `holds` with its name, the recorded and the recomputed
-value. So nothing is rejected without a reason.
+A rule is a call of `same`, `close`, `at_most` or `holds` with a name, the recorded and the recomputed value.
 """
 
 from __future__ import annotations
@@ -21,15 +20,10 @@ SMALL = 1e-9
 
 
 @dataclass(eq=False)
-class Disagreement(Exception):  # noqa: N818 - what the program is for, not an error of it
-    """A rule that the files break.
+class Disagreement(Exception):  # noqa: N818 - what the program looks for, not an error of the program
+    """The files break a rule: they say `recorded`, where `recomputed` follows from them.
 
-    Attributes:
-        rule: its name.
-        recorded: what the files say.
-        recomputed: what follows from them.
-        about: the robot, pair, event, decision or file.
-        t_s: when in the run, s; None where there is no time.
+    `about` is the robot, pair, event, decision or file; `t_s` is the time in the run, s, if there is one.
     """
 
     rule: str
@@ -41,13 +35,7 @@ class Disagreement(Exception):  # noqa: N818 - what the program is for, not an e
 
 @dataclass(eq=False)
 class NotEstablished(Exception):  # noqa: N818
-    """A rule that cannot be applied, because a file cannot be read or something is missing.
-
-    Attributes:
-        rule: its name.
-        why: the reason.
-        about: as above.
-    """
+    """A rule cannot be applied, because a file cannot be read or something is missing; `why` says what."""
 
     rule: str
     why: str
@@ -61,7 +49,7 @@ class Found:
     Attributes:
         status: the verdict.
         margin: distance from refutation; None where the claim has no number.
-        exercised: how often the claim was put to the test, at least and at most; they differ where rounding decides.
+        exercised: how often the claim was tested, at least and at most; they differ where rounding decides.
         because: the broken rule that refutes the claim; None if its margin decides.
     """
 
@@ -72,39 +60,37 @@ class Found:
 
 
 def same(rule: str, recorded: Any, recomputed: Any, *, about: str = "", t_s: float | None = None) -> None:
-    """Raise Disagreement unless both are equal; of nested values the first part that differs is named.
+    """Compare two values exactly; the first part of nested values that differs is named.
 
     Raises:
         Disagreement: if they differ.
     """
-    _compare(rule, recorded, recomputed, about, t_s, within=0.0, every_key=True)
+
+    def descend(theirs: Any, ours: Any, path: Any) -> None:
+        same(rule, theirs, ours, about=f"{about}.{path}".strip("."), t_s=t_s)
+
+    if isinstance(recomputed, Mapping) and isinstance(recorded, dict):
+        for key in sorted({*recomputed, *recorded}):
+            descend(recorded.get(key, "nothing"), recomputed.get(key, "nothing"), key)
+    elif isinstance(recomputed, (list, tuple)) and isinstance(recorded, list):
+        if len(recomputed) != len(recorded):
+            raise Disagreement(f"{rule}: number of entries", len(recorded), len(recomputed), about, t_s)
+        for k, (theirs, ours) in enumerate(zip(recorded, recomputed, strict=True)):
+            descend(theirs, ours, k)
+    elif recorded != recomputed or not (type(recorded) is type(recomputed) or _are_numbers(recorded, recomputed)):
+        raise Disagreement(rule, recorded, recomputed, about, t_s)
 
 
-def agrees(
-    rule: str, recorded: Any, recomputed: Any, *, within: float, about: str = "", t_s: float | None = None
-) -> None:
-    """Raise Disagreement unless every recomputed part is recorded, numbers to within `within` * (1 + size).
-
-    Keys that are recorded and not recomputed are left alone.
-
-    Raises:
-        Disagreement: if a part differs.
-    """
-    _compare(rule, recorded, recomputed, about, t_s, within=within, every_key=False)
+def _are_numbers(*values: Any) -> bool:
+    return all(isinstance(value, (int, float)) and not isinstance(value, bool) for value in values)
 
 
 def close(
     rule: str, recorded: Any, recomputed: Any, *, within: Any, about: str = "", t_s: float | Array | None = None
 ) -> None:
-    """Raise Disagreement unless two arrays of one shape differ by `within` at most; a nan differs from everything.
+    """Compare two arrays of one shape, to an absolute tolerance `within`; a nan differs from everything.
 
-    Args:
-        rule: name of the rule.
-        recorded: numbers, any shape.
-        recomputed: numbers of the same shape.
-        within: absolute tolerance; a number, or an array that broadcasts.
-        about: of what.
-        t_s: one time, or one for each entry along the first axis.
+    `t_s` is one time, or one for each entry along the first axis; likewise below.
 
     Raises:
         Disagreement: with the first entry along the first axis that differs.
@@ -112,17 +98,16 @@ def close(
     theirs, ours = np.asarray(recorded, dtype=np.float64), np.asarray(recomputed, dtype=np.float64)
     if theirs.shape != ours.shape:
         raise Disagreement(f"{rule}: number of values", list(theirs.shape), list(ours.shape), about)
-    with np.errstate(invalid="ignore"):
-        holds(rule, np.abs(theirs - ours) <= within, theirs, ours, about=about, t_s=t_s)
+    holds(rule, np.abs(theirs - ours) <= within, theirs, ours, about=about, t_s=t_s)
 
 
 def at_most(
     rule: str, recorded: Any, limit: Any, *, within: float = 0.0, about: str = "", t_s: float | Array | None = None
 ) -> None:
-    """Raise Disagreement where a number is above its limit by more than `within`, or is not a number.
+    """Require numbers that exceed their limits by at most `within`; a nan exceeds everything.
 
     Raises:
-        Disagreement: with the first entry along the first axis that is.
+        Disagreement: with the first entry along the first axis that is too large.
     """
     theirs, most = np.broadcast_arrays(np.asarray(recorded, dtype=np.float64), np.asarray(limit, dtype=np.float64))
     holds(f"{rule} (at most)", theirs <= most + within, theirs, most, about=about, t_s=t_s)
@@ -131,18 +116,12 @@ def at_most(
 def holds(
     rule: str, held: Any, recorded: Any, recomputed: Any, *, about: str = "", t_s: float | Array | None = None
 ) -> None:
-    """Raise Disagreement where a condition does not hold.
+    """Require a condition `held`, (), (K,) or (K, ...).
 
-    Args:
-        rule: name of the rule.
-        held: the condition, (), (K,) or (K, ...).
-        recorded: what it is about, of that shape.
-        recomputed: what it should be: of that shape, or one text.
-        about: of what.
-        t_s: one time, or one for each entry along the first axis.
+    `recorded` has that shape; `recomputed` has it too, or is one text.
 
     Raises:
-        Disagreement: with the first entry along the first axis for which it does not hold.
+        Disagreement: with the first entry along the first axis for which the condition does not hold.
     """
     wrong = ~np.asarray(held)
     if not wrong.any():
@@ -155,35 +134,5 @@ def _entry(values: Any, k: int | None) -> Any:
     """Entry k along the first axis, as plain numbers; a text, None or a single number is the same for all entries."""
     if values is None or isinstance(values, str) or np.ndim(values) == 0:
         return values.item() if isinstance(values, (np.ndarray, np.generic)) else values
-    found = np.asarray(values)
-    return found.tolist() if k is None else found[k].tolist()
-
-
-def _compare(
-    rule: str, recorded: Any, recomputed: Any, about: str, t_s: float | None, *, within: float, every_key: bool
-) -> None:
-    def descend(theirs: Any, ours: Any, path: str) -> None:
-        _compare(rule, theirs, ours, f"{about}.{path}".strip("."), t_s, within=within, every_key=every_key)
-
-    if isinstance(recomputed, Mapping) and isinstance(recorded, dict):
-        keys = {*recomputed, *recorded} if every_key else {*recomputed}
-        for key in sorted(keys, key=str):
-            descend(recorded.get(key, "nothing"), recomputed.get(key, "nothing"), str(key))
-    elif isinstance(recomputed, (list, tuple)) and isinstance(recorded, list):
-        if len(recomputed) != len(recorded):
-            raise Disagreement(f"{rule}: number of entries", len(recorded), len(recomputed), about, t_s)
-        for k, (theirs, ours) in enumerate(zip(recorded, recomputed, strict=True)):
-            descend(theirs, ours, str(k))
-    elif not _equal(recorded, recomputed, within):
-        raise Disagreement(rule, recorded, recomputed, about, t_s)
-
-
-def _equal(recorded: Any, recomputed: Any, within: float) -> bool:
-    """Numbers to within a tolerance, everything else exactly; a truth value is no number."""
-    if _is_number(recorded) and _is_number(recomputed):
-        return bool(recorded == recomputed or abs(recorded - recomputed) <= within * (1.0 + abs(recomputed)))
-    return type(recorded) is type(recomputed) and bool(recorded == recomputed)
-
-
-def _is_number(value: Any) -> bool:
-    return isinstance(value, (int, float)) and not isinstance(value, bool)
+    found = np.asarray(values).tolist()
+    return found if k is None else found[k]

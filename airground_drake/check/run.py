@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-import json
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 import pandas as pd
 
-from .files import Json, canonical, parse_json, parse_table, read_bytes, sha256
+from .files import Json, parse_table, read_bytes, read_json, sha256
 from .nearness import least_apart_m
-from .rules import SMALL, Array, Flags, NotEstablished, at_most, close, holds, same
+from .rules import SMALL, Array, NotEstablished, close, holds, same
 from .scenario import Levels, Pair, Preset, as_run, levels_of, pairs_of, preset_of, robots_of
 
 Rows = npt.NDArray[np.intp]
@@ -58,9 +58,7 @@ META = (
     "decision_block", "faults", "files",
 )  # fmt: skip
 SHARED = ("method", "composition", "seed", "zeta_m", "events", "faults")
-"""What meta.json and the run's entry in report.json both say."""
-INTERVENING = 1.0
-"""The mode in which the UAV intervenes."""
+"""Keys that meta.json and the run's entry in report.json share."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,24 +67,18 @@ class Run:
 
     Attributes:
         name: of the run in its scenario.
-        scenario: as resolved.
+        scenario: as resolved, with the values that the run sets.
         events: by time.
-        decision_times_s: CPU time of each decision.
-        wall_s: wall-clock time of the simulation.
         signals: see airground_drake/run/trace.py for the columns.
         decisions: a row per decision of the gatekeeper.
-        problems: the problem (26) of each decision.
         proposals: a row per proposal of the UAV.
     """
 
     name: str
     scenario: Json
     events: list[Json]
-    decision_times_s: list[float]
-    wall_s: float
     signals: pd.DataFrame
     decisions: pd.DataFrame
-    problems: pd.DataFrame
     proposals: pd.DataFrame
 
     @cached_property
@@ -145,11 +137,6 @@ class Run:
         return places
 
     @cached_property
-    def command_m_s(self) -> dict[str, Array]:
-        """Velocity of each robot since the row before, (T, 3); 0 in the first row."""
-        return {robot: self.vector(robot, "v", "m_s") for robot in self.robots}
-
-    @cached_property
     def sample_s(self) -> Array:
         """Times of the control samples, (S,): multiples of the control period before the end."""
         period = self.scenario["control"]["period_s"]
@@ -164,21 +151,11 @@ class Run:
         """A column of the signals, (T,).
 
         Raises:
-            NotEstablished: if it is not there.
             Disagreement: if a number is not finite.
         """
-        if name not in self._columns:
-            if name not in self.signals:
-                raise NotEstablished("the signals have the column", "it is missing", name)
-            values = self.signals[name].to_numpy(dtype=np.float64)
-            holds("numbers are finite", np.isfinite(values), values, "a finite number", about=name)
-            self._columns[name] = values
-        return self._columns[name]
-
-    @cached_property
-    def _columns(self) -> dict[str, Array]:
-        """Columns that were read before."""
-        return {}
+        values = self.signals[name].to_numpy(dtype=np.float64)
+        holds("numbers are finite", np.isfinite(values), values, "a finite number", about=name)
+        return values
 
     def vector(self, robot: str, stem: str, unit: str) -> Array:
         """Three columns of the signals, (T, 3), such as `ugv1.vx_m_s`: stem `v`, unit `m_s`."""
@@ -193,13 +170,9 @@ class Run:
         found = [float(event["t_s"]) for event in self.events if (event["robot"], event["kind"]) == (robot, kind)]
         return np.array(sorted(found))
 
-    def executed(self, ugv: str) -> Flags:
-        """Rows up to which an intervention was executed, (T,)."""
-        return self.column(f"{ugv}.accepted") != 0.0
-
 
 def read_run(folder: Path, name: str, report: Json) -> Run:
-    """Read a trace and apply the rules that all claims about it rest on; equal files give the same Run.
+    """Read a trace, and check the rules that all claims about it rest on.
 
     Args:
         folder: of the trace.
@@ -210,110 +183,65 @@ def read_run(folder: Path, name: str, report: Json) -> Run:
         Disagreement: if a rule is broken.
         NotEstablished: if a file cannot be read.
     """
-    contents = tuple(read_bytes(folder / file) for file in ("meta.json", "timings.json", *TABLES))
-    entry = {key: report["runs"][name][key] for key in SHARED}
-    return _run(name, canonical(report["scenario"]["resolved"]), canonical(entry), contents)
-
-
-@lru_cache(maxsize=8)
-def _run(name: str, scenario_text: str, entry_text: str, contents: tuple[bytes, ...]) -> Run:
-    scenario, entry = json.loads(scenario_text), json.loads(entry_text)
-    meta, timings = parse_json(contents[0], "meta.json"), parse_json(contents[1], "timings.json")
+    scenario, meta = report["scenario"]["resolved"], read_json(folder / "meta.json")
+    same("keys of meta.json", sorted(meta), sorted(META))
+    same("keys of timings.json", sorted(read_json(folder / "timings.json")), ["decision_times_s", "wall_s"])
     same("files of the trace", sorted(meta["files"]), sorted(TABLES))
-    same("what meta.json says", sorted(meta), sorted(META))
-    same("what timings.json says", sorted(timings), ["decision_times_s", "wall_s"])
-    tables = []
-    for file, content in zip(TABLES, contents[2:], strict=True):
-        same("SHA-256 of a table", meta["files"][file], sha256(content), about=file)
-        tables.append(parse_table(content, file))
-        columns = COLUMNS.get(file) or _signals_of(scenario)
-        strange = sorted({*tables[-1].columns} - {*columns})
-        same("no column but those of a trace", strange, [], about=file)
-    _is_of_the_run(meta, entry, scenario, name)
-    run = Run(name, as_run(scenario, name), meta["events"], timings["decision_times_s"], timings["wall_s"], *tables)
-    same("a time for each decision", len(run.decision_times_s), len(run.decisions))
-    at_most("times of decisions are not negative", -np.array([*run.decision_times_s, run.wall_s]), 0.0)
+    tables = {file: _table(folder / file, meta["files"][file], _columns(file, scenario)) for file in TABLES}
+    _is_of_the_run(meta, report["runs"][name], scenario, name)
+    signals, decisions, _, proposals = tables.values()
+    run = Run(name, as_run(scenario, name), meta["events"], signals, decisions, proposals)
+    close("threshold in force", meta["zeta_m"], run.levels.zeta_m, within=SMALL)
     _rows_cover_the_run(run)
-    _decisions_come_by_time(run)
-    _a_row_at_every_control_sample(run)
-    _robots_start_where_declared(run)
-    _robots_are_where_their_commands_lead(run)
-    _presets_are_those_of_the_scenario(run)
-    _nothing_is_commanded_before_the_start(run)
-    _flags_are_0_or_1(run)
+    for robot in run.robots:
+        _moves_as_commanded(run, robot)
+    for ugv, preset in run.presets.items():
+        recorded, flags = run.vector(ugv, "ref_", "m"), run.column(f"{ugv}.accepted")
+        close("preset trajectory", recorded, preset.position_m(run.t_s), within=SMALL, about=ugv, t_s=run.t_s)
+        holds("flag of an intervention", np.isin(flags, (0.0, 1.0)), flags, "0 or 1", about=ugv, t_s=run.t_s)
     return run
 
 
-def _signals_of(scenario: Json) -> list[str]:
-    """Columns of the signals."""
+def _table(path: Path, digest: str, columns: Sequence[str]) -> pd.DataFrame:
+    """The table in a file that has the digest and the columns."""
+    content = read_bytes(path)
+    same("SHA-256 of a table", digest, sha256(content), about=path.name)
+    table = parse_table(content, path.name)
+    same("columns of a table", sorted(table.columns), sorted(columns), about=path.name)
+    return table
+
+
+def _columns(file: str, scenario: Json) -> Sequence[str]:
+    """Columns of a table; those of the signals follow from the robots."""
     of_robots = [f"{robot}.{name}" for robot in robots_of(scenario) for name in OF_ROBOT]
-    return ["t_s", *of_robots, *(f"{ugv}.{name}" for ugv in scenario["ugvs"] for name in OF_UGV)]
+    of_ugvs = [f"{ugv}.{name}" for ugv in scenario["ugvs"] for name in OF_UGV]
+    return COLUMNS.get(file) or ["t_s", *of_robots, *of_ugvs]
 
 
 def _is_of_the_run(meta: Json, entry: Json, scenario: Json, name: str) -> None:
     """meta.json, the run's entry in report.json and the scenario say the same."""
-    same("schema of the trace", meta["schema"], SCHEMA)
-    same("name of the run", meta["run"], name)
-    same("scenario of the trace", meta["scenario"], scenario)
-    same("method of the run", meta["method"], scenario["runs"][name]["method"])
-    same("composition of the run", meta["composition"], scenario["runs"][name]["composition"])
-    same("seed of the run", meta["seed"], scenario["seed"])
-    same("UGVs of the run", meta["ugvs"], list(scenario["ugvs"]))
-    same("robots of the run", meta["robots"], list(robots_of(scenario)))
-    close("threshold in force", meta["zeta_m"], levels_of(as_run(scenario, name)).zeta_m, within=SMALL)
-    for key in SHARED:
-        same(f"{key} in report.json", entry[key], meta[key])
-
-
-def _decisions_come_by_time(run: Run) -> None:
-    """The decisions of a UGV are in the order of time."""
-    for ugv in run.ugvs:
-        times = run.decisions.loc[run.decisions["robot"] == ugv, "t_s"].to_numpy(dtype=np.float64)
-        later = times[1:]
-        holds("decisions are in order", later >= times[:-1], later, "not before the one above", about=ugv, t_s=later)
+    of_scenario = {key: scenario["runs"][name][key] for key in ("method", "composition")} | {
+        "schema": SCHEMA, "run": name, "scenario": scenario, "seed": scenario["seed"],
+        "ugvs": list(scenario["ugvs"]), "robots": list(robots_of(scenario)),
+    }  # fmt: skip
+    same("meta.json is of the run", {key: meta[key] for key in of_scenario}, of_scenario)
+    same("report.json is of the run", {key: entry[key] for key in SHARED}, {key: meta[key] for key in SHARED})
 
 
 def _rows_cover_the_run(run: Run) -> None:
-    """Time increases from row to row, from 0 to the duration."""
+    """Time increases from 0 to the duration, with a row at every control sample."""
     t = run.t_s
     if len(t) < 2:
         raise NotEstablished("the rows cover the run", f"there are {len(t)} rows")
     holds("time increases from row to row", np.diff(t) > 0.0, t[1:], "later than the row before", t_s=t[1:])
     close("the rows cover the run", t[[0, -1]], [0.0, run.scenario["duration_s"]], within=SMALL, t_s=t[[0, -1]])
+    close("a row at every control sample", t[run.sample_row], run.sample_s, within=SMALL, t_s=run.sample_s)
 
 
-def _a_row_at_every_control_sample(run: Run) -> None:
-    close("a row at every control sample", run.t_s[run.sample_row], run.sample_s, within=SMALL, t_s=run.sample_s)
-
-
-def _robots_start_where_declared(run: Run) -> None:
-    for robot, spec in run.robots.items():
-        close("start of a robot", run.position_m[robot][0], spec["start_m"], within=SMALL, about=robot)
-
-
-def _robots_are_where_their_commands_lead(run: Run) -> None:
-    """position[k] = position[k-1] + (t[k] - t[k-1]) * command[k]."""
-    dt = np.diff(run.t_s)[:, None]
-    for robot in run.robots:
-        led = run.position_m[robot][:-1] + dt * run.command_m_s[robot][1:]
-        close("law of motion", run.position_m[robot][1:], led, within=SMALL, about=robot, t_s=run.t_s[1:])
-
-
-def _nothing_is_commanded_before_the_start(run: Run) -> None:
-    """The first row is the start, so its command is 0."""
-    for robot in run.robots:
-        first = run.command_m_s[robot][0]
-        close("command before the start", first, np.zeros(3), within=0.0, about=robot, t_s=float(run.t_s[0]))
-
-
-def _flags_are_0_or_1(run: Run) -> None:
-    for ugv in run.ugvs:
-        flags = run.column(f"{ugv}.accepted")
-        holds("flag whether an intervention is executed", (flags == 0.0) | (flags == 1.0), flags, "0 or 1",
-              about=ugv, t_s=run.t_s)  # fmt: skip
-
-
-def _presets_are_those_of_the_scenario(run: Run) -> None:
-    for ugv, preset in run.presets.items():
-        recorded = run.vector(ugv, "ref_", "m")
-        close("preset trajectory", recorded, preset.position_m(run.t_s), within=SMALL, about=ugv, t_s=run.t_s)
+def _moves_as_commanded(run: Run, robot: str) -> None:
+    """position[k] = position[k-1] + (t[k] - t[k-1]) * command[k], from the declared start and a command of 0."""
+    place, command = run.position_m[robot], run.vector(robot, "v", "m_s")
+    close("start of a robot", place[0], run.robots[robot]["start_m"], within=SMALL, about=robot)
+    close("command before the start", command[0], np.zeros(3), within=0.0, about=robot, t_s=float(run.t_s[0]))
+    led = place[:-1] + np.diff(run.t_s)[:, None] * command[1:]
+    close("law of motion", place[1:], led, within=SMALL, about=robot, t_s=run.t_s[1:])

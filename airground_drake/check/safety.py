@@ -16,29 +16,28 @@ FAR_M = 1e-6
 """Largest error of a distance in floating point, m; pairs that are farther apart need no exact arithmetic."""
 
 
-def least_distance_m(own_m: Array, other_m: Array) -> float:
-    """Least distance of two bodies that move straight between samples, at places (K, 3) each.
+def distances_m(relative_m: Array) -> Array:
+    """Least distance of two bodies between any two rows, (T - 1,), m, from relative positions (T, 3), m.
 
-    On a segment the relative position is r + s w, 0 <= s <= 1; |r + s w|^2 is least at s = -r.w / w.w.
+    Both move straight: the relative position is r + s w, 0 <= s <= 1, and |r + s w|^2 is least at s = -r.w / w.w.
     """
-    relative = own_m - other_m
-    r, w = relative[:-1], np.diff(relative, axis=0)
+    r, w = relative_m[:-1], np.diff(relative_m, axis=0)
     ww = (w * w).sum(axis=1)
     s = np.clip(-(r * w).sum(axis=1) / np.where(ww > 0.0, ww, 1.0), 0.0, 1.0)
-    return float(np.linalg.norm(r + s[:, None] * w, axis=1).min())
+    return np.asarray(np.linalg.norm(r + s[:, None] * w, axis=1))
 
 
 def safe_trace(run: Run) -> Found:
     """SAFE-TRACE: ||p_i(t) - q_j(t)|| >= d_ij at every time, for every pair.
 
-    A pair puts the claim to the test if it comes so near that one period at the speed limits could break it.
+    A pair tests the claim if it comes so near that one period at the speed limits could break it.
     """
     margin, least, most = np.inf, 0, 0
     for pair in run.pairs:
         closing = pair.closing_m_s * run.scenario["control"]["period_s"]
         if run.apart_m[pair.robot, pair.other] - pair.safe_m > max(margin, closing + SMALL):
             continue  # neither the nearest pair nor near enough to count
-        of_pair = least_distance_m(run.position_m[pair.robot], run.position_m[pair.other]) - pair.safe_m
+        of_pair = float(distances_m(run.position_m[pair.robot] - run.position_m[pair.other]).min()) - pair.safe_m
         margin = min(margin, of_pair)
         least += of_pair - closing < -SMALL
         most += of_pair - closing <= SMALL
@@ -46,14 +45,14 @@ def safe_trace(run: Run) -> Found:
 
 
 def _root(square: Fraction) -> tuple[Fraction, Fraction]:
-    """Bounds of a square root, 2^-160 relative to the denominator apart."""
+    """Lower and upper bound of a square root, 2^-160 relative to the denominator apart."""
     numerator = isqrt(square.numerator * square.denominator << 320)
     denominator = square.denominator << 160
     return Fraction(numerator, denominator), Fraction(numerator + 1, denominator)
 
 
 def _missed_m(x: list[Fraction], step: list[Fraction], safe: Fraction, share: Fraction, gain: Fraction) -> Fraction:
-    """By how much a step along x / |x| falls short of its share of the bound, at most; 0 if it meets it.
+    """Upper bound of what a step along x / |x| lacks of its share of the avoidance inequality, m; at least 0.
 
     Args:
         x: from what is avoided to the robot, m.
@@ -63,7 +62,7 @@ def _missed_m(x: list[Fraction], step: list[Fraction], safe: Fraction, share: Fr
         gain: A h, at most 1.
     """
     least, most = _root(sum((c * c for c in x), Fraction()))
-    if not least:  # no direction: any unit vector may be taken
+    if not least:  # both are at one place: the law may take any unit vector
         return max(Fraction(), share * gain * safe)
     along = sum((c * s for c, s in zip(x, step, strict=True)), Fraction())
     bounds = [share * (gain * (safe - d) if d <= safe else safe - d) for d in (least, most)]
@@ -71,15 +70,14 @@ def _missed_m(x: list[Fraction], step: list[Fraction], safe: Fraction, share: Fr
 
 
 def gain_of(scenario: Json, period_s: float) -> Fraction:
-    """A h of the numbers as they are written, at most 1: the bound with 1 demands less."""
+    """A h of the decimal numbers as written; a gain above 1 counts as 1, which demands less."""
     return min(written(scenario["control"]["avoidance_gain_1_s"]) * written(period_s), Fraction(1))
 
 
 def shortfall_m(own_m: Array, other_m: Array, pair: Pair, gain: Fraction, last: Fraction = Fraction(1)) -> Fraction:
-    """The most that a pair's inequalities together miss their bound by at any sample, m per period; exact.
+    """The largest sum of what a pair's inequalities lack at one sample, m per period, in exact arithmetic.
 
-    Positions are taken as the rational numbers that they are. Samples at which the two cannot meet within a period,
-    whatever their direction, need no inequality.
+    Samples at which the two cannot meet within a period, whatever their direction, need no inequality.
 
     Args:
         own_m: places of the robot at the control samples and at the end, (K + 1, 3).
@@ -107,15 +105,12 @@ def shortfall_m(own_m: Array, other_m: Array, pair: Pair, gain: Fraction, last: 
 
 
 def lost_m(missed: Fraction, gain: Fraction, samples: int) -> float:
-    """The largest loss of distance that follows from a shortfall: e / (A h), or the sum of all if the gain is 0."""
+    """Bound of the distance that a shortfall can cost, m: e / (A h), or the sum over all samples if the gain is 0."""
     return float(missed / gain if gain else missed * samples)
 
 
 def safe_hyp(run: Run) -> Found:
-    """SAFE-HYP: the hypotheses of the safety theorem, up to e per pair; its margin is the least -e / (A h).
-
-    How often inequalities bound a command is not counted here.
-    """
+    """SAFE-HYP: the hypotheses of the safety theorem, up to e per pair; its margin is the least -e / (A h)."""
     try:
         _constants(run)
         _motion(run)
@@ -150,12 +145,11 @@ def _constants(run: Run) -> None:
 def _motion(run: Run) -> None:
     """Robots move straight from sample to sample, at most at their speed limits, and UGVs stay at their height."""
     rows = np.append(run.sample_row, len(run.t_s) - 1)
-    at_most("spacing of the samples", np.diff(run.t_s[rows]), run.scenario["control"]["period_s"], within=SMALL)
     for robot, spec in run.robots.items():
         place = run.position_m[robot]
         on_chord = np.stack([np.interp(run.t_s, run.t_s[rows], axis[rows]) for axis in place.T], axis=1)
         close("straight motion", place, on_chord, within=SMALL, about=robot, t_s=run.t_s)
-        speed = np.linalg.norm(run.command_m_s[robot][1:], axis=1)
+        speed = np.linalg.norm(run.vector(robot, "v", "m_s")[1:], axis=1)
         at_most("speed limit", speed, spec["max_speed_m_s"], within=SMALL, about=robot, t_s=run.t_s[:-1])
         if robot != run.uav:
             close("planar motion", place[:, 2], np.full(len(place), place[0, 2]), within=0.0, about=robot, t_s=run.t_s)

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import json
 import math
+from copy import deepcopy
 from dataclasses import dataclass
 from fractions import Fraction
-from functools import lru_cache
 from itertools import combinations
 from typing import Any, NamedTuple
 
@@ -68,8 +67,8 @@ class Preset:
 
 
 def as_run(scenario: Json, name: str) -> Json:
-    """The scenario with the values that a run sets for itself, by dotted key."""
-    changed: Json = json.loads(json.dumps(scenario))
+    """The scenario with the values that a run sets by dotted key."""
+    changed: Json = deepcopy(scenario)
     for key, value in scenario["runs"][name]["set"].items():
         *above, last = key.split(".")
         place: Any = changed
@@ -96,18 +95,12 @@ def pairs_of(scenario: Json) -> list[Pair]:
     beside_robots = []
     for one, other in combinations(robots, 2):
         safe = apart_m(scenario, "air_ground_m" if other == uav else "ugv_m", robots[one], robots[other])
-        beside_robots.append(Pair(one, other, safe, _decimal_sum(limit[one], limit[other]), 0.5))
+        beside_robots.append(Pair(one, other, safe, limit[one] + limit[other], 0.5))
     return beside_obstacles + beside_robots
 
 
-@lru_cache(maxsize=10_000)
-def _decimal_sum(one: float, other: float) -> float:
-    """The sum of two numbers as they are written: 1.1 and 2.2 make 3.3. Teams have few speeds, so few sums."""
-    return float(written(one) + written(other))
-
-
 def apart_m(scenario: Json, kind: str, one: Json, other: Json) -> float:
-    """A distance that surfaces keep, by its name in the scenario, as a distance of centres: both radii are added."""
+    """Distance of two centres, m: a distance of surfaces, by its name in the scenario, and both radii."""
     return float(scenario["safe_distance"][kind]) + (float(one["radius_m"]) + float(other["radius_m"]))
 
 

@@ -46,12 +46,12 @@ class Variable:
     x_m: Array
 
     def at(self, t_s: float) -> float:
-        """X at a time, m."""
+        """Value of x at a time, m."""
         parts = np.array([np.interp(t_s, self.t_s, part) for part in self.parts_m.T])
         return float(np.linalg.norm(parts[:3]) + parts[3])
 
     def reaches(self, level_m: float, after_s: float, *, above: bool) -> float | None:
-        """First time after `after_s` at which x comes to be >= the level (above) or < it; by bisection."""
+        """First time after `after_s` at which x is at or above the level, or below it if not `above`; by bisection."""
         later = np.flatnonzero(((self.x_m >= level_m) == above) & (self.t_s > after_s))
         if not len(later):
             return None
@@ -64,7 +64,7 @@ class Variable:
 
 
 def decision_variable(run: Run, ugv: str) -> Variable:
-    """X from positions, preset and noise; cut at corners of the preset and at turning points of x."""
+    """The decision variable from positions, preset and noise, cut at the preset's corners and at x's turning points."""
     corners = run.presets[ugv].corner_s
     t = np.union1d(run.t_s, corners[(corners > run.t_s[0]) & (corners < run.t_s[-1])])
     moving = np.column_stack([run.position_m[ugv], run.column(f"{ugv}.noise_m")])
@@ -124,21 +124,17 @@ def automaton(x: Variable, levels: Levels) -> list[Step]:
 
 
 def thr_trig(run: Run) -> Found:
-    """THR-TRIG: the recorded triggers and releases are those of the automaton run on x.
-
-    A broken rule refutes the claim.
-    """
+    """THR-TRIG: the recorded triggers, releases, modes and noise are those of (15) and of the automaton run on x."""
     lags_s: list[float] = []
     least, most = 0, 0
     try:
-        _only_ugvs_are_triggered_on(run)
         for ugv in run.ugvs:
             x = decision_variable(run, ugv)
             steps = automaton(x, run.levels)
             at_rows = np.interp(run.t_s, x.t_s, x.x_m)  # rows are knots
             recorded = run.column(f"{ugv}.decision_variable_m")
             close("decision variable", recorded, at_rows, within=VARIABLE_M, about=ugv, t_s=run.t_s)
-            lags_s += _events_are_the_automatons(run, ugv, steps)
+            lags_s += _lags_s(run, ugv, steps)
             least += _transitions(steps, before_s=float(run.t_s[-1]) - EVENT_S, at_once_s=EVENT_S)
             most += _transitions(steps, before_s=np.inf, at_once_s=0.0)
             _modes_are_the_automatons(run, ugv, steps)
@@ -150,7 +146,7 @@ def thr_trig(run: Run) -> Found:
 
 
 def _transitions(steps: list[Step], before_s: float, at_once_s: float) -> int:
-    """Transitions of the automaton before a time; the end of a rest with a trigger within `at_once_s` is one."""
+    """Number of transitions before a time; the end of a rest and a trigger within `at_once_s` of it count as one."""
     ends_of_a_rest_with_a_trigger = sum(
         one.event == "" and other.event == "trigger" and other.t_s - one.t_s <= at_once_s
         for one, other in pairwise(steps)
@@ -158,26 +154,20 @@ def _transitions(steps: list[Step], before_s: float, at_once_s: float) -> int:
     return sum(step.t_s < before_s for step in steps) - ends_of_a_rest_with_a_trigger
 
 
-def _only_ugvs_are_triggered_on(run: Run) -> None:
-    for event in run.events:
-        known = event["kind"] not in ("trigger", "release") or event["robot"] in run.ugvs
-        holds("only UGVs are triggered on", known, event["robot"], "a UGV", t_s=event["t_s"])
-
-
-def _events_are_the_automatons(run: Run, ugv: str, steps: list[Step]) -> list[float]:
-    """Compare one by one; those in the last 1e-5 s may be on either side of the end. Returns the differences, s."""
+def _lags_s(run: Run, ugv: str, steps: list[Step]) -> list[float]:
+    """Differences of recorded and recomputed event times, s; an event in the last 1e-5 s may be missing in one."""
     ours = [(step.t_s, step.event) for step in steps if step.event]
     theirs = sorted((float(when), kind) for kind in ("trigger", "release") for when in run.times_s(ugv, kind))
     lags: list[float] = []
     for recomputed, recorded in zip_longest(ours, theirs):
-        first = min(event for event in (recomputed, recorded) if event is not None)
-        if recomputed is None or recorded is None:
-            if first[0] < run.t_s[-1] - EVENT_S:
-                raise Disagreement("triggers and releases", recorded, recomputed, ugv, first[0])
-            continue
-        lags.append(abs(recomputed[0] - recorded[0]))
-        if recomputed[1] != recorded[1] or lags[-1] > EVENT_S:
-            raise Disagreement("triggers and releases", recorded, recomputed, ugv, first[0])
+        first_s = min(event[0] for event in (recomputed, recorded) if event is not None)
+        if recomputed is not None and recorded is not None:
+            lags.append(abs(recomputed[0] - recorded[0]))
+            fits = recomputed[1] == recorded[1] and lags[-1] <= EVENT_S
+        else:
+            fits = first_s >= run.t_s[-1] - EVENT_S
+        if not fits:
+            raise Disagreement("triggers and releases", recorded, recomputed, ugv, first_s)
     return lags
 
 
@@ -193,20 +183,17 @@ def _modes_are_the_automatons(run: Run, ugv: str, steps: list[Step]) -> None:
 
 def _noise_moves_as_it_must(run: Run, ugv: str) -> None:
     """(15) from 0: from row to row by Euler's method, with one sample for each period of the noise."""
-    decision, noise = run.scenario["decision"], run.column(f"{ugv}.noise_m")
+    decision, noise, end = run.scenario["decision"], run.column(f"{ugv}.noise_m"), run.t_s[1:]
     close("noise at the start", noise[0], 0.0, within=NOISE_M, about=ugv, t_s=float(run.t_s[0]))
-    steps: dict[int, list[tuple[float, float, float]]] = {}
-    for begin, end, before, after in zip(run.t_s, run.t_s[1:], noise, noise[1:], strict=False):
-        step = float(end - begin)
-        driven = float(after - before * (1.0 - decision["leak_1_s"] * step))
-        steps.setdefault(int((begin + end) / (2.0 * decision["noise_period_s"])), []).append((step, driven, float(end)))
+    step = np.diff(run.t_s)
+    driven = noise[1:] - noise[:-1] * (1.0 - decision["leak_1_s"] * step)
+    period = np.floor((end - step / 2.0) / decision["noise_period_s"])
+    by_length = np.lexsort((step, period))
+    longest = by_length[np.append(np.diff(period[by_length]) > 0, True)]  # row of each period with the longest step
+    sample = (driven / step)[longest][np.searchsorted(period[longest], period)]
+    close("noise of one sample", driven, sample * step, within=NOISE_M, about=ugv, t_s=end)
     most = LARGEST_SAMPLE * decision["noise_m_sqrt_s"] / decision["noise_period_s"] ** 0.5
-    for within in steps.values():
-        longest, driven, _ = max(within)
-        at = np.array([when for _, _, when in within])
-        found, lasts = (np.array([step[k] for step in within]) for k in (1, 0))
-        close("noise of one sample", found, driven / longest * lasts, within=NOISE_M, about=ugv, t_s=at)
-        at_most("sample of the noise", abs(driven), most * longest, within=NOISE_M, about=ugv, t_s=float(at[0]))
+    at_most("sample of the noise", np.abs(sample) * step, most * step, within=NOISE_M, about=ugv, t_s=end)
 
 
 def zeno_trace(run: Run) -> Found:
@@ -225,7 +212,7 @@ def zeno_trace(run: Run) -> Found:
 
 
 def _columns_follow_the_events(run: Run, ugv: str) -> None:
-    """The columns on the last trigger, the last release and the count are those of the events before each row."""
+    """The columns for the last trigger, the last release and the number of triggers follow from the events."""
     for kind, name in (("trigger", "triggered_at_s"), ("release", "released_at_s")):
         times = run.times_s(ugv, kind)
         last = np.append(-1.0, times)

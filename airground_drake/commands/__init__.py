@@ -11,14 +11,15 @@ from importlib.metadata import version
 from typing import NamedTuple
 
 from airground_drake.base import interruption
-from airground_drake.base.usage import Parser, refuse
+from airground_drake.base.errors import AirgroundError, SimulationError
+from airground_drake.base.usage import EXIT_TOOL, EXIT_USAGE, Parser, refuse
 
 
 class Command(NamedTuple):
     """What `airground NAME ...` does.
 
     The module has `main`, which takes the arguments and returns the exit code, and `parser`, which makes the parser of
-    the arguments. It imports what takes long to import in `main` only.
+    the arguments. Slow imports are inside `main`. An error that `main` raises becomes one line, see `main` below.
     """
 
     module: str
@@ -53,33 +54,45 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run a command.
 
     Returns:
-        The command's exit code; 2 if the command is unknown.
+        The command's exit code; 2 if the command is unknown or refuses, 4 if a simulation stops.
     """
-    width = max(map(len, COMMANDS))
-    parser = Parser(
-        prog="airground",
-        description="Event-triggered UAV-to-UGV intervention on Drake, with verification reports.",
-        epilog="commands:\n"
-        + "\n".join(f"  {name:{width}}  {command.says}" for name, command in COMMANDS.items())
-        + "\n\n`airground COMMAND --help` says more.",
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-        usage="airground COMMAND ...",
-    )
-    parser.add_argument("--version", action="version", version=f"airground_drake {version('airground_drake')}")
-    parser.add_argument("command", metavar="COMMAND", nargs="?")
     given = list(sys.argv[1:] if arguments is None else arguments)
-    options, unknown = parser.parse_known_args(given[:1])
+    options, unknown = _parser().parse_known_args(given[:1])
     name = "".join(unknown) or options.command
     if name is None:
-        parser.error(f"a command is needed: {', '.join(COMMANDS)}")
+        return refuse(f"a command is needed: {', '.join(COMMANDS)}")
     if name in GONE:
         return refuse(f"`airground {name}` is gone: use `{GONE[name]}` (CHANGELOG.md)")
     if name not in COMMANDS:
         close = difflib.get_close_matches(name, COMMANDS, n=1)
         meant = f"did you mean {close[0]}? " if close else ""
         return refuse(f"{name!r} is no command: {meant}commands are {', '.join(COMMANDS)}")
-    code: int = import_module(COMMANDS[name].module).main(given[1:])
+    try:
+        code: int = import_module(COMMANDS[name].module).main(given[1:])
+    except BrokenPipeError:  # nobody reads what is printed
+        raise
+    except SimulationError as error:
+        return refuse(error, EXIT_TOOL)
+    except AirgroundError as error:
+        return refuse(error)
+    except OSError as error:  # of a file that was named, or of standard output
+        return refuse(error, EXIT_USAGE if error.filename else EXIT_TOOL)
     return code
+
+
+def _parser() -> argparse.ArgumentParser:
+    width = max(map(len, COMMANDS))
+    commands = "\n".join(f"  {name:{width}}  {command.says}" for name, command in COMMANDS.items())
+    parser = Parser(
+        prog="airground",
+        description="Event-triggered UAV-to-UGV intervention on Drake, with verification reports.",
+        epilog=f"commands:\n{commands}\n\n`airground COMMAND --help` says more.",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        usage="airground COMMAND ...",
+    )
+    parser.add_argument("--version", action="version", version=f"airground_drake {version('airground_drake')}")
+    parser.add_argument("command", metavar="COMMAND", nargs="?")
+    return parser
 
 
 def entry() -> None:

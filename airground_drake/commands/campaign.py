@@ -1,4 +1,4 @@
-"""`airground campaign SPEC -n 1000`: many draws of a scenario, and what can be concluded from them."""
+"""`airground campaign SPEC -n 1000`: judge many draws of a scenario, and bound how likely a violation is."""
 
 from __future__ import annotations
 
@@ -9,17 +9,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from airground_drake.base import files
-from airground_drake.base.errors import (
-    AirgroundError,
-    FolderError,
-    LimitError,
-    ScenarioError,
-    UnknownNameError,
-    one_line,
-)
-from airground_drake.base.parallel import MOST_JOBS, one_thread_each, processors
+from airground_drake.base.errors import AirgroundError, one_line
+from airground_drake.base.parallel import one_thread_each, processors
 from airground_drake.base.progress import progress_bar
-from airground_drake.base.usage import EXIT_TOOL, Parser, positive, refuse, whole
+from airground_drake.base.usage import EXIT_TOOL, REFUSALS, Parser, output_folder, parallel, positive, refuse, whole
 from airground_drake.campaign.rows import UNFINISHED
 from airground_drake.scenarios import plugins
 from airground_drake.scenarios.estimate import DEFAULT_LIMITS, Limits
@@ -33,7 +26,7 @@ EXIT_REFUTED, EXIT_UNDECIDED = 1, 3
 
 
 def parser() -> argparse.ArgumentParser:
-    """What the command line takes."""
+    """Make the parser."""
     parser = Parser(
         prog="airground campaign",
         description="Simulate and judge many draws of a scenario, and bound how likely a violation is.",
@@ -45,16 +38,14 @@ def parser() -> argparse.ArgumentParser:
         "-n", "--number", type=whole(1), metavar="N", help="draws (default: one, or all combinations of grids)"
     )
     parser.add_argument(
-        "-o", "--output", type=Path, metavar="DIR",
+        "-o", "--output", type=output_folder, metavar="DIR",
         help="default: campaigns/<name>; new, or --resume; with --only, the file of the scenario",
     )  # fmt: skip
     parser.add_argument("--resume", action="store_true", help="go on with what the folder has")
     parser.add_argument(
         "--only", type=whole(0, MAX_SEED), metavar="INDEX", help="this draw alone; its scenario is written"
     )
-    parser.add_argument(
-        "--jobs", type=whole(1, MOST_JOBS), metavar="N", help="processes (default: one for each processor)"
-    )
+    parallel(parser)
     parser.add_argument("--scheduler", metavar="ADDRESS", help="of a Dask cluster, such as tcp://host:8786")
     parser.add_argument(
         "--stop-when", metavar="RULE", help="end when the anytime-valid bound meets RULE: 'SAFE-TRACE < 1e-2'"
@@ -67,29 +58,22 @@ def parser() -> argparse.ArgumentParser:
         "--limit-time", type=positive, default=DEFAULT_LIMITS.time, metavar="S",
         help="stop a draw that takes longer (default: %(default)g)",
     )  # fmt: skip
-    parser.add_argument("-q", "--quiet", action="store_true", help="no progress")
     parser.add_argument(plugins.OPTION, action="store_true", help=plugins.HELP)
     return parser
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command line.
-
-    Returns:
-        Exit code: 0 every claim as expected in every draw, 1 one differs, 2 usage, bad spec or folder, 3 something
-        was undecided or a draw could not be judged, 4 tool error.
-    """
-    of_command = parser()
-    options = of_command.parse_args(arguments)
+    """Do a campaign, or one draw; the exit codes are in the help."""
+    options = parser().parse_args(arguments)
     if options.only is not None and (options.resume or options.stop_when or options.number is not None):
-        of_command.error("--only is one draw alone: -n, --resume and --stop-when do not go with it")
+        return refuse("--only is one draw alone: -n, --resume and --stop-when do not go with it")
     one_thread_each()
     from airground_drake.campaign.spec import load_spec
 
     try:
         spec = load_spec(options.spec)
         return _all(spec, options) if options.only is None else _only(spec, options)
-    except (ScenarioError, LimitError, FolderError, UnknownNameError, ValueError) as error:
+    except (*REFUSALS, ValueError) as error:
         return refuse(error)
     except (AirgroundError, OSError) as error:
         return refuse(error, EXIT_TOOL)
@@ -154,7 +138,7 @@ def _code(found: dict[str, Any]) -> int:
 
 
 def _undecided(found: dict[str, Any]) -> list[str]:
-    """What is undecided, in words: the reasons of exit code 3."""
+    """The reasons of exit code 3, in words."""
     draws, ended = found["draws"], found["ended"]
     lines = [f"{ended[name]} of {draws} draws {name}" for name in UNFINISHED if name in ended]
     for claim in found["claims"]:
@@ -171,7 +155,7 @@ def _name(claim: dict[str, Any]) -> str:
 
 
 def _summary(found: dict[str, Any], *, looked: bool) -> str:
-    """As text. The bounds hold for a number of draws fixed beforehand; after intermediate looks, at any time."""
+    """The evidence as text. After intermediate looks only the anytime-valid bounds hold, so these are given then."""
     ended = ", ".join(f"{count} {name}" for name, count in found["ended"].items())
     lines = [f"{found['name']}: {found['draws']} draws ({ended}), {found['simulated_s']:.0f} s simulated"]
     for claim in found["claims"]:

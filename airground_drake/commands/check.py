@@ -1,8 +1,8 @@
 """`airground check DIR`: the checker, then every claim judged again by its own code, from the files alone.
 
-Two processes go over the files. The checker (`airground_drake.check`) is separate code for what matters most. Then
-`airground_drake.report.rebuild` builds the report again without Drake, and each value of it is compared. With `--coq`
-the safety of the runs is proved again, too. Each line says which of the three it comes from.
+The checker (`airground_drake.check`) is separate code for the most important rules. Then a process without Drake
+(`airground_drake.report.rebuild`) builds the report again and compares each value. With `--coq` the safety of the runs
+is proved again, too. Each line names its source among these three.
 """
 
 from __future__ import annotations
@@ -24,13 +24,13 @@ if TYPE_CHECKING:
     from airground_drake.check.report import Line
 
 NEEDED = ("report", "files", "trace")
-"""Checks that must agree before claims are judged again: else the files are not those of the report."""
+"""Checks that must agree before claims are judged again: otherwise the files do not belong to the report."""
 EXIT_UNUSABLE = 2
-"""Of `airground prove`: without Coq, or with a report that it cannot read."""
+"""Exit code of `airground prove` without Coq, or with a report that it cannot read."""
 
 
 def parser() -> argparse.ArgumentParser:
-    """What the command line takes."""
+    """Make the parser: that of the checker, and `--coq`."""
     found = checker.parser()
     found.prog = "airground check"
     found.description = "Check a report from its files alone, then have its claims judged again by their own code."
@@ -39,7 +39,7 @@ def parser() -> argparse.ArgumentParser:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command line.
+    """Check, and print a line for each check.
 
     Returns:
         Exit code: 0 all agree, 1 not all, 2 usage or no report, 4 a fault of the checker.
@@ -63,8 +63,8 @@ def judged_again(folder: Path, lines: Sequence[Line], limit_s: float) -> Iterato
 
     Args:
         folder: of the report.
-        lines: what the checker says of it.
-        limit_s: CPU time for each process that judges.
+        lines: results of the checker.
+        limit_s: CPU time for each process that judges, s.
     """
     from airground_drake.check.report import AGREES, OPEN, Line
 
@@ -82,7 +82,7 @@ def judged_again(folder: Path, lines: Sequence[Line], limit_s: float) -> Iterato
 
 
 def _proved_again(folder: Path) -> Iterator[Line]:
-    """What Coq says of each run, from positions written anew."""
+    """Have Coq prove each run, from positions written anew."""
     from airground_drake.check.files import read_json
     from airground_drake.check.report import AGREES, DISAGREES, OPEN, Line
     from airground_drake.check.rules import Disagreement, NotEstablished

@@ -1,4 +1,4 @@
-"""`airground compare BEFORE AFTER`: what has changed from one report to another."""
+"""`airground compare BEFORE AFTER`: list what has changed from one report to another."""
 
 from __future__ import annotations
 
@@ -9,19 +9,19 @@ from pathlib import Path
 from typing import Any
 
 from airground_drake.base import files
-from airground_drake.base.errors import AirgroundError, TraceError, one_line
-from airground_drake.base.usage import Parser, refuse
+from airground_drake.base.errors import TraceError, one_line
+from airground_drake.base.usage import Parser, output_file
 from airground_drake.report import compare
 
 EXIT_WORSE = 1
 PARTS = ("overall", "verdicts", "margins", "exercised", "expectations", "reproduction", "audit", "events")
 MOST_LINES, MOST_ROWS = 20, 200
-"""Changes of one part that are shown, in the terminal and on the page; --json has all."""
+"""Changes of one part that are shown, in the terminal and on the page; `--json` has all."""
 _ABOUT = ("claim", "id", "run", "robot", "kind", "n")
 
 
 def parser() -> argparse.ArgumentParser:
-    """What the command line takes."""
+    """Make the parser."""
     parser = Parser(
         prog="airground compare",
         description="What has changed from one report to another: verdicts, margins, what was exercised, events.",
@@ -34,28 +34,21 @@ def parser() -> argparse.ArgumentParser:
     parser.add_argument("after", type=Path, metavar="AFTER", help="folder of another")
     parser.add_argument("--json", action="store_true", help="print all of it as JSON")
     parser.add_argument(
-        "--html", type=Path, metavar="FILE", help="write a page, with the runs drawn one over the other"
+        "--html", type=output_file, metavar="FILE", help="write a page, with the runs drawn one over the other"
     )
     parser.add_argument("--exact", action="store_true", help="exit code 1 if anything differs, to the last digit")
     return parser
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Compare, and say what differs.
-
-    Returns:
-        Exit code: 0, 1 if something is worse than before (or differs, if asked for), 2 if a folder is no report.
-    """
+    """Compare, and print what differs; the exit codes are in the help."""
     options = parser().parse_args(arguments)
-    try:
-        before, after = compare.read(options.before), compare.read(options.after)
-        found = compare.compared(before, after)
-        if options.html is not None:
-            page = _page((options.before, options.after), before, after, found)
-            with files.wanted(options.html, "a file for the page"):
-                files.write_text(options.html, page)
-    except (AirgroundError, OSError) as error:
-        return refuse(error)
+    before, after = compare.read(options.before), compare.read(options.after)
+    found = compare.compared(before, after)
+    if options.html is not None:
+        page = _page((options.before, options.after), before, after, found)
+        with files.wanted(options.html, "a file for the page"):
+            files.write_text(options.html, page)
     if options.json:
         places = {"schema": compare.SCHEMA, "before": str(options.before), "after": str(options.after)}
         print(json.dumps({**places, **found}, indent=1, allow_nan=False))
@@ -79,7 +72,7 @@ def _lines(found: Mapping[str, Any]) -> Iterator[str]:
 
 
 def _line(change: Mapping[str, Any]) -> str:
-    """A change in a line: what, before, after."""
+    """A change in a line: its subject, before, after."""
     about = " ".join(str(change[key]) for key in _ABOUT if change.get(key))
     unit = f" {change['unit']}" if change.get("unit") else ""
     relative = change.get("relative")
@@ -113,10 +106,9 @@ def _page(
     for position, run in enumerate(name for name in after["runs"] if name in before["runs"] and name.isidentifier()):
         try:
             one, two = (trace.load(folder / "trace" / run) for folder in folders)
+            figures.append(overlay.draw(run, position, one, two))
         except (TraceError, OSError) as error:
             problems.append(f"Run {run} cannot be drawn: {error}")
-        else:
-            figures.append(overlay.draw(run, position, one, two))
     return render_beside(
         "compare.html.j2", before=before, after=after, found=found, figures=figures, problems=problems, parts=PARTS,
         places=[str(folder) for folder in folders], most=MOST_ROWS, regressions=worse,

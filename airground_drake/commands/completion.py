@@ -1,4 +1,4 @@
-"""`airground completion SHELL`: what completes this command line in a shell."""
+"""`airground completion SHELL`: print the script that completes this command line in a shell."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Iterable, Sequence
 from importlib import import_module
 from pathlib import Path
 
-from airground_drake.base.usage import Parser
+from airground_drake.base.usage import Parser, output_file, output_folder
 from airground_drake.registry import SAMPLERS
 from airground_drake.scenarios.shipped import shipped
 
@@ -22,7 +22,7 @@ SCENARIOS = ("scenario", "target")
 
 
 def parser() -> argparse.ArgumentParser:
-    """What the command line takes."""
+    """Make the parser."""
     parser = Parser(
         prog="airground completion",
         description="Print what completes commands, options, scenarios and files in a shell.",
@@ -34,7 +34,7 @@ def parser() -> argparse.ArgumentParser:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Print it."""
+    """Print the script."""
     shell = parser().parse_args(arguments).shell
     import shtab
 
@@ -43,7 +43,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def tree() -> argparse.ArgumentParser:
-    """The parsers of all commands as one, with what completes each argument."""
+    """Merge the parsers of all commands into one, and say for each argument how it is completed."""
     from airground_drake.commands import COMMANDS
 
     whole = argparse.ArgumentParser(prog="airground")
@@ -58,19 +58,19 @@ def tree() -> argparse.ArgumentParser:
 
 
 def _complete(action: argparse.Action) -> None:
-    """Give an argument what shtab completes it with."""
+    """Tell shtab how to complete an argument."""
     import shtab
 
     if action.dest in SCENARIOS:
         action.complete = _name_or_file("scenario", shipped())  # type: ignore[attr-defined]
     elif action.dest == "sampler":
         action.complete = _name_or_file("sampler", SAMPLERS)  # type: ignore[attr-defined]
-    elif action.type is Path:
+    elif action.type in (Path, output_file, output_folder):
         action.complete = shtab.DIRECTORY if action.metavar == "DIR" else shtab.FILE  # type: ignore[attr-defined]
 
 
 def _name_or_file(kind: str, allowed: Iterable[str]) -> dict[str, str | dict[str, str]]:
-    """Some names and files, in the words of each shell."""
+    """Completion by some names and by files, in the language of each shell."""
     names, function = " ".join(allowed), f"_airground_{kind}"
     bash = f'{function}() {{\n  compgen -W "{names}" -- "$1"\n  _shtab_compgen_files "$1"\n}}'
     zsh = f"{function}() {{\n  _alternative '{kind}:{kind}:({names})' 'files:file:_files'\n}}"

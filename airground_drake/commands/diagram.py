@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from airground_drake.base import files
-from airground_drake.base.errors import AirgroundError, UnknownNameError
-from airground_drake.base.usage import Parser, overridable, refuse
+from airground_drake.base.errors import UnknownNameError
+from airground_drake.base.usage import Parser, output_folder, overridable
 from airground_drake.registry import METHODS
 from airground_drake.scenarios import plugins
 
@@ -16,45 +16,40 @@ FORMATS = ("dot", "svg", "pdf", "png")
 
 
 def parser() -> argparse.ArgumentParser:
-    """What the command line takes."""
+    """Make the parser."""
     parser = Parser(prog="airground diagram", description="Draw the diagram of a scenario.")
     parser.add_argument("scenario", help="name of a shipped scenario, or path to a YAML file")
     parser.add_argument("--method", choices=tuple(METHODS), help="default: the most complete of its runs")
     parser.add_argument("--part", metavar="NAME", help="only the layer of that name, with all ports")
     parser.add_argument("--format", action="append", choices=FORMATS, help="may be repeated (default: dot and svg)")
-    parser.add_argument("-o", "--output", type=Path, default=Path(), metavar="DIR", help="default: this folder")
+    parser.add_argument(
+        "-o", "--output", type=output_folder, default=Path(), metavar="DIR", help="default: this folder"
+    )
     overridable(parser)
     parser.add_argument(plugins.OPTION, action="store_true", help=plugins.HELP)
     return parser
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Write the pictures.
-
-    Returns:
-        Exit code: 0, or 2 if the scenario or the folder cannot be used.
-    """
+    """Write the pictures, and print their paths."""
     options = parser().parse_args(arguments)
     from airground_drake.scenarios.load import load
     from airground_drake.systems import graphviz
     from airground_drake.systems.diagram import build_diagram, most_complete
 
-    try:
-        scenario, _ = load(options.scenario, options.set)
-        with plugins.admitted(scenario, options.scenario, allow=options.allow_plugins):
-            method = most_complete(scenario) if options.method is None else options.method
-            diagram, name = build_diagram(scenario, method=method), scenario.name
-        if options.part is not None:
-            parts = [system.get_name() for system in diagram.GetSystems()]
-            if options.part not in parts:
-                raise UnknownNameError("part", options.part, parts)
-            diagram, name = diagram.GetSubsystemByName(options.part), f"{name}_{options.part}"
-        text = graphviz.dot(diagram)
-        files.make_folder(options.output, "the pictures")
-        for kind in options.format or ("dot", "svg"):
-            path = options.output / f"{name}.{kind}"
-            files.write_bytes(path, graphviz.drawn(text, kind))
-            print(path)
-    except (AirgroundError, OSError) as error:
-        return refuse(error)
+    scenario, _ = load(options.scenario, options.set)
+    with plugins.admitted(scenario, options.scenario, allow=options.allow_plugins):
+        method = most_complete(scenario) if options.method is None else options.method
+        diagram, name = build_diagram(scenario, method=method), scenario.name
+    if options.part is not None:
+        parts = [system.get_name() for system in diagram.GetSystems()]
+        if options.part not in parts:
+            raise UnknownNameError("part", options.part, parts)
+        diagram, name = diagram.GetSubsystemByName(options.part), f"{name}_{options.part}"
+    text = graphviz.dot(diagram)
+    files.make_folder(options.output, "the pictures")
+    for kind in options.format or ("dot", "svg"):
+        path = options.output / f"{name}.{kind}"
+        files.write_bytes(path, graphviz.drawn(text, kind))
+        print(path)
     return 0

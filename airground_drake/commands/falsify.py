@@ -11,18 +11,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from airground_drake.base import files
-from airground_drake.base.errors import (
-    AirgroundError,
-    Fault,
-    FolderError,
-    PluginError,
-    ScenarioError,
-    UnknownNameError,
-    one_line,
-)
-from airground_drake.base.parallel import MOST_JOBS, one_thread_each, processors
+from airground_drake.base.errors import AirgroundError, Fault, PluginError, ScenarioError, UnknownNameError, one_line
+from airground_drake.base.parallel import one_thread_each, processors
 from airground_drake.base.progress import progress_bar
-from airground_drake.base.usage import EXIT_TOOL, Parser, positive, refuse, whole
+from airground_drake.base.usage import EXIT_TOOL, REFUSALS, Parser, output_file, parallel, positive, refuse, whole
 from airground_drake.campaign.rows import COLUMNS
 from airground_drake.registry import RUN_CLAIMS, SAMPLERS, is_plugin
 from airground_drake.scenarios import plugins
@@ -40,7 +32,7 @@ TIMES = tuple(name for name in COLUMNS if name.endswith("_s") and name not in ("
 
 
 def parser() -> argparse.ArgumentParser:
-    """What the command line takes."""
+    """Make the parser."""
     parser = Parser(
         prog="airground falsify",
         description="Search the space of a campaign for a scenario that violates a claim, and shrink it.",
@@ -61,32 +53,23 @@ def parser() -> argparse.ArgumentParser:
         "--shrink", type=whole(0), default=300, metavar="N",
         help="runs for shrinking a counterexample (default: %(default)s)",
     )  # fmt: skip
-    parser.add_argument("-o", "--output", type=Path, metavar="FILE", help="new; default: <name>_<sampler>.yaml")
-    parser.add_argument(
-        "--jobs", type=whole(1, MOST_JOBS), metavar="N", help="processes (default: one for each processor)"
-    )
-    parser.add_argument("-q", "--quiet", action="store_true", help="no progress")
+    parser.add_argument("-o", "--output", type=output_file, metavar="FILE", help="new; default: <name>_<sampler>.yaml")
+    parallel(parser)
     parser.add_argument(plugins.OPTION, action="store_true", help=plugins.HELP)
     return parser
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command line.
-
-    Returns:
-        Exit code: 0 no counterexample, 1 one was found, 2 usage, bad spec or output, 3 nothing was judged, 4 tool
-        error.
-    """
-    of_command = parser()
-    options = of_command.parse_args(arguments)
+    """Search; the exit codes are in the help."""
+    options = parser().parse_args(arguments)
     if options.limit is not None and options.most is None:
-        of_command.error("--limit is of a time: name it with --most")
+        return refuse("--limit is of a time: name it with --most")
     one_thread_each()
     from airground_drake.campaign.spec import load_spec
 
     try:
         return _run(load_spec(options.spec), options)
-    except (ScenarioError, UnknownNameError, FolderError) as error:
+    except REFUSALS as error:
         return refuse(error)
     except (AirgroundError, OSError) as error:
         return refuse(error, EXIT_TOOL)
@@ -158,27 +141,25 @@ def _small(path: Path) -> Path:
 def _save(search: Search, best: Best, path: Path, tests: int) -> None:
     """Write the scenario of the best point; beside it a small one, if it is a counterexample."""
     from airground_drake.campaign.shrink import shrink
+    from airground_drake.scenarios.document import text_of
     from airground_drake.scenarios.limits import MAX_NAME
     from airground_drake.scenarios.load import resolved
 
+    def write(to: Path, data: dict[str, Any]) -> None:
+        files.write_text(to, text_of(data))
+        print(one_line(str(to)))
+
     scenario = search.spec.scenario_of(search.values(best.point), 0)
     data = resolved(scenario)
-    _write(path, data)
+    write(path, data)
     for run in scenario.runs if best.found else ():
         alone = data | {"runs": {run: data["runs"][run]}}
         if search.fails(alone):
             smaller, used = shrink(alone, search.fails, search.trace, tests)
             small = _small(path)
-            _write(small, smaller | {"name": f"{scenario.name[: MAX_NAME - len('_small')]}_small"})
+            write(small, smaller | {"name": f"{scenario.name[: MAX_NAME - len('_small')]}_small"})
             print(
                 f"made small with {used} runs: {len(smaller['ugvs'])} UGVs, {len(smaller['obstacles'])} obstacles, "
                 f"{smaller['duration_s']:g} s: airground report {argument(small)}"
             )
             return
-
-
-def _write(path: Path, data: dict[str, Any]) -> None:
-    from airground_drake.scenarios.document import text_of
-
-    files.write_text(path, text_of(data))
-    print(one_line(str(path)))

@@ -1,4 +1,4 @@
-"""`airground index DIR`: a page that lists the reports in a folder."""
+"""`airground index DIR`: write a page that lists the reports in a folder."""
 
 from __future__ import annotations
 
@@ -9,18 +9,18 @@ from typing import Any
 from urllib.parse import quote
 
 from airground_drake.base import files
-from airground_drake.base.errors import AirgroundError, FolderError, ReportError, TraceError
-from airground_drake.base.usage import Parser, refuse
+from airground_drake.base.errors import FolderError, ReportError, TraceError
+from airground_drake.base.usage import Parser
 from airground_drake.report import compare, folder, summary
 from airground_drake.report.phrases import Line
 
 PAGE = "index.html"
 MARK = "airground_drake index"
-"""By which a page of ours is known."""
+"""Text in every page that this command has written."""
 
 
 def parser() -> argparse.ArgumentParser:
-    """What the command line takes."""
+    """Make the parser."""
     parser = Parser(
         prog="airground index", description=f"Write DIR/{PAGE}, which lists the reports below DIR and leads to them."
     )
@@ -29,26 +29,13 @@ def parser() -> argparse.ArgumentParser:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Write the page.
-
-    Returns:
-        Exit code: 0, or 2 if there are no reports or the page cannot be written.
-    """
-    place: Path = parser().parse_args(arguments).folder
-    try:
-        print(_write(place))
-    except (AirgroundError, OSError) as error:
-        return refuse(error)
+    """Write the page, and print its path."""
+    print(_write(parser().parse_args(arguments).folder))
     return 0
 
 
 def _write(place: Path) -> Path:
-    """Write the page of a folder.
-
-    Raises:
-        FolderError: if there are no reports in it, or a foreign page.
-        OSError: if it cannot be written.
-    """
+    """Write the page of a folder; FolderError if it has no reports, or an index.html that is not ours."""
     from airground_drake.report.html import render_beside
 
     page = place / PAGE
@@ -72,11 +59,7 @@ def _write(place: Path) -> Path:
 
 
 def _entry(report: Path, place: Path, prefix: str) -> dict[str, Any]:
-    """What the page says of a report.
-
-    Raises:
-        ReportError: if it cannot be used.
-    """
+    """Return the values that the page shows of a report; ReportError if it cannot be used."""
     document = compare.read(report)
     leads_to = report / (folder.PAGES["html"] if (report / folder.PAGES["html"]).is_file() else folder.PAGES["json"])
     where = report.relative_to(place).as_posix()
@@ -89,7 +72,7 @@ def _entry(report: Path, place: Path, prefix: str) -> dict[str, Any]:
 
 
 def _headline(document: Mapping[str, Any]) -> Line | None:
-    """The report in a sentence; None if it lacks something that only the first screen reads."""
+    """The report in a sentence; None if it lacks something that only its first screen needs."""
     try:
         return summary.headline(document)
     except (LookupError, TypeError, ValueError, AttributeError):

@@ -8,24 +8,24 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from airground_drake.base import files
-from airground_drake.base.errors import FolderError, one_line
-from airground_drake.base.usage import Parser, refuse, whole
+from airground_drake.base.errors import one_line
+from airground_drake.base.usage import Parser, output_file, refuse, whole
 from airground_drake.scenarios.fleet import fleet
 from airground_drake.scenarios.limits import MAX_NAME, MAX_SEED, MAX_UGVS
 from airground_drake.scenarios.shipped import argument, json_schema_file, shipped_files
 
 MOST_OBSTACLES = 2000 - MAX_UGVS
-"""Beside as many UGVs as are allowed, what the checker looks at."""
+"""With the largest number of UGVs, as many bodies as the checker accepts."""
 MODEL = "minimal"
 """The shipped scenario that is copied."""
 
 
 def parser() -> argparse.ArgumentParser:
-    """What the command line takes."""
+    """Make the parser."""
     parser = Parser(
         prog="airground init", description="Write a small scenario that runs: a UGV, an obstacle in its way, a UAV."
     )
-    parser.add_argument("file", type=Path, nargs="?", default=Path("scenario.yaml"), help="default: %(default)s")
+    parser.add_argument("file", type=output_file, nargs="?", default=Path("scenario.yaml"), help="default: %(default)s")
     parser.add_argument(
         "--fleet", type=whole(1, MAX_UGVS), metavar="N", help="N UGVs that cross a field of obstacles instead"
     )
@@ -37,20 +37,12 @@ def parser() -> argparse.ArgumentParser:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Write the file; one that is there is left alone.
-
-    Returns:
-        Exit code: 0, or 2 if the file exists or cannot be written.
-    """
-    of_command = parser()
-    options = of_command.parse_args(arguments)
+    """Write the file; an existing file is left alone."""
+    options = parser().parse_args(arguments)
     if options.fleet is None and (options.obstacles, options.seed) != (None, None):
-        of_command.error("--obstacles and --seed need --fleet")
+        return refuse("--obstacles and --seed need --fleet")
     path: Path = options.file
-    try:
-        files.try_to_create(path)
-    except FolderError as error:
-        return refuse(error)
+    files.try_to_create(path)
     name = re.sub(r"^[\W\d_]+|[\W_]+$", "", re.sub(r"\W+", "_", path.stem, flags=re.ASCII))[:MAX_NAME] or MODEL
     if options.fleet is None:
         text = shipped_files()[MODEL].read_text(encoding="utf-8")

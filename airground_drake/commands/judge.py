@@ -10,18 +10,18 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from airground_drake.base import files
-from airground_drake.base.errors import FAULT_WIDTH, AirgroundError, one_line
+from airground_drake.base.errors import FAULT_WIDTH, one_line
 from airground_drake.base.usage import Parser, overridable, refuse
 
 if TYPE_CHECKING:
     import pandas as pd
 
 MOST_LISTED = 20
-"""Pairs that are printed: those of least margin."""
+"""Most pairs that are printed; those of least margin come first."""
 
 
 def parser() -> argparse.ArgumentParser:
-    """What the command line takes."""
+    """Make the parser."""
     parser = Parser(
         prog="airground judge",
         description="Judge sampled positions of robots from any source: which distances were kept, and by how much "
@@ -40,20 +40,14 @@ def parser() -> argparse.ArgumentParser:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command line.
-
-    Returns:
-        Exit code: 0 every distance is kept, 1 one is not, 2 usage, or a table or scenario that cannot be used.
-    """
+    """Judge, and print every pair; the exit codes are in the help."""
     options = parser().parse_args(arguments)
     from airground_drake.check import positions
     from airground_drake.scenarios.load import load, resolved
 
+    scenario = resolved(load(options.scenario, options.set)[0])
     try:
-        scenario = resolved(load(options.scenario, options.set)[0])
         found = positions.judge(_table(options.positions), scenario)
-    except (AirgroundError, OSError) as error:
-        return refuse(error)
     except (positions.UnusableError, ValueError) as error:
         return refuse(f"{options.positions}: {str(error)[:FAULT_WIDTH]}")
     broken = [one for one in found if not one.kept]
@@ -73,12 +67,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _table(path: Path) -> pd.DataFrame:
-    """The table in a file.
-
-    Raises:
-        OSError: if it cannot be read.
-        ValueError: if it is no table.
-    """
+    """Read a table; ValueError if the file does not contain one."""
     import pandas as pd
 
     content = files.read_bytes(path)

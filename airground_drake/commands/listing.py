@@ -1,4 +1,4 @@
-"""`airground list [KIND]`: what a scenario or the command line can name, a line each."""
+"""`airground list [KIND]`: every name that a scenario or the command line can use, a line each."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from airground_drake.registry import METHODS, MODEL_CLAIMS, POLICIES, ROUTES, RU
 from airground_drake.scenarios.shipped import shipped, title
 
 Lines = Iterator[tuple[str, str]]
-"""Names, and what each is."""
+"""Names and their descriptions."""
 
 
 def parser() -> argparse.ArgumentParser:
-    """What the command line takes."""
+    """Make the parser."""
     parser = Parser(prog="airground list", description=f"List {__doc__.partition(': ')[2]}")
     parser.add_argument("kind", nargs="?", choices=tuple(KINDS), help="default: all of them")
     parser.add_argument("--schema", action="store_true", help="the JSON Schema of scenario files instead, for editors")
@@ -36,30 +36,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return 0
 
 
-def _scenarios() -> Lines:
-    for name in shipped():
-        yield name, title(name)
-
-
-def _methods() -> Lines:
-    for name, method in METHODS.items():
-        yield name, method.says
-
-
 def _registered(*registries: Registry) -> Callable[[], Lines]:
-    """Everything in some registries."""
-
-    def lines() -> Lines:
-        for registry in registries:
-            for name in registry:
-                yield name, registry.says(name)
-
-    return lines
+    return lambda: ((name, registry.says(name)) for registry in registries for name in registry)
 
 
 KINDS: dict[str, Callable[[], Lines]] = {
-    "scenarios": _scenarios,
-    "methods": _methods,
+    "scenarios": lambda: ((name, title(name)) for name in shipped()),
+    "methods": lambda: ((name, method.says) for name, method in METHODS.items()),
     "policies": _registered(POLICIES),
     "routes": _registered(ROUTES),
     "tasks": _registered(UAV_TASKS),

@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from airground_drake.base.errors import AirgroundError
 from airground_drake.base.usage import Parser, positive, refuse
 
 if TYPE_CHECKING:
@@ -17,7 +16,7 @@ EXIT_UNPROVED = 1
 
 
 def parser() -> argparse.ArgumentParser:
-    """What the command line takes."""
+    """Make the parser."""
     parser = Parser(
         prog="airground prove",
         description="Have the proof checker Coq check the package's theorems (without DIR), or prove for the runs of a "
@@ -28,12 +27,9 @@ def parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("report", type=Path, metavar="DIR", nargs="?", help="folder of a report")
     parser.add_argument(
-        "--run",
-        action="append",
-        default=[],
-        metavar="NAME",
+        "--run", action="append", default=[], metavar="NAME",
         help="prove only this run of DIR, even if the scenario does not expect it to pass; may be repeated",
-    )
+    )  # fmt: skip
     parser.add_argument(
         "--limit", type=positive, default=600.0, metavar="S", help="seconds for one call of Coq (default: %(default)g)"
     )
@@ -42,11 +38,7 @@ def parser() -> argparse.ArgumentParser:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Check or prove, and say what was found.
-
-    Returns:
-        Exit code: 0, 1 if something is not proved, 2 if that cannot be told.
-    """
+    """Check or prove, and print the results; the exit codes are in the help."""
     from airground_drake.proofs.coq import CoqError
 
     options = parser().parse_args(arguments)
@@ -58,8 +50,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return _runs(options) if options.report else _theorems(record=options.record, limit_s=options.limit)
     except CoqError as error:
         return refuse(error, EXIT_UNPROVED)
-    except (AirgroundError, OSError) as error:
-        return refuse(error)
 
 
 def _theorems(*, record: bool, limit_s: float) -> int:

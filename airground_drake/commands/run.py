@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Iterator, Sequence
-from pathlib import Path
 from threading import Event
 from typing import TYPE_CHECKING
 
 from airground_drake.base import files
-from airground_drake.base.errors import AirgroundError, SimulationError, UnknownNameError
-from airground_drake.base.usage import EXIT_TOOL, Parser, overridable, positive, refuse
+from airground_drake.base.errors import UnknownNameError
+from airground_drake.base.usage import Parser, output_folder, overridable, positive, refuse
 from airground_drake.registry import METHODS
 from airground_drake.scenarios import plugins
 
@@ -18,17 +17,17 @@ if TYPE_CHECKING:
     from airground_drake.run.trace import Trace
 
 SPEED = 1.0
-"""Simulated seconds per second in Meshcat, unless the command line says otherwise."""
+"""Default speed in Meshcat, simulated seconds per second."""
 
 
 def parser() -> argparse.ArgumentParser:
-    """What the command line takes."""
+    """Make the parser."""
     parser = Parser(prog="airground run", description="Simulate one run of a scenario and print its events.")
     parser.add_argument("scenario", help="name of a shipped scenario, or path to a YAML file")
     parser.add_argument("run", nargs="?", metavar="RUN", help="default: the run with the most complete method")
     parser.add_argument("--meshcat", action="store_true", help="show the robots in a browser while they move")
     parser.add_argument("--speed", type=positive, metavar="X", help=f"with --meshcat: its speed (default: {SPEED:g})")
-    parser.add_argument("-o", "--output", type=Path, metavar="DIR", help="save the trace in this folder, too")
+    parser.add_argument("-o", "--output", type=output_folder, metavar="DIR", help="save the trace in this folder, too")
     overridable(parser)
     parser.add_argument("--seed", type=int, metavar="N", help="seed of the decision noise")
     parser.add_argument(plugins.OPTION, action="store_true", help=plugins.HELP)
@@ -36,49 +35,39 @@ def parser() -> argparse.ArgumentParser:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Simulate, and print.
-
-    Returns:
-        Exit code: 0, 2 if the scenario, the run or the folder cannot be used, 4 if the simulation stops.
-    """
-    of_command = parser()
-    options = of_command.parse_args(arguments)
+    """Simulate, and print."""
+    options = parser().parse_args(arguments)
     if options.speed and not options.meshcat:
-        of_command.error("--speed needs --meshcat")
+        return refuse("--speed needs --meshcat")
     from airground_drake.scenarios.load import load
 
     overrides = [*options.set, *([] if options.seed is None else [f"seed={options.seed}"])]
-    try:
-        scenario, _ = load(options.scenario, overrides)
-        methods = {name: run.method for name, run in scenario.runs.items()}
-        name = options.run or max(methods, key=lambda run: list(METHODS).index(methods[run]))
-        if name not in methods:
-            raise UnknownNameError("run", name, methods)
-        if options.output is not None:
-            files.make_folder(options.output, "the trace")
-        from airground_drake.run import trace as traces
-        from airground_drake.run.simulation import simulate
+    scenario, _ = load(options.scenario, overrides)
+    methods = {name: run.method for name, run in scenario.runs.items()}
+    name = options.run or max(methods, key=lambda run: list(METHODS).index(methods[run]))
+    if name not in methods:
+        raise UnknownNameError("run", name, methods)
+    if options.output is not None:
+        files.make_folder(options.output, "the trace")
+    from airground_drake.run import trace as traces
+    from airground_drake.run.simulation import simulate
 
-        with plugins.admitted(scenario, options.scenario, allow=options.allow_plugins):
-            if options.meshcat:
-                from airground_drake.view.draw import served
-
-                meshcat = served()
-                print(f"{meshcat.web_url()}  (Ctrl-C ends it)", flush=True)
-                meshcat.StartRecording()
-                trace = simulate(scenario, name, meshcat=meshcat, speed=options.speed or SPEED)
-                meshcat.PublishRecording()
-            else:
-                trace = simulate(scenario, name)
-        if options.output is not None:
-            traces.save(trace, options.output)
-        print("\n".join(_said(trace)), flush=True)
+    with plugins.admitted(scenario, options.scenario, allow=options.allow_plugins):
         if options.meshcat:
-            Event().wait()  # the page stays until the process is interrupted
-    except SimulationError as error:
-        return refuse(error, EXIT_TOOL)
-    except (AirgroundError, OSError) as error:
-        return refuse(error)
+            from airground_drake.view.draw import served
+
+            meshcat = served()
+            print(f"{meshcat.web_url()}  (Ctrl-C ends it)", flush=True)
+            meshcat.StartRecording()
+            trace = simulate(scenario, name, meshcat=meshcat, speed=options.speed or SPEED)
+            meshcat.PublishRecording()
+        else:
+            trace = simulate(scenario, name)
+    if options.output is not None:
+        traces.save(trace, options.output)
+    print("\n".join(_said(trace)), flush=True)
+    if options.meshcat:
+        Event().wait()  # the page stays until the process is interrupted
     return 0
 
 

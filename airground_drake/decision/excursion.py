@@ -1,8 +1,9 @@
 """How far the decision variable goes between two instants, exactly.
 
 Between two updates a task error e moves on a straight line and the noise n is linear, so that x = ||e|| + n is convex:
-it is largest at an end, and smallest at an end or where its slope is 0. With d = e1 - e0 the change of e, u the
-distance along d from the point nearest to the origin, p the distance of that point, and k the change of n over ||d||,
+it is largest at an end, and smallest at an end or where its slope is 0. Let u be the distance along the change of e
+from the point nearest to the origin, p the distance of that point, and k the change of n over the length of that of e.
+Then
 
     x = sqrt(u^2 + p^2) + k u + const,   smallest at u = -k p / sqrt(1 - k^2)   if |k| < 1,
 
@@ -90,11 +91,7 @@ def variables(parts: Array) -> Array:
 def gathered(t: float, position: Array, reference: Array, noise: Array) -> Array:
     """Time, s, then task error, m, noise, m, and x of (15), m, of each of n UGVs: (1 + 5n,).
 
-    Args:
-        t: time, s.
-        position: theirs first, (3n + ...,), m.
-        reference: the same of their preset trajectories.
-        noise: (n,), m.
+    `position` and `reference` begin with those of the UGVs, (3n + ...,), m; `noise` is (n,), m.
     """
     signals = np.empty(1 + 5 * len(noise))
     signals[0] = t

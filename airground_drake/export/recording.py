@@ -1,4 +1,4 @@
-"""A run as an MCAP file for Foxglove and other programs that read it: robots, obstacles, signals and events."""
+"""A run as an MCAP file, for Foxglove and other readers: robots, obstacles, signals and events."""
 
 from __future__ import annotations
 
@@ -7,20 +7,18 @@ import json
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-import numpy as np
-
 from airground_drake.base.errors import ExportError
 from airground_drake.run.trace import Trace
 from airground_drake.scenarios.schema import Scenario
-from airground_drake.view.looks import OBSTACLE_COLOR, SAFE_COLOR, STATE_COLORS, UAV_COLOR, UNSEEN_COLOR
-from airground_drake.view.stage import Robot, Stage, stage, states
+from airground_drake.view.looks import SAFE_COLOR, STATE_COLORS, UAV_COLOR, UNSEEN_COLOR, rgb
+from airground_drake.view.stage import Robot, Stage, stage_of, states
 
 if TYPE_CHECKING:
     from mcap.writer import Writer
 
 FRAME = "world"
 LEVELS = {"collision": 4, "refuse": 3}
-"""Levels of `foxglove.Log` for kinds of events: 4 is an error, 3 a warning; every other event is information, 2."""
+"""Levels of `foxglove.Log` by kind of event: 4 is an error, 3 a warning; all other kinds are information, 2."""
 
 _NUMBER, _TEXT = {"type": "number"}, {"type": "string"}
 
@@ -52,7 +50,7 @@ _SIGNALS = _object(
 
 
 class Message(NamedTuple):
-    """What is written at a time, s, on a topic."""
+    """A message on a topic."""
 
     t_s: float
     topic: str
@@ -100,7 +98,7 @@ def _write(writer: Writer, messages: list[Message]) -> None:
 
 def _messages(trace: Trace, scenario: Scenario) -> Iterator[Message]:
     """All messages of a run."""
-    standing = stage(scenario, np.concatenate([trace.position(robot) for robot in trace.robots]))
+    standing = stage_of(trace, scenario)
     yield Message(0.0, "/scene", "foxglove.SceneUpdate", {"deletions": [], "entities": list(_obstacles(standing))})
     looks = {robot: states(trace, robot, trace.t) for robot in trace.ugvs}
     for k, t in enumerate(trace.t.tolist()):
@@ -129,12 +127,11 @@ def _signals(trace: Trace, robot: str, k: int) -> dict[str, Any]:
 
 
 def _obstacles(standing: Stage) -> Iterator[dict[str, Any]]:
-    """Each obstacle as a cylinder in the transparent cylinder that UGVs must stay out of; phantoms as cylinders."""
+    """Each obstacle as a cylinder inside its transparent safe cylinder; phantoms as cylinders."""
     low = standing.mark_m
     for obstacle in standing.obstacles:
-        color = OBSTACLE_COLOR if obstacle.known_to_uav else UNSEEN_COLOR
         centre = obstacle.centre_m.tolist()
-        cylinders = [_cylinder(centre, obstacle.radius_m, 2.0 * low, color)]
+        cylinders = [_cylinder(centre, obstacle.radius_m, 2.0 * low, obstacle.color)]
         cylinders.append(_cylinder(centre, obstacle.safe_m, low, SAFE_COLOR, 0.2))
         yield _entity(f"obstacle {obstacle.name}", 0.0, cylinders=cylinders)
     for k, phantom in enumerate(standing.phantoms_m.tolist()):
@@ -151,7 +148,7 @@ def _robot(robot: Robot, t: float, position: list[float], color: str) -> dict[st
 
 
 def _entity(name: str, t: float, **shapes: list[dict[str, Any]]) -> dict[str, Any]:
-    """A scene entity that stays until one of its name replaces it."""
+    """A scene entity, shown until another of the same name replaces it."""
     stays = {"sec": 0, "nsec": 0}
     return {"timestamp": _time(t), "frame_id": FRAME, "id": name, "lifetime": stays, "frame_locked": False, **shapes}
 
@@ -172,7 +169,7 @@ def _vector(values: list[float]) -> dict[str, float]:
 
 
 def _rgba(color: str, alpha: float = 1.0) -> dict[str, float]:
-    return {**{name: int(color[i : i + 2], 16) / 255.0 for name, i in zip("rgb", (1, 3, 5), strict=True)}, "a": alpha}
+    return dict(zip("rgba", [*rgb(color), alpha], strict=True))
 
 
 def _time(t_s: float) -> dict[str, int]:

@@ -1,4 +1,4 @@
-"""From a solved problem to the UGV's answer to a proposal, and what solving it may cost."""
+"""From a solved problem to the UGV's answer to a proposal."""
 
 from __future__ import annotations
 
@@ -7,24 +7,21 @@ from dataclasses import dataclass, field, replace
 from typing import Literal
 
 from airground_drake.gatekeeper.budget import Budget
-from airground_drake.gatekeeper.outcome import Outcome
+from airground_drake.gatekeeper.outcome import USELESS, Outcome
 from airground_drake.gatekeeper.problem import Problem
-from airground_drake.gatekeeper.solution import ConstantPlans, Solution
+from airground_drake.gatekeeper.solution import Solution
 from airground_drake.intervention.messages import ACCEPT, SILENT
 from airground_drake.intervention.policy import Proposal
-
-USELESS = 1e-6
-"""Relative gain over refusing throughout below which nothing is gained: ten times the solver's tolerance."""
 
 
 @dataclass(frozen=True)
 class Rules:
-    """When a solution becomes an answer, and what it may cost.
+    """How a solution becomes an answer, and the effort that solving may take.
 
     Attributes:
         switching_margin: relative gain that a reversal needs over keeping the answer throughout.
         min_dwell: least time between opposite answers to a proposal, s.
-        first_stage: the paper's own rule: the first stage of every plan is the answer, whatever was answered before.
+        first_stage: the paper's own rule: the first stage of every plan is the answer, whatever the answer before was.
         budget: of one solution, in counts.
         allowance_s: time by the budget's clock that all solutions of a sample may take, s; None: no limit.
     """
@@ -72,21 +69,21 @@ WORDS: dict[Reason, str] = {
 
 @dataclass(frozen=True)
 class Decision:
-    """What the gatekeeper decided about one proposal at one sample: a row of the trace's table `decisions`.
+    """The decision about one proposal for one UGV at one sample: a row of the trace's table `decisions`.
 
-    By (26) it rests on `problem`, `solution` and `throughout`; by outcomes, on `refuse`, `accept` and `tries`.
+    Under method (c) it rests on `problem`, `solution` and `throughout`; under (d), on `refuse`, `accept` and `tries`.
 
     Attributes:
-        t: when, s.
-        robot: for which UGV.
-        proposal: on what.
+        t: time, s.
+        robot: index of the UGV.
+        proposal: the proposal.
         accepted: the answer.
-        reason: why.
+        reason: see `WORDS`.
         problem: (26) as predicted.
         solution: the route's.
         throughout: costs (25) of accepting and of refusing throughout; -1 without a plan.
-        refuse: what comes of refusing; None unless it was looked at.
-        accept: what comes of accepting; None unless it was looked at.
+        refuse: outcome of refusing; None if no outcomes were compared.
+        accept: outcome of accepting; None if no outcomes were compared.
         tries: acceptances since the last rest, with this decision.
     """
 
@@ -115,35 +112,26 @@ def in_words(decision: Decision) -> str:
     return words
 
 
-def costs_throughout(problem: Problem, solution: Solution) -> tuple[float, float]:
-    """Costs (25) of accepting and of refusing throughout; mode velocities are exact for them. -1 without a plan."""
-    if not solution.has_plan:
-        return -1.0, -1.0
-    constants = ConstantPlans.of(problem)
-    return constants.accept.objective, constants.refuse.objective
-
-
 def settle(
     solution: Solution, throughout: tuple[float, float], standing: float, stood: float, rules: Rules
 ) -> tuple[bool, Reason]:
     """Whether the proposal is accepted, and why.
 
     Without a plan (the data are not finite) it is refused, whatever stands. By the rule `first_stage` the answer is, at
-    every sample, the first stage of the rounded plan, or of the optimum if the route rounds nothing. Otherwise there is
-    hysteresis. A new proposal is accepted if the best plan
-    starts by accepting it, unless it makes no difference. If that plan accepts it later, the proposal is refused as
-    well, even if accepting throughout costs less than refusing throughout: so a UGV may wait for ever.
+    every sample, the first stage of the rounded plan, or of the optimum if the route rounds nothing.
 
-    A standing answer is reversed only if the best plan starts with the other choice and is cheaper, by the switching
-    margin, than to keep the answer throughout, and not before the dwell is over. (The best plan that keeps the answer
-    for one more stage and then changes it costs nearly the same as the one that changes it now: that comparison would
-    decide nothing.)
+    Otherwise there is hysteresis. A new proposal is accepted if the best plan starts by accepting it, unless it makes
+    no difference. It is refused if that plan accepts it later, even if accepting throughout costs less than refusing
+    throughout: so a UGV may wait for ever. A standing answer is reversed only if the best plan starts with the other
+    choice and is cheaper, by the switching margin, than to keep the answer throughout, and not before the dwell is
+    over. (The best plan that keeps the answer for one more stage costs nearly the same as the one that changes it now:
+    that comparison would decide nothing.)
 
     Args:
         solution: the route's.
         throughout: costs (25) of accepting and of refusing throughout the horizon.
-        standing: ACCEPT, REFUSE or SILENT.
-        stood: for how long that has been the answer, s.
+        standing: the answer now, ACCEPT, REFUSE or SILENT.
+        stood: for how long it has stood, s.
         rules: margins and limits.
     """
     if not solution.has_plan:

@@ -51,14 +51,7 @@ class BinaryProgram:
         self.half_planes = self.program.AddLinearConstraint(
             np.zeros((1, b + n)), np.full(1, -np.inf), np.full(1, np.inf), np.concatenate([self.omega, self.u])
         )
-        positive = self.program.AddBoundingBoxConstraint(0.0, np.inf, self.u)
-        for description, binding in (
-            ("(25) task error", self.error),
-            ("(25) slack", self.slack),
-            ("(26d) as half-planes", self.half_planes),
-            ("(26e) slack", positive),
-        ):
-            binding.evaluator().set_description(description)
+        self.program.AddBoundingBoxConstraint(0.0, np.inf, self.u)  # (26e)
         self.within = np.zeros((n, 0), dtype=bool)
         self._of_block = np.equal.outer(self.block, np.arange(b)).astype(np.float64)
 
@@ -87,13 +80,10 @@ class BinaryProgram:
     def _rows(
         self, problem: Problem, normals: Array, steps: Array, away: Array
     ) -> tuple[Array, npt.NDArray[np.float64]]:
-        """Coefficients (rows, B + N) and lower bounds of the half-planes; if there are no half-planes, one empty row.
+        """Coefficients (rows, B + N) and lower bounds of the half-planes along normals (N, m, 3).
 
-        Args:
-            problem: data of (26).
-            normals: (N, m, 3).
-            steps: what accepting at a stage adds to the position, (N, 2), m.
-            away: task errors of refusing throughout, (N, 3), m.
+        Without half-planes: one empty row. `steps` is what accepting at a stage adds to the position, (N, 2), m, and
+        `away` are the task errors of refusing throughout, (N, 3), m.
         """
         n, b = problem.stages, self._of_block.shape[1]
         stage, point = np.nonzero(self.within)
@@ -107,11 +97,10 @@ class BinaryProgram:
         return np.hstack([of_omega, of_u]), lower
 
     def plan(self, values: Array) -> Array:
-        """Of omega's values (B,), one per stage, (N,)."""
-        stages: Array = values[self.block]
-        return stages
+        """The value of each stage, (N,), from those of the blocks, (B,)."""
+        return np.take(values, self.block)
 
     def blocked(self, plan: Array) -> Array:
-        """Of a plan (N,), the mode that has most stages of each block, (B,), 0 or 1; accepting on a tie."""
+        """The mode that a plan (N,) has in most stages of each block, (B,), 0 or 1; accepting on a tie."""
         share = self._of_block.T @ plan / self._of_block.sum(axis=0)
         return (share >= 0.5).astype(np.float64)

@@ -1,9 +1,8 @@
-"""What solving one problem may spend: counted work in simulation, a clock in real time."""
+"""Limits of solving one problem: counted work in simulation, a clock in real time."""
 
 from __future__ import annotations
 
 import math
-import sys
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -20,8 +19,8 @@ class Budget:
 
     Attributes:
         iterations: of each call of the solver of a relaxation.
-        search_iterations: of a search by branch and bound; what a longer one finds is not used. A solver that can only
-            be stopped by the clock is not stopped here: so the same searches count on every machine.
+        search_iterations: of a search by branch and bound; the result of a longer one is not used, so that the same
+            searches count on every machine.
         search_s: time after which a search is stopped, s: several times what `search_iterations` take.
         deadline_s: time on `clock` at which the solution must stand, s; inf: counted work only.
         clock: what `deadline_s` refers to.
@@ -33,15 +32,6 @@ class Budget:
     deadline_s: float = math.inf
     clock: Clock = field(default=time.monotonic, compare=False)
 
-    def __post_init__(self) -> None:
-        """Check the limits.
-
-        Raises:
-            ValueError: if there is no iteration, no time to search, or the deadline is not a number.
-        """
-        if min(self.iterations, self.search_iterations) < 1 or not self.search_s > 0.0 or math.isnan(self.deadline_s):
-            raise ValueError(f"a budget needs iterations of 1 or more, search_s > 0 and a deadline, got {self}")
-
     def spent(self) -> bool:
         """Whether the deadline has passed; counted work alone never makes it so."""
         return self.deadline_s < math.inf and self.clock() >= self.deadline_s
@@ -49,7 +39,3 @@ class Budget:
     def left_s(self) -> float:
         """Time to the deadline, s, not below 0; inf without one."""
         return math.inf if self.deadline_s == math.inf else max(0.0, self.deadline_s - self.clock())
-
-
-UNLIMITED = Budget(iterations=10_000, search_iterations=sys.maxsize, search_s=math.inf)
-"""Bounded only in principle: for oracles, benchmarks and tests."""

@@ -2,7 +2,7 @@
 
 All code that evaluates a plan, a stage or a branch of a search calls `add_stage`. Some code assumes the form of (25)
 without evaluating it, and must change with it: the quadratic costs of `binary_program` and `routes.nonlinear`, and in
-`relaxation` the weak duality of `dual_bound` and the unavoidable task error of `remaining_cost`.
+`relaxation` the weak duality of `dual_bound` and the unavoidable task error of `unavoidable_cost`.
 """
 
 from __future__ import annotations
@@ -16,17 +16,11 @@ from airground_drake.base.arrays import Array
 
 
 class Terms(NamedTuple):
-    """The data of (23) and (25)-(26e) over N stages with m points; numba takes it as one argument.
+    """The data of a `Problem` as numba takes them.
 
     Attributes:
-        dt: length of a stage, s.
-        initial: position at the beginning, (3,), m.
         velocities: of the modes, (2, N, 3), m/s, in the order of `rollout.REFUSED` and `ACCEPTED`.
-        reference: preset trajectory at the ends of the stages, (N, 3), m.
-        centres: points to keep away from at the ends of the stages, (N, m, 3), m.
-        distances: safe distances d of (26d), (m,), m.
-        error_weights: a_i of (25) at the ends of the stages, (N,), 1/(m^2 s), see `error_weights`.
-        slack_weight: b_i of (25), 1/(m^2 s).
+        error_weights: a_i of (25) at the ends of the stages, (N,), 1/(m^2 s); the last one includes the terminal cost.
     """
 
     dt: float
@@ -37,23 +31,6 @@ class Terms(NamedTuple):
     distances: Array
     error_weights: Array
     slack_weight: float
-
-
-def error_weights(stages: int, dt: float, error_weight: float, terminal_weight: float) -> Array:
-    """Weights of the task error in (25) at the ends of the stages, (N,), in the unit of `error_weight`.
-
-    The terminal cost w a ||rho_rd - rho_N||^2 of the stability theory of model predictive control (Mayne et al.,
-    Automatica 36, 2000) falls on the last: a stage of length dt weighs dt a there, and it makes that (dt + w) a.
-
-    Args:
-        stages: N.
-        dt: length of a stage, s.
-        error_weight: a_i of (25).
-        terminal_weight: w, s; 0: (25) as the paper has it.
-    """
-    weights = np.full(stages, error_weight)
-    weights[-1] *= 1.0 + terminal_weight / dt
-    return weights
 
 
 @njit(cache=True)
@@ -77,7 +54,9 @@ def plan_cost(terms: Terms, positions: Array) -> tuple[float, float]:
         x, y, z = positions[k, 0], positions[k, 1], positions[k, 2]
         clearance = np.inf
         for m in range(len(terms.distances)):
-            clearance = min(clearance, np.sqrt(_squared_distance(terms, k, m, x, y, z)) - terms.distances[m])
+            ox, oy, oz = terms.centres[k, m, 0], terms.centres[k, m, 1], terms.centres[k, m, 2]
+            distance = np.sqrt((x - ox) ** 2 + (y - oy) ** 2 + (z - oz) ** 2)
+            clearance = min(clearance, distance - terms.distances[m])
         total = add_stage(total, terms, k, x, y, z, max(0.0, -clearance))
         least = min(least, clearance)
     return terms.dt * total, least
@@ -96,9 +75,3 @@ def half_plane_cost(terms: Terms, positions: Array, normals: Array) -> float:
             clearance = min(clearance, reach - terms.distances[m])
         total = add_stage(total, terms, k, positions[k, 0], positions[k, 1], positions[k, 2], max(0.0, -clearance))
     return terms.dt * total
-
-
-@njit(cache=True)
-def _squared_distance(terms: Terms, k: int, m: int, x: float, y: float, z: float) -> float:
-    c = terms.centres
-    return (x - c[k, m, 0]) ** 2 + (y - c[k, m, 1]) ** 2 + (z - c[k, m, 2]) ** 2

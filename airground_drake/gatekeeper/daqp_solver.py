@@ -20,8 +20,8 @@ _ITERATIONS = 10_000
 """DAQP's own limit."""
 
 _IDLE = 1e-7
-"""A stage whose choice moves the ends less than this, relative to the largest, is no decision: with it the Hessian is
-singular to DAQP, which may then say "infeasible"."""
+"""A stage whose choice moves the later positions by less than this share of the largest move is left out: it would make
+the Hessian singular, and DAQP may then say "infeasible"."""
 
 _TOLERANCE = 1e-9
 """Of constraints, in the scaled variables."""
@@ -29,7 +29,7 @@ _TOLERANCE = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class Found:
-    """Where the solver ended.
+    """The solver's result.
 
     Attributes:
         omega: values of the accept variables, (B,); None without a solution.

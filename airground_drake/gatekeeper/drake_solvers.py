@@ -12,17 +12,17 @@ from airground_drake.gatekeeper.binary_program import BinaryProgram
 from airground_drake.gatekeeper.daqp_solver import Found
 
 SOLVERS: dict[str, Any] = {"gurobi": GurobiSolver, "mosek": MosekSolver}
-"""By the name that `gatekeeper.solver` gives them: what Drake calls them."""
+"""Drake's classes by the name in `gatekeeper.solver`."""
 
 OPTIONS: dict[str, tuple[str, dict[str, float]]] = {
     "gurobi": ("TimeLimit", {"MIPGap": 0.0, "MIPGapAbs": 0.0}),
     "mosek": ("MSK_DPAR_MIO_MAX_TIME", {"MSK_DPAR_MIO_TOL_REL_GAP": 0.0, "MSK_DPAR_MIO_TOL_ABS_GAP": 0.0}),
 }
-"""Their words for a limit in time, s, and for a proven optimum: by default they stop at a gap."""
+"""Their options for a limit in time, s, and for a proven optimum: by default they stop at a gap."""
 
 
 def lacking(name: str) -> str:
-    """What keeps a solver from being used here, in words; '' if nothing does."""
+    """Why a solver cannot be used here; '' if it can."""
     solver = SOLVERS[name]()
     if not solver.available():
         return "this build of Drake does not have it"
@@ -47,7 +47,7 @@ class DrakeSearch:
         self._limit, self._exact = OPTIONS[name]
 
     def minimise(self, binary: BinaryProgram, *, known: float = math.inf, seconds: float = math.inf) -> Found:
-        """The optimum of the program; arguments as of `daqp_solver.minimise`, `known` is of no use to these solvers."""
+        """The optimum of the program; arguments as of `daqp_solver.minimise`, but these solvers ignore `known`."""
         options = SolverOptions()
         options.SetOption(CommonSolverOption.kMaxThreads, 1)
         for option, value in self._exact.items():

@@ -1,4 +1,4 @@
-"""What the UGVs do at one sample of the gatekeeper: sense, predict, decide, answer; by (26) under method (c)."""
+"""One sample of the UGVs' gatekeepers: sense, predict, decide, answer; under method (c) by problem (26)."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ import numpy as np
 import numpy.typing as npt
 
 from airground_drake.base.arrays import Array
-from airground_drake.gatekeeper.answer import Decision, Rules, costs_throughout, in_words, settle
+from airground_drake.gatekeeper.answer import Decision, Rules, in_words, settle
 from airground_drake.gatekeeper.budget import Budget
 from airground_drake.gatekeeper.patience import Commitment
 from airground_drake.gatekeeper.problem import Horizon, predicted_problem
 from airground_drake.gatekeeper.rollout import View
 from airground_drake.gatekeeper.routes.route import Route
-from airground_drake.gatekeeper.solution import after_failure
+from airground_drake.gatekeeper.solution import ConstantPlans, after_failure
 from airground_drake.geometry.motion import Motion
 from airground_drake.intervention.messages import ACCEPT, REFUSE, SILENT, Disc, Proposals, Report, Reports, answer_to
 from airground_drake.intervention.policy import Proposal
@@ -30,14 +30,14 @@ from airground_drake.world.world import World
 
 @dataclass(frozen=True, eq=False)
 class GatekeeperState:
-    """What the gatekeepers of n UGVs keep from sample to sample.
+    """The memory of the gatekeepers of n UGVs between samples.
 
     Attributes:
         answers: in force, (2n,), see `messages`.
         since: when each UGV's answer became what it is, (n,), s.
         reports: what came with them.
-        decisions: those of the last sample at which anything was to be judged or remembered.
-        commitments: under method (d), what each UGV has committed itself to.
+        decisions: those of the last sample that was not idle.
+        commitments: under method (d), each UGV's tries and rests.
         sensed: under method (d), which obstacles each UGV has sensed so far, (n, m).
     """
 
@@ -61,7 +61,7 @@ class GatekeeperState:
 
 @dataclass(frozen=True, eq=False)
 class Inputs:
-    """What comes in at a sample.
+    """The inputs at a sample.
 
     Attributes:
         t: time, s.
@@ -83,8 +83,7 @@ class Gatekeepers(abc.ABC):
 
     Attributes:
         law: their control law, with the scenario's gains.
-        times_s: CPU time of every prediction and decision so far (what it costs, not what else the machine did
-            meanwhile).
+        times_s: CPU time of every prediction and decision so far.
     """
 
     def __init__(self, world: World, law: UgvLaw, presets: Sequence[Motion]) -> None:
@@ -104,19 +103,14 @@ class Gatekeepers(abc.ABC):
         """Whether a sample changes nothing: no proposal, no answer to take back, nothing new to remember."""
         return not any(proposals) and not any(before.answers[::2])
 
-    def _sensed(self, position: Array) -> npt.NDArray[np.bool_]:
-        """Which obstacles are within sensing range, (m,)."""
-        away = distances(self._near.still, position)
-        return np.asarray(away <= self.law.avoidance.sensing_range)
-
     def _report(self, position: Array, decision: Decision) -> Report:
-        """What goes with an answer."""
-        near = self._sensed(position)
+        """The report with an answer: the obstacles within sensing range, and the reason."""
+        near = distances(self._near.still, position) <= self.law.avoidance.sensing_range
         discs: tuple[Disc, ...] = tuple((x, y, z, radius) for x, y, z, radius in self._discs[near].tolist())
         return Report(discs, decision.reason, in_words(decision))
 
     def _view(self, now: Inputs, i: int) -> View:
-        """What a UGV has around it: all obstacles and robots, whether within sensing range or not."""
+        """All obstacles and robots around a UGV, whether within sensing range or not."""
         near = self._near
         return View(
             t=now.t,
@@ -136,16 +130,7 @@ class PaperGatekeepers(Gatekeepers):
     def __init__(
         self, world: World, law: UgvLaw, presets: Sequence[Motion], route: Route, horizon: Horizon, rules: Rules
     ) -> None:
-        """Of the UGVs of a world.
-
-        Args:
-            world: who keeps what distance from whom.
-            law: their control law.
-            presets: their preset trajectories.
-            route: solves (26).
-            horizon: grid and weights of (25)-(27).
-            rules: from the solution to the answer.
-        """
+        """As `Gatekeepers`; the route solves (26) over the horizon, and the rules lead to the answer."""
         super().__init__(world, law, presets)
         self._route, self._horizon, self._rules = route, horizon, rules
 
@@ -183,16 +168,14 @@ class PaperGatekeepers(Gatekeepers):
             solution = after_failure(problem, solution)
         self.times_s.append(thread_time() - started)
         standing, stood = answer_to(proposal, before.answers, i), now.t - before.since[i]
-        throughout = costs_throughout(problem, solution)
+        constants = ConstantPlans.of(problem)
+        throughout = (constants.accept.objective, constants.refuse.objective) if solution.has_plan else (-1.0, -1.0)
         accepted, reason = settle(solution, throughout, standing, stood, self._rules)
         return Decision(now.t, i, proposal, accepted, reason, problem, solution, throughout)
 
 
 def _rest_of_plan(before: GatekeeperState, t: float, i: int, proposal: Proposal) -> Array | None:
-    """What the plan that was decided on at the sample before says from time t, s, on, (N,); None without one.
-
-    It ends earlier by a sampling period; its last choice stands for the rest.
-    """
+    """The rest of the last sample's plan from time t, s, on, (N,), its last choice repeated; None without a plan."""
     for decision in before.decisions:
         if decision.robot == i and decision.proposal is proposal and decision.problem and decision.solution:
             plan = decision.solution.plan

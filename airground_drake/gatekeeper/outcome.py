@@ -1,16 +1,16 @@
 """Outcomes of accepting and of refusing a proposal: both rolled out until nothing moves any more, eq (25).
 
-Two choices only, never and now: follow the proposed motion until it is over and then the own task, or the own task all
-along. "Wait, then accept" is not among them; it looks cheaper at every sample and never comes to an acceptance.
+There are two choices, now and never: follow the proposed motion until it is over and then the own task, or the own task
+all along. "Wait, then accept" is not among them: it looks cheaper at every sample, and would never accept.
 
 Each is worth the cost (25) along the roll-out plus a heuristic cost-to-go,
 
     V(p) = L(p)^3 / (3 v),
 
-with L the length of the shortest way to the goal among the safe circles that are known and v the reference speed: the
-integral of L^2 for a UGV that goes this way at that speed. It is not a bound of what (25) will still grow by, as the
-own task does not go the shortest way. A roll-out that comes to rest short of the goal will never get there: its
-cost-to-go counts as infinite. Of two such the one that leaves less of the way is better.
+with L the length of the shortest way to the goal among the known safe circles and v the reference speed: the integral
+of L^2 for a UGV that takes this way at that speed. It is no bound of the cost to come, because the own task does not
+take the shortest way. A roll-out that comes to rest short of the goal will never get there: its cost-to-go counts as
+infinite. Of two such roll-outs the one with less way left is better.
 """
 
 from __future__ import annotations
@@ -21,15 +21,7 @@ import numpy as np
 from numba import njit
 
 from airground_drake.base.arrays import Array
-from airground_drake.gatekeeper.rollout import (
-    ACCEPTED,
-    REFUSED,
-    ClosedLoop,
-    View,
-    loop_among,
-    velocity_of,
-    workspace,
-)
+from airground_drake.gatekeeper.rollout import ACCEPTED, REFUSED, ClosedLoop, View, advance, closed_loop, workspace
 from airground_drake.geometry.paths import NoPath, shortest_path
 from airground_drake.intervention.policy import Proposal
 from airground_drake.nsbc.law import UgvLaw
@@ -37,21 +29,21 @@ from airground_drake.nsbc.law import UgvLaw
 USELESS = 1e-6
 """Relative gain below which an intervention makes no difference."""
 STILL_SHARE = 0.1
-"""Of what a UGV can do in a second: `Outlook.still` is no more than this."""
+"""Largest `Outlook.still` as a share of the way that the UGV can do in a second."""
 MOST_CIRCLES = 32
-"""Among which a shortest way is looked for: it takes 10 ms, and eight times as long for twice as many."""
+"""Circles among which a shortest way is looked for: it takes 10 ms, and eight times as long for twice as many."""
 
 
 @dataclass(frozen=True)
 class Outlook:
-    """How far outcomes are looked at.
+    """How far the roll-outs go.
 
     Attributes:
         longest: time that an accepted intervention may last, s.
         past: time that is rolled out when motion and preset trajectory are over, s.
         coasting: time for which a robot without a proposal is predicted to keep its velocity; then it stands, s.
-        near: this close to the goal the own task is done, m.
-        still: less than this within the last second counts as being at rest, m; for slow UGVs it is less.
+        near: the own task is done this close to the goal, m.
+        still: a UGV that moves less than this within the last second is at rest, m; for slow UGVs it is less.
     """
 
     longest: float
@@ -68,7 +60,7 @@ class Outcome:
     Attributes:
         positions: at the control samples, (S + 1, 3), m.
         stalls: whether it comes to rest short of the goal.
-        left: length of the way that is left at the end, m.
+        left: length of the way to the goal from its end, m.
         cost: (25) with weight 1, plus the cost-to-go V; V alone for one that stalls, m^2 s.
     """
 
@@ -90,7 +82,7 @@ class Outcome:
 
 
 def outcomes(seen: View, law: UgvLaw, proposal: Proposal, look: Outlook) -> tuple[Outcome, Outcome]:
-    """What comes of refusing and of accepting.
+    """The outcomes of refusing and of accepting.
 
     Args:
         seen: what the UGV knows; obstacles stand still, whatever their velocities.
@@ -112,7 +104,7 @@ def outcomes(seen: View, law: UgvLaw, proposal: Proposal, look: Outlook) -> tupl
     for together, accepted in ((False, 0), (True, max(0, int(np.ceil((until - t) / h - 1e-9))))):
         places = [robot_at(seen, j, after, look.coasting, together=together)[:, None] for j in range(len(seen.asked))]
         points = np.ascontiguousarray(np.concatenate([fixed, *places], axis=1))  # the layout that is compiled for
-        loop = loop_among(seen, law, proposal, after, points)
+        loop = closed_loop(seen, law, proposal, after, points)
         positions, cost = _rolled_out(loop, accepted, goal, steps, look.near, look.still)
         found.append(_outcome(positions, cost, goal, seen.preset.max_speed, discs, distances, h, look))
     return found[0], found[1]
@@ -122,8 +114,9 @@ def robot_at(seen: View, robot: int, after: Array, coasting: float, *, together:
     """Where one of the other robots is predicted to be at times `after` from now, (S + 1,) s: (S + 1, 3), m.
 
     A robot that is asked to make a motion tracks it: its distance from the motion decays with a time constant of 1 s.
-    Another robot keeps its velocity for `coasting`, s, then stands. What it has not accepted yet counts only `together`
-    with what this UGV is asked: else each would refuse its part of a joint plan because the others free its way.
+    Any other robot keeps its velocity for `coasting`, s, then stands. A motion that it has not accepted yet counts only
+    where this UGV accepts, too (`together`): otherwise each would refuse its part of a joint plan because the other
+    parts free its way.
     """
     k, asked = len(seen.centres) - len(seen.asked) + robot, seen.asked[robot]
     if asked is None or not (together or asked[1]):
@@ -147,10 +140,10 @@ def _outcome(
 
 
 def way_left(place: Array, goal: Array, discs: Array, distances: Array | float) -> float:
-    """Length of the shortest way to the goal among circles around discs (m, 3), m; straight if there is none.
+    """Length of the shortest way to the goal among circles around discs (m, 3), m; straight if no way is free.
 
-    The circles are where balls of radii `distances`, (m,) or one for all, m, meet the plane of the way. Of
-    more than `MOST_CIRCLES` those nearest to the straight way count, so that no map makes it take long.
+    Balls of radii `distances`, (m,) or one for all, m, meet the plane of the way in these circles. If there are more
+    than `MOST_CIRCLES`, those nearest to the straight way count, so that no map makes it take long.
     """
     squared = np.square(distances) - np.square(discs[:, 2] - place[2])
     near = squared > 0.0
@@ -174,27 +167,27 @@ def way_left(place: Array, goal: Array, discs: Array, distances: Array | float) 
 def _rolled_out(
     loop: ClosedLoop, accepted: int, goal: Array, settled: int, near: float, still: float
 ) -> tuple[Array, float]:
-    """Positions at the control samples (k + 1, 3), m, and (25) with weight 1, accepted for so many periods.
+    """Positions at the control samples (k + 1, 3), m, and (25) with weight 1, when `accepted` periods are accepted.
 
-    It ends when nothing moves any more: after `settled` periods, at the goal or at rest for a second.
+    It ends after `settled` periods, when the preset and all predicted motions are over, as soon as the UGV is at the
+    goal or has been at rest for a second.
     """
     steps = len(loop.preset) - 1
-    second = max(1, round(1.0 / loop.law.period))
+    second = max(1, round(1.0 / loop.law.layer.period))
     positions = np.empty((steps + 1, 3))
     positions[0] = loop.start
     position, work = loop.start.copy(), workspace(loop)
     cost = 0.0
     for k in range(steps):
-        velocity = velocity_of(loop, ACCEPTED if k < accepted else REFUSED, k, position, work)
+        advance(loop, ACCEPTED if k < accepted else REFUSED, k, position, work)
         squared, left, moved = 0.0, 0.0, 0.0
         for a in range(3):
-            position[a] += loop.law.period * velocity[a]
             positions[k + 1, a] = position[a]
             squared += (loop.preset[k + 1, a] - position[a]) ** 2
             left += (goal[a] - position[a]) ** 2
             if k + 1 >= second:
                 moved += (position[a] - positions[k + 1 - second, a]) ** 2
-        cost += loop.law.period * squared
+        cost += loop.law.layer.period * squared
         if k >= settled and (left < near**2 or (k + 1 >= second and moved < (0.1 * still) ** 2)):
             return positions[: k + 2], cost
     return positions, cost

@@ -1,13 +1,12 @@
 """Method (d)'s gatekeeper: proposals are judged by their outcome, once.
 
 At the first sample at which a UGV sees a proposal it rolls out both outcomes (`outcome`): accepting it now, and
-refusing it for ever. It takes the better one. That answer stands: a refusal for good, an acceptance until the proposal
-is withdrawn, its motion is over, or it has been executed for as long as it may be. It is never reversed because waiting
-looks cheaper, nor because the other choice does, with one exception: when the UGV senses an obstacle that it did not
-know at the acceptance, it looks at both outcomes again. That is no new try: how often a UGV goes along is bounded
-(`patience`).
+refusing it for ever. It takes the better one. A refusal stands for good. An acceptance stands until the proposal is
+withdrawn, its motion is over, or it has been executed for as long as it may be. Neither is reversed because waiting
+or the other choice looks cheaper. There is one exception: when the UGV senses an obstacle that it did not know at the
+acceptance, it compares both outcomes again. That is no new try: `patience` bounds how often a UGV goes along.
 
-Safety does not rest on this: whatever is accepted is executed below the avoidance inequalities.
+Safety does not rest on this: an accepted motion is executed below the avoidance inequalities.
 """
 
 from __future__ import annotations
@@ -56,7 +55,7 @@ class OutcomeGatekeepers(Gatekeepers):
         return super().idle(proposals, positions, before) and before.sensed is self._remembered(positions, before)
 
     def sample(self, now: Inputs, before: GatekeeperState) -> GatekeeperState:
-        """Judge every proposal in force by its outcome if it is new; else keep to what was answered."""
+        """Judge every new proposal by its outcome; keep to the answer to every other."""
         sensed = self._remembered(now.positions, before)
         known = replace(before, sensed=sensed)
         answers: list[float] = []
@@ -73,13 +72,7 @@ class OutcomeGatekeepers(Gatekeepers):
                 reports.append(Report())
                 continue
             started = thread_time()
-            if standing == ACCEPT:
-                again = self._discovers(sensed, before, i, proposal)
-                decision, held[i] = self._go_on(now, known, i, proposal, held[i], again=again)
-            elif standing == SILENT:
-                decision, held[i] = self._judge(now, known, i, proposal, held[i])
-            else:
-                decision = Decision(now.t, i, proposal, False, "kept", tries=held[i].tries)
+            decision, held[i] = self._decide(now, known, before, i, proposal, standing, held[i])
             self.times_s.append(thread_time() - started)
             decisions.append(decision)
             answers += [_answer(decision, standing), proposal.number]
@@ -105,46 +98,40 @@ class OutcomeGatekeepers(Gatekeepers):
         apart = np.linalg.norm(new[:, None] - proposal.mapped, axis=2)
         return not (apart <= SAME_M).any(axis=1).all()
 
-    def _judge(
-        self, now: Inputs, known: GatekeeperState, i: int, proposal: Proposal, held: Commitment
+    def _decide(
+        self,
+        now: Inputs,
+        known: GatekeeperState,
+        before: GatekeeperState,
+        i: int,
+        proposal: Proposal,
+        standing: float,
+        held: Commitment,
     ) -> tuple[Decision, Commitment]:
-        """The first decision about a proposal."""
-        if self._patience.exhausted(held):
-            return Decision(now.t, i, proposal, False, "exhausted", tries=held.tries), held
-        reason, refuse, accept = self._weigh(now, known, i, proposal)
-        if reason in ACCEPTING:
-            held = self._patience.accept(held, now.t, proposal.motion.end)
-        made = Decision(now.t, i, proposal, held.executing, reason, refuse=refuse, accept=accept, tries=held.tries)
-        return made, held
-
-    def _go_on(
-        self, now: Inputs, known: GatekeeperState, i: int, proposal: Proposal, held: Commitment, *, again: bool
-    ) -> tuple[Decision, Commitment]:
-        """A later decision about a proposal that is executed; `again`: look at both outcomes once more."""
+        """Judge a new proposal, watch over an accepted one, keep to a refusal: the decision, and the new commitment."""
         reason: Reason = "kept"
         refuse = accept = None
-        if self._patience.over(held, now.t):
+        if standing == ACCEPT and self._patience.over(held, now.t):
             reason = "over"
-        elif again:
-            reason, refuse, accept = self._weigh(now, known, i, proposal)
-        stays = reason == "kept" or reason in ACCEPTING
-        made = Decision(now.t, i, proposal, stays, reason, refuse=refuse, accept=accept, tries=held.tries)
-        return made, held if stays else self._patience.stop(held, now.t)
-
-    def _weigh(
-        self, now: Inputs, known: GatekeeperState, i: int, proposal: Proposal
-    ) -> tuple[Reason, Outcome, Outcome]:
-        """The reason for the answer, and what comes of refusing and of accepting."""
-        refuse, accept = self.foresee(self._view_of(now, known, i, proposal), now.law, proposal)
-        favour = proposal.cause in self._ugvs and proposal.cause != self._ugvs[i]
-        return reason_of(refuse, accept, favour=favour), refuse, accept
+        elif standing == SILENT and self._patience.exhausted(held):
+            reason = "exhausted"
+        elif standing == SILENT or (standing == ACCEPT and self._discovers(known.sensed, before, i, proposal)):
+            refuse, accept = self.foresee(self._view_of(now, known, i, proposal), now.law, proposal)
+            favour = proposal.cause in self._ugvs and proposal.cause != self._ugvs[i]
+            reason = reason_of(refuse, accept, favour=favour)
+        accepted = reason in ACCEPTING or (reason == "kept" and standing == ACCEPT)
+        if accepted and standing == SILENT:
+            held = self._patience.accept(held, now.t, proposal.motion.end)
+        elif standing == ACCEPT and not accepted:
+            held = self._patience.stop(held, now.t)
+        return Decision(now.t, i, proposal, accepted, reason, refuse=refuse, accept=accept, tries=held.tries), held
 
     def foresee(self, seen: View, law: UgvLaw, proposal: Proposal) -> tuple[Outcome, Outcome]:
-        """What comes of refusing and of accepting, as far as a UGV sees."""
+        """The outcomes of refusing and of accepting, from what a UGV knows."""
         return outcomes(seen, law, proposal, self._outlook)
 
     def _view_of(self, now: Inputs, known: GatekeeperState, i: int, proposal: Proposal) -> View:
-        """What a UGV knows: obstacles that it has sensed or been told of, other robots and what these are asked."""
+        """A UGV's knowledge: obstacles sensed or told of, other robots and the motions asked of them."""
         around, m = self._view(now, i), len(self._near.still)
         discs, distances = self._known(now.positions[i], known.sensed[i], i, proposal)
         asked = []
@@ -164,14 +151,8 @@ class OutcomeGatekeepers(Gatekeepers):
     def _known(self, position: Array, sensed: npt.NDArray[np.bool_], i: int, proposal: Proposal) -> tuple[Array, Array]:
         """Obstacles that a UGV has sensed, and those of the UAV's map that are out of its sight.
 
-        Of the latter the `MOST_CLAIMED` that are nearest, so that no map makes a decision take long. Obstacles whose
-        radius is no length are left out.
-
-        Args:
-            position: of the UGV, (3,), m.
-            sensed: which obstacles it has sensed, (m,).
-            i: the UGV.
-            proposal: with the UAV's map.
+        Only the `MOST_CLAIMED` of these that are nearest count, so that no map makes a decision take long. Obstacles
+        whose radius is negative or not finite are left out.
 
         Returns:
             Centres, (k, 3), and safe distances, (k,), m.
@@ -189,7 +170,7 @@ class OutcomeGatekeepers(Gatekeepers):
 
 
 def _answer(decision: Decision, standing: float) -> float:
-    """The answer that a decision comes to: what was DONE stays so."""
+    """The answer that follows from a decision; DONE stays DONE."""
     if decision.accepted:
         return ACCEPT
     done = decision.reason == "over" and decision.t >= decision.proposal.motion.end
@@ -197,11 +178,10 @@ def _answer(decision: Decision, standing: float) -> float:
 
 
 def reason_of(refuse: Outcome, accept: Outcome, *, favour: bool) -> Reason:
-    """Why to accept (one of ACCEPTING) or why not, given what comes of either.
+    """Why to accept (one of ACCEPTING) or why not, given both outcomes.
 
-    A UGV that is asked to make way for another one of its team (a `favour`) has nothing to gain: it accepts unless it
-    would come to rest short of its own goal. Whether that other one's trigger is on it cannot know; what a lie may cost
-    it is bounded like any other try (`patience`).
+    A UGV that makes way for another UGV (a `favour`) has nothing to gain: it accepts unless it would come to rest short
+    of its own goal. It cannot know whether the other UGV's trigger is on; `patience` bounds the cost of a lie.
     """
     if not (np.isfinite(accept.cost) and np.isfinite(refuse.cost)):
         return "no_plan"

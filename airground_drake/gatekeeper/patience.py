@@ -5,8 +5,8 @@
     EXECUTING   -- withdrawn, over, or not worth it any more --------> ON ITS OWN
 
 A try lasts no longer than `longest` s. With all tries used the UGV is exhausted: it refuses everything until it has
-been on its own for `rest` s. So between two rests no UAV keeps it from its own task for longer than `most * longest` s
-and what noticing the end of each try takes, whatever it sends.
+been on its own for `rest` s. So between two rests no UAV, whatever it sends, keeps the UGV from its own task for longer
+than `most * longest` s plus one sampling period per try, in which the UGV notices the end.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 
 @dataclass(frozen=True)
 class Commitment:
-    """What a UGV has committed itself to: its state of the automaton.
+    """A UGV's state of the automaton.
 
     Attributes:
         executing: whether an accepted proposal is executed.
@@ -45,15 +45,6 @@ class Patience:
     rest: float
     longest: float
 
-    def __post_init__(self) -> None:
-        """Check the parameters.
-
-        Raises:
-            ValueError: if there is no try, or a time is not positive.
-        """
-        if not (self.most >= 1 and self.rest > 0.0 and self.longest > 0.0):
-            raise ValueError(f"patience needs at least one try, and positive times, got {self}")
-
     def rested(self, now: Commitment, t: float) -> Commitment:
         """At time t, s: the tries count anew after a rest."""
         if not now.executing and t >= now.since + self.rest:
@@ -61,18 +52,17 @@ class Patience:
         return now
 
     def exhausted(self, now: Commitment) -> bool:
-        """Whether nothing is accepted before the next rest."""
+        """Whether the UGV accepts nothing before the next rest."""
         return now.tries >= self.most
 
     def accept(self, now: Commitment, t: float, end: float) -> Commitment:
-        """At time t, s: a motion that ends at `end`, s, is accepted, by a UGV on its own that is not exhausted."""
-        until = end if end <= t + self.longest else t + self.longest
-        return replace(now, executing=True, tries=now.tries + 1, since=t, until=until)
+        """At time t, s: a UGV on its own that is not exhausted accepts a motion that ends at `end`, s."""
+        return replace(now, executing=True, tries=now.tries + 1, since=t, until=min(t + self.longest, end))
 
     def stop(self, now: Commitment, t: float) -> Commitment:
         """At time t, s: the UGV is on its own again."""
         return replace(now, executing=False, since=t)
 
     def over(self, now: Commitment, t: float) -> bool:
-        """Whether the time of what is executed is over at time t, s."""
+        """Whether the time of the executed proposal is over at time t, s."""
         return t >= now.until

@@ -8,23 +8,15 @@ from functools import cached_property
 import numpy as np
 
 from airground_drake.base.arrays import Array
-from airground_drake.gatekeeper.cost import Terms, error_weights, half_plane_cost, plan_cost
-from airground_drake.gatekeeper.rollout import ClosedLoop, View, closed_loop
+from airground_drake.gatekeeper.cost import Terms, half_plane_cost, plan_cost
+from airground_drake.gatekeeper.rollout import ACCEPTED, REFUSED, View, closed_loop, follow
 from airground_drake.intervention.policy import Proposal
 from airground_drake.nsbc.law import UgvLaw
 
 
 @dataclass(frozen=True)
 class Horizon:
-    """Discretisation and weights of (25)-(27).
-
-    Attributes:
-        stages: N.
-        substeps: control periods per stage.
-        error_weight: a_i of (25), 1/(m^2 s).
-        slack_weight: b_i of (25), 1/(m^2 s).
-        terminal_weight: of the terminal cost, see `cost.error_weights`, s.
-    """
+    """N stages of (25)-(27), control periods per stage, and weights as in `Problem`."""
 
     stages: int
     substeps: int
@@ -50,10 +42,8 @@ class Problem:
         distances: safe distances d of (26d), (m,), m.
         error_weight: a_i of (25), 1/(m^2 s).
         slack_weight: b_i of (25), 1/(m^2 s).
-        terminal_weight: of the terminal cost, see `cost.error_weights`, s; 0: none, as the paper has it.
-        loop: what the mode velocities were rolled out from; None for a problem that is given by them alone.
-        previous: what is left of the plan decided on at the sample before, (N,), 0 or 1; None if there is none. It is
-            no part of (26), but a plan to start from.
+        terminal_weight: w of the terminal cost, see `terms`, s; 0: none, as the paper has it.
+        previous: the rest of the plan of the last sample, (N,), 0 or 1, for a search to start from; None without one.
     """
 
     dt: float
@@ -66,7 +56,6 @@ class Problem:
     error_weight: float
     slack_weight: float
     terminal_weight: float = 0.0
-    loop: ClosedLoop | None = None
     previous: Array | None = None
 
     @property
@@ -76,8 +65,13 @@ class Problem:
 
     @cached_property
     def terms(self) -> Terms:
-        """What (23) and (25) are made of, for compiled code."""
-        weights = error_weights(self.stages, self.dt, self.error_weight, self.terminal_weight)
+        """The data of (23) and (25) for compiled code.
+
+        The terminal cost w a ||rho_rd - rho_N||^2 of the stability theory of model predictive control (Mayne et al.,
+        Automatica 36, 2000) is part of the last weight of the task error: dt a becomes (dt + w) a.
+        """
+        weights = np.full(self.stages, self.error_weight)
+        weights[-1] *= 1.0 + self.terminal_weight / self.dt
         modes = np.stack([self.refuse, self.accept])
         data = self.initial, modes, self.reference, self.centres, self.distances
         return Terms(float(self.dt), *data, weights, float(self.slack_weight))
@@ -85,8 +79,7 @@ class Problem:
     def is_finite(self) -> bool:
         """Whether all data are finite numbers."""
         data = (self.initial, self.accept, self.refuse, self.reference, self.centres, self.distances)
-        looped = self.loop is None or self.loop.is_finite()
-        return looped and all(np.isfinite(array).all() for array in data)
+        return all(np.isfinite(array).all() for array in data)
 
     def positions(self, omega: Array) -> Array:
         """Predicted positions at the ends of the stages, (23): omega (N,) in [0, 1] to (N, 3), m."""
@@ -96,17 +89,6 @@ class Problem:
     def evaluate(self, omega: Array) -> Evaluation:
         """Cost (25) of a plan, (N,), by the mode velocities of (23), with the exact distances of (26d)."""
         positions = self.positions(omega)
-        return Evaluation(omega, positions, *plan_cost(self.terms, positions))
-
-    def evaluate_closed_loop(self, omega: Array) -> Evaluation:
-        """Cost (25) of a plan, (N,) of 0 and 1, rolled out on the closed loop, with the exact distances of (26d).
-
-        Raises:
-            ValueError: if the problem has no closed loop, or the plan is not one of its plans.
-        """
-        if self.loop is None:
-            raise ValueError("a problem that is given by mode velocities has no closed loop")
-        positions = self.loop.positions(omega)
         return Evaluation(omega, positions, *plan_cost(self.terms, positions))
 
     def evaluate_half_planes(self, positions: Array, normals: Array) -> float:
@@ -127,17 +109,18 @@ class Evaluation:
 def predicted_problem(seen: View, law: UgvLaw, proposal: Proposal, horizon: Horizon) -> Problem:
     """(26) for one UGV: roll out both choices and keep the points that it senses and might come near."""
     seen = seen.restrict(np.linalg.norm(seen.centres - seen.position, axis=1) <= law.avoidance.sensing_range)
-    loop = closed_loop(seen, law, proposal, horizon.stages, horizon.substeps)
-    accept, refuse = loop.constant_plans()
-    dt = horizon.substeps * law.avoidance.period
-    after = dt * np.arange(1.0, horizon.stages + 1.0)
+    dt, stages = horizon.substeps * law.avoidance.period, np.ones(horizon.stages, dtype=np.int64)
+    samples = law.avoidance.period * np.arange(0.0, horizon.stages * horizon.substeps + 1.0)
+    points = seen.centres + samples[:, None, None] * seen.velocities
+    loop = closed_loop(seen, law, proposal, samples, points, horizon.substeps)
+    accept, refuse = (follow(loop, mode * stages)[1] for mode in (ACCEPTED, REFUSED))
     squared = np.maximum(np.square(accept).sum(axis=1), np.square(refuse).sum(axis=1))
     # a plan that switches may be faster than both constant ones, but for a retreat not above the speed limit
     reach = dt * np.cumsum(np.sqrt(np.maximum(squared, seen.max_speed**2)))
-    centres = seen.centres + after[:, None, None] * seen.velocities
+    centres = points[horizon.substeps :: horizon.substeps]
     gap = np.linalg.norm(centres - seen.position, axis=2) - seen.distances - reach[:, None]
     height = np.abs(centres[:, :, 2] - seen.position[2]) - seen.distances
-    near = ((gap < 0.0) & (height < 0.0)).any(axis=0)
+    near = ~((gap >= 0.0) | (height >= 0.0)).all(axis=0)  # also what is not a number, so that the problem is refused
     return Problem(
         dt=dt,
         initial=seen.position,
@@ -149,5 +132,4 @@ def predicted_problem(seen: View, law: UgvLaw, proposal: Proposal, horizon: Hori
         error_weight=horizon.error_weight,
         slack_weight=horizon.slack_weight,
         terminal_weight=horizon.terminal_weight,
-        loop=loop,
     )

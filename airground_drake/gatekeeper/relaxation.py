@@ -16,11 +16,39 @@ from airground_drake.gatekeeper.cost import Terms
 from airground_drake.gatekeeper.problem import Problem
 
 
+def boxes(problem: Problem) -> tuple[Array, Array]:
+    """Least and largest coordinates, (N, 3) each, m, that any plan, relaxed or not, can have at the ends of stages."""
+    slower, faster = np.minimum(problem.accept, problem.refuse), np.maximum(problem.accept, problem.refuse)
+    low, high = (np.cumsum(np.vstack([problem.initial, problem.dt * v]), axis=0)[1:] for v in (slower, faster))
+    return low, high
+
+
+def nearest_in_reach(problem: Problem) -> Array:
+    """Where in the box of each stage a plan could be nearest to each point, (N, m, 3), m."""
+    low, high = boxes(problem)
+    return np.clip(problem.centres, low[:, None], high[:, None])
+
+
+def within_reach(problem: Problem) -> npt.NDArray[np.bool_]:
+    """(N, m): False where no relaxed plan can come within the safe distance, so that (26d) costs nothing there."""
+    squared = np.square(nearest_in_reach(problem) - problem.centres).sum(axis=2)
+    within: npt.NDArray[np.bool_] = squared < np.square(problem.distances)
+    return within
+
+
+def unavoidable_cost(problem: Problem) -> float:
+    """Lower bound of (25) over all plans, relaxed or not: the task error of the nearest points of the boxes."""
+    low, high = boxes(problem)
+    beyond = np.maximum(0.0, np.maximum(low - problem.reference, problem.reference - high))
+    errors = problem.dt * problem.terms.error_weights * np.square(beyond).sum(axis=1)
+    return (1.0 - 1e-9) * float(np.cumsum(errors[::-1])[-1])  # the last digits of the sums must not cut an optimum
+
+
 def normals_along(problem: Problem, positions: Array) -> Array:
     """Unit vectors (N, m, 3) from the points to a guiding trajectory (N, 3).
 
-    Where no plan can come near, (26d) asks for nothing, and no half-plane shall: there they are from the points to
-    the nearest place that any plan could reach. All of them are beyond that half-plane.
+    Where no plan can come near, (26d) demands nothing. There the vectors point to the nearest place that any plan could
+    reach, so that no plan violates the half-plane.
     """
     guide = np.where(within_reach(problem)[:, :, None], positions[:, None, :], nearest_in_reach(problem))
     offset = guide - problem.centres
@@ -37,76 +65,23 @@ def offsets(problem: Problem, normals: Array) -> Array:
     return problem.distances + np.einsum("kmi,kmi->km", normals, problem.centres - at)
 
 
-def nearest_in_reach(problem: Problem) -> Array:
-    """Where in the box of each stage a plan could be nearest to each point, (N, m, 3), m."""
-    nearest: Array = _nearest(problem.terms)
-    return nearest
-
-
-def within_reach(problem: Problem) -> npt.NDArray[np.bool_]:
-    """(N, m): False where no relaxed plan can come within the safe distance, so that (26d) costs nothing there."""
-    squared = np.square(nearest_in_reach(problem) - problem.centres).sum(axis=2)
-    within: npt.NDArray[np.bool_] = squared < np.square(problem.distances)
-    return within
-
-
-def remaining_cost(problem: Problem) -> Array:
-    """Lower bound of (25) over the stages from k on, for k = 0..N, (N + 1,): task error from the box."""
-    tail: Array = _remaining_cost(problem.terms)
-    return tail
-
-
-@njit(cache=True)
-def _grow(terms: Terms, k: int, low: Array, high: Array) -> None:
-    """From the box (low, high), (3,) each, m, at the beginning of stage k to that at its end, in place."""
-    for a in range(3):
-        low[a] += terms.dt * min(terms.velocities[1, k, a], terms.velocities[0, k, a])
-        high[a] += terms.dt * max(terms.velocities[1, k, a], terms.velocities[0, k, a])
-
-
-@njit(cache=True)
-def _nearest(terms: Terms) -> Array:
-    nearest = np.empty_like(terms.centres)
-    low, high = terms.initial.copy(), terms.initial.copy()
-    for k in range(len(terms.reference)):
-        _grow(terms, k, low, high)
-        for m in range(len(terms.distances)):
-            for a in range(3):
-                nearest[k, m, a] = min(max(terms.centres[k, m, a], low[a]), high[a])
-    return nearest
-
-
-@njit(cache=True)
-def _remaining_cost(terms: Terms) -> Array:
-    stages = len(terms.reference)
-    tail = np.zeros(stages + 1)
-    low, high = terms.initial.copy(), terms.initial.copy()
-    for k in range(stages):
-        _grow(terms, k, low, high)
-        squared = 0.0
-        for a in range(3):
-            squared += max(0.0, low[a] - terms.reference[k, a], terms.reference[k, a] - high[a]) ** 2
-        tail[k] = terms.dt * terms.error_weights[k] * squared
-    for k in range(stages - 1, -1, -1):
-        tail[k] += tail[k + 1]
-    return (1.0 - 1e-9) * tail  # the last digits of the running sums must not cut an optimum
-
-
-def dual_bound(problem: Problem, normals: Array, omega: Array, multipliers: Array) -> float:
+def dual_bound(problem: Problem, normals: Array, omega: Array, multipliers: Array | None = None) -> float:
     """Lower bound of (25), with distances along half-planes, by weak duality; valid for any arguments.
 
-    For multipliers l >= 0 of the half-planes, (25) is at least the Lagrangian, whose minimum over u >= 0 is
-    closed, and whose task error is convex in omega, so that it is at least its linearisation at any omega,
-    whose minimum over the box [0, 1]^N is closed, too. At an optimum of the relaxation, with its multipliers,
-    the bound is the optimum. A solver's tolerances cost tightness only, never validity.
+    For multipliers l >= 0 of the half-planes, (25) is at least the Lagrangian. Its minimum over u >= 0 has a closed
+    form. Its task error is convex in omega, hence at least its linearisation at any omega, and the minimum of that over
+    [0, 1]^N has a closed form, too. At an optimum of the relaxation, with its multipliers, the bound is the optimum. A
+    solver's tolerances cost tightness only, never validity.
 
     Args:
         problem: data of (26).
         normals: unit vectors, (N, m, 3).
         omega: where to linearise, (N,).
-        multipliers: of the half-planes, (N, m), 1/m; negative ones count as 0.
+        multipliers: of the half-planes, (N, m), 1/m; negative ones count as 0. None: those of an optimum at omega.
     """
     at = problem.positions(omega)
+    if multipliers is None:
+        multipliers = _multipliers(problem.terms, normals, at)
     return float(_dual_bound(problem.terms, normals, omega, at, multipliers))
 
 
@@ -136,18 +111,13 @@ def _dual_bound(terms: Terms, normals: Array, omega: Array, positions: Array, mu
     return total
 
 
-def multipliers_at(problem: Problem, normals: Array, positions: Array) -> Array:
+@njit(cache=True)
+def _multipliers(terms: Terms, normals: Array, positions: Array) -> Array:
     """Multipliers of the half-planes, (N, m), 1/m, at an optimum with these positions and no ties.
 
-    The derivative of b u^2 dt on the half-plane that is violated most at each stage. Where two are violated
-    equally, an optimum may share it between them: ask the solver there.
+    The derivative of b u^2 dt on the half-plane that is violated most at each stage. Where two are violated equally,
+    an optimum may share it between them: ask the solver there.
     """
-    multipliers: Array = _multipliers_at(problem.terms, normals, positions)
-    return multipliers
-
-
-@njit(cache=True)
-def _multipliers_at(terms: Terms, normals: Array, positions: Array) -> Array:
     result = np.zeros(normals.shape[:2])
     for k in range(len(positions)):
         most, which = 0.0, -1

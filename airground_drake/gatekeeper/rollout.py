@@ -1,4 +1,4 @@
-"""The closed loop of one UGV from what it knows, rolled out under switching answers by the law that commands it."""
+"""Predicted motion of one UGV: its control law, rolled out from what it knows, under any answers to a proposal."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from numba import njit
 from airground_drake.base.arrays import Array
 from airground_drake.geometry.motion import Motion
 from airground_drake.intervention.policy import Proposal
-from airground_drake.nsbc.kernels import fill_half_spaces
-from airground_drake.nsbc.law import Intervention, Numbers, UgvLaw, command
+from airground_drake.nsbc.kernels import Points, fill_half_spaces
+from airground_drake.nsbc.law import Intervention, Numbers, Tracking, Ugv, UgvLaw, command
 
 REFUSED, ACCEPTED = 0, 1
 """Modes of a control period: whether the proposal is in force."""
@@ -21,7 +21,7 @@ REFUSED, ACCEPTED = 0, 1
 
 @dataclass(frozen=True, eq=False)
 class View:
-    """What a UGV sees when it decides: K points, obstacles first, then other robots.
+    """A UGV's view when it decides: K points, obstacles first, then other robots.
 
     Attributes:
         t: time, s.
@@ -32,8 +32,8 @@ class View:
         distances: safe distances to them, (K,), m.
         shares: share of each avoidance inequality, (K,).
         max_speed: own speed limit, m/s.
-        asked: under method (d), per robot: the motion that it has accepted or is asked to make, and whether it has
-            accepted it; None without one.
+        asked: under method (d), per other robot, the motion that it is asked to make and whether it has accepted it,
+            or None.
     """
 
     t: float
@@ -60,8 +60,7 @@ class View:
 class ClosedLoop(NamedTuple):
     """All that the motion of one UGV over the horizon depends on, besides the answers to the proposal.
 
-    N stages of `substeps` control periods each, S = N * substeps in all. A named tuple because that is what
-    numba takes as one argument; the arrays are never written to.
+    N stages of `substeps` control periods each, S = N * substeps in all. The arrays are never written to.
 
     Attributes:
         law: the numbers of its control law.
@@ -87,63 +86,14 @@ class ClosedLoop(NamedTuple):
     max_speed: float
     substeps: int
 
-    @property
-    def stages(self) -> int:
-        """N."""
-        return (len(self.preset) - 1) // self.substeps
 
-    def is_finite(self) -> bool:
-        """Whether all arrays hold finite numbers."""
-        arrays = (self.start, self.preset, self.wanted, self.chosen, self.points, self.distances, self.shares)
-        return all(bool(np.isfinite(array).all()) for array in arrays)
-
-    def positions(self, omega: Array) -> Array:
-        """Positions at the ends of the stages, (N, 3), m, when stage k runs with the answer omega[k].
-
-        Args:
-            omega: (N,), 1 where the proposal is accepted, 0 where it is refused.
-
-        Raises:
-            ValueError: if there are not N answers or one is neither 0 nor 1.
-        """
-        answers = np.asarray(omega)
-        if answers.shape != (self.stages,) or not np.isin(answers, (REFUSED, ACCEPTED)).all():
-            raise ValueError(f"a plan needs {self.stages} answers that are 0 or 1, got {omega!r}")
-        return _follow(self, answers.astype(np.int64))[0]
-
-    def constant_plans(self) -> tuple[Array, Array]:
-        """Mean velocity of each stage, (N, 3) m/s, accepted throughout and refused throughout."""
-        every = np.ones(self.stages, dtype=np.int64)
-        return _follow(self, ACCEPTED * every)[1], _follow(self, REFUSED * every)[1]
-
-
-def closed_loop(seen: View, law: UgvLaw, proposal: Proposal, stages: int, substeps: int) -> ClosedLoop:
-    """The UGV's closed loop over `stages` of `substeps` control periods each.
-
-    Args:
-        seen: what the UGV sees now.
-        law: its control law.
-        proposal: the intervention in question.
-        stages: N.
-        substeps: control periods per stage.
-    """
-    after = law.avoidance.period * np.arange(0.0, stages * substeps + 1.0)
-    points = seen.centres + after[:, None, None] * seen.velocities
-    return loop_among(seen, law, proposal, after, points, substeps)
-
-
-def loop_among(
+def closed_loop(
     seen: View, law: UgvLaw, proposal: Proposal, after: Array, points: Array, substeps: int = 1
 ) -> ClosedLoop:
-    """The UGV's closed loop among points that move in any way.
+    """The UGV's closed loop among points that move in any way, with `substeps` control periods per stage.
 
-    Args:
-        seen: what the UGV sees; its `centres` and `velocities` are not looked at.
-        law: its control law.
-        proposal: the intervention in question.
-        after: control samples from now on, (S + 1,), s.
-        points: where the points are at these, (S + 1, K, 3), m.
-        substeps: control periods per stage.
+    `after` are control samples from now on, (S + 1,), s, and `points` the places of the points then, (S + 1, K, 3), m.
+    The `centres` and `velocities` of the view do not count.
     """
     t = seen.t + after
     return ClosedLoop(
@@ -161,14 +111,10 @@ def loop_among(
 
 
 class Workspace(NamedTuple):
-    """Arrays that one control period writes to.
+    """Arrays that one control period writes to, and the UGV's mobility.
 
-    Attributes:
-        mobility: (3,), 1 where the UGV can move, 0 where it cannot; not written to.
-        normal: of the avoidance inequalities, (K, 3).
-        bound: of the avoidance inequalities, (K,), m/s.
-        rate: velocity of the preset trajectory, (3,), m/s.
-        asked: velocity of the proposed motion, (3,), m/s.
+    The avoidance inequalities are `normal`, (K, 3), and `bound`, (K,), m/s; `rate` and `asked` are the velocities of
+    the preset trajectory and of the proposed motion, (3,), m/s.
     """
 
     mobility: Array
@@ -180,49 +126,55 @@ class Workspace(NamedTuple):
 
 @njit(cache=True)
 def workspace(loop: ClosedLoop) -> Workspace:
-    """Uninitialised arrays for `velocity_of`."""
+    """Uninitialised arrays for `advance`."""
     count = len(loop.distances)
     plane = np.array([1.0, 1.0, 0.0])
     return Workspace(plane, np.empty((count, 3)), np.empty(count), np.empty(3), np.empty(3))
 
 
 @njit(cache=True)
-def velocity_of(loop: ClosedLoop, mode: int, k: int, position: Array, work: Workspace) -> Array:
-    """Velocity (3,), m/s, that the law commands in control period k; rates are of the sampled motions.
+def advance(loop: ClosedLoop, mode: int, k: int, position: Array, work: Workspace) -> Array:
+    """Move the UGV through control period k, and return its mean velocity in it, (3,), m/s.
 
-    Args:
-        loop: the closed loop.
-        mode: REFUSED or ACCEPTED.
-        k: control period, from 0.
-        position: of the UGV at its beginning, (3,), m.
-        work: overwritten.
+    Only here do predictions assume a plant, the first-order one: it moves straight at its command. A test holds this
+    step against `world.plant.FirstOrder`. Another plant replaces it here.
+
+    `mode` is REFUSED or ACCEPTED. `position`, (3,), m, is that at the beginning of the period, then that at its end.
     """
-    mobility, normal, bound, rate, asked = work
-    law = loop.law
-    fill_half_spaces(
-        position, loop.points[k], loop.distances, loop.shares, law.avoidance_gain, law.period, mobility,
-        law.sensing_range, normal, bound,
-    )  # fmt: skip
+    velocity = _command(loop, mode, k, position, work)
     for a in range(3):
-        rate[a] = (loop.preset[k + 1, a] - loop.preset[k, a]) / law.period
-        asked[a] = (loop.wanted[k + 1, a] - loop.wanted[k, a]) / law.period
-    return command(
-        law, position, loop.preset[k], rate, mode == ACCEPTED, Intervention(loop.wanted[k], asked, loop.chosen),
-        normal, bound, mobility, loop.max_speed,
-    )  # fmt: skip
+        position[a] += loop.law.layer.period * velocity[a]
+    return velocity
 
 
 @njit(cache=True)
-def _follow(loop: ClosedLoop, answers: npt.NDArray[np.int64]) -> tuple[Array, Array]:
-    """Positions at the ends of the stages, (N, 3), m, and mean velocities of the stages, (N, 3), m/s."""
+def _command(loop: ClosedLoop, mode: int, k: int, position: Array, work: Workspace) -> Array:
+    """Velocity that the law commands in control period k, (3,), m/s; rates are of the sampled motions."""
+    mobility, normal, bound, rate, asked = work
+    law, points = loop.law, Points(loop.points[k], loop.distances, loop.shares)
+    fill_half_spaces(position, mobility, points, law.layer, normal, bound)
+    for a in range(3):
+        rate[a] = (loop.preset[k + 1, a] - loop.preset[k, a]) / law.layer.period
+        asked[a] = (loop.wanted[k + 1, a] - loop.wanted[k, a]) / law.layer.period
+    ugv, track = Ugv(position, mobility, loop.max_speed), Tracking(loop.preset[k], rate)
+    intervention = Intervention(loop.wanted[k], asked, loop.chosen)
+    return command(law, ugv, track, intervention, mode == ACCEPTED, normal, bound)
+
+
+@njit(cache=True)
+def follow(loop: ClosedLoop, answers: npt.NDArray[np.int64]) -> tuple[Array, Array]:
+    """Roll out under an answer per stage, (N,), REFUSED or ACCEPTED.
+
+    Returns:
+        Positions at the ends of the stages, (N, 3), m, and mean velocities of the stages, (N, 3), m/s.
+    """
     stages = len(answers)
     positions, mean = np.empty((stages, 3)), np.zeros((stages, 3))
     position, work = loop.start.copy(), workspace(loop)
     for stage in range(stages):
         for k in range(stage * loop.substeps, (stage + 1) * loop.substeps):
-            velocity = velocity_of(loop, answers[stage], k, position, work)
+            velocity = advance(loop, answers[stage], k, position, work)
             for a in range(3):
-                position[a] += loop.law.period * velocity[a]
                 mean[stage, a] += velocity[a] / loop.substeps
         positions[stage] = position
     return positions, mean

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from typing import Literal
+from dataclasses import dataclass
+from typing import Any, Literal
 
 import numpy as np
 
@@ -60,7 +60,7 @@ class Solution:
     @property
     def has_plan(self) -> bool:
         """Whether it rests on a plan, by its status."""
-        return self.status in ("optimal", "budget_spent", "solver_failed")
+        return self.status != "refused_not_finite"
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,37 +97,27 @@ def cheapest(
     *,
     status: Status = "optimal",
     route_bound: float = -1.0,
-    gap: float = -1.0,
     normals: Array | None = None,
     relaxed: Array | None = None,
     rounded: Array | None = None,
 ) -> Solution:
     """The cheapest of some evaluated plans, among them both constant ones; the first on a tie.
 
-    Args:
-        problem: what they are plans of.
-        plans: at least one that starts by accepting and one that starts by refusing.
-        status: any but a refusal.
-        route_bound: of the cost (25), with distances measured along `normals` if there are any.
-        gap: of the plans to that bound; with `normals` it is computed.
-        normals: of half-planes, (N, m, 3).
-        relaxed: omega of the relaxation, (N,), if it was solved.
-        rounded: the same after sum-up rounding, (N,).
+    The other arguments are those of `Solution`. With `normals`, the bound and the gap are about distances along them.
     """
     best = min(plans, key=lambda plan: plan.objective)
+    reached = best.objective
     if normals is not None:
-        convexified = min(problem.evaluate_half_planes(plan.positions, normals) for plan in plans)
-        gap = relative_gap(convexified, route_bound)
+        reached = min(problem.evaluate_half_planes(plan.positions, normals) for plan in plans)
+    deviation = None if relaxed is None or rounded is None else rounding_deviation(relaxed, rounded, problem.dt)
     return Solution(
         accept_first=bool(best.omega[0] == 1.0),
         status=status,
         objective=best.objective,
         route_bound=route_bound,
-        gap=gap,
+        gap=-1.0 if route_bound < 0.0 else (reached - route_bound) / max(reached, 1e-12),
         relaxed_first_stage=-1.0 if relaxed is None else float(relaxed[0]),
-        rounding_deviation=(
-            -1.0 if relaxed is None or rounded is None else rounding_deviation(relaxed, rounded, problem.dt)
-        ),
+        rounding_deviation=-1.0 if deviation is None else deviation,
         clearance=min(best.clearance, 1e9),
         objective_accept=min(plan.objective for plan in plans if plan.omega[0] == 1.0),
         objective_refuse=min(plan.objective for plan in plans if plan.omega[0] == 0.0),
@@ -140,56 +130,23 @@ def cheapest(
 
 
 def cut_short(
-    problem: Problem,
-    plans: Sequence[Evaluation],
-    bound: float,
-    *,
-    status: Status = "budget_spent",
-    normals: Array | None = None,
-    relaxed: Array | None = None,
-    rounded: Array | None = None,
+    problem: Problem, plans: Sequence[Evaluation], bound: float, status: Status = "budget_spent", **evidence: Any
 ) -> Solution:
     """The solution when the budget is spent or a solver failed: the best plan so far, and a bound without a solver.
 
-    Args:
-        problem: what they are plans of.
-        plans: as for `cheapest`.
-        bound: lower bound of every plan.
-        status: 'budget_spent' or 'solver_failed'.
-        normals: as for `cheapest`.
-        relaxed: as for `cheapest`.
-        rounded: as for `cheapest`.
+    As `cheapest`, which takes `evidence`; `bound` is a lower bound of every plan.
     """
-    best = min(plan.objective for plan in plans)
-    bound = min(bound, best)
-    gap = relative_gap(best, bound)
-    return cheapest(
-        problem, plans, status=status, route_bound=bound, gap=gap, normals=normals, relaxed=relaxed, rounded=rounded
-    )
+    bound = min(bound, *(plan.objective for plan in plans))
+    return cheapest(problem, plans, status=status, route_bound=bound, **evidence)
 
 
 def after_failure(problem: Problem, solution: Solution) -> Solution:
-    """The solution after a solver failure: the cheapest of its own plan, the constant plans and the previous one.
-
-    Args:
-        problem: what they are plans of.
-        solution: the route's, with or without a plan.
-    """
+    """The solution after a solver failure: the cheapest of its own plan, the constant plans and the previous one."""
     constants = ConstantPlans.of(problem)
     if not (problem.is_finite() and constants.are_finite()):
         return Solution(False, "refused_not_finite")
     known = [problem.evaluate(plan) for plan in (solution.plan, problem.previous) if plan is not None]
-    bound = max(0.0, solution.route_bound)
-    found = cut_short(
-        problem, (*constants.both, *known), bound, status="solver_failed",
-        relaxed=solution.relaxed, rounded=solution.rounded,
+    return cut_short(
+        problem, (*constants.both, *known), max(0.0, solution.route_bound), "solver_failed",
+        normals=solution.normals, relaxed=solution.relaxed, rounded=solution.rounded,
     )  # fmt: skip
-    if solution.normals is None or found.positions is None:
-        return found
-    along = problem.evaluate_half_planes(found.positions, solution.normals)
-    return replace(found, gap=relative_gap(along, found.route_bound), normals=solution.normals)
-
-
-def relative_gap(objective: float, route_bound: float) -> float:
-    """(objective - route_bound) / objective; 0 / 0 is 0."""
-    return (objective - route_bound) / max(objective, 1e-12)

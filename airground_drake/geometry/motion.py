@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from bisect import bisect_right
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Self
 
 import numpy as np
 
-from airground_drake.base.arrays import Array
+from airground_drake.base.arrays import Array, read_only
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,6 +24,8 @@ class Motion:
 
     times: Array
     positions: Array
+    _times: list[float] = field(init=False, repr=False)
+    _slopes: Array = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         """Check and freeze the arrays.
@@ -31,8 +33,7 @@ class Motion:
         Raises:
             ValueError: if shapes disagree, times do not increase, or a number is not finite.
         """
-        times = np.array(self.times, dtype=np.float64)
-        positions = np.array(self.positions, dtype=np.float64)
+        times, positions = read_only(self.times), read_only(self.positions)
         if times.ndim != 1 or len(times) == 0 or positions.shape != (len(times), 3):
             raise ValueError(f"a motion needs times (M,) and positions (M, 3), got {times.shape}, {positions.shape}")
         if not (np.isfinite(times).all() and np.isfinite(positions).all()):
@@ -42,8 +43,7 @@ class Motion:
             if not (steps > 0.0).all():
                 raise ValueError("the times of a motion must increase strictly")
             slopes = (positions[1:] - positions[:-1]) / steps[:, None]
-        for array in (times, positions, slopes):
-            array.setflags(write=False)
+        slopes.setflags(write=False)
         object.__setattr__(self, "times", times)
         object.__setattr__(self, "positions", positions)
         object.__setattr__(self, "_times", times.tolist())
@@ -74,17 +74,15 @@ class Motion:
     @property
     def max_speed(self) -> float:
         """Largest speed, m/s."""
-        slopes: Array = self._slopes  # type: ignore[attr-defined]
-        return float(np.linalg.norm(slopes, axis=1).max(initial=0.0))
+        return float(np.linalg.norm(self._slopes, axis=1).max(initial=0.0))
 
     def at(self, t: float) -> tuple[Array, Array]:
         """Position (3,) m and velocity (3,) m/s at time t (at a vertex: the velocity after it)."""
-        times: list[float] = self._times  # type: ignore[attr-defined]
-        k = bisect_right(times, t) - 1
-        if k < 0 or k >= len(times) - 1:
+        k = bisect_right(self._times, t) - 1
+        if k < 0 or k >= len(self._times) - 1:
             return self.positions[max(k, 0)], np.zeros(3)
-        slope: Array = self._slopes[k]  # type: ignore[attr-defined]
-        return self.positions[k] + (t - times[k]) * slope, slope
+        slope: Array = self._slopes[k]
+        return self.positions[k] + (t - self._times[k]) * slope, slope
 
     def sample(self, t: Array) -> Array:
         """Positions at times (k,): (k, 3) m."""

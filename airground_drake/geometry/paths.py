@@ -1,12 +1,12 @@
 """Shortest planar path of a point robot among discs that may overlap.
 
-The discs are open sets: running along a circle is allowed, crossing its inside is not. A shortest path is
-made of straight segments tangent to circles and of arcs of those circles, so it is found exactly: the common
-tangents that no disc blocks and the uncovered arcs between their ends form a graph, searched with Dijkstra.
-Start and goal enter the construction as circles of radius zero.
+The discs are open sets: running along a circle is allowed, crossing its inside is not. A shortest path is made of
+straight segments tangent to circles and of arcs of those circles, so it is found exactly: the common tangents that no
+disc blocks and the uncovered arcs between their ends form a graph, searched with Dijkstra. Start and goal are circles
+of radius zero in it.
 
-All points are in one planar Cartesian frame (the caller's world frame), in metres; angles are in radians. The
-private functions write a point (x, y) as the complex number x + iy.
+All points are in one planar frame, in m; angles are in rad. The private functions write a point (x, y) as the complex
+number x + iy.
 """
 
 from __future__ import annotations
@@ -15,7 +15,6 @@ import math
 from bisect import bisect_right
 from dataclasses import dataclass, field
 from itertools import accumulate
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -23,22 +22,22 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 from scipy.spatial import cKDTree
 
-Array = NDArray[np.float64]
+from airground_drake.base.arrays import Array, read_only
+
 Points = NDArray[np.complex128]
 
 TOL = 1e-9
-"""The one tolerance [m]. A start or goal up to TOL inside a circle counts as on it, and a disc of radius up
-to TOL is ignored. A tenth of it absorbs rounding: a leg may dip TOL / 10 into a disc, a disc that sticks out
-of another by no more is dropped, a piece that short is left out of the path. Meant for coordinates and radii
-up to about 1e4 m, where double rounding (2e-12 m) stays well below."""
+"""Tolerance, m. A start or goal up to TOL inside a circle counts as on it; a disc of radius up to TOL is ignored. It is
+meant for coordinates and radii up to 1e4 m, where rounding (2e-12 m) stays well below."""
 _EPS = TOL / 10
-
+"""Room for rounding, m: legs may dip so far into a disc, a disc that sticks out of another by less is dropped, shorter
+pieces are left out of the path."""
 
 FEW = 64
-"""Discs that are all taken into account at once; of more, those that a path runs into."""
+"""Up to this number all discs enter the graph; beyond it only the discs that a path runs into."""
 
 AT_ONCE = 1_000_000
-"""Pairs of a segment and a disc that are looked at together, lest they take up the memory."""
+"""Largest number of pairs of a segment and a disc that are tested together, to limit memory."""
 
 
 class NoPath(ValueError):  # noqa: N818
@@ -50,10 +49,9 @@ class Path:
     """A planar curve of joined straight segments and circular arcs, parameterised by arc length; immutable.
 
     Attributes:
-        pieces: Shape (n, 6), n >= 1, non-writeable, a row per piece in order of travel: x, y [m] of its first
-            point, its unit tangent there, signed curvature [1/m] (0 straight, > 0 turning left), length [m].
-            A path of zero length is one row with tangent 0.
-        length_m: Total length [m].
+        pieces: (n, 6), n >= 1, a row per piece in order of travel: x, y of its first point, m, its unit tangent there,
+            signed curvature, 1/m (0 straight, > 0 turning left), length, m. A path of zero length has tangent 0.
+        length_m: total length, m.
     """
 
     pieces: Array
@@ -62,32 +60,18 @@ class Path:
     _begins: tuple[float, ...] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        pieces = np.array(self.pieces, dtype=np.float64)
-        pieces.setflags(write=False)
+        pieces = read_only(self.pieces)
         ends = tuple(accumulate(pieces[:, 5].tolist(), initial=0.0))
         object.__setattr__(self, "pieces", pieces)
         object.__setattr__(self, "length_m", ends[-1])
         object.__setattr__(self, "_rows", tuple(map(tuple, pieces.tolist())))
         object.__setattr__(self, "_begins", ends[:-1])
 
-    def __deepcopy__(self, memo: dict[int, Any]) -> Path:
-        return self
-
     def at(self, s: float) -> tuple[Array, Array]:
-        """Point of the curve at an arc length.
+        """Point, (2,), m, and unit tangent in the direction of travel, (2,), at an arc length, m.
 
-        Args:
-            s: Arc length from the start [m], clipped to [0, length_m].
-
-        Returns:
-            Position [m] and unit tangent in the direction of travel, each of shape (2,), in the frame of the
-            path. The tangent of a path of zero length is 0.
-
-        Raises:
-            ValueError: If ``s`` is NaN.
+        The arc length is clipped to the path; the tangent of a path of zero length is 0.
         """
-        if s != s:
-            raise ValueError("s: must not be NaN")
         s = min(max(s, 0.0), self.length_m)
         k = bisect_right(self._begins, s) - 1
         x, y, tx, ty, curvature, _ = self._rows[k]
@@ -108,24 +92,21 @@ def shortest_path(start: ArrayLike, goal: ArrayLike, centres: ArrayLike, radii: 
     depends on the arguments only, also where two paths are equally short.
 
     Args:
-        start: Shape (2,), first point [m].
-        goal: Shape (2,), last point [m], same frame.
-        centres: Shape (m, 2), centres of the discs [m], same frame; m = 0 gives the straight line.
-        radii: Shape (m,), radii of the discs [m], not negative.
-
-    Returns:
-        The path, in the frame of the arguments.
+        start: first point, (2,), m.
+        goal: last point, (2,), m.
+        centres: of the discs, (m, 2), m; m = 0 gives the straight line.
+        radii: of the discs, (m,), m.
 
     Raises:
-        NoPath: If the goal is strictly inside a disc, or if the start (or the point where it leaves the
+        NoPath: if the goal is strictly inside a disc, or if the start (or the point where it leaves the
             discs) and the goal are in different components of the free space.
-        ValueError: If an argument has a wrong shape or a value that is not finite, or a radius is negative.
+        ValueError: if a number is not finite.
     """
-    p, q = (complex(*_floats(name, z, (2,))) for name, z in (("start", start), ("goal", goal)))
-    c = _floats("centres", centres, (-1, 2)) @ np.array((1.0, 1.0j))
-    r = _floats("radii", radii, c.shape)
-    if (r < 0.0).any():
-        raise ValueError("radii: must not be negative")
+    given = start, goal, centres, radii
+    if not all(np.isfinite(numbers).all() for numbers in given):
+        raise ValueError(f"a path needs finite numbers, got {given}")
+    p, q = complex(*np.asarray(start)), complex(*np.asarray(goal))
+    c, r = np.reshape(centres, (-1, 2)) @ np.array((1.0, 1.0j)), np.asarray(radii, dtype=np.float64)
     c, r = _outermost(c, r)
     inside = abs(c - q) < r - TOL
     if inside.any():
@@ -142,17 +123,6 @@ def shortest_path(start: ArrayLike, goal: ArrayLike, centres: ArrayLike, radii: 
     pieces = np.concatenate((_rows(np.array([p]), leg, np.zeros(1), abs(leg)), route))
     kept = pieces[:, 5] > _EPS
     return Path(pieces[kept] if kept.any() else np.array([[p.real, p.imag, 0.0, 0.0, 0.0, 0.0]]))
-
-
-def _floats(name: str, value: ArrayLike, shape: tuple[int, ...]) -> Array:
-    """Return ``value`` as finite floats of ``shape`` (-1: any); ValueError naming the argument otherwise."""
-    try:
-        array = np.array(value, dtype=np.float64)
-        if (array.size > 0 and array.shape != array.reshape(shape).shape) or not np.isfinite(array).all():
-            raise ValueError(f"got {array}")
-        return array.reshape(shape)
-    except (TypeError, ValueError) as error:
-        raise ValueError(f"{name}: expected finite numbers of shape {shape}: {error}") from error
 
 
 def _show(z: complex) -> str:
@@ -174,12 +144,12 @@ def _outermost(c: Points, r: Array) -> tuple[Points, Array]:
 
 
 def _clear(points: Points, c: Points, r: Array) -> NDArray[np.bool_]:
-    """Tell which points, shape (n, 1) or one per disc (n, m), are outside all discs; shape (n,)."""
+    """Which points, shape (n, 1) or one per disc (n, m), are outside all discs; shape (n,)."""
     return np.asarray((abs(points - c) >= r - _EPS).all(axis=1))
 
 
 def _passable(a: Points, b: Points, c: Points, r: Array) -> NDArray[np.bool_]:
-    """Tell which segments, from (n,) to (n,), no disc blocks; shape (n,)."""
+    """Which segments, from (n,) to (n,), no disc blocks; shape (n,)."""
     u = (b - a) / np.maximum(abs(b - a), 1e-300)
     free = np.ones(len(a), dtype=bool)
     for some in np.array_split(np.arange(len(a)), len(a) * len(r) // AT_ONCE + 1):
@@ -189,7 +159,7 @@ def _passable(a: Points, b: Points, c: Points, r: Array) -> NDArray[np.bool_]:
 
 
 def _crossings(c: Points, r: Array) -> tuple[Points, NDArray[np.intp]]:
-    """Return the points where two circles cross, (n,), and the indices of the two circles, (2, n)."""
+    """The points where two circles cross, (n,), and the indices of the two circles, (2, n)."""
     i, j = np.triu_indices(len(r), 1)
     d = abs(c[j] - c[i])
     real = (d > abs(r[i] - r[j])) & (d <= r[i] + r[j])
@@ -201,7 +171,7 @@ def _crossings(c: Points, r: Array) -> tuple[Points, NDArray[np.intp]]:
 
 
 def _escape(p: complex, c: Points, r: Array) -> complex:
-    """Return the nearest point to p, which is inside a disc, of the boundary of the union of the discs."""
+    """The nearest point to p, which is inside a disc, of the boundary of the union of the discs."""
     reach = 2.0 * float(r.max())
     while True:  # as far as it reaches, the discs that do, too, are the union
         near = abs(c - p) - r <= reach
@@ -212,14 +182,14 @@ def _escape(p: complex, c: Points, r: Array) -> complex:
 
 
 def _exit(p: complex, c: Points, r: Array) -> complex:
-    """Return what `_escape` does, with all crossings of the circles."""
+    """As `_escape`, with all crossings of the circles."""
     e = np.where(abs(p - c) > _EPS, p - c, 1.0)  # along +x from a centre
     candidates = np.concatenate(((c + r / abs(e) * e)[abs(p - c) < r], _crossings(c, r)[0]))
     return complex(min(candidates[_clear(candidates[:, None], c, r)], key=lambda z: float(abs(z - p))))
 
 
 def _tangents(c: Points, r: Array) -> tuple[Points, Points, NDArray[np.intp]]:
-    """Return both ends of all common tangents, (n,), and the circles they touch, (2, n); 0, 1 are points."""
+    """Both ends of all common tangents, (n,), and the circles they touch, (2, n); 0, 1 are points."""
     i, j = np.tile(np.triu_indices(len(r), 1), 4)
     side, turn = np.repeat([[1.0, 1.0, -1.0, -1.0], [1.0, -1.0, 1.0, -1.0]], len(i) // 4, axis=1)
     d, k = abs(c[j] - c[i]), r[i] - side * r[j]  # side: 1 outer tangent, -1 inner
@@ -232,7 +202,7 @@ def _tangents(c: Points, r: Array) -> tuple[Points, Points, NDArray[np.intp]]:
 
 
 def _rows(begin: Points, heading: Points, curvature: Array, length: Array) -> Array:
-    """Return rows of ``Path.pieces``; the headings may have any length, also zero."""
+    """Rows of ``Path.pieces``; the headings may have any length, also zero."""
     unit = heading / np.maximum(abs(heading), 1e-300)
     return np.stack((begin.real, begin.imag, unit.real, unit.imag, curvature, length), axis=1)
 
@@ -251,7 +221,7 @@ def _route_among(p: complex, q: complex, c: Points, r: Array) -> Array | None:
 
 
 def _entered(pieces: Array, c: Points, r: Array) -> NDArray[np.bool_]:
-    """Tell which discs pieces of a path (see ``Path``) run into; shape (m,)."""
+    """Which discs pieces of a path (see ``Path``) run into; shape (m,)."""
     x, y, tx, ty, curvature, length = pieces.T[:, :, None]
     begin, heading, bent = x + 1j * y, tx + 1j * ty, curvature != 0.0
     along = np.clip(((c - begin) * heading.conj()).real, 0.0, length)
@@ -266,7 +236,7 @@ def _entered(pieces: Array, c: Points, r: Array) -> NDArray[np.bool_]:
 
 
 def _route(p: complex, q: complex, c: Points, r: Array) -> Array | None:
-    """Return the pieces (see ``Path``) of the shortest path between free points; None if no path exists."""
+    """The pieces (see ``Path``) of the shortest path between free points; None if no path exists."""
     if abs(q - p) <= _EPS:
         return np.empty((0, 6))
     a, b, on = _tangents(np.concatenate(([p, q], c)), np.concatenate(([0.0, 0.0], r)))

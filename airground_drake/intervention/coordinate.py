@@ -1,4 +1,4 @@
-"""The coordinate policy: a joint plan for the triggered UGVs and those in their way."""
+"""The coordinate policy: a joint plan for the triggered UGVs and for UGVs in their way."""
 
 from __future__ import annotations
 
@@ -20,36 +20,38 @@ from airground_drake.intervention.policy import Observation, Policy, Teammate
 SHARE = 0.8
 """A plan uses this share of a UGV's speed limit; the rest is for catching up."""
 MOST_PLANS = 4
-"""Largest number of joint plans for one proposal, each for more UGVs."""
+"""Largest number of joint plans that are tried for one proposal, each with more UGVs."""
 NARROWER = (1.0, 0.1, 0.01)
-"""Shares of the clearance. The next one is tried while the UGV that is planned for has no way even alone: its own task
-may have taken it through a gap with no room for more."""
+"""Shares of the clearance. The next share is tried if the UGV has no way even alone: its own task may have led it
+through a gap that is too narrow for the full clearance."""
 ON_PRESET_M = 0.5
-"""A motion that ends no farther than this from the preset, m, is taken to go on along it."""
+"""A motion that ends this near to the preset, m, is predicted to go on along the preset."""
 BLEND_S = 1.0
 """A UGV without a proposal is predicted to approach its preset with this time constant, s."""
 
 SAME_PLACE_M = 1e-3
-"""A UGV that has moved no farther than this is where it was, m."""
+"""A UGV that has moved no farther than this counts as unmoved, m."""
 
 Alone = Callable[[int], Way | None]
-"""The way that a UGV of the team, given by its index, would have if there were no others."""
+"""The way that a UGV, given by its index in the team, would have without other UGVs."""
 
 
 class Coordinate(Policy):
     """Bring every triggered UGV back to its preset by motions that are planned together.
 
-    The first plan is for the triggered UGVs without a proposal in force. They go round obstacles, robots that stand,
-    and the predicted motions of the others. If they find no way, the next plan includes UGVs in their way, if these are
-    willing: a parked one steps aside and comes back. If no plan serves all, as many UGVs move as can. All proposals of
-    a plan have the same time of issue. If the UGV would find no way even alone, less clearance is tried. Where it finds
-    none at all, it is not planned for again until it has moved or the map has changed.
+    1. The first plan is for the triggered UGVs without a proposal in force. They avoid obstacles, robots that stand,
+       and the predicted motions of all others.
+    2. If one of them finds no way, the next plan includes willing UGVs in its way. A parked UGV steps aside and comes
+       back.
+    3. If no plan gives every UGV a way, the plan with the fewest UGVs left behind is proposed.
+    4. If the UGV `seen.robot` finds no way even alone, less clearance is tried. Without any way, it is not planned for
+       again until it has moved or the map has changed.
 
     Attributes:
-        speed: largest, m/s; no UGV uses more than SHARE of its limit.
+        speed: largest speed, m/s; no UGV uses more than SHARE of its limit.
         clearance: distance to keep from obstacles beyond the safe distance, m.
         spacing: distance to keep between UGVs beyond their safe distance, m.
-        follow: how long a proposal goes on along the preset after joining it, s. The preset must be free for so long.
+        follow: how long a proposal follows the preset after joining it, s. The preset must be free for so long.
     """
 
     counted = True
@@ -60,7 +62,7 @@ class Coordinate(Policy):
         """Set the parameters; all have defaults.
 
         Raises:
-            ValueError: if one is not positive (`follow_s`: negative).
+            ValueError: if a parameter is not positive, or `follow_s` is negative.
         """
         if not (speed_m_s > 0.0 and clearance_m > 0.0 and spacing_m > 0.0 and follow_s >= 0.0):
             raise ValueError(
@@ -92,9 +94,9 @@ class Coordinate(Policy):
         return self._proposals(seen, group, found)
 
     def _is_known_to_be_shut_in(self, seen: Observation) -> bool:
-        """Whether the UGV found no way here before, even alone, on the same map. Waiting opens no way.
+        """Whether the UGV has already found no way from here on the same map, even alone.
 
-        Time takes away places at which the preset can be joined, and adds none.
+        Waiting cannot open a way: with time there are fewer places at which the preset can be joined.
         """
         before = self._shut_in.get(seen.robot)
         return (
@@ -106,7 +108,7 @@ class Coordinate(Policy):
         )
 
     def _joint(self, seen: Observation, space: Space, alone: Alone) -> tuple[tuple[float, ...], list[int], Plan]:
-        """Cost of the best plan, indices of its UGVs, and the plan."""
+        """The best joint plan: its cost, the indices of its UGVs, and the plan."""
         everyone = range(len(seen.team))
         group = [i for i in everyone if seen.team[i].name == seen.robot or _waits(seen.team[i], seen.t)]
         best: tuple[list[int], Plan] | None = None
@@ -135,9 +137,10 @@ class Coordinate(Policy):
     def _in_the_way(
         self, seen: Observation, space: Space, group: Sequence[int], found: Plan, alone: Alone
     ) -> list[int]:
-        """Willing UGVs outside a group that are near the ways that its lost triggered UGVs would have alone.
+        """Willing UGVs outside the group that are in the way of its triggered UGVs without a way.
 
-        All willing ones if none is near; nobody if no lost UGV has a way even alone.
+        A UGV is in the way if it comes near the way that such a UGV would have alone. Without any near one, all willing
+        UGVs are returned. If no such UGV has a way even alone, nobody can help: the list is empty.
         """
         lost = [i for i, way in zip(group, found.ways, strict=True) if way is None and seen.team[i].triggered]
         ways = [(seen.team[i], way) for i in lost if (way := alone(i)) is not None]
@@ -153,7 +156,7 @@ class Coordinate(Policy):
         return near or others
 
     def _alone(self, seen: Observation, space: Space, i: int) -> Way | None:
-        """The way of a UGV if there were no others."""
+        """The way that a UGV would have without other UGVs."""
         mate = seen.team[i]
         pace = min(self.speed, SHARE * mate.max_speed)
         return plan(space, [task_of(mate, seen.start)], [pace], follow=self.follow).ways[0]
@@ -169,14 +172,14 @@ class Coordinate(Policy):
         return motions if helped else None
 
     def _space(self, seen: Observation, clearance: float) -> Space:
-        """Obstacles and distances for a UGV without a body, in the plane of the one that is planned for."""
+        """Obstacles and distances for a UGV without a body, in the plane of `seen.robot`."""
         radii = seen.safe_distance + np.broadcast_to(seen.obstacle_radii, len(seen.obstacles))
         above = seen.obstacles[:, 2] - float(seen.position[2])
         return Space(seen.obstacles[:, :2], radii, clearance, seen.robot_distance, self.spacing, above)
 
 
 def task_of(mate: Teammate, start: float) -> RobotTask:
-    """The task to bring a UGV from its place to its preset, from time `start`, s, on."""
+    """The task to bring a UGV back to its preset, from time `start`, s, on."""
     preset = mate.preset
     times = np.append(start, preset.times[preset.times > start + 1e-6])
     return RobotTask(mate.position[:2].copy(), timed(times - start, preset.sample(times)[:, :2]), mate.radius)
@@ -185,8 +188,8 @@ def task_of(mate: Teammate, start: float) -> RobotTask:
 def predicted(mate: Teammate, start: float) -> Array:
     """Predicted motion of a UGV from time `start`, s, on: timed, (M, 3), from t = 0.
 
-    It follows the proposal in force unless it has refused it, and then its preset if the proposal ends on it. Without a
-    proposal it stays where it is if it stands or is triggered; otherwise it comes back to its preset.
+    A UGV with a proposal in force that it has not refused follows the proposal, and then its preset if the proposal
+    ends near it. Any other UGV stays where it is if it stands or is triggered, and returns to its preset if not.
     """
     here, proposal = mate.position[:2], mate.proposal
     if proposal is not None and mate.answered != "refused":
@@ -208,19 +211,19 @@ def predicted(mate: Teammate, start: float) -> Array:
 
 
 def _waits(mate: Teammate, t: float) -> bool:
-    """Whether a UGV is triggered, may be asked, and has nothing in force that it has not refused."""
+    """Whether a UGV is triggered, may be asked, and has no proposal in force or has refused it."""
     idle = mate.proposal is None or mate.answered == "refused"
     return mate.triggered and idle and _is_willing(mate, t)
 
 
 def _is_willing(mate: Teammate, t: float) -> bool:
-    """Whether a UGV may be asked at time t, s."""
+    """Whether a UGV may get a proposal at time t, s."""
     just_asked = mate.proposal is not None and mate.proposal.issued == t
     return not (mate.resting or just_asked)
 
 
 def _cost(seen: Observation, group: Sequence[int], found: Plan) -> tuple[float, ...]:
-    """Numbers of triggered UGVs without a way and of UGVs that move; sum of the times until presets are joined, s."""
+    """Cost of a plan: triggered UGVs without a way, UGVs that move, and the sum of the times to join presets, s."""
     ways = list(zip(group, found.ways, strict=True))
     lost = sum(way is None and seen.team[i].triggered for i, way in ways)
     moved = sum(way is not None and speed(way.motion) > 0.0 for _, way in ways)
@@ -228,7 +231,7 @@ def _cost(seen: Observation, group: Sequence[int], found: Plan) -> tuple[float, 
 
 
 def _motion(way: Way, start: float, follow: float, height: float) -> Motion:
-    """A way as a motion in space, which ends `follow`, s, after the preset is joined."""
+    """A way as a motion in space, which ends `follow`, s, after it has joined the preset."""
     until = min(way.joined + follow, float(way.motion[-1, 0]))
     rows = way.motion[way.motion[:, 0] < until - 1e-9]
     last = [until, *(np.interp(until, way.motion[:, 0], axis) for axis in way.motion[:, 1:].T)]
@@ -238,7 +241,7 @@ def _motion(way: Way, start: float, follow: float, height: float) -> Motion:
 
 @cache
 def warm_up() -> None:
-    """Load the compiled loops before the first plan is asked for: a plan has little time."""
+    """Load the compiled functions before the first proposal is needed."""
     room = Space(np.array([[0.0, 1.0]]), np.array([0.1]), 0.1, 1.0, 0.1)
     ends = [np.array([0.0, 0.0]), np.array([3.0, 0.0])]
     tasks = [RobotTask(a, np.array([[0.0, *b]])) for a, b in pairwise([*ends, ends[0]])]

@@ -1,4 +1,7 @@
-"""The UAV's behaviour database: which policy proposes next, and what happens when a policy fails."""
+"""The UAV's behaviour database: it asks the policies for a proposal, in turn or by rank, and records their failures.
+
+The planner calls `plan` for a UGV that needs a proposal, and `after_refusal` when a UGV has refused one.
+"""
 
 from __future__ import annotations
 
@@ -13,32 +16,32 @@ from airground_drake.base.errors import PolicyError, described
 from airground_drake.geometry.motion import Motion
 from airground_drake.intervention.guest.process import GuestPolicy
 from airground_drake.intervention.guest.time_limit import OutOfTime, time_limit
-from airground_drake.intervention.policy import Observation, Policy, Proposal, Teammate, motions_of
+from airground_drake.intervention.policy import Observation, Policy, Proposal, motions_of
 from airground_drake.registry import POLICIES
 
 Ranking = Literal["listed", "predicted"]
 RANKINGS: tuple[Ranking, ...] = get_args(Ranking)
 
 MOST_DOUBLINGS = 10
-"""Of the rest while no policy proposes anything: by then it is longer than any run that it began in."""
+"""The rest doubles at most this often while no policy proposes anything; it is then longer than any run."""
 PREDICTION_S = 3.0
 INTRUSION = 1000.0
-"""Weight of squared intrusion against squared task error, as the gatekeeper's by default."""
+"""Weight of squared intrusion against squared task error; the gatekeeper's default is the same."""
 
 Candidate = tuple[int, str, dict[str, Motion]]
-"""What a policy proposes: its turn, the policy's name, motions by UGV."""
+"""A proposal: its turn, the policy's name, and motions by UGV."""
 
 
 def make_policy(name: str, parameters: Mapping[str, float], budget: float = 2.0) -> Policy:
-    """Build a policy: in this process, if it comes with the package or was added here, else in one of its own.
+    """Build a policy: in this process if it comes with the package or was added here, else in a process of its own.
 
     Args:
-        name: of a policy.
+        name: of the policy.
         parameters: of the policy.
         budget: wall-clock time for a proposal of a policy in a process of its own, s.
 
     Raises:
-        UnknownNameError: if the name is neither registered nor that of code of others.
+        UnknownNameError: if the name is neither registered nor the place of a plug-in.
         PluginError: if it cannot be imported, is no Policy, or does not take these parameters.
     """
     if POLICIES.accepts(name) and POLICIES.is_foreign(name):
@@ -48,15 +51,15 @@ def make_policy(name: str, parameters: Mapping[str, float], budget: float = 2.0)
 
 @dataclass(frozen=True)
 class Negotiation:
-    """Where the UAV stands with one UGV.
+    """What the UAV remembers of its exchange with one UGV.
 
     Attributes:
-        proposal: the one in force, or None.
-        turn: index of the policy that made it, or that is to be asked next.
-        refusals: refused proposals since the trigger.
-        in_vain: how often in a row no policy had a proposal.
-        retry_at: no new proposal before this time, s.
-        cause: name of the UGV whose trigger it was last sent a proposal for; empty: its own.
+        proposal: the proposal in force, or None.
+        turn: index of the policy that made the proposal, or that is asked next.
+        refusals: number of refused proposals since the trigger.
+        in_vain: how many times in a row no policy had a proposal.
+        retry_at: earliest time for a new proposal, s.
+        cause: name of the UGV whose trigger led to the last proposal; empty before the first.
     """
 
     proposal: Proposal | None = None
@@ -67,11 +70,11 @@ class Negotiation:
     cause: str = ""
 
     def is_due(self, t: float) -> bool:
-        """Whether nothing is in force at time t, s, and the rest is over."""
+        """Whether the UGV has no proposal in force at time t, s, and its rest is over."""
         return self.proposal is None and t >= self.retry_at
 
     def refused_lately(self, t: float) -> bool:
-        """Whether it rests at time t, s, because the UGV has refused: then it gets no part of another's plan either."""
+        """Whether the UGV rests at time t, s, because it has refused. Then it gets no part of a joint plan either."""
         return self.proposal is None and t < self.retry_at and not self.in_vain
 
     def __deepcopy__(self, memo: dict[int, Any]) -> Self:
@@ -81,7 +84,7 @@ class Negotiation:
 
 @dataclass(frozen=True)
 class Fault:
-    """A policy's failure: it counted as no intervention."""
+    """A policy's failure, which counted as no intervention: time, s, UGV, policy, and what went wrong."""
 
     t: float
     robot: str
@@ -93,12 +96,13 @@ class BehaviourDatabase:
     """Policies and the order in which the UAV tries them.
 
     Attributes:
-        policies: (name, policy) pairs; none at all means that the UAV only supervises.
-        retry: rest after a refusal, s; so, too, when no policy has a proposal, and twice as long each time in a row.
-        ranking: 'listed' takes the policies in turn; 'predicted' asks them all and takes the proposal with the
-            best predicted outcome on the UAV's own map, after refusals the next best.
-        budget: wall-clock time that a policy may take for one proposal, s, unless it counts its effort.
-        joint: whether a joint plan takes effect as a whole or not at all; otherwise each part is a proposal of its own.
+        policies: (name, policy) pairs; without any the UAV only supervises.
+        retry: rest after a refusal, or when no policy has a proposal, s. It doubles each time in a row without a
+            proposal.
+        ranking: 'listed' asks the policies in turn. 'predicted' asks all and takes the proposal with the best predicted
+            outcome on the UAV's map; after a refusal it takes the next best.
+        budget: wall-clock time for a policy's proposal, s, unless the policy counts its effort.
+        joint: whether a joint plan takes effect only as a whole. If not, each part is a proposal of its own.
     """
 
     def __init__(
@@ -118,34 +122,33 @@ class BehaviourDatabase:
         self.joint = joint
 
     def close(self) -> None:
-        """End the processes of policies that have one."""
+        """End the processes of third-party policies."""
         for _, policy in self.policies:
             if isinstance(policy, GuestPolicy):
                 policy.close()
 
     def after_refusal(self, held: Negotiation, t: float, *, learnt: bool = False) -> Negotiation:
-        """After a UGV has refused its proposal: the next policy's turn, after a rest.
+        """The negotiation after the UGV has refused its proposal: after a rest it is the next policy's turn.
 
         Args:
-            held: with the proposal.
+            held: negotiation with the refused proposal.
             t: time, s.
-            learnt: whether the refusal has put an obstacle on the map: then a ranking starts anew.
+            learnt: whether the UAV has learnt of an obstacle with the refusal; then a ranking starts again at the best.
         """
         turn = 0 if learnt and self.ranking == "predicted" else held.turn + 1
         return Negotiation(turn=turn, refusals=held.refusals + 1, retry_at=t + self.retry, cause=held.cause)
 
     def plan(self, held: Negotiation, seen: Observation) -> tuple[dict[str, Negotiation], list[Fault]]:
-        """Next proposal for a UGV that needs one, and those to others that go with it.
+        """Ask the policies for the next proposal to a UGV; a joint plan brings proposals to other UGVs, too.
 
-        A UGV without a proposal is planned for again after `retry`. Each time in a row that no policy proposes
-        anything to anybody, that time doubles.
+        If no policy has a proposal, the UGV rests for `retry`, and twice as long each time in a row.
 
         Args:
-            held: with this UGV.
+            held: negotiation with this UGV.
             seen: what the UAV sees.
 
         Returns:
-            The negotiations that change, by UGV, and faults of the policies asked.
+            The negotiations that change, by UGV, and the faults of the policies that were asked.
         """
         seen = replace(seen, refusals=held.refusals)
         candidates, faults = self._ranked(seen, held.turn) if self.ranking == "predicted" else self._next(seen, held)
@@ -155,7 +158,7 @@ class BehaviourDatabase:
         for turn, name, motions in candidates[:1]:
             party = tuple(sorted(motions)) if self.joint and len(motions) > 1 else ()
             for robot, motion in motions.items():
-                mate = None if robot == seen.robot else _mate(seen, robot)
+                mate = None if robot == seen.robot else next(each for each in seen.team if each.name == robot)
                 before = held if mate is None else Negotiation(refusals=mate.refusals)
                 cause = robot if mate is None or mate.triggered else seen.robot
                 proposal = Proposal(
@@ -166,7 +169,7 @@ class BehaviourDatabase:
         return found, faults
 
     def _next(self, seen: Observation, held: Negotiation) -> tuple[list[Candidate], list[Fault]]:
-        """The first policy, from this turn on, that proposes."""
+        """The proposal of the first policy, from the negotiation's turn on, that has one."""
         faults: list[Fault] = []
         for step in range(len(self.policies)):
             turn = (held.turn + step) % len(self.policies)
@@ -176,7 +179,7 @@ class BehaviourDatabase:
         return [], faults
 
     def _ranked(self, seen: Observation, turn: int) -> tuple[list[Candidate], list[Fault]]:
-        """All proposals from best to worst, rotated so that the one of this turn comes first."""
+        """All proposals from best to worst, rotated so that the proposal with the index `turn` comes first."""
         faults: list[Fault] = []
         asked = [(name, self._ask(i, seen, faults)) for i, (name, _) in enumerate(self.policies)]
         found = [(name, motions) for name, motions in asked if motions]
@@ -192,16 +195,16 @@ class BehaviourDatabase:
                 return motions_of(policy.propose(seen if isinstance(policy, GuestPolicy) else seen.fresh()), seen)
         except PolicyError as fault:
             faults.append(Fault(seen.t, seen.robot, name, str(fault)))
-        except (Exception, OutOfTime, SystemExit) as error:  # whatever a policy does, it must not stop the UAV
+        except (Exception, OutOfTime, SystemExit) as error:  # no failure of a policy may stop the UAV
             faults.append(Fault(seen.t, seen.robot, name, described(error, type(policy).propose)))
         return {}
 
 
 def predicted_cost(motions: Mapping[str, Motion], seen: Observation) -> float:
-    """Outcome that the UAV predicts for a proposal on the obstacles that it knows; smaller is better.
+    """Cost (25) of a proposal over PREDICTION_S, as the UAV predicts it with the obstacles that it knows.
 
-    The cost (25) over PREDICTION_S, for a UGV that follows its motion exactly (or stands, without one): squared
-    distance to the preset trajectory, and squared intrusion into safe distances, with the weight INTRUSION, to
+    The UGV is assumed to follow its motion exactly, or to stand without one. The cost is its squared distance to the
+    preset trajectory, plus INTRUSION times its squared intrusion into safe distances. These are the distances to
     obstacles, and to UGVs that stand, have accepted a motion, or get one with this proposal.
     """
     t = seen.start + np.arange(0.0, PREDICTION_S, 0.05)
@@ -218,7 +221,3 @@ def predicted_cost(motions: Mapping[str, Motion], seen: Observation) -> float:
         distance = np.linalg.norm(positions - (mate.position if motion is None else motion.sample(t)), axis=1)
         cost += INTRUSION * np.square(np.maximum(0.0, seen.distance_to(mate) - distance)).sum()
     return float(0.05 * cost)
-
-
-def _mate(seen: Observation, name: str) -> Teammate:
-    return next(mate for mate in seen.team if mate.name == name)

@@ -1,4 +1,4 @@
-"""The detour policy: the shortest path back to the preset, round known obstacles and standing robots."""
+"""The detour policy: the shortest path back to the preset, round known obstacles and robots that stand."""
 
 from __future__ import annotations
 
@@ -17,20 +17,19 @@ SAMPLE_S = 0.05
 RENDEZVOUS_TOLERANCE_S = 1e-3
 
 CHASED = 16
-"""After so many steps without a rendezvous the steps are doubled: the preset runs away."""
-
+"""After so many steps without a rendezvous the steps are doubled: the preset moves away."""
 
 LONGEST_FOLLOW_S = 600.0
-"""Longest time for which a proposal follows the preset, s; it has a vertex for each SAMPLE_S."""
+"""Longest time for which a proposal follows the preset, s."""
 
 
 class Detour(Policy):
-    """Meet the preset trajectory again as early as possible, by the shortest safe path at a set speed.
+    """Meet the preset trajectory again as early as possible, on the shortest safe path at a set speed.
 
     Attributes:
         speed: along the path, m/s.
-        clearance: kept beyond the safe distance, m.
-        follow: how long the proposal goes on along the preset trajectory after the rendezvous, s.
+        clearance: distance to keep beyond the safe distance, m.
+        follow: how long the proposal follows the preset trajectory after the rendezvous, s.
     """
 
     def __init__(self, *, speed_m_s: float, clearance_m: float = 0.05, follow_s: float = 5.0) -> None:
@@ -49,9 +48,9 @@ class Detour(Policy):
         self.follow = follow_s
 
     def propose(self, seen: Observation) -> Motion | None:
-        """Shortest path to the earliest rendezvous with the preset trajectory, then along it.
+        """The shortest path to the earliest rendezvous with the preset trajectory, then the trajectory.
 
-        Robots that stand, and have accepted no motion, count as obstacles. None if no free path leads to the preset
+        Robots that stand and have not accepted a motion count as obstacles. None if no free path leads to the preset
         trajectory before its end.
         """
         height = seen.position[2]
@@ -69,9 +68,9 @@ class Detour(Policy):
     def _rendezvous(self, seen: Observation, centres: Array, radii: Array) -> tuple[float, Path] | None:
         """Time to a rendezvous, s, and the path to it; None if the preset is blocked up to its end.
 
-        The duration only grows: by a sample where the preset is blocked, else to the travel time. So no rendezvous is
-        missed that lasts longer than a sample. If the preset moves away nearly as fast as the UGV, the steps double,
-        and the last one is bisected. That finds a rendezvous, perhaps not the earliest.
+        The tried duration only grows: by a sample where the preset is blocked, otherwise to the travel time. So the
+        search finds every rendezvous that lasts longer than a sample. If the preset moves away nearly as fast as the
+        UGV, the steps double and the last step is bisected. That finds a rendezvous, perhaps not the earliest.
         """
         gap = np.linalg.norm(seen.preset.at(seen.start)[0][:2] - seen.position[:2])
         duration = float(gap) / (self.speed + seen.preset.max_speed)  # no rendezvous can be earlier
@@ -99,7 +98,7 @@ class Detour(Policy):
         return duration, path
 
     def _way(self, seen: Observation, duration: float, centres: Array, radii: Array) -> tuple[float, Path | None]:
-        """Travel time, s, to the place of the preset after the duration, s, and the path; None: there is no path."""
+        """Travel time, s, and path to the preset's place after the duration, s; infinite and None without a path."""
         goal = seen.preset.at(seen.start + duration)[0][:2]
         try:
             path = shortest_path(seen.position[:2], goal, centres, radii)
@@ -108,7 +107,7 @@ class Detour(Policy):
         return path.length_m / self.speed, path
 
     def _in_the_way(self, seen: Observation) -> tuple[Array, Array]:
-        """Centres (m, 2), m, and radii (m,), m, of the discs to keep out of, in the plane of the UGV."""
+        """Centres (m, 2), m, and radii (m,), m, of the discs that the path must keep out of."""
         height = seen.position[2]
         robots = [mate for mate in seen.team if mate.name != seen.robot and mate.standing and not _will_move(mate)]
         places = np.array([mate.position for mate in robots]).reshape(-1, 3)
@@ -127,7 +126,7 @@ def _will_move(mate: Teammate) -> bool:
 
 
 def _then_follow(times: Array, legs: Array, preset: Motion, follow: float, height: float) -> Motion:
-    """Append the preset trajectory, from its next vertex or sample on, to planar legs (k, 2) at times (k,)."""
+    """The motion along planar legs (k, 2), m, at times (k,), s, then along the preset trajectory."""
     after = times[-1] + np.arange(1, max(1, round(follow / SAMPLE_S)) + 1) * SAMPLE_S
     points = np.concatenate([legs, preset.sample(after)[:, :2]])
     return Motion(np.concatenate([times, after]), np.column_stack([points, np.full(len(points), height)]))

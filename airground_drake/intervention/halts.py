@@ -1,4 +1,4 @@
-"""Which UGVs stand: the planner notes at every instant where each UGV came to a halt, and when."""
+"""Which UGVs stand still: at every instant the planner notes where and when each UGV came to a halt."""
 
 from __future__ import annotations
 
@@ -9,26 +9,26 @@ from numba import njit
 from airground_drake.base.arrays import Array
 
 STANDS_S = 1.0
-"""A UGV stands once it has kept to one place for this long, s."""
+"""A UGV stands once it has stayed at one place for this long, s."""
 STANDS_M = 0.1
-"""One place: no farther than this from where it came to a halt, m; for slow UGVs it is less."""
+"""Radius of one place, m; it is smaller for slow UGVs."""
 STANDS_SHARE = 0.1
-"""Of what a UGV can do in `STANDS_S`: one place is no larger than this."""
+"""Largest radius of one place, as a share of the distance that a UGV can travel in `STANDS_S`."""
 NOT_WATCHED = -1.0
-"""Since when, s, before a UGV has been watched."""
+"""Time of the halt, s, before the first instant."""
 
 
 def room(max_speed: Array) -> Array:
-    """How large one place is for UGVs with these speed limits, (n,), m/s: radii, (n,), m."""
+    """Radii of one place, (n,), m, for UGVs with these speed limits, (n,), m/s."""
     return np.minimum(STANDS_M, STANDS_SHARE * STANDS_S * max_speed)
 
 
 @njit(cache=True)
 def watched(halts: Array, t: float, positions: Array, room: Array) -> Array:
-    """Halts of n UGVs at time t, s.
+    """Halts of n UGVs at time t, s, (4n,).
 
     Args:
-        halts: before: place, m, world frame, and since when, s, per UGV, (4n,).
+        halts: place, m, world frame, and time, s, of each UGV's halt as noted before, (4n,).
         t: time, s.
         positions: of the UGVs first, (3n + ...,), m, world frame.
         room: see `room`, (n,), m.

@@ -1,8 +1,8 @@
-"""The bidirectional channel: proposals from the UAV, answers from the UGVs.
+"""The channel between UAV and UGVs: the UAV sends proposals, each UGV answers with a verdict and a report.
 
 An answer is two numbers per UGV: ACCEPT, REFUSE, DONE or SILENT, and the number of the proposal that it answers. DONE
-means that the UGV has executed the motion to its end. An answer to another proposal than the one in force means
-nothing. With it comes a report: the obstacles that the UGV sensed when it decided, and why it answers so.
+means that the UGV has executed the motion to its end. The UAV ignores an answer unless it names the proposal in force.
+The report lists the obstacles that the UGV sensed when it decided, and the reason for its answer.
 
 A joint plan takes effect only while all its parts in force are accepted: see `accepted_proposals`.
 """
@@ -25,12 +25,12 @@ Disc = tuple[float, float, float, float]
 
 
 class Report(NamedTuple):
-    """What comes with an answer.
+    """A UGV's report, sent with its answer.
 
     Attributes:
         sensed: obstacles that the UGV sensed when it decided.
-        reason: of the answer, see `gatekeeper.answer.Reason`; empty if it has not decided.
-        words: the same as a sentence.
+        reason: why it answers so, see `gatekeeper.answer.Reason`; empty before it has decided.
+        words: the reason as a sentence.
     """
 
     sensed: tuple[Disc, ...] = ()
@@ -46,17 +46,17 @@ Proposals = tuple[Proposal | None, ...]
 
 
 def answer_to(proposal: Proposal | None, answers: Sequence[float] | Array, robot: int) -> float:
-    """The UGV's answer to this very proposal: ACCEPT, REFUSE, DONE or SILENT; answers (2n,) flattened."""
+    """A UGV's answer to this proposal: ACCEPT, REFUSE, DONE, or SILENT if it answers another one; `answers` (2n,)."""
     if proposal is None or answers[2 * robot + 1] != proposal.number:
         return SILENT
     return float(answers[2 * robot])
 
 
 def accepted_proposals(proposals: Sequence[Proposal | None], answers: Array) -> list[Proposal | None]:
-    """Per UGV, the proposal that it executes: the one in force if it has taken effect, else None.
+    """The proposals that UGVs execute, one entry per UGV: the proposal in force if it has taken effect, else None.
 
-    A proposal takes effect when its UGV accepts it. A part of a joint plan also needs every other part in force to be
-    accepted or done.
+    A proposal takes effect when its UGV accepts it. A part of a joint plan takes effect when, besides, every other part
+    in force is accepted or done.
     """
     said = [answer_to(proposal, answers, i) for i, proposal in enumerate(proposals)]
     stopped = {p.joint for p, answer in zip(proposals, said, strict=True) if p and answer not in (ACCEPT, DONE)}

@@ -1,4 +1,8 @@
-"""The UAV's planner: it finds the UGVs that need a proposal, asks the policies, and takes answers into account."""
+"""The UAV's planner, run once per planning period.
+
+It first reads the UGVs' answers: it learns obstacles from their reports, and withdraws proposals that are refused, done
+or no longer needed. Then it asks the behaviour database for a proposal to every triggered UGV that needs one.
+"""
 
 from __future__ import annotations
 
@@ -11,28 +15,21 @@ import numpy as np
 from airground_drake.base.arrays import Array
 from airground_drake.geometry.motion import Motion
 from airground_drake.intervention.database import BehaviourDatabase, Fault, Negotiation
-from airground_drake.intervention.messages import (
-    ACCEPT,
-    DONE,
-    REFUSE,
-    SILENT,
-    Disc,
-    Proposals,
-    Reports,
-    answer_to,
-)
+from airground_drake.intervention.messages import ACCEPT, DONE, REFUSE, SILENT, Disc, Proposals, Reports, answer_to
 from airground_drake.intervention.policy import Answered, Observation, Proposal, Teammate
+
+_WORDS: dict[float, Answered] = {ACCEPT: "accepted", REFUSE: "refused"}
 
 
 @dataclass(frozen=True)
 class PlannerState:
-    """What the UAV remembers.
+    """What the UAV remembers between planning periods.
 
     Attributes:
-        talks: where it stands with each UGV.
-        learnt: obstacles that came with answers and were not on the map.
-        sent: (UGV, proposal), in order.
-        faults: of policies, in order.
+        talks: negotiations, one per UGV.
+        learnt: obstacles from UGVs' reports that are not on the map.
+        sent: all proposals with the index of their UGV, in order of sending.
+        faults: failures of policies, in order.
     """
 
     talks: tuple[Negotiation, ...]
@@ -46,19 +43,19 @@ class PlannerState:
 
     @property
     def proposals(self) -> Proposals:
-        """In force, one entry per UGV."""
+        """The proposals in force, one entry per UGV."""
         return tuple(talk.proposal for talk in self.talks)
 
 
 def sent_after(before: PlannerState, after: PlannerState, t: float) -> PlannerState:
-    """Number the proposals that a planning instant has brought, and note them as sent.
+    """Number the new proposals of a planning instant, and note them as sent.
 
-    Every proposal that was not there before gets the next number and the time, whatever it came with: no planner can
-    send another motion under the number that a UGV has answered.
+    Every new proposal gets the next number and the time t, even if the planner has set others. So no planner can send
+    another motion under a number that a UGV has already answered.
 
     Args:
         before: memory before the instant.
-        after: what the planner has made of it.
+        after: memory as the planner returns it.
         t: time, s.
     """
     sent, talks = list(before.sent), list(after.talks)
@@ -72,25 +69,25 @@ def sent_after(before: PlannerState, after: PlannerState, t: float) -> PlannerSt
 
 @dataclass(frozen=True, eq=False)
 class Planner:
-    """The UAV's planner, on its own map, which may miss obstacles.
+    """The UAV's planner. It plans on the UAV's own map, which may miss obstacles.
 
-    Policies are asked for UGVs that are intervened on. What they propose to others, which are to make way, is a
-    proposal like any other, in force as long as the UGV that it is for is intervened on. A refusal withdraws the
-    proposal, and all other parts of its joint plan; the next behaviour is tried after a rest. The obstacles that the
-    UGV senses come with every answer, and the UAV knows them from then on. See docs/design.md.
+    The policies are asked for each triggered UGV. They may also propose that other UGVs make way for it; such a
+    proposal stays in force as long as the triggered UGV's intervention. A refusal withdraws the proposal and all other
+    parts of its joint plan; after a rest the next policy is asked. UGVs report the obstacles that they sense with every
+    answer, and the UAV adds these to its map. See docs/design.md.
 
     Attributes:
-        ugvs: names.
+        ugvs: names of the UGVs.
         database: policies, in the order in which they are tried.
         period: planning period, s; a proposal can act one period after it is made.
         presets: preset trajectories of the UGVs.
-        targets: (n, 3), m.
-        mapped: obstacles on the UAV's map, (m, 3), m.
+        targets: targets of the UGVs, (n, 3), m.
+        mapped: centres of the obstacles on the UAV's map, (m, 3), m.
         safe_distance: d to obstacles, m.
         robot_distance: d between UGVs, m.
-        max_speed: of the UGVs, (n,), m/s.
-        radius: of the UGVs' bodies, (n,), m, or one for all.
-        mapped_radii: of the obstacles on the map, (m,), m, or one for all.
+        max_speed: speed limits of the UGVs, (n,), m/s.
+        radius: radii of the UGVs' bodies, (n,), m, or one for all.
+        mapped_radii: radii of `mapped`, (m,), m, or one for all.
     """
 
     ugvs: tuple[str, ...]
@@ -111,11 +108,11 @@ class Planner:
         return np.broadcast_to(self.radius, len(self.ugvs))
 
     def start(self) -> PlannerState:
-        """What is remembered at the beginning: nothing."""
+        """The memory at the beginning of a run."""
         return PlannerState((Negotiation(),) * len(self.ugvs))
 
     def idle(self, memory: PlannerState, intervening: Sequence[bool]) -> bool:
-        """Whether a planning instant changes nothing: nobody is intervened on, and nothing of it is remembered."""
+        """Whether a planning instant changes nothing: no UGV is triggered, and no negotiation is open."""
         return not any(intervening) and memory.talks == self.start().talks
 
     def plan(
@@ -128,16 +125,16 @@ class Planner:
         reports: Reports,
         standing: Sequence[bool] = (),
     ) -> PlannerState:
-        """One planning period.
+        """The memory after one planning period.
 
         Args:
-            memory: before.
+            memory: of the UAV before.
             t: time, s.
             positions: of all robots, (n + 1, 3), m, world frame.
-            intervening: per UGV, whether the trigger has it in mode INTERVENING.
+            intervening: per UGV, whether its trigger is in mode INTERVENING.
             answers: of the UGVs, (2n,), see `messages`.
-            reports: what they sensed, see `messages`.
-            standing: per UGV, whether it stands, see `halts`; default: none does.
+            reports: of the UGVs, see `messages`.
+            standing: per UGV, whether it stands, see `halts`; default: no UGV stands.
         """
         said = [answer_to(talk.proposal, answers, i) for i, talk in enumerate(memory.talks)]
         heard = [report for report, answer in zip(reports, said, strict=True) if answer != SILENT]
@@ -183,7 +180,11 @@ class Planner:
         *,
         learnt: bool,
     ) -> list[Negotiation]:
-        """Negotiations without what is withdrawn: refused in any part, run out, or for a UGV without a trigger now."""
+        """Negotiations after the UGVs' answers.
+
+        A proposal is withdrawn if any part of its plan is refused, if its motion is over, or if neither its UGV nor its
+        cause is triggered any more.
+        """
         called = {name for name, one in zip(self.ugvs, intervening, strict=True) if one}
         refused = {talk.proposal.joint for talk, no in zip(talks, said, strict=True) if talk.proposal and no == REFUSE}
         found = []
@@ -208,7 +209,7 @@ class Planner:
         talks: Sequence[Negotiation],
         standing: Sequence[bool],
     ) -> tuple[Teammate, ...]:
-        """Every UGV as it is now."""
+        """All UGVs as the UAV sees them at time t, s."""
         return tuple(
             Teammate(
                 name=name,
@@ -219,17 +220,10 @@ class Planner:
                 triggered=bool(intervening[i]),
                 standing=standing[i] if standing else False,
                 proposal=talks[i].proposal,
-                answered=_answered(talks[i].proposal, answers, i),
+                answered=_WORDS.get(answer_to(talks[i].proposal, answers, i), "silent"),
                 refusals=talks[i].refusals,
                 resting=talks[i].refused_lately(t),
                 radius=float(self.radii[i]),
             )
             for i, name in enumerate(self.ugvs)
         )
-
-
-def _answered(proposal: Proposal | None, answers: Array, robot: int) -> Answered:
-    answer = answer_to(proposal, answers, robot)
-    if answer == ACCEPT:
-        return "accepted"
-    return "refused" if answer == REFUSE else "silent"

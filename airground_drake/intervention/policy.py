@@ -1,4 +1,4 @@
-"""What an intervention policy sees and what it proposes: the plug-in interface of the behaviour database."""
+"""The interface of intervention policies: what a policy sees, and what it proposes."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from airground_drake.geometry.motion import Motion
 from airground_drake.nsbc.task import pseudoinverse
 
 Answered = Literal["silent", "accepted", "refused"]
-"""What has become of a proposal in force."""
+"""A UGV's answer to its proposal in force."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,12 +28,12 @@ class Teammate:
         target: (3,), m.
         preset: its preset trajectory.
         max_speed: m/s.
-        triggered: whether its trigger has it in mode INTERVENING.
-        standing: whether it has stood where it is for a while (`halts.STANDS_S`).
-        proposal: the one in force, or None.
-        answered: what the UGV says to it.
-        refusals: proposals that it has refused since its trigger, or since that of the UGV that it was asked for.
-        resting: whether it has refused so recently that it gets no proposal now.
+        triggered: whether its trigger is in mode INTERVENING.
+        standing: whether it has stood still for `halts.STANDS_S`.
+        proposal: its proposal in force, or None.
+        answered: its answer to that proposal.
+        refusals: number of proposals that it has refused in the current intervention.
+        resting: whether it gets no proposal now because it has refused one recently.
         radius: of its body, m.
     """
 
@@ -57,22 +57,21 @@ class Observation:
 
     Attributes:
         t: time, s.
-        start: earliest time at which a proposal made now can act, s (messages take a period each way).
+        start: earliest time at which a proposal made now can act, s; messages take a period each way.
         robot: name of the UGV.
         position: its position, (3,), m, world frame.
         target: its target, (3,), m.
         preset: its preset trajectory.
-        obstacles: centres of the obstacles that the UAV knows: its own map, and what answers have taught it,
-            (m, 3), m.
-        mapped: those of its own map alone, (k, 3), m.
+        obstacles: centres of all obstacles that the UAV knows, from its own map and from answers, (m, 3), m.
+        mapped: centres of the obstacles on its own map, (k, 3), m.
         others: positions of the other robots, (n, 3), m.
         safe_distance: distance d to keep from obstacles, between surfaces, m.
         refusals: number of proposals that the UGV has refused since the trigger.
-        team: every UGV, this one among them, in array order.
+        team: all UGVs in array order, this one among them.
         robot_distance: distance that two UGVs have to keep, between surfaces, m.
         radius: of the UGV's body, m.
-        obstacle_radii: of the obstacles, (m,), m, or one for all.
-        mapped_radii: of those of its own map, (k,), m, or one for all.
+        obstacle_radii: radii of `obstacles`, (m,), m, or one for all.
+        mapped_radii: radii of `mapped`, (k,), m, or one for all.
     """
 
     t: float
@@ -94,35 +93,33 @@ class Observation:
 
     @property
     def obstacle_distances(self) -> Array:
-        """Distances to keep from the obstacles, of the UGV's centre from theirs, (m,), m."""
+        """Distances to keep between the centres of the UGV and of each obstacle, (m,), m."""
         return self.safe_distance + (self.radius + np.broadcast_to(self.obstacle_radii, len(self.obstacles)))
 
     def distance_to(self, mate: Teammate) -> float:
-        """Distance that the UGV has to keep from another one, of its centre from its, m."""
+        """Distance to keep between the centres of the UGV and of another one, m."""
         return self.robot_distance + (self.radius + mate.radius)
 
     def fresh(self) -> Self:
-        """A copy whose arrays are its own and read-only: whatever becomes of it, nothing else changes."""
+        """A copy with read-only arrays of its own. A policy that changes the copy changes nothing else."""
         return _fresh(self)
 
 
 @dataclass(frozen=True, eq=False)
 class Proposal:
-    """The UAV's intervention task for one UGV, eqs (12)-(14), as data: the message that is sent.
+    """The message that the UAV sends to one UGV: its intervention task, eqs (12)-(14), as data.
 
     Attributes:
         policy: name of the policy that made it.
         issued: time of sending, s.
-        motion: desired value of the task over time: where the UGV is to be.
+        motion: desired value of the task over time: where the UGV should be.
         selection: J_int, (m, 3), directions in which the UAV intervenes (default: all).
-        mapped: obstacles that the UAV knows, (k, 3), m: a UGV judges by them how useful the proposal is, and nothing
-            else rests on them.
-        cause: name of the UGV whose trigger it is sent for: another one's, if this UGV is asked to make way for it;
-            empty: its own.
-        mapped_radii: of the obstacles that the UAV knows, (k,), m, or one for all.
-        party: names of all UGVs with a part in the same joint plan; empty: the proposal stands alone.
-        number: identifies the proposal in the UGV's answer. It is given when the proposal is sent, see
-            `planner.sent_after`; before that it is -1.
+        mapped: obstacles that the UAV knows, (k, 3), m. The UGV uses them only to judge how useful the proposal is.
+        cause: name of the UGV whose trigger led to the proposal. If it names another UGV, this one is asked to make
+            way for it. Empty: this UGV.
+        mapped_radii: radii of `mapped`, (k,), m, or one for all.
+        party: names of all UGVs in the same joint plan; empty: the proposal stands alone.
+        number: identifies the proposal in the UGV's answer. `planner.sent_after` gives it; before that it is -1.
     """
 
     policy: str
@@ -137,7 +134,7 @@ class Proposal:
 
     @property
     def joint(self) -> tuple[float, tuple[str, ...]]:
-        """What all parts of a joint plan have in common, and nothing else: time of sending, s, and party."""
+        """Key of the joint plan that this proposal is a part of: time of sending, s, and party."""
         return self.issued, self.party
 
     @cached_property
@@ -151,41 +148,41 @@ class Proposal:
 
 
 SHORTEST_LEG_S = 1e-8
-"""Vertices of a proposed motion are so far apart at least, s: times of a run are rounded to 1e-13 s and more, and a leg
-that is hardly longer has no velocity to speak of."""
+"""Least time between the vertices of a proposed motion, s. Times of a run are rounded to about 1e-13 s: a shorter
+leg has no meaningful velocity."""
 
 
 class Policy(abc.ABC):
     """An intervention behaviour of the UAV. Subclasses take their parameters as keyword numbers.
 
-    A policy may fail: an exception, or anything but None or motions of numbers up to `LARGEST` in size, counts as no
-    intervention and is reported (see `database.py`). No policy's code runs in a UGV's control loop, and one that does
-    not come with the package runs in a process of its own (see `process.py`).
+    A policy may fail: if it raises, or returns anything but None or motions of numbers up to `LARGEST`, there is no
+    intervention and the failure is reported (see `database.py`). No policy's code runs in a UGV's control loop.
+    Third-party policies run in processes of their own (see `guest/process.py`).
 
     Attributes:
-        counted: whether a proposal's effort is bounded in counts. Then it is not stopped after `intervention.budget_s`,
-            and runs are the same on every machine.
+        counted: whether counts bound the effort of a proposal. Then `intervention.budget_s` does not stop it, and runs
+            are the same on every machine.
     """
 
     counted: ClassVar[bool] = False
 
     @abc.abstractmethod
     def propose(self, seen: Observation) -> Motion | Mapping[str, Motion] | None:
-        """What is proposed from `seen.start` on, or None for no intervention.
+        """Propose a motion from `seen.start` on, motions for several UGVs, or None for no intervention.
 
-        A Motion is for the UGV that the observation is about. Motions by name are a joint plan, for any UGVs of the
-        team: those that are triggered get proposals of their own, others are asked to make way for this one. Only a
-        UGV that has a proposal of this very instant (`issued == seen.t`) cannot be asked again.
+        A Motion is for the UGV `seen.robot`. Motions by name are a joint plan for UGVs of the team. UGVs in it that
+        are triggered get proposals of their own; the others are asked to make way for `seen.robot`. A UGV that has got
+        a proposal at this instant (`issued == seen.t`) cannot be in the plan.
         """
 
 
 def motions_of(proposed: object, seen: Observation) -> dict[str, Motion]:
-    """A policy's answer as plain data, so that none of its code is called later; empty: nothing.
+    """A policy's proposal as plain motions by UGV, so that none of its code is called later; empty: no intervention.
 
     Raises:
         TypeError: if it is neither a motion nor motions by name.
-        ValueError: if it names what is no UGV of the team, asks one again that has a proposal of this instant, has
-            vertices that are hardly apart in time, or numbers beyond `LARGEST`.
+        ValueError: if a name is not a UGV of the team, a UGV has got a proposal at this instant, vertices are less than
+            `SHORTEST_LEG_S` apart, or a number exceeds `LARGEST`.
     """
     if proposed is None:
         return {}
@@ -211,7 +208,7 @@ def motions_of(proposed: object, seen: Observation) -> dict[str, Motion]:
 
 
 def _fresh(value: Any) -> Any:
-    """A copy of a dataclass, and of what is in it, with arrays of its own that are read-only."""
+    """A deep copy of a dataclass with read-only arrays."""
     if isinstance(value, np.ndarray):
         return read_only(value)
     if isinstance(value, tuple):

@@ -1,4 +1,4 @@
-"""Wrong interventions: proposals of a UAV under occlusion, noise, a stale map or malice."""
+"""Wrong interventions, as a UAV proposes them under occlusion, noise, a stale map or malice."""
 
 from __future__ import annotations
 
@@ -26,15 +26,15 @@ class Towards(Policy):
 
 
 class StaleMap(Detour):
-    """The detour on the map of the start: obstacles learnt from refusals are ignored."""
+    """The detour on the UAV's own map: it ignores obstacles learnt from answers."""
 
     def propose(self, seen: Observation) -> Motion | None:
-        """The detour round the obstacles of the original map."""
+        """The detour round the obstacles of its own map."""
         return super().propose(replace(seen, obstacles=seen.mapped, obstacle_radii=seen.mapped_radii))
 
 
 class Noisy(Detour):
-    """The detour with errors of measurement: every vertex displaced by independent Gaussian noise in the plane."""
+    """The detour with measurement errors: independent Gaussian noise displaces every vertex in the plane."""
 
     def __init__(
         self, *, speed_m_s: float, noise_m: float, seed: float = 0.0, clearance_m: float = 0.05, follow_s: float = 5.0
@@ -57,7 +57,7 @@ class Noisy(Detour):
 
 
 class Hostile(Policy):
-    """As dangerous as the speed limit allows: straight into the nearest obstacle or robot, chosen at each proposal."""
+    """Straight into the nearest obstacle or robot, chosen anew for each proposal."""
 
     def __init__(self, *, speed_m_s: float) -> None:
         """Set the speed, m/s; raises ValueError unless it is positive."""

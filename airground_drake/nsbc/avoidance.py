@@ -20,6 +20,7 @@ import numpy as np
 
 from airground_drake.base.arrays import Array
 from airground_drake.nsbc import kernels
+from airground_drake.nsbc.kernels import limit_speed as limit_speed
 from airground_drake.world.world import Neighbours
 
 Composition = Literal["augmented", "recursion_nearest", "recursion_listed"]
@@ -48,7 +49,7 @@ class HalfSpaces:
 
 @dataclass(frozen=True)
 class Surroundings:
-    """What each of n robots must keep away from, K points each.
+    """The K points that each of n robots must keep away from.
 
     Attributes:
         centre: (n, K, 3), m, world frame.
@@ -62,7 +63,7 @@ class Surroundings:
 
     @classmethod
     def of(cls, near: Neighbours, positions: Array) -> Surroundings:
-        """What is around the members when all bodies that move are at positions (M, 3) m."""
+        """The surroundings of the members when all bodies that move are at positions (M, 3) m."""
         return cls(kernels.gather(positions, near.still, near.others), near.distance, near.share)
 
 
@@ -74,10 +75,10 @@ class Avoidance:
         gain: A of (8), 1/s.
         period: control period h, s; gain * period <= 1 keeps the recovery from overshooting.
         sensing_range: farther points are not seen, m.
-        composition: 'augmented' is the KKT point of min ||v - lower||^2 under all constraints, that is the
-            augmented null-space projection over the active set, shortened to be exact in floating point.
-            'recursion_nearest' and 'recursion_listed' apply (5) as printed to the same constraints, with the
-            nearest or the first listed obstacle as highest priority; they are not safe, and here to show it.
+        composition: 'augmented' is the KKT point of min ||v - lower||^2 under all constraints: the augmented null-space
+            projection over the active set, shortened to be exact in floating point. 'recursion_nearest' and
+            'recursion_listed' apply (5) as printed to the same constraints, with the nearest or the first listed
+            obstacle as highest priority. They are there to show that (5) is not safe.
     """
 
     gain: float
@@ -86,22 +87,19 @@ class Avoidance:
     composition: Composition = "augmented"
 
     @property
-    def code(self) -> int:
-        """The composition as the kernels take it."""
-        return _CODES[self.composition]
+    def layer(self) -> kernels.Layer:
+        """The numbers as the kernels take them."""
+        return kernels.Layer(float(self.gain), float(self.period), float(self.sensing_range), _CODES[self.composition])
 
     def half_spaces(self, position: Array, mobility: Array, around: Surroundings) -> HalfSpaces:
         """Constraints at positions (n, 3) m; mobility (n, 3) is 1 where a robot can move, else 0."""
-        return HalfSpaces(
-            *kernels.team_half_spaces(
-                position, around.centre, around.distance, around.share,
-                self.gain, self.period, mobility, self.sensing_range,
-            )
-        )  # fmt: skip
+        points = kernels.Points(around.centre, around.distance, around.share)
+        return HalfSpaces(*kernels.team_half_spaces(position, mobility, points, self.layer))
 
     def apply(self, lower: Array, spaces: HalfSpaces) -> Array:
         """Put the avoidance tasks above lower-priority velocities: (n, 3) m/s to (n, 3) m/s."""
-        return kernels.team_avoid(lower, spaces.normal, spaces.bound, self.code)
+        rows = zip(lower, spaces.normal, spaces.bound, strict=True)
+        return np.array([kernels.avoid_one(*row, self.layer.composition) for row in rows])
 
     def command(self, lower: Array, positions: Array, near: Neighbours) -> Array:
         """Commands of k robots, (k, 3), m/s: lower-priority velocities (k, 3), limited in speed, below avoidance.
@@ -111,9 +109,4 @@ class Avoidance:
             positions: of all bodies that move, (M, 3), m, world frame.
             near: the robots and what is around them.
         """
-        return kernels.commands(lower, positions, *near, self.gain, self.period, self.sensing_range, self.code)
-
-
-def limit_speed(velocity: Array, max_speed: Array) -> Array:
-    """Scale velocities (n, 3) down to at most max_speed (n,), m/s, keeping their direction."""
-    return kernels.limit_speed(velocity, max_speed)
+        return kernels.commands(lower, positions, *near, *self.layer)

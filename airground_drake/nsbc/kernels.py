@@ -1,10 +1,12 @@
 """Compiled inner loops of set-based avoidance (numba); `avoidance.py` explains and wraps them.
 
-Scalar code without temporaries, because the gatekeeper rolls the closed loop out hundreds of thousands of
-times. No fast-math: results are those of IEEE arithmetic in the order written.
+Scalar code without temporaries, because the gatekeeper computes the command of hundreds of thousands of periods. No
+fast-math: results are those of IEEE arithmetic in the order written.
 """
 
 from __future__ import annotations
+
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -13,15 +15,15 @@ from numba import njit
 from airground_drake.base.arrays import Array
 
 MARGIN_M_S = 1e-12
-"""Added to every bound in the projection, m/s. The bound of a robot in contact is 0. Without the margin
-rounding misses it every other time, and `_scale_back` stops a robot that should slide along."""
+"""Added to every bound in the projection, m/s. The bound of a robot in contact is 0. Without the margin rounding would
+miss it every other time, and `_scale_back` would stop a robot that should slide along."""
 CONTRADICTION_M_S = 1e-9
-"""Constraints contradict each other if one is missed by more where the others are met, m/s; by less, it is rounding."""
+"""Constraints contradict each other if one is missed by more than this where the others are met, m/s."""
 ABOVE_LEAST = 1e-9
-"""Violations within this relative distance of the least one count as equal, so that no speed is spent on rounding."""
+"""Violations that exceed the least one by no more than this share count as least: no speed is spent on rounding."""
 ABOVE_LEAST_M_S = 1e-11
-"""So is one that is larger by this, m/s: between two points in opposite directions but for rounding, a velocity along
-both boundaries, as fast as the nearest far obstacle allows, would be better by what rounding makes of that speed."""
+"""So do violations that exceed it by this, m/s. Between two points in opposite directions but for rounding, a fast
+velocity along both boundaries would otherwise win by its rounding error."""
 DEPENDENT = 1e-20
 """Normals within 1e-10 rad of linear dependence count as dependent: the square of the sine of that angle."""
 ROUNDING = 1e-15
@@ -30,35 +32,43 @@ ROUNDING = 1e-15
 AUGMENTED, RECURSION_NEAREST, RECURSION_LISTED = 0, 1, 2
 
 
+class Layer(NamedTuple):
+    """The numbers of `Avoidance`."""
+
+    gain: float
+    period: float
+    sensing_range: float
+    composition: int
+
+
+class Points(NamedTuple):
+    """The points that one robot must keep away from: centres, (K, 3), m, safe distances, (K,), m, shares, (K,)."""
+
+    centre: Array
+    distance: Array
+    share: Array
+
+
 @njit(cache=True)
 def fill_half_spaces(
-    position: Array,
-    centre: Array,
-    distance: Array,
-    share: Array,
-    gain: float,
-    period: float,
-    mobility: Array,
-    sensing_range: float,
-    normal: Array,
-    bound: Array,
+    position: Array, mobility: Array, points: Points, layer: Layer, normal: Array, bound: Array
 ) -> None:
-    """Write the velocity constraints of one robot: normal (K, 3), bound (K,); see `half_spaces`."""
+    """Write the velocity constraints of one robot: normal (K, 3), bound (K,); see `Avoidance.half_spaces`."""
     for k in range(len(bound)):
         squared = 0.0
         for a in range(3):
-            normal[k, a] = position[a] - centre[k, a]
+            normal[k, a] = position[a] - points.centre[k, a]
             squared += normal[k, a] ** 2
         reach = np.sqrt(squared)
         for a in range(3):
             normal[k, a] = mobility[a] * normal[k, a] / reach if reach > 0.0 else 0.0
-        excess = reach - distance[k]
-        if reach > sensing_range:
+        excess = reach - points.distance[k]
+        if reach > layer.sensing_range:
             bound[k] = -np.inf
         elif excess <= 0.0:
-            bound[k] = -share[k] * gain * excess
+            bound[k] = -points.share[k] * layer.gain * excess
         else:
-            bound[k] = -share[k] * excess / period
+            bound[k] = -points.share[k] * excess / layer.period
 
 
 @njit(cache=True)
@@ -133,32 +143,13 @@ def _recursion(lower: Array, normal: Array, bound: Array, nearest_first: bool) -
 
 
 @njit(cache=True)
-def team_half_spaces(
-    position: Array,
-    centre: Array,
-    distance: Array,
-    share: Array,
-    gain: float,
-    period: float,
-    mobility: Array,
-    sensing_range: float,
-) -> tuple[Array, Array]:
-    """Constraints of n robots: normal (n, K, 3), bound (n, K)."""
-    normal, bound = np.empty(centre.shape), np.empty(distance.shape)
+def team_half_spaces(position: Array, mobility: Array, points: Points, layer: Layer) -> tuple[Array, Array]:
+    """Constraints of n robots, with a leading dimension n in `points`: normal (n, K, 3), bound (n, K)."""
+    normal, bound = np.empty(points.centre.shape), np.empty(points.distance.shape)
     for i in range(len(position)):
-        fill_half_spaces(
-            position[i], centre[i], distance[i], share[i], gain, period, mobility[i], sensing_range, normal[i], bound[i]
-        )
+        around = Points(points.centre[i], points.distance[i], points.share[i])
+        fill_half_spaces(position[i], mobility[i], around, layer, normal[i], bound[i])
     return normal, bound
-
-
-@njit(cache=True)
-def team_avoid(lower: Array, normal: Array, bound: Array, composition: int) -> Array:
-    """Velocities of n robots, (n, 3) m/s."""
-    velocity = np.empty(lower.shape)
-    for i in range(len(lower)):
-        velocity[i] = avoid_one(lower[i], normal[i], bound[i], composition)
-    return velocity
 
 
 @njit(cache=True)
@@ -191,14 +182,14 @@ def commands(
     sensing_range: float,
     composition: int,
 ) -> Array:
-    """Velocities of k robots, (k, 3), m/s; see `Avoidance.command`, with the fields of `Neighbours` one by one."""
+    """Velocities of k robots, (k, 3), m/s; see `Avoidance.command`, with the fields of `Neighbours` and of `Layer`."""
+    # one by one, because numba takes 1.5 us to unpack a named tuple that Python passes, and 0.04 us for an array
+    layer = Layer(gain, period, sensing_range, composition)
     velocity, centre = limit_speed(lower, max_speed), gather(positions, still, others)
     normal, bound = np.empty(centre.shape[1:]), np.empty(centre.shape[1])
     for i in range(len(velocity)):
-        fill_half_spaces(
-            positions[members[i]], centre[i], distance[i], share[i], gain, period, mobility[i], sensing_range,
-            normal, bound,
-        )  # fmt: skip
+        around = Points(centre[i], distance[i], share[i])
+        fill_half_spaces(positions[members[i]], mobility[i], around, layer, normal, bound)
         velocity[i] = avoid_one(velocity[i], normal, bound, composition)
     return velocity
 
@@ -235,11 +226,11 @@ def _closest_feasible(lower: Array, normal: Array, bound: Array) -> Array:
 
 @njit(cache=True)
 def _least_violation(normal: Array, bound: Array) -> Array:
-    """Slowest velocity among those whose largest violation is least, but for `ABOVE_LEAST` of it and `ABOVE_LEAST_M_S`.
+    """Slowest velocity whose largest violation is least, up to `ABOVE_LEAST` and `ABOVE_LEAST_M_S`.
 
-    Constraints contradict each other only where a robot is inside several safe distances at once. What the
-    lower priorities ask for then has no say: they might be hostile. The least violation is found from below: each
-    contradiction proves that every velocity misses a constraint by so much, and the bounds are lowered by that.
+    Constraints contradict each other only where a robot is inside several safe distances at once. The wishes of lower
+    priorities then have no say: they might be hostile. The least violation is found from below: each contradiction
+    proves that every velocity misses some constraint by a certain amount, and the bounds are lowered by that.
     """
     still = np.zeros(normal.shape[1])
     least, more = 0.0, np.inf
@@ -253,13 +244,13 @@ def _least_violation(normal: Array, bound: Array) -> Array:
 def _closest(lower: Array, normal: Array, bound: Array, contradiction: float) -> tuple[Array, float]:
     """Closest velocity to `lower` (d,) with normal (K, d) . v >= bound (K,), and the violation that is certain, m/s.
 
-    The dual active-set method of Goldfarb and Idnani (Mathematical Programming 27, 1983) in any number of dimensions
-    d. The velocity is always the closest one under the active constraints, each of which pushes with a force >= 0. The
-    constraint that is missed most joins them; one whose force falls to 0 on the way leaves.
+    The dual active-set method of Goldfarb and Idnani (Mathematical Programming 27, 1983) in d dimensions. The velocity
+    is always the closest one under the active constraints; each of these pushes with a force >= 0. The constraint that
+    is missed most joins them; a constraint whose force falls to 0 on the way leaves.
 
     A constraint that the active ones contradict is left out if it is missed by no more than `contradiction`, m/s.
-    Otherwise the certain violation is above 0: every velocity misses a constraint by as much, and the velocity returned
-    means nothing.
+    Otherwise the certain violation is above 0: every velocity misses some constraint by at least that much, and the
+    velocity returned means nothing.
     """
     count, d = normal.shape
     velocity, settled = lower.copy(), np.zeros(count, dtype=np.bool_)  # active or left out
@@ -274,29 +265,15 @@ def _closest(lower: Array, normal: Array, bound: Array, contradiction: float) ->
         force[size] = 0.0
         while True:
             _split(normal[p], across, share, size)
-            across_squared, squared, missed = 0.0, 0.0, bound[p]
-            for a in range(d):
-                across_squared += across[size, a] ** 2
-                squared += normal[p, a] ** 2
-                missed -= normal[p, a] * velocity[a]
-            step, leaving = np.inf, -1
-            pull[:size] = share[size, :size]
-            for m in range(size - 1, -1, -1):  # normal[p] = across[size] + sum over m of pull[m] * normal[active[m]]
-                for n in range(m):
-                    pull[n] -= pull[m] * share[m, n]
-                if pull[m] > 0.0 and force[m] < step * pull[m]:
-                    step, leaving = max(force[m], 0.0) / pull[m], m
-            if leaving < 0 and (across_squared <= DEPENDENT * squared or squared < 1e-18):
+            step, leaving = _first_release(force, share, pull, size)
+            missed, free, squared = _missed(velocity, normal, bound, p), _squared(across, size), _squared(normal, p)
+            if leaving < 0 and (free <= DEPENDENT * squared or squared < 1e-18):
                 if missed <= contradiction:
                     break
-                weight, total = 1.0, bound[p]  # no velocity changes this sum of what is missed
-                for m in range(size):
-                    weight -= pull[m]
-                    total -= pull[m] * bound[active[m]]
-                return velocity, total / weight
-            joins = missed < step * across_squared
+                return velocity, _certain_violation(bound, p, pull, active[:size])
+            joins = missed < step * free
             if joins:
-                step = missed / across_squared
+                step = missed / free
             for a in range(d):
                 velocity[a] += step * across[size, a]
             for m in range(size):
@@ -308,23 +285,35 @@ def _closest(lower: Array, normal: Array, bound: Array, contradiction: float) ->
                 _meet(velocity, normal, bound, active[:size], across)
                 break
             settled[active[leaving]] = False
-            for m in range(leaving, size):
-                force[m] = force[m + 1]
             size -= 1
-            for m in range(leaving, size):
-                active[m] = active[m + 1]
-                _split(normal[active[m]], across, share, m)
+            _remove(leaving, normal, active[: size + 1], force, across, share)
     return velocity, 0.0
 
 
 @njit(cache=True)
+def _missed(velocity: Array, normal: Array, bound: Array, k: int) -> float:
+    """By how much a velocity misses a constraint, m/s."""
+    missed = bound[k]
+    for a in range(len(velocity)):
+        missed -= normal[k, a] * velocity[a]
+    return missed
+
+
+@njit(cache=True)
+def _squared(vectors: Array, k: int) -> float:
+    """Squared length of a row."""
+    squared = 0.0
+    for a in range(vectors.shape[1]):
+        squared += vectors[k, a] ** 2
+    return squared
+
+
+@njit(cache=True)
 def _most_missed(velocity: Array, normal: Array, bound: Array, settled: npt.NDArray[np.bool_]) -> int:
-    """Index of the constraint that is missed most, by more than rounding, among those not settled; -1 if none is."""
+    """Index of the constraint that is missed most, by more than rounding, among those not settled; -1 without one."""
     found, worst = -1, 0.0
     for k in range(len(bound)):
-        missed = bound[k]
-        for a in range(len(velocity)):
-            missed -= normal[k, a] * velocity[a]
+        missed = _missed(velocity, normal, bound, k)
         if missed > worst and not settled[k]:
             terms = abs(bound[k])
             for a in range(len(velocity)):
@@ -335,10 +324,50 @@ def _most_missed(velocity: Array, normal: Array, bound: Array, settled: npt.NDAr
 
 
 @njit(cache=True)
+def _first_release(force: Array, share: Array, pull: Array, size: int) -> tuple[float, int]:
+    """How far the velocity can move before the force of an active constraint falls to 0, and which one that is.
+
+    Writes into `pull` the weights of the active normals in the new one, which is across[size] + sum of pull * normal.
+    Without such a constraint: inf and -1.
+    """
+    step, leaving = np.inf, -1
+    for m in range(size):
+        pull[m] = share[size, m]
+    for m in range(size - 1, -1, -1):
+        for n in range(m):
+            pull[n] -= pull[m] * share[m, n]
+        if pull[m] > 0.0 and force[m] < step * pull[m]:
+            step, leaving = max(force[m], 0.0) / pull[m], m
+    return step, leaving
+
+
+@njit(cache=True)
+def _certain_violation(bound: Array, p: int, pull: Array, active: npt.NDArray[np.int64]) -> float:
+    """Every velocity misses p or an active constraint by this, m/s: no velocity changes this mean of their misses."""
+    weight, total = 1.0, bound[p]
+    for m in range(len(active)):
+        weight -= pull[m]
+        total -= pull[m] * bound[active[m]]
+    return total / weight
+
+
+@njit(cache=True)
+def _remove(
+    leaving: int, normal: Array, active: npt.NDArray[np.int64], force: Array, across: Array, share: Array
+) -> None:
+    """Close the gap that an active constraint leaves, in the forces, too, and split the normals behind it again."""
+    for m in range(leaving, len(active)):
+        force[m] = force[m + 1]
+    for m in range(leaving, len(active) - 1):
+        active[m] = active[m + 1]
+        _split(normal[active[m]], across, share, m)
+
+
+@njit(cache=True)
 def _split(vector: Array, across: Array, share: Array, k: int) -> None:
     """Write the part of a vector that is orthogonal to across[:k] into across[k], and into share[k, :k] its shares.
 
-    Gram-Schmidt, twice: once leaves, of nearly parallel ones, a part along the others that is as large as the rest.
+    Gram-Schmidt, twice: of nearly parallel vectors, one pass leaves a part along the others as large as the rest.
     """
     across[k] = vector
     share[k, :k] = 0.0
@@ -357,8 +386,8 @@ def _split(vector: Array, across: Array, share: Array, k: int) -> None:
 def _meet(velocity: Array, normal: Array, bound: Array, active: npt.NDArray[np.int64], across: Array) -> None:
     """Take a velocity, in place, the shortest way to where the active constraints hold with equality.
 
-    Twice: of nearly parallel ones the first pass leaves rounding, divided by the sine of their angle, which is more
-    than what counts as met; the second one starts beside the goal, and what it leaves is rounding again.
+    Twice: with nearly parallel normals the first pass misses by the rounding error over the sine of their angle, which
+    is too much. The second pass starts beside the goal and misses by the rounding error only.
     """
     for _ in range(2):
         for m in range(len(active)):
@@ -374,7 +403,7 @@ def _meet(velocity: Array, normal: Array, bound: Array, active: npt.NDArray[np.i
 def _scale_back(velocity: Array, normal: Array, bound: Array) -> Array:
     """Shorten a velocity, in place, until every constraint that v = 0 satisfies holds in floating point.
 
-    A robot in contact is at the safe distance but for rounding, on either side of it: it counts as there.
+    A robot that is inside the safe distance by rounding only counts as being at it.
     """
     while True:
         scale = 1.0

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cache, cached_property
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -17,12 +17,12 @@ from numba import njit
 
 from airground_drake.base.arrays import Array
 from airground_drake.nsbc.avoidance import Avoidance
-from airground_drake.nsbc.kernels import avoid_one, fill_half_spaces, gather, limit_one
+from airground_drake.nsbc.kernels import Layer, Points, avoid_one, fill_half_spaces, gather, limit_one
 from airground_drake.world.world import Neighbours
 
 
 class Intervention(NamedTuple):
-    """What an accepted intervention asks of one UGV now, (12)-(13).
+    """The demand of an accepted intervention on one UGV now, (12)-(13).
 
     Attributes:
         wanted: where it is to be, (3,), m, world frame.
@@ -36,20 +36,32 @@ class Intervention(NamedTuple):
 
 
 class Numbers(NamedTuple):
-    """The numbers of `UgvLaw`, as numba takes them; `composition` is `Avoidance.code`."""
+    """The numbers of `UgvLaw`, as numba takes them."""
 
     motion_gain: float
     intervention_gain: float
     intervention_on_top: bool
-    avoidance_gain: float
-    period: float
-    sensing_range: float
-    composition: int
+    layer: Layer
+
+
+class Ugv(NamedTuple):
+    """A UGV's position, (3,), m, mobility, (3,), 1 where it can move, else 0, and speed limit, m/s."""
+
+    position: Array
+    mobility: Array
+    max_speed: float
+
+
+class Tracking(NamedTuple):
+    """A UGV's own task (6): where it is to be, (3,), m, and the velocity of that place, (3,), m/s."""
+
+    target: Array
+    rate: Array
 
 
 @dataclass(frozen=True)
 class UgvLaw:
-    """The numbers of the UGVs' control law, and the law.
+    """The UGVs' control law.
 
     Attributes:
         avoidance: the set-based layer.
@@ -73,19 +85,11 @@ class UgvLaw:
     @cached_property
     def numbers(self) -> Numbers:
         """For compiled code."""
-        layer = self.avoidance
-        return Numbers(
-            float(self.motion_gain), float(self.intervention_gain), self.intervention_on_top,
-            float(layer.gain), float(layer.period), float(layer.sensing_range), layer.code,
-        )  # fmt: skip
+        gains = float(self.motion_gain), float(self.intervention_gain)
+        return Numbers(*gains, self.intervention_on_top, self.avoidance.layer)
 
     def velocity(
-        self,
-        positions: Array,
-        near: Neighbours,
-        target: Array,
-        rate: Array,
-        asked: Sequence[Intervention | None],
+        self, positions: Array, near: Neighbours, target: Array, rate: Array, asked: Sequence[Intervention | None]
     ) -> Array:
         """Commands of n UGVs, (n, 3), m/s: `command` for each.
 
@@ -96,35 +100,21 @@ class UgvLaw:
             rate: velocity of the target, (n, 3), m/s.
             asked: per UGV, what the accepted intervention asks for, or None.
         """
-        executing, together = _nothing_asked(len(target))
-        if any(one is not None for one in asked):
-            executing, together = executing.copy(), Intervention(*(array.copy() for array in together))
-            for i, one in enumerate(asked):
-                if one is not None:
-                    executing[i] = True
-                    together.wanted[i], together.rate[i], together.chosen[i] = one
-        return _commands(*self.numbers, *near, *together, positions, target, rate, executing)
-
-
-@cache
-def _nothing_asked(count: int) -> tuple[npt.NDArray[np.bool_], Intervention]:
-    """No UGV executes an intervention: flags (n,), and arrays that the law does not read then. Do not write to them."""
-    zero = np.zeros((count, 3))
-    return np.zeros(count, dtype=np.bool_), Intervention(zero, zero, np.zeros((count, 3, 3)))
+        count = len(target)
+        executing, chosen = np.zeros(count, dtype=np.bool_), np.zeros((count, 3, 3))
+        wanted, wanted_rate = np.zeros((2, count, 3))
+        for i, one in enumerate(asked):
+            if one is not None:
+                executing[i] = True
+                wanted[i], wanted_rate[i], chosen[i] = one
+        own = self.numbers
+        numbers = (own.motion_gain, own.intervention_gain, own.intervention_on_top, *own.layer)
+        return _commands(*numbers, *near, wanted, wanted_rate, chosen, positions, target, rate, executing)
 
 
 @njit(cache=True)
 def command(
-    law: Numbers,
-    position: Array,
-    target: Array,
-    rate: Array,
-    executing: bool,
-    asked: Intervention,
-    normal: Array,
-    bound: Array,
-    mobility: Array,
-    max_speed: float,
+    law: Numbers, ugv: Ugv, track: Tracking, asked: Intervention, executing: bool, normal: Array, bound: Array
 ) -> Array:
     """Command of one UGV, (3,), m/s.
 
@@ -132,36 +122,27 @@ def command(
     composite, as (20) does; otherwise it is the task below avoidance, and tracking fills its null space, so that no
     intervention can break an avoidance inequality.
 
-    Args:
-        law: its numbers.
-        position: (3,), m, world frame.
-        target: of its own task (6), (3,), m.
-        rate: velocity of the target, (3,), m/s.
-        executing: whether an intervention is accepted.
-        asked: what it asks for; not looked at without one.
-        normal: of the avoidance inequalities at this position, (K, 3).
-        bound: of the avoidance inequalities, (K,), m/s.
-        mobility: (3,), 1 where it can move, else 0.
-        max_speed: m/s.
+    `asked` counts only if `executing`. The avoidance inequalities at this position are `normal`, (K, 3), and `bound`,
+    (K,), m/s.
     """
-    own = np.empty(3)
+    own, composition = np.empty(3), law.layer.composition
     for a in range(3):
-        own[a] = mobility[a] * (rate[a] + law.motion_gain * (target[a] - position[a]))
-    limit_one(own, max_speed)
+        own[a] = ugv.mobility[a] * (track.rate[a] + law.motion_gain * (track.target[a] - ugv.position[a]))
+    limit_one(own, ugv.max_speed)
     if not executing:
-        return avoid_one(own, normal, bound, law.composition)
-    below = avoid_one(own, normal, bound, law.composition) if law.intervention_on_top else own
+        return avoid_one(own, normal, bound, composition)
+    below = avoid_one(own, normal, bound, composition) if law.intervention_on_top else own
     task = below.copy()  # (20): v_int + (I - J_int^+ J_int) v, with v_int of (14)
     for b in range(3):
-        wish = mobility[b] * (asked.rate[b] + law.intervention_gain * (asked.wanted[b] - position[b]))
+        wish = ugv.mobility[b] * (asked.rate[b] + law.intervention_gain * (asked.wanted[b] - ugv.position[b]))
         for a in range(3):
             task[a] += asked.chosen[a, b] * (wish - below[b])
     for a in range(3):
-        task[a] *= mobility[a]
-    if not np.isfinite(task).all():  # the planner sends no such thing; nothing to follow then
+        task[a] *= ugv.mobility[a]
+    if not np.isfinite(task).all():  # the planner never sends such numbers
         task = below
-    limit_one(task, max_speed)
-    return task if law.intervention_on_top else avoid_one(task, normal, bound, law.composition)
+    limit_one(task, ugv.max_speed)
+    return task if law.intervention_on_top else avoid_one(task, normal, bound, composition)
 
 
 @njit(cache=True)
@@ -188,26 +169,15 @@ def _commands(
     rate: Array,
     executing: npt.NDArray[np.bool_],
 ) -> Array:
-    """`command` for n UGVs, (n, 3), m/s: the fields of `Numbers`, `Neighbours` and `Intervention`, then arrays.
-
-    They come one by one because numba takes 1.5 us to unpack a named tuple and 0.04 us for an array.
-    """
-    law = Numbers(
-        motion_gain, intervention_gain, intervention_on_top, avoidance_gain, period, sensing_range, composition
-    )
-    near = Neighbours(members, others, still, distance, share, mobility, max_speed)
-    asked = Intervention(wanted, wanted_rate, chosen)
-    velocity, centre = np.empty(target.shape), gather(positions, near.still, near.others)
+    """`command` for n UGVs, (n, 3), m/s: the fields of `Numbers`, `Neighbours` and `Intervention`, then arrays."""
+    # one by one, because numba takes 1.5 us to unpack a named tuple that Python passes, and 0.04 us for an array
+    layer = Layer(avoidance_gain, period, sensing_range, composition)
+    law = Numbers(motion_gain, intervention_gain, intervention_on_top, layer)
+    velocity, centre = np.empty(target.shape), gather(positions, still, others)
     normal, bound = np.empty(centre.shape[1:]), np.empty(centre.shape[1])
     for i in range(len(target)):
-        position = positions[near.members[i]]
-        fill_half_spaces(
-            position, centre[i], near.distance[i], near.share[i], law.avoidance_gain, law.period, near.mobility[i],
-            law.sensing_range, normal, bound,
-        )  # fmt: skip
-        velocity[i] = command(
-            law, position, target[i], rate[i], executing[i],
-            Intervention(asked.wanted[i], asked.rate[i], asked.chosen[i]), normal, bound, near.mobility[i],
-            near.max_speed[i],
-        )  # fmt: skip
+        ugv = Ugv(positions[members[i]], mobility[i], max_speed[i])
+        fill_half_spaces(ugv.position, ugv.mobility, Points(centre[i], distance[i], share[i]), layer, normal, bound)
+        asked = Intervention(wanted[i], wanted_rate[i], chosen[i])
+        velocity[i] = command(law, ugv, Tracking(target[i], rate[i]), asked, executing[i], normal, bound)
     return velocity

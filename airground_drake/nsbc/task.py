@@ -42,10 +42,6 @@ class Task(abc.ABC):
     def desired(self) -> tuple[Array, Array]:
         """Desired value sigma_d and its rate, each (n, m) or broadcastable to it."""
 
-    def error(self, position: Array) -> Array:
-        """Task error sigma_d - sigma, (n, m)."""
-        return self.desired()[0] - self.value(position)
-
     def velocity(self, position: Array) -> Array:
         """Task velocity v_d = J^+ (sigma_d_dot + gain * (sigma_d - sigma)), eq (4): (n, 3) in m/s."""
         wanted, rate = self.desired()

@@ -2,7 +2,6 @@
 
 The UAV's controller runs the task it is given, by default `FormationTask`. The UGVs' law is compiled: it has
 `DistanceTask` as inequalities (`avoidance.py`), and `PositionTask` and the intervention (14) in closed form (`law.py`).
-Tests hold it against the tasks.
 """
 
 from __future__ import annotations
@@ -79,8 +78,8 @@ class DistanceTask(Task):
 class FormationTask(PositionTask):
     """Stay over the centroid of the UGVs, eqs (9)-(10), at a set altitude (gain C).
 
-    Equation (9) makes the centroid of the UGVs the task value, which the UAV cannot move; what it can do,
-    and what we build, is hold its own position at that centroid, raised by the altitude.
+    Equation (9) makes the centroid of the UGVs the task value, which the UAV cannot move. Here the UAV holds its own
+    position at that centroid, raised by the altitude.
     """
 
     def __init__(self, ugv_positions: Array, ugv_velocities: Array, altitude: float, gain: float) -> None:
@@ -91,5 +90,5 @@ class FormationTask(PositionTask):
 
 @cache
 def _share(count: int) -> Array:
-    """What each of `count` robots has in their centroid, (1, count)."""
+    """Weight of each of `count` robots in their centroid, (1, count)."""
     return read_only(np.full((1, count), 1.0 / count))

@@ -1,4 +1,4 @@
-"""The folder `proofs` of a report against its traces, without Coq: what was proved must be about the recorded runs."""
+"""Compare the folder `proofs` of a report with its traces, without Coq: the proofs must be about the recorded runs."""
 
 from __future__ import annotations
 
@@ -20,15 +20,15 @@ Broken = tuple[str, Any, Any]
 def broken_rules(folder: Path, traces: Mapping[str, Trace]) -> tuple[dict[str, Any], list[Broken]]:
     """Compare proofs.json and the Coq files with the traces of the report.
 
-    Whether every distance is kept is computed here in exact arithmetic, so no run can be called proved that is not
-    safe. Whether Coq has accepted a file is taken as recorded: `airground check --coq` asks it again.
+    The distances are computed here in exact arithmetic, so an unsafe run cannot be called proved. Whether Coq has
+    accepted a file is taken from the record: `airground check --coq` asks Coq again.
 
     Args:
         folder: `proofs` of the report.
         traces: of the report's runs, by name; in the folder `trace` beside `folder`.
 
     Returns:
-        proofs.json, and what is broken.
+        proofs.json, and the broken rules.
 
     Raises:
         KeyError, TypeError, ValueError, AttributeError: if proofs.json is not what `airground prove` writes.

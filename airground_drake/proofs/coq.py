@@ -1,4 +1,4 @@
-"""Runs the proof checker Coq: compiles theories, asks for the axioms of a theorem, has `coqchk` check it all again."""
+"""Run the proof checker Coq: compile theories, list the axioms of theorems, check compiled files with `coqchk`."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ UNSOUND = re.compile(
     r"\b(Admitted|admit|give_up|Axioms?|Parameters?|Conjecture|Declare\s+ML\s+Module|bypass_check|Unset\s+\w+\s+Checking"
     r"|Type\s+In\s+Type|Load|Extract\s+\w+|Drop)\b"
 )
-"""Words by which a file could assume what it should prove, or turn off Coq's own checks."""
+"""Words with which a file could assume what it should prove, or turn off Coq's own checks."""
 
 
 class CoqError(AirgroundError):
@@ -129,7 +129,7 @@ def axioms_of(theorems: Sequence[str], folder: Path, limit_s: float = LIMIT_S) -
 
 
 def listed(theorem: str, answer: str) -> list[str]:
-    """The axioms in an answer of `Print Assumptions`: each begins a line, and what follows is indented.
+    """The axioms in an answer of `Print Assumptions`: each begins a line, and its type is indented.
 
     Raises:
         CoqError: if one is outside ALLOWED_AXIOMS.
@@ -144,7 +144,7 @@ def listed(theorem: str, answer: str) -> list[str]:
 
 
 def check_again(modules: Sequence[str], folder: Path, limit_s: float = LIMIT_S) -> None:
-    """Have `coqchk` check compiled files once more, with everything that they require.
+    """Have `coqchk` check compiled files and everything that they require.
 
     Raises:
         CoqError: if it does not accept them, or finds an axiom outside ALLOWED_AXIOMS or a check turned off.

@@ -65,7 +65,7 @@ class Recorded:
 
 
 def recorded(trace: Trace) -> Recorded:
-    """A run as recorded, positions rounded to 1/PARTS m; nothing else is rounded.
+    """A run with its positions rounded to 1/PARTS m; nothing else is rounded.
 
     Raises:
         TraceError: if a column is missing or not finite.
@@ -102,7 +102,7 @@ def _rounded(place: Sequence[float]) -> Place:
 
 
 def _spelled(names: list[str]) -> dict[str, str]:
-    """Names for Coq: as they are, where that is an identifier that nothing else can have; else by number."""
+    """Names for Coq: as they are if that is a free identifier, else by number."""
     plain = re.compile(r"(?!run_|body_number_)(?!\w*(_and_|_places\b))[A-Za-z]\w*", re.ASCII)
     return {
         name: name if plain.fullmatch(name) and name not in _taken() else f"body_number_{k}"

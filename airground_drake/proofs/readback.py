@@ -1,7 +1,7 @@
 """Reads an exported Coq file back and compares it with the run.
 
-Coq cannot see whether the numbers in the file are the recorded ones. Patterns of this module take the file apart. Of
-the exporter only `demands` is used: who keeps which distance from whom.
+Coq cannot see whether the numbers in the file are the recorded ones. This module takes the file apart by its own
+patterns. From the exporter it uses only `demands`: who keeps which distance from whom.
 """
 
 from __future__ import annotations

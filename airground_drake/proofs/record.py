@@ -43,12 +43,12 @@ class Standing:
 
 
 def standing(*names: str, folder: Path = FOLDER) -> Standing:
-    """Whether the named theorems (all, if none is named) count as proved: no Coq is needed.
+    """Whether the named theorems (default: all) count as proved. Coq is not needed.
 
     The SHA-256 of each file that they rest on is compared with the record of the last check.
 
     Raises:
-        ValueError: if there is no theorem of a name; lists those that there are.
+        ValueError: if a name is unknown; lists the known ones.
     """
     unknown = [name for name in names if name not in THEOREMS]
     if unknown:
@@ -105,28 +105,19 @@ def digest(file: Path) -> str:
 
 
 def closure(names: Iterable[str], folder: Path = FOLDER) -> list[str]:
-    """Theories and those that they require, directly or not, in an order in which Coq can compile them.
+    """Theories and everything that they require, in an order in which Coq can compile them.
 
     Raises:
         OSError: if one cannot be read.
     """
     order: list[str] = []
-    seen: set[str] = set()
-
-    def visit(name: str) -> None:
-        if name not in seen:
-            seen.add(name)
-            for other in required(folder / name):
-                visit(other)
-            order.append(name)
-
     for name in names:
-        visit(name)
+        order += [each for each in (*closure(required(folder / name), folder), name) if each not in order]
     return order
 
 
 def required(file: Path) -> list[str]:
-    """The theories beside a file that it requires.
+    """The theories in the same folder that a file requires.
 
     Raises:
         OSError: if it cannot be read.

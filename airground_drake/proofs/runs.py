@@ -13,7 +13,7 @@ from typing import Any
 from airground_drake.base import files
 from airground_drake.base.errors import TraceError, UnknownNameError, one_line
 from airground_drake.proofs import coq, readback
-from airground_drake.proofs.export import Demand, Recorded, distances_file, law_file, recorded
+from airground_drake.proofs.export import Demand, Recorded, demands, distances_file, law_file, recorded
 from airground_drake.proofs.record import FOLDER, digest
 from airground_drake.proofs.too_near import TooNear, too_near
 from airground_drake.run import trace
@@ -25,22 +25,22 @@ PLACE = "proofs"
 FOUND = "proofs.json"
 """File in that folder with the results."""
 COMPUTED = "is expected to have type"
-"""In Coq's complaint where a checker has computed `false`, and the proof says `true`."""
+"""Part of Coq's message if a checker has computed `false` where the proof says `true`."""
 CHECKERS = ("DistanceChecker.v", "LawChecker.v")
 
 
 @dataclass(frozen=True)
 class Answer:
-    """What Coq says to one theorem.
+    """Coq's answer about one theorem.
 
     Attributes:
         proved: whether it accepts it.
         theorem: its name.
-        file: it is in.
-        why: if it is not proved, in words.
+        file: its file.
+        why: the reason if it is not proved.
         refused: the first pair that Coq refuses.
-        too_near: pairs that do not keep their distance, where that is why.
-        axioms: on which the proof rests.
+        too_near: pairs that do not keep their distance.
+        axioms: of the proof.
         seconds: how long Coq took, s.
     """
 
@@ -96,7 +96,7 @@ class Workshop:
 
 @contextmanager
 def workshop(limit_s: float = coq.LIMIT_S) -> Iterator[Workshop]:
-    """Compile what the files of runs require, in a folder that is removed in the end.
+    """Compile the theories that the files of runs require, in a temporary folder.
 
     Raises:
         CoqError: if a theory is not accepted.
@@ -109,9 +109,9 @@ def workshop(limit_s: float = coq.LIMIT_S) -> Iterator[Workshop]:
 
 
 def prove(place: Workshop, run: Trace, limit_s: float = coq.LIMIT_S) -> tuple[Answer, Answer, readback.Rounding]:
-    """Have Coq decide whether a run keeps its distances, and if so, whether it obeys the law.
+    """Have Coq decide whether a run keeps its distances and, if it does, whether it obeys the law.
 
-    The files are left in the workshop.
+    The exported files stay in the workshop.
 
     Raises:
         ReadbackError: if the exported file differs from the trace.
@@ -151,22 +151,22 @@ def _pair(demand: Demand) -> str:
 
 
 def _about(run: Recorded, text: str, line: int) -> Demand | None:
-    """The pair whose lemma has a line of an exported file."""
+    """The pair whose lemma is at a line of an exported file."""
     before = "\n".join(text.splitlines()[:line])
     lemma = before.rpartition("\nLemma ")[2].partition(" ")[0].removesuffix("_obey")
     return next((demand for demand in run.demands if demand.lemma == lemma), None)
 
 
 def prove_report(report: Path, names: Sequence[str] = (), limit_s: float = coq.LIMIT_S) -> Iterator[Proved]:
-    """Prove the runs of a report, one after the other; what was found is written into its folder `proofs` in the end.
+    """Prove the runs of a report, one after the other, and write the results to its folder `proofs`.
 
     Args:
         report: its folder.
-        names: of the runs; all, if none is named.
+        names: of the runs; default: all.
         limit_s: wall-clock time for one call of Coq, s.
 
     Raises:
-        UnknownNameError: if there is no run of a name.
+        UnknownNameError: if the report has no run with a name in `names`.
         TraceError: if a trace cannot be read.
         CoqError: if a theory is not accepted.
         NoCoqError: if Coq is not installed.
@@ -192,7 +192,7 @@ def prove_report(report: Path, names: Sequence[str] = (), limit_s: float = coq.L
                     files.write_bytes(report / PLACE / answer.file, (place.folder / answer.file).read_bytes())
             meta = digest(report / "trace" / name / "meta.json")
             found.append(
-                Proved(name, expects_kept(run), len(recorded(run).demands), len(run.t), distances, law, rounded, meta)
+                Proved(name, expects_kept(run), len(demands(run.scenario)), len(run.t), distances, law, rounded, meta)
             )
             yield found[-1]
         files.write_json(report / PLACE / FOUND, document(place, found))

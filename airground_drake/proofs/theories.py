@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -34,12 +33,12 @@ class Checked:
 
     @property
     def record(self) -> dict[str, Any]:
-        """What is kept of it."""
+        """The content of the record."""
         return {"coq": self.coq, "sha256": self.sha256, "axioms": self.axioms}
 
 
 def check(source: Path = FOLDER, limit_s: float = coq.LIMIT_S) -> Checked:
-    """Compile all theories, ask for the axioms of all theorems, and have `coqchk` check it again.
+    """Compile all theories, list the axioms of all theorems, and have `coqchk` check everything again.
 
     Raises:
         CoqError: if something is not accepted.
@@ -59,19 +58,16 @@ def check(source: Path = FOLDER, limit_s: float = coq.LIMIT_S) -> Checked:
 
 
 def differences(found: Checked, source: Path = FOLDER) -> list[str]:
-    """In what the record differs, a line each; empty if it agrees. Another version of Coq is no difference."""
+    """Differences from the record, a line each. Another version of Coq does not count."""
     record = read_record(source)
     if record is None:
         return [f"{RECORD} cannot be read"]
     return [
         f"{name} differs from its record"
         for part, now in (("sha256", found.sha256), ("axioms", found.axioms))
-        for name in _differing(record[part], now)
+        for name in sorted({*record[part], *now})
+        if record[part].get(name) != now.get(name)
     ]
-
-
-def _differing(before: Mapping[str, Any], now: Mapping[str, Any]) -> list[str]:
-    return sorted(name for name in {*before, *now} if before.get(name) != now.get(name))
 
 
 def write_record(found: Checked, source: Path = FOLDER) -> Path:

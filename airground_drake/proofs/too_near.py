@@ -12,7 +12,7 @@ import numpy as np
 from airground_drake.proofs.export import Demand, Place, Recorded
 
 SCREEN_M = 1e-6
-"""Floating-point distances are this wrong at most, m; only steps that come nearer than that are computed exactly."""
+"""Largest error of floating-point distances, m; steps that come near by less are computed exactly."""
 
 
 @dataclass(frozen=True)

@@ -1,1 +1,1 @@
-"""Replay of saved runs: what is where at each moment (`scene`), as a page (`page`) or a video (`video`)."""
+"""Replay of a saved run: its `scene`, shown as a `page` or a `video`."""

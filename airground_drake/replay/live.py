@@ -12,10 +12,10 @@ from airground_drake.base.errors import AirgroundError
 
 
 def serve(runs: Sequence[str], page: Callable[[str], str]) -> None:
-    """Serve the pages of runs until the process is interrupted; says where.
+    """Serve the pages of runs until the process is interrupted, and print the address.
 
     Raises:
-        OSError: if there is no port.
+        OSError: if no port is available.
     """
     with server(runs, page) as running:
         print(f"http://localhost:{running.server_port}/  (Ctrl-C ends it)", flush=True)
@@ -23,7 +23,7 @@ def serve(runs: Sequence[str], page: Callable[[str], str]) -> None:
 
 
 def server(runs: Sequence[str], page: Callable[[str], str]) -> ThreadingHTTPServer:
-    """A server on this machine's own address, at a free port: each page under its run's name, made when asked for."""
+    """A server at a free port of this machine; each page has its run's name and is made on its first request."""
     made = cache(page)
     index = "".join(f'<li><a href="/{quote(name)}">{html.escape(name)}</a></li>' for name in runs)
 

@@ -32,7 +32,7 @@ def page(scene: Scene) -> str:
     """The page of a run.
 
     Raises:
-        ReplayError: if there is no port for Meshcat, or its page is not as expected.
+        ReplayError: if no port is available for Meshcat, or its page is not as expected.
     """
     html = str(recorded(scene).StaticHtml())
     if html.count("</body>") != 1 or "<head>" not in html:
@@ -48,7 +48,7 @@ _POLICY = (
     "default-src 'none'; style-src 'unsafe-inline'; img-src data: blob:; connect-src data:; worker-src blob:; "
     "base-uri 'none'; form-action 'none'; script-src"
 )
-"""Nothing from a network, and no script but those of the page; Meshcat makes its styles and its buffers as it runs."""
+"""No network, and no scripts but those of the page; Meshcat makes its styles and its buffers as it runs."""
 
 
 _LOOKS = {
@@ -61,7 +61,7 @@ _LOOKS = {
 
 
 def _data(scene: Scene) -> dict[str, Any]:
-    """What the page's script reads: the names to show, and where in Meshcat's tree they belong."""
+    """Data for the page's script: the names to show, and their places in Meshcat's tree."""
     return {
         "title": f"{scene.scenario}, run {scene.run}",
         "end_s": float(scene.times_s[-1]),

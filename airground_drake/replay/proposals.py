@@ -1,4 +1,4 @@
-"""What became of each proposal of a run, and from when to when: from the trace alone."""
+"""The state of each proposal of a run over time, from the trace."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from airground_drake.run.trace import Trace
 Outcome = Literal["asked", "accepted", "refused"]
 
 LINGER_S = 1.0
-"""How long a refused or unanswered proposal is still shown."""
+"""Time for which a refused or unanswered proposal is shown, s."""
 
 _ANSWERS: dict[str, Outcome] = {"accept": "accepted", "refuse": "refused"}
 
 
 class Span(NamedTuple):
-    """A stretch of time, s, in which a proposal stands as it does."""
+    """A time interval, s, in which a proposal has one outcome."""
 
     start_s: float
     end_s: float
@@ -27,7 +27,7 @@ class Span(NamedTuple):
 
 
 class Sent(NamedTuple):
-    """A proposal: for which UGV, by which policy, the corners of its motion (M, 3), m, and how it stood when."""
+    """A proposal: its UGV, its policy, the corners of its motion (M, 3), m, and its outcomes over time."""
 
     robot: str
     policy: str
@@ -38,8 +38,8 @@ class Sent(NamedTuple):
 def sent(trace: Trace) -> tuple[Sent, ...]:
     """All proposals of a run, in the order of the trace.
 
-    Where a gatekeeper decides, a proposal stands as decided last, up to the last decision on it. Without one (method
-    (b)) it is accepted while the UGV carries out an intervention. The next proposal to the same UGV takes its place.
+    A gatekeeper's latest decision on a proposal counts, up to its last one. Without a gatekeeper (method (b)), a
+    proposal is accepted while the UGV executes it. The next proposal to the same UGV replaces it.
     """
     return tuple(
         Sent(str(row["robot"]), str(row["policy"]), np.reshape(row["positions_m"], (-1, 3)), tuple(_spans(trace, row)))
@@ -60,7 +60,7 @@ def _spans(trace: Trace, row: Mapping[Any, Any]) -> Iterator[Span]:
 
 
 def _answers(trace: Trace, row: Mapping[Any, Any], until: float) -> tuple[list[tuple[float, Outcome]], float]:
-    """From when on a proposal stood how, and the last time that anything is known of it, s."""
+    """Times, s, at which the outcome of a proposal changed, with the new outcome; and the last time known, s."""
     robot, issued = row["robot"], float(row["issued_s"])
     changes: list[tuple[float, Outcome]] = [(issued, "asked")]
     decided = trace.decisions[trace.decisions["number"] == row["number"]]

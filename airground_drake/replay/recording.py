@@ -16,14 +16,14 @@ from airground_drake.view.looks import OUTCOME_COLORS, PATH_COLOR
 from airground_drake.view.stage import STATES
 
 STRAIGHT_M = 1e-9
-"""A frame is left out if it is so close to the middle of its neighbours: over an hour that adds up to millimetres."""
+"""A frame so close to the middle of its neighbours is left out: over an hour, the errors add up to millimetres."""
 
 
 def recorded(scene: Scene) -> Meshcat:
     """A Meshcat with the scene and its recording.
 
     Raises:
-        ReplayError: if there is no port that it may listen on.
+        ReplayError: if no port is available.
     """
     meshcat = served()
     draw(meshcat, scene)
@@ -43,7 +43,7 @@ def recorded(scene: Scene) -> Meshcat:
 
 
 def _proposal(meshcat: Meshcat, animation: MeshcatAnimation, scene: Scene, proposal: Sent, k: int) -> None:
-    """A band on the ground while the proposal stands: in full once accepted, else dashed."""
+    """A band on the ground while the proposal is open or executed: solid once accepted, else dashed."""
     width = 0.35 * scene.mark_m
     height = scene.mark_m * (0.05 + 0.2 * k / len(scene.proposals))  # no two in the same plane
     for outcome in {span.outcome: None for span in proposal.spans}:
@@ -61,7 +61,7 @@ def _proposal(meshcat: Meshcat, animation: MeshcatAnimation, scene: Scene, propo
 
 
 def _move(meshcat: Meshcat, animation: MeshcatAnimation, path: str, positions: Array) -> None:
-    """Keyframes where the motion is not as between its neighbours."""
+    """Keyframes where the motion bends."""
     bent = np.abs(np.diff(positions, n=2, axis=0)).max(axis=1, initial=0.0) > STRAIGHT_M
     for k in np.flatnonzero(np.concatenate([[True], bent, [True]])[: len(positions)]):
         animation.SetTransform(int(k), path, RigidTransform(positions[k]))
@@ -69,7 +69,7 @@ def _move(meshcat: Meshcat, animation: MeshcatAnimation, path: str, positions: A
 
 
 def _show(meshcat: Meshcat, animation: MeshcatAnimation, path: str, shown: npt.NDArray[np.bool_]) -> None:
-    """Keyframes where a body comes and goes."""
+    """Keyframes where a body appears or disappears."""
     for k in np.flatnonzero(np.append(True, shown[1:] != shown[:-1])):
         animation.SetProperty(int(k), path, "visible", bool(shown[k]))
     meshcat.SetProperty(path, "visible", bool(shown[0]))

@@ -1,4 +1,4 @@
-"""What there is in a run, and where and in which state at each frame: all that a replay shows, from the trace alone."""
+"""All that a replay shows: positions and states of the robots at each frame, proposals and events, from the trace."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from airground_drake.registry import method_of
 from airground_drake.replay.proposals import Sent, sent
 from airground_drake.run.trace import Trace
 from airground_drake.scenarios.schema import Scenario
-from airground_drake.view.stage import Robot, Stage, stage, states
+from airground_drake.view.stage import Robot, Stage, stage_of, states
 
 FRAMES_PER_S = 30
 """Frames in a second of simulated time."""
 
 MAX_NAMED_OBSTACLES = 8
-"""If there are more obstacles, their names are not shown."""
+"""With more obstacles, names are not shown."""
 
 
 @dataclass(frozen=True)
@@ -49,14 +49,14 @@ def scene(trace: Trace, scenario: Scenario) -> Scene:
 
     Args:
         trace: the run.
-        scenario: what was simulated; that of the trace.
+        scenario: of the trace.
 
     Raises:
         TraceError: if the trace lacks a column or holds numbers that are not finite.
-        UnknownNameError: if its metadata name a method that there is not.
+        UnknownNameError: if its metadata name an unknown method.
     """
     times = frame_times(trace.t)
-    still = stage(scenario, np.concatenate([trace.position(robot) for robot in trace.robots]))
+    still = stage_of(trace, scenario)
     bodies = tuple(
         Body(
             **vars(robot),
@@ -78,5 +78,5 @@ def scene(trace: Trace, scenario: Scenario) -> Scene:
 
 
 def frame_times(t: Array) -> Array:
-    """Times of the frames, (F,), s, of a run with rows at times (T,): from 0 on, and the end."""
+    """Times of the frames, (F,), s, from 0 to the end of a run with rows at times (T,), s."""
     return np.minimum(np.arange(np.ceil(t[-1] * FRAMES_PER_S - 1e-6) + 1) / FRAMES_PER_S, t[-1])

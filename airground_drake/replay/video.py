@@ -18,7 +18,6 @@ from airground_drake.replay.proposals import Sent
 from airground_drake.replay.scene import MAX_NAMED_OBSTACLES, Body, Scene
 from airground_drake.report.figures import canvas
 from airground_drake.view.looks import (
-    OBSTACLE_COLOR,
     OUTCOME_COLORS,
     PATH_COLOR,
     SAFE_COLOR,
@@ -32,21 +31,21 @@ from airground_drake.view.stage import Pillar
 PICTURES_PER_S = 15
 """Pictures in a second of the video."""
 MOST_PICTURES = 600
-"""In a video: an encoder of WebP wants them all at once, 1.6 MB each."""
+"""Pictures of a video at most: the encoder of WebP keeps all in memory, 1.6 MB each."""
 WIDTH_PX, DPI, MOST_PX = 640, 100, 1000
 SUFFIXES = (".webp", ".mp4")
 
 _BOX = {"facecolor": "white", "edgecolor": "none", "alpha": 0.7, "pad": 1.0}
 
 Update = Callable[[int], None]
-"""Brings a part of the picture to a frame of the scene, by its index."""
+"""Sets a part of the picture to a frame of the scene, by its index."""
 
 
 def write(scene: Scene, path: Path, speed: float) -> None:
-    """Write the video of a run, `speed` times as fast as it was.
+    """Write the video of a run, `speed` times as fast as the run.
 
     Raises:
-        ReplayError: if there is no encoder for files of this name, or the video would be too long.
+        ReplayError: if no encoder is available for this suffix, or the video would be too long.
         OSError: if it cannot be written.
     """
     shown = np.arange(0.0, scene.times_s[-1], speed / PICTURES_PER_S)
@@ -56,13 +55,12 @@ def write(scene: Scene, path: Path, speed: float) -> None:
     frames = [*np.searchsorted(scene.times_s, shown - 1e-9), len(scene.times_s) - 1]
     with canvas.style(), files.temporary_folder() as folder:
         encoder = _encoder(path)
-        figure, updates = _picture(scene)
+        figure, update = _picture(scene)
         part = folder / f"video{path.suffix}"
         try:
             with encoder.saving(figure, str(part), DPI):
                 for frame in frames:
-                    for update in updates:
-                        update(int(frame))
+                    update(int(frame))
                     encoder.grab_frame()
         except (ValueError, OSError, CalledProcessError) as error:  # Pillow without WebP, ffmpeg without H.264
             raise ReplayError(f"{path}: no encoder here for {path.suffix}: {error}") from error
@@ -80,8 +78,8 @@ def _encoder(path: Path) -> AbstractMovieWriter:
     return FFMpegWriter(fps=PICTURES_PER_S, extra_args=["-pix_fmt", "yuv420p"])
 
 
-def _picture(scene: Scene) -> tuple[Figure, list[Update]]:
-    """The picture before anything has moved, and what moves it."""
+def _picture(scene: Scene) -> tuple[Figure, Update]:
+    """The picture of a scene, without a frame yet."""
     low, high = scene.low_m[:2] - 3.0 * scene.mark_m, scene.high_m[:2] + 3.0 * scene.mark_m
     width, height = high - low
     scale = min(WIDTH_PX / width, MOST_PX / height)
@@ -97,14 +95,19 @@ def _picture(scene: Scene) -> tuple[Figure, list[Update]]:
     updates += [_robot(axes, body) for body in scene.robots]
     figure.text(8.0 / size[0], 1.0 - 10.0 / size[1], f"{scene.scenario}, run {scene.run}: {scene.says}", va="top")
     clock = figure.text(8.0 / size[0], 1.0 - 30.0 / size[1], "", va="top", fontweight="bold")
-    updates.append(lambda frame: clock.set_text(f"{scene.times_s[frame]:.2f} s"))
-    return figure, updates
+
+    def update(frame: int) -> None:
+        clock.set_text(f"{scene.times_s[frame]:.2f} s")
+        for part in updates:
+            part(frame)
+
+    return figure, update
 
 
 def _pillar(axes: Axes, obstacle: Pillar, *, named: bool) -> None:
     place = (float(obstacle.centre_m[0]), float(obstacle.centre_m[1]))
     axes.add_patch(Circle(place, obstacle.safe_m, facecolor=f"{SAFE_COLOR}22", edgecolor=SAFE_COLOR, linewidth=0.8))
-    axes.add_patch(Circle(place, obstacle.radius_m, color=OBSTACLE_COLOR if obstacle.known_to_uav else UNSEEN_COLOR))
+    axes.add_patch(Circle(place, obstacle.radius_m, color=obstacle.color))
     if named:
         offset = (0.0, -4.0)
         axes.annotate(obstacle.name, (place[0], place[1] - obstacle.radius_m), offset, textcoords="offset points",

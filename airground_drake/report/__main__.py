@@ -24,7 +24,7 @@ from airground_drake.base.errors import (
     one_line,
 )
 from airground_drake.base.progress import progress_bar
-from airground_drake.base.usage import EXIT_TOOL, Parser, formats_of, overridable, positive, refuse
+from airground_drake.base.usage import EXIT_TOOL, Parser, formats_of, output_folder, overridable, positive, refuse
 from airground_drake.report import folder
 from airground_drake.scenarios import plugins
 from airground_drake.scenarios.estimate import DEFAULT_LIMITS, GIB, Limits
@@ -107,7 +107,9 @@ def parser() -> argparse.ArgumentParser:
         "130 interrupted (SIGINT), 143 terminated (SIGTERM)",
     )
     parser.add_argument("scenario", nargs="?", help="name of a shipped scenario, path to a YAML file, or audit")
-    parser.add_argument("-o", "--output", type=Path, metavar="DIR", help=f"default: reports/<scenario>; {folder.RULE}")
+    parser.add_argument(
+        "-o", "--output", type=output_folder, metavar="DIR", help=f"default: reports/<scenario>; {folder.RULE}"
+    )
     parser.add_argument(
         "--format", type=formats_of(FORMATS), default=FORMATS, help="comma-separated: html,json,junit (default: all)"
     )

@@ -72,7 +72,7 @@ def write(
     if "junit" in formats:
         pages[PAGES["junit"]] = junit.render(report)
     if "html" in formats:
-        pages[PAGES["html"]] = page(report, judged.figures, traces, pages["diagram.svg"])
+        pages[PAGES["html"]] = page(report, judged.figures, pages["diagram.svg"])
     folder.clear(output)
     written = [*pages]
     for name, of_run in traces.items():

@@ -1,4 +1,4 @@
-"""What needs attention in a report: one line each, with the moment that shows it."""
+"""What needs attention in a report, each in one line."""
 
 from __future__ import annotations
 
@@ -25,8 +25,6 @@ class Item(NamedTuple):
         claim: the claim that it is about, '' if none.
         run: in which run, '' if none.
         about: what was expected, in words.
-        bodies: robots and obstacles that it is about.
-        t_s: when, s; None: no single moment.
         anchor: where in the page there is more about it.
     """
 
@@ -35,8 +33,6 @@ class Item(NamedTuple):
     claim: str = ""
     run: str = ""
     about: str = ""
-    bodies: tuple[str, ...] = ()
-    t_s: float | None = None
     anchor: str = "claims"
 
 
@@ -58,11 +54,8 @@ def items(document: Mapping[str, Any]) -> list[Item]:
 def _of_claim(claim: Mapping[str, Any], run: Mapping[str, Any]) -> Item:
     place = {**claim["where"], **(claim["counterexample"] or {})}
     bodies = tuple(dict.fromkeys(str(place[name]) for name in _NAMES if isinstance(place.get(name), str)))
-    t_s = place.get("t_s")
-    at_the_end = "condition" in place and run
     words = _words(claim, place, bodies)
-    if at_the_end and bodies:
-        t_s = run["metrics"]["duration_s"]
+    if "condition" in place and run and bodies:
         words += _refused(run, bodies[0])
     return Item(
         outcome(claim["status"], claim["exercised"]),
@@ -70,8 +63,6 @@ def _of_claim(claim: Mapping[str, Any], run: Mapping[str, Any]) -> Item:
         claim["id"],
         claim["run"],
         about=f"expected: {str(claim['expected']).replace('_', ' ')}",
-        bodies=bodies,
-        t_s=t_s if isinstance(t_s, float | int) else None,
         anchor=f"claim-{claim['id']}",
     )
 

@@ -56,7 +56,7 @@ SECTIONS = {
     "provenance": "How to run it again",
 }
 """Sections of the page, in order, by their identifiers; an empty section is left out."""
-PLACES = {"distances": "safe", **dict.fromkeys(("decision", "events", "gaps", "threshold-choice"), "intervened")}
+PLACES = {"distances": "safe", **dict.fromkeys(("decision", "events", "threshold-choice"), "intervened")}
 """Sections of the figures; the others are maps of what happened."""
 LOOKS = {"yes": "good", "partly": "tuned", "no": "bad", "open": "open", "none": "idle"}
 """Class of each mark of the first screen, which sets its colour: never by colour alone."""

@@ -7,24 +7,20 @@ from dataclasses import replace
 from typing import Any
 
 from airground_drake.report import html
-from airground_drake.report.figures import moments, threshold, zeno_refine
+from airground_drake.report.figures import threshold, zeno_refine
 from airground_drake.report.figures.findings import draw as draw_findings
 from airground_drake.report.figures.panels import Figure
-from airground_drake.run.trace import Trace
 
 BESIDE = 9
 """Finding about the paper beside which the figure of ZENO-REFINE is shown, if it is in the report."""
 
 
-def page(
-    report: Mapping[str, Any], figures: Sequence[Figure], traces: Mapping[str, Trace], diagram_svg: str | None
-) -> str:
+def page(report: Mapping[str, Any], figures: Sequence[Figure], diagram_svg: str | None) -> str:
     """The page.
 
     Args:
         report: report.json, as built by `document.build`.
         figures: of the runs, see `figures.draw`.
-        traces: of the runs, by name.
         diagram_svg: the drawing of the block diagram.
     """
     model = {claim["id"]: claim for claim in report["claims"] if not claim["run"]}
@@ -35,5 +31,4 @@ def page(
     if "THR-CHOICE" in model:
         chosen = threshold.draw(model["THR-CHOICE"]["inputs"], model["THR-CHOICE"]["evidence"])
         plates += [chosen] if chosen else []
-    plates += [*moments.draw(report, traces), *draw_findings(report["audit"])]
-    return html.render(report, plates, diagram_svg)
+    return html.render(report, [*plates, *draw_findings(report["audit"])], diagram_svg)

@@ -19,31 +19,27 @@ from pathlib import Path
 from typing import Any
 
 WITHIN = 1e-8
-"""Numbers agree to this, relative to 1 plus their size: versions of numpy, scipy and solvers round differently."""
+"""Numbers agree to this times 1 plus their size: versions of numpy, scipy and solvers round differently."""
 WITHIN_PX = 0.02
 """Coordinates in drawings agree to this: they are rounded to 0.01."""
-OTHERWISE_CHECKED = ("provenance", "files")
+TAKEN_AS_RECORDED = ("provenance", "files")
 """Parts of report.json that do not follow from its traces: the clock, versions, and the digests of files."""
 
 _DRAWING = re.compile(r"(<svg\b.*?</svg>)", re.DOTALL)
 _TEXT = re.compile(r">\s*([^<>\s][^<>]*)<")
 _NUMBER = re.compile(r"(-?\d+(?:\.\d+)?)")
 Line = dict[str, Any]
-"""What is printed of a check: `claim`, `run`, `outcome`, `text`, and of a difference where it is and both values."""
+"""Keys `claim`, `run`, `outcome` and `text`; a difference has `rule`, `about`, `recorded` and `recomputed` besides."""
 Judge = Callable[[Any, Sequence[Any]], Sequence[Any]]
-"""From a scenario and its traces to verdicts, as `verify_all`."""
+"""From a scenario and its traces to verdicts, like `verify_all`."""
 
 
 def lines(folder: Path, judge: Judge | None = None) -> Iterator[Line]:
-    """Everything that report.json says, built again and compared: a line for each claim and each other part.
+    """Build report.json again and compare it: a line for each claim and each other part.
 
     Args:
         folder: of a report whose files are those that it names.
         judge: judges the claims; default: `verify_all`, without its cache.
-
-    Yields:
-        `claim` (or the name of the part), `run`, `outcome`, `text`, and of a difference `rule`, `about`, `recorded`
-        and `recomputed`.
 
     Raises:
         ScenarioError, TraceError, OSError: if a file cannot be used.
@@ -72,18 +68,18 @@ def lines(folder: Path, judge: Judge | None = None) -> Iterator[Line]:
     parts = [_with_note(line, other_code) for line in _parts(report, again, third_party)]
     yield from parts
     if any(line["outcome"] == "DISAGREES" for line in parts):
-        return  # pages show report.json, which is not what it should be
+        return  # pages that show a wrong report.json need no comparison
     try:
         for line in _pages(folder, report, scenario, traces):
             yield _with_note(line, other_code)
-    except Exception as error:  # parts of report.json that are taken as recorded may be anything
+    except Exception as error:  # the parts that are taken as recorded may have any content
         why = f"{type(error).__name__}: {error}"
         text = f"the pages cannot be made again: {_short(why)}"
         yield {"claim": "report.html", "run": "", "outcome": "cannot be checked", "text": text, "rule": "pages"}
 
 
 def _other_code(provenance: Any) -> str:
-    """That other code wrote the report, which may word or draw things otherwise; empty if it was this code."""
+    """A note if other code wrote the report: it may word or draw things otherwise; empty if this code wrote it."""
     from airground_drake.report.document import commit
 
     found = provenance if isinstance(provenance, dict) else {}
@@ -99,26 +95,22 @@ def _with_note(line: Line, note: str) -> Line:
 
 def _parts(report: Mapping[str, Any], again: Mapping[str, Any], third_party: Mapping[str, Any]) -> Iterator[Line]:
     """Each claim and each other part of report.json, compared with what was built again."""
-    recorded = {(entry["id"], entry["run"]): entry for entry in report["claims"]}
+    recorded = {(entry["id"], entry["run"]): entry | {"from_cache": False} for entry in report["claims"]}
     rebuilt = {(entry["id"], entry["run"]): entry for entry in again["claims"]}
-    for claim, run in recorded:
+    for claim, run in {**recorded, **rebuilt}:
         if claim in third_party:
             text = "a third-party claim: `airground verify --allow-plugins` judges it"
             yield {"claim": claim, "run": run, "outcome": "cannot be checked", "text": text, "rule": "own claims"}
         else:
-            entry = recorded[claim, run] | {"from_cache": False}
-            yield _compared(claim, run, entry, rebuilt.get((claim, run)))
-    for claim, run in [key for key in rebuilt if key not in recorded]:
-        yield _compared(claim, run, None, rebuilt[claim, run])
-    parts = [part for part in again if part not in ("claims", *OTHERWISE_CHECKED)]
-    for part in [*parts, *(key for key in report if key not in again)]:
-        if part == "overall" and third_party:
-            continue  # it counts verdicts that are not judged here; the checker derives it from all entries
-        yield _compared(part, "", report.get(part), again.get(part))
+            yield _compared(claim, run, recorded.get((claim, run)), rebuilt.get((claim, run)))
+    for part in {**again, **report}:
+        # with third-party claims, `overall` counts verdicts that are not judged here; the checker derives it
+        if part not in ("claims", *TAKEN_AS_RECORDED) and not (part == "overall" and third_party):
+            yield _compared(part, "", report.get(part), again.get(part))
 
 
 def _pages(folder: Path, report: Mapping[str, Any], scenario: Any, traces: Mapping[str, Any]) -> Iterator[Line]:
-    """Files that follow from report.json and the traces: the page, junit.xml, and what `airground prove` has added."""
+    """The files that follow from report.json and the traces: pages, and what `airground prove` has added."""
     from airground_drake.proofs.compare import broken_rules
     from airground_drake.report import junit, proved
     from airground_drake.report.figures.draw import draw
@@ -139,20 +131,16 @@ def _pages(folder: Path, report: Mapping[str, Any], scenario: Any, traces: Mappi
     if "junit.xml" in report["files"]:
         yield _same_text("junit.xml", folder, junit.render(made))
     if "report.html" in report["files"]:
-        text = page(made, draw(scenario, traces), traces, (folder / "diagram.svg").read_text(encoding="utf-8"))
+        text = page(made, draw(scenario, traces), (folder / "diagram.svg").read_text(encoding="utf-8"))
         text = text if found is None else proved.filled(text, found)
         drawn_by = report["provenance"]["packages"]["matplotlib"]
         yield _same_text("report.html", folder, text, other_drawings=drawn_by != version("matplotlib"))
 
 
 def _same_text(name: str, folder: Path, rebuilt: str, *, other_drawings: bool = False) -> Line:
-    """Compare a file with what it should be: exactly, but for drawings.
+    """Compare a file with the text that it should have: exactly, except for drawings.
 
-    Args:
-        name: of the file.
-        folder: of the report.
-        rebuilt: the text that it should have.
-        other_drawings: whether another version of matplotlib made the drawings: then only their texts are compared.
+    With `other_drawings`, another version of matplotlib made the drawings: then only their texts are compared.
     """
     recorded = (folder / name).read_text(encoding="utf-8")
     for k, (theirs, ours) in enumerate(zip_longest(_DRAWING.split(recorded), _DRAWING.split(rebuilt))):
@@ -167,15 +155,16 @@ def _same_text(name: str, folder: Path, rebuilt: str, *, other_drawings: bool = 
 
 def _is_same_drawing(theirs: str, ours: str, *, shapes: bool) -> bool:
     """Whether two drawings have the same texts and, with `shapes`, the same elements at the same places."""
-    if _TEXT.findall(theirs) != _TEXT.findall(ours) or not shapes:
-        return _TEXT.findall(theirs) == _TEXT.findall(ours)
+    if _TEXT.findall(theirs) != _TEXT.findall(ours):
+        return False
     one, other = _NUMBER.split(theirs), _NUMBER.split(ours)  # every second part is a number
     words = one[::2] == other[::2]
-    return words and all(abs(float(a) - float(b)) <= WITHIN_PX for a, b in zip(one[1::2], other[1::2], strict=True))
+    near = words and all(abs(float(a) - float(b)) <= WITHIN_PX for a, b in zip(one[1::2], other[1::2], strict=True))
+    return near or not shapes
 
 
 def _from_other_runs(report: Mapping[str, Any], scenario: Any, traces: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """Findings about the paper that rest on runs and computations beyond those of the report: as recorded."""
+    """The recorded findings about the paper that rest on other runs than those of the report."""
     from airground_drake.audit import of_runs
 
     here = {item["id"] for item in of_runs(scenario, traces)}
@@ -222,14 +211,6 @@ def _short(value: Any, most: int = 120) -> str:
     return text if len(text) <= most else f"{text[:most]}..."
 
 
-class _WithoutDrake:
-    """Refuses to import Drake."""
-
-    def find_spec(self, name: str, path: object = None, target: object = None) -> None:
-        if name.partition(".")[0] == "pydrake":
-            raise ImportError("claims are judged again without Drake")
-
-
 def main(arguments: Sequence[str]) -> int:
     """Print the lines of a report, one JSON object each.
 
@@ -253,5 +234,5 @@ def main(arguments: Sequence[str]) -> int:
 
 
 if __name__ == "__main__":
-    sys.meta_path.insert(0, _WithoutDrake())
+    sys.modules["pydrake"] = None  # type: ignore[assignment]  # claims are judged again without Drake
     sys.exit(main(sys.argv[1:]))

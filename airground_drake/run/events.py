@@ -1,4 +1,4 @@
-"""Events of a run, from its signals and decisions: trigger, release, proposal, accept, refuse, arrival, collision."""
+"""Events of a run: trigger, release, proposal, accept, refuse, arrival, collision."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from airground_drake.world.world import ROBOTS, Body
 
 
 def extract(trace: Trace, sent: Iterable[tuple[str, float, str]]) -> list[dict[str, Any]]:
-    """All events of a run by time, from its signals and decisions.
+    """All events of a run in the order of time, from its signals and decisions.
 
     Args:
         trace: the run.
@@ -49,7 +49,7 @@ def extract(trace: Trace, sent: Iterable[tuple[str, float, str]]) -> list[dict[s
 
 
 def _add_arrival(trace: Trace, robot: str, add: Any) -> None:
-    """The time from which on the robot stays within the arrival tolerance of its target."""
+    """Add the time after which the robot stays within the arrival tolerance of its target."""
     scenario = trace.scenario
     away = np.linalg.norm(trace.position(robot) - np.array(scenario.robots[robot].target_m), axis=1)
     outside = np.flatnonzero(away > scenario.arrival_tolerance_m)
@@ -59,7 +59,7 @@ def _add_arrival(trace: Trace, robot: str, add: Any) -> None:
 
 
 def _add_collisions(trace: Trace, add: Any) -> None:
-    """Visits within collision distance, from surface to surface, of obstacles and of robots that are listed later."""
+    """Add each robot's visits within collision distance of obstacles and of robots later in the list."""
     world, collision_m = make_world(trace.scenario), trace.scenario.safe_distance.collision_m
     ways = [_way(trace, body) for body in world.bodies]
     low, high = (np.array(corners) for corners in zip(*map(_box, ways), strict=True))
@@ -75,7 +75,7 @@ def _add_collisions(trace: Trace, add: Any) -> None:
 
 
 def _way(trace: Trace, body: Body) -> Motion:
-    """Where a body is between the rows: (T - 1, 3), or (3,) if it never moves."""
+    """Motion of a body between the rows: (T - 1, 3), or (3,) if it never moves."""
     if body.plant is None:
         return Motion(body.start_m, body.start_m)
     position = trace.position(body.name)
@@ -83,17 +83,16 @@ def _way(trace: Trace, body: Body) -> Motion:
 
 
 def _box(way: Motion) -> tuple[Array, Array]:
-    """Two corners, (3,), m, of a box that holds a way."""
+    """Two opposite corners, (3,), m, of a box around a motion."""
     places = np.concatenate([way.start.reshape(-1, 3), way.end.reshape(-1, 3)])
     return places.min(axis=0) - way.off_m, places.max(axis=0) + way.off_m
 
 
 def visits(apart: Motion, shape: Shape, within: float) -> npt.NDArray[np.intp]:
-    """Rows, (K,), at which visits of a centre within a distance of a shape begin.
+    """Rows, (K,), at which a centre comes within a distance of a shape; between two rows, the first of them.
 
     Args:
-        apart: motion of the centre relative to the shape's, (T - 1, 3), m. A visit between two rows is given by the
-            first of them.
+        apart: motion of the centre relative to the shape's, (T - 1, 3), m.
         shape: the shape.
         within: the distance, m.
     """

@@ -1,4 +1,4 @@
-"""The paths of a run on axes of the user's own."""
+"""Draws the paths of a run on matplotlib axes."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
-"""The runs of a scenario, each simulated in a child process; what comes back is a saved trace, read with its checks.
+"""Simulates the runs of a scenario in child processes; each saves its trace, which is loaded and checked here.
 
-So nothing that a scenario's routes and tasks do to the process that they run in reaches the one in which verdicts are
-made; and a run that ends its process is a failure that the caller survives.
+So the routes and tasks of a scenario cannot touch the process in which verdicts are made, and the caller survives a run
+that ends its process.
 """
 
 from __future__ import annotations
@@ -37,8 +37,53 @@ FAILURE = "failure.json"
 TOLD_S = 0.2
 """Period of progress messages, s."""
 STANDSTILL_S = 600.0
-"""A run ends when its simulated time has stood still for so long by the clock, s. Only third-party code can hang: every
-step of the package is bounded in counts."""
+"""A run is ended when its simulated time has stood still for so long by the clock, s. Only third-party code can hang:
+each step of the package has a bound on its work."""
+
+
+class _Process:
+    """A run in a process of its own."""
+
+    def __init__(self, scenario: Scenario, name: str, folder: Path) -> None:
+        """Start it; it leaves its trace in `folder`, or a note on why there is no trace."""
+        context = multiprocessing.get_context("fork") if forks() else multiprocessing.get_context("spawn")
+        self._name, self._folder, self._what = name, folder, f"run {name} of {scenario.name}"
+        self._clock = context.RawValue("d")  # simulated time, s
+        self._before, self._since = 0.0, time.monotonic()
+        self.process = context.Process(target=_simulate, args=(scenario, name, folder, self._clock))
+        self.process.start()
+
+    def advanced(self) -> float:
+        """Simulated time since the last call, s.
+
+        Raises:
+            SimulationError: if it has stood still for too long.
+        """
+        by = self._clock.value - self._before
+        self._before += by
+        if by > 0.0:
+            self._since = time.monotonic()
+        elif self.process.is_alive() and time.monotonic() - self._since > STANDSTILL_S:
+            raise SimulationError(self._name, self._before, f"no further after {STANDSTILL_S:g} s of waiting")
+        return by
+
+    def trace(self) -> Trace:
+        """The trace of a run whose process has ended.
+
+        Raises:
+            PluginError, SimulationError: as the process has noted.
+            AirgroundError: if it has noted something else, or died.
+            TraceError: if the trace cannot be used.
+        """
+        self.process.join()
+        code = self.process.exitcode or 0
+        self.process.close()
+        if (self._folder / FAILURE).is_file():
+            raise _noted((self._folder / FAILURE).read_bytes(), self._what)
+        if code or not (self._folder / "meta.json").is_file():
+            how = interruption.ended_how(code)
+            raise AirgroundError(one_line(f"{self._what}: the process that simulated it died ({how})"))
+        return trace.load(self._folder)
 
 
 def simulate_all(
@@ -53,58 +98,47 @@ def simulate_all(
         scenario: from a file or made in Python.
         jobs: number of processes at a time; default: one for each processor that this process may use.
         progress: is told the simulated time.
-        meanwhile: is called once, when the first processes have begun.
+        meanwhile: is called once, after the first processes have started.
 
     Raises:
         ScenarioError: if the scenario is not valid.
         PluginError: if it names a policy, route, task or solver that cannot be made.
-        SimulationError: if a simulation stops before its end, or comes no further.
+        SimulationError: if a simulation stops before its end, or stands still.
         AirgroundError: if its process dies.
     """
     scenario = validated(scenario)
     most = processors() if jobs is None else max(1, jobs)
-    context = multiprocessing.get_context("fork") if forks() else multiprocessing.get_context("spawn")
     if not _compiled():
         progress.stage("compiling, once, about half a minute")
     if forks():
         warm_up()
     progress.stage(f"simulating {', '.join(scenario.runs)}", scenario.duration_s * len(scenario.runs), "s")
-    clocks = {name: context.RawValue("d") for name in scenario.runs}
-    waiting, running = deque(scenario.runs), dict[str, BaseProcess]()
+    waiting, running = deque(scenario.runs), dict[str, _Process]()
     traces: dict[str, Trace] = {}
-    since = dict[str, tuple[float, float]]()  # simulated time of each run, and since when it is that
-    reached = 0.0
     with files.temporary_folder() as made, warnings.catch_warnings():
         warnings.simplefilter("ignore", DeprecationWarning)  # idle threads of numerical libraries survive a fork
         try:
             while waiting or running:
                 while waiting and len(running) < most:
                     name = waiting.popleft()
-                    running[name] = context.Process(target=_simulate, args=(scenario, name, made / name, clocks[name]))
-                    running[name].start()
+                    running[name] = _Process(scenario, name, made / name)
                 if meanwhile is not None:
                     meanwhile()
                     meanwhile = None
-                wait([process.sentinel for process in running.values()], TOLD_S)
-                reached, before = sum(clock.value for clock in clocks.values()), reached
-                progress.advance(reached - before)
-                for name, process in list(running.items()):
-                    if not process.is_alive():
-                        traces[name] = _result(made / name, running.pop(name), f"run {name} of {scenario.name}")
-                    elif name not in since or clocks[name].value > since[name][0]:
-                        since[name] = clocks[name].value, time.monotonic()
-                    elif time.monotonic() - since[name][1] > STANDSTILL_S:
-                        raise SimulationError(name, since[name][0], f"no further after {STANDSTILL_S:g} s of waiting")
+                wait([each.process.sentinel for each in running.values()], TOLD_S)
+                ended = [name for name, each in running.items() if not each.process.is_alive()]
+                progress.advance(sum(each.advanced() for each in running.values()))
+                traces |= {name: running.pop(name).trace() for name in ended}
         finally:
-            _stop(list(running.values()))
+            _stop([each.process for each in running.values()])
     return {name: traces[name] for name in scenario.runs}
 
 
 def _simulate(scenario: Scenario, run: str, folder: Path, clock: Any) -> None:
-    """Simulate a run in this process and save it, or what has kept it from being simulated; the clock goes with it."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent's to heed
+    """Simulate a run in this process and save its trace, or a note on its failure; `clock` shows simulated time."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent reacts to it
     signal.signal(signal.SIGTERM, _end)
-    interruption.end_with_parent()  # at once: code that never returns to the interpreter heeds no other signal
+    interruption.end_with_parent()  # by SIGKILL: code that never returns to the interpreter ignores other signals
     folder.mkdir()
     try:
         trace.save(simulate(scenario, run, watch=partial(setattr, clock, "value")), folder)
@@ -112,7 +146,7 @@ def _simulate(scenario: Scenario, run: str, folder: Path, clock: Any) -> None:
         stopped = [error.run, error.t, error.what] if isinstance(error, SimulationError) else None
         plain = str(error) if isinstance(error, AirgroundError) else described(error)
         refused = isinstance(error, PluginError | ScenarioError)
-        with suppress(OSError):  # a full disk; the parent says that this process died
+        with suppress(OSError):  # a full disk: the parent reports that this process died
             files.write_json(folder / FAILURE, {"what": plain, "refused": refused, "stopped": stopped})
 
 
@@ -122,27 +156,8 @@ def _end(*_: object) -> None:
     os._exit(128 + signal.SIGTERM)
 
 
-def _result(folder: Path, process: BaseProcess, what: str) -> Trace:
-    """The trace that a process has left behind.
-
-    Raises:
-        PluginError, SimulationError: as the process has noted.
-        AirgroundError: if it has noted something else, or died.
-        TraceError: if the trace cannot be used.
-    """
-    process.join()
-    code = process.exitcode or 0
-    process.close()
-    if (folder / FAILURE).is_file():
-        raise _noted((folder / FAILURE).read_bytes(), what)
-    if code or not (folder / "meta.json").is_file():
-        how = interruption.ended_how(code)
-        raise AirgroundError(one_line(f"{what}: the process that simulated it died ({how})"))
-    return trace.load(folder)
-
-
 def _noted(note: bytes, what: str) -> AirgroundError:
-    """The error that a process has noted."""
+    """The error in a note."""
     try:
         failure = json.loads(note)
         if failure["stopped"] is None:
@@ -154,7 +169,7 @@ def _noted(note: bytes, what: str) -> AirgroundError:
 
 
 def _stop(processes: list[BaseProcess]) -> None:
-    """End processes, those that do not heed the request by force."""
+    """End processes, by force if they ignore the request."""
     for process in processes:
         process.terminate()
     for process in processes:
@@ -165,5 +180,5 @@ def _stop(processes: list[BaseProcess]) -> None:
 
 
 def _compiled() -> bool:
-    """Whether numba has kept what it has compiled of the control law."""
+    """Whether the cache of numba holds the compiled control law."""
     return any(Path(str(kernels.avoid_one.stats.cache_path)).glob("kernels.*.nbi"))

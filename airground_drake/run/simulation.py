@@ -1,4 +1,4 @@
-"""Run a model with Drake's Simulator and turn what was logged into a Trace."""
+"""Runs a model with Drake's Simulator and turns its log into a Trace."""
 
 from __future__ import annotations
 
@@ -50,14 +50,14 @@ if TYPE_CHECKING:
     from pydrake.geometry import Meshcat
 
 EVENT_ACCURACY = 1e-6
-"""Accuracy of the Context: witness functions are isolated to it (relative to the time scale of 1 s)."""
+"""Accuracy of the Context: events are isolated to this, relative to the time scale of 1 s."""
 
 MERGE_S = 1e-9
-"""Rows closer than this are one: periods that are not binary fractions give steps of about 1e-17 s."""
+"""Rows closer than this are merged, s: periods that are not binary fractions give steps of about 1e-17 s."""
 
 
 class Recorder:
-    """A model inside a diagram that logs its exported outputs at every step; may be used for several seeds."""
+    """A model in a diagram that logs its outputs at every step, for runs with one or several seeds."""
 
     def __init__(
         self,
@@ -68,15 +68,9 @@ class Recorder:
         *,
         make_gatekeepers: GatekeepersFactory = make_gatekeepers,
     ) -> None:
-        """Build the model of a run of the scenario and its loggers; `decision_block` and `meshcat` as in `simulate`.
+        """Build the model of a run of the scenario and its logger.
 
-        `make_gatekeepers` is that of `build_model`.
-
-        Raises:
-            ScenarioError: if the scenario is not valid.
-            UnknownNameError: if it has no such run.
-            PluginError: if it names a policy, route or task that cannot be made, or the decision block has other
-                ports.
+        `decision_block` and `meshcat` as in `simulate`, `make_gatekeepers` as in `build_model`; raises as `simulate`.
         """
         self._scenario, self._name = validated(scenario), name
         if name not in self._scenario.runs:
@@ -84,7 +78,7 @@ class Recorder:
         self._run = self._scenario.runs[name]
         composition: Composition = self._run.composition  # type: ignore[assignment]
         self._own = own(self._scenario, name)
-        self._model: Model = build_model(
+        self._model = build_model(
             self._own,
             self._run.method,
             composition,
@@ -123,24 +117,25 @@ class Recorder:
             seed: of the decision noise; default: the scenario's.
             duration: s; default: the scenario's.
             watch: is told the time, s, at every step.
-            speed: simulated seconds per second at most; 0: as fast as it goes.
+            speed: simulated seconds per second at most; 0: no limit.
 
         Raises:
             SimulationError: if Drake or a system stops; names the run and the time.
         """
+        model = self._model
         seed = self._scenario.seed if seed is None else seed
         context = self._root.CreateDefaultContext()
         self._root.SetRandomContext(context, RandomGenerator(seed))
         context.SetAccuracy(EVENT_ACCURACY)
         simulator = Simulator(self._root, context)
         period = self._scenario.control.period_s
-        # velocities are held between samples: for straight motion Euler's method is exact
-        scheme = "explicit_euler" if self._model.world.moves_straight(period) else "runge_kutta3"
+        # velocities are held between samples: Euler's method is exact for straight motion
+        scheme = "explicit_euler" if model.world.moves_straight(period) else "runge_kutta3"
         config = SimulatorConfig(integration_scheme=scheme, max_step_size=period, use_error_control=False)
         ApplySimulatorConfig(config, simulator)
         simulator.set_target_realtime_rate(speed)
-        if self._model.gatekeeper is not None:
-            self._model.gatekeeper.reset_timing()
+        if model.gatekeeper is not None:
+            model.gatekeeper.reset_timing()
         if watch is not None:
             simulator.set_monitor(lambda root: watch(root.get_time()))
         started = time.perf_counter()
@@ -148,12 +143,10 @@ class Recorder:
             simulator.Initialize()
             simulator.AdvanceTo(self._scenario.duration_s if duration is None else duration)
         except (Exception, SystemExit) as error:  # Drake raises many kinds
-            what = described(error)
-            raise SimulationError(self._name, context.get_time(), what) from error
+            raise SimulationError(self._name, context.get_time(), described(error)) from error
         finally:
-            self._model.planner.close()
-        wall = time.perf_counter() - started
-        return self._trace(context, seed, wall)
+            model.planner.close()
+        return self._trace(context, seed, time.perf_counter() - started)
 
     def _trace(self, context: Context, seed: int, wall: float) -> Trace:
         model, ugvs, robots = self._model, self._model.world.names("ugv"), self._model.world.robots
@@ -163,11 +156,14 @@ class Recorder:
         t = log.sample_times()
         keep = _distinct(t, data["team_command"])
         data = {name: rows[:, keep] for name, rows in data.items()}
-        signals = _signals(t[keep], data, ugvs, robots)
-        gatekeeper = model.gatekeeper
-        decided = gatekeeper.decisions(gatekeeper.GetMyContextFromRoot(context)) if gatekeeper is not None else ()
+        decided: list[Decision] = []
+        timings: dict[str, Any] = {"wall_s": wall, "decision_times_s": []}
+        if (gatekeeper := model.gatekeeper) is not None:
+            decided = gatekeeper.decisions(gatekeeper.GetMyContextFromRoot(context))
+            timings["decision_times_s"] = list(gatekeeper.decision_times_s)
         memory = model.planner.memory(model.planner.GetMyContextFromRoot(context))
-        decisions = _decisions([_decision(r, ugvs[r.robot], self._own.gatekeeper.route) for r in decided])
+        rows = [_decision(made, ugvs[made.robot], self._own.gatekeeper.route) for made in decided]
+        decisions = pd.DataFrame(rows, columns=list(DECISION_COLUMNS)).astype(DECISION_COLUMNS)
         sent = [(ugvs[i], proposal.issued, proposal.policy) for i, proposal in memory.sent]
         meta: dict[str, Any] = {
             "schema": SCHEMA,
@@ -180,28 +176,20 @@ class Recorder:
             "scenario": resolved(self._scenario),
             "events": [],
             **read_back(model, context),
-            "decision_block": _decision_block(model),
+            "decision_block": "" if (kind := type(model.decision_block)) is DecisionVariable else kind.__qualname__,
             "faults": [{"t_s": f.t, "robot": f.robot, "policy": f.policy, "what": f.what} for f in memory.faults],
         }
-        times = list(gatekeeper.decision_times_s) if gatekeeper is not None else []
-        timings = {"wall_s": wall, "decision_times_s": times}
-        proposals = _proposals(ugvs, memory.sent)
+        signals, proposals = _signals(t[keep], data, ugvs, robots), _proposals(ugvs, memory.sent)
         trace = Trace(meta, signals, decisions, timings, _problems(decided), proposals)
         meta["events"] = extract(trace, sent)
         return trace
 
 
 def read_back(model: Model, root: Context) -> dict[str, Any]:
-    """What runs in a Context, for `Trace.meta`: `zeta_m`, and `controllers` by name (see `controllers.read_back`)."""
+    """Parameters in force in a Context, for `Trace.meta`: `zeta_m`, and `controllers` (see `controllers.read_back`)."""
     levels = model.trigger.levels(model.trigger.GetMyContextFromRoot(root))
     ran = {each.get_name(): each.parameters(each.GetMyContextFromRoot(root)) for each in model.controllers}
     return {"zeta_m": float(levels.zeta_m), "controllers": ran}
-
-
-def _decision_block(model: Model) -> str:
-    """Name of the class that computes the decision variables in the diagram; "" for that of (15)."""
-    kind = type(model.decision_block)
-    return "" if kind is DecisionVariable else kind.__qualname__
 
 
 def _decision(decision: Decision, robot: str, route: str) -> dict[str, Any]:
@@ -244,14 +232,8 @@ def _decision(decision: Decision, robot: str, route: str) -> dict[str, Any]:
     }
 
 
-def _decisions(rows: Sequence[dict[str, Any]]) -> pd.DataFrame:
-    """`Trace.decisions` of its rows."""
-    columns: dict[str, Any] = {name: [row[name] for row in rows] for name in DECISION_COLUMNS}
-    return pd.DataFrame({name: pd.Series(values, dtype=DECISION_COLUMNS[name]) for name, values in columns.items()})
-
-
 def _proposals(ugvs: Sequence[str], sent: Sequence[tuple[int, Proposal]]) -> pd.DataFrame:
-    """`Trace.proposals` of what was sent to whom."""
+    """`Trace.proposals` of the proposals sent, each with the index of its UGV."""
     rows = [
         (
             proposal.number, ugvs[i], proposal.policy, float(proposal.issued), proposal.motion.times.tolist(),
@@ -288,7 +270,7 @@ def _problems(decided: Sequence[Decision]) -> pd.DataFrame:
 
 @cache
 def warm_up() -> None:
-    """Load the compiled kernels and the solver, once per process, so that no run's time includes that."""
+    """Load the compiled kernels and the solver, once per process, so that no run's time includes loading."""
     one, motion = np.ones((1, 3)), Motion(np.array([0.0, 1.0]), np.zeros((2, 3)))
     news_within(one, one, 1.0, within(one, one, 1.0))
     distances(one, one[0])
@@ -322,8 +304,8 @@ def simulate(
         seed: of the decision noise, in place of the scenario's.
         watch: is told the time, s, at every step.
         decision_block: makes the block that drives the trigger; see `build_diagram`.
-        meshcat: shows the robots while they move; the run is the same with it and without.
-        speed: simulated seconds per second at most, for those who watch; 0: as fast as it goes.
+        meshcat: shows the robots while they move; it does not change the run.
+        speed: simulated seconds per second at most, for watching; 0: no limit.
 
     Raises:
         ScenarioError: if the scenario, or the seed, is not valid.
@@ -339,8 +321,8 @@ def simulate(
 def _distinct(t: Array, command: Array) -> npt.NDArray[np.intp]:
     """Indices of rows (T,) at distinct times, for commands (3 r, T) of r robots.
 
-    Of rows within MERGE_S of each other the last one is kept that still has the command of the first: the
-    command that led there.
+    Among rows within MERGE_S of each other, the last row that has the command of the first is kept: the command that
+    led there.
     """
     cluster = np.concatenate([[0], np.cumsum(np.diff(t) > MERGE_S)])
     first = np.searchsorted(cluster, cluster)
@@ -351,16 +333,12 @@ def _distinct(t: Array, command: Array) -> npt.NDArray[np.intp]:
 def _signals(t: Array, data: dict[str, Array], ugvs: tuple[str, ...], robots: tuple[str, ...]) -> pd.DataFrame:
     columns: dict[str, Array] = {"t_s": t}
     for i, robot in enumerate(robots):
-        for a, axis in enumerate("xyz"):
-            columns[f"{robot}.{axis}_m"] = data["bodies"][3 * i + a]
-        for a, axis in enumerate("xyz"):
-            columns[f"{robot}.v{axis}_m_s"] = data["team_command"][3 * i + a]
+        columns |= {f"{robot}.{axis}_m": data["bodies"][3 * i + a] for a, axis in enumerate("xyz")}
+        columns |= {f"{robot}.v{axis}_m_s": data["team_command"][3 * i + a] for a, axis in enumerate("xyz")}
     for i, ugv in enumerate(ugvs):
-        for a, axis in enumerate("xyz"):
-            columns[f"{ugv}.ref_{axis}_m"] = data["reference"][3 * i + a]
+        columns |= {f"{ugv}.ref_{axis}_m": data["reference"][3 * i + a] for a, axis in enumerate("xyz")}
         columns[f"{ugv}.noise_m"] = data["noise"][i]
         columns[f"{ugv}.decision_variable_m"] = data["decision_variable"][i]
-        for k, name in enumerate(Status.get_fields()):
-            columns[f"{ugv}.{name}"] = data["status"][FIELDS * i + k]
+        columns |= {f"{ugv}.{name}": data["status"][FIELDS * i + k] for k, name in enumerate(Status.get_fields())}
         columns[f"{ugv}.accepted"] = data["accepted"][i]
     return pd.DataFrame(columns)

@@ -1,10 +1,10 @@
-"""What a run leaves behind: every signal once, every event, every gatekeeper decision; saved and loaded.
+"""The record of a run: signals, events, gatekeeper decisions; saved and loaded.
 
 Rows of `signals` are the ends of the simulator's steps: all control periods, and the isolated event times in
-between. A row's command is the velocity that was applied *up to* this row since the one before, so that
+between. A row's command is the velocity that was applied between the previous row and this one, so that
 position[k] = position[k-1] + (t[k] - t[k-1]) * command[k]: between rows every robot moves on a straight line.
 The other held signals (mode, accepted, ...) are likewise those in force just before the row's time, so an event
-at the last row's time may be absent. Noise is linear between rows. Row 0's command means nothing.
+at the last row's time may be missing. Noise is linear between rows. Row 0's command means nothing.
 
 Columns (units in the names; one set per robot or UGV):
     t_s
@@ -12,14 +12,14 @@ Columns (units in the names; one set per robot or UGV):
     <robot>.vx_m_s .vy_m_s .vz_m_s            command in force up to this row
     <ugv>.ref_x_m .ref_y_m .ref_z_m           preset trajectory rho_rd(t)
     <ugv>.noise_m                             integrated noise of (15)
-    <ugv>.decision_variable_m                 x, the signal that the trigger has: ||rho_rd - rho|| + noise, unless
-                                              another block computes it
+    <ugv>.decision_variable_m                 x, input of the trigger: ||rho_rd - rho|| + noise, unless another
+                                              block computes it
     <ugv>.mode                                0 supervising, 1 intervening, 2 refractory
     <ugv>.triggers                            number of triggers so far
-    <ugv>.triggered_at_s .released_at_s       time of the last one, -1 before the first
+    <ugv>.triggered_at_s .released_at_s       time of the last trigger and release, -1 before the first
     <ugv>.accepted                            1 while an intervention is accepted
 
-Rows closer than 1e-9 s are one.
+Rows closer than 1e-9 s are merged.
 """
 
 from __future__ import annotations
@@ -78,40 +78,36 @@ DECISION_COLUMNS = {
     "tries": "float64",
 }
 """Columns of `Trace.decisions`, one row per robot and gatekeeper call; -1 where a number does not apply. `number` is
-that of the proposal in `Trace.proposals`. Those up to
-`predicted_clearance_m` are of decisions by problem (26), the others of decisions by outcomes: what comes of either
-choice as `gatekeeper.outcome` has it (cost, 1 if it comes to rest short of the goal, way left), and how often the UGV
-has gone along since it last rested."""
+that of the proposal in `Trace.proposals`. Columns up to `predicted_clearance_m` belong to decisions by problem (26),
+the others to decisions by outcomes: the outcome of either choice by `gatekeeper.outcome` (cost, 1 if the UGV comes to
+rest short of its goal, way left), and the number of tries since the UGV last rested."""
 
 PROBLEM_SCALARS = ("dt_s", "error_weight_1_m2_s", "slack_weight_1_m2_s", "terminal_weight_s")
 PROBLEM_ARRAYS = (
     "initial_m", "accept_m_s", "refuse_m_s", "reference_m", "centres_m", "distances_m",
     "plan", "positions_m", "relaxed", "rounded", "normals",
 )  # fmt: skip
-"""Columns of `Trace.problems` (empty under method (d)): the data of (26) as each decision saw it, and what the route
-found, row by row as in `decisions`. Arrays are flattened in C order: initial (3), accept, refuse and reference (N x 3),
-centres and normals (N x m x 3), distances (m), plan, relaxed and rounded omega (N), positions of the plan (N x 3);
-empty where the route has none. Normals are those of the half-planes that `route_bound` is about."""
+"""Columns of `Trace.problems` (empty under method (d)): the data of (26) for each row of `decisions`, and the result of
+the route. Arrays are flattened in C order: initial (3), accept, refuse and reference (N x 3), centres and normals
+(N x m x 3), distances (m), plan, relaxed and rounded omega (N), positions of the plan (N x 3). An array that the route
+does not give is empty. The normals are those of the half-planes of `route_bound`."""
 
 PROPOSAL_COLUMNS = (
     "number", "robot", "policy", "issued_s", "times_s", "positions_m", "selection", "mapped_m", "mapped_radius_m",
     "cause", "party",
 )  # fmt: skip
-"""Columns of `Trace.proposals`, one row per proposal sent: its number, which identifies it and counts from 0 in the
-order of sending; for which UGV, by which policy, when; the vertices of the
-motion that it asks for, times (M) and positions (M x 3, flattened in C order), and J_int of (12)-(14), (m x 3, ditto):
-the directions that it concerns, and the obstacles that the UAV knows, centres (k x 3, ditto) and radii (k); and the UGV
-whose trigger it was sent for: this one, or another one that it is to make way for; and where all UGVs with a
-part in the same joint plan are in `ugvs`, counted from 0 (empty: the proposal stands alone)."""
+"""Columns of `Trace.proposals`, one row per proposal sent; arrays are flattened in C order:
+- number: identifies the proposal; counts from 0 in the order of sending.
+- robot, policy, issued_s: its UGV, its policy, the time of sending.
+- times_s (M), positions_m (M x 3): vertices of the requested motion.
+- selection (m x 3): J_int of (12)-(14), the directions that the motion concerns.
+- mapped_m (k x 3), mapped_radius_m (k): centres and radii of the obstacles on the UAV's map.
+- cause: the UGV whose trigger led to it: this UGV, or another UGV for which it makes way.
+- party: indices in `ugvs` of all UGVs in the same joint plan; empty if the proposal stands alone."""
 
 
 TABLES = ("signals", "decisions", "problems", "proposals")
 """Attributes of `Trace` that are tables, each saved as a Parquet file of its name."""
-
-
-def no_proposals() -> pd.DataFrame:
-    """The table `proposals` of a run in which nothing was sent."""
-    return pd.DataFrame(columns=list(PROPOSAL_COLUMNS))
 
 
 @dataclass(frozen=True, repr=False)
@@ -127,13 +123,13 @@ class Trace:
             resolved scenario as nested dicts), `events` (list, by time), `controllers` (what the controllers were
             built with, read back from the diagram: see `systems.controllers.read_back`), `decision_block` (name of
             the class that computes the decision variables, read back from the diagram; empty for that of (15)),
-            `faults` (list of what went wrong in a policy or solver).
+            `faults` (list of errors in policies and solvers).
         signals: see the module's docstring.
         decisions: see DECISION_COLUMNS.
         problems: see PROBLEM_ARRAYS.
         proposals: see PROPOSAL_COLUMNS.
-        timings: kept apart because they differ between identical runs: `wall_s`, how long the run took by the
-            clock, and `decision_times_s`, CPU time of each row of `decisions`, in order.
+        timings: what may differ between identical runs: `wall_s`, duration of the run by the clock, and
+            `decision_times_s`, CPU time of each row of `decisions`, in order.
     """
 
     meta: dict[str, Any]
@@ -141,7 +137,7 @@ class Trace:
     decisions: pd.DataFrame
     timings: dict[str, Any] = field(default_factory=dict, compare=False)
     problems: pd.DataFrame = field(default_factory=lambda: pd.DataFrame(columns=[*PROBLEM_SCALARS, *PROBLEM_ARRAYS]))
-    proposals: pd.DataFrame = field(default_factory=no_proposals)
+    proposals: pd.DataFrame = field(default_factory=lambda: pd.DataFrame(columns=list(PROPOSAL_COLUMNS)))
     _read: dict[str, Array] = field(default_factory=dict, init=False, repr=False, compare=False)
     _derived: dict[Any, Any] = field(default_factory=dict, init=False, repr=False, compare=False)
 
@@ -162,7 +158,7 @@ class Trace:
 
     @property
     def uavs(self) -> list[str]:
-        """Names of the UAVs: the robots that are no UGVs."""
+        """Names of the UAVs: the robots that are not UGVs."""
         return [name for name in self.robots if name not in self.ugvs]
 
     @property
@@ -176,7 +172,7 @@ class Trace:
 
     @property
     def events(self) -> list[dict[str, Any]]:
-        """Events by time: `t_s`, `robot`, `kind`, `position_m`, and what else belongs to the kind."""
+        """Events by time: `t_s`, `robot`, `kind`, `position_m`, and further entries of the kind."""
         return list(self.meta["events"])
 
     @property
@@ -185,7 +181,7 @@ class Trace:
         return self.column("t_s")
 
     def column(self, name: str) -> Array:
-        """One column as float64, (T,), read-only: every claim asks for the same few, which are looked at once.
+        """One column as float64, (T,), read-only and cached.
 
         Raises:
             TraceError: if it is missing or not finite.
@@ -202,7 +198,7 @@ class Trace:
         return values
 
     def derived(self, key: Any, work_out: Callable[[], T]) -> T:
-        """What follows from the run and a key, worked out once: several claims ask for the same."""
+        """The value of `work_out`, computed once per key: several claims need the same."""
         if key not in self._derived:
             self._derived[key] = work_out()
         found: T = self._derived[key]
@@ -235,18 +231,18 @@ class Trace:
         return table
 
     def plot(self, axes: Axes | None = None) -> Axes:
-        """Draw the paths of the run on axes of yours, or on new ones: see `run.plot`."""
+        """Draw the paths of the run on given or new axes: see `run.plot`."""
         from airground_drake.run.plot import paths  # matplotlib takes half a second to import
 
         return paths(self, axes)
 
     def __repr__(self) -> str:
-        """In one line: which run of which scenario, how many rows and events."""
+        """Run, scenario, numbers of rows and events in one line."""
         scenario, events = self.meta.get("scenario", {}).get("name"), self.meta.get("events", [])
         return f"<Trace: run {self.meta.get('run')!r} of {scenario!r}, {len(self.signals)} rows, {len(events)} events>"
 
     def _repr_html_(self) -> str:
-        """What a notebook shows: the line of `repr` and a table of the events."""
+        """For notebooks: the line of `repr` and a table of the events."""
         rows = [(f"{event['t_s']:.3f}", event["robot"], event["kind"]) for event in self.events]
         table = pd.DataFrame(rows, columns=["time, s", "robot", "event"]).to_html(index=False, border=0)
         return f"<p>{escape(repr(self))}</p>{table}"
@@ -255,7 +251,7 @@ class Trace:
 def save(trace: Trace, folder: Path) -> list[str]:
     """Write a Parquet file per table, `timings.json`, then `meta.json` with digests.
 
-    Each file is written atomically and `meta.json` last, so that an interrupted save is recognised by `load`.
+    Each file is written atomically and `meta.json` last, so that `load` recognises an interrupted save.
 
     Returns:
         The names of the files.
@@ -277,10 +273,10 @@ def save(trace: Trace, folder: Path) -> list[str]:
 
 
 def load(folder: Path) -> Trace:
-    """Read a saved trace back.
+    """Load a saved trace.
 
     Raises:
-        TraceError: if it is of another schema, or a file is missing, unreadable, or differs from the digest in
+        TraceError: if it has another schema, or a file is missing, unreadable, or differs from its digest in
             `meta.json`.
     """
     try:

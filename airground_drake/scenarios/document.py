@@ -1,4 +1,4 @@
-"""YAML text, or data made in Python, as plain data that knows where it comes from; every mistake becomes one line.
+"""YAML text or data made in Python as plain data with their places of origin; every mistake becomes one line.
 
 Scalars are read by the rules of YAML 1.2 (`1e-3` is a number, `yes` and `1:30` are text). Anchors, merge keys
 (`<<`) and templates under top-level keys that begin with an underscore work as in Drake's own files.
@@ -22,10 +22,8 @@ from airground_drake.base.errors import Fault, ScenarioError, short
 from airground_drake.scenarios.shipped import shipped, shipped_files
 
 MAX_BYTES = 2**20
-MAX_VALUES = 50_000
-"""Values of a scenario with every alias and merge expanded."""
-MAX_DEPTH = 100
-"""Of values within values."""
+MAX_VALUES = 50_000  # of a scenario, with every alias and merge expanded
+MAX_DEPTH = 100  # of values within values
 TAG = "tag:yaml.org,2002:"
 _SCALARS: dict[str, tuple[str | None, Callable[[str], object]]] = {  # tag: its plain scalars, conversion
     "null": (r"~|null|Null|NULL|", lambda _: None),
@@ -44,16 +42,16 @@ Children = dict[str, tuple[yaml.Node, yaml.Node]]
 """Key node (for its line) and value node of each entry."""
 
 Places = dict[tuple[str, ...], tuple[str, str]]
-"""File and line, or command-line option, of key and value, by the names and indices that lead there."""
+"""Place of each key and value (file and line, or command-line option), by the names and indices that lead there."""
 
 
 class Document(NamedTuple):
-    """Plain data, and where it comes from.
+    """Plain data with their places of origin.
 
     Attributes:
         data: dicts, lists and scalars; None where no value is given.
-        source: where all of it comes from.
-        places: where its entries and items come from.
+        source: file, option or other origin of all data.
+        places: places of the entries and items.
     """
 
     data: Any
@@ -61,11 +59,11 @@ class Document(NamedTuple):
     places: Places
 
     def where(self, *at: str, key: bool = False) -> str:
-        """File and line, or option, of the entry at a place, or else of what it would be in.
+        """File and line, or option, of an entry; for a missing entry, of the innermost mapping or list around it.
 
         Args:
-            at: names and indices that lead to it.
-            key: whether the key is meant, which may be in a line before its value.
+            at: names and indices that lead to the entry.
+            key: whether to name the line of the key, which may be before that of the value.
         """
         if at in self.places:
             return self.places[at][not key]
@@ -73,26 +71,40 @@ class Document(NamedTuple):
 
 
 class _Loader(yaml.BaseLoader):
-    """Composes nodes whose scalars are tagged by the rules of YAML 1.2; stops when there are too many."""
+    """Composes nodes, tags scalars by the rules of YAML 1.2, and refuses nodes that are too large or too deep."""
 
-    count, depth = 0, 0
+    def __init__(self, text: str, source: str) -> None:
+        super().__init__(text)
+        self.name, self.depth = source, 0
+        self.sizes: dict[int, tuple[int, int]] = {}
+        """Numbers of values and of levels in each node, with aliases and merges expanded."""
 
-    def compose_node(self, parent: yaml.Node | None, index: Any) -> yaml.Node | None:
+    def compose_node(self, parent: yaml.Node | None, index: Any) -> yaml.Node:
         """A node and those within it.
 
         Raises:
-            ScenarioError: if the document has more of them than MAX_VALUES, or deeper ones than MAX_DEPTH.
+            ScenarioError: if the node has more than MAX_VALUES values, is deeper than MAX_DEPTH, or contains itself.
         """
-        self.count, self.depth = self.count + 1, self.depth + 1
-        if self.count > MAX_VALUES or self.depth > MAX_DEPTH:
-            raise _excess(f"{self.name}:{self.line + 1}", deep=self.depth > MAX_DEPTH)
+        event: yaml.Event = self.peek_event()  # type: ignore[no-untyped-call]
+        self.depth += 1
+        if self.depth > MAX_DEPTH:
+            raise _excess(_where(event), deep=True)
         node: yaml.Node | None = super().compose_node(parent, index)
+        assert node is not None
         self.depth -= 1
+        if not isinstance(event, yaml.AliasEvent):
+            inner = [self.sizes[id(each)] for each in _within(node)]
+            self.sizes[id(node)] = 1 + sum(n for n, _ in inner), 1 + max((levels for _, levels in inner), default=0)
+        elif id(node) not in self.sizes:  # an alias of a node around it
+            raise _excess(_where(event), deep=True)
+        values, levels = self.sizes[id(node)]
+        if values > MAX_VALUES or self.depth + levels > MAX_DEPTH:
+            raise _excess(_where(node), deep=self.depth + levels > MAX_DEPTH)
         return node
 
 
 class _Dumper(yaml.SafeDumper):
-    """Quotes text that would be read as something else, by the rules of YAML 1.1 or 1.2."""
+    """Quotes text that YAML 1.1 or 1.2 would read as another type."""
 
 
 for _name, (_pattern, _) in _SCALARS.items():
@@ -102,16 +114,16 @@ for _name, (_pattern, _) in _SCALARS.items():
 
 
 def text_of(data: Mapping[str, Any]) -> str:
-    """A YAML file of ours from nested dicts, lists and scalars."""
+    """Nested dicts, lists and scalars as the text of a YAML file."""
     text: str = yaml.dump(data, Dumper=_Dumper, sort_keys=False, allow_unicode=True)
     return text
 
 
 def read(name_or_path: str | Path) -> tuple[Document, bytes]:
-    """A YAML file, or a shipped scenario; and its bytes.
+    """The document and the bytes of a YAML file or a shipped scenario.
 
     Raises:
-        ScenarioError: if it cannot be read, is no YAML text, or larger than the limits.
+        ScenarioError: if it cannot be read, is not YAML text, or exceeds the limits.
     """
     source, data = _read_bytes(str(name_or_path))
     try:
@@ -123,7 +135,7 @@ def read(name_or_path: str | Path) -> tuple[Document, bytes]:
 
 
 def _read_bytes(name_or_path: str) -> tuple[str, bytes]:
-    """Path and content of a scenario; a shipped scenario's name has precedence."""
+    """Path and content of a scenario; the name of a shipped scenario has precedence over a path."""
     file: Traversable = shipped_files().get(name_or_path, Path(name_or_path))
     source = str(file)
     try:
@@ -134,7 +146,7 @@ def _read_bytes(name_or_path: str) -> tuple[str, bytes]:
         wanted = f"{close}wanted: the path of a YAML file, or a shipped scenario: {', '.join(shipped())}"
         raise ScenarioError(name_or_path, "", Fault("no such scenario or file"), wanted) from None
     except (OSError, ValueError) as error:
-        why = getattr(error, "strerror", None) or "a path has no null character"  # which a ValueError is about
+        why = getattr(error, "strerror", None) or "a path has no null character"  # the cause of a ValueError
         fault = Fault(f"cannot be read ({why})")
         raise ScenarioError(source, "", fault, "wanted: a readable YAML file") from None
     if len(data) > MAX_BYTES:
@@ -146,25 +158,22 @@ def parsed(text: str, source: str, at: tuple[str, ...] = ()) -> Document:
     """The data of YAML text, within the limits.
 
     Args:
-        text: the text; keys of a whole document that begin with an underscore are templates, and left out.
+        text: the text. Top-level keys that begin with an underscore are templates and left out.
         source: file or command-line option, for messages.
-        at: where the data belongs in a document.
+        at: place in a document for which the data are meant.
 
     Raises:
-        ScenarioError: if it is no YAML, no plain data, or larger than the limits.
+        ScenarioError: if the text is not plain YAML, or exceeds the limits.
     """
     root = _composed(text, source)
-    _within_limits(root)
     places: Places = {at: (_where(root), _where(root))}
     return Document(_plain(root, at, places), source, places)
 
 
 def _composed(text: str, source: str) -> yaml.Node:
-    """Nodes of a YAML document whose marks bear the source's name."""
+    """The root node of a YAML document; the marks of all nodes have the source's name."""
     try:
-        loader = _Loader(text)
-        loader.name = source
-        root: yaml.Node | None = loader.get_single_node()
+        root: yaml.Node | None = _Loader(text, source).get_single_node()
     except (yaml.YAMLError, ValueError, OverflowError) as error:
         mark = getattr(error, "problem_mark", None)
         line = mark.line + 1 if mark else text.count("\n", 0, getattr(error, "position", 0)) + 1
@@ -180,7 +189,7 @@ def of_data(data: Any, source: str) -> Document:
     """A document of nested dicts and lists made in Python.
 
     Raises:
-        ScenarioError: if it is nested too deeply.
+        ScenarioError: if the data are nested too deeply.
     """
     try:
         return Document(simple(data), source, {})
@@ -189,7 +198,7 @@ def of_data(data: Any, source: str) -> Document:
 
 
 def simple(value: Any) -> Any:
-    """A copy in which values of numpy, and tuples, are what YAML knows."""
+    """A copy with plain numbers and lists in place of tuples and of numpy's values."""
     if isinstance(value, Mapping):
         return {str(name): simple(each) for name, each in value.items()}
     if isinstance(value, np.ndarray | np.generic):
@@ -198,14 +207,14 @@ def simple(value: Any) -> Any:
 
 
 def replace(document: Document, override: str) -> None:
-    """Put another value into a document, which is changed.
+    """Change a document by an override.
 
     Args:
         document: to be changed.
-        override: `dotted.key=value`; items of lists by index, names that are not there yet are added.
+        override: `dotted.key=value`; items of lists are addressed by index, new names are added.
 
     Raises:
-        ScenarioError: if it has another form, its value is no YAML, or there is no such item.
+        ScenarioError: if the override has another form, its value is not YAML, or the item does not exist.
     """
     source = f"--set {short(override)}"
     key, equals, text = override.partition("=")
@@ -218,10 +227,10 @@ def replace(document: Document, override: str) -> None:
 
 
 def put(document: Document, at: tuple[str, ...], new: Any, source: str) -> None:
-    """Put another value at a place of a document, which is changed.
+    """Change a document: put another value at a place.
 
     Raises:
-        ScenarioError: if it leads to no such item of a list.
+        ScenarioError: if the place is an item that a list does not have.
     """
     data = document.data
     for place in [each for each in document.places if each[: len(at)] == at]:
@@ -238,7 +247,7 @@ def put(document: Document, at: tuple[str, ...], new: Any, source: str) -> None:
 
 
 def _plain(node: yaml.Node, at: tuple[str, ...], places: Places) -> Any:
-    """What a node stands for; the places of what is in it are added."""
+    """The plain value of a node; the places of its entries and items are added to `places`."""
     key = ".".join(at)
     if isinstance(node, yaml.ScalarNode):
         value = _value_of(node)
@@ -256,7 +265,7 @@ def _plain(node: yaml.Node, at: tuple[str, ...], places: Places) -> Any:
 
 
 def _value_of(node: yaml.Node) -> object:
-    """Value of a scalar node, None where none is given; a `Fault` that says what it is for any other."""
+    """Value of a scalar node (None if it is empty), or a `Fault` that describes a node that has no plain value."""
     tag = node.tag.removeprefix(TAG)
     if not isinstance(node, yaml.ScalarNode) or tag not in _SCALARS:
         return Fault({"map": "a mapping is given", "seq": "a list is given"}.get(tag, f"the tag {tag} is given"))
@@ -267,7 +276,7 @@ def _value_of(node: yaml.Node) -> object:
 
 
 def _entries_of(node: yaml.Node, key: str) -> Children:
-    """Entries of a mapping with what it merges, items of a list by index; none of a scalar."""
+    """Entries of a mapping with those it merges, or items of a list by index; empty for a scalar."""
     if isinstance(node, yaml.SequenceNode):
         return {str(index): (child, child) for index, child in enumerate(node.value)}
     entries: Children = {}
@@ -289,30 +298,10 @@ def _entries_of(node: yaml.Node, key: str) -> Children:
     return entries
 
 
-def _where(node: yaml.Node) -> str:
-    """File and line of a node."""
-    return f"{node.start_mark.name}:{node.start_mark.line + 1}"
-
-
-def _within_limits(root: yaml.Node) -> None:
-    """Count the values of a document with its aliases and merges expanded, looking at each node once.
-
-    Raises:
-        ScenarioError: if there are more than MAX_VALUES or deeper ones than MAX_DEPTH; one that holds itself is.
-    """
-    counted: dict[int, tuple[int, int]] = {}
-
-    def count(node: yaml.Node, above: int) -> tuple[int, int]:
-        """Number of values in a node, itself among them, and of levels."""
-        if id(node) not in counted and above < MAX_DEPTH:
-            within = [count(child, above + 1) for child in _within(node)]
-            counted[id(node)] = 1 + sum(n for n, _ in within), 1 + max((levels for _, levels in within), default=0)
-        values, levels = counted.get(id(node), (1, 1))
-        if values > MAX_VALUES or above + levels > MAX_DEPTH:
-            raise _excess(_where(node), deep=above + levels > MAX_DEPTH)
-        return values, levels
-
-    count(root, 0)
+def _where(node: yaml.Node | yaml.Event) -> str:
+    """File and line of a node or of the event at its beginning."""
+    mark: Any = node.start_mark
+    return f"{mark.name}:{mark.line + 1}"
 
 
 def _within(node: yaml.Node) -> Iterable[yaml.Node]:
@@ -330,18 +319,18 @@ def _excess(source: str, *, deep: bool) -> ScenarioError:
 
 
 def suggestion(name: str, options: Iterable[str]) -> str:
-    """The beginning of a message: which of the options may have been meant, if one is close to a name."""
+    """The beginning of a message: the option that is close to a name, if any."""
     close = difflib.get_close_matches(name, list(options), n=1)
     return f"did you mean {close[0]}? " if close else ""
 
 
 def unknown(source: str, key: str, part: str, options: Sequence[str]) -> ScenarioError:
-    """The error of a key that there is not, the last part of a dotted one."""
+    """The error of an unknown key; `part` is the last part of the dotted key."""
     return ScenarioError(
         source, key, UNKNOWN_KEY, f"{suggestion(part, options)}allowed: {', '.join(options) or 'none'}"
     )
 
 
 def _dotted(key: str, part: str) -> str:
-    """Key of a part of what has this key ('' for the document itself)."""
+    """Dotted key of a part of the entry with this key ('' for the document itself)."""
     return f"{key}.{part}" if key else part

@@ -1,17 +1,17 @@
 """How much work a scenario asks for, counted from its numbers before the work begins.
 
-Of a run of n UGVs and the UAV for T seconds, with control period h, among m obstacles and phantoms (K = n + m points
-that a UGV keeps away from):
+A run has n UGVs and the UAV, T seconds, control period h, and m obstacles and phantoms. A UGV keeps away from
+K = n + m points. The run asks for:
 
-    rows        T / min(h, noise period) + 1; each event of a run adds a few
+    rows        T / min(h, noise period) + 1; each event adds a few
     steps       (n + 1) rows: robots moved by one step
-    decisions   n (T / gatekeeper's period + 1) where UGVs decide about proposals, if each decides at every sample
-    predictions a decision of method (c) predicts both choices for horizon / h periods; of method (d), once for each
-                proposal, and so no more often than the UAV plans, for (longest + settling) / h periods
-    memory      tables of the trace, one number for each pair and row where a claim looks at distances, what decisions
-                of method (c) keep, the longest prediction, and the tangents of the discs that a way leads round
+    decisions   n (T / gatekeeper's period + 1) at most, if the method has a gatekeeper
+    predictions a decision of method (c) predicts both choices for horizon / h periods; one of method (d), made once
+                per proposal, predicts them for (longest + settling) / h periods
+    memory      tables of the trace, one number per pair and row for distances, records of the decisions of method (c),
+                the longest prediction, and tangents of the discs on a shortest path
 
-These are counts, not times: how long a step takes depends on the machine.
+These are counts, not times: the time of a step depends on the machine.
 """
 
 from __future__ import annotations
@@ -26,23 +26,17 @@ if TYPE_CHECKING:  # pydantic, which the schema imports, would delay `report --l
     from airground_drake.scenarios.schema import Run, Scenario
 
 PREDICTED = 2e-4
-"""Work of a period predicted for one UGV next to one point (compiled, some 30 ns) in steps simulated (some 0.2 ms)."""
+"""Work to predict one period of one UGV beside one point (30 ns, compiled), in simulated steps (0.2 ms)."""
 
 GIB = 2**30
-FLOAT = 8
-"""Bytes of a number."""
-COPIES = 6
-"""Of a table, while it is logged, made, written and looked at."""
-OF_A_DECISION = 2048
-"""Bytes of a decision without its arrays: a row of a table and some objects."""
-OF_A_TANGENT = 320
-"""Bytes of a tangent of two discs: complex numbers and copies of them."""
-PROGRAM = GIB // 2
-"""Bytes of the program itself with its libraries."""
-
+FLOAT = 8  # bytes of a number
+COPIES = 6  # of a table while it is logged, made, written and judged
+OF_A_DECISION = 2048  # bytes, without its arrays: a row of a table and some objects
+OF_A_TANGENT = 320  # bytes of a tangent of two discs: complex numbers and copies of them
+PROGRAM = GIB // 2  # bytes of the program with its libraries
 
 MOST_ROWS = 4_000_000
-"""Of a campaign, which holds them in memory: one for each draw, run and claim takes up to 1.7 kB (measured)."""
+"""Largest number of rows of a campaign, one per draw, run and claim; a row takes up to 1.7 kB of memory (measured)."""
 
 
 class Limits(NamedTuple):
@@ -51,8 +45,8 @@ class Limits(NamedTuple):
     Attributes:
         work: steps.
         memory: bytes.
-        time: by the clock, s, for a draw of a campaign: third-party code may never end.
-        plugins: whether third-party code of a draw may be imported and run.
+        time: wall-clock time for a draw of a campaign, s, as third-party code may never end.
+        plugins: whether the third-party code of a draw may be imported and run.
     """
 
     work: float = 1e7
@@ -65,13 +59,13 @@ DEFAULT_LIMITS = Limits()
 
 
 class Estimate(NamedTuple):
-    """What the runs of a scenario ask for, in all.
+    """The work that all runs of a scenario ask for.
 
     Attributes:
-        rows: of the traces' signals.
+        rows: rows of the traces' signals.
         steps: robots moved by one step.
-        decisions: of gatekeepers, at most.
-        predicted: periods predicted for one UGV, times the points that it keeps away from, at most.
+        decisions: largest number of gatekeepers' decisions.
+        predicted: largest number of predicted periods of a UGV, times the points that it keeps away from.
         memory: bytes.
     """
 
@@ -83,7 +77,7 @@ class Estimate(NamedTuple):
 
     @property
     def work(self) -> float:
-        """Steps, with what is predicted in them."""
+        """Steps, with predictions counted as steps."""
         return self.steps + PREDICTED * self.predicted
 
     def __str__(self) -> str:
@@ -95,7 +89,7 @@ class Estimate(NamedTuple):
 
 
 def estimate(scenario: Scenario) -> Estimate:
-    """What all runs of a validated scenario ask for, from its numbers alone, at once."""
+    """The work that all runs of a validated scenario ask for."""
     from airground_drake.scenarios.load import own
 
     of_runs = [_of_run(own(scenario, name), run) for name, run in scenario.runs.items()]
@@ -104,10 +98,10 @@ def estimate(scenario: Scenario) -> Estimate:
 
 
 def within(scenario: Scenario, limits: Limits) -> Estimate:
-    """The estimate of a validated scenario, if it keeps to the limits.
+    """The estimate of a validated scenario that keeps to the limits.
 
     Raises:
-        LimitError: if not; names what is asked for and what is allowed.
+        LimitError: if the scenario asks for more; says how much it asks for and how much is allowed.
     """
     found = estimate(scenario)
     if not (found.work <= limits.work and found.memory <= limits.memory):
@@ -135,7 +129,7 @@ def _of_run(scenario: Scenario, run: Run) -> Estimate:
 
 
 def _planning(scenario: Scenario) -> float:
-    """Bytes for the shortest way among all discs, where some run asks for one: two discs have four tangents."""
+    """Bytes for a shortest path among all discs, if a run plans any: two discs have four tangents."""
     if not any(METHODS[run.method].intervenes for run in scenario.runs.values()):
         return 0.0
     discs = len(scenario.ugvs) + len(scenario.obstacles) + len(scenario.uav.phantoms_m)

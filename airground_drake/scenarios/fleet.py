@@ -1,7 +1,7 @@
 """Scenarios of any size: UGVs that cross a field of obstacles, drawn from a seed.
 
-Starts, targets and obstacles lie one to a cell of a square grid, off its middle by chance, so that a UGV passes between
-any two of them. Every UGV goes straight from its cell to the next but one; some have an obstacle in the way.
+Each start, target and obstacle lies at a random place near the middle of its own cell of a square grid, so that a UGV
+can pass between any two. Every UGV goes straight to the second cell ahead; some UGVs have an obstacle in their way.
 """
 
 from __future__ import annotations
@@ -11,11 +11,11 @@ import random
 
 CELL_M = 5.0
 OFF_M = 1.4
-"""From the middle of its cell along either axis, m, at most: neighbours are farther apart than two safe distances."""
+"""Largest offset from the middle of a cell along either axis, m. Neighbours are over two safe distances apart."""
 BLOCKED = 3
-"""One of so many UGVs has an obstacle in the middle of its way."""
+"""One in so many UGVs has an obstacle in the middle of its way."""
 ROOMY = 1.5
-"""Cells for each thing that is put into one."""
+"""Number of cells per occupied cell."""
 
 SIDES = ((1, 0), (-1, 0), (0, 1), (0, -1))
 
@@ -61,9 +61,9 @@ def fleet(ugvs: int, obstacles: int, seed: int = 1, name: str = "fleet") -> str:
     """The text of a scenario file, without a comment at its head.
 
     Args:
-        ugvs: how many, at least 1.
-        obstacles: how many.
-        seed: of all that is drawn.
+        ugvs: number of UGVs, at least 1.
+        obstacles: number of obstacles.
+        seed: of the random field.
         name: of the scenario.
     """
     side = math.ceil(math.sqrt(ROOMY * (3 * ugvs + obstacles)))
@@ -85,7 +85,7 @@ def fleet(ugvs: int, obstacles: int, seed: int = 1, name: str = "fleet") -> str:
 
 
 def _field(draw: random.Random, ugvs: int, obstacles: int, side: int) -> tuple[list[tuple[Point, Point]], list[Point]]:
-    """Ways of UGVs and places of obstacles, as many as fit into a square of cells, m."""
+    """Ways of UGVs (start and target) and places of obstacles, m, as many as fit into a square of cells."""
     free = {(column, row) for column in range(side) for row in range(side)}
     cells = draw.sample(sorted(free), len(free))
     ways, rocks = list[tuple[Point, Point]](), list[Point]()

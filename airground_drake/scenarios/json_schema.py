@@ -1,7 +1,7 @@
-"""Scenario files as JSON Schema (draft 2020-12), made by pydantic from `schema.py`, for editors, messages and docs.
+"""The JSON Schema (draft 2020-12) of scenario files, made by pydantic from `schema.py`, for editors, messages and docs.
 
-It has what can be said key by key: types, units, defaults, bounds, what may be named. How values must go together is
-for `validate.py`: what this accepts may still be refused there, never the other way round (with merge keys expanded).
+It states types, units, defaults, bounds and allowed names, key by key. `validate.py` checks how values go together: it
+may refuse a file that the schema accepts, never the other way round (with merge keys expanded).
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ Schema = dict[str, Any]
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 
 NAMES = "[key]"
-"""What pydantic calls the names of a mapping's entries in the place of an error."""
+"""pydantic's word, in the place of an error, for a name of a mapping."""
 
 _NAMES = {"anyOf": [{"type": "string", "pattern": NAME_PATTERN, "maxLength": MAX_NAME}, {"const": "<<"}]}
 
@@ -39,7 +39,7 @@ def scenario_schema(*, installed: bool = True) -> Schema:
     """The schema of a scenario file.
 
     Args:
-        installed: whether it has the names that installed packages add through entry points, besides our own.
+        installed: whether to include names that installed packages add through entry points.
     """
     made = _adapted(TypeAdapter(schema.Scenario).json_schema(), installed)
     kinds = {name: _object(getattr(schema, name), made["$defs"][name]) for name in sorted(made["$defs"])}
@@ -49,7 +49,7 @@ def scenario_schema(*, installed: bool = True) -> Schema:
 
 
 def _adapted(part: Any, installed: bool) -> Any:
-    """Part of what pydantic says, with the names of registries, merge keys among free names, and no titles."""
+    """A part of pydantic's schema with the names of registries, with merge keys among free names, without titles."""
     if isinstance(part, Registry):
         return [*part] if installed else [*part.own]
     if isinstance(part, list):
@@ -79,7 +79,7 @@ def _expectations(claims: Registry, installed: bool) -> Schema:
 
 
 def _object(kind: type, made: Schema) -> Schema:
-    """A dataclass: its keys in their order, described with their units, and every default."""
+    """The schema of a dataclass: its keys in order, with descriptions, units and defaults."""
     properties: Schema = {}
     for field in fields(kind):
         says = properties[field.name] = made["properties"][field.name]
@@ -97,12 +97,12 @@ def _object(kind: type, made: Schema) -> Schema:
 
 
 def keys_at(whole: Schema, *at: str) -> list[str]:
-    """Keys of the mapping at a place in a file with this schema: the names and indices that lead to it."""
+    """Keys of the mapping at a place in a file with this schema; `at` has the names and indices that lead there."""
     return [key for key in _at(whole, at)[0]["properties"] if key != "<<"]
 
 
 def wanted_at(whole: Schema, *at: str) -> str:
-    """What may stand at a place in a file with this schema, in words."""
+    """The values that are allowed at a place in a file with this schema, in words."""
     says, name = _at(whole, at)
     kind, unit = says.get("type", "string"), unit_of(name, " in ")
     if WANTED in says:
@@ -128,12 +128,12 @@ def wanted_at(whole: Schema, *at: str) -> str:
 
 @functools.cache
 def schema_of(kind: type) -> Schema:
-    """The schema of the files that a dataclass stands for, to be read only."""
+    """The schema of the files of a dataclass; do not change it."""
     return scenario_schema() if kind is schema.Scenario else TypeAdapter(kind).json_schema()
 
 
 def _at(whole: Schema, at: Sequence[str]) -> tuple[Schema, str]:
-    """What is said of a place, and the name whose suffix gives its unit."""
+    """The schema at a place, and the name whose suffix gives the unit."""
     says, name = whole, ""
     for part in at:
         inner = says.get("properties", {}).get(part)

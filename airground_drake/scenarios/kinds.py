@@ -1,4 +1,4 @@
-"""Kinds of values in a scenario file: the annotations of the dataclasses of `schema.py`, as pydantic takes them."""
+"""Kinds of values in a scenario file: pydantic's annotations for the dataclasses of `schema.py`."""
 
 import math
 import re
@@ -29,42 +29,42 @@ CLAIM_PATTERN = f"^[A-Z][A-Z0-9-]{{0,{MAX_NAME - 1}}}$"
 
 PLUG_IN = {"type": "string", "pattern": PLUGIN_PATTERN}
 EXPECTED = "x-expected"
-"""Word for the registry of claims in the place of JSON Schema's words for their expected verdicts."""
+"""Key for a registry of claims; `json_schema.py` replaces it by the claims and their expected verdicts."""
 RECORDED = "recorded"
-"""Context in which pydantic reads the scenario of a run's metadata: rules of names are not checked again."""
+"""pydantic's context for the scenario in a run's metadata: its rules are not checked again."""
 WANTED = "x-wanted"
-"""Word of a JSON Schema for what messages say of a value, where types and bounds do not say it."""
+"""Key for the words in which messages describe an allowed value, where its type and bounds do not say it."""
 
 # Unit by the suffix of a key, the longest suffix first.
 _UNITS = {"m_sqrt_s": "m/sqrt(s)", "1_m2_s": "1/(m^2 s)", "m_s": "m/s", "1_s": "1/s", "m": "m", "s": "s"}
 
 
 def unit_of(name: str, before: str = "") -> str:
-    """Unit that the suffix of a key says, with words before it; '' if it says none."""
+    """Unit in the suffix of a key, with words before it; '' without a unit."""
     return next((before + unit for suffix, unit in _UNITS.items() if name.endswith(f"_{suffix}")), "")
 
 
 def refused(value: object, allowed: str, *at: str) -> PydanticCustomError:
-    """The error of a value that breaks a rule, `at` a place within what the rule looks at; `allowed` says the rule."""
+    """The error of a value that breaks a rule; `allowed` states the rule, `at` the place within the checked value."""
     return PydanticCustomError("rule", "{allowed}", {"value": value, "allowed": allowed, "at": at})
 
 
 def as_float(value: object) -> object:
-    """A whole number as a floating-point number; infinite if it is too large for one."""
+    """A whole number as a floating-point number; infinite if it is too large."""
     if type(value) is not int:
         return value
     return float(value) if abs(value) < 1e300 else math.inf
 
 
 def _visible(text: str) -> str:
-    """Refuse text that would take something else's place where it is shown."""
+    """Refuse text with characters that could disguise it where it is shown."""
     if hidden := next(filter(_is_hidden, text), None):
         raise refused(hidden, "text without control characters and without marks that turn the direction of writing")
     return text
 
 
 def _is_hidden(character: str) -> bool:
-    """Whether a character shows only by what it does to others; line breaks, tabs and joiners are not meant."""
+    """Whether a character is invisible and changes how others are shown; line breaks, tabs and joiners are allowed."""
     return character not in "\n\t\u200c\u200d" and unicodedata.category(character) in ("Cc", "Cf", "Cs", "Zl", "Zp")
 
 
@@ -96,18 +96,18 @@ GroundPoint = Annotated[Point, AfterValidator(_on_the_ground)]
 
 @dataclass(frozen=True)
 class Rule:
-    """A function that returns a value or raises `refused`, and what JSON Schema says of the rule.
+    """A function that returns a value or raises `refused`, and the rule in JSON Schema.
 
-    A registry in what it says stands for its names at the time: `json_schema.py` puts them in.
+    A registry in the schema stands for its names; `json_schema.py` inserts them.
     """
 
     check: Callable[[Any], Any]
     says: Callable[[], dict[str, Any]]
 
     def __get_pydantic_core_schema__(self, source: object, handler: GetCoreSchemaHandler) -> CoreSchema:
-        """Check what the annotations before this one have let pass, except in the metadata of a run.
+        """Check a value after the annotations before this one, except in the metadata of a run.
 
-        A run may be judged where a plug-in that it named is not installed.
+        A run may be judged on a machine without its plug-ins.
         """
 
         def checked(value: Any, info: ValidationInfo) -> Any:
@@ -116,7 +116,7 @@ class Rule:
         return core_schema.with_info_after_validator_function(checked, handler(source))
 
     def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
-        """What the annotations before this one say, and this."""
+        """The schema of the annotations before this one, with this rule added."""
         return {**handler(schema), **self.says()}
 
 
@@ -124,7 +124,7 @@ PointOrNone = Annotated[list[Real], Field(strict=True), Rule(_all_or_none, lambd
 
 
 def one_of(options: Iterable[str], place: str = "") -> Rule:
-    """A name out of a collection, or of another at a place, `module:NAME`, which is imported when it is needed."""
+    """A name from a collection, or from another one at a place, `module:NAME`, which is imported when needed."""
 
     def allowed() -> list[str]:
         module, _, name = place.partition(":")
@@ -139,7 +139,7 @@ def one_of(options: Iterable[str], place: str = "") -> Rule:
 
 
 def registered(registry: Registry, retired: Mapping[str, str] | None = None) -> Rule:
-    """A name of a registry, or a plug-in; `retired` says what has taken the place of former names."""
+    """A name of a registry, or a plug-in; `retired` maps former names to their successors."""
 
     def check(value: str) -> str:
         if retired and value in retired:
@@ -152,7 +152,7 @@ def registered(registry: Registry, retired: Mapping[str, str] | None = None) -> 
 
 
 def expected_of(claims: Registry) -> Rule:
-    """Expected verdicts by claim; whether there is such a claim depends on the scenario's own, too."""
+    """Expected verdicts by claim; `validate.py` checks the claims, as a scenario may add its own."""
 
     def check(value: dict[str, str]) -> dict[str, str]:
         for claim, expected in value.items():
@@ -187,7 +187,7 @@ def settings_of(sections: tuple[str, ...]) -> Rule:
 
 
 def _claims_of_others(value: dict[str, str]) -> dict[str, str]:
-    """Refuse identifiers that claims of the package have, and what names no class."""
+    """Refuse identifiers of the package's own claims, and values that do not name a class."""
     for claim, place in value.items():
         if claim in (*RUN_CLAIMS, *MODEL_CLAIMS) or not re.fullmatch(CLAIM_PATTERN, claim):
             what = f"a new identifier of at most {MAX_NAME} capitals, digits and hyphens, such as MY-CLAIM"

@@ -1,7 +1,7 @@
 """From the name or file of a scenario to a validated `Scenario`; every mistake becomes one line.
 
-YAML text becomes plain data that knows its lines, in which `--set` replaces values (`document.py`). pydantic checks the
-data against the dataclasses of `schema.py` and builds them. `validate.py` checks how values go together.
+`document.py` reads YAML text as plain data with line numbers, and replaces values by those of `--set`. pydantic checks
+the data against the dataclasses of `schema.py` and builds them. `validate.py` checks how values go together.
 """
 
 from __future__ import annotations
@@ -37,8 +37,8 @@ def load(name_or_path: str | Path, overrides: Overrides = ()) -> tuple[Scenario,
 
     Args:
         name_or_path: name of a shipped scenario, or path to a YAML file.
-        overrides: applied in order; list items are addressed by index. A key must be one of the schema, an item
-            that exists, or an entry, which may be new, of a mapping whose names are free, such as `obstacles`.
+        overrides: applied in order; list items are addressed by index. A key must be a key of the schema, an existing
+            item of a list, or an old or new entry of a mapping with free names, such as `obstacles`.
 
     Returns:
         The scenario, and the SHA-256 of the file's bytes followed by a NUL byte and the text of each override.
@@ -54,11 +54,11 @@ def load(name_or_path: str | Path, overrides: Overrides = ()) -> tuple[Scenario,
 
 
 def validated(scenario: Scenario, overrides: Overrides = ()) -> Scenario:
-    """A scenario made or changed in Python, checked as strictly as a file; numpy's numbers and arrays may be in it.
+    """A scenario made or changed in Python, checked as strictly as a file. It may contain numbers and arrays of numpy.
 
     Args:
-        scenario: left as it is.
-        overrides: as of `load`.
+        scenario: to be checked; it is not changed.
+        overrides: as in `load`.
 
     Returns:
         A copy whose values have the types of the schema.
@@ -78,8 +78,8 @@ def from_data(data: Mapping[str, Any], source: str, overrides: Overrides = ()) -
 
     Args:
         data: with the keys of a scenario file.
-        source: where it comes from, for messages.
-        overrides: as of `load`.
+        source: where the data come from, for messages.
+        overrides: as in `load`.
 
     Raises:
         ScenarioError: if it is not valid.
@@ -88,10 +88,10 @@ def from_data(data: Mapping[str, Any], source: str, overrides: Overrides = ()) -
 
 
 def resolved(scenario: Scenario) -> dict[str, Any]:
-    """The scenario as nested dicts and lists, defaults filled in.
+    """The scenario as nested dicts and lists, with all defaults.
 
     Raises:
-        TypeError: if it is something else.
+        TypeError: if it is not a Scenario.
     """
     if not isinstance(scenario, Scenario):
         raise TypeError(f"{type(scenario).__name__} is no Scenario")
@@ -110,11 +110,11 @@ def _build(document: Document, overrides: Sequence[str]) -> Scenario:
 
 
 def own(scenario: Scenario, run: str) -> Scenario:
-    """The scenario as a run of it has it: with the values that the run sets.
+    """The scenario with the values that one of its runs sets.
 
     Args:
         scenario: validated.
-        run: name of one of its runs.
+        run: name of the run.
     """
     settings = scenario.runs[run].set
     return _as_set(of_data(resolved(scenario), scenario.name), run, settings) if settings else scenario
@@ -124,7 +124,7 @@ def _as_set(document: Document, run: str, settings: Mapping[str, Any]) -> Scenar
     """The scenario of a document with the values that a run sets.
 
     Raises:
-        ScenarioError: if it is not valid; names the run, too.
+        ScenarioError: if the result is not valid; the message names the run.
     """
     changed = Document(copy.deepcopy(document.data), document.source, dict(document.places))
     try:
@@ -137,7 +137,7 @@ def _as_set(document: Document, run: str, settings: Mapping[str, Any]) -> Scenar
 
 
 def _checked(document: Document) -> Scenario:
-    """The scenario of a document, without what its runs set."""
+    """The scenario of a document, without the values that its runs set."""
     scenario: Scenario = filled(Scenario, document)
     _complete(scenario)
     try:
@@ -152,7 +152,7 @@ def filled(kind: type, document: Document) -> Any:
     """A dataclass with the data of a document, checked by pydantic.
 
     Raises:
-        ScenarioError: if a key or value is not what the dataclass says.
+        ScenarioError: if a key or value does not fit the dataclass.
     """
     try:
         return adapter(kind).validate_python(document.data)
@@ -165,16 +165,16 @@ _UNKNOWN = ("unexpected_keyword_argument", "invalid_key")
 
 
 def _rank(error: ErrorDetails) -> int:
-    """Of several errors one is shown: a key that is not known may be why another is missing."""
+    """Rank of an error; the lowest is shown. An unknown key comes first: it may be a misspelt one that is missing."""
     return 0 if error["type"] in _UNKNOWN else 1 if error["type"] == "missing" else 2
 
 
 def _in_words(error: ErrorDetails, document: Document, schema: json_schema.Schema) -> ScenarioError:
-    """What pydantic says of a value, in one line: where it is, its key, the value, and what is allowed."""
+    """An error of pydantic as one line: place, key, value, and what is allowed."""
     kind, given, says = error["type"], error["input"], error.get("ctx", {})
     loc = [str(part) for part in error["loc"]]
     at = [part for part in (*loc, *says.get("at", ())) if part != json_schema.NAMES]
-    of_type = kind.endswith(("_type", "missing"))  # then the line of the value is named, not that of its key
+    of_type = kind.endswith(("_type", "missing"))  # the message names the line of the value, not of its key
     key, source = ".".join(at), document.where(*at, key=not of_type)
     if kind == "rule":
         return ScenarioError(source, key, says["value"], says["allowed"])
@@ -198,7 +198,7 @@ def _in_words(error: ErrorDetails, document: Document, schema: json_schema.Schem
 
 
 def _complete(scenario: Scenario) -> None:
-    """Fill in what follows from other keys, and round a gain of 1/period down to where gain * period <= 1 exactly."""
+    """Fill in the UAV's target if it is left out, and round gains of 1/period down so that gain * period <= 1."""
     if not scenario.uav.target_m:
         scenario.uav.target_m = _over_the_targets(scenario)
     control = scenario.control
@@ -207,10 +207,10 @@ def _complete(scenario: Scenario) -> None:
 
 
 def _rounded_down(gain: float, period: float) -> float:
-    """A gain, 1/s; the largest number below it that proofs admit if it is 1/period but for rounding.
+    """A gain, 1/s, rounded down if it exceeds 1/period by rounding alone.
 
-    Proofs take numbers as the decimals that they print as: 3.3333333333333335 * 0.3 is 1 in floating point, and more
-    than 1 there. A smaller gain only demands less.
+    Proofs read numbers as the decimals that Python prints: 3.3333333333333335 * 0.3 is 1 in floating point, but more
+    than 1 in decimals. A smaller gain only demands less.
     """
     while gain * period == 1.0 < decimal(gain) * decimal(period):
         gain = math.nextafter(gain, 0.0)
@@ -218,7 +218,7 @@ def _rounded_down(gain: float, period: float) -> float:
 
 
 def _over_the_targets(scenario: Scenario) -> Vector:
-    """Where the UAV's task (9) leads if every UGV reaches its target: over their centroid, [x, y, z], m."""
+    """Where the UAV's task (9) leads when every UGV is at its target: over the centroid, [x, y, z], m."""
     targets = [ugv.target_m for ugv in scenario.ugvs.values()]
     x, y = (sum(target[axis] for target in targets) / len(targets) for axis in range(2))
     return [x, y, scenario.uav.altitude_m]
@@ -244,5 +244,5 @@ def _texts(overrides: Overrides) -> list[str]:
 
 
 def _yaml_of(text: str) -> str:
-    """JSON as YAML: any character as it is, where YAML takes the pairs of escapes that JSON has for halves."""
+    """JSON as YAML: other characters as single escapes, as YAML would read a surrogate pair of JSON as two."""
     return "".join(each if " " <= each <= "~" else f"\\U{ord(each):08x}" for each in text)

@@ -21,12 +21,12 @@ def picture(scenario: Scenario, paths: Mapping[str, Array] | None = None, colors
     """Obstacles (grey) in their safe circles, a line for each UGV that ends in a dot, and targets (crosses).
 
     Args:
-        scenario: says what stands where.
-        paths: positions (T, 2), m, by UGV; default: the preset trajectories of all.
+        scenario: has the obstacles and targets.
+        paths: positions (T, 2), m, by UGV; default: the preset trajectories of all UGVs.
         colors: of the UGVs' lines, in turn.
 
     Returns:
-        An SVG document; names are the lines' tooltips.
+        An SVG document; the tooltip of a line is the UGV's name.
     """
     if paths is None:
         paths = {name: np.array(ugv.preset.waypoints_m)[:, :2] for name, ugv in scenario.ugvs.items()}

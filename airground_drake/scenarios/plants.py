@@ -1,4 +1,4 @@
-"""The plants of a scenario's robots. Claims read them here, too; of `scenarios.world` they know nothing."""
+"""The plants of a scenario's robots, for the world and, independently of it, for claims."""
 
 from __future__ import annotations
 

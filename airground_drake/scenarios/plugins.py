@@ -24,7 +24,7 @@ WANTED = f"third-party code is imported and run only with {OPTION}"
 
 
 def plugins(scenario: Scenario) -> dict[str, str]:
-    """Names of third-party code in a scenario, by key, without entry points of installed packages."""
+    """Names of third-party code in a scenario, by key; entry points of installed packages are not among them."""
     named: list[tuple[str, str, Registry]] = [
         ("uav.task", scenario.uav.task, UAV_TASKS),
         ("gatekeeper.route", scenario.gatekeeper.route, ROUTES),
@@ -45,10 +45,10 @@ def refuse(scenario: Scenario, source: str, keys: Collection[str] | None = None)
     Args:
         scenario: validated.
         source: where it comes from, for the message.
-        keys: those that matter; default: all.
+        keys: keys to check; default: all.
 
     Raises:
-        ScenarioError: if the scenario names any; says how to allow it.
+        ScenarioError: if the scenario names third-party code at such a key; says how to allow it.
     """
     for key, name in plugins(scenario).items():
         if keys is None or key in keys:
@@ -57,14 +57,13 @@ def refuse(scenario: Scenario, source: str, keys: Collection[str] | None = None)
 
 @contextmanager
 def admitted(scenario: Scenario, source: str, *, allow: bool, keys: Collection[str] | None = None) -> Iterator[None]:
-    """While a scenario is used, third-party code is found in the folder of its file, too; or refused, if not allowed.
+    """In the body, third-party code is also found in the folder of the scenario's file; if not allowed, it is refused.
 
-    The folder is the last one on Python's path, so that it takes the place of nothing, and only for the time being.
-    Child processes have the path of the process that starts them.
+    The folder comes last on Python's path, so that it cannot hide other modules. Child processes inherit the path.
 
     Args:
         scenario: validated.
-        source: name of a shipped scenario or path of a file, for messages too.
+        source: name of a shipped scenario or path of a file.
         allow: whether third-party code may be imported.
         keys: as in `refuse`.
 
@@ -79,7 +78,7 @@ def admitted(scenario: Scenario, source: str, *, allow: bool, keys: Collection[s
 
 @contextmanager
 def beside(source: str, *, allow: bool) -> Iterator[None]:
-    """Have the folder of a file as the last one on Python's path for the time being, if third-party code is allowed."""
+    """In the body, the folder of a file comes last on Python's path, if third-party code is allowed."""
     before, path = list(sys.path), Path(source)
     if allow and path.is_file():
         importlib.invalidate_caches()
@@ -91,7 +90,7 @@ def beside(source: str, *, allow: bool) -> Iterator[None]:
 
 
 def without(scenario: Scenario) -> Scenario:
-    """The scenario with the package's own task and route and no policies: its diagram has the same systems."""
+    """The scenario with the package's own task and route and without policies; its diagram has the same systems."""
     return replace(
         scenario,
         uav=replace(scenario.uav, task="formation"),

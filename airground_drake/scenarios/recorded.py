@@ -1,4 +1,4 @@
-"""The scenario that the metadata of a run hold, typed again. Only types are checked here, no names, no values."""
+"""The typed scenario from the metadata of a run. Only types are checked here, not names or values."""
 
 import copy
 import functools
@@ -13,14 +13,14 @@ from airground_drake.scenarios.schema import Scenario
 
 
 def of_run(data: Mapping[str, Any], run: str) -> Scenario:
-    """The scenario as a run of it had it: with the values that the run sets.
+    """The scenario of a run, with the values that the run sets.
 
     Args:
-        data: nested dicts and lists with the keys of the schema, defaults filled in.
+        data: nested dicts and lists with the keys of the schema, with all defaults.
         run: name of the run.
 
     Raises:
-        TraceError: if they are no scenario; names the first key and what is wrong there.
+        TraceError: if the data are not a scenario; names the first key and what is wrong there.
     """
     try:
         scenario: Scenario = adapter(Scenario).validate_python(data, context=RECORDED)
@@ -37,7 +37,7 @@ def of_run(data: Mapping[str, Any], run: str) -> Scenario:
 
 @functools.cache
 def adapter(kind: type) -> TypeAdapter[Any]:
-    """What checks nested data against the types of a dataclass, and makes it."""
+    """pydantic's adapter, which checks nested data and makes the dataclass."""
     return TypeAdapter(kind)
 
 

@@ -1,6 +1,6 @@
-"""What rounding may take from a safe distance in binary64: one formula, by which scenarios are accepted.
+"""A bound of the distance that rounding (binary64) may take from a safe distance.
 
-A scenario is accepted only where the loss stays below `TOLERANCE_M`; SAFE-HYP measures what a run lost.
+A scenario is accepted only if the bound stays below `TOLERANCE_M`. SAFE-HYP measures what a run lost.
 """
 
 from __future__ import annotations
@@ -12,32 +12,31 @@ import numpy as np
 from airground_drake.base.arrays import ROUNDOFF, Array
 
 TOLERANCE_M = 1e-9
-"""What a distance may fall short of the safe one, as SAFE-TRACE judges it, m."""
+"""Largest shortfall of a safe distance that SAFE-TRACE tolerates, m."""
 STEPS_PER_PERIOD = 64
-"""Integration steps into which events may cut a control period; 13 have been seen, where a witness function was
-isolated."""
+"""Largest number of integration steps in a control period, which events cut; the most seen is 13."""
 SLACK = 1.01
-"""Over the sum of first-order bounds, for products of roundings and for those of this formula."""
+"""Factor on the first-order bounds, for products of roundings and for rounding in this formula."""
 
 Number = TypeVar("Number", float, Array)
 
 
 def loss_of_inequality(distance: Number, speed: Number, period: float) -> Number:
-    """What rounding in kernels may cost in one period, m: u (7 D + 9 V h) for an inequality that floats meet.
+    """Loss by rounding in the kernels in one period, m: u (7 D + 9 V h) if floats meet the inequality.
 
-    The bound is computed from D (1 + 3.5u) and errs by (4 D + 3 |D - d|) u / h, |D - d| <= D as D >= d; each term of
-    n.v errs by (5.5 + 3)u of itself.
+    The kernels compute the bound from D (1 + 3.5u). It errs by (4 D + 3 |D - d|) u / h, and |D - d| <= D as D >= d.
+    Each term of n.v has a relative error of (5.5 + 3)u.
     """
     return ROUNDOFF * (7.0 * distance + 9.0 * speed * period)
 
 
 class Rounding(NamedTuple):
-    """What the loss of a kind of pairs depends on.
+    """The quantities on which the loss of a kind of pairs depends.
 
-    One step loses what the kernels lose (`loss_of_inequality`, both robots), u (P + h V) per coordinate, integration
-    step and robot in the positions (P: largest coordinate), and u T V per integration step because multiples of h
-    are rounded (T: duration). A deficit calls in the lower branch of the inequality, which leaves (1 - A h) of it per
-    period; so alone it never exceeds (loss of a step) / (A h). With A = 0 nothing is restored and losses add up.
+    One control period loses three amounts: the kernels' loss (`loss_of_inequality`, for both robots); u (P + h V) in
+    the positions, per coordinate, integration step and robot (P: largest coordinate); and u T V per integration step,
+    as multiples of h are rounded (T: duration). The law reduces a deficit to (1 - A h) of it per period. So a deficit
+    never exceeds (loss of a period) / (A h). With A = 0 nothing is restored, and losses add up.
 
     Attributes:
         reach: largest distance at which an inequality acts, m.
@@ -57,15 +56,15 @@ class Rounding(NamedTuple):
         return SLACK * (self._kernel + moves + self._per_second * duration)
 
     def largest_extent(self, duration: float) -> float:
-        """Coordinate up to which a deficit stays within the tolerance, m; may be negative: then none."""
+        """Largest coordinate for which a deficit stays within the tolerance, m; negative if there is no such one."""
         return (self._budget - self._per_second * duration) / _PER_METRE
 
     def longest(self, start: float, speed: float) -> float:
-        """Duration up to which it does for coordinates up to start + speed * duration, s; may be negative."""
+        """Largest duration for coordinates up to start + speed * duration, s; negative if there is no such one."""
         return (self._budget - _PER_METRE * start) / (_PER_METRE * speed + self._per_second)
 
     def least_gain(self, extent: float, duration: float) -> float:
-        """Gain from which on it does, 1/s."""
+        """Smallest gain for which a deficit stays within the tolerance, 1/s."""
         return self.of_a_step(extent, duration) / (TOLERANCE_M * self.period)
 
     @property
@@ -83,4 +82,4 @@ class Rounding(NamedTuple):
 
 
 _PER_METRE = 2.0 * float(np.sqrt(3.0)) * STEPS_PER_PERIOD * ROUNDOFF
-"""Loss of a step for each metre of the largest coordinate: three coordinates, two robots."""
+"""Loss of a step per metre of the largest coordinate, for three coordinates and two robots."""

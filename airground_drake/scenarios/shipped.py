@@ -1,4 +1,4 @@
-"""The scenarios that come with the package: their files, by name, and what each is, without reading all of it."""
+"""The scenarios that come with the package: their files and titles, by name."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import yaml
 from airground_drake.base.errors import one_line
 
 AUDIT = "audit"
-"""What `airground report` takes besides the name of a scenario or a file."""
+"""The argument of `airground report` that is neither a scenario nor a file."""
 
 
 def shipped() -> list[str]:
@@ -27,18 +27,18 @@ def shipped_files() -> dict[str, Traversable]:
 
 
 def argument(path: Path) -> str:
-    """The path of a scenario as the command line takes it: quoted, neither an option nor a name that is shipped."""
+    """A scenario's path as an argument of the command line: quoted, and distinct from options and shipped names."""
     text = str(path)
     return one_line(shlex.quote(f"./{text}" if text.startswith("-") or text in (AUDIT, *shipped()) else text))
 
 
 def json_schema_file() -> Traversable:
-    """The JSON Schema of scenario files, of what comes with the package, for editors: see `json_schema.py`."""
+    """The file of the JSON Schema of scenario files, without installed plug-ins; see `json_schema.py`."""
     return resources.files(__package__) / "scenario.schema.json"
 
 
 def title(name: str) -> str:
-    """The title of a shipped scenario, which stands near its beginning: no more of the file is parsed."""
+    """The title of a shipped scenario. The file is parsed only up to its title, which stands near the beginning."""
     depth, before = 0, ""
     with shipped_files()[name].open("rb") as stream:
         for event in yaml.parse(stream, yaml.BaseLoader):

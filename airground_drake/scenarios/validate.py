@@ -1,7 +1,7 @@
 """How the values of a scenario must go together: one small function per rule, all in `CHECKS`.
 
-What each value may be by itself is in `schema.py`. A check yields its problems as (key, value, allowed); `check` raises
-the first. Nothing that a scenario names is imported here.
+`schema.py` says which values a single key may have. A rule yields its problems as (key, value, allowed); `check` raises
+the first. Plug-ins that a scenario names are not imported here.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from airground_drake.base.errors import Fault, ScenarioError
+from airground_drake.base.errors import ScenarioError
 from airground_drake.base.exact import decimal
 from airground_drake.base.statuses import alternatives
 from airground_drake.decision.bayes import COMPUTED
@@ -66,10 +66,11 @@ def _blocks(scenario: Scenario) -> Problems:
     if gatekeeper.blocks > gatekeeper.stages:
         allowed = "a whole number from 1 to gatekeeper.stages, or 0: one accept variable per stage"
         yield "gatekeeper.blocks", gatekeeper.blocks, allowed
-    if gatekeeper.blocks and gatekeeper.route in (set(ROUTES.own) - {"mixed_integer"}):
-        yield "gatekeeper.blocks", gatekeeper.blocks, "0: only the route mixed_integer has blocks"
-    if gatekeeper.solver != "daqp" and gatekeeper.route in (set(ROUTES.own) - {"mixed_integer"}):
-        yield "gatekeeper.solver", gatekeeper.solver, "daqp: only the route mixed_integer has other solvers"
+    if gatekeeper.route in ROUTES.own and gatekeeper.route != "mixed_integer":
+        if gatekeeper.blocks:
+            yield "gatekeeper.blocks", gatekeeper.blocks, "0: only the route mixed_integer has blocks"
+        if gatekeeper.solver != "daqp":
+            yield "gatekeeper.solver", gatekeeper.solver, "daqp: only the route mixed_integer has other solvers"
 
 
 def _runs(scenario: Scenario) -> Problems:
@@ -104,9 +105,9 @@ def preset_s(waypoints_m: Sequence[Vector], speed_m_s: float) -> float:
 
 
 def _ends(scenario: Scenario) -> Problems:
-    """A preset leads to its target, to within the tolerance, where a run expects the UGV there.
+    """A preset must lead to its target, to within the tolerance, if a run expects the UGV there.
 
-    Runs that are shorter than a preset are cut short on purpose: their robots are not to arrive.
+    A scenario that ends before a preset does is cut short on purpose: no arrival is expected.
     """
     presets = [ugv.preset for ugv in scenario.ugvs.values()]
     if max(preset_s(each.waypoints_m, each.speed_m_s) for each in presets) > scenario.duration_s:
@@ -163,11 +164,7 @@ def _release(scenario: Scenario) -> Problems:
     decision, rule = scenario.decision, scenario.decision.threshold
     zeta = rule.zeta_m
     if rule.rule in COMPUTED:
-        try:
-            zeta = COMPUTED[rule.rule](rule.drift_m_s, rule.noise_m_sqrt_s, rule.c1_1_s, rule.c2)
-        except ValueError:
-            none = Fault(f"no {rule.rule} threshold found")
-            yield "decision.threshold", none, "numbers of comparable size are allowed"
+        zeta = COMPUTED[rule.rule](rule.drift_m_s, rule.noise_m_sqrt_s, rule.c1_1_s, rule.c2)
     if decision.trigger == "automaton" and not decision.release_m < zeta:
         yield "decision.release_m", decision.release_m, f"less than the {rule.rule} threshold, {zeta:.9g} m"
 
@@ -185,52 +182,47 @@ def _distances(scenario: Scenario) -> Problems:
 
 
 def _and(radii: float) -> str:
-    """What two radii add to a distance, m, as a message has it."""
+    """What radii add to a distance, m, in the words of a message."""
     return f" + radii {radii:.9g} m" if radii else ""
 
 
 class _Body(NamedTuple):
-    """What keeps apart from others: how far it reaches in a control period m, its speed m/s, radius m and name."""
+    """A robot or obstacle: radius plus travel in a control period, m; speed, m/s; radius, m; name."""
 
     reach: float
     speed: float
     radius: float
     name: str
 
-    @classmethod
-    def of(cls, name: str, radius: float, speed: float, period: float) -> _Body:
-        return cls(radius + speed * period, speed, radius, name)
-
 
 def _nearest_pairs(scenario: Scenario) -> list[tuple[str, _Body, _Body]]:
-    """Of each kind of pairs, named by the key of its safe distance, the one that needs the most room in a period."""
-    h, uav = scenario.control.period_s, scenario.uav
-    ugvs = [_Body.of(name, ugv.radius_m, ugv.max_speed_m_s, h) for name, ugv in scenario.ugvs.items()]
+    """For each kind of pairs the pair that needs the most room in a period, with the key of its safe distance."""
+    h = scenario.control.period_s
+    *ugvs, uav = (
+        _Body(each.radius_m + each.max_speed_m_s * h, each.max_speed_m_s, each.radius_m, name)
+        for name, each in scenario.robots.items()
+    )
     ugvs.sort(reverse=True)
-    flier = _Body.of(uav.name, uav.radius_m, uav.max_speed_m_s, h)
-    fixed = [_Body.of(name, obstacle.radius_m, 0.0, h) for name, obstacle in scenario.obstacles.items()]
-    pairs = [("air_ground_m", flier, ugvs[0]), *(("ugv_m", one, other) for one, other in pairwise(ugvs[:2]))]
-    return [*pairs, *(("obstacle_m", max(flier, ugvs[0]), each) for each in fixed)]
+    fixed = [_Body(each.radius_m, 0.0, each.radius_m, name) for name, each in scenario.obstacles.items()]
+    pairs = [("air_ground_m", uav, ugvs[0]), *(("ugv_m", one, other) for one, other in pairwise(ugvs[:2]))]
+    return [*pairs, *(("obstacle_m", max(uav, ugvs[0]), each) for each in fixed)]
 
 
 def _shown(number: Fraction, rounding: str) -> str:
-    """A number of nine digits, rounded so that it is itself allowed."""
+    """A number with nine digits, rounded in the direction in which it is allowed."""
     digits = Context(prec=9, rounding=rounding).divide(Decimal(number.numerator), Decimal(number.denominator))
     return f"{digits:.9g}"
 
 
-def _closing(one: _Body, other: _Body, period: float) -> Fraction:
-    """How much nearer two can come in a control period, m."""
-    return (decimal(one.speed) + decimal(other.speed)) * decimal(period)
-
-
 def _sensing(scenario: Scenario) -> Problems:
-    """What is farther than the sensing range must not come within the safe distance in one control period."""
+    """A body beyond the sensing range must not come within the safe distance in one control period."""
     period = scenario.control.period_s
-    needed, kind, one, other = max(
-        (decimal(getattr(scenario.safe_distance, kind) + (a.radius + b.radius)) + _closing(a, b, period), kind, a, b)
-        for kind, a, b in _nearest_pairs(scenario)
-    )
+
+    def room(kind: str, one: _Body, other: _Body) -> Fraction:
+        closing = (decimal(one.speed) + decimal(other.speed)) * decimal(period)
+        return decimal(getattr(scenario.safe_distance, kind) + (one.radius + other.radius)) + closing
+
+    needed, kind, one, other = max((room(*pair), *pair) for pair in _nearest_pairs(scenario))
     if decimal(scenario.control.sensing_range_m) < needed:
         apart = f"safe_distance.{kind} {getattr(scenario.safe_distance, kind):.9g} m{_and(one.radius + other.radius)}"
         total = f"{apart} + closing {one.speed + other.speed:.9g} m/s * control.period_s {period:.9g} s"
@@ -239,14 +231,14 @@ def _sensing(scenario: Scenario) -> Problems:
 
 
 def _extent(scenario: Scenario) -> Problems:
-    """Rounding must not take more from a safe distance than SAFE-TRACE tolerates; without a gain nothing is restored.
+    """Rounding must not take more from a safe distance than SAFE-TRACE tolerates.
 
-    Then (A = 0) there is nothing that an extent could be accepted by; SAFE-HYP says what a run lost.
+    With the gain A = 0 the law restores no lost distance, and no bound applies; SAFE-HYP says what a run lost.
     """
     control, duration = scenario.control, scenario.duration_s
     if control.avoidance_gain_1_s == 0.0:
         return
-    speeds = sorted([scenario.uav.max_speed_m_s, *(ugv.max_speed_m_s for ugv in scenario.ugvs.values())])
+    speeds = sorted(each.max_speed_m_s for each in scenario.robots.values())
     speed, closing = speeds[-1], speeds[-2] + speeds[-1]
     loss = Rounding(control.sensing_range_m, closing, control.period_s, control.avoidance_gain_1_s)
     points: list[tuple[str, Vector]] = []
@@ -276,7 +268,7 @@ def _extent(scenario: Scenario) -> Problems:
 
 
 class _Round(NamedTuple):
-    """A robot or obstacle: its key in the scenario, its name, where it is, m, and its radius, m."""
+    """A robot or obstacle: its key in the scenario, its name, its place, m, and its radius, m."""
 
     key: str
     name: str
@@ -285,7 +277,7 @@ class _Round(NamedTuple):
 
 
 def _clearances(scenario: Scenario) -> Problems:
-    """Robots that start, or are to end, within the safe distance of an obstacle or of each other."""
+    """No robot may start or end within the safe distance of an obstacle or of another robot."""
     fixed = [_Round("", name, each.position_m, each.radius_m) for name, each in scenario.obstacles.items()]
     for attribute, verb in (("start_m", "starts"), ("target_m", "would end")):
         ugvs = [
@@ -305,7 +297,7 @@ def _clearances(scenario: Scenario) -> Problems:
 
 
 def _within(these: Sequence[_Round], those: Sequence[_Round], distance: float) -> Iterator[tuple[_Round, _Round]]:
-    """Pairs whose surfaces are nearer than that, m; of one list with itself, each pair once."""
+    """Pairs whose surfaces are nearer than a distance, m. If both lists are the same, each pair comes once."""
     (points, radii), (others, other_radii) = (
         (np.reshape([each.point for each in group], (-1, 3)), np.array([each.radius for each in group]))
         for group in (these, those)
@@ -334,7 +326,7 @@ def _choices(scenario: Scenario) -> Problems:
 
 
 def _keys(value: object, above: str = "") -> Iterator[str]:
-    """Dotted keys of all that is in nested dicts and lists."""
+    """Dotted keys of all entries of nested dicts and lists."""
     entries = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
     for name, inner in entries:
         yield f"{above}{name}"

@@ -1,4 +1,4 @@
-"""From a scenario to the objects that the diagram is made of: one factory each. Tests and audits use them, too."""
+"""Factories: each makes one part of the diagram from a scenario."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ from airground_drake.scenarios.schema import Decision, Scenario
 from airground_drake.scenarios.world import make_world
 
 SAME_TIME = 1e-12
-"""Vertices of presets this close, s or relatively, differ by rounding: times are sums of some quotients."""
+"""Times of vertices that are this close (s, or relative) are equal but for rounding: they are sums of quotients."""
 
 
 def make_avoidance(scenario: Scenario, composition: Composition = "augmented") -> Avoidance:
@@ -43,39 +43,31 @@ def make_avoidance(scenario: Scenario, composition: Composition = "augmented") -
 
 
 def make_law(scenario: Scenario, method: Method, composition: Composition = "augmented") -> UgvLaw:
-    """The numbers of the UGVs' control law under a method."""
+    """The control law of the UGVs under a method."""
     control, avoidance = scenario.control, make_avoidance(scenario, composition)
     return UgvLaw(avoidance, control.motion_gain_1_s, control.intervention_gain_1_s, method.intervention_on_top)
 
 
-def make_database(scenario: Scenario, method: Method) -> BehaviourDatabase:
-    """The UAV's behaviours; none under a method without interventions.
+def make_planner(scenario: Scenario, method: Method) -> Planner:
+    """The UAV's planner with its policies (none under a method without interventions) and its map.
 
     Raises:
         UnknownNameError, PluginError: if the scenario names a policy that cannot be made.
     """
+    mapped, radii = make_map(scenario)
     given = scenario.intervention
     policies = given.policies if method.intervenes else []
-    return BehaviourDatabase(
+    database = BehaviourDatabase(
         [(entry.name, make_policy(entry.name, entry.parameters, given.budget_s)) for entry in policies],
         retry=given.retry_s,
         ranking=given.ranking,  # type: ignore[arg-type]
         budget=given.budget_s,
         joint=not method.intervention_on_top,  # the paper's UGVs decide each for itself
     )
-
-
-def make_planner(scenario: Scenario, method: Method) -> Planner:
-    """The UAV's planner, with what is on its map.
-
-    Raises:
-        UnknownNameError, PluginError: if the scenario names a policy that cannot be made.
-    """
-    mapped, radii = make_map(scenario)
     return Planner(
         ugvs=tuple(scenario.ugvs),
-        database=make_database(scenario, method),
-        period=scenario.intervention.period_s,
+        database=database,
+        period=given.period_s,
         presets=tuple(make_presets(scenario)),
         targets=positions([ugv.target_m for ugv in scenario.ugvs.values()]),
         mapped=mapped,
@@ -88,7 +80,7 @@ def make_planner(scenario: Scenario, method: Method) -> Planner:
 
 
 def make_map(scenario: Scenario) -> tuple[Array, Array]:
-    """The obstacles on the UAV's map: those that it knows, and those that are only there, without a radius.
+    """The UAV's map: obstacles that it knows, and phantoms, which exist on the map only and have no radius.
 
     Returns:
         Centres, (m, 3), m, and radii, (m,), m.
@@ -99,11 +91,11 @@ def make_map(scenario: Scenario) -> tuple[Array, Array]:
 
 
 def make_route(scenario: Scenario) -> Route:
-    """How the gatekeeper's problem (26) is solved.
+    """The solver route of the gatekeeper's problem (26).
 
     Raises:
         UnknownNameError, PluginError: if the scenario names a route that cannot be made.
-        ScenarioError: if it names a solver that cannot be used here; says why, and which can.
+        ScenarioError: if it names a solver that cannot be used here.
     """
     gate = scenario.gatekeeper
     chosen: dict[str, Any] = {"blocks": gate.blocks} if gate.blocks else {}
@@ -129,7 +121,7 @@ def make_horizon(scenario: Scenario) -> Horizon:
 
 
 def make_rules(scenario: Scenario) -> Rules:
-    """When the gatekeeper's decisions become answers, and what they may cost."""
+    """How the gatekeeper's decisions become answers, and the budget of a decision."""
     gate = scenario.gatekeeper
     return Rules(
         switching_margin=gate.switching_margin,
@@ -141,23 +133,23 @@ def make_rules(scenario: Scenario) -> Rules:
 
 
 def make_outlook(scenario: Scenario) -> Outlook:
-    """How far outcomes are looked at."""
+    """How far ahead outcomes are predicted."""
     gate = scenario.gatekeeper
     return Outlook(gate.longest_s, gate.settling_s, gate.horizon_s, scenario.arrival_tolerance_m)
 
 
 def make_patience(scenario: Scenario) -> Patience:
-    """How long UGVs go along with the UAV."""
+    """How often and how long UGVs follow the UAV."""
     gate = scenario.gatekeeper
     return Patience(gate.tries, gate.rest_s, gate.longest_s)
 
 
 GatekeepersFactory = Callable[[Scenario, UgvLaw], Gatekeepers]
-"""Makes what judges proposals, of a scenario and the law of its UGVs."""
+"""Makes the gatekeepers from a scenario and the law of its UGVs."""
 
 
 def make_gatekeepers(scenario: Scenario, law: UgvLaw) -> Gatekeepers:
-    """How the UGVs judge proposals: by problem (26) where the intervention is on top, else by outcomes.
+    """Gatekeepers by problem (26) where interventions have priority over avoidance, else by outcomes.
 
     Raises:
         UnknownNameError, PluginError: if the scenario names a route that cannot be made.
@@ -176,7 +168,7 @@ def make_trigger(scenario: Scenario, zeta: float) -> Trigger:
 
 
 def threshold(scenario: Scenario) -> float:
-    """Decision threshold zeta, m: the fixed one, the minimiser of the Bayes risk, or the root of (19) as printed."""
+    """Decision threshold zeta, m: fixed, the minimiser of the Bayes risk, or the root of (19) as printed."""
     rule = scenario.decision.threshold
     if rule.rule in COMPUTED:
         return COMPUTED[rule.rule](rule.drift_m_s, rule.noise_m_sqrt_s, rule.c1_1_s, rule.c2)
@@ -184,14 +176,14 @@ def threshold(scenario: Scenario) -> float:
 
 
 def positions(rows: Sequence[Sequence[float]]) -> Array:
-    """Points as an array, (n, 3), m, also where there are none."""
+    """Points as an array, (n, 3), m; n may be 0."""
     return np.array(rows, dtype=np.float64).reshape(-1, 3)
 
 
 def stack_presets(presets: list[Motion]) -> PiecewisePolynomial:
     """All presets as one trajectory of 3n components over the union of their vertices.
 
-    Vertices of several presets that only rounding keeps apart are one: a velocity over so short a time is rounding.
+    Vertices that only rounding keeps apart are merged: a velocity over so short a time would be a rounding error.
     """
     times = np.unique(np.concatenate([preset.times for preset in presets]))
     kept = np.append(np.diff(times) > SAME_TIME * np.maximum(1.0, times[1:]), True)
@@ -202,7 +194,7 @@ def stack_presets(presets: list[Motion]) -> PiecewisePolynomial:
 
 
 def make_noise(count: int, given: Decision) -> tuple[RandomSource, AffineSystem]:
-    """Where the noise of `count` decision variables comes from, and what integrates it; to be connected."""
+    """Source of the noise of `count` decision variables, and its integrator; to be connected."""
     source = RandomSource(RandomDistribution.kGaussian, count, given.noise_period_s)
     return source, integrated_noise(count, given.noise_m_sqrt_s, given.leak_1_s, given.noise_period_s)
 

@@ -1,7 +1,8 @@
 """Sampled NSBC controllers of the UGVs and of the UAV.
 
-Both act on what planner and gatekeeper decide at the same instant, because Drake makes all unrestricted updates of an
-instant before the discrete ones: these systems' updates must stay discrete, and those of the others unrestricted.
+Both act on what planner and gatekeeper decide at the same instant: Drake makes all unrestricted updates of an instant
+before the discrete ones. So the controllers' updates must stay discrete, and those of planner and gatekeeper
+unrestricted.
 """
 
 from __future__ import annotations
@@ -16,7 +17,6 @@ import numpy as np
 from pydrake.common.value import AbstractValue, Value
 from pydrake.systems.framework import (
     BasicVector,
-    CacheIndex,
     Context,
     DiscreteValues,
     LeafSystem,
@@ -37,7 +37,33 @@ from airground_drake.systems.signals import UavGains, UgvGains, declare_bodies, 
 from airground_drake.world.world import Neighbours, World
 
 
-class UgvController(LeafSystem):
+class _Controller(LeafSystem):
+    """A sampled controller whose gains are parameters of its Context."""
+
+    def _declare_gains(self, view: Any, gains: Sequence[float], model: Any) -> None:
+        """Declare the gains, named as in `view`, and a cached value like `model` that `_with_gains` computes."""
+        self._view = view
+        index = NumericParameterIndex(self.DeclareNumericParameter(BasicVector(list(gains))))
+        self._gains_ticket = self.numeric_parameter_ticket(index)
+        producer = ValueProducer(allocate=lambda: Value(model), calc=weakly(self._calc_in_force))
+        self._cached = self.DeclareCacheEntry("law in force", producer, {self._gains_ticket}).cache_index()
+
+    def mutable_gains(self, context: Context) -> Any:
+        """The gains in force as a named view; assigning to it changes the gains in this Context."""
+        return self._view(context.get_mutable_numeric_parameter(0).get_mutable_value())
+
+    def _with_gains(self, *gains: float) -> Any:
+        raise NotImplementedError
+
+    def _calc_in_force(self, context: Context, output: AbstractValue) -> None:
+        output.set_value(self._with_gains(*context.get_numeric_parameter(0).value().tolist()))
+
+    def _in_force(self, context: Context) -> Any:
+        """What `_with_gains` returns for the gains in force."""
+        return self.get_cache_entry(self._cached).Eval(context)
+
+
+class UgvController(_Controller):
     """NSBC of all UGVs, see `UgvLaw`: avoidance (7)-(8), tracking (6), intervention (14), composed as (5) or (20).
 
     Ports (n UGVs, M bodies that move, world frame):
@@ -67,44 +93,29 @@ class UgvController(LeafSystem):
         accepted = self.DeclareDiscreteState(n)
         self.DeclareStateOutputPort("command", command)
         self.DeclareStateOutputPort("accepted", accepted)
-        gains = [law.avoidance.gain, law.motion_gain, law.intervention_gain]
-        self._gains = self.DeclareNumericParameter(BasicVector(gains))
-        self._law = _cached(self, law, weakly(self._calc_law), self._gains)
-        given = {self.numeric_parameter_ticket(NumericParameterIndex(self._gains))}
+        gains = law.avoidance.gain, law.motion_gain, law.intervention_gain
+        self._declare_gains(UgvGains, gains, law)
+        given = {self._gains_ticket}
         self.DeclareVectorOutputPort("gains", len(gains), weakly(self._calc_gains), prerequisites_of_calc=given)
         self.DeclarePeriodicDiscreteUpdateEvent(law.avoidance.period, 0.0, weakly(self._update))
 
-    def gains(self, context: Context) -> Any:
-        """The gains in force, a `UgvGains`."""
-        return UgvGains(context.get_numeric_parameter(self._gains).value())
-
-    def mutable_gains(self, context: Context) -> Any:
-        """The same, to be assigned to: changes the gains in this Context."""
-        return UgvGains(context.get_mutable_numeric_parameter(self._gains).get_mutable_value())
-
-    def law_in(self, context: Context) -> UgvLaw:
-        """The law with the gains in force."""
-        law: UgvLaw = self.get_cache_entry(self._law).Eval(context)
-        return law
-
     def parameters(self, context: Context) -> dict[str, Any]:
         """What it runs with, see `read_back`, and whether it puts interventions on top of avoidance."""
-        law = self.law_in(context)
+        law: UgvLaw = self._in_force(context)
         found = read_back(self, law.avoidance, self._near)
         return {**found, "composition": law.avoidance.composition, "intervention_on_top": law.intervention_on_top}
 
-    def _calc_law(self, context: Context, output: AbstractValue) -> None:
-        output.set_value(self.law.with_gains(*context.get_numeric_parameter(self._gains).value().tolist()))
+    def _with_gains(self, *gains: float) -> UgvLaw:
+        return self.law.with_gains(*gains)
 
     def _calc_gains(self, context: Context, output: BasicVector) -> None:
-        output.SetFromVector(context.get_numeric_parameter(self._gains).value())
+        output.SetFromVector(context.get_numeric_parameter(0).value())
 
     def _update(self, context: Context, discrete: DiscreteValues) -> None:
         positions = _finite(self._bodies.Eval(context)).reshape(-1, 3)
         reference, rate = self._reference.Eval(context).reshape(2, -1, 3)
         proposals = accepted_proposals(self._proposals.Eval(context), self._answers.Eval(context))
-        law = self.get_cache_entry(self._law).Eval(context)
-        velocity = self.velocity(context.get_time(), positions, reference, rate, proposals, law)
+        velocity = self.velocity(context.get_time(), positions, reference, rate, proposals, self._in_force(context))
         discrete.set_value(0, velocity.ravel())
         discrete.set_value(1, [float(proposal is not None) for proposal in proposals])
 
@@ -117,7 +128,7 @@ class UgvController(LeafSystem):
         accepted: Sequence[Proposal | None],
         law: UgvLaw | None = None,
     ) -> Array:
-        """What the law commands.
+        """Commands of the law.
 
         Args:
             t: time, s.
@@ -135,7 +146,7 @@ class UgvController(LeafSystem):
         return law.velocity(positions, self._near, reference, rate, asked)
 
 
-class UavController(LeafSystem):
+class UavController(_Controller):
     """NSBC of a UAV: obstacle avoidance (11) above a task, by default to stay over the UGVs' centroid, (9)-(10).
 
     Ports (n UGVs, M bodies that move, world frame):
@@ -164,8 +175,8 @@ class UavController(LeafSystem):
             avoidance: the set-based layer.
             gain: of the task, 1/s, by default.
             altitude: m.
-            task: made at each sample from positions (n, 3), m, and velocities (n, 3), m/s, of the UGVs, altitude and
-                gain; asked for the velocity of one robot, (1, 3), m/s.
+            task: makes the task of a sample from positions (n, 3), m, and velocities (n, 3), m/s, of the UGVs,
+                altitude and gain; it gives the velocity of one robot, (1, 3), m/s.
         """
         super().__init__()
         self.avoidance = avoidance
@@ -178,36 +189,26 @@ class UavController(LeafSystem):
         self._ugv_command = self.DeclareVectorInputPort("ugv_command", 3 * len(world.names("ugv")))
         command = self.DeclareDiscreteState(3)
         self.DeclareStateOutputPort("command", command)
-        self._gains = self.DeclareNumericParameter(BasicVector([avoidance.gain, gain]))
-        self._layer = _cached(self, avoidance, weakly(self._calc_layer), self._gains)
+        self._declare_gains(UavGains, (avoidance.gain, gain), avoidance)
         self.DeclarePeriodicDiscreteUpdateEvent(avoidance.period, 0.0, weakly(self._update))
-
-    def gains(self, context: Context) -> Any:
-        """The gains in force, a `UavGains`."""
-        return UavGains(context.get_numeric_parameter(self._gains).value())
-
-    def mutable_gains(self, context: Context) -> Any:
-        """The same, to be assigned to: changes the gains in this Context."""
-        return UavGains(context.get_mutable_numeric_parameter(self._gains).get_mutable_value())
 
     def parameters(self, context: Context) -> dict[str, Any]:
         """What it runs with, see `read_back`."""
-        layer, _ = self.get_cache_entry(self._layer).Eval(context)
-        return read_back(self, layer, self._near)
+        avoidance, _ = self._in_force(context)
+        return read_back(self, avoidance, self._near)
 
-    def _calc_layer(self, context: Context, output: AbstractValue) -> None:
-        avoidance, formation = context.get_numeric_parameter(self._gains).value().tolist()
-        output.set_value((replace(self.avoidance, gain=avoidance), formation))
+    def _with_gains(self, *gains: float) -> tuple[Avoidance, float]:
+        return replace(self.avoidance, gain=gains[0]), gains[1]
 
     def _update(self, context: Context, discrete: DiscreteValues) -> None:
         positions = _finite(self._bodies.Eval(context)).reshape(-1, 3)
         commands = self._ugv_command.Eval(context).reshape(-1, 3)
-        discrete.set_value(0, self.velocity(positions, commands, *self.get_cache_entry(self._layer).Eval(context)))
+        discrete.set_value(0, self.velocity(positions, commands, *self._in_force(context)))
 
     def velocity(
         self, positions: Array, ugv_commands: Array, avoidance: Avoidance | None = None, gain: float | None = None
     ) -> Array:
-        """What the law commands, (3,), m/s.
+        """Command of the law, (3,), m/s.
 
         Args:
             positions: of all bodies that move, (M, 3), m.
@@ -216,7 +217,7 @@ class UavController(LeafSystem):
             gain: of the task, 1/s; default: as it was built.
 
         Raises:
-            PluginError: if the task asks for what is no velocity.
+            PluginError: if the task does not ask for a velocity.
         """
         avoidance = self.avoidance if avoidance is None else avoidance
         gain = self._gain if gain is None else gain
@@ -224,7 +225,7 @@ class UavController(LeafSystem):
         return velocity
 
     def _asked(self, positions: Array, ugv_commands: Array, gain: float) -> Array:
-        """What the task asks for, (1, 3), m/s. The answer of a task from outside the package is checked."""
+        """Velocity that the task asks for, (1, 3), m/s. The answer of a third-party task is checked."""
         ugvs, own = positions[self._ugvs], positions[self._own]
         if self._task is FormationTask:
             return FormationTask(ugvs, ugv_commands, self._altitude, gain).velocity(own)
@@ -232,23 +233,15 @@ class UavController(LeafSystem):
         return _velocity_of(task, read_only(own))
 
 
-def _cached(system: LeafSystem, model: Any, calc: Callable[..., None], gains: int) -> CacheIndex:
-    """Declare a value that is computed from the gains of a Context when they change; it has the type of `model`."""
-    producer = ValueProducer(allocate=lambda: Value(model), calc=calc)
-    return system.DeclareCacheEntry(
-        type(model).__name__, producer, {system.numeric_parameter_ticket(NumericParameterIndex(gains))}
-    ).cache_index()
-
-
 def read_back(system: LeafSystem, avoidance: Avoidance, near: Neighbours) -> dict[str, Any]:
-    """The parameters of a controller's avoidance as it runs in a Context, in strict JSON, for the trace.
+    """The parameters with which a controller's avoidance runs, in strict JSON, for the trace.
 
     Returns:
-        Of its k robots: `members`, their indices in the order of the world; `obstacles_m`, centres (m, 3); `others`,
+        For its k robots: `members`, their indices in the order of the world; `obstacles_m`, centres (m, 3); `others`,
         indices of the n robots that each avoids, (k, n); `safe_m` and `share` beside the obstacles, then beside the
-        robots, (k, m + n); `mobility` (k, 3); `max_speed_m_s` (k,). Of all: `sampling_s`, period and offset;
-        `gain_1_s`, `period_s`, `sensing_range_m`. Arrays in C order; `safe_m` and `share` as [value, how many] in a
-        row.
+        robots, (k, m + n); `mobility` (k, 3); `max_speed_m_s` (k,). For the layer: `sampling_s`, period and offset;
+        `gain_1_s`, `period_s`, `sensing_range_m`. Arrays are flat, in C order; `safe_m` and `share` are lists of
+        [value, number of repetitions].
     """
     timing = system.GetUniquePeriodicDiscreteUpdateAttribute()
     return {
@@ -267,12 +260,16 @@ def read_back(system: LeafSystem, avoidance: Avoidance, near: Neighbours) -> dic
 
 
 def _in_runs(array: Array) -> list[list[float]]:
-    """Equal neighbours as [value, how many]: 100 robots among 1,000 obstacles have 110,000 distances, mostly alike."""
+    """Runs of equal values as [value, length]: 100 robots and 1,000 obstacles have 110,000 distances, mostly equal."""
     return [[value, len(list(alike))] for value, alike in groupby(array.ravel().tolist())]
 
 
 def _finite(positions: Array) -> Array:
-    """The positions that the plants give; raise if one is not finite, because no robot could avoid such a body."""
+    """The given positions.
+
+    Raises:
+        PluginError: if one is not finite, because no robot could avoid such a body.
+    """
     if not math.isfinite(positions @ positions) and not np.isfinite(positions).all():  # quickly, then exactly
         raise PluginError(f"positions are not finite, from a plant or a disturbance: {short(repr(positions.tolist()))}")
     return positions

@@ -33,36 +33,36 @@ from airground_drake.systems.signals import (
     components_of,
     declare_bodies,
     laid_out,
-    of_ugv,
 )
 from airground_drake.world.world import World
 
 NOT_BEGUN = -1.0
-"""Beginning of the run and of the step, s, before there is one."""
+"""Stands for the beginning of a run or a step, s, before the first one."""
 
 SHORTEST_S = 1e-9
-"""Steps shorter than this are not looked into, s; what is due in one happens at its end. Ticks of different periods can
-be one unit in the last place apart, and Drake cannot isolate anything in such a step: it stops instead."""
+"""Events are not isolated within steps shorter than this, s; they happen at the step's end. Ticks of different periods
+can be one unit in the last place apart, and Drake stops when it must isolate an event in such a step."""
 
 
 class DecisionBlock(LeafSystem):
-    """Ports, state and rate of a block that computes the decision variables of n UGVs; a subclass says which.
+    """Base of blocks that compute the decision variables x of n UGVs.
 
-    Between the simulator's steps positions, references and noise are linear in time, but for corners of the presets.
-    So the block keeps what they were when the step began, and tells how far x has gone since: what the trigger needs
-    to miss nothing between two updates. A subclass defines `value`, and `extremes` if the variable can be smaller or
-    larger within a straight stretch than at its ends.
+    Within a step of the simulator, positions, references and noise are linear in time, except at corners of the
+    presets. So the block keeps their values at the beginning of the step and outputs the range of x since then: the
+    trigger needs it to miss nothing between two updates. A subclass defines `value`, and `extremes` if x can be smaller
+    or larger within a straight stretch than at its ends.
 
     Ports (n UGVs, M bodies that move):
         in  `bodies` (3M) m; `reference` (6n), positions first; `noise` (n) m.
-        out `decision_variable` (n) m, x now; `decision_range` (2n) m, the least x since the step began, then the
-            largest one. Both are continuous in time.
-    State (1 + 5n): of the beginning of the step, time, s; then of every UGV task error (3), noise and x, m.
+        out `decision_variable` (n) m, x now; `decision_range` (2n) m, the smallest x since the step began, then the
+            largest. Both are continuous in time.
+    State (1 + 5n): the time at which the step began, s; then for each UGV its task error (3), noise and x at that time,
+        m.
     Rate: one update per step of the simulator.
     """
 
     def __init__(self, world: World, presets: Sequence[Motion] = ()) -> None:
-        """Declare ports, state and events for the UGVs of a world; their presets tell where references bend."""
+        """Declare ports, state and events for the UGVs of a world. References have corners where their presets do."""
         super().__init__()
         count = len(world.names("ugv"))
         self._ugvs = components_of(world, "ugv")
@@ -86,7 +86,7 @@ class DecisionBlock(LeafSystem):
         self.DeclarePerStepDiscreteUpdateEvent(weakly(self._begin_step))
 
     def value(self, t: float, parts: Array) -> Array | Sequence[float]:
-        """x of every UGV, (n,), m; it must depend on the arguments alone.
+        """x of every UGV, (n,), m. It may depend on nothing but the arguments.
 
         Args:
             t: time, s.
@@ -95,7 +95,7 @@ class DecisionBlock(LeafSystem):
         raise NotImplementedError(f"{type(self).__name__} does not define `value`")
 
     def extremes(self, begin: float, before: Array, end: float, after: Array, ends: Array) -> Array:
-        """Least and largest x, (2, n), m, while task errors and noise are linear in time: here those at the ends.
+        """Smallest and largest x, (2, n), m, over a straight stretch; by default those at its ends.
 
         Args:
             begin: time, s.
@@ -107,14 +107,13 @@ class DecisionBlock(LeafSystem):
         return np.sort(ends, axis=0)
 
     def _calc_signals(self, context: Context, output: AbstractValue) -> None:
-        """What the state keeps of an instant, as it is now."""
+        """The numbers that the state keeps, at this instant."""
         position, reference = self._bodies.Eval(context)[self._ugvs], self._reference.Eval(context)
-        output.set_value(
-            self._with_variable(gathered(context.get_time(), position, reference, self._noise.Eval(context)))
-        )
+        signals = gathered(context.get_time(), position, reference, self._noise.Eval(context))
+        output.set_value(self._with_variable(signals))
 
     def _with_variable(self, signals: Array) -> Array:
-        """Signals with this block's x in place of that of (15)."""
+        """Signals whose x of (15) is replaced by that of this block."""
         rows = signals[1:].reshape(-1, 5)
         rows[:, 4] = self.value(signals[0], rows[:, :4].copy())
         return signals
@@ -134,16 +133,16 @@ class DecisionBlock(LeafSystem):
         output.SetFromVector(found.ravel())
 
     def _spans(self, begun: Array, now: Array) -> Array:
-        """Least and largest x over a step without corners, (2, n), m, of the signals at its ends."""
+        """Smallest and largest x over a step without corners, (2, n), m, from the signals at its ends."""
         before, after = begun[1:].reshape(-1, 5), now[1:].reshape(-1, 5)
         return self.extremes(begun[0], before[:, :4], now[0], after[:, :4], np.stack([before[:, 4], after[:, 4]]))
 
     def _look_into_corners(self, found: Array, corners: Sequence[tuple[float, int]], begun: Array, now: Array) -> None:
-        """Replace least and largest x of the UGVs whose references bend within a step.
+        """Replace the smallest and largest x of UGVs whose references have corners within a step.
 
         Args:
-            found: what is replaced, (2, n), m.
-            corners: times, s, of bends within the step, and indices of the UGVs.
+            found: smallest and largest x, (2, n), m, changed in place.
+            corners: times of the corners, s, and indices of the UGVs.
             begun: signals at the beginning of the step.
             now: signals at its end.
         """
@@ -164,7 +163,7 @@ class DecisionBlock(LeafSystem):
             found[:, j] = ranges[:, 0, j].min(), ranges[:, 1, j].max()
 
     def _begin_step(self, context: Context, discrete: DiscreteValues) -> EventStatus:
-        """Keep the signals of this instant: a step ends here, or a simulator begins."""
+        """Keep the signals of this instant: the end of a step, or the start of a simulator."""
         discrete.set_value(0, self.get_cache_entry(self._signals).Eval(context))
         return EventStatus.Succeeded()
 
@@ -184,7 +183,7 @@ class DecisionVariable(DecisionBlock):
         return extremes(before, after, ends)
 
     def _with_variable(self, signals: Array) -> Array:
-        """They have it already, unless a subclass has another one."""
+        """Signals have this x already, unless a subclass defines another."""
         return signals if type(self).value is DecisionVariable.value else super()._with_variable(signals)
 
     def _spans(self, begun: Array, now: Array) -> Array:
@@ -194,23 +193,24 @@ class DecisionVariable(DecisionBlock):
 
 
 class EventTrigger(LeafSystem):
-    """The automaton of `decision.trigger` for every UGV, its events isolated by a witness function.
+    """The automaton of `decision.trigger` for every UGV; a witness function isolates its events.
 
-    It knows the decision variables alone, whatever block computes them. The witness looks at the whole step so far,
-    not at its end: the least and the largest x since the step began are an input. It changes its sign once a
-    transition has become due anywhere in the step, and cannot change it back before the step ends: a dip below the
-    release level and back within a step is isolated like any other crossing, and nothing is missed. At the isolated
-    time the step ends, and the per-step update makes the transition; what is due at the beginning of a run, at once.
-    The per-step updates of a diagram all see the signals before any of them: the trigger sees the range of the step
-    that ends, while the block that computes it begins another. The Context needs an accuracy
-    (`Context.SetAccuracy`): without it Drake stops at the first event, or with fixed steps it comes at the end of one.
-    A Simulator that is initialised in the middle of a run, such as one for a clone of its Context, goes on with it; one
-    that is initialised again before its first step, or for an earlier time, begins anew.
+    The trigger sees decision variables only, whatever block computes them. The witness uses the range of x since the
+    step began, not only x at its end. It changes its sign once a transition has become due anywhere in the step and
+    cannot change it back within the step. So a dip below the release level and back within a step is isolated like any
+    other crossing. At the isolated time the step ends and the per-step update makes the transition; transitions due at
+    the beginning of a run are made at once.
+
+    All per-step updates of a diagram see the signals before any of them: the trigger sees the range of the step that
+    ends while the block that computes it begins another. The Context needs an accuracy (`Context.SetAccuracy`).
+    Without it Drake stops at the first event or, with fixed steps, reports it at the end of a step. A Simulator that is
+    initialised in the middle of a run, such as one for a clone of its Context, continues the run. One that is
+    initialised again before its first step, or for an earlier time, starts a new run.
 
     Ports (n UGVs):
-        in  `decision_variable` (n) m; `decision_range` (2n) m, the least since the step began, then the largest.
+        in  `decision_variable` (n) m; `decision_range` (2n) m, the smallest since the step began, then the largest.
         out `status` (4n): a `Status` per UGV.
-    State: the status; the beginning of the step and of the run, s.
+    State: the status; the times at which the step and the run began, s.
     Parameters: `TriggerLevels`; by default those of the trigger.
     Rate: one update per step of the simulator.
     """
@@ -236,14 +236,14 @@ class EventTrigger(LeafSystem):
         return TriggerLevels(context.get_numeric_parameter(0).value())
 
     def mutable_levels(self, context: Context) -> Any:
-        """The same, to be assigned to: changes the levels in this Context."""
+        """The same as a view; assigning to it changes the levels in this Context."""
         return TriggerLevels(context.get_mutable_numeric_parameter(0).get_mutable_value())
 
     def trigger(self, context: Context) -> Trigger:
         """The automaton with the levels in force.
 
         Raises:
-            ValueError: if there is no such automaton.
+            ValueError: if no automaton can have these levels.
         """
         return Trigger(*context.get_numeric_parameter(0).value().tolist())
 
@@ -268,19 +268,13 @@ class EventTrigger(LeafSystem):
         t = context.get_time()
         if t - context.get_discrete_state(1)[0] < SHORTEST_S:
             return 1.0
-        status, levels = (
-            context.get_discrete_state(0).value(),
-            context.get_numeric_parameter(0).value(),
-        )
+        status, levels = context.get_discrete_state(0).value(), context.get_numeric_parameter(0).value()
         return -1.0 if anything_due(status, t, self._range.Eval(context), levels) else 1.0
 
     def update(self, context: Context, discrete: DiscreteValues) -> EventStatus:
-        """Make the transitions that have become due in the step that ends, and begin another: the per-step update."""
+        """The per-step update: make the transitions that became due in the step that ends, and begin another step."""
         t, spans = context.get_time(), self._range.Eval(context)
-        before, levels = (
-            context.get_discrete_state(0).value(),
-            context.get_numeric_parameter(0).value(),
-        )
+        before, levels = context.get_discrete_state(0).value(), context.get_numeric_parameter(0).value()
         if anything_due(before, t, spans, levels):
             least, most = spans[: self._count], spans[self._count :]
             discrete.set_value(0, self._after(context, before, self._variable.Eval(context), least, most))
@@ -288,20 +282,20 @@ class EventTrigger(LeafSystem):
         return EventStatus.Succeeded()
 
     def _after(self, context: Context, before: Array, x: Array, least: Array, most: Array) -> Array:
-        """Status once the transitions that became due in a step are made."""
+        """Status after the transitions that became due in a step."""
         t, trigger, status = context.get_time(), self.trigger(context), before.reshape(-1, FIELDS).copy()
         levels = context.get_numeric_parameter(0).value()
         for j in np.flatnonzero(transitions_due(before, t, least, most, levels)):
-            state, lowest, highest = _unpack(before, int(j)), float(least[j]), float(most[j])
-            status[j] = _pack([_moved(trigger, state, t, float(x[j]), lowest, highest)])
+            state = _unpack(before, int(j))
+            status[j] = _pack([_moved(trigger, state, t, float(x[j]), float(least[j]), float(most[j]))])
         return status.ravel()
 
 
 def _moved(trigger: Trigger, before: TriggerState, t: float, x: float, least: float, most: float) -> TriggerState:
-    """State at the end of a step in which a transition became due: x now, and how far it went, m."""
+    """State at the end of a step in which a transition became due, from x now and its range in the step, m."""
     seen = {Mode.SUPERVISING: most, Mode.INTERVENING: least, Mode.REFRACTORY: x}[before.mode]
     after = trigger.step(before, t, seen)
-    return after if after.mode is before.mode else trigger.step(after, t, x)  # x may have come back already
+    return after if after.mode is before.mode else trigger.step(after, t, x)  # x may have crossed back already
 
 
 def _pack(states: Sequence[TriggerState]) -> Array:
@@ -309,5 +303,5 @@ def _pack(states: Sequence[TriggerState]) -> Array:
 
 
 def _unpack(status: Array, index: int) -> TriggerState:
-    one = of_ugv(Status, status, index)
+    one = Status(status[FIELDS * index : FIELDS * (index + 1)])
     return TriggerState(Mode(int(one.mode)), int(one.triggers), float(one.triggered_at_s), float(one.released_at_s))

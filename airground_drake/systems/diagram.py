@@ -1,4 +1,4 @@
-"""From a scenario to a Drake Diagram of the layers of the paper's Figure 2 and the vehicles, wired by port names.
+"""Builds the Drake Diagram of a scenario: the layers of the paper's Figure 2 and the vehicles, wired by port names.
 
 Data flows through `decision_making` (noise, DDM, trigger), `task_planning` (presets, planner, controllers),
 `optimisation` (gatekeeper) and `vehicles` (commands, disturbances, plants), whose positions are fed back.
@@ -41,16 +41,16 @@ from airground_drake.world.world import ROBOTS, Body, World
 RECORDED = (
     "bodies", "team_command", "reference", "noise", "decision_variable", "status", "accepted",
 )  # fmt: skip
-"""Exported output ports of the diagram, the signals of a trace."""
+"""Exported output ports of the diagram: the signals of a trace."""
 
 PlantFactory = Callable[[str, Array], System]
 """Makes the plant of a robot from its name and its start (3,), m: a System with one input, the velocity (3,), m/s, and
 one output, the position (3,), m, both in the world frame, whose default state has the robot at its start."""
 
 DecisionFactory = Callable[[World, Sequence[Motion]], System]
-"""Makes the block that computes the decision variables of n UGVs, from their world and their presets: a System with the
-output ports `decision_variable` (n), m, and `decision_range` (2n), m, the least and the largest since the simulator's
-step began. Its input ports are fed by name. `systems.DecisionBlock` is a base for such blocks."""
+"""Makes the block that computes the decision variables of n UGVs from their world and their presets: a System with the
+output ports `decision_variable` (n), m, and `decision_range` (2n), m, the smallest and the largest since the
+simulator's step began. Its input ports are fed by name. `systems.DecisionBlock` is a base for such blocks."""
 
 
 @dataclass(frozen=True)
@@ -59,9 +59,8 @@ class Model:
 
     Attributes:
         diagram: the whole system; its exported output ports are RECORDED.
-        method: which method's priorities and gatekeeper it has.
         world: all bodies, in the order of the port `bodies`.
-        decision_block: what drives the trigger.
+        decision_block: drives the trigger.
         trigger: of all UGVs.
         planner: the UAV's planner.
         gatekeeper: of methods (c) and (d), else None.
@@ -69,7 +68,6 @@ class Model:
     """
 
     diagram: Diagram
-    method: Method
     world: World
     decision_block: System
     trigger: EventTrigger
@@ -97,16 +95,17 @@ def build_diagram(
         decision_block: makes the block that drives the trigger. The default, `systems.DecisionVariable`, is (15).
 
     Returns:
-        A Diagram whose default context has every robot at its start; to be simulated, a context needs an accuracy:
-        `context.SetAccuracy(1e-6)`. Outputs: RECORDED. Inputs: `disturbance_<robot>` (3), m/s, added to the robot's
-        velocity; 0 where not connected. With a monitor, its output `violation`, too. The scenario's seed has no part
-        in it: the noise is that of `diagram.SetRandomContext(context, RandomGenerator(seed))`.
+        A Diagram whose default context has every robot at its start. For a simulation its context needs an accuracy:
+        `context.SetAccuracy(1e-6)`. Outputs: RECORDED and, with a monitor, `violation`. Inputs: `disturbance_<robot>`
+        (3), m/s, added to the robot's velocity; 0 if not connected. The scenario's seed is not part of the diagram:
+        `diagram.SetRandomContext(context, RandomGenerator(seed))` gives a context the noise of a seed. pydrake never
+        frees diagrams of Python systems by itself; `systems.lifetime.untie` allows it.
 
     Raises:
         ScenarioError: if the scenario is not valid.
         UnknownNameError: if there is no such method or composition.
-        PluginError: if it names a policy, route or task that cannot be made, or a plant or the decision block has other
-            ports.
+        PluginError: if a policy, route or task of the scenario cannot be made, or a plant or the decision block does
+            not have the ports of one.
     """
     diagram = build_model(validated(scenario), method, composition, plants, monitor, decision_block).diagram
     of = ref(diagram)
@@ -115,7 +114,7 @@ def build_diagram(
 
 
 def _picture(diagram: Diagram | None) -> str:
-    """The picture of a diagram; '' once it is gone."""
+    """The picture of a diagram; '' if the diagram has been freed."""
     if diagram is None:
         return ""
     from airground_drake.systems import graphviz  # which builds diagrams itself
@@ -135,10 +134,10 @@ def build_model(
     disturbed: bool = True,
     make_gatekeepers: components.GatekeepersFactory = components.make_gatekeepers,
 ) -> Model:
-    """Build and wire all components of one method of a valid scenario; else as `build_diagram`.
+    """Build and wire all components of one method of a valid scenario; see `build_diagram`.
 
-    If it is not to be `disturbed`, the diagram has no inputs for disturbances: commands go straight to the plants.
-    `make_gatekeepers` makes what judges proposals in another way; claims about decisions are about the default.
+    Without `disturbed` the diagram has no inputs for disturbances: commands go straight to the plants.
+    `make_gatekeepers` replaces the gatekeepers; claims about decisions are about the default.
     """
     chosen, composition = _chosen(scenario, method, composition)
     world, presets = make_world(scenario), components.make_presets(scenario)
@@ -153,14 +152,15 @@ def build_model(
     planner = InterventionPlanner(components.make_planner(scenario, chosen), world, scenario.control.period_s)
     gatekeeper = None
     if chosen.gated:
-        gatekeepers = make_gatekeepers(scenario, law)
         periods = {"period": scenario.gatekeeper.period_s, "control": scenario.control.period_s}
-        gatekeeper = Gatekeeper(gatekeepers, world, **periods)
+        gatekeeper = Gatekeeper(make_gatekeepers(scenario, law), world, **periods)
+    answering = DirectAcceptance(n) if gatekeeper is None else gatekeeper
+    answers = {name: answering.GetOutputPort(name) for name in ("answers", "reports")}
     controllers = UgvController(world, law), _uav_controller(scenario, world)
     parts = {
         "decision_making": decision,
         "task_planning": _task_planning(presets, planner, *controllers),
-        "optimisation": _optimisation(gatekeeper if gatekeeper is not None else DirectAcceptance(n)),
+        "optimisation": _assembled("optimisation", {"gatekeeper": answering}, answers),
         "vehicles": vehicles,
     }
     if monitor is not None:
@@ -168,20 +168,16 @@ def build_model(
     named = {port.get_name(): port for part in parts.values() for port in _outputs(part)}
     exported = [*RECORDED, *(["violation"] if monitor is not None else [])]
     diagram = _assembled(f"{scenario.name}_method_{chosen.id}", parts, named, exported)
-    return Model(diagram, chosen, world, block, trigger, planner, gatekeeper, controllers)
+    return Model(diagram, world, block, trigger, planner, gatekeeper, controllers)
 
 
 def most_complete(scenario: Scenario) -> str:
-    """The method of the scenario's runs that has the most parts, by its identifier: the one that pictures show."""
+    """Identifier of the method with the most parts among the scenario's runs: the one that pictures show."""
     return max((run.method for run in scenario.runs.values()), key=list(METHODS).index)
 
 
 def _chosen(scenario: Scenario, method: str | None, composition: str | None) -> tuple[Method, Composition]:
-    """The requested method and composition; without a method, those of the scenario's last run.
-
-    Raises:
-        UnknownNameError: if there is no such method or composition.
-    """
+    """The requested method and composition; without a method, those of the scenario's last run."""
     if method is None:
         last = next(reversed(scenario.runs.values()))
         method = last.method
@@ -193,7 +189,7 @@ def _chosen(scenario: Scenario, method: str | None, composition: str | None) -> 
 
 
 def _decision_making(scenario: Scenario, n: int, variable: System, events: EventTrigger) -> Diagram:
-    """The decision-making layer of n UGVs: noise, the block of the decision variables, triggers."""
+    """The decision-making layer of n UGVs: noise, decision variables, trigger."""
     source, noise = components.make_noise(n, scenario.decision)
     systems = {
         "noise_source": source, "decision_noise": noise, "decision_variable": variable, "event_trigger": events,
@@ -211,7 +207,7 @@ def _decision_making(scenario: Scenario, n: int, variable: System, events: Event
 def _task_planning(
     presets: Sequence[Motion], planner: InterventionPlanner, ugvs: UgvController, uav: UavController
 ) -> Diagram:
-    """The task planning layer: preset trajectories, the UAV's proposals, and the tasks that all robots compose."""
+    """The task planning layer: preset trajectories, planner, controllers."""
     reference = TrajectorySource(components.stack_presets(list(presets)), output_derivative_order=1)
     systems = {
         "reference": reference, "intervention_planner": planner, "ugv_controller": ugvs, "uav_controller": uav,
@@ -227,14 +223,8 @@ def _task_planning(
     return _assembled("task_planning", systems, named)
 
 
-def _optimisation(gatekeeper: Gatekeeper | DirectAcceptance) -> Diagram:
-    """The optimisation layer: the UGVs accept or refuse."""
-    named = {name: gatekeeper.GetOutputPort(name) for name in ("answers", "reports")}
-    return _assembled("optimisation", {"gatekeeper": gatekeeper}, named)
-
-
 def _vehicles(world: World, plants: Mapping[str, System], *, disturbed: bool) -> Diagram:
-    """Where the robots are, and what moves them: commands, disturbances, plants."""
+    """The vehicles: commands, disturbances, plants, positions."""
     builder = DiagramBuilder()
     sizes = [3 * len(world.names(kind)) for kind in ROBOTS]
     team_command = builder.AddNamedSystem("team_command", Multiplexer(sizes))
@@ -271,11 +261,11 @@ def _assembled(
 
     Args:
         name: of the diagram.
-        systems: what is in it, in the order in which Drake goes through them.
-        named: output ports. Each feeds the input ports of its name; an input port of another name becomes one of the
-            diagram, together with all that have the same.
-        exported: which of `named` are output ports of the diagram; default: all.
-        wires: what else feeds what.
+        systems: its systems, in Drake's order of computation.
+        named: output ports; each feeds all input ports of its name. Input ports of any other name become an input port
+            of the diagram, one for each name.
+        exported: which of `named` become output ports of the diagram; default: all.
+        wires: further connections.
     """
     builder = DiagramBuilder()
     for each, system in systems.items():
@@ -312,12 +302,12 @@ def _outputs(system: System) -> list[OutputPort]:
 def make_monitor(
     scenario: Scenario, method: str | None = None, composition: Composition | None = None, *, terminate: bool = False
 ) -> Monitor:
-    """A monitor of a diagram of the scenario, with laws of its own.
+    """A monitor of a diagram of the scenario, with laws made separately from it.
 
     Args:
-        scenario: what is to hold, whatever the diagram was built from.
+        scenario: what must hold; the diagram may have been built from another one.
         method: default: that of the scenario's last run.
-        composition: of the UGVs' avoidance tasks; default: 'augmented', without a method that of the last run.
+        composition: of the UGVs' avoidance tasks; default: as in `build_diagram`.
         terminate: end the simulation at the first violation.
 
     Raises:
@@ -342,7 +332,7 @@ def _uav_controller(scenario: Scenario, world: World) -> UavController:
 
 
 def _plant(body: Body, plants: PlantFactory | None, period_s: float) -> System:
-    """The Drake system of a body that moves: the user's, else that of its plant.
+    """The Drake system of a moving body: the user's, or that of its plant.
 
     Raises:
         PluginError: if the user's system does not have the ports of a plant.
@@ -360,10 +350,10 @@ def _plant(body: Body, plants: PlantFactory | None, period_s: float) -> System:
 
 
 def _checked_block(n: int, block: System) -> System:
-    """The block of the decision variables of n UGVs, if it has the output ports of one.
+    """The given block.
 
     Raises:
-        PluginError: if not.
+        PluginError: if it lacks the output ports of a decision block of n UGVs.
     """
     sizes = {port.get_name(): port.size() for port in _outputs(block)}
     wanted = {"decision_variable": n, "decision_range": 2 * n}

@@ -17,10 +17,10 @@ from airground_drake.world.world import World
 
 
 class DecisionLog(list[Decision]):
-    """Decisions by time, for the trace."""
+    """Decisions in the order of time, for the trace."""
 
     def __deepcopy__(self, memo: dict[int, Any]) -> Self:
-        """Of a copied Context: a log of its own, with the same decisions."""
+        """A copied Context gets a log of its own with the same decisions."""
         return type(self)(self)
 
 
@@ -28,21 +28,21 @@ class Gatekeeper(LeafSystem):
     """Decides at every sample about the proposal in force for each UGV, (21)-(29).
 
     Under method (c) each UGV predicts its own closed loop under both choices from what it senses (23), solves (26)
-    through a route and answers by the first stage of the plan, see `gatekeeper.mpc_gatekeeper`; under (d) it judges the
-    outcome and watches the progress, see `gatekeeper.outcome_gatekeeper`. The answer goes to its controller and back
-    to the UAV.
+    through a route and answers by the first stage of the plan: see `gatekeeper.mpc_gatekeeper`. Under (d) it judges the
+    outcome and watches the progress: see `gatekeeper.outcome_gatekeeper`. The answer goes to the UGV's controller and
+    back to the UAV.
 
     Ports (n UGVs, r robots, M bodies that move):
         in  `bodies` (3M) m; `team_command` (3r) m/s, for the predicted motion of the other robots; `gains`, the
             `UgvGains` that the controllers run with; `proposals` abstract, n of Proposal or None.
         out `answers` (2n), an `Answer` per UGV, and `reports` (abstract), see `messages`; held.
     State: abstract, a `GatekeeperState`.
-    Rate: one update per gatekeeper period, from t = 0. What it decides there is published at the end of the
-    simulator's step: put into a log that the Context holds, as Drake's loggers do. The log decides nothing.
+    Rate: one update per gatekeeper period, from t = 0. Its decisions are published at the end of the simulator's step
+    to a log in the Context, as Drake's loggers do; nothing reads the log during a run.
     """
 
     def __init__(self, gatekeepers: Gatekeepers, world: World, *, period: float, control: float) -> None:
-        """Declare ports, state and the periodic update for the UGVs of a world; its period and the controllers', s."""
+        """Declare ports, state and the update every `period`, s; the controllers' period is `control`, s."""
         super().__init__()
         n = len(world.names("ugv"))
         self._gatekeepers = gatekeepers
@@ -70,10 +70,7 @@ class Gatekeeper(LeafSystem):
 
     @property
     def decision_times_s(self) -> list[float]:
-        """CPU time of every decision since construction or `reset_timing`.
-
-        Kept outside the Context because it differs between identical runs.
-        """
+        """CPU time of each decision since `reset_timing`, outside the Context: identical runs differ in it."""
         return self._gatekeepers.times_s
 
     def reset_timing(self) -> None:
@@ -81,8 +78,8 @@ class Gatekeeper(LeafSystem):
         self._gatekeepers.times_s = []
 
     def decisions(self, context: Context) -> DecisionLog:
-        """Every decision that was published in a simulation of this Context."""
-        entry = self.get_cache_entry(self._log)  # kept by its index: Python's object would keep the system
+        """All decisions published in the simulation of this Context."""
+        entry = self.get_cache_entry(self._log)  # by index: the object would keep the system alive
         log: DecisionLog = entry.get_mutable_cache_entry_value(context).GetMutableValueOrThrow()
         return log
 

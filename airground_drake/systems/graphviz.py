@@ -16,7 +16,7 @@ from pydrake.systems.framework import Diagram
 
 from airground_drake.base import files
 from airground_drake.scenarios.load import load
-from airground_drake.systems import blocks, schematic
+from airground_drake.systems import schematic
 from airground_drake.systems.diagram import build_diagram, most_complete
 
 _PICTURE = re.compile(r'<svg width="(\d+)pt" height="(\d+)pt".*?>\s*(<g .*</g>)\s*</svg>', re.DOTALL)
@@ -24,19 +24,19 @@ _ID = re.compile(r' id="[^"]*"')
 
 
 def dot(diagram: Diagram) -> str:
-    """Graphviz text: of a scenario's diagram the picture of its layers, of any other one its blocks and their ports.
+    """Graphviz text: the picture of the layers for a scenario's diagram, Drake's own for any other diagram.
 
-    The same diagram always gives the same text.
+    The text of a scenario's diagram depends on the scenario and the method only.
     """
     layered = all(diagram.HasSubsystemNamed(layer) for layer in schematic.LAYERS)
-    return schematic.graph(diagram) if layered else blocks.graph(diagram)
+    return schematic.graph(diagram) if layered else str(diagram.GetGraphvizString(max_depth=1))
 
 
 def svg(dot_text: str) -> str:
     """Lay out Graphviz text as SVG.
 
-    The same text gives the same bytes on the same machine; box sizes depend on its fonts. The digest of the text
-    is in the picture, so that it can be told whether a picture is current.
+    The same text gives the same bytes on the same machine; box sizes depend on its fonts. The picture holds the digest
+    of its text for `is_current`.
     """
     found = _PICTURE.search(re.sub(r"<!--.*?-->\n?", "", _laid_out(dot_text, "svg").decode(), flags=re.DOTALL))
     if found is None:
@@ -54,7 +54,7 @@ def svg(dot_text: str) -> str:
 
 
 def drawn(dot_text: str, kind: str) -> bytes:
-    """Graphviz text as a file: dot, svg, pdf, png, or what else Graphviz knows."""
+    """Graphviz text as a file of a kind that Graphviz knows: dot, svg, pdf, png and others."""
     if kind == "dot":
         return dot_text.encode()
     return svg(dot_text).encode() if kind == "svg" else _laid_out(dot_text, kind)
@@ -68,7 +68,7 @@ def _laid_out(dot_text: str, kind: str) -> bytes:
 
 
 def is_current(name: str, content: str, found: str) -> bool:
-    """Whether a file's text is that of the present code: `.dot` to the letter, `.svg` by the digest inside."""
+    """Whether the file `name` with text `found` is up to date: `.dot` must equal `content`, `.svg` have its digest."""
     if name.endswith(".svg"):
         mark = re.search(r"<!-- (dot sha256 \w+) -->", content)
         return mark is not None and mark[1] in found
@@ -81,7 +81,7 @@ def _digest(dot_text: str) -> str:
 
 @contextmanager
 def _silent_stderr() -> Iterator[None]:
-    """Point file descriptor 2 at nothing: the C libraries below write there."""
+    """Discard what C libraries write to file descriptor 2."""
     sys.stderr.flush()
     saved = os.dup(2)
     nothing = os.open(os.devnull, os.O_WRONLY)
@@ -95,7 +95,7 @@ def _silent_stderr() -> Iterator[None]:
 
 
 def pictures() -> dict[str, str]:
-    """File name to content: `.dot` and `.svg` of the paper's two cases, as reports show them."""
+    """Contents by file name: `.dot` and `.svg` of the paper's two cases, as reports show them."""
     content = {}
     for name in ("case_a", "case_b"):
         scenario = load(name)[0]

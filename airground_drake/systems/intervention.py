@@ -19,18 +19,18 @@ from airground_drake.world.world import ROBOTS, World
 class InterventionPlanner(LeafSystem):
     """Supervises every UGV; for those in mode INTERVENING the `Planner` makes proposals, (12)-(14).
 
-    The system numbers the proposals itself, see `sent_after`.
+    The system numbers the proposals: see `sent_after`.
 
     Ports (n UGVs, M bodies that move):
         in  `bodies` (3M) m; `status` (4n) from EventTrigger; `answers` (2n) and `reports`
             (abstract), see `messages`.
         out `proposals` abstract, n of Proposal or None.
-    State: where each UGV has been since when, see `halts`; abstract, a `PlannerState`.
+    State: the last resting place of each UGV and since when, see `halts`; abstract, a `PlannerState`.
     Rate: one update per planning period, from t = 0. A proposal can act one period after it is made.
     """
 
-    def __init__(self, planner: Planner, world: World, control_period: float | None = None) -> None:
-        """Declare ports, state and the periodic update; the controllers' period in s (default: the planner's)."""
+    def __init__(self, planner: Planner, world: World, control_period: float) -> None:
+        """Declare ports, state and the periodic update; the controllers' period is in s."""
         super().__init__()
         self._planner = planner
         n = len(planner.ugvs)
@@ -48,19 +48,19 @@ class InterventionPlanner(LeafSystem):
             weakly(self._calc_proposals),
             prerequisites_of_calc={self.abstract_state_ticket(held)},
         )
-        self._ticks = Ticks(planner.period, planner.period if control_period is None else control_period)
+        self._ticks = Ticks(planner.period, control_period)
         self._room = room(planner.max_speed)
         self.DeclareDiscreteState(np.tile([0.0, 0.0, 0.0, NOT_WATCHED], n))
         self.DeclarePeriodicDiscreteUpdateEvent(self._ticks.period, 0.0, weakly(self._watch))
         self.DeclarePeriodicUnrestrictedUpdateEvent(self._ticks.period, 0.0, weakly(self._update))
 
     def memory(self, context: Context) -> PlannerState:
-        """What was sent and what went wrong, up to the context's time."""
+        """Proposals sent and faults met, up to the context's time."""
         memory: PlannerState = context.get_abstract_state(self._memory).get_value()
         return memory
 
     def close(self) -> None:
-        """End the processes of policies that have one; the next run starts them anew."""
+        """End the processes of policies; the next run starts them again."""
         self._planner.database.close()
 
     def _calc_proposals(self, context: Context, output: AbstractValue) -> None:

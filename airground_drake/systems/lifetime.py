@@ -1,8 +1,8 @@
-"""How Python systems and their diagrams are freed, which pydrake by itself never does.
+"""Frees Python systems and their diagrams, which pydrake by itself never does.
 
-Two ties keep them: Drake holds the methods that a system declares, and they hold the system; and pydrake ties systems,
-ports, builders and diagrams to each other, so that a user who keeps one of them keeps all, in a way which the garbage
-collector cannot see through where a class is derived in Python.
+Two kinds of references keep them alive. Drake holds the methods that a system declares, and these hold the system. And
+pydrake makes systems, ports, builders and diagrams refer to each other, so that keeping one of them keeps all; the
+garbage collector cannot break this cycle for classes derived in Python.
 """
 
 from __future__ import annotations
@@ -14,19 +14,20 @@ from weakref import ref
 from pydrake.systems.framework import Diagram, DiagramBuilder, InputPort, OutputPort
 
 PEERS = "_pydrake_internal_ref_cycle_peers"
-"""Attribute with which pydrake ties one object to others. Without it `untie` does nothing, and nothing is freed."""
+"""Attribute in which pydrake keeps these references. Under another name `untie` would free nothing."""
 
 
 def weakly(method: Any) -> Callable[..., Any]:
-    """A bound method that does not keep its object: for what a system declares about itself."""
+    """A bound method that does not keep its object alive, for what a system declares about itself."""
     of, function = ref(method.__self__), method.__func__
     return lambda *arguments: function(of(), *arguments)
 
 
 def untie(diagram: Diagram) -> None:
-    """Let a diagram be freed with the last reference to it: its systems no longer keep it, it keeps its systems.
+    """Let a diagram be freed with the last reference to it.
 
-    Code that keeps one of its systems or ports must then keep the diagram, too.
+    It still keeps its systems, but they no longer keep it: code that uses one of its systems or ports must keep the
+    diagram, too.
     """
     for system in diagram.GetSystems():
         if isinstance(system, Diagram):

@@ -1,4 +1,4 @@
-"""What a run must never break, watched while it runs."""
+"""Watches commands for violations while a run is simulated."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ from airground_drake.systems.signals import declare_bodies, no_proposals
 from airground_drake.world.world import ROBOTS, World
 
 INEQUALITY_TOLERANCE_M_S = 1e-9
-"""By this much a velocity may miss an inequality or a limit, m/s, as in SAFE-HYP: rounding errs by 1e-13 m/s."""
+"""Tolerance of inequalities and limits, m/s, as in SAFE-HYP: rounding errors are about 1e-13 m/s."""
 LAW_TOLERANCE_M_S = 1e-6
-"""By this much a command may differ from the law, m/s, as in EXEC."""
+"""Tolerance of the difference between a command and the law, m/s, as in EXEC."""
 
 
 class Rule(IntEnum):
-    """What can be broken."""
+    """Rules that commands must keep."""
 
     AVOIDANCE = 0
     SPEED_LIMIT = 1
@@ -40,8 +40,8 @@ class Violation(NamedTuple):
     Attributes:
         t_s: control sample at which the command was chosen.
         robot: index in the order of the world.
-        rule: what it breaks.
-        amount_m_s: by how much.
+        rule: the broken rule.
+        amount_m_s: size of the violation.
     """
 
     t_s: float
@@ -52,7 +52,7 @@ class Violation(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Sample:
-    """What the controllers saw at a control sample."""
+    """Inputs of the controllers at a control sample."""
 
     t: float
     positions: Array
@@ -62,7 +62,7 @@ class Sample:
 
 @dataclass(frozen=True)
 class Memory:
-    """What the monitor remembers."""
+    """Memory of the monitor."""
 
     sample: Sample | None = None
     violation: Violation | None = None
@@ -74,12 +74,12 @@ class Memory:
 
 @dataclass(frozen=True)
 class Laws:
-    """The laws that commands are compared with; the monitor's maker makes them anew.
+    """Laws that commands are compared with, made separately from those of the diagram.
 
     Attributes:
-        ugvs: commands (n, 3), m/s, from the time, positions (M, 3), preset positions and velocities (n, 3) each,
-            and per UGV the accepted proposal or None.
-        uav: command (3,), m/s, from positions (M, 3), m, and the UGVs' commands (n, 3), m/s, of the sample before.
+        ugvs: commands (n, 3), m/s, from the time, positions (M, 3), preset positions and velocities (n, 3) each, and
+            the accepted proposal or None of each UGV.
+        uav: command (3,), m/s, from positions (M, 3), m, and the UGVs' commands (n, 3), m/s, one sample earlier.
     """
 
     ugvs: Callable[[float, Array, Array, Array, Sequence[Proposal | None]], Array]
@@ -87,10 +87,10 @@ class Laws:
 
 
 class Monitor(LeafSystem):
-    """Holds the first command that breaks what SAFE-HYP and EXEC are about, (6)-(11), (14), (20), for any diagram.
+    """Finds the first command that violates SAFE-HYP or EXEC, (6)-(11), (14), (20), in any diagram.
 
-    The avoidance inequalities, speed limits and planar motion of all robots are watched; with laws, and where their
-    inputs are connected, the commands, too.
+    It checks the avoidance inequalities, speed limits and planar motion of all robots. Given laws, it also compares the
+    commands with them, as far as their inputs are connected.
 
     Ports (n UGVs, r robots, M bodies that move, world frame):
         in  `bodies` (3M) m; `team_command` (3r) m/s; for the laws: `reference` (6n): preset positions m,
@@ -98,11 +98,11 @@ class Monitor(LeafSystem):
         out `violation` (5): 1 from the first violation on, else 0; then its control sample, s, the robot's index in
             the order of the world, the `Rule`, the amount, m/s (-1 each before a violation).
     State: abstract, a `Memory`.
-    Rate: one update per control period, from t = 0. What is chosen at a tick is judged at the next one, when it can be
-    seen; so the last command of a simulation is not judged.
+    Rate: one update per control period, from t = 0. A command chosen at one tick is visible, and judged, at the next;
+    so the last command of a simulation is not judged.
 
-    It shares the compiled kernels with the controllers: what it notices are wrong parameters, wiring, timing and
-    composition. Claims that share nothing with the controllers judge the trace afterwards.
+    It shares the compiled kernels with the controllers, so it finds wrong parameters, wiring, timing and composition.
+    Claims that share nothing with the controllers judge the trace afterwards.
     """
 
     def __init__(
@@ -133,7 +133,7 @@ class Monitor(LeafSystem):
         self.DeclarePeriodicUnrestrictedUpdateEvent(avoidance.period, 0.0, weakly(self._update))
 
     def violation(self, context: Context) -> Violation | None:
-        """The first one up to the context's time."""
+        """The first violation up to the context's time."""
         return self._remembered(context).violation
 
     def _remembered(self, context: Context) -> Memory:
@@ -159,7 +159,7 @@ class Monitor(LeafSystem):
         return EventStatus.Succeeded()
 
     def _first(self, context: Context, sample: Sample) -> Violation | None:
-        """What the commands chosen at the last sample, held until now, break the most, if anything."""
+        """The largest violation by the commands that were chosen at `sample` and are held until now."""
         commands = self._command.Eval(context).reshape(-1, 3)
         near = self._near
         own = sample.positions[near.members]
@@ -181,9 +181,9 @@ class Monitor(LeafSystem):
         return Violation(sample.t, robot, Rule.LAW, float(away[robot])) if away[robot] > LAW_TOLERANCE_M_S else None
 
     def _by_the_laws(self, context: Context, sample: Sample, laws: Laws, commands: Array) -> Array:
-        """Commands by the laws, (r, 3), m/s; those given for the UGVs where their inputs are not connected.
+        """Commands by the laws, (r, 3), m/s; for UGVs the given ones if their inputs are not connected.
 
-        Until this tick's own updates are made, proposals and answers are those that the controllers saw at the last.
+        Before the updates of this tick, proposals and answers are still those that the controllers saw at the last one.
         """
         due = commands.copy()
         ports = (self._reference, self._proposals, self._answers)

@@ -1,4 +1,4 @@
-"""The Drake systems of plants, by the kind of the plant, and what disturbs their motion."""
+"""The Drake systems of plants, by the kind of the plant, and of disturbances."""
 
 from __future__ import annotations
 
@@ -25,11 +25,11 @@ def first_order_plant(robot: str, start: Array) -> LinearSystem:
 PLANTS: dict[str, Callable[[Body, float], System]] = {
     FirstOrder.kind: lambda body, period_s: first_order_plant(body.name, body.start_m),
 }
-"""Makes the Drake system of a body from the control period, s; by the kind of the body's plant."""
+"""Makes the Drake system of a body, by the kind of its plant; the number is the control period, s."""
 
 
 class VelocityDisturbance(LeafSystem):
-    """Adds a disturbance to the command of each robot: p_dot = v + w, the disturbance w of SAFE-DIST.
+    """Adds a disturbance w to the command v of each robot, p_dot = v + w, as in SAFE-DIST.
 
     Ports (r robots, world frame):
         in  `command` (3r) m/s; `disturbance_<robot>` (3) m/s for every robot, 0 where not connected.

@@ -1,20 +1,18 @@
-"""One picture of a scenario's diagram: the layers of the paper's Figure 2, read from left to right.
+"""Graphviz picture of a scenario's diagram: the layers of the paper's Figure 2, read from left to right.
 
-Systems and wires are read from the Drake diagram, and only their places are known here: task planning above, decision
-making and optimisation below, the vehicles to the right; the positions run back between them as one bold wire.
-What is inside `vehicles` other than plants (multiplexers, disturbances) is folded, and so is the source of the noise.
+Systems and wires are read from the Drake diagram; this module only knows their places. Task planning is above, decision
+making and optimisation are below, and the vehicles are on the right. One bold wire carries the positions back.
+The picture leaves out the source of the noise and all of `vehicles` except the plants.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence, Set
+from collections.abc import Iterator, Mapping, Sequence, Set
 from html import escape
 from itertools import pairwise
 from typing import NamedTuple
 
 from pydrake.systems.framework import Diagram, PortDataType, System
-
-from airground_drake.systems.blocks import FONT_PT, OUTSIDE, PLAIN, UNITS, blocks, wires
 
 LAYERS = {
     "task_planning": "#e7f1e1",
@@ -22,7 +20,18 @@ LAYERS = {
     "optimisation": "#fbefdc",
     "vehicles": "#ececec",
 }
-"""The diagrams inside, and the colour of each."""
+"""The layers, which are diagrams themselves, and their colours."""
+UNITS = {
+    "bodies": "m",
+    "ugv_command": "m/s",
+    "uav_command": "m/s",
+    "reference": "m, m/s",
+    "noise": "m",
+    "decision_variable": "m",
+    "decision_range": "m",
+    "gains": "1/s",
+}
+"""Units of signals by name. Other signals have several units or no unit."""
 REALISES = {
     "AffineSystem": "integrated noise",
     "DecisionVariable": "DDM, (15)",
@@ -35,14 +44,16 @@ REALISES = {
     "UavController": "NSBC, (9)-(11)",
     "TrajectorySource": "preset trajectories",
 }
-"""What a system does, by the name of its class; other classes are told by their name."""
+"""What a system does, by the name of its class. The picture shows the class name of any other system."""
 MOST_PLANTS = 6
-"""Of more vehicles than that only the first ones and the UAV are drawn."""
+"""Larger teams are drawn with their first UGVs and the UAV only."""
 
-HEIGHT_PT, PLANT_PT, SMALL_PT, MARGIN_PT = 34.0, 20.0, 8, 9.0
-"""Heights of a block and of a vehicle; size of small letters; between a block and the frame of its layer."""
+FONT_PT, SMALL_PT = 10, 8
+OUTSIDE, PLAIN = "#0060a8", "#444444"
+HEIGHT_PT, PLANT_PT, MARGIN_PT = 34.0, 20.0, 9.0
+"""Heights of a block and of a vehicle; distance from a block to the frame of its layer."""
 LETTER_PT, TITLE_PT, BUS_PT = 5.7, 18.0, 18.0
-"""Width of a letter; height of a layer's title; between a layer and the wire of the positions."""
+"""Width of a letter; height of a layer's title; distance from a layer to the wire of the positions."""
 ARROW_PT = 6.0
 
 Point = tuple[float, float]
@@ -58,12 +69,12 @@ class Box(NamedTuple):
 
     @property
     def x(self) -> float:
-        """Of the middle."""
+        """Middle across."""
         return (self.left + self.right) / 2
 
     @property
     def y(self) -> float:
-        """Of the middle."""
+        """Middle up."""
         return (self.low + self.up) / 2
 
 
@@ -74,14 +85,22 @@ class Route(NamedTuple):
     label: Point | None = None
 
 
+class End(NamedTuple):
+    """An end of a wire: a system, its layer ('' beside the layers), and the index of the port."""
+
+    layer: str
+    system: str
+    port: int
+
+
 Signals = dict[tuple[str, str], list[tuple[str, bool]]]
-"""By the systems at the two ends: names of the signals between them, and whether each is a message."""
+"""Names of the signals from one system to another, and whether each is a message."""
 
 
 def graph(diagram: Diagram) -> str:
-    """Graphviz text of a diagram that `build_diagram` has made, with a place for everything (layout `nop2`)."""
-    systems = {path.rpartition("/")[2]: system for path, system in blocks(diagram, 2).items()}
-    layers = {part.get_name(): [each.get_name() for each in part.GetSystems()] for part in _parts(diagram)}
+    """Graphviz text of a diagram of `build_diagram`, with a fixed place for everything (layout `nop2`)."""
+    systems = _systems(diagram)
+    layers = {layer: [each.get_name() for each in diagram.GetSubsystemByName(layer).GetSystems()] for layer in LAYERS}
     plants = [name for name in layers["vehicles"] if name.endswith("_plant")]  # the last is the UAV's
     shown = plants if len(plants) <= MOST_PLANTS else [*plants[: MOST_PLANTS - 2], plants[-1]]
     boxes = _places(systems, shown)
@@ -90,7 +109,7 @@ def graph(diagram: Diagram) -> str:
     lines = [
         f'digraph "{diagram.get_name()}" {{',
         f'graph [layout=nop2, bb="0,0,{width:g},{height:g}", lp="{width / 2:g},{height - 12:g}", '
-        f"label={_title(diagram, plants, shown, set(systems) - set(boxes))}, fontname=Helvetica, fontsize={FONT_PT}]",
+        f"label={_title(diagram, plants, shown)}, fontname=Helvetica, fontsize={FONT_PT}]",
         f'node [shape=box, style=filled, fillcolor=white, color="{PLAIN}", fixedsize=true, margin=0, '
         f"fontname=Helvetica, fontsize={FONT_PT}]",
         f'edge [arrowsize=0.6, color="{PLAIN}", fontname=Helvetica, fontsize={SMALL_PT}]',
@@ -110,42 +129,59 @@ def graph(diagram: Diagram) -> str:
 
 
 def signals(diagram: Diagram) -> Signals:
-    """The wires between what the picture has a block for; `vehicles` is one, at either end."""
+    """The signals between the systems of the layers; all of `vehicles` counts as one system."""
     found: Signals = {}
-    systems = blocks(diagram, 2)
-    for start, end in sorted(wires(diagram, 2)):
-        source, target = (
-            "vehicles" if block.startswith("/vehicles/") else block.rpartition("/")[2]
-            for block in (start.block, end.block)
-        )
+    systems = _systems(diagram)
+    for start, end in sorted(_wires(diagram)):
+        source, target = ("vehicles" if each.layer == "vehicles" else each.system for each in (start, end))
         if source in (target, "noise_source"):
             continue
-        port = systems[start.block].get_output_port(start.port)
-        name = systems[end.block].get_input_port(end.port).get_name()  # inputs are fed by name
+        port = systems[start.system].get_output_port(start.port)
+        name = systems[end.system].get_input_port(end.port).get_name()  # inputs are fed by name
         name = f"{source.partition('_')[0]}_command" if target == "vehicles" else name
         found.setdefault((source, target), []).append((name, port.get_data_type() == PortDataType.kAbstractValued))
     return found
 
 
+def _systems(diagram: Diagram) -> dict[str, System]:
+    """The systems in the layers and beside them, by name."""
+    parts = diagram.GetSystems()
+    return {each.get_name(): each for part in parts for each in (part.GetSystems() if _is_layer(part) else [part])}
+
+
+def _is_layer(system: System) -> bool:
+    return system.get_name() in LAYERS
+
+
+def _wires(diagram: Diagram) -> Iterator[tuple[End, End]]:
+    """Each wire between two of `_systems` once: within layers, and through the ports of layers."""
+    for layer in ("", *LAYERS):
+        within = diagram.GetSubsystemByName(layer) if layer else diagram
+        for (target, i), (source, k) in within.connection_map().items():
+            start, ends = End(layer, source.get_name(), int(k)), [End(layer, target.get_name(), int(i))]
+            if _is_layer(source):
+                inner, port = source.get_output_port_locator(k)
+                start = End(source.get_name(), inner.get_name(), int(port))
+            if _is_layer(target):
+                inside = target.GetInputPortLocators(i)
+                ends = [End(target.get_name(), each.get_name(), int(port)) for each, port in inside]
+            yield from ((start, end) for end in ends)
+
+
 def _lettered(layer: str, frame: Box, words: str, boxes: Mapping[str, Box]) -> str:
-    """Where the title of a layer is: above, or below in those that the wires enter from above."""
+    """Place of a layer's title: at its top, or at its bottom if wires enter from above."""
     beside = {"decision_making": "event_trigger", "optimisation": "gatekeeper"}.get(layer)
     left = frame.left + MARGIN_PT if beside is None else boxes[beside].left
     y = frame.up - TITLE_PT / 2 if beside is None else frame.low + TITLE_PT / 2
     return f"{left + LETTER_PT * len(words) / 2:g},{y:g}"
 
 
-def _parts(diagram: Diagram) -> list[Diagram]:
-    return [part for part in diagram.GetSystems() if part.get_name() in LAYERS]
-
-
-def _title(diagram: Diagram, plants: Sequence[str], shown: Sequence[str], left_out: Iterable[str]) -> str:
+def _title(diagram: Diagram, plants: Sequence[str], shown: Sequence[str]) -> str:
     """Name of the diagram, and below it how to read the picture."""
     told = ["solid: numbers, dashed: messages, bold: positions (to the gatekeeper: commands, too), blue: recorded"]
     if len(shown) < len(plants):
         told.append(f"{len(plants)} vehicles, {len(shown)} of them shown")
-    aside = sorted(name for name in left_out if name in {each.get_name() for each in diagram.GetSystems()})
-    told += [f"beside it: {name}" for name in aside]
+    told += [f"beside it: {each.get_name()}" for each in diagram.GetSystems() if not _is_layer(each)]
     return f'<<B>{escape(diagram.get_name())}</B><BR/><FONT POINT-SIZE="{SMALL_PT}">{escape("; ".join(told))}</FONT>>'
 
 
@@ -160,7 +196,7 @@ def _width(name: str, small: str) -> float:
 
 
 def _places(systems: Mapping[str, System], plants: Sequence[str]) -> dict[str, Box]:
-    """Where the blocks are: five columns, two rows below the wire of the positions, two above it."""
+    """Places of the blocks: five columns; two rows below the wire of the positions and two above it."""
     columns = (
         ("reference", "decision_variable", "decision_noise"),
         ("intervention_planner", "event_trigger"),
@@ -194,7 +230,7 @@ def _places(systems: Mapping[str, System], plants: Sequence[str]) -> dict[str, B
 
 
 def _frames(boxes: Mapping[str, Box], plants: Sequence[str]) -> dict[str, Box]:
-    """Where the layers are."""
+    """Places of the layers."""
     first, last = boxes[plants[0]], boxes[plants[-1]]
     top = max(boxes["reference"].up, first.up) + TITLE_PT + MARGIN_PT / 2
     below, planner, gate = boxes["decision_variable"], boxes["intervention_planner"], boxes["gatekeeper"]
@@ -208,15 +244,15 @@ def _frames(boxes: Mapping[str, Box], plants: Sequence[str]) -> dict[str, Box]:
 
 
 def _routes(boxes: Mapping[str, Box], frames: Mapping[str, Box], plants: Sequence[str]) -> dict[tuple[str, str], Route]:
-    """How the wires run, by the systems at their ends; that of the positions begins at its junction."""
+    """Corners of the wires by the systems at their ends. Wires of positions begin at a junction."""
     ddm, noise, trigger = (boxes[name] for name in ("decision_variable", "decision_noise", "event_trigger"))
     reference, planner, gate = (boxes[name] for name in ("reference", "intervention_planner", "gatekeeper"))
     ugv, uav = boxes["ugv_controller"], boxes["uav_controller"]
     above, below, beside = planner.y + 7, planner.y - 7, ddm.left + 24
-    judged, asked, answered = gate.left - 22, ugv.left - 28, ugv.left - 14
-    fanned = boxes[plants[0]].left - 12
-    bus = frames["task_planning"].low - BUS_PT
-    start = (boxes[plants[-1]].right + 10, bus)
+    # where bent wires go up or down: answers to the planner, proposals, answers to the controller, commands
+    judged, asked, answered, fanned = gate.left - 22, ugv.left - 28, ugv.left - 14, boxes[plants[0]].left - 12
+    start = _junction(boxes, frames, plants)
+    bus = start[1]
     found = {
         ("decision_noise", "decision_variable"): Route(
             [(noise.x, noise.up), (noise.x, ddm.low)], (noise.x + 24, noise.up + 9)
@@ -261,8 +297,13 @@ def _routes(boxes: Mapping[str, Box], frames: Mapping[str, Box], plants: Sequenc
     return found
 
 
+def _junction(boxes: Mapping[str, Box], frames: Mapping[str, Box], plants: Sequence[str]) -> Point:
+    """Where the positions of all vehicles join."""
+    return boxes[plants[-1]].right + 10, frames["task_planning"].low - BUS_PT
+
+
 def _bent(start: Point, x: float, end: Point) -> list[Point]:
-    """Across to x, up or down, and across to the end."""
+    """Corners of a wire that goes across to x, up or down, and across to its end."""
     return [start, (x, start[1]), (x, end[1]), end]
 
 
@@ -277,9 +318,9 @@ def _node(name: str, system: System, box: Box) -> str:
 def _edges(
     joined: Signals, boxes: Mapping[str, Box], frames: Mapping[str, Box], plants: Sequence[str], recorded: Set[str]
 ) -> list[str]:
-    """The wires, with the junction of the positions."""
+    """Graphviz text of the wires and of the junction of the positions."""
     routes = _routes(boxes, frames, plants)
-    junction = (boxes[plants[-1]].right + 10, frames["task_planning"].low - BUS_PT)
+    junction = _junction(boxes, frames, plants)
     bold = "penwidth=2.5, "
     lines = [f'"bodies" [pos="{junction[0]:g},{junction[1]:g}", shape=point, width=0.05, label=""]']
     for plant in plants:
@@ -305,19 +346,19 @@ def _edges(
 
 
 def _straight(begin: Box, end: Box) -> Route:
-    """Between two blocks that only a user's own one connects."""
+    """A straight wire, for signals that only a user's own block has."""
     return Route([(begin.x, begin.y), (end.x, end.y)], ((begin.x + end.x) / 2, (begin.y + end.y) / 2))
 
 
 def _told(name: str, recorded: Set[str], *, narrow: bool) -> str:
-    """A signal's name and unit, below each other if there is little room."""
+    """Name and unit of a signal, in two lines if `narrow`."""
     text = f"{name}{'<BR/>' if narrow else ' '}<I>{UNITS[name]}</I>" if name in UNITS else name
     kept = name in recorded or name.endswith("_command")  # the two commands are recorded together
     return f'<FONT COLOR="{OUTSIDE}">{text}</FONT>' if kept else text
 
 
 def _spline(corners: Sequence[Point], *, arrow: bool = True) -> str:
-    """Straight lines through corners as Graphviz has them: Bezier curves, the arrow's head beyond their end."""
+    """Straight lines through corners as Bezier curves of Graphviz, where the arrow's head begins at their end."""
     ends = list(corners)
     (x, y), (x0, y0) = ends[-1], ends[-2]
     if arrow:

@@ -1,4 +1,4 @@
-"""What flows through ports and what Contexts hold: named vectors per UGV and per system, and types of messages."""
+"""Named views of vectors in ports and Contexts, and the types of messages."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ Status = namedview("Status", ["mode", "triggers", "triggered_at_s", "released_at
 """Trigger state of one UGV: `decision.trigger.Mode`, number of triggers, times of the last trigger and the last release
 (-1 before the first)."""
 Answer = namedview("Answer", ["answer", "number"])
-"""Answer of one UGV: ACCEPT, REFUSE or SILENT of `messages`, and the number of the proposal."""
+"""Answer of one UGV: `messages.ACCEPT`, REFUSE or SILENT, and the number of the proposal."""
 UgvGains = namedview("UgvGains", ["avoidance_gain_1_s", "motion_gain_1_s", "intervention_gain_1_s"])
 """Parameters of `UgvController`: A of (8), B of (6), Lambda of (14)."""
 UavGains = namedview("UavGains", ["avoidance_gain_1_s", "formation_gain_1_s"])
@@ -26,28 +26,22 @@ TriggerLevels = namedview("TriggerLevels", ["zeta_m", "release_m", "dwell_s"])
 """Parameters of `EventTrigger`: see `decision.trigger.Trigger`."""
 
 FIELDS = len(Status.get_fields())
-"""Numbers of the trigger's status per UGV."""
+"""Length of a `Status`."""
 
 
 def declare_bodies(system: LeafSystem, world: World) -> InputPort:
     """Declare the input port `bodies`: positions of all bodies of a world that move, (3 M,), m, in their order.
 
-    Bodies at rest are in the `World`; so no tick copies them. `values.reshape(-1, 3)[world.select("ugv")]` is a view of
-    the positions of the UGVs.
+    Bodies at rest are in the `World` only, so that no tick copies them. `values.reshape(-1, 3)[world.select("ugv")]` is
+    a view of the positions of the UGVs.
     """
     return system.DeclareVectorInputPort("bodies", 3 * len(world.moving))
 
 
 def components_of(world: World, *kinds: Kind) -> slice:
-    """Which numbers of the port `bodies`, or of `team_command`, belong to the bodies of some kinds."""
+    """Slice of the ports `bodies` and `team_command` that belongs to the bodies of some kinds."""
     rows = world.select(*kinds)
     return slice(3 * rows.start, 3 * rows.stop)
-
-
-def of_ugv(view: Any, values: Array, index: int) -> Any:
-    """The named vector of one UGV, from the values of all UGVs."""
-    size = len(view.get_fields())
-    return view(values[size * index : size * (index + 1)])
 
 
 def laid_out(view: Any, rows: list[list[float]]) -> Array:
@@ -56,10 +50,10 @@ def laid_out(view: Any, rows: list[list[float]]) -> Array:
 
 
 def no_proposals(count: int) -> AbstractValue:
-    """Type of the messages `proposals`: a tuple with a `Proposal` or None for each of `count` UGVs."""
+    """Model value of the port `proposals`: a tuple with a `Proposal` or None for each of `count` UGVs."""
     return Value((None,) * count)
 
 
 def no_reports(count: int) -> AbstractValue:
-    """Type of the messages `reports`: a tuple with a `Report` for each of `count` UGVs."""
+    """Model value of the port `reports`: a tuple with a `Report` for each of `count` UGVs."""
     return Value((Report(),) * count)

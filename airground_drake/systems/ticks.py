@@ -1,4 +1,4 @@
-"""Instants that sampled systems of different periods share, to the last bit."""
+"""Sampling instants of systems with different periods, equal to the last bit."""
 
 from __future__ import annotations
 
@@ -6,26 +6,23 @@ from fractions import Fraction
 
 
 class Ticks:
-    """Every so many control periods: a tick per sampling period, each of them an instant of the controllers.
+    """Ticks of a sampling period, each at an instant of the controllers.
 
-    Drake ticks at k times the period, rounded. Where a period is a multiple of the control period only up to rounding
-    (0.3 s and 0.1 s), the two ticks of one instant are a unit in the last place apart, and which comes first changes
-    from tick to tick: a controller would act on the message of the sample before. There the system ticks with the
-    controllers and does nothing at most ticks.
+    Drake ticks at k times the period, rounded. If a period is a multiple of the control period only up to rounding
+    (0.3 s and 0.1 s), the two ticks of one instant are a unit in the last place apart, and their order varies: a
+    controller would act on the message of the sample before. Such a system ticks with the controllers instead and does
+    nothing at ticks that are not `due`.
 
     Attributes:
-        period: with which to declare the periodic event, s.
+        period: of the declared periodic event, s.
     """
 
     def __init__(self, period: float, control: float) -> None:
-        """Of a sampling period, a whole multiple of the control period to 1e-9; both s."""
-        self._control, self._every = control, round(period / control)
+        """The sampling period must be a multiple of the control period up to 1e-9; both in s."""
+        self._every = round(period / control)
         exact = Fraction(period) == self._every * Fraction(control)
-        if exact or self._every < 1:
-            self._every = 1
-            self._control = period
-        self.period = self._control
+        self._every, self.period = (1, period) if exact else (self._every, control)
 
     def due(self, t: float) -> bool:
         """Whether the event at time t, s, is a tick."""
-        return self._every == 1 or round(t / self._control) % self._every == 0
+        return self._every == 1 or round(t / self.period) % self._every == 0

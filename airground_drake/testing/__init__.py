@@ -1,12 +1,12 @@
-"""For tests of one's own: claims as assertions; traces that a session simulates once; scenarios drawn at random.
+"""For your own tests: claims as assertions, traces that a session simulates once, and random scenarios.
 
     from airground_drake.testing import assert_holds
 
     def test_my_team_keeps_its_distances(airground_trace):
         assert_holds(airground_trace("team.yaml", "d"), "SAFE-TRACE", "LIVE-GOAL", exercised=True)
 
-`plugin.py` is a pytest plugin that installs itself, with the fixture `airground_trace`; `strategies.py` has scenarios
-for Hypothesis. Who imports these needs pytest and hypothesis; nothing else here does.
+`plugin.py` is a pytest plugin that is installed with the package; its fixture is `airground_trace`. `strategies.py` has
+scenarios for Hypothesis. These two need pytest and hypothesis.
 """
 
 from __future__ import annotations

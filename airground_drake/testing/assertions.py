@@ -1,4 +1,4 @@
-"""Claims as assertions: what fails says, in words, what was claimed, what was found, and what was needed."""
+"""Claims as assertions: a failure says in words what was claimed, what was found, and what was needed."""
 
 from __future__ import annotations
 
@@ -20,33 +20,32 @@ class ClaimError(AssertionError):
     """Claims that did not come out as asserted.
 
     Attributes:
-        verdicts: of the claims; `finding.status` says whether they were refuted, could not be decided
-            (`inconclusive`), or something kept them from being decided (`error`, `not_run`).
+        verdicts: of the claims; their `finding.status` is `refuted`, `inconclusive`, `error` or `not_run`.
     """
 
     def __init__(self, message: str, verdicts: Sequence[Verdict] = ()) -> None:
-        """What is said, and about what."""
+        """Keep the verdicts with the message."""
         super().__init__(message)
         self.verdicts = tuple(verdicts)
 
 
 class NotExercisedWarning(UserWarning):
-    """A claim that holds because nothing put it to the test."""
+    """A claim holds because nothing tested it."""
 
 
 def assert_holds(trace: Trace, *claims: str | TraceClaim, exercised: bool = False) -> None:
-    """Assert that claims about a run hold, without regard to what its scenario expects.
+    """Assert that claims about a run hold, whatever its scenario expects.
 
     Args:
         trace: the run.
-        claims: identifiers (of the package's claims, or of those that the scenario adds), or claims as objects, which
-            need no name in the scenario; none: every claim that says anything about the run.
-        exercised: whether each must have been put to the test, too. If not, one that holds because there was nothing
-            to check is a `NotExercisedWarning`.
+        claims: identifiers of the package's or the scenario's claims, or claims as objects; default: every claim about
+            runs of this method.
+        exercised: whether something must have tested each claim. If False, a claim that nothing tested is a
+            `NotExercisedWarning`.
 
     Raises:
-        ClaimError: if one does not hold, was not exercised although that is asked for, or says nothing about a run of
-            this method.
+        ClaimError: if a claim does not hold, was not exercised although it must be, or says nothing about runs of this
+            method.
         UnknownNameError: if there is no such claim.
         PluginError: if a claim of the scenario cannot be made.
     """
@@ -70,13 +69,13 @@ def assert_proved(
     """Assert that claims about the model are proved for a scenario's constants, or supported if they are statistical.
 
     Args:
-        scenario: name of a shipped one, path, or made in Python.
-        claims: identifiers; none: every claim about the model, which takes a while.
+        scenario: name of a shipped scenario, path, or object.
+        claims: identifiers; default: every claim about the model, which takes a while.
         set: overrides, values by dotted key.
-        kept: folder of findings that are reused (`airground_drake.verify.cache_folder()`); None: proved anew.
+        kept: folder of findings to be reused (`airground_drake.verify.cache_folder()`); None: prove anew.
 
     Raises:
-        ClaimError: if one is not.
+        ClaimError: if a claim is neither.
         ScenarioError: if the scenario or an override is not valid.
         UnknownNameError: if there is no such claim.
         PluginError: if a claim of the scenario cannot be made.

@@ -1,7 +1,6 @@
-"""The pytest plugin: `airground_trace`, a simulation that a session makes once for all workers.
+"""The pytest plugin with the fixture `airground_trace`: each simulation is made once per session for all workers.
 
-It is loaded into every session of pytest where the package is installed, and imports Drake only when the fixture is
-called.
+Every session of pytest loads it where the package is installed. It imports Drake only when the fixture is called.
 """
 
 from __future__ import annotations
@@ -25,10 +24,10 @@ class Simulations(Protocol):
     """The type of the fixture `airground_trace`."""
 
     def __call__(self, scenario: str | Path | Scenario, run: str, *, set: Overrides = ()) -> Trace:
-        """The trace of one run; not to be changed, as other tests get the same one.
+        """The trace of one run; do not change it, as other tests get the same object.
 
         Args:
-            scenario: name of a shipped one, path, or made in Python.
+            scenario: name of a shipped scenario, path, or object.
             run: name of one of its runs.
             set: values by dotted key, or texts as after `--set`.
 
@@ -72,7 +71,7 @@ def airground_trace(tmp_path_factory: pytest.TempPathFactory) -> Simulations:
 
 @contextmanager
 def _alone(lock: Path) -> Iterator[None]:
-    """No other process is in here with the same lock."""
+    """At most one process at a time holds the same lock."""
     with lock.open("w") as file:
         fcntl.flock(file, fcntl.LOCK_EX)
         yield

@@ -12,15 +12,15 @@ from airground_drake.scenarios.schema import Scenario
 
 
 def chosen(scenario: str | Path | Scenario, overrides: Overrides = ()) -> Scenario:
-    """A scenario by name or path, or a copy of the one given, with overrides.
+    """A scenario by name or path, or a copy of the given one, with overrides.
 
     Raises:
-        ScenarioError: if it, or an override, is not valid.
+        ScenarioError: if the scenario or an override is not valid.
     """
     return validated(scenario, overrides) if isinstance(scenario, Scenario) else load(scenario, overrides)[0]
 
 
 def digest(scenario: Scenario, run: str) -> str:
-    """Name of a folder for a run: what it is of, readable, and a digest of all that the simulation rests on."""
+    """Name of a folder for a run: readable names, and a digest of all that the simulation depends on."""
     told = re.sub(r"[^\w-]", "_", f"{scenario.name}-{run}", flags=re.ASCII)[:80]
     return f"{told}-{files.sha256(json.dumps([resolved(scenario), run]).encode())[:16]}"

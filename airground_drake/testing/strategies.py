@@ -1,9 +1,8 @@
 """Hypothesis strategies for scenarios: every draw is valid, and stays valid while it shrinks.
 
-Nothing is filtered: what the rules of `scenarios.validate` tie together is built from one another. Places are cells of
-a grid whose pitch keeps every safe distance; periods are multiples of the control period; gains, release level and
-sensing range are fractions or multiples of what bounds them. Draws shrink to fewer robots and obstacles, shorter runs,
-and the defaults of the schema.
+Nothing is filtered. Places are cells of a grid whose pitch keeps every safe distance; periods are multiples of the
+control period; gains, release level and sensing range are fractions or multiples of their bounds. Draws shrink to fewer
+robots and obstacles, shorter runs, and the defaults of the schema.
 
     from hypothesis import given, settings, strategies as st
     from airground_drake import simulate
@@ -20,7 +19,7 @@ and the defaults of the schema.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import lru_cache
 from typing import TypeVar
 
@@ -50,34 +49,30 @@ from airground_drake.scenarios.schema import (
 T = TypeVar("T")
 
 SPEEDS = (1.0, 0.5, 2.0)
-"""Of preset trajectories and of what policies propose, m/s."""
+"""Speeds of preset trajectories and of proposals, m/s."""
 DISTANCES = (2.0, 1.0, 0.5, 3.0)
 """Safe distances, m, the default first."""
 RADII = (0.0, 0.5, 0.1)
-"""Of robots and obstacles, m."""
+"""Radii of robots and obstacles, m."""
 PERIODS = (0.025, 0.05, 0.1)
-"""Control periods, s; no gain that is drawn is too high for them."""
+"""Control periods, s."""
 JITTER = (0.0, 0.25, -0.25, 0.5, -0.5)
-"""By how much a place is off the middle of its cell, along an axis, m."""
+"""Offsets of a place from the middle of its cell, along an axis, m."""
 BAYES = (Threshold("bayes"), Threshold("bayes", drift_m_s=0.5, noise_m_sqrt_s=1.0))
 """Thresholds by the Bayes risk."""
 
 
 @lru_cache(maxsize=None, typed=True)
 def first_of(*values: T) -> SearchStrategy[T]:
-    """One of these; the first is the simplest. Made once, as most of what a draw takes is making strategies."""
+    """One of the values; the first is the simplest. Cached, because making strategies takes most of a draw's time."""
     return st.sampled_from(values)
 
 
-PARAMETERS: dict[str, Callable[[float], dict[str, float]]] = {
-    "coordinate": lambda speed: {"speed_m_s": speed},
-    "detour": lambda speed: {"speed_m_s": speed},
-    "towards": lambda speed: {"speed_m_s": speed, "x_m": 0.0, "y_m": 0.0},
-    "stale_map": lambda speed: {"speed_m_s": speed},
-    "noisy": lambda speed: {"speed_m_s": speed, "noise_m": 0.5},
-    "hostile": lambda speed: {"speed_m_s": speed},
-}
-"""What the package's policies are given, for a speed in m/s."""
+PARAMETERS: dict[str, dict[str, float]] = {
+    "coordinate": {}, "detour": {}, "towards": {"x_m": 0.0, "y_m": 0.0}, "stale_map": {}, "noisy": {"noise_m": 0.5},
+    "hostile": {},
+}  # fmt: skip
+"""Parameters of the package's policies, besides their speed."""
 
 
 @st.composite
@@ -86,20 +81,19 @@ def policies(draw: DrawFn, names: Sequence[str] = tuple(PARAMETERS), *, at_most:
 
     Args:
         draw: given by Hypothesis.
-        names: which may be in it, the simplest first; the package's policies are given parameters, those of others
-            (`module:Class`) none.
-        at_most: so many.
+        names: allowed policies, the simplest first; third-party ones (`module:Class`) get no parameters.
+        at_most: largest number of policies.
     """
     chosen = draw(st.lists(st.sampled_from(names), max_size=at_most, unique=True))
-    return [Policy(name, _parameters(name, draw(first_of(*SPEEDS)))) for name in chosen]
-
-
-def _parameters(name: str, speed: float) -> dict[str, float]:
-    return PARAMETERS[name](speed) if name in PARAMETERS else {}
+    speeds = [draw(first_of(*SPEEDS)) for _ in chosen]
+    return [
+        Policy(name, {"speed_m_s": speed, **PARAMETERS[name]} if name in PARAMETERS else {})
+        for name, speed in zip(chosen, speeds, strict=True)
+    ]
 
 
 DATABASES = policies()
-"""Any of them."""
+"""Made once, because making strategies takes time."""
 
 
 @st.composite
@@ -125,10 +119,9 @@ def scenarios(
         policies: of the UAV; default: `policies()`.
         triggers: default: any.
         routes: of method (c)'s gatekeeper; default: any.
-        durations: of the run, s; default: 1 to 20. Of minutes not every draw is valid: rounding takes more from a
-            distance the farther robots may get.
-        compositions: of the avoidance; default: `augmented`, the only one that is certified. Under the others no
-            distance is guaranteed.
+        durations: of the run, s; default: 1 to 20. Runs of minutes may be invalid, because rounding errors of
+            distances grow with the way.
+        compositions: of the avoidance; default: `augmented`, the only one that guarantees distances.
     """
     count = draw(st.integers(1, 4) if ugvs is None else ugvs)
     method = draw(first_of(*sorted(METHODS, reverse=True)) if methods is None else methods)
@@ -156,26 +149,26 @@ def scenarios(
 
 
 def _reach(safe: SafeDistance, radius: float, speed: float, period: float) -> float:
-    """A sensing range, m, that covers safe distances, radii and what two robots at this speed close in one period."""
+    """A sensing range, m, that covers safe distances, radii and the way of two robots at this speed in one period."""
     return max(safe.obstacle_m, safe.ugv_m, safe.air_ground_m) + 2.0 * (radius + speed * period)
 
 
 Cell = tuple[int, int]
-"""Of the grid on which maps are drawn: column and row."""
+"""Column and row in the grid of a map."""
 
 
 @st.composite
 def _maps(
     draw: DrawFn, count: int, others: int, safe: SafeDistance, largest: float
 ) -> tuple[dict[str, Ugv], Uav, dict[str, Obstacle]]:
-    """UGVs, UAV and obstacles on a grid; no two starts share a cell, nor two targets, nor any with an obstacle.
+    """UGVs, UAV and obstacles on a grid; each start has its own cell, and so has each target and each obstacle.
 
     Args:
         draw: given by Hypothesis.
         count: number of UGVs.
         others: number of obstacles.
         safe: distances that starts and targets keep.
-        largest: radius of a robot or obstacle, m.
+        largest: the largest radius, m.
     """
     pitch = max(safe.obstacle_m, safe.ugv_m, safe.air_ground_m) + 2.0 * (max(JITTER) + largest)
     radii = first_of(0.0, largest)
@@ -194,7 +187,7 @@ def _maps(
 
 @st.composite
 def _places(draw: DrawFn, free: list[Cell], pitch: float, besides: Cell | None = None) -> Vector:
-    """A point on the ground, m, in a free cell other than the one that it is to be besides; it is then taken."""
+    """A point on the ground, m, in a free cell other than `besides`; the cell is free no more."""
     options = [cell for cell in free if cell != besides]
     cell = options[draw(st.integers(0, len(options) - 1))]
     free.remove(cell)
@@ -210,7 +203,7 @@ def _middles(cells: list[Cell], pitch: float, at_most: int) -> SearchStrategy[li
 def _ugvs(
     draw: DrawFn, cells: list[Cell], starts: list[Cell], targets: list[Cell], pitch: float, radii: SearchStrategy[float]
 ) -> Ugv:
-    """A UGV that has somewhere to go, by a preset trajectory that may lead anywhere."""
+    """A UGV with a target away from its start, and a preset trajectory that may lead anywhere."""
     begin = draw(_places(starts, pitch))
     end = draw(_places(targets, pitch, besides=(round(begin[0] / pitch), round(begin[1] / pitch))))
     speed = draw(first_of(*SPEEDS))
@@ -228,7 +221,7 @@ def _uavs(
     altitude: float,
     radii: SearchStrategy[float],
 ) -> Uav:
-    """A UAV that starts and ends over cells of its own, with obstacles on its map that may not be there."""
+    """A UAV whose start and target have cells of their own; its map may have phantom obstacles."""
     above = [[*draw(_places(free, pitch))[:2], altitude] for free in (starts, targets)]
     return Uav(
         start_m=above[0],
@@ -247,7 +240,7 @@ def _distinct(points: list[Vector]) -> list[Vector]:
 
 @st.composite
 def _controls(draw: DrawFn, period: float, reach: float) -> Control:
-    """Gains up to nine tenths of what the period allows; a sensing range that is just enough, or more."""
+    """Gains up to nine tenths of the bound by the period; a sensing range that is just enough, or larger."""
     gain = st.one_of(st.none(), first_of(0.1, 0.5, 0.9).map(lambda part: part / period))
     names = ("avoidance_gain_1_s", "motion_gain_1_s", "formation_gain_1_s", "intervention_gain_1_s")
     gains = {name: value for name in names if (value := draw(gain)) is not None}
@@ -275,7 +268,7 @@ def _decisions(draw: DrawFn, period: float, triggers: SearchStrategy[str] | None
 
 @st.composite
 def _interventions(draw: DrawFn, period: float, database: list[Policy]) -> Intervention:
-    """How often the UAV plans, and in which order it asks its policies."""
+    """Times and order in which the UAV asks its policies."""
     return Intervention(
         period_s=period * draw(first_of(2, 1, 4)),
         retry_s=draw(first_of(1.0, 0.0)),
@@ -286,7 +279,7 @@ def _interventions(draw: DrawFn, period: float, database: list[Policy]) -> Inter
 
 @st.composite
 def _gatekeepers(draw: DrawFn, period: float, routes: SearchStrategy[str] | None) -> Gatekeeper:
-    """A horizon of stages that are multiples of the control period; how often it decides, and for how long."""
+    """A gatekeeper whose stages and period are multiples of the control period."""
     stages = draw(first_of(60, 20, 6, 2))
     return Gatekeeper(
         route=draw(first_of(*ROUTES.own) if routes is None else routes),

@@ -1,4 +1,4 @@
-"""What a verdict says, for a person who reads the output of a failed test."""
+"""A verdict in words, for the output of a failed test."""
 
 from __future__ import annotations
 
@@ -21,11 +21,9 @@ _FOUND = {
 
 
 def told(verdict: Verdict, place: str) -> str:
-    """A verdict in words, several lines: what was claimed, who did what, when, and what was needed.
+    """A verdict in several lines: what was claimed, which robots, when, what was found and needed.
 
-    Args:
-        verdict: any.
-        place: where, such as "on run d of case_a".
+    `place` is a phrase such as "on run d of case_a".
     """
     claim, finding = verdict.claim, verdict.finding
     lines = [f"{claim.id} {_found(verdict)}, {place}", f"  claim: {claim.statement}"]
@@ -41,7 +39,7 @@ def told(verdict: Verdict, place: str) -> str:
     if more := [_told(key, value) for key, value in seen.items() if key not in told_already]:
         lines.append(f"  seen: {'; '.join(more)}")
     if finding.status not in ("refuted", *PASSING):
-        lines += [f"  why: {_told(key, value)}" for key, value in finding.evidence.items()][:5]
+        lines += [f"  why: {_told(key, value)}" for key, value in finding.to_json()["evidence"].items()][:5]
     return "\n".join(lines)
 
 
@@ -51,8 +49,8 @@ def _found(verdict: Verdict) -> str:
         return _FOUND[finding.status]
     by = verdict.claim.exercised_by
     if finding.exercised is None:
-        return f"{finding.status}, but does not count what puts it to the test"
-    return f"{finding.status}, but nothing put it to the test ({finding.exercised} {by or 'things'})"
+        return f"{finding.status}, but does not count what tests it"
+    return f"{finding.status}, but nothing tested it ({finding.exercised} {by or 'things'})"
 
 
 def _told(key: str, value: Any) -> str:

@@ -1,11 +1,11 @@
 """Claims about the model and about runs.
 
 `verify(trace)` judges a run from its trace alone. `verify_model(scenario)` checks the hypotheses of theorems for the
-constants of a scenario, or makes experiments of its own. Claims about a run share no code with the controllers, the
-simulator or the optimiser whose work they judge.
+constants of a scenario, or runs experiments. Claims about a run share no code with the controllers, the simulator and
+the optimiser that they judge.
 
-`claim.py` says what a claim is, `registry.py` which there are. `runs/` has the claims about a trace and `model/` those
-about the model, each in a file that has its identifier as a name. `engines/` computes for them and knows no claim.
+`claim.py` defines a claim, and `registry.py` lists them. `runs/` has the claims about a trace and `model/` those about
+the model; each file is named after its claim. `engines/` computes for them and imports no claim.
 """
 
 from __future__ import annotations
@@ -38,13 +38,10 @@ __all__ = [
 ]
 
 _HOME = {
-    "cache_folder": "cache",
-    "verdicts_to_pandas": "judge",
-    "verify": "judge",
-    "verify_all": "judge",
-    "verify_model": "judge",
-    **dict.fromkeys(("Claim", "ModelClaim", "TraceClaim", "Verdict"), "claim"),
-    "Finding": "finding",
+    "cache": ("cache_folder",),
+    "judge": ("verdicts_to_pandas", "verify", "verify_all", "verify_model"),
+    "claim": ("Claim", "ModelClaim", "TraceClaim", "Verdict"),
+    "finding": ("Finding",),
 }
 _INSTANCES = {"MODEL_CLAIMS": "model_claims", "TRACE_CLAIMS": "run_claims"}
 
@@ -53,9 +50,10 @@ def __getattr__(name: str) -> Any:
     """Import on first use: a part of this package loads only what it needs."""
     if name in _INSTANCES:
         return tuple(getattr(import_module(f"{__name__}.registry"), _INSTANCES[name])())
-    if name not in _HOME:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(import_module(f"{__name__}.{_HOME[name]}"), name)
+    for module, names in _HOME.items():
+        if name in names:
+            return getattr(import_module(f"{__name__}.{module}"), name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
 
 def __dir__() -> list[str]:

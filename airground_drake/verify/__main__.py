@@ -37,7 +37,7 @@ def parser() -> argparse.ArgumentParser:
     parser.add_argument("target", help="folder of a saved run (DIR/trace/RUN), or a scenario, shipped or a YAML file")
     parser.add_argument("claims", nargs="*", metavar="CLAIM", help="identifiers (default: all that apply)")
     parser.add_argument("--json", action="store_true", help="print the whole verdicts as JSON")
-    parser.add_argument("-v", "--verbose", action="store_true", help="say what took how long")
+    parser.add_argument("-v", "--verbose", action="store_true", help="say how long each claim took")
     parser.add_argument(plugins.OPTION, action="store_true", help=plugins.HELP)
     return parser
 
@@ -77,9 +77,9 @@ def _line(verdict: Verdict) -> str:
 
 
 def _judge(target: str, wanted: Sequence[str], progress: Progress, *, allow_plugins: bool) -> list[Verdict]:
-    """Verdicts on the claims wanted (none: all), as far as they say anything about the target.
+    """Verdicts on the claims wanted (none: all) that apply to the target.
 
-    Of what a saved run names, only claims of others that are wanted are imported, and nothing unless that is allowed.
+    Third-party claims that a saved run names are imported only if they are wanted, and only if that is allowed.
 
     Raises:
         UnknownNameError: if there is no such claim.

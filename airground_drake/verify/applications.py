@@ -1,7 +1,7 @@
 """What the runs of a report add to claims about the model.
 
-They count how often they met the premises of theorems: one that never applies protects nothing. For THR-CHOICE they
-measure the drift and the noise that there really were.
+They count how often they met the premises of theorems: a theorem that never applies protects nothing. For THR-CHOICE
+they measure the real drift and noise.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ from dataclasses import replace
 from airground_drake.run.trace import Trace
 from airground_drake.verify.finding import Finding
 from airground_drake.verify.model import thr_choice
+from airground_drake.verify.model.theorem import Proof
 from airground_drake.verify.runs.followed import followed
 from airground_drake.verify.runs.proposals import accepted_at
 from airground_drake.verify.runs.safe_hyp import guarantees
@@ -21,19 +22,19 @@ Count = tuple[int, int]
 
 
 def safe_pairs(trace: Trace) -> Count:
-    """Pairs that came within reach of each other and met every inequality, of all pairs within reach."""
+    """Count the pairs within reach of each other, and those of them that met every inequality."""
     kept = guarantees(trace)
     return sum(one.margin_m == 0.0 for one in kept), len(kept)
 
 
 def below_avoidance(trace: Trace) -> Count:
-    """Interventions that were executed under method (d), of all that were executed."""
+    """Count the executed interventions, and those of them under method (d)."""
     count = sum(len({id(one) for one in accepted_at(trace, ugv) if one is not None}) for ugv in trace.ugvs)
     return (count if trace.meta["method"] == "d" else 0), count
 
 
 def as_predicted(trace: Trace) -> Count:
-    """Interventions accepted under method (d) that went as predicted, of all of these."""
+    """Count the interventions accepted under method (d), and those of them that went as predicted."""
     found = followed(trace)
     return sum(one.met for one in found), len(found)
 
@@ -44,27 +45,27 @@ COUNTED: dict[str, Callable[[Trace], Count]] = {
     "LIVE-GATE": as_predicted,
     "LIVE-WAIT": below_avoidance,
 }
-"""By claim about the model: what counts as a case of its theorem in a run."""
+"""How a run counts the cases of a theorem, by claim about the model."""
 
 
 def counts(trace: Trace) -> dict[str, Count]:
-    """The counts of a run, by claim; no counts where records are missing or wrong, which claims about runs report."""
+    """The counts of a run, by claim; a claim is left out if records are missing or wrong, which other claims report."""
     found = {}
     for claim, count in COUNTED.items():
         try:
             found[claim] = count(trace)
-        except (Exception, SystemExit):  # as in `judge`: whatever went wrong, nothing was counted
+        except (Exception, SystemExit):  # as in `judge`
             continue
     return found
 
 
 def with_counts(claim: str, finding: Finding, of_runs: Iterable[dict[str, Count]]) -> Finding:
-    """A finding about the model with how often the runs met its premise, `applies_to`, of how many times, `of`."""
+    """The finding on a theorem, with how often the runs met its premise."""
     counted = [found[claim] for found in of_runs if claim in found]
-    if not counted:
+    if not counted or not isinstance(finding.evidence, Proof):
         return finding
     met, cases = (sum(column) for column in zip(*counted, strict=True))
-    return replace(finding, evidence={**finding.evidence, "applies_to": met, "of": cases})
+    return replace(finding, evidence=replace(finding.evidence, applies_to=met, of=cases))
 
 
 def measured(trace: Trace) -> dict[str, thr_choice.Measured]:
@@ -75,9 +76,9 @@ def measured(trace: Trace) -> dict[str, thr_choice.Measured]:
         return {}
 
 
-def with_runs(claim: str, finding: Finding, of_runs: Iterable[dict[str, thr_choice.Measured]]) -> Finding:
-    """THR-CHOICE with what was measured in the runs under `runs`; other findings as they are."""
-    if claim != "THR-CHOICE" or finding.status == "error":
+def with_runs(finding: Finding, of_runs: Iterable[dict[str, thr_choice.Measured]]) -> Finding:
+    """The finding on THR-CHOICE with what was measured in the runs; other findings as they are."""
+    if not isinstance(finding.evidence, thr_choice.Choice):
         return finding
     runs = {name: row for each in of_runs for name, row in each.items()}
-    return replace(finding, evidence={**finding.evidence, "runs": runs})
+    return replace(finding, evidence=replace(finding.evidence, runs=runs))

@@ -1,24 +1,24 @@
-"""Findings of experiments about the model, kept by content: equal code and inputs, equal finding.
+"""Findings of experiments about the model, kept by content: equal code and inputs give an equal finding.
 
-An entry is a file that says what it is about: claim, inputs, digest of the code, versions of the engines, the finding
-and its SHA-256. It is taken if all of that is what is asked for and the finding passes and has that digest. Anything
-else is decided anew, so that a damaged entry costs time and no more. An entry that somebody forged with its digest is
-believed: see docs/verification.md.
+An entry is a file with the claim, its inputs, a digest of the code, the versions of the engines, the finding and the
+finding's SHA-256. It is used only if everything matches and the finding passes. Otherwise the claim is decided anew, so
+a damaged entry only costs time. An entry that somebody forged together with its digest is believed: see
+docs/verification.md.
 """
 
 from __future__ import annotations
 
 import contextlib
 import json
-import math
 import os
 import platform
 from collections.abc import Mapping
-from dataclasses import asdict, replace
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any
+
+from pydantic import TypeAdapter
 
 from airground_drake.base import files
 from airground_drake.base.statuses import PASSING
@@ -39,15 +39,20 @@ def found(claim: ModelClaim, inputs: dict[str, Any], folder: Path | None = None)
 
     Args:
         claim: the claim.
-        inputs: what it is about, strict JSON.
-        folder: where findings of `KEPT` are kept; None: computed anew, kept nowhere.
+        inputs: its constants, strict JSON.
+        folder: where findings of `KEPT` are kept; None: computed anew and not kept.
     """
-    kept = _read(folder, claim, inputs)
-    if kept is not None:
+    if folder is None or claim.id not in KEPT:
+        return claim.judge(inputs)
+    path = folder / f"{key(claim, inputs)}.json"
+    if (kept := _read(path, claim, inputs)) is not None:
         return kept
-    made = claim.judge(inputs)
-    _keep(folder, claim, inputs, made)
-    return made
+    found = claim.judge(inputs)
+    if found.status in PASSING:
+        made = found.to_json()
+        with contextlib.suppress(OSError):  # a folder that cannot be written keeps nothing
+            files.write_json(path, {**content(claim, inputs), "finding": made, "sha256": _digest(made)})
+    return found
 
 
 def cache_folder() -> Path:
@@ -73,7 +78,7 @@ def _code() -> str:
 
 
 def code_digest(package: Path) -> str:
-    """SHA-256 of all Python files of a package, those of its sub-packages too: where they are and what they say."""
+    """SHA-256 of the paths and contents of all Python files of a package and its sub-packages."""
     digests = {str(path.relative_to(package)): files.sha256(path.read_bytes()) for path in package.rglob("*.py")}
     return files.sha256(json.dumps(digests, sort_keys=True).encode())
 
@@ -89,47 +94,22 @@ def _engines() -> dict[str, str]:
     return found
 
 
-def _keep(folder: Path | None, claim: ModelClaim, inputs: Mapping[str, Any], finding: Finding) -> None:
-    """Write an entry, whole or not at all, of a finding that passes."""
-    if folder is None or claim.id not in KEPT or finding.status not in PASSING:
-        return
-    made = asdict(finding)
-    with contextlib.suppress(OSError):  # a folder that cannot be written keeps nothing
-        entry = {**content(claim, inputs), "finding": made, "sha256": _digest(made)}
-        files.write_json(_path(folder, claim, inputs), entry)
-
-
-def _read(folder: Path | None, claim: ModelClaim, inputs: Mapping[str, Any]) -> Finding | None:
-    """The finding that was kept; None if there is none, or none that can be taken."""
-    if folder is None or claim.id not in KEPT:
-        return None
-    path = _path(folder, claim, inputs)
+def _read(path: Path, claim: ModelClaim, inputs: Mapping[str, Any]) -> Finding | None:
+    """The finding that was kept, if the entry is sound and about this claim."""
     try:
         if not path.is_file() or path.stat().st_size > LARGEST_BYTES:
             return None
-        entry = json.loads(path.read_text(encoding="utf-8"), parse_constant=_refused, parse_float=_finite)
+        entry = json.loads(path.read_text(encoding="utf-8"))
         made, digest = entry.pop("finding"), entry.pop("sha256")
-        finding = Finding(**made)
-        sound = digest == _digest(made) and finding.status in PASSING
+        sound = digest == _digest(made) and made["status"] in PASSING
+        about = json.dumps(entry, sort_keys=True) == json.dumps(content(claim, inputs), sort_keys=True)
+        evidence = TypeAdapter(claim.record).validate_python(made["evidence"])
+        finding = Finding(**made | {"evidence": evidence, "from_cache": True})
     except (OSError, ValueError, TypeError, AttributeError, KeyError, RecursionError):
         return None
-    about = json.dumps(entry, sort_keys=True) == json.dumps(content(claim, inputs), sort_keys=True)
-    return replace(finding, from_cache=True) if sound and about else None
+    return finding if sound and about else None
 
 
 def _digest(finding: Mapping[str, Any]) -> str:
-    """SHA-256 of a finding: a bit that flips on a disk is noticed."""
+    """SHA-256 of a finding, which shows bits that flipped on a disk; numbers that are not finite raise ValueError."""
     return files.sha256(json.dumps(finding, sort_keys=True, allow_nan=False).encode())
-
-
-def _path(folder: Path, claim: ModelClaim, inputs: Mapping[str, Any]) -> Path:
-    return folder / f"{key(claim, inputs)}.json"
-
-
-def _finite(text: str) -> float:
-    value = float(text)
-    return value if math.isfinite(value) else _refused(text)
-
-
-def _refused(text: str) -> NoReturn:
-    raise ValueError(f"{text} is not finite")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import abc
 import json
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from html import escape
 from typing import Any
 
@@ -15,7 +15,7 @@ from airground_drake.base.statuses import PASSING, STATUSES, Status, meets, outc
 from airground_drake.run.trace import Trace
 from airground_drake.scenarios.plants import plant_of
 from airground_drake.scenarios.schema import Scenario
-from airground_drake.verify.finding import Finding
+from airground_drake.verify.finding import Evidence, Failure, Finding
 
 __all__ = [
     "Claim",
@@ -28,8 +28,8 @@ __all__ = [
 ]
 
 MOTION_TOLERANCE_M = 1e-9
-"""A row may differ by this from the position that its command leads to, m: floating-point integration of one
-step errs by 1e-15 m, and a lie this small moves no robot more than it in any step."""
+"""A row may differ by this from the position that its command leads to, m. Integrating one step in floating point errs
+by 1e-15 m."""
 
 TIME_TOLERANCE_S = 1e-9
 """Two instants that differ by less are the same, s: rounding of multiples of a period errs by 1e-14 s."""
@@ -68,40 +68,43 @@ class Claim(abc.ABC):
 class ModelClaim(Claim):
     """A claim about the model and its constants, whatever the run: a proof, or an experiment of its own.
 
-    `check` sees nothing but `inputs`, so that equal inputs (and equal code) give equal findings: that is what the
-    cache of findings rests on.
+    `check` sees nothing but `inputs`. So equal inputs and equal code give equal findings, and the cache can keep them.
+
+    Attributes (all of the class):
+        record: type of the evidence; the cache needs it to read a finding back.
     """
 
     expected: Status = "proved"
+    record: type[Evidence] = Evidence
 
     @abc.abstractmethod
     def inputs(self, scenario: Scenario) -> dict[str, Any]:
-        """The constants of a scenario that the claim is about, strict JSON; {} if it is about none."""
+        """The constants of a scenario that the claim is about, strict JSON; may be empty."""
 
     @abc.abstractmethod
     def check(self, inputs: dict[str, Any]) -> Finding:
-        """Decide the claim for these constants; what is left open is `inconclusive`, never a pass.
+        """Decide the claim for these constants; an open question is `inconclusive`, never a pass.
 
         Called through `judge`, which turns an exception into `error`.
         """
 
     def judge_inputs(self, scenario: Scenario) -> dict[str, Any]:
-        """`inputs` under guard: what keeps them from being found is told to `judge`."""
+        """`inputs`; an exception becomes inputs that `judge` turns into the status `error`."""
         try:
             return self.inputs(scenario)
         except (Exception, SystemExit) as error:
             return {"error": described(error)}
 
     def judge(self, inputs: dict[str, Any]) -> Finding:
-        """`check` under guard."""
+        """`check`, with exceptions turned into the status `error`."""
         if set(inputs) == {"error"}:
-            return Finding("error", evidence=inputs)
+            return Finding("error", evidence=Failure(inputs["error"]))
         try:
             finding = self.check(inputs)
             require_count(self, finding)
-            json.dumps(asdict(finding), allow_nan=False)
+            json.dumps(finding.to_json(), allow_nan=False)
         except (Exception, SystemExit) as error:  # whatever went wrong, the claim was not decided
-            return Finding("error", evidence={"error": described(error)})
+            return Finding("error", evidence=Failure(described(error)))
         return finding
 
 
@@ -118,20 +121,20 @@ class TraceClaim(Claim):
         """
 
     def applies(self, trace: Trace) -> bool:
-        """Whether the claim says anything about a run of this method; if not it is left out, not passed."""
+        """Whether the claim says anything about a run of this method; if not, it is left out."""
         return True
 
     def judge(self, trace: Trace) -> Finding:
-        """`check` under guard: a malformed trace or a failing checker is `error`, and so is a pass on half a run."""
+        """`check`; a malformed trace, an exception or a pass on half a run is the status `error`."""
         try:
             require_motion(trace)
             finding = self.check(trace)
             if finding.status in PASSING:
                 require_whole_run(trace)
             require_count(self, finding)
-            json.dumps(asdict(finding), allow_nan=False)  # a margin that is not a number must not pass
+            json.dumps(finding.to_json(), allow_nan=False)  # a margin that is not a number must not pass
         except (Exception, SystemExit) as error:  # whatever went wrong, the claim was not decided
-            return Finding("error", evidence={"error": described(error)})
+            return Finding("error", evidence=Failure(described(error)))
         return finding
 
 
@@ -170,30 +173,21 @@ class Verdict:
 
     def to_json(self) -> dict[str, Any]:
         """The entry of `claims` in report.json."""
-        described = (
-            "id",
-            "summary",
-            "statement",
-            "formula",
-            "method",
-            "equations",
-            "does_not_establish",
-            "exercised_by",
-        )
+        words = "id", "summary", "statement", "formula", "method", "equations", "does_not_establish", "exercised_by"
         return {
-            **{name: getattr(self.claim, name) for name in described},
+            **{name: getattr(self.claim, name) for name in words},
             "assumptions": list(self.claim.assumptions),
             "latex": list(self.claim.latex),
             "run": self.run,
             "expected": self.expected,
             "as_expected": self.as_expected,
             "inputs": self.inputs,
-            **asdict(self.finding),
+            **self.finding.to_json(),
         }
 
 
 def require_count(claim: Claim, finding: Finding) -> None:
-    """Check that a claim that says what exercises it has counted that, so that no pass is taken for more than it is.
+    """Check that a claim with `exercised_by` has counted it.
 
     Raises:
         ValueError: if its status is unknown, if it passes without a count, or if the count is no whole number from 0.

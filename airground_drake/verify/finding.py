@@ -1,10 +1,10 @@
-"""The shape of what a check found: a status, a margin, the evidence."""
+"""What a check found: a status, a margin, the evidence."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields, is_dataclass
 from typing import Any
 
 from airground_drake.base.statuses import Status
@@ -14,16 +14,31 @@ PLAIN_NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]{0,99}")
 
 
 @dataclass(frozen=True)
+class Evidence:
+    """Numbers behind a verdict. Each claim adds its own fields, which are the keys in report.json.
+
+    A field whose default is None is left out of report.json while it is None.
+    """
+
+
+@dataclass(frozen=True)
+class Failure(Evidence):
+    """Why a claim could not be decided."""
+
+    error: str
+
+
+@dataclass(frozen=True)
 class Finding:
     """What a check found.
 
     Attributes:
         status: the verdict class.
-        margin: signed distance from refutation (negative: refuted), in `unit`; None where there is none.
+        margin: signed distance from refutation (negative: refuted), in `unit`; None if the claim has no margin.
         unit: unit of the margin.
         where: where the margin is attained: robot, obstacle, time and the like.
         counterexample: for `refuted`: enough to reproduce it by hand.
-        evidence: numbers behind the verdict, strict JSON.
+        evidence: numbers behind the verdict: the claim's own `Evidence`, or a dict of strict JSON.
         quantity: what the margin is of, in a few words.
         exercised: how often the claim was put to the test, in what its `exercised_by` counts; 0: nothing could have
             refuted it; None: not counted.
@@ -35,7 +50,20 @@ class Finding:
     unit: str = ""
     where: dict[str, Any] = field(default_factory=dict)
     counterexample: dict[str, Any] | None = None
-    evidence: Mapping[str, Any] = field(default_factory=dict)
+    evidence: Any = Evidence()
     quantity: str = ""
     exercised: int | None = None
     from_cache: bool = False
+
+    def to_json(self) -> dict[str, Any]:
+        """All fields, with records as objects."""
+        return {name: _in_json(value) for name, value in vars(self).items()}
+
+
+def _in_json(value: Any) -> Any:
+    if is_dataclass(value):
+        pairs = ((each, getattr(value, each.name)) for each in fields(value))
+        return {each.name: _in_json(one) for each, one in pairs if one is not None or each.default is not None}
+    if isinstance(value, Mapping):
+        return {key: _in_json(one) for key, one in value.items()}
+    return [_in_json(one) for one in value] if isinstance(value, (list, tuple)) else value

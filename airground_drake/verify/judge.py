@@ -104,7 +104,7 @@ def verify_all(
 ) -> list[Verdict]:
     """Judge every claim: on runs of a scenario, and then about its model.
 
-    What `verify` and `verify_model` find, side by side in processes of their own.
+    The same as `verify` and `verify_model`, in parallel processes.
 
     Args:
         scenario: its constants.
@@ -119,24 +119,25 @@ def verify_all(
     asked = _asked(scenario)
     of_runs = [(replace(trace), _applicable(trace)) for trace in traces]  # as in `verify`
     pieces: list[Callable[[], Any]] = [partial(found, each.claim, each.inputs, kept) for each in asked]
-    pieces += [partial(_judged, trace, claims) for trace, claims in of_runs]
+    pieces += [partial(_Judged.of, trace, claims) for trace, claims in of_runs]
     names = [*(each.name for each in asked), *(f"claims about run {trace.run}" for trace, _ in of_runs)]
     progress.stage("judging", len(pieces), "claims about the model or a run")
     done = run_parallel(pieces, names=names, progress=progress)
-    about_the_model, about_runs = done[: len(asked)], done[len(asked) :]
+    about_runs: list[_Judged] = done[len(asked) :]
     verdicts = [
         verdict
-        for (trace, claims), (findings, *_) in zip(of_runs, about_runs, strict=True)
-        for verdict in _verdicts(trace, claims, findings)
+        for (trace, claims), found in zip(of_runs, about_runs, strict=True)
+        for verdict in _verdicts(trace, claims, found.findings)
     ]
     apart = {(each.claim.id, each.run) for each in asked if each.run}
-    for each, finding in zip(asked, about_the_model, strict=True):
-        name, concerned = each.claim.id, []
-        for (trace, _), about in zip(of_runs, about_runs, strict=True):
-            if each.run == (trace.run if (each.claim.id, trace.run) in apart else ""):
-                concerned.append(about)
-        counted = with_counts(name, finding, [met for _, met, _ in concerned])
-        verdicts.append(each.verdict(scenario, with_runs(name, counted, [shown for *_, shown in concerned])))
+    for each, finding in zip(asked, done, strict=False):
+        concerned = [
+            about
+            for (trace, _), about in zip(of_runs, about_runs, strict=True)
+            if each.run == (trace.run if (each.claim.id, trace.run) in apart else "")
+        ]
+        counted = with_counts(each.claim.id, finding, [about.counts for about in concerned])
+        verdicts.append(each.verdict(scenario, with_runs(counted, [about.measured for about in concerned])))
     return verdicts
 
 
@@ -149,7 +150,7 @@ class _Asked(NamedTuple):
 
     @property
     def name(self) -> str:
-        """For whoever waits for it."""
+        """Shown as progress."""
         return f"{self.claim.id} {self.run}".strip()
 
     def verdict(self, scenario: Scenario, finding: Finding) -> Verdict:
@@ -170,6 +171,13 @@ def _asked(scenario: Scenario, claims: Collection[str] | None = None) -> list[_A
     ]
 
 
-def _judged(trace: Trace, claims: Sequence[TraceClaim]) -> tuple[list[Finding], dict[str, Count], dict[str, Any]]:
-    """What the claims found about a run, how often it met the premises of the theorems, and what it shows of itself."""
-    return [claim.judge(trace) for claim in claims], counts(trace), measured(trace)
+class _Judged(NamedTuple):
+    """What the claims found about a run, how often it met the premises of theorems, and what it measured."""
+
+    findings: list[Finding]
+    counts: dict[str, Count]
+    measured: dict[str, Any]
+
+    @classmethod
+    def of(cls, trace: Trace, claims: Sequence[TraceClaim]) -> _Judged:
+        return cls([claim.judge(trace) for claim in claims], counts(trace), measured(trace))

@@ -1,7 +1,7 @@
-"""The claims that are registered, made on use.
+"""The registered claims, made on use.
 
-Which claims there are stands in `airground_drake.registry`, in the order of the report: a new claim is one file and one
-line there. A scenario adds its own under `claims`.
+`airground_drake.registry` lists them in the order of the report: a new claim is one file and one line there. A scenario
+adds its own under `claims`.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ def model_claims(ids: Collection[str] | None = None, added: Mapping[str, str] | 
 
     Args:
         ids: default: all.
-        added: claims of a scenario, `module:Class` by identifier; those about runs are left out.
+        added: claims of a scenario, `module:Class` by identifier. Those about runs are left out.
 
     Raises:
         UnknownNameError: if an identifier is not that of a claim about the model.
@@ -32,7 +32,7 @@ def model_claims(ids: Collection[str] | None = None, added: Mapping[str, str] | 
 
 
 def run_claims(ids: Collection[str] | None = None, added: Mapping[str, str] | None = None) -> list[TraceClaim]:
-    """The claims that are decided from one trace, or those with these identifiers; as `model_claims` otherwise."""
+    """The claims that are decided from one trace; otherwise as `model_claims`."""
     return _made(RUN_CLAIMS, TraceClaim, ids, added or {})
 
 

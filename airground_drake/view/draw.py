@@ -1,4 +1,4 @@
-"""Draw what stands in a scenario in Meshcat."""
+"""Draw a scenario in Meshcat."""
 
 from __future__ import annotations
 
@@ -11,28 +11,21 @@ from pydrake.math import RigidTransform, RollPitchYaw
 from airground_drake.base.arrays import Array
 from airground_drake.base.errors import ReplayError
 from airground_drake.view.geometry import camera, grid
-from airground_drake.view.looks import (
-    OBSTACLE_COLOR,
-    PATH_COLOR,
-    SAFE_COLOR,
-    STATE_COLORS,
-    UAV_COLOR,
-    UNSEEN_COLOR,
-)
+from airground_drake.view.looks import PATH_COLOR, SAFE_COLOR, STATE_COLORS, UAV_COLOR, UNSEEN_COLOR, rgb
 from airground_drake.view.stage import STATES, TRIGGERED, Pillar, Robot, Stage
 
 ELEVATION = np.radians(58.0)
 OPENING_DEG, MARGIN_DEG = 46.0, 7.0
-"""Angle of the camera, and how much of it is left to the panels."""
+"""Opening angle of the camera, and the part of it that the panels of the page may cover."""
 
 
 def served() -> Meshcat:
-    """A new Meshcat, which serves itself on this machine as long as it lives.
+    """A new Meshcat, which listens on a port of this machine as long as it exists.
 
     Raises:
-        ReplayError: if there is no port that it may listen on.
+        ReplayError: if no port is available.
     """
-    logging.getLogger("drake").setLevel(logging.WARNING)  # it tells its address, which says nothing about the file
+    logging.getLogger("drake").setLevel(logging.WARNING)  # Meshcat logs its address, which nobody needs for a file
     try:
         return Meshcat(MeshcatParams(host="localhost", show_stats_plot=False))
     except RuntimeError as error:
@@ -40,7 +33,7 @@ def served() -> Meshcat:
 
 
 def draw(meshcat: Meshcat, stage: Stage) -> None:
-    """Draw what stands in a scenario; robots are drawn at the origin, each UGV once in every state."""
+    """Draw a scenario; robots are drawn at the origin, each UGV once in every state."""
     _ground(meshcat, stage)
     for k, obstacle in enumerate(stage.obstacles):
         _pillar(meshcat, obstacle_path(k), obstacle, stage.mark_m * (1.0 + k / len(stage.obstacles)))
@@ -51,32 +44,31 @@ def draw(meshcat: Meshcat, stage: Stage) -> None:
 
 
 def robot_path(k: int) -> str:
-    """Where robot k is in Meshcat's tree; below it is one child per state.
+    """Place of robot k in Meshcat's tree; below it is one child per state.
 
-    The tree has numbers, no names: its nodes are JavaScript objects, in which `__proto__` or `constructor` is no
-    child's name.
+    The tree has numbers instead of names: its nodes are JavaScript objects, which reserve names such as `__proto__`.
     """
     return f"/robots/{k}"
 
 
 def state_path(k: int, state: int) -> str:
-    """Where UGV k is drawn as it looks in a state, an index of STATES."""
+    """Place of UGV k as it looks in a state, an index of STATES."""
     return f"{robot_path(k)}/{state}"
 
 
 def shadow_path(k: int) -> str:
-    """Where the shadow of robot k is in Meshcat's tree."""
+    """Place of the shadow of robot k."""
     return f"/shadows/{k}"
 
 
 def obstacle_path(k: int) -> str:
-    """Where obstacle k is in Meshcat's tree."""
+    """Place of obstacle k."""
     return f"/obstacles/{k}"
 
 
 def rgba(color: str, alpha: float = 1.0) -> Rgba:
-    """The colour that #rrggbb names."""
-    return Rgba(*(int(color[i : i + 2], 16) / 255.0 for i in (1, 3, 5)), alpha)
+    """Drake's form of a colour #rrggbb."""
+    return Rgba(*rgb(color), alpha)
 
 
 def _cylinder(
@@ -105,9 +97,8 @@ def _ground(meshcat: Meshcat, stage: Stage) -> None:
 
 
 def _pillar(meshcat: Meshcat, path: str, obstacle: Pillar, height: float) -> None:
-    """An obstacle in its safe cylinder; no two of the same height, so that each is seen where they overlap."""
-    color = OBSTACLE_COLOR if obstacle.known_to_uav else UNSEEN_COLOR
-    _cylinder(meshcat, f"{path}/body", obstacle.radius_m, 2.0 * height, obstacle.centre_m, color)
+    """An obstacle in its safe cylinder; different heights show each cylinder where two overlap."""
+    _cylinder(meshcat, f"{path}/body", obstacle.radius_m, 2.0 * height, obstacle.centre_m, obstacle.color)
     _cylinder(meshcat, f"{path}/safe", obstacle.safe_m, height, obstacle.centre_m, SAFE_COLOR, 0.2)
     angle = np.linspace(0.0, 2.0 * np.pi, 73)
     rim = np.array([obstacle.safe_m * np.cos(angle), obstacle.safe_m * np.sin(angle), np.full_like(angle, height)])
@@ -129,7 +120,7 @@ def _robot(meshcat: Meshcat, k: int, robot: Robot) -> None:
 
 
 def _ugv(meshcat: Meshcat, path: str, r: float, state: int) -> None:
-    """A low cylinder in the colour of its state: with a cone over it if triggered, a ring round it if intervened."""
+    """A low cylinder in the colour of its state, with a cone above it if triggered, a ring if intervened."""
     color = STATE_COLORS[state]
     _cylinder(meshcat, f"{path}/body", r, r, np.zeros(3), color)
     if state == TRIGGERED:

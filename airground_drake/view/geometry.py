@@ -10,9 +10,9 @@ import numpy.typing as npt
 from airground_drake.base.arrays import Array
 
 MOST_DASHES = 1000
-"""Dashes of a line at most."""
+"""Most dashes of a line."""
 MOST_LINES = 30
-"""Lines of a grid at most, per side, about."""
+"""About the most lines of a grid, per side."""
 
 
 class Mesh(NamedTuple):
@@ -23,7 +23,7 @@ class Mesh(NamedTuple):
 
 
 def ribbon(path: Array, width_m: float, dash_m: float | None = None) -> Mesh:
-    """A flat band along a path (M, 3), m, seen from above; dashed with so long a period if asked."""
+    """A flat band along a path (M, 3), m, seen from above; dashes have the period `dash_m` if it is given."""
     steps = np.linalg.norm(np.diff(path[:, :2], axis=0), axis=1)
     kept = np.append(True, steps > 1e-9)
     corners, along = path[kept], np.append(0.0, np.cumsum(steps))[kept]
@@ -48,9 +48,9 @@ def ribbon(path: Array, width_m: float, dash_m: float | None = None) -> Mesh:
 
 
 def grid(low: Array, high: Array) -> tuple[Array, Array]:
-    """Ends of the lines of a grid, (3, N) each, m, on the ground, over a rectangle with corners (2,), m, at least.
+    """Ends of the lines of a grid on the ground, (3, N) each, m, which covers a rectangle with corners (2,), m.
 
-    The spacing is 1, 2 or 5 times a power of ten: the least, from 1 m on, with at most MOST_LINES to a side.
+    The spacing is 1, 2 or 5 times a power of ten: the smallest, from 1 m on, with at most MOST_LINES per side.
     """
     spacing = next(
         step * 10.0**power for power in range(300) for step in (1, 2, 5)
@@ -64,7 +64,7 @@ def grid(low: Array, high: Array) -> tuple[Array, Array]:
 
 
 def camera(low: Array, high: Array, elevation: float, opening: float) -> tuple[Array, Array]:
-    """Where a camera stands, and what it looks at, (3,) each, m, so that it sees a whole box with corners (3,), m.
+    """Place of a camera, and the point that it looks at, (3,) each, m, so that it sees a box with corners (3,), m.
 
     Args:
         low: the corner with the least coordinates.

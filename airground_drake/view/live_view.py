@@ -20,19 +20,17 @@ from airground_drake.world.world import ROBOTS
 class LiveView(LeafSystem):
     """Draws a scenario in a Meshcat, and moves its robots there as the simulation goes on.
 
-    Its input ports have the names of the output ports that they belong to (n UGVs, M bodies that move):
-        `bodies` (3M) m; `status` (4n), of the event trigger; `accepted` (n), 1 while an intervention is
-        accepted.
+    Input ports (n UGVs, M moving bodies), named like the output ports that they belong to: `bodies` (3M), m;
+    `status` (4n), of the event trigger; `accepted` (n), 1 while an intervention is accepted.
 
-    It publishes at the ends of the simulator's steps, at most FRAMES_PER_S times in a second of simulated time: so it
-    adds no step, and the run is the same with it and without. If the Meshcat records (`meshcat.StartRecording()`), the
-    motion goes into the recording.
+    It publishes at the ends of the simulator's steps, at most FRAMES_PER_S times per second of simulated time. It adds
+    no step, so it does not change the run. `meshcat.StartRecording()` records the motion.
     """
 
     FRAMES_PER_S = 30.0
 
     def __init__(self, meshcat: Meshcat, scenario: Scenario) -> None:
-        """Draw what stands in a valid scenario, and declare the ports."""
+        """Draw a valid scenario, and declare the ports."""
         super().__init__()
         world = make_world(scenario)
         n, self._uavs = len(scenario.ugvs), world.select("uav")

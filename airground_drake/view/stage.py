@@ -1,4 +1,4 @@
-"""What stands in a scenario, and how large it is drawn: from the scenario alone."""
+"""The robots and obstacles of a scenario, as large as they are drawn."""
 
 from __future__ import annotations
 
@@ -11,20 +11,21 @@ from airground_drake.base.arrays import Array
 from airground_drake.decision.trigger import Mode
 from airground_drake.run.trace import Trace
 from airground_drake.scenarios.schema import Obstacle, Scenario, Uav, Ugv
+from airground_drake.view.looks import OBSTACLE_COLOR, UNSEEN_COLOR
 
 STATES = ("own task", "triggered", "intervened")
-"""What a robot does: follow its own task; the same, with its trigger set; carry out a proposal. By index."""
+"""A robot follows its own task, follows it while its trigger is set, or executes a proposal."""
 OWN, TRIGGERED, INTERVENED = range(3)
 
 SMALLEST, LARGEST = 0.006, 0.018
-"""Radius of what is a point, as a share of the larger side of the scene: between these."""
+"""Smallest and largest radius with which a point is drawn, as shares of the larger side of the scene."""
 OF_SAFE_DISTANCE = 0.4
-"""Its share of the least safe distance on the ground: two points that keep it are drawn apart."""
+"""Radius of a point as a share of the least safe distance on the ground: points that keep it are drawn apart."""
 
 
 @dataclass(frozen=True)
 class Robot:
-    """A robot as it is drawn, with `radius_m`; `kind` is UGV or UAV; it is to arrive at `target_m` (3,)."""
+    """A robot: `kind` is UGV or UAV, `radius_m` as drawn, `target_m` (3,)."""
 
     name: str
     kind: str
@@ -34,7 +35,7 @@ class Robot:
 
 @dataclass(frozen=True)
 class Pillar:
-    """An obstacle: `radius_m` as drawn; UGVs have to stay `safe_m` away from its centre, with their whole bodies."""
+    """An obstacle: `radius_m` as drawn; the surfaces of UGVs have to stay `safe_m` away from its centre."""
 
     name: str
     centre_m: Array
@@ -42,10 +43,15 @@ class Pillar:
     safe_m: float
     known_to_uav: bool
 
+    @property
+    def color(self) -> str:
+        """#rrggbb."""
+        return OBSTACLE_COLOR if self.known_to_uav else UNSEEN_COLOR
+
 
 @dataclass(frozen=True)
 class Stage:
-    """What stands in a scenario before anything moves.
+    """A scenario before anything moves.
 
     `low_m` and `high_m` (3,) bound what is shown. `mark_m` is the radius with which a point is drawn. `phantoms_m`
     (P, 3) are the obstacles that only the UAV's map has.
@@ -60,7 +66,7 @@ class Stage:
 
 
 def stage(scenario: Scenario, visited_m: Array | None = None) -> Stage:
-    """The stage of a scenario; it is large enough for all positions in `visited_m` (M, 3), m, if that is given."""
+    """The stage of a scenario; it contains the positions `visited_m` (M, 3), m; default: the starts."""
     specs: dict[str, Ugv | Uav] = {**scenario.ugvs, scenario.uav.name: scenario.uav}
     if visited_m is None:
         visited_m = np.array([spec.start_m for spec in specs.values()])
@@ -81,24 +87,29 @@ def stage(scenario: Scenario, visited_m: Array | None = None) -> Stage:
     return Stage(robots, obstacles, np.reshape(scenario.uav.phantoms_m, (-1, 3)), low, high, mark)
 
 
+def stage_of(trace: Trace, scenario: Scenario) -> Stage:
+    """The stage of a run of a scenario."""
+    return stage(scenario, np.concatenate([trace.position(robot) for robot in trace.robots]))
+
+
 def safe_m(scenario: Scenario, obstacle: Obstacle) -> float:
-    """How far UGVs have to stay from the centre of an obstacle, with their whole bodies, m: d and its radius."""
+    """Distance that the surfaces of UGVs must keep from the centre of an obstacle, m: d and its radius."""
     return scenario.safe_distance.obstacle_m + obstacle.radius_m
 
 
 def states(trace: Trace, ugv: str, times: Array) -> npt.NDArray[np.intp]:
-    """Indices of STATES (F,) at times (F,), s: what was in force just before each."""
+    """Indices of STATES (F,) in force just before times (F,), s."""
     rows = np.minimum(np.searchsorted(trace.t, times - 1e-9), len(trace.t) - 1)
     return states_of(trace.column(f"{ugv}.accepted")[rows], trace.column(f"{ugv}.mode")[rows])
 
 
 def states_of(accepted: Array, mode: Array) -> npt.NDArray[np.intp]:
-    """Indices of STATES: from whether a proposal is accepted, 1 or 0, and the mode of the trigger, of equal shapes."""
+    """Indices of STATES, from `accepted`, 1 while a proposal is executed, and the trigger's mode, of equal shapes."""
     return np.where(accepted > 0, INTERVENED, np.where(mode == Mode.INTERVENING, TRIGGERED, OWN))
 
 
 def _bounds(scenario: Scenario, visited_m: Array) -> tuple[Array, Array]:
-    """Corners (3,), m, of a box with the positions (M, 3), m, the targets, and the obstacles' safe cylinders in it."""
+    """Corners (3,), m, of a box around positions (M, 3), m, the targets and the obstacles' safe cylinders."""
     points = [visited_m, np.array([spec.target_m for spec in scenario.ugvs.values()])]
     for spec in scenario.obstacles.values():
         reach = np.array([1.0, 1.0, 0.0]) * safe_m(scenario, spec)

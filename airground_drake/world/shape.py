@@ -1,4 +1,4 @@
-"""What room a body takes up."""
+"""The room that a body takes up."""
 
 from __future__ import annotations
 

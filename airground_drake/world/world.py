@@ -65,7 +65,7 @@ class Pair(NamedTuple):
 
 
 class Neighbours(NamedTuple):
-    """What k robots keep away from, as arrays for compiled code: m bodies at rest, then n that move.
+    """The bodies that k robots keep away from, as arrays for compiled code: m at rest, then n that move.
 
     Attributes:
         members: the robots, rows of the positions of moving bodies, (k,).
@@ -88,7 +88,7 @@ class Neighbours(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class World:
-    """All bodies: UGVs, UAVs, then obstacles; those of a kind stand side by side, those that move before the others.
+    """All bodies: UGVs, UAVs, then obstacles; of each kind, bodies that move stand before bodies at rest.
 
     The port `bodies` of the Diagram holds the positions of the M bodies that move, (3 M,), m, in this order. Bodies at
     rest are known here and never copied: a thousand of them would cost every tick more than the control law.
@@ -129,7 +129,7 @@ class World:
         """Row of a body.
 
         Raises:
-            ValueError: if there is no body of that name.
+            ValueError: if no body has that name.
         """
         return self.names().index(name)
 
@@ -162,7 +162,7 @@ class World:
         return self.apart_m.get(frozenset((first, second)), 0.0)
 
     def pair(self, first: str, second: str) -> Pair:
-        """What a robot and another body keep between their centres."""
+        """The distance and the shares of a robot and another body."""
         i, j = self.index(first), self.index(second)
         shares = float(self._share[i, j]), float(self._share[j, i]) if j < len(self._share) else 0.0
         return Pair(first, second, float(self._distance[i, j]), shares)
@@ -184,7 +184,7 @@ class World:
         return share
 
     def around(self, rows: slice) -> Neighbours:
-        """What the robots in some rows keep away from."""
+        """The bodies that the robots in some rows keep away from."""
         count = len(self.moving)
         members = np.arange(count)[rows]
         others = np.array([np.delete(np.arange(count), i) for i in members], dtype=np.intp).reshape(len(members), -1)

@@ -1,1 +1,1 @@
-"""Mutants of the package, what is run on each, and the page about them; see `benchmarks/mutants.py`."""
+"""Mutants of the package, and the runs that judge each; see `benchmarks/mutants.py`."""

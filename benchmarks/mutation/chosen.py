@@ -117,7 +117,7 @@ LAW = (
         "own task not filtered",
         "nsbc/law.py",
         "command",
-        "        return avoid_one(own, normal, bound, law.composition)\n",
+        "        return avoid_one(own, normal, bound, composition)\n",
         "        return own\n",
     ),
     Mutant(
@@ -131,8 +131,8 @@ LAW = (
         "executed whatever the answer, the answer recorded",
         "systems/controllers.py",
         "UgvController._update",
-        "velocity = self.velocity(context.get_time(), positions, reference, rate, proposals, law)",
-        "velocity = self.velocity(context.get_time(), positions, reference, rate, self._proposals.Eval(context), law)",
+        "reference, rate, proposals, self._in_force(context))",
+        "reference, rate, self._proposals.Eval(context), self._in_force(context))",
     ),
     Mutant(
         "presets end with a jump to the target",
@@ -193,7 +193,7 @@ TRIGGERS = (
         "integrated_noise",
         "B=intensity / np.sqrt(period) * eye",
         "B=1.05 * intensity / np.sqrt(period) * eye",
-        tests=("tests/systems/test_noise.py",),
+        tests=("tests/systems/test_decision.py",),
     ),
 )
 """The trigger: dwell, release, events, threshold, noise."""
@@ -269,9 +269,9 @@ GATEKEEPER = (
     Mutant(
         "the prediction has no avoidance",
         "gatekeeper/rollout.py",
-        "velocity_of",
-        "mode == ACCEPTED, Intervention(loop.wanted[k], asked, loop.chosen),\n        normal, bound,",
-        "mode == ACCEPTED, Intervention(loop.wanted[k], asked, loop.chosen),\n        0.0 * normal, 0.0 * bound,",
+        "_command",
+        "mode == ACCEPTED, normal, bound)",
+        "mode == ACCEPTED, 0.0 * normal, 0.0 * bound)",
     ),
     Mutant(
         "a first stage that refuses is accepted",
@@ -328,6 +328,7 @@ GATEKEEPER = (
 )
 """The gatekeepers."""
 
+RULES = "tests/check/test_forgeries.py::test_each_rule_of_the_checker_refuses_what_it_is_for"
 JUDGES = (
     Mutant(
         "SAFE-TRACE allows 5 cm",
@@ -336,7 +337,7 @@ JUDGES = (
         ">= -DISTANCE_TOLERANCE_M",
         ">= -0.05",
         runs=("case_b d", "soft_gate c", "crowd b"),
-        tests=(f"{RUNS}/test_safe_trace.py",),
+        tests=(f"{RUNS}/test_distances.py",),
     ),
     Mutant(
         "SAFE-HYP gives every robot the whole share",
@@ -354,16 +355,16 @@ JUDGES = (
         "EVENT_TOLERANCE_S = 1e-5",
         "EVENT_TOLERANCE_S = 0.1",
         runs=("case_b d", "soft_gate c", "crowd b"),
-        tests=(f"{RUNS}/test_thr_trig.py", f"{RUNS}/test_tolerances.py"),
+        tests=(f"{RUNS}/test_tolerances.py",),
     ),
     Mutant(
         "EXEC believes the signal",
         "verify/runs/exec.py",
-        "_first_wrong",
-        "| (one.executing != one.said)",
-        "| (one.executing != one.executing)",
+        "Judged.first_wrong",
+        "| (self.executing != self.said)",
+        "| (self.executing != self.executing)",
         runs=("case_b d", "soft_gate c", "crowd b"),
-        tests=(f"{RUNS}/test_exec.py",),
+        tests=(f"{RUNS}/test_breakages.py",),
     ),
     Mutant(
         "half a run is enough",
@@ -377,22 +378,20 @@ JUDGES = (
     Mutant(
         "checker: digests are not compared",
         "check/run.py",
-        "_run",
-        'same("SHA-256 of a table", meta["files"][file], sha256(content), about=file)',
+        "_table",
+        'same("SHA-256 of a table", digest, sha256(content), about=path.name)',
         "pass",
         runs=(),
-        tests=(
-            "tests/check/test_tampering.py::test_the_checker_itself_names_the_broken_rule[table_in_other_bytes_digest_left]",
-        ),
+        tests=(f"{RULES}[table with other bytes]",),
     ),
     Mutant(
         "checker: commands need not lead anywhere",
         "check/run.py",
-        "_robots_are_where_their_commands_lead",
-        'close("law of motion", run.position_m[robot][1:], led, within=SMALL,',
-        'close("law of motion", run.position_m[robot][1:], led, within=1e9,',
+        "_moves_as_commanded",
+        'close("law of motion", place[1:], led, within=SMALL,',
+        'close("law of motion", place[1:], led, within=1e9,',
         runs=(),
-        tests=("tests/check/test_tampering.py::test_the_checker_itself_names_the_broken_rule[position_changed]",),
+        tests=(f"{RULES}[elsewhere in a row]",),
     ),
 )
 """What judges: claims and the checker. On honest runs one that demands less says the same."""

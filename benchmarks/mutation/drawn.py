@@ -21,8 +21,8 @@ RUNNING = (
     "base/arrays.py", "run/events.py", "run/simulation.py",
     "scenarios/world.py", "decision", "gatekeeper", "geometry", "intervention", "nsbc", "systems", "world",
 )  # fmt: skip
-"""Files and folders of what produces a run."""
-PICTURES = ("systems/blocks.py", "systems/graphviz.py", "systems/schematic.py")
+"""Files and folders of the code that produces a run."""
+PICTURES = ("systems/graphviz.py", "systems/schematic.py")
 """Files in these folders that only draw diagrams."""
 PROBES = ("crowd d", "crowd c", "bodies d", "case_b d", "soft_gate c", "crowd b")
 HYPOTHESES = {
@@ -98,7 +98,7 @@ class Source:
         return True
 
     def _below(self, node: ast.AST, local: Mapping[str, str]) -> Iterator[Edit]:
-        """Edits of a node and of what is in it; `local` has the names of the function around, and of what type."""
+        """Edits of a node and of the nodes in it; `local` has the names of the surrounding function, with types."""
         if isinstance(node, UNTOUCHED):
             return
         if isinstance(node, ast.FunctionDef):
@@ -112,11 +112,30 @@ class Source:
                         yield from self._below(child, local)
 
     def _edits_of(self, node: ast.expr | ast.stmt, local: Mapping[str, str]) -> Iterator[Edit]:
-        start, end = self.span(node)
+        match node:
+            case ast.Compare() | ast.BinOp() | ast.BoolOp() | ast.UnaryOp():
+                yield from self._edits_of_operator(node)
+            case ast.Constant():
+                yield from (self._instead("constant", node, new) for new in _other_constants(node.value))
+            case ast.Name(ctx=ast.Load()) if node.id in local:
+                alike = (name for name, kind in local.items() if kind == local[node.id] and name != node.id)
+                yield from (self._instead("name", node, other) for other in alike)
+            case ast.Call():
+                yield from self._edits_of_call(node)
+            case ast.If() | ast.While() | ast.IfExp():
+                yield self._instead("condition", node.test, f"not ({self.of(node.test)})")
+            case ast.Expr(value=ast.Call()) | ast.AugAssign() | ast.Continue() | ast.Break():
+                yield self._instead("statement", node, "pass")
+            case ast.Assign(targets=[ast.Attribute() | ast.Subscript()]):
+                yield self._instead("statement", node, "pass")
+            case _:
+                pass
 
-        def instead(kind: str, new: str, where: tuple[int, int] = (start, end)) -> Edit:
-            return Edit(kind, node.lineno, *where, new)
+    def _instead(self, kind: str, node: ast.expr | ast.stmt, new: str) -> Edit:
+        """`new` in the place of a node."""
+        return Edit(kind, node.lineno, *self.span(node), new)
 
+    def _edits_of_operator(self, node: ast.expr) -> Iterator[Edit]:
         match node:
             case ast.Compare(ops=[op]):
                 old, others = FLIPPED[type(op)]
@@ -129,28 +148,9 @@ class Source:
                 if len(node.values) == 2:  # of more than two, one joint alone would bind differently
                     yield from self._between("operator", node.values[0], node.values[1], old, new)
                 for one, other in itertools.pairwise(node.values):
-                    yield instead("part dropped", "", (self.span(one)[0], self.span(other)[0]))
+                    yield Edit("part dropped", node.lineno, self.span(one)[0], self.span(other)[0], "")
             case ast.UnaryOp(op=ast.USub() | ast.Not()):
-                yield instead("sign", self.of(node.operand))
-            case ast.Constant(value=bool(value)):
-                yield instead("constant", str(not value))
-            case ast.Constant(value=int(value)):
-                yield instead("constant", str(value + 1))
-                yield instead("constant", str(value - 1))
-            case ast.Constant(value=float(value)):
-                yield instead("constant", str(1.1 * value if value else 1.0))
-                yield instead("constant", str(0.0 if value else -1.0))
-            case ast.Name(ctx=ast.Load()) if node.id in local:
-                alike = (name for name, kind in local.items() if kind == local[node.id] and name != node.id)
-                yield from (instead("name", other) for other in alike)
-            case ast.Call():
-                yield from self._edits_of_call(node)
-            case ast.If() | ast.While() | ast.IfExp():
-                yield Edit("condition", node.test.lineno, *self.span(node.test), f"not ({self.of(node.test)})")
-            case ast.Expr(value=ast.Call()) | ast.AugAssign() | ast.Continue() | ast.Break():
-                yield instead("statement", "pass")
-            case ast.Assign(targets=[ast.Attribute() | ast.Subscript()]):
-                yield instead("statement", "pass")
+                yield self._instead("sign", node, self.of(node.operand))
             case _:
                 pass
 
@@ -175,6 +175,17 @@ class Source:
         start, end = self.span(left)[1], self.span(right)[0]
         at = self.text.index(old, start, end)
         yield Edit(kind, left.end_lineno or left.lineno, at, at + len(old), new)
+
+
+def _other_constants(value: object) -> tuple[str, ...]:
+    """Replacements of a constant; none for a text."""
+    if isinstance(value, bool):
+        return (str(not value),)
+    if isinstance(value, int):
+        return str(value + 1), str(value - 1)
+    if isinstance(value, float):
+        return str(1.1 * value if value else 1.0), str(0.0 if value else -1.0)
+    return ()
 
 
 def _local_names(function: ast.FunctionDef) -> dict[str, str]:

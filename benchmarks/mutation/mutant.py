@@ -1,4 +1,4 @@
-"""A mutant: one edit of one file of the package, and what may catch it."""
+"""A mutant: one edit of one file of the package, and the runs and tests that may catch it."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ class Mutant:
         file.write_text(self.edited(file.read_text(encoding="utf-8")), encoding="utf-8")
 
     def compiled(self, root: Path) -> bool:
-        """Whether numba compiles functions of the file: what it keeps of their callers is out of date after an edit."""
+        """Whether numba compiles functions of the file: its cache of their callers is out of date after an edit."""
         return "@njit" in (root / PACKAGE / self.path).read_text(encoding="utf-8")
 
 

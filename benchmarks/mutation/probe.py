@@ -1,4 +1,4 @@
-"""What claims and the checker say of short runs of the package that is on the path.
+"""Verdicts of claims and of the checker on short runs of the package that is on the path.
 
     python probe.py
 
@@ -104,7 +104,7 @@ OTHERS = (
 )  # fmt: skip
 """Packages that every child needs."""
 LONGEST_CPU_S, MOST_BYTES = 300, 12 << 30
-"""Of a child: a mutant may run for ever, or remember everything."""
+"""Limits of a child: a mutant may run for ever, or fill the memory."""
 KINDS = {"ways": ways, "runs": runs}
 
 
@@ -125,7 +125,7 @@ def _answer(file: str, kind: str, names: list[str]) -> None:
     resource.setrlimit(resource.RLIMIT_CPU, (LONGEST_CPU_S, LONGEST_CPU_S))
     resource.setrlimit(resource.RLIMIT_DATA, (MOST_BYTES, MOST_BYTES))
     try:
-        os.dup2(2, 1)  # what is printed must not be taken for an answer
+        os.dup2(2, 1)  # printed text must not be taken for an answer
         Path(file).write_text(json.dumps(KINDS[kind](names)), encoding="utf-8")
         code = 0
     except BaseException:  # whatever a mutant does

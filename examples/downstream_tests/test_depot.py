@@ -1,4 +1,4 @@
-"""A team of one's own: what its runs keep, what is proved for its numbers, a policy and a claim of one's own."""
+"""Your own team: claims about its runs, proofs for its numbers, your own policy and claim."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ DEPOT = Path(__file__).with_name("depot.yaml")
 
 
 class Reckless(Policy):
-    """Straight through whatever is in the way."""
+    """Straight to the target, through all obstacles."""
 
     def propose(self, seen: Observation) -> Motion:
         return Motion.at_speed(np.array([seen.position, seen.target]), 2.0, start=seen.start)

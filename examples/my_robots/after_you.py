@@ -5,7 +5,7 @@ from airground_drake.intervention.policy import Observation, Policy
 
 
 class AfterYou(Policy):
-    """The UGV goes straight to its target; whoever stands near that line backs off sideways and returns."""
+    """The UGV goes straight to its target; a robot near that line backs off sideways and returns."""
 
     def propose(self, seen: Observation) -> dict[str, Motion]:
         """A motion for the UGV, and one for each that is in its way."""

@@ -47,7 +47,7 @@ class Scene(NamedTuple):
 
 
 class Round(Task):
-    """Move along a boundary: sigma is the way along the tangent, whose rate is to be `speed`; J is one row."""
+    """Move along a boundary: sigma is the path along the tangent, with the wanted rate `speed`; J is one row."""
 
     def __init__(self, tangent: Array, speed: float) -> None:
         """Unit vector (3,) and speed, m/s."""
@@ -70,7 +70,7 @@ def null_space(jacobian: Array) -> Array:
 
 
 def normals(scene: Scene, position: Array) -> Array:
-    """Unit vectors away from the obstacles at whose safe circle the UGV is, (k, 3)."""
+    """Unit vectors away from the obstacles whose safe circle the UGV touches, (k, 3)."""
     offset = position - scene.obstacles
     distance = np.linalg.norm(offset, axis=1)
     near = distance < DISTANCE_M + NEAR_M
@@ -112,7 +112,7 @@ def fixed(seen: int) -> int:
 
 
 def rule(seen: int) -> int:
-    """Go round, to the left unless already to the right, while the target is behind what is in the way."""
+    """Go round, to the left unless already to the right, while an obstacle hides the target."""
     sector, order = divmod(seen, len(ORDERS))
     behind = sector - 1 not in (3, 4)  # the two sectors of the outward direction
     return (order or 1) if sector and behind else 0
@@ -127,7 +127,7 @@ class Supervisor(LeafSystem):
     """In `position` (3), m; out `order` (1), held: which task comes first. Rate: DECIDE_S."""
 
     def __init__(self, scene: Scene, decide: Callable[[int], int]) -> None:
-        """`decide` maps what is seen, a `state`, to an index of ORDERS."""
+        """`decide` maps an observed `state` to an index of ORDERS."""
         super().__init__()
         self._scene, self._decide = scene, decide
         self._position = self.DeclareVectorInputPort("position", 3)

@@ -31,14 +31,12 @@ def test_a_course_is_a_valid_scenario(seed: int, ugvs: int, density: float) -> N
         assert 4 * density <= len(course.obstacles) <= 9 * density
 
 
-def test_walls_are_all_around() -> None:
+def test_walls_are_all_around_and_other_numbers_of_ugvs_are_refused() -> None:
     course = maps.draw(3, 1, 0.0, walls=True)
     start, target = course.starts[0], course.targets[0]
     assert shortest_length(start, target, course.obstacles, maps.SAFE_M) == pytest.approx(20.0)
     for outside in ([10.0, 20.0], [10.0, -20.0], [-20.0, 0.0], [40.0, 0.0]):
         assert np.isinf(shortest_length(start, np.array(outside), course.obstacles, maps.SAFE_M))
 
-
-def test_other_numbers_of_ugvs_are_refused() -> None:
     with pytest.raises(ValueError, match="3 UGVs: one of 1, 2, 4, 8"):
         maps.draw(0, 3)

@@ -1,15 +1,36 @@
-"""Every benchmark can be started, as far as that what it imports is there."""
+"""Benchmarks start, and their problems and attacks are what they say."""
 
 from __future__ import annotations
 
 import runpy
 from pathlib import Path
 
+import hostile
 import pytest
 
 BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
 
 
 @pytest.mark.parametrize("name", sorted(path.stem for path in BENCHMARKS.glob("*.py")))
-def test_what_it_imports_is_there(name: str) -> None:
+def test_its_imports_exist(name: str) -> None:
     assert runpy.run_path(str(BENCHMARKS / f"{name}.py"))["__doc__"]
+
+
+@pytest.mark.slow
+def test_problems_of_the_gatekeeper_are_those_of_runs_with_method_c() -> None:
+    recorded = runpy.run_path(str(BENCHMARKS / "gatekeeper.py"))["recorded"]  # its name is that of a folder of tests
+    samples = recorded("case_a", "c", 5)
+    assert 1 < len(samples) <= 5
+    assert all(problem.loop is None and problem.stages == 60 for (problem,) in samples)
+    with pytest.raises(ValueError, match="case_a, run d: no problem"):
+        recorded("case_a", "d", 5)
+
+
+def test_no_hostile_proposal_or_uav_brings_d_below_the_safe_distance() -> None:
+    worst, accepted, below = hostile.at_decision_level(seed=0, proposals=150)
+    assert worst >= -1e-9
+    assert accepted > below > 0  # the measure sees the effect of proposals that (c) accepts
+    certified, executed, _, stolen, bound = hostile.whole_run(seed=1)
+    assert certified >= -1e-9
+    assert executed > 0
+    assert stolen <= bound

@@ -43,15 +43,10 @@ def moved(trace: Trace, robot: str, row: int, offset: list[float]) -> Trace:
     def edit(signals: pd.DataFrame) -> None:
         dt = np.diff(signals["t_s"].to_numpy())
         for axis, delta in zip("xyz", offset, strict=True):
-            place, velocity = (
-                signals[f"{robot}.{axis}_m"].to_numpy(copy=True),
-                signals[f"{robot}.v{axis}_m_s"].to_numpy(copy=True),
-            )
-            place[row] += delta
-            velocity[row] += delta / dt[row - 1]
+            signals.loc[row, f"{robot}.{axis}_m"] += delta
+            signals.loc[row, f"{robot}.v{axis}_m_s"] += delta / dt[row - 1]
             if row + 1 < len(signals):
-                velocity[row + 1] -= delta / dt[row]
-            signals[f"{robot}.{axis}_m"], signals[f"{robot}.v{axis}_m_s"] = place, velocity
+                signals.loc[row + 1, f"{robot}.v{axis}_m_s"] -= delta / dt[row]
 
     return with_signals(trace, edit)
 

@@ -1,4 +1,4 @@
-"""The one way to make a trace: from positions, velocities and what is held, whoever moved the robots."""
+"""Makes a trace from positions, velocities and held signals."""
 
 from __future__ import annotations
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import cache
 
 from airground_drake.run.trace import Trace
-from airground_drake.scenarios.schema import Decision, Obstacle
+from airground_drake.scenarios.schema import Decision, Obstacle, Threshold
 from builders.scenarios import STILL, case_a, lone
 from builders.simulation import simulate
 
@@ -24,7 +24,7 @@ def chattering() -> Trace:
 
 
 def at_rest(t: float) -> list[list[float]]:
-    """Nobody moves."""
+    """No robot moves."""
     return [[0.0] * 3, [0.0] * 3]
 
 
@@ -46,3 +46,16 @@ def passing_by(offset: float) -> Trace:
         [-0.5125, 2.0 + offset, 0.0], [0.4875, 2.0 + offset, 0.0], STILL, 1.0, obstacles={"o": Obstacle([0.0] * 3)}
     )
     return simulate(scenario, drive=lambda t: [[1.0, 0.0, 0.0], [0.0] * 3])
+
+
+def leaking() -> Trace:
+    """Noise that triggers within its periods, so that these have rows within."""
+    threshold = Threshold(zeta_m=0.5)
+    decision = Decision(threshold, release_m=0.4, min_inter_event_s=0.1, noise_m_sqrt_s=1.0, leak_1_s=0.5)
+    return simulate(lone([0.0] * 3, [0.2, 0.0, 0.0], STILL, 10.0, decision=decision), drive=at_rest)
+
+
+def beside_a_rock(step: float = 0.0, start: float = -2.0) -> Trace:
+    """A UGV stands at the safe distance of an obstacle and takes one step into it, m."""
+    scenario = lone([start, 0.0, 0.0], [start, 0.0, 0.0], STILL, 3.0, obstacles={"o": Obstacle([0.0] * 3)})
+    return simulate(scenario, drive=lambda t: [[step / 0.025 * (round(t / 0.025) == 7), 0.0, 0.0], [0.0] * 3])

@@ -11,8 +11,10 @@ import numpy as np
 from scipy.optimize import brentq
 
 from airground_drake.base.arrays import Array
-from airground_drake.nsbc.avoidance import Avoidance, Surroundings
 from airground_drake.run.trace import Trace
+from airground_drake.scenarios.recorded import of_run
+from airground_drake.scenarios.world import make_world
+from airground_drake.systems.components import make_avoidance
 from builders.layout import HELD, laid_out, reference_at
 
 Drive = Callable[[float], list[list[float]]]
@@ -30,6 +32,8 @@ class _Simulation:
     def __init__(self, scenario: dict[str, Any], run: str, drive: Drive | None, seed: int) -> None:
         self.scenario, self.run, self.drive, self.rng = scenario, run, drive, np.random.default_rng(seed)
         self.method = scenario["runs"][run]["method"]
+        typed = of_run(scenario, run)
+        self.avoidance, self.near = make_avoidance(typed), make_world(typed).around(slice(0, len(typed.robots)))
         self.specs = list(scenario["ugvs"].values())
         self.robots = [*scenario["ugvs"], scenario["uav"]["name"]]
         self.n = len(self.specs)
@@ -125,7 +129,7 @@ class _Simulation:
 
     def velocities(self, t: float) -> Array:
         """NSBC with the avoidance inequalities on top; an accepted detour replaces the tracking task."""
-        control, safe = self.scenario["control"], self.scenario["safe_distance"]
+        control = self.scenario["control"]
         lower = np.zeros((self.n + 1, 3))
         for i in range(self.n):
             reference = np.array(self.reference(i, t))
@@ -137,20 +141,7 @@ class _Simulation:
                 lower[i] = 2.6 * offset / np.linalg.norm(offset)
         centroid = self.position[: self.n].mean(axis=0) + np.array([0.0, 0.0, self.scenario["uav"]["altitude_m"]])
         lower[self.n] = control["formation_gain_1_s"] * (centroid - self.position[self.n])
-        speed = np.linalg.norm(lower, axis=1)
-        lower *= np.minimum(1.0, 5.9 / np.maximum(speed, 1e-9))[:, None]
-        obstacles = np.array([o["position_m"] for o in self.scenario["obstacles"].values()]).reshape(-1, 3)
-        m = len(obstacles)
-        centre, distance = np.empty((self.n + 1, m + self.n, 3)), np.full((self.n + 1, m + self.n), safe["obstacle_m"])
-        share, mobility = np.ones(distance.shape), np.ones((self.n + 1, 3))
-        centre[:, :m], share[:, m:], mobility[: self.n, 2] = obstacles, 0.5, 0.0
-        for i in range(self.n + 1):
-            centre[i, m:] = np.delete(self.position, i, axis=0)
-            distance[i, m:] = safe["air_ground_m"] if i == self.n else safe["ugv_m"]
-        distance[: self.n, -1] = safe["air_ground_m"]
-        avoidance = Avoidance(control["avoidance_gain_1_s"], control["period_s"], control["sensing_range_m"])
-        spaces = avoidance.half_spaces(self.position, mobility, Surroundings(centre, distance, share))
-        return avoidance.apply(lower, spaces)
+        return self.avoidance.command(lower, self.position, self.near)
 
     def record(self, t: float) -> None:
         x = [self.x(i, self.position[i], self.noise[i], t) for i in range(self.n)]

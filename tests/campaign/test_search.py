@@ -21,17 +21,14 @@ from airground_drake.scenarios.load import from_data, load, resolved
 @pytest.mark.parametrize("name", SAMPLERS.own)
 @pytest.mark.parametrize("dimensions", [1, 5])
 def test_samplers_stay_in_the_cube_and_depend_on_nothing_but_the_seed(name: str, dimensions: int) -> None:
-    found = []
-    for _ in range(2):
+    found: list[list[np.ndarray]] = [[], []]
+    for batches in found:
         sampler = SAMPLERS.make(name, of=Sampler, dimensions=dimensions, seed=7)
-        batches = []
         for _ in range(4):
-            points = sampler.ask()
+            batches.append(points := sampler.ask())
             assert points.shape[1] == dimensions
             assert ((points >= 0.0) & (points < 1.0)).all()
             sampler.tell(points, ((points - 0.3) ** 2).sum(axis=1))
-            batches.append(points)
-        found.append(np.concatenate(batches))
     np.testing.assert_array_equal(*found)
 
 
@@ -50,9 +47,8 @@ def test_the_strategy_goes_where_it_is_least_and_the_baselines_do_not() -> None:
 
 
 def row(**more: Any) -> Row:
-    return (
-        blank() | {"ended": JUDGED, "claim": "SAFE-TRACE", "status": "holds", "margin": 0.5, "intervened_s": 2.0} | more
-    )
+    judged = {"ended": JUDGED, "claim": "SAFE-TRACE", "status": "holds", "margin": 0.5, "intervened_s": 2.0}
+    return blank() | judged | more
 
 
 def test_objectives() -> None:

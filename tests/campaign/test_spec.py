@@ -35,17 +35,11 @@ def test_a_draw_is_a_validated_scenario_named_by_its_index(tmp_path: Path) -> No
     assert scenario != spec.draw(4712)
 
 
-def test_what_is_set_is_so_in_every_draw_and_runs_can_be_chosen(tmp_path: Path) -> None:
-    spec = spec_of(tmp_path, "scenario: case_a\nruns: [d]\nset: {duration_s: 3.5}\n")
-    assert spec.draw(1).duration_s == 3.5
-    assert list(spec.draw(1).runs) == ["d"]
-    assert spec.combinations == 1
-
-
-def test_a_scenario_beside_the_spec(tmp_path: Path) -> None:
-    own = (Path(__file__).parents[2] / "airground_drake/scenarios/minimal.yaml").read_text(encoding="utf-8")
-    (tmp_path / "own.yaml").write_text(own, encoding="utf-8")
-    assert spec_of(tmp_path, "scenario: own.yaml\n").draw(0).ugvs
+def test_a_scenario_beside_the_spec_with_fixed_keys_and_chosen_runs(tmp_path: Path) -> None:
+    own = Path(__file__).parents[2] / "airground_drake/scenarios/minimal.yaml"
+    (tmp_path / "own.yaml").write_bytes(own.read_bytes())
+    drawn = spec_of(tmp_path, "scenario: own.yaml\nruns: [d]\nset: {duration_s: 3.5}\n").draw(1)
+    assert (drawn.duration_s, list(drawn.runs)) == (3.5, ["d"])
 
 
 def test_random_courses_are_valid_and_have_the_counts_that_are_asked_for(tmp_path: Path) -> None:
@@ -60,13 +54,10 @@ def test_random_courses_are_valid_and_have_the_counts_that_are_asked_for(tmp_pat
             assert getattr(each.uav, end) == pytest.approx([*centroid[:2], each.uav.altitude_m], abs=1e-6)
 
 
-def test_obstacles_of_a_course_are_clear_of_a_low_uav(tmp_path: Path) -> None:
+def test_obstacles_of_a_course_are_clear_of_a_low_uav_and_one_without_room_cannot_be_drawn(tmp_path: Path) -> None:
     low = "set: {uav.altitude_m: 1.2}\ncourse: {ugvs: 2, obstacles: 9, length_m: 12, width_m: 9}\n"
     spec = spec_of(tmp_path, f"scenario: minimal\n{low}")
     assert len([spec.draw(i) for i in range(12)]) == 12  # all are valid
-
-
-def test_a_course_without_room_is_a_draw_that_cannot_be_made(tmp_path: Path) -> None:
     spec = spec_of(tmp_path, "scenario: minimal\ncourse: {ugvs: 9, width_m: 3}\n")
     with pytest.raises(ScenarioError, match="have no room"):
         spec.draw(0)
@@ -89,34 +80,19 @@ def test_a_course_without_room_is_a_draw_that_cannot_be_made(tmp_path: Path) -> 
         ("scenario: minimal\ndraw: {seed: {uniform: [1, 0]}}", "draw.seed.uniform: [1, 0] is not allowed; wanted"),
         ("scenario: minimal\ncourse: {ugvs: 0}", ":2: course.ugvs: 0 is not allowed; wanted: a whole number from 1"),
         ("scenario: minimal\ncourse: []", ":2: course: a list is given; wanted: a mapping with the keys ugvs"),
-        ("scenario: minimal\ncourse: {ugvs: 1000000000000}", "wanted: a whole number from 1 to 100"),
-        (
-            "scenario: minimal\ncourse: {ugvs: 1, width_m: .inf}",
-            "course.width_m: inf is not allowed; wanted: a number in m",
-        ),
         (f"scenario: minimal\ncourse: {{length_m: 1{'0' * 400}}}", "wanted: a number in m from 1e-09 to 1e+09"),
-        (f"scenario: minimal\ndraw: {{duration_s: {{uniform: [1, 1{'0' * 400}]}}}}", "wanted: "),
-        (f"scenario: minimal\ndraw: {{duration_s: {{normal: [1, 1{'0' * 400}]}}}}", "wanted: "),
         (f"scenario: minimal\ndraw: {{seed: {{integer: [0, 1{'0' * 400}]}}}}", "whole numbers up to 2147483647"),
         ("scenario: minimal\ncourse: {hidden: 2}", "course.hidden: 2.0 is not allowed; wanted: a number from 0 to 1"),
         ("scenario: minimal\ncourse: {width: 2}", ":2: course.width: unknown key; did you mean width_m?"),
-        (
-            "scenario: minimal\ncourse: {}\nset: {ugvs.ugv1.radius_m: 0.5}",
-            ":3: set.ugvs.ugv1.radius_m: the course would",
-        ),
+        ("scenario: minimal\ncourse: {}\nset: {ugvs.u.radius_m: 0.5}", ":3: set.ugvs.u.radius_m: the course would"),
         (
             "scenario: minimal\nmarks: {arrival: 2}",
-            ":2: marks.arrival: 'arrival' is not allowed; did you mean arrival_s?",
+            ":2: marks.arrival: 'arrival' is not allowed; did you mean arrival_",
         ),
         ("scenario: minimal\nset: [1]", ":2: set: a list is given; wanted: a mapping with dotted keys"),
         ("scenario: minimal\nset: {contrl.period_s: 1}", ":2: set.contrl: unknown key; did you mean control?"),
-        (
-            "scenario: minimal\nset: {control.period_s: no}",
-            ":2: set.control.period_s: 'no' is not allowed; wanted: a num",
-        ),
+        ("scenario: minimal\nset: {control.period_s: no}", ":2: set.control.period_s: 'no' is not allowed; wanted: a"),
         ("scenario: minimal\ndraw: {contrl.period_s: {uniform: [1, 2]}}", ":2: draw.contrl: unknown key; did you mean"),
-        ("a: &a [*a]", ":1: nested too deeply"),
-        ("\tx", ":1: not YAML"),
     ],
 )
 def test_mistakes_are_one_line(tmp_path: Path, text: str, says: str) -> None:
@@ -124,9 +100,3 @@ def test_mistakes_are_one_line(tmp_path: Path, text: str, says: str) -> None:
         spec_of(tmp_path, text)
     assert says in str(caught.value)
     assert "\n" not in str(caught.value)
-
-
-@pytest.mark.parametrize("name", ["nothere.yaml", "case_a"])
-def test_a_campaign_is_a_file(name: str) -> None:
-    with pytest.raises(ScenarioError, match="no such file; wanted: the path of a campaign"):
-        load_spec(Path(name))

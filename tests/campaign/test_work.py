@@ -1,4 +1,4 @@
-"""One draw: its rows, whatever comes of it."""
+"""The rows of one draw, whatever becomes of it."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import json
 import math
 from dataclasses import replace
 from pathlib import Path
-from textwrap import dedent
+from typing import Any
 
 import pytest
 
@@ -22,13 +22,24 @@ set: {duration_s: 2.0}
 draw: {seed: {integer: [0, 1000]}}
 claims: [SAFE-TRACE, ZENO-TRACE]
 """
+SLOW = """
+class Route:
+    def solve(self, problem, budget):
+        while True:
+            pass
+"""
+IDLE = """
+class Policy:
+    def propose(self, seen):
+        return None
+"""
 
 
 @pytest.fixture
 def spec(tmp_path: Path) -> Spec:
-    path = tmp_path / "mine.yaml"
-    path.write_text(TEXT, encoding="utf-8")
-    return load_spec(path)
+    for name, text in (("mine.yaml", TEXT), ("slow.py", SLOW), ("idle.py", IDLE)):
+        (tmp_path / name).write_text(text, encoding="utf-8")
+    return load_spec(tmp_path / "mine.yaml")
 
 
 def test_a_row_for_each_run_and_claim(spec: Spec) -> None:
@@ -37,33 +48,28 @@ def test_a_row_for_each_run_and_claim(spec: Spec) -> None:
     for row in rows:
         assert row.keys() == COLUMNS.keys()
         assert (row["ended"], row["index"], row["status"]) == (JUDGED, 5, "holds")
-        assert json.loads(row["drawn"]) == spec.values(5)
-        assert row["wall_s"] > 0.0
+        assert (json.loads(row["drawn"]), row["wall_s"] > 0.0) == (spec.values(5), True)
     safe = next(row for row in rows if row["claim"] == "SAFE-TRACE")
     assert safe["margin"] >= 0.0
     assert math.isnan(safe["first_trigger_s"])
 
 
-def test_a_draw_that_makes_no_scenario_is_counted_as_such(spec: Spec) -> None:
-    (row,) = work.rows_of(replace(spec, fixed={"duration_s": -1.0}), 5, DEFAULT_LIMITS)
-    assert (row["ended"], row["claim"]) == (INVALID, "")
-    assert "duration_s" in row["what"]
-    (row,) = work.rows_of(spec, 5, Limits(work=1.0))
-    assert row["ended"] == INVALID
-
-
-def test_numbers_that_are_none_and_runs_that_are_not_there_make_no_scenario_either(spec: Spec) -> None:
-    (row,) = work.rows_at(spec, {"decision.noise_m_sqrt_s": float("nan")}, 5, DEFAULT_LIMITS)
-    assert (row["ended"], row["drawn"]) == (INVALID, '{"decision.noise_m_sqrt_s": "nan"}')
-    without = replace(spec, runs=("d",))
-    (row,) = work.rows_at(without, {"runs": {"b": {"method": "b"}}}, 5, DEFAULT_LIMITS)
-    assert (row["ended"], "runs: 'd' is not allowed" in row["what"]) == (INVALID, True)
-
-
-def test_code_of_others_is_not_imported(spec: Spec) -> None:
-    own = replace(spec, fixed={"intervention.policies": [{"name": "no_such_module:Policy"}]})
-    (row,) = work.rows_of(own, 0, DEFAULT_LIMITS)
-    assert (row["ended"], "third-party code" in row["what"]) == (INVALID, True)
+@pytest.mark.parametrize(
+    ("changes", "values", "limits", "what"),
+    [
+        ({"fixed": {"duration_s": -1.0}}, {}, DEFAULT_LIMITS, "duration_s"),
+        ({}, {}, Limits(work=1.0), "asks for"),
+        ({}, {"decision.noise_m_sqrt_s": float("nan")}, DEFAULT_LIMITS, "decision.noise_m_sqrt_s"),
+        ({"runs": ("d",)}, {"runs": {"b": {"method": "b"}}}, DEFAULT_LIMITS, "runs: 'd' is not allowed"),
+        ({"fixed": {"intervention.policies": [{"name": "idle.py:Policy"}]}}, {}, DEFAULT_LIMITS, "third-party code"),
+    ],
+)
+def test_a_draw_without_a_usable_scenario_is_invalid(
+    changes: dict[str, Any], values: dict[str, Any], limits: Limits, what: str, spec: Spec
+) -> None:
+    (row,) = work.rows_at(replace(spec, **changes), values, 5, limits)
+    assert (row["ended"], row["claim"], what in row["what"]) == (INVALID, "", True)
+    assert "NaN" not in row["drawn"]
 
 
 def test_a_run_that_stops_is_a_row(spec: Spec, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -76,17 +82,8 @@ def test_a_run_that_stops_is_a_row(spec: Spec, monkeypatch: pytest.MonkeyPatch) 
     assert "t0 < ti" in rows[0]["what"]
 
 
-SLOW = """
-    class Route:
-        def solve(self, problem, budget):
-            while True:
-                pass
-"""
-
-
-def test_a_draw_that_never_ends_is_stopped(spec: Spec, tmp_path: Path) -> None:
+def test_a_draw_that_never_ends_is_stopped(spec: Spec) -> None:
     """By third-party code that is found beside the spec."""
-    (tmp_path / "slow.py").write_text(dedent(SLOW), encoding="utf-8")
     changes = {
         "gatekeeper.route": "slow.py:Route",
         "runs": {"c": {"method": "c"}},
@@ -99,15 +96,7 @@ def test_a_draw_that_never_ends_is_stopped(spec: Spec, tmp_path: Path) -> None:
     assert work.trace_of(hangs, hangs.draw(0), Limits(time=0.5, plugins=True)) is None
 
 
-IDLE = """
-    class Policy:
-        def propose(self, seen):
-            return None
-"""
-
-
-def test_what_is_made_small_is_simulated_with_code_beside_the_spec(spec: Spec, tmp_path: Path) -> None:
-    (tmp_path / "idle.py").write_text(dedent(IDLE), encoding="utf-8")
+def test_a_scenario_that_is_made_small_is_simulated_with_code_beside_the_spec(spec: Spec) -> None:
     own = replace(spec, fixed={"intervention.policies": [{"name": "idle.py:Policy"}]})
     trace = work.trace_of(own, own.draw(0), Limits(plugins=True))
     assert trace is not None

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from airground_drake.check.rules import Disagreement, agrees, at_most, close, holds, same
+from airground_drake.check.rules import Disagreement, at_most, close, holds, same
 
 
 def test_the_first_part_that_differs_is_named() -> None:
@@ -18,40 +18,31 @@ def test_the_first_part_that_differs_is_named() -> None:
     assert (found.value.rule, found.value.t_s) == ("rule", 2.0)
 
 
-@pytest.mark.parametrize(
-    ("recorded", "recomputed"),
-    [(1, True), (True, 1), ("1", 1), (None, 0), ([1], [1, 2]), ({"a": 1}, {}), ({}, {"a": 1}), (1.0, math.nan)],
-)
-def test_what_is_not_the_same_is_refused(recorded: Any, recomputed: Any) -> None:
-    with pytest.raises(Disagreement):
-        same("rule", recorded, recomputed)
-
-
-def test_evidence_may_say_more_but_not_otherwise() -> None:
-    agrees("rule", {"a": 1.0, "b": 2.0}, {"a": 1.0 + 1e-12}, within=1e-9)
-    with pytest.raises(Disagreement):
-        agrees("rule", {"b": 2.0}, {"a": 1.0}, within=1e-9)
-
-
-def test_the_first_row_that_is_off_is_named_with_its_time() -> None:
-    t = np.array([0.0, 0.1, 0.2])
-    recorded = np.array([[1.0, 2.0], [1.0, 2.5], [9.0, 9.0]])
+def test_the_first_row_that_differs_is_named_with_its_time() -> None:
+    recorded, t = np.array([[1.0, 2.0], [1.0, 2.5], [9.0, 9.0]]), np.array([0.0, 0.1, 0.2])
     with pytest.raises(Disagreement) as found:
         close("rule", recorded, np.array([[1.0, 2.0]] * 3), within=1e-9, t_s=t)
     assert (found.value.recorded, found.value.recomputed, found.value.t_s) == ([1.0, 2.5], [1.0, 2.0], 0.1)
 
 
-@pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])
-def test_what_is_no_finite_number_is_close_to_nothing_and_below_no_limit(bad: float) -> None:
+@pytest.mark.parametrize(
+    ("recorded", "recomputed"),
+    [(1, True), (True, 1), ("1", 1), (None, 0), ([1], [1, 2]), ({"a": 1}, {}), ({}, {"a": 1}), (1.0, math.nan)],
+)
+def test_different_values_are_refused(recorded: Any, recomputed: Any) -> None:
     with pytest.raises(Disagreement):
-        close("rule", [bad], [bad], within=1.0)
-    if bad != -math.inf:
-        with pytest.raises(Disagreement):
-            at_most("rule", [bad], 1.0)
+        same("rule", recorded, recomputed)
 
 
-def test_shapes_must_agree() -> None:
+@pytest.mark.parametrize(
+    ("rule", "arguments"),
+    [(close, ([math.nan], [math.nan])), (close, ([1.0, 2.0], [1.0])), (at_most, ([math.nan], 1.0))],
+)
+def test_a_nan_is_close_to_nothing_and_below_no_limit_and_shapes_must_agree(rule: Any, arguments: Any) -> None:
     with pytest.raises(Disagreement):
-        close("rule", [1.0, 2.0], [1.0], within=9.0)
+        rule("rule", *arguments, within=9.0)
+
+
+def test_nothing_breaks_no_rule() -> None:
     close("rule", [], [], within=0.0)
     holds("rule", np.array([], dtype=bool), [], "nothing")

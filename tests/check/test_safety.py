@@ -42,7 +42,7 @@ def test_a_distance_that_is_short_refutes(short_m: float, status: str) -> None:
 def test_the_least_distance_lies_between_rows() -> None:
     passing = run([3.0, -3.0])
     passing.position_m["ugv1"][:, 1] = 0.5
-    assert safety.least_distance_m(*passing.position_m.values()) == 0.5
+    assert safety.distances_m(passing.position_m["ugv1"]).tolist() == [0.5]
 
 
 @pytest.mark.parametrize(

@@ -4,15 +4,14 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import pytest
+from commands.conftest import Airground
 
-from airground_drake.commands import main
 from airground_drake.run import trace
 
 
-def test_events_are_printed_and_the_trace_is_saved(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["run", "case_a", "b", "--set", "duration_s=15", "-o", str(tmp_path / "b")]) == 0
-    first, *events = capsys.readouterr().out.splitlines()
+def test_events_are_printed_and_the_trace_is_saved(tmp_path: Path, airground: Airground) -> None:
+    said = airground("run", "case_a", "b", "--set", "duration_s=15", "-o", tmp_path / "b")
+    first, *events = said.splitlines()
     assert first.startswith("case_a, run b: method (b), ")
     assert [line.split()[2:4] for line in events] == [["ugv1", "trigger"], ["ugv1", "proposal"]]
     assert trace.load(tmp_path / "b").run == "b"

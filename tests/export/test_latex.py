@@ -33,7 +33,7 @@ def rows(table: str) -> list[list[str]]:
     return [[cell.strip() for cell in re.split(r"(?<!\\)&", line.removesuffix(" \\\\"))] for line in body.splitlines()]
 
 
-def test_a_row_per_claim_and_a_column_per_run() -> None:
+def test_a_row_per_claim_and_per_result_of_the_paper() -> None:
     table = latex.verdicts(REPORT)
     assert "claim & model & a & d\\_2 \\\\" in table
     assert rows(table) == [
@@ -41,9 +41,6 @@ def test_a_row_per_claim_and_a_column_per_run() -> None:
         ["ZENO-TRACE", "", "not tested", "holds"],
         ["SAFE-TRACE", "", "refuted", ""],
     ]
-
-
-def test_a_row_per_result_of_the_paper() -> None:
     assert rows(latex.reproduction(REPORT)) == [
         ["A1", r"stall \& 5 \%", "(3.3, 5.1) m", "(3.369, 5.102) m", "not reproduced"],
         ["A3", "grows", "yes", "no", "calibrated"],

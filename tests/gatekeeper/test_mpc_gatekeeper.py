@@ -1,43 +1,85 @@
-"""Method (c)'s gatekeeper, sample by sample: since when an answer stands."""
+"""Method (c): from a solution to an answer, and since when it stands."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
+import pytest
 from builders.worlds import world
+from hypothesis import given
+from hypothesis import strategies as st
 
-from airground_drake.gatekeeper.answer import Decision, Rules
+from airground_drake.gatekeeper.answer import Rules, settle
 from airground_drake.gatekeeper.budget import Budget
 from airground_drake.gatekeeper.mpc_gatekeeper import GatekeeperState, Inputs, PaperGatekeepers
-from airground_drake.gatekeeper.problem import Horizon
-from airground_drake.gatekeeper.routes.relaxed import RelaxedRoute
+from airground_drake.gatekeeper.problem import Horizon, Problem
+from airground_drake.gatekeeper.solution import Solution
 from airground_drake.geometry.motion import Motion
-from airground_drake.intervention.messages import ACCEPT
+from airground_drake.intervention.messages import ACCEPT, REFUSE, SILENT
 from airground_drake.intervention.policy import Proposal
 from airground_drake.nsbc.avoidance import Avoidance
 from airground_drake.nsbc.law import UgvLaw
 
+RULES = Rules(switching_margin=0.1, min_dwell=0.2)
+COSTS = st.floats(0.1, 100.0)
 
-class Agreeing(PaperGatekeepers):
-    """Accepts everything."""
 
-    def _decide(
-        self, now: Inputs, before: GatekeeperState, i: int, proposal: Proposal, budgets: Iterator[Budget]
-    ) -> Decision:
-        return Decision(now.t, i, proposal, True, "cheaper")
+def solution(accept: float, refuse: float, status: Any = "optimal") -> Solution:
+    return Solution(accept < refuse, status, objective=min(accept, refuse))
+
+
+@pytest.mark.parametrize(
+    ("accept", "refuse", "standing", "stood", "answer"),
+    [
+        (10.0, 10.5, SILENT, 0.0, (True, "cheaper")),
+        (10.5, 10.0, SILENT, 0.0, (False, "not_cheaper")),
+        (10.0 - 1e-9, 10.0, SILENT, 0.0, (False, "no_difference")),
+        (10.5, 10.0, ACCEPT, 1.0, (True, "kept")),
+        (10.0, 10.5, REFUSE, 1.0, (False, "kept")),
+        (20.0, 10.0, ACCEPT, 0.2, (False, "reversed")),
+        (10.0, 20.0, REFUSE, 0.2, (True, "reversed")),
+        (20.0, 10.0, ACCEPT, 0.15, (True, "dwell")),
+        (10.0, 20.0, REFUSE, 0.15, (False, "dwell")),
+    ],
+)
+def test_answers(accept: float, refuse: float, standing: float, stood: float, answer: tuple[bool, str]) -> None:
+    """Where keeping an answer throughout costs what the best plan costs that starts with it."""
+    assert settle(solution(accept, refuse), (accept, refuse), standing, stood, RULES) == answer
+    without = solution(accept, refuse, "refused_not_finite")
+    assert settle(without, (accept, refuse), standing, stood, RULES) == (False, "no_plan")
+
+
+def test_a_plan_that_accepts_later_is_refused_although_accepting_throughout_costs_less_than_refusing() -> None:
+    later = Solution(False, "optimal", objective=350.0)
+    assert settle(later, (350.3, 468.8), SILENT, 0.0, RULES) == (False, "waits")
+    assert settle(later, (350.3, 350.0 + 1e-7), SILENT, 0.0, RULES) == (False, "not_cheaper")
+
+
+@given(COSTS, COSTS, st.tuples(COSTS, COSTS), st.floats(0.0, 0.5), st.sampled_from([ACCEPT, REFUSE]))
+def test_once_reversed_the_same_costs_do_not_reverse_an_answer_back(
+    accept: float, refuse: float, kept: tuple[float, float], margin: float, standing: float
+) -> None:
+    rules = Rules(switching_margin=margin)
+    accepted, _ = settle(solution(accept, refuse), kept, standing, 1.0, rules)
+    assert settle(solution(accept, refuse), kept, ACCEPT if accepted else REFUSE, 1.0, rules)[1] == "kept"
+
+
+class Agreeing:
+    """A route that accepts everything."""
+
+    def solve(self, problem: Problem, budget: Budget) -> Solution:
+        return Solution(True, "optimal", objective=-1.0)
 
 
 def test_the_dwell_of_an_answer_begins_anew_with_each_proposal() -> None:
-    law = UgvLaw(Avoidance(3.0, 0.05, 4.0), 2.0, 1.5, intervention_on_top=True)
-    motion = Motion(np.zeros(1), np.zeros((1, 3)))
-    rules = Rules(switching_margin=0.1, min_dwell=0.2)
-    gate = Agreeing(world(("ugv",)), law, [motion], RelaxedRoute(), Horizon(4, 1, 1.0, 1.0, 0.0), rules)
-    state = GatekeeperState.empty(1)
-    since = []
+    law, places = UgvLaw(Avoidance(3.0, 0.05, 4.0), 2.0, 1.5, intervention_on_top=True), np.zeros((2, 3))
+    motion = Motion(np.zeros(1), places[:1])
+    gate = PaperGatekeepers(world(("ugv",)), law, [motion], Agreeing(), Horizon(4, 1, 1.0, 1.0), RULES)
+    state, since = GatekeeperState.empty(1), []
     for k, number in enumerate((0, 0, 1, 1)):
         proposal = Proposal("way", 0.0, motion, number=number)
-        state = gate.sample(Inputs(0.05 * (k + 1), (proposal,), np.zeros((2, 3)), np.zeros((2, 3)), law), state)
+        state = gate.sample(Inputs(0.05 * (k + 1), (proposal,), places, places, law), state)
         assert state.answers == (ACCEPT, number)
         since.append(state.since[0])
     assert since == [0.05, 0.05, 0.05 * 3, 0.05 * 3]

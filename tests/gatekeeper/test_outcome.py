@@ -16,13 +16,14 @@ from airground_drake.nsbc.law import UgvLaw
 
 LAW = UgvLaw(Avoidance(3.0, 0.05, 4.0), 2.0, 1.5, intervention_on_top=False)
 LOOK = Outlook(longest=20.0)
+Points = tuple[tuple[float, float], ...]
 
 
-def situation(*discs: tuple[float, float]) -> View:
+def situation(*discs: tuple[float, float], speed: float = 1.0, max_speed: float = 3.0) -> View:
     """A UGV at the origin that is to go to (8, 0), and discs of 2 m."""
-    preset = Motion.at_speed(np.array([[0.0, 0.0, 0.0], [8.0, 0.0, 0.0]]), 1.0)
+    preset = Motion.at_speed(np.array([[0.0, 0.0, 0.0], [8.0, 0.0, 0.0]]), speed)
     centres, one = np.array([[x, y, 0.0] for x, y in discs]).reshape(-1, 3), np.ones(len(discs))
-    return View(0.0, np.zeros(3), preset, centres, 0.0 * centres, 2.0 * one, one, 3.0)
+    return View(0.0, np.zeros(3), preset, centres, 0.0 * centres, 2.0 * one, one, max_speed)
 
 
 def along(*corners: tuple[float, float], speed: float = 2.0) -> Proposal:
@@ -30,83 +31,7 @@ def along(*corners: tuple[float, float], speed: float = 2.0) -> Proposal:
 
 
 ROUND = along((0.0, 0.0), (1.0, 3.5), (5.0, 3.5), (8.0, 0.0))
-
-
-def test_a_way_round_a_wall_is_better_than_standing_in_front_of_it() -> None:
-    scene = situation((4.0, 1.0), (4.0, -1.0))
-    refuse, accept = outcomes(scene, LAW, ROUND, LOOK)
-    assert refuse.stalls
-    assert not accept.stalls
-    assert accept.left == 0.0
-    assert accept.better_than(refuse)
-    assert not refuse.better_than(accept)
-    assert np.linalg.norm(accept.end - [8.0, 0.0, 0.0]) < 0.1
-
-
-def test_where_the_own_task_gets_there_a_detour_is_not_taken() -> None:
-    scene = situation()
-    refuse, accept = outcomes(scene, LAW, ROUND, LOOK)
-    assert not refuse.stalls
-    assert refuse.cost < 1e-9
-    assert not accept.better_than(refuse)
-
-
-def test_a_slow_robot_that_goes_on_does_not_stall() -> None:
-    scene = situation()
-    slow = replace(scene, preset=Motion.at_speed(scene.preset.positions, 0.02), max_speed=0.02)
-    way = along((0.0, 0.0), (4.0, 1.0), (8.0, 0.0), speed=0.02)
-    for outcome in outcomes(slow, LAW, way, LOOK):
-        assert not outcome.stalls
-        assert np.isfinite(outcome.cost)
-
-
-def test_a_slow_robot_stalls_in_front_of_a_wall() -> None:
-    scene = situation((2.5, 1.0), (2.5, -1.0))
-    slow = replace(scene, preset=Motion.at_speed(scene.preset.positions, 0.04), max_speed=0.04)
-    way = along((0.0, 0.0), (0.0, 4.0), (8.0, 4.0), speed=0.04)
-    refuse, accept = outcomes(slow, LAW, way, replace(LOOK, longest=60.0))
-    assert refuse.stalls
-    assert not accept.stalls
-    assert accept.better_than(refuse)
-
-
-def test_a_proposal_to_stay_makes_no_difference_to_a_stall() -> None:
-    scene = situation((4.0, 1.0), (4.0, -1.0))
-    refuse, accept = outcomes(scene, LAW, along((0.0, 0.0), (0.01, 0.0)), LOOK)
-    assert refuse.stalls
-    assert accept.stalls
-    assert not accept.better_than(refuse)
-
-
-def test_no_roll_out_takes_longer_than_the_longest_try_and_what_comes_past_it() -> None:
-    """However long the preset trajectory is."""
-    scene = situation()
-    endless = replace(scene, preset=Motion.at_speed(np.array([[0.0, 0.0, 0.0], [8.0, 0.0, 0.0]]), 1e-3))
-    for outcome in outcomes(endless, LAW, ROUND, LOOK):
-        assert len(outcome.positions) == round((LOOK.longest + LOOK.past) / LAW.avoidance.period) + 1
-
-
-def test_what_is_under_way_at_the_end_costs_the_way_that_is_left_as_well() -> None:
-    """Squared distances to the preset trajectory, and the cost-to-go along the way left: L^3 / (3 v)."""
-    scene = situation()
-    speed, look = 0.2, Outlook(longest=4.0, past=2.0)
-    slow = replace(scene, preset=Motion.at_speed(scene.preset.positions, speed), max_speed=1.0)
-    away = along((0.0, 0.0), (4.0, 0.0))
-    for outcome in outcomes(slow, LAW, away, look):
-        t = LAW.avoidance.period * np.arange(1.0, len(outcome.positions))
-        error = np.square(slow.preset.sample(t) - outcome.positions[1:]).sum()
-        assert not outcome.stalls
-        assert outcome.left == pytest.approx(8.0 - outcome.end[0])
-        assert 1.0 < outcome.left < 7.5
-        expected = LAW.avoidance.period * error + outcome.left**3 / (3.0 * speed)
-        assert outcome.cost == pytest.approx(expected, rel=1e-9)
-
-
-def test_what_is_not_known_is_not_avoided_and_a_map_that_lies_costs_no_more_than_usefulness() -> None:
-    assert not outcomes(situation(), LAW, ROUND, LOOK)[0].stalls
-    assert outcomes(situation((4.0, 1.0), (4.0, -1.0), (3.0, 3.5)), LAW, ROUND, LOOK)[1].stalls
-
-
+WALL = ((4.0, 1.0), (4.0, -1.0))
 AWAY = Motion.at_speed(np.array([[4.0, 0.0, 0.0], [4.0, 9.0, 0.0]]), 2.0)
 
 
@@ -115,63 +40,82 @@ def beside(asked: tuple[Motion, bool] | None) -> View:
     return replace(situation((4.0, 0.0)), asked=(asked,), shares=np.array([0.5]))
 
 
+@pytest.mark.parametrize(
+    ("scene", "proposal", "look", "stalls", "better"),
+    [
+        (situation(*WALL), ROUND, LOOK, [True, False], True),
+        (situation(), ROUND, LOOK, [False, False], False),  # the own task gets there without a detour
+        (situation(*WALL), along((0.0, 0.0), (0.01, 0.0)), LOOK, [True, True], False),  # to stay is no better
+        (situation(*WALL, (3.0, 3.5)), ROUND, LOOK, [True, True], None),
+        (situation(speed=0.02, max_speed=0.02), along((0.0, 0.0), (4.0, 1.0), (8.0, 0.0), speed=0.02), LOOK,
+         [False, False], None),  # a slow robot that goes on
+        (situation((2.5, 1.0), (2.5, -1.0), speed=0.04, max_speed=0.04),
+         along((0.0, 0.0), (0.0, 4.0), (8.0, 4.0), speed=0.04), replace(LOOK, longest=60.0), [True, False], True),
+        (beside(None), ROUND, LOOK, [True, False], True),
+        (beside((AWAY, True)), ROUND, LOOK, [False, False], False),  # the other robot makes way
+        (beside((AWAY, False)), ROUND, LOOK, [True, False], True),  # it has not accepted yet: no reason to refuse
+    ],
+)  # fmt: skip
+def test_what_stalls_and_what_is_better(
+    scene: View, proposal: Proposal, look: Outlook, stalls: list[bool], better: bool | None
+) -> None:
+    refuse, accept = outcomes(scene, LAW, proposal, look)
+    assert [refuse.stalls, accept.stalls] == stalls
+    assert better is None or accept.better_than(refuse) is better
+    assert not refuse.better_than(accept) or not better
+    assert np.isfinite([refuse.cost, accept.cost]).all()
+    for outcome in (refuse, accept):
+        assert len(outcome.positions) <= round((look.longest + look.past) / LAW.avoidance.period) + 1
+        assert (outcome.left == 0.0) == (np.linalg.norm(outcome.end - [8.0, 0.0, 0.0]) <= look.near)
+
+
+def test_the_cost_is_that_of_25_and_what_is_under_way_costs_the_way_left_as_well() -> None:
+    """Squared distances to the preset trajectory, and the cost-to-go along the way left: L^3 / (3 v)."""
+    scene, look = situation(speed=0.2, max_speed=1.0), Outlook(longest=4.0, past=2.0)
+    for outcome in outcomes(scene, LAW, along((0.0, 0.0), (4.0, 0.0)), look):
+        assert len(outcome.positions) == round(6.0 / LAW.avoidance.period) + 1  # however long the preset is
+        t = LAW.avoidance.period * np.arange(1.0, len(outcome.positions))
+        error = np.square(scene.preset.sample(t) - outcome.positions[1:]).sum()
+        assert not outcome.stalls
+        assert outcome.left == pytest.approx(8.0 - outcome.end[0])
+        assert 1.0 < outcome.left < 7.5
+        assert outcome.cost == pytest.approx(LAW.avoidance.period * error + outcome.left**3 / 0.6, rel=1e-9)
+
+
 def test_another_robot_is_predicted_on_the_motion_that_it_is_asked_for() -> None:
-    standing, going = beside(None), beside((AWAY, True))
-    assert outcomes(standing, LAW, ROUND, LOOK)[0].stalls
-    assert not outcomes(going, LAW, ROUND, LOOK)[0].stalls
     after = np.array([0.0, 1.0, 10.0])
-    passing = replace(standing, velocities=np.array([[1.0, 0.0, 0.0]]))
+    passing = replace(beside(None), velocities=np.array([[1.0, 0.0, 0.0]]))
     np.testing.assert_allclose(robot_at(passing, 0, after, 3.0, together=True)[:, 0], [4.0, 5.0, 7.0])
-    off = replace(going, centres=np.array([[3.0, 0.0, 0.0]]))
+    off = replace(beside((AWAY, True)), centres=np.array([[3.0, 0.0, 0.0]]))
     np.testing.assert_allclose(robot_at(off, 0, after, 3.0, together=False)[:, 0], 4.0 - np.exp(-after))
 
 
-def test_nobody_refuses_his_part_of_a_joint_plan_because_the_others_would_free_his_way() -> None:
-    """What another robot has not accepted yet is no reason to refuse."""
-    refuse, accept = outcomes(beside((AWAY, False)), LAW, ROUND, LOOK)
-    assert refuse.stalls
-    assert not accept.stalls
-    assert accept.better_than(refuse)
+AROUND = 2.0 * np.sqrt(12.0) + 2.0 * np.pi / 3.0
+FAR = tuple((x, y) for x in range(-50, 50, 5) for y in (40.0, 50.0, 60.0))
 
 
 @pytest.mark.parametrize(
-    ("place", "discs", "expected"),
+    ("x", "discs", "radius", "left"),
     [
-        ((0.0, 0.0), [], 8.0),
-        ((0.0, 0.0), [(4.0, 2.0)], 8.0),
-        ((4.0, 0.0), [(4.0, 0.0)], 4.0),
-        ((0.0, 0.0), [(8.0, 0.0)], 8.0),
+        (0.0, (), 2.0, 8.0),
+        (0.0, ((4.0, 2.0),), 2.0, 8.0),
+        (4.0, ((4.0, 0.0),), 2.0, 4.0),  # straight from inside a disc, and without any way
+        (0.0, ((8.0, 0.0),), 2.0, 8.0),
+        (0.0, ((4.0, 0.0),), 2.0, AROUND),
+        (0.0, ((4.0, 0.0),), 3.0, 2.0 * np.sqrt(7.0) + 6.0 * (np.pi / 2.0 - np.arccos(0.75))),
+        (0.0, ((4.0, 0.0), (4.0, 9.0)), (2.0, 5.0), AROUND),
+        (0.0, (*FAR, (4.0, 0.0)), 2.0, AROUND),  # of very many, those beside the way count
     ],
-)  # fmt: skip
-def test_the_way_left(place: tuple[float, float], discs: list[tuple[float, float]], expected: float) -> None:
-    centres = np.array([[x, y, 0.0] for x, y in discs]).reshape(-1, 3)
-    found = way_left(np.array([*place, 0.0]), np.array([8.0, 0.0, 0.0]), centres, 2.0)
-    assert found == pytest.approx(expected)  # straight where it is free, from inside a disc, and without any way
+)
+def test_the_way_left(x: float, discs: Points, radius: float | tuple[float, ...], left: float) -> None:
+    centres = np.array([[*disc, 0.0] for disc in discs]).reshape(-1, 3)
+    found = way_left(np.array([x, 0.0, 0.0]), np.array([8.0, 0.0, 0.0]), centres, np.array(radius))
+    assert found == pytest.approx(left)
 
 
-def test_the_way_left_goes_round() -> None:
-    left = way_left(np.zeros(3), np.array([8.0, 0.0, 0.0]), np.array([[4.0, 0.0, 0.0]]), 2.0)
-    assert left == pytest.approx(2.0 * np.sqrt(12.0) + 2.0 * np.pi / 3.0)
-
-
-def test_of_very_many_circles_those_beside_the_way_count() -> None:
-    far = np.array([[x, y, 0.0] for x in range(-50, 50, 5) for y in (40.0, 50.0, 60.0)])
-    discs = np.concatenate([far, [[4.0, 0.0, 0.0]]])
-    left = way_left(np.zeros(3), np.array([8.0, 0.0, 0.0]), discs, 2.0)
-    assert left == pytest.approx(2.0 * np.sqrt(12.0) + 2.0 * np.pi / 3.0)
-
-
-def test_the_cost_to_go_falls_along_the_way_by_what_is_left_squared() -> None:
-    """The condition of the stability theory: dV = -L^2 dt, and L is no less than the distance to the goal."""
-    scene = situation((4.0, 0.0))
-    goal, v, step = scene.preset.positions[-1], 1.0, 1e-4
-    here = np.array([1.0, 0.5, 0.0])
-    left = way_left(here, goal, scene.centres, 2.0)
-    ahead = here + step * np.array([*np.array([2.9, 1.7]) / np.hypot(2.9, 1.7), 0.0])
-    gains = (left**3 - (left - step) ** 3) / (3.0 * v)
-    assert gains == pytest.approx(left**2 * step / v, rel=1e-3)
-    assert left >= np.linalg.norm(goal - here)
-    assert way_left(ahead, goal, scene.centres, 2.0) >= left - step
+def test_a_ball_above_the_way_takes_up_the_circle_in_which_it_meets_the_plane() -> None:
+    left = way_left(np.zeros(3), np.array([8.0, 0.0, 0.0]), np.array([[4.0, 0.0, 1.5], [4.0, 0.0, 2.6]]), 2.5)
+    assert left == pytest.approx(AROUND)
 
 
 def test_outcomes_are_compared_by_stalling_first() -> None:
@@ -181,11 +125,3 @@ def test_outcomes_are_compared_by_stalling_first() -> None:
     assert not far.better_than(home)
     assert near.better_than(far)
     assert not near.better_than(replace(near, cost=near.cost * (1.0 + 1e-7)))
-
-
-def test_the_way_left_goes_round_circles_of_different_sizes() -> None:
-    discs = np.array([[4.0, 0.0, 0.0], [4.0, 9.0, 0.0], [4.0, -9.0, 2.5]])
-    left = way_left(np.zeros(3), np.array([8.0, 0.0, 0.0]), discs, np.array([2.0, 5.0, 2.5]))
-    assert left == pytest.approx(2.0 * np.sqrt(12.0) + 2.0 * np.pi / 3.0)
-    wide = way_left(np.zeros(3), np.array([8.0, 0.0, 0.0]), discs[:1], np.array([3.0]))
-    assert wide == pytest.approx(2.0 * np.sqrt(7.0) + 6.0 * (np.pi / 2.0 - np.arccos(0.75)))

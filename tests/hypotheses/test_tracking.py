@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from builders.worlds import world
 
@@ -19,14 +17,13 @@ from airground_drake.nsbc.avoidance import Avoidance
 from airground_drake.nsbc.law import UgvLaw
 from airground_drake.scenarios.load import load
 from airground_drake.systems.controllers import UgvController
-from airground_drake.verify.model.live_gate import LiveGate
 
-RUNS = 4
 PUSHED_M = 0.5
 """How far a UGV is pushed aside, about."""
 LEGS = 3
 """Of each way; corners lie on control samples, so that the rates of motion and sampled motion are the same."""
 FAR = np.array([0.0, -1e3, 0.0])
+CASE_B = load("case_b")[0]
 
 
 class Stalled(OutcomeGatekeepers):
@@ -38,14 +35,11 @@ class Stalled(OutcomeGatekeepers):
         return Outcome(accept.positions, True, 1.0, 1.0), Outcome(accept.positions, False, 0.0, 0.0)
 
 
-def runs(patience: Patience, inputs: dict[str, Any]) -> list[dict[str, Any]]:
-    """What came of each run: `given_back` (before its time), `largest_m` (how far it was pushed), `over_after_s`."""
-    return [_run(np.random.default_rng([20261122, k]), patience, inputs) for k in range(RUNS)]
-
-
-def _run(rng: np.random.Generator, patience: Patience, inputs: dict[str, Any]) -> dict[str, Any]:
-    h, gain, limit = inputs["control_period_s"], inputs["intervention_gain_1_s"], inputs["max_speed_m_s"]
-    d, every = inputs["obstacle_m"], round(inputs["period_s"] / inputs["control_period_s"])
+def drive(rng: np.random.Generator, patience: Patience) -> tuple[bool, float, float]:
+    """Whether a way was given back before its time, how far it was left, m, and when it was over after its end, s."""
+    control, every = CASE_B.control, round(CASE_B.gatekeeper.period_s / CASE_B.control.period_s)
+    h, gain, d = control.period_s, control.intervention_gain_1_s, CASE_B.safe_distance.obstacle_m
+    limit = max(ugv.max_speed_m_s for ugv in CASE_B.ugvs.values())
     speed = 0.5 * min(limit, 2.0) - min(0.25 * limit, 0.5) * float(rng.random())
     heading = np.cumsum(rng.uniform(-1.0, 1.0, LEGS))
     count = max(1, round(min(3.0, 0.3 * patience.longest) / h))
@@ -56,14 +50,13 @@ def _run(rng: np.random.Generator, patience: Patience, inputs: dict[str, Any]) -
     across = np.array([-np.sin(heading[1]), np.cos(heading[1]), 0.0])
     stands = corners[1] + legs[1] / 2.0 + across * (room + np.linalg.norm(legs, axis=1).sum())
     around = world(("ugv",), stands[None], d, 1.0, 1.0, max_speed=[limit, 1.0])
-    avoidance = Avoidance(inputs["avoidance_gain_1_s"], h, inputs["sensing_range_m"])
-    law = UgvLaw(avoidance, inputs["motion_gain_1_s"], gain, intervention_on_top=False)
+    avoidance = Avoidance(control.avoidance_gain_1_s, h, control.sensing_range_m)
+    law = UgvLaw(avoidance, control.motion_gain_1_s, gain, intervention_on_top=False)
     preset = Motion(np.zeros(1), np.zeros((1, 3)))
     gatekeepers = Stalled(around, law, [preset], Outlook(patience.longest), patience)
     controller = UgvController(around, law)
     memory, proposal = GatekeeperState.empty(1), Proposal("way", 0.0, motion)
-    place, largest, over = np.zeros(3), 0.0, -1.0
-    push = np.zeros(3)
+    place, push, largest, over = np.zeros(3), np.zeros(3), 0.0, -1.0
     for k in range(count * LEGS + 2 * every + 1):
         t = k * h
         if k % every == 0:
@@ -81,43 +74,26 @@ def _run(rng: np.random.Generator, patience: Patience, inputs: dict[str, Any]) -
             push = 0.99 * within * np.array([np.cos(angle), np.sin(angle), 0.0])
         place = place + h * (velocity + push)
     ended = over >= motion.end - 1e-9 and memory.decisions[-1].reason == "over"
-    return {"given_back": not ended, "largest_m": largest, "over_after_s": over - motion.end}
+    return not ended, largest, over - motion.end
 
 
-def of_case_b() -> dict[str, Any]:
-    scenario = load("case_b")[0]
-    control = scenario.control
-    return {
-        **LiveGate().inputs(scenario),
-        "intervention_gain_1_s": control.intervention_gain_1_s,
-        "control_period_s": control.period_s,
-        "motion_gain_1_s": control.motion_gain_1_s,
-        "avoidance_gain_1_s": control.avoidance_gain_1_s,
-        "sensing_range_m": control.sensing_range_m,
-        "max_speed_m_s": max(ugv.max_speed_m_s for ugv in scenario.ugvs.values()),
-        "obstacle_m": scenario.safe_distance.obstacle_m,
-    }
-
-
-def patience_of(kind: type[Patience], inputs: dict[str, Any]) -> Patience:
-    return kind(*(inputs[name] for name in ("tries", "rest_s", "longest_s")))
+def runs(kind: type[Patience]) -> list[tuple[bool, float, float]]:
+    gate = CASE_B.gatekeeper
+    patience = kind(gate.tries, gate.rest_s, gate.longest_s)
+    return [drive(np.random.default_rng([20261122, k]), patience) for k in range(4)]
 
 
 def test_nothing_is_given_back_before_its_time() -> None:
-    inputs = of_case_b()
-    for row in runs(patience_of(Patience, inputs), inputs):
-        assert not row["given_back"]
-        assert row["largest_m"] > 0.5 * PUSHED_M
-        assert row["over_after_s"] <= inputs["period_s"] + 1e-9
+    for given_back, largest, over_after_s in runs(Patience):
+        assert not given_back
+        assert largest > 0.5 * PUSHED_M
+        assert over_after_s <= CASE_B.gatekeeper.period_s + 1e-9
 
 
 class OverAtOnce(Patience):
-    """Over whenever it is asked."""
-
     def over(self, now: Commitment, t: float) -> bool:
         return t > now.since
 
 
 def test_a_run_that_is_given_back_early_is_noticed() -> None:
-    inputs = of_case_b()
-    assert all(row["given_back"] for row in runs(patience_of(OverAtOnce, inputs), inputs))
+    assert all(given_back for given_back, *_ in runs(OverAtOnce))

@@ -71,30 +71,23 @@ def test_the_trigger_makes_the_transitions_of_the_theorem() -> None:
     assert differing(Trigger) == []
 
 
-class Above(Trigger):
-    def rise(self, state: TriggerState, t: float) -> TriggerState:
-        return super().rise(state, t + 1e-9)
+def forgets(self: Trigger, state: TriggerState, t: float) -> TriggerState:
+    found = Trigger.fall(self, state, t)
+    return TriggerState(found.mode, 0, -1.0, found.released_at)
 
 
-class NoDwell(Trigger):
-    def dwell_end(self, state: TriggerState) -> float:
-        return state.triggered_at
-
-
-class Forgets(Trigger):
-    def fall(self, state: TriggerState, t: float) -> TriggerState:
-        found = super().fall(state, t)
-        return TriggerState(found.mode, 0, -1.0, found.released_at)
-
-
-class AlwaysOver(Trigger):
-    def fall(self, state: TriggerState, t: float) -> TriggerState:
-        return TriggerState(SUPERVISING, state.triggers, state.triggered_at, t)
-
-
-@pytest.mark.parametrize("kind", [Above, NoDwell, Forgets, AlwaysOver])
-def test_a_trigger_that_differs_is_noticed(kind: type[Trigger]) -> None:
-    assert differing(kind)
+@pytest.mark.parametrize(
+    ("method", "wrong"),
+    [
+        ("rise", lambda self, state, t: Trigger.rise(self, state, t + 1e-9)),
+        ("dwell_end", lambda _, state: state.triggered_at),
+        ("fall", forgets),
+        ("fall", lambda _, state, t: TriggerState(SUPERVISING, state.triggers, state.triggered_at, t)),
+    ],
+    ids=["late", "no dwell", "forgets", "the dwell is always over"],
+)
+def test_a_trigger_that_differs_is_noticed(method: str, wrong: Any) -> None:
+    assert differing(type("Wrong", (Trigger,), {method: wrong}))
 
 
 TIMES = (2, 5.0, 3.0)
@@ -128,29 +121,14 @@ def test_patience_makes_the_transitions_of_the_theorem() -> None:
     assert impatient(Patience) == []
 
 
-class NeverExhausted(Patience):
-    def exhausted(self, now: Commitment) -> bool:
-        return False
-
-
-class RestsAtOnce(Patience):
-    def rested(self, now: Commitment, t: float) -> Commitment:
-        return Commitment(now.executing, 0, now.since, now.until)
-
-
-class Endless(Patience):
-    def accept(self, now: Commitment, t: float, end: float) -> Commitment:
-        return Commitment(True, now.tries + 1, t, end)
-
-
-class DoesNotCount(Patience):
-    def accept(self, now: Commitment, t: float, end: float) -> Commitment:
-        return Commitment(True, now.tries, t, min(end, t + self.longest))
-
-
 @pytest.mark.parametrize(
-    ("kind", "what"),
-    [(NeverExhausted, "exhausted"), (RestsAtOnce, "rested"), (Endless, "accept"), (DoesNotCount, "accept")],
-)  # fmt: skip
-def test_a_patience_that_differs_is_noticed(kind: type[Patience], what: str) -> None:
-    assert impatient(kind) == [what]
+    ("method", "wrong"),
+    [
+        ("exhausted", lambda _, now: False),
+        ("rested", lambda _, now, t: Commitment(now.executing, 0, now.since, now.until)),
+        ("accept", lambda _, now, t, end: Commitment(True, now.tries + 1, t, end)),  # as long as the proposal
+        ("accept", lambda self, now, t, end: Commitment(True, now.tries, t, min(end, t + self.longest))),  # uncounted
+    ],
+)
+def test_a_patience_that_differs_is_noticed(method: str, wrong: Any) -> None:
+    assert impatient(type("Wrong", (Patience,), {method: wrong})) == [method]

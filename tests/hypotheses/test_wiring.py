@@ -22,12 +22,14 @@ from airground_drake.systems import controllers, diagram
 from airground_drake.world.world import Neighbours
 
 
-def uav_among(change: Callable[[Array, int], Array], edit: Callable[[Array], None] = lambda bound: None) -> Patch:
-    """The UAV's command by other inequalities: centres `change(centres, number of obstacles)`, bounds by `edit`."""
+def uav_among(
+    change: Callable[[Array], Array] = lambda centre: centre, edit: Callable[[Array], None] = lambda bound: None
+) -> Patch:
+    """The UAV's command by other inequalities: centres by `change`, bounds by `edit`."""
 
     def wrong(self: Avoidance, lower: Array, positions: Array, near: Neighbours) -> Array:
         around = Surroundings.of(near, positions)
-        around = replace(around, centre=change(around.centre, len(near.still)))
+        around = replace(around, centre=change(around.centre))
         spaces = self.half_spaces(positions[near.members], near.mobility, around)
         edit(spaces.bound)
         return self.apply(limit_speed(lower, near.max_speed), spaces)
@@ -35,24 +37,13 @@ def uav_among(change: Callable[[Array, int], Array], edit: Callable[[Array], Non
     return lambda patch: patch.setattr(Avoidance, "command", wrong)
 
 
-def far(centre: Array, columns: slice) -> Array:
-    moved = centre.copy()
-    moved[:, columns] += 1e3
-    return moved
+def answering(rule: Callable[[Proposal | None, float], bool]) -> Patch:
+    """Proposals are executed by another rule, from a proposal and the answer that there is."""
 
-
-def everything_accepted(patch: pytest.MonkeyPatch) -> None:
     def wrong(proposals: Sequence[Proposal | None], answers: Array) -> list[Proposal | None]:
-        return list(proposals)
+        return [p if rule(p, answers[2 * i]) else None for i, p in enumerate(proposals)]
 
-    patch.setattr(controllers, "accepted_proposals", wrong)
-
-
-def any_issue_answered(patch: pytest.MonkeyPatch) -> None:
-    def wrong(proposals: Sequence[Proposal | None], answers: Array) -> list[Proposal | None]:
-        return [p if answers[2 * i] == 1.0 else None for i, p in enumerate(proposals)]
-
-    patch.setattr(controllers, "accepted_proposals", wrong)
+    return lambda patch: patch.setattr(controllers, "accepted_proposals", wrong)
 
 
 def swapped(patch: pytest.MonkeyPatch) -> None:
@@ -67,14 +58,11 @@ def swapped(patch: pytest.MonkeyPatch) -> None:
 
 
 MUTANTS: dict[str, Patch] = {name: patch for name, (patch, _) in MISBUILT.items()} | {
-    "gather leaves out the UAV": uav_among(lambda centre, m: far(centre, slice(-1, None))),
-    "gather leaves out an obstacle": uav_among(lambda centre, m: far(centre, slice(0, min(m, 1)))),
-    "gather leaves out the UGVs": uav_among(lambda centre, m: far(centre, slice(m, -1))),
-    "gather in another order": uav_among(lambda centre, m: np.roll(centre, 1, axis=1)),
-    "everything accepted": everything_accepted,
-    "another proposal's answer": any_issue_answered,
+    "centres in another order": uav_among(lambda centre: np.roll(centre, 1, axis=1)),
+    "one inequality dropped": uav_among(edit=lambda bound: bound[:, 0].fill(-np.inf)),
+    "everything accepted": answering(lambda proposal, answer: True),
+    "another proposal's answer": answering(lambda proposal, answer: answer == 1.0),
     "commands swapped": swapped,
-    "one inequality dropped": uav_among(lambda centre, m: centre, lambda bound: bound[:, 0].fill(-np.inf)),
 }
 
 

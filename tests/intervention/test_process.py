@@ -1,10 +1,9 @@
-"""Policies of others in a process of their own: whatever they do there, it is a fault in words and no intervention."""
+"""Third-party policies in processes of their own: what goes wrong there is one line and counts as no intervention."""
 
 from __future__ import annotations
 
 import os
 import re
-import signal
 import subprocess
 import sys
 import time
@@ -17,16 +16,15 @@ import pytest
 from builders.hostile_policies import KILLS_OTHERS, KINDS
 from builders.observations import mate, seen
 
-from airground_drake.base.errors import FAULT_WIDTH, PluginError, PolicyError
+from airground_drake.base.errors import PluginError, PolicyError
 from airground_drake.geometry.motion import Motion
 from airground_drake.intervention.database import BehaviourDatabase, Negotiation, make_policy
 from airground_drake.intervention.guest import process
 from airground_drake.intervention.guest.codec import KINDS as CLASSES
 from airground_drake.intervention.guest.codec import decoded, encoded
 from airground_drake.intervention.guest.process import LIVES, GuestPolicy
-from airground_drake.intervention.policy import Observation, Policy, Proposal
+from airground_drake.intervention.policy import Observation, Proposal
 from airground_drake.nsbc.avoidance import Avoidance
-from airground_drake.registry import POLICIES
 from airground_drake.run.simulation import simulate
 from airground_drake.scenarios.load import load
 from airground_drake.verify.claim import TraceClaim
@@ -54,7 +52,7 @@ def guests() -> Iterator[dict[bool, GuestPolicy]]:
 def test_whatever_a_policy_does_counts_as_no_intervention(name: str, guests: dict[bool, GuestPolicy]) -> None:
     if name == KILLS_OTHERS and not _landlock():
         pytest.skip("this kernel cannot keep a process from sending signals")
-    kind, before = KINDS[name], (Avoidance.apply, TraceClaim.judge, os.getcwd())
+    kind, before = KINDS[name], (Avoidance.apply, TraceClaim.judge)
     guest = guests[kind.hangs]
     database = BehaviourDatabase([("hostile", guest)], ranking="predicted")
     found, faults = database.plan(Negotiation(refusals=doing(name).refusals), TEAM)
@@ -68,7 +66,7 @@ def test_whatever_a_policy_does_counts_as_no_intervention(name: str, guests: dic
         assert fault.what.isprintable()
         assert len(fault.what) <= 600
     assert [talk.proposal for talk in found.values()] == [None]
-    assert (Avoidance.apply, TraceClaim.judge, os.getcwd()) == before
+    assert (Avoidance.apply, TraceClaim.judge) == before
     if not kind.tame or not guest._end.alive:
         guest.close()  # the next kind gets a new process
 
@@ -88,6 +86,19 @@ def test_after_a_fault_the_policy_is_asked_again_but_not_for_ever(guests: dict[b
     assert guest.propose(doing("")) is not None
 
 
+def test_after_a_hang_the_policy_is_not_asked_again(
+    guests: dict[bool, GuestPolicy], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    guest = guests[True]
+    guest.close()
+    assert guest.propose(doing("")) is not None
+    monkeypatch.setattr(process, "START_S", SHORT_S)  # what counts as a hang
+    with pytest.raises(PolicyError, match=r"OutOfTime: .*; not asked again in this run"):
+        guest.propose(doing("loops_and_swallows_everything"))
+    assert guest.propose(doing("")) is None
+    guest.close()
+
+
 def test_what_a_policy_has_started_ends_with_it(guests: dict[bool, GuestPolicy]) -> None:
     guest = guests[False]
     guest.close()
@@ -96,29 +107,6 @@ def test_what_a_policy_has_started_ends_with_it(guests: dict[bool, GuestPolicy])
     os.killpg(group, 0)
     guest.close()
     _gone(group)
-
-
-BOOM = """
-from airground_drake.intervention.policy import Policy
-class It(Policy):
-    def propose(self, seen): return self.plan(seen)
-    def plan(self, seen): return int("far too long " * 99)
-"""
-
-
-@pytest.mark.parametrize("kind", ["in a process of its own", "in this process"])
-def test_a_fault_begins_with_the_line_of_the_policy_that_it_came_from(
-    kind: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.syspath_prepend(str(tmp_path))
-    (tmp_path / "boom.py").write_text(BOOM)
-    guest = kind == "in a process of its own"
-    policy = GuestPolicy("boom.py:It", {}, LONG_S) if guest else POLICIES.make("boom.py:It", Policy)
-    _, (fault,) = BehaviourDatabase([("boom", policy)], ranking="listed").plan(Negotiation(), TEAM)
-    if isinstance(policy, GuestPolicy):
-        policy.close()
-    assert fault.what.startswith("boom.py:5 ValueError: invalid literal for int()")
-    assert len(fault.what) <= FAULT_WIDTH
 
 
 STARTER = """
@@ -144,9 +132,8 @@ START()
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGTERM, signal.SIGINT])
 @pytest.mark.parametrize("start", ["hang", "in_a_thread"])
-def test_a_policys_process_ends_with_the_one_that_started_it(start: str, how: signal.Signals) -> None:
+def test_a_policys_process_ends_with_the_one_that_started_it(start: str) -> None:
     """Though it hangs, and whether the main thread has started it or another one, as those of a Dask worker do."""
     with subprocess.Popen(
         [sys.executable, "-c", STARTER.replace("START", start)],
@@ -157,7 +144,7 @@ def test_a_policys_process_ends_with_the_one_that_started_it(start: str, how: si
     ) as starter:
         assert starter.stdout is not None
         worker = int(starter.stdout.readline())
-        starter.send_signal(how)
+        starter.kill()
         starter.wait()
     _gone(worker)
 
@@ -181,16 +168,12 @@ def _gone(group: int) -> None:
 MODULES = {
     "import sys; sys.exit(0)": "cannot be imported: SystemExit: 0",
     "import os; os._exit(0)": r"its process ended or closed its channel \(exit code 0",
-    "raise RuntimeError('not today')": "cannot be imported: RuntimeError: not today",
-    "raise BaseException": "cannot be imported: BaseException",
-    "class E(Exception):\n    def __str__(self): raise E\nraise E": "an exception that cannot be put into words",
+    "class E(BaseException):\n    def __str__(self): raise E\nraise E": "an exception that cannot be put into words",
     "while True: pass": "OutOfTime",
     "a syntax error": "cannot be imported: SyntaxError",
     "": "cannot be imported: AttributeError",
-    "class It: pass": "is not a subclass of airground_drake.intervention.policy.Policy",
-    "from airground_drake.intervention.policy import Policy as It": "abstract",
     "It = 3": "is not a subclass",
-    "It.__init__ = lambda self: __import__('sys').exit(0)": "SystemExit: 0",
+    "from airground_drake.intervention.policy import Policy as It": "abstract",
     "It.__init__ = lambda self: __import__('os')._exit(0)": r"its process ended or closed its channel \(exit code 0",
     "It.__init__ = lambda self: None.thing": "AttributeError",
     "It.__init__ = lambda self, speed: None": "speed",

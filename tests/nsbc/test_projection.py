@@ -123,43 +123,14 @@ def test_normals_that_depend_on_each_other(seed: int, kind: str, planar: bool) -
         np.testing.assert_allclose(kernels._closest_feasible(lower, normal, bound), expected, atol=1e-6)
 
 
-def between_two(count: int) -> list[tuple[Array, Array, Array]]:
-    """A robot in contact with two others on opposite sides, but for 1e-9.5 to 0.1 rad, and a far obstacle."""
-    rng, found = np.random.default_rng(0), []
-    for _ in range(count):
-        angle = rng.uniform(0.0, 2.0 * np.pi) + np.array([0.0, np.pi, rng.uniform(0.5, 2.5)])
-        angle[1] += 10.0 ** rng.uniform(-9.5, -1.0) * rng.choice([-1.0, 1.0])
-        normal = np.column_stack([np.cos(angle), np.sin(angle), np.zeros(3)])
-        bound = np.array([*rng.choice([0.0, 1e-15, -1e-15, -1e-16], 2), -50.0])
-        found.append((2.0 * rng.normal(size=3) * [1.0, 1.0, 0.0], normal, bound))
-    return found
-
-
-def test_between_two_opposite_contacts_the_margin_decides_where_the_corner_is() -> None:
-    """Without the margin the corner would be elsewhere by up to 2e-12 m/s over the angle: another law."""
-    apart = []
-    for lower, normal, bound in between_two(400):
-        expected = law(lower, normal, bound)
-        assert expected is not None
-        np.testing.assert_allclose(kernels._closest_feasible(lower, normal, bound), expected, atol=1e-6)
-        without, missed = kernels._closest(lower, normal, bound, kernels.CONTRADICTION_M_S)
-        assert missed == 0.0
-        np.testing.assert_allclose(without, closest(lower, normal, rational(bound)), atol=1e-6)
-        apart.append(np.abs(without - expected).max())
-    assert max(apart) > 1e-3
-
-
-def test_without_the_margin_rounding_would_stop_robots_that_slide_along() -> None:
-    """At exactly the safe distance the bound is 0, and a velocity that misses it by 1e-17 m/s is scaled back to 0."""
-    rng, stopped = np.random.default_rng(1), 0
+def test_robots_in_contact_slide_along() -> None:
+    """At exactly the safe distance the bound is 0: without the margin, a miss of 1e-17 m/s would stop the robot."""
+    rng = np.random.default_rng(1)
     for _ in range(200):
         angle = rng.uniform(0.0, 2.0 * np.pi)
-        normal, bound = np.array([[np.cos(angle), np.sin(angle), 0.0]]), np.zeros(1)
+        normal = np.array([[np.cos(angle), np.sin(angle), 0.0]])
         lower = 2.0 * (np.array([-normal[0, 1], normal[0, 0], 0.0]) - normal[0])
-        assert kernels.avoid_one(lower, normal, bound, kernels.AUGMENTED) @ lower == pytest.approx(4.0, abs=1e-9)
-        bare, _ = kernels._closest(lower, normal, bound, kernels.CONTRADICTION_M_S)
-        stopped += not kernels._scale_back(bare, normal, bound).any()
-    assert stopped
+        assert kernels.avoid_one(lower, normal, np.zeros(1), kernels.AUGMENTED) @ lower == pytest.approx(4.0, abs=1e-9)
 
 
 @examples(80, fuzz=2000)
@@ -191,13 +162,3 @@ def test_contradicting_constraints_are_missed_as_little_and_as_slowly_as_can_be(
     assert slowest is not None
     scale = max(1.0, float(np.linalg.norm(slowest)))
     np.testing.assert_allclose(found, slowest, atol=1e-6 * scale)
-
-
-@given(SEEDS, st.integers(1, 5))
-def test_any_number_of_dimensions(seed: int, axes: int) -> None:
-    rng = np.random.default_rng(seed)
-    normal, lower = rng.normal(size=(int(rng.integers(1, 6)), axes)), rng.normal(size=axes)
-    bound = -np.abs(rng.normal(size=len(normal)))
-    found, missed = kernels._closest(lower, normal, bound, 0.0)
-    assert missed == 0.0
-    np.testing.assert_allclose(found, closest(lower, normal, rational(bound)), atol=1e-9)

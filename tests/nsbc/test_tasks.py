@@ -1,58 +1,56 @@
-"""Tasks, against finite differences and by hand."""
+"""Tasks, against finite differences and by hand; the law as their composition."""
 
 from __future__ import annotations
 
 import numpy as np
-import pytest
 from hypothesis import given
-from nsbc.cases import POSITIONS, VECTOR
-from nsbc.composition import InterventionTask
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
 
-from airground_drake.nsbc.task import Task
+from airground_drake.nsbc import law
+from airground_drake.nsbc.avoidance import Avoidance
 from airground_drake.nsbc.tasks import DistanceTask, FormationTask, PositionTask
+from airground_drake.world.world import Neighbours
+
+COORDINATE = st.floats(-20.0, 20.0, allow_subnormal=False).map(lambda x: round(x, 3))
+POSITIONS = st.integers(1, 4).flatmap(lambda n: arrays(np.float64, (n, 3), elements=COORDINATE))
 
 
-def every_task(n: int, centre: np.ndarray) -> list[Task]:
-    target, rate = np.ones((n, 3)), np.full((n, 3), 0.5)
-    return [
-        PositionTask(target, rate, 2.0),
-        DistanceTask(centre, 2.0, 3.0),
-        FormationTask(target, rate, 2.0, 5.0),
-        InterventionTask(target, rate, 1.5, np.eye(3)),
-        InterventionTask(target, rate, 1.5, np.array([[0.6, 0.8, 0.0]])),
-    ]
-
-
-@given(POSITIONS, VECTOR)
-def test_jacobians_agree_with_finite_differences(position: np.ndarray, centre: np.ndarray) -> None:
-    step = 1e-6
-    for task in every_task(len(position), centre):
-        if isinstance(task, DistanceTask) and np.linalg.norm(position - centre, axis=1).min() < 0.1:
+@given(POSITIONS, arrays(np.float64, 3, elements=COORDINATE))
+def test_jacobians_are_derivatives_and_velocities_move_the_tasks_as_asked(p: np.ndarray, centre: np.ndarray) -> None:
+    """J v_d = rate + gain * error wherever J has full row rank, eq (4); at the centre nothing is asked for."""
+    target, rate = np.ones(p.shape), np.full(p.shape, 0.5)
+    tasks = PositionTask(target, rate, 2.0), DistanceTask(centre, 2.0, 3.0), FormationTask(target, rate, 2.0, 5.0)
+    for task in tasks:
+        if isinstance(task, DistanceTask) and np.linalg.norm(p - centre, axis=1).min() < 0.1:
+            assert not task.velocity(centre[None]).any()
             continue  # the direction turns too fast for a finite difference
-        jacobian = task.jacobian(position)
+        jacobian, step = task.jacobian(p), 1e-6
         for axis in range(3):
             shift = step * np.eye(3)[axis]
-            slope = (task.value(position + shift) - task.value(position - shift)) / (2.0 * step)
+            slope = (task.value(p + shift) - task.value(p - shift)) / (2.0 * step)
             np.testing.assert_allclose(jacobian[..., axis], slope, atol=1e-6)
+        wanted, rates = task.desired()
+        moved = np.einsum("nij,nj->ni", jacobian, task.velocity(p))
+        np.testing.assert_allclose(moved, rates + task.gain * (wanted - task.value(p)) + 0.0 * moved, atol=1e-9)
+    place, asked = tasks[2].desired()
+    np.testing.assert_allclose((place[0], asked[0]), ([1.0, 1.0, 3.0], [0.5, 0.5, 0.5]))
 
 
-@given(POSITIONS, VECTOR)
-def test_task_velocity_moves_the_task_as_asked(position: np.ndarray, centre: np.ndarray) -> None:
-    """J v_d = rate + gain * error wherever J has full row rank, eq (4)."""
-    for task in every_task(len(position), centre):
-        if isinstance(task, DistanceTask) and (np.linalg.norm(position - centre, axis=1) == 0.0).any():
-            continue
-        wanted, rate = task.desired()
-        moved = np.einsum("nij,nj->ni", task.jacobian(position), task.velocity(position))
-        np.testing.assert_allclose(moved, rate + task.gain * (wanted - task.value(position)) + 0.0 * moved, atol=1e-9)
-
-
-def test_distance_task_is_singular_but_finite_at_the_centre() -> None:
-    task = DistanceTask(np.zeros(3), 2.0, 3.0)
-    np.testing.assert_array_equal(task.velocity(np.zeros((1, 3))), np.zeros((1, 3)))
-
-
-@pytest.mark.parametrize("gain", [-1.0, np.nan, np.inf])
-def test_bad_gain_is_refused(gain: float) -> None:
-    with pytest.raises(ValueError, match="gain"):
-        PositionTask(np.zeros((1, 3)), np.zeros((1, 3)), gain)
+@given(POSITIONS, st.sampled_from([np.eye(3), np.array([[0.6, 0.8, 0.0]]), np.array([[1.0, 0, 0], [0, 1.0, 0]])]))
+def test_the_law_has_20_as_the_composition_of_tasks(position: np.ndarray, selection: np.ndarray) -> None:
+    """The intervention (12)-(14) above the UGV's own task (6), in a plane, with nothing near and no speed limit."""
+    plane, count = np.array([1.0, 1.0, 0.0]), len(position)
+    position = position * plane
+    target, rate = np.cos(position) * plane, np.sin(position) * plane
+    wanted, wanted_rate, inverse = 2.0 * plane, 0.3 * plane, np.linalg.pinv(selection)
+    intervention = (wanted_rate + 1.5 * (wanted - position)) @ selection.T @ inverse.T
+    composed = intervention + (rate + 0.7 * (target - position)) @ (np.eye(3) - inverse @ selection).T
+    none = np.zeros((count, 0))
+    near = Neighbours(
+        np.arange(count), none.astype(np.intp), np.zeros((0, 3)), none, none, np.tile(plane, (count, 1)),
+        np.full(count, 1e9),
+    )  # fmt: skip
+    asked = [law.Intervention(wanted, wanted_rate, inverse @ selection)] * count
+    commanded = law.UgvLaw(Avoidance(1.0, 0.1), 0.7, 1.5, True).velocity(position, near, target, rate, asked)
+    np.testing.assert_allclose(commanded, composed, rtol=1e-9, atol=1e-9)

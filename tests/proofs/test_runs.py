@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from builders.edits import with_scenario
 
 from airground_drake.base.arrays import Array
 from airground_drake.commands import main
@@ -41,21 +42,10 @@ def test_case_a_keeps_its_distances_and_obeys_the_law(name: str, run: Simulation
     assert f"2 <= norm (sub (position run_{name} ugv1 t) (position run_{name} obstacle_1 t)) /\\" in said
 
 
-@pytest.mark.slow
-def test_the_run_of_case_b_that_hits_the_obstacle_is_refused(run: Simulations, workshop: Workshop) -> None:
-    distances, law, _ = prove(workshop, run("case_b", "b"))
-    assert not distances.proved
-    assert distances.why.startswith(
-        "Coq refuses ugv1 and obstacle_2, 2 m. In exact arithmetic ugv1 and obstacle_2 are "
-    )
-    assert (law.proved, law.why) == (False, "not tried: a distance is not kept")
-
-
 def moved(of: Trace, row: int, place: Array) -> Trace:
     """The run with UGV1 at another place in one row."""
     signals = of.signals.copy()
-    for axis, value in zip("xyz", place, strict=True):
-        signals.loc[row, f"{UGV}.{axis}_m"] = value
+    signals.loc[row, [f"{UGV}.{axis}_m" for axis in "xyz"]] = place
     return replace(of, signals=signals)
 
 
@@ -75,8 +65,9 @@ def test_a_step_through_an_obstacle_is_refused_though_both_of_its_ends_keep_the_
     row, rock, offset = near_the_rock(whole)
     through = moved(whole, row, rock - 1.1 * offset)
     assert np.linalg.norm(through.position(UGV) - rock, axis=1).min() >= 2.0
-    distances, _, _ = prove(workshop, through)
+    distances, law, _ = prove(workshop, through)
     assert distances.why.startswith(f"{REFUSED}. In exact arithmetic ")
+    assert (law.proved, law.why) == (False, "not tried: a distance is not kept")
 
 
 @pytest.mark.slow
@@ -180,17 +171,10 @@ def test_a_file_that_says_something_else_than_the_trace_is_refused(
         compare(edit(text), few)
 
 
-@pytest.mark.parametrize(
-    ("expected", "kept"),
-    [({}, True), ({"SAFE-TRACE": "exercised"}, True), ({"SAFE-TRACE": "holds or refuted"}, False)],
-)
-def test_a_scenario_says_which_runs_are_to_keep_their_distances(
-    expected: dict[str, str], kept: bool, run: Simulations
-) -> None:
+def test_a_scenario_says_which_runs_are_to_keep_their_distances(run: Simulations) -> None:
     of = run("case_a", "d")
-    given = of.meta["scenario"]
-    scenario = {**given, "runs": {"d": {**given["runs"]["d"], "expected": expected}}}
-    assert expects_kept(replace(of, meta={**of.meta, "scenario": scenario})) is kept
+    for expected, kept in (("holds", True), ("exercised", True), ("holds or refuted", False)):
+        assert expects_kept(with_scenario(of, runs__d__expected={"SAFE-TRACE": expected})) is kept
 
 
 @pytest.fixture
@@ -245,17 +229,9 @@ def test_what_cannot_be_proved_for_want_of_coq_or_of_files_is_said(
         said = capsys.readouterr().err
         assert said.count("\n") == 1
         assert re.search(why, said), said
-    monkeypatch.setenv("PATH", str(tmp_path))
-    assert main(["prove"]) == 2
-    assert "coqc is not on the PATH: install Coq" in capsys.readouterr().err
-
-
-def test_a_damaged_trace_is_said(report: Path, coq_version: str, capsys: pytest.CaptureFixture[str]) -> None:
     (report / "trace" / "d" / "signals.parquet").write_bytes(b"")
     assert main(["prove", str(report)]) == 2
     assert "SHA-256" in capsys.readouterr().err
-
-
-def test_the_command_of_before_names_its_successor(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["proofs", "reports/case_a"]) == 2
-    assert capsys.readouterr().err == "error: `airground proofs` is gone: use `airground prove` (CHANGELOG.md)\n"
+    monkeypatch.setenv("PATH", str(tmp_path))
+    assert main(["prove"]) == 2
+    assert "coqc is not on the PATH: install Coq" in capsys.readouterr().err

@@ -42,7 +42,6 @@ def test_what_differs_from_the_record_is_named(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     "cheat",
     [
-        "Theorem so : False. Proof. Admitted.",
         "Theorem so : False. Proof. admit. Admitted.",
         "Axiom so : False.",
         "Parameter so : False.",
@@ -52,26 +51,20 @@ def test_what_differs_from_the_record_is_named(tmp_path: Path) -> None:
     ],
 )
 def test_words_that_assume_something_are_refused(cheat: str) -> None:
+    comment = "(* no Axiom (* is Admitted *), no Parameter *)\n"
+    coq.screen(f"{comment}Definition a := 1.\n", "fine.v")
     with pytest.raises(coq.CoqError, match=r"so\.v has the word '.*': a theory may assume nothing"):
-        coq.screen(f"(* a comment (* in a comment *) *)\n{cheat}\n", "so.v")
-
-
-def test_comments_may_have_any_word() -> None:
-    coq.screen("(* no Axiom (* is Admitted *), no Parameter *)\nDefinition a := 1.\n", "fine.v")
+        coq.screen(f"{comment}{cheat}\n", "so.v")
 
 
 def test_what_is_assumed_in_other_words_is_found_among_the_axioms(coq_version: str, tmp_path: Path) -> None:
-    (tmp_path / "so.v").write_text(ASSUMED, encoding="utf-8")
-    coq.compile_file(tmp_path / "so.v")
+    for name, text in (("so", ASSUMED), ("fine", "Theorem fine : 1 + 1 = 2.\nProof. reflexivity. Qed.\n")):
+        (tmp_path / f"{name}.v").write_text(text, encoding="utf-8")
+        coq.compile_file(tmp_path / f"{name}.v")
     with pytest.raises(coq.CoqError, match=r"so\.so rests on so\.it_is_so, which is not allowed"):
         coq.axioms_of(["so.so"], tmp_path)
     with pytest.raises(coq.CoqError, match=r"coqchk finds the axiom so\.it_is_so, which is not allowed"):
         coq.check_again(["so"], tmp_path)
-
-
-def test_coqchk_accepts_what_rests_on_nothing(coq_version: str, tmp_path: Path) -> None:
-    (tmp_path / "fine.v").write_text("Theorem fine : 1 + 1 = 2.\nProof. reflexivity. Qed.\n", encoding="utf-8")
-    coq.compile_file(tmp_path / "fine.v")
     coq.check_again(["fine"], tmp_path)
     assert coq.axioms_of(["fine.fine"], tmp_path) == {"fine.fine": []}
 

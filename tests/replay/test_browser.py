@@ -52,7 +52,7 @@ def test_any_name_is_shown_and_the_policy_blocks_nothing_of_the_page(browser: Br
     page.goto(file.as_uri())
     if page.inner_text("#replay-clock") == "no WebGL":
         pytest.skip("this browser has no WebGL")
-    page.wait_for_function("document.querySelector('.replay-name.state0')", timeout=WAIT_MS)
+    page.locator(".replay-name.state0").first.wait_for(state="attached", timeout=WAIT_MS)
     shown = [text.split()[0] for text in page.locator(".replay-name").all_inner_texts()]
     assert sorted(shown) == sorted([*NAMES, *OBSTACLES])
     assert not errors

@@ -44,12 +44,9 @@ def test_index_and_pages() -> None:
             urlopen(f"{address}/../etc/passwd")
 
 
-def test_the_only_run_needs_no_index() -> None:
+def test_the_only_run_needs_no_index_and_a_page_that_cannot_be_made_is_an_error() -> None:
     with served("d") as address:
         assert urlopen(address).read() == b"page of d"
-
-
-def test_a_page_that_cannot_be_made() -> None:
     with served("broken") as address, pytest.raises(HTTPError) as refused:
         urlopen(f"{address}/broken")
     assert refused.value.code == 500

@@ -1,4 +1,4 @@
-"""What needs attention: in words, with who and when, and a picture of the moment."""
+"""What needs attention: in words, with who and when."""
 
 from __future__ import annotations
 
@@ -10,7 +10,6 @@ from hypothesis import strategies as st
 from report.cases import FINE, built, verdict
 
 from airground_drake.report import attention
-from airground_drake.report.figures import moments
 from airground_drake.run.trace import Trace
 from airground_drake.scenarios.schema import Scenario
 
@@ -71,17 +70,6 @@ def test_what_is_missing_or_faulty_or_ends_too_early(scenario: Scenario, traces:
     assert attention.items(report)[3].words == "97 more kinds of faults"
 
 
-def test_the_moment_is_drawn_where_there_is_one(scenario: Scenario, traces: dict[str, Trace]) -> None:
-    somewhere = verdict("c", "refuted", where=AT, counterexample=AT | TOO_NEAR)
-    nowhere = verdict("a", "refuted", counterexample={"kind": "stray"})
-    (drawn,) = moments.draw(built(scenario, traces, [nowhere, somewhere, FINE[2]]), traces)
-    assert drawn.beside == "attention-1"
-    assert "ugv1 and obstacle_1 at 7.717 s" in drawn.caption
-    assert [row[0] for row in drawn.panels[0].table.rows] == ["ugv1", "obstacle_1"]
-    many = [somewhere] * (2 * moments.MAX_MOMENTS)
-    assert len(moments.draw(built(scenario, traces, many), traces)) == moments.MAX_MOMENTS
-
-
 KEYS = st.sampled_from([*attention._NAMES, *TOO_NEAR, *END, "t_s", "hypothesis", "margin", "unit", "kind"])
 VALUES = st.none() | st.booleans() | st.floats() | st.text() | st.sampled_from(["ugv1", "uav", "obstacle_1"])
 
@@ -93,4 +81,3 @@ def test_whatever_a_third_party_claim_found_is_told(
 ) -> None:
     report = built(scenario, {"c": traces["c"]}, [verdict("c", "refuted", margin=margin, counterexample=found)])
     assert attention.items(report)[0].words
-    moments.draw(report, traces)

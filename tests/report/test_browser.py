@@ -18,7 +18,7 @@ from report.cases import FINE, built, verdict
 from airground_drake import audit
 from airground_drake.commands import index
 from airground_drake.report import document, html
-from airground_drake.report.figures import draw, moments
+from airground_drake.report.figures import draw
 from airground_drake.run.trace import Trace
 from airground_drake.scenarios.schema import Scenario
 
@@ -44,7 +44,7 @@ def page_file(scenario: Scenario, traces: dict[str, Trace], tmp_path_factory: py
     verdicts = [verdict("a", exercised=0), failed, FINE[2]]
     about = {"package": "0.1.0"}
     report = document.build(scenario, "ab" * 32, faulty, verdicts, about, audit=items, required=["SAFE-INV"])
-    figures = [*draw.draw(scenario, traces), *moments.draw(report, traces)]
+    figures = draw.draw(scenario, traces)
     for k, figure in enumerate(figures):
         cut = [replace(panel, table=replace(panel.table, rows=panel.table.rows[:4])) for panel in figure.panels]
         figures[k] = replace(figure, panels=tuple(cut))

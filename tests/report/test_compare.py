@@ -12,12 +12,16 @@ from typing import Any
 import pytest
 from report.cases import FINE, GOING_ROUND, SUCCESS, built, make_scenario, make_trace, make_traces, verdict
 
+from airground_drake import commands
 from airground_drake.base.statuses import NOT_EXERCISED, STATUSES
-from airground_drake.commands.compare import main
 from airground_drake.report import compare, document
 from airground_drake.run import trace
 
 Json = dict[str, Any]
+
+
+def main(arguments: list[str]) -> int:
+    return commands.main(["compare", *arguments])
 
 
 def claim(found: Json, run: str) -> Json:
@@ -159,7 +163,7 @@ def test_the_page_shows_the_regression_first_both_runs_drawn_and_nothing_foreign
     headline = text[text.index('class="headline bad"') :].partition("</p>")[0]
     assert "SAFE-TRACE a: holds -&gt; none" in headline
     assert "<summary>1 changed by no more than rounding</summary>" in text
-    assert text.count("<svg") == 2
+    assert text.count("<svg") == 1
     assert not re.search(r"<(script|img|link|iframe)\b", text)
     assert "default-src 'none'" in text
     assert "http://" not in text.replace("http://www.w3.org/", "")

@@ -15,7 +15,7 @@ from report.cases import FINE, Kept, built, event, make_scenario, make_trace, ma
 
 from airground_drake.base.statuses import STATUSES
 from airground_drake.report import attention, document, html
-from airground_drake.report.figures import draw, moments
+from airground_drake.report.figures import draw
 from airground_drake.report.figures.panels import Figure
 from airground_drake.run.trace import Trace
 from airground_drake.scenarios.schema import Run, Scenario
@@ -67,7 +67,7 @@ def hostile_page() -> str:
     claim = type("Hostile", (Kept,), {**texts, "latex": latex, "assumptions": (HOSTILE,)})
     finding = Finding("refuted", -1.0, HOSTILE, {HOSTILE: HOSTILE}, {"x": HOSTILE}, {HOSTILE: [HOSTILE]})
     report = built(scenario, traces, [*FINE, Verdict(claim(), PLACEHOLDER, finding, "holds")])
-    figures = [*draw.draw(scenario, traces), *moments.draw(report, traces)]
+    figures = draw.draw(scenario, traces)
     report = json.loads(json.dumps(report).replace(PLACEHOLDER, HOSTILE))
     report["provenance"][HOSTILE] = report["provenance"]["command"] = HOSTILE
     return html.render(report, figures, DIAGRAM)

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from builders.decisions import decided_run
 from report.cases import make_scenario, make_trace
 
 from airground_drake.report import metrics
@@ -31,9 +31,11 @@ def test_least_pair_margin_is_the_exact_one_not_that_at_the_rows() -> None:
     assert (nearest[0], nearest[1]["value"]) == ("ugv2", pytest.approx(to_ugv2.min(), abs=1e-6))
 
 
-def test_decisions_are_counted_by_their_gap_and_those_that_met_their_budget() -> None:
-    trace = decided_run("mixed_integer")
-    table = trace.decisions.assign(gap=[0.0, -1e-12, -1.0, 0.01, 0.02, 1.0])
+def test_decisions_are_counted_by_their_gap_and_those_that_met_their_budget(
+    run: Callable[[str, str], Trace],
+) -> None:
+    trace = run("case_b", "c")
+    table = trace.decisions.iloc[:6].assign(gap=[0.0, -1e-12, -1.0, 0.01, 0.02, 1.0])
     table = table.assign(decision="refuse", number=[1, 1, 2, 2, 2, 3], robot="ugv1", reason=["waits", "kept"] * 3)
     table["status"] = ["optimal", "optimal", "optimal", "budget_spent", "budget_spent", "solver_failed"]
     found = metrics.gatekeeper(replace(trace, decisions=table))

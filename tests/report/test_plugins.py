@@ -15,8 +15,7 @@ from pathlib import Path
 import pytest
 from builders.hostile_policies import KINDS
 
-from airground_drake import scenarios
-from airground_drake.commands import diagram
+from airground_drake import commands, scenarios
 from airground_drake.report.__main__ import main
 from airground_drake.verify import __main__ as judge
 
@@ -117,7 +116,7 @@ def test_third_party_code_is_refused_unless_it_is_allowed(
     assert main(["case_a", "-o", str(out), "--set", f"claims={{MINE: '{name}'}}"]) == 2
     minimal = resources.files(scenarios).joinpath("minimal.yaml").read_text()
     (tmp_path / "mine.yaml").write_text(f"{minimal}\ngatekeeper: {{route: '{name}'}}\n")
-    assert diagram.main([str(tmp_path / "mine.yaml"), "-o", str(out)]) == 2
+    assert commands.main(["diagram", str(tmp_path / "mine.yaml"), "-o", str(out)]) == 2
     assert capsys.readouterr().err.count("--allow-plugins") == 2
     assert not out.exists()
 

@@ -8,12 +8,11 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scenarios.cases import SMALL_DATA, edit
 
 from airground_drake.base.errors import LimitError
-from airground_drake.run.simulation import simulate
 from airground_drake.run.trace import Trace
 from airground_drake.scenarios.estimate import DEFAULT_LIMITS, PROGRAM, Limits, estimate, within
 from airground_drake.scenarios.load import from_data, load, shipped
@@ -44,21 +43,6 @@ def test_runs_keep_to_the_estimate(name: str, run_name: str, run: Callable[[str,
     assert len(trace.decisions) <= asked.decisions
     tables = sum(int(table.memory_usage(deep=True).sum()) for table in (trace.signals, trace.decisions, trace.problems))
     assert PROGRAM + tables <= asked.memory
-
-
-@settings(max_examples=6)
-@given(
-    period=st.sampled_from([0.01, 0.02, 0.05, 0.07]),
-    ratio=st.sampled_from([1 / 3, 0.5, 1.0, 2.0]),
-    duration=st.floats(0.1, 1.0),
-)
-def test_rows_are_those_of_any_run(period: float, ratio: float, duration: float) -> None:
-    scenario = replace(small("a"), duration_s=duration)
-    scenario.control.period_s = scenario.gatekeeper.period_s = scenario.intervention.period_s = period
-    scenario.gatekeeper.horizon_s = period * scenario.gatekeeper.stages
-    scenario.decision.noise_period_s = ratio * period
-    rows = len(simulate(scenario, "one").t)
-    assert abs(rows - estimate(scenario).rows) <= 2.0
 
 
 @given(
@@ -96,10 +80,6 @@ def test_more_of_anything_never_asks_for_less(method: str, key: str, factor: int
 def test_what_would_never_end_is_refused_in_one_line(key: str, value: object, method: str) -> None:
     data = edit(dataclasses.asdict(small(method)), key, value)
     scenario = from_data(edit(data, "control.avoidance_gain_1_s", 0.0), "big")
-    with pytest.raises(LimitError) as refused:
+    with pytest.raises(LimitError, match=r"^small asks for about [^\n]*; allowed: 1e\+07 steps, 8 GiB$"):
         within(scenario, DEFAULT_LIMITS)
-    text = str(refused.value)
-    assert text.startswith("small asks for about ")
-    assert "allowed: 1e+07 steps, 8 GiB" in text
-    assert "\n" not in text
     assert within(scenario, Limits(math.inf, math.inf)) == estimate(scenario)

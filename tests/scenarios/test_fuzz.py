@@ -15,7 +15,6 @@ from properties import examples
 from scenarios.cases import SMALL, SMALL_DATA
 
 from airground_drake.base.errors import ScenarioError
-from airground_drake.scenarios import schema
 from airground_drake.scenarios.document import text_of
 from airground_drake.scenarios.load import load, resolved
 
@@ -50,22 +49,16 @@ JUNK = st.one_of(
 )
 
 
-def load_if_valid(path: str, overrides: Sequence[str] = ()) -> schema.Scenario | None:
-    """The scenario, or None where it is refused in one printable line; any other exception passes."""
+def loads_or_explains(path: Path, content: bytes, overrides: Sequence[str] = ()) -> None:
+    """Load; an accepted scenario round-trips, a refused one is explained in one line; any other exception passes."""
+    path.write_bytes(content)
     refusal = ""
     try:
-        return load(path, overrides)[0]
+        scenario = load(str(path), overrides)[0]
     except ScenarioError as error:
         refusal = str(error)
     assert refusal.isprintable()
-    return None
-
-
-def loads_or_explains(path: Path, content: bytes) -> None:
-    """Load; an accepted scenario round-trips, a refused one is explained in one line."""
-    path.write_bytes(content)
-    scenario = load_if_valid(str(path))
-    if scenario is not None:
+    if not refusal:
         path.write_text(text_of(resolved(scenario)), encoding="utf-8")
         assert load(str(path))[0] == scenario
 
@@ -108,6 +101,4 @@ def test_mutated_text(folder: Path, data: st.DataObject) -> None:
     value=st.one_of(JUNK.map(str), st.text(max_size=8)),
 )
 def test_random_overrides(folder: Path, key: str, value: str) -> None:
-    path = folder / "overridden.yaml"
-    path.write_text(SMALL, encoding="utf-8")
-    load_if_valid(str(path), [f"{key}={value}"])
+    loads_or_explains(folder / "overridden.yaml", SMALL.encode(), [f"{key}={value}"])

@@ -1,17 +1,19 @@
-"""What is well-formed loads, with the values of the file."""
+"""What is well-formed loads, with the values of the file, of `--set` and of each run's `set`."""
 
 from __future__ import annotations
 
 import hashlib
 import math
 from dataclasses import replace
-from typing import Any
 
 import pytest
-from scenarios.cases import CASE_A, DATA, SMALL, Write, case_a, message
+import yaml
+from scenarios.cases import CASE_A, SMALL, SMALL_DATA, Write, case_a, edit, message
 
+from airground_drake.base.errors import ScenarioError
+from airground_drake.scenarios import plugins
 from airground_drake.scenarios.document import text_of
-from airground_drake.scenarios.load import load, resolved, shipped, validated
+from airground_drake.scenarios.load import load, own, resolved, shipped, validated
 from airground_drake.scenarios.schema import Uav
 
 
@@ -23,81 +25,117 @@ def test_shipped_scenarios_load(name: str) -> None:
     assert digest == hashlib.sha256(file.read_bytes()).hexdigest() == load(str(file))[1]
 
 
-def test_values_are_those_of_the_file() -> None:
-    plain = resolved(case_a()[0])
-    assert list(plain["ugvs"]) == list(DATA["ugvs"])
-    assert list(plain["obstacles"]) == list(DATA["obstacles"])
-
-    def covers(whole: Any, part: Any) -> bool:
-        if isinstance(part, dict):
-            return all(key in whole and covers(whole[key], value) for key, value in part.items())
-        if isinstance(part, list):
-            return len(whole) == len(part) and all(map(covers, whole, part))
-        return bool(whole == part)
-
-    assert covers(plain, {name: part for name, part in DATA.items() if not name.startswith("_")})
-
-
-@pytest.mark.parametrize("title", ["Case A", "1e5", "1:30", "yes", "0x1f", ".5", "~", "+1", "", "Ä: #"])
+@pytest.mark.parametrize(
+    "title", ["Case A", "1e5", "1:30", "yes", "0x1f", ".5", "~", "+1", "", "\u00c4: # \U0001f697 \\"]
+)
 def test_resolved_round_trips(title: str, write: Write) -> None:
     """Whatever text looks like by the rules of YAML 1.1 or 1.2."""
     scenario = replace(case_a()[0], title=title)
-    again, _ = load(write(text_of(resolved(scenario))))
-    assert again == scenario
-    assert resolved(again) == resolved(scenario)
+    assert load(write(text_of(resolved(scenario))))[0] == scenario
+    assert validated(case_a()[0], {"title": title}).title == title
 
 
-def test_numbers_are_read_by_the_rules_of_yaml_1_2(write: Write) -> None:
-    path = write(SMALL.replace("duration_s: 5", "duration_s: 1e+1\nstall_tolerance_m: 2E-2\ntitle: yes"))
-    scenario, _ = load(path)
+def test_yaml_is_read_by_version_1_2_with_anchors_merges_and_templates(write: Write) -> None:
+    text = "_template: &fast {max_speed_m_s: 4}\n" + SMALL
+    for old, new in {
+        "duration_s: 5": "duration_s: 1e+1\nstall_tolerance_m: 2E-2\ntitle: yes",
+        "max_speed_m_s: 2}": "<<: *fast}",
+        "max_speed_m_s: 3}": "<<: [*fast, {}]}",
+        "\n": "\r\n",
+    }.items():
+        text = text.replace(old, new)
+    scenario, _ = load(write(b"\xef\xbb\xbf" + text.encode()), ["ugvs.one.max_speed_m_s=5"])
     assert (scenario.duration_s, scenario.stall_tolerance_m, scenario.title) == (10.0, 0.02, "yes")
-    assert type(scenario.ugvs["one"].max_speed_m_s) is float
-
-
-def test_anchors_merges_and_private_templates(write: Write) -> None:
-    text = SMALL.replace("max_speed_m_s: 2}", "<<: *fast}").replace("max_speed_m_s: 3}", "<<: [*fast, {}]}")
-    path = write("_template: &fast {max_speed_m_s: 4}\n" + text)
-    scenario, _ = load(path, ["ugvs.one.max_speed_m_s=5"])
     assert [ugv.max_speed_m_s for ugv in scenario.ugvs.values()] == [5.0, 4.0]
+    assert type(scenario.ugvs["one"].start_m[0]) is float
 
 
-def test_a_byte_order_mark_and_crlf_are_harmless(write: Write) -> None:
-    assert load(write(b"\xef\xbb\xbf" + SMALL.replace("\n", "\r\n").encode()))[0].name == "small"
+@pytest.mark.parametrize(
+    ("override", "value"),
+    [
+        ("seed=7", 7),
+        ("control.sensing_range_m=5", 5.0),
+        ("ugvs.ugv1.preset.waypoints_m.1=[3.3, 13.05, 0]", [3.3, 13.05, 0.0]),
+        ("ugvs.ugv1.start_m.0=1.25", 1.25),
+        ("intervention.policies.0.parameters.clearance_m=2e-1", 0.2),
+        ("intervention.policies.0.name=my.module:Policy", "my.module:Policy"),
+        ("obstacles.obstacle_3.known_to_uav=false", False),
+        ("obstacles._box={position_m: [-9, -9, 0], known_to_uav: true, radius_m: 0}",
+         {"position_m": [-9.0, -9.0, 0.0], "known_to_uav": True, "radius_m": 0.0}),
+        ("title=a = b", "a = b"),
+        ("runs.b.expected={SAFE-TRACE: refuted}", {"SAFE-TRACE": "refuted"}),
+        ("runs.d.expected.LIVE-GOAL=refuted", "refuted"),
+    ],
+)  # fmt: skip
+def test_override(override: str, value: object) -> None:
+    scenario, digest = load("case_a", [override])
+    assert resolved(scenario) == edit(resolved(case_a()[0]), override.partition("=")[0], value)
+    assert digest != case_a()[1]
 
 
-def test_starting_exactly_at_the_safe_distance_is_allowed(write: Write) -> None:
-    angle = 0.3
-    start = [5 + 2 * math.cos(angle), -5 + 2 * math.sin(angle), 0.0]
-    assert load(write(SMALL), [f"ugvs.one.start_m={start}"])[0].ugvs["one"].start_m == start
+def test_overrides_apply_in_order_and_leave_aliases_alone(write: Write) -> None:
+    first, second = "preset: {waypoints_m: [[0, 0, 0]", "preset: {waypoints_m: [[0, 5, 0], [9, 5, 0]]}"
+    path = write(SMALL.replace(first, first.replace("preset:", "preset: &shared")).replace(second, "preset: *shared"))
+    scenario, _ = load(path, ["ugvs.one.preset.speed_m_s=1.5", "ugvs.one.preset.speed_m_s=2"])
+    assert [ugv.preset.speed_m_s for ugv in scenario.ugvs.values()] == [2.0, 1.0]
+    splits = (["title=a", "title=b"], ["title=b"], ["title=atitle=b"])
+    assert len({load(path, overrides)[1] for overrides in splits}) == 3
 
 
-@pytest.mark.parametrize("period", ["0.05", "0.1", "0.01", "0.0625"])
-def test_multiples_tolerate_rounding(period: str, write: Write) -> None:
-    overrides = ["control.period_s=0.01", "decision.noise_period_s=0.01", "intervention.period_s=0.07"]
-    if period == "0.0625":
-        assert "gatekeeper.period_s: 0.0625" in message(write(SMALL), [*overrides, f"gatekeeper.period_s={period}"])
-    else:
-        load(write(SMALL), [*overrides, f"gatekeeper.period_s={period}"])
-
-
-def test_a_plug_in_may_stand_for_a_policy(write: Write) -> None:
-    assert load(write(SMALL), ["intervention.policies.0.name=my.module:Policy"])
+@pytest.mark.parametrize(
+    "overrides",
+    [
+        [f"ugvs.one.start_m={[5 + 2 * math.cos(0.3), -5 + 2 * math.sin(0.3), 0.0]}"],  # at the safe distance
+        ["control.period_s=0.01", "decision.noise_period_s=0.01", "intervention.period_s=0.07"],  # not 7 * 0.01
+        ["obstacles={}"],
+    ],
+)
+def test_limits_themselves_are_allowed(overrides: list[str], write: Write) -> None:
+    load(write(SMALL), overrides)
 
 
 def test_the_uav_ends_over_the_centroid_of_the_targets_unless_the_scenario_says_where(write: Write) -> None:
     assert load(write(SMALL))[0].uav.target_m == [9.0, 2.0, 2.0]
     silent = write(SMALL.replace("uav: {start_m: [0, 2, 2], target_m: [9, 2, 2]}", "uav: {start_m: [0, 2, 2]}"))
-    assert load(silent)[0].uav.target_m == [9.0, 2.5, 2.0]
     moved = ["ugvs.one.target_m=[5, 1, 0]", "ugvs.one.preset.waypoints_m.1=[5, 1, 0]", "uav.altitude_m=3"]
     scenario = load(silent, moved)[0]
     assert scenario.uav.target_m == [7.0, 3.0, 3.0]
     assert validated(replace(scenario, uav=Uav(start_m=[0.0, 2.0, 2.0]))).uav.target_m == [7.0, 3.0, 2.0]
-    assert "ugvs.one.target_m: [5]" in message(silent, ["ugvs.one.target_m=[5]"])
 
 
 def test_an_attribute_that_is_no_key_cannot_be_set() -> None:
-    scenario = load("minimal")[0]
-    ugv = scenario.ugvs["ugv1"]
-    for part in (scenario, scenario.uav, ugv, ugv.preset, scenario.control):
+    ugv = load("minimal")[0].ugvs["ugv1"]
+    for part in (ugv, ugv.preset):
         with pytest.raises(AttributeError, match="has no attribute 'max_sped'"):
-            part.max_sped = 3.0
+            part.max_sped = 3.0  # type: ignore[union-attr]
+
+
+def test_a_run_has_the_values_that_it_sets(write: Write) -> None:
+    settings = {"gatekeeper.tries": 2, "intervention.policies.0.name": "mine:Mine", "gatekeeper.route": "mine:Route"}
+    file = write(yaml.safe_dump(edit(SMALL_DATA, "runs.other", {"method": "c", "set": settings})))
+    scenario = load(file, ["runs.other.set.gatekeeper.tries=3", "runs.d.set.decision.threshold.zeta_m=2"])[0]
+    assert own(scenario, "other").gatekeeper.tries == 3
+    assert own(scenario, "d").decision.threshold.zeta_m == 2.0
+    assert (scenario.gatekeeper.tries, scenario.decision.threshold.zeta_m) == (5, 3.0)
+    assert {key.partition(".set.")[2] for key in plugins.plugins(scenario)} == {*settings} - {"gatekeeper.tries"}
+    assert plugins.plugins(plugins.without(scenario)) == {}
+    with pytest.raises(ScenarioError, match=r"--set runs.d.set.decision.threshold.zeta_m=1: .*decision.release_m"):
+        load(file, ["runs.d.set.decision.threshold.zeta_m=1"])
+
+
+def test_what_a_message_allows_is_allowed_and_no_more(write: Write) -> None:
+    """Limits are those of the proofs to the last digit: decimals, not what floating-point numbers make of them."""
+    changes = {
+        "ugvs.one.max_speed_m_s": 1.1, "ugvs.two.max_speed_m_s": 2.2, "uav.max_speed_m_s": 1.0,
+        "control.period_s": 0.1, "decision.noise_period_s": 0.1, "gatekeeper.period_s": 0.1,
+        "intervention.period_s": 0.1, "gatekeeper.stages": 30, "control.formation_gain_1_s": 1.0,
+        "control.sensing_range_m": 2.33,
+    }  # fmt: skip
+    slow = SMALL_DATA
+    for key, value in changes.items():
+        slow = edit(slow, key, value)
+    assert load(write(yaml.safe_dump(slow)))[0].control.sensing_range_m == 2.33
+    short = write(yaml.safe_dump(edit(slow, "control.sensing_range_m", 2.3299999999)))
+    assert "at least 2.33 m for two and one" in message(short)
+    fast = edit(edit(SMALL_DATA, "control.period_s", 0.03), "control.motion_gain_1_s", 33.33333334)
+    assert "at most 33.3333333 1/s" in message(write(yaml.safe_dump(fast)))

@@ -21,12 +21,8 @@ from airground_drake.systems.diagram import build_diagram
 from airground_drake.verify import verify
 
 
-def test_what_is_registered_is_none(case_a: Scenario) -> None:
-    assert plugins(case_a) == {}
-    refuse(case_a, "case_a")
-
-
 def test_all_that_can_be_named_is_looked_at(case_a: Scenario) -> None:
+    refuse(case_a, "case_a")
     case_a.uav.task, case_a.gatekeeper.route, case_a.claims = "m:Task", "m:Route", {"MINE": "m:Claim"}
     case_a.intervention.policies.append(Policy("m:Policy"))
     assert plugins(case_a) == {
@@ -100,29 +96,21 @@ def test_code_of_others_is_found_beside_the_scenario_file_wherever_it_runs(tmp_p
 
 
 def test_what_is_not_found_says_where_it_was_looked_for(case_a: Scenario, tmp_path: Path) -> None:
-    file = tmp_path / "mine.yaml"
+    file, before = tmp_path / "mine.yaml", list(sys.path)
     file.touch()
-    for name in ("no_such_module:It", "no/such-file.py:It"):
-        with admitted(case_a, str(file), allow=True), pytest.raises(PluginError, match="looked in") as error:
-            ROUTES.load(name, of=object)
-        assert f"looked in {tmp_path}, " in str(error.value)
-        assert str(error.value).endswith("Python's own folders")
-    case_a.intervention.policies[0].name = "no/such-file.py:It"
-    with admitted(case_a, str(file), allow=True), pytest.raises(PluginError, match=f"looked in {tmp_path}"):
-        simulate_all(case_a)
-
-
-def test_without_leave_the_path_is_what_it_was(case_a: Scenario, tmp_path: Path) -> None:
-    (tmp_path / "mine.yaml").touch()
-    before = list(sys.path)
-    with admitted(case_a, str(tmp_path / "mine.yaml"), allow=False):
+    with admitted(case_a, str(file), allow=False):
         assert sys.path == before
-    case_a.uav.task = "hover.py:Hover"
-    with pytest.raises(ScenarioError, match="--allow-plugins"), admitted(case_a, "mine.yaml", allow=False):
+    case_a.intervention.policies[0].name = "no/such-file.py:It"
+    with admitted(case_a, str(file), allow=True):
+        with pytest.raises(PluginError, match=f"looked in {tmp_path}, .*Python's own folders$"):
+            ROUTES.load("no_such_module:It", of=object)
+        with pytest.raises(PluginError, match=f"looked in {tmp_path}"):
+            simulate_all(case_a)
+    with pytest.raises(ScenarioError, match="--allow-plugins"), admitted(case_a, str(file), allow=False):
         pytest.fail("admitted")
 
 
-@pytest.mark.parametrize("name", ["../x.py:It", "/x.py:It", "a//x.py:It", ".py:It", "x.py", "x.py:", "a.b/x.py:It"])
+@pytest.mark.parametrize("name", ["../x.py:It", "/x.py:It", "a//x.py:It", "x.py:"])
 def test_a_file_is_one_below_a_folder_of_the_path(name: str) -> None:
     assert not is_plugin(name)
 

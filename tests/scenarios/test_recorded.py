@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import copy
 from dataclasses import replace
 from typing import Any
 
 import pytest
 from builders.runs import run_of
+from scenarios.cases import edit
 
 from airground_drake.base.errors import TraceError
 from airground_drake.scenarios.load import from_data
@@ -21,18 +21,15 @@ def test_a_trace_has_the_scenario_that_its_metadata_hold_and_makes_it_once() -> 
 
 
 @pytest.mark.parametrize(
-    ("section", "key", "value", "says"),
+    ("key", "value", "says"),
     [
-        ("control", "period_s", "fast", "control.period_s: "),
-        ("decision", "no_key", 1.0, "decision.no_key: "),
-        ("runs", "d", {"method": "d", "set": {"decision.no_key": 1.0}}, "no_key: "),
+        ("control.period_s", "fast", "control.period_s: "),
+        ("runs.d", {"method": "d", "set": {"decision.no_key": 1.0}}, "no_key: "),
     ],
 )
-def test_metadata_that_hold_no_scenario_are_refused_in_one_line(section: str, key: str, value: Any, says: str) -> None:
+def test_metadata_that_hold_no_scenario_are_refused_in_one_line(key: str, value: Any, says: str) -> None:
     trace = run_of("d")
-    scenario = copy.deepcopy(trace.meta["scenario"])
-    scenario[section][key] = value
-    broken = replace(trace, meta=trace.meta | {"scenario": scenario})
+    broken = replace(trace, meta=trace.meta | {"scenario": edit(trace.meta["scenario"], key, value)})
     with pytest.raises(TraceError, match=f"^run d: the scenario in its metadata: .*{says}[^\n]*$"):
         _ = broken.scenario
     assert {each.finding.status for each in verify(broken)} == {"error"}

@@ -1,17 +1,15 @@
-"""What decides a run is in its Context: copies of it, and other simulators, go on identically."""
+"""The state of a run is in its Context: copies of it and other simulators continue identically."""
 
 from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
 import pytest
 from pydrake.common import RandomGenerator
 from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorConfig
 from pydrake.systems.framework import Context, Diagram
 
-from airground_drake.intervention.messages import ACCEPT, SILENT
-from airground_drake.run.simulation import EVENT_ACCURACY, simulate
+from airground_drake.run.simulation import EVENT_ACCURACY
 from airground_drake.scenarios.load import load
 from airground_drake.systems.diagram import RECORDED, Model, build_model
 
@@ -69,35 +67,3 @@ def test_two_simulators_of_one_diagram_do_not_disturb_each_other() -> None:
         alone = build_model(scenario, "d")
         expected = ends(alone, advanced(alone.diagram, begun(alone.diagram, seed), END_S).get_context())
         assert ends(model, simulator.get_context()) == expected
-
-
-def test_decisions_are_published_at_the_end_of_the_step_and_are_those_of_the_trace() -> None:
-    scenario = load("case_a")[0]
-    model = build_model(scenario, "d")
-    assert model.gatekeeper is not None
-    simulator = advanced(model.diagram, begun(model.diagram, scenario.seed), scenario.duration_s)
-    decided = model.gatekeeper.decisions(model.gatekeeper.GetMyContextFromRoot(simulator.get_context()))
-    recorded = simulate(scenario, "d").decisions
-    assert [d.t for d in decided] == recorded["t_s"].tolist()
-    assert [d.reason for d in decided] == recorded["reason"].tolist()
-    assert np.diff([d.t for d in decided]).min() >= 0.0
-
-
-def test_controllers_act_on_answers_of_the_same_instant_and_the_gatekeeper_on_proposals_of_the_one_before() -> None:
-    """Drake makes all unrestricted updates of an instant before the discrete ones."""
-    scenario = load("case_a")[0]
-    model = build_model(scenario, "d")
-    assert model.gatekeeper is not None
-    proposed = float(simulate(scenario, "d").proposals["issued_s"].min())
-    answered = proposed + scenario.gatekeeper.period_s
-    simulator = advanced(model.diagram, begun(model.diagram, scenario.seed), answered)
-    root = simulator.get_context()
-    answers = model.gatekeeper.GetOutputPort("answers")
-    accepted = model.diagram.GetOutputPort("accepted")
-    assert any(model.planner.GetOutputPort("proposals").Eval(model.planner.GetMyContextFromRoot(root)))
-    assert answers.Eval(model.gatekeeper.GetMyContextFromRoot(root))[::2].tolist() == [SILENT, SILENT]
-    assert accepted.Eval(root).tolist() == [0.0, 0.0]
-    simulator.AdvancePendingEvents()
-    said = answers.Eval(model.gatekeeper.GetMyContextFromRoot(root))[::2].tolist()
-    assert ACCEPT in said
-    assert accepted.Eval(root).tolist() == [float(each == ACCEPT) for each in said]

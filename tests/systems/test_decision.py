@@ -1,4 +1,4 @@
-"""The event trigger in a Drake diagram: whatever happens between two updates is isolated, or made up for."""
+"""The event trigger in a Drake diagram: events between two updates are isolated, or made up for."""
 
 from __future__ import annotations
 
@@ -120,21 +120,13 @@ def test_a_peak_at_a_corner_of_the_reference_is_a_trigger() -> None:
     assert times(run(TRIGGER, path, 1.0), 2) == []
 
 
-@pytest.mark.parametrize("late", [0.0, 1e-16, 3e-16, 1e-12, 2e-9, 1e-7])
+@pytest.mark.parametrize("late", [0.0, 3e-16, 2e-9])
 def test_two_ugvs_at_nearly_the_same_instant(late: float) -> None:
     noise = np.array([[0.0, -late * 10.0], [10.0, 10.0 - late * 10.0]])
     path = Path(np.array([0.0, 1.0]), np.zeros((2, 2, 3)), noise)
     status = run(TRIGGER, path, 0.3)
     for robot in range(2):
         assert times(status, 2, robot) == [pytest.approx(0.3, abs=2e-6)]  # at the very end of the first step
-
-
-@pytest.mark.parametrize("start", [3.0, 4.0])
-def test_at_or_above_the_threshold_at_the_start(start: float) -> None:
-    path = straight((start, 0.0, 0.0), (start - 2.5, 0.0, 0.0))
-    status = run(TRIGGER, path, 1.0)
-    assert times(status, 2) == [0.0]
-    assert times(status, 3) == [pytest.approx((start - 1.0) / 2.5, abs=2e-6)] * (start < 3.5)
 
 
 def test_a_bare_trigger_that_starts_at_the_threshold_lasts_while_x_stays_there_and_ends_when_it_falls() -> None:
@@ -189,14 +181,6 @@ class Silent(DecisionBlock):
         return np.zeros(len(parts))
 
 
-class MaxNorm(DecisionBlock):
-    """The largest coordinate of the task error, plus the noise."""
-
-    def value(self, t: float, parts: Array) -> Array:
-        found: Array = np.abs(parts[:, :3]).max(axis=1) + parts[:, 3]
-        return found
-
-
 class Played(DecisionBlock):
     """A recorded signal: rises to 4 m in 2 s and falls to 0 m in 2 s, for every UGV."""
 
@@ -208,16 +192,15 @@ def of_kind(trace: Trace, kind: str) -> list[float]:
     return [float(event["t_s"]) for event in trace.events if event["kind"] == kind]
 
 
-def test_a_decision_block_that_returns_0_triggers_nothing() -> None:
-    scenario = load("case_a")[0]
-    assert of_kind(simulate(scenario, "b"), "trigger")
-    trace = simulate(scenario, "b", decision_block=Silent)
+def test_a_decision_block_that_returns_0_triggers_nothing_and_does_not_pass_for_15() -> None:
+    trace = simulate(load("case_a", {"duration_s": 15.0})[0], "b", decision_block=Silent)
     assert of_kind(trace, "trigger") == []
     assert trace.meta["decision_block"] == "Silent"
     finding = judge("THR-TRIG", trace)
-    assert finding.status == "holds"
-    assert finding.exercised == 0
+    assert (finding.status, finding.exercised) == ("holds", 0)
     assert finding.evidence["ugvs"][0]["port_against_15"]["status"] == "not_run"
+    passed_off = judge("THR-TRIG", replace(trace, meta={**trace.meta, "decision_block": ""}))
+    assert passed_off.status == passed_off.evidence["ugvs"][0]["port_against_15"]["status"] == "refuted"
 
 
 def test_a_subclass_of_the_built_in_block_has_its_own_say() -> None:
@@ -230,19 +213,6 @@ def test_a_subclass_of_the_built_in_block_has_its_own_say() -> None:
     assert not trace.column("ugv1.decision_variable_m").any()
 
 
-def test_another_norm_triggers_when_it_reaches_the_threshold() -> None:
-    scenario = load("case_a")[0]
-    trace = simulate(scenario, "b", decision_block=MaxNorm)
-    first = of_kind(trace, "trigger")[0]
-    assert first > of_kind(simulate(scenario, "b"), "trigger")[0]  # the largest coordinate is less than the norm
-    row = int(np.searchsorted(trace.t, first))
-    error = np.array([trace.column(f"ugv1.ref_{a}_m") - trace.column(f"ugv1.{a}_m") for a in "xyz"])
-    largest = np.abs(error).max(axis=0) + trace.column("ugv1.noise_m")
-    assert largest[row] == pytest.approx(scenario.decision.threshold.zeta_m, abs=1e-5)
-    assert largest[:row].max() < scenario.decision.threshold.zeta_m
-    assert judge("THR-TRIG", trace).status == "holds"
-
-
 def test_a_recorded_signal_drives_the_trigger_and_its_crossings_are_isolated() -> None:
     scenario = load("case_a", {"duration_s": 5.0, "decision.release_m": 1.0})[0]
     trace = simulate(scenario, "b", decision_block=Played)
@@ -252,14 +222,6 @@ def test_a_recorded_signal_drives_the_trigger_and_its_crossings_are_isolated() -
     assert judge("THR-TRIG", trace).status == "holds"
     late = [{**e, "t_s": e["t_s"] + 0.001 * (e["kind"] == "release")} for e in trace.events]
     assert judge("THR-TRIG", replace(trace, meta={**trace.meta, "events": late})).status == "refuted"
-
-
-def test_a_run_of_another_block_does_not_pass_for_one_of_15() -> None:
-    trace = simulate(load("case_a", {"duration_s": 2.0})[0], "b", decision_block=Silent)
-    passed_off = replace(trace, meta={**trace.meta, "decision_block": ""})
-    finding = judge("THR-TRIG", passed_off)
-    assert finding.status == "refuted"
-    assert finding.evidence["ugvs"][0]["port_against_15"]["status"] == "refuted"
 
 
 def test_a_decision_block_without_a_range_is_refused() -> None:

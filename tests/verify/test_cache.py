@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Callable
-from dataclasses import asdict, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -16,16 +16,24 @@ from airground_drake.base import files
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.verify import cache
 from airground_drake.verify.claim import ModelClaim
-from airground_drake.verify.finding import Finding
+from airground_drake.verify.finding import Evidence, Finding
+
+
+@dataclass(frozen=True)
+class Noted(Evidence):
+    runs: dict[str, list[float]]
+
+
+FOUND = Finding("proved", margin=2.0, exercised=1, evidence=Noted({"a": [1.0]}))
 
 
 class Counting(ModelClaim):
     """A claim that counts how often it is decided."""
 
     id, statement, formula, method, equations = "THR-DDM", "s", "f", "m", "e"
-    assumptions, does_not_establish = (), "n"
+    assumptions, does_not_establish, record = (), "n", Noted
 
-    def __init__(self, found: Finding | Exception) -> None:
+    def __init__(self, found: Finding | Exception = FOUND) -> None:
         self.found, self.calls = found, 0
 
     def inputs(self, scenario: Scenario) -> dict[str, Any]:
@@ -39,105 +47,82 @@ class Counting(ModelClaim):
 
 
 def test_findings_are_kept_by_their_inputs(tmp_path: Path) -> None:
-    claim = Counting(Finding("proved", evidence={"a": "b"}))
-    first = cache.found(claim, {"x": 1.0}, tmp_path)
-    assert not first.from_cache
-    assert cache.found(claim, {"x": 1.0}, tmp_path) == replace(first, from_cache=True)
+    claim = Counting()
+    assert cache.found(claim, {"x": 1.0}, tmp_path) == FOUND
+    assert cache.found(claim, {"x": 1.0}, tmp_path) == replace(FOUND, from_cache=True)
     assert claim.calls == 1
     cache.found(claim, {"x": 2.0}, tmp_path)
     cache.found(claim, {"x": 1.0}, None)
     assert claim.calls == 3
 
 
-def test_what_was_left_open_is_tried_again(tmp_path: Path) -> None:
-    for found in (Finding("inconclusive"), RuntimeError("no luck"), Finding("proved", margin=float("nan"))):
-        claim = Counting(found)
-        for _ in range(2):
-            made = cache.found(claim, {}, tmp_path)
-        assert claim.calls == 2
-        assert made.status in ("inconclusive", "error")
+@pytest.mark.parametrize(
+    "found", [Finding("inconclusive"), RuntimeError("no luck"), replace(FOUND, margin=float("nan"))]
+)
+def test_an_undecided_claim_is_tried_again(tmp_path: Path, found: Finding | Exception) -> None:
+    claim = Counting(found)
+    assert cache.found(claim, {}, tmp_path).status == cache.found(claim, {}, tmp_path).status != "proved"
+    assert claim.calls == 2
     assert not list(tmp_path.iterdir())
 
 
-def put(folder: Path, content: bytes) -> None:
-    """In the place of the one entry."""
-    (kept,) = folder.iterdir()
-    kept.unlink()
-    kept.write_bytes(content)
-
-
 def entry(**changes: Any) -> bytes:
-    """One of COUNTING for {}, with changes to its finding."""
-    finding = asdict(Finding("proved", margin=1.0, exercised=1)) | changes
-    about = cache.content(Counting(Finding("proved")), {})
-    text = json.dumps(finding, sort_keys=True, allow_nan=True)
-    return json.dumps({**about, "finding": finding, "sha256": files.sha256(text.encode())}).encode()
+    """An entry of `Counting` for {} that says another margin than 2, with changes to its finding."""
+    finding = replace(FOUND, margin=1.0).to_json() | changes
+    digest = files.sha256(json.dumps(finding, sort_keys=True).encode())
+    return json.dumps({**cache.content(Counting(), {}), "finding": finding, "sha256": digest}).encode()
 
 
 UNUSABLE: dict[str, bytes] = {
-    "nothing": b"",
     "not JSON": b"{",
     "not UTF-8": b"\xff\xfe",
     "a list": b"[]",
     "deep": b"[" * 100_000,
-    "no finding": json.dumps(cache.content(Counting(Finding("proved")), {})).encode(),
-    "a status that is none": entry(status="lol"),
-    "a status of another type": entry(status=["proved"]),
+    "no finding": json.dumps(cache.content(Counting(), {})).encode(),
+    "an unknown status": entry(status=["proved"]),
     "a margin of NaN": entry(margin=float("nan")),
-    "a margin beyond all": entry().replace(b"1.0", b"1e999"),
+    "an infinite margin": entry().replace(b"1.0", b"1e999"),
     "a field too many": entry(more=1),
+    "evidence of another claim": entry(evidence={"runs": 3}),
     "a flipped bit": entry().replace(b'"margin": 1.0', b'"margin": 3.0'),
-    "no digest": entry().replace(b'"sha256"', b'"sha265"'),
-    "nothing that passes": entry(status="inconclusive"),
     "a refutation": entry(status="refuted", counterexample={"x": 1}),
     "another claim": entry().replace(b"THR-DDM", b"ANOTHER"),
     "another code": entry().replace(cache._code().encode(), b"0" * 64),
     "another engine": entry().replace(b'"numba"', b'"numbb"'),
-    "another schema": entry().replace(b"finding/2", b"finding/1"),
     "large": entry() + b" " * cache.LARGEST_BYTES,
 }
 
 
 @pytest.mark.parametrize("what", UNUSABLE)
-def test_an_entry_that_cannot_be_taken_is_made_anew(tmp_path: Path, what: str) -> None:
-    claim = Counting(Finding("proved", margin=2.0, exercised=1))
-    cache.found(claim, {}, tmp_path)
-    put(tmp_path, UNUSABLE[what])
-    found = cache.found(claim, {}, tmp_path)
-    assert (found.margin, found.from_cache, claim.calls) == (2.0, False, 2)
-
-
-def test_an_entry_as_it_should_be_is_taken(tmp_path: Path) -> None:
-    claim = Counting(Finding("proved", margin=2.0, exercised=1))
-    cache.found(claim, {}, tmp_path)
-    put(tmp_path, entry())
-    assert cache.found(claim, {}, tmp_path) == Finding("proved", 1.0, exercised=1, from_cache=True)
+def test_an_unusable_entry_is_made_anew(tmp_path: Path, what: str) -> None:
+    claim, file = Counting(), tmp_path / f"{cache.key(Counting(), {})}.json"
+    file.write_bytes(entry())
+    assert cache.found(claim, {}, tmp_path).margin == 1.0
+    file.write_bytes(UNUSABLE[what])
+    assert cache.found(claim, {}, tmp_path) == FOUND
+    assert claim.calls == 1
 
 
 @pytest.mark.parametrize("make", [os.mkfifo, Path.mkdir, lambda path: path.symlink_to("/dev/zero")])
-def test_what_is_no_file_is_not_read(tmp_path: Path, make: Callable[[Path], None]) -> None:
-    make(tmp_path / f"{cache.key(Counting(Finding('proved')), {})}.json")
-    assert cache.found(Counting(Finding("proved")), {}, tmp_path) == Finding("proved")
+def test_only_regular_files_are_read(tmp_path: Path, make: Callable[[Path], None]) -> None:
+    make(tmp_path / f"{cache.key(Counting(), {})}.json")
+    assert cache.found(Counting(), {}, tmp_path) == FOUND
 
 
 def test_an_entry_under_another_key_is_made_anew(tmp_path: Path) -> None:
     """What was proved for a dwell says nothing of a trigger without."""
-    claim = Counting(Finding("proved"))
+    claim = Counting()
     cache.found(claim, {"dwell_s": 1.0}, tmp_path)
     (kept,) = tmp_path.iterdir()
     kept.rename(tmp_path / f"{cache.key(claim, {'dwell_s': 0.0})}.json")
     assert not cache.found(claim, {"dwell_s": 0.0}, tmp_path).from_cache
-    assert claim.calls == 2
 
 
 def test_claims_that_are_not_listed_are_decided_anew(tmp_path: Path) -> None:
-    """A theorem's hypotheses take no longer to check than an entry takes to read; claims of others may change."""
-    claim = Counting(Finding("proved"))
+    """Third-party code is not part of the key."""
+    claim = Counting()
     claim.id = "OWN"
-    for _ in range(2):
-        assert not cache.found(claim, {}, tmp_path).from_cache
-    assert claim.calls == 2
-    assert not list(tmp_path.iterdir())
+    assert not any(cache.found(claim, {}, tmp_path).from_cache for _ in range(2))
 
 
 def test_the_key_covers_every_file_of_the_package_where_it_is(tmp_path: Path) -> None:
@@ -148,8 +133,5 @@ def test_the_key_covers_every_file_of_the_package_where_it_is(tmp_path: Path) ->
     (tmp_path / "sub/deeper/c.py").write_text("x = 2\n", encoding="utf-8")
     digests.append(cache.code_digest(tmp_path))
     (tmp_path / "sub/b.py").rename(tmp_path / "sub/deeper/b.py")
-    digests.append(cache.code_digest(tmp_path))
-    assert len(set(digests)) == 3
-    assert cache.code_digest(tmp_path) == digests[-1]
-    package = Path(airground_drake.__file__).parent
-    assert cache.code_digest(package) == cache._code()
+    assert len({*digests, cache.code_digest(tmp_path)}) == 3
+    assert cache.code_digest(Path(airground_drake.__file__).parent) == cache._code()

@@ -15,7 +15,6 @@ from airground_drake.nsbc.avoidance import Avoidance
 from airground_drake.run import events
 from airground_drake.run.simulation import simulate
 from airground_drake.scenarios.load import load
-from airground_drake.scenarios.world import make_world
 from airground_drake.verify import verify
 from airground_drake.world.motion import Motion
 from airground_drake.world.plant import FirstOrder
@@ -29,7 +28,7 @@ WORLD = world(
 VECTORS = arrays(np.float64, (4, 3), elements=st.floats(-9.0, 9.0))
 
 
-def test_distances_of_a_pair() -> None:
+def test_distances_and_shares() -> None:
     near = WORLD.around(WORLD.select(*ROBOTS))
     assert near.distance.tolist() == [
         [5.5, 2.5, 2.25, 1.625],  # shelf, point, two, UAV
@@ -44,22 +43,10 @@ def test_distances_of_a_pair() -> None:
 def test_both_of_a_pair_keep_the_same_to_the_bit_and_their_shares_make_one(radii: list[float]) -> None:
     found = world(2, np.zeros((2, 3)), radius=np.array(radii[:3]), obstacle_radius=np.array(radii[3:]))
     for one in found.robots:
-        for other in found.names():
-            if one != other:
-                pair = found.pair(one, other)
-                assert sum(pair.shares) == 1.0
-                if other in found.robots:
-                    assert pair.distance_m == found.pair(other, one).distance_m
-
-
-def test_the_world_of_a_scenario_has_its_bodies_in_order() -> None:
-    scenario = load("case_b")[0]
-    found = make_world(scenario)
-    assert found.names() == (*scenario.ugvs, scenario.uav.name, *scenario.obstacles)
-    assert [found.names()[found.select(kind)] for kind in ("ugv", "uav", "obstacle")] == [
-        tuple(scenario.ugvs), (scenario.uav.name,), tuple(scenario.obstacles),
-    ]  # fmt: skip
-    assert [body.name for body in found.moving] == [*scenario.ugvs, scenario.uav.name]
+        for other in set(found.names()) - {one}:
+            pair = found.pair(one, other)
+            assert sum(pair.shares) == 1.0
+            assert other not in found.robots or pair.distance_m == found.pair(other, one).distance_m
 
 
 @pytest.mark.parametrize(
@@ -99,14 +86,6 @@ def test_no_point_of_two_motions_is_nearer_than_the_least_distance(
     np.testing.assert_allclose(Ball(1.5).least_distance(apart), least - 1.5)
 
 
-@given(VECTORS, VECTORS, st.floats(1e-3, 1.0))
-def test_a_first_order_plant_moves_as_it_is_told(start: np.ndarray, velocity: np.ndarray, period: float) -> None:
-    plant = FirstOrder()
-    end = plant.step(start, velocity, period)
-    np.testing.assert_allclose(end, start + period * velocity, atol=1e-12)
-    assert plant.motion(start, end, period).off_m == plant.reach(6.0, period) == 0.0
-
-
 def test_a_plant_that_leaves_the_straight_line_costs_what_it_may_be_off(monkeypatch: pytest.MonkeyPatch) -> None:
     """SAFE-TRACE and the events of collisions ask the plant how robots move between the rows."""
     trace = simulate(load("minimal", ["duration_s=4.0"])[0], "d")
@@ -118,6 +97,5 @@ def test_a_plant_that_leaves_the_straight_line_costs_what_it_may_be_off(monkeypa
         both = 4.0 if pair["second"] in trace.robots else 2.0
         assert pair["min_distance_m"] == max(least[pair["first"], pair["second"]] - both, 0.0)
     assert off.finding.status == "refuted"
-    assert {event["kind"] for event in events.extract(trace, ())} - {event["kind"] for event in trace.events} == {
-        "collision"
-    }
+    told = {event["kind"] for event in events.extract(trace, ())} - {event["kind"] for event in trace.events}
+    assert told == {"collision"}

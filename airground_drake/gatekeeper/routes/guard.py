@@ -4,12 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from pydrake.solvers import MathematicalProgramResult, SolutionResult
-
 from airground_drake.base.arrays import Array
 from airground_drake.gatekeeper.budget import Budget
 from airground_drake.gatekeeper.problem import Problem
-from airground_drake.gatekeeper.relaxation import remaining_cost
+from airground_drake.gatekeeper.relaxation import unavoidable_cost
 from airground_drake.gatekeeper.solution import ConstantPlans, Solution, Status, cut_short
 
 Search = Callable[[Problem, ConstantPlans, Budget], Solution]
@@ -17,13 +15,7 @@ Search = Callable[[Problem, ConstantPlans, Budget], Solution]
 
 
 def guarded(problem: Problem, budget: Budget, search: Search) -> Solution:
-    """Search, unless the problem or its costs are not finite, or the budget is spent.
-
-    Args:
-        problem: data of (26).
-        budget: asked when the constant plans are evaluated: there is always one of them to go by.
-        search: what to do then.
-    """
+    """Search, unless the problem or its costs are not finite, or the budget is spent once constant plans are known."""
     if not problem.is_finite():
         return Solution(False, "refused_not_finite")
     constants = ConstantPlans.of(problem)
@@ -41,27 +33,6 @@ def without_optimum(
     normals: Array | None = None,
     ended: Status = "solver_failed",
 ) -> Solution:
-    """The better constant plan, when a solver gave nothing because it ran out of time or failed.
-
-    Args:
-        problem: what they are plans of.
-        constants: its constant plans.
-        budget: if it is spent, the solver wanted time.
-        normals: of half-planes that stand for (26d), (N, m, 3).
-        ended: how the solver says that it ended.
-    """
+    """The better constant plan, when a solver gave no solution; whatever it says, a spent budget is the reason."""
     status: Status = "budget_spent" if budget.spent() else ended
-    return cut_short(problem, constants.both, unavoidable_cost(problem), status=status, normals=normals)
-
-
-def how_it_ended(result: MathematicalProgramResult, budget: Budget) -> Status:
-    """How a solver ended: with an optimum, out of budget, or by failing."""
-    if result.is_success():
-        return "optimal"
-    stopped = budget.spent() or result.get_solution_result() == SolutionResult.kIterationLimit
-    return "budget_spent" if stopped else "solver_failed"
-
-
-def unavoidable_cost(problem: Problem) -> float:
-    """Lower bound of (25) over all plans, relaxed or not, for which no solver is needed."""
-    return float(remaining_cost(problem)[0])
+    return cut_short(problem, constants.both, unavoidable_cost(problem), status, normals=normals)

@@ -16,8 +16,8 @@ from airground_drake.gatekeeper.cost import Terms, half_plane_cost
 from airground_drake.gatekeeper.daqp_solver import Found, minimise
 from airground_drake.gatekeeper.drake_solvers import DrakeSearch
 from airground_drake.gatekeeper.problem import Problem
-from airground_drake.gatekeeper.relaxation import dual_bound, multipliers_at, normals_along, sum_up_rounding
-from airground_drake.gatekeeper.routes.guard import guarded, unavoidable_cost
+from airground_drake.gatekeeper.relaxation import dual_bound, normals_along, sum_up_rounding, unavoidable_cost
+from airground_drake.gatekeeper.routes.guard import guarded
 from airground_drake.gatekeeper.solution import ConstantPlans, Solution, Status, cheapest
 
 _AGREE = 1e-6
@@ -27,19 +27,17 @@ _AGREE = 1e-6
 class MixedIntegerRoute:
     """Mixed-integer quadratic program with one binary per stage, or per block of stages, and a proof of optimality.
 
-    The program (`BinaryProgram`) is one `MathematicalProgram` with the half-planes of `RelaxedRoute`. DAQP takes its
-    numbers and searches by branch and bound; Gurobi and Mosek can do so in its place, where Drake has them. First the
-    relaxation is solved, and the best of sum-up rounding, the constant plans and what is left of the previous plan is
-    improved by changing one choice at a time. The cost of that plan, the incumbent, cuts the search.
+    First the relaxation is solved, as by `RelaxedRoute`. The best of sum-up rounding, the constant plans and the rest
+    of the previous plan is improved by changing one choice at a time. Its cost, that of the incumbent, cuts the search
+    by branch and bound: DAQP's, or that of Gurobi or Mosek where Drake has them.
 
-    The plan returned is the cheapest by exact distances of the optimum, the incumbent, what that was chosen from, and
-    each of these with the other first choice. `route_bound` is the optimum along the half-planes; the gap is 0.
+    The plan returned is the cheapest by exact distances of the optimum, the incumbent, the plans that it was chosen
+    from, and each of these with the other first choice. `route_bound` is the optimum along the half-planes; the gap
+    is 0.
 
-    Budget: DAQP can be stopped by the clock only (its limit of iterations is one for each node), but it says how many
-    iterations it took. If they are more than `search_iterations`, or the time `search_s` was up, or the solver fails,
-    the incumbent decides, which does not depend on the clock; its bound is that of the relaxation.
-
-    The program is built once for a number of stages and blocks, then only its coefficients change.
+    Budget: only the clock can stop DAQP during a search, but it says how many iterations it took. If they are more than
+    `search_iterations`, or the time `search_s` was up, or the solver fails, the incumbent decides. It does not depend
+    on the clock; its bound is that of the relaxation.
     """
 
     def __init__(self, blocks: int | None = None, solver: str = "daqp") -> None:
@@ -92,8 +90,9 @@ class MixedIntegerRoute:
         )
 
     def _program(self, problem: Problem) -> BinaryProgram:
+        """Built once for a number of stages and blocks; then only its coefficients change."""
         stages = problem.stages
-        size = stages, stages if self._blocks is None else min(self._blocks, stages)
+        size = stages, min(self._blocks or stages, stages)
         if size not in self._programs:
             self._programs[size] = BinaryProgram(*size)
         return self._programs[size]
@@ -108,8 +107,7 @@ def _known(binary: BinaryProgram, problem: Problem, normals: Array) -> tuple[flo
     bound, relaxed = -math.inf, minimise(binary, relaxed=True).omega
     if relaxed is not None:
         known.append(sum_up_rounding(relaxed))
-        omega = binary.plan(relaxed)
-        bound = dual_bound(problem, normals, omega, multipliers_at(problem, normals, problem.positions(omega)))
+        bound = dual_bound(problem, normals, binary.plan(relaxed))
     return bound, [binary.plan(values) for values in known]
 
 
@@ -123,24 +121,25 @@ def _improved(terms: Terms, normals: Array, block: npt.NDArray[np.int64], start:
         block: that each stage belongs to, (N,).
         start: where to begin, (N,), constant on each block.
     """
-    plan, positions = start.copy(), np.empty((len(start), 3))
-    best, changed = np.inf, True
+    plan, best, changed = start.copy(), _cost_turned(terms, normals, block, start, -1), True
     while changed:
         changed = False
-        for turned in range(-1, block[-1] + 1):
-            x, y, z = terms.initial[0], terms.initial[1], terms.initial[2]
-            for k in range(len(plan)):
-                mode = int(plan[k]) if block[k] != turned else 1 - int(plan[k])
-                x += terms.dt * terms.velocities[mode, k, 0]
-                y += terms.dt * terms.velocities[mode, k, 1]
-                z += terms.dt * terms.velocities[mode, k, 2]
-                positions[k, 0], positions[k, 1], positions[k, 2] = x, y, z
-            cost = half_plane_cost(terms, positions, normals)
+        for turned in range(block[-1] + 1):
+            cost = _cost_turned(terms, normals, block, plan, turned)
             if cost < best * (1.0 - 1e-12):
-                if best < np.inf:
-                    changed = True
-                    for k in range(len(plan)):
-                        if block[k] == turned:
-                            plan[k] = 1.0 - plan[k]
-                best = cost
+                plan, best, changed = np.where(block == turned, 1.0 - plan, plan), cost, True
     return plan
+
+
+@njit(cache=True)
+def _cost_turned(terms: Terms, normals: Array, block: npt.NDArray[np.int64], plan: Array, turned: int) -> float:
+    """Cost of a plan along the half-planes, with the opposite choice in one block; -1: in no block."""
+    positions = np.empty((len(plan), 3))
+    x, y, z = terms.initial[0], terms.initial[1], terms.initial[2]
+    for k in range(len(plan)):
+        mode = int(plan[k]) if block[k] != turned else 1 - int(plan[k])
+        x += terms.dt * terms.velocities[mode, k, 0]
+        y += terms.dt * terms.velocities[mode, k, 1]
+        z += terms.dt * terms.velocities[mode, k, 2]
+        positions[k, 0], positions[k, 1], positions[k, 2] = x, y, z
+    return half_plane_cost(terms, positions, normals)

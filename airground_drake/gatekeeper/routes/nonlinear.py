@@ -6,13 +6,13 @@ import math
 from typing import Any
 
 import numpy as np
-from pydrake.solvers import MathematicalProgram, QuadraticConstraint, SnoptSolver, SolverOptions
+from pydrake.solvers import MathematicalProgram, QuadraticConstraint, SnoptSolver, SolutionResult, SolverOptions
 
 from airground_drake.base.arrays import Array
 from airground_drake.gatekeeper.budget import Budget
 from airground_drake.gatekeeper.problem import Evaluation, Problem
-from airground_drake.gatekeeper.relaxation import sum_up_rounding, within_reach
-from airground_drake.gatekeeper.routes.guard import guarded, how_it_ended, unavoidable_cost, without_optimum
+from airground_drake.gatekeeper.relaxation import sum_up_rounding, unavoidable_cost, within_reach
+from airground_drake.gatekeeper.routes.guard import guarded, without_optimum
 from airground_drake.gatekeeper.solution import ConstantPlans, Solution, Status, cheapest, cut_short
 
 _AXES = 2  # UGVs move in their plane
@@ -38,8 +38,8 @@ class NonlinearRoute:
     The start is the cheaper constant plan. The plan returned is the cheapest, by the exact cost (25), of the
     rounded one and the two constant ones. A local optimum bounds nothing: `route_bound` and `gap` are -1.
 
-    Budget: major iterations and the time left go to the solver. An iterate that it stops at is
-    rounded like an optimum; the status is 'budget_spent' and the bound then that of `remaining_cost`.
+    Budget: major iterations and the time left go to the solver. If it stops early, its iterate is rounded like an
+    optimum; the status is then 'budget_spent' and the bound `unavoidable_cost`.
     """
 
     def __init__(self) -> None:
@@ -57,8 +57,7 @@ class NonlinearRoute:
         rounded = sum_up_rounding(relaxed)
         plans = (problem.evaluate(rounded), *constants.both)
         if status != "optimal":
-            bound = unavoidable_cost(problem)
-            return cut_short(problem, plans, bound, status=status, relaxed=relaxed, rounded=rounded)
+            return cut_short(problem, plans, unavoidable_cost(problem), status, relaxed=relaxed, rounded=rounded)
         return cheapest(problem, plans, relaxed=relaxed, rounded=rounded)
 
     def _relax(self, problem: Problem, start: Evaluation, budget: Budget) -> tuple[Array | None, Status]:
@@ -69,7 +68,9 @@ class NonlinearRoute:
         except RuntimeError:
             return None, "solver_failed"
         relaxed = np.clip(result.GetSolution(omega), 0.0, 1.0)
-        return relaxed if np.isfinite(relaxed).all() else None, how_it_ended(result, budget)
+        stopped = budget.spent() or result.get_solution_result() == SolutionResult.kIterationLimit
+        ended: Status = "optimal" if result.is_success() else "budget_spent" if stopped else "solver_failed"
+        return relaxed if np.isfinite(relaxed).all() else None, ended
 
 
 def _options(budget: Budget) -> SolverOptions:
@@ -102,12 +103,11 @@ def relaxation(problem: Problem, start: Evaluation) -> tuple[MathematicalProgram
     r = program.NewContinuousVariables(len(stage), "r")
 
     of_error, of_slack = problem.terms.error_weights.repeat(_AXES), np.full(stages, problem.slack_weight)
-    for name, weights, variables in (("error", of_error, e), ("slack", of_slack, u)):
+    for weights, variables in ((of_error, e), (of_slack, u)):  # (25)
         hessian = np.diag(2.0 * weights * dt)
-        cost = program.AddQuadraticCost(hessian, np.zeros(len(variables)), variables, is_convex=True)
-        cost.evaluator().set_description(f"(25) {name}")
-    program.AddBoundingBoxConstraint(0.0, 1.0, omega).evaluator().set_description("(27c) relaxed")
-    program.AddBoundingBoxConstraint(0.0, np.inf, u).evaluator().set_description("(27e)")
+        program.AddQuadraticCost(hessian, np.zeros(len(variables)), variables, is_convex=True)
+    program.AddBoundingBoxConstraint(0.0, 1.0, omega)  # (27c)
+    program.AddBoundingBoxConstraint(0.0, np.inf, u)  # (27e)
 
     before = np.vstack([problem.initial, problem.reference[:-1]])
     drift = (dt * problem.refuse + before - problem.reference)[:, :_AXES]
@@ -115,28 +115,26 @@ def relaxation(problem: Problem, start: Evaluation) -> tuple[MathematicalProgram
     for axis in range(_AXES):
         change[_AXES * np.arange(stages) + axis, np.arange(stages)] = dt * (problem.accept - problem.refuse)[:, axis]
     dynamics = np.hstack([np.eye(size) - np.eye(size, k=-_AXES), -change])
-    program.AddLinearEqualityConstraint(
-        dynamics, drift.ravel(), np.concatenate([e, omega])
-    ).evaluator().set_description("(23), (27b)")
+    program.AddLinearEqualityConstraint(dynamics, drift.ravel(), np.concatenate([e, omega]))  # (23), (27b)
 
     distance = problem.distances[point]
     offset = start.positions[stage] - problem.centres[stage, point]
     if len(stage):
-        program.AddBoundingBoxConstraint(0.0, np.inf, r).evaluator().set_description("radius of (27d)")
+        program.AddBoundingBoxConstraint(0.0, np.inf, r)
         picks = np.zeros((len(stage), stages))
         picks[np.arange(len(stage)), stage] = 1.0
         program.AddLinearConstraint(
             np.hstack([np.eye(len(stage)), picks]), distance, np.full(len(stage), np.inf), np.concatenate([r, u])
-        ).evaluator().set_description("(27d) radius and slack")
+        )
     away = problem.reference[stage] - problem.centres[stage, point]
     away[:, 2] = offset[:, 2]  # the height does not change
     hessian = np.diag([2.0, 2.0, -2.0])
     for i, k in enumerate(stage.tolist()):
-        # ||e + away||^2 >= r^2
+        # (27d): ||e + away||^2 >= r^2
         program.AddQuadraticConstraint(
             hessian, np.array([2.0 * away[i, 0], 2.0 * away[i, 1], 0.0]), -float(away[i] @ away[i]), np.inf,
             np.array([e[_AXES * k], e[_AXES * k + 1], r[i]]), QuadraticConstraint.HessianType.kIndefinite,
-        ).evaluator().set_description(f"(27d) stage {k} point {int(point[i])}")  # fmt: skip
+        )  # fmt: skip
 
     lacking = np.maximum(0.0, distance - np.linalg.norm(offset, axis=1))
     slack = np.zeros(stages)

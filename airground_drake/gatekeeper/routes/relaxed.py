@@ -8,8 +8,8 @@ from airground_drake.gatekeeper.binary_program import BinaryProgram
 from airground_drake.gatekeeper.budget import Budget
 from airground_drake.gatekeeper.daqp_solver import minimise
 from airground_drake.gatekeeper.problem import Problem
-from airground_drake.gatekeeper.relaxation import dual_bound, multipliers_at, normals_along, sum_up_rounding
-from airground_drake.gatekeeper.routes.guard import guarded, unavoidable_cost, without_optimum
+from airground_drake.gatekeeper.relaxation import dual_bound, normals_along, sum_up_rounding, unavoidable_cost
+from airground_drake.gatekeeper.routes.guard import guarded, without_optimum
 from airground_drake.gatekeeper.solution import ConstantPlans, Solution, cheapest
 
 ACTIVE_SETS = 100
@@ -19,28 +19,20 @@ ACTIVE_SETS = 100
 class RelaxedRoute:
     """Relax, solve, round; every solution carries its optimality gap.
 
-    The obstacle constraint (26d) is replaced by supporting half-planes n_k.(p_k - o) >= d - u_k with unit n_k.
-    As ||p_k - o|| >= n_k.(p_k - o), they imply (26d) for any n_k: conservative, never optimistic. The n_k are
-    taken along the better of the two constant plans. Taking them along the best plan found and solving again
-    was tried: it costs half as much again and brought the plans no nearer to the best known.
+    Half-planes along the better of the two constant plans stand for (26d). Half-planes along the best plan found, and
+    a second solve, cost half as much again and brought the plans no nearer to the best known.
 
     The rounded plan, the same with the other first stage, and both constant plans are evaluated with the exact
     distances; the cheapest is returned. (A search for better plans, which came within 0.1 % of the best known, was
     tried and taken out: it changed no answer of any shipped case, and plans that switch are predicted to no better
     than 0.3 m.)
 
-    `route_bound` is computed from multipliers by weak duality (`dual_bound`), so that it is a bound whatever the
-    solver's tolerances.
-
-    Budget: iterations (active sets: `ACTIVE_SETS` times as many) and the time left go to the solver; there is no tree
-    to search. Without an optimum the better constant plan decides.
-
-    The program is that of `MixedIntegerRoute` with shares in place of binaries. It is built once for a number of
-    stages, then only its coefficients change.
+    Budget: iterations (active sets: `ACTIVE_SETS` times as many) and the time left go to the solver. Without an optimum
+    the better constant plan decides.
     """
 
     def __init__(self) -> None:
-        """Start without any program."""
+        """Start without any program: one is built for each number of stages, then only its coefficients change."""
         self._programs: dict[int, BinaryProgram] = {}
 
     def solve(self, problem: Problem, budget: Budget = Budget()) -> Solution:  # noqa: B008 (immutable)
@@ -58,7 +50,7 @@ class RelaxedRoute:
         relaxed = found.omega
         if relaxed is None:
             return without_optimum(problem, constants, budget, normals, ended=found.ended)
-        bound = dual_bound(problem, normals, relaxed, multipliers_at(problem, normals, problem.positions(relaxed)))
+        bound = dual_bound(problem, normals, relaxed)
         if found.multipliers is not None and program.within.any():  # better where half-planes share the slack
             multipliers = np.zeros(program.within.shape)
             multipliers[program.within] = found.multipliers

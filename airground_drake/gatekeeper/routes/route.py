@@ -1,4 +1,4 @@
-"""What a solution route is: the contract for those here and for any from elsewhere."""
+"""The contract of a solution route, built in or added from outside."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ class Route(Protocol):
     """A way to solve (26): any object with this method, whose class can be constructed without arguments.
 
     A gatekeeper keeps one object for all its UGVs and samples, so that a route may keep programs or workspaces
-    between calls. What it owes:
+    between calls. The contract:
 
     - It never raises, whatever the problem. For data that are not finite, and costs that overflow, it returns
       `Solution(False, "refused_not_finite")`, as `guard.guarded` does.
@@ -23,13 +23,12 @@ class Route(Protocol):
     - It keeps the budget: the counts, and the deadline but for one step of its own. At the end of the budget it
       returns the best plan known, with status 'budget_spent'. Counts alone give the same solution on every machine
       and at every call.
-    - `plan` is binary, `positions` is where it leads, `objective` its cost (25), both by `Problem.evaluate`; no
-      constant plan is cheaper.
-    - `objective_accept` and `objective_refuse` are costs of plans as well; `objective` is the lower of the two, and
-      `accept_first` says whose.
-    - `route_bound`, `gap`: a valid bound of what `Solution` says that it bounds, or -1. Never a guess: the
-      verifier computes it again.
-    - `relaxed`, `rounded`: both or none, `rounded` by `relaxation.sum_up_rounding`.
+    - `plan` is binary. `positions` and the cost `objective` are those of `Problem.evaluate`; no constant plan is
+      cheaper.
+    - `objective_accept` and `objective_refuse` are costs of plans as well. `objective` is the lower of the two, and
+      `accept_first` says which.
+    - `route_bound` and `gap` are valid as `Solution` describes them, or -1. The verifier computes them again.
+    - `relaxed` and `rounded` are both there or both None, `rounded` by `relaxation.sum_up_rounding`.
     """
 
     def solve(self, problem: Problem, budget: Budget, /) -> Solution:

@@ -1,6 +1,6 @@
-"""Safe intervals, compiled (numba): when motions block the nodes of a roadmap, and the search among free times.
+"""Safe intervals: when the nodes of a roadmap are free, and the search for the earliest way among the free times.
 
-There is no fast-math: results are those of IEEE arithmetic in the order written.
+The functions are compiled by numba without fast-math: results are those of IEEE arithmetic in the order written.
 """
 
 from __future__ import annotations
@@ -18,12 +18,12 @@ Indices = npt.NDArray[np.int64]
 
 
 class Grid(NamedTuple):
-    """Nodes of a roadmap, sorted into square cells to find them by place.
+    """Nodes of a roadmap in square cells, to find the nodes near a place.
 
     Attributes:
         nodes: (N, 2), m.
-        first: first member of each cell, column by column, (cells + 1,).
-        members: nodes by cell, (N,).
+        first: index of the first member of each cell, column by column, (cells + 1,).
+        members: nodes sorted by cell, (N,).
         corner: lowest corner of the grid, (2,), m.
         size: of a cell, m.
         shape: number of columns and rows, (2,).
@@ -42,8 +42,8 @@ class Edges(NamedTuple):
 
     Attributes:
         first: first edge of each node, (N + 1,).
-        heads: where edges lead, (E,).
-        durations: of travel along them, (E,), s.
+        heads: node at the end of each edge, (E,).
+        durations: travel times, (E,), s.
     """
 
     first: Indices
@@ -52,11 +52,11 @@ class Edges(NamedTuple):
 
 
 class Intervals(NamedTuple):
-    """Safe intervals: when nobody is too near to a node.
+    """Safe intervals: times at which no other robot is too near to a node.
 
     Attributes:
         first: first interval of each node, (N + 1,).
-        times: begin and end of each, (K, 2), s; the end may be infinite.
+        times: begin and end of each interval, (K, 2), s; the end may be infinite.
     """
 
     first: Indices
@@ -65,15 +65,18 @@ class Intervals(NamedTuple):
 
 @njit(cache=True)
 def time_within(x: float, y: float, vx: float, vy: float, radius: float, duration: float) -> tuple[float, float]:
-    """When a point is nearer to the origin than a radius: begin and end, s; the begin is not before the end: never.
+    """When a point that moves straight is nearer to the origin than a radius.
 
     Args:
         x: place at t = 0, m.
-        y: the same.
+        y: place at t = 0, m.
         vx: velocity, m/s.
-        vy: the same.
+        vy: velocity, m/s.
         radius: m.
         duration: of the motion, s; may be infinite.
+
+    Returns:
+        Begin and end of that time, s. The end is not after the begin if the point is never so near.
     """
     c = x * x + y * y - radius * radius
     squared = vx * vx + vy * vy
@@ -89,7 +92,7 @@ def time_within(x: float, y: float, vx: float, vy: float, radius: float, duratio
 
 @njit(cache=True)
 def cells_between(low: float, high: float, corner: float, size: float, count: int) -> tuple[int, int]:
-    """First cell of a row of cells that an interval meets, and the one after the last.
+    """First cell in a row that an interval meets, and the cell after the last one.
 
     Args:
         low: begin of the interval, m.
@@ -103,40 +106,36 @@ def cells_between(low: float, high: float, corner: float, size: float, count: in
 
 
 @njit(cache=True)
-def blocked_times(
-    motion: Array, grid: Grid, radius: float, special: Indices, special_radii: Array
-) -> tuple[Indices, Array]:
-    """When a timed motion is nearer to nodes than a radius.
+def nodes_near(grid: Grid, column: int, low: float, high: float) -> Indices:
+    """The nodes of a column of cells between two coordinates, m, and of the cells that these lie in."""
+    begin, end = cells_between(low, high, grid.corner[1], grid.size, grid.shape[1])
+    return grid.members[grid.first[column * grid.shape[1] + begin] : grid.first[column * grid.shape[1] + end]]
+
+
+@njit(cache=True)
+def blocked_times(motion: Array, grid: Grid, radii: Array) -> tuple[Indices, Array]:
+    """When a timed motion is nearer to nodes than their radii.
 
     Args:
         motion: (M, 3).
         grid: the nodes.
-        radius: m.
-        special: nodes that have a radius of their own, (S,).
-        special_radii: the same, (S,), m; only what is below `radius` counts.
+        radii: of the nodes, (N,), m.
 
     Returns:
         Nodes (B,) and begin and end of each blocked time, (B, 2), s.
     """
     found, times, count = np.empty(1024, np.int64), np.empty((1024, 2)), 0
+    reach = radii.max()
     for k in range(len(motion)):
         begin, px, py = motion[k, 0], motion[k, 1], motion[k, 2]
         duration, qx, qy, vx, vy = np.inf, px, py, 0.0, 0.0
         if k + 1 < len(motion):
             duration, qx, qy = motion[k + 1, 0] - begin, motion[k + 1, 1], motion[k + 1, 2]
             vx, vy = (qx - px) / duration, (qy - py) / duration
-        x, y = grid.corner
-        columns, rows = grid.shape
-        left, right = cells_between(min(px, qx) - radius, max(px, qx) + radius, x, grid.size, columns)
-        low, high = cells_between(min(py, qy) - radius, max(py, qy) + radius, y, grid.size, rows)
+        left, right = cells_between(min(px, qx) - reach, max(px, qx) + reach, grid.corner[0], grid.size, grid.shape[0])
         for column in range(left, right):
-            # the cells of a column lie one behind the other
-            for n in grid.members[grid.first[column * rows + low] : grid.first[column * rows + high]]:
-                keep = radius
-                for s in range(len(special)):
-                    if special[s] == n:
-                        keep = min(keep, special_radii[s])
-                entry, leave = time_within(px - grid.nodes[n, 0], py - grid.nodes[n, 1], vx, vy, keep, duration)
+            for n in nodes_near(grid, column, min(py, qy) - reach, max(py, qy) + reach):
+                entry, leave = time_within(px - grid.nodes[n, 0], py - grid.nodes[n, 1], vx, vy, radii[n], duration)
                 if entry >= leave:
                     continue
                 if count == len(found):
@@ -148,7 +147,7 @@ def blocked_times(
 
 @njit(cache=True)
 def times_by_node(count: int, nodes: Indices, times: Array) -> tuple[Indices, Array]:
-    """Sort blocked times by node, and those of a node by their begin.
+    """Sort blocked times by node, and the times of each node by their begin.
 
     Args:
         count: of nodes, N.
@@ -156,7 +155,7 @@ def times_by_node(count: int, nodes: Indices, times: Array) -> tuple[Indices, Ar
         times: begin and end of each blocked time, (B, 2), s.
 
     Returns:
-        First time of each node, (N + 1,), and the sorted times, (B, 2), s.
+        Index of the first time of each node, (N + 1,), and the sorted times, (B, 2), s.
     """
     first = np.zeros(count + 1, np.int64)
     for n in nodes:
@@ -204,13 +203,13 @@ def safe_intervals(count: int, nodes: Indices, times: Array) -> Intervals:
 
 @njit(cache=True)
 def join_time(arrival: float, end: float, first: float, last: float) -> float:
-    """Earliest time at which a robot that waits at a node can leave the roadmap for its preset, s; infinite: never.
+    """Earliest time at which a robot that waits at a node can join its preset there, s; infinite: never.
 
     Args:
         arrival: of the robot at the node, s.
         end: of the safe interval in which it waits, s.
-        first: time at which the preset can be joined there, s.
-        last: the same; infinite: the robot stays at the node for good, which the whole interval must allow.
+        first: earliest time at which the node allows a join, s.
+        last: latest such time, s. Infinite: the robot then stays at the node, so the interval must have no end.
     """
     joined = max(arrival, first)
     if joined > min(last, end) or (last == np.inf and end < np.inf):
@@ -222,22 +221,21 @@ def join_time(arrival: float, end: float, first: float, last: float) -> float:
 def search(
     edges: Edges, intervals: Intervals, start: int, joins: Array, to_go: Array, budget: int
 ) -> tuple[Indices, Array, float, int]:
-    """Safe-interval search: the way from a node to the earliest join.
+    """Safe-interval search (A*): the way from a node to the earliest join.
 
-    A robot may wait at a node during a safe interval of it, and travels an edge only while both ends are safe.
+    The robot may wait at a node during a safe interval of the node. It travels an edge only while both ends are safe.
 
     Args:
         edges: of the roadmap.
-        intervals: safe ones.
+        intervals: safe intervals of its nodes.
         start: node at t = 0.
-        joins: times at which a robot that waits at a node can leave the roadmap, first and last, (N, 2), s; see
-            `join_time`.
+        joins: first and last time at which the preset can be joined at each node, (N, 2), s; see `join_time`.
         to_go: lower bound of the time from a node to any join, (N,), s.
-        budget: of expanded intervals.
+        budget: largest number of expanded intervals.
 
     Returns:
-        Nodes (L,) in order, arrival at each (L,), s, the time of the join (infinite: there is none; then L = 0), and
-        the number of expanded intervals.
+        Nodes (L,) in order, arrival at each (L,), s, time of the join, s, and number of expanded intervals. If no join
+        is found, L = 0 and its time is infinite.
     """
     first, times = intervals
     arrival, before = np.full(len(times), np.inf), np.full(len(times), -1, np.int64)
@@ -284,11 +282,11 @@ def reach_neighbours(
         edges: see `search`.
         intervals: see `search`.
         node: where the robot is.
-        i: the safe interval of the node, in which it may wait.
+        i: safe interval of the node in which the robot may wait.
         to_go: see `search`.
-        arrival: earliest one found in each interval, (K,), s; written to.
-        before: interval from which it is reached, (K,); written to.
-        heap: of lower bounds of join times, s, and intervals; written to.
+        arrival: earliest arrival found in each interval, (K,), s; written to.
+        before: interval from which each is reached, (K,); written to.
+        heap: pairs of a lower bound of the join time, s, and an interval; written to.
     """
     first, times = intervals
     end = times[i, 1]

@@ -1,4 +1,4 @@
-"""Joint plans: robots are planned for one after the other, in many orders (prioritised planning), within a budget."""
+"""Joint plans by prioritised planning: one robot after the other, in many orders, within a budget."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ MOST_ORDERS = 30
 MOST_SEARCHES = 240
 """Largest number of searches for single robots: a large team gets fewer orders."""
 LEAVING = 2.0
-"""A robot may need its place for the time in which it travels this many times the distance that robots keep."""
+"""A robot leaves its place within the time in which it travels this many times the distance that robots keep."""
 LATER_ORDERS = 3
-"""After the first order in which every robot finds a way, so many more are tried for a better plan."""
+"""Orders that are tried for a better plan after the first complete one."""
 
 
 @dataclass(frozen=True)
@@ -28,9 +28,9 @@ class Effort:
     """Limits of the work on a plan, in counts, so that the plan is the same on every machine.
 
     Attributes:
-        orders: of the robots.
-        searches: for single robots, in all orders together.
-        expansions: of safe intervals, in all searches together; a quarter of them is kept for a partial plan.
+        orders: orders of the robots.
+        searches: searches for single robots, in all orders together.
+        expansions: expanded intervals, in all searches together; a quarter is reserved for a partial plan.
     """
 
     orders: int = MOST_ORDERS
@@ -44,8 +44,8 @@ class Plan:
 
     Attributes:
         ways: one per robot; None: it stays where it is.
-        orders: how many were tried.
-        expansions: of safe intervals.
+        orders: number of orders that were tried.
+        expansions: number of expanded intervals.
     """
 
     ways: tuple[Way | None, ...]
@@ -67,20 +67,21 @@ def plan(
     follow: float = math.inf,
     effort: Effort | None = None,
 ) -> Plan:
-    """Plan ways for some robots that keep away from discs, from each other, and from others with fixed motions.
+    """Plan ways for some robots, which keep their distances from discs, from each other and from fixed motions.
 
-    Each robot is planned for among those before it. If one finds no way, the order is tried again, and those before it
-    leave the places of later ones alone until these can have left them. If that fails, too, the robot without a way
-    comes first in the next order. Where that order has been tried, orders are drawn (always the same ones). If no
-    order serves, robots without a way stay where they are, and the others go round them.
+    The robots of an order are planned for in turn, each among the ways of those before it. If a robot finds no way:
+    1. The order is tried again, and every robot keeps clear of the starts of later robots until these can have left.
+    2. If that fails too, the robot without a way comes first in the next order.
+    3. If that order has been tried before, the next order is drawn from a fixed sequence.
+    If no order gives every robot a way, robots without a way stay where they are, and the others go round them.
 
     Args:
-        space: what a robot without a body keeps away from.
+        space: discs and distances for a robot without a body.
         tasks: one per robot.
         speeds: m/s, one per robot.
-        fixed: others, with their motions from t = 0 on.
-        follow: for how long a robot must be able to follow its preset after it has joined it, s.
-        effort: None: the default.
+        fixed: other robots, with their motions from t = 0 on.
+        follow: how long a robot must be able to follow its preset after it has joined it, s.
+        effort: limits of the work; default: `Effort()`.
     """
     effort = effort or Effort()
     spaces = [space.of(task.body) for task in tasks]
@@ -112,7 +113,7 @@ class _Search:
         self._without_way: list[int] = []
 
     def in_orders(self) -> list[Way | None] | None:
-        """The best complete plan; None without any."""
+        """The best complete plan, or None."""
         if any(math.isinf(mover.to_go[mover.own.start]) for mover in self._movers):
             return None
         best: list[Way | None] | None = None
@@ -126,7 +127,7 @@ class _Search:
             self.orders += 1
             left -= 1
             ways, failed = self._in_order(order)
-            if failed == order[0]:  # it has no way even if the others of the plan are left out
+            if failed == order[0]:  # it has no way even without the other robots of the plan
                 self._without_way.append(failed)
                 return None
             if failed is not None:
@@ -143,7 +144,7 @@ class _Search:
         return best
 
     def _drawn(self) -> Iterator[tuple[int, ...]]:
-        """Orders: first by length of way, the longest first, then drawn ones."""
+        """Orders of the robots: the longest way first, then random ones from a fixed seed."""
         count = len(self._movers)
         by_length = sorted(range(count), key=lambda i: (-self._movers[i].to_go[self._movers[i].own.start], i))
         yield tuple(by_length)
@@ -154,12 +155,12 @@ class _Search:
     def _in_order(
         self, order: Sequence[int], staying: Sequence[int] = (), *, considerate: bool = False
     ) -> tuple[list[Way | None], int | None]:
-        """Ways of the robots, planned for in this order, and the first robot without one (None: all have one).
+        """Ways of the robots in this order, and the first robot without a way, or None.
 
         Args:
             order: of the robots.
             staying: robots that stay where they are.
-            considerate: whether robots keep clear of the places of later ones until these can have left.
+            considerate: whether robots keep clear of the starts of later robots until these can have left.
         """
         ways: list[Way | None] = [None] * len(self._movers)
         taken = [*self._fixed, *(_resting(self._movers[i].task) for i in staying)]
@@ -176,13 +177,13 @@ class _Search:
         return ways, None
 
     def _leaving(self, robot: int) -> Body:
-        """A robot at its place, for as long as it may need it."""
+        """A robot at its start, until it can have left."""
         mover = self._movers[robot]
         until = LEAVING * (mover.space.apart + mover.space.spacing) / mover.speed
         return _resting(mover.task)._replace(until=until)
 
     def partly(self) -> list[Way | None]:
-        """A plan in which some robots stay: each one that finds no way is dropped, and the others are planned anew."""
+        """A plan in which robots without a way stay. Each time a robot finds none, the others are planned anew."""
         self._limit = self._effort.expansions
         staying = self._without_way
         order = next(self._drawn())

@@ -1,4 +1,4 @@
-"""The graph on which robots move: a lattice between the discs, and starts, targets, presets and shortest paths."""
+"""The graph on which robots move: a lattice between the discs, with the robots' starts, presets and shortest paths."""
 
 from __future__ import annotations
 
@@ -22,14 +22,13 @@ PITCH = 0.2
 REACH = 1.75
 """Nodes outside the lattice are connected to all nodes within this many spacings."""
 FAR = 0.95
-"""Edges from starts and to targets are no longer than this share of what `single.find` allows."""
+"""Edges from starts and to targets are no longer than this share of the length that `single.find` allows."""
 RINGS, RAYS = 3, 16
-"""Extra nodes round a start, in rings: robots that block each other have little room."""
+"""Rings of extra nodes round a start, and nodes per ring: robots that block each other have little room."""
 MOST_NODES = 30_000
-"""Largest number of nodes of the lattice: a larger area gets a wider spacing."""
+"""Largest number of nodes of the lattice; a larger area gets a wider spacing."""
 MOST_PATH_NODES = 2_000
-"""Largest number of nodes of a preset or shortest path: a longer one gets wider gaps, and is connected through the
-lattice."""
+"""Largest number of nodes of a preset or shortest path; a longer path gets wider gaps, which the lattice connects."""
 CHORDS = 0.5
 """Share of the clearance that edges keep. Chords of the arcs of shortest paths come nearer to discs than the arcs."""
 ARCS = 0.75
@@ -39,15 +38,15 @@ ROUNDING_M = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class Space:
-    """Discs and distances that a robot has to keep. `Space.of` makes it for a robot with a body.
+    """Discs and distances that a robot has to keep. `Space.of` makes the space of a robot with a body.
 
     Attributes:
         centres: of the obstacles, (m, 2), m.
-        radii: distance to keep from them, (m,), m.
-        clearance: to keep beyond that, m; nodes of the lattice keep it all, edges half of it.
-        apart: distance that the robot's centre has to keep from the surfaces of others, m.
-        spacing: to keep beyond that where possible, m; not 0.
-        above: distance of the obstacles from the robot's plane, (m,), m; `radii` are those of balls then.
+        radii: distances to keep from the centres, (m,), m.
+        clearance: extra distance from obstacles, m. Nodes of the lattice keep all of it, edges half of it.
+        apart: distance between the robot's centre and the surfaces of other robots, m.
+        spacing: extra distance from other robots where possible, m; not 0.
+        above: distances of the obstacles from the robot's plane, (m,), m; then `radii` are radii of balls.
     """
 
     centres: Array
@@ -58,15 +57,16 @@ class Space:
     above: Array | float = 0.0
 
     def of(self, body: float) -> Space:
-        """The same in the plane, for the centre of a robot whose body has this radius, m."""
+        """This space for the centre of a robot whose body has this radius, m: balls are cut by the robot's plane."""
         squared = np.square(self.radii + body) - np.square(self.above)
         near = squared > 0.0
         return Space(self.centres[near], np.sqrt(squared[near]), self.clearance, self.apart + body, self.spacing)
 
     def wide(self, longest: float, body: float = 0.0) -> float:
-        """Distance of another robot from both ends of an edge, m, that keeps it `apart + spacing` from the whole edge.
+        """How far another robot must be from both ends of an edge to be `apart + spacing` from the whole edge, m.
 
-        The squared distance to a point of an edge of length L is a mean of those to the ends less s (1 - s) L^2.
+        Let s be the share of the edge up to a point, and L its length. The squared distance to that point is the
+        weighted mean of the squared distances to the ends, less s (1 - s) L^2.
 
         Args:
             longest: length of the longest edge, m.
@@ -76,22 +76,22 @@ class Space:
 
     @property
     def discs(self) -> Array:
-        """Centres, and the distances that motions keep except near their ends, (m, 3), m."""
+        """Centres and distances to keep with the clearance of edges, (m, 3), m."""
         return self._discs(CHORDS * self.clearance)
 
     def _discs(self, clearance: float) -> Array:
-        """Centres, and distances to keep with a clearance, (m, 3), m."""
+        """Centres and distances to keep with a clearance, m, as (m, 3), m."""
         return np.column_stack([self.centres, self.radii + clearance])
 
     def segments_are_free(self, begin: Array, end: Array) -> npt.NDArray[np.bool_]:
-        """Which of the segments (K, 2)-(K, 2), m, come nearer to no disc than allowed, or than one of their ends is.
+        """Which segments, from begin (K, 2), m, to end (K, 2), m, keep the distance from every disc.
 
-        So a segment that begins too near to a disc is free if it only leads away.
+        A segment that begins or ends too near to a disc is free if it comes no nearer in between.
         """
         return free_segments(begin, end, self.discs, ROUNDING_M)
 
     def points_are_free(self, points: Array, clearance: float) -> npt.NDArray[np.bool_]:
-        """Which of the points (K, 2), m, keep every distance, and this clearance, m, beyond it."""
+        """Which points (K, 2), m, keep every distance and this clearance, m."""
         return free_points(points, self._discs(clearance - ROUNDING_M))
 
 
@@ -100,11 +100,11 @@ class RobotNodes:
     """The nodes of one robot.
 
     Attributes:
-        start: node.
-        target: node.
+        start: node of its start.
+        target: node of its target.
         preset: nodes along the rest of its preset, (K,); the last is the target.
         preset_times: times at these nodes, (K,), s.
-        usable: whether they keep every distance, (K,); no edge leads to the others.
+        usable: which of these nodes keep every distance, (K,); no edge leads to the others.
     """
 
     start: int
@@ -116,14 +116,14 @@ class RobotNodes:
 
 @dataclass(frozen=True, eq=False)
 class Roadmap:
-    """A graph in the plane, with a grid to find nodes by place. Every edge is in it in both directions.
+    """A graph in the plane, with a grid to find nodes by place. It has every edge in both directions.
 
     Attributes:
         grid: of the nodes.
         first_edge: first edge of each node, (N + 1,).
-        heads: where edges lead, (E,).
-        lengths: of edges, (E,), m.
-        longest: bound of the length of edges, except those at starts and targets, m.
+        heads: node at the end of each edge, (E,).
+        lengths: of the edges, (E,), m.
+        longest: upper bound of the lengths, except those of edges at starts and targets, m.
         robots: one entry per robot.
     """
 
@@ -140,13 +140,13 @@ class Roadmap:
         return self.grid.nodes
 
     def distances_to(self, targets: Indices) -> Array:
-        """Length of the shortest way from every node to the nearest target node, (N,), m; infinite: there is no way."""
+        """Length of the shortest way from every node to the nearest target node, (N,), m; infinite without a way."""
         graph = csr_array((self.lengths, self.heads, self.first_edge), shape=(len(self.nodes),) * 2)
         found: Array = dijkstra(graph, indices=targets, min_only=True)
         return found
 
     def within(self, space: Space, own: RobotNodes) -> Roadmap:
-        """The same with only those edges that a larger robot can use, which has to keep larger distances."""
+        """This roadmap with only those edges that a larger robot can use."""
         tails = np.repeat(np.arange(len(self.nodes)), np.diff(self.first_edge))
         free = space.points_are_free(self.nodes, CHORDS * space.clearance)
         free[np.append(own.preset[own.usable], own.start)] = True
@@ -157,12 +157,12 @@ class Roadmap:
 
 @dataclass(frozen=True, eq=False)
 class RobotTask:
-    """Where a robot is and where it is to go.
+    """Where a robot is, and where it must go.
 
     Attributes:
-        start: (2,), m.
-        preset: rest of its preset, a timed motion (M, 3) from t = 0 on, which ends at its target.
-        body: its radius, m.
+        start: its place, (2,), m.
+        preset: the rest of its preset, a timed motion (M, 3) from t = 0 on, which ends at its target.
+        body: radius of the robot, m.
     """
 
     start: Array
@@ -171,12 +171,12 @@ class RobotTask:
 
 
 def build_roadmap(spaces: Sequence[Space], tasks: Sequence[RobotTask], others: Sequence[Array] = ()) -> Roadmap:
-    """The roadmap of some robots. Its lattice and edges are those of the smallest robot: see `Roadmap.within`.
+    """The roadmap of some robots. Its edges are free for the smallest robot; `Roadmap.within` removes some for others.
 
     Args:
-        spaces: discs and distances that each robot has to keep.
+        spaces: one per robot.
         tasks: one per robot.
-        others: places of other robots, (2,) each, m: they only widen the area.
+        others: places of other robots, (2,) each, m; the lattice reaches beyond them.
     """
     by_size = sorted(spaces, key=lambda each: each.apart)
     space = by_size[0]
@@ -211,12 +211,12 @@ def _lattice(space: Space, low: Array, high: Array, pitch: float) -> tuple[Array
 
 
 def _robot_nodes(space: Space, task: RobotTask, first: int, pitch: float, far: float) -> tuple[Array, RobotNodes]:
-    """Nodes of a robot: start, preset, shortest path to the target, and a fan round the start.
+    """Places and numbers of a robot's nodes: start, preset, shortest path to the target, and a fan round the start.
 
     Args:
-        space: discs and distances that the robot has to keep.
+        space: of the robot.
         task: of the robot.
-        first: number of the first of its nodes.
+        first: number of its first node.
         pitch: gap between nodes, m.
         far: radius of the fan, m.
     """
@@ -228,7 +228,7 @@ def _robot_nodes(space: Space, task: RobotTask, first: int, pitch: float, far: f
 
 
 def _area(space: Space, tasks: Sequence[RobotTask], others: Sequence[Array]) -> tuple[Array, Array]:
-    """Corners of a box that contains all robots, presets and the discs near them, with room to go round these."""
+    """Corners of a box round all robots, presets and nearby discs, with room to go round these."""
     points = np.concatenate(
         [*(task.start[None] for task in tasks), *(task.preset[:, 1:] for task in tasks),
          np.array(others).reshape(-1, 2)]
@@ -244,7 +244,7 @@ def _area(space: Space, tasks: Sequence[RobotTask], others: Sequence[Array]) -> 
 
 
 def _preset_nodes(preset: Array, pitch: float) -> tuple[Array, Array]:
-    """Places along a timed motion, (K, 2), m, about `pitch` apart, m, and the times there, (K,), s."""
+    """Places along a timed motion, (K, 2), m, about `pitch`, m, apart, and the times there, (K,), s."""
     legs = np.hypot(*np.diff(preset[:, 1:], axis=0).T)
     gap = max(pitch, float(legs.sum()) / MOST_PATH_NODES)
     pieces = np.maximum(1, np.ceil(legs / gap)).astype(int)
@@ -260,7 +260,7 @@ def _spread(times: Array, pieces: Indices) -> Array:
 
 
 def _path_nodes(space: Space, start: Array, target: Array, pitch: float) -> Array:
-    """Places along the shortest path to the target, (K, 2), m, with the ends of its pieces; K = 0: there is none."""
+    """Places along the shortest path to the target, (K, 2), m, among them the ends of its pieces; K = 0: no path."""
     try:
         path = shortest_path(start, target, space.centres, space.radii + ARCS * space.clearance)
     except NoPath:
@@ -274,7 +274,7 @@ def _path_nodes(space: Space, start: Array, target: Array, pitch: float) -> Arra
 
 
 def _lattice_edges(number: npt.NDArray[np.intp]) -> Indices:
-    """Pairs of neighbouring nodes, (E, 2), of a lattice whose nodes have these numbers; -1: no node."""
+    """Pairs of neighbours, (E, 2), in a lattice of node numbers; -1 marks a place without a node."""
     found = []
     for dx, dy in ((1, 0), (0, 1), (1, 1), (1, -1)):
         tail = number[: len(number) - dx, max(0, -dy) : number.shape[1] - max(0, dy)]
@@ -285,11 +285,11 @@ def _lattice_edges(number: npt.NDArray[np.intp]) -> Indices:
 
 
 def _other_edges(points: Array, radii: Array) -> Indices:
-    """Pairs of nodes, (E, 2), with the second outside the lattice and the first within the radius of the second.
+    """Pairs of a node outside the lattice and any node within its radius, each pair once, (E, 2).
 
     Args:
-        points: all nodes, (N, 2), m, those outside the lattice last.
-        radii: of those outside the lattice, (R,), m.
+        points: all nodes, (N, 2), m; the nodes outside the lattice are the last R.
+        radii: of the nodes outside the lattice, (R,), m.
     """
     others = np.arange(len(points) - len(radii), len(points))
     near = cKDTree(points).query_ball_point(points[others], radii, return_sorted=True)
@@ -300,7 +300,7 @@ def _other_edges(points: Array, radii: Array) -> Indices:
 
 
 def _is_short_cut(points: Array, pairs: Indices, robots: Sequence[RobotNodes]) -> npt.NDArray[np.bool_]:
-    """Which edges lead from a robot's start to its target: at both ends others may be too near."""
+    """Which edges lead from a robot's start straight to its target. Other robots may be too near at both ends."""
     found = np.zeros(len(pairs), dtype=bool)
     for own in robots:
         if np.hypot(*(points[own.start] - points[own.target])) > ROUNDING_M:
@@ -309,7 +309,7 @@ def _is_short_cut(points: Array, pairs: Indices, robots: Sequence[RobotNodes]) -
 
 
 def _fan(space: Space, start: Array, far: float) -> Array:
-    """Free places round a start, (K, 2), m, on rings up to the radius `far`, m."""
+    """Free places on rings round a start, (K, 2), m; the largest ring has the radius `far`, m."""
     angles = 2.0 * np.pi * np.arange(RAYS) / RAYS
     rays = np.column_stack([np.cos(angles), np.sin(angles)])
     places = np.concatenate([start + far * (ring + 1.0) / RINGS * rays for ring in range(RINGS)])

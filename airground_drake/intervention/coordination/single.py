@@ -1,4 +1,4 @@
-"""Plan the way of one robot among motions that are fixed: safe-interval search, then along the preset."""
+"""Plan one robot's way among robots with fixed motions: a safe-interval search to its preset, then along it."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from airground_drake.intervention.coordination.roadmap import Roadmap, RobotNode
 from airground_drake.intervention.coordination.timed import distance, free_pieces, timed, without_repeats
 
 ROUNDING_M = 1e-9
-"""Robots may be nearer to each other than asked for by this, m."""
+"""Distances between robots may fall short by this, m."""
 
 
 class Body(NamedTuple):
@@ -26,7 +26,7 @@ class Body(NamedTuple):
     Attributes:
         motion: timed, (M, 3).
         radius: of its body, m.
-        until: the motion counts up to then, s.
+        until: the robot counts as an obstacle up to this time, s.
     """
 
     motion: Array
@@ -40,8 +40,8 @@ class Way:
 
     Attributes:
         motion: timed, (M, 3), from t = 0 to the end of its preset.
-        joined: when it is back on its preset, s.
-        rows: of the motion up to then.
+        joined: time at which it is back on its preset, s.
+        rows: number of rows of the motion up to that time.
     """
 
     motion: Array
@@ -54,13 +54,13 @@ class Mover:
     """One robot on a roadmap.
 
     Attributes:
-        task: where it is and where it is to go.
+        task: where it is, and where it must go.
         speed: m/s.
         own: its nodes.
         roadmap: the part that it can use.
-        space: the discs and distances that it has to keep.
+        space: discs and distances that it has to keep.
         to_go: lower bound of the time from every node to its preset, (N,), s.
-        clear: which pieces of its preset between neighbouring nodes no disc blocks, (K - 1,).
+        clear: which pieces of its preset between neighbouring nodes are free of discs, (K - 1,).
     """
 
     task: RobotTask
@@ -85,23 +85,24 @@ def find(
 ) -> tuple[Way | None, int]:
     """Find the way on which a robot is back on its preset as early as possible.
 
-    Back means that nothing blocks the preset for the time `follow` after the robot has joined it, or to its end.
+    The robot is back when it has joined its preset and nothing blocks it for the time `follow`, or to its end.
 
     Why robots keep their distance d + spacing also along an edge: let R^2 = (d + spacing)^2 + L^2/4, where L is the
-    length of the longest edge. Another robot blocks a node while it is nearer to it than R. The squared distance to a
-    point of the edge is a mean of those to the ends less s (1 - s) L^2, hence at least R^2 - L^2/4. Only start and
-    target may be nearer: to d, or to what the distance to the other robot is in the beginning or in the end. Edges from
-    there are shorter than sqrt(R^2 - d^2), so that the distance grows on them from the first.
+    length of the longest edge. Another robot blocks a node while its distance from the node is below R. The squared
+    distance to a point of the edge is a weighted mean of the squared distances to the ends, less s (1 - s) L^2. So it
+    is at least R^2 - L^2/4. Only at start and target may the other robot be nearer: at d, or at the distance that it
+    has there in the beginning or in the end. Edges at these nodes are shorter than sqrt(R^2 - d^2), so the distance
+    grows along them from the first.
 
     Args:
         mover: the robot.
         fixed: the other robots.
         follow: how long the preset must be free, s.
-        budget: of expanded intervals.
-        brief: places that others need for a time.
+        budget: largest number of expanded intervals.
+        brief: other robots at places that they need for a time only.
 
     Returns:
-        The way, None if there is none or the budget is spent; and the number of expanded intervals.
+        The way, or None if no way is found within the budget; and the number of expanded intervals.
     """
     own, roadmap = mover.own, mover.roadmap
     blocked = [_blocked_times(mover, other) for other in [*fixed, *brief]]
@@ -115,15 +116,15 @@ def find(
 
 
 def _blocked_times(mover: Mover, other: Body) -> tuple[Indices, Array]:
-    """Nodes (B,) that another robot blocks, and when, (B, 2), s; start and target may be nearer to it, see `find`."""
+    """Nodes (B,) that another robot blocks, and when, (B, 2), s. Start and target have smaller radii, see `find`."""
     roadmap, space = mover.roadmap, mover.space
     start, target = roadmap.nodes[mover.own.start], roadmap.nodes[mover.own.target]
     at_first = float(np.hypot(*(start - other.motion[0, 1:])))
     at_last = float(np.hypot(*(target - other.motion[-1, 1:])))
     near = np.minimum([at_first, at_last], space.apart + other.radius) - ROUNDING_M
-    ends = np.array([mover.own.start, mover.own.target])
-    radius = space.wide(roadmap.longest, other.radius)
-    nodes, times = intervals.blocked_times(other.motion, roadmap.grid, radius, ends, near)
+    radii = np.full(len(roadmap.nodes), space.wide(roadmap.longest, other.radius))
+    np.minimum.at(radii, [mover.own.start, mover.own.target], near)
+    nodes, times = intervals.blocked_times(other.motion, roadmap.grid, radii)
     return nodes, np.minimum(times, other.until)
 
 
@@ -140,7 +141,7 @@ def _joins(mover: Mover, fixed: Sequence[Body], follow: float) -> Array:
         distance(stays, other.motion, float(times[-1])) >= min(_wished(space, other), end) - ROUNDING_M
         for other, end in zip(fixed, in_the_end.tolist(), strict=True)
     )
-    # when the preset is next blocked, seen from each of its nodes
+    # the next time at which the preset is blocked, for each of its nodes
     blocked = np.append(np.where(clear, np.inf, times[:-1]), np.inf if held else times[-1])
     blocked = np.minimum.accumulate(blocked[::-1])[::-1]
     joins = np.tile([np.inf, -np.inf], (len(roadmap.nodes), 1))
@@ -151,12 +152,12 @@ def _joins(mover: Mover, fixed: Sequence[Body], follow: float) -> Array:
 
 
 def _wished(space: Space, other: Body) -> float:
-    """Distance that a robot is to keep from another one if possible, m."""
+    """Distance that a robot keeps from another one where possible, m."""
     return space.apart + other.radius + space.spacing
 
 
 def _way(roadmap: Roadmap, mover: Mover, route: Indices, arrivals: Array, joined: float) -> Way:
-    """The motion along a route, waits included, then along the preset from the time `joined`, s."""
+    """The motion along a route with its waits, then along the preset from the time `joined`, s, on."""
     places = roadmap.nodes[route]
     lengths = np.hypot(*np.diff(places, axis=0).T)
     leaves = arrivals[1:] - np.maximum(lengths, ROUNDING_M) / mover.speed

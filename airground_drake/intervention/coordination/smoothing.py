@@ -1,4 +1,4 @@
-"""Straighten ways: remove detours that come from the roadmap alone, and keep every distance."""
+"""Straighten ways: remove detours that only the roadmap causes, and keep every distance."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ ROUNDS = 2
 def smooth(
     spaces: Sequence[Space], ways: Sequence[Way | None], rests: Sequence[Body], fixed: Sequence[Body]
 ) -> list[Way | None]:
-    """The same ways with straight pieces where these are free. The times at which presets are joined do not change.
+    """The ways with straight pieces where these are free. The times at which robots join their presets do not change.
 
     Args:
-        spaces: discs and distances that each robot has to keep.
-        ways: one per robot; None: it stays where it is.
-        rests: the robots at rest where they are.
-        fixed: other robots.
+        spaces: one per robot.
+        ways: one per robot; None: the robot stays where it is.
+        rests: the robots at rest, one per robot.
+        fixed: other robots with their motions.
     """
     found = list(ways)
     for _ in range(ROUNDS):

@@ -1,7 +1,7 @@
-"""Timed motions in the plane: exact distances to each other and to discs, over all times, and straight short cuts.
+"""Timed motions in the plane: their exact distances from each other and from discs over all times, and short cuts.
 
 A timed motion is an array (M, 3) of times, s, and places, m. It is straight between its rows, and rests at the last
-place. What is compiled (numba) has no fast-math: results are those of IEEE arithmetic in the order written.
+place. Functions are compiled by numba without fast-math: results are those of IEEE arithmetic in the order written.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ def speed(motion: Array) -> float:
 
 
 def without_repeats(motion: Array) -> Array:
-    """The same timed motion without redundant rows: at the time of the row before, or between neighbours on a line."""
+    """The timed motion without rows that repeat the time before, or lie on the line between their neighbours."""
     motion = motion[np.append(True, np.diff(motion[:, 0]) > 1e-9)]
     if len(motion) < 3:
         return motion
@@ -95,7 +95,7 @@ def closest(one: Array, other: Array, begin: float, end: float) -> float:
 
 @njit(cache=True)
 def free_pieces(preset: Array, other: Array, apart: float) -> npt.NDArray[np.bool_]:
-    """Which pieces between the rows of a timed motion (K, 3) stay so far, m, from another one; shape (K - 1,)."""
+    """Which pieces between the rows of a timed motion (K, 3) stay `apart`, m, from another motion; (K - 1,)."""
     free = np.empty(len(preset) - 1, np.bool_)
     for k in range(len(free)):
         free[k] = closest(preset[k : k + 2], other, preset[k, 0], preset[k + 1, 0]) >= apart
@@ -117,13 +117,13 @@ def free_points(points: Array, discs: Array) -> npt.NDArray[np.bool_]:
 
 @njit(cache=True)
 def free_segments(begin: Array, end: Array, discs: Array, slack: float) -> npt.NDArray[np.bool_]:
-    """Which segments (K, 2)-(K, 2), m, come nearer to no disc than its radius or than one of their ends is.
+    """Which segments keep out of all discs. A segment with an end in a disc must come no nearer than that end.
 
     Args:
         begin: (K, 2), m.
         end: (K, 2), m.
         discs: (m, 3) of centre and radius, m.
-        slack: distances may fall short by this, m.
+        slack: tolerance of the distances, m.
     """
     free = np.ones(len(begin), np.bool_)
     for k in range(len(begin)):
@@ -151,7 +151,7 @@ def straight_is_free(
 ) -> bool:
     """Whether a timed motion may go straight from row i to row j.
 
-    It may come no nearer to anything than the allowed distance, or than it is at one of the two rows.
+    It keeps the allowed distances. Where one of the two rows is nearer, it comes no nearer than that row.
 
     Args:
         motion: (M, 3).
@@ -188,9 +188,9 @@ def straightened(
 ) -> Array:
     """The timed motion without needless detours between its first `upto` rows.
 
-    From each row that is kept the motion goes straight, at constant speed, to a later row that `straight_is_free`
-    allows: it tries the farthest row first, then three quarters of the way, again and again. Times of rows stay as
-    they are. The other arguments are those of `straight_is_free`.
+    From each row that is kept the motion goes straight, at constant speed, to a later row. The function tries the
+    farthest row, then the row at three quarters of the way there, and so on, until `straight_is_free` allows one. Rows
+    keep their times. The other arguments are those of `straight_is_free`.
     """
     kept = np.empty(len(motion), np.int64)
     kept[0], count, i = 0, 1, 0

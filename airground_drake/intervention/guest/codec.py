@@ -1,6 +1,6 @@
-"""Messages to and from a policy's process: strict JSON, so that nothing is ever unpickled.
+"""Messages to and from a policy's process: JSON, which cannot carry code, as a pickle can.
 
-An array is sent as its shape and its bytes (binary64, in base64): every number arrives to the bit.
+An array is sent as its shape and its bytes (binary64, in base64), so that every number arrives unchanged.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from airground_drake.geometry.motion import Motion
 from airground_drake.intervention.policy import Observation, Proposal, Teammate
 
 KINDS: tuple[type, ...] = (Observation, Teammate, Proposal, Motion)
-"""Classes whose objects can be part of a message."""
+"""Classes whose objects a message may contain."""
 LONGEST = 4 * 2**20
 """Largest answer of a policy, bytes: some 90,000 vertices."""
 

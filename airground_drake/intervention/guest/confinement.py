@@ -1,8 +1,8 @@
-"""Limits that a process sets itself before it runs third-party code, as far as the system supports them.
+"""Limits that a policy's process sets itself before it runs third-party code, as far as the system supports them.
 
-`resource` limits memory and core files (POSIX; macOS does not enforce the limit of the address space). With Landlock
-(Linux 6.12 and later) the process cannot send a signal to a process that it has not started, look into the memory of
-such a process, or gain privileges. Nothing here keeps it from files or the network.
+`resource` limits memory and core files (macOS does not enforce the limit of the address space). Landlock (Linux 6.12
+and later) forbids three things: signals to processes that this one has not started, access to their memory, and new
+privileges. Files and the network stay open to the policy.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ from __future__ import annotations
 import contextlib
 import ctypes
 import os
+import resource
 import struct
 import sys
 
@@ -24,10 +25,10 @@ RULESET = struct.pack("=QQQ", 0, 0, LANDLOCK_SCOPES)
 
 
 def confine(alive: int, memory: int) -> None:
-    """Set all limits; to be called before any import that may start a thread.
+    """Set all limits. Call this before any import that may start a thread.
 
     Args:
-        alive: descriptor of a pipe's reading end; this process is killed when the pipe has no writer any more.
+        alive: descriptor of a pipe's reading end; this process is killed when the pipe has no writer left.
         memory: limit of the address space, bytes.
     """
     interruption.end_with_pipe(alive)
@@ -37,10 +38,6 @@ def confine(alive: int, memory: int) -> None:
 
 def limit_memory(bytes_: int) -> None:
     """Limit the address space, so that larger allocations fail (MemoryError), and write no core files."""
-    try:
-        import resource
-    except ImportError:
-        return
     for kind, most in ((resource.RLIMIT_AS, bytes_), (resource.RLIMIT_CORE, 0)):
         _, hard = resource.getrlimit(kind)
         most = most if hard == resource.RLIM_INFINITY else min(most, hard)
@@ -49,7 +46,7 @@ def limit_memory(bytes_: int) -> None:
 
 
 def restrict_signals() -> bool:
-    """Give up, for good, signals to processes that this one has not started, and access to their memory.
+    """Give up for good the right to signal processes that this one has not started, and to access their memory.
 
     Returns:
         Whether the kernel supports it (Landlock, ABI 6).

@@ -1,7 +1,7 @@
-"""A third-party policy in a process of its own. It is killed when it takes too long, and cannot touch the run.
+"""A third-party policy in a process of its own, which is killed when it takes too long.
 
-The process is a fresh interpreter (`worker.py`), started once and kept. It sends JSON of bounded length, which is
-decoded and checked here. It shares no memory with the simulation.
+The process is a fresh interpreter (`worker.py`), started once and kept. It shares no memory with the simulation. It
+sends JSON of bounded length, which is decoded and checked here.
 """
 
 from __future__ import annotations
@@ -27,11 +27,12 @@ from airground_drake.intervention.guest.codec import LONGEST, decoded, encoded
 from airground_drake.intervention.policy import Observation, Policy
 
 START_S = 30.0
-"""Time for the interpreter, the policy's imports and its construction, s."""
+"""Time limit for the interpreter, the policy's imports and its construction, s. A policy that is silent for so long
+hangs: it is not asked again in this run."""
 COUNTED_S = 60.0
-"""Least time for a proposal of a policy that says that it bounds its effort by counts, s: it may be wrong."""
+"""Time limit for a proposal of a policy that bounds its effort by counts, s; at least its budget."""
 LIVES = 3
-"""A policy's process is started at most this many times in a run; then the policy is not asked any more."""
+"""A policy's process is started at most this many times in a run; then the policy is not asked again."""
 MEMORY = 4 * 2**30
 """Address space of the process, bytes."""
 
@@ -41,18 +42,18 @@ _PROGRAM = (
     "from airground_drake.intervention.guest.worker import main; main(int(sys.argv[2]))"
 )
 _ENVIRONMENT = {"PYTHONHASHSEED": "0", "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
-"""With a fixed hash seed, a proposal that depends on the order of a set is the same in every run. Without threads of
-libraries, their memory is not needed."""
+"""With a fixed hash seed, a proposal that depends on the order of a set is the same in every run. Without threads,
+numerical libraries need less memory."""
 
 
 class GuestPolicy(Policy):
     """Stands in for a policy that runs in a process of its own.
 
-    A fault of the policy is raised as `PolicyError`. After its process has ended or been killed, a new one is asked for
-    the next proposal. It knows nothing of what was before. After `LIVES` processes nothing is proposed any more.
+    A fault of the policy is raised as `PolicyError`. If its process ends or is killed, the next question starts a new
+    one, which remembers nothing. After a hang, and after `LIVES` processes, the policy proposes nothing any more.
     """
 
-    counted = True  # its time is limited here, by the life of its process
+    counted = True  # the time limit is enforced here, by killing the process
 
     def __init__(self, name: str, parameters: Mapping[str, float], budget: float) -> None:
         """Start the process.
@@ -73,7 +74,7 @@ class GuestPolicy(Policy):
             raise PluginError(f"policy {name!r}: {fault}") from None
 
     def propose(self, seen: Observation) -> dict[str, Motion] | None:
-        """What the policy proposes; names and numbers are not checked yet, see `motions_of`.
+        """What the policy proposes; `motions_of` checks the names and numbers afterwards.
 
         Raises:
             PolicyError: if the policy fails or sends no proposal.
@@ -89,24 +90,23 @@ class GuestPolicy(Policy):
         except (PolicyError, PluginError, KeyError, TypeError, ValueError) as error:
             self._end()
             what = str(error) if isinstance(error, PolicyError | PluginError) else "its process sent no proposal"
-            last = f"; its process was started {LIVES} times: not asked again in this run"
-            raise PolicyError(what + last * (self._used >= LIVES)) from None
+            raise PolicyError(what + "; not asked again in this run" * (self._used >= LIVES)) from None
         raise PolicyError(_words(answer["fault"]))
 
     def close(self) -> None:
-        """End the process, and all others in its process group. A later proposal belongs to a new run."""
+        """End the process and its process group. A later question belongs to a new run."""
         self._end()
         self._used = 0
 
     def _start(self) -> None:
-        """Start a process and let it make the policy.
+        """Start a process, in a session of its own, and let it make the policy.
 
-        It has a session of its own, and nothing open but its ends of the channel and of a pipe. Only this process has
-        the other end of the pipe: when it ends, the policy's process is killed.
+        The process inherits only its ends of the channel and of a pipe. This process alone holds the other end of the
+        pipe. When this process ends, the pipe closes and the policy's process is killed.
 
         Raises:
             PluginError: if the policy cannot be made.
-            PolicyError: if the process ends, sends nonsense, or is late.
+            PolicyError: if the process ends, sends a malformed message, or is late.
         """
         self._used += 1
         self._channel, theirs = Pipe()
@@ -132,12 +132,11 @@ class GuestPolicy(Policy):
         self._limit = max(self._budget, COUNTED_S) if answer.get("counted") is True else self._budget
 
     def _ask(self, question: object, limit_s: float) -> dict[str, Any]:
-        """The process's answer. Without a well-formed one in time, s, the process has been ended.
+        """The process's answer, an object. Without one, the process is ended.
 
         Raises:
-            PolicyError: if there is none.
+            PolicyError: if there is no well-formed answer within the time limit, s.
         """
-        fault = ""
         try:
             with _hung_up_after(limit_s, self._channel) as late:
                 self._channel.send_bytes(encoded(question))
@@ -145,18 +144,21 @@ class GuestPolicy(Policy):
             answer = decoded(data, (Motion,))
             if isinstance(answer, dict) and not late.is_set():
                 return answer
-            fault = "its process sent no message: not an object"
+            fault = "not an object"
         except (EOFError, ConnectionError):
-            pass
+            fault = ""
         except Exception as error:  # the sender is not trusted
-            fault = one_line(f"its process sent no message: {error}"[:FAULT_WIDTH])
+            fault = str(error)[:FAULT_WIDTH]
         except BaseException:
             self._end()
             raise
         self._end()
         if late.is_set():
+            self._used = LIVES if limit_s >= START_S else self._used
             raise PolicyError(f"OutOfTime: not done after {limit_s:g} s")
-        raise PolicyError(fault or f"its process ended or closed its channel ({ended_how(self._process.returncode)})")
+        if fault:
+            raise PolicyError(one_line(f"its process sent no message: {fault}"[:FAULT_WIDTH]))
+        raise PolicyError(f"its process ended or closed its channel ({ended_how(self._process.returncode)})")
 
 
 _GUESTS: weakref.WeakSet[GuestPolicy] = weakref.WeakSet()
@@ -170,7 +172,7 @@ def end_all() -> None:
 
 @contextmanager
 def _hung_up_after(seconds: float, channel: Connection) -> Iterator[threading.Event]:
-    """Shut a channel after so many seconds, so that nobody waits for it any more, not even for half a message.
+    """Shut a channel after so many seconds, so that the body stops waiting for it, even for half a message.
 
     The event tells whether this has happened.
     """

@@ -9,25 +9,22 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from types import FrameType
 
-_LONGEST_S = 1e9
-"""Thirty years; the system's timer takes at most three hundred."""
-_AT_ONCE_S = 1e-6
-"""Shortest time that a timer is set to, s; 0 would turn it off."""
+_LONGEST_S = 1e9  # thirty years; the system's timer takes at most three hundred
+_AT_ONCE_S = 1e-6  # 0 would turn the timer off
 
 
 class OutOfTime(BaseException):
-    """Raised inside code that exceeds its time limit; not an Exception, so that `except Exception` lets it pass."""
+    """Raised inside code that exceeds its time limit. `except Exception` does not catch it."""
 
 
 @contextmanager
 def time_limit(seconds: float, error: type[BaseException] = OutOfTime) -> Iterator[None]:
     """Raise an error in the body after so many seconds of wall-clock time.
 
-    This needs the main thread and a system with interval timers; elsewhere there is no limit. Code that does not return
-    to the Python interpreter is interrupted only when it does. Limits can be nested: an inner limit is no longer than
-    the rest of the outer one, which raises its own error as soon as the inner has ended.
+    The limit works in the main thread only. Compiled code is interrupted when it returns to the interpreter. Limits can
+    be nested: an inner limit lasts no longer than the rest of the outer one, which then raises its own error.
     """
-    if threading.current_thread() is not threading.main_thread() or not hasattr(signal, "setitimer"):
+    if threading.current_thread() is not threading.main_thread():
         yield
         return
 

@@ -1,7 +1,7 @@
 """The process in which a third-party policy runs: it receives observations and sends motions.
 
-`process.py` starts it in a fresh interpreter and ends it. Whatever the policy does to this module or this process, the
-other side accepts nothing but a well-formed message in time.
+`process.py` starts it in a fresh interpreter and ends it. A policy can change anything in here, so the other side
+checks every message, and accepts only a well-formed one in time.
 """
 
 from __future__ import annotations
@@ -34,12 +34,12 @@ def main(channel: int) -> None:
 
 
 def answer(policy: Policy, data: bytes) -> dict[str, Any]:
-    """What the policy proposes on an encoded observation: `motions`, a list of names and motions, or a `fault`."""
+    """The policy's answer to an encoded observation: `motions`, a list of names and motions, or a `fault`."""
     try:
         seen = decoded(data, KINDS)
         found = {"motions": list(motions_of(policy.propose(seen), seen).items())}
         if (size := len(encoded(found))) > LONGEST:
             raise ValueError(f"a proposal of {size} bytes; at most {LONGEST} are allowed")
-    except BaseException as error:  # whatever the policy does, it counts as no intervention
+    except BaseException as error:  # any failure counts as no intervention
         return {"fault": described(error, type(policy).propose)}
     return found

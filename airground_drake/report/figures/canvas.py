@@ -1,4 +1,4 @@
-"""Common ground of the figures: looks that do not rely on colour, labels beside the data, SVG of fixed bytes."""
+"""Shared by all figures: looks that do not rely on colour, labels beside the data, reproducible SVG."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ from matplotlib.ticker import MaxNLocator
 from airground_drake.base.arrays import Array
 
 MAX_POINTS = 600
-"""Points of a line at most: two per pixel of a panel, the extremes of each stretch among them."""
+"""Maximum number of points of a line: two per pixel of a panel."""
 
 MAP_IN, WIDE_IN, FULL_IN, TALLEST_IN = 3.3, 4.4, 11.6, 8.0
-"""Widths of a map among others, of a panel of half the page, of one of the whole page; height of a map at most."""
+"""Widths of a narrow map and of panels on half and on the whole page; maximum height of a map; inches."""
 
 SCALE = 1.45
-"""CSS pixels per point of a panel that takes the whole width: its type is as large as that of the text."""
+"""CSS pixels per point of a panel on the whole page: its letters are as large as those of the text."""
 
 INK, MUTED, ALARM = "#1a1a1a", "#5a5a5a", "#b00020"
 _POINTS_PER_INCH = 72.0
@@ -31,9 +31,9 @@ _FONT_PT = 9.0
 _GRID: Any = {"color": "#dddddd", "linewidth": 0.6, "zorder": 0.5}
 _NUMBERS: Any = {"fontsize": 8.5}
 
-# Text stays text (fonttype 'none'): it can be selected, searched and enlarged, it is a tenth of the size of
-# outlines, and the bytes do not depend on the glyphs of the matplotlib release. The price is that a reader
-# without the first font sees another one, so labels get room. Names are the user's: no mathtext in them.
+# Text stays text (fonttype 'none'): it can be selected, searched and enlarged, it takes a tenth of the bytes of
+# outlines, and it does not depend on the glyphs of the matplotlib release. A reader without the first font sees
+# another one, so labels get room. Names come from the user: mathtext is off.
 _RC: Any = {
     "svg.fonttype": "none",
     "svg.hashsalt": "airground_drake",
@@ -43,7 +43,7 @@ _RC: Any = {
     "font.size": _FONT_PT,
     "axes.titlesize": _FONT_PT,
     "axes.titlelocation": "left",
-    "axes.titley": 1.0,  # fixed: finding a place for it costs a sixth of the drawing time
+    "axes.titley": 1.0,  # fixed: to find a place takes a sixth of the drawing time
     "axes.edgecolor": MUTED,
     "axes.spines.top": False,
     "axes.spines.right": False,
@@ -54,7 +54,7 @@ _RC: Any = {
 
 
 class Look(NamedTuple):
-    """How a line is told apart: colour, dash pattern and marker, each different."""
+    """Colour, dash pattern and marker of a line."""
 
     color: str
     dash: Any
@@ -69,7 +69,7 @@ LOOKS = (
     Look("#6b5900", (0, (9, 2, 1, 2, 1, 2)), "v"),
     Look("#303030", (0, (3, 3)), "P"),
 )
-"""Six looks, distinct for colour-blind readers and in greyscale through dash and marker; reused in turn."""
+"""Six looks, distinct in greyscale and for colour-blind readers by dash and marker; reused in turn."""
 UAV_LOOK = Look("#666666", (0, (3, 2)), "d")
 
 DARK = {
@@ -78,11 +78,10 @@ DARK = {
     "#cfe6dc": "#1f4436",
     "#0060a8": "#6db8ff", "#b34700": "#ff9d5c", "#00705a": "#4fd1b0", "#8b3a8b": "#e08ee0", "#6b5900": "#d9c24d",
     "#303030": "#d0d0d0", "#666666": "#a8a8a8",
-    "black": "#e8e8e8", "white": "#16181c", "lightgrey": "#4a4e57", "grey": "#a8a8a8", "green": "#8fe3a1",
-    "blue": "#8ec5ff", "#444444": "#b0b4bb", "#dfe8f1": "#20303f",
+    "black": "#e8e8e8", "white": "#16181c", "#444444": "#b0b4bb",
     "#e1ebf6": "#1c2c3e", "#e7f1e1": "#1f3323", "#fbefdc": "#3d3020", "#ececec": "#2c2f36",
 }  # fmt: skip
-"""What each colour of a drawing, and of the block diagram, becomes on a dark page."""
+"""Colours of the figures and the block diagram on a dark page."""
 
 
 def look(position: int) -> Look:
@@ -91,14 +90,14 @@ def look(position: int) -> Look:
 
 
 def short(name: str, limit: int = 18) -> str:
-    """A name cut to what fits beside a line; names of a team differ at their ends, so the middle goes."""
+    """A name cut in the middle to fit beside a line; names of a team differ at their ends."""
     head = (limit - 1) // 2
     return name if len(name) <= limit else f"{name[:head]}…{name[head + 1 - limit :]}"
 
 
 @contextmanager
 def style(settings: Mapping[Any, Any] | None = None) -> Iterator[None]:
-    """The settings of all figures, whatever the user's own, for as long as the context lasts; `settings` besides."""
+    """Context with the settings of all figures and `settings`, independent of the user's own."""
     with matplotlib.rc_context():
         matplotlib.rcdefaults()
         matplotlib.rcParams.update({**_RC, **(settings or {})})
@@ -106,14 +105,14 @@ def style(settings: Mapping[Any, Any] | None = None) -> Iterator[None]:
 
 
 def svg(figure: Figure) -> str:
-    """The SVG document of a figure, without date or version; call it inside `style`."""
+    """SVG document of a figure, without date and version; call it inside `style`."""
     buffer = io.StringIO()
     figure.savefig(buffer, format="svg", metadata={"Date": None, "Creator": None, "Format": None, "Type": None})
     return buffer.getvalue()
 
 
 def thin(values: Array, limit: int = MAX_POINTS) -> npt.NDArray[np.intp]:
-    """Indices of at most `limit` rows of (T,) or (T, m) that keep the ends and each bucket's extremes."""
+    """Indices of at most `limit` rows of (T,) or (T, m), among them the ends and the extremes of each stretch."""
     rows = len(values)
     if rows <= limit:
         return np.arange(rows)
@@ -141,7 +140,7 @@ def level(axes: Axes, value: float, dash: Any) -> None:
 
 
 def label_right(axes: Axes, labels: Sequence[tuple[float, str, str]]) -> None:
-    """Labels (value, text, colour) in the margin right of the axes, at their values as far as there is room."""
+    """Labels (value, text, colour) right of the axes, at their values if there is room."""
     bottom, top = axes.get_ylim()
     order = sorted(range(len(labels)), key=lambda k: labels[k][0])
     places = spread([(labels[k][0] - bottom) / (top - bottom) for k in order], line_gap(axes))
@@ -151,7 +150,7 @@ def label_right(axes: Axes, labels: Sequence[tuple[float, str, str]]) -> None:
 
 
 def line_gap(axes: Axes) -> float:
-    """How far apart lines of text are, as a share of the axes' height."""
+    """Distance between lines of text, as a share of the axes' height."""
     return 1.25 * _FONT_PT / _POINTS_PER_INCH / size_in(axes)[1]
 
 
@@ -168,42 +167,29 @@ def spread(places: Sequence[float], gap: float) -> list[float]:
 
 
 def rule(axes: Axes, x: str, y: str, log: str = "") -> None:
-    """Grid lines, numbers and axis labels, once the limits are set; an empty label leaves the numbers out.
+    """Draw grid lines, numbers and axis labels, once the limits are set; an empty label leaves the numbers out.
 
-    On the axes of `log`, among "xy", are the logarithms to base 10 of what is written.
-
-    Drawn as a few artists: matplotlib's own ticks would take nearly half of the drawing time.
+    Values on the axes named in `log` are logarithms to base 10; the numbers show what they are the logarithms of.
+    These are few artists: matplotlib's own ticks would take nearly half of the drawing time.
     """
     width_in, height_in = size_in(axes)
     axes.set_xticks([])
     axes.set_yticks([])
-    columns = _ticks(axes.get_xlim(), 6, whole="x" in log)
-    axes.vlines(columns, 0.0, 1.0, transform=axes.get_xaxis_transform(), **_GRID)
+    columns, across = _ticks(axes.get_xlim(), 6, whole="x" in log), axes.get_xaxis_transform()
+    axes.vlines(columns, 0.0, 1.0, transform=across, **_GRID)
     for at in columns if x else ():
-        axes.text(
-            at,
-            -0.05 / height_in,
-            _number(10.0**at if "x" in log else at),
-            transform=axes.get_xaxis_transform(),
-            ha="center",
-            va="top",
-            **_NUMBERS,
-        )
+        written = _number(at, log="x" in log)
+        axes.text(at, -0.05 / height_in, written, transform=across, ha="center", va="top", **_NUMBERS)
     axes.text(0.5, -0.22 / height_in, x, transform=axes.transAxes, ha="center", va="top")
-    if y:
-        rows = _ticks(axes.get_ylim(), max(2, min(7, round(3.5 * height_in))), whole="y" in log)
-        axes.hlines(rows, 0.0, 1.0, transform=axes.get_yaxis_transform(), **_GRID)
-        for at in rows:
-            axes.text(
-                -0.05 / width_in,
-                at,
-                _number(10.0**at if "y" in log else at),
-                transform=axes.get_yaxis_transform(),
-                ha="right",
-                va="center",
-                **_NUMBERS,
-            )
-        axes.text(-0.36 / width_in, 0.5, y, transform=axes.transAxes, ha="right", va="center", rotation=90)
+    if not y:
+        return
+    rows = _ticks(axes.get_ylim(), max(2, min(7, round(3.5 * height_in))), whole="y" in log)
+    up = axes.get_yaxis_transform()
+    axes.hlines(rows, 0.0, 1.0, transform=up, **_GRID)
+    for at in rows:
+        written = _number(at, log="y" in log)
+        axes.text(-0.05 / width_in, at, written, transform=up, ha="right", va="center", **_NUMBERS)
+    axes.text(-0.36 / width_in, 0.5, y, transform=axes.transAxes, ha="right", va="center", rotation=90)
 
 
 def _ticks(limits: tuple[float, float], count: int, *, whole: bool) -> list[float]:
@@ -213,8 +199,8 @@ def _ticks(limits: tuple[float, float], count: int, *, whole: bool) -> list[floa
     return [float(round(at, 12)) for at in ticks if low - slack <= at <= high + slack]
 
 
-def _number(at: float) -> str:
-    return f"{at:g}".replace("-", "\N{MINUS SIGN}")
+def _number(at: float, *, log: bool) -> str:
+    return f"{10.0**at if log else at:g}".replace("-", "\N{MINUS SIGN}")
 
 
 def size_in(axes: Axes) -> tuple[float, float]:

@@ -1,4 +1,4 @@
-"""The figure that compares recursion (5) as printed with the augmented projector."""
+"""The figure that compares runs by recursion (5) as printed with runs by the augmented projector."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ MAX_RUNS = 6
 
 
 def draw(scenario: Scenario, traces: Mapping[str, Trace]) -> Figure | None:
-    """Recursion (5) against the augmented projector, None if the runs do not have both."""
+    """Paths and distances by both compositions; None unless the runs have both."""
     printed = [name for name in traces if scenario.runs[name].composition.startswith("recursion")]
     methods = {scenario.runs[name].method for name in printed}
     augmented = [name for name in traces if name not in printed and scenario.runs[name].method in methods]
@@ -63,7 +63,7 @@ def _how(scenario: Scenario, run: str) -> str:
 
 
 def _frame(runs: Mapping[str, Trace], robot: str, gaps: Mapping[str, Array]) -> maps.Frame:
-    """Around the closest approaches of the runs and the two obstacles nearest to them."""
+    """The rectangle around the closest approaches of the runs and the two nearest obstacles."""
     closest = np.array([trace.position(robot)[int(gaps[name].argmin()), :2] for name, trace in runs.items()])
     first = next(iter(runs.values()))
     centres = np.array([place(first, name)[:2] for name in first.scenario.obstacles])

@@ -1,14 +1,13 @@
-"""The figures of a report: maps, distances, decision variables, events, gaps between triggers; a team in histograms.
+"""The figures of a report: maps, distances, decision variables, events; histograms of a large team.
 
-Each figure is a row of panels: separate drawings, so that a page can stack them on a phone. Runs with identical paths
-share a panel. Each panel comes with a table of its data.
+Each figure is a row of panels, separate drawings that a page can stack on a phone. Runs with identical paths share a
+panel. Each panel has a table of its data.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -25,13 +24,13 @@ from airground_drake.run.trace import Trace
 from airground_drake.scenarios.schema import Scenario
 
 MAX_RUNS, MAX_UGVS, MAX_TEAM = 6, 4, 6
-"""What a figure shows at most: runs, UGVs with distances of their own, UGVs by name. A larger team is in histograms."""
+"""Maximum numbers of runs, of UGVs in the figure of distances, and of UGVs by name. Larger teams get histograms."""
 ALIKE_M = 1e-9
-"""Paths are identical if they differ by no more than rounding."""
+"""Paths that differ by no more than this are identical but for rounding."""
 FARTHEST = 5.0
-"""Distances are drawn up to so many required ones."""
+"""Distances are drawn up to this multiple of the largest required one."""
 LISTED = 3
-"""Happenings that a caption lists of each run."""
+"""Number of events that a caption lists for each run."""
 
 _PAPER = {"case_a": (3, 4, 5, 6), "case_b": (7, 8, 9, 10)}
 """Numbers of the paper's figures, by the beginning of a scenario's name."""
@@ -40,13 +39,13 @@ _NUMBERED = ("trajectories", "decision", "distances", "events")
 
 @dataclass(frozen=True)
 class _Selection:
-    """What the figures show.
+    """The runs and UGVs that the figures show.
 
     Attributes:
-        runs: all of them.
-        shown: one of each kind of paths, by what heads its panels.
+        runs: all runs.
+        shown: one run for each set of identical paths, by the heading of its panels.
         team: UGVs with names and looks.
-        ugvs: those of them with distances of their own.
+        ugvs: UGVs of the team with distances of their own.
     """
 
     runs: dict[str, Trace]
@@ -69,7 +68,7 @@ def draw(scenario: Scenario, traces: Mapping[str, Trace], settings: Mapping[str,
 
     Raises:
         TraceError: if a trace lacks a column, holds numbers that are not finite, or has other robots than its scenario.
-        UnknownNameError: if its metadata name a method that there is not.
+        UnknownNameError: if its metadata name an unknown method.
     """
     if not traces:
         return []
@@ -80,7 +79,7 @@ def draw(scenario: Scenario, traces: Mapping[str, Trace], settings: Mapping[str,
     numbers = next((paper for name, paper in _PAPER.items() if scenario.name.startswith(name)), ())
     with canvas.style(settings):
         chosen = _select(scenario, traces)
-        drawn = [_trajectories(chosen), _distances(chosen), _decision(chosen), _events(chosen), _gaps(chosen)]
+        drawn = [_trajectories(chosen), _distances(chosen), _decision(chosen), _events(chosen)]
         drawn += [_team(chosen)] if len(chosen.first.ugvs) > MAX_TEAM else []
         compared = comparison.draw(scenario, traces)
     counterpart = dict(zip(_NUMBERED, numbers, strict=False))
@@ -116,13 +115,11 @@ def _select(scenario: Scenario, traces: Mapping[str, Trace]) -> _Selection:
 
 def _alike(one: Trace, other: Trace) -> bool:
     """Whether all robots take the same paths at the same times."""
-    return all(
-        len(a.t) > 0
-        and a.t[-1] == b.t[-1]
-        and bool((np.abs(np.interp(a.t, b.t, b.position(robot)[:, k]) - a.position(robot)[:, k]) <= ALIKE_M).all())
-        for a, b in ((one, other), (other, one))
+    t = np.union1d(one.t, other.t)
+    return bool(one.t[-1] == other.t[-1]) and all(
+        np.abs(np.interp(t, one.t, a) - np.interp(t, other.t, b)).max() <= ALIKE_M
         for robot in one.robots
-        for k in range(3)
+        for a, b in zip(one.position(robot).T, other.position(robot).T, strict=True)
     )
 
 
@@ -134,7 +131,7 @@ def _heading(group: list[str], runs: Mapping[str, Trace]) -> str:
 
 
 def _runs(heading: str) -> str:
-    """A heading without what it says about its runs."""
+    """The part of a heading that names its runs."""
     return heading.partition(":")[0]
 
 
@@ -245,28 +242,6 @@ def _events(chosen: _Selection) -> Figure | None:
     return Figure("events", "Triggers, proposals, decisions", caption, (row,), look="wide")
 
 
-def _gaps(chosen: _Selection) -> Figure | None:
-    """Times between consecutive triggers of a UGV, where one was triggered twice."""
-    gaps: dict[str, list[tuple[float, float]]] = {}
-    for name, trace in chosen.runs.items():
-        for ugv in trace.ugvs:
-            times = [float(event["t_s"]) for event in events_of(trace, ugv, "trigger")]
-            gaps.setdefault(name, []).extend((late, late - early) for early, late in pairwise(times))
-    gaps = {name: sorted(found) for name, found in gaps.items() if found}
-    if not gaps:
-        return None
-    bound = float(chosen.first.scenario.decision.min_inter_event_s)
-    least = min(gap for found in gaps.values() for _, gap in found)
-    caption = (
-        f"Smallest gap {least:.3f} s; the minimum inter-event time is {bound:g} s (line). Each mark is a trigger, "
-        "at the time since the one before of the same UGV."
-    )
-    rows = [(name, f"{t:.3f}", f"{gap:.4f}") for name, found in gaps.items() for t, gap in found]
-    table = Table("Gaps between triggers", ("run", "t, s", "gap, s"), tuple(rows[:MAX_TABLE_ROWS]))
-    drawing, title = timelines.gaps(gaps, bound, chosen.first), "Gaps between triggers"
-    return Figure("gaps", title, caption, (panel(drawing, "gaps-0", title, caption, "", table),))
-
-
 def _team(chosen: _Selection) -> Figure:
     """Histograms over the UGVs of a large team."""
     ugvs = chosen.first.ugvs
@@ -304,7 +279,7 @@ def _team(chosen: _Selection) -> Figure:
 
 
 def _ends(chosen: _Selection) -> str:
-    """How each run ended: collisions, UGVs that stand still, arrivals."""
+    """The end of each run: collisions, UGVs that stand still, arrivals."""
     told: dict[str, list[str]] = {}
     for heading, trace in chosen.shown.items():
         hits = [event for ugv in trace.ugvs for event in events_of(trace, ugv, "collision")[:1]]
@@ -323,7 +298,7 @@ def _ends(chosen: _Selection) -> str:
 
 
 def _first_triggers(chosen: _Selection) -> str:
-    """When the UGVs of each run reach the threshold, the first ones."""
+    """The first triggers of each run."""
     told: dict[str, list[str]] = {}
     for name, trace in chosen.runs.items():
         early = sorted((event["t_s"], event["robot"]) for event in trace.events if event["kind"] == "trigger")[:LISTED]

@@ -1,4 +1,4 @@
-"""Labels beside their points, off each other, the lines and the points of a drawing."""
+"""Places labels beside their points, clear of each other and of lines and points."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from airground_drake.base.arrays import Array
 from airground_drake.report.figures.canvas import INK, MUTED, thin
 
 MAX_LINE_POINTS = 80
-"""Points of a line that labels keep off."""
+"""Number of points of a line that labels avoid."""
 _BOX = {"facecolor": "white", "edgecolor": "none", "alpha": 0.7, "pad": 0.5}
 
 
@@ -28,11 +28,11 @@ class Label(NamedTuple):
 
 
 def place(axes: Axes, labels: Sequence[Label], lines: Sequence[Array]) -> None:
-    """Write the labels, the first ones nearest to their points; one that had to move away is tied by a thin line.
+    """Write the labels, the first ones nearest to their points; a thin line leads to a label that had to move.
 
     Args:
         axes: with their final limits.
-        labels: what to write; what is about a point outside the axes is left out.
+        labels: labels of points outside the axes are left out.
         lines: (T, 2) each, in the coordinates of the axes.
     """
     (left, right), (bottom, top) = axes.get_xlim(), axes.get_ylim()

@@ -16,6 +16,7 @@ from airground_drake.report.figures.canvas import (
     ALARM,
     INK,
     MUTED,
+    TALLEST_IN,
     UAV_LOOK,
     WIDE_IN,
     Look,
@@ -33,7 +34,7 @@ from airground_drake.view.stage import safe_m
 
 MAX_NAMED_OBSTACLES = 12
 _LEFT_IN, _BESIDE_IN = 0.5, 0.65
-"""What is left of a map, and on both sides together, inches."""
+"""Margin left of a map, and both side margins together, inches."""
 
 
 class Frame(NamedTuple):
@@ -45,12 +46,12 @@ class Frame(NamedTuple):
     top: float
 
     def width_in(self, widest: float, tallest: float) -> float:
-        """Width of a map of it that is neither wider nor taller than these, inches."""
+        """Width of its largest map within these limits, inches."""
         return min(widest, tallest * (self.right - self.left) / (self.top - self.bottom) + _BESIDE_IN)
 
 
 def frame_of(traces: Sequence[Trace], robots: Sequence[str]) -> Frame:
-    """What has to be in the picture: robots, targets, obstacles with their safe circles."""
+    """The rectangle around robots, targets and obstacles with their safe circles."""
     scenario = traces[0].scenario
     ways = [(trace.position(robot)[:, :2], radius_m(trace, robot)) for trace in traces for robot in robots]
     points = [way + side * radius for way, radius in ways for side in ((-1.0, 1.0) if radius else (0.0,))]
@@ -66,7 +67,7 @@ def frame_of(traces: Sequence[Trace], robots: Sequence[str]) -> Frame:
 def plane(trace: Trace, ugvs: Sequence[str], frame: Frame, width_in: float) -> Figure:
     """Trajectories of a run in the plane: starts o, targets x, obstacles with safe circles, the UAV dashed.
 
-    Other UGVs than those named are thin lines that end in a dot.
+    UGVs other than `ugvs` are thin lines that end in a dot.
     """
     figure, axes = _map(trace, frame, width_in)
     labels = list[Label]()
@@ -114,8 +115,22 @@ def compared_paths(runs: Mapping[str, Trace], robot: str, frame: Frame) -> Figur
     return figure
 
 
+def two_versions(before: Trace, after: Trace, ugvs: Sequence[str]) -> Figure:
+    """Trajectories of UGVs in two versions of a run: before thin and dashed, after thick."""
+    frame = frame_of([before, after], ugvs)
+    figure, axes = _map(after, frame, frame.width_in(WIDE_IN, TALLEST_IN))
+    names = list[Label]()
+    for position, ugv in enumerate(ugvs):
+        appearance = look(position)
+        _path(axes, before.position(ugv), appearance._replace(dash=(0, (3, 2))), linewidth=1.0)
+        _path(axes, after.position(ugv), appearance._replace(dash="-"), linewidth=1.8)
+        names.append(_name(ugv, after.position(ugv)[-1], appearance))
+    place(axes, [*names, *_obstacles(after.scenario)], [after.position(ugv) for ugv in ugvs])
+    return figure
+
+
 def _map(trace: Trace, frame: Frame, width_in: float, above_in: float = 0.1) -> tuple[Figure, Axes]:
-    """Axes over a part of the ground plane, at equal scales, with the obstacles drawn."""
+    """Axes with equal scales over a part of the ground plane, with the obstacles."""
     inner_in = width_in - _BESIDE_IN
     inner_height_in = inner_in * (frame.top - frame.bottom) / (frame.right - frame.left)
     height_in = inner_height_in + 0.42 + above_in
@@ -146,7 +161,7 @@ def _map(trace: Trace, frame: Frame, width_in: float, above_in: float = 0.1) -> 
 
 
 def _obstacles(scenario: Scenario) -> list[Label]:
-    """Names of the obstacles, if they are few, and of what is on the UAV's map only."""
+    """Labels of the obstacles, unless they are many, and of phantoms."""
     named = scenario.obstacles if len(scenario.obstacles) <= MAX_NAMED_OBSTACLES else {}
     hint = {True: "", False: "\n(unseen by the UAV)"}
     places = [
@@ -157,7 +172,7 @@ def _obstacles(scenario: Scenario) -> list[Label]:
 
 
 def _body(axes: Axes, at: Sequence[float] | Array, radius: float, color: str) -> None:
-    """A robot or an obstacle as large as it is."""
+    """A robot or an obstacle in its true size."""
     if radius:
         axes.add_patch(Circle((at[0], at[1]), radius, facecolor=color, edgecolor=color, alpha=0.35, zorder=1.5))
 
@@ -172,7 +187,7 @@ def _name(robot: str, at: Sequence[float] | Array, appearance: Look) -> Label:
 
 
 def _happenings(axes: Axes, trace: Trace, ugv: str) -> list[Label]:
-    """Mark where a UGV triggered, collided or stands still; what to write there."""
+    """Mark where a UGV triggered, collided or stands still; the labels of these marks."""
     found: list[tuple[Array, list[str]]] = []
 
     def mark(at: Array, text: str, **options: Any) -> None:

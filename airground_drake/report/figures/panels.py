@@ -14,12 +14,12 @@ from airground_drake.report.figures import canvas, svg
 from airground_drake.run.trace import Trace
 
 MAX_TABLE_ROWS = 31
-"""Rows of a data table at most; all of them are in the trace."""
+"""Maximum number of rows of a data table; the trace has all rows."""
 
 
 @dataclass(frozen=True)
 class Table:
-    """Data of a panel: cells are text, the first column heads its row."""
+    """Data of a panel as text; the first column is the heading of the row."""
 
     caption: str
     columns: tuple[str, ...]
@@ -34,9 +34,9 @@ class Panel:
     svg: str
     table: Table
     drawing: Drawing = field(compare=False, repr=False)
-    """What the SVG was made of, for files of other formats."""
+    """Source of the SVG, for files of other formats."""
     tracks: Mapping[str, Any] | None = None
-    """Of a drawing of the ground plane: where the robots are in it, see `report.scrubber`."""
+    """For drawings of the ground plane: places of the robots, see `report.scrubber`."""
 
 
 @dataclass(frozen=True)
@@ -48,9 +48,8 @@ class Figure:
         title: its heading.
         caption: what to see.
         panels: its drawings.
-        beside: what it is shown beside, a claim's identifier, `audit-<item>` or `attention-<item>`; '' for the
-            section of figures.
-        look: "wide" if a panel takes the whole width, "narrow" if several stand beside each other.
+        beside: place in the page: a claim's identifier or `audit-<item>`; '' for the section of figures.
+        look: "wide" for a panel on the whole width, "narrow" for panels side by side.
     """
 
     id: str
@@ -73,7 +72,7 @@ def panel(
 ) -> Panel:
     """A panel of a drawing; call it inside `canvas.style`.
 
-    `name` is unique in the page, `title` and `says` are for those who cannot see it.
+    `name` is unique in the page; `title` and `says` are for readers who cannot see it.
     """
     return Panel(heading, svg.inline(canvas.svg(drawing), name, title, says, scale=scale), table, drawing, tracks)
 

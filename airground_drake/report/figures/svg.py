@@ -1,7 +1,7 @@
-"""SVG made fit for inlining in an HTML page: named for screen readers, with unique ids, small, inert, unstyled.
+"""Prepares SVG for an HTML page: names for screen readers, unique ids, no scripts and no styles.
 
-Styles become presentation attributes: a page whose content security policy admits no inline style shows them all the
-same, and its style sheet can give each colour another one in the dark.
+Styles become presentation attributes. They work under a content security policy without inline styles, and the page's
+style sheet can replace each colour on a dark page.
 """
 
 from __future__ import annotations
@@ -20,26 +20,26 @@ _REFERENCE = re.compile(r"url\(\s*['\"]?#([^'\")\s]+)['\"]?\s*\)")
 _LONG_NUMBER = re.compile(r"-?\d+\.\d{3,}")
 _STYLED = re.compile(r"(?:fill|stroke|font|opacity|text-anchor|dominant-baseline)[a-z-]*")
 _FONT = re.compile(r"(?:(\w+) )?([\d.]+px) (.+)")
-"""The shorthand `font` of older releases of matplotlib: weight, size, families."""
+"""The shorthand `font` of matplotlib 3.10: weight, size, families."""
 _ROUNDED = {"d", "points", "transform", "x", "y", "width", "height", "cx", "cy", "rx", "ry", "r"}
 
 
 def inline(
     svg: str, prefix: str, title: str, description: str, *, natural_size: bool = False, scale: float = 0.0
 ) -> str:
-    """An SVG document as an element to be placed in HTML.
+    """An SVG document as an element for HTML.
 
-    Scripts, style sheets, handlers and references to anything outside the document are removed (style sheets
-    would apply to the whole page), inline styles become attributes, ids get a prefix, and unused ones are removed,
-    so that several drawings can share a page; coordinates are rounded to 0.01 units.
+    Scripts, style sheets, handlers and references to anything outside the document are removed (a style sheet would
+    apply to the whole page). Inline styles become attributes. Ids get a prefix, so that several drawings can share a
+    page; unused ids are removed. Coordinates are rounded to 0.01 units.
 
     Args:
         svg: the document; `viewBox` must be set.
         prefix: unique in the page; letters, digits, '-' and '_'.
         title: the accessible name.
-        description: what it shows.
-        natural_size: whether to keep the size of the document; otherwise it is left to the page.
-        scale: CSS pixels per unit of the drawing, if it is to have a width of its own; 0: it is left to the page.
+        description: text for readers who cannot see it.
+        natural_size: keep the size of the document; otherwise the page chooses.
+        scale: CSS pixels per unit of the drawing; 0: the page chooses the width.
 
     Raises:
         ValueError: if it is not an SVG document.
@@ -79,7 +79,7 @@ def _drop(element: ET.Element) -> None:
 
 
 def _presentation(style: str) -> dict[str, str]:
-    """The declarations of an inline style, those that SVG has attributes for."""
+    """The declarations of an inline style that SVG has attributes for."""
     declared = dict(part.strip().split(":", 1) for part in style.split(";") if ":" in part)
     found = {name.strip(): value.strip() for name, value in declared.items() if _STYLED.fullmatch(name.strip())}
     if shorthand := _FONT.fullmatch(found.pop("font", "")):
@@ -108,7 +108,7 @@ def _clean(element: ET.Element, prefix: str, used: set[str]) -> None:
         elif name in _ROUNDED and "scale" not in value and "matrix" not in value:
             rounded = _LONG_NUMBER.sub(lambda match: f"{float(match.group()):.2f}".rstrip("0").rstrip("."), value)
             element.set(name, " ".join(rounded.split()))
-    if not (element.text or "").strip():  # spaces between elements are half of a drawing
+    if not (element.text or "").strip():  # spaces between elements are half of the bytes
         element.text = None
     element.tail = (element.tail or "").strip() or None
 

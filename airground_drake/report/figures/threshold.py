@@ -1,4 +1,4 @@
-"""The figure of THR-CHOICE: the Bayes risk over the threshold; in force, optimal, and as (19) is printed."""
+"""The figure of THR-CHOICE: the Bayes risk over the threshold; threshold in force, optimal, and by (19) as printed."""
 
 from __future__ import annotations
 
@@ -11,15 +11,14 @@ from airground_drake.decision.bayes import bayes_risk
 from airground_drake.report.figures import canvas
 from airground_drake.report.figures.findings.lines import Lines
 from airground_drake.report.figures.panels import Figure
-from airground_drake.verify.model.thr_choice import Choice, Measured
 
 POINTS = 200
 BEYOND = 1.6
-"""The axis goes so far beyond the largest mark."""
+"""Length of the axis, relative to the largest mark."""
 
 
-def draw(inputs: Mapping[str, Any], evidence: Choice) -> Figure | None:
-    """The figure, from what the claim is about and its evidence; None without them."""
+def draw(inputs: Mapping[str, Any], evidence: Mapping[str, Any]) -> Figure | None:
+    """The figure from the inputs and the evidence of the claim; None without evidence."""
     if "optimal_threshold_m" not in evidence:
         return None
     constants = inputs["drift_m_s"], inputs["noise_m_sqrt_s"], inputs["c1_1_s"], inputs["c2"]
@@ -42,8 +41,8 @@ def draw(inputs: Mapping[str, Any], evidence: Choice) -> Figure | None:
         return shown.plate("threshold-choice", "", caption)
 
 
-def _as_it_was(runs: Mapping[str, Measured]) -> str:
-    """The drift and noise of the first UGV that triggered, and what would be optimal for them."""
+def _as_it_was(runs: Mapping[str, Any]) -> str:
+    """Drift and noise of the first UGV that triggered, and the thresholds that are optimal for them."""
     for name, row in runs.items():
         optima = {
             "the assumed noise": row["optimum_for_this_drift_m"],

@@ -31,9 +31,9 @@ from airground_drake.report.outcomes import SLACK_M, distance
 from airground_drake.run.trace import Trace
 
 MARKS = {"trigger": "^", "release": "v", "proposal": "D", "accept": "o", "refuse": "X"}
-"""Marks of events, by kind."""
+"""Markers of events by kind."""
 MAX_ROWS, MAX_TOLD, TOLD_CHARS = 16, 7, 58
-"""Rows of the event figure; events that a row lists with their times, in lines of so many characters."""
+"""Maximum number of rows of the event figure, of events listed beside a row, and of characters in a line."""
 _FORBIDDEN: dict[str, Any] = {
     "facecolor": "#eeeeee", "hatch": "///", "edgecolor": "#d4d4d4", "linewidth": 0.0, "zorder": 0,
 }  # fmt: skip
@@ -41,7 +41,7 @@ _FORBIDDEN: dict[str, Any] = {
 
 
 def decision(trace: Trace, ugvs: Sequence[str], top: float) -> Figure:
-    """Decision variables of a run with the threshold and the release level."""
+    """Decision variables of a run, the threshold and the release level."""
     figure, (axes,) = _time_axes(1, 2.5, trace, above_in=0.08)
     zeta, release = float(trace.meta["zeta_m"]), float(trace.scenario.decision.release_m)
     labels = [(zeta, f"threshold {zeta:.3g}", INK)]
@@ -65,7 +65,7 @@ def decision(trace: Trace, ugvs: Sequence[str], top: float) -> Figure:
 def distances(
     trace: Trace, near: Mapping[str, Sequence[Nearby]], looks: Mapping[str, Mapping[str, int]], top: float
 ) -> Figure:
-    """Distances of each UGV to what is near it, of surfaces, the required ones, and the exact minimum."""
+    """Distances between the surfaces of each UGV and bodies near it, the required ones, and the exact minimum."""
     figure, every = _time_axes(len(near), 0.5 + 1.75 * len(near), trace)
     required = sorted({found.required_m for each in near.values() for found in each})
     for axes, (ugv, those) in zip(every, near.items(), strict=True):
@@ -99,7 +99,7 @@ def distances(
 
 
 def events(rows: Sequence[tuple[Trace, str]]) -> Figure:
-    """Triggers, proposals and decisions over time, a row for each UGV in each run, with the times written beside."""
+    """Triggers, proposals and decisions over time: a row per UGV and run, with the times beside it."""
     longest = max((trace for trace, _ in rows), key=lambda trace: float(trace.t[-1]))
     figure, (axes,) = _time_axes(1, 0.6 + 0.5 * len(rows), longest, FULL_IN, left_in=1.3, right_in=4.3, above_in=0.05)
     axes.set_ylim(len(rows) - 0.4, -0.6)
@@ -120,42 +120,24 @@ def events(rows: Sequence[tuple[Trace, str]]) -> Figure:
 
 
 def told(trace: Trace, ugv: str) -> str:
-    """The events of a UGV with their times, or, if they are many, how many there are of each kind."""
+    """The events of a UGV with their times; many events are counted by kind."""
     found = events_of(trace, ugv, *MARKS)
     if len(found) <= MAX_TOLD:
         return _wrapped(f"{event['kind']} {event['t_s']:.2f}" for event in found)
     counts = {kind: [event["t_s"] for event in found if event["kind"] == kind] for kind in MARKS}
-    many = (
+    return _wrapped(
         f"{len(t)} \N{MULTIPLICATION SIGN} {kind} from {t[0]:.2f}" if len(t) > 1 else f"{kind} {t[0]:.2f}"
         for kind, t in counts.items()
         if t
     )
-    return _wrapped(many)
 
 
 def _wrapped(words: Iterable[str]) -> str:
     return fill(f"{', '.join(words)}\N{NO-BREAK SPACE}s", TOLD_CHARS)
 
 
-def gaps(of_runs: Mapping[str, Sequence[tuple[float, float]]], bound_s: float, trace: Trace) -> Figure:
-    """Times since the trigger before, at the times of the triggers, and the least that is allowed."""
-    figure, (axes,) = _time_axes(1, 2.5, trace, above_in=0.08)
-    labels = [(bound_s, f"at least {bound_s:g}", INK)]
-    axes.set_ylim(0.0, 1.1 * max(bound_s, *(gap for found in of_runs.values() for _, gap in found)))
-    axes.axhspan(0.0, bound_s, **_FORBIDDEN)
-    level(axes, bound_s, "-")
-    for position, (name, found) in enumerate(of_runs.items()):
-        color, _, marker = look(position)
-        size = 5.0 + 3.0 * position  # hollow and of different sizes: runs may trigger at the same times
-        axes.plot(*zip(*found, strict=True), marker, markersize=size, color=color, markerfacecolor="none")
-        labels.append((found[-1][1], f"run {short(name, 8)}", color))
-    rule(axes, "time of the trigger, s", "time since the last, s")
-    label_right(axes, labels)
-    return figure
-
-
 def histogram(quantity: str, of_runs: Mapping[str, Sequence[float]]) -> Figure:
-    """How many UGVs there are of each size of a quantity, a line for each run."""
+    """Histogram of a quantity over the UGVs, a line per run."""
     figure = Figure(figsize=(WIDE_IN, 2.0))
     axes = figure.add_axes((0.13, 0.24, 0.6, 0.7))
     every = np.concatenate([np.asarray(values) for values in of_runs.values()])
@@ -175,16 +157,10 @@ def histogram(quantity: str, of_runs: Mapping[str, Sequence[float]]) -> Figure:
 
 
 def compared_distances(runs: Mapping[str, Trace], robot: str) -> Figure:
-    """Distance to the nearest obstacle over time of one robot in several runs, with the minima."""
+    """Distance from one robot to its nearest obstacle over time in several runs, with the minima."""
     first = next(iter(runs.values()))
     d = float(first.scenario.safe_distance.obstacle_m)
-    figure, (axes,) = _time_axes(
-        1,
-        3.0 + 0.22 * len(runs),
-        first,
-        right_in=0.65,
-        above_in=0.22 * len(runs),
-    )
+    figure, (axes,) = _time_axes(1, 3.0 + 0.22 * len(runs), first, right_in=0.65, above_in=0.22 * len(runs))
     gaps = {name: nearest_distance(trace, robot) for name, trace in runs.items()}
     low = min(d, *(float(gap.min()) for gap in gaps.values()))
     axes.set_ylim(max(0.0, low - 0.15 * d), 1.6 * d)
@@ -205,7 +181,7 @@ def compared_distances(runs: Mapping[str, Trace], robot: str) -> Figure:
 
 
 def nearest_distance(trace: Trace, robot: str) -> Array:
-    """Distance to the nearest obstacle at the rows, of surfaces, (T,), m."""
+    """Distance between surfaces to the nearest obstacle, (T,), m."""
     nearest: Array = np.min([gap_m(trace, robot, name) for name in trace.scenario.obstacles], axis=0)
     return nearest
 
@@ -220,7 +196,7 @@ def _time_axes(
     right_in: float = 1.05,
     above_in: float = 0.24,
 ) -> tuple[Figure, list[Axes]]:
-    """Axes over time, one above the other, with room for labels on the right."""
+    """Axes over time, stacked, with room for labels on the right."""
     figure = Figure(figsize=(width_in, height_in))
     below_in, between_in = 0.42, 0.32
     inner_in = (height_in - below_in - above_in - between_in * (count - 1)) / count
@@ -236,7 +212,7 @@ def _time_axes(
 
 
 def _bars(axes: Axes, trace: Trace, active: npt.NDArray[np.bool_], y: float, **options: Any) -> None:
-    """Bars over the times at which a held signal is true; row k holds what was in force since row k-1."""
+    """Bars over the times at which a held signal is true; row k holds its value since row k-1."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], active, [False]]).astype(np.int8)))
     begins, ends = trace.t[np.maximum(edges[::2] - 1, 0)], trace.t[edges[1::2] - 1]
     spans = [(float(begin), float(end - begin)) for begin, end in zip(begins, ends, strict=True)]

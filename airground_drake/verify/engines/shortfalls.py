@@ -23,7 +23,7 @@ import numpy.typing as npt
 from airground_drake.base.arrays import Array
 
 SCREEN_M = 1e-9
-"""What floats find far, or met, by more than this is so, m: for bodies within 1e5 m they err by less than 1e-10 m."""
+"""Floats decide pairs by more than this, m: for bodies within 1e5 m they err by less than 1e-10 m."""
 BITS = 160
 """Lengths are enclosed to 2^-160 units."""
 
@@ -32,7 +32,7 @@ def demanded(lacking: Any, inside: Any, outside: Any) -> Any:
     """Rate at which two bodies have to part, or may approach at most: the law's inequality, here and nowhere else.
 
     Args:
-        lacking: d - D, what is missing of the safe distance: an array of doubles, or one rational number.
+        lacking: d - D, the missing distance: an array of doubles, or one rational number.
         inside: rate per distance where D <= d: the gain.
         outside: the same where D > d: one over the period.
     """
@@ -96,7 +96,7 @@ def _shortfall(ends: Array, d: Fraction, share: Fraction, gain: Fraction, lasts:
     reach = sum((_length(step, unit)[1] for step in steps), Fraction(0)) / lasts
     if low >= d + reach:
         return Fraction(0)
-    if low == 0:  # whatever n is, a step has no less along it than its length backwards
+    if low == 0:  # n is unknown: along any n a step is at least minus its length
         return gain * d + reach
     bound = demanded(d - low, gain, Fraction(1))  # it decreases with the distance
     missed = Fraction(0)

@@ -52,6 +52,16 @@ class Rule(NamedTuple):
         k = self.noise**2 / self.drift**2
         return lambda u: ball(k) * (u.sinh() + u) - ball(ratio)
 
+    @property
+    def root(self) -> Ends:
+        """The root of (19) with c2/c1, in u."""
+        return enclose(self.residual(self.c2 / self.c1), Fraction(0))
+
+    @property
+    def printed_root(self) -> Ends:
+        """The root of (19) as printed, with c1/c2, in u."""
+        return enclose(self.residual(self.c1 / self.c2), Fraction(0))
+
     def risk(self, u: Any) -> Any:
         """The Bayes risk (16) without initial deviation, at a ball u."""
         k = self.noise**2 / self.drift**2
@@ -71,7 +81,7 @@ def value(function: Function, u: Fraction) -> Any:
 
 
 def sign(function: Function, u: Fraction) -> int:
-    """The sign of the function at u: -1 or 1; 0 if the ball contains 0, so that it is open."""
+    """The sign of the function at u: -1 or 1; 0 if the ball contains 0, which leaves the sign open."""
     found = value(function, u)
     return int(bool(found > 0)) - int(bool(found < 0))
 

@@ -1,4 +1,4 @@
-"""Claims about the model and its constants, whatever the run; one claim, one file, named by its identifier.
+"""Claims about the model and its constants; each file is named after its claim.
 
 Safety begins with `safe_inv.py`, the trigger with `zeno_proof.py`, the threshold with `thr_root.py`. Several share
 `theorem.py` (a theorem and its hypotheses), `pair_kinds.py` (who keeps apart from whom) and `levels.py` (the trigger).

@@ -1,12 +1,11 @@
 """Simulated drift-diffusion paths of the decision variable between two thresholds.
 
-Paths are those of the diagram's systems with a task error that grows at the drift, x = drift t + n: over each noise
-period x changes by drift * period + noise * sqrt(period) * (a normal number). Tests compare these increments with those
-of the running systems.
+The task error grows at the drift, x = drift t + n: over each noise period x changes by drift * period +
+noise * sqrt(period) * (a normal number). tests/systems compares the variance with that of the running noise.
 
-A path is decided at the first sample at or beyond a barrier, which is later, and less often wrong, than for the
-continuous process. The barrier is therefore moved inwards by 0.5826 noise sqrt(period) (Chernoff 1965, Siegmund
-1979); the mean of the sampled time is then T + period/4.
+A path is decided at the first sample at or beyond a barrier. That is later, and less often wrong, than for the
+continuous process. So the barrier is moved inwards by 0.5826 noise sqrt(period) (Chernoff 1965, Siegmund 1979); the
+mean of the sampled time is then T + period/4.
 """
 
 from __future__ import annotations
@@ -19,10 +18,11 @@ from typing import Any
 import numpy as np
 
 from airground_drake.decision.bayes import decision_time, error_rate, optimal_threshold
+from airground_drake.verify.model.levels import NUMBERS
 
 SEED = 20061
 MOST_PERIODS = 1_000_000
-"""Noise periods of a path: with the drifts in use some hundred are needed."""
+"""Most noise periods of a path; a few hundred are needed with the drifts in use."""
 OVERSHOOT = 0.5825971579390107
 """-zeta(1/2)/sqrt(2 pi): mean overshoot of a sampled Wiener path beyond a far barrier, in steps of one deviation."""
 STEP = 0.2
@@ -56,7 +56,7 @@ class PassageExperiment:
 
 @dataclass(frozen=True)
 class Sample:
-    """What an experiment gave: wrong decisions, sum and sum of squares of the noise periods to the decision."""
+    """Wrong decisions of an experiment, sum and sum of squares of the noise periods to the decision."""
 
     experiment: PassageExperiment
     wrong: int
@@ -65,12 +65,12 @@ class Sample:
 
 
 def experiments(inputs: dict[str, Any]) -> tuple[PassageExperiment, ...]:
-    """At the Bayes threshold with and without deviation, with other drift and noise, and Bayes against printed (19).
+    """Experiments with and without deviation, with other drift and noise, and with the threshold of the printed (19).
 
     The last two have the drift at which the Bayes threshold is at u = 1, where both kinds of decision are common and
     their thresholds differ most clearly.
     """
-    drift, noise, c1, c2 = (float(inputs[name]) for name in ("drift_m_s", "noise_m_sqrt_s", "c1_1_s", "c2"))
+    drift, noise, c1, c2 = (float(inputs[name]) for name in NUMBERS)
     zeta = optimal_threshold(drift, noise, c1, c2)
     clear = noise * math.sqrt((math.sinh(1.0) + 1.0) * c1 / c2)
     bayes = optimal_threshold(clear, noise, c1, c2)
@@ -95,7 +95,7 @@ def running(experiment: PassageExperiment) -> tuple[float, float]:
 
 @lru_cache(maxsize=16)
 def simulate(experiment: PassageExperiment) -> Sample:
-    """Decide `experiment.paths` paths, side by side.
+    """Decide all paths of an experiment.
 
     Raises:
         ArithmeticError: if a path is not decided within MOST_PERIODS.

@@ -8,9 +8,12 @@ from airground_drake.decision.bayes import COMPUTED
 from airground_drake.decision.trigger import Trigger
 from airground_drake.scenarios.schema import Scenario
 
+NUMBERS = ("drift_m_s", "noise_m_sqrt_s", "c1_1_s", "c2")
+"""The numbers of a threshold rule."""
+
 
 def levels_of(scenario: Scenario) -> dict[str, float]:
-    """Threshold and release level, m, and the dwell in force, s; the paper's bare trigger has neither of the latter."""
+    """Threshold and release level, m, and the dwell in force, s; the bare trigger has no release level and no dwell."""
     decision = scenario.decision
     zeta = float(threshold_m(scenario))
     if decision.trigger == "bare":

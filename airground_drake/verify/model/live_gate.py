@@ -2,15 +2,22 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
-from airground_drake.scenarios.schema import Scenario
 from airground_drake.verify.model.live_wait import LiveWait
-from airground_drake.verify.model.theorem import Hypothesis, TheoremClaim
+from airground_drake.verify.model.theorem import Proof
 
 
-class LiveGate(TheoremClaim):
-    """LIVE-GATE."""
+@dataclass(frozen=True, kw_only=True)
+class Ends(Proof):
+    """After how long an accepted intervention is over at the latest, s."""
+
+    over_after_s: float
+
+
+class LiveGate(LiveWait):
+    """LIVE-GATE; its hypotheses are those of LIVE-WAIT."""
 
     id = "LIVE-GATE"
     summary = "An accepted intervention is carried through to its end, unless a new obstacle is sensed."
@@ -28,8 +35,8 @@ class LiveGate(TheoremClaim):
     )
     method = (
         "Theorems in Coq about the transitions of a commitment. Tests compare those of the running `Patience` with the "
-        "theorem's, and disturb the running gatekeeper and control law. The report counts how many accepted "
-        "interventions of its runs under (d) met the premise, from acceptance until they were given back or withdrawn."
+        "theorem's, and disturb the running gatekeeper and control law. For its runs under (d) the report counts the "
+        "accepted interventions that met the premise until they were given back or withdrawn."
     )
     equations = "(20)"
     assumptions = (
@@ -44,16 +51,7 @@ class LiveGate(TheoremClaim):
     )
 
     theorems = ("Patience.kept", "Patience.over_in_time")
-    margin_of = LiveWait.margin_of
 
-    def inputs(self, scenario: Scenario) -> dict[str, Any]:
-        """The numbers of a UGV's patience."""
-        return LiveWait().inputs(scenario)
-
-    def hypotheses(self, inputs: dict[str, Any]) -> list[Hypothesis]:
-        """Times are positive."""
-        return LiveWait().hypotheses(inputs)
-
-    def numbers(self, inputs: dict[str, Any]) -> dict[str, Any]:
-        """The longest that an accepted intervention may last, s."""
-        return {"over_after_s": float(inputs["longest_s"] + inputs["period_s"])}
+    def evidence(self, inputs: dict[str, Any], **proof: Any) -> Proof:
+        """Add the longest that an accepted intervention may last."""
+        return Ends(over_after_s=float(inputs["longest_s"] + inputs["period_s"]), **proof)

@@ -2,12 +2,19 @@
 
 from __future__ import annotations
 
-from fractions import Fraction
+from dataclasses import dataclass
 from typing import Any
 
 from airground_drake.base.exact import decimal
 from airground_drake.scenarios.schema import Scenario
-from airground_drake.verify.model.theorem import Hypothesis, TheoremClaim
+from airground_drake.verify.model.theorem import Hypothesis, Proof, TheoremClaim
+
+
+@dataclass(frozen=True, kw_only=True)
+class Bound(Proof):
+    """How long a UAV can keep a UGV from its own task between two rests, s."""
+
+    bound_s: float
 
 
 class LiveWait(TheoremClaim):
@@ -22,23 +29,23 @@ class LiveWait(TheoremClaim):
     formula = (
         "between two rests of rest_s on its own: time executed <= tries (longest_s + h), h the period of the gatekeeper"
     )
-    latex = (r"\text{time executed between two rests} \le N (\tau_{\text{longest}} + h)",)
+    latex: tuple[str, ...] = (r"\text{time executed between two rests} \le N (\tau_{\text{longest}} + h)",)
     method = (
         "Theorems in Coq, by induction over any messages at any samples; the bounds follow from the scenario. Tests "
         "compare the transitions of the running `Patience` with the theorem's, and attack running gatekeepers that "
         "believe every prediction."
     )
     equations = "(20)"
-    assumptions = (
+    assumptions: tuple[str, ...] = (
         "The gatekeeper is sampled every period, and the controller executes what it accepts at its next sample.",
         "Rounding of times, 1e-15 s, is not counted.",
     )
     does_not_establish = (
-        "That what is accepted is of use, or that the UGV gets anywhere on its own; that refused proposals cost "
-        "nothing but messages. Safety is SAFE-GATE."
+        "That an accepted intervention is useful, that the UGV gets anywhere on its own, or that refused proposals "
+        "cost only messages. Safety is SAFE-GATE."
     )
 
-    theorems = ("Patience.bounded",)
+    theorems: tuple[str, ...] = ("Patience.bounded",)
     margin_of = "longest intervention allowed"
 
     def inputs(self, scenario: Scenario) -> dict[str, Any]:
@@ -55,11 +62,11 @@ class LiveWait(TheoremClaim):
         """Times are positive."""
         longest, period = decimal(inputs["longest_s"]), decimal(inputs["period_s"])
         return [
-            Hypothesis(self.margin_of, "the longest intervention takes more than 0 s", longest, "s", strict=True),
-            Hypothesis("gatekeeper's period", "the gatekeeper's period is above 0", period, "s", strict=True),
+            Hypothesis.of(self.margin_of, "the longest intervention takes more than 0 s", longest, "s", strict=True),
+            Hypothesis.of("gatekeeper's period", "the gatekeeper's period is above 0", period, "s", strict=True),
         ]
 
-    def numbers(self, inputs: dict[str, Any]) -> dict[str, Any]:
-        """The bound, s."""
-        bound: Fraction = inputs["tries"] * (decimal(inputs["longest_s"]) + decimal(inputs["period_s"]))
-        return {"bound_s": float(bound)}
+    def evidence(self, inputs: dict[str, Any], **proof: Any) -> Proof:
+        """Add the bound."""
+        bound = inputs["tries"] * (decimal(inputs["longest_s"]) + decimal(inputs["period_s"]))
+        return Bound(bound_s=float(bound), **proof)

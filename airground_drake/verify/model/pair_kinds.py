@@ -1,6 +1,6 @@
 """Who must keep which distance from whom, read from the scenario alone.
 
-Nothing here is taken from the controllers. SAFE-HYP compares the built ones with the scenario.
+SAFE-HYP compares the built controllers with the scenario.
 """
 
 from __future__ import annotations
@@ -45,9 +45,9 @@ def kinds_of(inputs: dict[str, Any]) -> list[Kind]:
 
 
 def _kinds(scenario: Scenario) -> Iterator[Kind]:
-    """Of each kind the pairs than which no other is as far apart and as fast, and the nearest ones.
+    """The extreme pairs of each kind: the hypotheses hold for all pairs if they hold for these.
 
-    With radii there are many distances of a kind; what holds for these pairs holds for all.
+    Kept are pairs that no other pair exceeds in both distance and speed, and the nearest pair.
     """
     safe = scenario.safe_distance
     ugvs = [(decimal(ugv.radius_m), decimal(ugv.max_speed_m_s)) for ugv in scenario.ugvs.values()]

@@ -1,9 +1,9 @@
 """Paths of the decision variable at the threshold under refinement of the noise step, and the triggers on them.
 
-Paths: x = zeta + n, a task error held at the threshold plus the diagram's integrated noise, dn = -leak n dt + s dW by
-Euler-Maruyama on the grid dt and linear in between. The same Wiener paths are used at every dt (increments summed), and
-n(0) is that of a Wiener path one coarse step old, so that no path starts exactly at the threshold. Triggers are
-counted exactly on the piecewise linear path by the running `Trigger`.
+Paths are x = zeta + n: the task error stays at the threshold, and n is the diagram's integrated noise, dn = -leak n dt
++ s dW by Euler-Maruyama on the grid dt and linear in between. Every dt uses the same Wiener paths (increments summed).
+n(0) is a Wiener path after one coarse step, so no path starts exactly at the threshold. The running `Trigger` counts
+triggers exactly on the piecewise linear path.
 
 Theory of the bare count: x rises through zeta in one step with probability arccos(rho_k) / (2 pi), rho_k being the
 correlation of n at the step's ends (both are normal with mean 0), and starts above it with probability 1/2. So the
@@ -11,8 +11,8 @@ expected count is 1/2 + sum_k arccos(rho_k) / (2 pi), k = 0, ..., K - 1, K = dur
 rho_k = sqrt((c + k)/(c + k + 1)), c = (coarsest dt)/dt, arccos(rho_k) = arctan(1/sqrt(c + k)), and the sum is
 (sqrt(c + K) - sqrt(c))/pi + O(1): dt^(-1/2) with a relative correction of order sqrt(dt).
 
-Intensity s: that of the scenario, or if that is less what crosses the hysteresis within a dwell,
-(zeta - release) / sqrt(dwell), so that the automaton has something to do; it is also counted at the scenario's own.
+The intensity s is that of the scenario, but at least (zeta - release) / sqrt(dwell), which crosses the hysteresis
+within a dwell: the automaton must have something to do. It is also counted at the scenario's own intensity.
 """
 
 from __future__ import annotations
@@ -25,6 +25,7 @@ import numpy as np
 
 from airground_drake.base.arrays import Array
 from airground_drake.decision.trigger import Mode, Trigger
+from airground_drake.verify.model.levels import trigger_of
 
 SEED = 5
 PATHS = 96
@@ -32,7 +33,7 @@ SERIES = ("bare", "automaton", "automaton_at_scenario_noise")
 HALVINGS = 8
 """dt is halved this often: a factor of 256."""
 COARSE_STEPS = (64, 640)
-"""Fewest and most steps of the coarsest grid; the duration or the first dt is cut down to that."""
+"""Fewest and most steps of the coarsest grid; the first dt or the duration is cut down to that."""
 DWELL_STEPS = 10
 """Fewest steps of the coarsest grid in a dwell (in 1 s without one): the correction must be small."""
 
@@ -60,7 +61,7 @@ class Refinement:
 
 def experiment(inputs: dict[str, Any]) -> Refinement:
     """The experiment for the constants of a scenario."""
-    trigger = Trigger(inputs["zeta_m"], inputs["released_below_m"], inputs["dwell_s"])
+    trigger = trigger_of(inputs)
     fewest, most = COARSE_STEPS
     scale = trigger.dwell or 1.0
     coarse = min(inputs["noise_period_s"], inputs["duration_s"] / fewest, scale / DWELL_STEPS)

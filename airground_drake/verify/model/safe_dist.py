@@ -1,4 +1,4 @@
-"""SAFE-DIST: what is left of the safe distance when velocities are disturbed (proofs/Safety.v, Gate.v).
+"""SAFE-DIST: the distance that remains when velocities are disturbed (proofs/Safety.v, Gate.v).
 
 Every robot moves with v + e(t), ||e(t)|| <= w, instead of v; W is what the disturbances of a pair add up to: w beside
 an obstacle, 2 w between robots. Other symbols are those of `safe_inv.py`.
@@ -6,14 +6,23 @@ an obstacle, 2 w between robots. Other symbols are those of `safe_inv.py`.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from fractions import Fraction
+from math import inf
 from typing import Any
 
 from airground_drake.base.exact import decimal
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.verify.model.pair_kinds import Kind, constants, kinds_of
 from airground_drake.verify.model.safe_inv import stable
-from airground_drake.verify.model.theorem import Hypothesis, TheoremClaim
+from airground_drake.verify.model.theorem import Hypothesis, Proof, TheoremClaim
+
+
+@dataclass(frozen=True, kw_only=True)
+class LeastDistances(Proof):
+    """The least distances, m, by kind of pair; none without a gain."""
+
+    least_distances_m: dict[str, float] | None = None
 
 
 class SafeDist(TheoremClaim):
@@ -73,23 +82,23 @@ class SafeDist(TheoremClaim):
         gain, h = decimal(inputs["avoidance_gain_1_s"]), decimal(inputs["period_s"])
         found = [
             *stable(gain, h),
-            Hypothesis("A", "the gain A is above 0: it restores a distance", gain, "1/s", strict=True),
+            Hypothesis.of("A", "the gain A is above 0: it restores a distance", gain, "1/s", strict=True),
         ]
         if gain <= 0:
             return found
         return found + [
-            Hypothesis(self.margin_of, f"{each.kind}: d - W/A is above 0", left_m(inputs, each), "m", strict=True)
+            Hypothesis.of(self.margin_of, f"{each.kind}: d - W/A is above 0", left_m(inputs, each), "m", strict=True)
             for each in kinds_of(inputs)
         ]
 
-    def numbers(self, inputs: dict[str, Any]) -> dict[str, Any]:
-        """The least distances, m, by kind of pair."""
+    def evidence(self, inputs: dict[str, Any], **proof: Any) -> LeastDistances:
+        """Add the least distances."""
         if not inputs["avoidance_gain_1_s"] > 0.0:
-            return {}
-        pairs = kinds_of(inputs)
-        kinds = dict.fromkeys(each.kind for each in pairs)
-        least = {kind: float(min(left_m(inputs, each) for each in pairs if each.kind == kind)) for kind in kinds}
-        return {"least_distances_m": least}
+            return LeastDistances(**proof)
+        least = dict[str, float]()
+        for pair in kinds_of(inputs):
+            least[pair.kind] = min(float(left_m(inputs, pair)), least.get(pair.kind, inf))
+        return LeastDistances(least_distances_m=least, **proof)
 
 
 def left_m(inputs: dict[str, Any], pair: Kind) -> Fraction:

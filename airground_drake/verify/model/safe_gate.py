@@ -7,13 +7,12 @@ from typing import Any
 
 from airground_drake.registry import METHODS
 from airground_drake.scenarios.schema import Scenario
-from airground_drake.verify.model.pair_kinds import constants
 from airground_drake.verify.model.safe_inv import SafeInv
-from airground_drake.verify.model.theorem import Hypothesis, TheoremClaim
+from airground_drake.verify.model.theorem import Hypothesis
 
 
-class SafeGate(TheoremClaim):
-    """SAFE-GATE."""
+class SafeGate(SafeInv):
+    """SAFE-GATE; its hypotheses are those of SAFE-INV and one more."""
 
     id = "SAFE-GATE"
     summary = "Under method (d) nothing that the UAV asks for can bring a robot closer than the safe distance."
@@ -46,14 +45,13 @@ class SafeGate(TheoremClaim):
     )
 
     theorems = ("Gate.scaled_back", "Safety.standing", "Safety.safe_always")
-    margin_of = SafeInv.margin_of
 
     def inputs(self, scenario: Scenario) -> dict[str, Any]:
         """Those of SAFE-INV, and whether method (d) puts an intervention above avoidance."""
-        return {**constants(scenario), "intervention_on_top": METHODS["d"].intervention_on_top}
+        return {**super().inputs(scenario), "intervention_on_top": METHODS["d"].intervention_on_top}
 
     def hypotheses(self, inputs: dict[str, Any]) -> list[Hypothesis]:
         """Those of SAFE-INV, and the order of priorities."""
         on_top = Fraction(inputs["intervention_on_top"])
-        order = Hypothesis("order of priorities", "method (d) has avoidance above the intervention", -on_top)
-        return [*SafeInv().hypotheses(inputs), order]
+        order = Hypothesis.of("order of priorities", "method (d) has avoidance above the intervention", -on_top)
+        return [*super().hypotheses(inputs), order]

@@ -32,7 +32,7 @@ class SafeInv(TheoremClaim):
         "D <= d, n.v >= q A (d - D) => ||x + s v|| >= D and d - ||x + h v|| <= (1 - A h)(d - D); "
         "D > R, R >= d + c h => ||x + s v|| >= d"
     )
-    latex = (
+    latex: tuple[str, ...] = (
         r"D \ge d, \; n^\top v \ge -q (D - d) / h \; \Rightarrow \; \lVert x + s v \rVert \ge d \quad "
         r"\text{for all } s \in [0, h]",
         r"D \le d, \; n^\top v \ge q A (d - D) \; \Rightarrow \; \lVert x + s v \rVert \ge D, \; d - \lVert x "
@@ -45,10 +45,10 @@ class SafeInv(TheoremClaim):
         "checked here in exact arithmetic; those about a run are SAFE-HYP."
     )
     equations = "(7)-(8), (11) in the inequality form of the package (set-based avoidance)"
-    assumptions = (
+    assumptions: tuple[str, ...] = (
         "Positions are integrals of the commands, which are held between samples; all robots are sampled at the same "
         "instants.",
-        "Obstacles stand still. Robots obey their speed limits; what is out of range counts on that. Distances are of "
+        "Obstacles stand still. Robots obey their speed limits: pairs out of range rely on that. Distances are of "
         "centres: a body is a ball, and both radii are part of d.",
         "A UGV's velocity has no z component.",
     )
@@ -58,7 +58,7 @@ class SafeInv(TheoremClaim):
         "inequalities. That the program computes these inequalities is for tests and SAFE-HYP to show."
     )
 
-    theorems = (
+    theorems: tuple[str, ...] = (
         "Safety.safe_always",
         "Safety.recovers",
         "Safety.obstacle",
@@ -76,32 +76,32 @@ class SafeInv(TheoremClaim):
         """A h is at most 1, shares add up to 1, the sensing range covers d + c h."""
         gain, h = decimal(inputs["avoidance_gain_1_s"]), decimal(inputs["period_s"])
         reach = decimal(inputs["sensing_range_m"])
-        found = stable(gain, h)
-        found += [
-            Hypothesis(
+        pairs = kinds_of(inputs)
+        shares = [
+            Hypothesis.of(
                 "share that is missing to 1",
                 f"{kind}: the shares of both bodies add up to 1",
                 -abs(sum(SHARES[kind], Fraction(-1))),
             )
-            for kind in dict.fromkeys(each.kind for each in kinds_of(inputs))
+            for kind in dict.fromkeys(each.kind for each in pairs)
         ]
-        found += [
-            Hypothesis(
+        ranges = [
+            Hypothesis.of(
                 self.margin_of,
                 f"{each.kind}: the sensing range {float(reach):g} m is at least d + c h = {float(each.safe_m):g} m + "
                 f"{float(each.closing_m_s):g} m/s * {float(h):g} s",
                 reach - each.safe_m - each.closing_m_s * h,
                 "m",
             )
-            for each in kinds_of(inputs)
+            for each in pairs
         ]
-        return found
+        return [*stable(gain, h), *shares, *ranges]
 
 
 def stable(gain: Fraction, h: Fraction) -> list[Hypothesis]:
     """A h is between 0 and 1."""
     return [
-        Hypothesis("1 - A h", f"A h = {float(gain * h):g} is at most 1", 1 - gain * h),
-        Hypothesis("A", "the gain A is not negative", gain, "1/s"),
-        Hypothesis("h", "the control period h is above 0", h, "s", strict=True),
+        Hypothesis.of("1 - A h", f"A h = {float(gain * h):g} is at most 1", 1 - gain * h),
+        Hypothesis.of("A", "the gain A is not negative", gain, "1/s"),
+        Hypothesis.of("h", "the control period h is above 0", h, "s", strict=True),
     ]

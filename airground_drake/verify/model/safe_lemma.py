@@ -39,6 +39,6 @@ class SafeLemma(TheoremClaim):
     def hypotheses(self, inputs: dict[str, Any]) -> list[Hypothesis]:
         """Safe distances are positive, so that no pair is at one point."""
         return [
-            Hypothesis(self.margin_of, f"{each.kind}: the safe distance is above 0", each.safe_m, "m", strict=True)
+            Hypothesis.of(self.margin_of, f"{each.kind}: the safe distance is above 0", each.safe_m, "m", strict=True)
             for each in kinds_of(inputs)
         ]

@@ -10,48 +10,59 @@ from typing import Any
 
 from airground_drake.proofs import THEOREMS, standing
 from airground_drake.verify.claim import ModelClaim
-from airground_drake.verify.finding import Finding
+from airground_drake.verify.finding import Evidence, Finding
 
 
 @dataclass(frozen=True)
-class Hypothesis:
-    """What a theorem takes, with the numbers of a scenario.
+class Hypothesis(Evidence):
+    """A hypothesis of a theorem with the numbers of a scenario.
 
     Attributes:
-        name: what the margin is of, in a few words.
+        hypothesis: what the margin is of, in a few words.
         says: the hypothesis in words.
-        margin: how far it is from failing, in `unit`; exact where the numbers are decimals.
+        margin: how far it is from failing, in `unit`.
         unit: of the margin.
-        strict: whether a margin of 0 fails.
+        holds: whether the scenario meets it.
     """
 
-    name: str
+    hypothesis: str
     says: str
-    margin: Fraction
-    unit: str = ""
-    strict: bool = False
+    margin: float
+    unit: str
+    holds: bool
 
-    @property
-    def holds(self) -> bool:
-        """Whether the scenario meets it."""
-        return self.margin > 0 if self.strict else self.margin >= 0
+    @classmethod
+    def of(cls, name: str, says: str, margin: Fraction, unit: str = "", *, strict: bool = False) -> Hypothesis:
+        """Decide it by its exact margin; if `strict`, a margin of 0 fails."""
+        return cls(name, says, float(margin), unit, margin > 0 if strict else margin >= 0)
 
-    def to_json(self) -> dict[str, Any]:
-        """For the evidence."""
-        return {
-            "hypothesis": self.name,
-            "says": self.says,
-            "margin": float(self.margin),
-            "unit": self.unit,
-            "holds": self.holds,
-        }
+
+@dataclass(frozen=True, kw_only=True)
+class Proof(Evidence):
+    """The evidence of a theorem.
+
+    Attributes:
+        proof: whether Coq has checked the theorems, in words.
+        theorems: what they say, by name.
+        hypotheses: those that were checked.
+        reason: why the claim is left open.
+        applies_to: how often the runs of a report met the premise, `of` how many times.
+        of: see `applies_to`.
+    """
+
+    proof: str
+    theorems: dict[str, str]
+    hypotheses: Sequence[Hypothesis]
+    reason: str | None = None
+    applies_to: int | None = None
+    of: int | None = None
 
 
 class TheoremClaim(ModelClaim):
     """A theorem and its hypotheses.
 
-    It is proved if Coq has checked the theories that are installed and every hypothesis holds. A hypothesis that fails
-    leaves the claim open, unless `counterexample` shows that what it says is false.
+    It is proved if Coq has checked the installed theories and every hypothesis holds. A hypothesis that fails leaves
+    the claim open, unless `counterexample` shows that the claim is false.
 
     Attributes (all of the class):
         theorems: names in `airground_drake.proofs.THEOREMS`.
@@ -64,50 +75,30 @@ class TheoremClaim(ModelClaim):
 
     @abc.abstractmethod
     def hypotheses(self, inputs: dict[str, Any]) -> Sequence[Hypothesis]:
-        """What the theorems take, for these constants."""
+        """The hypotheses of the theorems, for these constants."""
 
-    def numbers(self, inputs: dict[str, Any]) -> dict[str, Any]:
-        """What follows from the theorems for these constants, strict JSON."""
-        return {}
+    def evidence(self, inputs: dict[str, Any], **proof: Any) -> Proof:
+        """The proof, with the numbers that follow for these constants."""
+        return Proof(**proof)
 
     def counterexample(self, inputs: dict[str, Any], broken: Hypothesis) -> dict[str, Any] | None:
-        """What shows that the claim is false where this hypothesis fails; None: it is only left open."""
+        """A case that refutes the claim if this hypothesis fails; None: the claim is only left open."""
         return None
 
     def check(self, inputs: dict[str, Any]) -> Finding:
         """Check the hypotheses, and whether Coq has checked the theorems as they stand here."""
         found = self.hypotheses(inputs)
-        shown = next((each for each in found if not each.holds), None) or _named(found, self.margin_of)
+        named = [each for each in found if each.hypothesis == self.margin_of]
+        shown = next((each for each in found if not each.holds), None) or min(named, key=lambda each: each.margin)
         stands = standing(*self.theorems)
-        evidence = {
-            "proof": stands.words,
-            "theorems": {name: THEOREMS[name].statement for name in self.theorems},
-            "hypotheses": [each.to_json() for each in found],
-            **self.numbers(inputs),
-        }
+        statements = {name: THEOREMS[name].statement for name in self.theorems}
+        evidence = self.evidence(inputs, proof=stands.words, theorems=statements, hypotheses=found)
         finding = Finding(
-            "proved",
-            margin=float(shown.margin),
-            unit=shown.unit,
-            quantity=shown.name,
-            evidence=evidence,
-            exercised=len(found),
+            "proved", shown.margin, shown.unit, evidence=evidence, quantity=shown.hypothesis, exercised=len(found)
         )
-        if not shown.holds:
-            return self._failed(inputs, shown, finding)
-        return finding if stands.checked else _open(finding, f"the theorems are {stands.words}")
-
-    def _failed(self, inputs: dict[str, Any], broken: Hypothesis, finding: Finding) -> Finding:
-        against = self.counterexample(inputs, broken)
-        if against is None:
-            return _open(finding, f"a hypothesis fails: {broken.says}")
-        return replace(finding, status="refuted", counterexample=against)
-
-
-def _named(found: Sequence[Hypothesis], name: str) -> Hypothesis:
-    """The hypothesis of this name with the least margin."""
-    return min((each for each in found if each.name == name), key=lambda each: each.margin)
-
-
-def _open(finding: Finding, reason: str) -> Finding:
-    return replace(finding, status="inconclusive", evidence={**finding.evidence, "reason": reason})
+        if shown.holds and stands.checked:
+            return finding
+        if not shown.holds and (against := self.counterexample(inputs, shown)) is not None:
+            return replace(finding, status="refuted", counterexample=against)
+        reason = f"the theorems are {stands.words}" if shown.holds else f"a hypothesis fails: {shown.says}"
+        return replace(finding, status="inconclusive", evidence=replace(evidence, reason=reason))

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from fractions import Fraction
-from typing import Any, TypedDict
+from dataclasses import asdict, dataclass
+from typing import Any
 
 import numpy as np
 
@@ -12,9 +12,9 @@ from airground_drake.decision.bayes import bayes_risk, optimal_threshold, printe
 from airground_drake.run.trace import Trace
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.verify.claim import ModelClaim
-from airground_drake.verify.engines.signs import enclose
-from airground_drake.verify.finding import Finding
-from airground_drake.verify.model.thr_root import NUMBERS, ThrRoot, rule_of
+from airground_drake.verify.finding import Evidence, Finding
+from airground_drake.verify.model.levels import NUMBERS
+from airground_drake.verify.model.thr_root import ThrRoot, rule_of
 
 EQUAL = 1e-6
 """A threshold is the optimum if it differs by this share at most: it then costs less than 1e-11 of the risk."""
@@ -26,26 +26,12 @@ BEFORE_S = 1.0
 """The drift of a run is the growth of the task error over this time before the first trigger, s."""
 
 
-class Choice(TypedDict, total=False):
-    """The evidence: thresholds in m, Bayes risks, and what was measured in the runs, by `run UGV`."""
-
-    kind: str
-    rule: str
-    threshold_in_force_m: float
-    optimal_threshold_m: float
-    threshold_as_printed_in_19_m: float
-    risk_in_force: float
-    least_risk: float
-    extra_risk: float
-    runs: dict[str, Measured]
-
-
-class Measured(TypedDict):
+@dataclass(frozen=True)
+class Measured(Evidence):
     """Drift and noise that a UGV had in a run before its first trigger, and what they say of the threshold.
 
-    Thresholds are the optima for this drift: with the noise that the rule assumes, and with the run's own. The extra
-    risk is that of the threshold in force. None: there is no such number, as the task error does not grow, or the run
-    has no noise.
+    Thresholds, m, are the optima for this drift: with the noise that the rule assumes, and with the run's own. The
+    extra risk is that of the threshold in force. None: the task error does not grow, or the run has no noise.
     """
 
     first_trigger_s: float
@@ -55,6 +41,21 @@ class Measured(TypedDict):
     optimum_for_this_drift_m: float | None
     optimum_for_this_drift_and_noise_m: float | None
     extra_risk: float | None
+
+
+@dataclass(frozen=True)
+class Choice(Evidence):
+    """Thresholds, m, their Bayes risks, and what was measured in the runs of a report, by `run UGV`."""
+
+    kind: str
+    rule: str
+    threshold_in_force_m: float
+    optimal_threshold_m: float
+    threshold_as_printed_in_19_m: float
+    risk_in_force: float
+    least_risk: float
+    extra_risk: float
+    runs: dict[str, Measured] | None = None
 
 
 class ThrChoice(ModelClaim):
@@ -93,20 +94,21 @@ class ThrChoice(ModelClaim):
         """Compare the threshold in force with the optimum, and their risks."""
         numbers = [inputs[name] for name in NUMBERS]
         rule, zeta = rule_of(inputs), float(inputs["zeta_m"])
-        optimum = float(rule.zeta(enclose(rule.residual(rule.c2 / rule.c1), Fraction(0)).low))
+        optimum = float(rule.zeta(rule.root.low))
         least, risk = (float(bayes_risk(each, *numbers)) for each in (optimum, zeta))
         off = abs(zeta - optimum)
         optimal = off <= EQUAL * optimum
-        evidence: Choice = {
-            "kind": "optimal" if optimal else "declared",
-            "rule": inputs["rule"],
-            "threshold_in_force_m": zeta,
-            "optimal_threshold_m": optimum,
-            "threshold_as_printed_in_19_m": float(printed_threshold(*numbers)),
-            "risk_in_force": risk,
-            "least_risk": least,
-            "extra_risk": max(round(risk - least, DIGITS), 0.0),
-        }
+        evidence = Choice(
+            "optimal" if optimal else "declared",
+            inputs["rule"],
+            zeta,
+            optimum,
+            float(printed_threshold(*numbers)),
+            risk_in_force=risk,
+            least_risk=least,
+            extra_risk=max(round(risk - least, DIGITS), 0.0),
+        )
+        shown = {key: value for key, value in asdict(evidence).items() if value is not None}
         if not optimal and inputs["rule"] != "bayes":
             return Finding("holds", evidence=evidence, exercised=0)
         return Finding(
@@ -114,7 +116,7 @@ class ThrChoice(ModelClaim):
             margin=EQUAL * optimum - off,
             unit="m",
             quantity="tolerance left between threshold and optimum",
-            counterexample=None if optimal else dict(evidence),
+            counterexample=None if optimal else shown,
             evidence=evidence,
             exercised=1,
         )
@@ -140,13 +142,5 @@ def of_run(trace: Trace) -> dict[str, Measured]:
         if optima[1] is not None:
             more = bayes_risk(zeta, drift, noise, *costs) - bayes_risk(optima[1], drift, noise, *costs)
             extra = max(round(float(more), DIGITS), 0.0)
-        found[f"{trace.run} {ugv}"] = {
-            "first_trigger_s": times[0],
-            "drift_m_s": drift,
-            "noise_m_sqrt_s": noise,
-            "threshold_m": zeta,
-            "optimum_for_this_drift_m": optima[0],
-            "optimum_for_this_drift_and_noise_m": optima[1],
-            "extra_risk": extra,
-        }
+        found[f"{trace.run} {ugv}"] = Measured(times[0], drift, noise, zeta, optima[0], optima[1], extra)
     return found

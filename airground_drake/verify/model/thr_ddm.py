@@ -1,45 +1,61 @@
 """THR-DDM: mean decision time and error rate of simulated drift-diffusion paths against (17)-(18).
 
-Paths are those of `first_passages.py`; what their correction for sampling leaves is allowed for by ERROR_ALLOWANCE and
-TIME_ALLOWANCE, which the tests check against a quadrature of the sampled process.
-
-Intervals are simultaneous over all comparisons (Bonferroni), Clopper-Pearson for error rates and normal for times.
-
-Each comparison in the evidence has the experiment's constants and seed, the numbers of paths and of wrong decisions,
-sum and sum of squares of the noise periods to the decision, the interval and the formula's value: from the counts on
-everything can be redone by hand.
+The paths are those of `first_passages.py`. ERROR_ALLOWANCE and TIME_ALLOWANCE cover the bias that their correction for
+sampling leaves; tests compare them with a quadrature of the sampled process. Intervals are simultaneous over all
+comparisons (Bonferroni): Clopper-Pearson for error rates, normal for times. The evidence has the counts, from which
+everything else can be redone by hand.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from typing import Any
 
 from scipy.special import betainccinv, betaincinv, ndtri
 
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.verify.claim import ModelClaim
-from airground_drake.verify.finding import Finding
-from airground_drake.verify.model.first_passages import (
-    PassageExperiment,
-    Sample,
-    experiments,
-    running,
-    simulate,
-)
+from airground_drake.verify.finding import Evidence, Finding
+from airground_drake.verify.model.first_passages import PassageExperiment, Sample, experiments, running, simulate
+from airground_drake.verify.model.levels import NUMBERS
 
 LEVEL = 0.99
-
 ERROR_ALLOWANCE = 2e-4
 """Bias of the corrected error rate."""
-
 TIME_ALLOWANCE = 0.05
 """Bias of the corrected time, in noise periods."""
 
 Formulas = Callable[[PassageExperiment], tuple[float, float]]
 """Mean decision time, s, and error rate that are to be compared with the simulation."""
+
+
+@dataclass(frozen=True)
+class Comparison(Evidence):
+    """A simulated mean, its interval and the formula's value; the margin is in half-widths of the interval."""
+
+    experiment: str
+    quantity: str
+    unit: str
+    constants: dict[str, Any]
+    wrong_decisions: int
+    periods_sum: int
+    periods_sum_of_squares: int
+    estimate: float
+    interval: list[float]
+    formula: float
+    z_score: float
+    margin: float
+
+
+@dataclass(frozen=True)
+class Comparisons(Evidence):
+    """All comparisons, the number of paths and the simultaneous level of the intervals."""
+
+    paths: int
+    comparisons: list[Comparison]
+    family_level: float
 
 
 class ThrDdm(ModelClaim):
@@ -74,18 +90,13 @@ class ThrDdm(ModelClaim):
         "period or leak. Statistics exclude deviations larger than the intervals, not smaller ones."
     )
     expected = "supported"
-
+    record = Comparisons
     exercised_by = "simulated paths"
 
     def inputs(self, scenario: Scenario) -> dict[str, Any]:
         """The numbers of the threshold rule."""
         rule = scenario.decision.threshold
-        return {
-            "drift_m_s": rule.drift_m_s,
-            "noise_m_sqrt_s": rule.noise_m_sqrt_s,
-            "c1_1_s": rule.c1_1_s,
-            "c2": rule.c2,
-        }
+        return {name: getattr(rule, name) for name in NUMBERS}
 
     def check(self, inputs: dict[str, Any]) -> Finding:
         """Simulate and compare."""
@@ -95,58 +106,45 @@ class ThrDdm(ModelClaim):
 def compare(chosen: tuple[PassageExperiment, ...], formulas: Formulas) -> Finding:
     """The verdict for these formulas: 'supported' if all intervals contain them, else 'refuted'."""
     rows = [row for each in chosen for row in _rows(simulate(each), formulas(each), 2 * len(chosen))]
-    worst = min(rows, key=lambda row: float(row["margin"]))
-    supported = worst["margin"] >= 0.0
+    worst = min(rows, key=lambda row: row.margin)
+    supported = worst.margin >= 0.0
     paths = sum(each.paths for each in chosen)
-    evidence = {
-        "paths": paths,
-        "comparisons": rows,
-        "family_level": LEVEL,
-    }
     return Finding(
         "supported" if supported else "refuted",
-        margin=worst["margin"],
+        margin=worst.margin,
         unit="interval half-widths",
         quantity="what a simulated mean leaves of its confidence interval about the formula",
-        where={key: worst[key] for key in ("experiment", "quantity")},
-        counterexample=None if supported else worst,
-        evidence=evidence,
+        where={"experiment": worst.experiment, "quantity": worst.quantity},
+        counterexample=None if supported else asdict(worst),
+        evidence=Comparisons(paths, rows, LEVEL),
         exercised=paths,
     )
 
 
-def _rows(sample: Sample, formula: tuple[float, float], comparisons: int) -> list[dict[str, Any]]:
-    """Both comparisons of an experiment: estimate, interval, formula, z-score and margin."""
-    each = sample.experiment
-    count = sample.experiment.paths
+def _rows(sample: Sample, formula: tuple[float, float], comparisons: int) -> list[Comparison]:
+    """Compare the mean decision time and the error rate of an experiment with the formula's."""
+    each, wrong = sample.experiment, sample.wrong
+    count, period = each.paths, each.period
     tail = (1.0 - LEVEL) / comparisons / 2.0
-    period = each.period
     mean = sample.periods / count
     deviation = math.sqrt((sample.squares - sample.periods * mean) / (count - 1.0) / count)
     half = float(-ndtri(tail)) * deviation + TIME_ALLOWANCE
     time = [(mean - 0.25 + side * half) * period for side in (-1.0, 1.0)]
-    low = float(betaincinv(sample.wrong, count - sample.wrong + 1, tail)) if sample.wrong else 0.0
-    high = float(betainccinv(sample.wrong + 1, count - sample.wrong, tail)) if sample.wrong < count else 1.0
-    rate = sample.wrong / count
+    low = float(betaincinv(wrong, count - wrong + 1, tail)) if wrong else 0.0
+    high = float(betainccinv(wrong + 1, count - wrong, tail)) if wrong < count else 1.0
+    rate = wrong / count
     spread = math.sqrt(max(rate * (1.0 - rate), 1.0 / count) / count)
     found = (
         ("mean decision time", "s", (mean - 0.25) * period, deviation * period, time, formula[0]),
         ("error rate", "", rate, spread, [low - ERROR_ALLOWANCE, high + ERROR_ALLOWANCE], formula[1]),
     )
+    constants = {**asdict(each), "noise_period_s": period, "barrier_m": each.barrier}
+    counted = wrong, sample.periods, sample.squares
     return [
-        {
-            "experiment": each.name,
-            "quantity": quantity,
-            "unit": unit,
-            "constants": {**asdict(each), "noise_period_s": period, "barrier_m": each.barrier},
-            "wrong_decisions": sample.wrong,
-            "periods_sum": sample.periods,
-            "periods_sum_of_squares": sample.squares,
-            "estimate": estimate,
-            "interval": interval,
-            "formula": value,
-            "z_score": (estimate - value) / error,
-            "margin": 2.0 * min(value - interval[0], interval[1] - value) / (interval[1] - interval[0]),
-        }
+        Comparison(
+            each.name, quantity, unit, constants, *counted, estimate, interval, value,
+            z_score=(estimate - value) / error,
+            margin=2.0 * min(value - interval[0], interval[1] - value) / (interval[1] - interval[0]),
+        )
         for quantity, unit, estimate, error, interval, value in found
-    ]
+    ]  # fmt: skip

@@ -32,8 +32,8 @@ class ThrIso(TheoremClaim):
     )
     method = (
         "Theorems in Coq. Checked here: noise is updated at control samples only, so that it is linear between two "
-        "updates. As the least value so far never rises within a step and the largest never falls, what has become due "
-        "stays due until the step ends, so that Drake sees the witness change its sign and isolates it. Tests compare "
+        "updates. Within a step the least value so far never rises and the largest never falls, so a due transition "
+        "stays due until the step ends. Drake then sees the witness change its sign and isolates it. Tests compare "
         "the running trigger with dense sampling."
     )
     equations = "(15), (20)"
@@ -61,7 +61,7 @@ class ThrIso(TheoremClaim):
         steps = decimal(inputs["noise_period_s"]) / decimal(inputs["period_s"])
         says = f"the noise period is a whole number of control periods: {float(steps):g}"
         return [
-            Hypothesis(self.margin_of, "the threshold is above 0", decimal(inputs["zeta_m"]), "m", strict=True),
-            Hypothesis("noise periods beside control samples", says, -(steps % 1)),
-            Hypothesis("control periods in a noise period", "there is at least one", steps - 1),
+            Hypothesis.of(self.margin_of, "the threshold is above 0", decimal(inputs["zeta_m"]), "m", strict=True),
+            Hypothesis.of("noise periods beside control samples", says, -(steps % 1)),
+            Hypothesis.of("control periods in a noise period", "there is at least one", steps - 1),
         ]

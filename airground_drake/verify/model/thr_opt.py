@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
@@ -9,8 +10,28 @@ from airground_drake.base.exact import decimal
 from airground_drake.decision.bayes import bayes_risk
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.verify.engines.signs import Ends, Rule, ball, enclose, sign, value
-from airground_drake.verify.model.theorem import Hypothesis, TheoremClaim
-from airground_drake.verify.model.thr_root import NUMBERS, ThrRoot, as_floats, rule_of, two_signs
+from airground_drake.verify.model.levels import NUMBERS
+from airground_drake.verify.model.theorem import Hypothesis, Proof, TheoremClaim
+from airground_drake.verify.model.thr_root import ThrRoot, as_floats, rule_of, two_signs
+
+
+@dataclass(frozen=True, kw_only=True)
+class Optimum(Proof):
+    """Where both roots are, for which drifts the threshold in force is optimal, and the risks.
+
+    Attributes:
+        enclosures: of both roots, as u and as a threshold, m.
+        optimal_for_drifts_m_s: enclosures of the drifts, m/s.
+        threshold_in_force_m: m.
+        risk_at_the_root: Bayes risk.
+        risk_at_the_threshold_in_force: Bayes risk.
+    """
+
+    enclosures: dict[str, list[float]]
+    optimal_for_drifts_m_s: list[list[float]]
+    threshold_in_force_m: float
+    risk_at_the_root: float
+    risk_at_the_threshold_in_force: float
 
 
 class ThrOpt(TheoremClaim):
@@ -65,34 +86,32 @@ class ThrOpt(TheoremClaim):
         rule = rule_of(inputs)
         found = ThrRoot().hypotheses(inputs)
         if rule.c1 == rule.c2:
-            return [*found, Hypothesis(self.margin_of, "c1 = c2: both equations have the same root", Fraction(0))]
-        printed = enclose(rule.residual(rule.c1 / rule.c2), Fraction(0))
+            return [*found, Hypothesis.of(self.margin_of, "c1 = c2: both equations have the same root", Fraction(0))]
+        printed = rule.printed_root
         return [
             *found,
-            *two_signs("the printed (19)", printed, (-1, 1)),
-            Hypothesis(self.margin_of, "the risk at the printed root is higher", _gap(rule, printed), strict=True),
+            *two_signs("the printed (19)", printed),
+            Hypothesis.of(self.margin_of, "the risk at the printed root is higher", _gap(rule, printed), strict=True),
         ]
 
-    def numbers(self, inputs: dict[str, Any]) -> dict[str, Any]:
-        """Enclosures of both roots and of the drifts that the threshold in force is optimal for; risks."""
-        rule = rule_of(inputs)
-        root, printed = (enclose(rule.residual(r), Fraction(0)) for r in (rule.c2 / rule.c1, rule.c1 / rule.c2))
-        optimal = float(rule.zeta(root.low))
-        risks = {
-            name: bayes_risk(zeta, *(inputs[each] for each in NUMBERS))
-            for name, zeta in (("root", optimal), ("threshold_in_force", inputs["zeta_m"]))
-        }
-        return {
-            "enclosures": {**as_floats(rule, root), **as_floats(rule, printed, "printed_")},
-            "optimal_for_drifts_m_s": _drifts(rule, decimal(inputs["zeta_m"])),
-            "threshold_in_force_m": inputs["zeta_m"],
-            **{f"risk_at_the_{name}": float(risk) for name, risk in risks.items()},
-        }
+    def evidence(self, inputs: dict[str, Any], **proof: Any) -> Optimum:
+        """Add the enclosures of both roots and of the drifts, and the risks."""
+        rule, zeta = rule_of(inputs), inputs["zeta_m"]
+        root, printed = rule.root, rule.printed_root
+        numbers = [inputs[each] for each in NUMBERS]
+        return Optimum(
+            enclosures={**as_floats(rule, root), **as_floats(rule, printed, "printed_")},
+            optimal_for_drifts_m_s=_drifts(rule, decimal(zeta)),
+            threshold_in_force_m=zeta,
+            risk_at_the_root=float(bayes_risk(float(rule.zeta(root.low)), *numbers)),
+            risk_at_the_threshold_in_force=float(bayes_risk(zeta, *numbers)),
+            **proof,
+        )
 
 
 def _gap(rule: Rule, printed: Ends) -> Fraction:
     """A lower bound of the risk at the printed root less that at the root: of the ends next to each other."""
-    root = enclose(rule.residual(rule.c2 / rule.c1), Fraction(0))
+    root = rule.root
     v, u = (printed.high, root.low) if rule.c1 < rule.c2 else (printed.low, root.high)
     return Fraction(float((value(rule.risk, v) - value(rule.risk, u)).lower()))
 

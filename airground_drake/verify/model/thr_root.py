@@ -2,19 +2,27 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
 from airground_drake.base.exact import decimal
 from airground_drake.decision.bayes import optimal_threshold
 from airground_drake.scenarios.schema import Scenario
-from airground_drake.verify.engines.signs import Ends, Rule, enclose, value
-from airground_drake.verify.model.levels import threshold_m
-from airground_drake.verify.model.theorem import Hypothesis, TheoremClaim
+from airground_drake.verify.engines.signs import Ends, Rule, value
+from airground_drake.verify.model.levels import NUMBERS, threshold_m
+from airground_drake.verify.model.theorem import Hypothesis, Proof, TheoremClaim
 
 FLOAT_TOLERANCE = Fraction(1, 10**12)
 """The program's threshold may be this far outside its enclosure, relative to it: rounding errs by some 1e-15."""
-NUMBERS = ("drift_m_s", "noise_m_sqrt_s", "c1_1_s", "c2")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Root(Proof):
+    """The root, as u and as a threshold, m, and the threshold that the program computes, m."""
+
+    enclosures: dict[str, list[float]]
+    computed_threshold_m: float
 
 
 class ThrRoot(TheoremClaim):
@@ -55,30 +63,30 @@ class ThrRoot(TheoremClaim):
     def hypotheses(self, inputs: dict[str, Any]) -> list[Hypothesis]:
         """The constants are positive, two signs enclose the root, and the program's threshold is between them."""
         rule = rule_of(inputs)
-        root = enclose(rule.residual(rule.c2 / rule.c1), Fraction(0))
-        names = ("drift", "noise", "c1", "c2")
+        root = rule.root
         judged = [Fraction(self.computed(inputs))]
         if inputs["rule"] == "bayes":
             judged.append(Fraction(inputs["zeta_m"]))
         low, high = rule.zeta(root.low), rule.zeta(root.high)
+        says = "the program's threshold is between the points, to within 1e-12"
         outside = max(max(low - zeta, zeta - high) for zeta in judged)
         return [
-            *(Hypothesis(name, f"{name} is above 0", number, strict=True)
-              for name, number in zip(names, rule, strict=True)),
-            *two_signs("(19)", root, (-1, 1)),
-            Hypothesis(self.margin_of, "the program's threshold is between the points, to within 1e-12",
-                       FLOAT_TOLERANCE * high - outside, "m"),
-        ]  # fmt: skip
+            *(
+                Hypothesis.of(name, f"{name} is above 0", number, strict=True)
+                for name, number in rule._asdict().items()
+            ),
+            *two_signs("(19)", root),
+            Hypothesis.of(self.margin_of, says, FLOAT_TOLERANCE * high - outside, "m"),
+        ]
 
-    def numbers(self, inputs: dict[str, Any]) -> dict[str, Any]:
-        """The enclosure of u and of the threshold, m, and what the program computes, m."""
+    def evidence(self, inputs: dict[str, Any], **proof: Any) -> Root:
+        """Add the enclosure of the root, and what the program computes."""
         rule = rule_of(inputs)
-        root = enclose(rule.residual(rule.c2 / rule.c1), Fraction(0))
-        return {"enclosures": as_floats(rule, root), "computed_threshold_m": self.computed(inputs)}
+        return Root(enclosures=as_floats(rule, rule.root), computed_threshold_m=self.computed(inputs), **proof)
 
     def counterexample(self, inputs: dict[str, Any], broken: Hypothesis) -> dict[str, Any] | None:
         """The program's threshold does not solve the equation."""
-        if broken.name != self.margin_of:
+        if broken.hypothesis != self.margin_of:
             return None
         rule, zeta = rule_of(inputs), self.computed(inputs)
         residual = value(rule.residual(rule.c2 / rule.c1), rule.u(Fraction(zeta)))
@@ -94,14 +102,12 @@ def rule_of(inputs: dict[str, Any]) -> Rule:
     return Rule(*(decimal(inputs[name]) for name in NUMBERS))
 
 
-def two_signs(what: str, ends: Ends, wanted: tuple[int, int]) -> list[Hypothesis]:
-    """That a function has these signs at the ends of an enclosure."""
-    words = {-1: "below 0", 1: "above 0"}
+def two_signs(what: str, ends: Ends) -> list[Hypothesis]:
+    """That a function is below 0 at the lower end of an enclosure, and above 0 at the upper one."""
+    found = zip(("below", "above"), ends[:2], (-ends.signs[0], ends.signs[1]), strict=True)
     return [
-        Hypothesis(
-            f"sign of {what}", f"{what} is {words[want]} at u = {float(u)!r}", Fraction(have * want), strict=True
-        )
-        for u, have, want in zip(ends[:2], ends.signs, wanted, strict=True)
+        Hypothesis.of(f"sign of {what}", f"{what} is {side} 0 at u = {float(u)!r}", Fraction(right), strict=True)
+        for side, u, right in found
     ]
 
 

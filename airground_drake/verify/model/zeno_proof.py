@@ -2,16 +2,24 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 from airground_drake.base.exact import decimal
-from airground_drake.decision.trigger import Mode, Trigger, TriggerState
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.verify.model.levels import levels_of, trigger_of
-from airground_drake.verify.model.theorem import Hypothesis, TheoremClaim
+from airground_drake.verify.model.theorem import Hypothesis, Proof, TheoremClaim
 
 SHORTEST_S = 1e-3
-"""Bound that is tried where the scenario has none (0 s), s: any number would do, the counterexample scales with it."""
+"""The bound to refute if the scenario declares 0 s, s. Any number would do: the counterexample scales with it."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Dwell(Proof):
+    """The least time between two triggers, s, and how many a run can have at most; None without a dwell."""
+
+    bound_s: float
+    most_triggers: int | None
 
 
 class ZenoProof(TheoremClaim):
@@ -62,39 +70,29 @@ class ZenoProof(TheoremClaim):
         dwell, zeta, release = (decimal(inputs[name]) for name in ("dwell_s", "zeta_m", "released_below_m"))
         bound = decimal(inputs["min_inter_event_s"])
         return [
-            Hypothesis(
+            Hypothesis.of(
                 "dwell less the bound", "the dwell is the minimum inter-event time at least", dwell - bound, "s"
             ),
-            Hypothesis(self.margin_of, "the dwell in force is above 0", dwell, "s", strict=True),
-            Hypothesis("threshold less release", "the release level is at most the threshold", zeta - release, "m"),
+            Hypothesis.of(self.margin_of, "the dwell in force is above 0", dwell, "s", strict=True),
+            Hypothesis.of("threshold less release", "the release level is at most the threshold", zeta - release, "m"),
         ]
 
-    def numbers(self, inputs: dict[str, Any]) -> dict[str, Any]:
-        """The bound, s, and how many triggers the run can have at most."""
+    def evidence(self, inputs: dict[str, Any], **proof: Any) -> Dwell:
+        """Add the bound, and how many triggers the run can have at most."""
         dwell = decimal(inputs["dwell_s"])
         most = int(decimal(inputs["duration_s"]) // dwell) + 1 if dwell > 0 else None
-        return {"bound_s": inputs["min_inter_event_s"] or SHORTEST_S, "most_triggers": most}
+        return Dwell(bound_s=inputs["min_inter_event_s"] or SHORTEST_S, most_triggers=most, **proof)
 
     def counterexample(self, inputs: dict[str, Any], broken: Hypothesis) -> dict[str, Any] | None:
         """Two triggers closer than the bound, on a run of the automaton: up, down and up again."""
-        trigger, bound = trigger_of(inputs), float(self.numbers(inputs)["bound_s"])
+        trigger, bound = trigger_of(inputs), inputs["min_inter_event_s"] or SHORTEST_S
         gap = max(trigger.dwell, bound / 2.0)
         if not gap < bound:
             return None
-        low = trigger.release - trigger.zeta
-        run = replay(trigger, [(0.0, trigger.zeta), (gap / 2.0, low), (gap, trigger.zeta)])
+        state, run = trigger.start(0.0, trigger.zeta), list[dict[str, Any]]()
+        for t, x in ((0.0, trigger.zeta), (gap / 2.0, trigger.release - trigger.zeta), (gap, trigger.zeta)):
+            before = state.triggers if run else 0
+            state = trigger.step(state, t, x) if run else state
+            run.append({"t_s": t, "x_m": x, "mode": state.mode.name, "trigger": state.triggers > before})
         times = [row["t_s"] for row in run if row["trigger"]]
-        if len(times) < 2:
-            return None
-        return {"run": run, "gap_s": times[1] - times[0], "bound_s": bound}
-
-
-def replay(trigger: Trigger, events: list[tuple[float, float]]) -> list[dict[str, Any]]:
-    """Run the automaton through events (t in s, x in m): the state after each."""
-    state, rows = TriggerState(), list[dict[str, Any]]()
-    for i, (t, x) in enumerate(events):
-        before = state.mode
-        state = trigger.start(t, x) if i == 0 else trigger.step(state, t, x)
-        fired = state.mode is Mode.INTERVENING and before is not Mode.INTERVENING
-        rows.append({"t_s": t, "x_m": x, "mode": state.mode.name, "trigger": fired})
-    return rows
+        return {"run": run, "gap_s": times[1] - times[0], "bound_s": bound} if len(times) > 1 else None

@@ -1,26 +1,24 @@
 """ZENO-REFINE: as the noise step is refined, the bare threshold's event count diverges and the automaton's does not.
 
-Paths and counts are those of `refined_paths.py`: the bare count grows like dt^(-1/2) with a relative correction of
-order sqrt(dt). The delay of a level crossing that is seen on a grid, 0.58 s sqrt(dt) (Chernoff 1965, Siegmund 1979),
-makes the correction of the automaton's count one of order sqrt(dt) as well. Both counts are therefore fitted by
+Paths and counts are those of `refined_paths.py`. The bare count grows like dt^(-1/2) with a relative correction of
+order sqrt(dt). A level crossing is seen on a grid with a delay of 0.58 s sqrt(dt) (Chernoff 1965, Siegmund 1979), so
+the correction of the automaton's count is of order sqrt(dt), too. Both counts are therefore fitted by
 
     ln(mean count) = intercept + exponent ln(dt) + correction sqrt(dt)        (least squares over the dt)
 
-and the interval of the exponent is the percentile bootstrap over paths, which are independent (resampling weights:
+The interval of the exponent is the percentile bootstrap over paths, which are independent (resampling weights:
 numpy's default_rng([SEED, PATHS]).multinomial).
 
-Verdict, fixed beforehand: 'supported' as the claim's `method` says (the bias is that of the fit to the theoretical
-counts); 'inconclusive' if an interval is wider than 1/5, or all holds but the bare counts are too far from their
-expectation at some dt; else 'refuted'. Margin: the smallest distance of an interval's end from breaking the rule.
-
-The evidence has the trigger counts by path and dt, from which means, standard errors and fits can be redone; the
-theoretical counts follow from the formula in `refined_paths.py`.
+The rule was fixed beforehand. 'supported': see the claim's `method`; the bias is that of the fit to the theoretical
+counts. 'inconclusive': an interval is wider than 1/5, or only the bare counts are too far from their expectation at
+some dt. Else 'refuted'. The margin is the smallest distance of an interval's end from breaking the rule.
 """
 
 from __future__ import annotations
 
 import math
-from typing import Any, Literal, TypedDict
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -28,12 +26,13 @@ from airground_drake.base.arrays import Array
 from airground_drake.base.statuses import Status
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.verify.claim import ModelClaim
-from airground_drake.verify.finding import Finding
+from airground_drake.verify.finding import Evidence, Finding
 from airground_drake.verify.model.levels import levels_of
 from airground_drake.verify.model.refined_paths import (
     HALVINGS,
     PATHS,
     SEED,
+    SERIES,
     Refinement,
     counts,
     expected_bare,
@@ -41,17 +40,59 @@ from airground_drake.verify.model.refined_paths import (
 )
 
 LEVEL = 0.99
-
 RESAMPLES = 4000
-
 DIVERGES_BELOW = -0.25
-
 FLAT_WITHIN = 0.1
-
 STANDARD_ERRORS = 5.0
-
 ROUNDING = 1e-9
 """Exponents are equal within this: the fit to equal counts gives about 1e-15."""
+
+
+@dataclass(frozen=True)
+class Counted(Evidence):
+    """Triggers in a path, a number for each dt: their mean, its standard error, the largest."""
+
+    mean: list[float]
+    standard_error: list[float]
+    largest: list[float]
+
+
+@dataclass(frozen=True)
+class Fit(Evidence):
+    """The curve exp(intercept + correction sqrt(dt)) dt^exponent, and its values at each dt."""
+
+    exponent: float
+    interval: list[float]
+    intercept: float
+    correction: float
+    at_dt: list[float]
+
+
+@dataclass(frozen=True)
+class Series(Evidence):
+    """The evidence: everything that the figure needs.
+
+    `dt_s` are the noise steps, and `expected_bare` is the theory of the bare mean at each. `counts` has a text for each
+    path with its triggers at each dt. `bias` is that of the bare exponent. `most_triggers` is duration/dwell + 1; None
+    without a dwell. `level` is that of the intervals.
+    """
+
+    dt_s: list[float]
+    bare: Counted
+    automaton: Counted
+    automaton_at_scenario_noise: Counted
+    expected_bare: list[float]
+    counts: dict[str, list[str]]
+    fit: dict[str, Fit]
+    bias: float
+    most_triggers: int | None
+    duration_s: float
+    noise_m_sqrt_s: float
+    own_noise_m_sqrt_s: float
+    leak_1_s: float
+    paths: int
+    seed: int
+    level: float
 
 
 class ZenoRefine(ModelClaim):
@@ -93,6 +134,7 @@ class ZenoRefine(ModelClaim):
         "run of the scenario has: its task error passes the threshold, it does not stay there (ZENO-TRACE counts them)."
     )
 
+    record = Series
     exercised_by = "simulated paths, each at every noise step"
 
     def inputs(self, scenario: Scenario) -> dict[str, Any]:
@@ -111,50 +153,6 @@ class ZenoRefine(ModelClaim):
         return judge_experiment(experiment(inputs))
 
 
-class Counted(TypedDict):
-    """Triggers in a path, a number for each dt: their mean, its standard error, the largest."""
-
-    mean: list[float]
-    standard_error: list[float]
-    largest: list[float]
-
-
-class Fit(TypedDict):
-    """The curve exp(intercept + correction sqrt(dt)) dt^exponent, and its values at each dt."""
-
-    exponent: float
-    interval: list[float]
-    intercept: float
-    correction: float
-    at_dt: list[float]
-
-
-class Series(TypedDict):
-    """The evidence: everything that the figure needs.
-
-    `dt_s` are the noise steps. `expected_bare` is the theory of the bare mean for each dt. `counts` has a text for each
-    path, the triggers at each dt. `bias` is that of the bare exponent, `most_triggers` duration/dwell + 1, None without
-    a dwell, and `level` that of the intervals.
-    """
-
-    dt_s: list[float]
-    bare: Counted
-    automaton: Counted
-    automaton_at_scenario_noise: Counted
-    expected_bare: list[float]
-    counts: dict[str, list[str]]
-    fit: dict[str, Fit]
-    bias: float
-    most_triggers: int | None
-    duration_s: float
-    noise_m_sqrt_s: float
-    own_noise_m_sqrt_s: float
-    leak_1_s: float
-    paths: int
-    seed: int
-    level: float
-
-
 def series(setting: Refinement, found: dict[str, Array]) -> Series:
     """The evidence, from the counts of an experiment."""
     dt, dwell = np.array(setting.dt_s), setting.trigger.dwell
@@ -163,42 +161,33 @@ def series(setting: Refinement, found: dict[str, Array]) -> Series:
     weights = rng.multinomial(PATHS, np.full(PATHS, 1.0 / PATHS), RESAMPLES) / PATHS
     fits = dict[str, Fit]()
     for name in ("bare", "automaton"):
-        intercept, exponent, correction = _fit(dt, found[name].mean(axis=0))
+        intercept, exponent, correction = _fit(dt, found[name].mean(axis=0)).tolist()
         resampled = _fit(dt, weights @ found[name])[1]
-        fits[name] = {
-            "exponent": float(exponent),
-            "interval": np.quantile(resampled, [(1.0 - LEVEL) / 2.0, (1.0 + LEVEL) / 2.0]).tolist(),
-            "intercept": float(intercept),
-            "correction": float(correction),
-            "at_dt": (np.exp(intercept + correction * np.sqrt(dt)) * dt**exponent).tolist(),
-        }
-    return {
-        "dt_s": dt.tolist(),
-        "bare": _counted(found["bare"]),
-        "automaton": _counted(found["automaton"]),
-        "automaton_at_scenario_noise": _counted(found["automaton_at_scenario_noise"]),
-        "expected_bare": expected.tolist(),
-        "counts": {name: [" ".join(f"{n:.0f}" for n in row) for row in values] for name, values in found.items()},
-        "fit": fits,
-        "bias": float(_fit(dt, expected)[1]) + 0.5,
-        "most_triggers": int(setting.duration_s / dwell + 1e-9) + 1 if dwell > 0.0 else None,
-        "duration_s": setting.duration_s,
-        "noise_m_sqrt_s": setting.noise_m_sqrt_s,
-        "own_noise_m_sqrt_s": setting.own_noise_m_sqrt_s,
-        "leak_1_s": setting.leak_1_s,
-        "paths": PATHS,
-        "seed": SEED,
-        "level": LEVEL,
-    }
+        interval = np.quantile(resampled, [(1.0 - LEVEL) / 2.0, (1.0 + LEVEL) / 2.0]).tolist()
+        at_dt = (np.exp(intercept + correction * np.sqrt(dt)) * dt**exponent).tolist()
+        fits[name] = Fit(exponent, interval, intercept, correction, at_dt)
+    return Series(
+        dt_s=dt.tolist(),
+        **{name: _counted(found[name]) for name in SERIES},
+        expected_bare=expected.tolist(),
+        counts={name: [" ".join(f"{n:.0f}" for n in row) for row in values] for name, values in found.items()},
+        fit=fits,
+        bias=float(_fit(dt, expected)[1]) + 0.5,
+        most_triggers=int(setting.duration_s / dwell + 1e-9) + 1 if dwell > 0.0 else None,
+        duration_s=setting.duration_s,
+        noise_m_sqrt_s=setting.noise_m_sqrt_s,
+        own_noise_m_sqrt_s=setting.own_noise_m_sqrt_s,
+        leak_1_s=setting.leak_1_s,
+        paths=PATHS,
+        seed=SEED,
+        level=LEVEL,
+    )
 
 
 def _counted(values: Array) -> Counted:
-    """Of triggers by path and dt."""
-    return {
-        "mean": values.mean(axis=0).tolist(),
-        "standard_error": (values.std(axis=0, ddof=1) / math.sqrt(PATHS)).tolist(),
-        "largest": values.max(axis=0).tolist(),
-    }
+    """Summarise triggers by path and dt."""
+    error = values.std(axis=0, ddof=1) / math.sqrt(PATHS)
+    return Counted(values.mean(axis=0).tolist(), error.tolist(), values.max(axis=0).tolist())
 
 
 def _fit(dt: Array, mean: Array) -> Array:
@@ -211,8 +200,9 @@ def judge_experiment(setting: Refinement) -> Finding:
     """The finding of an experiment by the rule of the module docstring."""
     found = counts(setting)
     evidence = series(setting, found)
-    (low, high), (ours_low, ours_high) = (evidence["fit"][name]["interval"] for name in ("bare", "automaton"))
-    bias = abs(evidence["bias"])
+    bare, ours = evidence.fit["bare"], evidence.fit["automaton"]
+    (low, high), (ours_low, ours_high) = bare.interval, ours.interval
+    bias = abs(evidence.bias)
     slack = {
         "bare exponent: -1/2 is not below its interval": -0.5 - (low - bias),
         "bare exponent: -1/2 is not above its interval": high + bias + 0.5,
@@ -222,9 +212,8 @@ def judge_experiment(setting: Refinement) -> Finding:
         "automaton's exponent: close to 0": FLAT_WITHIN - max(-ours_low, ours_high),
     }
     condition = min(slack, key=lambda name: slack[name])
-    spread = np.array(evidence["bare"]["standard_error"])
-    off = np.abs(np.array(evidence["bare"]["mean"]) - evidence["expected_bare"])
-    most, largest = evidence["most_triggers"], max(evidence["automaton"]["largest"])
+    off = np.abs(np.array(evidence.bare.mean) - evidence.expected_bare)
+    most, largest = evidence.most_triggers, max(evidence.automaton.largest)
     status: Status = "supported"
     broken: dict[str, Any] | None = None
     if most is not None and largest > most:
@@ -236,11 +225,10 @@ def judge_experiment(setting: Refinement) -> Finding:
         status = "inconclusive"
     elif slack[condition] < -ROUNDING:
         status = "refuted"
-        which: Literal["bare", "automaton"] = "bare" if condition.startswith("bare") else "automaton"
-        fit = evidence["fit"][which]
-        broken = {"what": f"not so: {condition}", "exponent": fit["exponent"], "interval": fit["interval"]}
-        broken |= {"dt_s": evidence["dt_s"], "mean": evidence[which]["mean"]}
-    elif (off > STANDARD_ERRORS * spread).any():
+        fit, counted = (bare, evidence.bare) if condition.startswith("bare") else (ours, evidence.automaton)
+        broken = {"what": f"not so: {condition}", "exponent": fit.exponent, "interval": fit.interval}
+        broken |= {"dt_s": evidence.dt_s, "mean": counted.mean}
+    elif (off > STANDARD_ERRORS * np.array(evidence.bare.standard_error)).any():
         status = "inconclusive"
     quantity = "what the confidence interval of an exponent, or a count, leaves of the condition"
     return Finding(

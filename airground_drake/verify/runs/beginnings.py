@@ -1,9 +1,8 @@
-"""What a UGV knew when it decided about a proposal, and what it was to expect of the others, again from a trace."""
+"""What a UGV knew when it decided about a proposal, and how it predicts other robots, again from a trace."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -12,10 +11,10 @@ from airground_drake.run.trace import Trace
 from airground_drake.verify.claim import TIME_TOLERANCE_S
 from airground_drake.verify.engines.geometry import corner_times, interpolate, travelled
 from airground_drake.verify.runs.closed_loops import Scene
-from airground_drake.verify.runs.pairs import Pair, around, pairs_of, places_of, preset_of, radii_of, speed_limits
-from airground_drake.verify.runs.proposals import Sent
+from airground_drake.verify.runs.instants import row_at
+from airground_drake.verify.runs.pairs import Pair, around, centres_of, pairs_of, places_of, preset_of
+from airground_drake.verify.runs.proposals import ProposalRecord, answers_to, proposal_of, proposals_of
 
-NONE = np.empty(0), np.empty(0), np.empty(0)
 MOST_CLAIMED = 64
 """Obstacles of a message that a UGV takes into account."""
 
@@ -26,7 +25,7 @@ class Beginning(NamedTuple):
     Attributes:
         refused, accepted: the closed loops if the proposal is refused and if it is accepted. Obstacles come first
             among their points.
-        settled: periods after which it is over when nothing moves any more.
+        settled: periods after which the prediction ends once nothing moves.
         discs: number of obstacles.
         goal: (3,), m.
     """
@@ -43,27 +42,19 @@ class Beginning(NamedTuple):
         return self.refused.points[0, : self.discs], self.refused.safe[: self.discs]
 
 
-def beginning(trace: Trace, t: float, number: int, sent: Sequence[Sent]) -> Beginning:
-    """What the roll-outs of a decision by outcomes begin with, from the recorded signals.
-
-    Args:
-        trace: the run.
-        t: when the UGV decides, s.
-        number: of the proposal that it decides on.
-        sent: all proposals.
-    """
+def beginning(trace: Trace, t: float, number: int) -> Beginning:
+    """What the roll-outs begin with when a UGV decides by outcomes at t, s, about the proposal with a number."""
     gate, h = trace.scenario.gatekeeper, trace.scenario.control.period_s
-    on = next(one for one in sent if one.number == number)
+    on = proposal_of(trace, number)
     robot = on.ugv
     corners, speed = preset_of(trace, robot)
     arrives = float(corner_times(corners, speed)[-1]) if len(corners) > 1 else 0.0
-    longest = gate.longest_s
-    until = min(float(on.times_s[-1]), t + longest)
-    ends = min(max(until, arrives), t + longest) + gate.settling_s
+    until = min(float(on.times_s[-1]), t + gate.longest_s)
+    ends = min(max(until, arrives), t + gate.longest_s) + gate.settling_s
     after = h * np.arange(np.ceil((ends - t) / h) + 1.0)
     discs, distances = known_discs(trace, robot, t, on)
     pairs = [pair for pair in _among_robots(trace) if robot in (pair.first, pair.second)]
-    others = [_other(trace, robot, t, after, pair, sent) for pair in pairs]
+    others = [_other(trace, robot, t, after, pair) for pair in pairs]
     settled = max(until, arrives, t + gate.horizon_s, *(end for _, _, _, end in others))
     fixed = np.broadcast_to(discs, (len(after), *discs.shape))
     safe = np.array([*distances, *(each[1] for each in others)])
@@ -79,7 +70,7 @@ def beginning(trace: Trace, t: float, number: int, sent: Sequence[Sent]) -> Begi
 
 
 def scene(
-    trace: Trace, on: Sent, t: float, after: Array, periods: int, points: Array, safe: Array, share: Array
+    trace: Trace, on: ProposalRecord, t: float, after: Array, periods: int, points: Array, safe: Array, share: Array
 ) -> Scene:
     """The closed loop of the UGV that a proposal is for.
 
@@ -99,7 +90,7 @@ def scene(
         wanted=on.place(t + after),
         executed=np.arange(len(after) - 1) < periods,
         chosen=on.chosen,
-        limit=np.array(speed_limits(trace)[on.ugv]),
+        limit=np.array(trace.scenario.ugvs[on.ugv].max_speed_m_s),
         points=points,
         safe=safe,
         share=share,
@@ -129,8 +120,7 @@ def _moves(trace: Trace, name: str, t: float) -> tuple[Array, Array]:
     place = places_of(trace)[name]
     if place.ndim == 1:
         return place, np.zeros(3)
-    row = min(int(np.searchsorted(trace.t, t - TIME_TOLERANCE_S)), len(trace.t) - 1)
-    return interpolate(trace.t, place, t), trace.command(name)[row]
+    return interpolate(trace.t, place, t), trace.command(name)[row_at(trace, t)]
 
 
 def _among_robots(trace: Trace) -> list[Pair]:
@@ -138,10 +128,10 @@ def _among_robots(trace: Trace) -> list[Pair]:
     return trace.derived("robots", lambda: [pair for pair in pairs_of(trace) if pair.second in robots])
 
 
-def known_discs(trace: Trace, robot: str, t: float, on: Sent) -> tuple[Array, Array]:
+def known_discs(trace: Trace, robot: str, t: float, on: ProposalRecord) -> tuple[Array, Array]:
     """Obstacles that a UGV has sensed up to a time, and those of the message that it would not sense.
 
-    Of the latter no more than the `MOST_CLAIMED` nearest, and none with a negative radius.
+    At most the `MOST_CLAIMED` nearest ones of the message count, and those with a negative radius are left out.
 
     Returns:
         Centres, (k, 3), and the distances that the UGV keeps from them, (k,), m.
@@ -149,22 +139,21 @@ def known_discs(trace: Trace, robot: str, t: float, on: Sent) -> tuple[Array, Ar
     sensing, gate_s = trace.scenario.control.sensing_range_m, trace.scenario.gatekeeper.period_s
     samples = gate_s * np.arange(round(t / gate_s) + 1.0)
     was = interpolate(trace.t, trace.position(robot), np.minimum(samples, t))
-    places = [o.position_m for o in trace.scenario.obstacles.values()]
-    obstacles = np.array(places, dtype=np.float64).reshape(-1, 3)
+    obstacles = centres_of(trace)
     seen = (np.linalg.norm(was[:, None] - obstacles, axis=2) <= sensing).any(axis=0)
     hidden = np.linalg.norm(on.mapped_m - was[-1], axis=1) > sensing
     told = np.column_stack([on.mapped_m, on.mapped_radius_m])[hidden & (on.mapped_radius_m >= 0.0)]
     apart = np.linalg.norm(told[:, None, :3] - obstacles[seen], axis=2)
     new = told[(apart > 1e-9).all(axis=1)]
     order = np.linalg.norm(new[:, :3] - was[-1], axis=1).argsort(kind="stable")
-    radius = radii_of(trace)
-    own = np.array([radius[name] for name in trace.scenario.obstacles])
-    known = np.concatenate([np.column_stack([obstacles, own])[seen], new[order.argsort() < MOST_CLAIMED]])
-    return known[:, :3], trace.scenario.safe_distance.obstacle_m + (radius[robot] + known[:, 3])
+    radii = np.array([each.radius_m for each in trace.scenario.obstacles.values()])
+    known = np.concatenate([np.column_stack([obstacles, radii])[seen], new[order.argsort() < MOST_CLAIMED]])
+    own = trace.scenario.ugvs[robot].radius_m
+    return known[:, :3], trace.scenario.safe_distance.obstacle_m + (own + known[:, 3])
 
 
-def discovers(trace: Trace, robot: str, t: float, on: Sent) -> bool:
-    """Whether at a sample of the gatekeeper a UGV senses an obstacle for the first time that the message does not show.
+def discovers(trace: Trace, robot: str, t: float, on: ProposalRecord) -> bool:
+    """Whether a UGV senses, at a sample of the gatekeeper, an obstacle that is new and not on the message's map.
 
     Args:
         trace: the run.
@@ -173,8 +162,7 @@ def discovers(trace: Trace, robot: str, t: float, on: Sent) -> bool:
         on: the proposal.
     """
     first = trace.derived(f"first sensed by {robot}", lambda: _first_sensed(trace, robot))
-    obstacles = np.array([o.position_m for o in trace.scenario.obstacles.values()]).reshape(-1, 3)
-    new = obstacles[np.abs(first - t) <= TIME_TOLERANCE_S]
+    new = centres_of(trace)[np.abs(first - t) <= TIME_TOLERANCE_S]
     shown = (np.linalg.norm(new[:, None] - on.mapped_m, axis=2) <= 1e-9).any(axis=1)
     return bool((~shown).any())
 
@@ -184,54 +172,37 @@ def _first_sensed(trace: Trace, robot: str) -> Array:
     period_s = trace.scenario.gatekeeper.period_s
     samples = period_s * np.arange(np.floor(trace.t[-1] / period_s + 1e-9) + 1.0)
     was = interpolate(trace.t, trace.position(robot), np.minimum(samples, trace.t[-1]))
-    first = []
-    for obstacle in trace.scenario.obstacles.values():
-        away = np.linalg.norm(was - np.asarray(obstacle.position_m), axis=1)
-        seen = np.flatnonzero(away <= trace.scenario.control.sensing_range_m)
-        first.append(samples[seen[0]] if seen.size else np.inf)
-    return np.array(first)
+    away = np.linalg.norm(was[:, None] - centres_of(trace), axis=2)
+    seen = away <= trace.scenario.control.sensing_range_m
+    return np.where(seen.any(axis=0), samples[seen.argmax(axis=0)], np.inf)
 
 
 def _other(
-    trace: Trace, robot: str, t: float, after: Array, pair: Any, sent: Sequence[Sent]
+    trace: Trace, robot: str, t: float, after: Array, pair: Pair
 ) -> tuple[tuple[Array, Array], float, float, float]:
     """Where another robot is predicted to be, (S + 1, 3), m; its safe distance, its share, when its motion is over.
 
-    Twice: if the proposal is refused, and if it is accepted. What it has not accepted yet counts in the latter only.
+    The places come twice: if the proposal is refused, and if it is accepted. A motion that the other robot has not
+    accepted yet counts in the latter only.
     """
     other = pair.second if pair.first == robot else pair.first
     place, velocity = _moves(trace, other, t)
     coasting = place + np.minimum(after, trace.scenario.gatekeeper.horizon_s)[:, None] * velocity
-    asked, accepted = asked_of(trace, other, t, sent)
+    asked, accepted = asked_of(trace, other, t)
     if asked is None:
         return (coasting, coasting), pair.safe_m, pair.share, -np.inf
     goes = asked.place(t + after) + np.exp(-after)[:, None] * (place - asked.place(t))
     return (goes if accepted else coasting, goes), pair.safe_m, pair.share, float(asked.times_s[-1])
 
 
-def asked_of(trace: Trace, ugv: str, t: float, sent: Sequence[Sent]) -> tuple[Sent | None, bool]:
+def asked_of(trace: Trace, ugv: str, t: float) -> tuple[ProposalRecord | None, bool]:
     """The proposal in force for a UGV at a sample of the gatekeeper, unless it has refused it by the sample before.
 
-    A proposal in force is one that the UGV decides about at that sample. Besides: whether it has accepted it by then.
+    A proposal is in force if the UGV decides about it at that sample. Besides: whether it has accepted it by then.
     """
-    when, on, answers = _answers_of(trace).get(ugv, NONE)
-    now = np.flatnonzero(np.abs(when - t) <= TIME_TOLERANCE_S)
-    if not now.size:
-        return None, False
-    number = on[now[0]]
-    before = np.flatnonzero((on == number) & (when < t - TIME_TOLERANCE_S))
-    answer = str(answers[before[-1]]) if before.size else ""
-    if answer == "refuse":
-        return None, False
-    return next(one for one in sent if one.number == number), answer == "accept"
-
-
-def _answers_of(trace: Trace) -> dict[str, tuple[Array, Array, Any]]:
-    """Of each UGV with decisions: their times, s, the numbers of the proposals, and the answers, (D,) each."""
-
-    def found() -> dict[str, tuple[Array, Array, Any]]:
-        by_ugv = trace.decisions.groupby("robot", sort=False)
-        columns = {str(ugv): [rows[name].to_numpy() for name in ("t_s", "number", "decision")] for ugv, rows in by_ugv}
-        return {ugv: (when, on, answers) for ugv, (when, on, answers) in columns.items()}
-
-    return trace.derived("answers", found)
+    for one in proposals_of(trace):
+        answers = answers_to(trace, one) if one.ugv == ugv else []
+        if any(abs(answer.t_s - t) <= TIME_TOLERANCE_S for answer in answers):
+            before = [answer.accepted for answer in answers if answer.t_s < t - TIME_TOLERANCE_S]
+            return (one if all(before[-1:]) else None), any(before[-1:])
+    return None, False

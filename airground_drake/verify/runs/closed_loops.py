@@ -1,7 +1,4 @@
-"""Closed loops of a UGV rolled out again in plain numpy, many side by side: what a decision predicts from.
-
-GATE-MODEL compares with them what was recorded; LIVE-PROG and LIVE-GATE take from them where a UGV was to be.
-"""
+"""Closed loops of a UGV rolled out again in plain numpy, many side by side; GATE-MODEL compares records with them."""
 
 from __future__ import annotations
 
@@ -16,21 +13,21 @@ from airground_drake.run.trace import Trace
 from airground_drake.verify.runs.control_law import Asked, commanded, inequalities, tracking
 
 AT_ONCE = 5_000_000
-"""Coordinates of points to keep away from that are rolled out side by side: they have to fit into the memory."""
+"""Largest number of coordinates of points that are rolled out side by side, so that they fit into memory."""
 FAR_M = 1e9
 """A coordinate beyond every sensing range."""
 T = TypeVar("T")
 
 
 class Scene(NamedTuple):
-    """What a closed loop of S control periods begins with, among K points to keep away from.
+    """The inputs of a closed loop of S control periods, among K points to keep away from.
 
-    Of R scenes that are stacked, each array has R in front.
+    The arrays of R stacked scenes have a first axis R.
 
     Attributes:
         here: (3,), m.
         preset: at the control samples, (S + 1, 3), m.
-        wanted: where the proposed motion is then, (S + 1, 3), m.
+        wanted: the proposed motion at the control samples, (S + 1, 3), m.
         executed: in which periods the proposal is executed, (S,).
         chosen: J_int^+ J_int, (3, 3).
         limit: speed limit, (), m/s.
@@ -51,9 +48,9 @@ class Scene(NamedTuple):
 
 
 def stacked(scenes: Sequence[Scene]) -> Scene:
-    """Scenes as one, all as long as the longest, with as many points as the one with most.
+    """Scenes as one, padded to the longest and to the largest number of points.
 
-    One that is shorter stays at the end of its motion, which nobody has to look at; points that it has not are far off.
+    A padded motion stays at its end; padded points are far away.
     """
     steps, most = max(len(one.executed) for one in scenes), max(len(one.safe) for one in scenes)
 
@@ -85,7 +82,7 @@ def roll_out(trace: Trace, scenes: Scene) -> Iterator[Array]:
 
 
 def in_batches(items: Iterable[T], scenes_of: Callable[[T], Sequence[Scene]]) -> Iterator[list[T]]:
-    """Items, as many at a time as there is memory for their scenes side by side."""
+    """Items in batches whose scenes fit into memory side by side."""
     batch, count, largest = list[T](), 0, 0
     for item in items:
         scenes = scenes_of(item)

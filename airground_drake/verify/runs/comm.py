@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from dataclasses import asdict, dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -13,7 +14,7 @@ from airground_drake.base.errors import TraceError
 from airground_drake.run.trace import Trace
 from airground_drake.verify.claim import TIME_TOLERANCE_S, TraceClaim
 from airground_drake.verify.finding import Finding
-from airground_drake.verify.runs.instants import GATED_METHODS, intervening, talk_is_due
+from airground_drake.verify.runs.instants import GATED_METHODS, intervening, silent, talk_is_due
 from airground_drake.verify.runs.standing import map_conflicts, standing_conflicts
 
 KINDS = ("proposal", "decision")
@@ -26,17 +27,33 @@ class Message(NamedTuple):
     cause: str
 
 
+@dataclass(frozen=True)
+class Spent:
+    """The evidence: messages by kind, of the run and of a scheme without a trigger, and the fraction saved.
+
+    `ugvs` has the messages of each UGV and the intervals in which it was intervened on.
+    """
+
+    spent: dict[str, int]
+    always_on: dict[str, int]
+    saved: dict[str, float]
+    ugvs: dict[str, dict[str, Any]]
+    outside_interventions: list[dict[str, Any]]
+    without_proposals: list[str]
+    without_decisions: list[str]
+
+
 class Comm(TraceClaim):
     """COMM."""
 
     id = "COMM"
     summary = "The UAV talked only while it was needed, and less than if it always talked."
     statement = (
-        "Messages and gatekeeper solves were spent only while the UGV concerned, or the one that it was asked to make "
-        "way for, was being intervened on, and no more of them than an always-on scheme would have spent. "
-        "All parts of a joint plan were sent together, and one refusal withdrew them all. No proposal was decided on "
-        "once it was taken back. None in force was replaced but by a part of a joint plan, or while another UGV was "
-        "intervened on, too. What it said of obstacles was what the UAV knew: its own map, and what UGVs sensed when "
+        "Messages and gatekeeper solves were spent only while the UGV concerned, or the UGV that it was to make way "
+        "for, was being intervened on. An always-on scheme would have spent at least as many. All parts of a joint "
+        "plan were sent together, and one refusal withdrew them all. No proposal was decided on after it was "
+        "withdrawn. A proposal in force was replaced only by a part of a joint plan, or while another UGV was being "
+        "intervened on. Each proposal showed the obstacles that the UAV knew: its own map, and what UGVs sensed when "
         "they answered."
     )
     formula = (
@@ -52,18 +69,18 @@ class Comm(TraceClaim):
         r"h_{\text{gate}} \rceil",
     )
     method = (
-        "Counts of proposal events and of decisions (each one solve and one answer), each looked up in the intervals "
-        "in which the mode column of the UGV, or of the one whose trigger is the proposal's cause, says "
-        "'intervening'. After a release the UAV withdraws its proposal at its next "
-        "planning instant and the gatekeeper notices at its next sample: hence the allowance of one period each. What "
-        "UGVs sensed at answers follows from their positions; the UAV reads an answer at the next planning instant, "
-        "if the proposal is in force until then. When a proposal is withdrawn follows as for EXEC."
+        "Counts of proposal events and of decisions (each is one solve and one answer). Each must be in an interval in "
+        "which the mode of the UGV, or of the UGV whose trigger is the proposal's cause, is 'intervening'. After a "
+        "release the UAV withdraws its proposal at its next planning instant, and the gatekeeper notices at its next "
+        "sample: hence the allowance of one period each. Positions show what UGVs sensed when they answered; the UAV "
+        "reads an answer at the next planning instant if the proposal is still in force. Proposals are withdrawn as "
+        "for EXEC."
     )
     equations = "(20), (26)"
     assumptions = (
         "Always-on means a proposal per planning period and a decision per gatekeeper period, for every UGV.",
         "Every proposal sent and every decision made is recorded.",
-        "Policies of others may send another map than the UAV's.",
+        "Third-party policies may send another map than the UAV's.",
     )
     does_not_establish = (
         "Bytes on a channel, or the cost of supervising: the UAV observes all UGVs all the time, which is not counted. "
@@ -77,15 +94,14 @@ class Comm(TraceClaim):
     exercised_by = "proposals sent"
 
     def check(self, trace: Trace) -> Finding:
-        """Count, look for strays, compare with always-on; the margin is the fraction saved of what saves least."""
+        """Count, look for strays, compare with always-on; the margin is the smaller fraction saved of both kinds."""
         by_ugv = {ugv: _messages(trace, ugv) for ugv in trace.ugvs}
         spent = {kind: sum(len(each[kind]) for each in by_ugv.values()) for kind in KINDS}
         most = _always_on(trace)
-        silent = {kind: [u for u in trace.ugvs if not by_ugv[u][kind] and _is_due(trace, u, kind)] for kind in KINDS}
-        for kind, ugvs in silent.items():
+        without = {kind: [u for u in trace.ugvs if not by_ugv[u][kind] and _is_due(trace, u, kind)] for kind in KINDS}
+        for kind, ugvs in without.items():
             if ugvs and not spent[kind]:
-                reason = f"{', '.join(ugvs)} were in mode 'intervening', but the trace has no {kind}"
-                return Finding("not_run", evidence={"reason": reason, "faults": trace.meta["faults"]})
+                return silent(trace, ugvs, kind)
         strays = [stray for ugv, sent in by_ugv.items() for stray in _strays(trace, ugv, sent)]
         misused = [*map_conflicts(trace), *standing_conflicts(trace)] if len(trace.proposals) and not strays else []
         over = {"spent": spent, "always_on": most} if any(spent[kind] > most[kind] for kind in KINDS) else None
@@ -100,23 +116,16 @@ class Comm(TraceClaim):
             unit="fraction saved",
             quantity="messages or decisions saved against always-on",
             counterexample=min(strays + misused, key=lambda stray: float(stray["t_s"]), default=over),
-            evidence={
-                "spent": spent,
-                "always_on": most,
-                "saved": saved,
-                "ugvs": per_ugv,
-                "outside_interventions": strays,
-                **{f"without_{kind}s": ugvs for kind, ugvs in silent.items()},
-            },
+            evidence=asdict(Spent(spent, most, saved, per_ugv, strays, *without.values())),
             exercised=spent["proposal"],
         )
 
 
 def _messages(trace: Trace, ugv: str) -> dict[str, list[Message]]:
-    """What was sent to a UGV, and what it decided, by kind.
+    """The messages of a UGV by kind.
 
     Raises:
-        TraceError: if a proposal or a decision is for no UGV, or a decision at no time or about no proposal.
+        TraceError: if a message is not of a UGV of the trace, or a decision has no time or no proposal.
     """
     named = {e["robot"] for e in trace.events if e["kind"] == "proposal"} | set(trace.decisions["robot"])
     if strangers := named - set(trace.ugvs):
@@ -143,7 +152,7 @@ def _strays(trace: Trace, ugv: str, sent: dict[str, list[Message]]) -> Iterator[
 
 
 def _is_called(trace: Trace, ugv: str, t: float) -> bool:
-    """Whether a UGV was intervened on at a time, s, or so shortly before that the messages may not have ended yet."""
+    """Whether a UGV was intervened on at a time, s, or less than the allowance before it."""
     allowance = trace.scenario.intervention.period_s + trace.scenario.gatekeeper.period_s
     intervals = intervening(trace, ugv)
     begins, ends = intervals[:, 0] - TIME_TOLERANCE_S, intervals[:, 1] + allowance + TIME_TOLERANCE_S

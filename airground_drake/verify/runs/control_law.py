@@ -22,8 +22,8 @@ PLANE = np.array([1.0, 1.0, 0.0])
 ON_TOP = ("b", "c")
 """Methods that put an accepted intervention above the avoidance inequalities, as (20) does."""
 MARGIN_M_S = 1e-12
-"""The law's closest velocity keeps its inequalities by this much, m/s. Where two of them are nearly parallel, such as
-those of a robot squeezed between an obstacle and another robot, their corner is elsewhere without it, by far more."""
+"""The law's closest velocity keeps its inequalities by this much, m/s. Without it the corner of two nearly parallel
+inequalities (a robot squeezed between an obstacle and another robot) is elsewhere by far more."""
 
 
 class Inequalities(NamedTuple):
@@ -34,7 +34,7 @@ class Inequalities(NamedTuple):
 
 
 class Asked(NamedTuple):
-    """What accepted interventions ask for: places (B, 3), their rates (B, 3), J_int^+ J_int (B, 3, 3)."""
+    """Accepted interventions: wanted places (B, 3), their rates (B, 3), J_int^+ J_int (B, 3, 3)."""
 
     wanted: Array
     rate: Array
@@ -62,7 +62,7 @@ def inequalities(
 
 
 def inequalities_of(trace: Trace, robot: str, samples: npt.NDArray[np.intp]) -> Inequalities:
-    """Those of a robot at rows (B,) of its run, in the order of `around`: what is never in sensing range has none."""
+    """The inequalities of a robot at rows (B,) of its run, beside the bodies of `around` in their order."""
     places, beside = places_of(trace), around(trace, robot)
     others = [np.broadcast_to(places[other], (len(trace.t), 3))[samples] for other, _ in beside]
     return inequalities(
@@ -76,22 +76,20 @@ def inequalities_of(trace: Trace, robot: str, samples: npt.NDArray[np.intp]) -> 
 
 
 def spare(given: Inequalities, velocity: Array) -> Array:
-    """What velocities (B, 3) have to spare of each inequality, (B, K), m/s; inf beyond the sensing range."""
-    left: Array = np.einsum("bkd,bd->bk", given.normal, velocity) - given.bound
-    return left
+    """Slack of velocities (B, 3) in each inequality, (B, K), m/s; inf beyond the sensing range."""
+    return np.asarray(np.einsum("bkd,bd->bk", given.normal, velocity) - given.bound)
 
 
 def limited(velocity: Array, limit: Array | float) -> Array:
     """Velocities (B, 3) shortened to a speed limit, a number or (B,)."""
     speed = np.sqrt(np.square(velocity).sum(axis=1))
-    shorter: Array = velocity * np.minimum(1.0, limit / np.maximum(speed, 1e-300))[:, None]
-    return shorter
+    return np.asarray(velocity * np.minimum(1.0, limit / np.maximum(speed, 1e-300))[:, None])
 
 
 def avoiding(below: Array, given: Inequalities, composition: str, *, planar: bool) -> Array:
     """The avoidance tasks above velocities (B, 3): the closest ones, or (5) as printed for `recursion_*`."""
     velocity = below.copy()
-    missed = (np.einsum("bkd,bd->bk", given.normal, below) < given.bound).any(axis=1)
+    missed = (spare(given, below) < 0.0).any(axis=1)
     if not missed.any():
         return velocity
     normal, bound = given.normal[missed], given.bound[missed]
@@ -129,7 +127,7 @@ def tracking(position: Array, preset: Array, rate: Array, gain: float, limit: Ar
 
 
 def intervened(position: Array, below: Array, asked: Asked, gain: float, limit: Array | float) -> Array:
-    """(14) above what is below it, (20): v_int + (I - J^+ J) v, within the speed limit."""
+    """(14) above the velocities below it, (20): v_int + (I - J^+ J) v, within the speed limit."""
     wish = PLANE * (asked.rate + gain * (asked.wanted - position))
     return limited(PLANE * (below + np.einsum("bij,bj->bi", asked.chosen, wish - below)), limit)
 
@@ -150,8 +148,8 @@ def commanded(
         position: (B, 3).
         own: its own task (6), (B, 3).
         given: its avoidance inequalities.
-        rows: in which an intervention is executed, (E,).
-        asked: what those ask for, E of them.
+        rows: those in which an intervention is executed, (E,).
+        asked: the E interventions.
         limit: speed limits, (B,).
     """
     composition, gain = trace.meta["composition"], trace.scenario.control.intervention_gain_1_s

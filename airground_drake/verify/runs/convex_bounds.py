@@ -1,4 +1,4 @@
-"""Bounds of the optimum of a decision's convex problem, by weak duality: whatever solver gave the multipliers."""
+"""Bounds of the optimum of a decision's convex problem by weak duality; the solver need not be trusted."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from scipy.optimize import lsq_linear
 
 from airground_drake.base.arrays import Array
 from airground_drake.base.errors import TraceError
-from airground_drake.verify.runs.gate_record import Row
+from airground_drake.verify.runs.gate_record import DecisionRecord
 
 WIDE = 1e-5
 """Relative width of an enclosure above which a better omega* is looked for."""
@@ -20,7 +20,7 @@ WIDE = 1e-5
 
 @dataclass(frozen=True)
 class Enclosure:
-    """Bounds of the optimum of one decision's problem, and a lower one for plans with the other first stage."""
+    """Bounds of the optimum of a decision's problem, and a lower bound for plans with the other first stage."""
 
     lower: float
     upper: float
@@ -32,13 +32,13 @@ class Enclosure:
         return Enclosure(lower, upper, max(self.other_first, other.other_first))
 
 
-def enclose(rows: Sequence[Row]) -> list[Enclosure]:
+def enclose(rows: Sequence[DecisionRecord]) -> list[Enclosure]:
     """Bounds of the optimum over omega in [0, 1]^N of the cost with distances along the half-planes' normals.
 
     For any multipliers l_kj >= 0 of u_k >= d_j - n_kj.(rho_k - o_kj), minimising the Lagrangian over u leaves
-    q(omega) - sum_k (sum_j l_kj)^2 / (4 dt b), q convex and quadratic, whose tangent at any omega* is below
-    it everywhere, and least at a corner of the box. Both l and omega* are the solver's; neither need be good. Where
-    costs are tiny the solver's omega* is no minimiser to so many digits, and q's own is taken besides.
+    q(omega) - sum_k (sum_j l_kj)^2 / (4 dt b) with q convex and quadratic. The tangent of q at any omega* is below q
+    everywhere, and its minimum is at a corner of the box. Both l and omega* are the solver's; neither need be good.
+    Where costs are tiny, the solver's omega* is not accurate enough, and the minimiser of q is used, too.
     """
     if not rows:
         return []
@@ -52,8 +52,8 @@ def enclose(rows: Sequence[Row]) -> list[Enclosure]:
     return found
 
 
-def _bounds(row: Row, omega: Array, multiplier: Array) -> Enclosure:
-    """Those of `enclose` for a plan (N,) and multipliers (N, m), 1/m."""
+def _bounds(row: DecisionRecord, omega: Array, multiplier: Array) -> Enclosure:
+    """The bounds of `enclose` for a plan (N,) and multipliers (N, m), 1/m."""
     dt, slack, normals = row.dt, row.slack_weight, row.half_planes
     error = row.error_weight * row.lasting[:, None]
     positions = row.positions(omega)
@@ -68,9 +68,9 @@ def _bounds(row: Row, omega: Array, multiplier: Array) -> Enclosure:
     return Enclosure(float(value + corner.sum()), float(row.cost(positions, normals)), float(other))
 
 
-def _minimiser(row: Row, multiplier: Array) -> Array:
-    """Where in the box q is least: bounded least squares, the multipliers' forces being shifts of the reference."""
-    n = len(row["reference_m"])
+def _minimiser(row: DecisionRecord, multiplier: Array) -> Array:
+    """Minimiser of q in the box, by bounded least squares; the multipliers' forces shift the reference."""
+    n = row.stages
     weight = row.error_weight * row.lasting[:, None]
     force = np.einsum("km,kmi->ki", multiplier, row.half_planes)
     aim = row["reference_m"] + force / (2.0 * weight) - row.positions(np.zeros(n))
@@ -81,8 +81,8 @@ def _minimiser(row: Row, multiplier: Array) -> Array:
     return np.clip(np.asarray(fitted.x), 0.0, 1.0)
 
 
-def _solve(rows: Sequence[Row]) -> tuple[list[Array], list[Array]]:
-    """Relaxed plans (N,) and multipliers (N, m) >= 0, costs relative to `Row.scale`, of all rows as one program.
+def _solve(rows: Sequence[DecisionRecord]) -> tuple[list[Array], list[Array]]:
+    """Relaxed plans (N,) and multipliers (N, m) >= 0, costs relative to each scale, of all rows as one program.
 
     Variables, stage by stage of row by row: task errors e = rho - reference, omega and u.
 
@@ -92,7 +92,7 @@ def _solve(rows: Sequence[Row]) -> tuple[list[Array], list[Array]]:
     import cvxpy  # takes a second, which other claims need not wait for
 
     cp: Any = cvxpy  # its types are incomplete
-    stages = len(rows[0]["reference_m"])
+    stages = rows[0].stages
     total = stages * len(rows)
     change = np.concatenate([row.dt * (row["accept_m_s"] - row["refuse_m_s"]) for row in rows])
     moved = [np.diff(row["reference_m"], axis=0, prepend=row["initial_m"][None]) for row in rows]

@@ -1,7 +1,7 @@
-"""What the controllers of a run have to be built with: who keeps what distance from whom, and with which share.
+"""The parameters that the controllers of a run must be built with: who keeps what distance from whom, which share.
 
-It is read off the scenario and compared with what was read back from the controllers in the diagram. Nothing is taken
-from the code that builds them, so that a wrong distance there is a difference here.
+They are read off the scenario and compared with those that were read back from the controllers in the diagram. Nothing
+is taken from the code that builds them, so that a wrong distance there is a difference here.
 """
 
 from __future__ import annotations
@@ -13,13 +13,11 @@ import numpy as np
 
 from airground_drake.run.trace import Trace
 from airground_drake.verify.runs.control_law import ON_TOP
-from airground_drake.verify.runs.pairs import radii_of, speed_limits
+from airground_drake.verify.runs.pairs import pairs_of
 
 CONTROLLERS = ("ugv_controller", "uav_controller")
 NO_INTERVENTION = "a"
 """Method without interventions."""
-OBSTACLE_SHARE, ROBOT_SHARE = 1.0, 0.5
-"""Parts of an avoidance inequality: an obstacle takes none of it, two robots take half each."""
 PLANAR, SPATIAL = (1.0, 1.0, 0.0), (1.0, 1.0, 1.0)
 """Directions in which UGVs and UAVs move."""
 
@@ -27,30 +25,30 @@ PLANAR, SPATIAL = (1.0, 1.0, 0.0), (1.0, 1.0, 1.0)
 def demanded(trace: Trace) -> dict[str, dict[str, Any]]:
     """The parameters of both controllers by the scenario, as `systems.controllers.read_back` names them; flat arrays.
 
-    Every robot avoids all obstacles, then all other robots in team order. Safe distances are those of the kind of pair
-    and both radii.
+    Every robot avoids all obstacles, then all other robots in team order.
     """
     scenario, robots = trace.scenario, trace.robots
-    control, safe, uav = scenario.control, scenario.safe_distance, scenario.uav.name
-    obstacles, radius, limit = scenario.obstacles, radii_of(trace), speed_limits(trace)
-    everybody, bodies = np.arange(len(robots)), np.array([radius[name] for name in robots])
-    with_uav = np.array([name == uav for name in robots])
-    beside_robots = np.where(with_uav[:, None] | with_uav, safe.air_ground_m, safe.ugv_m)
-    beside_robots = beside_robots + (bodies[:, None] + bodies)
-    beside_obstacles = safe.obstacle_m + (bodies[:, None] + np.array([radius[name] for name in obstacles]))
+    control, obstacles = scenario.control, scenario.obstacles
+    everybody, m = np.arange(len(robots)), len(obstacles)
+    number = {name: k for k, name in enumerate([*obstacles, *robots])}
+    safe, share = np.zeros((2, len(robots), len(number)))
+    for pair in pairs_of(trace):
+        first, second = number[pair.first], number[pair.second]
+        for i, j in ((first, second), (second, first)):
+            if i >= m:  # an obstacle avoids nothing
+                safe[i - m, j], share[i - m, j] = pair.safe_m, pair.share
+    with_uav = np.array([name == scenario.uav.name for name in robots])
     found = {}
     for name, team in zip(CONTROLLERS, (everybody[~with_uav], everybody[with_uav]), strict=True):
-        others = np.array([np.delete(everybody, i) for i in team])
-        apart = np.hstack([beside_obstacles[team], np.take_along_axis(beside_robots[team], others, axis=1)])
-        share = np.where(np.arange(apart.shape[1]) < len(obstacles), OBSTACLE_SHARE, ROBOT_SHARE)
+        beside = np.array([np.delete(np.arange(len(number)), m + i) for i in team])
         found[name] = {
             "members": team,
             "obstacles_m": np.array([each.position_m for each in obstacles.values()]).ravel(),
-            "others": others.ravel(),
-            "safe_m": apart.ravel(),
-            "share": np.tile(share, len(team)),
+            "others": (beside[:, m:] - m).ravel(),
+            "safe_m": np.take_along_axis(safe[team], beside, axis=1).ravel(),
+            "share": np.take_along_axis(share[team], beside, axis=1).ravel(),
             "mobility": np.array([SPATIAL if with_uav[i] else PLANAR for i in team]).ravel(),
-            "max_speed_m_s": np.array([limit[robots[i]] for i in team]),
+            "max_speed_m_s": np.array([scenario.robots[robots[i]].max_speed_m_s for i in team]),
             "sampling_s": np.array([control.period_s, 0.0]),
             "gain_1_s": control.avoidance_gain_1_s,
             "period_s": control.period_s,
@@ -58,7 +56,7 @@ def demanded(trace: Trace) -> dict[str, dict[str, Any]]:
         }
     of_run = scenario.runs[trace.run]
     found["ugv_controller"]["composition"] = of_run.composition
-    if of_run.method != NO_INTERVENTION:  # where none is accepted, their order says nothing
+    if of_run.method != NO_INTERVENTION:
         found["ugv_controller"]["intervention_on_top"] = of_run.method in ON_TOP
     return found
 

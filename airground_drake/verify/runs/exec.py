@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import asdict, dataclass
 from itertools import product
 from typing import Any, NamedTuple
 
@@ -10,7 +11,6 @@ import numpy as np
 import numpy.typing as npt
 
 from airground_drake.base.arrays import Array
-from airground_drake.base.errors import TraceError
 from airground_drake.run.trace import Trace
 from airground_drake.verify.claim import TIME_TOLERANCE_S, TraceClaim
 from airground_drake.verify.engines.geometry import corner_times, travelled
@@ -27,14 +27,36 @@ from airground_drake.verify.runs.control_law import (
 )
 from airground_drake.verify.runs.instants import chosen_at, samples_of
 from airground_drake.verify.runs.pairs import preset_of
-from airground_drake.verify.runs.proposals import Sent, accepted_at
+from airground_drake.verify.runs.proposals import ProposalRecord, accepted_at
+
+Flags = npt.NDArray[np.bool_]
 
 COMMAND_TOLERANCE_M_S = 1e-6
 """A command may differ from the law by this, m/s. Both are evaluated at the same recorded positions and differ by
-rounding (1e-13 m/s), and by what a corner of two nearly parallel inequalities makes of that: it divides by the sine of
-their angle, 1e-10 at least, for the controller treats anything flatter as parallel. In 100 s it is 0.1 mm."""
+rounding (1e-13 m/s). A corner of two nearly parallel inequalities divides that by the sine of their angle, which is at
+least 1e-10: the controller treats flatter ones as parallel. In 100 s the tolerance is 0.1 mm."""
 BINDING_M_S = 1e-9
 """An inequality binds where the law's command has less to spare, m/s."""
+
+
+@dataclass(frozen=True)
+class Robot:
+    """Evidence about a robot, with counts of samples: an accepted proposal was executed, an inequality bound, both."""
+
+    largest_difference_m_s: float
+    executing: int
+    binding: int
+    executing_and_binding: int
+
+
+@dataclass(frozen=True)
+class Commands:
+    """The evidence: samples for each robot, what was found by robot, and robots whose law is not known."""
+
+    samples: int
+    robots: dict[str, Robot]
+    not_judged: list[str]
+    tolerance_m_s: float = COMMAND_TOLERANCE_M_S
 
 
 class Judged(NamedTuple):
@@ -43,9 +65,9 @@ class Judged(NamedTuple):
     Attributes:
         robot: name.
         t: (S,), s.
-        away: what they differ by, (S,), m/s.
+        away: difference of the commands, (S,), m/s.
         law: commands by the law, (S, 3), m/s.
-        recorded: commands, (S, 3), m/s.
+        recorded: recorded commands, (S, 3), m/s.
         executing: whether an accepted proposal is executed, by the messages, (S,).
         said: the same by the signals, (S,).
         binding: whether an inequality binds, (S,).
@@ -56,9 +78,30 @@ class Judged(NamedTuple):
     away: Array
     law: Array
     recorded: Array
-    executing: npt.NDArray[np.bool_]
-    said: npt.NDArray[np.bool_]
-    binding: npt.NDArray[np.bool_]
+    executing: Flags
+    said: Flags
+    binding: Flags
+
+    def summary(self) -> Robot:
+        """The evidence about this robot."""
+        counts = (int(flags.sum()) for flags in (self.executing, self.binding, self.executing & self.binding))
+        return Robot(float(self.away.max(initial=0.0)), *counts)
+
+    def first_wrong(self) -> dict[str, Any] | None:
+        """The first sample at which a command, or the signal `accepted`, is not what it should be."""
+        found = np.flatnonzero(~(self.away <= COMMAND_TOLERANCE_M_S) | (self.executing != self.said))
+        if not found.size:
+            return None
+        k = int(found[0])
+        return {
+            "robot": self.robot,
+            "t_s": float(self.t[k]),
+            "accepted_by_the_messages": bool(self.executing[k]),
+            "accepted_by_the_signals": bool(self.said[k]),
+            "command_m_s": self.recorded[k].tolist(),
+            "law_m_s": self.law[k].tolist(),
+            "difference_m_s": float(self.away[k]),
+        }
 
 
 class Exec(TraceClaim):
@@ -67,9 +110,9 @@ class Exec(TraceClaim):
     id = "EXEC"
     summary = "Each robot was commanded what its control law says, in every control period."
     statement = (
-        "At every control sample of the run each robot was commanded what the control law says: a UGV its own task (6) "
-        "and, from when it accepted a proposal until that was over, the intervention (14), composed with the avoidance "
-        "inequalities as the run's method has it; the UAV its formation task (9)-(10) below avoidance (11)."
+        "At every control sample of the run each robot got the command of the control law. A UGV follows its own task "
+        "(6) and, while a proposal is accepted, the intervention (14), composed with the avoidance inequalities in the "
+        "order of the run's method. The UAV follows its formation task (9)-(10) below avoidance (11)."
     )
     formula = (
         "own = lim(rho_rd' + B (rho_rd - rho)); int(v) = lim(v + J^+ J (rho_int' + Lambda (rho_int - rho) - v)); "
@@ -93,29 +136,28 @@ class Exec(TraceClaim):
         r"\lVert v_{\text{recorded}} - v \rVert \le 10^{-6} \text{ m/s}",
     )
     method = (
-        "Evaluated again in plain numpy at each multiple of the control period, at the recorded positions, from "
-        "the scenario and the table of proposals. The closest velocity is found by another algorithm than the "
-        "controller's (constraints one by one, each reducing the dimension), so also where inequalities bind, each "
-        "with the 1e-12 m/s that the controller adds to it; where they contradict each other it is the slowest of "
-        "those that miss them least. It is shortened until those hold that standing still meets but for 1e-9 m/s. What "
-        "is accepted follows from "
-        "proposals, modes, answers and the periods, not from the signal `accepted`, which has to agree. At a corner of "
-        "a preset or proposed motion either rate counts."
+        "The law is evaluated again in plain numpy at each multiple of the control period, at the recorded positions, "
+        "from the scenario and the table of proposals. Another algorithm than the controller's finds the closest "
+        "velocity (constraints one by one, each reducing the dimension); each inequality has the 1e-12 m/s that the "
+        "controller adds. If inequalities contradict each other, the slowest velocity that misses them least counts. "
+        "It is shortened until it meets all that standing still meets up to 1e-9 m/s. Proposals, modes, answers and "
+        "periods tell what is accepted; the signal `accepted` must agree. At a corner of a preset or proposed motion "
+        "either rate counts."
     )
     equations = "(5)-(6), (7)-(8), (9)-(10), (11), (12)-(14), (20)"
     assumptions = (
         "The command of a row is the velocity applied since the row before (the trace's convention); that it is held "
         "between samples is SAFE-HYP.",
-        "A proposal stays in force as the planner's rules say: see `verify.runs.proposals.accepted_at`. One that asks "
-        "a UGV to make way for another one is in force as long as one of the two is intervened on. The trace's table "
-        "of proposals says for whose trigger each was sent; that has to be the UGV's own while it is intervened on.",
+        "A proposal stays in force as the planner's rules say: see `verify.runs.proposals.accepted_at`. If it asks a "
+        "UGV to make way for another one, it is in force while one of the two is intervened on. The trace's table of "
+        "proposals says for whose trigger each was sent; while a UGV is intervened on, that must be its own trigger.",
         "The UAV feeds the UGVs' commands of the sample before forward: controllers of one sample see each other's "
         "last commands.",
     )
     does_not_establish = (
-        "That what was accepted was useful or safe, or that it was right to accept it (GATE-FEAS, SAFE-TRACE). "
-        "Commands that are wrong by less than 1e-6 m/s. Under a disturbance of the motion it is about the commands, "
-        "not about where they led. A UAV with another task than 'formation' is not judged; the evidence says so."
+        "That an accepted proposal was useful or safe, or that it was right to accept it (GATE-FEAS, SAFE-TRACE). "
+        "Errors of commands below 1e-6 m/s. With a disturbance of the motion the claim is about the commands, not "
+        "about where they led. A UAV with another task than 'formation' is not judged; the evidence says so."
     )
 
     exercised_by = "commands for which an accepted proposal was executed, or which an avoidance inequality bound"
@@ -127,7 +169,7 @@ class Exec(TraceClaim):
         formation = trace.scenario.uav.task == "formation"
         if formation:
             judged.append(_judge_uav(trace, samples))
-        wrong = [entry for one in judged if (entry := _first_wrong(one)) is not None]
+        wrong = [entry for one in judged if (entry := one.first_wrong())]
         worst = max(judged, key=lambda one: float(one.away.max(initial=0.0)))
         k = int(np.argmax(worst.away))
         margin = COMMAND_TOLERANCE_M_S - float(worst.away[k])
@@ -138,39 +180,15 @@ class Exec(TraceClaim):
             quantity="tolerance left by which a command may differ from the law's",
             where={"robot": worst.robot, "t_s": float(worst.t[k])},
             counterexample=min(wrong, key=lambda entry: float(entry["t_s"]), default=None),
-            evidence={
-                "samples": len(samples),
-                "robots": {
-                    one.robot: {
-                        "largest_difference_m_s": float(one.away.max(initial=0.0)),
-                        "executing": int(one.executing.sum()),
-                        "binding": int(one.binding.sum()),
-                        "executing_and_binding": int((one.executing & one.binding).sum()),
-                    }
-                    for one in judged
-                },
-                "not_judged": [] if formation else [f"{trace.robots[-1]}: task {trace.scenario.uav.task}"],
-                "tolerance_m_s": COMMAND_TOLERANCE_M_S,
-            },
+            evidence=asdict(
+                Commands(
+                    len(samples),
+                    {one.robot: one.summary() for one in judged},
+                    [] if formation else [f"{trace.robots[-1]}: task {trace.scenario.uav.task}"],
+                )
+            ),
             exercised=sum(int((one.executing | one.binding).sum()) for one in judged),
         )
-
-
-def _first_wrong(one: Judged) -> dict[str, Any] | None:
-    """The first sample at which a command, or what is said to be executed, is not that of the law."""
-    found = np.flatnonzero(~(one.away <= COMMAND_TOLERANCE_M_S) | (one.executing != one.said))
-    if not found.size:
-        return None
-    k = int(found[0])
-    return {
-        "robot": one.robot,
-        "t_s": float(one.t[k]),
-        "accepted_by_the_messages": bool(one.executing[k]),
-        "accepted_by_the_signals": bool(one.said[k]),
-        "command_m_s": one.recorded[k].tolist(),
-        "law_m_s": one.law[k].tolist(),
-        "difference_m_s": float(one.away[k]),
-    }
 
 
 def _judge_ugv(trace: Trace, ugv: str, samples: npt.NDArray[np.intp]) -> Judged:
@@ -198,10 +216,8 @@ def _judge_ugv(trace: Trace, ugv: str, samples: npt.NDArray[np.intp]) -> Judged:
     return Judged(ugv, t, away, law, recorded, executing, said, _binding(given, law))
 
 
-def _said(
-    accepted: npt.NDArray[np.bool_], chosen: npt.NDArray[np.intp], executing: npt.NDArray[np.bool_]
-) -> npt.NDArray[np.bool_]:
-    """What the signal says of S control samples: otherwise than the messages if any row does up to the next sample."""
+def _said(accepted: Flags, chosen: npt.NDArray[np.intp], executing: Flags) -> Flags:
+    """The signal at S control samples, (S,): it contradicts the messages if any row up to the next sample does."""
     held = np.searchsorted(chosen, np.arange(chosen[0], len(accepted)), side="right") - 1
     said = executing.copy()
     wrong = held[accepted[chosen[0] :] != executing[held]]
@@ -220,8 +236,8 @@ def _preset_rates(waypoints: Array, speed: float, t: Array) -> list[Array]:
     return [slopes[np.searchsorted(times, t + shift)] for shift in (-TIME_TOLERANCE_S, TIME_TOLERANCE_S)]
 
 
-def _asked(accepted: Sequence[Sent | None], t: Array) -> list[Asked]:
-    """What the proposals that are executed ask for, with the rates before and after each instant, E samples each."""
+def _asked(accepted: Sequence[ProposalRecord | None], t: Array) -> list[Asked]:
+    """What the E executed proposals ask for, once with the rates before each instant and once with those after it."""
     executed = [(sent, now) for sent, now in zip(accepted, t.tolist(), strict=True) if sent is not None]
     wanted = np.array([sent.place(now) for sent, now in executed]).reshape(-1, 3)
     chosen = np.array([sent.chosen for sent, _ in executed]).reshape(-1, 3, 3)
@@ -233,8 +249,6 @@ def _judge_uav(trace: Trace, samples: npt.NDArray[np.intp]) -> Judged:
     """The UAV's commands against (9)-(11)."""
     uav, control, chosen = trace.scenario.uav, trace.scenario.control, chosen_at(trace, samples)
     name = uav.name
-    if name != trace.robots[-1]:
-        raise TraceError(f"the last robot is {trace.robots[-1]}, not the UAV {name}")
     position, recorded = trace.position(name)[samples], trace.command(name)[chosen]
     centroid = np.mean([trace.position(ugv)[samples] for ugv in trace.ugvs], axis=0)
     fed = np.mean([trace.command(ugv)[samples] for ugv in trace.ugvs], axis=0)
@@ -248,5 +262,5 @@ def _judge_uav(trace: Trace, samples: npt.NDArray[np.intp]) -> Judged:
     return Judged(name, trace.t[samples], away, law, recorded, none, none, _binding(given, law))
 
 
-def _binding(given: Inequalities, velocity: Array) -> npt.NDArray[np.bool_]:
+def _binding(given: Inequalities, velocity: Array) -> Flags:
     return np.asarray((spare(given, velocity) <= BINDING_M_S).any(axis=1))

@@ -1,7 +1,8 @@
-"""Accepted interventions of a run, and whether an obstacle was sensed meanwhile that was new: LIVE-GATE's premise."""
+"""Accepted interventions of a run, and whether a new obstacle was sensed meanwhile: the premise of LIVE-GATE."""
 
 from __future__ import annotations
 
+from itertools import compress
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -9,8 +10,9 @@ import numpy as np
 from airground_drake.run.trace import Trace
 from airground_drake.verify.claim import TIME_TOLERANCE_S
 from airground_drake.verify.runs.beginnings import known_discs
-from airground_drake.verify.runs.instants import control_samples
-from airground_drake.verify.runs.proposals import accepted_at, proposals_of
+from airground_drake.verify.runs.instants import samples_of
+from airground_drake.verify.runs.pairs import centres_of
+from airground_drake.verify.runs.proposals import accepted_at, proposal_of
 
 METHOD = "d"
 """Only this method predicts where an accepted intervention leads."""
@@ -24,7 +26,7 @@ class Followed(NamedTuple):
     Attributes:
         ugv: which UGV.
         t_s: when it was accepted.
-        new: obstacles that were sensed meanwhile and not known at the acceptance.
+        new: obstacles that were sensed meanwhile and were not known at the acceptance.
     """
 
     ugv: str
@@ -38,7 +40,7 @@ class Followed(NamedTuple):
 
 
 def followed(trace: Trace) -> list[Followed]:
-    """All accepted interventions of a run under method (d), by time; of another method none.
+    """All accepted interventions of a run under method (d), by time; [] for another method.
 
     Raises:
         TraceError: if a decision is on a proposal that was not sent.
@@ -51,18 +53,14 @@ def followed(trace: Trace) -> list[Followed]:
 
 
 def _followed(trace: Trace, given: dict[Any, Any]) -> Followed:
-    ugv, t_s = str(given["robot"]), float(given["t_s"])
-    control, obstacles = trace.scenario.control, trace.scenario.obstacles
-    on = next(one for one in proposals_of(trace) if one.number == given["number"])
-    samples = control_samples(trace.t, control.period_s)
+    ugv, t_s, on = str(given["robot"]), float(given["t_s"]), proposal_of(trace, given["number"])
+    samples = samples_of(trace)
     begin = int(np.searchsorted(trace.t[samples], t_s - TIME_TOLERANCE_S))
     executed = [one is on for one in accepted_at(trace, ugv)[begin:]]
     lasts = executed.index(False) if False in executed else len(executed)
     places = trace.position(ugv)[np.append(samples, len(trace.t) - 1)[begin : begin + lasts + 1]]
-    centres = np.array([each.position_m for each in obstacles.values()], dtype=np.float64).reshape(-1, 3)
+    centres, reach = centres_of(trace), trace.scenario.control.sensing_range_m
     known, _ = known_discs(trace, ugv, t_s, on)
-    sensed = (np.linalg.norm(places[:, None] - centres, axis=2) <= control.sensing_range_m).any(axis=0)
+    sensed = (np.linalg.norm(places[:, None] - centres, axis=2) <= reach).any(axis=0)
     strange = (np.linalg.norm(centres[:, None] - known, axis=2) > SAME_M).all(axis=1)
-    return Followed(
-        ugv, t_s, [name for name, is_new in zip(obstacles, (sensed & strange).tolist(), strict=True) if is_new]
-    )
+    return Followed(ugv, t_s, list(compress(trace.scenario.obstacles, sensed & strange)))

@@ -1,14 +1,14 @@
-"""GATE-MODEL: what the data of the gatekeeper's problems are worth: predictions rolled out again, what came of them."""
+"""GATE-MODEL: the gatekeeper's predictions, rolled out again and compared with the run."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
 
 from airground_drake.base.arrays import Array
-from airground_drake.base.errors import TraceError
 from airground_drake.run.trace import Trace
 from airground_drake.verify.claim import TIME_TOLERANCE_S
 from airground_drake.verify.engines.geometry import interpolate
@@ -16,10 +16,10 @@ from airground_drake.verify.finding import Finding
 from airground_drake.verify.runs.beginnings import scene, sensed
 from airground_drake.verify.runs.closed_loops import Scene, in_batches, roll_out, stacked
 from airground_drake.verify.runs.control_law import ON_TOP
-from airground_drake.verify.runs.gate_record import GateClaim, Off, Row, conclude
+from airground_drake.verify.runs.gate_record import DecisionRecord, Deviation, GateClaim, conclude
 from airground_drake.verify.runs.instants import samples_of
 from airground_drake.verify.runs.outcome_rolls import foreseen
-from airground_drake.verify.runs.proposals import accepted_at, proposals_of
+from airground_drake.verify.runs.proposals import accepted_at, proposal_of, proposals_of
 
 VELOCITY_TOLERANCE_M_S = 1e-6
 """Recorded and recomputed mode velocities may differ by this, m/s: rounding of two algorithms, which the closed loop
@@ -31,14 +31,24 @@ LEFT_TOLERANCE_M = 1e-3
 the recorded one."""
 
 
+@dataclass(frozen=True)
+class Predicted:
+    """The evidence under method (c); a prediction applies to the run while its answer stands."""
+
+    decisions: int
+    largest_difference_m_s: float
+    answers_that_stood_to_the_horizon: int
+    farthest_from_predicted: dict[str, Any]
+
+
 class GateModel(GateClaim):
     """GATE-MODEL."""
 
     id = "GATE-MODEL"
     summary = "What the gatekeeper predicted for yes and for no is what the UGV would have done."
     statement = (
-        "The mode velocities that every gatekeeper decision rests on are those of the UGV's closed loop, "
-        "with the proposal accepted throughout and refused throughout, rolled out again from what it sensed."
+        "Every gatekeeper decision rests on the right mode velocities: those of the UGV's closed loop with the "
+        "proposal accepted throughout and refused throughout, rolled out again from what the UGV sensed."
     )
     formula = (
         "a_k, b_k = mean velocity over stage k of rho+ = rho + h law(rho; accepted | refused), rho(0) = p(t), others "
@@ -50,61 +60,66 @@ class GateModel(GateClaim):
         r"10^{-6} \text{ m/s}",
     )
     method = (
-        "The control law in numpy as for EXEC, with code of its own, from the signals, the scenario and the table of "
-        "proposals, all decisions side by side. Reported besides, and never a reason to refute: by how much a UGV was "
-        "elsewhere than predicted while its answer stood."
+        "The control law in numpy as for EXEC, from the signals, the scenario and the table of proposals, for all "
+        "decisions side by side. The evidence also says how far a UGV was from its prediction while the answer stood; "
+        "that never refutes the claim."
     )
     equations = "(23), (25)"
     assumptions = (
-        "A UGV predicts with what is within sensing range when it decides, moving on as it does then.",
+        "A UGV predicts with the bodies within sensing range when it decides, which keep their velocities.",
         "In a prediction the rates of preset and proposed motion are those of the motion sampled every control period.",
     )
     does_not_establish = (
-        "That the run went as predicted: others turn, and what is out of sight is left out; the largest difference is "
-        "reported. For plans that change their mode (23) adds velocities of two different ways and is an "
-        "approximation: `benchmarks/regret.py` says what plans cost on the closed loop."
+        "That the run went as predicted: other robots turn, and bodies out of sight are left out; the largest "
+        "difference is reported. For plans that change their mode, (23) adds velocities of two different ways, which "
+        "is an approximation: `benchmarks/regret.py` shows what plans cost on the closed loop."
     )
 
     exercised_by = "decisions that were rolled out again"
 
-    def judge_rows(self, trace: Trace, rows: list[Row]) -> Finding:
+    def judge_rows(self, trace: Trace, rows: list[DecisionRecord]) -> Finding:
         """Roll out both choices of every decision; the margin is the tolerance less the largest difference."""
         if trace.meta["method"] not in ON_TOP:
             return judge_outcomes(trace, rows)
-        compared, largest = list[Off](), 0.0
+        compared, largest = list[Deviation](), 0.0
         for row, both in predicted(trace, rows):
             for name, places in zip(("refuse", "accept"), both, strict=True):
                 off = row[f"{name}_m_s"] - velocities(places, row)
                 largest = max(largest, float(np.abs(off).max()))
-                compared.append(Off(row, f"velocity of mode {name}, m/s", off, VELOCITY_TOLERANCE_M_S))
+                compared.append(Deviation(row, f"velocity of mode {name}, m/s", off, VELOCITY_TOLERANCE_M_S))
         finding = Finding(
             "holds",
             margin=VELOCITY_TOLERANCE_M_S - largest,
             unit="m/s",
             quantity="tolerance left by which a predicted velocity may differ from the closed loop's",
-            evidence={"decisions": len(rows), "largest_difference_m_s": largest, **_realised(trace, rows)},
+            evidence=asdict(Predicted(len(rows), largest, *_realised(trace, rows))),
             exercised=len(rows),
         )
         return conclude(finding, compared)
 
 
-def judge_outcomes(trace: Trace, rows: Sequence[Row]) -> Finding:
-    """Method (d): what comes of either choice, rolled out again for every first decision about a proposal."""
-    sent, compared, largest = proposals_of(trace), list[Off](), 0.0
+def judge_outcomes(trace: Trace, rows: Sequence[DecisionRecord]) -> Finding:
+    """Method (d): the outcome of either choice, rolled out again for every first decision about a proposal."""
+    proposals_of(trace)  # raises if a decision is on a proposal that was never sent
+    compared, largest = list[Deviation](), 0.0
     speeds = {ugv: trace.scenario.ugvs[ugv].preset.speed_m_s for ugv in trace.ugvs}
     looked = [row for row in rows if row.given["accept_stalls"] >= 0.0]
     for row in looked:
-        for choice, found in zip(("refuse", "accept"), foreseen(trace, row.given, sent), strict=True):
+        for choice, found in zip(("refuse", "accept"), foreseen(trace)[row.t_s, row.number], strict=True):
             cost, left = (float(row.given[f"{choice}_{name}"]) for name in ("outcome_m2_s", "left_m"))
-            ahead = left**3 / (3.0 * speeds[str(row.given["robot"])])
+            ahead = left**3 / (3.0 * speeds[row.robot])
             due = ahead if found.stalls else found.integral_m2_s + ahead
-            compared.append(Off(row, f"{choice}: stalls", row.given[f"{choice}_stalls"] - float(found.stalls), 0.0))
+            compared.append(
+                Deviation(row, f"{choice}: stalls", row.given[f"{choice}_stalls"] - float(found.stalls), 0.0)
+            )
             allowed = OUTCOME_TOLERANCE * max(1.0, due)
-            compared.append(Off(row, f"{choice}: outcome, m^2 s", cost - due, allowed, recomputed=due, recorded=cost))
+            compared.append(
+                Deviation(row, f"{choice}: outcome, m^2 s", cost - due, allowed, recomputed=due, recorded=cost)
+            )
             largest = max(largest, abs(cost - due) / allowed)
             short = max(0.0, found.least_left_m - left, left - found.most_left_m)
             within = max(LEFT_TOLERANCE_M, OUTCOME_TOLERANCE * left)
-            compared.append(Off(row, f"{choice}: way left, m", short, within, recorded=left))
+            compared.append(Deviation(row, f"{choice}: way left, m", short, within, recorded=left))
     finding = Finding(
         "holds",
         margin=1.0 - largest,
@@ -116,7 +131,7 @@ def judge_outcomes(trace: Trace, rows: Sequence[Row]) -> Finding:
     return conclude(finding, compared)
 
 
-def predicted(trace: Trace, rows: Sequence[Row]) -> Iterator[tuple[Row, tuple[Array, Array]]]:
+def predicted(trace: Trace, rows: Sequence[DecisionRecord]) -> Iterator[tuple[DecisionRecord, tuple[Array, Array]]]:
     """Each decision with the places that refusing and accepting throughout lead to, (S + 1, 3) each, m."""
     begun = ((row, [scene_of(trace, row, np.full(row.stages, choice)) for choice in (0.0, 1.0)]) for row in rows)
     for batch in in_batches(begun, lambda each: each[1]):
@@ -126,47 +141,42 @@ def predicted(trace: Trace, rows: Sequence[Row]) -> Iterator[tuple[Row, tuple[Ar
             yield row, (ways[2 * k], ways[2 * k + 1])
 
 
-def scene_of(trace: Trace, row: Row, plan: Array) -> Scene:
+def scene_of(trace: Trace, row: DecisionRecord, plan: Array) -> Scene:
     """The closed loop of a decision under a plan (N,) of 0 (refused) and 1 (accepted): others move on as they do."""
     control_s, horizon_s = trace.scenario.control.period_s, trace.scenario.gatekeeper.horizon_s
-    t, each = float(row.given["t_s"]), round(horizon_s / row.stages / control_s)
+    each = round(horizon_s / row.stages / control_s)
     after = control_s * np.arange(each * row.stages + 1.0)
-    on = next((one for one in proposals_of(trace) if one.number == row.given["number"]), None)
-    if on is None or on.ugv != row.given["robot"]:
-        raise TraceError(f"{row.label}: on a proposal that was not sent to it")
-    there = sensed(trace, on.ugv, t, after)
+    on = proposal_of(trace, row.number)
+    there = sensed(trace, on.ugv, row.t_s, after)
     points = np.stack([one.places for one in there], axis=1) if there else np.empty((len(after), 0, 3))
     safe, share = (np.array([getattr(one.pair, name) for one in there]) for name in ("safe_m", "share"))
-    loop = scene(trace, on, t, after, 0, points, safe, share)
+    loop = scene(trace, on, row.t_s, after, 0, points, safe, share)
     return loop._replace(executed=np.repeat(plan == 1.0, each))
 
 
-def velocities(places: Array, row: Row) -> Array:
+def velocities(places: Array, row: DecisionRecord) -> Array:
     """Mean velocities over the stages of a decision, (N, 3), m/s, from places at the control samples, (S + 1, 3), m."""
     return np.diff(places[:: (len(places) - 1) // row.stages], axis=0) / row.dt
 
 
-def _realised(trace: Trace, rows: Sequence[Row]) -> dict[str, Any]:
-    """By how much UGVs were elsewhere than predicted while the answer stood."""
-    t = trace.t[samples_of(trace)]
-    accepted = {ugv: accepted_at(trace, ugv) for ugv in trace.ugvs}
+def _realised(trace: Trace, rows: Sequence[DecisionRecord]) -> tuple[int, dict[str, Any]]:
+    """How many answers stood to the horizon, and where a UGV was farthest from its prediction while one stood."""
+    t, accepted = trace.t[samples_of(trace)], {ugv: accepted_at(trace, ugv) for ugv in trace.ugvs}
     farthest: dict[str, Any] = {}
     stood = 0
     for row in rows:
-        begin, ugv = float(row.given["t_s"]), str(row.given["robot"])
         yes = row.given["decision"] == "accept"
-        due = row.given["number"] if yes else None
-        first = int(np.searchsorted(t, begin - TIME_TOLERANCE_S))
-        numbers = [None if one is None else one.number for one in accepted[ugv][first:]]
-        other = next((k for k, found in enumerate(numbers) if found != due), None)
-        until = min(float(trace.t[-1]), float(t[first + other]) if other is not None else np.inf)
-        ends = begin + row.dt * np.arange(1.0, len(row["reference_m"]) + 1.0)
-        stood += bool(ends[-1] <= until + TIME_TOLERANCE_S)
-        ends = ends[ends <= until + TIME_TOLERANCE_S]
-        went = interpolate(trace.t, trace.position(ugv), ends)
+        due, first = row.number if yes else None, int(np.searchsorted(t, row.t_s - TIME_TOLERANCE_S))
+        numbers = (None if one is None else one.number for one in accepted[row.robot][first:])
+        other = next((float(t[first + k]) for k, found in enumerate(numbers) if found != due), np.inf)
+        until = min(float(trace.t[-1]), other) + TIME_TOLERANCE_S
+        ends = row.t_s + row.dt * np.arange(1.0, row.stages + 1.0)
+        stood += bool(ends[-1] <= until)
+        ends = ends[ends <= until]
+        went = interpolate(trace.t, trace.position(row.robot), ends)
         away = np.linalg.norm(went - row.constant[int(yes)][: len(ends)], axis=1)
         if away.max(initial=0.0) >= farthest.get("away_m", 0.0) and len(ends):
             k = int(np.argmax(away))
-            farthest = {"robot": ugv, "t_s": begin, "decision": str(row.given["decision"])}
-            farthest |= {"away_m": float(away[k]), "after_s": float(ends[k] - begin)}
-    return {"answers_that_stood_to_the_horizon": stood, "farthest_from_predicted": farthest}
+            farthest = {"robot": row.robot, "t_s": row.t_s, "decision": str(row.given["decision"])}
+            farthest |= {"away_m": float(away[k]), "after_s": float(ends[k] - row.t_s)}
+    return stood, farthest

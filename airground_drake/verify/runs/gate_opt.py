@@ -7,8 +7,9 @@ and convexity gives bounds that need no trust in any solver: see `convex_bounds.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -19,9 +20,9 @@ from airground_drake.verify.finding import Finding
 from airground_drake.verify.runs.convex_bounds import Enclosure, enclose
 from airground_drake.verify.runs.gate_record import (
     POSITION_TOLERANCE_M,
-    Off,
-    ProblemClaim,
-    Row,
+    DecisionRecord,
+    Deviation,
+    GateClaim,
     conclude,
     cost_tolerance,
 )
@@ -48,7 +49,26 @@ HALF_PLANE_ROUTES = (*PROVED_ROUTES, "relaxed")
 """Routes that bound the cost with distances along recorded normals; the others know no bound."""
 
 
-class GateOpt(ProblemClaim):
+@dataclass(frozen=True)
+class Bounds:
+    """The evidence; gaps and enclosures are relative to the cheaper constant plan's cost.
+
+    The first stage of a plan is certified if every plan with the other first stage costs more.
+    """
+
+    decisions: int
+    without_a_plan: list[str]
+    bounded: int
+    without_a_bound: list[str]
+    gap_too_wide_to_decide: list[str]
+    largest_gap: float | None
+    median_gap: float | None
+    widest_enclosure: float
+    first_stage_certified: int
+    largest_gaps: list[dict[str, Any]]
+
+
+class GateOpt(GateClaim):
     """GATE-OPT."""
 
     largest_gap = 0.05
@@ -91,76 +111,76 @@ class GateOpt(ProblemClaim):
         "With `gatekeeper.blocks`, the route 'mixed_integer' chooses one mode for each block of stages.",
     )
     does_not_establish = (
-        "It is about the route's own problem, of which mode velocities and half-planes are data: no plan of that "
-        "problem is much cheaper; it does not mean that none is on the closed loop, or with the exact distances of "
-        "(26d), whose optimum may be below the bound (GATE-MODEL says what the data are worth). Not established: "
-        "optimality for the exact distances of (26d) (half-planes are conservative: another choice of normals may "
-        "allow a cheaper plan), for another dwell, or for the nonlinear closed loop; nor that the first stage is the "
-        "optimal one, unless counted as certified. Where the plan is the better by exact distances, it may cost less "
-        "than the bound, and the gap is negative. Refusals for want of a plan are only listed."
+        "The claim is about the route's own problem. Mode velocities and half-planes are data of that problem "
+        "(GATE-MODEL says what they are worth). Not established: optimality for the exact distances of (26d) "
+        "(half-planes are conservative: another choice of normals may allow a cheaper plan), for another dwell, or "
+        "for the nonlinear closed loop; nor that the first stage is the optimal one, unless counted as certified. A "
+        "plan may cost less by exact distances than the bound; its gap is then negative. Refusals for want of a plan "
+        "are only listed."
     )
 
     exercised_by = "decisions that rest on a plan"
 
-    def judge_rows(self, trace: Trace, rows: list[Row]) -> Finding:
+    def applies(self, trace: Trace) -> bool:
+        """Only method (c) solves problem (26); method (d) compares outcomes."""
+        return trace.meta.get("method") == "c"
+
+    def judge_rows(self, trace: Trace, rows: list[DecisionRecord]) -> Finding:
         """Enclose every optimum; the margin is what is left of the largest gap allowed."""
-        route = trace.scenario.gatekeeper.route
+        gate = trace.scenario.gatekeeper
         planned = [row for row in rows if row.planned]
-        lacking = [row for row in planned if route in HALF_PLANE_ROUTES and row.data["normals"] is None]
+        lacking = [row for row in planned if gate.route in HALF_PLANE_ROUTES and row.data["normals"] is None]
         if cut := [row for row in lacking if row.given["status"] == "optimal"]:
             raise TraceError(f"{cut[0].label} claims to be complete, but has no normals")
         compared = [one for row in planned for one in compare_with_constant_plans(row)]
-        if route not in HALF_PLANE_ROUTES:
-            reason = f"route {route!r} has no bound that can be established again"
+        if gate.route not in HALF_PLANE_ROUTES:
+            reason = f"route {gate.route!r} has no bound that can be established again"
             open_ = Finding("inconclusive", evidence={"decisions": len(rows), "reason": reason}, exercised=len(planned))
             return conclude(open_, compared)
-        blocks = trace.scenario.gatekeeper.blocks
-        bounded = bound([row for row in planned if row not in lacking], blocks)
+        bounded = bound([row for row in planned if row not in lacking], gate.blocks)
         for each in bounded:
-            compared += compare_bounds(each.row, each.optimum, blocks)
-            if each.gap > self.largest_gap and not blocks:
+            compared += compare_bounds(each.row, each.optimum, gate.blocks)
+            if each.gap > self.largest_gap and not gate.blocks:
                 compared.append(compare_with_blocks(each, self.largest_gap))
-        finding = self._finding(bounded, lacking)
-        listed = {"decisions": len(rows), "without_a_plan": [row.label for row in rows if not row.planned]}
-        return conclude(replace(finding, evidence={**listed, **finding.evidence}, exercised=len(planned)), compared)
-
-    def _finding(self, bounded: Sequence[Bounded], lacking: Sequence[Row]) -> Finding:
-        """What the gaps say, as long as nothing recorded is wrong; a gap that is too wide is open, not refuted."""
-        too_wide = [each.row.label for each in bounded if each.gap > self.largest_gap]
-        width = max((each.width for each in bounded), default=0.0)
-        decided = bool(bounded) and not lacking and not too_wide and width <= self.widest
-        gaps = [each.gap for each in bounded]
-        largest = [bounded[i] for i in np.argsort(gaps)[:-6:-1]]
-        worst = [{**{name: each.row.given[name] for name in ("t_s", "robot")}, "gap": each.gap} for each in largest]
-        return Finding(
-            "holds" if decided else "inconclusive",
-            margin=self.largest_gap - worst[0]["gap"] if decided else None,
+        evidence = self._bounds(rows, bounded, lacking)
+        undecided = not bounded or lacking or evidence.gap_too_wide_to_decide
+        decided = not undecided and evidence.widest_enclosure <= self.widest
+        worst = evidence.largest_gaps[0] if bounded else {}
+        finding = Finding(
+            "holds" if decided else "inconclusive",  # a gap that is too wide is open, not refuted
+            margin=self.largest_gap - worst["gap"] if decided else None,
             unit="of the cheaper constant plan's cost",
             quantity="largest gap allowed less the largest gap",
-            where={name: worst[0][name] for name in ("robot", "t_s")} if worst else {},
-            evidence={
-                "bounded": len(bounded),
-                "without_a_bound": [row.label for row in lacking],
-                "gap_too_wide_to_decide": too_wide,
-                "largest_gap": worst[0]["gap"] if worst else None,
-                "median_gap": float(np.median(gaps)) if gaps else None,
-                "widest_enclosure": width,
-                "first_stage_certified": sum(each.first_stage_certified for each in bounded),
-                "largest_gaps": worst,
-            },
+            where={name: worst[name] for name in ("robot", "t_s") if worst},
+            evidence=asdict(evidence),
+            exercised=len(planned),
+        )
+        return conclude(finding, compared)
+
+    def _bounds(
+        self, rows: Sequence[DecisionRecord], bounded: Sequence[Bounded], lacking: Sequence[DecisionRecord]
+    ) -> Bounds:
+        gaps = [each.gap for each in bounded]
+        largest = [bounded[i] for i in np.argsort(gaps)[:-6:-1]]
+        return Bounds(
+            decisions=len(rows),
+            without_a_plan=[row.label for row in rows if not row.planned],
+            bounded=len(bounded),
+            without_a_bound=[row.label for row in lacking],
+            gap_too_wide_to_decide=[each.row.label for each in bounded if each.gap > self.largest_gap],
+            largest_gap=max(gaps, default=None),
+            median_gap=float(np.median(gaps)) if gaps else None,
+            widest_enclosure=max((each.width for each in bounded), default=0.0),
+            first_stage_certified=sum(each.first_stage_certified for each in bounded),
+            largest_gaps=[{"t_s": each.row.t_s, "robot": each.row.robot, "gap": each.gap} for each in largest],
         )
 
 
 @dataclass(frozen=True)
 class Bounded:
-    """A decision with a plan, and bounds of the optimum of the problem that its route solves.
+    """A decision with a plan, and bounds of the optimum of the problem that its route solves."""
 
-    Attributes:
-        row: the decision.
-        optimum: its bounds.
-    """
-
-    row: Row
+    row: DecisionRecord
     optimum: Enclosure
 
     @cached_property
@@ -170,7 +190,7 @@ class Bounded:
 
     @property
     def width(self) -> float:
-        """Of the enclosure, in the same units."""
+        """Width of the enclosure, in the same units."""
         return (self.optimum.upper - self.optimum.lower) / self.row.scale
 
     @property
@@ -179,34 +199,33 @@ class Bounded:
         return self.optimum.other_first > self.optimum.lower + self.gap * self.row.scale
 
 
-def bound(rows: Sequence[Row], blocks: int) -> list[Bounded]:
+def bound(rows: Sequence[DecisionRecord], blocks: int) -> list[Bounded]:
     """Bounds for each decision: of the relaxation, or of all plans if `blocks` are few (0: one per stage)."""
     optima = [cheapest_of_blocks(row, blocks) for row in rows] if 0 < blocks <= MOST_BLOCKS else enclose(rows)
     return [Bounded(*one) for one in zip(rows, optima, strict=True)]
 
 
-def compare_with_blocks(each: Bounded, allowed: float) -> Off:
+def compare_with_blocks(each: Bounded, allowed: float) -> Deviation:
     """A gap that is too wide is wrong only if the route's problem has a cheaper plan: rounding may cost that much."""
     row = each.row
     shown = (float(row.cost(row["positions_m"])) - cheapest_of_blocks(row, BLOCKS).lower) / row.scale
-    return Off(row, "a plan of blocks is cheaper", max(0.0, shown), allowed)
+    return Deviation(row, "a plan of blocks is cheaper", max(0.0, shown), allowed)
 
 
-def compare_with_constant_plans(row: Row) -> Iterator[Off]:
+def compare_with_constant_plans(row: DecisionRecord) -> Iterator[Deviation]:
     """The plan against the constant ones, by the exact cost; each choice against the constant plan that makes it."""
     for name, constant in zip(("refuse", "accept"), row.cost(row.constant).tolist(), strict=True):
         tolerance = cost_tolerance(constant)
         for column in ("objective", f"objective_{name}"):
             excess = max(0.0, row.given[column] - constant)
-            yield Off(row, f"{column} above {name} throughout", excess, tolerance, constant_plan=constant)
+            yield Deviation(row, f"{column} above {name} throughout", excess, tolerance, constant_plan=constant)
 
 
-def compare_bounds(row: Row, found: Enclosure, blocks: int) -> Iterator[Off]:
+def compare_bounds(row: DecisionRecord, found: Enclosure, blocks: int) -> Iterator[Deviation]:
     """The recorded normals, lower bound and gap; `blocks`: binaries of the route, 0: one per stage."""
     given, normals = row.given, row.half_planes
     proved = given["route"] in PROVED_ROUTES
-    lower = float(row.given["route_bound"])
-    scale = row.scale
+    lower, scale = float(given["route_bound"]), row.scale
     own = float(row.cost(row["positions_m"], normals))
     known = [*row.constant, *([row.positions(row["rounded"])] if row.data["rounded"] is not None else [])]
     # the losing choice's plan is not recorded, but along normals it costs no less than by exact distances
@@ -217,17 +236,17 @@ def compare_bounds(row: Row, found: Enclosure, blocks: int) -> Iterator[Off]:
         best = min(best, given["objective"])
         upper = float(row.cost(row.positions(neighbours(row["plan"], blocks)), normals).min())
     lengths = np.linalg.norm(row["normals"], axis=2)
-    yield Off(row, "length of a normal, minus 1", lengths - 1.0, POSITION_TOLERANCE_M)
+    yield Deviation(row, "length of a normal, minus 1", lengths - 1.0, POSITION_TOLERANCE_M)
     more = {"route_bound": lower, "optimum_at_least": found.lower, "optimum_at_most": upper}
-    yield Off(row, "lower bound above the plan's cost", max(0.0, lower - own) / scale, OVERSTATED, cost=own)
-    yield Off(row, "lower bound overstated", max(0.0, lower - upper) / scale, OVERSTATED, **more)
+    yield Deviation(row, "lower bound above the plan's cost", max(0.0, lower - own) / scale, OVERSTATED, cost=own)
+    yield Deviation(row, "lower bound overstated", max(0.0, lower - upper) / scale, OVERSTATED, **more)
     if given["status"] == "optimal":
-        yield Off(row, "lower bound understated", max(0.0, found.lower - lower) / scale, UNDERSTATED, **more)
+        yield Deviation(row, "lower bound understated", max(0.0, found.lower - lower) / scale, UNDERSTATED, **more)
     if given["status"] == "optimal" and proved:
-        yield Off(row, "optimal, but with a gap", max(0.0, given["gap"]), GAP_TOLERANCE)
+        yield Deviation(row, "optimal, but with a gap", max(0.0, given["gap"]), GAP_TOLERANCE)
     least, most = ((cost - lower) / max(cost, 1e-12) for cost in (best, own))
     beyond = max(0.0, least - given["gap"], given["gap"] - most)
-    yield Off(row, "recorded gap", beyond, GAP_TOLERANCE, recorded=given["gap"], at_least=least, at_most=most)
+    yield Deviation(row, "recorded gap", beyond, GAP_TOLERANCE, recorded=given["gap"], at_least=least, at_most=most)
 
 
 def neighbours(plan: Array, blocks: int) -> Array:
@@ -238,9 +257,9 @@ def neighbours(plan: Array, blocks: int) -> Array:
     return np.vstack([plan, np.where(turned, 1.0 - plan, plan), np.zeros(stages), np.ones(stages)])
 
 
-def cheapest_of_blocks(row: Row, blocks: int) -> Enclosure:
+def cheapest_of_blocks(row: DecisionRecord, blocks: int) -> Enclosure:
     """The cheapest along the half-planes of all plans that are constant on blocks, by evaluating each."""
-    stages = len(row["reference_m"])
+    stages = row.stages
     blocks = min(blocks, stages)
     modes = (np.arange(2**blocks)[:, None] >> np.arange(blocks)) % 2
     omega = modes[:, np.arange(stages) * blocks // stages].astype(np.float64)

@@ -1,4 +1,4 @@
-"""What a recorded gatekeeper decision is, and what the claims about decisions share.
+"""Recorded gatekeeper decisions, and what the claims about them share.
 
 The paper's formulas are written again in plain numpy; N is the number of stages, m of the points to keep away from.
 """
@@ -6,7 +6,7 @@ The paper's formulas are written again in plain numpy; N is the number of stages
 from __future__ import annotations
 
 import abc
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
@@ -19,16 +19,18 @@ from airground_drake.run.trace import PROBLEM_ARRAYS, PROBLEM_SCALARS, Trace
 from airground_drake.verify.claim import TraceClaim
 from airground_drake.verify.finding import Finding
 from airground_drake.verify.runs.control_law import ON_TOP
-from airground_drake.verify.runs.instants import GATED_METHODS, talk_is_due
+from airground_drake.verify.runs.instants import GATED_METHODS, silent, talk_is_due
 
 POSITION_TOLERANCE_M = 1e-9
 """Recorded and recomputed positions may differ by this, m: rounding of N additions errs by 1e-13 m."""
 LEAST_COST = 1e-6
 """Costs are compared relative to the cheaper constant plan's, but to no less than this: 1 mm of error for 1 s."""
+MAY_BE_EMPTY = ("plan", "positions_m", "relaxed", "rounded", "normals")
+"""Arrays of a problem that a route may leave out."""
 
 
 @dataclass(frozen=True, eq=False)
-class Row:
+class DecisionRecord:
     """One decision, and its problem if it has one: a row of `Trace.decisions` and of `Trace.problems`.
 
     Attributes:
@@ -47,11 +49,26 @@ class Row:
     terminal_weight: float = -1.0
     data: dict[str, Array | None] = field(default_factory=dict)
 
+    @property
+    def t_s(self) -> float:
+        """Time of the decision, s."""
+        return float(self.given["t_s"])
+
+    @property
+    def robot(self) -> str:
+        """The UGV that decides."""
+        return str(self.given["robot"])
+
+    @property
+    def number(self) -> int:
+        """Number of the proposal that it is about."""
+        return int(self.given["number"])
+
     def __getitem__(self, name: str) -> Array:
         """An array that must be there.
 
         Raises:
-            TraceError: if it is not.
+            TraceError: if it is missing.
         """
         found = self.data[name]
         if found is None:
@@ -61,7 +78,7 @@ class Row:
     @property
     def label(self) -> str:
         """Which decision."""
-        return f"decision of {self.given['robot']} at t = {self.given['t_s']} s"
+        return f"decision of {self.robot} at t = {self.given['t_s']} s"
 
     @property
     def planned(self) -> bool:
@@ -109,8 +126,8 @@ class Row:
 
     @cached_property
     def lasting(self) -> Array:
-        """What the task error at the end of each stage counts for, (N,), s: the stage, and at the last w besides."""
-        return np.append(np.full(len(self["reference_m"]) - 1, self.dt), self.dt + self.terminal_weight)
+        """Weight of the task error at the end of each stage, (N,), s: its length, and w more at the last one."""
+        return np.append(np.full(self.stages - 1, self.dt), self.dt + self.terminal_weight)
 
     def cost(self, positions: Array, normals: Array | None = None) -> Any:
         """(25) by the right-hand rectangle rule, slack being max(0, d - distance), and the terminal cost; (...)."""
@@ -121,16 +138,16 @@ class Row:
     @cached_property
     def constant(self) -> Array:
         """Positions of the plans that refuse and that accept throughout, (2, N, 3), m."""
-        return self.positions(np.array([[0.0], [1.0]]) * np.ones(len(self["reference_m"])))
+        return self.positions(np.array([[0.0], [1.0]]) * np.ones(self.stages))
 
     @cached_property
     def scale(self) -> float:
-        """What differences of cost are compared with."""
+        """The cost that differences of cost are relative to."""
         return max(LEAST_COST, float(self.cost(self.constant).min()))
 
 
-def rows_of(trace: Trace) -> list[Row]:
-    """All decisions, with their problems (26); under method (d) there are none.
+def rows_of(trace: Trace) -> list[DecisionRecord]:
+    """All decisions, with their problems (26); method (d) has no problems.
 
     Raises:
         TraceError: if the tables do not belong together, decisions are not in order, a shape is wrong, a number is
@@ -146,22 +163,41 @@ def rows_of(trace: Trace) -> list[Row]:
         if not (np.diff(times.to_numpy(dtype=np.float64)) >= 0.0).all():
             raise TraceError(f"the decisions of {ugv} are not in order of their times")
     problems = trace.problems.to_dict("records")
-    rows = [_solved(trace, *both) for both in zip(given, problems, strict=True)] if due else [Row(one) for one in given]
+    rows = (
+        [_solved(trace, *both) for both in zip(given, problems, strict=True)]
+        if due
+        else [DecisionRecord(one) for one in given]
+    )
     for row in rows:
         if not np.isfinite([value for value in row.given.values() if isinstance(value, float)]).all():
             raise TraceError(f"{row.label}: it has numbers that are not finite")
-        if row.given["robot"] not in trace.ugvs:
+        if row.robot not in trace.ugvs:
             raise TraceError(f"{row.label}: not of a UGV of the trace")
     return rows
 
 
-def _solved(trace: Trace, given: dict[str, Any], problem: dict[Any, Any]) -> Row:
+def in_turn(trace: Trace, rows: Iterable[DecisionRecord]) -> Iterator[tuple[DecisionRecord, DecisionRecord | None]]:
+    """Each decision, by UGV and time, with the one before it on the same proposal, if there is one."""
+    rows = list(rows)
+    for ugv in trace.ugvs:
+        last: DecisionRecord | None = None
+        for row in (row for row in rows if row.robot == ugv):
+            yield row, last if last and last.number == row.number else None
+            last = row
+
+
+def reasons_of(trace: Trace) -> dict[str, int]:
+    """How many decisions were made for each reason."""
+    return {str(reason): int(count) for reason, count in trace.decisions["reason"].value_counts().items()}
+
+
+def _solved(trace: Trace, given: dict[str, Any], problem: dict[Any, Any]) -> DecisionRecord:
     """A decision with its problem, a row of `Trace.problems`."""
     gate = trace.scenario.gatekeeper
     scalars = [float(problem[name]) for name in PROBLEM_SCALARS]
     dt, error, slack, terminal = scalars
     flat = {name: np.asarray(problem[name], dtype=np.float64).ravel() for name in PROBLEM_ARRAYS}
-    row = Row(given, dt, error, slack, terminal, _shaped(flat, int(gate.stages)))
+    row = DecisionRecord(given, dt, error, slack, terminal, _shaped(flat, int(gate.stages)))
     if not all(np.isfinite(values).all() for values in (np.array(scalars), *flat.values())):
         raise TraceError(f"{row.label}: its problem has numbers that are not finite")
     if given["route"] != gate.route:
@@ -175,24 +211,23 @@ def _solved(trace: Trace, given: dict[str, Any], problem: dict[Any, Any]) -> Row
 def _shaped(flat: dict[str, Array], n: int) -> dict[str, Array | None]:
     """Arrays of a problem of n stages in their shapes; None for what is empty and may be."""
     m = len(flat["distances_m"])
-    shapes: dict[str, tuple[int, ...]] = {"initial_m": (3,), "distances_m": (m,), "centres_m": (n, m, 3)}
-    shapes |= dict.fromkeys(("accept_m_s", "refuse_m_s", "reference_m"), (n, 3))
-    optional: dict[str, tuple[int, ...]] = dict.fromkeys(("plan", "relaxed", "rounded"), (n,))
-    optional |= {"positions_m": (n, 3), "normals": (n, m, 3)}
+    shapes: dict[str, tuple[int, ...]] = {"initial_m": (3,), "distances_m": (m,)}
+    shapes |= dict.fromkeys(("centres_m", "normals"), (n, m, 3)) | dict.fromkeys(("plan", "relaxed", "rounded"), (n,))
+    shapes |= dict.fromkeys(("accept_m_s", "refuse_m_s", "reference_m", "positions_m"), (n, 3))
     shaped: dict[str, Array | None] = {}
     for name, values in flat.items():
-        shape = optional[name] if name in optional else shapes[name]
+        shape = shapes[name]
         size = int(np.prod(shape))
-        if values.size != size and (values.size or name not in optional):
+        if values.size != size and (values.size or name not in MAY_BE_EMPTY):
             raise TraceError(f"a problem's {name!r} has {values.size} numbers, not {size}")
         shaped[name] = values.reshape(shape) if values.size == size else None
     return shaped
 
 
-class Off:
+class Deviation:
     """A comparison: how far a recorded value is from what it should be, and how far it may be."""
 
-    def __init__(self, row: Row, what: str, by: Any, allowed: float, **more: Any) -> None:
+    def __init__(self, row: DecisionRecord, what: str, by: Any, allowed: float, **more: Any) -> None:
         """Compare.
 
         Args:
@@ -220,21 +255,20 @@ class Off:
 
 
 def cost_tolerance(cost: float) -> float:
-    """What recorded and recomputed costs may differ by: rounding of 3 N additions errs by 1e-13, relative."""
+    """How much recorded and recomputed costs may differ: rounding of 3 N additions errs by 1e-13, relative."""
     return 1e-9 * max(cost, LEAST_COST)
 
 
-def conclude(finding: Finding, compared: Iterable[Off]) -> Finding:
-    """The finding, or if a comparison is wrong a refutation by the first such one in time."""
-    wrong = [one for one in compared if one.wrong]
-    if not wrong:
+def conclude(finding: Finding, compared: Iterable[Deviation]) -> Finding:
+    """The finding, or a refutation by the first wrong comparison in time."""
+    first = min((one for one in compared if one.wrong), key=lambda one: one.row.t_s, default=None)
+    if first is None:
         return finding
-    first = min(wrong, key=lambda one: float(one.row.given["t_s"]))
     return replace(finding, status="refuted", margin=None, counterexample=first.to_json())
 
 
 def without_decisions(trace: Trace) -> list[str]:
-    """UGVs that had reason to decide, but never did: they executed something, or were intervened on for long enough.
+    """UGVs that never decided, though they executed something or were intervened on for long enough.
 
     This is no refutation: the UAV's policies may have found nothing to propose. GATE-FEAS refutes it where a proposal
     stood for long enough, EXEC where something was executed.
@@ -244,7 +278,7 @@ def without_decisions(trace: Trace) -> list[str]:
 
 
 class GateClaim(TraceClaim):
-    """What the claims share: they are about the decisions of a gatekeeper, all of them recorded."""
+    """A claim about the decisions of a gatekeeper."""
 
     def applies(self, trace: Trace) -> bool:
         """Methods (a) and (b) optimise nothing."""
@@ -256,8 +290,7 @@ class GateClaim(TraceClaim):
             return Finding("not_run", evidence={"reason": "the problems of the decisions were not recorded"})
         without = without_decisions(trace)
         if without and not len(trace.decisions):
-            reason = f"{', '.join(without)} were in mode 'intervening', but the trace has no decision"
-            return Finding("not_run", evidence={"reason": reason, "faults": trace.meta["faults"]})
+            return silent(trace, without, "decision")
         rows = trace.derived("rows", lambda: rows_of(trace))
         if not rows:
             reason = "no UGV was intervened on: nothing to decide"
@@ -266,13 +299,5 @@ class GateClaim(TraceClaim):
         return replace(finding, evidence={**finding.evidence, "without_decisions": without})
 
     @abc.abstractmethod
-    def judge_rows(self, trace: Trace, rows: list[Row]) -> Finding:
+    def judge_rows(self, trace: Trace, rows: list[DecisionRecord]) -> Finding:
         """Decide the claim about at least one decision."""
-
-
-class ProblemClaim(GateClaim):
-    """A claim about problem (26): of method (c) alone."""
-
-    def applies(self, trace: Trace) -> bool:
-        """Method (d) compares outcomes and solves no problem (26)."""
-        return super().applies(trace) and trace.meta.get("method") in ON_TOP

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import numpy as np
 import numpy.typing as npt
 
@@ -9,22 +11,24 @@ from airground_drake.base.arrays import Array
 from airground_drake.run.trace import Trace
 from airground_drake.verify.claim import TIME_TOLERANCE_S
 from airground_drake.verify.engines.geometry import MERGE_S
+from airground_drake.verify.finding import Finding
 
 GATED_METHODS = ("c", "d")
 """Methods with an optimising gatekeeper."""
 
 
-def control_samples(t: Array, period: float) -> npt.NDArray[np.intp]:
-    """Rows of the control samples: the nearest to each multiple of the period before the last row, if it is there."""
+def samples_of(trace: Trace) -> npt.NDArray[np.intp]:
+    """Rows of the control samples, (S,): the nearest to each multiple of the period before the last row."""
+    t, period = trace.t, trace.scenario.control.period_s
     instants = np.arange(int((t[-1] - MERGE_S) / period) + 1) * period
     right = np.searchsorted(t, instants).clip(1, len(t) - 1)
     nearest = right - (instants - t[right - 1] < t[right] - instants)
     return np.asarray(nearest[np.abs(t[nearest] - instants) <= TIME_TOLERANCE_S])
 
 
-def samples_of(trace: Trace) -> npt.NDArray[np.intp]:
-    """Rows of the control samples of a run, (S,)."""
-    return control_samples(trace.t, trace.scenario.control.period_s)
+def row_at(trace: Trace, t_s: float) -> int:
+    """The row at a time, s, or the next one; for times after the run the last one."""
+    return min(int(np.searchsorted(trace.t, t_s - TIME_TOLERANCE_S)), len(trace.t) - 1)
 
 
 def chosen_at(trace: Trace, samples: npt.NDArray[np.intp]) -> npt.NDArray[np.intp]:
@@ -43,3 +47,9 @@ def talk_is_due(trace: Trace, ugv: str) -> bool:
     """Whether a UGV is intervened on for longer than a proposal and a decision on it take."""
     periods = trace.scenario.intervention.period_s + trace.scenario.gatekeeper.period_s
     return bool((np.diff(intervening(trace, ugv)) > periods).any())
+
+
+def silent(trace: Trace, ugvs: Iterable[str], kind: str) -> Finding:
+    """Not run: UGVs were intervened on, but no message of a kind was recorded."""
+    reason = f"{', '.join(ugvs)} were in mode 'intervening', but the trace has no {kind}"
+    return Finding("not_run", evidence={"reason": reason, "faults": trace.meta["faults"]})

@@ -1,9 +1,9 @@
-"""What comes of a proposal and of its refusal, rolled out again from a trace: what method (d) decides by."""
+"""Outcomes of accepting and of refusing a proposal, rolled out again from a trace; method (d) decides by them."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -13,21 +13,17 @@ from airground_drake.run.trace import Trace
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.verify.runs.beginnings import Beginning, beginning
 from airground_drake.verify.runs.closed_loops import Scene, in_batches, roll_out, stacked
-from airground_drake.verify.runs.proposals import Sent
 from airground_drake.verify.runs.way_left import bounds_of_way_left
 
 STILL_M = 0.05
-"""Less than this within the last second is at rest, m; for a UGV that is slow, a tenth of what it can do then."""
+"""A UGV is at rest if it moved less than this, m, or a tenth of what it can, within the last second."""
 Key = tuple[float, int]
-"""Of a decision: time, s, and number of the proposal."""
+"""Identifies a decision: time, s, and number of the proposal."""
 Counts = npt.NDArray[np.int64]
 
 
 class Foreseen(NamedTuple):
-    """What comes of a choice: places (S + 1, 3), m, whether it stalls, (25) along it, m^2 s, and the way left, m.
-
-    `least_left_m` and `most_left_m` are bounds of the latter.
-    """
+    """The outcome of a choice: places (S + 1, 3), whether it stalls, (25) along the way, bounds of the way left."""
 
     places_m: Array
     stalls: bool
@@ -36,39 +32,22 @@ class Foreseen(NamedTuple):
     most_left_m: float
 
 
-def foreseen(trace: Trace, given: dict[str, Any], sent: Sequence[Sent]) -> tuple[Foreseen, Foreseen]:
-    """What comes of refusing and of accepting, for the first decision about a proposal.
-
-    Args:
-        trace: the run.
-        given: the decision's row.
-        sent: all proposals.
-    """
-    known = trace.derived("foreseen", lambda: dict(_all_foreseen(trace, _looked_at(trace), sent)))
-    key = float(given["t_s"]), int(given["number"])
-    if key not in known:
-        known |= dict(_all_foreseen(trace, [key], sent))
-    return known[key]
+def foreseen(trace: Trace) -> dict[Key, tuple[Foreseen, Foreseen]]:
+    """Outcomes of refusing and of accepting, for each decision for which outcomes were recorded."""
+    return trace.derived("foreseen", lambda: dict(_foreseen(trace)))
 
 
-def _looked_at(trace: Trace) -> list[Key]:
-    """The decisions for which what comes of either choice was recorded."""
+def _foreseen(trace: Trace) -> Iterator[tuple[Key, tuple[Foreseen, Foreseen]]]:
     rows = trace.decisions[trace.decisions["accept_stalls"] >= 0.0]
-    return [(float(t), int(number)) for t, number in zip(rows["t_s"], rows["number"], strict=True)]
-
-
-def _all_foreseen(
-    trace: Trace, keys: Sequence[Key], sent: Sequence[Sent]
-) -> Iterator[tuple[Key, tuple[Foreseen, Foreseen]]]:
-    """What comes of either choice of some decisions, many side by side."""
-    begun = ((key, beginning(trace, *key, sent)) for key in keys)
+    keys = [(float(t), int(number)) for t, number in zip(rows["t_s"], rows["number"], strict=True)]
+    begun = ((key, beginning(trace, *key)) for key in keys)
     for batch in in_batches(begun, lambda each: (each[1].refused, each[1].accepted)):
         found = _rolled_out(trace, [each for _, each in batch])
         yield from zip([key for key, _ in batch], found, strict=True)
 
 
 def _rolled_out(trace: Trace, begun: Sequence[Beginning]) -> list[tuple[Foreseen, Foreseen]]:
-    """What comes of refusing and of accepting, for some decisions."""
+    """Outcomes of refusing and of accepting, for some decisions."""
     h, scenes = trace.scenario.control.period_s, [each.refused for each in begun]
     scenes += [each.accepted for each in begun]
     goal, settled = np.array([each.goal for each in begun] * 2), np.array([each.settled for each in begun] * 2)
@@ -84,14 +63,14 @@ def _rolled_out(trace: Trace, begun: Sequence[Beginning]) -> list[tuple[Foreseen
 
 
 def _followed(trace: Trace, loops: Scene, goal: Array, settled: Counts, lasting: Counts) -> tuple[Array, Counts]:
-    """Where R closed loops lead, (T + 1, R, 3), m, and the period after which each is over, (R,); T is the last.
+    """Where R closed loops lead, (T + 1, R, 3), m, and the period after which each ends, (R,); T is the last.
 
     Args:
         trace: the run.
         loops: stacked.
         goal: (R, 3), m.
-        settled: periods after which each may be over, (R,).
-        lasting: periods after which it is, (R,).
+        settled: periods after which each may end, once it is at rest, (R,).
+        lasting: periods after which each ends, (R,).
     """
     second = max(1, round(1.0 / trace.scenario.control.period_s))
     ways, done, still = [loops.here], lasting, np.minimum(STILL_M, loops.limit / 10.0)

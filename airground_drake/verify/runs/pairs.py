@@ -1,8 +1,8 @@
-"""The pairs of a run that are to be kept apart, and where they are."""
+"""The pairs of bodies that must keep apart, by the scenario, and where they are during a run."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator
 from itertools import combinations
 from typing import Any, NamedTuple
 
@@ -15,14 +15,14 @@ from airground_drake.verify.engines.geometry import MERGE_S, apart_at_least, box
 
 
 class Pair(NamedTuple):
-    """A robot, and an obstacle or another robot that it has to keep apart from.
+    """A robot, and an obstacle or another robot that it must keep away from.
 
     Attributes:
         first: the robot.
         second: the obstacle or other robot.
-        safe_m: safe distance of the centres: that of the kind of pair, and both radii.
-        share: part of the avoidance inequality that each robot takes.
-        reach_m: by how much they can approach each other in one control period, at most.
+        safe_m: safe distance of the centres: that of the kind of pair, plus both radii.
+        share: part of the avoidance inequality that each robot takes: all beside an obstacle, half beside a robot.
+        reach_m: how far they can approach each other in one control period.
     """
 
     first: str
@@ -41,8 +41,9 @@ def pairs_of(trace: Trace) -> tuple[Pair, ...]:
 
 
 def _pairs_of(trace: Trace) -> Iterator[Pair]:
-    safe, uav, radius = trace.scenario.safe_distance, trace.scenario.uav.name, radii_of(trace)
-    limit, period = speed_limits(trace), trace.scenario.control.period_s
+    safe, uav, period = trace.scenario.safe_distance, trace.scenario.uav.name, trace.scenario.control.period_s
+    radius = {name: body.radius_m for name, body in trace.scenario.bodies.items()}
+    limit = {name: robot.max_speed_m_s for name, robot in trace.scenario.robots.items()}
     for robot in trace.robots:
         for obstacle in trace.scenario.obstacles:
             distance = safe.obstacle_m + (radius[robot] + radius[obstacle])
@@ -54,7 +55,7 @@ def _pairs_of(trace: Trace) -> Iterator[Pair]:
 
 
 def apart_of(trace: Trace) -> Array:
-    """A bound of the distance of each pair over the whole run from below, (P,), m, in the order of `pairs_of`."""
+    """A lower bound of the distance of each pair over the whole run, (P,), m, in the order of `pairs_of`."""
     return trace.derived("apart", lambda: _apart_of(trace))
 
 
@@ -62,7 +63,7 @@ def _apart_of(trace: Trace) -> Array:
     places, pairs = places_of(trace), pairs_of(trace)
     number = {name: k for k, name in enumerate(places)}
     boxes = boxes_of(np.stack([np.broadcast_to(place, (len(trace.t), 3)) for place in places.values()]))
-    first, second = (np.array([number[name] for name in names], dtype=np.intp) for names in _sides(pairs))
+    first, second = np.array([[number[pair.first], number[pair.second]] for pair in pairs], dtype=np.intp).T
     off = np.array([off_m_of(trace, name) for name in places])
     return apart_at_least(boxes, first, second) - (off[first] + off[second])
 
@@ -76,13 +77,13 @@ def off_m_of(trace: Trace, name: str) -> float:
 
 
 def least_of(bounds: Array, most: int, value: Callable[[int], float]) -> list[int]:
-    """Indices of the `most` least of K values, in increasing order; few values have to be computed.
+    """Indices of the smallest of K values, in increasing order; few values have to be computed.
 
     Args:
         bounds: lower bounds of the values, (K,).
-        most: how many are wanted.
-        value: computes the k-th value. The wanted ones are at most the largest of any `most` values, so those with
-            larger bounds are not computed.
+        most: how many indices are wanted.
+        value: computes the k-th value. No wanted value is above the largest of any `most` values, so values with larger
+            bounds are not computed.
     """
     if len(bounds) <= most:
         return list(range(len(bounds)))
@@ -90,12 +91,8 @@ def least_of(bounds: Array, most: int, value: Callable[[int], float]) -> list[in
     return sorted(sorted(np.flatnonzero(bounds <= enough).tolist(), key=value)[:most])
 
 
-def _sides(pairs: Sequence[Pair]) -> tuple[list[str], list[str]]:
-    return [pair.first for pair in pairs], [pair.second for pair in pairs]
-
-
 def near_pairs(trace: Trace) -> tuple[Pair, ...]:
-    """The pairs, in their order, that may come within sensing range of each other: no other has an inequality."""
+    """The pairs, in their order, that may come within sensing range: other pairs have no inequality."""
 
     def chosen() -> tuple[Pair, ...]:
         near = apart_of(trace) <= trace.scenario.control.sensing_range_m
@@ -105,10 +102,10 @@ def near_pairs(trace: Trace) -> tuple[Pair, ...]:
 
 
 def around(trace: Trace, robot: str) -> list[tuple[str, Pair]]:
-    """What may come within sensing range of a robot, by name, with the pair that it is with the robot."""
+    """Bodies that may come within sensing range of a robot, by name, each with their pair."""
 
     def by_robot() -> dict[str, list[tuple[str, Pair]]]:
-        found: dict[str, list[tuple[str, Pair]]] = {name: [] for name in trace.robots}
+        found = {name: list[tuple[str, Pair]]() for name in trace.robots}
         for pair in near_pairs(trace):
             found[pair.first].append((pair.second, pair))
             if pair.second in found:
@@ -116,16 +113,6 @@ def around(trace: Trace, robot: str) -> list[tuple[str, Pair]]:
         return found
 
     return trace.derived("around", by_robot)[robot]
-
-
-def radii_of(trace: Trace) -> dict[str, float]:
-    """Radius of each robot and obstacle, m."""
-    return {name: body.radius_m for name, body in trace.scenario.bodies.items()}
-
-
-def speed_limits(trace: Trace) -> dict[str, float]:
-    """Maximum speed of each robot, m/s."""
-    return {name: robot.max_speed_m_s for name, robot in trace.scenario.robots.items()}
 
 
 def preset_of(trace: Trace, ugv: str) -> tuple[Array, float]:
@@ -145,8 +132,13 @@ def places_of(trace: Trace) -> dict[str, Array]:
     return trace.derived("places", found)
 
 
+def centres_of(trace: Trace) -> Array:
+    """Centres of the obstacles, (m, 3), m."""
+    return np.array([o.position_m for o in trace.scenario.obstacles.values()], dtype=np.float64).reshape(-1, 3)
+
+
 def snapshot(trace: Trace, names: Iterable[str], t_s: float) -> dict[str, Any]:
-    """Positions at a time, and velocities of the robots just after it, of those of `names` that are things."""
+    """Positions of the bodies among `names` at a time, and velocities of the robots among them just after it."""
     t = trace.t
     places = places_of(trace)
     wanted = set(names)

@@ -1,8 +1,8 @@
 """The closest velocity under inequalities, by another algorithm than the controller's, for many samples at once.
 
-Constraints are taken one by one. While the best velocity so far meets the next one nothing changes; otherwise the
-best velocity under it and those before it lies on its boundary, which is the same problem with one dimension less
-(Seidel's algorithm). In one dimension the answer is an interval's closest point.
+Seidel's algorithm takes the constraints one by one. If the best velocity so far meets the next constraint, nothing
+changes. Otherwise the best velocity lies on the boundary of that constraint: the same problem with one dimension less.
+In one dimension the answer is the closest point of an interval.
 """
 
 from __future__ import annotations
@@ -15,15 +15,14 @@ from airground_drake.base.arrays import Array
 Flags = npt.NDArray[np.bool_]
 
 PARALLEL = 1e-10
-"""A normal this short, in a plane into which it was projected, is that of a parallel plane: its inequality says nothing
-there but how far apart the two are."""
+"""A normal that is this short after projection into a plane belongs to a parallel plane, and says nothing there."""
 ROUNDING_M_S = 5e-13
 """Velocities that miss an inequality by less meet it, m/s."""
 CONTRADICTION_M_S = 1e-9
-"""Inequalities that nothing meets by more contradict each other, m/s; the controller tells them apart by the same."""
+"""Inequalities contradict each other if every velocity misses one by more than this, m/s; as in the controller."""
 ABOVE_LEAST, ABOVE_LEAST_M_S = 1e-9, 1e-11
-"""A violation that is larger than the least by the first, relatively, and by the second, m/s, is as good: no speed is
-spent on what is rounding."""
+"""A violation may exceed the least one by the first, relatively, and by the second, m/s: no speed is spent on
+rounding."""
 
 
 def closest(
@@ -35,11 +34,11 @@ def closest(
         wanted: (B, d), m/s.
         normal: (B, K, d), of any length.
         bound: (B, K), m/s; -inf where nothing is asked.
-        contradiction: inequalities that nothing meets by more contradict each other, m/s.
+        contradiction: inequalities contradict each other if every velocity misses one by more than this, m/s.
 
     Returns:
-        Velocities (B, d), m/s, and whether the inequalities of a sample can be met: (B,). Where they cannot, the
-        velocity means nothing.
+        Velocities (B, d), m/s, and whether the inequalities of a sample can be met, (B,); if not, its velocity means
+        nothing.
     """
     length = np.linalg.norm(normal, axis=2)
     flat = length <= PARALLEL
@@ -89,7 +88,7 @@ def _in_interval(wanted: Array, sign: Array, level: Array, contradiction: float)
 
 
 def shortened(velocity: Array, normal: Array, bound: Array) -> Array:
-    """Velocities (B, d), shortened until those inequalities hold that standing still meets but for rounding."""
+    """Velocities (B, d), shortened until they meet each inequality that standing still meets up to rounding."""
     rate, least = np.einsum("bkd,bd->bk", normal, velocity), np.minimum(bound, 0.0)
     broken = (rate < least) & (bound <= CONTRADICTION_M_S)
     factor = np.where(broken, least / np.where(broken, rate, 1.0), 1.0).min(axis=1, initial=1.0)
@@ -99,7 +98,7 @@ def shortened(velocity: Array, normal: Array, bound: Array) -> Array:
 def least_violation(normal: Array, bound: Array) -> Array:
     """The slowest of the velocities that miss inequalities by as little as possible, (B, d), m/s; by bisection.
 
-    What is more by `ABOVE_LEAST`, relatively, and `ABOVE_LEAST_M_S` is as little.
+    Violations that exceed the least one by `ABOVE_LEAST` and `ABOVE_LEAST_M_S` count as equal to it.
     """
     still = np.zeros((normal.shape[0], normal.shape[2]))
     low = np.zeros(len(bound))

@@ -1,13 +1,13 @@
 """SAFE-HYP: the hypotheses of the safety theorems along a run, recomputed from its positions.
 
-What is missed of the avoidance inequalities is found in exact arithmetic (`engines.shortfalls`), and so is the distance
-that follows. What the controllers were built with is compared with the scenario (`demands`).
+Exact arithmetic (`engines.shortfalls`) finds how far each step misses the avoidance inequalities, and the distance that
+follows. The parameters of the controllers are compared with the scenario (`demands`).
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from fractions import Fraction
 from functools import cache
 from itertools import groupby
@@ -34,7 +34,6 @@ from airground_drake.verify.runs.pairs import (
     pairs_of,
     places_of,
     snapshot,
-    speed_limits,
 )
 
 VELOCITY_TOLERANCE_M_S = 1e-9
@@ -52,9 +51,9 @@ BUILT = "controller parameters"
 
 @dataclass(frozen=True)
 class _Hypothesis:
-    """One hypothesis over K instants or pairs: margins (K,), negative where broken beyond the tolerance `slop`.
+    """One hypothesis over K instants or pairs: margins (K,); it is broken where one is below -`slop`.
 
-    It is about a robot, or whatever `about` says, and in the k-th place about `others[k]`, if there are any.
+    `about` names its robot or pair. With `others`, the k-th margin is about the pair with `others[k]`.
     """
 
     name: str
@@ -66,7 +65,7 @@ class _Hypothesis:
     others: Sequence[str] = ()
 
     def broken(self) -> npt.NDArray[np.intp]:
-        """Instants at which it does not hold; a margin that is not a number counts."""
+        """Instants at which it does not hold, also those with a margin that is not a number."""
         return np.flatnonzero(~(self.margin >= -self.slop))
 
     def at(self, k: int) -> dict[str, Any]:
@@ -77,14 +76,14 @@ class _Hypothesis:
 
 
 class Guarantee(NamedTuple):
-    """What follows for a pair of bodies: D >= `distance_m` at all times of the run.
+    """The distance that is promised for a pair of bodies: D >= `distance_m` at all times of the run.
 
     Attributes:
-        pair: which.
-        missed_m: what each sample misses, e_i + e_j, (K,), m per control period; 0: both inequalities are met.
-        short_m: by how much the pair started too close, m.
-        distance_m: d - max(e / a, short_m), e the most that is missed and a = min(A h, 1). Without a gain nothing is
-            restored: d - K e - short_m.
+        pair: the two bodies.
+        missed_m: how far each sample misses the inequalities, e_i + e_j, (K,), m per control period; 0: both are met.
+        short_m: how much too close the pair started, m.
+        distance_m: d - max(e / a, short_m), with e the largest of `missed_m` and a = min(A h, 1). Without a gain
+            nothing is restored: d - K e - short_m.
     """
 
     pair: Pair
@@ -96,6 +95,24 @@ class Guarantee(NamedTuple):
     def margin_m(self) -> float:
         """The distance promised less the safe one; not positive."""
         return self.distance_m - self.pair.safe_m
+
+
+@dataclass(frozen=True)
+class Hypotheses:
+    """The evidence: the largest shortfall, the least distance promised (None: no pair came within reach), and details.
+
+    `pairs` are those with the least guarantee, `worst` is the least margin of each other hypothesis.
+    """
+
+    e_m: float
+    guarantee_m: float | None
+    pairs: list[dict[str, Any]]
+    pairs_in_reach: int
+    different_parameters: list[dict[str, Any]]
+    worst: list[dict[str, Any]]
+    inequalities_in_range: int
+    inequalities_that_bind: dict[str, int]
+    tolerance_m: float = DISTANCE_TOLERANCE_M
 
 
 class SafeHyp(TraceClaim):
@@ -124,10 +141,10 @@ class SafeHyp(TraceClaim):
         r"R \ge d + c h",
     )
     method = (
-        "From the recorded positions at the control samples, which are rational numbers, in exact arithmetic; square "
-        "roots are enclosed. Only pairs and samples that floats do not find far, or met by more than 1e-9 m, are "
-        "computed so. What the controllers were built with was read back from the diagram, and is compared with the "
-        "scenario. Rows less than 1e-9 s apart count as one instant."
+        "Exact arithmetic on the recorded positions at the control samples, which are rational numbers; square roots "
+        "are enclosed. Pairs and samples are left out if floats find them far apart, or an inequality met by more than "
+        "1e-9 m. The parameters of the controllers were read back from the diagram and are compared with the scenario. "
+        "Rows less than 1e-9 s apart count as one instant."
     )
     equations = "(7)-(8), (11) in the inequality form of the package (set-based avoidance)"
     assumptions = (
@@ -161,17 +178,18 @@ class SafeHyp(TraceClaim):
             quantity="distance promised less the safe one" if name == AVOIDANCE else f"least slack of {name!r}",
             where={key: shown[key] for key in shown if key not in ("margin", "unit")},
             counterexample=first | snapshot(trace, map(str, first.values()), first["t_s"]) if first else None,
-            evidence={
-                "e_m": float(max((one.missed_m.max() for one in kept), default=0.0)),
-                "guarantee_m": kept[0].distance_m if kept else None,
-                "pairs": listed,
-                "pairs_in_reach": len(kept),
-                "different_parameters": different,
-                "worst": worst,
-                "inequalities_in_range": in_range,
-                "inequalities_that_bind": binding,
-                "tolerance_m": DISTANCE_TOLERANCE_M,
-            },
+            evidence=asdict(
+                Hypotheses(
+                    float(max((one.missed_m.max() for one in kept), default=0.0)),
+                    kept[0].distance_m if kept else None,
+                    listed,
+                    len(kept),
+                    different,
+                    worst,
+                    in_range,
+                    binding,
+                )
+            ),
             exercised=sum(binding.values()),
         )
 
@@ -190,7 +208,7 @@ def _worst(hypotheses: Sequence[_Hypothesis]) -> list[dict[str, Any]]:
 def _shown(
     first: dict[str, Any] | None, worst: Sequence[dict[str, Any]], listed: Sequence[Any], kept: Sequence[Guarantee]
 ) -> dict[str, Any]:
-    """Whose margin is the finding's: of the hypothesis that was broken first, or else of the inequalities."""
+    """The entry with the finding's margin: that of the hypothesis broken first, or else of the inequalities."""
     if first and first["hypothesis"] == BUILT:
         return first
     name = first["hypothesis"] if first else AVOIDANCE
@@ -247,7 +265,7 @@ def _longest(places: Array, last: float) -> float:
 
 
 def _avoidance(trace: Trace, kept: Sequence[Guarantee]) -> Iterator[_Hypothesis]:
-    """What is missed of the inequalities at each sample, as what it costs of the distance."""
+    """The distance that is lost, m, because a sample misses the inequalities."""
     t, gain = trace.t[samples_of(trace)], float(_gain(trace))
     for one in kept:
         lost = one.missed_m / gain if gain else one.missed_m * len(t)
@@ -271,7 +289,8 @@ def _binding(trace: Trace) -> tuple[int, dict[str, int]]:
 
 def _static(trace: Trace) -> Iterator[_Hypothesis]:
     """Hypotheses on the scenario and the start: gain, sensing range, distances at t = 0."""
-    control, places, limit = trace.scenario.control, places_of(trace), speed_limits(trace)
+    control, places = trace.scenario.control, places_of(trace)
+    limit = {name: robot.max_speed_m_s for name, robot in trace.scenario.robots.items()}
     period, reach = decimal(control.period_s), decimal(control.sensing_range_m)
     stable = np.array([float(1 - decimal(control.avoidance_gain_1_s) * period)])
     yield _Hypothesis("gain: A h <= 1", "1", trace.t[:1], stable, 0.0, {})
@@ -296,7 +315,7 @@ def _static(trace: Trace) -> Iterator[_Hypothesis]:
 
 def _sampled(trace: Trace) -> Iterator[_Hypothesis]:
     """Hypotheses at the control samples: their spacing, straight motion between them, speed limits, planar motion."""
-    period, limits, t, samples = trace.scenario.control.period_s, speed_limits(trace), trace.t, samples_of(trace)
+    period, robots, t, samples = trace.scenario.control.period_s, trace.scenario.robots, trace.t, samples_of(trace)
     spacing = np.diff(np.append(t[samples], t[-1]))
     yield _Hypothesis("sampling", "s", t[samples], period - spacing, TIME_TOLERANCE_S, {})
     ends = np.append(samples, len(t) - 1)
@@ -304,7 +323,7 @@ def _sampled(trace: Trace) -> Iterator[_Hypothesis]:
         place, about = trace.position(robot), {"robot": robot}
         off = np.linalg.norm(place - interpolate(t[ends], place[ends], t), axis=1)
         yield _Hypothesis("straight motion", "m", t, 0.0 - off, DISTANCE_TOLERANCE_M, about)
-        spare = limits[robot] - np.linalg.norm(trace.command(robot)[1:], axis=1)
+        spare = robots[robot].max_speed_m_s - np.linalg.norm(trace.command(robot)[1:], axis=1)
         yield _Hypothesis("speed limit", "m/s", t[:-1], spare, VELOCITY_TOLERANCE_M_S, about)
         if robot in trace.ugvs:
             yield _Hypothesis("planar motion", "m", t, 0.0 - np.abs(place[:, 2] - place[0, 2]), 0.0, about)

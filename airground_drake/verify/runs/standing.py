@@ -1,4 +1,4 @@
-"""What a proposal says of obstacles, and how long it stands: by the UAV's map, the answers and the periods."""
+"""Whether the map in each proposal is the UAV's, and whether proposals stand as long as they may."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from airground_drake.run.trace import Trace
 from airground_drake.scenarios.schema import Obstacle
 from airground_drake.verify.claim import TIME_TOLERANCE_S
 from airground_drake.verify.engines.geometry import interpolate
+from airground_drake.verify.runs.instants import row_at
 from airground_drake.verify.runs.proposals import answers_to, parts_of, proposals_of, withdrawn_s
 
 SENSED_M = 1e-9
@@ -21,9 +22,10 @@ Disc = tuple[float, ...]
 
 
 def map_conflicts(trace: Trace) -> Iterator[dict[str, Any]]:
-    """Proposals whose obstacles are not those that the UAV knew: own policies send its map as it is.
+    """Proposals whose obstacles are not those that the UAV knew; third-party policies may send other maps.
 
-    What comes with an answer the UAV knows from the next planning instant on, if the proposal is in force until then.
+    The UAV knows an obstacle that came with an answer from the next planning instant on, if the proposal is in force
+    until then.
     """
     scenario = trace.scenario
     known = [_disc(each) for each in scenario.obstacles.values() if each.known_to_uav]
@@ -59,7 +61,7 @@ def standing_conflicts(trace: Trace) -> Iterator[dict[str, Any]]:
     for ugv in trace.ugvs:
         for before, after in pairwise(sent for sent in every if sent.ugv == ugv):
             t = after.issued_s + TIME_TOLERANCE_S
-            row = min(int(np.searchsorted(trace.t, after.issued_s - TIME_TOLERANCE_S)), len(trace.t) - 1)
+            row = row_at(trace, after.issued_s)
             others = any(trace.column(f"{other}.mode")[row] == 1.0 for other in trace.ugvs if other != ugv)
             alone = not (after.party or others) and after.cause == ugv
             if alone and withdrawn_s(trace, before, unless_replaced=True) > t and before.times_s[-1] > t:
@@ -67,7 +69,7 @@ def standing_conflicts(trace: Trace) -> Iterator[dict[str, Any]]:
 
 
 def _told(trace: Trace) -> tuple[dict[Disc, float], dict[Disc, float]]:
-    """What came with answers: from when on the UAV surely knew each obstacle, and since when it may have, s.
+    """When the UAV surely knew each obstacle that came with an answer, and when it may have known it, s.
 
     At a planning instant the UAV reads the last answer before, if the proposal has been in force until then.
     """

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from airground_drake.base.errors import TraceError
-from airground_drake.verify.runs.gate_record import Off, Row
+from airground_drake.verify.runs.gate_record import DecisionRecord, Deviation
 
 TIE = 1e-9
 """Accumulated deficits closer to 1/2 than this are a tie: either mode may follow."""
@@ -15,7 +15,7 @@ ROUNDED_ROUTES = ("relaxed", "nonlinear")
 """Routes that solve (27) and round by (28)-(29)."""
 
 
-def is_rounded(row: Row) -> bool:
+def is_rounded(row: DecisionRecord) -> bool:
     """Whether the decision rests on a relaxed plan that was rounded.
 
     Raises:
@@ -28,20 +28,20 @@ def is_rounded(row: Row) -> bool:
     return row.data["relaxed"] is not None
 
 
-def compare_without_rounding(row: Row) -> Iterator[Off]:
+def compare_without_rounding(row: DecisionRecord) -> Iterator[Deviation]:
     """A route that proves its optimum rounds nothing, and records nothing of the kind."""
     if row.given["route"] == "mixed_integer":
         arrays = [name for name in ("relaxed", "rounded") if row.data[name] is not None]
         numbers = [row.given[name] + 1.0 for name in ("rounding_deviation_s", "relaxed_first_stage")]
-        yield Off(row, "a relaxation that the route has not", [len(arrays), *numbers], 0.0)
+        yield Deviation(row, "a relaxation that the route has not", [len(arrays), *numbers], 0.0)
 
 
-def integrated_error_s(row: Row) -> float:
+def integrated_error_s(row: DecisionRecord) -> float:
     """Largest integrated difference of the relaxed and the rounded plan, s."""
     return float(row.dt * np.abs(np.cumsum(row["relaxed"] - row["rounded"])).max())
 
 
-def compare_rounding(row: Row) -> Iterator[Off]:
+def compare_rounding(row: DecisionRecord) -> Iterator[Deviation]:
     """Compare the rounded plan with the rule (28)-(29), and the recorded numbers with the plans.
 
     Each stage is judged by the deficit that the recorded stages before it leave, so that one wrong stage does not
@@ -49,13 +49,13 @@ def compare_rounding(row: Row) -> Iterator[Off]:
     the theorem that follows from the rule.
     """
     relaxed, rounded, given = row["relaxed"], row["rounded"], row.given
-    yield Off(row, "relaxed omega is outside [0, 1]", np.maximum(0.0, np.abs(relaxed - 0.5) - 0.5), 0.0)
-    yield Off(row, "rounded omega is not binary", np.minimum(np.abs(rounded), np.abs(rounded - 1.0)), 0.0)
+    yield Deviation(row, "relaxed omega is outside [0, 1]", np.maximum(0.0, np.abs(relaxed - 0.5) - 0.5), 0.0)
+    yield Deviation(row, "rounded omega is not binary", np.minimum(np.abs(rounded), np.abs(rounded - 1.0)), 0.0)
     deficit = np.cumsum(relaxed) - np.concatenate([[0.0], np.cumsum(rounded)[:-1]])
     against = np.where(rounded == 1.0, 0.5 - deficit, deficit - 0.5)  # positive: the other mode lacks more
-    yield Off(row, "rounded against the rule", np.maximum(0.0, against), TIE, stage=int(np.argmax(against)))
+    yield Deviation(row, "rounded against the rule", np.maximum(0.0, against), TIE, stage=int(np.argmax(against)))
     error = integrated_error_s(row)
     beyond = max(0.0, error - row.dt / 2.0)
-    yield Off(row, "integrated rounding error beyond half a stage, s", beyond, TIE * row.dt, error_s=error)
-    yield Off(row, "recorded rounding error, s", given["rounding_deviation_s"] - error, TIE, recomputed_s=error)
-    yield Off(row, "recorded relaxed first stage", given["relaxed_first_stage"] - relaxed[0], TIE)
+    yield Deviation(row, "integrated rounding error beyond half a stage, s", beyond, TIE * row.dt, error_s=error)
+    yield Deviation(row, "recorded rounding error, s", given["rounding_deviation_s"] - error, TIE, recomputed_s=error)
+    yield Deviation(row, "recorded relaxed first stage", given["relaxed_first_stage"] - relaxed[0], TIE)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Iterator
+from dataclasses import asdict, dataclass
 from itertools import pairwise, zip_longest
 from typing import Any, NamedTuple
 
@@ -70,13 +71,13 @@ class ThrTrig(TraceClaim):
         r"n(0) = 0, \quad \dot n = \sigma w_k / \sqrt{h} - \lambda n, \quad |w_k| \le 9",
     )
     method = (
-        "(15) is rebuilt from positions, noise and the scenario's preset, and the recorded x, the signal that the "
-        "trigger has, is compared with it at every row: `port_against_15` in the evidence. Where they agree, the "
-        "rebuilt x also tells what x is between rows; where they do not, or the block that computes x is another than "
-        "that of (15), x is linear between rows. It is cut at the preset's corners and at its turning points (closed "
-        "form) into monotone pieces; crossings are then sign changes, located by Brent's method to 1e-12 s. The "
-        "automaton is run again on it and its events, and the mode column, are compared one by one. Where "
-        "a period of the noise has several rows, all must have the same sample, given the leak."
+        "(15) is rebuilt from positions, noise and the scenario's preset. The recorded x, the signal that the trigger "
+        "has, is compared with it at every row: `port_against_15` in the evidence. If they agree, the rebuilt x is "
+        "used between rows, too; if not, or if another block computes x, x is taken as linear between rows. It is cut "
+        "at the preset's corners and at its turning points (closed form) into monotone pieces; crossings are then sign "
+        "changes, located by Brent's method to 1e-12 s. The automaton is run again on x, and its events and the mode "
+        "column are compared one by one. If a period of the noise has several rows, all must have the same sample, "
+        "given the leak."
     )
     equations = "(15), (20)"
     assumptions = (
@@ -87,9 +88,8 @@ class ThrTrig(TraceClaim):
     )
     does_not_establish = (
         "That the threshold is a good one (THR-CHOICE); that the noise has the stated distribution (THR-DDM), "
-        "or the stated leak where no period of the noise has a row within; or anything about a Wiener path between the "
-        "noise samples. Where x only touches a level to within rounding, 1e-12 m, a trigger and none are equally right "
-        "and the verdict follows the rounding."
+        "or the stated leak if no period of the noise has a row within; or anything about a Wiener path between the "
+        "noise samples. If x only touches a level up to rounding, 1e-12 m, the verdict follows the rounding."
     )
 
     exercised_by = "transitions of the automaton that were due"
@@ -100,7 +100,8 @@ class ThrTrig(TraceClaim):
         judged = [_judged(trace, ugv, levels) for ugv in trace.ugvs]
         wrong = [*_of_strangers(trace), *(conflict for one in judged for conflict in one.wrong)]
         due = Counter(kind for one in judged for kind in _as_transitions(one.predicted))
-        lags = [(one.lag_s, one.ugv) for one in judged if one.expected]
+        replayed = [one.evidence for one in judged]
+        lags = [(one.worst_time_difference_s, one.robot) for one in replayed if one.events]
         worst = max(lags) if lags and not wrong else None
         return Finding(
             "refuted" if wrong else "holds",
@@ -109,18 +110,13 @@ class ThrTrig(TraceClaim):
             quantity="time left by which an event may differ from the crossing",
             where={"robot": worst[1]} if worst else {},
             counterexample=min(wrong, key=lambda conflict: float(conflict["t_s"])) if wrong else None,
-            evidence={
-                "ugvs": [one.to_json() for one in judged],
-                "decision_block": _block(trace) or "that of (15)",
-                **levels._asdict(),
-                "transitions_due": dict(due),
-            },
+            evidence=asdict(Replay(replayed, _block(trace) or "that of (15)", *levels, dict(due))),
             exercised=due.total(),
         )
 
 
 class Levels(NamedTuple):
-    """Of the trigger in force: threshold and release level, m, and dwell, s."""
+    """Threshold and release level of the trigger in force, m, and its dwell, s."""
 
     zeta_m: float
     release_m: float
@@ -150,47 +146,46 @@ def _block(trace: Trace) -> str:
 
 
 def _of_strangers(trace: Trace) -> Iterator[Conflict]:
-    """Triggers and releases of what is not a UGV."""
+    """Triggers and releases of robots that are not UGVs."""
     for event in trace.events:
         if event["kind"] in ("trigger", "release") and event["robot"] not in trace.ugvs:
             what = f"spurious {event['kind']}: not a UGV"
             yield {"robot": str(event["robot"]), "t_s": float(event["t_s"]), "what": what}
 
 
+@dataclass(frozen=True)
+class Replayed:
+    """Evidence about the trigger of a UGV: `events` are those that the trace must have, with `t_s` and `kind`."""
+
+    robot: str
+    events: list[dict[str, Any]]
+    worst_time_difference_s: float
+    largest_decision_variable_m: float
+    port_against_15: dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Replay:
+    """The evidence: the trigger of each UGV, the block of x, the levels in force, transitions that were due by kind."""
+
+    ugvs: list[Replayed]
+    decision_block: str
+    zeta_m: float
+    release_m: float
+    dwell_s: float
+    transitions_due: dict[str, int]
+
+
 class Judged(NamedTuple):
-    """The trigger of one UGV, run again.
+    """The trigger of a UGV, run again: the evidence, the automaton's transitions, and all that disagrees."""
 
-    Attributes:
-        ugv: whose.
-        predicted: the automaton's transitions.
-        expected: the events that the trace has to have.
-        lag_s: largest time difference of the events that agree.
-        largest_m: of the decision variable.
-        against_15: how the recorded variable compares with (15).
-        wrong: what disagrees.
-    """
-
-    ugv: str
+    evidence: Replayed
     predicted: list[Transition]
-    expected: list[Transition]
-    lag_s: float
-    largest_m: float
-    against_15: dict[str, Any]
     wrong: list[Conflict]
-
-    def to_json(self) -> dict[str, Any]:
-        """For the evidence."""
-        return {
-            "robot": self.ugv,
-            "events": [{"t_s": time, "kind": kind} for time, kind in self.expected],
-            "worst_time_difference_s": self.lag_s,
-            "largest_decision_variable_m": self.largest_m,
-            "port_against_15": self.against_15,
-        }
 
 
 def _judged(trace: Trace, ugv: str, levels: Levels) -> Judged:
-    """Run the automaton again for a UGV, and compare everything recorded with that."""
+    """Run the automaton again for a UGV, and compare all records with that."""
     x, against_15, off = _variable(trace, ugv)
     predicted = list(transitions(x, *levels))
     expected = [(time, EVENT_KINDS[kind]) for time, kind in predicted if kind in EVENT_KINDS]
@@ -199,11 +194,12 @@ def _judged(trace: Trace, ugv: str, levels: Levels) -> Judged:
     columns, modes = column_conflict(trace, ugv, recorded), _mode_conflict(trace, ugv, predicted)
     found = (off, mismatch, columns, modes, noise_conflict(trace, ugv))
     wrong = [{"robot": ugv, **conflict} for conflict in found if conflict is not None]
-    return Judged(ugv, predicted, expected, lag, float(x.x.max()), against_15, wrong)
+    events = [{"t_s": time, "kind": kind} for time, kind in expected]
+    return Judged(Replayed(ugv, events, lag, float(x.x.max()), against_15), predicted, wrong)
 
 
 def _as_transitions(predicted: list[Transition]) -> Iterator[str]:
-    """Those of the automaton, by name: what becomes due at the end of the dwell is one, with a trigger or without."""
+    """The automaton's transitions by name: the end of the dwell is one, also with a trigger at the same instant."""
     before = ""
     for (time, kind), (later, then) in pairwise([*predicted, (math.inf, "")]):
         at_once = kind == "resume" and (later, then) == (time, "trigger")

@@ -1,4 +1,4 @@
-"""The triggers of a run: what is recorded of them, and the trigger (20) run again on its decision variable.
+"""The recorded triggers of a run, and the trigger (20) run again on its decision variable.
 
 The decision variable x(t) = ||rho_rd(t) - rho(t)|| + n(t) is, between rows, the norm of a vector that is linear
 in time plus a number that is linear in time, so its turning points and crossings are found exactly.
@@ -21,13 +21,13 @@ Transition = tuple[float, str]
 """Time in s, and a key of MODES or kind of event."""
 
 Conflict = dict[str, Any]
-"""What disagrees: `t_s`, `what`, and the values on both sides."""
+"""A disagreement: `t_s`, `what`, and the values on both sides."""
 
 NOISE_TOLERANCE_M = 1e-8
-"""Noise at a row may differ from what its period's sample makes of the row before by this, m: rows closer than 1e-9 s
-are one, and noise moves by less in that time."""
+"""Noise at a row may differ by this, m, from the row before and the sample of its period: rows closer than 1e-9 s are
+one, and noise moves by less in that time."""
 LARGEST_SAMPLE = 9.0
-"""In standard deviations: of normal samples one in 1e19 is larger."""
+"""Standard deviations: one normal sample in 1e19 is larger."""
 
 
 def recorded_events(trace: Trace, ugv: str) -> list[Transition]:
@@ -108,9 +108,8 @@ def noise_conflict(trace: Trace, ugv: str) -> Conflict | None:
 
 
 def _rates(moved: Array, dt: Array, period: Array) -> Array:
-    """Of each step, moved / dt of the longest step in the same period, (S,)."""
+    """moved / dt of the longest step in the same period, for each step, (S,)."""
     _, of = np.unique(period, return_inverse=True)
     order = np.lexsort((dt, of))
     longest = order[np.append(np.diff(of[order]) > 0, True)]
-    rates: Array = (moved[longest] / dt[longest])[of]
-    return rates
+    return np.asarray((moved[longest] / dt[longest])[of])

@@ -1,6 +1,6 @@
-"""Bounds of the shortest way that is left to a UGV among safe circles, on another graph than the gatekeeper's.
+"""Bounds of the shortest way left to a UGV among safe circles, on another graph than the gatekeeper's.
 
-Between points all around the circles: the way over them is longer by a part of a thousandth.
+The nodes are points around the circles; a way over them is longer than the shortest one by less than a thousandth.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ def bounds_of_way_left(place: Array, goal: Array, discs: Array, distances: Array
     direct = float(np.linalg.norm(goal[:2] - place[:2]))
     legs = np.array([place[:2], goal[:2]])
     some = _crossed(legs, centres, radii)
-    while True:  # a way round some that crosses none of the others is one round all
+    while True:  # a way round some circles that crosses no other circle is a way round all
         legs = _round(legs[0], legs[-1], centres[some], radii[some])
         if not len(legs):
             return direct, np.inf
@@ -45,7 +45,7 @@ def _crossed(way: Array, centres: Array, radii: Array) -> npt.NDArray[np.bool_]:
 
 
 def _round(place: Array, goal: Array, centres: Array, radii: Array) -> Array:
-    """A short way round circles over points all around them, (M, 2), m; (0, 2) where there is none."""
+    """A short way round circles, over points around them, (M, 2), m; (0, 2) if no such way exists."""
     ends = np.stack([place, goal])
     if not len(centres):
         return ends

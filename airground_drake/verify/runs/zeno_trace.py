@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict, dataclass
 from itertools import pairwise
 
 from airground_drake.base.errors import TraceError
@@ -9,6 +10,33 @@ from airground_drake.run.trace import Trace
 from airground_drake.verify.claim import TIME_TOLERANCE_S, TraceClaim
 from airground_drake.verify.finding import Finding
 from airground_drake.verify.runs.triggers import column_conflict, recorded_events
+
+
+@dataclass(frozen=True)
+class Triggers:
+    """Triggers of a UGV: how many, and when, s."""
+
+    count: int
+    t_s: list[float]
+
+
+@dataclass(frozen=True, order=True)
+class Gap:
+    """Two consecutive triggers of a UGV, s."""
+
+    gap_s: float
+    robot: str
+    previous_t_s: float
+    t_s: float
+
+
+@dataclass(frozen=True)
+class Gaps:
+    """The evidence: triggers by UGV, the bound on gaps, s, and the number of triggers that it admits."""
+
+    triggers: dict[str, Triggers]
+    bound_s: float
+    most_triggers_possible: int
 
 
 class ZenoTrace(TraceClaim):
@@ -27,8 +55,8 @@ class ZenoTrace(TraceClaim):
     assumptions = ("The trace records every trigger (THR-TRIG recomputes them independently).",)
     does_not_establish = (
         "Absence of Zeno behaviour in other runs: a finite run has finitely many events whatever the trigger is. The "
-        "statement for all runs is ZENO-PROOF, that about refined noise ZENO-REFINE. With fewer than two triggers the "
-        "claim holds for lack of a gap (the margin is then empty)."
+        "statement for all runs is ZENO-PROOF, that about refined noise ZENO-REFINE. Without two triggers of a UGV "
+        "there is no gap: the claim holds with an empty margin."
     )
 
     exercised_by = "gaps between consecutive triggers of one UGV"
@@ -38,32 +66,30 @@ class ZenoTrace(TraceClaim):
         bound = float(trace.scenario.decision.min_inter_event_s)
         if bound <= 0.0:
             return Finding("not_run", evidence={"reason": "min_inter_event_s is 0: no bound to compare with"})
-        triggers: dict[str, list[float]] = {}
+        triggers: dict[str, Triggers] = {}
         for ugv in trace.ugvs:
             events = recorded_events(trace, ugv)
             if conflict := column_conflict(trace, ugv, events):
                 raise TraceError(f"events and columns disagree: {conflict}")
-            triggers[ugv] = [time for time, kind in events if kind == "trigger"]
+            times = [time for time, kind in events if kind == "trigger"]
+            triggers[ugv] = Triggers(len(times), times)
+        evidence = asdict(Gaps(triggers, bound, int(trace.scenario.duration_s / bound) + 1))
         gaps = [
-            (after - before, ugv, before, after) for ugv, times in triggers.items() for before, after in pairwise(times)
+            Gap(after - before, ugv, before, after)
+            for ugv, found in triggers.items()
+            for before, after in pairwise(found.t_s)
         ]
-        evidence = {
-            "triggers": {ugv: {"count": len(times), "t_s": times} for ugv, times in triggers.items()},
-            "bound_s": bound,
-            "most_triggers_possible": int(trace.scenario.duration_s / bound) + 1,
-        }
         if not gaps:
             return Finding("holds", evidence=evidence | {"reason": "no UGV was triggered twice"}, exercised=0)
-        gap, ugv, before, after = min(gaps)
-        smallest = {"robot": ugv, "previous_t_s": before, "t_s": after, "gap_s": gap}
-        held = gap >= bound - TIME_TOLERANCE_S
+        smallest = min(gaps)
+        held = smallest.gap_s >= bound - TIME_TOLERANCE_S
         return Finding(
             "holds" if held else "refuted",
-            margin=gap - bound,
+            margin=smallest.gap_s - bound,
             unit="s",
             quantity="smallest gap between two triggers less the bound",
-            where={"robot": ugv, "t_s": after},
-            counterexample=None if held else smallest,
-            evidence=evidence | {"smallest_gap": smallest},
+            where={"robot": smallest.robot, "t_s": smallest.t_s},
+            counterexample=None if held else asdict(smallest),
+            evidence=evidence | {"smallest_gap": asdict(smallest)},
             exercised=len(gaps),
         )

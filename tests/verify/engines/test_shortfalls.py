@@ -23,55 +23,46 @@ def along_x(*places: float) -> Array:
     return np.array([[x, 0.0, 0.0] for x in places])
 
 
-ROCK = np.zeros(3)
-
-
 @pytest.mark.parametrize(
-    ("places", "missed"),
+    ("first", "second", "share", "last", "missed"),
     [
-        ((2.0, 1.75), 0.25),  # a step of 0.25 m into the safe distance
-        ((2.0, 2.0), 0.0),
-        ((2.5, 2.0), 0.0),  # onto it
-        ((2.5, 1.9375), 0.0625),
-        ((1.0, 1.0), 0.075),  # no step back where A h times the deficit is due
-        ((1.0, 1.0625), 0.0125),
-        ((-1.0, -1.0625), 0.0125),
-        ((0.0, 1.0), 0.075 * 2.0 + 1.0),  # on the obstacle no direction leads away: more is not known
-        ((9.0, 8.0), 0.0),  # far
+        # beside an obstacle
+        ((2.0, 1.75), (0.0, 0.0), ONE, ONE, 0.25),  # a step of 0.25 m into the safe distance
+        ((2.5, 2.0), (0.0, 0.0), ONE, ONE, 0.0),  # onto it
+        ((2.5, 1.9375), (0.0, 0.0), ONE, ONE, 0.0625),
+        ((1.0, 1.0), (0.0, 0.0), ONE, ONE, 0.075),  # no step back where A h times the deficit is due
+        ((-1.0, -1.0625), (0.0, 0.0), ONE, ONE, 0.0125),
+        ((0.0, 1.0), (0.0, 0.0), ONE, ONE, 0.075 * 2.0 + 1.0),  # on the obstacle no direction leads away
+        ((9.0, 8.0), (0.0, 0.0), ONE, ONE, 0.0),  # far
+        ((2.0, 2.0 - 2.0**-52), (0.0, 0.0), ONE, ONE, 2.0**-52),  # nothing is below the resolution
+        # two robots, which together may come 0.5 m nearer
+        ((2.5, 2.5), (0.0, 0.75), HALF, ONE, 0.5),
+        ((2.5, 2.5), (0.0, 0.75), HALF / 2, ONE, 0.375),
+        ((2.5, 3.5), (0.0, 0.75), HALF, ONE, 0.5),  # the other's step is no help
+        ((2.5, 3.5), (0.0, -1.0), HALF, ONE, 0.0),
+        ((3.0, 2.25), (0.0, 0.0), HALF, ONE, 0.0),  # too far to reach each other
+        ((3.0, 2.25), (0.0, 0.5), HALF, ONE, 0.25),
+        # the last period cut short
+        ((2.0, 1.75), (0.0, 0.0), ONE, HALF, 0.5),
+        ((3.0, 2.5), (0.0, 0.0), ONE, HALF, 0.0),
+        ((3.0, 2.375), (0.0, 0.0), ONE, HALF, 0.25),
     ],
 )
-def test_what_a_step_beside_an_obstacle_misses(places: tuple[float, float], missed: float) -> None:
-    (found,) = shortfalls(along_x(*places), ROCK, D, ONE, GAIN, ONE)
-    assert found == pytest.approx(missed, abs=1e-15)
+def test_what_a_step_misses(
+    first: tuple[float, ...], second: tuple[float, ...], share: Fraction, last: Fraction, missed: float
+) -> None:
+    other = along_x(*second) if share < 1 else np.zeros(3)
+    (found,) = shortfalls(along_x(*first), other, D, share, GAIN, last)
+    assert found == pytest.approx(missed, abs=1e-15, rel=1e-15)
     assert (found == 0.0) == (missed == 0.0)
 
 
-def test_each_of_two_robots_is_asked_for_its_share() -> None:
-    still, near = along_x(2.5, 2.5), along_x(0.0, 0.75)  # together they may come 0.5 m nearer
-    assert shortfalls(still, near, D, HALF, GAIN, ONE).tolist() == [0.5]
-    assert shortfalls(still, near, D, Fraction(1, 4), GAIN, ONE).tolist() == [0.375]
-    assert shortfalls(along_x(2.5, 3.5), near, D, HALF, GAIN, ONE).tolist() == [0.5]  # the other's step is no help
-    assert shortfalls(along_x(2.5, 3.5), along_x(0.0, -1.0), D, HALF, GAIN, ONE).tolist() == [0.0]
-
-
-def test_robots_that_cannot_reach_each_other_are_asked_for_nothing() -> None:
-    fast, slow = along_x(3.0, 2.25), along_x(0.0, 0.0)
-    assert shortfalls(fast, slow, D, HALF, GAIN, ONE).tolist() == [0.0]
-    assert shortfalls(fast, along_x(0.0, 0.5), D, HALF, GAIN, ONE).tolist() == [0.25]
-
-
-def test_the_last_period_may_be_cut_short() -> None:
-    assert shortfalls(along_x(2.0, 2.0, 1.75), ROCK, D, ONE, GAIN, HALF).tolist() == [0.0, 0.5]
-    assert shortfalls(along_x(3.0, 2.5), ROCK, D, ONE, GAIN, HALF).tolist() == [0.0]
-    assert shortfalls(along_x(3.0, 2.375), ROCK, D, ONE, GAIN, HALF).tolist() == [0.25]
-
-
-def test_nothing_is_below_the_resolution() -> None:
-    tiny = 2.0 - 2.0**-52
-    assert shortfalls(along_x(2.0, tiny), ROCK, D, ONE, GAIN, ONE).tolist() == [2.0**-52]
-    assert shortage(np.array([tiny, 0.0, 0.0]), ROCK, D) == Fraction(2) ** -52
-    assert shortage(np.array([2.0, 0.0, 0.0]), ROCK, D) == 0
-    assert shortfalls(along_x(2.0, 2.0) + np.array([0.0, 1e-100, 0.0]), ROCK, D, ONE, GAIN, ONE).tolist() == [0.0]
+def test_a_distance_too_short_is_found_exactly() -> None:
+    assert shortage(np.array([2.0 - 2.0**-52, 0.0, 0.0]), np.zeros(3), D) == Fraction(2) ** -52
+    assert shortage(np.array([2.0, 0.0, 0.0]), np.zeros(3), D) == 0
+    assert shortfalls(along_x(2.0, 2.0) + np.array([0.0, 1e-100, 0.0]), np.zeros(3), D, ONE, GAIN, ONE).tolist() == [
+        0.0
+    ]
 
 
 @given(seed=st.integers(0, 2**32 - 1), share=st.sampled_from([ONE, HALF]))

@@ -1,112 +1,130 @@
-"""Edits of one recorded decision, given as its columns and its problem."""
+"""Kinds of edits of a run, and honest runs by name."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from builders.decisions import ALL_PLANS, STAGE_S, STAGES, TERMINAL_S
-from builders.edits import DecisionEdit
+import pandas as pd
+from builders.decisions import STAGES
+from builders.edits import first_of, with_decision, with_meta, with_scenario, with_signals
+from builders.runs import beside_a_rock, chattering, leaking, refractory, run_of
 
-from airground_drake.base.arrays import Array
+from airground_drake.run.trace import Trace
 
+Edit = Callable[[Trace], Trace]
+EIGHT = [f"gatekeeper.stages={STAGES}", "gatekeeper.horizon_s=0.4"]
+"""Few stages, so that all plans can be evaluated."""
+SIXTH = 5
+"""The decision that is edited: the best plan there changes its mode."""
 
-def task_error(problem: dict[str, Any], positions: Array, terminal_s: float = TERMINAL_S) -> float:
-    """The task error's part of (25) through positions (N, 3), m, and the terminal cost."""
-    error = (positions.ravel() - problem["reference_m"]) ** 2
-    return float(STAGE_S * error.sum() + terminal_s * error[-3:].sum())
-
-
-def fractional_plan(row: dict[str, Any], problem: dict[str, Any]) -> None:
-    problem["plan"][3] = 0.5
-
-
-def inflate_loser(row: dict[str, Any], problem: dict[str, Any]) -> None:
-    other = {"accept": "refuse", "refuse": "accept"}[row["first_stage"]]
-    row[f"objective_{other}"] *= 10.0
-
-
-def wrong_first_stage(row: dict[str, Any], problem: dict[str, Any]) -> None:
-    row["first_stage"] = {"accept": "refuse", "refuse": "accept"}[row["first_stage"]]
+A, D = "synthetic a", "synthetic d"
+A_D, B_C, B_D, DOORWAY, SWAP = "case_a d", "case_b c", "case_b d", "doorway d", "swap c"
+RELAXED, BINARY, LOCAL, BLOCKS = "relaxed", "mixed_integer", "nonlinear", "blocks"
+SYNTHETIC: dict[str, Callable[[], Trace]] = {
+    A: lambda: run_of("a"), D: lambda: run_of("d"), "refractory": refractory, "leaking": leaking,
+    "chattering": chattering, "at a rock": beside_a_rock,
+}  # fmt: skip
 
 
-def without_point(index: int) -> DecisionEdit:
-    def edit(row: dict[str, Any], problem: dict[str, Any]) -> None:
-        keep = 1 - index
-        problem["centres_m"] = problem["centres_m"].reshape(STAGES, 2, 3)[:, keep : keep + 1].ravel()
-        problem["normals"] = problem["normals"].reshape(STAGES, 2, 3)[:, keep : keep + 1].ravel()
-        problem["distances_m"] = problem["distances_m"][keep : keep + 1]
+def scenario(**changes: Any) -> Edit:
+    return lambda trace: with_scenario(trace, **changes)
+
+
+def meta(**changes: Any) -> Edit:
+    return lambda trace: with_meta(trace, **changes)
+
+
+def signals(**columns: Any) -> Edit:
+    return lambda trace: with_signals(trace, lambda table: table.assign(**columns))
+
+
+def events(edit: Callable[[list[dict[str, Any]]], object]) -> Edit:
+    def change(trace: Trace) -> Trace:
+        copies = [dict(event) for event in trace.events]
+        edit(copies)
+        return with_meta(trace, events=copies)
+
+    return change
+
+
+def decisions(edit: Callable[[pd.DataFrame], pd.DataFrame]) -> Edit:
+    return lambda trace: replace(trace, decisions=edit(trace.decisions))
+
+
+def proposals(edit: Callable[[pd.DataFrame], pd.DataFrame]) -> Edit:
+    return lambda trace: replace(trace, proposals=edit(trace.proposals))
+
+
+def one_more(**columns: Any) -> Edit:
+    """The last decision once more, with other values in some columns."""
+    return decisions(lambda table: pd.concat([table, table.iloc[[-1]].assign(**columns)], ignore_index=True))
+
+
+def proposed(*times: float, robot: str = "ugv1") -> Edit:
+    """More events of proposals."""
+    return events(lambda all_: all_.extend([{**first_of(all_, "proposal"), "t_s": t, "robot": robot} for t in times]))
+
+
+def first(where: Callable[[pd.DataFrame], Any], **values: Any) -> Edit:
+    """Values of the first decision for which something is true, set or called with what is there."""
+
+    def edit(table: pd.DataFrame) -> pd.DataFrame:
+        k, table = int(np.flatnonzero(where(table))[0]), table.copy()
+        for name, value in values.items():
+            table.loc[k, name] = value(table.loc[k, name]) if callable(value) else value
+        return table
+
+    return decisions(edit)
+
+
+def decision(edit: Callable[[dict[str, Any], dict[str, Any]], object], row: int = SIXTH) -> Edit:
+    """A decision, as its columns and its problem."""
+    return lambda trace: with_decision(trace, edit, row)
+
+
+def problem(row: int = SIXTH, **arrays: Callable[[Any], Any]) -> Edit:
+    """Numbers of a decision's problem."""
+    return decision(lambda _, given: given.update({k: change(given[k]) for k, change in arrays.items()}), row)
+
+
+def column(**values: Any) -> Edit:
+    """Values of a decision, set or called with what is there."""
+    return decision(lambda row, _: row.update({k: v(row[k]) if callable(v) else v for k, v in values.items()}))
+
+
+def kept(*numbers: int) -> Edit:
+    """These decisions only, in this order, with their problems."""
+
+    def edit(trace: Trace) -> Trace:
+        return replace(
+            trace, decisions=trace.decisions.iloc[list(numbers)], problems=trace.problems.iloc[list(numbers)]
+        )
 
     return edit
 
 
-def standing_robot(row: dict[str, Any], problem: dict[str, Any]) -> None:
-    centres = problem["centres_m"].reshape(STAGES, 2, 3)
-    centres[:, 1] = centres[0, 1]
+def at(index: Any, value: Any) -> Callable[[Any], Any]:
+    """A number of an array, set or called with what is there."""
+
+    def change(values: Any) -> Any:
+        values = np.array(values, dtype=float)
+        values[index] = value(values[index]) if callable(value) else value
+        return values
+
+    return change
 
 
-def lighter_slack(row: dict[str, Any], problem: dict[str, Any]) -> None:
-    problem["slack_weight_1_m2_s"] = 1.0
+def both(*edits: Edit) -> Edit:
+    def edit(trace: Trace) -> Trace:
+        for each in edits:
+            trace = each(trace)
+        return trace
+
+    return edit
 
 
-def other_terminal_cost(row: dict[str, Any], problem: dict[str, Any]) -> None:
-    problem["terminal_weight_s"] = 0.0
-
-
-def without_terminal_cost(row: dict[str, Any], problem: dict[str, Any]) -> None:
-    """What the running code would record if it forgot the terminal cost."""
-    row["objective"] -= task_error(problem, problem["positions_m"]) - task_error(problem, problem["positions_m"], 0.0)
-    row[f"objective_{row['first_stage']}"] = row["objective"]
-
-
-def contrary_answer(row: dict[str, Any], problem: dict[str, Any]) -> None:
-    row["decision"] = {"accept": "refuse", "refuse": "accept"}[row["decision"]]
-
-
-def wrong_reason(row: dict[str, Any], problem: dict[str, Any]) -> None:
-    row["reason"] = "dwell"
-
-
-def round_otherwise(row: dict[str, Any], problem: dict[str, Any]) -> None:
-    problem["rounded"][4] = 1.0 - problem["rounded"][4]
-
-
-def fractional_rounding(row: dict[str, Any], problem: dict[str, Any]) -> None:
-    problem["rounded"] = problem["relaxed"].copy()
-    row["rounding_deviation_s"] = 0.0
-
-
-def relaxed_outside(row: dict[str, Any], problem: dict[str, Any]) -> None:
-    problem["relaxed"][0] = 1.0 + 1e-6
-
-
-def understate_rounding(row: dict[str, Any], problem: dict[str, Any]) -> None:
-    row["rounding_deviation_s"] *= 0.5
-
-
-def long_normals(row: dict[str, Any], problem: dict[str, Any]) -> None:
-    problem["normals"] *= 1.01
-
-
-def worst_plan(row: dict[str, Any], problem: dict[str, Any]) -> None:
-    """A consistent record of a plan that is worse than both constant ones."""
-    accept, refuse = (problem[name].reshape(STAGES, 3) for name in ("accept_m_s", "refuse_m_s"))
-    shape = (STAGES, len(problem["distances_m"]), 3)
-
-    def cost(plan: Array) -> float:
-        positions = problem["initial_m"] + STAGE_S * np.cumsum(np.where(plan[:, None] == 1.0, accept, refuse), axis=0)
-        gap = problem["distances_m"] - np.linalg.norm(positions[:, None] - problem["centres_m"].reshape(shape), axis=2)
-        return task_error(problem, positions) + float(STAGE_S * 10.0 * np.sum(np.maximum(0.0, gap.max(axis=1)) ** 2))
-
-    plan = max(ALL_PLANS, key=cost)
-    problem["plan"] = plan
-    problem["positions_m"] = (
-        problem["initial_m"] + STAGE_S * np.cumsum(np.where(plan[:, None] == 1.0, accept, refuse), axis=0)
-    ).ravel()
-    row["objective"] = cost(plan)
-
-
-def refused_for_want_of_a_plan(row: dict[str, Any], problem: dict[str, Any]) -> None:
-    row |= {"status": "refused_not_finite", "decision": "refuse", "reason": "no_plan"}
-    for name in ("plan", "positions_m", "relaxed", "rounded", "normals"):
-        problem[name] = []
+def swapped(value: str) -> str:
+    return {"accept": "refuse", "refuse": "accept"}[value]

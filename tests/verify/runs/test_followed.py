@@ -1,9 +1,10 @@
-"""Where the premise of LIVE-GATE was met, and what follows there."""
+"""How often the premises of theorems were met in runs."""
 
 from __future__ import annotations
 
 import json
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,45 +14,40 @@ from builders.edits import with_scenario
 from airground_drake.run.trace import Trace
 from airground_drake.verify.applications import counts, with_counts
 from airground_drake.verify.finding import Finding
-from airground_drake.verify.runs.followed import Followed, followed
+from airground_drake.verify.model.theorem import Proof
+from airground_drake.verify.runs.followed import followed
 
 Run = Callable[[str, str], Trace]
 
 
 @pytest.mark.parametrize(
-    ("scenario", "met"), [("case_a", 1), ("case_b", 1), ("swap", 1), ("pocket", 1), ("doorway", 3), ("contact", 2)]
+    ("scenario", "run_name", "met"),
+    [("case_a", "d", 1), ("case_b", "d", 1), ("pocket", "d", 1), ("doorway", "d", 3), ("case_a", "c", 0)],
 )
-def test_what_is_accepted_where_all_obstacles_are_known_meets_the_premise(run: Run, scenario: str, met: int) -> None:
-    assert [one.met for one in followed(run(scenario, "d"))] == [True] * met
-
-
-@pytest.mark.parametrize("name", ["a", "b", "c"])
-def test_only_method_d_predicts(run: Run, name: str) -> None:
-    assert followed(run("case_a", name)) == []
-
-
-def only(trace: Trace) -> Followed:
-    (found,) = followed(trace)
-    return found
+def test_what_is_accepted_where_all_obstacles_are_known_meets_the_premise(
+    run: Run, scenario: str, run_name: str, met: int
+) -> None:
+    assert [one.met for one in followed(run(scenario, run_name))] == [True] * met
 
 
 def test_an_obstacle_that_is_sensed_later_is_no_part_of_the_premise(run: Run) -> None:
     trace = run("case_a", "d")
-    accepted = only(trace)
+    (accepted,) = followed(trace)
     rows = np.flatnonzero((trace.t >= accepted.t_s) & (trace.column("ugv1.accepted") > 0.0))
     ahead = trace.position("ugv1")[rows[-1]] + np.array([0.0, 3.95, 0.0])
     away = np.linalg.norm(trace.position("ugv1") - ahead, axis=1)
     assert away[: rows[0]].min() > 4.0 > away[rows].min()  # the sensing range
     late = {"position_m": ahead.tolist(), "radius_m": 0.0, "known_to_uav": False}
     beside = with_scenario(trace, obstacles={**trace.meta["scenario"]["obstacles"], "late": late})
-    found = only(beside)
+    (found,) = followed(beside)
     assert (found.new, found.met) == (["late"], False)
 
 
 def test_counts_of_several_runs_are_added() -> None:
     runs: list[dict[str, tuple[int, int]]] = [{"A": (1, 2)}, {}, {"A": (0, 3), "B": (1, 1)}]
-    assert with_counts("A", Finding("proved", evidence={"x": 1}), runs).evidence == {"x": 1, "applies_to": 1, "of": 5}
-    assert with_counts("C", Finding("proved"), runs).evidence == {}
+    proof = Proof(proof="checked", theorems={}, hypotheses=[])
+    assert with_counts("A", Finding("proved", evidence=proof), runs).evidence == replace(proof, applies_to=1, of=5)
+    assert with_counts("C", Finding("proved", evidence=proof), runs).evidence is proof
 
 
 def test_a_run_whose_records_are_wrong_is_not_counted(run: Run) -> None:
@@ -61,14 +57,11 @@ def test_a_run_whose_records_are_wrong_is_not_counted(run: Run) -> None:
 
 
 def test_theorems_say_how_often_their_premise_was_met(report: Callable[[str], Path]) -> None:
-    folder = report("case_b")
-    claims = {c["id"]: c for c in json.loads((folder / "report.json").read_text())["claims"] if not c["run"]}
-    counts = {
-        name: (c["evidence"]["applies_to"], c["evidence"]["of"]) for name, c in claims.items() if "of" in c["evidence"]
-    }
-    assert counts["LIVE-GATE"] == (1, 1)
-    assert counts["SAFE-GATE"] == counts["LIVE-WAIT"]
-    assert counts["SAFE-GATE"][0] < counts["SAFE-GATE"][1]  # not where the intervention is on top: runs b and c
-    assert 0 < counts["SAFE-INV"][0] < counts["SAFE-INV"][1]  # run b hits an obstacle
-    page = (folder / "report.html").read_text()
-    assert "applies to 1 of 1 in these runs" in page
+    document = json.loads((report("case_b") / "report.json").read_text())
+    evidence = {claim["id"]: claim["evidence"] for claim in document["claims"] if not claim["run"]}
+    found = {name: (each["applies_to"], each["of"]) for name, each in evidence.items() if "of" in each}
+    assert found["LIVE-GATE"] == (1, 1)
+    assert found["SAFE-GATE"] == found["LIVE-WAIT"]
+    assert found["SAFE-GATE"][0] < found["SAFE-GATE"][1]  # not where the intervention is on top: runs b and c
+    assert 0 < found["SAFE-INV"][0] < found["SAFE-INV"][1]  # run b hits an obstacle
+    assert "applies to 1 of 1 in these runs" in (report("case_b") / "report.html").read_text()

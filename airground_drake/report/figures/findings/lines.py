@@ -1,12 +1,11 @@
-"""A picture of lines, each by its name, and of marked points; what is what stands beside it."""
+"""A picture of named lines and marked points."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Drawing
 
 from airground_drake.base.arrays import Array
@@ -14,7 +13,7 @@ from airground_drake.report.figures import canvas
 from airground_drake.report.figures.panels import MAX_TABLE_ROWS, Figure, Table, panel
 
 NAME_CHARS = 24
-"""What fits beside the lines."""
+"""Longest name that fits beside the axes."""
 MARKERS = "os^Dv"
 
 
@@ -23,7 +22,7 @@ class Lines(NamedTuple):
 
     Attributes:
         title: of the picture.
-        x, y: what is on the axes, with units.
+        x, y: names of the axes, with units.
         lines: (T,) across and (T,) up by name.
         marks: points by name.
         log: the axes that are logarithmic, among "xy".
@@ -42,7 +41,7 @@ class Lines(NamedTuple):
         return self.plate(name, f"Finding {number}", self._marked() and f"{self._marked()}.", beside=name)
 
     def plate(self, name: str, heading: str, caption: str, beside: str = "") -> Figure:
-        """The figure with this identifier, heading and caption, beside a finding; inside `canvas.style`."""
+        """The figure with this identifier, heading and caption, beside a finding; call it inside `canvas.style`."""
         text = f"Up: {self.y}. Across: {self.x}. {self._marked()}".rstrip()
         rows = []
         for line, (x, y) in self.lines.items():
@@ -50,59 +49,26 @@ class Lines(NamedTuple):
             rows += [(line, f"{x[k]:.4g}", f"{y[k]:.4g}") for k in chosen]
         rows += [(mark, f"{x:.4g}", f"{y:.4g}") for mark, (x, y) in self.marks.items()]
         table = Table(f"{self.title}, some of its points", ("line", self.x, self.y), tuple(rows))
-        drawn = panel(_drawing(self), name, self.title, text, heading, table)
+        drawn = panel(self._drawing(), name, self.title, text, heading, table)
         return Figure(name, self.title, caption, (drawn,), beside=beside)
 
     def _marked(self) -> str:
         return "; ".join(f"{mark}: ({x:.3g}, {y:.3g})" for mark, (x, y) in self.marks.items())
 
-
-def _drawing(shown: Lines) -> Drawing:
-    drawing = Drawing(figsize=(canvas.WIDE_IN, 2.3))
-    axes = drawing.add_axes((0.14, 0.19, 0.47, 0.78))
-    lines = {name: _scaled(shown.log, *line) for name, line in shown.lines.items()}
-    marks = {name: _scaled(shown.log, *at) for name, at in shown.marks.items()}
-    for position, (x, y) in enumerate(lines.values()):
-        look = canvas.look(position)
-        axes.plot(x, y, color=look.color, linestyle=look.dash)
-    for at, marker in zip(marks.values(), MARKERS, strict=False):
-        axes.plot(*at, **_mark(marker))
-    across, up = (
-        np.concatenate([np.atleast_1d(each[k]) for each in (*lines.values(), *marks.values())]) for k in (0, 1)
-    )
-    for limit, values, share in ((axes.set_xlim, across, 0.03), (axes.set_ylim, up, 0.07)):
-        pad = share * float(np.ptp(values) or 1.0)
-        limit(float(values.min()) - pad, float(values.max()) + pad)
-    canvas.rule(axes, shown.x, shown.y, shown.log)
-    _key(axes, lines, marks)
-    return drawing
-
-
-def _scaled(log: str, x: Array | float, y: Array | float) -> tuple[Array, Array]:
-    return np.log10(x) if "x" in log else np.asarray(x), np.log10(y) if "y" in log else np.asarray(y)
-
-
-def _mark(marker: str) -> dict[str, Any]:
-    return {
-        "marker": marker, "markersize": 7, "markerfacecolor": "none", "markeredgewidth": 1.6,
-        "linestyle": "none", "color": canvas.INK, "zorder": 5, "clip_on": False,
-    }  # fmt: skip
-
-
-def _key(axes: Axes, lines: Mapping[str, tuple[Array, Array]], marks: Mapping[str, tuple[Array, Array]]) -> None:
-    """A sample of each line and mark with its name, right of the axes, near where the line ends or the mark is."""
-    bottom, top = axes.get_ylim()
-    entries: list[tuple[float, str, canvas.Look | str]] = [
-        *((float(y[-1]), name, canvas.look(k)) for k, (name, (_, y)) in enumerate(lines.items())),
-        *((float(y), name, marker) for (name, (_, y)), marker in zip(marks.items(), MARKERS, strict=False)),
-    ]
-    entries.sort(key=lambda entry: entry[0])
-    places = canvas.spread([(up - bottom) / (top - bottom) for up, _, _ in entries], canvas.line_gap(axes))
-    for (_, name, look), at in zip(entries, places, strict=True):
-        sample: dict[str, Any] = {"transform": axes.transAxes, "clip_on": False}
-        if isinstance(look, canvas.Look):
-            axes.plot((1.03, 1.15), (at, at), color=look.color, linestyle=look.dash, **sample)
-        else:
-            axes.plot(1.09, at, **_mark(look) | sample)
-        color = look.color if isinstance(look, canvas.Look) else canvas.INK
-        axes.text(1.18, at, canvas.short(name, NAME_CHARS), color=color, va="center", ha="left", fontsize=8.5, **sample)
+    def _drawing(self) -> Drawing:
+        drawing = Drawing(figsize=(canvas.WIDE_IN, 2.3))
+        axes = drawing.add_axes((0.14, 0.19, 0.43, 0.78))
+        across, up = (np.log10 if axis in self.log else np.asarray for axis in "xy")
+        for position, (name, (x, y)) in enumerate(self.lines.items()):
+            look, label = canvas.look(position), canvas.short(name, NAME_CHARS)
+            axes.plot(across(x), up(y), color=look.color, linestyle=look.dash, label=label)
+        for marker, (name, at) in zip(MARKERS, self.marks.items(), strict=False):
+            axes.plot(
+                across(at[0]), up(at[1]), label=canvas.short(name, NAME_CHARS), color=canvas.INK, linestyle="none",
+                marker=marker, markersize=7, markerfacecolor="none", markeredgewidth=1.6, zorder=5,
+            )  # fmt: skip
+        axes.margins(0.04, 0.07)
+        axes.set(xlim=axes.get_xlim(), ylim=axes.get_ylim())
+        canvas.rule(axes, self.x, self.y, self.log)
+        axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), frameon=False, fontsize=8.5, handlelength=1.6)
+        return drawing

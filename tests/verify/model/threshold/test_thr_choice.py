@@ -16,46 +16,32 @@ from airground_drake.report.figures import threshold
 from airground_drake.run.trace import Trace
 from airground_drake.scenarios.load import load
 from airground_drake.verify import verify_all, verify_model
-from airground_drake.verify.applications import with_runs
-from airground_drake.verify.finding import Finding
 from airground_drake.verify.model.thr_choice import ThrChoice, of_run
 
 
-def judged(inputs: dict[str, Any], **changes: Any) -> Finding:
-    return ThrChoice().judge(inputs | changes)
-
-
-def test_a_threshold_that_is_not_optimal_is_declared_and_nothing_could_refute_it() -> None:
-    finding = judged(TABLE_1)
-    assert (finding.status, finding.exercised, finding.evidence["kind"]) == ("holds", 0, "declared")
-    assert finding.evidence["threshold_in_force_m"] == 3.0
-    assert finding.evidence["optimal_threshold_m"] == pytest.approx(2.9921, abs=1e-4)
-    assert finding.evidence["extra_risk"] == pytest.approx(3.118e-7, rel=1e-3)
-
-
-def test_the_optimum_is_optimal_whoever_wrote_it_down() -> None:
-    zeta = optimal_threshold(6.05, 10.0, 0.5, 1.0)
-    for rule in ("fixed", "bayes"):
-        finding = judged(TABLE_1, rule=rule, zeta_m=zeta)
-        assert (finding.status, finding.exercised, finding.evidence["kind"]) == ("holds", 1, "optimal")
-        assert finding.evidence["extra_risk"] == pytest.approx(0.0, abs=1e-15)
-
-
-@pytest.mark.parametrize("factor", [1.0 - 2e-6, 1.0 + 2e-6, 2.0])
-def test_a_bayes_threshold_that_is_not_the_optimum_is_refuted(factor: float) -> None:
-    good = INPUTS["audit"]
-    finding = judged(good, zeta_m=factor * good["zeta_m"])
-    assert finding.status == "refuted"
-    assert finding.margin is not None
-    assert finding.margin < 0.0
-    assert judged(good, zeta_m=(1.0 + 0.5e-6) * good["zeta_m"]).status == "holds"
+@pytest.mark.parametrize(
+    ("name", "changes", "status", "exercised", "kind"),
+    [
+        ("table 1", {}, "holds", 0, "declared"),  # nothing could refute it
+        ("table 1", {"zeta_m": optimal_threshold(6.05, 10.0, 0.5, 1.0)}, "holds", 1, "optimal"),
+        ("audit", {}, "holds", 1, "optimal"),
+        ("audit", {"zeta_m": (1.0 + 0.5e-6) * INPUTS["audit"]["zeta_m"]}, "holds", 1, "optimal"),
+        ("audit", {"zeta_m": (1.0 + 2e-6) * INPUTS["audit"]["zeta_m"]}, "refuted", 1, "declared"),
+        ("audit", {"zeta_m": (1.0 - 2e-6) * INPUTS["audit"]["zeta_m"]}, "refuted", 1, "declared"),
+    ],
+)
+def test_a_threshold_is_optimal_or_declared(
+    name: str, changes: dict[str, Any], status: str, exercised: int, kind: str
+) -> None:
+    finding = ThrChoice().judge(INPUTS[name] | changes)
+    assert (finding.status, finding.exercised, finding.evidence.kind) == (status, exercised, kind)
+    assert (finding.margin is not None and finding.margin < 0.0) == (status == "refuted")
 
 
 @pytest.mark.parametrize(
     ("scenario", "run", "rule", "in_force", "extra"),
     [
         ("case_a", "", "fixed", 3.0, 3.118e-7),
-        ("warehouse", "", "fixed", 1.5, 0.011223),
         ("bayes_threshold", "", "bayes", 0.50310, 0.0),
         ("bayes_threshold", "d_printed", "printed", 0.03109, 1.44155),
     ],
@@ -66,62 +52,46 @@ def test_shipped_scenarios(scenario: str, run: str, rule: str, in_force: float, 
     found = verdict.finding.evidence
     assert verdict.as_expected
     assert verdict.expected == ("exercised" if rule == "bayes" else "holds")
-    assert (found["rule"], found["kind"]) == (rule, "optimal" if rule == "bayes" else "declared")
-    assert found["threshold_in_force_m"] == pytest.approx(in_force, rel=1e-4)
-    assert found["extra_risk"] == pytest.approx(extra, rel=1e-3, abs=1e-12)
+    assert (found.rule, found.kind) == (rule, "optimal" if rule == "bayes" else "declared")
+    assert found.threshold_in_force_m == pytest.approx(in_force, rel=1e-4)
+    assert found.extra_risk == pytest.approx(extra, rel=1e-3, abs=1e-12)
     if rule == "printed":
-        assert found["threshold_in_force_m"] == found["threshold_as_printed_in_19_m"]
+        assert found.threshold_in_force_m == found.threshold_as_printed_in_19_m
 
 
-def test_the_drift_and_the_noise_that_a_run_of_case_a_had(run: Callable[[str, str], Trace]) -> None:
+def test_runs_show_the_drift_and_the_noise_that_they_had(run: Callable[[str, str], Trace]) -> None:
     found = of_run(run("case_a", "b"))["b ugv1"]
-    assert found["drift_m_s"] == pytest.approx(0.5606, abs=5e-4)
-    assert found["noise_m_sqrt_s"] == 0.004
-    assert found["optimum_for_this_drift_m"] == pytest.approx(0.2802, abs=5e-4)
-    assert found["optimum_for_this_drift_and_noise_m"] == pytest.approx(0.00016, abs=5e-6)
-    assert found["extra_risk"] == pytest.approx(0.5 * 3.0 / 0.5606, rel=1e-2)  # c1 times the time to reach 3 m
-
-
-def test_where_there_is_no_drift_or_noise_there_is_no_optimum() -> None:
-    trace = run_of("d")
-    assert of_run(trace)["d ugv1"]["optimum_for_this_drift_and_noise_m"] > 0.0
-    trace = with_scenario(trace, decision__noise_m_sqrt_s=0.0)
-    row = of_run(trace)["d ugv1"]
-    assert row["optimum_for_this_drift_m"] > 0.0
-    assert row["optimum_for_this_drift_and_noise_m"] is None
-    assert row["extra_risk"] is None
-
-
-def test_only_this_claim_shows_the_runs() -> None:
-    rows = [{"a ugv1": {"drift_m_s": 1.0}}, {}]
-    assert with_runs("THR-CHOICE", Finding("holds"), rows).evidence == {"runs": {"a ugv1": {"drift_m_s": 1.0}}}
-    assert with_runs("THR-OPT", Finding("proved"), rows).evidence == {}
+    assert found.drift_m_s == pytest.approx(0.5606, abs=5e-4)
+    assert found.noise_m_sqrt_s == 0.004
+    assert found.optimum_for_this_drift_m == pytest.approx(0.2802, abs=5e-4)
+    assert found.optimum_for_this_drift_and_noise_m == pytest.approx(0.00016, abs=5e-6)
+    assert found.extra_risk == pytest.approx(0.5 * 3.0 / 0.5606, rel=1e-2)  # c1 times the time to reach 3 m
+    quiet = of_run(with_scenario(run_of("d"), decision__noise_m_sqrt_s=0.0))["d ugv1"]
+    assert quiet.optimum_for_this_drift_m > 0.0
+    assert quiet.optimum_for_this_drift_and_noise_m is quiet.extra_risk is None
 
 
 def test_a_report_has_the_runs_beside_the_numbers_of_the_rule(run: Callable[[str, str], Trace]) -> None:
     scenario = load("bayes_threshold")[0]
     verdicts = verify_all(scenario, [run("bayes_threshold", name) for name in scenario.runs])
     found, printed = [verdict.finding.evidence for verdict in verdicts if verdict.claim.id == "THR-CHOICE"]
-    assert set(found["runs"]) == {"a ugv1", "d ugv1"}
-    assert set(printed["runs"]) == {"d_printed ugv1"}
-    for row in (*found["runs"].values(), *printed["runs"].values()):
-        assert row["drift_m_s"] == pytest.approx(1.0, abs=1e-6)
-        assert row["optimum_for_this_drift_and_noise_m"] == pytest.approx(found["threshold_in_force_m"])
+    assert (set(found.runs), set(printed.runs)) == ({"a ugv1", "d ugv1"}, {"d_printed ugv1"})
+    for row in (*found.runs.values(), *printed.runs.values()):
+        assert row.drift_m_s == pytest.approx(1.0, abs=1e-6)
+        assert row.optimum_for_this_drift_and_noise_m == pytest.approx(found.threshold_in_force_m)
 
 
 def test_the_figure_marks_three_thresholds_and_says_what_the_runs_had() -> None:
-    finding, drift = judged(TABLE_1), {"drift_m_s": 0.5606, "noise_m_sqrt_s": 0.004}
+    shown = ThrChoice().judge(TABLE_1).to_json()["evidence"]
     optima = {"optimum_for_this_drift_m": 0.2803, "optimum_for_this_drift_and_noise_m": None}
-    figure = threshold.draw(TABLE_1, {**finding.evidence, "runs": {"b ugv1": {**drift, **optima}}})
+    runs = {"b ugv1": {"drift_m_s": 0.5606, "noise_m_sqrt_s": 0.004} | optima}
+    figure, without = threshold.draw(TABLE_1, {**shown, "runs": runs}), threshold.draw(TABLE_1, shown)
     assert figure is not None
-    assert figure.id == "threshold-choice"
+    assert without is not None
     rows = {row[0]: row[1:] for row in figure.panels[0].table.rows[-3:]}
     assert rows == {"in force": ("3", "0.4547"), "optimal": ("2.992", "0.4547"), "(19) as printed": ("0.7557", "0.48")}
     assert "In run b, ugv1 had a drift of 0.5606 m/s" in figure.caption
-    assert "best for that drift: 0.28 m with the assumed noise." in figure.caption
-    none = threshold.draw(TABLE_1, finding.evidence)
-    assert none is not None
-    assert none.caption.endswith("No run triggered: the real drift is not known.")
+    assert without.caption.endswith("No run triggered: the real drift is not known.")
     assert threshold.draw(TABLE_1, {"error": "failed"}) is None
 
 

@@ -3,26 +3,23 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from statistics import NormalDist
 
 import pytest
+from verify.judging import Judged
 from verify.model.threshold.cases import TABLE_1
 
-from airground_drake.verify.finding import Finding
 from airground_drake.verify.model import first_passages, thr_ddm
+from airground_drake.verify.model.thr_ddm import ThrDdm
 
 
-def test_formulas_are_supported(simulated: Finding) -> None:
-    assert simulated.status == "supported"
-    assert simulated.evidence["paths"] >= 20000
-    assert len(simulated.evidence["comparisons"]) == 12
-    assert simulated.margin is not None
-    assert 0.0 < simulated.margin <= 1.0
-
-
-def test_intervals_can_be_redone_by_hand(simulated: Finding) -> None:
+def test_formulas_are_supported_and_intervals_can_be_redone_by_hand(judged: Judged) -> None:
     """Binomial tails and the normal quantile with `math` only, from the recorded counts."""
-    tail = (1.0 - simulated.evidence["family_level"]) / 12 / 2
+    simulated = judged(ThrDdm())
+    assert (simulated.status, len(simulated.evidence.comparisons)) == ("supported", 12)
+    assert simulated.evidence.paths >= 20000
+    tail = (1.0 - simulated.evidence.family_level) / 12 / 2
     quantile = NormalDist().inv_cdf(1.0 - tail)
 
     def below(k: int, n: int, p: float) -> float:
@@ -32,19 +29,27 @@ def test_intervals_can_be_redone_by_hand(simulated: Finding) -> None:
             for i in range(k + 1)
         )
 
-    for row in simulated.evidence["comparisons"]:
-        n, wrong, constants = row["constants"]["paths"], row["wrong_decisions"], row["constants"]
-        low, high = row["interval"]
-        if row["quantity"] == "error rate":
+    for row in simulated.evidence.comparisons:
+        n, wrong, period = row.constants["paths"], row.wrong_decisions, row.constants["noise_period_s"]
+        low, high = row.interval
+        if row.quantity == "error rate":
             assert below(wrong, n, high - thr_ddm.ERROR_ALLOWANCE) == pytest.approx(tail, rel=1e-6)
             assert 1.0 - below(wrong - 1, n, low + thr_ddm.ERROR_ALLOWANCE) == pytest.approx(tail, rel=1e-6)
         else:
-            mean = row["periods_sum"] / n
-            spread = math.sqrt((row["periods_sum_of_squares"] / n - mean**2) / (n - 1))
-            half = (quantile * spread + thr_ddm.TIME_ALLOWANCE) * constants["noise_period_s"]
-            assert (high - low) / 2 == pytest.approx(half, rel=1e-9)
-            assert (high + low) / 2 == pytest.approx((mean - 0.25) * constants["noise_period_s"], rel=1e-9)
-        assert low < row["formula"] < high
+            mean = row.periods_sum / n
+            spread = math.sqrt((row.periods_sum_of_squares / n - mean**2) / (n - 1))
+            half = quantile * spread + thr_ddm.TIME_ALLOWANCE
+            assert ((high - low) / 2, (high + low) / 2) == pytest.approx((half * period, (mean - 0.25) * period))
+        assert low < row.formula < high
+
+
+def test_wrong_formulas_are_refuted() -> None:
+    """Without the initial deviation."""
+    chosen = first_passages.experiments(TABLE_1)
+    finding = thr_ddm.compare(chosen, lambda each: first_passages.running(replace(each, deviation=0.0)))
+    assert finding.status == "refuted"
+    assert finding.counterexample is not None
+    assert finding.counterexample["constants"]["deviation"] != 0.0
 
 
 def test_pyddm_agrees_with_the_formulas() -> None:

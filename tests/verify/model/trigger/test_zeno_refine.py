@@ -25,18 +25,13 @@ def test_the_shipped_trigger_is_supported(judged: Judged, case_a: Scenario) -> N
     assert finding.status == "supported", finding.counterexample
     evidence = finding.evidence
     assert evidence == zeno_refine.series(experiment(REFINE), refined_paths.counts(experiment(REFINE)))
-    dt = evidence["dt_s"]
-    assert dt[0] / dt[-1] >= 256
-    for name in refined_paths.SERIES:
-        assert {len(values) for values in evidence[name].values()} == {len(dt)}
-    low, high = evidence["fit"]["bare"]["interval"]
+    assert evidence.dt_s[0] / evidence.dt_s[-1] >= 256
+    low, high = evidence.fit["bare"].interval
     assert low < -0.49 < high < -0.4
-    assert max(evidence["automaton"]["largest"]) <= evidence["most_triggers"] == 61
-    assert evidence["bare"]["mean"][-1] > 10.0 * evidence["bare"]["mean"][0]
-    rows = evidence["counts"]["bare"]
-    assert len(rows) == refined_paths.PATHS
-    last = [float(row.split()[-1]) for row in rows]
-    assert sum(last) / len(last) == pytest.approx(evidence["bare"]["mean"][-1])
+    assert max(evidence.automaton.largest) <= evidence.most_triggers == 61
+    assert evidence.bare.mean[-1] > 10.0 * evidence.bare.mean[0]
+    last = [float(row.split()[-1]) for row in evidence.counts["bare"]]
+    assert sum(last) / refined_paths.PATHS == pytest.approx(evidence.bare.mean[-1])
 
 
 class NoDwell(Trigger):

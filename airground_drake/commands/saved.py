@@ -1,0 +1,67 @@
+"""What `replay`, `export` and `figures` share: a report, its runs, and a place outside of it."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from airground_drake.base import files
+from airground_drake.base.errors import FolderError, UnknownNameError, one_line
+from airground_drake.base.usage import Parser
+from airground_drake.report.folder import is_report
+
+if TYPE_CHECKING:
+    from airground_drake.run.trace import Trace
+    from airground_drake.scenarios.schema import Scenario
+
+
+def parser_of(name: str, description: str) -> argparse.ArgumentParser:
+    """Make the parser of a command that takes a report."""
+    parser = Parser(prog=f"airground {name}", description=description)
+    parser.add_argument("folder", type=Path, metavar="DIR", help="folder of a report")
+    return parser
+
+
+def runs_of(folder: Path, run: str | None = None) -> Sequence[str]:
+    """Return the runs of a report that have left a trace, or only the one that is named.
+
+    Raises:
+        FolderError: if it is no report, or one without runs.
+        UnknownNameError: if it has no such run.
+    """
+    found = sorted(path.parent.name for path in folder.glob("trace/*/meta.json"))
+    if not is_report(folder):
+        raise FolderError(one_line(f"{folder} is no report; allowed: a folder that `airground report` has written"))
+    if not found:
+        raise FolderError(one_line(f"{folder} has no runs to replay; allowed: a report with trace/RUN/meta.json"))
+    if run not in (None, *found):
+        raise UnknownNameError("run", run, found)
+    return found if run is None else [run]
+
+
+def outside_reports(folder: Path, what: str) -> None:
+    """Create a folder for `what`. Reports are left as they are: the checker refuses files that are not theirs.
+
+    Raises:
+        FolderError: if the folder is one of a report, or cannot be written.
+    """
+    for each in (folder.resolve(), *folder.resolve().parents):
+        if is_report(each):
+            raise FolderError(one_line(f"{folder} is in the report {each}, which is complete; name another, with -o"))
+    files.make_folder(folder, what)
+
+
+def trace_of(folder: Path, run: str) -> tuple[Trace, Scenario]:
+    """Load the trace of a run, and the scenario that it was simulated with.
+
+    Raises:
+        TraceError: if the trace cannot be used.
+        ScenarioError: if its scenario cannot be used.
+    """
+    from airground_drake.run import trace
+    from airground_drake.scenarios.load import from_data
+
+    saved = trace.load(folder / "trace" / run)
+    return saved, from_data(saved.meta["scenario"], str(folder / "trace" / run))

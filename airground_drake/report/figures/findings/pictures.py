@@ -1,0 +1,215 @@
+"""What is drawn beside each finding about the paper: a function of the finding for each number."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+
+from airground_drake.base.arrays import Array
+from airground_drake.decision.bayes import bayes_risk, decision_time, optimal_threshold
+from airground_drake.report.figures.findings.lines import Lines
+
+POINTS = 200
+
+
+def risk(item: Mapping[str, Any]) -> Lines:
+    """Item 2: where the printed and the corrected (19) put the threshold on the curve of the Bayes risk."""
+    known, roots = item["evidence"], {"root as printed, c1/c2": item["paper"], "root with c2/c1": item["ours"]}
+    constants = known["drift_m_s"], known["noise_m_sqrt_s"], known["c1_1_s"], known["c2"]
+    zeta = np.linspace(0.02, 2.5 * item["ours"]["root_m"], POINTS)
+    marks = {name: (root["root_m"], root["risk"]) for name, root in roots.items()}
+    curve = _curve(lambda z: bayes_risk(z, *constants), zeta)
+    return Lines("Bayes risk (16) over the threshold", "threshold, m", "Bayes risk", {"risk (16)": curve}, marks)
+
+
+def time(item: Mapping[str, Any]) -> Lines:
+    """Item 3: mean decision time over the initial deviation, as printed and corrected."""
+    known = item["evidence"]
+    zeta, drift, noise = known["zeta_m"], known["drift_m_s"], known["noise_m_sqrt_s"]
+    deviation = np.linspace(-0.99, 0.99, POINTS) * zeta / max(drift, 1.0)
+    return Lines(
+        "Mean decision time (17) over the initial deviation", "initial deviation, m", "time, s",
+        {
+            "corrected, metres": _curve(lambda y: decision_time(zeta, drift, noise, y), deviation),
+            "as printed": _curve(lambda y: decision_time(zeta, drift, noise, y * drift), deviation),
+        },
+        {"by finite differences": (known["deviation_m"], known["exact_mean_exit_time_s"])},
+    )  # fmt: skip
+
+
+def optimum(item: Mapping[str, Any]) -> Lines:
+    """Item 4: the threshold over the drift, Bayes-optimal and by (19) as printed, and Table 1's."""
+    known, zeta = item["evidence"], item["paper"]["zeta_m"]
+    right, printed = item["ours"]["drift_m_s"], item["paper"]["drift_m_s"]
+    noise, c1, c2 = known["noise_m_sqrt_s"], known["c1_1_s"], known["c2"]
+    drift = np.geomspace(0.3, 3.0 * max(right, default=10.0), POINTS)
+    return Lines(
+        "Threshold over the drift, Bayes-optimal and by (19) as printed", "drift, m/s", "threshold, m",
+        {
+            "Bayes-optimal": _curve(lambda a: optimal_threshold(a, noise, c1, c2), drift),
+            "(19) as printed": _curve(lambda a: optimal_threshold(a, noise, c2, c1), drift),
+            "Table 1": (drift, np.full(POINTS, zeta)),
+        },
+        {f"{a:.3g} m/s": (a, zeta) for a in (*right, *printed)}, log="x",
+    )  # fmt: skip
+
+
+def first_passage(item: Mapping[str, Any]) -> Lines:
+    """Item 5: when noise alone reaches either threshold, over its intensity, and the paper's trigger."""
+    known, at = item["evidence"], item["evidence"]["noise_m_sqrt_s"]
+    noise = np.geomspace(0.05 * at, 2.0 * at, POINTS)
+    return Lines(
+        "Mean time in which noise alone reaches either threshold", "noise intensity, m/√s", "time, s",
+        {
+            "noise alone": (noise, (known["zeta_m"] / noise) ** 2),
+            "the paper's trigger": (noise, np.full(POINTS, item["paper"]["trigger_s"])),
+        },
+        {f"{at:g}, finite differences": (at, known["by_finite_differences_s"])}, log="xy",
+    )  # fmt: skip
+
+
+def due(item: Mapping[str, Any]) -> Lines:
+    """Item 6: how far the reference is from the stalled UGV, at the printed and at the scenario's speed."""
+    known = item["evidence"]
+    travelled, distance = (np.array(known["reference"][key]) for key in ("travelled_m", "distance_m"))
+    zeta, due_s = known["zeta_m"], known["trigger_at_printed_speed_s"]
+    speeds = known["reference_travelled_m"] / due_s, known["scenario_speed_m_s"]
+    last = travelled[-1] / min(speeds)
+    return Lines(
+        "Distance of the reference from the stalled UGV", "time, s", "distance, m",
+        {f"at {speed:g} m/s": (travelled / speed, distance) for speed in speeds}
+        | {"threshold": (np.array([0.0, last]), np.array([zeta, zeta]))},
+        {f"due at {speeds[0]:g} m/s": (due_s, zeta), "the paper's trigger": (item["paper"], zeta)},
+    )  # fmt: skip
+
+
+def sides(item: Mapping[str, Any]) -> Lines:
+    """Item 7: the ways of UGV2 with either sign of its preset."""
+    ways = {f"x = {known['preset_x_m']:g} m": np.array(known["way_m"]) for known in item["evidence"].values()}
+    return Lines(
+        "Ways of UGV2", "y, m", "x, m",
+        {f"preset {name}": (way[:, 1], way[:, 0]) for name, way in ways.items()},
+        {f"end, {name}": (way[-1, 1], way[-1, 0]) for name, way in ways.items()},
+    )  # fmt: skip
+
+
+def intrusion(item: Mapping[str, Any]) -> Lines:
+    """Item 10: distance to the nearest obstacle under either gatekeeper."""
+    known, safe = item["evidence"]["distance_to_the_nearest_obstacle"], item["evidence"]["safe_distance_m"]
+    t = np.array(known["t_s"])
+    gaps = {name.removesuffix("_m"): np.array(gap) for name, gap in known.items() if name != "t_s"}
+    return Lines(
+        "Distance to the nearest obstacle", "time, s", "distance, m",
+        {name: (t, gap) for name, gap in gaps.items()} | {"safe distance": (t, np.full(len(t), safe))},
+        {f"closest, {name}": (float(t[gap.argmin()]), float(gap.min())) for name, gap in gaps.items()},
+    )  # fmt: skip
+
+
+def task_error(item: Mapping[str, Any]) -> Lines:
+    """Item 11: the task error that (26) counts along the horizon, without and with the kinematics."""
+    known = item["evidence"]["task_error"]
+    names = {"printed_m": "as printed, either", "accept_m": "with (23), accept", "refuse_m": "with (23), refuse"}
+    lines = {name: (np.array(known["t_s"]), np.array(known[key])) for key, name in names.items()}
+    return Lines("Task error along the horizon", "time from the decision, s", "task error, m", lines)
+
+
+def feed_forward(item: Mapping[str, Any]) -> Lines:
+    """Item 12: both sides of (6) over the velocity, for some error: they meet where there is a solution."""
+    known = item["evidence"]
+    correction, solution = known["gain_1_s"] * known["error_m"], known["velocities_m_s"]["corrected"][0]
+    v = np.linspace(0.0, 2.0 * solution, 50)
+    corrected = np.full(len(v), known["desired_rate_m_s"] + correction)
+    return Lines(
+        f"Both sides of (6), J = I, for an error of {known['error_m']:g} m", "velocity, m/s", "side of (6), m/s",
+        {"left, v": (v, v), "right, as printed": (v, v + correction), "right, corrected": (v, corrected)},
+        {"solution, corrected": (solution, solution)},
+    )  # fmt: skip
+
+
+def centroid(item: Mapping[str, Any]) -> Lines:
+    """Item 13: the task value (9) over the UAV's own position."""
+    known = item["evidence"]["task_values"]
+    lines = {name: (np.array(known["uav_x_m"]), np.array(known[f"{name.replace(' ', '_')}_m"]))
+             for name in ("as printed", "corrected")}  # fmt: skip
+    return Lines("Task value (9) over the UAV's position", "x of the UAV, m", "task value, m", lines)
+
+
+def sums(item: Mapping[str, Any]) -> Lines:
+    """Item 14: what the sum (27a) makes of the integrand 1, over the number of stages."""
+    known = item["evidence"]
+    stages, printed, corrected = (np.array(known["sums"][key]) for key in ("stages", "as_printed", "corrected_s"))
+    return Lines(
+        "The cost of the integrand 1 over the number of stages", "stages N", "sum",
+        {"as printed": (stages, printed), "corrected, s": (stages, corrected)},
+        {
+            f"printed, N = {known['stages']}": (known["stages"], item["paper"]),
+            "integral, s": (known["stages"], known["integral_s"]),
+        },
+    )  # fmt: skip
+
+
+def dimensions(item: Mapping[str, Any]) -> Lines:
+    """Item 15: total dimension of the tasks over the lowest one's, where rule (3) admits it and where not."""
+    known = item["evidence"]
+    lowest, total, admitted = (np.array(known["totals"][key]) for key in ("lowest_task", "total", "admitted"))
+    return Lines(
+        f"Total dimension of the tasks, {known['higher_tasks']} of them taken", "dimension of the lowest task",
+        "total dimension",
+        {
+            "rule (3) admits": (lowest[admitted], total[admitted]),
+            "rule (3) excludes": (lowest[~admitted], total[~admitted]),
+            "n, of the velocity": (lowest, np.full(len(lowest), known["n"])),
+        },
+        {"example": (known["lowest_task"], known["total"])},
+    )  # fmt: skip
+
+
+def null_space(item: Mapping[str, Any]) -> Lines:
+    """Item 16: the part of the own task's velocity, in any direction, that an intervention leaves."""
+    angle = np.linspace(0.0, 2.0 * np.pi, 73)
+    own = np.stack([np.cos(angle), np.sin(angle), np.zeros_like(angle)])
+    one, left = (np.array(item["evidence"][key]) @ own for key in ("projector_for_one_direction", "projector"))
+    return Lines(
+        "What is left of the own task's velocity of 1 m/s under an intervention", "x, m/s", "y, m/s",
+        {"own, any direction": (own[0], own[1]), "left: y intervened on": (one[0], one[1])},
+        {"left: position, J = I": (float(left[0, 0]), float(left[1, 0]))},
+    )  # fmt: skip
+
+
+def speeds(item: Mapping[str, Any]) -> Lines:
+    """Item 17: when the trigger is due over the reference's speed, and what the paper reports."""
+    known, printed, ours = item["evidence"]["reference_travelled_at_the_trigger_m"], item["paper"], item["ours"]
+    speed = np.linspace(0.8 * min(ours["speed_m_s"].values()), 1.2 * printed["speed_m_s"], 100)
+    reported = {f"reported, {name}": (ours["speed_m_s"][name], at) for name, at in printed["trigger_s"].items()}
+    return Lines(
+        "Trigger over the reference's speed", "speed, m/s", "trigger, s",
+        {f"{name}, {way:.3g} m": (speed, way / speed) for name, way in known.items()},
+        reported | {"Table 1's speed": (printed["speed_m_s"], known["case_a"] / printed["speed_m_s"])},
+    )  # fmt: skip
+
+
+def one_or_two(item: Mapping[str, Any]) -> Lines:
+    """Item 18: mean decision time over the drift, with two thresholds and with the one that the trigger has."""
+    known = item["evidence"]["Table 1, drift assumed"]
+    zeta, noise, at = known["zeta_m"], known["noise_m_sqrt_s"], known["drift_m_s"]
+    drift = np.geomspace(0.1 * at, 10.0 * at, POINTS)
+    two = _curve(lambda a: decision_time(zeta, a, noise), drift)
+    return Lines(
+        "Mean decision time over the drift, with one threshold and with two", "drift, m/s", "time, s",
+        {"one threshold": (drift, zeta / drift), "two thresholds, (17)": two},
+        {f"{name}, finite differences": (at, known[f"time_of_{key}_s"])
+         for name, key in (("one", "one_threshold"), ("two", "two_thresholds"))}, log="xy",
+    )  # fmt: skip
+
+
+def _curve(value: Callable[[float], float], x: Array) -> tuple[Array, Array]:
+    return x, np.array([value(each) for each in x])
+
+
+PICTURES: dict[int, Callable[[Mapping[str, Any]], Lines]] = {
+    2: risk, 3: time, 4: optimum, 5: first_passage, 6: due, 7: sides, 10: intrusion, 11: task_error,
+    12: feed_forward, 13: centroid, 14: sums, 15: dimensions, 16: null_space, 17: speeds, 18: one_or_two,
+}  # fmt: skip
+"""By number of the finding. Pictures of 1 and 9 are drawn from runs and from ZENO-REFINE."""

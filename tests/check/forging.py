@@ -1,0 +1,165 @@
+"""Forge copies of a report of case B, and check them.
+
+Files of a copy are hard links, so a forger never writes into a file: another one takes its place. Digests are made
+right afterwards, as a forger would.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import io
+import json
+import os
+import shutil
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import joblib
+import pandas as pd
+import pytest
+
+from airground_drake.check import command as checker
+from airground_drake.check.report import AGREES, Line
+from airground_drake.report import rebuild
+from airground_drake.run.trace import Trace
+from airground_drake.scenarios.schema import Scenario
+from airground_drake.verify import Verdict, judge, verify_all
+
+RUN, UGV = "d", "ugv1"
+"""The run and the UGV that are forged unless others are named."""
+Edit = Callable[[Path], None]
+"""Forges a copy of a report in place."""
+
+
+def write(path: Path, content: bytes) -> None:
+    """Put a file in the place of another."""
+    path.unlink(missing_ok=True)
+    path.write_bytes(content)
+
+
+def trace(folder: Path, run: str = RUN) -> Path:
+    """The folder of a trace."""
+    return folder / "trace" / run
+
+
+@contextlib.contextmanager
+def edited_json(path: Path) -> Iterator[Any]:
+    """The value of a JSON file, to be changed in place."""
+    value = json.loads(path.read_bytes())
+    yield value
+    write(path, json.dumps(value, ensure_ascii=False).encode())
+
+
+def edited_report(folder: Path) -> contextlib.AbstractContextManager[Any]:
+    """report.json, to be changed in place."""
+    return edited_json(folder / "report.json")
+
+
+@contextlib.contextmanager
+def edited_entries(folder: Path, run: str = RUN) -> Iterator[list[Any]]:
+    """A run's entry in report.json, and its meta.json, to be changed in place."""
+    with edited_report(folder) as report, edited_json(trace(folder, run) / "meta.json") as meta:
+        yield [report["runs"][run], meta]
+
+
+@contextlib.contextmanager
+def edited_scenarios(folder: Path) -> Iterator[list[Any]]:
+    """The resolved scenario in report.json and in each meta.json, to be changed in place."""
+    with contextlib.ExitStack() as stack:
+        report = stack.enter_context(edited_report(folder))
+        metas = [stack.enter_context(edited_json(path)) for path in sorted(folder.glob("trace/*/meta.json"))]
+        yield [report["scenario"]["resolved"], *(meta["scenario"] for meta in metas)]
+
+
+def claim_of(report: Any, claim: str, run: str = RUN) -> Any:
+    """A claim's entry in report.json."""
+    return next(entry for entry in report["claims"] if (entry["id"], entry["run"]) == (claim, run))
+
+
+def read_table(folder: Path, table: str = "signals", run: str = RUN) -> pd.DataFrame:
+    """A table of a trace."""
+    return pd.read_parquet(trace(folder, run) / f"{table}.parquet")
+
+
+def write_table(folder: Path, frame: pd.DataFrame, table: str = "signals", run: str = RUN) -> None:
+    """Put a table in the place of another."""
+    buffer = io.BytesIO()
+    frame.to_parquet(buffer, index=False)
+    write(trace(folder, run) / f"{table}.parquet", buffer.getvalue())
+    seal(folder, run)
+
+
+@contextlib.contextmanager
+def edited_table(folder: Path, table: str = "signals", run: str = RUN) -> Iterator[pd.DataFrame]:
+    """A table, to be changed in place."""
+    frame = read_table(folder, table, run)
+    yield frame
+    write_table(folder, frame, table, run)
+
+
+def seal(folder: Path, run: str = RUN) -> None:
+    """Make the digests in a meta.json right."""
+    with edited_json(trace(folder, run) / "meta.json") as meta:
+        for name in meta["files"]:
+            meta["files"][name] = hashlib.sha256((trace(folder, run) / name).read_bytes()).hexdigest()
+
+
+def copy(report: Path, folder: Path) -> Path:
+    """A new copy of a report, to be forged."""
+    shutil.rmtree(folder, ignore_errors=True)
+    return Path(shutil.copytree(report, folder, copy_function=os.link))
+
+
+def mend(folder: Path) -> None:
+    """Make the list of files right, if there is a report to put it into."""
+    if not (folder / "report.json").is_file():  # nobody reads a pipe to its end
+        return
+    with contextlib.suppress(OSError, ValueError, TypeError, RecursionError), edited_report(folder) as report:
+        files = {path.relative_to(folder).as_posix(): path for path in folder.rglob("*") if path.is_file()}
+        report["files"] = {
+            name: hashlib.sha256(path.read_bytes()).hexdigest()
+            for name, path in files.items()
+            if name != "report.json" and not name.startswith("proofs/")  # those are added later
+        }
+
+
+def attempt(report: Path, edit: Edit, *, mended: bool = True) -> tuple[int, str]:
+    """Forge a copy of a report, beside it, and check it: the exit code, and a line for each check that fails.
+
+    Args:
+        report: folder of the report.
+        edit: the forgery.
+        mended: whether the list of files is made right afterwards.
+    """
+    folder = copy(report, report.with_name(f"forged_{os.getpid()}"))
+    edit(folder)
+    if mended:
+        mend(folder)
+    try:
+        found = checker.checked(folder, checker.LIMIT_S)
+    except checker.UsageError as error:
+        return 2, str(error)
+    if all(line.outcome == AGREES for line in found):
+        found = [Line(**line, by="judged again") for line in rebuild.lines(folder, judge=judged)]
+    refused = [line for line in found if line.outcome != AGREES]
+    assert all(line.rule and line.text for line in refused)
+    return int(bool(refused)), "\n".join(f"{line.by}: {line.claim}: {line.text}" for line in refused)
+
+
+_JUDGED: dict[str, Any] = {}
+
+
+def judged(scenario: Scenario, traces: Sequence[Trace]) -> list[Verdict]:
+    """As `verify_all`, but equal work is done once: most forgeries leave most runs as they are."""
+
+    def once(piece: Any) -> Any:
+        key = joblib.hash((piece.func.__name__, piece.args))
+        if key not in _JUDGED:
+            _JUDGED[key] = piece()
+        return _JUDGED[key]
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(judge, "run_parallel", lambda pieces, **_: list(map(once, pieces)))
+        return verify_all(scenario, traces)
