@@ -92,8 +92,8 @@ def _page(
     folders: tuple[Path, Path], before: compare.Document, after: compare.Document, found: Mapping[str, Any]
 ) -> str:
     """The comparison as a page, with the runs that both reports have traces of."""
-    from airground_drake.report import pages
     from airground_drake.report.figures import overlay
+    from airground_drake.report.html import render_beside
     from airground_drake.run import trace
 
     worse = [
@@ -109,7 +109,7 @@ def _page(
             figures.append(overlay.draw(run, position, one, two))
         except (TraceError, OSError) as error:
             problems.append(f"Run {run} cannot be drawn: {error}")
-    return pages.render(
+    return render_beside(
         "compare.html.j2", before=before, after=after, found=found, figures=figures, problems=problems, parts=PARTS,
         places=[str(folder) for folder in folders], most=MOST_ROWS, regressions=worse,
     )  # fmt: skip

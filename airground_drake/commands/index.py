@@ -12,6 +12,7 @@ from airground_drake.base import files
 from airground_drake.base.errors import FolderError, ReportError, TraceError
 from airground_drake.base.usage import Parser
 from airground_drake.report import compare, folder, summary
+from airground_drake.report.phrases import Line
 
 PAGE = "index.html"
 MARK = "airground_drake index"
@@ -35,7 +36,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _write(place: Path) -> Path:
     """Write the page of a folder; FolderError if it has no reports, or an index.html that is not ours."""
-    from airground_drake.report import pages
+    from airground_drake.report.html import render_beside
 
     page = place / PAGE
     if page.exists() and MARK.encode() not in files.read_bytes(page):
@@ -53,7 +54,7 @@ def _write(place: Path) -> Path:
         raise FolderError(f"there are no reports in the folders below {place}{why}")
     entries.sort(key=lambda entry: (entry["scenario"]["name"], entry["provenance"].get("started", ""), entry["place"]))
     name = place.resolve().name
-    files.write_text(page, pages.render("index.html.j2", entries=entries, problems=problems, name=name, mark=MARK))
+    files.write_text(page, render_beside("index.html.j2", entries=entries, problems=problems, name=name, mark=MARK))
     return page
 
 
@@ -70,7 +71,7 @@ def _entry(report: Path, place: Path, prefix: str) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _headline(document: Mapping[str, Any]) -> summary.Line | None:
+def _headline(document: Mapping[str, Any]) -> Line | None:
     """The report in a sentence; None if it lacks something that only its first screen needs."""
     try:
         return summary.headline(document)

@@ -32,7 +32,7 @@ from airground_drake.scenarios.shipped import AUDIT, shipped
 
 FORMATS = tuple(folder.PAGES)
 AUDITED = "case_a"
-"""`report audit` is the report of the scenario AUDITED with every finding about the paper."""
+"""`report audit` reports on this scenario, with every finding about the paper."""
 AUDIT_TITLE = "The paper's formulas and numbers, audited"
 AUDIT_DESCRIPTION = (
     "Case A with all its runs and proofs, and every finding about the paper: its formula, ours, and evidence made by a "
@@ -44,8 +44,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line.
 
     Returns:
-        Exit code: 0 all claims as expected, 1 a claim differs, 2 usage or bad scenario, 3 inconclusive,
-        4 tool error.
+        Exit code: 0 all claims as expected, 1 a claim differs, 2 usage or bad scenario, 3 inconclusive, 4 tool error.
     """
     options = parser().parse_args(arguments)
     if options.scenario is None and not options.list:
@@ -60,7 +59,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return refuse(f"{error}; see --limit-steps and --limit-memory")
     except (ScenarioError, PluginError, UnknownNameError, FolderError) as error:
         return refuse(error)
-    except BrokenPipeError:  # nobody reads what is printed
+    except BrokenPipeError:  # the output pipe is closed
         raise
     except (AirgroundError, OSError) as error:
         return refuse(error, EXIT_TOOL)
@@ -75,19 +74,18 @@ def _reported(options: argparse.Namespace, command: str) -> int:
     scenario, digest = load(AUDITED if audited else options.scenario, overrides)
     if audited:
         scenario.name, scenario.title, scenario.description = AUDIT, AUDIT_TITLE, AUDIT_DESCRIPTION
-    from airground_drake.report import attention, make, summary  # once the scenario is valid: this takes long to import
+    from airground_drake.report import attention, make, summary  # slow to import: only for a valid scenario
     from airground_drake.verify.cache import cache_folder
 
     kept = None if options.no_cache else cache_folder()
     output = options.output or Path("reports") / scenario.name
     limits = Limits(options.limit_steps, options.limit_memory * GIB)
+    wanted = make.Wanted(options.format, command, kept, audited, limits)
     with (
         plugins.admitted(scenario, options.scenario, allow=options.allow_plugins),
         progress_bar(quiet=options.quiet, verbose=options.verbose) as progress,
     ):
-        report = make.write_report(
-            scenario, digest, output, options.format, command, kept, options.scenario == AUDIT, limits, progress
-        )
+        report = make.write_report(scenario, digest, output, wanted, progress)
     overall = report["overall"]
     if not options.quiet:
         for item in attention.beforehand(report):
@@ -132,8 +130,8 @@ def parser() -> argparse.ArgumentParser:
     parser.add_argument("--open", action="store_true", help="open the report in a browser")
     parser.add_argument("--list", action="store_true", help="list the shipped scenarios")
     loudness = parser.add_mutually_exclusive_group()
-    loudness.add_argument("-q", "--quiet", action="store_true", help="say nothing but errors")
-    loudness.add_argument("-v", "--verbose", action="store_true", help="say what took how long")
+    loudness.add_argument("-q", "--quiet", action="store_true", help="print only errors")
+    loudness.add_argument("-v", "--verbose", action="store_true", help="print how long each step took")
     return parser
 
 

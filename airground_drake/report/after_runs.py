@@ -17,6 +17,8 @@ from airground_drake.base.progress import Progress
 from airground_drake.report import document, folder, junit
 from airground_drake.report.figures.draw import draw
 from airground_drake.report.figures.panels import Figure
+from airground_drake.report.folder import PAGES
+from airground_drake.report.make import Wanted
 from airground_drake.report.page import page
 from airground_drake.run import trace
 from airground_drake.run.trace import Trace
@@ -31,72 +33,55 @@ PACKAGES = ("airground_drake", "drake", "numpy", "scipy", "numba", "pandas", "ma
 
 
 class Judged(NamedTuple):
-    """What is said of the runs, and their figures."""
+    """The runs of a scenario, what is said of them, and their figures."""
 
+    traces: Mapping[str, Trace]
     verdicts: Sequence[Verdict]
     findings: Sequence[dict[str, Any]]
     figures: Sequence[Figure]
 
 
-def judge(
-    scenario: Scenario,
-    traces: Mapping[str, Trace],
-    kept: Path | None,
-    *,
-    audited: bool,
-    drawn: bool,
-    progress: Progress,
-) -> Judged:
+def judge(scenario: Scenario, traces: Mapping[str, Trace], wanted: Wanted, progress: Progress) -> Judged:
     """Judge the runs and the model and, if asked for, the paper; draw the runs at the same time.
 
     Raises:
         PluginError: if a claim of the scenario cannot be made.
         AirgroundError: if a process dies.
     """
-    figures = start_in_process(partial(draw, scenario, traces)) if drawn else list
-    verdicts = verify_all(scenario, traces.values(), kept=kept, progress=progress)
-    if audited:
+    figures = start_in_process(partial(draw, scenario, traces)) if "html" in wanted.formats else list
+    verdicts = verify_all(scenario, traces.values(), kept=wanted.kept, progress=progress)
+    if wanted.audited:
         progress.stage("auditing the paper")
-    findings = audit.whole(scenario, verdicts) if audited else ()
-    return Judged(verdicts, findings, figures())
+    findings = audit.whole(scenario, verdicts) if wanted.audited else ()
+    return Judged(traces, verdicts, findings, figures())
 
 
 def write(
-    scenario: Scenario,
-    digest: str,
-    output: Path,
-    formats: Sequence[str],
-    traces: Mapping[str, Trace],
-    judged: Judged,
-    provenance: dict[str, Any],
+    scenario: Scenario, digest: str, output: Path, formats: Sequence[str], judged: Judged, provenance: dict[str, Any]
 ) -> dict[str, Any]:
-    """Write the folder, and return the document; arguments as of `make.write_report`.
+    """Write the folder, and return the document; arguments as of `make.write_report` and `document.build`.
 
     Raises:
         OSError: if something cannot be written.
     """
     dot = graphviz.dot(build_diagram(plugins.without(scenario), most_complete(scenario)))
-    drawn = graphviz.svg(dot)
+    pages = {"diagram.dot": dot, "diagram.svg": graphviz.svg(dot)}
+    required = [claim.id for claim in model_claims(added=scenario.claims)]
+    traces, findings = judged.traces, judged.findings
+    report = document.build(scenario, digest, traces, judged.verdicts, provenance, audit=findings, required=required)
+    if "junit" in formats:
+        pages[PAGES["junit"]] = junit.render(report)
+    if "html" in formats:
+        pages[PAGES["html"]] = page(report, judged.figures, pages["diagram.svg"])
     folder.clear(output)
-    written = []
+    written = [*pages]
     for name, of_run in traces.items():
         written += [f"trace/{name}/{file}" for file in trace.save(of_run, output / "trace" / name)]
-    files.write_text(output / "diagram.dot", dot)
-    files.write_text(output / "diagram.svg", drawn)
-    written += ["diagram.dot", "diagram.svg"]
-    required = [claim.id for claim in model_claims(added=scenario.claims)]
-    report = document.build(
-        scenario, digest, traces, judged.verdicts, provenance, audit=judged.findings, required=required
-    )
-    if "junit" in formats:
-        files.write_text(output / "junit.xml", junit.render(report))
-        written.append("junit.xml")
-    if "html" in formats:
-        files.write_text(output / "report.html", page(report, judged.figures, drawn))
-        written.append("report.html")
+    for name, text in pages.items():
+        files.write_text(output / name, text)
     report = document.sealed(report, output, written)
     if "json" in formats:
-        files.write_json(output / "report.json", report)
+        files.write_json(output / PAGES["json"], report)
     return report
 
 
@@ -123,7 +108,7 @@ def provenance(scenario: Scenario, started: datetime, command: str) -> dict[str,
 
 
 def _solver(scenario: Scenario, daqp: str) -> str:
-    """What solves (26) under method (c)."""
+    """The solver of (26) under method (c)."""
     route, solver = scenario.gatekeeper.route, scenario.gatekeeper.solver
     if route != "mixed_integer":
         return f"that of the route {route}"

@@ -1,7 +1,7 @@
 """What has changed from one report to another, read from their report.json alone.
 
-A verdict is worse than before if it stands further down in `ORDER`, if it was as the scenario expected and no longer
-is, or if it is gone; so is a row of the reproduction table, by `ROWS`, and a finding about the paper that is no longer
+A verdict is worse if it stands further down in `ORDER` than before, if it was as expected and no longer is, or if it
+is gone. A row of the reproduction table is worse by `ROWS`, and a finding about the paper if it is no longer
 demonstrated. Numbers are compared to the last digit.
 """
 
@@ -22,28 +22,15 @@ from airground_drake.report.rebuild import WITHIN
 
 SCHEMA = "airground_drake.comparison/1"
 REPORT = "airground_drake.report/2"
-EARLIER = ("airground_drake.report/1",)
 
-ORDER: tuple[tuple[str, ...], ...] = (
-    ("proved",),
-    ("holds", "supported"),
-    ("not_exercised",),
-    (*UNDECIDED, "gone"),
-    ("refuted",),
-)
-"""Verdicts from the best to the worst, as `statuses.outcome` names them; `gone`: there is none any more."""
-ROWS: tuple[tuple[str, ...], ...] = (
-    ("reproduced",),
-    ("calibrated",),
-    ("by_construction",),
-    ("ambiguous",),
-    ("not_reproduced", "gone"),
-)
+ORDER = (("proved",), ("holds", "supported"), ("not_exercised",), (*UNDECIDED, "gone"), ("refuted",))
+"""Verdicts from the best to the worst, as `statuses.outcome` names them; `gone`: no verdict any more."""
+ROWS = (("reproduced",), ("calibrated",), ("by_construction",), ("ambiguous",), ("not_reproduced", "gone"))
 """Rows of the reproduction table, likewise."""
-OVERALL: tuple[tuple[str, ...], ...] = (("as_expected",), ("inconclusive",), ("not_as_expected",))
+OVERALL = (("as_expected",), ("inconclusive",), ("not_as_expected",))
 """Over all claims, likewise."""
 LONGEST_INTEGER = 18
-"""Digits of an integer that is read."""
+"""Maximum number of digits of an integer."""
 
 Document = Mapping[str, Any]
 Change = dict[str, Any]
@@ -59,48 +46,44 @@ def read(folder: Path) -> Document:
     try:
         text = files.read_text(path)
         document = json.loads(text, parse_constant=_finite, parse_float=_finite, parse_int=_short)
-        json.dumps(document, ensure_ascii=False).encode()  # no halves of characters
-        if is_earlier(document):
-            raise ReportError(f"{path} is by an earlier version: make the report again (CHANGELOG.md)")
+        json.dumps(document, ensure_ascii=False).encode()  # refuses half of a surrogate pair
         if document["schema"] != REPORT:
             raise ValueError(f"its schema is not {REPORT}")
-        _usable(document)
+        _require_usable(document)
     except (OSError, ValueError, TypeError, LookupError, AttributeError, RecursionError) as error:
         why = getattr(error, "strerror", None) or f"{type(error).__name__}: {error}"
         raise ReportError(one_line(f"{path} is no report that can be used: {why}"[:300])) from None
     return dict(document)
 
 
-def is_earlier(document: Document) -> bool:
-    """Whether a report is by an earlier version: of another schema, or with broken variants of proofs."""
-    return document["schema"] in EARLIER or (document["schema"] == REPORT and "mutants" in document)
+_CLAIM = {"margin": (int, float, type(None)), "exercised": (int, type(None)), "expected": (str, type(None))}
 
 
-def _usable(document: Document) -> None:
-    """Look at everything that a comparison looks at.
+def _require_usable(document: Document) -> None:
+    """Refuse a report in which a value that the comparison reads is of another kind.
 
     Raises:
-        ValueError, TypeError, KeyError, AttributeError: if something is of another kind.
+        ValueError, TypeError, KeyError, AttributeError: if there is one.
     """
     compared(document, document)
-    for part, names in (("scenario", ("name", "title")), ("overall", ("why",)), ("provenance", ("started",))):
-        if not all(isinstance(document[part][name], str) for name in names):
-            raise TypeError(f"{part} is not what it should be")
-    for status in document["overall"]["counts"]:
-        _rank(ORDER, status)
-    if not all(isinstance(document["overall"][name], int) for name in ("checks", "as_expected")):
-        raise TypeError("overall is not what it should be")
-    for claim in document["claims"]:
-        _rank(ORDER, _outcome(claim))
-        if not isinstance(claim["margin"], float | int | None) or not isinstance(claim["exercised"], int | None):
-            raise TypeError("a margin or a count is no number")
-        if not isinstance(claim["expected"], str | None):
-            raise TypeError("an expectation is no text")
-    for event in (event for run in document["runs"].values() for event in run["events"]):
-        if not (isinstance(event["t_s"], float | int) and math.isfinite(event["t_s"])):
-            raise TypeError("the time of an event is no number")
-    for row in document["reproduction"]:
-        _rank(ROWS, row["status"])
+    overall, claims, runs = document["overall"], document["claims"], document["runs"]
+    entries: list[tuple[Mapping[str, Any], Mapping[str, Any]]] = [
+        (document["scenario"], {"name": str, "title": str}),
+        (document["provenance"], {"started": str}),
+        (overall, {"why": str, "checks": int, "as_expected": int}),
+        *((claim, _CLAIM) for claim in claims),
+        *((event, {"t_s": (int, float)}) for run in runs.values() for event in run["events"]),
+    ]
+    for entry, kinds in entries:
+        for name, kind in kinds.items():
+            if not isinstance(entry[name], kind):
+                raise TypeError(f"{name} is {entry[name]!r}")
+    for order, names in (
+        (ORDER, [*overall["counts"], *map(_outcome, claims)]),
+        (ROWS, [row["status"] for row in document["reproduction"]]),
+    ):
+        for name in names:
+            _rank(order, name)
 
 
 def compared(before: Document, after: Document) -> dict[str, Any]:
@@ -108,9 +91,9 @@ def compared(before: Document, after: Document) -> dict[str, Any]:
 
     Returns:
         Strict JSON: `regressions`, a count; lists of changes `overall` (one at most), `verdicts`, `margins`,
-        `exercised`, `expectations`, `reproduction`, `audit`, `events`. Each change has `before` and `after`
-        (None where there is none), what it is about (`claim` and `run`, `id`, or `run`, `robot`, `kind` and which of
-        its kind, `n`, from 1), and whether it is `worse`; margins have their `relative` change.
+        `exercised`, `expectations`, `reproduction`, `audit`, `events`. A change has `before` and `after` (None if
+        missing), whether it is `worse`, and what it is about: `claim` and `run`; `id`; or `run`, `robot`,
+        `kind` and `n`, the number of the event among those of its kind, from 1. Margins have their `relative` change.
     """
     found: dict[str, Any] = {
         "overall": list(_overall(before, after)),
@@ -128,14 +111,14 @@ def compared(before: Document, after: Document) -> dict[str, Any]:
 
 
 def is_rounding(change: Change) -> bool:
-    """Whether a number changed by no more than versions of numpy, scipy and solvers round differently."""
+    """Whether a number changed by no more than rounding differs between versions of numpy, scipy and solvers."""
     was, now = change["before"], change["after"]
     both = all(isinstance(side, int | float) and not isinstance(side, bool) for side in (was, now))
     return both and not change["worse"] and abs(now - was) <= WITHIN * (1.0 + abs(now))
 
 
 def _overall(before: Document, after: Document) -> Iterator[Change]:
-    """What is over all claims may change though no verdict does: where one is expected that is missing."""
+    """The verdict over all claims, which may change though no claim does: one may be missing."""
     was, now = before["overall"]["status"], after["overall"]["status"]
     worse = _rank(OVERALL, now) > _rank(OVERALL, was)
     if was != now:
@@ -200,7 +183,7 @@ def _times(events: Sequence[Mapping[str, Any]]) -> dict[tuple[str, str], list[fl
 def _paired(
     before: Sequence[Mapping[str, Any]], after: Sequence[Mapping[str, Any]], *keys: str
 ) -> Iterator[tuple[tuple[str, ...], Mapping[str, Any] | None, Mapping[str, Any] | None]]:
-    """What has the same key in both lists, and what is in one of them only."""
+    """Entries with the same key in both lists, and those in only one of them."""
     old, new = ({tuple(str(each[key]) for key in keys): each for each in part} for part in (before, after))
     for key in dict.fromkeys([*old, *new]):
         yield key, old.get(key), new.get(key)
@@ -215,7 +198,7 @@ def _rank(order: Sequence[Sequence[str]], name: str) -> int:
 
 
 def _relative(change: Change) -> float | None:
-    """The change of a number relative to what it was; None where there is no such thing."""
+    """The change of a number relative to what it was; None if it was 0 or is gone."""
     was, now = change["before"], change["after"]
     relative = (now - was) / abs(was) if was and now is not None else math.nan
     return relative if math.isfinite(relative) else None

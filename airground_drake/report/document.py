@@ -17,6 +17,7 @@ from airground_drake.base.files import sha256
 from airground_drake.base.statuses import NOT_EXERCISED, STATUSES, UNDECIDED, admits_either, outcome
 from airground_drake.registry import method_of
 from airground_drake.report import metrics, reproduction
+from airground_drake.report.phrases import counted
 from airground_drake.run.trace import Trace
 from airground_drake.scenarios.plugins import OPTION
 from airground_drake.scenarios.schema import Scenario
@@ -25,7 +26,7 @@ from airground_drake.verify.claim import Verdict
 SCHEMA = "airground_drake.report/2"
 
 MOST_LISTED = 4
-"""Checks that a sentence names."""
+"""Maximum number of checks that a sentence names."""
 EXIT_CODES = {"as_expected": 0, "not_as_expected": 1, "inconclusive": 3}
 
 
@@ -66,15 +67,10 @@ def build(
     ]
     items = sorted([*of_runs(scenario, traces), *map(dict, audit)], key=lambda item: item["id"])
     resolved = asdict(scenario)
+    about = {key: resolved[key] for key in ("name", "title", "description")}
     document = {
         "schema": SCHEMA,
-        "scenario": {
-            "name": scenario.name,
-            "title": scenario.title,
-            "description": scenario.description,
-            "sha256": digest,
-            "resolved": resolved,
-        },
+        "scenario": {**about, "sha256": digest, "resolved": resolved},
         "provenance": dict(provenance),
         "overall": overall(claims, missing(scenario, traces, claims, required), items if audit else ()),
         "runs": {name: _run(scenario, trace) for name, trace in traces.items()},
@@ -89,7 +85,7 @@ def build(
 
 
 def sealed(document: Mapping[str, Any], folder: Path, names: Iterable[str]) -> dict[str, Any]:
-    """The document with the SHA-256 of every other file of the report under `files`, so that none can be exchanged.
+    """The document with the SHA-256 of every other file of the report under `files`: an exchanged file is noticed.
 
     Args:
         document: of `build`.
@@ -107,39 +103,34 @@ def overall(
     absent: Sequence[Mapping[str, Any]],
     items: Sequence[Mapping[str, Any]] = (),
 ) -> dict[str, Any]:
-    """The verdict over all claims: `status`, `exit_code`, `why`, counts, and what differs, is open or missing.
+    """The verdict over all claims, and over the findings about the paper `items`.
 
-    `counts` has a claim that was established because nothing put it to the test under `not_exercised`, never under
-    its status; the list of that name says which they are. `either` lists claims that the scenario admits refuted as
-    well as established: that they came out as expected says nothing.
-
-    Of `items`, the findings about the paper, one that was not demonstrated differs, too.
+    Returns:
+        `status`, `exit_code`, `why`, counts, and lists of what differs, is undecided or is missing. `counts` has a
+        claim that nothing put to the test under `not_exercised`, never under its status; the list of that name says
+        which these are. `either` lists claims that the scenario admits refuted as well as established: that they came
+        out as expected says nothing. A finding that was not demonstrated differs, too.
     """
     undemonstrated = [item["id"] for item in items if not item["demonstrated"]]
     keys = ("id", "run", "status", "expected", "exercised")
-    unexpected = [{key: c[key] for key in keys} for c in claims if not c["as_expected"]]
-    differs = [c for c in unexpected if c["status"] not in UNDECIDED]
-    undecided = [c for c in unexpected if c["status"] in UNDECIDED]
-    counts = Counter(outcome(c["status"], c["exercised"]) for c in claims)
-    idle = [{"id": c["id"], "run": c["run"]} for c in claims if outcome(c["status"], c["exercised"]) == NOT_EXERCISED]
-    either = [{"id": c["id"], "run": c["run"]} for c in claims if admits_either(c["expected"])]
+    unexpected = [{key: claim[key] for key in keys} for claim in claims if not claim["as_expected"]]
+    differs = [claim for claim in unexpected if claim["status"] not in UNDECIDED]
+    undecided = [claim for claim in unexpected if claim["status"] in UNDECIDED]
+    outcomes = [(outcome(claim["status"], claim["exercised"]), claim) for claim in claims]
+    counts = Counter(found for found, _ in outcomes)
     if differs:
         status = "not_as_expected"
         differ = "differs" if len(differs) == 1 else "differ"
-        why = f"{len(differs)} of {_checks(len(claims))} {differ} from what the scenario declares: {_list(differs)}."
+        why = f"{len(differs)} of {counted(len(claims), 'check')} {differ} from what the scenario declares: "
+        why += f"{_listed(differs)}."
     elif undemonstrated:
         status = "not_as_expected"
         why = f"Findings about the paper that were not demonstrated: {', '.join(map(str, undemonstrated))}."
     elif undecided or absent or not claims:
-        status = "inconclusive"
-        open_items = [*undecided, *absent]
-        why = f"{_checks(len(open_items))} could not be decided: {_list(open_items)}." if open_items else "No checks."
+        status, left = "inconclusive", [*undecided, *absent]
+        why = f"{counted(len(left), 'check')} could not be decided: {_listed(left)}." if left else "No checks."
     else:
-        status = "as_expected"
-        why = f"All {_checks(len(claims))} gave the verdict that the scenario declares for them."
-        why += f" {len(either)} of them may come out either way: {_together(either)}." if either else ""
-        why += f" {len(idle)} of them had nothing to check: {_together(idle)}." if idle else ""
-        why += f" All {len(items)} findings about the paper were demonstrated." if items else ""
+        status, why = "as_expected", f"All {counted(len(claims), 'check')} gave the verdict that the scenario declares."
     return {
         "status": status,
         "exit_code": EXIT_CODES[status],
@@ -147,8 +138,8 @@ def overall(
         "checks": len(claims),
         "as_expected": len(claims) - len(unexpected),
         "counts": {name: counts[name] for name in (*STATUSES, NOT_EXERCISED) if counts[name]},
-        "not_exercised": idle,
-        "either": either,
+        "not_exercised": _named(claim for found, claim in outcomes if found == NOT_EXERCISED),
+        "either": _named(claim for claim in claims if admits_either(claim["expected"])),
         "differs": differs,
         "undecided": undecided,
         "missing": list(absent),
@@ -164,17 +155,17 @@ def missing(
 ) -> list[dict[str, str]]:
     """Runs without a trace or any verdict, and claims that are expected or required but nobody checked."""
     checked = {(claim["run"], claim["id"]) for claim in claims}
+    judged = {run for run, _ in checked}
     found = []
     for name, run in scenario.runs.items():
         if name not in traces:
-            found.append({"run": name, "id": "", "why": "the run has no trace"})
-        elif name not in {of_run for of_run, _ in checked}:
-            found.append({"run": name, "id": "", "why": "no claim was checked on the run"})
+            found.append((name, "", "the run has no trace"))
+        elif name not in judged:
+            found.append((name, "", "no claim was checked on the run"))
         else:
-            unchecked = [claim for claim in run.expected if (name, claim) not in checked]
-            found += [{"run": name, "id": claim, "why": "expected, but not checked"} for claim in unchecked]
-    unproved = [claim for claim in dict.fromkeys([*required, *scenario.expected]) if ("", claim) not in checked]
-    return found + [{"run": "", "id": claim, "why": "not checked"} for claim in unproved]
+            found += [(name, claim, "expected, but not checked") for claim in run.expected]
+    found += [("", claim, "not checked") for claim in dict.fromkeys([*required, *scenario.expected])]
+    return [{"run": run, "id": claim, "why": why} for run, claim, why in found if (run, claim) not in checked]
 
 
 def _run(scenario: Scenario, trace: Trace) -> dict[str, Any]:
@@ -193,7 +184,7 @@ def _run(scenario: Scenario, trace: Trace) -> dict[str, Any]:
 
 
 def _lookup(resolved: Any, key: str) -> Any:
-    """Value at a dotted path of the resolved scenario, None if there is none."""
+    """Value at a dotted path of the resolved scenario, None if the path leads nowhere."""
     for part in key.split("."):
         if isinstance(resolved, list):
             resolved = {str(position): each for position, each in enumerate(resolved)}
@@ -203,40 +194,22 @@ def _lookup(resolved: Any, key: str) -> Any:
     return resolved
 
 
-def _checks(count: int) -> str:
-    return f"{count} check" if count == 1 else f"{count} checks"
+def _named(claims: Iterable[Mapping[str, Any]]) -> list[dict[str, str]]:
+    return [{"id": claim["id"], "run": claim["run"]} for claim in claims]
 
 
-def _together(items: Sequence[Mapping[str, Any]]) -> str:
-    """Claims and their runs in words; those of equal runs together."""
-    runs: dict[str, list[str]] = {}
-    for item in items:
-        runs.setdefault(item["id"], []).append(item["run"])
-    together: dict[str, list[str]] = {}
-    for name, where in runs.items():
-        together.setdefault(", ".join(filter(None, where)), []).append(name)
-    return "; ".join(f"{', '.join(names)}{_on(where)}" for where, names in together.items())
-
-
-def _list(items: Sequence[Mapping[str, Any]]) -> str:
+def _listed(items: Sequence[Mapping[str, Any]]) -> str:
     """The first few items in words."""
-    words = [
-        f"{item['id']}{_on(item['run'])} ({_found(item)}, expected {item['expected']})"
-        if "status" in item
-        else f"{item['id'] or 'run'} {item['run']} ({item['why']})"
-        for item in items[:MOST_LISTED]
-    ]
-    return ", ".join(words) + (f" and {len(items) - MOST_LISTED} more" if len(items) > MOST_LISTED else "")
+    more = f" and {len(items) - MOST_LISTED} more" if len(items) > MOST_LISTED else ""
+    return ", ".join(map(_told, items[:MOST_LISTED])) + more
 
 
-def _found(item: Mapping[str, Any]) -> str:
-    """The status, or that there was nothing to check."""
+def _told(item: Mapping[str, Any]) -> str:
+    name = " on run ".join(filter(None, (item["id"], item["run"])))
+    if "why" in item:
+        return f"{name} ({item['why']})"
     idle = outcome(item["status"], item["exercised"]) == NOT_EXERCISED
-    return f"{item['status']}, nothing to check" if idle else str(item["status"])
-
-
-def _on(run: str) -> str:
-    return f" on run {run}" if run else ""
+    return f"{name} ({item['status']}{', nothing to check' * idle}, expected {item['expected']})"
 
 
 def _strict(value: Any) -> Any:

@@ -8,20 +8,19 @@ from typing import Any
 from airground_drake.report.figures.panels import Table
 
 MAX_ROWS, MAX_COLUMNS, MAX_CELL_CHARS = 40, 10, 200
-"""What a table shows at most; all of it is in report.json."""
-UNITS = ("1_m2_s", "1_m_s", "m_sqrt_s", "m2_s", "m_s", "1_s", "1_m", "m", "s")
-"""Units with which the names of quantities end, the longest first."""
-_WRITTEN = {
+"""Maximum size of a table; report.json has all of it."""
+UNITS = {
     "1_m2_s": "1/(m²s)", "1_m_s": "1/(m s)", "m_sqrt_s": "m/√s", "m2_s": "m²s", "m_s": "m/s", "1_s": "1/s",
-    "1_m": "1/m",
+    "1_m": "1/m", "m": "m", "s": "s",
 }  # fmt: skip
+"""Units with which the names of quantities end, and how they are written; the longest first."""
 
 
 def split(key: str) -> tuple[str, str]:
-    """A key as name and unit, as a reader would write them: `min_distance_m` is "min distance" and "m"."""
+    """The name and the unit in a key: `min_distance_m` is "min distance" and "m"."""
     for unit in UNITS:
         if key.endswith(f"_{unit}"):
-            return key.removesuffix(f"_{unit}").replace("_", " "), _WRITTEN.get(unit, unit)
+            return key.removesuffix(f"_{unit}").replace("_", " "), UNITS[unit]
     return key.replace("_", " "), ""
 
 
@@ -48,12 +47,10 @@ def tables(evidence: Mapping[str, Any], caption: str, number: Callable[[Any], st
 
 
 def _records(value: Any) -> list[tuple[str, Mapping[str, Any]]]:
-    """Records with what heads them: a list of them by number, a record of records by key; empty: neither."""
-    if isinstance(value, list) and value and all(isinstance(each, Mapping) and each for each in value):
-        return [(str(position + 1), each) for position, each in enumerate(value)]
-    if isinstance(value, Mapping) and value and all(isinstance(each, Mapping) and each for each in value.values()):
-        return [(str(key), each) for key, each in value.items()]
-    return []
+    """The records in a list, by number, or in a record, by key; empty if the value is neither."""
+    items = value.items() if isinstance(value, Mapping) else enumerate(value, 1) if isinstance(value, list) else ()
+    records = [(str(key), each) for key, each in items]
+    return records if all(isinstance(each, Mapping) and each for _, each in records) else []
 
 
 def _table(caption: str, records: Sequence[tuple[str, Mapping[str, Any]]], number: Callable[[Any], str]) -> Table:

@@ -1,7 +1,6 @@
-"""The folder of a report: whose it is, and whether it can be written, asked before the work; what is of an old report.
+"""The folder of a report: whether one may be written there, asked before the work, and removing an old one.
 
-What belongs to a report is told by its path. Nothing else is ever removed, and nothing else may be there unless a
-report of ours is there, too.
+A file belongs to a report by its path. No other file is removed, and none may be there unless a report is there, too.
 """
 
 from __future__ import annotations
@@ -20,19 +19,17 @@ PAGES = {"html": "report.html", "json": "report.json", "junit": "junit.xml"}
 """The formats of a report, and the file of each."""
 RULE = "allowed: a folder that is new or empty, has a report.json of ours, or nothing but files of a report"
 
-_CLAIM = r"[A-Z][A-Z0-9-]*"
 _FILES = re.compile(
     r"report\.html|report\.json|junit\.xml|diagram\.dot|diagram\.svg"
-    r"|trace/\w+/(\w+\.parquet|timings\.json|meta\.json)"
-    rf"|certificates/{_CLAIM}/\w[\w.-]*|proofs/(proofs\.json|run_\w+\.v|index\.json|{_CLAIM}/\w[\w.-]*)"
+    r"|trace/\w+/(\w+\.parquet|timings\.json|meta\.json)|proofs/(proofs\.json|run_\w+\.v)"
 )
-_FOLDERS = re.compile(rf"trace(/\w+)?|(certificates|proofs)(/{_CLAIM})?")
+_FOLDERS = re.compile(r"trace(/\w+)?|proofs")
 _OURS = re.compile(rb'\s*\{\s*"schema":\s*"airground_drake\.report/')
 
 
 @contextmanager
 def held(folder: Path) -> Iterator[None]:
-    """Prepare the folder, and keep other reports out of it; no file says so, and it ends with this process.
+    """Prepare the folder, and keep other reports out of it by a lock that ends with this process.
 
     Raises:
         FolderError: as `prepare`, and if another report is being written to it.
@@ -45,18 +42,18 @@ def held(folder: Path) -> Iterator[None]:
             fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
             raise FolderError(one_line(f"{folder} is in use by another report; name another folder")) from None
-        except OSError:  # the file system has no such locks
+        except OSError:  # a file system without locks
             pass
         prepare(folder)
         yield
     finally:
         with suppress(OSError):
-            fcntl.flock(handle, fcntl.LOCK_UN)  # also where a process that was forked meanwhile still lives
+            fcntl.flock(handle, fcntl.LOCK_UN)  # a process forked meanwhile may still hold the handle
         os.close(handle)
 
 
 def prepare(folder: Path) -> None:
-    """Create the folder if need be, look whose it is, try to write to it, and sweep what killed runs have left in it.
+    """Create the folder if need be, see that a report may be written there, and remove what killed runs have left.
 
     Raises:
         FolderError: if it holds something that is no report, or cannot be created or written.
@@ -64,14 +61,14 @@ def prepare(folder: Path) -> None:
     with files.wanted(folder, "a folder for the report"):
         folder.mkdir(parents=True, exist_ok=True)
         if why := _refused(folder):
-            raise FolderError(one_line(why))
+            raise FolderError(one_line(f"{folder} holds {why}; {RULE}"))
         files.sweep(folder)
         for each in (folder, *_parts(folder)):
             files.try_to_write(each)
 
 
 def clear(folder: Path) -> None:
-    """Remove what is of an earlier report: pages of all formats first, then traces, certificates and what came later.
+    """Remove an earlier report: the pages first, so that none is ever beside other traces.
 
     Raises:
         OSError: if something cannot be removed.
@@ -90,42 +87,37 @@ def is_report(folder: Path) -> bool:
     """Whether there is a report.json of ours in a folder."""
     try:
         with files.open_regular(folder / PAGES["json"]) as file:
-            beginning = min(100, os.fstat(file.fileno()).st_size)  # a file of the kernel's has none, and may wait
+            beginning = min(
+                100, os.fstat(file.fileno()).st_size
+            )  # files of the kernel have size 0, and reading may block
             return _OURS.match(file.read(beginning)) is not None
     except OSError:
         return False
 
 
 def _refused(folder: Path) -> str:
-    """Why the folder may not be written to; '' if it may."""
+    """What in the folder keeps a report from being written there; '' if nothing does."""
     ours = is_report(folder)
     for path in _within(folder):
         name = path.relative_to(folder).as_posix()
-        if _blocks(path, name):
-            return f"{folder} holds {name!r}, which is in the way; {RULE}"
-        if not (ours or _belongs(name) or files.is_partial(path)):
-            return f"{folder} holds {name!r} and no report; {RULE}"
+        is_folder = path.is_dir()
+        if (_FOLDERS if is_folder else _FILES).fullmatch(name) and not (is_folder and path.is_symlink()):
+            continue
+        if _FILES.fullmatch(name) or _FOLDERS.fullmatch(name):
+            return f"{name!r}, which is in the way"
+        if not (ours or files.is_partial(path)):
+            return f"{name!r} and no report"
     return ""
 
 
 def _within(folder: Path) -> Iterator[Path]:
-    """What is in the folder, each folder before what is in it; of folders in it only those that a report has."""
+    """The entries of the folder, and of the folders in it that a report has; each folder before its entries."""
     for path in sorted(folder.iterdir()):
         yield path
         if path.is_dir() and _FOLDERS.fullmatch(path.name):
             yield from sorted(path.rglob("*"))
 
 
-def _belongs(name: str) -> bool:
-    return bool(_FILES.fullmatch(name) or _FOLDERS.fullmatch(name))
-
-
-def _blocks(path: Path, name: str) -> bool:
-    """Whether there is a file where a report has a folder, or the other way round, or a folder that is elsewhere."""
-    there = path.is_dir()
-    return _belongs(name) and ((there and path.is_symlink()) or not (_FOLDERS if there else _FILES).fullmatch(name))
-
-
 def _parts(folder: Path) -> list[Path]:
-    """The folders of a report that there are, each before those in it."""
+    """The folders of a report in the folder, each before those in it."""
     return [each for each in _within(folder) if each.is_dir() and _FOLDERS.fullmatch(str(each.relative_to(folder)))]

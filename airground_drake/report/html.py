@@ -1,7 +1,7 @@
 """report.html: one self-contained page that renders report.json, the figures and the diagram.
 
-Its content security policy admits its own style sheet and scripts, by their digests, and nothing else; without scripts
-it has everything but the filter of claims and the marks that move over the trajectories.
+Its content security policy admits only its own style sheet and scripts, by their digests. Without scripts it lacks the
+filter of claims and the marks that move over the trajectories, nothing else.
 """
 
 from __future__ import annotations
@@ -18,12 +18,15 @@ from jinja2 import Environment
 from markupsafe import Markup
 
 from airground_drake.base.statuses import PASSING, outcome
-from airground_drake.report import attention, evidence, summary
+from airground_drake.gatekeeper.answer import WORDS
+from airground_drake.report import attention, evidence, phrases, summary
 from airground_drake.report.compare import is_rounding
 from airground_drake.report.figures import svg
 from airground_drake.report.figures.canvas import DARK
 from airground_drake.report.figures.panels import Figure, Table
 from airground_drake.report.mathml import mathml
+from airground_drake.report.outcomes import pairs
+from airground_drake.report.phrases import grouped
 from airground_drake.report.proved import place
 from airground_drake.report.reproduction import YES_NO
 from airground_drake.report.templating import environment_of
@@ -36,10 +39,10 @@ MAX_DIAGRAM_CHARS = 500_000
 MAX_SCENARIO_CHARS = 20_000
 LINE_CHARS = 110
 KINDS = ("declared", "stuck")
-"""Evidence of these kinds is shown instead of the verdict where that passes: it must not look like more than it is."""
+"""Kinds of evidence shown instead of a passing verdict, so that it does not look like more than it is."""
 MAX_DISTANCE_ROWS = 120
 MAX_FAULTS = 40
-"""Different ones of a run that are listed."""
+"""Maximum number of kinds of faults listed per run."""
 
 SECTIONS = {
     "happened": "What happened",
@@ -52,7 +55,7 @@ SECTIONS = {
     "claims": "All checks",
     "provenance": "How to run it again",
 }
-"""Sections of the page, in order, by their identifiers; what has nothing to say is left out."""
+"""Sections of the page, in order, by their identifiers; an empty section is left out."""
 PLACES = {"distances": "safe", **dict.fromkeys(("decision", "events", "threshold-choice"), "intervened")}
 """Sections of the figures; the others are maps of what happened."""
 LOOKS = {"yes": "good", "partly": "tuned", "no": "bad", "open": "open", "none": "idle"}
@@ -88,22 +91,17 @@ def render(document: Mapping[str, Any], figures: Sequence[Figure], diagram_svg: 
     Args:
         document: report.json, as built by `document.build`.
         figures: as drawn by `figures.draw` and the like, in the order of the page.
-        diagram_svg: the exported block diagram; left out if it is not an SVG or too large to inline.
+        diagram_svg: the block diagram; left out if it is no SVG or too large to inline.
     """
-    distances = _distances(document["runs"])
-    claims = document["claims"]
-    plates: dict[str, list[Figure]] = {}
-    beside: dict[str, list[Figure]] = {}
-    for figure in figures:
-        if figure.beside:
-            beside.setdefault(figure.beside, []).append(figure)
-        else:
-            plates.setdefault(PLACES.get(figure.id, "happened"), []).append(figure)
+    runs, claims = document["runs"], document["claims"]
+    distances = [(name, pair) for name, run in runs.items() for pair in pairs(run)]
+    distances.sort(key=lambda found: found[1].margin_m)
+    plates = grouped((PLACES.get(figure.id, "happened"), figure) for figure in figures if not figure.beside)
     diagram = _diagram(diagram_svg, str(document["scenario"]["name"]))
     sections = {
-        "happened": bool(document["runs"]),
+        "happened": bool(runs),
         "safe": bool(distances),
-        "intervened": "intervened" in plates or any(r["metrics"]["gatekeeper"] for r in document["runs"].values()),
+        "intervened": "intervened" in plates or any(r["metrics"]["gatekeeper"] for r in runs.values()),
         "reproduction": bool(document["reproduction"]),
         "choices": bool(document["choices"]),
         "audit": bool(document["audit"]),
@@ -111,41 +109,40 @@ def render(document: Mapping[str, Any], figures: Sequence[Figure], diagram_svg: 
     }
     return environment().get_template("report.html.j2").render(
         report=document,
-        headline=summary.headline(document),
-        answers=summary.answers(document),
-        methods=summary.methods(document),
-        required=summary.required_m(document),
-        beware=summary.do_not_conclude(document),
-        declared=summary.as_declared(document),
-        legend=summary.legend(document),
+        first=summary.first_screen(document),
         sections=[(name, title) for name, title in SECTIONS.items() if sections.get(name, True)],
         plates=plates,
-        beside=beside,
+        beside=grouped((figure.beside, figure) for figure in figures if figure.beside),
         diagram=diagram,
         groups=_by_claim(claims),
         outcomes=list(dict.fromkeys(map(_shown, claims))),
         attention=attention.items(document),
         assumptions=_assumptions(claims),
-        distances=sorted(distances, key=lambda row: float(row["margin"]))[:MAX_DISTANCE_ROWS],
+        distances=distances[:MAX_DISTANCE_ROWS],
         left_out=max(0, len(distances) - MAX_DISTANCE_ROWS),
     )  # fmt: skip
 
 
+def render_beside(template: str, **content: Any) -> str:
+    """A page beside the report, without scripts, from a template of this package."""
+    policy = Markup(security_policy(stylesheet()))
+    return environment().get_template(template).render(policy=policy, scripts=(), **content)
+
+
 @cache
 def environment() -> Environment:
-    """The environment of the report's page and of those beside it."""
+    """Renders the report's page and those beside it."""
     environment = environment_of("airground_drake.report")
     style = stylesheet()
     scripts = [_template(name) for name in SCRIPTS]
     environment.filters.update(
         num=number, value=value, yaml=as_yaml, together=attention.faults_together, inline=Markup, mathml=mathml,
         evidence=evidence_tables, proof=place, records=partial(evidence.tables, number=number), brief=brief,
-        shown=shown,
     )  # fmt: skip
     environment.tests["rounding"] = is_rounding
     environment.globals.update(
-        chips=CHIPS, shown=_shown, refused=attention.REFUSED, max_faults=MAX_FAULTS,
-        marks=summary.MARKS, kinds=LOOKS, names=summary.MEANINGS,
+        chips=CHIPS, shown=_shown, reasons=WORDS, max_faults=MAX_FAULTS,
+        marks=phrases.MARKS, kinds=LOOKS, names=phrases.MEANINGS,
         policy=Markup(security_policy(style, scripts)), style=Markup(style), scripts=list(map(Markup, scripts)),
     )  # fmt: skip
     return environment
@@ -181,7 +178,7 @@ def digest(text: str) -> str:
 
 
 def _in_the_dark() -> str:
-    """Rules that give the drawings other colours on a dark page; an ancestor in a selector is not seen from <use>."""
+    """Rules that recolour the drawings on a dark page; they name no ancestor, which would not match inside <use>."""
     rules = "\n".join(
         f'[{name}="{light}"] {{ {name}: {dark}; }}' for light, dark in DARK.items() for name in ("fill", "stroke")
     )
@@ -219,38 +216,23 @@ def value(x: Any, unit: str = "") -> str:
     return f"{text} {unit}".strip()
 
 
-def brief(x: Any, unit: str = "") -> str:
-    """A finding about the paper in a line: numbers with their units, named where there are several."""
+def brief(x: Any, unit: str = "", digits: int = 5) -> str:
+    """A value or several in a line: numbers with their units, named where there are several."""
     if isinstance(x, Mapping):
-        return "; ".join(
-            f"{name} {brief(item, of or unit)}" for key, item in x.items() for name, of in [evidence.split(key)]
-        )
+        named = ((evidence.split(key), item) for key, item in x.items())
+        return "; ".join(f"{name} {brief(item, own or unit, digits)}" for (name, own), item in named)
     if isinstance(x, list):
-        return ", ".join(brief(item, unit) for item in x)
+        return ", ".join(brief(item, unit, digits) for item in x)
     if isinstance(x, bool):
         return "yes" if x else "no"
-    return f"{number(x, 5)} {unit}".strip() if isinstance(x, int | float) else str(x)
-
-
-def shown(x: Any) -> str:
-    """What a change between two reports has on one side, for reading."""
-    if isinstance(x, dict):
-        return ", ".join(f"{name} {shown(item)}" for name, item in x.items())
-    if isinstance(x, list):
-        return f"({', '.join(map(shown, x))})"
-    if isinstance(x, bool):
-        return "yes" if x else "no"
-    return number(x, 6) if isinstance(x, int | float) else str(x or "none").replace("_", " ")
+    return f"{number(x, digits)} {unit}".strip() if isinstance(x, int | float) else str(x)
 
 
 def as_yaml(x: Any) -> str:
-    """A scenario for reading; what is not ASCII is escaped, and so is what would turn or break lines."""
+    """A scenario for reading, cut if it is long; everything but ASCII is escaped, so that nothing turns the text."""
     text: str = yaml.safe_dump(x, default_flow_style=None, sort_keys=False, width=LINE_CHARS)
-    return (
-        text
-        if len(text) <= MAX_SCENARIO_CHARS
-        else f"{text[:MAX_SCENARIO_CHARS]}\n… cut here; report.json has all of it"
-    )
+    cut = "\n… cut here; report.json has all of it" if len(text) > MAX_SCENARIO_CHARS else ""
+    return text[:MAX_SCENARIO_CHARS] + cut
 
 
 def _diagram(source: str | None, name: str) -> str | None:
@@ -267,51 +249,28 @@ def _diagram(source: str | None, name: str) -> str | None:
 
 def _by_claim(claims: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
     """Claims of the same identifier together, those with a deviation first."""
-    groups: dict[str, list[Mapping[str, Any]]] = {}
-    for claim in claims:
-        groups.setdefault(claim["id"], []).append(claim)
-    grouped = [
+    groups = [
         {
             "id": name,
             "claims": members,
             "fine": all(claim["as_expected"] for claim in members),
-            "settled": all(
-                claim["as_expected"] and claim["status"] in PASSING and not claim["run"] for claim in members
-            ),
-            "verdicts": _together(members, sum(bool(claim["run"]) for claim in members)),
+            "settled": all(c["as_expected"] and c["status"] in PASSING and not c["run"] for c in members),
+            "verdicts": _together(members),
         }
-        for name, members in groups.items()
+        for name, members in grouped((claim["id"], claim) for claim in claims).items()
     ]
-    return sorted(grouped, key=lambda group: bool(group["fine"]))
+    return sorted(groups, key=lambda group: bool(group["fine"]))
 
 
-def _together(members: Sequence[Mapping[str, Any]], runs: int) -> list[tuple[Mapping[str, Any], str]]:
-    """Verdicts of a claim that are shown alike, each with its runs; all of them are several."""
-    alike: dict[tuple[str, bool, str], tuple[Mapping[str, Any], list[str]]] = {}
-    for claim in members:
-        fine = bool(claim["as_expected"])
-        key = _shown(claim), fine, "" if fine else str(claim["expected"])
-        alike.setdefault(key, (claim, []))[1].extend(filter(None, [claim["run"]]))
-    return [(claim, f"all {runs}" if len(names) == runs > 1 else ", ".join(names)) for claim, names in alike.values()]
+def _together(members: Sequence[Mapping[str, Any]]) -> list[tuple[Mapping[str, Any], str]]:
+    """Verdicts of a claim that are shown alike, each with its runs; "all 3" if three runs have the same."""
+    runs = sum(bool(claim["run"]) for claim in members)
+    alike = grouped(((_shown(claim), claim["as_expected"] or claim["expected"]), claim) for claim in members)
+    names = [(those[0], [claim["run"] for claim in those if claim["run"]]) for those in alike.values()]
+    return [(claim, f"all {runs}" if len(where) == runs > 1 else ", ".join(where)) for claim, where in names]
 
 
 def _assumptions(claims: Sequence[Mapping[str, Any]]) -> dict[str, list[str]]:
-    """What is taken for granted, and by which claims; what most claims rest on first."""
-    resting: dict[str, list[str]] = {}
-    for claim in claims:
-        for assumption in claim["assumptions"]:
-            names = resting.setdefault(assumption, [])
-            if claim["id"] not in names:
-                names.append(claim["id"])
+    """Assumptions and the claims that make them; those of many claims first."""
+    resting = grouped(dict.fromkeys((assumed, claim["id"]) for claim in claims for assumed in claim["assumptions"]))
     return dict(sorted(resting.items(), key=lambda item: -len(item[1])))
-
-
-def _distances(runs: Mapping[str, Mapping[str, Any]]) -> list[dict[str, Any]]:
-    """All smallest distances, a row each with its margin."""
-    return [
-        {"run": run, "robot": robot, "other": other, "margin": found["value"] - found["safe_distance_m"], **found}
-        for run, entry in runs.items()
-        for kind in ("min_distance_m", "min_robot_distance_m")
-        for robot, others in entry["metrics"][kind].items()
-        for other, found in others.items()
-    ]

@@ -17,9 +17,9 @@ _NOT_XML = re.compile("[^\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]"
 def render(document: Mapping[str, Any]) -> str:
     """JUnit XML of report.json: a suite per run.
 
-    A claim whose status is the expected one passes; if it holds because nothing put it to the test, it is skipped,
-    with that reason. Otherwise it fails; an `error` is an error and a `not_run` is skipped. What is missing altogether
-    (a run without a trace, a claim that nobody checked) is an error.
+    A claim whose status is the expected one passes; it is skipped, with the reason, if nothing put it to the test.
+    Otherwise it fails; an `error` is an error and a `not_run` is skipped. A run without a trace and a claim that nobody
+    checked are errors.
 
     Args:
         document: as built by `document.build`.
@@ -50,33 +50,30 @@ def _case(suite: ET.Element, scenario: str, run: str, claim: str) -> ET.Element:
 
 
 def _outcome(case: ET.Element, claim: Mapping[str, Any]) -> None:
+    """Add to a test case what came of its claim."""
     idle = outcome(claim["status"], claim["exercised"]) == NOT_EXERCISED
-    if claim["as_expected"] and idle:
-        reason = f"{claim['status']}, nothing to check: 0 {claim['exercised_by']}; {claim['statement']}"
-        ET.SubElement(case, "skipped", {"message": _text(reason)})
+    found = f"{claim['status']}, nothing to check (0 {claim['exercised_by']})" if idle else claim["status"]
     if claim["as_expected"]:
+        if idle:
+            ET.SubElement(case, "skipped", {"message": _text(f"{found}: {claim['statement']}")})
         return
-    kind = {"error": "error", "not_run": "skipped"}.get(claim["status"], "failure")
     margin = "" if claim["margin"] is None else f", margin {claim['margin']:.4g} {claim['unit']}".rstrip()
     if margin and claim["quantity"]:
         margin += f" ({claim['quantity']})"
-    found = f"{claim['status']}, nothing to check (0 {claim['exercised_by']})" if idle else claim["status"]
-    message = f"{found}, expected {claim['expected']}{margin}: {claim['statement']}"
-    element = ET.SubElement(case, kind, {"message": _text(message)})
-    if kind != "skipped":
-        element.set("type", claim["status"])
-        details = {key: claim[key] for key in ("where", "counterexample", "evidence") if claim[key]}
-        element.text = _text(json.dumps(details, indent=1, ensure_ascii=False))
+    message = _text(f"{found}, expected {claim['expected']}{margin}: {claim['statement']}")
+    if claim["status"] == "not_run":
+        ET.SubElement(case, "skipped", {"message": message})
+        return
+    kind = "error" if claim["status"] == "error" else "failure"
+    element = ET.SubElement(case, kind, {"message": message, "type": claim["status"]})
+    details = {key: claim[key] for key in ("where", "counterexample", "evidence") if claim[key]}
+    element.text = _text(json.dumps(details, indent=1, ensure_ascii=False))
 
 
 def _count(element: ET.Element, suites: list[ET.Element], seconds: float) -> None:
     """Set the totals of a suite, or of all suites."""
-    for total, path in (
-        ("tests", "testcase"),
-        ("failures", "*/failure"),
-        ("errors", "*/error"),
-        ("skipped", "*/skipped"),
-    ):
+    paths = {"tests": "testcase", "failures": "*/failure", "errors": "*/error", "skipped": "*/skipped"}
+    for total, path in paths.items():
         element.set(total, str(sum(len(suite.findall(path)) for suite in suites)))
     element.set("time", f"{seconds:.3f}")
 

@@ -2,50 +2,52 @@
 
 from __future__ import annotations
 
-import json
 import time
-from collections.abc import Sequence
 from datetime import UTC, datetime
 from functools import partial
 from importlib import import_module
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from airground_drake.base import files
-from airground_drake.base.errors import ReportError
 from airground_drake.base.progress import SILENT, Progress
 from airground_drake.report import folder
-from airground_drake.report.folder import PAGES
 from airground_drake.run.runs import simulate_all
 from airground_drake.scenarios.estimate import DEFAULT_LIMITS, Limits, within
 from airground_drake.scenarios.schema import Scenario
 
 _NEXT = "airground_drake.report.after_runs"
-"""What follows the simulation takes long to import: that is done while the runs are simulated."""
+"""Slow to import, and needed after the simulation: it is imported while the runs are simulated."""
+
+
+class Wanted(NamedTuple):
+    """What a report should have, and what it may cost.
+
+    Attributes:
+        formats: which of html, json and junit to write; traces and diagram are always written.
+        command: how to make this report again.
+        kept: folder of kept findings about the model, see `verify_model`; None: everything anew.
+        audited: whether to add all findings about the paper, also those that take other runs.
+        limits: what the scenario may ask for.
+    """
+
+    formats: tuple[str, ...] = tuple(folder.PAGES)
+    command: str = ""
+    kept: Path | None = None
+    audited: bool = False
+    limits: Limits = DEFAULT_LIMITS
 
 
 def write_report(
-    scenario: Scenario,
-    digest: str,
-    output: Path,
-    formats: Sequence[str] = tuple(PAGES),
-    command: str = "",
-    kept: Path | None = None,
-    audited: bool = False,
-    limits: Limits = DEFAULT_LIMITS,
-    progress: Progress = SILENT,
+    scenario: Scenario, digest: str, output: Path, wanted: Wanted, progress: Progress = SILENT
 ) -> dict[str, Any]:
     """Simulate every run, judge it, and write everything to a folder.
 
     Args:
         scenario: validated scenario.
         digest: SHA-256 of its file.
-        output: folder, created if need be; nothing of an earlier report stays in it.
-        formats: which of html, json and junit to write; traces and diagram are always written.
-        command: how to make this report again.
-        kept: folder of kept findings about the model, see `verify_model`; None: everything anew.
-        audited: add all findings about the paper, also those that take other runs.
-        limits: what the scenario may ask for.
+        output: folder, created if need be; an earlier report in it is removed.
+        wanted: what the report should have.
         progress: is told what is done.
 
     Returns:
@@ -56,41 +58,21 @@ def write_report(
         FolderError: if the folder holds something that is no report, is in use, or cannot be written; before the work.
         PluginError: if the scenario names a policy, route or task that cannot be made.
         OSError: if something cannot be written, after all.
-        ReportError: if, read back, it is not what was written.
     """
-    within(scenario, limits)
+    within(scenario, wanted.limits)
     started, clock = datetime.now(UTC), time.perf_counter()
-    if scenario.claims:  # what cannot be made is told before the work
+    if scenario.claims:  # a claim that cannot be made is refused before the work
         from airground_drake.verify.registry import model_claims
 
         model_claims(added=scenario.claims)
     with folder.held(output):
-        if kept is not None and kept.is_dir():
-            files.sweep(kept)
+        if wanted.kept is not None and wanted.kept.is_dir():
+            files.sweep(wanted.kept)
         traces = simulate_all(scenario, progress=progress, meanwhile=partial(import_module, _NEXT))
         from airground_drake.report import after_runs
 
-        judged = after_runs.judge(scenario, traces, kept, audited=audited, drawn="html" in formats, progress=progress)
+        judged = after_runs.judge(scenario, traces, wanted, progress)
         progress.stage("writing")
-        provenance = after_runs.provenance(scenario, started, command)
+        provenance = after_runs.provenance(scenario, started, wanted.command)
         provenance["wall_s"] = time.perf_counter() - clock
-        report = after_runs.write(scenario, digest, output, formats, traces, judged, provenance)
-        read_back(output, formats, report)
-    return report
-
-
-def read_back(folder: Path, formats: Sequence[str], report: dict[str, Any]) -> None:
-    """See that the report is there, and says what was written.
-
-    Raises:
-        ReportError: if not.
-        OSError: if a file cannot be read.
-    """
-    for path in (folder / PAGES[each] for each in formats):
-        text = path.read_text(encoding="utf-8")
-        try:
-            same = bool(text) and (path.suffix != ".json" or json.loads(text) == report)
-        except ValueError:
-            same = False
-        if not same:
-            raise ReportError(f"{path}: read back, it is not what was written")
+        return after_runs.write(scenario, digest, output, wanted.formats, judged, provenance)

@@ -12,12 +12,12 @@ from markupsafe import Markup, escape
 
 @cache
 def mathml(latex: str) -> Markup:
-    """A formula as a block of MathML; what cannot be typeset is shown as it is written.
+    """A formula as a block of MathML; a formula that the library cannot typeset is shown as it is written.
 
-    The library's own text is not escaped, and a claim of others may say anything: the elements are written here.
+    The library does not escape text, and a third-party claim may contain anything: `ET` writes the elements.
 
     Args:
-        latex: one row, without delimiters; what takes several rows is given as several.
+        latex: one row, without delimiters; a formula of several rows is given as several.
     """
     try:
         root = convert_to_element(latex, display="block")
@@ -25,7 +25,7 @@ def mathml(latex: str) -> Markup:
         return Markup("<code>{}</code>").format(escape(latex))
     for element in root.iter():
         if element.tag == "mover":
-            element.set("accent", "true")  # a dot over a letter is no smaller than the letter's own
+            element.set("accent", "true")  # a dot over a letter keeps its size
         element.text = unescape(element.text or "") or None
         for name in ("href", "style"):
             element.attrib.pop(name, None)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from functools import cache
 from typing import Any, NamedTuple
 
@@ -18,14 +18,14 @@ from airground_drake.world.world import World
 
 MOST_OBSTACLES = 20
 """Maximum number of obstacles listed per robot."""
-
-
 NEAR_OBSTACLES, NEAR_ROBOTS = 3, 1
 """Numbers of obstacles and robots that count as close by."""
+NO_GAP = 1e-9
+"""A relative optimality gap up to this is a rounding error."""
 
 
 class Nearby(NamedTuple):
-    """Smallest distance of surfaces over continuous time, m, when, s, to what, and the distance required, m."""
+    """Smallest distance of surfaces over continuous time, m; when, s; to what; and the distance required, m."""
 
     value: float
     t_s: float
@@ -37,11 +37,10 @@ def of_run(trace: Trace) -> dict[str, Any]:
     """Metrics of one run.
 
     Returns:
-        `min_distance_m` (robot -> obstacle -> value, t_s, safe_distance_m; exact in continuous time; of many obstacles
-        those of least margin) and
-        `min_robot_distance_m` (the same, for the other robot of least margin only), `final_position_m`,
-        `duration_s`, `wall_s` and `realtime_factor` (None if not measured), `event_counts` (robot -> kind ->
-        count), `gatekeeper` (see `gatekeeper`).
+        `min_distance_m` (robot -> obstacle -> value, t_s, safe_distance_m; exact in continuous time; at most
+        `MOST_OBSTACLES`, those of least margin), `min_robot_distance_m` (the same for the other robot of least
+        margin), `final_position_m`, `duration_s`, `wall_s` and `realtime_factor` (None if not measured),
+        `event_counts` (robot -> kind -> count), `gatekeeper` (see `gatekeeper`).
     """
     wall_s = trace.timings.get("wall_s")
     duration_s = float(trace.t[-1] - trace.t[0])
@@ -49,8 +48,7 @@ def of_run(trace: Trace) -> dict[str, Any]:
     return {
         "min_distance_m": {robot: _to_obstacles(trace, robot) for robot in trace.robots},
         "min_robot_distance_m": {
-            robot: _distances(trace, robot, [other for other in trace.robots if other != robot], 1)
-            for robot in trace.robots
+            robot: _distances(trace, robot, _others(trace, robot), NEAR_ROBOTS) for robot in trace.robots
         },
         "final_position_m": {robot: trace.position(robot)[-1].tolist() for robot in trace.robots},
         "duration_s": duration_s,
@@ -65,19 +63,19 @@ def gatekeeper(trace: Trace) -> dict[str, Any] | None:
     """Summary of the gatekeeper's decisions, None if it made none.
 
     Returns:
-        `calls`, `decisions` (decision -> count), `solver_failures` (decisions for which the solver failed, so
-        that they rest on the best plan known), `budget_spent` (the same for those that met the limit of their budget),
-        `refusals` (robot -> reason -> proposals refused at the first
-        answer), `max_gap` (largest optimality gap), `gaps` (decisions with a gap of 0, up to
-        1 %, and more), `period_s` of the gatekeeper, `time_s` (p50, p99, max
-        of the CPU times, order statistics), `late` (decisions that took a period or longer; simulated time waits for
-        them) and `closest_call`: where the costs of accepting and refusing were closest,
-        relative to the smaller one, so that nobody has to trust a knife edge. None where not recorded.
+        `calls`, `decisions` (decision -> count), `solver_failures` (decisions that rest on the best plan known because
+        the solver failed), `budget_spent` (the same because the budget was spent), `refusals` (robot -> reason ->
+        proposals refused at the first answer), `max_gap` (largest optimality gap), `gaps` (decisions with no gap, up
+        to 1 %, and more), `period_s` of the gatekeeper, `time_s` (CPU times: p50, p99, max, as order statistics),
+        `late` (decisions that took a period or longer; simulated time waits for them) and `closest_call` (the
+        decision at which the costs of accepting and refusing were closest, relative to the smaller one). None where
+        not recorded.
     """
     table = trace.decisions
     if not len(table):
         return None
-    gaps = table["gap"][table["gap"] >= 0.0]
+    gaps = table["gap"].to_numpy(dtype=np.float64)
+    known = gaps[gaps >= 0.0]
     times = np.asarray(trace.timings.get("decision_times_s", []), dtype=np.float64)
     period = float(trace.scenario.gatekeeper.period_s)
     levels = {"p50": 0.5, "p99": 0.99, "max": 1.0}
@@ -88,26 +86,16 @@ def gatekeeper(trace: Trace) -> dict[str, Any] | None:
         "solver_failures": int((table["status"] == "solver_failed").sum()),
         "refusals": _refusals(trace),
         "budget_spent": int((table["status"] == "budget_spent").sum()),
-        "max_gap": float(gaps.max()) if len(gaps) else None,
-        "gaps": _gaps(table["gap"].to_numpy(dtype=np.float64)),
+        "max_gap": float(known.max()) if len(known) else None,
+        "gaps": {
+            "zero": int(((gaps <= NO_GAP) & (gaps != -1.0)).sum()),  # -1 is unknown
+            "up_to_1_percent": int(((gaps > NO_GAP) & (gaps <= 0.01)).sum()),
+            "more": int((gaps > 0.01).sum()),
+        },
         "period_s": period,
         "time_s": time_s or None,
         "late": int((times >= period).sum()) if times.size else None,
         "closest_call": _closest_call(trace),
-    }
-
-
-NO_GAP = 1e-9
-"""Gaps up to this, relative, are 0 but for rounding."""
-
-
-def _gaps(gaps: Array) -> dict[str, int]:
-    """How many decisions have no gap, one up to 1 %, and a larger one; -1 is unknown."""
-    none = (gaps <= NO_GAP) & (gaps != -1.0)
-    return {
-        "zero": int(none.sum()),
-        "up_to_1_percent": int(((gaps > NO_GAP) & (gaps <= 0.01)).sum()),
-        "more": int((gaps > 0.01).sum()),
     }
 
 
@@ -123,25 +111,18 @@ def _refusals(trace: Trace) -> dict[str, dict[str, int]]:
 
 def _closest_call(trace: Trace) -> dict[str, Any] | None:
     """The decision at which accepting and refusing throughout differ least in cost."""
-    both = trace.decisions[
-        (trace.decisions["accept_throughout"] >= 0.0) & (trace.decisions["refuse_throughout"] >= 0.0)
-    ]
+    costs = ["accept_throughout", "refuse_throughout"]
+    both = trace.decisions[(trace.decisions[costs] >= 0.0).all(axis=1)]
     if not len(both):
         return None
-    smaller = both[["accept_throughout", "refuse_throughout"]].min(axis=1).clip(lower=1e-12)
-    margin = ((both["accept_throughout"] - both["refuse_throughout"]).abs() / smaller).to_numpy()
+    smaller = both[costs].min(axis=1).clip(lower=1e-12)
+    margin = ((both[costs[0]] - both[costs[1]]).abs() / smaller).to_numpy()
     k = int(np.argmin(margin))
     row = both.iloc[k]
     return {
         "relative_cost_margin": float(margin[k]),
-        "t_s": float(row["t_s"]),
-        "robot": str(row["robot"]),
-        "policy": str(row["policy"]),
-        "decision": str(row["decision"]),
-        "reason": str(row["reason"]),
-        "objective": float(row["objective"]),
-        "accept_throughout": float(row["accept_throughout"]),
-        "refuse_throughout": float(row["refuse_throughout"]),
+        **{name: str(row[name]) for name in ("robot", "policy", "decision", "reason")},
+        **{name: float(row[name]) for name in ("t_s", "objective", *costs)},
     }
 
 
@@ -152,19 +133,16 @@ def closest_obstacle(trace: Trace, robot: str) -> Nearby | None:
 
 def close_by(trace: Trace, robot: str) -> list[Nearby]:
     """Smallest distances of a robot to its nearest obstacles and robots, exact, those of least margin first."""
-    robots = [other for other in trace.robots if other != robot]
     found = _distances(trace, robot, list(trace.scenario.obstacles), NEAR_OBSTACLES)
-    found |= _distances(trace, robot, robots, NEAR_ROBOTS)
+    found |= _distances(trace, robot, _others(trace, robot), NEAR_ROBOTS)
     return sorted(_surfaces(trace, robot, found), key=lambda at: at.value - at.required_m)
 
 
-def _surfaces(trace: Trace, robot: str, found: dict[str, dict[str, float]]) -> list[Nearby]:
+def _surfaces(trace: Trace, robot: str, found: dict[str, dict[str, float]]) -> Iterator[Nearby]:
     """The same distances, of surfaces."""
-    return [
-        Nearby(at["value"] - radii, at["t_s"], other, at["safe_distance_m"] - radii)
-        for other, at in found.items()
-        for radii in [radius_m(trace, robot) + radius_m(trace, other)]
-    ]
+    for other, at in found.items():
+        radii = radius_m(trace, robot) + radius_m(trace, other)
+        yield Nearby(at["value"] - radii, at["t_s"], other, at["safe_distance_m"] - radii)
 
 
 def gap_m(trace: Trace, robot: str, other: str) -> Array:
@@ -195,14 +173,18 @@ def _to_obstacles(trace: Trace, robot: str) -> dict[str, dict[str, float]]:
     return _distances(trace, robot, list(trace.scenario.obstacles), MOST_OBSTACLES)
 
 
+def _others(trace: Trace, robot: str) -> list[str]:
+    return [other for other in trace.robots if other != robot]
+
+
 def events_of(trace: Trace, robot: str, *kinds: str) -> list[dict[str, Any]]:
     """Events of a robot, by time, of the given kinds."""
     return [event for event in trace.events if event["robot"] == robot and event["kind"] in kinds]
 
 
 def _distances(trace: Trace, robot: str, among: Sequence[str], most: int) -> dict[str, dict[str, float]]:
-    """Least distances of a robot to so many of some obstacles or robots, those of least margin."""
-    bound = _bounds(trace)
+    """Smallest distances of a robot to at most `most` of some obstacles or robots, those of least margin."""
+    bound = trace.derived("bounds", lambda: _bounds(trace))
     required = {other: safe_distance_m(trace, robot, other) for other in among}
 
     @cache
@@ -220,10 +202,6 @@ def _distances(trace: Trace, robot: str, among: Sequence[str], most: int) -> dic
 
 
 def _bounds(trace: Trace) -> dict[frozenset[str], float]:
-    """What each pair keeps apart at least, m."""
-
-    def found() -> dict[frozenset[str], float]:
-        apart = zip(pairs_of(trace), apart_of(trace).tolist(), strict=True)
-        return {frozenset((pair.first, pair.second)): least for pair, least in apart}
-
-    return trace.derived("bounds", found)
+    """A lower bound of the distance of each pair over the run, m."""
+    apart = zip(pairs_of(trace), apart_of(trace).tolist(), strict=True)
+    return {frozenset((pair.first, pair.second)): least for pair, least in apart}

@@ -1,4 +1,4 @@
-"""report.html from report.json, the traces and the drawing of the diagram: written once, and drawn again to compare."""
+"""report.html from report.json, the traces and the drawing of the diagram; `rebuild` makes it again to compare."""
 
 from __future__ import annotations
 
@@ -23,13 +23,12 @@ def page(report: Mapping[str, Any], figures: Sequence[Figure], diagram_svg: str 
         figures: of the runs, see `figures.draw`.
         diagram_svg: the drawing of the block diagram.
     """
-    about_the_model = {claim["id"]: claim for claim in report["claims"] if not claim["run"]}
+    model = {claim["id"]: claim for claim in report["claims"] if not claim["run"]}
     plates = [*figures]
-    if "ZENO-REFINE" in about_the_model:
-        refined = zeno_refine.draw(about_the_model["ZENO-REFINE"]["evidence"])
+    if "ZENO-REFINE" in model and (refined := zeno_refine.draw(model["ZENO-REFINE"]["evidence"])):
         audited = any(item["id"] == BESIDE for item in report["audit"])
-        plates += [replace(refined, beside=f"audit-{BESIDE}") if audited else refined] if refined else []
-    if "THR-CHOICE" in about_the_model:
-        chosen = threshold.draw(about_the_model["THR-CHOICE"]["inputs"], about_the_model["THR-CHOICE"]["evidence"])
+        plates.append(replace(refined, beside=f"audit-{BESIDE}") if audited else refined)
+    if "THR-CHOICE" in model:
+        chosen = threshold.draw(model["THR-CHOICE"]["inputs"], model["THR-CHOICE"]["evidence"])
         plates += [chosen] if chosen else []
     return html.render(report, [*plates, *draw_findings(report["audit"])], diagram_svg)

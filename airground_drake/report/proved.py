@@ -1,6 +1,6 @@
-"""What `airground prove DIR` found, put into the page of that report: a line beside SAFE-TRACE of each run.
+"""Puts what `airground prove DIR` found into the page of that report: a line beside SAFE-TRACE of each run.
 
-The page is written before anything is proved. It has a place for each line, and `write` fills these places.
+The page is written before anything is proved, with an empty place for each line; `write` fills these places.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ _PLACES = re.compile(r"<!--Coq on (\w+)-->.*?<!--end-->", re.DOTALL)
 
 
 def place(claim: Mapping[str, Any], line: str = "") -> Markup:
-    """Where the page says what Coq found about a claim, an entry of report.json; '' if Coq is not asked about it."""
+    """The place of Coq's line about a claim, an entry of report.json; '' if Coq is not asked about that claim."""
     return Markup(_PLACE).format(run=claim["run"], line=line) if claim["id"] == CLAIM else Markup("")
 
 
@@ -59,7 +59,7 @@ def write(folder: Path) -> bool:
 
 
 def filled(page: str, found: Mapping[str, Any]) -> str:
-    """A page with its places filled from proofs.json; those of other runs are emptied."""
+    """A page with its places filled from proofs.json; places of other runs are emptied."""
     runs = {run: _line(entry, found["coq"]) for run, entry in found["runs"].items()}
     return _PLACES.sub(lambda at: place({"id": CLAIM, "run": at[1]}, runs.get(at[1], Markup())), page)
 

@@ -1,8 +1,8 @@
 """The paper's reported results against ours: a registry of measures, and the reproduction table.
 
 A measure is a pure function of a trace and a robot. It returns its components in the order of the scenario's
-`paper` values, 1 or 0 for a yes/no quantity, and an empty list where the run has no such value: a row without
-a value is never reproduced.
+`paper` values, 1 or 0 for a yes/no quantity, and an empty list if the run has no such value. A row without a value is
+never reproduced.
 """
 
 from __future__ import annotations
@@ -21,10 +21,10 @@ from airground_drake.scenarios.schema import Reproduction, Scenario
 Measure = Callable[[Trace, str], list[float]]
 
 STILL_M = 1e-3
-"""A robot that moved less than this during the last STILL_S of a run stands still."""
+"""A robot stands still if it moved less than this during the last STILL_S of a run."""
 STILL_S = 1.0
 TRIGGER_TOLERANCE_M = 1e-5
-"""A trigger is at the threshold if the decision variable is not below it by more than this: event isolation."""
+"""A trigger counts as at the threshold if the decision variable is at most this much below: event isolation."""
 YES_NO = "yes/no"
 """Unit of a row that is compared exactly."""
 
@@ -94,8 +94,8 @@ def trigger_time(trace: Trace, robot: str) -> list[float]:
 def recovery_duration(trace: Trace, robot: str) -> list[float]:
     """Time from the first trigger until the decision variable first falls below the threshold, s.
 
-    The row of the trigger may be below the threshold by the accuracy of event isolation, so a fall needs a row
-    at or above the threshold before it. Linear interpolation between rows.
+    The row of the trigger may be slightly below the threshold (accuracy of event isolation), so a fall starts from a
+    row at or above it. Rows are interpolated linearly.
     """
     triggers = _times(trace, robot, "trigger")
     if not triggers:
@@ -140,7 +140,7 @@ def refusal_time(trace: Trace, robot: str) -> list[float]:
 
 @measure
 def execution_time(trace: Trace, robot: str) -> list[float]:
-    """Time from which on an intervention is executed for the first time, s."""
+    """Time at which an intervention is first executed, s."""
     rows = np.flatnonzero(trace.column(f"{robot}.accepted") > 0.0)
     return [float(trace.t[max(rows[0] - 1, 0)])] if len(rows) else []
 
@@ -148,8 +148,6 @@ def execution_time(trace: Trace, robot: str) -> list[float]:
 @measure
 def final_position(trace: Trace, robot: str) -> list[float]:
     """Position [x, y] in m at the end of the run."""
-    if robot not in trace.robots:
-        raise TraceError(f"run {trace.run}: there is no robot {robot!r}; there are {', '.join(trace.robots)}")
     return _planar(trace.position(robot)[-1])
 
 
@@ -168,10 +166,9 @@ def rows(scenario: Scenario, traces: Mapping[str, Trace]) -> list[dict[str, Any]
         traces: by run.
 
     Returns:
-        For each row `id`, `quantity`, `measure`, `run`, `robot`, `paper`, `ours` (scalars if of one component,
+        For each row `id`, `quantity`, `measure`, `run`, `robot`, `paper` and `ours` (scalars if of one component;
         `ours` is None without a value), `difference` (largest over the components), `unit`, `tolerance`,
-        `status` (reproduced, calibrated, by_construction, ambiguous or not_reproduced) and `why`, which says so where
-        ours is within the tolerance but does not round to the paper's digits.
+        `status` (reproduced, calibrated, by_construction, ambiguous or not_reproduced) and `why`.
     """
     return [_row(row, traces) for row in scenario.reproduction]
 
@@ -181,22 +178,16 @@ def _row(row: Reproduction, traces: Mapping[str, Trace]) -> dict[str, Any]:
     tolerance = 0.0 if row.unit == YES_NO else row.tolerance
     difference = max(abs(a - b) for a, b in zip(ours, row.paper, strict=True)) if ours else None
     within = difference is not None and difference <= tolerance * (1.0 + 1e-9) + 1e-12
-    if difference is not None and not within and row.unit != YES_NO:
-        reason = f"differs by {difference:.4g} {row.unit}, {tolerance:.4g} {row.unit} are allowed"
-    elif difference is not None and not within:
-        reason = "the answer differs"
-    elif within and row.unit != YES_NO:
-        reason = _off_the_digits(ours, row.paper, row.unit)
+    if difference is not None and row.unit == YES_NO:
+        reason = "" if within else "the answer differs"
+    elif difference is not None:
+        too_much = f"differs by {difference:.4g} {row.unit}, {tolerance:.4g} {row.unit} are allowed"
+        reason = _off_the_digits(ours, row.paper, row.unit) if within else too_much
     return {
-        "id": row.id,
-        "quantity": row.quantity,
-        "measure": row.measure,
-        "run": row.run,
-        "robot": row.robot,
+        **{name: getattr(row, name) for name in ("id", "quantity", "measure", "run", "robot", "unit")},
         "paper": _scalar(row.paper),
         "ours": _scalar(ours),
         "difference": difference,
-        "unit": row.unit,
         "tolerance": tolerance,
         "status": _status(row, within),
         "why": "; ".join(filter(None, (reason, "" if within else row.ambiguous, row.why))),
@@ -212,7 +203,7 @@ def _status(row: Reproduction, within: bool) -> str:
 
 
 def _off_the_digits(ours: list[float], paper: list[float], unit: str) -> str:
-    """What to say where ours, rounded to the paper's digits, is another number: only the tolerance lets it pass."""
+    """A note for a value that passes by the tolerance, but does not round to the digits that the paper prints."""
     off = [
         f"ours rounds to {round(mine, decimals):g} {unit}, the paper prints {printed:g} {unit}"
         for mine, printed in zip(ours, paper, strict=True)
@@ -223,7 +214,7 @@ def _off_the_digits(ours: list[float], paper: list[float], unit: str) -> str:
 
 
 def _evaluate(row: Reproduction, traces: Mapping[str, Trace]) -> tuple[list[float], str]:
-    """Our value and, where there is none to compare, the reason."""
+    """Our value, or an empty list and the reason why there is no value to compare."""
     if row.measure not in MEASURES:
         return [], f"there is no measure {row.measure!r}; there are {', '.join(sorted(MEASURES))}"
     if row.run not in traces:
@@ -259,8 +250,6 @@ def _planar(position: Any) -> list[float]:
 
 
 def _arrived(trace: Trace, robot: str) -> bool:
-    scenario = trace.scenario
-    if robot not in trace.robots:
-        raise TraceError(f"run {trace.run}: there is no robot {robot!r}; there are {', '.join(trace.robots)}")
-    target = scenario.robots[robot].target_m
-    return bool(np.linalg.norm(trace.position(robot)[-1] - np.asarray(target)) <= scenario.arrival_tolerance_m)
+    end = trace.position(robot)[-1]
+    target = trace.scenario.robots[robot].target_m
+    return bool(np.linalg.norm(end - np.asarray(target)) <= trace.scenario.arrival_tolerance_m)

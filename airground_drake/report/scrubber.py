@@ -1,6 +1,6 @@
-"""The scrubber of the trajectory figure: where each robot is in its drawing, at any time, for a script of the page.
+"""The time slider of the trajectory figure: where each robot is in its drawing at any time.
 
-The drawings are complete without it. `templates/scrubber.js` moves marks over them.
+`templates/scrubber.js` moves marks over the drawings, which are complete without it.
 """
 
 from __future__ import annotations
@@ -17,16 +17,16 @@ from airground_drake.run.trace import Trace
 from airground_drake.view.stage import states
 
 SAMPLES = 121
-"""Times at which a robot's place is in the page, evenly spread over the run; in between it is interpolated."""
+"""Number of times, evenly spread over the run, for which the page has the places; the script interpolates."""
 PER_UNIT = 10
-"""Places are in so many parts of a unit of the drawing, as whole numbers."""
+"""Places are whole numbers of this fraction of a unit of the drawing."""
 
 
 def tracks(drawing: Drawing, trace: Trace, ugvs: Sequence[str]) -> dict[str, Any]:
     """Places of the UAV and of some UGVs in a drawing of the ground plane, as JSON that `scrubber.js` reads.
 
     Args:
-        drawing: with one pair of axes, over x and y in m; drawn, so that the axes have their final place.
+        drawing: with one pair of axes, over x and y in m; already drawn, so that the axes are in their final place.
         trace: the run.
         ugvs: their names, in the order of their looks.
     """

@@ -6,7 +6,7 @@ from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined
 
 
 def environment_of(*packages: str) -> Environment:
-    """One for the templates of these packages: everything is escaped, and a name that stands for nothing is an error.
+    """An environment for the templates of these packages: it escapes every value and refuses undefined names.
 
     Args:
         packages: whose folders `templates` are searched, in this order.
