@@ -53,16 +53,15 @@ def test_a_name_or_parameters_that_do_not_fit_are_told_with_those_that_do(
     assert "TypeError" not in str(caught.value)
 
 
-def test_classes_of_entry_points_and_classes_that_are_added_in_a_block(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_classes_of_entry_points_and_classes_that_are_added_in_a_block() -> None:
     point = EntryPoint("orbit", "airground_drake.intervention.detour:Detour", POLICIES.group)
-    monkeypatch.setattr(registry, "entry_points", lambda group: [point] if group == POLICIES.group else [])
-    registry._entry_points.cache_clear()
-    try:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(registry, "entry_points", lambda group: [point] if group == POLICIES.group else [])
+        registry._entry_points.cache_clear()
         assert "orbit" in tuple(POLICIES)
         assert POLICIES.load("orbit", of=Policy).__name__ == "Detour"
         assert (POLICIES.accepts("orbit"), ROUTES.accepts("orbit")) == (True, False)
-    finally:
-        registry._entry_points.cache_clear()
+    registry._entry_points.cache_clear()
 
     class Mine(Policy):
         def propose(self, seen: Any) -> None:
