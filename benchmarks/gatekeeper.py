@@ -19,7 +19,7 @@ import csv
 import logging
 import time
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -61,7 +61,7 @@ def recorded(case: str, run: str, most: int) -> list[Sample]:
 
     class Listening(RelaxedRoute):
         def solve(self, problem: Problem, budget: Budget = Budget()) -> Solution:  # noqa: B008 (immutable)
-            seen.append([replace(problem, loop=None)])
+            seen.append([problem])
             return super().solve(problem, budget)
 
     scenario = load(case)[0]
@@ -77,7 +77,7 @@ def rolled_out(rng: np.random.Generator, ugvs: int, discs: int, stages: int, saf
     """Problems (26) of UGVs among discs; the same situations as `among`, by mode velocities."""
     horizon, sample = Horizon(stages, 1, 1.0, 1000.0), []
     for scene, proposal in among(rng, ugvs, discs, safe):
-        sample.append(replace(predicted_problem(scene, LAW, proposal, horizon), loop=None))
+        sample.append(predicted_problem(scene, LAW, proposal, horizon))
     return sample
 
 
