@@ -18,7 +18,7 @@ CAMPAIGN = "scenario: minimal\nset: {duration_s: 0.2}\nclaims: [SAFE-TRACE]\ndra
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
-    """Modules with the names of others, and a configuration with a cache that numba would unpickle."""
+    """Modules with the names of well-known ones, and a configuration with a cache that numba would unpickle."""
     for name in NAMES:
         (tmp_path / f"{name}.py").write_text(HOSTILE)
     (tmp_path / ".numba_config.yaml").write_text(f"cache_dir: {tmp_path / 'cache'}\n")
