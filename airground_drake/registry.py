@@ -280,13 +280,6 @@ ROUTES = Registry(
 )
 """Ways to solve the gatekeeper's problem (26)."""
 
-RETIRED_ROUTES = {
-    "enumeration": "mixed_integer, with gatekeeper.blocks: 10 for the same plans",
-    "branch_and_bound": "mixed_integer, with gatekeeper.blocks: 10 for the same plans",
-    "rollout": "mixed_integer, or method (d), which compares outcomes on the closed loop",
-}
-"""Routes of earlier versions, and their successors."""
-
 UAV_TASKS = Registry("task", "uav_tasks", {"formation": "airground_drake.nsbc.tasks:FormationTask"})
 """Tasks of the UAV below obstacle avoidance: subclasses of `nsbc.task.Task`."""
 
@@ -319,12 +312,6 @@ RUN_CLAIMS = Registry(
     },
 )
 """Claims about one run, in the order of the report: subclasses of `verify.claim.TraceClaim`."""
-
-RETIRED_CLAIMS = {
-    "GATE-SUR": "it is part of GATE-FEAS",
-    "GATE-TIME": "decision times are measurements: runs.RUN.metrics.gatekeeper in report.json",
-}
-"""Claims of earlier versions, and their successors."""
 
 MODEL_CLAIMS = Registry(
     "claim",

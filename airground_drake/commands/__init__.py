@@ -46,7 +46,6 @@ COMMANDS: dict[str, Command] = {
     "diagram": Command("airground_drake.commands.diagram", "draw the diagram of a scenario"),
     "list": Command("airground_drake.commands.listing", "list scenarios, methods, policies, routes, tasks and claims"),
     "init": Command("airground_drake.commands.init", "write a small scenario to start from"),
-    "completion": Command("airground_drake.commands.completion", "print what completes this command line in a shell"),
 }
 
 

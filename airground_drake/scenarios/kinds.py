@@ -3,7 +3,7 @@
 import math
 import re
 import unicodedata
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from importlib import import_module
 from typing import Annotated, Any
@@ -138,12 +138,10 @@ def one_of(options: Iterable[str], place: str = "") -> Rule:
     return Rule(check, lambda: {"enum": allowed()})
 
 
-def registered(registry: Registry, retired: Mapping[str, str] | None = None) -> Rule:
-    """A name of a registry, or a plug-in; `retired` maps former names to their successors."""
+def registered(registry: Registry) -> Rule:
+    """A name of a registry, or a plug-in."""
 
     def check(value: str) -> str:
-        if retired and value in retired:
-            raise refused(value, f"no longer a {registry.kind}: use {retired[value]}")
         if not registry.accepts(value):
             raise refused(value, f"one of {', '.join(registry.allowed)}")
         return value

@@ -23,7 +23,7 @@ from airground_drake.base.exact import decimal
 from airground_drake.scenarios import json_schema, validate
 from airground_drake.scenarios.document import Document, of_data, put, read, replace, simple, unknown
 from airground_drake.scenarios.recorded import adapter
-from airground_drake.scenarios.schema import RETIRED_KEYS, Scenario, Vector
+from airground_drake.scenarios.schema import Scenario, Vector
 from airground_drake.scenarios.shipped import shipped
 
 __all__ = ["from_data", "load", "own", "resolved", "shipped", "validated"]
@@ -178,9 +178,6 @@ def _in_words(error: ErrorDetails, document: Document, schema: json_schema.Schem
     key, source = ".".join(at), document.where(*at, key=not of_type)
     if kind == "rule":
         return ScenarioError(source, key, says["value"], says["allowed"])
-    general = ".".join(["runs", "NAME", *at[2:]]) if at[:1] == ["runs"] else key
-    if general in RETIRED_KEYS:
-        return ScenarioError(source, key, Fault("no longer a key"), RETIRED_KEYS[general])
     if kind in _UNKNOWN:
         return unknown(source, key, at[-1], json_schema.keys_at(schema, *at[:-1]))
     place = loc[:-2] + loc[-1:] if loc[-1:] == [json_schema.NAMES] else at

@@ -13,7 +13,7 @@ from typing import Annotated, ClassVar
 
 from pydantic import ConfigDict, Field
 
-from airground_drake.registry import METHODS, MODEL_CLAIMS, POLICIES, RETIRED_ROUTES, ROUTES, RUN_CLAIMS, UAV_TASKS
+from airground_drake.registry import METHODS, MODEL_CLAIMS, POLICIES, ROUTES, RUN_CLAIMS, UAV_TASKS
 from airground_drake.scenarios.kinds import (
     CLAIMS,
     Count,
@@ -44,15 +44,6 @@ RULES: tuple[str, ...] = ("hysteresis", "first_stage")
 SETTABLE: tuple[str, ...] = ("decision", "gatekeeper", "intervention")
 """Sections in which a run may set its own values. All runs share bodies, distances and controllers: a report draws them
 once, and proves safety once."""
-
-_NO_LAG = "remove it: longest_s, tries and rest_s bound how long a UGV goes along"
-RETIRED_KEYS = {
-    "gatekeeper.budget_nodes": "remove it: the search of the route mixed_integer is limited in iterations",
-    "gatekeeper.lag_m": _NO_LAG,
-    "gatekeeper.behind_s": _NO_LAG,
-    "runs.NAME.rule": "write it as `set: {gatekeeper.rule: ...}` of the run",
-}
-"""Keys of earlier versions, and how to replace them; NAME stands for any run."""
 
 
 @dataclass(slots=True)
@@ -244,7 +235,7 @@ class Gatekeeper:
     been on its own for `rest_s`.
     """
 
-    route: Annotated[Words, registered(ROUTES, RETIRED_ROUTES)] = "mixed_integer"
+    route: Annotated[Words, registered(ROUTES)] = "mixed_integer"
     """How (26) is solved under method (c)."""
     period_s: Positive = 0.05
     """How often it decides; a multiple of the control period."""

@@ -21,7 +21,7 @@ from airground_drake.base.errors import ScenarioError
 from airground_drake.base.exact import decimal
 from airground_drake.base.statuses import alternatives
 from airground_drake.decision.bayes import COMPUTED
-from airground_drake.registry import MODEL_CLAIMS, RETIRED_CLAIMS, ROUTES, RUN_CLAIMS
+from airground_drake.registry import MODEL_CLAIMS, ROUTES, RUN_CLAIMS
 from airground_drake.scenarios.rounding import TOLERANCE_M, Rounding
 from airground_drake.scenarios.schema import Scenario, Vector
 
@@ -79,8 +79,6 @@ def _runs(scenario: Scenario) -> Problems:
             yield from _one_of(f"runs.{name}.stalls_m.{robot}", robot, scenario.ugvs, "one of the UGVs")
         for claim in run.expected:
             key = f"runs.{name}.expected.{claim}"
-            if claim in RETIRED_CLAIMS:
-                yield key, claim, f"no longer a claim, {RETIRED_CLAIMS[claim]}: remove it"
             known = (*RUN_CLAIMS, *scenario.claims, *(MODEL_CLAIMS if run.set else ()))
             yield from _one_of(key, claim, known, "one of the claims")
     for claim in scenario.expected:

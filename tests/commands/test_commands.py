@@ -22,7 +22,7 @@ from airground_drake.scenarios.load import load, shipped
 AIRGROUND = (sys.executable, "-m", "airground_drake")
 
 
-@pytest.mark.parametrize("line", ["--version", "--help", "list", "completion bash", *(f"{n} --help" for n in COMMANDS)])
+@pytest.mark.parametrize("line", ["--version", "--help", "list", *(f"{n} --help" for n in COMMANDS)])
 def test_slow_packages_are_imported_when_they_are_used(line: str) -> None:
     code = "import sys; from airground_drake.commands import main\ntry: main(sys.argv[1:])\nexcept SystemExit: pass\n"
     code += "print(*sys.modules, file=sys.stderr)"
@@ -191,7 +191,6 @@ init spec.yaml                          # spec.yaml exists; name a file that doe
 init nowhere/../spec.yaml               # spec.yaml exists; name a file that does not
 init spec.yaml/below                    # cannot be written
 init new/                               # 'new/' is a folder; wanted: the name of a file
-completion fish                         # invalid choice: 'fish'
 """
 
 

@@ -80,10 +80,6 @@ EDITS: list[tuple[str, object]] = [
     ("gatekeeper.stages", 1001),
     ("gatekeeper.budget_share", 1.5),
     # options
-    ("gatekeeper.route", "enumeration"),
-    ("gatekeeper.route", "rollout"),
-    ("gatekeeper.budget_nodes", 15000),
-    ("gatekeeper.lag_m", 0.5),
     ("gatekeeper.blocks", 61),
     ("gatekeeper", {"route": "relaxed", "blocks": 10}),
     ("gatekeeper.route", "exact"),
@@ -93,7 +89,6 @@ EDITS: list[tuple[str, object]] = [
     ("decision.trigger", "x"),
     ("decision.threshold.rule", "x"),
     ("runs.d.method", "e"),
-    ("runs.d.rule", "x"),
     ("intervention.policies.0.name", "detuor"),
     ("choices.0.source", "paper"),
     # runs, reproduction, choices
@@ -155,8 +150,6 @@ EDITS: list[tuple[str, object]] = [
     ("uav.start_m", [1e8, 0, 2]),
     ("control.avoidance_gain_1_s", 1e-9),
     # claims that have moved
-    ("runs.d.expected", {"GATE-SUR": "holds"}),
-    ("runs.d.expected", {"GATE-TIME": "exercised"}),
     # radii
     ("obstacles.rock.radius_m", -1),
     ("obstacles.rock.radius_m", 1.9),
