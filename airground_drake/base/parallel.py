@@ -97,7 +97,7 @@ def run_parallel(
                 _done(future.result(), called[futures[future]], progress)
             return [future.result()[0] for future in futures]  # type: ignore[misc]
     except BrokenProcessPool as error:
-        raise AirgroundError("a process that judged claims died") from error
+        raise AirgroundError("a worker process died") from error
     finally:
         _pieces = ()
 

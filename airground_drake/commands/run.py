@@ -55,11 +55,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
     with plugins.admitted(scenario, options.scenario, allow=options.allow_plugins):
         if options.meshcat:
             from airground_drake.view.draw import served
+            from airground_drake.view.live_view import LiveView
 
             meshcat = served()
             print(f"{meshcat.web_url()}  (Ctrl-C ends it)", flush=True)
             meshcat.StartRecording()
-            trace = simulate(scenario, name, meshcat=meshcat, speed=options.speed or SPEED)
+            view = LiveView(meshcat, scenario)
+            trace = simulate(scenario, name, observers=[view], speed=options.speed or SPEED)
             meshcat.PublishRecording()
         else:
             trace = simulate(scenario, name)

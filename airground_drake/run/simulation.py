@@ -5,14 +5,14 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from functools import cache
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 import pandas as pd
 from pydrake.common import RandomGenerator
 from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorConfig
-from pydrake.systems.framework import Context, DiagramBuilder
+from pydrake.systems.framework import Context, DiagramBuilder, LeafSystem
 from pydrake.systems.primitives import LogVectorOutput, Multiplexer
 
 from airground_drake.base.arrays import Array
@@ -46,9 +46,6 @@ from airground_drake.systems.signals import FIELDS, Status
 from airground_drake.world.plant import FirstOrder
 from airground_drake.world.world import Body, World
 
-if TYPE_CHECKING:
-    from pydrake.geometry import Meshcat
-
 EVENT_ACCURACY = 1e-6
 """Accuracy of the Context: events are isolated to this, relative to the time scale of 1 s."""
 
@@ -64,13 +61,13 @@ class Recorder:
         scenario: Scenario,
         name: str,
         decision_block: DecisionFactory = DecisionVariable,
-        meshcat: Meshcat | None = None,
+        observers: Sequence[LeafSystem] = (),
         *,
         make_gatekeepers: GatekeepersFactory = make_gatekeepers,
     ) -> None:
         """Build the model of a run of the scenario and its logger.
 
-        `decision_block` and `meshcat` as in `simulate`, `make_gatekeepers` as in `build_model`; raises as `simulate`.
+        `decision_block` and `observers` as in `simulate`, `make_gatekeepers` as in `build_model`; raises as `simulate`.
         """
         self._scenario, self._name = validated(scenario), name
         if name not in self._scenario.runs:
@@ -93,11 +90,9 @@ class Recorder:
         for i, port in enumerate(ports):
             builder.Connect(port, together.get_input_port(i))
         self._log = LogVectorOutput(together.get_output_port(), builder)  # one for all: a log costs a step 10 us
-        if meshcat is not None:
-            from airground_drake.view.live_view import LiveView  # half a second of imports
-
-            view = builder.AddNamedSystem("live_view", LiveView(meshcat, self._scenario))
-            for port in (view.get_input_port(i) for i in range(view.num_input_ports())):
+        for observer in observers:
+            builder.AddSystem(observer)
+            for port in (observer.get_input_port(i) for i in range(observer.num_input_ports())):
                 builder.Connect(self._model.diagram.GetOutputPort(port.get_name()), port)
         self._root = builder.Build()
         self._root.set_name("recorded")
@@ -293,7 +288,7 @@ def simulate(
     seed: int | None = None,
     watch: Callable[[float], None] | None = None,
     decision_block: DecisionFactory = DecisionVariable,
-    meshcat: Meshcat | None = None,
+    observers: Sequence[LeafSystem] = (),
     speed: float = 0.0,
 ) -> Trace:
     """Simulate one run of a scenario.
@@ -304,7 +299,8 @@ def simulate(
         seed: of the decision noise, in place of the scenario's.
         watch: is told the time, s, at every step.
         decision_block: makes the block that drives the trigger; see `build_diagram`.
-        meshcat: shows the robots while they move; it does not change the run.
+        observers: systems that watch the run, such as `view.live_view.LiveView`: their input ports have the names of
+            the model's output ports, and each has a name of its own. The run does not see them.
         speed: simulated seconds per second at most, for watching; 0: no limit.
 
     Raises:
@@ -315,7 +311,7 @@ def simulate(
     """
     if seed is not None:
         scenario = validated(scenario, {"seed": seed})
-    return Recorder(scenario, run, decision_block, meshcat).simulate(watch=watch, speed=speed)
+    return Recorder(scenario, run, decision_block, observers).simulate(watch=watch, speed=speed)
 
 
 def _distinct(t: Array, command: Array) -> npt.NDArray[np.intp]:

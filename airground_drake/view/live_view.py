@@ -32,6 +32,7 @@ class LiveView(LeafSystem):
     def __init__(self, meshcat: Meshcat, scenario: Scenario) -> None:
         """Draw a valid scenario, and declare the ports."""
         super().__init__()
+        self.set_name("live_view")
         world = make_world(scenario)
         n, self._uavs = len(scenario.ugvs), world.select("uav")
         self._meshcat, self._robots = meshcat, world.select(*ROBOTS)

@@ -9,6 +9,7 @@ from pydrake.geometry import Meshcat
 from airground_drake.run.simulation import simulate
 from airground_drake.scenarios.load import load
 from airground_drake.view.draw import robot_path, served, state_path
+from airground_drake.view.live_view import LiveView
 from airground_drake.view.stage import INTERVENED, OWN, STATES
 
 
@@ -27,7 +28,7 @@ def shown(meshcat: Meshcat, k: int) -> list[bool]:
 def test_the_run_is_the_same_and_the_robots_are_where_it_ends() -> None:
     scenario, _ = load("case_a", ["duration_s=15.0"])
     meshcat = served()
-    watched = simulate(scenario, "d", meshcat=meshcat)
+    watched = simulate(scenario, "d", observers=[LiveView(meshcat, scenario)])
     pd.testing.assert_frame_equal(watched.signals, simulate(scenario, "d").signals, check_exact=True)
     for k, robot in enumerate(watched.robots):
         assert place(meshcat, k) == watched.position(robot)[-1].tolist()
