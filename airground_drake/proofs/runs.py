@@ -147,7 +147,7 @@ def decide(place: Workshop, run: Recorded, name: str, text: str, theorem: str, l
 
 
 def _pair(demand: Demand) -> str:
-    return f"{demand.first} and {demand.second}, {float(demand.safe_m):g} m"
+    return f"{demand.first} and {demand.second}, {float(demand.required_m):g} m"
 
 
 def _about(run: Recorded, text: str, line: int) -> Demand | None:
@@ -231,7 +231,7 @@ def _entry(answer: Answer) -> dict[str, Any]:
     if answer.proved:
         return entry | {"axioms": list(answer.axioms), "seconds": round(answer.seconds, 3)}
     near = [
-        {"first": one.demand.first, "second": one.demand.second, "safe_distance_m": float(one.demand.safe_m)}
+        {"first": one.demand.first, "second": one.demand.second, "safe_distance_m": float(one.demand.required_m)}
         | {"least_m": one.least_m, "short_m": one.short_m, "t_s": one.t_s}
         for one in answer.too_near
     ]

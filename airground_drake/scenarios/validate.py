@@ -289,10 +289,9 @@ def _clearances(scenario: Scenario) -> Problems:
         ):  # fmt: skip
             least = getattr(scenario.safe_distance, kind)
             for robot, other in _within(robots, others, least - TOLERANCE):
-                radii = robot.radius + other.radius
-                allowed = f"at least safe_distance.{kind} = {least:.9g} m{_and(radii)} is needed"
-                distance = math.dist(robot.point, other.point)
-                message = f"{robot.name} {verb} {distance:.9g} m from {other.name}, {allowed}"
+                allowed = f"at least safe_distance.{kind} = {least:.9g} m is needed"
+                gap = math.dist(robot.point, other.point) - (robot.radius + other.radius)
+                message = f"{robot.name} {verb} {gap:.9g} m from {other.name}, {allowed}"
                 yield f"{robot.key}.{attribute}", robot.point, message
 
 
