@@ -12,6 +12,7 @@ from typing import Any
 
 from airground_drake.base import files
 from airground_drake.base.errors import TraceError, UnknownNameError, one_line
+from airground_drake.base.statuses import NOTHING, declared
 from airground_drake.proofs import coq, readback
 from airground_drake.proofs.export import Demand, Recorded, demands, distances_file, law_file, recorded
 from airground_drake.proofs.record import FOLDER, digest
@@ -199,9 +200,9 @@ def prove_report(report: Path, names: Sequence[str] = (), limit_s: float = coq.L
 
 
 def expects_kept(run: Trace) -> bool:
-    """Whether the scenario expects that the run keeps its distances: SAFE-TRACE may not be refuted."""
+    """Whether the scenario expects that the run keeps its distances: SAFE-TRACE is promised, and not to be refuted."""
     expected = run.scenario.runs[run.run].expected.get("SAFE-TRACE", "holds")
-    return "refuted" not in expected
+    return declared(expected) != NOTHING and "refuted" not in expected
 
 
 def document(place: Workshop, found: Sequence[Proved]) -> dict[str, Any]:

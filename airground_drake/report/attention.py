@@ -39,7 +39,7 @@ class Item(NamedTuple):
 
 def items(document: Mapping[str, Any]) -> list[Item]:
     """All of a report: what may explain the rest first, then refuted claims, then undecided and missing ones."""
-    unexpected = [claim for claim in document["claims"] if not claim["as_expected"]]
+    unexpected = [claim for claim in document["claims"] if claim["as_expected"] is False]
     unexpected.sort(key=lambda claim: claim["status"] in UNDECIDED)
     return [
         *beforehand(document),

@@ -107,7 +107,7 @@ def _judge(course: Course, document: Document) -> None:
     claim = next(iter(claims(document, "SAFE-TRACE", run=course.name)), unchecked)
     status = claim["status"]
     course.tested = claim["exercised"] != 0
-    course.declared_unsafe = status == "refuted" and claim["as_expected"]
+    course.declared_unsafe = status == "refuted" and claim["as_expected"] is True
     if course.collisions or (course.near and course.near[0].is_short):
         course.safe, course.why = False, ""
     elif status == "refuted":

@@ -19,7 +19,7 @@ import numpy as np
 
 from airground_drake.base.errors import ScenarioError
 from airground_drake.base.exact import decimal
-from airground_drake.base.statuses import alternatives
+from airground_drake.base.statuses import NOTHING, alternatives
 from airground_drake.decision.bayes import COMPUTED
 from airground_drake.registry import MODEL_CLAIMS, RETIRED_CLAIMS, ROUTES, RUN_CLAIMS
 from airground_drake.scenarios.rounding import TOLERANCE_M, Rounding
@@ -115,7 +115,8 @@ def _ends(scenario: Scenario) -> Problems:
     for name, ugv in scenario.ugvs.items():
         away, end = math.dist(ugv.preset.waypoints_m[-1], ugv.target_m), len(ugv.preset.waypoints_m) - 1
         for run, spec in scenario.runs.items():
-            arrives = name not in spec.stalls_m and "refuted" not in alternatives(spec.expected.get(ARRIVES, "holds"))
+            admitted = alternatives(spec.expected.get(ARRIVES, "holds"))
+            arrives = name not in spec.stalls_m and {"refuted", NOTHING}.isdisjoint(admitted)
             if arrives and away > scenario.arrival_tolerance_m + TOLERANCE:
                 allowed = (
                     f"at most arrival_tolerance_m = {scenario.arrival_tolerance_m:.9g} m from {name}'s target_m, where "
