@@ -4,19 +4,29 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from copy import deepcopy
-from dataclasses import replace
+from dataclasses import asdict, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import pytest
 from builders.misbuilt import neighbours
+from report.cases import built
 
 from airground_drake.base.arrays import Array
+from airground_drake.check import positions
+from airground_drake.export import tables
 from airground_drake.gatekeeper.outcome_gatekeeper import OutcomeGatekeepers
+from airground_drake.proofs.export import recorded
+from airground_drake.proofs.too_near import too_near
+from airground_drake.report import attention, summary
+from airground_drake.report.figures.draw import draw
+from airground_drake.report.page import page
 from airground_drake.run.simulation import simulate
 from airground_drake.run.trace import Trace
 from airground_drake.scenarios.load import load, validated
-from airground_drake.scenarios.schema import Scenario
+from airground_drake.scenarios.schema import Policy, Run, Scenario
 from airground_drake.verify import verify
 
 ROCK, OWN, FLIER = 0.5, 0.25, 0.25
@@ -62,6 +72,50 @@ def test_larger_bodies_were_too_near(bodies: Trace, kind: str, name: str) -> Non
     found = statuses(replace(bodies, meta=meta))
     for claim in ("SAFE-TRACE", "SAFE-HYP", "EXEC", "GATE-MODEL"):
         assert found[claim] == "refuted", claim
+
+
+@pytest.mark.parametrize(
+    ("ends_at", "gap_m", "told"), [(5.0, -ROCK - OWN, "-0.750 m (overlap)"), (4.0, 0.225, "0.225 m")]
+)
+def test_a_pair_has_one_distance_wherever_users_see_it(ends_at: float, gap_m: float, told: str, tmp_path: Path) -> None:
+    """A wrong intervention leads into the rock, or near it; the gap at its end follows from the radii."""
+    given, pair = scenario(), {"first": "ugv1", "second": "rock"}
+    given.runs = {"b": Run("b")}
+    given.intervention.policies = [Policy("towards", {"x_m": ends_at, "y_m": 0.0, "speed_m_s": 1.0})]
+    given = validated(given)
+    trace, required_m = simulate(given, "b"), given.safe_distance.obstacle_m
+    traces, found = {"b": trace}, verify(trace)
+    report = built(given, traces, found)
+    evidence = {verdict.claim.id: asdict(verdict.finding)["evidence"] for verdict in found}
+    places = [pd.DataFrame(trace.position(name), columns=["x_m", "y_m", "z_m"]) for name in trace.robots]
+    table = pd.concat([each.assign(t_s=trace.t, body=name) for each, name in zip(places, trace.robots, strict=True)])
+    judged = next(one for one in positions.judge(table, asdict(given)) if (one.first, one.second) == ("ugv1", "rock"))
+    listed = next(each for each in evidence["SAFE-TRACE"]["pairs"] if pair.items() <= each.items())
+    metric = report["runs"]["b"]["metrics"]["min_distance_m"]["ugv1"]["rock"]
+    exported = pd.read_csv([*tables.write(trace, tmp_path)][-1]).query("first == 'ugv1' and second == 'rock'").iloc[0]
+    (exact,) = (one for one in too_near(recorded(trace)) if one.demand.second == "rock" and one.demand.first == "ugv1")
+    for distance, required in (
+        (listed["min_distance_m"], listed["safe_distance_m"]),
+        (metric["value"], metric["safe_distance_m"]),
+        (judged.least_m, judged.safe_m),
+        (exported["min_distance_m"], exported["safe_distance_m"]),
+        (exact.least_m, float(exact.demand.required_m)),
+    ):
+        assert (distance, required) == (pytest.approx(gap_m, abs=1e-6), required_m)
+    promised = next(each for each in evidence["SAFE-HYP"]["pairs"] if pair.items() <= each.items())
+    assert (promised["safe_distance_m"], promised["guarantee_m"] <= gap_m + 1e-6) == (required_m, True)
+    words = [item.words for item in attention.items(report) if item.claim == "SAFE-TRACE"]
+    assert words[0].startswith(f"ugv1 and rock at {told}, 1.25 m required")
+    first = summary.text(report)
+    assert f"{told} (ugv1 to rock)" in first or f"{told} from rock" in first or f"{told} of rock" in first
+    assert "required 1.25 m" in first
+    drawn = page(report, draw(given, traces), None)
+    assert f"ugv1 comes to {told} of rock" in drawn
+    cells = (f'<td class="n">{gap_m:.4f}</td>', '<td class="n">1.25</td>')
+    rows = [row for row in drawn.split("<tr") if "<td>ugv1</td><td>rock</td>" in row]
+    assert rows
+    assert all(cell in rows[0] for cell in cells)
+    assert "2.00 m needed" not in drawn
 
 
 def points_in_mind(self: OutcomeGatekeepers, *args: Any) -> tuple[Array, Array]:

@@ -18,17 +18,20 @@ NOT_EXERCISED = "not_exercised"
 """Outcome of a claim that passed because nothing could have refuted it."""
 EXPECTATIONS: tuple[str, ...] = (*STATUSES, EXERCISED)
 """Allowed alternatives of an expectation."""
+NOTHING = "nothing"
+"""The expectation of a claim about which the method promises nothing: no verdict meets it, none differs from it."""
 
 
 def alternatives(expected: str) -> tuple[str, ...]:
-    """The alternatives of an expectation such as "holds", "exercised" or "exercised or refuted"."""
+    """The alternatives of an expectation such as "holds", "exercised" or "holds or supported"."""
     return tuple(expected.split(" or "))
 
 
-def admits_either(expected: str) -> bool:
-    """Whether an expectation admits both an established and a refuted claim."""
+def declared(expected: str) -> str:
+    """An expectation as it counts: one that admits both an established and a refuted claim expects nothing."""
     admitted = alternatives(expected)
-    return "refuted" in admitted and any(each in (*PASSING, EXERCISED) for each in admitted)
+    either = "refuted" in admitted and any(each in (*PASSING, EXERCISED) for each in admitted)
+    return NOTHING if either else expected
 
 
 def outcome(status: str, exercised: float | None) -> str:
@@ -41,7 +44,12 @@ def outcome(status: str, exercised: float | None) -> str:
     return NOT_EXERCISED if status in PASSING and exercised == 0 else status
 
 
-def meets(expected: str, status: str, exercised: int | None) -> bool:
-    """Whether an expectation admits a verdict; an expected status ignores how often the claim was tested."""
+def meets(expected: str, status: str, exercised: int | None) -> bool | None:
+    """Whether an expectation admits a verdict; None if nothing is expected.
+
+    An expected status ignores how often the claim was tested.
+    """
+    if expected == NOTHING:
+        return None
     put_to_the_test = status in PASSING and bool(exercised)
     return any(status == each or (each == EXERCISED and put_to_the_test) for each in alternatives(expected))

@@ -132,7 +132,7 @@ def _of_claim(verdict: Verdict) -> Row:
     return {
         "claim": verdict.claim.id,
         "status": finding.status,
-        "as_expected": verdict.as_expected,
+        "as_expected": verdict.as_expected is not False,
         "margin": float("nan") if finding.margin is None else float(finding.margin),
         "unit": finding.unit,
         "exercised": float("nan") if finding.exercised is None else float(finding.exercised),

@@ -12,7 +12,6 @@ import pandas as pd
 from .rules import SMALL, Disagreement, close, holds, same
 from .run import OF_MPC, OF_OUTCOMES, OF_SOLUTIONS, Run
 from .safety import distances_m
-from .scenario import apart_m
 
 UNUSED = -1.0
 """Number in a column of decisions that the run's method does not use; an unused text is empty."""
@@ -109,9 +108,8 @@ def _collisions(run: Run) -> Iterator[Event]:
     A collision has the time of the first row inside that distance. If a robot passes between two rows outside it, the
     collision has the time of the earlier of them.
     """
-    bodies = {**run.robots, **run.scenario["obstacles"]}
     for pair in run.pairs:
-        within = apart_m(run.scenario, "collision_m", bodies[pair.robot], bodies[pair.other])
+        within = float(run.scenario["safe_distance"]["collision_m"]) + pair.radii_m
         if run.apart_m[pair.robot, pair.other] >= within:
             continue
         away = run.position_m[pair.robot] - run.position_m[pair.other]

@@ -30,12 +30,12 @@ class UnusableError(Exception):
 
 
 class Judged(NamedTuple):
-    """What was found about a pair of bodies.
+    """What was found about a pair of bodies; distances are between their surfaces, below 0 they overlap.
 
     Attributes:
         first: a robot.
         second: an obstacle, or another robot.
-        safe_m: distance of the centres to be kept.
+        safe_m: distance to be kept.
         least_m: distance that was kept at all times, with straight motion between samples.
         missed_m: e, by how much the samples miss the avoidance inequalities, m per sampling period; None if the law
             says nothing, since samples are not equally spaced.
@@ -77,14 +77,14 @@ def judge(table: pd.DataFrame, scenario: Json) -> list[Judged]:
     found = []
     for pair in pairs_of(scenario):
         own, other = places[pair.robot], places[pair.other]
-        least_m = float(distances_m(own - other).min())
+        least_m = float(distances_m(own - other).min()) - pair.radii_m
         missed = guarantee = None
         if period is not None:
             gain = gain_of(scenario, period)
             e = shortfall_m(own, other, pair, gain)
             short = max(0.0, pair.safe_m - float(np.linalg.norm(own[0] - other[0])))
-            missed, guarantee = float(e), pair.safe_m - max(lost_m(e, gain, len(spacing)), short)
-        found.append(Judged(pair.robot, pair.other, pair.safe_m, least_m, missed, guarantee))
+            missed, guarantee = float(e), pair.gap_m - max(lost_m(e, gain, len(spacing)), short)
+        found.append(Judged(pair.robot, pair.other, pair.gap_m, least_m, missed, guarantee))
     return sorted(found, key=lambda one: one.least_m - one.safe_m)
 
 

@@ -28,7 +28,7 @@ DECIDED: Mapping[str, Callable[[Run], Found]] = {
 }
 """The claims that the checker decides by its own formulas; for the others it checks the expectation only."""
 
-SCHEMA = "airground_drake.report/2"
+SCHEMA = "airground_drake.report/3"
 SHAPE: Mapping[str, type] = {
     **dict.fromkeys(("scenario", "provenance", "overall", "runs", "files"), dict),
     **dict.fromkeys(("claims", "audit", "choices"), list),

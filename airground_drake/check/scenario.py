@@ -21,16 +21,23 @@ class Pair(NamedTuple):
     Attributes:
         robot: name.
         other: name.
-        safe_m: safe distance of the centres: d of the kind of pair, and both radii.
+        gap_m: distance of the surfaces to be kept: d of the kind of pair.
+        radii_m: sum of both radii.
         closing_m_s: largest speed at which they can approach each other.
         share: part of the inequality that each robot takes: 1 beside an obstacle, 1/2 beside a robot.
     """
 
     robot: str
     other: str
-    safe_m: float
+    gap_m: float
+    radii_m: float
     closing_m_s: float
     share: float
+
+    @property
+    def safe_m(self) -> float:
+        """Safe distance of the centres, m."""
+        return self.gap_m + self.radii_m
 
 
 class Levels(NamedTuple):
@@ -87,21 +94,23 @@ def pairs_of(scenario: Json) -> list[Pair]:
     """Every robot with every obstacle, and every two robots once."""
     uav, robots = scenario["uav"]["name"], robots_of(scenario)
     limit = {name: float(robot["max_speed_m_s"]) for name, robot in robots.items()}
+    safe = {kind: float(distance) for kind, distance in scenario["safe_distance"].items()}
     beside_obstacles = [
-        Pair(robot, obstacle, apart_m(scenario, "obstacle_m", robots[robot], body), limit[robot], 1.0)
+        Pair(robot, obstacle, safe["obstacle_m"], radii_m(robots[robot], body), limit[robot], 1.0)
         for robot in robots
         for obstacle, body in scenario["obstacles"].items()
     ]
     beside_robots = []
     for one, other in combinations(robots, 2):
-        safe = apart_m(scenario, "air_ground_m" if other == uav else "ugv_m", robots[one], robots[other])
-        beside_robots.append(Pair(one, other, safe, limit[one] + limit[other], 0.5))
+        gap_m = safe["air_ground_m" if other == uav else "ugv_m"]
+        radii = radii_m(robots[one], robots[other])
+        beside_robots.append(Pair(one, other, gap_m, radii, limit[one] + limit[other], 0.5))
     return beside_obstacles + beside_robots
 
 
-def apart_m(scenario: Json, kind: str, one: Json, other: Json) -> float:
-    """Distance of two centres, m: a distance of surfaces, by its name in the scenario, and both radii."""
-    return float(scenario["safe_distance"][kind]) + (float(one["radius_m"]) + float(other["radius_m"]))
+def radii_m(one: Json, other: Json) -> float:
+    """Sum of the radii of two bodies, m."""
+    return float(one["radius_m"]) + float(other["radius_m"])
 
 
 def preset_of(scenario: Json, ugv: str) -> Preset:

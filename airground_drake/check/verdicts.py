@@ -41,6 +41,8 @@ UNDECIDED = ("inconclusive", "error", "not_run")
 """Statuses that leave a claim open."""
 PASSING = ("proved", "holds", "supported")
 """Statuses with which a claim was established."""
+NOTHING = "nothing"
+"""An expectation: nothing is promised, so the verdict neither meets it nor differs from it."""
 EXERCISED = "exercised"
 """An expectation: the claim was established, and something tested it."""
 NOT_EXERCISED = "not_exercised"
@@ -60,17 +62,13 @@ def is_foreign(claim: str, scenario: Json) -> bool:
     return claim in scenario["claims"] and claim not in KNOWN
 
 
-def meets(expected: str, claim: Json) -> bool:
-    """Whether an expectation such as "holds", "holds or refuted" or "exercised" admits the verdict."""
+def meets(expected: str, claim: Json) -> bool | None:
+    """Whether an expectation such as "holds", "holds or supported" or "exercised" admits the verdict; None: nothing."""
+    if expected == NOTHING:
+        return None
     admitted = expected.split(" or ")
     status, count = claim["status"], claim["exercised"]
     return status in admitted or (EXERCISED in admitted and status in PASSING and count is not None and count > 0)
-
-
-def admits_either(expected: str) -> bool:
-    """Whether an expectation admits a claim that was established and one that was refuted."""
-    admitted = expected.split(" or ")
-    return "refuted" in admitted and not {*PASSING, EXERCISED}.isdisjoint(admitted)
 
 
 def outcome_of(claim: Json) -> str:
@@ -154,7 +152,8 @@ def _overall(report: Json) -> Json:
     """The verdict over all claims, and what prevents it; findings about the paper count in a report of all of them."""
     claims, audit = report["claims"], report["audit"]
     keys = ("id", "run", "status", "expected", "exercised")
-    unexpected = [{key: claim[key] for key in keys} for claim in claims if not meets(claim["expected"], claim)]
+    unexpected = [{key: claim[key] for key in keys} for claim in claims if meets(claim["expected"], claim) is False]
+    unpromised = [{"id": claim["id"], "run": claim["run"]} for claim in claims if claim["expected"] == NOTHING]
     undecided = [entry for entry in unexpected if entry["status"] in UNDECIDED]
     differs = [entry for entry in unexpected if entry["status"] not in UNDECIDED]
     whole = len(audit) >= FINDINGS
@@ -167,11 +166,11 @@ def _overall(report: Json) -> Json:
     return {
         "status": status,
         "exit_code": EXIT_CODES[status],
-        "checks": len(claims),
-        "as_expected": len(claims) - len(unexpected),
+        "checks": len(claims) - len(unpromised),
+        "as_expected": len(claims) - len(unpromised) - len(unexpected),
         "counts": dict(Counter(map(outcome_of, claims))),
         "not_exercised": [{"id": c["id"], "run": c["run"]} for c in claims if outcome_of(c) == NOT_EXERCISED],
-        "either": [{"id": c["id"], "run": c["run"]} for c in claims if admits_either(c["expected"])],
+        "unpromised": unpromised,
         "differs": differs,
         "undecided": undecided,
         "missing": [],

@@ -100,5 +100,5 @@ def _lines(found: Proved) -> list[str]:
         else:
             lines.append(f"run {found.run}: {what}: not proved: {answer.why}")
     if not found.expected:
-        lines.append(f"run {found.run}: the scenario does not ask for it: SAFE-TRACE may be refuted")
+        lines.append(f"run {found.run}: the scenario does not ask for it: it does not expect SAFE-TRACE to hold")
     return lines

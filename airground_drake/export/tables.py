@@ -12,10 +12,16 @@ import pandas as pd
 
 from airground_drake.base import files
 from airground_drake.run.trace import TABLES, Trace
+from airground_drake.verify.runs.pairs import least_gap, pairs_of
+
+TOLD = {"distances_m": "distances_of_centres_m"}
+"""Columns under the names that say what they are, by their names in a trace."""
 
 
 def write(trace: Trace, folder: Path) -> Iterator[Path]:
-    """Write the tables and the events of a run, `RUN_TABLE.csv`; numbers are written so that they read back equal.
+    """Write the tables, the events and the smallest distances of a run, `RUN_TABLE.csv`.
+
+    Distances are between surfaces, below 0 as an overlap. Numbers are written so that they read back equal.
 
     A cell that holds several numbers is a JSON list.
 
@@ -24,10 +30,20 @@ def write(trace: Trace, folder: Path) -> Iterator[Path]:
     """
     tables: dict[str, pd.DataFrame] = {name: getattr(trace, name) for name in TABLES}
     tables["events"] = pd.DataFrame(trace.events)
+    tables["distances"] = pd.DataFrame(_distances(trace))
     for name, table in tables.items():
         path = folder / f"{trace.run}_{name}.csv"
-        files.write_text(path, table.map(_cell).to_csv(index=False))
+        files.write_text(path, table.rename(columns=TOLD).map(_cell).to_csv(index=False))
         yield path
+
+
+def _distances(trace: Trace) -> Iterator[dict[str, Any]]:
+    """A row per pair, with the names of report.json."""
+    for least in (least_gap(trace, pair) for pair in pairs_of(trace)):
+        yield {
+            "first": least.pair.first, "second": least.pair.second, "min_distance_m": least.gap_m,
+            "safe_distance_m": least.pair.required_m, "t_s": least.t_s,
+        }  # fmt: skip
 
 
 def _cell(value: Any) -> Any:

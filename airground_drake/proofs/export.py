@@ -9,6 +9,7 @@ from fractions import Fraction
 from functools import cache
 from itertools import combinations, groupby, pairwise
 from math import isqrt, lcm
+from typing import NamedTuple
 
 from airground_drake.base.exact import decimal
 from airground_drake.proofs.record import FOLDER
@@ -21,13 +22,25 @@ PARTS = 2**60
 Place = tuple[Fraction, Fraction, Fraction]
 
 
-@dataclass(frozen=True)
-class Demand:
-    """Two bodies, by name, and the distance of their centres that they are to keep, m."""
+class Demand(NamedTuple):
+    """Two bodies, by name, and the distance that they are to keep.
+
+    Attributes:
+        first: a robot.
+        second: the other body.
+        required_m: distance of their surfaces, m.
+        radii_m: sum of their radii, m.
+    """
 
     first: str
     second: str
-    safe_m: Fraction
+    required_m: Fraction
+    radii_m: Fraction
+
+    @property
+    def safe_m(self) -> Fraction:
+        """Distance of the centres, m, which the theorems are about."""
+        return self.required_m + self.radii_m
 
     @property
     def lemma(self) -> str:
@@ -81,19 +94,19 @@ def recorded(trace: Trace) -> Recorded:
         times=tuple(map(Fraction, trace.t.tolist())),
         places={spelled[name]: place for name, place in places.items()},
         demands=tuple(
-            Demand(spelled[first], spelled[second], safe_m) for first, second, safe_m in demands(trace.scenario)
+            each._replace(first=spelled[each.first], second=spelled[each.second]) for each in demands(trace.scenario)
         ),
         gain=min(decimal(control.avoidance_gain_1_s) * decimal(control.period_s), Fraction(1)),
     )
 
 
-def demands(scenario: Scenario) -> list[tuple[str, str, Fraction]]:
-    """Who is to keep which distance from whom, m: each robot from each obstacle, and each two robots."""
+def demands(scenario: Scenario) -> list[Demand]:
+    """Who is to keep which distance from whom: each robot from each obstacle, and each two robots."""
     robots, safe, uav = scenario.robots, scenario.safe_distance, scenario.uav.name
     radius = {name: decimal(body.radius_m) for name, body in scenario.bodies.items()}
     found = [(robot, obstacle, safe.obstacle_m) for robot in robots for obstacle in scenario.obstacles]
     found += [(*two, safe.air_ground_m if uav in two else safe.ugv_m) for two in combinations(robots, 2)]
-    return [(one, other, decimal(apart) + radius[one] + radius[other]) for one, other, apart in found]
+    return [Demand(one, other, decimal(apart), radius[one] + radius[other]) for one, other, apart in found]
 
 
 def _rounded(place: Sequence[float]) -> Place:
@@ -167,7 +180,8 @@ def distances_file(run: Recorded) -> str:
         f"(** That {run.name} keeps its distances. Written by `airground prove`, from the positions in trace/. *)\n"
         "Require Import Reals Lra ZArith List.\nRequire Import Safety Run DistanceChecker.\nImport ListNotations.\n"
         f"Local Open Scope Z_scope.\n\n{_data(run)}{checks}{''.join(lemmas)}"
-        f"(** All pairs, m and s. *)\n{together}Proof. intros t T; exact {proof}. Qed.\n\n"
+        "(** All pairs: distances of centres, which are the safe distance and both radii, in m; times in s. *)\n"
+        f"{together}Proof. intros t T; exact {proof}. Qed.\n\n"
         f"Print Assumptions {run.name}_keeps_its_distances.\n"
     )
 
@@ -185,7 +199,7 @@ def law_file(run: Recorded) -> str:
         f"(** That {run.name} obeys the avoidance law. Written by `airground prove`, from the positions in trace/. *)\n"
         f"Require Import Reals Lra ZArith.\nRequire Import Safety Run LawChecker {run.name}.\n"
         f"Local Open Scope R_scope.\n\n{_LAW}{''.join(lemmas)}"
-        f"(** All pairs: A h, bodies, safe distance in m, error in m per step. *)\n"
+        f"(** All pairs: A h, bodies, distance of centres in m, error in m per step. *)\n"
         f"{_theorem(f'{run.name}_obeys_the_law', '', _grouped(run, claims))}Proof. exact {proof}. Qed.\n\n"
         f"Print Assumptions {run.name}_obeys_the_law.\n"
     )

@@ -52,7 +52,7 @@ def compare(text: str, trace: Trace) -> Rounding:
     if max(off) > Fraction(1, 2 * PARTS):
         raise ReadbackError(f"{run}: a position differs from the trace by {float(max(off)):.3g} m")
     spelled = dict(zip(recorded, bodies, strict=True))
-    wanted = [(spelled[one], spelled[two], safe) for one, two, safe in demands(trace.scenario)]
+    wanted = [(spelled[each.first], spelled[each.second], each.safe_m) for each in demands(trace.scenario)]
     _compare_statement(run, text, trace, wanted)
     return Rounding(sum(each > 0 for each in off), float(max(off)))
 

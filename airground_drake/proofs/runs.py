@@ -12,6 +12,7 @@ from typing import Any
 
 from airground_drake.base import files
 from airground_drake.base.errors import TraceError, UnknownNameError, one_line
+from airground_drake.base.statuses import NOTHING, declared
 from airground_drake.proofs import coq, readback
 from airground_drake.proofs.export import Demand, Recorded, demands, distances_file, law_file, recorded
 from airground_drake.proofs.record import FOLDER, digest
@@ -147,7 +148,7 @@ def decide(place: Workshop, run: Recorded, name: str, text: str, theorem: str, l
 
 
 def _pair(demand: Demand) -> str:
-    return f"{demand.first} and {demand.second}, {float(demand.safe_m):g} m"
+    return f"{demand.first} and {demand.second}, {float(demand.required_m):g} m"
 
 
 def _about(run: Recorded, text: str, line: int) -> Demand | None:
@@ -199,9 +200,9 @@ def prove_report(report: Path, names: Sequence[str] = (), limit_s: float = coq.L
 
 
 def expects_kept(run: Trace) -> bool:
-    """Whether the scenario expects that the run keeps its distances: SAFE-TRACE may not be refuted."""
+    """Whether the scenario expects that the run keeps its distances: SAFE-TRACE is promised, and not to be refuted."""
     expected = run.scenario.runs[run.run].expected.get("SAFE-TRACE", "holds")
-    return "refuted" not in expected
+    return declared(expected) != NOTHING and "refuted" not in expected
 
 
 def document(place: Workshop, found: Sequence[Proved]) -> dict[str, Any]:
@@ -231,7 +232,7 @@ def _entry(answer: Answer) -> dict[str, Any]:
     if answer.proved:
         return entry | {"axioms": list(answer.axioms), "seconds": round(answer.seconds, 3)}
     near = [
-        {"first": one.demand.first, "second": one.demand.second, "safe_distance_m": float(one.demand.safe_m)}
+        {"first": one.demand.first, "second": one.demand.second, "safe_distance_m": float(one.demand.required_m)}
         | {"least_m": one.least_m, "short_m": one.short_m, "t_s": one.t_s}
         for one in answer.too_near
     ]

@@ -21,7 +21,7 @@ class TooNear:
 
     Attributes:
         demand: the pair, and the distance that it is to keep.
-        least_m: its least distance.
+        least_m: least distance of its surfaces; below 0 they overlap.
         short_m: by how much that is too little.
         t_s: when the pair is so near.
     """
@@ -34,7 +34,7 @@ class TooNear:
     def __str__(self) -> str:
         """The pair, its distance and the time."""
         pair = f"{self.demand.first} and {self.demand.second}"
-        wanted = f"{self.short_m:.3g} m less than {float(self.demand.safe_m):g} m"
+        wanted = f"{self.short_m:.3g} m less than {float(self.demand.required_m):g} m"
         return f"{pair} are {self.least_m:.6g} m apart at {self.t_s:.6g} s, {wanted}"
 
 
@@ -54,10 +54,10 @@ def _worst(run: Recorded, demand: Demand) -> TooNear | None:
     if nearest is None or nearest[0] >= demand.safe_m**2:
         return None
     squared, row, fraction = nearest
-    least_m = sqrt(squared)
-    short_m = float(demand.safe_m**2 - squared) / (float(demand.safe_m) + least_m)  # d - D, without cancellation
+    apart_m = sqrt(squared)
+    short_m = float(demand.safe_m**2 - squared) / (float(demand.safe_m) + apart_m)  # d - D, without cancellation
     t_s = run.times[row] + fraction * (run.times[row + 1] - run.times[row])
-    return TooNear(demand, least_m, short_m, float(t_s))
+    return TooNear(demand, apart_m - float(demand.radii_m), short_m, float(t_s))
 
 
 def _at_all_rows(places: tuple[Place, ...], rows: int) -> tuple[Place, ...]:

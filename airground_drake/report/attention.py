@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 
 from airground_drake.base.errors import one_line
 from airground_drake.base.statuses import PASSING, UNDECIDED, outcome
+from airground_drake.report.outcomes import distance
 from airground_drake.report.phrases import MAX_NAMES, counted, grouped, refusal
 from airground_drake.scenarios.validate import preset_s
 
@@ -38,7 +39,7 @@ class Item(NamedTuple):
 
 def items(document: Mapping[str, Any]) -> list[Item]:
     """All of a report: what may explain the rest first, then refuted claims, then undecided and missing ones."""
-    unexpected = [claim for claim in document["claims"] if not claim["as_expected"]]
+    unexpected = [claim for claim in document["claims"] if claim["as_expected"] is False]
     unexpected.sort(key=lambda claim: claim["status"] in UNDECIDED)
     return [
         *beforehand(document),
@@ -79,7 +80,8 @@ def _words(claim: Mapping[str, Any], place: Mapping[str, Any], bodies: Sequence[
         why = claim["evidence"].get("reason") or claim["evidence"].get("error")
         return why if isinstance(why, str) else "could not be decided"
     if {"min_distance_m", "safe_distance_m"} <= known.keys():
-        return f"{who} at {known['min_distance_m']:.2f} m, {known['safe_distance_m']:g} m needed{at}"
+        apart = distance(known["min_distance_m"], known["safe_distance_m"])
+        return f"{who} at {apart}, {known['safe_distance_m']:g} m required{at}"
     if {"distance_m", "margin_m"} <= known.keys() and "condition" in place:
         allowed = known["distance_m"] + known["margin_m"]
         return f"{who} ended {known['distance_m']:.2f} m from where it must end, {allowed:g} m allowed"

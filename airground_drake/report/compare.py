@@ -21,7 +21,7 @@ from airground_drake.report.folder import PAGES
 from airground_drake.report.rebuild import WITHIN
 
 SCHEMA = "airground_drake.comparison/1"
-REPORT = "airground_drake.report/2"
+REPORT = "airground_drake.report/3"
 
 ORDER = (("proved",), ("holds", "supported"), ("not_exercised",), (*UNDECIDED, "gone"), ("refuted",))
 """Verdicts from the best to the worst, as `statuses.outcome` names them; `gone`: no verdict any more."""
@@ -128,11 +128,11 @@ def _overall(before: Document, after: Document) -> Iterator[Change]:
 def _verdicts(before: Document, after: Document) -> Iterator[Change]:
     for (claim, run), old, new in _paired(before["claims"], after["claims"], "id", "run"):
         was, now = _outcome(old), _outcome(new)
-        lost = bool(old and old["as_expected"] and not (new and new["as_expected"]))
+        lost = bool(old and old["as_expected"] and (not new or new["as_expected"] is False))
         if was != now or lost:
             worse = old is not None and (lost or _rank(ORDER, now) > _rank(ORDER, was))
             change = {"claim": claim, "run": run, "before": was if old else None, "after": now if new else None}
-            yield {**change, "worse": worse, "as_expected": bool(new and new["as_expected"])}
+            yield {**change, "worse": worse, "as_expected": bool(new and new["as_expected"] is not False)}
 
 
 def _of_claims(before: Document, after: Document, field: str) -> Iterator[Change]:

@@ -14,7 +14,7 @@ import numpy as np
 
 from airground_drake.audit import of_runs
 from airground_drake.base.files import sha256
-from airground_drake.base.statuses import NOT_EXERCISED, STATUSES, UNDECIDED, admits_either, outcome
+from airground_drake.base.statuses import NOT_EXERCISED, NOTHING, STATUSES, UNDECIDED, outcome
 from airground_drake.registry import method_of
 from airground_drake.report import metrics, reproduction
 from airground_drake.report.phrases import counted
@@ -23,7 +23,7 @@ from airground_drake.scenarios.plugins import OPTION
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.verify.claim import Verdict
 
-SCHEMA = "airground_drake.report/2"
+SCHEMA = "airground_drake.report/3"
 
 MOST_LISTED = 4
 """Maximum number of checks that a sentence names."""
@@ -108,12 +108,13 @@ def overall(
     Returns:
         `status`, `exit_code`, `why`, counts, and lists of what differs, is undecided or is missing. `counts` has a
         claim that nothing put to the test under `not_exercised`, never under its status; the list of that name says
-        which these are. `either` lists claims that the scenario admits refuted as well as established: that they came
-        out as expected says nothing. A finding that was not demonstrated differs, too.
+        which these are. `checks` counts claims about which something is expected, `unpromised` lists the others. A
+        finding that was not demonstrated differs, too.
     """
     undemonstrated = [item["id"] for item in items if not item["demonstrated"]]
     keys = ("id", "run", "status", "expected", "exercised")
-    unexpected = [{key: claim[key] for key in keys} for claim in claims if not claim["as_expected"]]
+    unexpected = [{key: claim[key] for key in keys} for claim in claims if claim["as_expected"] is False]
+    checks = sum(claim["as_expected"] is not None for claim in claims)
     differs = [claim for claim in unexpected if claim["status"] not in UNDECIDED]
     undecided = [claim for claim in unexpected if claim["status"] in UNDECIDED]
     outcomes = [(outcome(claim["status"], claim["exercised"]), claim) for claim in claims]
@@ -121,7 +122,7 @@ def overall(
     if differs:
         status = "not_as_expected"
         differ = "differs" if len(differs) == 1 else "differ"
-        why = f"{len(differs)} of {counted(len(claims), 'check')} {differ} from what the scenario declares: "
+        why = f"{len(differs)} of {counted(checks, 'check')} {differ} from what the scenario declares: "
         why += f"{_listed(differs)}."
     elif undemonstrated:
         status = "not_as_expected"
@@ -130,16 +131,16 @@ def overall(
         status, left = "inconclusive", [*undecided, *absent]
         why = f"{counted(len(left), 'check')} could not be decided: {_listed(left)}." if left else "No checks."
     else:
-        status, why = "as_expected", f"All {counted(len(claims), 'check')} gave the verdict that the scenario declares."
+        status, why = "as_expected", f"All {counted(checks, 'check')} gave the verdict that the scenario declares."
     return {
         "status": status,
         "exit_code": EXIT_CODES[status],
         "why": why,
-        "checks": len(claims),
-        "as_expected": len(claims) - len(unexpected),
+        "checks": checks,
+        "as_expected": checks - len(unexpected),
         "counts": {name: counts[name] for name in (*STATUSES, NOT_EXERCISED) if counts[name]},
         "not_exercised": _named(claim for found, claim in outcomes if found == NOT_EXERCISED),
-        "either": _named(claim for claim in claims if admits_either(claim["expected"])),
+        "unpromised": _named(claim for claim in claims if claim["expected"] == NOTHING),
         "differs": differs,
         "undecided": undecided,
         "missing": list(absent),

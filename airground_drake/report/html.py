@@ -253,7 +253,7 @@ def _by_claim(claims: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
         {
             "id": name,
             "claims": members,
-            "fine": all(claim["as_expected"] for claim in members),
+            "fine": all(claim["as_expected"] is not False for claim in members),
             "settled": all(c["as_expected"] and c["status"] in PASSING and not c["run"] for c in members),
             "verdicts": _together(members),
         }

@@ -53,9 +53,10 @@ def _outcome(case: ET.Element, claim: Mapping[str, Any]) -> None:
     """Add to a test case what came of its claim."""
     idle = outcome(claim["status"], claim["exercised"]) == NOT_EXERCISED
     found = f"{claim['status']}, nothing to check (0 {claim['exercised_by']})" if idle else claim["status"]
-    if claim["as_expected"]:
-        if idle:
-            ET.SubElement(case, "skipped", {"message": _text(f"{found}: {claim['statement']}")})
+    if claim["as_expected"] is not False:
+        told = f"{found}, nothing promised" if claim["as_expected"] is None else found if idle else ""
+        if told:
+            ET.SubElement(case, "skipped", {"message": _text(f"{told}: {claim['statement']}")})
         return
     margin = "" if claim["margin"] is None else f", margin {claim['margin']:.4g} {claim['unit']}".rstrip()
     if margin and claim["quantity"]:

@@ -4,17 +4,22 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from airground_drake.base.arrays import Array
 from airground_drake.run.trace import Trace
-from airground_drake.scenarios.world import make_world
-from airground_drake.verify.engines.geometry import Approach, closest_approach
-from airground_drake.verify.runs.pairs import apart_of, least_of, pairs_of
-from airground_drake.world.world import World
+from airground_drake.verify.runs.pairs import (
+    Gap,
+    apart_of,
+    gap_over_time,
+    least_gap,
+    least_of,
+    numbers_of,
+    pair_of,
+    pairs_of,
+)
 
 MOST_OBSTACLES = 20
 """Maximum number of obstacles listed per robot."""
@@ -37,18 +42,20 @@ def of_run(trace: Trace) -> dict[str, Any]:
     """Metrics of one run.
 
     Returns:
-        `min_distance_m` (robot -> obstacle -> value, t_s, safe_distance_m; exact in continuous time; at most
-        `MOST_OBSTACLES`, those of least margin), `min_robot_distance_m` (the same for the other robot of least
-        margin), `final_position_m`, `duration_s`, `wall_s` and `realtime_factor` (None if not measured),
+        `min_distance_m` (robot -> obstacle -> value, t_s, safe_distance_m; gaps between surfaces, exact in continuous
+        time; at most `MOST_OBSTACLES`, those of least margin), `min_robot_distance_m` (the same for the other robot of
+        least margin), `final_position_m`, `duration_s`, `wall_s` and `realtime_factor` (None if not measured),
         `event_counts` (robot -> kind -> count), `gatekeeper` (see `gatekeeper`).
     """
     wall_s = trace.timings.get("wall_s")
     duration_s = float(trace.t[-1] - trace.t[0])
     counts = {robot: Counter(e["kind"] for e in trace.events if e["robot"] == robot) for robot in trace.robots}
     return {
-        "min_distance_m": {robot: _to_obstacles(trace, robot) for robot in trace.robots},
+        "min_distance_m": {
+            robot: _listed(_least(trace, robot, [*trace.scenario.obstacles], MOST_OBSTACLES)) for robot in trace.robots
+        },
         "min_robot_distance_m": {
-            robot: _distances(trace, robot, _others(trace, robot), NEAR_ROBOTS) for robot in trace.robots
+            robot: _listed(_least(trace, robot, _others(trace, robot), NEAR_ROBOTS)) for robot in trace.robots
         },
         "final_position_m": {robot: trace.position(robot)[-1].tolist() for robot in trace.robots},
         "duration_s": duration_s,
@@ -128,49 +135,28 @@ def _closest_call(trace: Trace) -> dict[str, Any] | None:
 
 def closest_obstacle(trace: Trace, robot: str) -> Nearby | None:
     """Smallest distance of a robot to any obstacle over continuous time, exact; None without obstacles."""
-    return min(_surfaces(trace, robot, _to_obstacles(trace, robot)), default=None)
+    return min(_nearby(_least(trace, robot, [*trace.scenario.obstacles], MOST_OBSTACLES)), default=None)
 
 
 def close_by(trace: Trace, robot: str) -> list[Nearby]:
     """Smallest distances of a robot to its nearest obstacles and robots, exact, those of least margin first."""
-    found = _distances(trace, robot, list(trace.scenario.obstacles), NEAR_OBSTACLES)
-    found |= _distances(trace, robot, _others(trace, robot), NEAR_ROBOTS)
-    return sorted(_surfaces(trace, robot, found), key=lambda at: at.value - at.required_m)
+    found = _least(trace, robot, [*trace.scenario.obstacles], NEAR_OBSTACLES)
+    found |= _least(trace, robot, _others(trace, robot), NEAR_ROBOTS)
+    return sorted(_nearby(found), key=lambda at: at.value - at.required_m)
 
 
-def _surfaces(trace: Trace, robot: str, found: dict[str, dict[str, float]]) -> Iterator[Nearby]:
-    """The same distances, of surfaces."""
-    for other, at in found.items():
-        radii = radius_m(trace, robot) + radius_m(trace, other)
-        yield Nearby(at["value"] - radii, at["t_s"], other, at["safe_distance_m"] - radii)
+def _nearby(found: dict[str, Gap]) -> Iterator[Nearby]:
+    return (Nearby(least.gap_m, least.t_s, other, least.pair.required_m) for other, least in found.items())
 
 
 def gap_m(trace: Trace, robot: str, other: str) -> Array:
     """Distance of the surfaces of a robot and an obstacle or another robot at the rows, (T,), m."""
-    apart: Array = np.linalg.norm(trace.position(robot) - place(trace, other), axis=1)
-    return apart - (radius_m(trace, robot) + radius_m(trace, other))
-
-
-def place(trace: Trace, name: str) -> Array:
-    """Position of an obstacle, (3,), or of a robot, (T, 3), m."""
-    if name in trace.scenario.obstacles:
-        return np.asarray(trace.scenario.obstacles[name].position_m, dtype=np.float64)
-    return trace.position(name)
-
-
-def safe_distance_m(trace: Trace, robot: str, other: str) -> float:
-    """The safe distance of centres that the scenario sets for a robot and an obstacle or another robot, m."""
-    world: World = trace.derived("world", lambda: make_world(trace.scenario))
-    return world.pair(robot, other).distance_m
+    return gap_over_time(trace, pair_of(trace, robot, other))
 
 
 def radius_m(trace: Trace, name: str) -> float:
     """Radius of a robot or an obstacle, m."""
     return trace.scenario.bodies[name].radius_m
-
-
-def _to_obstacles(trace: Trace, robot: str) -> dict[str, dict[str, float]]:
-    return _distances(trace, robot, list(trace.scenario.obstacles), MOST_OBSTACLES)
 
 
 def _others(trace: Trace, robot: str) -> list[str]:
@@ -182,26 +168,17 @@ def events_of(trace: Trace, robot: str, *kinds: str) -> list[dict[str, Any]]:
     return [event for event in trace.events if event["robot"] == robot and event["kind"] in kinds]
 
 
-def _distances(trace: Trace, robot: str, among: Sequence[str], most: int) -> dict[str, dict[str, float]]:
-    """Smallest distances of a robot to at most `most` of some obstacles or robots, those of least margin."""
-    bound = trace.derived("bounds", lambda: _bounds(trace))
-    required = {other: safe_distance_m(trace, robot, other) for other in among}
+def _least(trace: Trace, robot: str, among: Sequence[str], most: int) -> dict[str, Gap]:
+    """Smallest gaps of a robot to at most `most` of some obstacles or robots, those of least margin."""
+    numbers = [numbers_of(trace)[frozenset((robot, other))] for other in among]
+    pairs = [pairs_of(trace)[k] for k in numbers]
+    bounds = apart_of(trace)[numbers] - np.array([pair.safe_m for pair in pairs])
+    near = least_of(bounds, most, lambda k: least_gap(trace, pairs[k]).margin_m)
+    return {among[k]: least_gap(trace, pairs[k]) for k in near}
 
-    @cache
-    def closest(k: int) -> Approach:
-        return closest_approach(trace.t, trace.position(robot), place(trace, among[k]))
 
-    least = np.array([bound[frozenset((robot, other))] - required[other] for other in among])
-    near = least_of(least, most, lambda k: closest(k).distance_m - required[among[k]])
+def _listed(found: dict[str, Gap]) -> dict[str, dict[str, float]]:
     return {
-        among[k]: {
-            "value": closest(k).distance_m, "t_s": closest(k).t_s, "safe_distance_m": required[among[k]],
-        }
-        for k in near
-    }  # fmt: skip
-
-
-def _bounds(trace: Trace) -> dict[frozenset[str], float]:
-    """A lower bound of the distance of each pair over the run, m."""
-    apart = zip(pairs_of(trace), apart_of(trace).tolist(), strict=True)
-    return {frozenset((pair.first, pair.second)): least for pair, least in apart}
+        other: {"value": least.gap_m, "t_s": least.t_s, "safe_distance_m": least.pair.required_m}
+        for other, least in found.items()
+    }

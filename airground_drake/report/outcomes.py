@@ -17,7 +17,7 @@ Document = Mapping[str, Any]
 
 
 class Near(NamedTuple):
-    """The smallest distance of a pair, of centres."""
+    """The smallest distance of a pair: the gap between the surfaces, below 0 if they overlap."""
 
     margin_m: float
     robot: str
@@ -107,7 +107,7 @@ def _judge(course: Course, document: Document) -> None:
     claim = next(iter(claims(document, "SAFE-TRACE", run=course.name)), unchecked)
     status = claim["status"]
     course.tested = claim["exercised"] != 0
-    course.declared_unsafe = status == "refuted" and claim["as_expected"]
+    course.declared_unsafe = status == "refuted" and claim["as_expected"] is True
     if course.collisions or (course.near and course.near[0].is_short):
         course.safe, course.why = False, ""
     elif status == "refuted":
@@ -168,8 +168,12 @@ def triggers(document: Document) -> list[Mapping[str, Any]]:
 
 
 def distance(value_m: float, required_m: float) -> str:
-    """A distance in words; if it falls short, with enough decimals to show a smaller number than the required one."""
+    """A distance in words, below 0 as an overlap.
+
+    If it falls short, it has enough decimals to show a smaller number than the required one.
+    """
     decimals = 3
     while value_m < required_m - SLACK_M and float(f"{value_m:.{decimals}f}") >= required_m and decimals < 9:
         decimals += 1
-    return f"{value_m:.{decimals}f} m"
+    shown = round(value_m, decimals) + 0.0  # no -0
+    return f"{shown:.{decimals}f} m{' (overlap)' * (shown < 0.0)}"

@@ -16,6 +16,7 @@ from markupsafe import Markup
 from airground_drake.base import files
 from airground_drake.base.errors import ReportError, one_line
 from airground_drake.report.folder import PAGES
+from airground_drake.report.outcomes import distance
 
 CLAIM = "SAFE-TRACE"
 """The claim that Coq proves of a run: every pair keeps its distance at all times."""
@@ -72,8 +73,8 @@ def _line(entry: Mapping[str, Any], coq: str) -> Markup:
         says = f"machine-checked for this run (Coq {coq})"
     elif near:
         pairs = (
-            f"pair {one['first']}, {one['second']}: {one['least_m']:.6g} m at {one['t_s']:.6g} s, "
-            f"{one['safe_distance_m']:g} m wanted"
+            f"pair {one['first']}, {one['second']}: {distance(one['least_m'], one['safe_distance_m'])} at "
+            f"{one['t_s']:.6g} s, {one['safe_distance_m']:g} m required"
             for one in near
         )
         says = f"Coq refused this run: {'; '.join(pairs)}"

@@ -14,7 +14,7 @@ import numpy as np
 
 from airground_drake.base.arrays import Array
 from airground_drake.base.errors import TraceError
-from airground_drake.report.metrics import closest_obstacle, events_of
+from airground_drake.report.metrics import closest_obstacle, events_of, gap_m
 from airground_drake.run.trace import Trace
 from airground_drake.scenarios.schema import Reproduction, Scenario
 
@@ -55,11 +55,7 @@ def distances_while_stalled(trace: Trace, robot: str) -> list[float]:
     """Final distances in m of a stalled robot to its two nearest obstacles, in the order of their names."""
     if not stall_position(trace, robot):
         return []
-    final = trace.position(robot)[-1]
-    distance = {
-        name: float(np.linalg.norm(final - np.asarray(obstacle.position_m)))
-        for name, obstacle in trace.scenario.obstacles.items()
-    }
+    distance = {name: float(gap_m(trace, robot, name)[-1]) for name in trace.scenario.obstacles}
     return [distance[name] for name in sorted(sorted(distance, key=distance.__getitem__)[:2])]
 
 

@@ -11,7 +11,7 @@ from textwrap import wrap
 from typing import NamedTuple
 
 from airground_drake.base.errors import one_line
-from airground_drake.base.statuses import NOT_EXERCISED, UNDECIDED, admits_either, outcome
+from airground_drake.base.statuses import NOT_EXERCISED, UNDECIDED, outcome
 from airground_drake.registry import METHODS
 from airground_drake.report.answers import Answer
 from airground_drake.report.answers import answers as answers_of
@@ -82,7 +82,7 @@ def first_screen(document: Document) -> FirstScreen:
 def headline(document: Document) -> Line:
     """The report in a sentence, and in another one if a verdict is not the one that the scenario declares."""
     mark, told = _outcome(courses(document))
-    differs = sum(not claim["as_expected"] and claim["status"] not in UNDECIDED for claim in document["claims"])
+    differs = sum(claim["as_expected"] is False and claim["status"] not in UNDECIDED for claim in document["claims"])
     if not differs:
         return Line(mark, told)
     checks = f"{counted(differs, 'check')} {'is' if differs == 1 else 'are'}"
@@ -198,17 +198,17 @@ def as_declared(document: Document) -> Line:
     overall, claims = document["overall"], document["claims"]
     if overall["status"] != "as_expected":
         return Line("no" if overall["status"] == "not_as_expected" else "open", str(overall["why"]))
-    failed = sum(claim["status"] == "refuted" and not admits_either(claim["expected"]) for claim in claims)
-    undecided = sum(claim["status"] in UNDECIDED for claim in claims)
+    failed = sum(claim["status"] == "refuted" and claim["as_expected"] is True for claim in claims)
+    undecided, unpromised = sum(claim["status"] in UNDECIDED for claim in claims), overall["unpromised"]
     idle = sum(outcome(claim["status"], claim["exercised"]) == NOT_EXERCISED for claim in claims)
     parts = [
         counted(failed, "deliberate failure") if failed else "",
         f"{undecided} undecided" if undecided else "",
         f"{idle} not tested" if idle else "",
-        f"{len(overall['either'])} allowed either way" if overall["either"] else "",
+        f"and {counted(len(unpromised), 'claim')} about which nothing is promised" if unpromised else "",
     ]
     told = ", ".join(filter(None, parts))
-    return Line("yes", f"{len(claims)} checks as declared{': ' if told else ''}{told}.")
+    return Line("yes", f"{overall['checks']} checks as declared{': ' if told else ''}{told}.")
 
 
 def text(document: Document) -> str:

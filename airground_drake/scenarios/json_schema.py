@@ -14,7 +14,7 @@ from typing import Any
 
 from pydantic import TypeAdapter
 
-from airground_drake.base.statuses import EXPECTATIONS
+from airground_drake.base.statuses import EXPECTATIONS, NOTHING
 from airground_drake.registry import Registry
 from airground_drake.scenarios import schema
 from airground_drake.scenarios.kinds import CLAIM_PATTERN, EXPECTED, NAME_PATTERN, WANTED, unit_of
@@ -69,7 +69,7 @@ def _adapted(part: Any, installed: bool) -> Any:
 def _expectations(claims: Registry, installed: bool) -> Schema:
     """Expected verdicts by claim."""
     one = "|".join(EXPECTATIONS)
-    verdict = {"anyOf": [{"enum": [*EXPECTATIONS]}, {"type": "string", "pattern": f"^({one})( or ({one}))*$"}]}
+    verdict = {"anyOf": [{"enum": [*EXPECTATIONS, NOTHING]}, {"type": "string", "pattern": f"^({one})( or ({one}))*$"}]}
     known = {name: {"description": claims.says(name), **verdict} for name in _adapted(claims, installed)}
     return {
         "properties": {**known, "<<": True},

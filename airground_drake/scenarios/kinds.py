@@ -19,7 +19,7 @@ from pydantic import (
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
 from airground_drake.base.arrays import LARGEST
-from airground_drake.base.statuses import EXPECTATIONS, alternatives
+from airground_drake.base.statuses import EXPECTATIONS, NOTHING, alternatives, declared
 from airground_drake.registry import MODEL_CLAIMS, PLUGIN, PLUGIN_PATTERN, RUN_CLAIMS, Registry, is_plugin
 from airground_drake.scenarios.limits import MAX_NAME, MAX_SEED, MAX_TEXT
 
@@ -154,10 +154,10 @@ def expected_of(claims: Registry) -> Rule:
 
     def check(value: dict[str, str]) -> dict[str, str]:
         for claim, expected in value.items():
-            if not set(alternatives(expected)) <= set(EXPECTATIONS):
-                several = "or several of them, such as: exercised or refuted"
+            if expected != NOTHING and not set(alternatives(expected)) <= set(EXPECTATIONS):
+                several = f"several of them, such as: holds or supported; or {NOTHING}"
                 raise refused(expected, f"one of {', '.join(EXPECTATIONS)}, {several}", claim)
-        return value
+        return {claim: declared(expected) for claim, expected in value.items()}
 
     return Rule(check, lambda: {EXPECTED: claims})
 

@@ -280,8 +280,8 @@ class Run:
     """One simulation: a method (see `airground list methods`) and what is expected of it.
 
     `stalls_m` names the UGVs that must end (to within `stall_tolerance_m`) at that point short of their
-    target. `expected` maps claim identifiers to the expected verdict; a claim that is not named must hold. "holds or
-    refuted" allows either, for a run without a guarantee. `exercised` means "holds, and the run tested it".
+    target. `expected` maps claim identifiers to the expected verdict; a claim that is not named must hold.
+    `nothing` is for a claim about which the method promises nothing. `exercised` means "holds, and the run tested it".
     `set: {decision.threshold.zeta_m: 2.0}` gives this run a value of its own, as `--set` does for all runs. Claims
     about the model that use a changed constant are judged for this run, too; `expected` may name them.
     """

@@ -19,7 +19,7 @@ import numpy as np
 
 from airground_drake.base.errors import ScenarioError
 from airground_drake.base.exact import decimal
-from airground_drake.base.statuses import alternatives
+from airground_drake.base.statuses import NOTHING, alternatives
 from airground_drake.decision.bayes import COMPUTED
 from airground_drake.registry import MODEL_CLAIMS, ROUTES, RUN_CLAIMS
 from airground_drake.scenarios.rounding import TOLERANCE_M, Rounding
@@ -113,7 +113,8 @@ def _ends(scenario: Scenario) -> Problems:
     for name, ugv in scenario.ugvs.items():
         away, end = math.dist(ugv.preset.waypoints_m[-1], ugv.target_m), len(ugv.preset.waypoints_m) - 1
         for run, spec in scenario.runs.items():
-            arrives = name not in spec.stalls_m and "refuted" not in alternatives(spec.expected.get(ARRIVES, "holds"))
+            admitted = alternatives(spec.expected.get(ARRIVES, "holds"))
+            arrives = name not in spec.stalls_m and {"refuted", NOTHING}.isdisjoint(admitted)
             if arrives and away > scenario.arrival_tolerance_m + TOLERANCE:
                 allowed = (
                     f"at most arrival_tolerance_m = {scenario.arrival_tolerance_m:.9g} m from {name}'s target_m, where "
@@ -287,10 +288,9 @@ def _clearances(scenario: Scenario) -> Problems:
         ):  # fmt: skip
             least = getattr(scenario.safe_distance, kind)
             for robot, other in _within(robots, others, least - TOLERANCE):
-                radii = robot.radius + other.radius
-                allowed = f"at least safe_distance.{kind} = {least:.9g} m{_and(radii)} is needed"
-                distance = math.dist(robot.point, other.point)
-                message = f"{robot.name} {verb} {distance:.9g} m from {other.name}, {allowed}"
+                allowed = f"at least safe_distance.{kind} = {least:.9g} m is needed"
+                gap = math.dist(robot.point, other.point) - (robot.radius + other.radius)
+                message = f"{robot.name} {verb} {gap:.9g} m from {other.name}, {allowed}"
                 yield f"{robot.key}.{attribute}", robot.point, message
 
 

@@ -60,7 +60,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(json.dumps([verdict.to_json() for verdict in verdicts], indent=1, allow_nan=False))
     else:
         print("".join(f"{_line(verdict)}\n" for verdict in verdicts), end="")
-    return 0 if all(verdict.as_expected for verdict in verdicts) else EXIT_DIFFERS
+    return EXIT_DIFFERS if any(verdict.as_expected is False for verdict in verdicts) else 0
 
 
 def _line(verdict: Verdict) -> str:
@@ -72,7 +72,7 @@ def _line(verdict: Verdict) -> str:
     idle = outcome(finding.status, finding.exercised) == NOT_EXERCISED
     found = f"{finding.status}, nothing to check" if idle else finding.status
     tested = f" [{finding.exercised} {verdict.claim.exercised_by}]" if finding.exercised is not None else ""
-    expected = "" if verdict.as_expected else f", expected {verdict.expected}"
+    expected = {True: "", False: f", expected {verdict.expected}", None: ", nothing promised"}[verdict.as_expected]
     return f"{name}: {found}{margin}{of}{tested}{expected}"
 
 

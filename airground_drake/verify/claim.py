@@ -146,7 +146,7 @@ class Verdict:
         claim: the claim.
         run: on which run; '' for a claim about the model.
         finding: what was found.
-        expected: the status that the scenario expects, or `exercised`; "holds or refuted" admits either.
+        expected: the status that the scenario expects, `exercised`, or `nothing`.
         inputs: the constants that a claim about the model is about.
     """
 
@@ -167,8 +167,11 @@ class Verdict:
         return "".join(f"<p>{escape(line)}</p>" for line in says)
 
     @property
-    def as_expected(self) -> bool:
-        """Whether the status is the expected one, and the claim was exercised where that is expected."""
+    def as_expected(self) -> bool | None:
+        """Whether the status is the expected one, and the claim was exercised where that is expected.
+
+        None if nothing is expected.
+        """
         return meets(self.expected, self.finding.status, self.finding.exercised)
 
     def to_json(self) -> dict[str, Any]:

@@ -222,7 +222,7 @@ RULES: dict[str, tuple[str, Edit]] = {
     "crash left undecided": ("verdict: recorded 'inconclusive'", crash_left_undecided),
     "margin": ("margin", claim("SAFE-TRACE", margin=lambda old: old + 1e-5)),
     "tests of a claim": ("how often the claim was exercised", claim("THR-TRIG", exercised=lambda old: old + 1)),
-    "expectation": ("expected verdict", claim("LIVE-GOAL", expected="holds or refuted")),
+    "expectation": ("expected verdict", claim("LIVE-GOAL", expected="nothing")),
     "as expected": ("as expected", claim("LIVE-GOAL", as_expected=False)),
     "run from a cache": ("only claims about the model come from a cache", claim("EXEC", from_cache=True)),
     "claim left out": ("claims that there are", report("claims", value=lambda old: old[1:])),

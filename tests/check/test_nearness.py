@@ -15,6 +15,6 @@ from airground_drake.verify.engines.geometry import closest_approach
 def test_no_pair_comes_nearer_than_its_balls(seed: int, rows: int, step: float) -> None:
     rng = np.random.default_rng(seed)
     ways = {name: 5.0 * rng.normal(size=3) + np.cumsum(step * rng.normal(size=(rows, 3)), axis=0) for name in "abc"}
-    pairs = [Pair(one, other, 1.0, 1.0, 0.5) for one, other in ("ab", "ac", "bc")]
+    pairs = [Pair(one, other, 1.0, 0.0, 1.0, 0.5) for one, other in ("ab", "ac", "bc")]
     exact = [closest_approach(np.arange(float(rows)), ways[p.robot], ways[p.other]).distance_m for p in pairs]
     assert (least_apart_m(ways, pairs) <= exact).all()

@@ -21,7 +21,7 @@ def run(way_m: list[float], **more: Any) -> Run:
     """A robot that moves along x towards a rock at the origin, one place per control sample."""
     t = PERIOD_S * np.arange(len(way_m))
     own = np.column_stack([way_m, np.zeros(len(t)), np.zeros(len(t))])
-    pair = Pair("ugv1", "rock", SAFE_M, 1.0, 1.0)
+    pair = Pair("ugv1", "rock", SAFE_M, 0.0, 1.0, 1.0)
     found = SimpleNamespace(
         t_s=t, sample_row=np.arange(len(t) - 1), pairs=[pair], apart_m={("ugv1", "rock"): 0.0},
         position_m={"ugv1": own, "rock": np.zeros((len(t), 3))},

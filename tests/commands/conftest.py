@@ -60,7 +60,7 @@ def made_report(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("made") / "report"
     for run in ("c", "d"):
         trace.save(replace(made, meta={**made.meta, "run": run}), folder / "trace" / run)
-    (folder / "report.json").write_text(json.dumps({"schema": "airground_drake.report/2"}))
+    (folder / "report.json").write_text(json.dumps({"schema": "airground_drake.report/3"}))
     return folder
 
 

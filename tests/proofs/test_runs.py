@@ -140,7 +140,7 @@ def test_every_pair_is_to_keep_its_kind_of_distance_and_both_radii() -> None:
         safe_distance=SafeDistance(obstacle_m=2.0, ugv_m=3.0, air_ground_m=1.0),
         runs={"d": Run("d")},
     )
-    assert [(one, other, float(safe)) for one, other, safe in demands(scenario)] == [
+    assert [(each.first, each.second, float(each.safe_m)) for each in demands(scenario)] == [
         ("one", "rock", 2.9), ("two", "rock", 3.0), ("above", "rock", 3.2),
         ("one", "two", 3.3), ("one", "above", 1.5), ("two", "above", 1.6),
     ]  # fmt: skip

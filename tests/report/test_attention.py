@@ -22,7 +22,7 @@ AVOIDANCE = {"hypothesis": "avoidance", "margin": -0.5}
 @pytest.mark.parametrize(
     ("status", "finding", "words"),
     [
-        ("refuted", {"counterexample": AT | TOO_NEAR}, "ugv1 and obstacle_1 at 0.00 m, 2 m needed, 7.717 s"),
+        ("refuted", {"counterexample": AT | TOO_NEAR}, "ugv1 and obstacle_1 at 0.000 m, 2 m required, 7.717 s"),
         ("refuted", {"counterexample": END}, "ugv1 ended 4.20 m from where it must end, 0.1 m allowed"),
         ("refuted", {"margin": -3.0, "unit": "m/s", "counterexample": AT | AVOIDANCE},
          "ugv1 and obstacle_1: avoidance missed by 0.5 m/s, 7.717 s"),

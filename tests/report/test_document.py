@@ -18,7 +18,7 @@ from airground_drake.verify.finding import Finding
 
 def test_minimum_of_the_schema_in_strict_json(scenario: Scenario, traces: dict[str, Trace]) -> None:
     report = json.loads(json.dumps(built(scenario, traces, FINE), allow_nan=False))
-    assert report["schema"] == "airground_drake.report/2"
+    assert report["schema"] == "airground_drake.report/3"
     run = report["runs"]["c"]
     for found, keys in (
         (report["scenario"], "name sha256 resolved"),
@@ -51,7 +51,8 @@ def test_minimum_of_the_schema_in_strict_json(scenario: Scenario, traces: dict[s
         ([*FINE, verdict("a", "holds", "exercised", exercised=4)], "as_expected", 0),
         ([*FINE, verdict("a", "holds", "exercised", exercised=0)], "not_as_expected", 1),
         ([*FINE, verdict("a", "refuted", "exercised", exercised=4)], "not_as_expected", 1),
-        ([*FINE, verdict("a", "refuted", "exercised or refuted", exercised=4)], "as_expected", 0),
+        ([*FINE, verdict("a", "refuted", "nothing", exercised=4)], "as_expected", 0),
+        ([*FINE, verdict("a", "error", "nothing")], "as_expected", 0),
         ([*FINE, verdict("a", "not_run", "exercised")], "inconclusive", 3),
         (FINE[:2], "inconclusive", 3),
         ([], "inconclusive", 3),
@@ -62,16 +63,18 @@ def test_overall(verdicts: list[Verdict], status: str, code: int, scenario: Scen
     assert (report["overall"]["status"], report["overall"]["exit_code"]) == (status, code)
 
 
-def test_what_nothing_tested_and_what_may_come_out_either_way_is_counted_apart(
+def test_what_nothing_tested_and_what_is_not_promised_is_counted_apart(
     scenario: Scenario, traces: dict[str, Trace]
 ) -> None:
     idle = [verdict("c", exercised=0), verdict("", "proved", "proved", exercised=0)]
-    either = [verdict("a", "refuted", "holds or refuted"), verdict("c", "holds", "exercised or refuted", exercised=1)]
-    overall = built(scenario, traces, [*FINE, verdict("a", exercised=1), *idle, *either])["overall"]
+    open_ = [verdict("a", "refuted", "nothing"), verdict("c", "holds", "nothing", exercised=1)]
+    report = built(scenario, traces, [*FINE, verdict("a", exercised=1), *idle, *open_])
+    overall = report["overall"]
     assert overall["counts"] == {"holds": 4, "refuted": 2, "not_exercised": 2}
     assert overall["not_exercised"] == [{"id": "SAFE-TRACE", "run": run} for run in ("c", "")]
-    assert overall["either"] == [{"id": "SAFE-TRACE", "run": run} for run in "ac"]
-    assert (overall["checks"], overall["as_expected"]) == (8, 8)
+    assert overall["unpromised"] == [{"id": "SAFE-TRACE", "run": run} for run in "ac"]
+    assert [claim["as_expected"] for claim in report["claims"][-2:]] == [None, None]
+    assert (overall["checks"], overall["as_expected"]) == (6, 6)
 
 
 def test_missing_data_is_listed(scenario: Scenario, traces: dict[str, Trace]) -> None:

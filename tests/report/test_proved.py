@@ -67,7 +67,8 @@ def test_each_run_has_a_line_of_its_own_and_the_files_are_still_those_of_the_rep
     lines = rows(report)
     assert f'<a href="proofs/run_a.v">{CHECKED}</a>' in lines["a"]
     assert "Coq did not prove this run: coqc took longer than 1 s &amp; more" in lines["c"]
-    says = "Coq refused this run: pair ugv1, uav: 0.5 m at 13 s, 2 m wanted; pair ugv1, uav: 0.5 m at 14 s, 2 m wanted"
+    near = "pair ugv1, uav: 0.500 m at {} s, 2 m required"
+    says = f"Coq refused this run: {near.format(13)}; {near.format(14)}"
     assert says in lines["a_printed"]
 
     proofs(report, "c")  # asked again, and about one run only: nothing is left of what was said of the others

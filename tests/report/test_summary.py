@@ -61,7 +61,7 @@ def document(runs: dict[str, Document | None], *claims: Document, **more: Any) -
     return {
         "scenario": {"resolved": resolved}, "runs": there, "reproduction": [row("reproduced")],
         "claims": [*claims, *(each for each in judged if ("SAFE-TRACE", each["run"]) not in given)],
-        "overall": {"status": "as_expected", "why": "", "either": []}, **more,
+        "overall": {"status": "as_expected", "why": "", "unpromised": [], "checks": 1}, **more,
     }  # fmt: skip
 
 
@@ -246,5 +246,5 @@ def test_the_pair_of_least_margin_counts_not_that_of_least_distance() -> None:
 
 def test_what_is_not_as_declared_says_so() -> None:
     for status, mark in (("not_as_expected", "no"), ("inconclusive", "open")):
-        overall = {"status": status, "why": "1 check differs.", "either": []}
+        overall = {"status": status, "why": "1 check differs.", "unpromised": [], "checks": 1}
         assert summary.as_declared(document({"d": run("d")}, overall=overall)) == (mark, "1 check differs.")

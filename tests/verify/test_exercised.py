@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 from verify.judging import CLAIMS
 
-from airground_drake.base.statuses import admits_either, meets, outcome
+from airground_drake.base.statuses import NOTHING, declared, meets, outcome
 from airground_drake.check import verdicts
 from airground_drake.run.simulation import simulate
 from airground_drake.run.trace import Trace
@@ -86,22 +86,24 @@ def test_a_claim_that_says_what_exercises_it_must_count_it(
     [
         ("exercised", "holds", 1, True), ("exercised", "proved", 9, True), ("exercised", "holds", 0, False),
         ("exercised", "holds", None, False), ("exercised", "refuted", 5, False),
-        ("exercised or refuted", "refuted", 5, True), ("exercised or refuted", "holds", 0, False),
-        ("holds", "holds", 0, True), ("holds or refuted", "holds", None, True),
+        ("exercised or error", "error", 5, True), ("exercised or error", "holds", 0, False),
+        ("holds", "holds", 0, True), ("holds or supported", "supported", None, True),
+        *(("nothing", status, count, None) for status in ("holds", "refuted", "error") for count in (0, 5)),
     ],
 )  # fmt: skip
-def test_exercised_is_established_on_something(expected: str, status: Any, count: int | None, met: bool) -> None:
+def test_exercised_is_established_on_something(expected: str, status: Any, count: int | None, met: bool | None) -> None:
     assert meets(expected, status, count) is met
+    assert verdicts.meets(expected, {"status": status, "exercised": count}) is met
     assert Verdict(CLAIMS["COMM"], "d", Finding(status, exercised=count), expected).as_expected is met
 
 
-def test_an_expectation_that_admits_either_verdict_is_known() -> None:
-    for expected in ("holds or refuted", "exercised or refuted", "refuted or supported or error"):
-        assert admits_either(expected)
-        assert verdicts.admits_either(expected)
+def test_an_expectation_that_admits_either_verdict_expects_nothing() -> None:
+    for expected in ("holds or refuted", "exercised or refuted", "refuted or supported or error", NOTHING):
+        assert declared(expected) == NOTHING
+        run = load("minimal", [f"runs.d.expected.LIVE-GOAL={expected}"])[0].runs["d"]
+        assert run.expected["LIVE-GOAL"] == NOTHING
     for expected in ("holds", "refuted", "holds or supported", "refuted or error"):
-        assert not admits_either(expected)
-        assert not verdicts.admits_either(expected)
+        assert declared(expected) == expected
 
 
 def test_report_and_command_line_say_what_was_not_exercised_and_what_a_margin_is_of(

@@ -9,9 +9,10 @@ import numpy as np
 from airground_drake.base.arrays import Array
 from airground_drake.report.figures import maps, timelines
 from airground_drake.report.figures.panels import Figure, panel, series
-from airground_drake.report.metrics import closest_obstacle, place
+from airground_drake.report.metrics import closest_obstacle
 from airground_drake.run.trace import Trace
 from airground_drake.scenarios.schema import Scenario
+from airground_drake.verify.runs.pairs import centres_of
 
 MAX_RUNS = 6
 
@@ -66,7 +67,7 @@ def _frame(runs: Mapping[str, Trace], robot: str, gaps: Mapping[str, Array]) -> 
     """The rectangle around the closest approaches of the runs and the two nearest obstacles."""
     closest = np.array([trace.position(robot)[int(gaps[name].argmin()), :2] for name, trace in runs.items()])
     first = next(iter(runs.values()))
-    centres = np.array([place(first, name)[:2] for name in first.scenario.obstacles])
+    centres = centres_of(first)[:, :2]
     reach = np.linalg.norm(centres - closest.mean(axis=0), axis=1)
     points = np.concatenate([closest, centres[np.argsort(reach, kind="stable")[:2]]])
     pad = 0.4 * float(first.scenario.safe_distance.obstacle_m)

@@ -69,7 +69,8 @@ def distances(
     figure, every = _time_axes(len(near), 0.5 + 1.75 * len(near), trace)
     required = sorted({found.required_m for each in near.values() for found in each})
     for axes, (ugv, those) in zip(every, near.items(), strict=True):
-        axes.axhspan(0.0, required[0], **_FORBIDDEN)
+        bottom = min(0.0, *(found.value for found in those)) if those else 0.0
+        axes.axhspan(bottom, required[0], **_FORBIDDEN)
         labels = [(d, f"required {d:.3g}", INK) for d in required]
         for d in required:
             level(axes, d, "-")
@@ -79,7 +80,7 @@ def distances(
             time_line(axes, trace.t, gap, appearance)
             labels.append((min(float(gap[-1]), top), short(found.other, 12), appearance.color))
             highest = max(highest, float(gap.max()))
-        axes.set_ylim(0.0, min(1.05 * highest, top))
+        axes.set_ylim(bottom, min(1.05 * highest, top))
         rule(axes, "time, s" if axes is every[-1] else "", "distance, m")
         label_right(axes, labels)
         if not those:
@@ -163,8 +164,9 @@ def compared_distances(runs: Mapping[str, Trace], robot: str) -> Figure:
     figure, (axes,) = _time_axes(1, 3.0 + 0.22 * len(runs), first, right_in=0.65, above_in=0.22 * len(runs))
     gaps = {name: nearest_distance(trace, robot) for name, trace in runs.items()}
     low = min(d, *(float(gap.min()) for gap in gaps.values()))
-    axes.set_ylim(max(0.0, low - 0.15 * d), 1.6 * d)
-    axes.axhspan(0.0, d, **_FORBIDDEN)
+    bottom = max(min(0.0, low), low - 0.15 * d)
+    axes.set_ylim(bottom, 1.6 * d)
+    axes.axhspan(min(0.0, bottom), d, **_FORBIDDEN)
     level(axes, d, "-")
     rule(axes, "time, s", "distance to the nearest obstacle, m")
     label_right(axes, [(d, f"d = {d:g}", INK)])

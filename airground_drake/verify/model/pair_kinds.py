@@ -33,7 +33,7 @@ def constants(scenario: Scenario) -> dict[str, Any]:
         "period_s": control.period_s,
         "sensing_range_m": control.sensing_range_m,
         "pairs": [
-            {"kind": each.kind, "safe_m": float(each.safe_m), "closing_m_s": float(each.closing_m_s)}
+            {"kind": each.kind, "distance_of_centres_m": float(each.safe_m), "closing_m_s": float(each.closing_m_s)}
             for each in _kinds(scenario)
         ],
     }
@@ -41,7 +41,10 @@ def constants(scenario: Scenario) -> dict[str, Any]:
 
 def kinds_of(inputs: dict[str, Any]) -> list[Kind]:
     """The pairs among a claim's inputs, as the decimals that their numbers print as."""
-    return [Kind(each["kind"], decimal(each["safe_m"]), decimal(each["closing_m_s"])) for each in inputs["pairs"]]
+    return [
+        Kind(each["kind"], decimal(each["distance_of_centres_m"]), decimal(each["closing_m_s"]))
+        for each in inputs["pairs"]
+    ]
 
 
 def _kinds(scenario: Scenario) -> Iterator[Kind]:

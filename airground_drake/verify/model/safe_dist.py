@@ -20,9 +20,9 @@ from airground_drake.verify.model.theorem import Hypothesis, Proof, TheoremClaim
 
 @dataclass(frozen=True, kw_only=True)
 class LeastDistances(Proof):
-    """The least distances, m, by kind of pair; none without a gain."""
+    """The least distances of centres, m, by kind of pair; none without a gain."""
 
-    least_distances_m: dict[str, float] | None = None
+    least_distances_of_centres_m: dict[str, float] | None = None
 
 
 class SafeDist(TheoremClaim):
@@ -68,7 +68,7 @@ class SafeDist(TheoremClaim):
     )
 
     theorems = ("Safety.disturbed", "Gate.deficit_closed_form", "Gate.common_direction", "Gate.overhead")
-    margin_of = "distance that is left, d - W/A"
+    margin_of = "distance of centres that is left, d - W/A"
 
     def inputs(self, scenario: Scenario) -> dict[str, Any]:
         """The constants of SAFE-INV, and the bound on the disturbance, m/s."""
@@ -98,7 +98,7 @@ class SafeDist(TheoremClaim):
         least = dict[str, float]()
         for pair in kinds_of(inputs):
             least[pair.kind] = min(float(left_m(inputs, pair)), least.get(pair.kind, inf))
-        return LeastDistances(least_distances_m=least, **proof)
+        return LeastDistances(least_distances_of_centres_m=least, **proof)
 
 
 def left_m(inputs: dict[str, Any], pair: Kind) -> Fraction:

@@ -88,8 +88,8 @@ class SafeInv(TheoremClaim):
         ranges = [
             Hypothesis.of(
                 self.margin_of,
-                f"{each.kind}: the sensing range {float(reach):g} m is at least d + c h = {float(each.safe_m):g} m + "
-                f"{float(each.closing_m_s):g} m/s * {float(h):g} s",
+                f"{each.kind}: the sensing range {float(reach):g} m is at least d + c h = {float(each.safe_m):g} m "
+                f"between centres + {float(each.closing_m_s):g} m/s * {float(h):g} s",
                 reach - each.safe_m - each.closing_m_s * h,
                 "m",
             )

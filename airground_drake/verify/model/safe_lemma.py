@@ -30,7 +30,7 @@ class SafeLemma(TheoremClaim):
     does_not_establish = "Anything about velocities that change within a period, or about rounding (see SAFE-HYP)."
 
     theorems = ("Safety.lemma", "Safety.lemma_in_the_plane")
-    margin_of = "least safe distance"
+    margin_of = "least safe distance of centres"
 
     def inputs(self, scenario: Scenario) -> dict[str, Any]:
         """The safe distances of the scenario's pairs, m."""

@@ -1,4 +1,8 @@
-"""The pairs of bodies that must keep apart, by the scenario, and where they are during a run."""
+"""The pairs of bodies that must keep apart, by the scenario, and where they are during a run.
+
+A distance that users see is the gap of a pair, beside the gap required: between surfaces, below 0 if the bodies
+overlap. `least_gap` and `gap_over_time` are its only sources. The law keeps distances of centres, `Pair.safe_m`.
+"""
 
 from __future__ import annotations
 
@@ -11,7 +15,7 @@ import numpy as np
 from airground_drake.base.arrays import Array
 from airground_drake.run.trace import Trace
 from airground_drake.scenarios.plants import plant_of
-from airground_drake.verify.engines.geometry import MERGE_S, apart_at_least, boxes_of, interpolate
+from airground_drake.verify.engines.geometry import MERGE_S, apart_at_least, boxes_of, closest_approach, interpolate
 
 
 class Pair(NamedTuple):
@@ -20,16 +24,41 @@ class Pair(NamedTuple):
     Attributes:
         first: the robot.
         second: the obstacle or other robot.
-        safe_m: safe distance of the centres: that of the kind of pair, plus both radii.
+        required_m: gap to keep: the scenario's safe distance of the kind of pair.
+        radii_m: sum of both radii.
         share: part of the avoidance inequality that each robot takes: all beside an obstacle, half beside a robot.
         reach_m: how far they can approach each other in one control period.
     """
 
     first: str
     second: str
-    safe_m: float
+    required_m: float
+    radii_m: float
     share: float
     reach_m: float
+
+    @property
+    def safe_m(self) -> float:
+        """Distance of the centres that the law keeps, m."""
+        return self.required_m + self.radii_m
+
+
+class Gap(NamedTuple):
+    """Where the gap of a pair was smallest.
+
+    Attributes:
+        pair: the two bodies.
+        gap_m: distance of their surfaces; below 0 they overlap.
+        margin_m: how much more that is than the gap required.
+        t_s: when, the earliest time.
+        row: row of the trace that ends the segment on which it was.
+    """
+
+    pair: Pair
+    gap_m: float
+    margin_m: float
+    t_s: float
+    row: int
 
 
 def pairs_of(trace: Trace) -> tuple[Pair, ...]:
@@ -46,16 +75,47 @@ def _pairs_of(trace: Trace) -> Iterator[Pair]:
     limit = {name: robot.max_speed_m_s for name, robot in trace.scenario.robots.items()}
     for robot in trace.robots:
         for obstacle in trace.scenario.obstacles:
-            distance = safe.obstacle_m + (radius[robot] + radius[obstacle])
-            yield Pair(robot, obstacle, distance, 1.0, limit[robot] * period)
+            yield Pair(robot, obstacle, safe.obstacle_m, radius[robot] + radius[obstacle], 1.0, limit[robot] * period)
     for robot, other in combinations(trace.robots, 2):
         apart = safe.air_ground_m if uav in (robot, other) else safe.ugv_m
-        distance = apart + (radius[robot] + radius[other])
-        yield Pair(robot, other, distance, 0.5, (limit[robot] + limit[other]) * period)
+        yield Pair(robot, other, apart, radius[robot] + radius[other], 0.5, (limit[robot] + limit[other]) * period)
+
+
+def pair_of(trace: Trace, one: str, other: str) -> Pair:
+    """The pair of two bodies, named in either order."""
+    return pairs_of(trace)[numbers_of(trace)[frozenset((one, other))]]
+
+
+def numbers_of(trace: Trace) -> dict[frozenset[str], int]:
+    """The place of each pair in `pairs_of`, by the names of its bodies."""
+
+    def numbered() -> dict[frozenset[str], int]:
+        return {frozenset((pair.first, pair.second)): k for k, pair in enumerate(pairs_of(trace))}
+
+    return trace.derived("numbers", numbered)
+
+
+def least_gap(trace: Trace, pair: Pair) -> Gap:
+    """The smallest gap of a pair over continuous time, exact if both move on straight lines, else a lower bound."""
+
+    def found() -> Gap:
+        places, off_m = places_of(trace), off_m_of(trace, pair.first) + off_m_of(trace, pair.second)
+        nearest = closest_approach(trace.t, places[pair.first], places[pair.second], off_m)
+        gap, margin = nearest.distance_m - pair.radii_m, nearest.distance_m - pair.safe_m
+        return Gap(pair, gap, margin, nearest.t_s, nearest.row)
+
+    return trace.derived(("least gap", pair.first, pair.second), found)
+
+
+def gap_over_time(trace: Trace, pair: Pair) -> Array:
+    """The gap of a pair at the rows of a trace, (T,), m."""
+    places = places_of(trace)
+    apart: Array = np.linalg.norm(places[pair.first] - places[pair.second], axis=1)
+    return apart - pair.radii_m
 
 
 def apart_of(trace: Trace) -> Array:
-    """A lower bound of the distance of each pair over the whole run, (P,), m, in the order of `pairs_of`."""
+    """A lower bound of the distance of the centres of each pair over the run, (P,), m, in the order of `pairs_of`."""
     return trace.derived("apart", lambda: _apart_of(trace))
 
 

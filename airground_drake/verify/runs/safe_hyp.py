@@ -76,25 +76,25 @@ class _Hypothesis:
 
 
 class Guarantee(NamedTuple):
-    """The distance that is promised for a pair of bodies: D >= `distance_m` at all times of the run.
+    """The distance that is promised for a pair of bodies: their gap is `gap_m` or more at all times of the run.
 
     Attributes:
         pair: the two bodies.
         missed_m: how far each sample misses the inequalities, e_i + e_j, (K,), m per control period; 0: both are met.
         short_m: how much too close the pair started, m.
-        distance_m: d - max(e / a, short_m), with e the largest of `missed_m` and a = min(A h, 1). Without a gain
-            nothing is restored: d - K e - short_m.
+        gap_m: d - max(e / a, short_m) with d the gap required, e the largest of `missed_m` and a = min(A h, 1).
+            Without a gain nothing is restored: d - K e - short_m.
     """
 
     pair: Pair
     missed_m: Array
     short_m: float
-    distance_m: float
+    gap_m: float
 
     @property
     def margin_m(self) -> float:
         """The distance promised less the safe one; not positive."""
-        return self.distance_m - self.pair.safe_m
+        return self.gap_m - self.pair.required_m
 
 
 @dataclass(frozen=True)
@@ -143,7 +143,8 @@ class SafeHyp(TraceClaim):
     method = (
         "Exact arithmetic on the recorded positions at the control samples, which are rational numbers; square roots "
         "are enclosed. Pairs and samples are left out if floats find them far apart, or an inequality met by more than "
-        "1e-9 m. The parameters of the controllers were read back from the diagram and are compared with the scenario. "
+        "1e-9 m. D and d are distances of centres, of which the law is; the distances promised are listed less the "
+        "radii. The parameters of the controllers were read back from the diagram and are compared with the scenario. "
         "Rows less than 1e-9 s apart count as one instant."
     )
     equations = "(7)-(8), (11) in the inequality form of the package (set-based avoidance)"
@@ -181,7 +182,7 @@ class SafeHyp(TraceClaim):
             evidence=asdict(
                 Hypotheses(
                     float(max((one.missed_m.max() for one in kept), default=0.0)),
-                    kept[0].distance_m if kept else None,
+                    kept[0].gap_m if kept else None,
                     listed,
                     len(kept),
                     different,
@@ -220,9 +221,9 @@ def _shown(
 def _listed(trace: Trace, one: Guarantee) -> dict[str, Any]:
     """A row of the evidence, with the sample at which the most was missed, if anything was."""
     e, k = float(one.missed_m.max()), int(np.argmax(one.missed_m))
-    described = {"first": one.pair.first, "second": one.pair.second, "safe_distance_m": one.pair.safe_m}
+    described = {"first": one.pair.first, "second": one.pair.second, "safe_distance_m": one.pair.required_m}
     t = float(trace.t[samples_of(trace)[k]]) if e > 0.0 else None
-    return {**described, "guarantee_m": one.distance_m, "e_m": e, "t_s": t}
+    return {**described, "guarantee_m": one.gap_m, "e_m": e, "t_s": t}
 
 
 def _gain(trace: Trace) -> Fraction:
@@ -254,7 +255,7 @@ def _guarantees(trace: Trace) -> Iterator[Guarantee]:
         e = Fraction(float(missed.max()))
         short = shortage(first[0], second if second.ndim == 1 else second[0], pair.safe_m)
         lost = max(e / gain, short) if gain else len(missed) * e + short
-        yield Guarantee(pair, missed, rounded_up(short), -rounded_up(lost - Fraction(pair.safe_m)))
+        yield Guarantee(pair, missed, rounded_up(short), -rounded_up(lost - Fraction(pair.required_m)))
 
 
 def _longest(places: Array, last: float) -> float:

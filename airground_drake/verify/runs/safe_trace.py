@@ -2,25 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
-from functools import cache, partial
+from functools import cache
 
 import numpy as np
 
-from airground_drake.base.arrays import Array
 from airground_drake.run.trace import Trace
 from airground_drake.verify.claim import TraceClaim
-from airground_drake.verify.engines.geometry import closest_approach
 from airground_drake.verify.finding import Finding
 from airground_drake.verify.runs.pairs import (
     DISTANCE_TOLERANCE_M,
-    Pair,
     apart_of,
+    least_gap,
     least_of,
-    off_m_of,
     pairs_of,
-    places_of,
     snapshot,
 )
 
@@ -34,10 +29,13 @@ class SafeTrace(TraceClaim):
     id = "SAFE-TRACE"
     summary = "No robot came closer to an obstacle or to another robot than the safe distance."
     statement = "During the whole run every robot kept the safe distance from every obstacle and every other robot."
-    formula = "min over t in [0, duration] of ||p_i(t) - q_j(t)|| >= d_ij for every pair (i, j), tolerance 1e-9 m"
+    formula = (
+        "min over t in [0, duration] of ||p_i(t) - q_j(t)|| - (r_i + r_j) >= d_ij for every pair (i, j), tolerance "
+        "1e-9 m"
+    )
     latex = (
-        r"\min_{t \in [0, T]} \lVert p_i(t) - q_j(t) \rVert \ge d_{ij} - 10^{-9} \text{ m} \quad \text{for "
-        r"every pair } (i, j)",
+        r"\min_{t \in [0, T]} \lVert p_i(t) - q_j(t) \rVert - (r_i + r_j) \ge d_{ij} - 10^{-9} \text{ m} \quad "
+        r"\text{for every pair } (i, j)",
     )
     method = (
         "Exact minimum of the distance on every segment between two rows (closest point of a relative straight motion "
@@ -47,8 +45,8 @@ class SafeTrace(TraceClaim):
     equations = "(7)-(8), (11)"
     assumptions = (
         "Between two rows every robot moves on a straight line at constant speed (integrator plant, zero-order hold).",
-        "Robots and obstacles are balls of the scenario's radii (`radius_m`; by default points): d_ij is the safe "
-        "distance of the kind of pair and both radii, and distances are of centres.",
+        "Robots and obstacles are balls of the scenario's radii r (`radius_m`; by default points). A distance is the "
+        "gap between their surfaces; below 0 they overlap. d_ij is the safe distance of the kind of pair.",
         "Obstacles stand still for the whole run, as the scenario lists them.",
     )
     does_not_establish = (
@@ -61,7 +59,11 @@ class SafeTrace(TraceClaim):
     def check(self, trace: Trace) -> Finding:
         """Compare the minimum distance of each pair with its safe distance; the worst pair gives the margin."""
         pairs = pairs_of(trace)
-        entry = cache(partial(_entry, trace, places_of(trace), pairs))
+
+        @cache
+        def entry(k: int) -> Distance:
+            return _entry(trace, k)
+
         least = apart_of(trace) - np.array([pair.safe_m for pair in pairs])
         listed = [entry(k) for k in least_of(least, MOST_LISTED, lambda k: entry(k).margin_m)]
         close_by = np.flatnonzero(least < np.array([pair.reach_m for pair in pairs])).tolist()
@@ -86,7 +88,7 @@ class SafeTrace(TraceClaim):
 
 @dataclass(frozen=True)
 class Distance:
-    """Where a pair was closest, in row `row`: distances of centres, m, and the time, s.
+    """Where a pair was closest, in row `row`: distances of surfaces, m, and the time, s.
 
     It was exercised if one control period at full speed would have broken the safe distance.
     """
@@ -101,11 +103,7 @@ class Distance:
     exercised: bool
 
 
-def _entry(trace: Trace, places: Mapping[str, Array], pairs: Sequence[Pair], k: int) -> Distance:
+def _entry(trace: Trace, k: int) -> Distance:
     """Where the k-th pair was closest."""
-    pair = pairs[k]
-    off_m = off_m_of(trace, pair.first) + off_m_of(trace, pair.second)
-    nearest = closest_approach(trace.t, places[pair.first], places[pair.second], off_m)
-    margin = nearest.distance_m - pair.safe_m
-    reached = bool(margin < pair.reach_m)
-    return Distance(pair.first, pair.second, pair.safe_m, nearest.distance_m, margin, nearest.t_s, nearest.row, reached)
+    pair, gap_m, margin_m, t_s, row = least_gap(trace, pairs_of(trace)[k])
+    return Distance(pair.first, pair.second, pair.required_m, gap_m, margin_m, t_s, row, margin_m < pair.reach_m)
