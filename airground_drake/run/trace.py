@@ -26,7 +26,7 @@ from __future__ import annotations
 
 import io
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from html import escape
 from pathlib import Path
@@ -223,6 +223,14 @@ class Trace:
         """Preset trajectory, (T, 3), m."""
         return self.vector(ugv, "ref_")
 
+    def rows_before(self, t_s: float) -> int:
+        """Number of rows before a time, s; at least one."""
+        return max(1, int(np.searchsorted(self.t, t_s)))
+
+    def counting_rows(self, robot: str) -> int:
+        """Number of rows that count for a robot: those before its first collision. The model lets it drive on."""
+        return self.rows_before(first_collisions_s(self.events).get(robot, np.inf))
+
     def to_pandas(self) -> pd.DataFrame:
         """The signals as a new table: a row per time, the index `t_s`; columns by robot, then by signal."""
         table = self.signals.set_index("t_s")
@@ -246,6 +254,16 @@ class Trace:
         rows = [(f"{event['t_s']:.3f}", event["robot"], event["kind"]) for event in self.events]
         table = pd.DataFrame(rows, columns=["time, s", "robot", "event"]).to_html(index=False, border=0)
         return f"<p>{escape(repr(self))}</p>{table}"
+
+
+def first_collisions_s(events: Iterable[Mapping[str, Any]]) -> dict[str, float]:
+    """The time of the first collision of each robot that collided, with an obstacle or with another robot, s."""
+    found: dict[str, float] = {}
+    for event in events:
+        if event["kind"] == "collision":
+            for robot in filter(None, (event["robot"], event.get("other"))):
+                found[robot] = min(event["t_s"], found.get(robot, event["t_s"]))
+    return found
 
 
 def save(trace: Trace, folder: Path) -> list[str]:
