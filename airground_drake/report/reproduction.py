@@ -15,7 +15,7 @@ import numpy as np
 from airground_drake.base.arrays import Array
 from airground_drake.base.errors import TraceError
 from airground_drake.report.metrics import closest_obstacle, events_of
-from airground_drake.run.trace import Trace, first_collisions_s
+from airground_drake.run.trace import Trace, first_collisions
 from airground_drake.scenarios.schema import Reproduction, Scenario
 
 Measure = Callable[[Trace, str], list[float]]
@@ -41,7 +41,7 @@ def measure(function: Measure) -> Measure:
 @measure
 def stall_position(trace: Trace, robot: str) -> list[float]:
     """Final [x, y] in m of a robot that stands still short of its target, and did not collide."""
-    hit = robot in first_collisions_s(trace.events)
+    hit = robot in first_collisions(trace.events)
     if hit or trace.t[-1] - trace.t[0] < STILL_S or _arrived(trace, robot):
         return []
     first = max(int(np.searchsorted(trace.t, trace.t[-1] - STILL_S, side="right")) - 1, 0)

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from airground_drake.base.arrays import Array
-from airground_drake.run.trace import Trace, first_collisions_s
+from airground_drake.run.trace import Trace, first_collisions
 from airground_drake.scenarios.world import make_world
 from airground_drake.world.motion import Motion
 from airground_drake.world.shape import Shape
@@ -43,9 +43,9 @@ def extract(trace: Trace, sent: Iterable[tuple[str, float, str]]) -> list[dict[s
             previous[row["number"]] = row["decision"]
             add(row["t_s"], row["robot"], row["decision"], policy=row["policy"], status=row["status"])
     _add_collisions(trace, add)
-    hit_s = first_collisions_s(found)
+    hits = first_collisions(found)
     for robot in trace.robots:
-        _add_arrival(trace, robot, trace.rows_before(hit_s.get(robot, np.inf)), add)
+        _add_arrival(trace, robot, trace.rows_before(hits[robot]["t_s"] if robot in hits else np.inf), add)
     return sorted(found, key=lambda event: (event["t_s"], order[event["robot"]]))
 
 

@@ -229,7 +229,7 @@ class Trace:
 
     def counting_rows(self, robot: str) -> int:
         """Number of rows that count for a robot: those before its first collision. The model lets it drive on."""
-        return self.rows_before(first_collisions_s(self.events).get(robot, np.inf))
+        return self.rows_before(first_collisions(self.events).get(robot, {"t_s": np.inf})["t_s"])
 
     def to_pandas(self) -> pd.DataFrame:
         """The signals as a new table: a row per time, the index `t_s`; columns by robot, then by signal."""
@@ -256,13 +256,12 @@ class Trace:
         return f"<p>{escape(repr(self))}</p>{table}"
 
 
-def first_collisions_s(events: Iterable[Mapping[str, Any]]) -> dict[str, float]:
-    """The time of the first collision of each robot that collided, with an obstacle or with another robot, s."""
-    found: dict[str, float] = {}
-    for event in events:
-        if event["kind"] == "collision":
-            for robot in filter(None, (event["robot"], event.get("other"))):
-                found[robot] = min(event["t_s"], found.get(robot, event["t_s"]))
+def first_collisions(events: Iterable[Mapping[str, Any]]) -> dict[str, Mapping[str, Any]]:
+    """The first collision, an event, of each robot that collided, with an obstacle or with another robot."""
+    found: dict[str, Mapping[str, Any]] = {}
+    for event in sorted((event for event in events if event["kind"] == "collision"), key=lambda event: event["t_s"]):
+        for robot in filter(None, (event["robot"], event.get("other"))):
+            found.setdefault(robot, event)
     return found
 
 

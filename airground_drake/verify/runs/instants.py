@@ -50,7 +50,7 @@ def talk_is_due(trace: Trace, ugv: str) -> bool:
 
 
 def without_proposals(trace: Trace) -> list[str]:
-    """UGVs that were intervened on for long enough and got no proposal: the UAV found no way, or its policies failed."""
+    """UGVs that were intervened on long enough, but got no proposal: the UAV found no way, or its policies failed."""
     asked = {event["robot"] for event in trace.events if event["kind"] == "proposal"}
     return [ugv for ugv in trace.ugvs if ugv not in asked and talk_is_due(trace, ugv)]
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from airground_drake.base.arrays import Array
 from airground_drake.base.errors import TraceError
-from airground_drake.run.trace import Trace, first_collisions_s
+from airground_drake.run.trace import Trace, first_collisions
 from airground_drake.verify.claim import TraceClaim
 from airground_drake.verify.engines.geometry import interpolate
 from airground_drake.verify.finding import Finding
@@ -61,9 +61,9 @@ class LiveGoal(TraceClaim):
         if unknown := set(stalls) - set(trace.ugvs):
             raise TraceError(f"stalls_m names {sorted(unknown)}, which are not UGVs of the trace")
         judged = list(_conditions(trace, stalls))
-        for robot, collided_s in first_collisions_s(trace.events).items():
-            for one in judged:
-                one.entry.update({"collided_s": collided_s} if one.entry["robot"] == robot else {})
+        hits = first_collisions(trace.events)
+        for entry in (one.entry for one in judged if one.entry["robot"] in hits):
+            entry["collided_s"] = hits[entry["robot"]]["t_s"]
         conditions, had_a_way = [one.entry for one in judged], [one.entry["robot"] for one in judged if one.had_a_way]
         worst = min(conditions, key=lambda one: (one["margin_m"] >= 0.0, "collided_s" not in one, one["margin_m"]))
         live = all(one["margin_m"] >= 0.0 for one in conditions)
