@@ -93,9 +93,15 @@ def _answers(run: Run) -> Iterator[Event]:
 
 
 def _arrivals(run: Run) -> Iterator[Event]:
-    """A robot arrives at the first row from which on it stays within the arrival tolerance of its target."""
+    """A robot arrives at the first row from which on it stays within the arrival tolerance of its target.
+
+    What it does from its first collision on does not count, except for where it starts.
+    """
+    hits = [*_collisions(run)]
     for robot, spec in run.robots.items():
-        away = np.linalg.norm(run.position_m[robot] - np.array(spec["target_m"]), axis=1)
+        end_s = min((hit.t_s for hit in hits if robot in (hit.robot, hit.other)), default=np.inf)
+        before = (run.t_s < end_s) | (np.arange(len(run.t_s)) == 0)
+        away = np.linalg.norm(run.position_m[robot][before] - np.array(spec["target_m"]), axis=1)
         outside = np.flatnonzero(away > run.scenario["arrival_tolerance_m"])
         first = int(outside[-1]) + 1 if len(outside) else 0
         if first < len(away):

@@ -3,17 +3,32 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from math import log
+from itertools import chain
+from math import dist, log
 from typing import Any, NamedTuple
 
 from airground_drake.base.statuses import PASSING, UNDECIDED
 from airground_drake.registry import METHODS
-from airground_drake.report.outcomes import Course, Document, claims, proved_for_d, triggers
-from airground_drake.report.phrases import MAX_NAMES, Line, colliding, counted, grouped, intrusion, more_pairs
+from airground_drake.report.attention import in_words
+from airground_drake.report.outcomes import Course, Document, Proof, claims, tolerance, triggers
+from airground_drake.report.phrases import (
+    MAX_NAMES,
+    Line,
+    collision,
+    counted,
+    ending,
+    found_no_way,
+    grouped,
+    intrusion,
+    joined,
+    labels,
+    more_pairs,
+)
 
 NEGLIGIBLE = 1e-3
 """A risk that exceeds the smallest one by less than this share counts as the smallest."""
 _MATCHES = {"reproduced": "without tuning", "calibrated": "after calibration"}
+_VOID = ": nothing after that counts"
 _REST = {"by_construction": "by construction", "ambiguous": "ambiguous", "not_reproduced": "not reproduced"}
 
 
@@ -34,7 +49,7 @@ def answers(document: Document, every: Sequence[Course], *, tabulated: bool) -> 
 
 def _safe(document: Document, every: Sequence[Course]) -> Iterator[Line]:
     bad = [course for course in every if course.safe is False]
-    printed = [course for course in bad if not course.plain and not course.collisions]
+    printed = [course for course in bad if not course.plain and not course.hits]
     for course in bad:
         if course not in printed:
             yield Line("no", f"{course.name}: {_intrusion(course)}{' (expected)' * course.declared_unsafe}.")
@@ -46,8 +61,7 @@ def _safe(document: Document, every: Sequence[Course]) -> Iterator[Line]:
         told = f"minimum distance {least.told()}, required {least.required_m:g} m"
         told += "" if tested else "; nothing came near, so this was not tested"
         yield Line("yes" if tested else "none", f"{', '.join(course.name for course in kept)}: {told}.")
-    if any(course.method == "d" for course in every):
-        yield _proof(document, every)
+    yield from _proof(every)
     if printed:
         told = _intrusion(min(printed, key=lambda course: course.near[:1]))
         told += " (expected)" * any(course.declared_unsafe for course in printed)
@@ -57,27 +71,51 @@ def _safe(document: Document, every: Sequence[Course]) -> Iterator[Line]:
 
 def _intrusion(course: Course) -> str:
     """Who came how near to what, when, and how many others did."""
-    if not (course.near and course.near[0].is_short):
+    hits = list(dict.fromkeys(map(collision, course.hits.values())))
+    if hits:
+        told = "; ".join([*hits[:MAX_NAMES], *([f"{len(hits) - MAX_NAMES} more collisions"] * (len(hits) > MAX_NAMES))])
+    elif course.near and course.near[0].is_short:
+        told = f"{intrusion(course)} at {course.near[0].t_s:.2f} s, required {course.near[0].required_m:g} m"
+    else:
         return intrusion(course)
-    least = course.near[0]
-    told = f"{colliding(course)}, {least} from {least.other}" if course.collisions else intrusion(course)
-    more = more_pairs(course)
-    return f"{told} at {least.t_s:.2f} s, required {least.required_m:g} m{more}{' too close' * bool(more)}"
+    more = more_pairs(course, max(1, len(hits)))
+    return f"{told}{more}{' too close' * bool(more)}"
 
 
-def _proof(document: Document, every: Sequence[Course]) -> Line:
-    """Whether the safety of method (d) is proved."""
-    if proved_for_d(document, every):
-        return Line("", "Proved for (d), whatever the UAV asks for.")
-    if {claim["status"] for claim in claims(document, "SAFE-INV", "SAFE-GATE", run="")} == {"proved"}:
-        return Line("no", "The proof for (d) does not apply: a run did not meet its conditions (SAFE-HYP).")
-    return Line("open", "Not proved for (d).")
+def _proof(every: Sequence[Course]) -> Iterator[Line]:
+    """Whether the safety of method (d) is proved, one sentence per status."""
+    of_d = [course for course in every if course.proof]
+    told = grouped(((*_lacking(course.proof), course.proof.status), course) for course in of_d if course.proof)
+    for (lacking, refuted, status), alike in told.items():
+        runs, who = joined([course.name for course in alike]), joined([*chain(*labels(alike, of_d))])
+        yield {
+            "tested": Line("yes", f"Proved for {who}, whatever the UAV asks for."),
+            "idle": Line(
+                "none", f"Proved for {who}, but nothing came near: its conditions hold with nothing to check."
+            ),
+            "refuted": Line("no", f"The proof does not apply to {runs}: its conditions did not hold ({lacking})."),
+            "undecided": Line("open", f"Not known whether the proof applies to {runs} ({lacking})."),
+            "unproved": Line("no" if refuted else "open", f"Not proved for {who} ({lacking})."),
+        }[status]
+
+
+def _lacking(proof: Proof) -> tuple[str, bool]:
+    """What a proof lacks, by claim, and whether one of these claims is refuted."""
+    told = (f"{name}: {in_words(claim) if claim else 'not checked'}" for name, claim in proof.lacking.items())
+    return "; ".join(told), any(claim and claim["status"] == "refuted" for claim in proof.lacking.values())
 
 
 def _arrived(document: Document, every: Sequence[Course]) -> Iterator[Line]:
     if home := [course for course in every if course.away == {} and course.plain]:
-        last = max(course.last_s for course in home)
-        yield Line("yes", f"{', '.join(course.name for course in home)}: all{f', by {last:.1f} s' if last else ''}.")
+        last = max((time_s for course in home for time_s in course.arrived_s.values()), default=0.0)
+        within = f" within {tolerance(document)} of their targets" if tolerance(document) else ""
+        by = f", by {last:.1f} s" if last else ""
+        yield Line("yes", f"{', '.join(course.name for course in home)}: all{within}{by}.")
+    for course in every:
+        for robot, hit in course.hits.items():
+            if robot in course.arrived_s:
+                told = f"{robot} arrives at {course.arrived_s[robot]:.1f} s; {collision(hit)}{_VOID}"
+                yield Line("partly", f"{course.name}: {told}.")
     away = [course for course in every if course.away != {}]
     for (mark, says), names in grouped((_whereabouts(document, course), course.name) for course in away).items():
         yield Line(mark, f"{', '.join(names)}: {says}.")
@@ -88,23 +126,30 @@ def _whereabouts(document: Document, course: Course) -> Line:
     if course.away is None:
         return Line("open", f"not known, {course.why}")
     resolved, ends = document["scenario"]["resolved"], []
-    as_printed = {
-        row["robot"]
-        for row in document["reproduction"]
-        if row["run"] == course.name
-        and row["measure"] in ("stall_position", "collision_position")
-        and row["status"] in _MATCHES
-    }
-    hit = {event["robot"] for event in course.collisions}
-    for robot, at in list(course.away.items())[:MAX_NAMES]:
+    for robot, end in list(course.away.items())[:MAX_NAMES]:
+        hit = course.hits.get(robot)
+        at = hit["position_m"] if hit else end
         place = ", ".join(f"{round(x, 2) + 0.0:.2f}" for x in (at if robot == resolved["uav"]["name"] else at[:2]))
-        how = "collided, ended" if robot in hit else "stuck" if robot in course.stuck else "ended short of its target,"
-        ends.append(f"{robot} {how} at ({place}) m{', as in the paper' * (robot in as_printed)}")
+        what = f"{collision(hit)}," if hit else f"{robot} is {ending(course, robot)}"
+        then = _VOID if hit else f"; {found_no_way([robot])}" if robot in course.no_way else ""
+        ends.append(f"{what} at ({place}) m{_off_the_paper(document, course.name, robot)}{then}")
     if len(course.away) > MAX_NAMES:
         ends.append(f"{len(course.away) - MAX_NAMES} more")
     ugvs = len(resolved["ugvs"])
     count = f"{course.there} of {ugvs} UGVs; " if ugvs > 2 else ""
-    return Line("no" if course.helped or course.collisions else "none", count + "; ".join(ends))
+    return Line("no" if course.helped or course.hits else "none", count + "; ".join(ends))
+
+
+def _off_the_paper(document: Document, run: str, robot: str) -> str:
+    """How far the place where a robot stalled or collided is from that of the paper, if it counts as the same."""
+    off = [
+        dist(row["ours"], row["paper"])
+        for row in document["reproduction"]
+        if (row["run"], row["robot"]) == (run, robot)
+        and row["measure"] in ("stall_position", "collision_position")
+        and row["status"] in _MATCHES
+    ]
+    return f", {off[0]:.2f} m from the paper's" if off else ""
 
 
 def _runs(document: Document, every: Sequence[Course]) -> Iterator[Line]:

@@ -7,8 +7,8 @@ from typing import Any, NamedTuple
 
 from airground_drake.base.errors import one_line
 from airground_drake.base.statuses import PASSING, UNDECIDED, outcome
-from airground_drake.report.outcomes import distance
-from airground_drake.report.phrases import MAX_NAMES, counted, grouped, refusal
+from airground_drake.report.outcomes import distance, no_way
+from airground_drake.report.phrases import MAX_NAMES, counted, found_no_way, grouped, refusal
 from airground_drake.scenarios.validate import preset_s
 
 MAX_FAULT_CHARS = 300
@@ -53,10 +53,8 @@ def items(document: Mapping[str, Any]) -> list[Item]:
 
 
 def _of_claim(claim: Mapping[str, Any], run: Mapping[str, Any]) -> Item:
-    place = {**claim["where"], **(claim["counterexample"] or {})}
-    bodies = tuple(dict.fromkeys(str(place[name]) for name in _NAMES if isinstance(place.get(name), str)))
-    words = _words(claim, place, bodies)
-    if "condition" in place and run and bodies:
+    words = in_words(claim)
+    if "condition" in _place(claim) and run and (bodies := _bodies(claim)):
         words += _refused(run, bodies[0])
     return Item(
         outcome(claim["status"], claim["exercised"]),
@@ -68,9 +66,20 @@ def _of_claim(claim: Mapping[str, Any], run: Mapping[str, Any]) -> Item:
     )
 
 
-def _words(claim: Mapping[str, Any], place: Mapping[str, Any], bodies: Sequence[str]) -> str:
+def _place(claim: Mapping[str, Any]) -> dict[str, Any]:
+    """Where the margin of a claim is, and its counterexample."""
+    return {**claim["where"], **(claim["counterexample"] or {})}
+
+
+def _bodies(claim: Mapping[str, Any]) -> list[str]:
+    """The bodies that a claim names."""
+    place = _place(claim)
+    return list(dict.fromkeys(str(place[name]) for name in _NAMES if isinstance(place.get(name), str)))
+
+
+def in_words(claim: Mapping[str, Any]) -> str:
     """What came of a claim, as far as it is known: who, how far from what was allowed, when."""
-    who = " and ".join(bodies)
+    place, who = _place(claim), " and ".join(_bodies(claim))
     known = {name: value for name, value in place.items() if isinstance(value, float | int)}
     at = f", {known['t_s']:.3f} s" if "t_s" in known else ""
     if claim["status"] in PASSING:
@@ -84,8 +93,11 @@ def _words(claim: Mapping[str, Any], place: Mapping[str, Any], bodies: Sequence[
         return f"{who} at {apart}, {known['safe_distance_m']:g} m required{at}"
     if {"distance_m", "margin_m"} <= known.keys() and "condition" in place:
         allowed = known["distance_m"] + known["margin_m"]
-        return f"{who} ended {known['distance_m']:.2f} m from where it must end, {allowed:g} m allowed"
+        ended = f"collided at {known['collided_s']:.2f} s," if "collided_s" in known else "ended"
+        return f"{who} {ended} {known['distance_m']:.2f} m from where it must end, {allowed:g} m allowed"
     who = f"{who}: " if who else ""
+    if {"parameter", "built", "scenario"} <= place.keys():
+        return f"{who}{place['parameter']} was built as {place['built']}, the scenario has {place['scenario']}"
     margin, unit = known.get("margin", claim["margin"]), place.get("unit", claim["unit"])
     if margin is not None:
         quantity = place.get("hypothesis") or place.get("condition") or claim["quantity"] or "margin"
@@ -106,8 +118,11 @@ def _refused(run: Mapping[str, Any], robot: str) -> str:
 
 
 def beforehand(document: Mapping[str, Any]) -> Iterator[Item]:
-    """Shown first, also on the terminal: faults of policies and solvers, and runs that end too early."""
+    """Shown first, also on the terminal: faults of policies and solvers, no way found, and runs that end too early."""
     yield from _of_faults(document["runs"])
+    for name, run in document["runs"].items():
+        if lost := no_way(run):
+            yield Item("not_exercised", found_no_way(lost), run=name, anchor="happened")
     scenario = document["scenario"]["resolved"]
     longer = {name: preset_s(**ugv["preset"]) for name, ugv in scenario["ugvs"].items()}
     longer = {name: time_s for name, time_s in longer.items() if time_s > scenario["duration_s"]}

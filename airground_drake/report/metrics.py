@@ -9,7 +9,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from airground_drake.base.arrays import Array
-from airground_drake.run.trace import Trace
+from airground_drake.registry import method_of
+from airground_drake.run.trace import Trace, first_collisions
+from airground_drake.verify.engines.geometry import interpolate
+from airground_drake.verify.runs.instants import without_proposals
+from airground_drake.verify.runs.live_goal import AT_REST_M, AT_REST_S, moved_at_the_end
 from airground_drake.verify.runs.pairs import (
     Gap,
     apart_of,
@@ -45,7 +49,8 @@ def of_run(trace: Trace) -> dict[str, Any]:
         `min_distance_m` (robot -> obstacle -> value, t_s, safe_distance_m; gaps between surfaces, exact in continuous
         time; at most `MOST_OBSTACLES`, those of least margin), `min_robot_distance_m` (the same for the other robot of
         least margin), `final_position_m`, `duration_s`, `wall_s` and `realtime_factor` (None if not measured),
-        `event_counts` (robot -> kind -> count), `gatekeeper` (see `gatekeeper`).
+        `event_counts` (robot -> kind -> count), `gatekeeper` (see `gatekeeper`), `on_the_way` (see `on_the_way`),
+        `without_proposals` (UGVs that were intervened on for long enough and got no proposal).
     """
     wall_s = trace.timings.get("wall_s")
     duration_s = float(trace.t[-1] - trace.t[0])
@@ -63,7 +68,47 @@ def of_run(trace: Trace) -> dict[str, Any]:
         "realtime_factor": duration_s / wall_s if wall_s else None,
         "event_counts": {robot: dict(sorted(count.items())) for robot, count in counts.items()},
         "gatekeeper": gatekeeper(trace),
+        "on_the_way": on_the_way(trace),
+        "without_proposals": without_proposals(trace) if method_of(trace.meta["method"]).intervenes else [],
     }
+
+
+def on_the_way(trace: Trace) -> dict[str, dict[str, Any]]:
+    """UGVs that neither arrived nor collided, and how far they had come when the run ended.
+
+    Returns:
+        By UGV `stands` (it did not move in the last second), `left_m` (the way to its target along its preset) and
+        `left_s` (how long that takes if it comes nearer as fast as in the last second; None if it does not).
+    """
+    done = {event["robot"] for event in trace.events if event["kind"] == "arrival"} | {*first_collisions(trace.events)}
+    return {ugv: _on_the_way(trace, ugv) for ugv in trace.ugvs if ugv not in done}
+
+
+def _on_the_way(trace: Trace, ugv: str) -> dict[str, Any]:
+    begin_s, end_s = max(trace.t[-1] - AT_REST_S, trace.t[0]), trace.t[-1]
+    before_m, left_m = (_way_left_m(trace, ugv, time_s) for time_s in (begin_s, end_s))
+    stands, speed_m_s = moved_at_the_end(trace, ugv) <= AT_REST_M, (before_m - left_m) / (end_s - begin_s)
+    return {
+        "stands": stands,
+        "left_m": left_m,
+        "left_s": left_m / speed_m_s if speed_m_s > 0.0 and not stands else None,
+    }
+
+
+def _way_left_m(trace: Trace, ugv: str, time_s: float) -> float:
+    """Way of a UGV to its target, m: to the nearest point of its preset that is past by then, and along the preset."""
+    own = trace.scenario.ugvs[ugv]
+    corners, place = np.array(own.preset.waypoints_m), interpolate(trace.t, trace.position(ugv), time_s)
+    legs = np.diff(corners, axis=0)
+    lengths = np.linalg.norm(legs, axis=1)
+    begins = np.cumsum(lengths) - lengths
+    travelled = own.preset.speed_m_s * time_s - begins
+    past = np.clip(travelled, 0.0, lengths)
+    along = np.clip(((place - corners[:-1]) * legs).sum(axis=1) / lengths, 0.0, past)
+    aside = np.linalg.norm(corners[:-1] + (along / lengths)[:, None] * legs - place, axis=1)
+    aside[travelled < 0.0] = np.inf
+    aside, rest = min(zip(aside.tolist(), (lengths.sum() - begins - along).tolist(), strict=True))
+    return float(aside + rest + np.linalg.norm(corners[-1] - own.target_m))
 
 
 def gatekeeper(trace: Trace) -> dict[str, Any] | None:

@@ -3,15 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from math import dist
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 from airground_drake.base.statuses import PASSING
 from airground_drake.registry import METHODS
+from airground_drake.run.trace import first_collisions
+from airground_drake.scenarios.schema import Scenario
 
 SLACK_M = 1e-9
 """A distance counts as kept if it falls short of the required one by less, as in SAFE-TRACE."""
+
+THEOREMS, CONDITIONS = ("SAFE-INV", "SAFE-GATE"), "SAFE-HYP"
+"""The claims that prove the safety of method (d), and the one that a run met their conditions."""
+
+_DEFAULT_TOLERANCE_M = next(each.default for each in fields(Scenario) if each.name == "arrival_tolerance_m")
 
 Document = Mapping[str, Any]
 
@@ -40,6 +47,24 @@ class Near(NamedTuple):
         return f"{self} ({self.robot} to {self.other}{', at the start' * (self.t_s == 0.0)})"
 
 
+class Proof(NamedTuple):
+    """Whether the safety of a run of method (d) is proved.
+
+    Attributes:
+        status: `tested` or `idle` if it is proved: the conditions held, and something came near, or nothing did;
+            `refuted` or `undecided` by the conditions; `unproved` if the theorems are.
+        lacking: the claims that are not as they should be, by identifier; None for one that was not judged.
+    """
+
+    status: Literal["tested", "idle", "refuted", "undecided", "unproved"]
+    lacking: Mapping[str, Mapping[str, Any] | None] = {}
+
+    @property
+    def holds(self) -> bool:
+        """Whether the run was proved safe."""
+        return self.status in ("tested", "idle")
+
+
 @dataclass
 class Course:
     """What came of a run.
@@ -53,11 +78,14 @@ class Course:
         why: why that is not known, or what SAFE-TRACE says if the distances alone do not decide.
         declared_unsafe: whether the scenario declares that the run is not safe, and it is not.
         tested: whether any pair came near enough to be kept apart.
-        collisions: events.
-        away: robots that did not end at their targets, and where they did; None: not known.
+        proof: of its safety under method (d); None under other methods.
+        hits: robots that collided, and the event of the first collision of each. What they do later does not count.
+        arrived_s: robots that arrived, and when, s.
+        away: robots that did not arrive, and where they ended; None: not known.
         stuck: robots among them that stand where the scenario declares a stall.
-        last_s: when the last robot arrived, s.
-        there: how many UGVs ended at their targets.
+        on_the_way: UGVs among them that did not collide, and how far they had come (`metrics.on_the_way`).
+        no_way: UGVs that the UAV was called for and found no way for.
+        there: how many UGVs arrived.
     """
 
     name: str
@@ -68,10 +96,13 @@ class Course:
     why: str = "it was not run"
     declared_unsafe: bool = False
     tested: bool = False
-    collisions: list[Mapping[str, Any]] = field(default_factory=list)
+    proof: Proof | None = None
+    hits: dict[str, Mapping[str, Any]] = field(default_factory=dict)
+    arrived_s: dict[str, float] = field(default_factory=dict)
     away: dict[str, Sequence[float]] | None = None
     stuck: set[str] = field(default_factory=set)
-    last_s: float = 0.0
+    on_the_way: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    no_way: list[str] = field(default_factory=list)
     there: int = 0
 
     @property
@@ -93,6 +124,7 @@ def courses(document: Document) -> list[Course]:
         if name in document["runs"]:
             _judge(course, document)
             _locate(course, document)
+        course.proof = _proof(document, name) if course.method == "d" else None
         found.append(course)
     return found
 
@@ -102,13 +134,13 @@ def _judge(course: Course, document: Document) -> None:
     run = document["runs"][course.name]
     unique = {frozenset((pair.robot, pair.other)): pair for pair in reversed([*pairs(run)])}
     course.near = sorted(unique.values())
-    course.collisions = [event for event in run["events"] if event["kind"] == "collision"]
+    course.hits = first_collisions(run["events"])
     unchecked: Mapping[str, Any] = {"status": "", "exercised": 0, "as_expected": False}
     claim = next(iter(claims(document, "SAFE-TRACE", run=course.name)), unchecked)
     status = claim["status"]
     course.tested = claim["exercised"] != 0
     course.declared_unsafe = status == "refuted" and claim["as_expected"] is True
-    if course.collisions or (course.near and course.near[0].is_short):
+    if course.hits or (course.near and course.near[0].is_short):
         course.safe, course.why = False, ""
     elif status == "refuted":
         course.safe, course.why = False, "SAFE-TRACE is refuted"
@@ -123,18 +155,39 @@ def _locate(course: Course, document: Document) -> None:
     resolved, run = document["scenario"]["resolved"], document["runs"][course.name]
     uav, ends = resolved["uav"], run["metrics"]["final_position_m"]
     targets = {name: ugv["target_m"] for name, ugv in resolved["ugvs"].items()} | {uav["name"]: uav["target_m"]}
-    course.away = {
-        robot: ends[robot]
-        for robot, target in targets.items()
-        if robot not in ends or dist(ends[robot], target) > resolved["arrival_tolerance_m"]
-    }
-    if len(course.away) > 1:
+    course.arrived_s = {event["robot"]: event["t_s"] for event in run["events"] if event["kind"] == "arrival"}
+    home = {robot for robot, at in targets.items() if dist(ends[robot], at) <= resolved["arrival_tolerance_m"]}
+    home = (home - course.hits.keys()) | (course.arrived_s.keys() & course.hits.keys())
+    course.away = {robot: ends[robot] for robot in targets if robot not in home}
+    if len(course.away) > 1 and uav["name"] not in course.hits:
         course.away.pop(uav["name"], None)  # it follows the UGVs: it is not home before they are
     for goal in claims(document, "LIVE-GOAL", run=course.name):
         stands = (each for each in goal["evidence"].get("conditions", []) if each.get("condition") == "stands")
         course.stuck = {each["robot"] for each in stands if each["margin_m"] >= 0.0} & course.away.keys()
     course.there = len(resolved["ugvs"].keys() - course.away.keys())
-    course.last_s = max((event["t_s"] for event in run["events"] if event["kind"] == "arrival"), default=0.0)
+    course.on_the_way, course.no_way = run["metrics"]["on_the_way"], no_way(run)
+
+
+def no_way(run: Mapping[str, Any]) -> list[str]:
+    """UGVs that the UAV was called for and found no way for in a run: it sent nothing, and no policy failed."""
+    failed = {fault["robot"] for fault in run["faults"]}
+    return [ugv for ugv in run["metrics"]["without_proposals"] if ugv not in failed]
+
+
+def _proof(document: Document, run: str) -> Proof:
+    """Whether a run of method (d) was proved safe; theorems may have been judged for this run alone."""
+
+    def judged(name: str) -> Mapping[str, Any] | None:
+        return next(iter([*claims(document, name, run=run), *claims(document, name, run="")]), None)
+
+    theorems = {name: judged(name) for name in THEOREMS}
+    if unproved := {name: claim for name, claim in theorems.items() if claim is None or claim["status"] != "proved"}:
+        return Proof("unproved", unproved)
+    conditions = judged(CONDITIONS)
+    if conditions is None or conditions["status"] not in PASSING:
+        refuted = conditions is not None and conditions["status"] == "refuted"
+        return Proof("refuted" if refuted else "undecided", {CONDITIONS: conditions})
+    return Proof("tested" if conditions["exercised"] else "idle")
 
 
 def pairs(run: Mapping[str, Any]) -> Iterator[Near]:
@@ -151,15 +204,10 @@ def claims(document: Document, *names: str, run: str | None = None) -> list[Mapp
     return [claim for claim in document["claims"] if claim["id"] in names and run in (None, claim["run"])]
 
 
-def proved_for_d(document: Document, every: Sequence[Course]) -> bool:
-    """Whether both safety theorems are proved, and every run of method (d) met their hypotheses and tested them."""
-    runs = [course.name for course in every if course.method == "d"]
-    met = [claim for claim in claims(document, "SAFE-HYP") if claim["run"] in runs]
-    return (
-        [claim["status"] for claim in claims(document, "SAFE-INV", "SAFE-GATE", run="")] == ["proved", "proved"]
-        and len(met) == len(runs) > 0
-        and all(claim["status"] in PASSING and claim["exercised"] for claim in met)
-    )
+def tolerance(document: Document) -> str:
+    """The arrival tolerance of the scenario with its unit, '' if it is the default."""
+    value = document["scenario"]["resolved"]["arrival_tolerance_m"]
+    return "" if value == _DEFAULT_TOLERANCE_M else f"{value:g} m"
 
 
 def triggers(document: Document) -> list[Mapping[str, Any]]:

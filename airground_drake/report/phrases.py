@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from typing import NamedTuple, TypeVar
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any, NamedTuple, TypeVar
 
 from airground_drake.report.outcomes import Course
 
@@ -58,27 +58,36 @@ def joined(words: Sequence[str]) -> str:
     return " and ".join(filter(None, (", ".join(words[:-1]), words[-1])))
 
 
-def methods(those: Sequence[Course]) -> str:
-    """The methods of some runs: "(d)", "(c) and (d)"."""
-    return joined(list(dict.fromkeys(f"({course.method})" for course in those)))
+def labels(those: Sequence[Course], among: Sequence[Course]) -> tuple[list[str], list[str]]:
+    """Methods all of whose runs among `among` are those: "(d)"; and the names of the other runs of those."""
+    apart = {course.method for course in among if course not in those}
+    by_method = [f"({course.method})" for course in those if course.method not in apart]
+    return list(dict.fromkeys(by_method)), [course.name for course in those if course.method in apart]
 
 
-def methods_are(those: Sequence[Course]) -> str:
-    """The same as the beginning of a sentence: "method (d) is", "methods (c) and (d) are"."""
-    one = len({course.method for course in those}) == 1
-    return f"method {methods(those)} is" if one else f"methods {methods(those)} are"
+def under(those: Sequence[Course], among: Sequence[Course]) -> str:
+    """Those runs as a condition: "under (c) and (d)", "under (b) and in run c_literal"."""
+    of_methods, runs = labels(those, among)
+    parts = [f"under {joined(of_methods)}" if of_methods else "", f"in {_plural('run', runs)}" if runs else ""]
+    return joined([part for part in parts if part])
 
 
-def trouble(those: Sequence[Course]) -> str:
-    """What went wrong in some runs: who came too near, or did not arrive."""
-    if unsafe := next((course for course in those if course.safe is False), None):
-        hit = {event["robot"] for event in unsafe.collisions}
-        away = [robot for robot in unsafe.away or () if robot not in hit]
-        return (colliding(unsafe) if hit else intrusion(unsafe)) + (f", and {_absent(away)}" if away else "")
-    away = list(dict.fromkeys(robot for course in those for robot in course.away or {}))
-    if all(course.stuck == (course.away or {}).keys() for course in those):
-        return f"{_robots(away)} {'is' if len(away) == 1 else 'are'} stuck"
-    return _absent(away)
+def subject(those: Sequence[Course], among: Sequence[Course]) -> str:
+    """Those runs as the subject of a sentence: "method (d) is", "methods (b) and (c) and run d_far are"."""
+    of_methods, runs = labels(those, among)
+    parts = [_plural("method", of_methods) if of_methods else "", _plural("run", runs) if runs else ""]
+    return f"{joined([part for part in parts if part])} {'is' if len(of_methods) + len(runs) == 1 else 'are'}"
+
+
+def _plural(noun: str, names: Sequence[str]) -> str:
+    return f"{noun}{'s' * (len(names) != 1)} {joined(names)}"
+
+
+def trouble(course: Course) -> str:
+    """What went wrong in a run: who came too near, and who did not arrive."""
+    away = [robot for robot in course.away or () if robot not in course.hits]
+    told = [] if course.safe is not False else [colliding(course) if course.hits else intrusion(course)]
+    return ", and ".join([*told, *([_absent(course, away)] if away else [])])
 
 
 def intrusion(course: Course) -> str:
@@ -86,24 +95,54 @@ def intrusion(course: Course) -> str:
     if course.near and course.near[0].is_short:
         least = course.near[0]
         return f"{least.robot} comes within {least} of {least.other}"
-    hit = next(iter(course.collisions), None)
-    return f"{hit['robot']} collides at {hit['t_s']:.2f} s" if hit else course.why
+    return course.why
 
 
-def more_pairs(course: Course) -> str:
-    """How many pairs besides the first came too near."""
-    more = sum(near.is_short for near in course.near) - 1
+def more_pairs(course: Course, named: int = 1) -> str:
+    """How many pairs besides those named came too near."""
+    more = sum(near.is_short for near in course.near) - named
     return f"; {counted(more, 'more pair')}" if more > 0 else ""
 
 
 def colliding(course: Course) -> str:
     """Who collides in a run."""
-    names = list(dict.fromkeys(event["robot"] for event in course.collisions))
+    names = list(course.hits)
     return f"{_robots(names)} collide{'s' * (len(names) == 1)}"
 
 
-def _absent(names: Sequence[str]) -> str:
-    return f"{_robots(names)} {'does' if len(names) == 1 else 'do'} not arrive"
+def collision(hit: Mapping[str, Any]) -> str:
+    """Who collided with what and when, by the event."""
+    return f"{hit['robot']} collides with {hit.get('other') or hit['obstacle']} at {hit['t_s']:.2f} s"
+
+
+def ending(course: Course, robot: str) -> str:
+    """How a robot ended that neither arrived nor collided, without the verb "is"."""
+    known = course.on_the_way.get(robot)
+    if robot in course.stuck:
+        return "stuck"
+    if known and known["stands"]:
+        return "standing still"
+    if known and known["left_s"] is not None:
+        return f"still moving at the end (about {rounded(known['left_s'])} s more)"
+    return "still moving at the end" if known else "short of its target"
+
+
+def rounded(value: float) -> str:
+    """Two digits of a number, without an exponent."""
+    return f"{float(f'{value:.2g}'):.15g}"
+
+
+def _absent(course: Course, names: Sequence[str]) -> str:
+    """How those ended that did not arrive, and for whom the UAV found no way."""
+    told = grouped((ending(course, robot), robot) for robot in names)
+    clauses = [f"{_robots(alike)} {'is' if len(alike) == 1 else 'are'} {how}" for how, alike in told.items()]
+    lost = [robot for robot in names if robot in course.no_way]
+    return joined(clauses) + (f": {found_no_way(lost)}" if lost else "")
+
+
+def found_no_way(names: Sequence[str]) -> str:
+    """For whom the UAV found no way."""
+    return f"the UAV found no way for {_robots(names)}"
 
 
 def _robots(names: Sequence[str]) -> str:

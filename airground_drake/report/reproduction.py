@@ -15,7 +15,7 @@ import numpy as np
 from airground_drake.base.arrays import Array
 from airground_drake.base.errors import TraceError
 from airground_drake.report.metrics import closest_obstacle, events_of, gap_m
-from airground_drake.run.trace import Trace
+from airground_drake.run.trace import Trace, first_collisions
 from airground_drake.scenarios.schema import Reproduction, Scenario
 
 Measure = Callable[[Trace, str], list[float]]
@@ -40,8 +40,9 @@ def measure(function: Measure) -> Measure:
 
 @measure
 def stall_position(trace: Trace, robot: str) -> list[float]:
-    """Final [x, y] in m of a robot that stands still short of its target."""
-    if trace.t[-1] - trace.t[0] < STILL_S or _arrived(trace, robot):
+    """Final [x, y] in m of a robot that stands still short of its target, and did not collide."""
+    hit = robot in first_collisions(trace.events)
+    if hit or trace.t[-1] - trace.t[0] < STILL_S or _arrived(trace, robot):
         return []
     first = max(int(np.searchsorted(trace.t, trace.t[-1] - STILL_S, side="right")) - 1, 0)
     last_second = trace.position(robot)[first:]
@@ -76,7 +77,7 @@ def grows_past_threshold(trace: Trace, robot: str) -> list[float]:
 
 @measure
 def arrives(trace: Trace, robot: str) -> list[float]:
-    """1 if the robot ends within the arrival tolerance of its target."""
+    """1 if the robot ends, or is before its first collision, within the arrival tolerance of its target."""
     return [float(_arrived(trace, robot))]
 
 
@@ -246,6 +247,6 @@ def _planar(position: Any) -> list[float]:
 
 
 def _arrived(trace: Trace, robot: str) -> bool:
-    end = trace.position(robot)[-1]
+    end = trace.position(robot)[trace.counting_rows(robot) - 1]
     target = trace.scenario.robots[robot].target_m
     return bool(np.linalg.norm(end - np.asarray(target)) <= trace.scenario.arrival_tolerance_m)

@@ -15,7 +15,7 @@ from airground_drake.base.statuses import NOT_EXERCISED, UNDECIDED, outcome
 from airground_drake.registry import METHODS
 from airground_drake.report.answers import Answer
 from airground_drake.report.answers import answers as answers_of
-from airground_drake.report.outcomes import Course, Document, courses, proved_for_d, triggers
+from airground_drake.report.outcomes import Course, Document, courses, tolerance, triggers
 from airground_drake.report.phrases import (
     MARKS,
     MEANINGS,
@@ -23,11 +23,11 @@ from airground_drake.report.phrases import (
     colliding,
     counted,
     grouped,
-    methods,
-    methods_are,
     more_pairs,
     refusal,
+    subject,
     trouble,
+    under,
 )
 
 WIDTH = 110
@@ -51,6 +51,8 @@ class FirstScreen(NamedTuple):
     rows: list[Row]
     required: str
     """The distances that pairs must keep, with their unit."""
+    within: str
+    """The arrival tolerance with its unit, '' if it is the default."""
     answers: list[Answer]
     beware: list[str]
     """What a reader might wrongly conclude: clauses that continue "Do not conclude that"."""
@@ -73,6 +75,7 @@ def first_screen(document: Document) -> FirstScreen:
         headline(document),
         [_row(document, course) for course in every] if tabulated else [],
         f"{' to '.join(f'{each:g}' for each in dict.fromkeys(required[:1] + required[-1:]))} m" if required else "",
+        tolerance(document),
         answers_of(document, every, tabulated=tabulated),
         _beware(document, every),
         as_declared(document),
@@ -104,27 +107,29 @@ def _outcome(every: Sequence[Course]) -> Line:
         told = "With and without help, all arrive safely." if helped and alone else "All arrive safely."
         return _unless_one_crashed(every, told)
     if helped and all(course.fine for course in helped):
-        return _unless_one_crashed(every, f"With help, all arrive safely. Without it, {trouble(alone)}.")
+        return _unless_one_crashed(every, f"With help, all arrive safely{_failures(alone, alone, '. Without it, ')}")
     short = [course for course in main if course.away and course not in unsafe]
     if fine:
-        bring = "brings" if len({course.method for course in fine}) == 1 else "bring"
-        told = f"Only {methods_are(fine)} safe and {bring} everyone home."
-        return Line("partly", f"{told} {_failures([*unsafe, *short])}")
+        who = subject(fine, main)
+        bring = "brings" if who.endswith("is") else "bring"
+        return Line("partly", f"Only {who} safe and {bring} everyone home{_failures([*unsafe, *short], main)}")
     if unsafe:
-        told = "No method brings everyone home safely." if len(main) > 1 else "Not safe."
-        return Line("no", f"{told} {_failures(unsafe)}")
-    return Line("no", f"Safe, but not all arrive: {trouble(short)}.")
+        told = "No method brings everyone home safely" if len(main) > 1 else "Not safe"
+        return Line("no", f"{told}{_failures(unsafe, main)}")
+    return Line("no", f"Safe, but not all arrive{_failures(short, main, ': ')}")
 
 
-def _failures(those: Iterable[Course]) -> str:
-    """What went wrong under each method, as a sentence."""
-    told = grouped((trouble([course]), course) for course in those)
-    return _sentence(f"under {methods(alike)}, {what}" for what, alike in told.items())
+def _failures(those: Iterable[Course], among: Sequence[Course], same: str = "") -> str:
+    """What went wrong in those runs, as a sentence; `same`: begins it if the same went wrong in all of `among`."""
+    told = grouped((trouble(course), course) for course in those if not course.fine)
+    if same and [len(alike) for alike in told.values()] == [len(among)]:
+        return f"{same}{next(iter(told))}."
+    return ". " + _sentence(f"{under(alike, among)}, {what}" for what, alike in told.items())
 
 
 def _unless_one_crashed(every: Iterable[Course], told: str) -> Line:
     """Good news, unless a robot collided in any run."""
-    crashed = [course for course in every if course.collisions]
+    crashed = [course for course in every if course.hits]
     hits = [f"in run {course.name}, {colliding(course)}" for course in crashed if not course.plain]
     return Line("partly" if crashed else "yes", f"{told} {_sentence(hits)}" if hits else told)
 
@@ -139,14 +144,14 @@ def _row(document: Document, course: Course) -> Row:
     says = METHODS[course.method].says if course.method in METHODS else course.method
     says += "".join(f", {key}: {value}" for key, value in resolved["runs"][course.name].get("set", {}).items())
     if course.away is None:
-        return Row(course.name, says, _safe(document, course), Line("open", "not known"), "not run")
+        return Row(course.name, says, _safe(course), Line("open", "not known"), "not run")
     count = len(resolved["ugvs"])
     uav = "; not the UAV" if course.away and course.there == count else ""
     arrived = Line("no" if course.away else "yes", f"{course.there} of {count}{uav}")
-    return Row(course.name, says, _safe(document, course), arrived, _interventions(document, course))
+    return Row(course.name, says, _safe(course), arrived, _interventions(document, course))
 
 
-def _safe(document: Document, course: Course) -> Line:
+def _safe(course: Course) -> Line:
     near = course.near[0] if course.near else None
     if course.safe is None:
         return Line("open", f"not known, {course.why}")
@@ -154,8 +159,7 @@ def _safe(document: Document, course: Course) -> Line:
         return Line("no", f"{near.told()}{more_pairs(course)}" if near else course.why)
     if not near:
         return Line("none", "nothing near")
-    proved = course.method == "d" and proved_for_d(document, [course])
-    told = f"{near}, {'proved' if proved else 'not proved'}"
+    told = f"{near}, {'proved' if course.proof and course.proof.holds else 'not proved'}"
     return Line("yes", told) if course.tested else Line("none", f"{told}; not tested")
 
 
@@ -164,7 +168,7 @@ def _interventions(document: Document, course: Course) -> str:
     run = document["runs"][course.name]
     kinds = Counter(event["kind"] for event in run["events"])
     if not kinds["proposal"]:
-        return "none"
+        return "none: no way found" if course.no_way else "none"
     if course.method in METHODS and not METHODS[course.method].gated:
         return f"{kinds['proposal']} obeyed"
     answers = {"accepted": kinds["accept"], "refused": kinds["refuse"]}
@@ -179,9 +183,9 @@ def _interventions(document: Document, course: Course) -> str:
 
 def _beware(document: Document, every: Sequence[Course]) -> list[str]:
     said = ["real vehicles are safe: the model is first-order, its sensing perfect"]
-    proved = proved_for_d(document, every)
-    if seen := [course for course in every if course.safe and not (course.method == "d" and proved)]:
-        said.append(f"{methods_are(seen)} also safe elsewhere: that was only seen in these runs")
+    main = [course for course in every if course.plain] or every
+    if seen := [course for course in main if course.safe and not (course.proof and course.proof.holds)]:
+        said.append(f"{subject(seen, main)} also safe elsewhere: that was only seen in these runs")
     home = [course.away == {} for course in every]
     if any(home):
         who = "all" if all(home) else "those that arrive here"
@@ -214,7 +218,7 @@ def as_declared(document: Document) -> Line:
 def text(document: Document) -> str:
     """The first screen for a terminal."""
     screen = first_screen(document)
-    lines = [one_line(_marked(screen.headline)), *_table(screen.rows, screen.required)]
+    lines = [one_line(_marked(screen.headline)), *_table(screen)]
     for question, answered in screen.answers:
         for k, line in enumerate(answered):
             asked = "" if k else question
@@ -228,9 +232,10 @@ def _marked(line: Line) -> str:
     return f"[{MARKS[line.mark]}] {line.text}"
 
 
-def _table(rows: Sequence[Row], required: str) -> list[str]:
+def _table(screen: FirstScreen) -> list[str]:
     """The table of methods in columns of equal width."""
-    cells = [["", "method", f"safe? ({required})", "arrived?", "UAV proposals"]]
-    cells += [[row.run, row.method, _marked(row.safe), _marked(row.arrived), row.interventions] for row in rows]
+    arrived = f"arrived?{f' (within {screen.within})' if screen.within else ''}"
+    cells = [["", "method", f"safe? ({screen.required})", arrived, "UAV proposals"]]
+    cells += [[row.run, row.method, _marked(row.safe), _marked(row.arrived), row.interventions] for row in screen.rows]
     widths = [max(map(len, column)) for column in zip(*cells, strict=True)]
-    return [one_line("  ".join(map(str.ljust, row, widths)).rstrip()) for row in cells] if rows else []
+    return [one_line("  ".join(map(str.ljust, row, widths)).rstrip()) for row in cells] if screen.rows else []

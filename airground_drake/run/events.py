@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from airground_drake.base.arrays import Array
-from airground_drake.run.trace import Trace
+from airground_drake.run.trace import Trace, first_collisions
 from airground_drake.scenarios.world import make_world
 from airground_drake.world.motion import Motion
 from airground_drake.world.shape import Shape
@@ -42,16 +42,17 @@ def extract(trace: Trace, sent: Iterable[tuple[str, float, str]]) -> list[dict[s
         if previous.get(row["number"]) != row["decision"]:
             previous[row["number"]] = row["decision"]
             add(row["t_s"], row["robot"], row["decision"], policy=row["policy"], status=row["status"])
-    for robot in trace.robots:
-        _add_arrival(trace, robot, add)
     _add_collisions(trace, add)
+    hits = first_collisions(found)
+    for robot in trace.robots:
+        _add_arrival(trace, robot, trace.rows_before(hits[robot]["t_s"] if robot in hits else np.inf), add)
     return sorted(found, key=lambda event: (event["t_s"], order[event["robot"]]))
 
 
-def _add_arrival(trace: Trace, robot: str, add: Any) -> None:
-    """Add the time after which the robot stays within the arrival tolerance of its target."""
+def _add_arrival(trace: Trace, robot: str, rows: int, add: Any) -> None:
+    """Add the time after which the robot stays within the arrival tolerance of its target during the first rows."""
     scenario = trace.scenario
-    away = np.linalg.norm(trace.position(robot) - np.array(scenario.robots[robot].target_m), axis=1)
+    away = np.linalg.norm(trace.position(robot)[:rows] - np.array(scenario.robots[robot].target_m), axis=1)
     outside = np.flatnonzero(away > scenario.arrival_tolerance_m)
     first = int(outside[-1]) + 1 if len(outside) else 0
     if first < len(away):

@@ -26,7 +26,7 @@ from __future__ import annotations
 
 import io
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from html import escape
 from pathlib import Path
@@ -223,6 +223,14 @@ class Trace:
         """Preset trajectory, (T, 3), m."""
         return self.vector(ugv, "ref_")
 
+    def rows_before(self, t_s: float) -> int:
+        """Number of rows before a time, s; at least one."""
+        return max(1, int(np.searchsorted(self.t, t_s)))
+
+    def counting_rows(self, robot: str) -> int:
+        """Number of rows that count for a robot: those before its first collision. The model lets it drive on."""
+        return self.rows_before(first_collisions(self.events).get(robot, {"t_s": np.inf})["t_s"])
+
     def to_pandas(self) -> pd.DataFrame:
         """The signals as a new table: a row per time, the index `t_s`; columns by robot, then by signal."""
         table = self.signals.set_index("t_s")
@@ -246,6 +254,15 @@ class Trace:
         rows = [(f"{event['t_s']:.3f}", event["robot"], event["kind"]) for event in self.events]
         table = pd.DataFrame(rows, columns=["time, s", "robot", "event"]).to_html(index=False, border=0)
         return f"<p>{escape(repr(self))}</p>{table}"
+
+
+def first_collisions(events: Iterable[Mapping[str, Any]]) -> dict[str, Mapping[str, Any]]:
+    """The first collision, an event, of each robot that collided, with an obstacle or with another robot."""
+    found: dict[str, Mapping[str, Any]] = {}
+    for event in sorted((event for event in events if event["kind"] == "collision"), key=lambda event: event["t_s"]):
+        for robot in filter(None, (event["robot"], event.get("other"))):
+            found.setdefault(robot, event)
+    return found
 
 
 def save(trace: Trace, folder: Path) -> list[str]:

@@ -20,7 +20,7 @@ from airground_drake.report.metrics import Nearby, close_by, events_of, gap_m, r
 from airground_drake.report.outcomes import SLACK_M, distance
 from airground_drake.report.reproduction import MEASURES
 from airground_drake.report.scrubber import tracks
-from airground_drake.run.trace import Trace
+from airground_drake.run.trace import Trace, first_collisions
 from airground_drake.scenarios.schema import Scenario
 
 MAX_RUNS, MAX_UGVS, MAX_TEAM = 6, 4, 6
@@ -282,12 +282,16 @@ def _ends(chosen: _Selection) -> str:
     """The end of each run: collisions, UGVs that stand still, arrivals."""
     told: dict[str, list[str]] = {}
     for heading, trace in chosen.shown.items():
-        hits = [event for ugv in trace.ugvs for event in events_of(trace, ugv, "collision")[:1]]
-        words = [f"{hit['robot']} collides at {hit['t_s']:.2f} s" for hit in hits]
+        hits = first_collisions(trace.events)
+        words = [
+            f"{ugv} collides at {hits[ugv]['t_s']:.2f} s, from where on its path is dashed"
+            for ugv in trace.ugvs
+            if ugv in hits
+        ]
         words += [
             f"{ugv} stands still at ({at[0]:.2f}, {at[1]:.2f}) m"
             for ugv in trace.ugvs
-            if ugv not in [hit["robot"] for hit in hits] and (at := MEASURES["stall_position"](trace, ugv))
+            if (at := MEASURES["stall_position"](trace, ugv))
         ]
         if len(words) > LISTED:
             words = [*words[:LISTED], f"{len(words) - LISTED} more do not arrive"]

@@ -33,6 +33,7 @@ from airground_drake.scenarios.schema import Scenario
 from airground_drake.view.stage import safe_m
 
 MAX_NAMED_OBSTACLES = 12
+_VOID_DASH = (0, (1.5, 2.5))
 _LEFT_IN, _BESIDE_IN = 0.5, 0.65
 """Margin left of a map, and both side margins together, inches."""
 
@@ -79,7 +80,7 @@ def plane(trace: Trace, ugvs: Sequence[str], frame: Frame, width_in: float) -> F
     targets = {**{name: ugv.target_m for name, ugv in trace.scenario.ugvs.items()}, uav: None}
     for position, robot in enumerate([*ugvs, uav]):
         appearance = UAV_LOOK if robot == uav else look(position)
-        _path(axes, trace.position(robot), appearance, linewidth=1.1 if robot == uav else 1.9)
+        _path(axes, trace, robot, appearance, linewidth=1.1 if robot == uav else 1.9)
         start, end = trace.position(robot)[0], trace.position(robot)[-1]
         for at in (start, end):
             _body(axes, at, radius_m(trace, robot), appearance.color)
@@ -102,7 +103,7 @@ def compared_paths(runs: Mapping[str, Trace], robot: str, frame: Frame) -> Figur
     labels = list[Label]()
     for position, (name, trace) in enumerate(runs.items()):
         path, appearance = trace.position(robot), look(position)
-        _path(axes, path, appearance, linewidth=2.0, label=f"run {short(name, 24)}")
+        _path(axes, trace, robot, appearance, linewidth=2.0, label=f"run {short(name, 24)}")
         inside = (path[:, 0] > frame.left) & (path[:, 0] < frame.right)
         inside &= (path[:, 1] > frame.bottom) & (path[:, 1] < frame.top)
         marked = np.flatnonzero(inside)[:: max(1, int(inside.sum()) // 7)]
@@ -122,8 +123,8 @@ def two_versions(before: Trace, after: Trace, ugvs: Sequence[str]) -> Figure:
     names = list[Label]()
     for position, ugv in enumerate(ugvs):
         appearance = look(position)
-        _path(axes, before.position(ugv), appearance._replace(dash=(0, (3, 2))), linewidth=1.0)
-        _path(axes, after.position(ugv), appearance._replace(dash="-"), linewidth=1.8)
+        _path(axes, before, ugv, appearance._replace(dash=(0, (3, 2))), linewidth=1.0)
+        _path(axes, after, ugv, appearance._replace(dash="-"), linewidth=1.8)
         names.append(_name(ugv, after.position(ugv)[-1], appearance))
     place(axes, [*names, *_obstacles(after.scenario)], [after.position(ugv) for ugv in ugvs])
     return figure
@@ -177,9 +178,12 @@ def _body(axes: Axes, at: Sequence[float] | Array, radius: float, color: str) ->
         axes.add_patch(Circle((at[0], at[1]), radius, facecolor=color, edgecolor=color, alpha=0.35, zorder=1.5))
 
 
-def _path(axes: Axes, path: Array, appearance: Look, **options: Any) -> None:
-    rows = thin(path[:, :2])
-    axes.plot(*path[rows, :2].T, color=appearance.color, linestyle=appearance.dash, **options)
+def _path(axes: Axes, trace: Trace, robot: str, appearance: Look, **options: Any) -> None:
+    """The path of a robot; from its first collision on, where nothing counts, in thin short dashes."""
+    path, rows = trace.position(robot)[:, :2], trace.counting_rows(robot)
+    parts = ((path[:rows], appearance.dash, options), (path[rows - 1 :], _VOID_DASH, {"linewidth": 0.9}))
+    for part, dash, of_line in parts[: 1 + (rows < len(path))]:
+        axes.plot(*part[thin(part)].T, color=appearance.color, linestyle=dash, **of_line)
 
 
 def _name(robot: str, at: Sequence[float] | Array, appearance: Look) -> Label:

@@ -14,7 +14,7 @@ from airground_drake.base.errors import TraceError
 from airground_drake.run.trace import Trace
 from airground_drake.verify.claim import TIME_TOLERANCE_S, TraceClaim
 from airground_drake.verify.finding import Finding
-from airground_drake.verify.runs.instants import GATED_METHODS, intervening, silent, talk_is_due
+from airground_drake.verify.runs.instants import GATED_METHODS, intervening, silent, talk_is_due, without_proposals
 from airground_drake.verify.runs.standing import map_conflicts, standing_conflicts
 
 KINDS = ("proposal", "decision")
@@ -98,10 +98,9 @@ class Comm(TraceClaim):
         by_ugv = {ugv: _messages(trace, ugv) for ugv in trace.ugvs}
         spent = {kind: sum(len(each[kind]) for each in by_ugv.values()) for kind in KINDS}
         most = _always_on(trace)
-        without = {kind: [u for u in trace.ugvs if not by_ugv[u][kind] and _is_due(trace, u, kind)] for kind in KINDS}
-        for kind, ugvs in without.items():
-            if ugvs and not spent[kind]:
-                return silent(trace, ugvs, kind)
+        without = {"proposal": without_proposals(trace), "decision": _without_decisions(trace, by_ugv)}
+        if without["decision"] and not spent["decision"]:
+            return silent(trace, without["decision"], "decision")
         strays = [stray for ugv, sent in by_ugv.items() for stray in _strays(trace, ugv, sent)]
         misused = [*map_conflicts(trace), *standing_conflicts(trace)] if len(trace.proposals) and not strays else []
         over = {"spent": spent, "always_on": most} if any(spent[kind] > most[kind] for kind in KINDS) else None
@@ -159,9 +158,10 @@ def _is_called(trace: Trace, ugv: str, t: float) -> bool:
     return bool(((t >= begins) & (t <= ends)).any())
 
 
-def _is_due(trace: Trace, ugv: str, kind: str) -> bool:
-    """Whether a UGV was intervened on for long enough for a message of a kind."""
-    return (kind == "proposal" or trace.meta["method"] in GATED_METHODS) and talk_is_due(trace, ugv)
+def _without_decisions(trace: Trace, sent: dict[str, dict[str, list[Message]]]) -> list[str]:
+    """UGVs that got a proposal, were intervened on for long enough, and never decided."""
+    gated = trace.meta["method"] in GATED_METHODS
+    return [u for u, own in sent.items() if gated and own["proposal"] and not own["decision"] and talk_is_due(trace, u)]
 
 
 def _always_on(trace: Trace) -> dict[str, int]:

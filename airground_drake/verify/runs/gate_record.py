@@ -19,7 +19,7 @@ from airground_drake.run.trace import PROBLEM_ARRAYS, PROBLEM_SCALARS, Trace
 from airground_drake.verify.claim import TraceClaim
 from airground_drake.verify.finding import Finding
 from airground_drake.verify.runs.control_law import ON_TOP
-from airground_drake.verify.runs.instants import GATED_METHODS, silent, talk_is_due
+from airground_drake.verify.runs.instants import GATED_METHODS, silent, talk_is_due, without_proposals
 
 POSITION_TOLERANCE_M = 1e-9
 """Recorded and recomputed positions may differ by this, m: rounding of N additions errs by 1e-13 m."""
@@ -268,12 +268,13 @@ def conclude(finding: Finding, compared: Iterable[Deviation]) -> Finding:
 
 
 def without_decisions(trace: Trace) -> list[str]:
-    """UGVs that never decided, though they executed something or were intervened on for long enough.
+    """UGVs that never decided, though they executed something, or got a proposal and were intervened on long enough.
 
-    This is no refutation: the UAV's policies may have found nothing to propose. GATE-FEAS refutes it where a proposal
-    stood for long enough, EXEC where something was executed.
+    This is no refutation. GATE-FEAS refutes it where a proposal stood for long enough, EXEC where something was
+    executed.
     """
-    called = [ugv for ugv in trace.ugvs if (trace.column(f"{ugv}.accepted") != 0.0).any() or talk_is_due(trace, ugv)]
+    asked = [ugv for ugv in trace.ugvs if talk_is_due(trace, ugv) and ugv not in without_proposals(trace)]
+    called = [ugv for ugv in trace.ugvs if (trace.column(f"{ugv}.accepted") != 0.0).any() or ugv in asked]
     return [ugv for ugv in called if not (trace.decisions["robot"] == ugv).any()]
 
 
@@ -285,7 +286,7 @@ class GateClaim(TraceClaim):
         return trace.meta.get("method") in GATED_METHODS
 
     def check(self, trace: Trace) -> Finding:
-        """Decide the claim; without decisions it holds only if no UGV was long enough in intervention to need one."""
+        """Decide the claim; without decisions it holds only if no UGV had anything to decide for long enough."""
         if len(trace.decisions) and not len(trace.problems) and trace.meta["method"] in ON_TOP:
             return Finding("not_run", evidence={"reason": "the problems of the decisions were not recorded"})
         without = without_decisions(trace)
@@ -293,7 +294,7 @@ class GateClaim(TraceClaim):
             return silent(trace, without, "decision")
         rows = trace.derived("rows", lambda: rows_of(trace))
         if not rows:
-            reason = "no UGV was intervened on: nothing to decide"
+            reason = "nothing was proposed to a UGV for long enough: nothing to decide"
             return Finding("holds", evidence={"decisions": 0, "reason": reason}, exercised=0)
         finding = self.judge_rows(trace, rows)
         return replace(finding, evidence={**finding.evidence, "without_decisions": without})

@@ -49,6 +49,12 @@ def talk_is_due(trace: Trace, ugv: str) -> bool:
     return bool((np.diff(intervening(trace, ugv)) > periods).any())
 
 
+def without_proposals(trace: Trace) -> list[str]:
+    """UGVs that were intervened on long enough, but got no proposal: the UAV found no way, or its policies failed."""
+    asked = {event["robot"] for event in trace.events if event["kind"] == "proposal"}
+    return [ugv for ugv in trace.ugvs if ugv not in asked and talk_is_due(trace, ugv)]
+
+
 def silent(trace: Trace, ugvs: Iterable[str], kind: str) -> Finding:
     """Not run: UGVs were intervened on, but no message of a kind was recorded."""
     reason = f"{', '.join(ugvs)} were in mode 'intervening', but the trace has no {kind}"

@@ -1,4 +1,4 @@
-"""LIVE-GOAL: where the robots of a run ended."""
+"""LIVE-GOAL: where the robots of a run ended. For a robot that collides, the run ends there."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 
 from airground_drake.base.arrays import Array
 from airground_drake.base.errors import TraceError
-from airground_drake.run.trace import Trace
+from airground_drake.run.trace import Trace, first_collisions
 from airground_drake.verify.claim import TraceClaim
 from airground_drake.verify.engines.geometry import interpolate
 from airground_drake.verify.finding import Finding
@@ -26,11 +26,15 @@ class LiveGoal(TraceClaim):
 
     id = "LIVE-GOAL"
     summary = "Every robot ended where it must: at its target, or where the scenario says that it stalls."
-    statement = "Every robot ended the run at its target, or standing where the scenario declares that it stalls."
+    statement = (
+        "Every robot ended the run at its target, or standing where the scenario declares that it stalls. For a robot "
+        "that collided, its motion before the first collision counts."
+    )
     formula = (
         "||p_i(end) - target_i|| <= arrival tolerance; for a declared stall ||p_i(end) - s_i|| <= stall tolerance, "
         "farther than the arrival tolerance from the target, and within 1e-3 m of p_i(end) during the last second; "
-        "the UAV then within the arrival tolerance of the UGVs' centroid raised by its altitude"
+        "the UAV then within the arrival tolerance of the UGVs' centroid raised by its altitude; end: of the run, or "
+        "the last row before the first collision of i"
     )
     latex = (
         r"\lVert p_i(T) - \text{target}_i \rVert \le \varepsilon_{\text{arrival}}",
@@ -38,7 +42,10 @@ class LiveGoal(TraceClaim):
         r"p_i(T) - \text{target}_i \rVert > \varepsilon_{\text{arrival}}",
         r"\text{and } \lVert p_i(t) - p_i(T) \rVert \le 10^{-3} \text{ m for } t \ge T - 1 \text{ s}",
     )
-    method = "The last row of the trace, and for stalls the rows of the last second (straight motion in between)."
+    method = (
+        "The last row of the trace, or the last one before the robot's first collision; for stalls the rows of the "
+        "last second before it (straight motion in between)."
+    )
     equations = "(6), (9)-(10)"
     assumptions = ("The scenario's duration is long enough to judge: the run is not continued.",)
     does_not_establish = (
@@ -54,15 +61,18 @@ class LiveGoal(TraceClaim):
         if unknown := set(stalls) - set(trace.ugvs):
             raise TraceError(f"stalls_m names {sorted(unknown)}, which are not UGVs of the trace")
         judged = list(_conditions(trace, stalls))
+        hits = first_collisions(trace.events)
+        for entry in (one.entry for one in judged if one.entry["robot"] in hits):
+            entry["collided_s"] = hits[entry["robot"]]["t_s"]
         conditions, had_a_way = [one.entry for one in judged], [one.entry["robot"] for one in judged if one.had_a_way]
-        worst = min(conditions, key=lambda one: one["margin_m"])
+        worst = min(conditions, key=lambda one: (one["margin_m"] >= 0.0, "collided_s" not in one, one["margin_m"]))
         live = all(one["margin_m"] >= 0.0 for one in conditions)
         return Finding(
             "holds" if live else "refuted",
             margin=worst["margin_m"],
             unit="m",
             quantity="tolerance left about where a robot must end",
-            where={"robot": worst["robot"], "condition": worst["condition"]},
+            where={key: worst[key] for key in ("robot", "condition", "collided_s") if key in worst},
             counterexample=None if live else worst,
             evidence={"conditions": conditions, "had_a_way_to_go": had_a_way} | ({"kind": "stuck"} if stalls else {}),
             exercised=len(had_a_way),
@@ -85,9 +95,9 @@ def _conditions(trace: Trace, stalls: Mapping[str, Sequence[float]]) -> Iterator
             yield _within(trace, ugv, "at its target", target, arrival)
             continue
         yield _within(trace, ugv, "at its stall point", stalls[ugv], scenario.stall_tolerance_m)
-        moved = _moved_at_the_end(trace, ugv)
+        moved = moved_at_the_end(trace, ugv)
         yield Condition({"robot": ugv, "condition": "stands", "moved_m": moved, "margin_m": AT_REST_M - moved})
-        away = float(np.linalg.norm(trace.position(ugv)[-1] - target))
+        away = float(np.linalg.norm(_end(trace, ugv) - target))
         yield Condition({"robot": ugv, "condition": "short of its target", "margin_m": away - arrival})
     if stalls:
         centroid = np.mean([trace.position(ugv)[-1] for ugv in trace.ugvs], axis=0)
@@ -100,15 +110,22 @@ def _conditions(trace: Trace, stalls: Mapping[str, Sequence[float]]) -> Iterator
 def _within(trace: Trace, robot: str, condition: str, point: Array | Sequence[float], tolerance_m: float) -> Condition:
     """That a robot ends no farther from a point, (3,), m, than a tolerance."""
     there = np.asarray(point, dtype=np.float64)
-    begin, end = trace.position(robot)[[0, -1]]
+    begin, end = trace.position(robot)[0], _end(trace, robot)
     before, after = (float(np.linalg.norm(place - there)) for place in (begin, end))
     at = {"robot": robot, "condition": condition, "point_m": there.tolist(), "final_m": end.tolist()}
     return Condition({**at, "distance_m": after, "margin_m": tolerance_m - after}, before > tolerance_m)
 
 
-def _moved_at_the_end(trace: Trace, robot: str) -> float:
-    """Largest distance from the final position during the last `AT_REST_S`, m; convex between rows."""
-    t, position = trace.t, trace.position(robot)
+def _end(trace: Trace, robot: str) -> Array:
+    """Where a robot is at the end of the run, or at the last row before its first collision, (3,), m."""
+    end: Array = trace.position(robot)[trace.counting_rows(robot) - 1]
+    return end
+
+
+def moved_at_the_end(trace: Trace, robot: str) -> float:
+    """Largest distance from the place of `_end` during the last `AT_REST_S` before it, m; convex between rows."""
+    rows = trace.counting_rows(robot)
+    t, position = trace.t[:rows], trace.position(robot)[:rows]
     begin = max(t[-1] - AT_REST_S, t[0])
     path = np.vstack([interpolate(t, position, begin), position[t >= begin]])
     return float(np.linalg.norm(path - position[-1], axis=1).max())
