@@ -42,15 +42,37 @@ MOST_UNPACKED = 1_000_000_000
 """Most bytes of an unpacked table, or of its texts."""
 
 
-def open_regular(path: Path) -> BinaryIO:
-    """Open a regular file, or a link to one, for reading.
+def open_regular(path: Path, flags: int = os.O_RDONLY, *, links: bool = False) -> int:
+    """Open a regular file of a folder that may be hostile: not through a link, and without waiting.
+
+    Args:
+        path: of the file.
+        flags: as of `os.open`.
+        links: whether the path may be a link to a regular file: for paths that the user names.
+
+    Returns:
+        The descriptor.
 
     Raises:
-        OSError: if it cannot be opened, or is something else: reading a pipe may hang, a device may never end.
+        OSError: if it cannot be opened, or is something else: reading a pipe may hang, a device may never end, and
+            a link may lead to a file of somebody else.
     """
-    if not stat.S_ISREG(os.stat(path).st_mode):  # asked before it is opened: opening a device may have effects
-        raise OSError(errno.EINVAL, "not a regular file", str(path))
-    return open(path, "rb")
+    with suppress(FileNotFoundError):  # the flags may create it
+        # asked before it is opened, too: opening a device may have effects
+        _be_regular(os.stat(path, follow_symlinks=links), path)
+    handle = os.open(path, flags | os.O_NONBLOCK | (0 if links else os.O_NOFOLLOW), 0o644)
+    try:
+        _be_regular(os.fstat(handle), path)
+    except OSError:
+        os.close(handle)
+        raise
+    return handle
+
+
+def _be_regular(about: os.stat_result, path: Path) -> None:
+    if not stat.S_ISREG(about.st_mode):
+        what = "a link, not a regular file" if stat.S_ISLNK(about.st_mode) else "not a regular file"
+        raise OSError(errno.EINVAL, what, str(path))
 
 
 def open_pipe(path: Path) -> BinaryIO:
@@ -60,13 +82,13 @@ def open_pipe(path: Path) -> BinaryIO:
     return open(handle, "rb")
 
 
-def read_bytes(path: Path, most: int = LARGEST_FILE) -> bytes:
-    """The content of a regular file that may be hostile.
+def read_bytes(path: Path, most: int = LARGEST_FILE, *, links: bool = False) -> bytes:
+    """The content of a regular file that may be hostile; `links` as of `open_regular`.
 
     Raises:
         OSError: as `open_regular`, or if it has more than `most` bytes.
     """
-    with open_regular(path) as file:
+    with open(open_regular(path, links=links), "rb") as file:
         size = os.fstat(file.fileno()).st_size
         if size > most:
             raise OSError(errno.EFBIG, f"it has {size} bytes, allowed: {most}", str(path))

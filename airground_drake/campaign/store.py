@@ -46,8 +46,7 @@ class Store:
 
         Raises:
             FolderError: if the folder cannot be written, has another campaign or something else, is open in another
-                command, or has rows that were changed.
-            OSError: if it cannot be read.
+                command, has rows that were changed, or links or pipes in the place of files.
         """
         files.make_folder(folder, "the campaign")
         self.folder = folder
@@ -57,7 +56,8 @@ class Store:
             raise FolderError(one_line(f"{folder} holds {there[0]!r}; allowed: a new or empty folder, or --resume"))
         if there:
             _be_the_same(folder, manifest)
-        self._journal = os.open(folder / JOURNAL, os.O_RDWR | os.O_CREAT | os.O_APPEND, 0o644)
+        with files.wanted(folder / JOURNAL, "a regular file"):
+            self._journal = files.open_regular(folder / JOURNAL, os.O_RDWR | os.O_CREAT | os.O_APPEND)
         try:
             fcntl.flock(self._journal, fcntl.LOCK_EX | fcntl.LOCK_NB)
             if (folder / MANIFEST).exists():  # another command's, if the folder was empty a moment ago
@@ -145,7 +145,7 @@ def _together(parts: Sequence[pd.DataFrame], lately: dict[int, list[Row]]) -> pd
 
 def _is_nothing(path: Path) -> bool:
     """Whether a command may have left this file when it was killed before it wrote the manifest."""
-    return files.is_partial(path) or (path.name == JOURNAL and path.stat().st_size == 0)
+    return files.is_partial(path) or (path.name == JOURNAL and path.lstat().st_size == 0)
 
 
 def _be_the_same(folder: Path, manifest: dict[str, Any]) -> None:
@@ -159,7 +159,7 @@ def _be_the_same(folder: Path, manifest: dict[str, Any]) -> None:
 
 def _manifest(folder: Path) -> dict[str, Any] | None:
     try:
-        found = json.loads((folder / MANIFEST).read_bytes())
+        found = json.loads(files.read_text(folder / MANIFEST))
     except (OSError, ValueError):
         return None
     return found if isinstance(found, dict) and found.get("schema") == SCHEMA else None
@@ -167,6 +167,8 @@ def _manifest(folder: Path) -> dict[str, Any] | None:
 
 def _read_parts(folder: Path, manifest: dict[str, Any]) -> pd.DataFrame:
     """Rows of all parts."""
+    if (folder / PARTS).is_symlink():
+        raise FolderError(one_line(f"{folder / PARTS} is a link; wanted: a folder"))
     parts, seen = [table_of([])], set[int]()
     for path in sorted((folder / PARTS).glob("*.parquet")):
         parts.append(_read_part(path))
@@ -179,17 +181,28 @@ def _read_parts(folder: Path, manifest: dict[str, Any]) -> pd.DataFrame:
 
 
 def _read_part(path: Path) -> pd.DataFrame:
-    part = pd.read_parquet(path)
+    try:
+        part = files.read_table(_content(path))
+    except ValueError as error:
+        raise FolderError(one_line(f"{path}: {error}")) from None
     if missing := [name for name in COLUMNS if name not in part]:
         raise FolderError(one_line(f"{path} has no column {missing[0]!r}; allowed: parts as campaigns write them"))
     return part
+
+
+def _content(path: Path) -> bytes:
+    """The content of a regular file of the folder; FolderError if it is something else."""
+    try:
+        return files.read_bytes(path)
+    except OSError as error:
+        raise FolderError(one_line(f"{path} cannot be read: {error.strerror}; wanted: a regular file")) from None
 
 
 def _read_journal(path: Path, manifest: dict[str, Any], known: set[int]) -> tuple[dict[int, list[Row]], int]:
     """Rows by index, except known draws, and the number of bytes up to the last whole line."""
     found: dict[int, list[Row]] = {}
     whole = 0
-    for line in path.read_bytes().splitlines(keepends=True) if path.exists() else ():
+    for line in _content(path).splitlines(keepends=True) if os.path.lexists(path) else ():
         if not line.endswith(b"\n"):
             break
         whole += len(line)

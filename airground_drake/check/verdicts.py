@@ -108,6 +108,8 @@ def check_overall(folder: Path, report: Json) -> str:
     found = [(claim["run"], claim["id"]) for claim in report["claims"]]
     foreign = {each for each in found if is_foreign(each[1], scenario)}
     same("claims that there are", sorted(map(list, found)), sorted(foreign | _own_claims(scenario, found)))
+    left_out = _left_out(scenario, foreign)
+    holds("claims that the scenario adds are there", not left_out, "nothing", ", ".join(left_out))
     same("runs", sorted(report["runs"]), sorted(scenario["runs"]))
     same("folders of traces", sorted(path.name for path in folder.glob("trace/*")), sorted(scenario["runs"]))
     same("seed", report["provenance"]["seed"], scenario["seed"])
@@ -127,6 +129,18 @@ def _own_claims(scenario: Json, found: Sequence[tuple[str, str]]) -> set[tuple[s
         wanted |= {(run, name) for name in (*EVERY_RUN, *BY_METHOD[about["method"]])}
         wanted |= {each for each in found if about["set"] and each[0] == run and each[1] in ABOUT_THE_MODEL}
     return wanted
+
+
+def _left_out(scenario: Json, foreign: set[tuple[str, str]]) -> list[str]:
+    """Claims that the scenario adds and the report leaves out: everywhere, or where the scenario expects a verdict.
+
+    Whether such a claim applies to a run of which nothing is expected, only its own code says.
+    """
+    judged = {name for _, name in foreign}
+    found = [name for name in scenario["claims"] if is_foreign(name, scenario) and name not in judged]
+    for run, expected in (("", scenario["expected"]), *((run, of["expected"]) for run, of in scenario["runs"].items())):
+        found += [f"{name} {run}" for name in expected if is_foreign(name, scenario) and (run, name) not in foreign]
+    return found
 
 
 def check_files(folder: Path, there: Sequence[str], recorded: Json) -> str:

@@ -113,7 +113,7 @@ def _only(spec: Spec, options: argparse.Namespace) -> int:
     path = options.output or Path(f"{scenario.name}.yaml")
     text = text_of(resolved(scenario))
     with files.wanted(path, "a file for the scenario"):
-        if not (path.is_file() and path.read_bytes() == text.encode()):  # the same draw may be asked for again
+        if not (path.is_file() and files.read_bytes(path) == text.encode()):  # the same draw may be asked for again
             files.try_to_create(path)
             files.write_text(path, text)
     rows = rows_of(spec, options.only, _limits(options))

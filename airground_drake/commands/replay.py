@@ -84,6 +84,4 @@ def _has(path: Path, mark: str) -> bool:
     """Whether a path is a plain file that ends with a mark."""
     if not path.is_file():
         return False
-    with path.open("rb") as file:
-        file.seek(max(0, path.stat().st_size - 2 * len(mark)))
-        return mark.encode() in file.read(2 * len(mark))
+    return mark.encode() in files.read_bytes(path)[-2 * len(mark) :]

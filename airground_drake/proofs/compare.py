@@ -49,7 +49,7 @@ def _broken(folder: Path, found: Mapping[str, Any], traces: Mapping[str, Trace])
         if name not in found["runs"]:
             continue
         entry, near = found["runs"][name], too_near(exact)
-        meta = files.sha256((folder.parent / "trace" / name / "meta.json").read_bytes())
+        meta = files.sha256(files.read_bytes(folder.parent / "trace" / name / "meta.json"))
         kept = entry["distances"]["proved"]
         expected = {
             "meta_sha256": meta, "expected": expects_kept(trace), "rows": len(trace.t), "pairs": len(exact.demands),

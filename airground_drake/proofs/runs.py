@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from airground_drake.base import files
-from airground_drake.base.errors import TraceError, UnknownNameError, one_line
+from airground_drake.base.errors import FolderError, TraceError, UnknownNameError, one_line
 from airground_drake.base.statuses import NOTHING, declared
 from airground_drake.proofs import coq, readback
 from airground_drake.proofs.export import Demand, Recorded, demands, distances_file, law_file, recorded
@@ -167,12 +167,15 @@ def prove_report(report: Path, names: Sequence[str] = (), limit_s: float = coq.L
         limit_s: wall-clock time for one call of Coq, s.
 
     Raises:
+        FolderError: if its folder `proofs` is a link.
         UnknownNameError: if the report has no run with a name in `names`.
         TraceError: if a trace cannot be read.
         CoqError: if a theory is not accepted.
         NoCoqError: if Coq is not installed.
         OSError: if the folder cannot be written.
     """
+    if (report / PLACE).is_symlink():
+        raise FolderError(one_line(f"{report / PLACE} is a link; wanted: a folder"))
     there = sorted(path.parent.name for path in report.glob("trace/*/meta.json"))
     for name in names:
         if name not in there:
@@ -191,7 +194,7 @@ def prove_report(report: Path, names: Sequence[str] = (), limit_s: float = coq.L
                 (report / PLACE / answer.file).unlink(missing_ok=True)
                 if (place.folder / answer.file).exists():
                     files.write_bytes(report / PLACE / answer.file, (place.folder / answer.file).read_bytes())
-            meta = digest(report / "trace" / name / "meta.json")
+            meta = files.sha256(files.read_bytes(report / "trace" / name / "meta.json"))
             found.append(
                 Proved(name, expects_kept(run), len(demands(run.scenario)), len(run.t), distances, law, rounded, meta)
             )

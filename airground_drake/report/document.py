@@ -154,7 +154,7 @@ def missing(
     claims: Sequence[Mapping[str, Any]],
     required: Iterable[str] = (),
 ) -> list[dict[str, str]]:
-    """Runs without a trace or any verdict, and claims that are expected or required but nobody checked."""
+    """Runs without a trace or any verdict; claims that are expected, required or added, but nobody checked."""
     checked = {(claim["run"], claim["id"]) for claim in claims}
     judged = {run for run, _ in checked}
     found = []
@@ -166,6 +166,8 @@ def missing(
         else:
             found += [(name, claim, "expected, but not checked") for claim in run.expected]
     found += [("", claim, "not checked") for claim in dict.fromkeys([*required, *scenario.expected])]
+    unjudged = {*scenario.claims} - {claim for _, claim in checked} - {claim for _, claim, _ in found}
+    found += [("", claim, "the scenario adds it, and it applies to no run") for claim in sorted(unjudged)]
     return [{"run": run, "id": claim, "why": why} for run, claim, why in found if (run, claim) not in checked]
 
 

@@ -86,7 +86,7 @@ def clear(folder: Path) -> None:
 def is_report(folder: Path) -> bool:
     """Whether there is a report.json of ours in a folder."""
     try:
-        with files.open_regular(folder / PAGES["json"]) as file:
+        with open(files.open_regular(folder / PAGES["json"]), "rb") as file:
             beginning = min(
                 100, os.fstat(file.fileno()).st_size
             )  # files of the kernel have size 0, and reading may block

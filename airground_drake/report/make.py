@@ -62,9 +62,10 @@ def write_report(
     within(scenario, wanted.limits)
     started, clock = datetime.now(UTC), time.perf_counter()
     if scenario.claims:  # a claim that cannot be made is refused before the work
-        from airground_drake.verify.registry import model_claims
+        from airground_drake.verify.registry import model_claims, run_claims
 
         model_claims(added=scenario.claims)
+        run_claims(added=scenario.claims)
     with folder.held(output):
         if wanted.kept is not None and wanted.kept.is_dir():
             files.sweep(wanted.kept)

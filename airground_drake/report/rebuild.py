@@ -18,6 +18,8 @@ from itertools import zip_longest
 from pathlib import Path
 from typing import Any
 
+from airground_drake.base import files
+
 WITHIN = 1e-8
 """Numbers agree to this times 1 plus their size: versions of numpy, scipy and solvers round differently."""
 WITHIN_PX = 0.02
@@ -49,7 +51,7 @@ def lines(folder: Path, judge: Judge | None = None) -> Iterator[Line]:
     from airground_drake.scenarios.load import from_data
     from airground_drake.verify import verify_all
 
-    report = json.loads((folder / "report.json").read_text(encoding="utf-8"))
+    report = json.loads(files.read_text(folder / "report.json"))
     scenario = from_data(report["scenario"]["resolved"], str(folder / "report.json"))
     third_party, own = scenario.claims, replace(scenario, claims={})
     traces = {name: trace.load(folder / "trace" / name) for name in scenario.runs}
@@ -131,7 +133,7 @@ def _pages(folder: Path, report: Mapping[str, Any], scenario: Any, traces: Mappi
     if "junit.xml" in report["files"]:
         yield _same_text("junit.xml", folder, junit.render(made))
     if "report.html" in report["files"]:
-        text = page(made, draw(scenario, traces), (folder / "diagram.svg").read_text(encoding="utf-8"))
+        text = page(made, draw(scenario, traces), files.read_text(folder / "diagram.svg"))
         text = text if found is None else proved.filled(text, found)
         drawn_by = report["provenance"]["packages"]["matplotlib"]
         yield _same_text("report.html", folder, text, other_drawings=drawn_by != version("matplotlib"))
@@ -142,7 +144,7 @@ def _same_text(name: str, folder: Path, rebuilt: str, *, other_drawings: bool = 
 
     With `other_drawings`, another version of matplotlib made the drawings: then only their texts are compared.
     """
-    recorded = (folder / name).read_text(encoding="utf-8")
+    recorded = files.read_text(folder / name)
     for k, (theirs, ours) in enumerate(zip_longest(_DRAWING.split(recorded), _DRAWING.split(rebuilt))):
         drawings = bool(k % 2) and theirs is not None and ours is not None
         if theirs == ours or (drawings and _is_same_drawing(theirs, ours, shapes=not other_drawings)):

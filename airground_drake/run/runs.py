@@ -79,7 +79,7 @@ class _Process:
         code = self.process.exitcode or 0
         self.process.close()
         if (self._folder / FAILURE).is_file():
-            raise _noted((self._folder / FAILURE).read_bytes(), self._what)
+            raise _noted(files.read_bytes(self._folder / FAILURE), self._what)
         if code or not (self._folder / "meta.json").is_file():
             how = interruption.ended_how(code)
             raise AirgroundError(one_line(f"{self._what}: the process that simulated it died ({how})"))

@@ -97,9 +97,7 @@ def _engines() -> dict[str, str]:
 def _read(path: Path, claim: ModelClaim, inputs: Mapping[str, Any]) -> Finding | None:
     """The finding that was kept, if the entry is sound and about this claim."""
     try:
-        if not path.is_file() or path.stat().st_size > LARGEST_BYTES:
-            return None
-        entry = json.loads(path.read_text(encoding="utf-8"))
+        entry = json.loads(files.read_bytes(path, LARGEST_BYTES))
         made, digest = entry.pop("finding"), entry.pop("sha256")
         sound = digest == _digest(made) and made["status"] in PASSING
         about = json.dumps(entry, sort_keys=True) == json.dumps(content(claim, inputs), sort_keys=True)

@@ -8,9 +8,11 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping
 from functools import cache
-from typing import TypeVar
+from typing import TypeVar, get_type_hints
 
-from airground_drake.base.errors import PluginError, UnknownNameError
+from pydantic import TypeAdapter, ValidationError
+
+from airground_drake.base.errors import PluginError, UnknownNameError, one_line, short
 from airground_drake.registry import MODEL_CLAIMS, RUN_CLAIMS, Registry
 from airground_drake.verify.claim import Claim, ModelClaim, TraceClaim
 
@@ -26,7 +28,8 @@ def model_claims(ids: Collection[str] | None = None, added: Mapping[str, str] | 
 
     Raises:
         UnknownNameError: if an identifier is not that of a claim about the model.
-        PluginError: if a claim cannot be imported, or has another identifier than its name.
+        PluginError: if a claim cannot be imported, lacks an attribute of `Claim`, or has another identifier than its
+            name.
     """
     return _made(MODEL_CLAIMS, ModelClaim, ids, added or {})
 
@@ -50,6 +53,21 @@ def _made(registry: Registry, kind: type[C], ids: Collection[str] | None, added:
 @cache
 def _instance(registry: Registry, kind: type[C], name: str, place: str) -> C:
     claim = registry.make(place, of=kind)
+    if why := _unsaid(claim):
+        raise PluginError(one_line(f"claim {name!r}: {place} {why}"))
     if claim.id != name:
         raise PluginError(f"claim {name!r}: {place} has the identifier {claim.id!r}")
     return claim
+
+
+def _unsaid(claim: Claim) -> str:
+    """What a claim does not say of itself, or says in another type than `Claim` declares; '' if it says everything."""
+    says = get_type_hints(Claim)
+    if missing := [name for name in says if not hasattr(claim, name)]:
+        return f"has no {missing[0]!r}; wanted: {', '.join(says)}"
+    for name, kind in says.items():
+        try:
+            TypeAdapter(kind).validate_python(getattr(claim, name))
+        except ValidationError as error:
+            return f"has {name!r} {short(repr(getattr(claim, name)))}: {error.errors()[0]['msg']}"
+    return ""

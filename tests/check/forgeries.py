@@ -191,6 +191,13 @@ def crash_left_undecided(folder: Path) -> None:
     report("overall", "counts", value=lambda old: old | {"refuted": old["refuted"] - 1, "inconclusive": 1})(folder)
 
 
+def added_claim_about_the_model_only(folder: Path) -> None:
+    """Although the scenario expects a verdict of it on a run, too."""
+    everywhere("claims", value={"MINE": "m:M"})(folder)
+    everywhere("runs", RUN, "expected", value=lambda old: old | {"MINE": "holds"})(folder)
+    report("claims", value=lambda old: [*old, old[-1] | {"id": "MINE", "run": ""}])(folder)
+
+
 def trigger_late(folder: Path) -> None:
     """The row of the trigger is left out, and the event put to the next one."""
     frame = read_table(folder)
@@ -227,6 +234,8 @@ RULES: dict[str, tuple[str, Edit]] = {
     "run from a cache": ("only claims about the model come from a cache", claim("EXEC", from_cache=True)),
     "claim left out": ("claims that there are", report("claims", value=lambda old: old[1:])),
     "claim twice": ("claims that there are", report("claims", value=lambda old: [*old, old[0]])),
+    "added claim left out": ("claims that the scenario adds are there", everywhere("claims", value={"MINE": "m:M"})),
+    "added claim left out of a run": ("claims that the scenario adds are there", added_claim_about_the_model_only),
     "run left out": ("runs", report("runs", value=lambda old: {run: old[run] for run in "cd"})),
     "trace added": (
         "folders of traces", lambda folder: shutil.copytree(trace(folder), trace(folder, "e")),

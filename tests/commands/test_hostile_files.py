@@ -17,6 +17,9 @@ from commands.conftest import Airground
 from report.cases import FINE, GOING_ROUND, SUCCESS, built, make_scenario, make_trace, make_traces
 
 from airground_drake.base import files
+from airground_drake.base.errors import FolderError
+from airground_drake.campaign import store
+from airground_drake.proofs.runs import prove_report
 from airground_drake.run import trace
 from airground_drake.scenarios.load import resolved
 
@@ -131,6 +134,33 @@ def test_a_pipe_as_a_scenario_is_empty_unless_somebody_writes(tmp_path: Path, ai
     os.close(writer)
     assert "version" in airground("verify", f"/dev/fd/{reader}", code=2)
     os.close(reader)
+
+
+@pytest.mark.parametrize("kind", [*FILES, "link"])
+@pytest.mark.parametrize("name", [store.JOURNAL, store.MANIFEST, "parts/part-000000.parquet"])
+def test_a_campaign_is_resumed_from_its_own_files_only(kind: str, name: str, tmp_path: Path) -> None:
+    """Nothing of it waits, and a link in it is not followed: its target stays as it is."""
+    folder, path = tmp_path / "campaign", tmp_path / "campaign" / name
+    store.Store(folder, {"name": "x"}, resume=False).close()
+    path.parent.mkdir(exist_ok=True)
+    path.unlink(missing_ok=True)
+    elsewhere = tmp_path / "elsewhere"
+    elsewhere.write_text("torn line")
+    (FILES | {"link": lambda path: path.symlink_to(elsewhere)})[kind](path)
+    for reading in (lambda: store.Store(folder, {"name": "x"}, resume=True), lambda: store.read(folder)):
+        with pytest.raises(FolderError):
+            reading()
+    assert elsewhere.read_text() == "torn line"
+
+
+def test_a_folder_of_a_campaign_or_of_proofs_is_no_link(hostile: Path, tmp_path: Path) -> None:
+    store.Store(tmp_path / "campaign", {"name": "x"}, resume=False).close()
+    (tmp_path / "campaign" / store.PARTS).symlink_to(tmp_path)
+    with pytest.raises(FolderError, match="parts is a link"):
+        store.Store(tmp_path / "campaign", {"name": "x"}, resume=True)
+    (hostile / "proofs").symlink_to(tmp_path)
+    with pytest.raises(FolderError, match="proofs is a link"):
+        next(prove_report(hostile))
 
 
 def test_nothing_is_written_through_a_link_or_over_a_pipe(honest: Path, hostile: Path, airground: Airground) -> None:

@@ -86,6 +86,8 @@ def test_missing_data_is_listed(scenario: Scenario, traces: dict[str, Trace]) ->
     other = Verdict(type("Other", (Kept,), {"id": "OTHER"})(), "a_printed", Finding("holds"), "holds")
     (item,) = built(scenario, traces, [*FINE[:2], other])["overall"]["missing"]
     assert (item["run"], item["id"]) == ("a_printed", "SAFE-TRACE")
+    (item,) = built(replace(scenario, claims={"MINE": "m:M"}), traces, FINE)["overall"]["missing"]
+    assert (item["run"], item["id"]) == ("", "MINE")
     assert built(replace(scenario, runs={}, reproduction=[]), {}, [])["overall"]["exit_code"] == 3
 
 

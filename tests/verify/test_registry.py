@@ -12,13 +12,15 @@ import pytest
 from builders.runs import run_of
 
 import airground_drake.verify
-from airground_drake.base.errors import UnknownNameError
+from airground_drake.base.errors import PluginError, UnknownNameError
 from airground_drake.registry import MODEL_CLAIMS, RUN_CLAIMS
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.verify import registry, verify, verify_model
 from airground_drake.verify.claim import Claim, ModelClaim, TraceClaim
 
 FOLDER = Path(airground_drake.verify.__file__).parent
+SAYS = "statement = formula = method = equations = does_not_establish = ''; assumptions = ()"
+"""What a claim must say of itself, in a class of one line."""
 SAID = ("statement", "formula", "method", "equations", "does_not_establish", "exercised_by")
 REGISTERED = [
     table.load(name, of=kind)
@@ -69,3 +71,26 @@ def test_claims_of_one_name_in_files_of_two_folders_are_two(tmp_path: Path) -> N
             patch.syspath_prepend(tmp_path / folder)
             found += registry.run_claims(["MINE"], {"MINE": "claims.py:Mine"})
     assert [claim.summary for claim in found] == ["one", "two"]
+
+
+@pytest.mark.parametrize(
+    ("says", "why"),
+    [
+        ("", "has no 'statement'; wanted: id, statement, formula, method, equations, assumptions"),
+        (f"{SAYS}; del assumptions", "has no 'assumptions'"),
+        (f"{SAYS}; assumptions = 'All is well.'", "'assumptions' 'All is well.': Input should be a valid tuple"),
+        (f"{SAYS}; expected = 'fine'", "'expected' 'fine': Input should be 'proved', 'holds'"),
+    ],
+)
+@pytest.mark.parametrize("kind", ["TraceClaim", "ModelClaim"])
+def test_a_claim_that_does_not_say_what_it_is_is_refused_before_it_is_judged(
+    says: str, why: str, kind: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "mute.py").write_text(
+        f"from airground_drake.verify.claim import {kind}\n"
+        f"class Mine({kind}):\n    id = 'MINE'; {says}\n    def check(self, *_): ...\n    def inputs(self, _): ...\n"
+    )
+    monkeypatch.syspath_prepend(tmp_path)
+    kinds: dict[str, Any] = {"TraceClaim": registry.run_claims, "ModelClaim": registry.model_claims}
+    with pytest.raises(PluginError, match=f"claim 'MINE': mute.py:Mine .*{why}"):
+        kinds[kind](["MINE"], {"MINE": "mute.py:Mine"})
