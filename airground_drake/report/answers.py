@@ -7,9 +7,8 @@ from math import log
 from typing import Any, NamedTuple
 
 from airground_drake.base.statuses import PASSING, UNDECIDED
-from airground_drake.registry import METHODS
 from airground_drake.report.outcomes import Course, Document, claims, proved_for_d, triggers
-from airground_drake.report.phrases import MAX_NAMES, Line, colliding, counted, grouped, intrusion, more_pairs
+from airground_drake.report.phrases import MAX_NAMES, Line, colliding, counted, grouped, intrusion, more_pairs, of_run
 
 NEGLIGIBLE = 1e-3
 """A risk that exceeds the smallest one by less than this share counts as the smallest."""
@@ -109,14 +108,8 @@ def _whereabouts(document: Document, course: Course) -> Line:
 
 def _runs(document: Document, every: Sequence[Course]) -> Iterator[Line]:
     """What each run is, for readers who do not know its letter."""
-    told = []
-    for course in every:
-        if course.plain and course.method in METHODS:
-            changed = document["scenario"]["resolved"]["runs"][course.name].get("set") or {}
-            extra = ", ".join(f"{key} {value}" for key, value in changed.items())
-            says = f"({course.method}) with {extra}" if extra else METHODS[course.method].says
-            told.append(f"{course.name}: {says}")
-    if told:
+    resolved = document["scenario"]["resolved"]
+    if told := [f"{course.name}: {of_run(resolved, course)}" for course in every if course.plain]:
         yield Line("", f"{'; '.join(told)}.")
 
 

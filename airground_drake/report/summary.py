@@ -26,6 +26,7 @@ from airground_drake.report.phrases import (
     methods,
     methods_are,
     more_pairs,
+    of_run,
     refusal,
     trouble,
 )
@@ -136,8 +137,7 @@ def _sentence(clauses: Iterable[str]) -> str:
 
 def _row(document: Document, course: Course) -> Row:
     resolved = document["scenario"]["resolved"]
-    says = METHODS[course.method].says if course.method in METHODS else course.method
-    says += "".join(f", {key}: {value}" for key, value in resolved["runs"][course.name].get("set", {}).items())
+    says = of_run(resolved, course)
     if course.away is None:
         return Row(course.name, says, _safe(document, course), Line("open", "not known"), "not run")
     count = len(resolved["ugvs"])
