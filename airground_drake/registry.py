@@ -237,7 +237,7 @@ METHODS: dict[str, Method] = {
     for method in (
         Method("a", "no intervention", intervenes=False, gated=False, intervention_on_top=True),
         Method("b", "direct intervention, no gatekeeper", intervenes=True, gated=False, intervention_on_top=True),
-        Method("c", "the paper's MPC gatekeeper", intervenes=True, gated=True, intervention_on_top=True),
+        Method("c", "MPC gatekeeper, (21)-(26)", intervenes=True, gated=True, intervention_on_top=True),
         Method("d", "avoidance on top, outcome gatekeeper", intervenes=True, gated=True, intervention_on_top=False),
     )
 }

@@ -186,7 +186,9 @@ DEVIATIONS: tuple[Deviation, ...] = (
     Deviation(
         "(28)", "sum-up rounding: accumulated deficit", ("gatekeeper.relaxation:sum_up_rounding",), "changed",
         "The routes `relaxed` and `nonlinear` compute it. They return the cheapest plan by (25) among the rounded "
-        "one and others, such as the two constant ones. A standing answer changes only by a margin and after a dwell.",
+        "one and others, such as the two constant ones. A standing answer changes only by a margin and after a dwell. "
+        "`gatekeeper.rule: first_stage` executes the first stage of the rounded plan; with the route `nonlinear` that "
+        "is the paper to the letter, run `c_literal` of `case_a` and `case_b`.",
         "The rounded plan can cost more than refusing throughout. The first stage alone reverses answers.", (22, 25),
     ),
     Deviation(
@@ -235,7 +237,8 @@ DEVIATIONS: tuple[Deviation, ...] = (
     ),
     Deviation(
         "methods (a) to (c)", "what is compared in section 5", ("registry:METHODS",), "changed",
-        "(a) no intervention, (b) every intervention is executed, (c) the MPC gatekeeper, in both cases. "
+        "(a) no intervention, (b) every intervention is executed, (c) an MPC gatekeeper, in both cases. Ours solves "
+        "each half-plane problem of (26) to optimality, keeps the best plan by (26) itself, and has hysteresis. "
         "Method (d), avoidance on top with an outcome gatekeeper, is ours.",
         "Method (b) has the MPC in section 5.1, but not in 5.2.", (23,),
     ),

@@ -21,7 +21,7 @@ class Rules:
     Attributes:
         switching_margin: relative gain that a reversal needs over keeping the answer throughout.
         min_dwell: least time between opposite answers to a proposal, s.
-        first_stage: the paper's own rule: the first stage of every plan is the answer, whatever the answer before was.
+        first_stage: the paper's own rule: the first stage of every rounded plan is the answer, whatever stands.
         budget: of one solution, in counts.
         allowance_s: time by the budget's clock that all solutions of a sample may take, s; None: no limit.
     """
@@ -57,7 +57,7 @@ WORDS: dict[Reason, str] = {
     "kept": "as answered before",
     "dwell": "as answered before: it is too early for another answer",
     "reversed": "the best plan begins with the other answer, and is cheaper than this one throughout",
-    "first_stage": "the best plan begins with this answer",
+    "first_stage": "the plan begins with this answer",
     "no_plan": "no outcome could be computed",
     "stalls": "with the proposal the UGV would come to rest short of its goal, no nearer than without",
     "makes_way": "the UGV makes way for another one and still reaches its goal",

@@ -8,7 +8,6 @@ from math import dist, log
 from typing import Any, NamedTuple
 
 from airground_drake.base.statuses import PASSING, UNDECIDED
-from airground_drake.registry import METHODS
 from airground_drake.report.attention import in_words
 from airground_drake.report.outcomes import Course, Document, Proof, claims, tolerance, triggers
 from airground_drake.report.phrases import (
@@ -23,6 +22,7 @@ from airground_drake.report.phrases import (
     joined,
     labels,
     more_pairs,
+    of_run,
 )
 
 NEGLIGIBLE = 1e-3
@@ -154,14 +154,8 @@ def _off_the_paper(document: Document, run: str, robot: str) -> str:
 
 def _runs(document: Document, every: Sequence[Course]) -> Iterator[Line]:
     """What each run is, for readers who do not know its letter."""
-    told = []
-    for course in every:
-        if course.plain and course.method in METHODS:
-            changed = document["scenario"]["resolved"]["runs"][course.name].get("set") or {}
-            extra = ", ".join(f"{key} {value}" for key, value in changed.items())
-            says = f"({course.method}) with {extra}" if extra else METHODS[course.method].says
-            told.append(f"{course.name}: {says}")
-    if told:
+    resolved = document["scenario"]["resolved"]
+    if told := [f"{course.name}: {of_run(resolved, course)}" for course in every if course.plain]:
         yield Line("", f"{'; '.join(told)}.")
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, NamedTuple, TypeVar
 
+from airground_drake.registry import METHODS
 from airground_drake.report.outcomes import Course
 
 K = TypeVar("K")
@@ -26,6 +27,14 @@ REFUSALS = {
     "exhausted": "it had used all of its tries",
 }
 """Why a proposal was refused, in a few words."""
+SETTINGS = {
+    ("gatekeeper.route", "mixed_integer"): "half-plane problems of (26) solved to optimality, best plan by (26) kept",
+    ("gatekeeper.route", "relaxed"): "(27) with half-planes, sum-up rounding (28)-(29)",
+    ("gatekeeper.route", "nonlinear"): "(27) by multiple shooting, sum-up rounding (28)-(29)",
+    ("gatekeeper.rule", "hysteresis"): "our hysteresis",
+    ("gatekeeper.rule", "first_stage"): "first stage applied",
+}
+"""What keys of the gatekeeper of method (c) mean, in a few words."""
 
 
 class Line(NamedTuple):
@@ -33,6 +42,20 @@ class Line(NamedTuple):
 
     mark: str
     text: str
+
+
+def of_run(resolved: Mapping[str, Any], course: Course) -> str:
+    """What a run is: its method, or the method's identifier and what the run sets differently."""
+    if course.method not in METHODS:
+        return course.method
+    if changed := resolved["runs"][course.name].get("set"):
+        says = [SETTINGS.get((key, str(value)), f"{key} {value}") for key, value in changed.items()]
+        return f"({course.method}) with {', '.join(says)}"
+    says = [METHODS[course.method].says]
+    if course.method == "c":
+        gate = ((f"gatekeeper.{key}", resolved["gatekeeper"][key]) for key in ("route", "rule"))
+        says += [SETTINGS.get(pair, " ".join(pair)) for pair in gate]
+    return ", ".join(says)
 
 
 def refusal(reason: str) -> str:

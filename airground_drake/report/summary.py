@@ -24,6 +24,7 @@ from airground_drake.report.phrases import (
     counted,
     grouped,
     more_pairs,
+    of_run,
     refusal,
     subject,
     trouble,
@@ -141,8 +142,7 @@ def _sentence(clauses: Iterable[str]) -> str:
 
 def _row(document: Document, course: Course) -> Row:
     resolved = document["scenario"]["resolved"]
-    says = METHODS[course.method].says if course.method in METHODS else course.method
-    says += "".join(f", {key}: {value}" for key, value in resolved["runs"][course.name].get("set", {}).items())
+    says = of_run(resolved, course)
     if course.away is None:
         return Row(course.name, says, _safe(course), Line("open", "not known"), "not run")
     count = len(resolved["ugvs"])

@@ -77,6 +77,8 @@ def test_the_numbers_of_the_audit(items: dict[int, dict[str, Any]], companion_it
     literal = {name: found["literal"] for name, found in companion_items[25]["evidence"]["answers"].items()}
     assert literal["case_a"][:2] == [(14.55, "accept"), (15.55, "refuse")]
     assert literal["case_b"][1:3] == [(13.1, "accept"), (14.1, "refuse")]
+    to_the_letter = {"gatekeeper.route": "nonlinear", "gatekeeper.rule": "first_stage"}
+    assert companion_items[25]["evidence"]["literal"] == dict.fromkeys(literal, to_the_letter)
     assert companion_items[11]["ours"]["cost_with_slack_accept_minus_refuse"] > 9000.0
 
 

@@ -57,6 +57,7 @@ def document(runs: dict[str, Document | None], *claims: Document, **more: Any) -
     resolved = {
         "runs": specs, "ugvs": {"ugv1": {"target_m": TARGET}}, "uav": {"name": "uav", "target_m": [0.0, 9.0, 2.0]},
         "arrival_tolerance_m": 0.1, "decision": {"min_inter_event_s": 0.5, "trigger": "automaton"},
+        "gatekeeper": {"route": "mixed_integer", "rule": "hysteresis"},
     }  # fmt: skip
     return {
         "scenario": {"resolved": resolved}, "runs": there, "reproduction": [row("reproduced")],
@@ -248,3 +249,17 @@ def test_what_is_not_as_declared_says_so() -> None:
     for status, mark in (("not_as_expected", "no"), ("inconclusive", "open")):
         overall = {"status": status, "why": "1 check differs.", "unpromised": [], "checks": 1}
         assert summary.as_declared(document({"d": run("d")}, overall=overall)) == (mark, "1 check differs.")
+
+
+def test_a_run_is_described_by_how_it_decides() -> None:
+    """The paper's gatekeeper to the letter is told apart from ours, whichever of the two a scenario has by default."""
+    literal = {"gatekeeper.route": "nonlinear", "gatekeeper.rule": "first_stage"}
+    found = document({"a": run("a"), "c": run("c"), "c_literal": run("c")})
+    found["scenario"]["resolved"]["runs"]["c_literal"]["set"] = {**literal, "decision.leak_1_s": 0.1}
+    how = "(27) by multiple shooting, sum-up rounding (28)-(29), first stage applied"
+    assert lines(found, "Runs") == [Line(
+        "", "a: no intervention; c: MPC gatekeeper, (21)-(26), half-plane problems of (26) solved to optimality, best "
+        f"plan by (26) kept, our hysteresis; c_literal: (c) with {how}, decision.leak_1_s 0.1.",
+    )]  # fmt: skip
+    found["scenario"]["resolved"]["gatekeeper"] = {key.partition(".")[2]: value for key, value in literal.items()}
+    assert f"c: MPC gatekeeper, (21)-(26), {how};" in lines(found, "Runs")[0].text

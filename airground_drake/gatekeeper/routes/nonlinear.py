@@ -1,4 +1,4 @@
-"""(27) as the paper has it, with the exact distances of (26d): a nonlinear program, then sum-up rounding."""
+"""The paper's route to the letter: (27) by multiple shooting, solved as a nonlinear program, then (28)-(29)."""
 
 from __future__ import annotations
 
@@ -24,7 +24,9 @@ _LIMITS = {"Major iterations limit": 1, "Iterations limit": 100}
 
 
 class NonlinearRoute:
-    """Relax, solve to a local optimum, round.
+    """Relax, solve to a local optimum by sequential quadratic programming, round.
+
+    Positions are variables, and the dynamics (23) are constraints between the stages.
 
     (26d), ||p - o|| >= d - u, is not ||p - o||^2 >= (d - u)^2: squared, a slack u > d would push the robot
     away again, and u > d is needed where the points of a stage have different d. So each pair of stage and
