@@ -11,6 +11,7 @@ import numpy as np
 from airground_drake.base.arrays import Array
 from airground_drake.run.trace import Trace
 from airground_drake.verify.runs.pairs import (
+    DISTANCE_TOLERANCE_M,
     Gap,
     apart_of,
     gap_over_time,
@@ -64,6 +65,41 @@ def of_run(trace: Trace) -> dict[str, Any]:
         "event_counts": {robot: dict(sorted(count.items())) for robot, count in counts.items()},
         "gatekeeper": gatekeeper(trace),
     }
+
+
+def outcome(trace: Trace) -> dict[str, Any]:
+    """What came of a run.
+
+    Returns:
+        `run`, `seed`, `kept` (whether every pair kept its distance), `home` (whether every robot arrived and had not
+        collided), and the pair of least margin: `first`, `second`, `min_distance_m` (the gap between their surfaces),
+        `safe_distance_m`, `t_s`.
+    """
+    pairs = pairs_of(trace)
+    bounds = apart_of(trace) - [pair.safe_m for pair in pairs]
+    (k,) = least_of(bounds, 1, lambda k: least_gap(trace, pairs[k]).margin_m)
+    least = least_gap(trace, pairs[k])
+    return {
+        "run": trace.run,
+        "seed": int(trace.meta["seed"]),
+        "kept": least.margin_m >= -DISTANCE_TOLERANCE_M,
+        "home": {*trace.robots} == {*_arrived(trace)},
+        "first": least.pair.first,
+        "second": least.pair.second,
+        "min_distance_m": least.gap_m,
+        "safe_distance_m": least.pair.required_m,
+        "t_s": least.t_s,
+    }
+
+
+def _arrived(trace: Trace) -> Iterator[str]:
+    """Robots that arrive before any collision of theirs."""
+    hit = set[str]()
+    for event in trace.events:
+        if event["kind"] == "collision":
+            hit |= {event["robot"], event.get("other", "")}
+        elif event["kind"] == "arrival" and event["robot"] not in hit:
+            yield event["robot"]
 
 
 def gatekeeper(trace: Trace) -> dict[str, Any] | None:
