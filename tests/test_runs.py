@@ -45,7 +45,11 @@ def parent_of() -> None:
 @pytest.mark.parametrize(
     ("does", "error", "said"),
     [
-        (lambda: os._exit(0), AirgroundError, r"run a of case_a: the process that simulated it died \(exit code 0\)"),
+        (
+            lambda: os._exit(0),
+            AirgroundError,
+            r"run a of case_a, seed 1: the process that simulated it died \(exit code 0\)",
+        ),
         (lambda: os.kill(os.getpid(), signal.SIGKILL), AirgroundError, r"died \(signal 9\)"),
         (parent_of, SimulationError, "run a stopped at t = 0 s: RuntimeError: simulated in"),
     ],

@@ -31,7 +31,7 @@ DECIDED: Mapping[str, Callable[[Run], Found]] = {
 SCHEMA = "airground_drake.report/3"
 SHAPE: Mapping[str, type] = {
     **dict.fromkeys(("scenario", "provenance", "overall", "runs", "files"), dict),
-    **dict.fromkeys(("claims", "audit", "choices"), list),
+    **dict.fromkeys(("claims", "audit", "choices", "seeds"), list),
 }
 """Type of each part of report.json that the checker reads; lists have objects."""
 

@@ -113,6 +113,9 @@ def check_overall(folder: Path, report: Json) -> str:
     same("runs", sorted(report["runs"]), sorted(scenario["runs"]))
     same("folders of traces", sorted(path.name for path in folder.glob("trace/*")), sorted(scenario["runs"]))
     same("seed", report["provenance"]["seed"], scenario["seed"])
+    number = len({row["seed"] for row in report["seeds"]})
+    due = [[run, seed] for run in scenario["runs"] for seed in range(1, number + 1)]
+    same("runs and seeds", [[row["run"], row["seed"]] for row in report["seeds"]], due)
     overall = _overall(report)
     same("verdict over all", report["overall"] | {"why": ""}, overall | {"why": ""})  # `why` is judged again
     return f"{overall['status']}, exit code {overall['exit_code']}"

@@ -24,7 +24,16 @@ from airground_drake.base.errors import (
     one_line,
 )
 from airground_drake.base.progress import progress_bar
-from airground_drake.base.usage import EXIT_TOOL, Parser, formats_of, output_folder, overridable, positive, refuse
+from airground_drake.base.usage import (
+    EXIT_TOOL,
+    Parser,
+    formats_of,
+    output_folder,
+    overridable,
+    positive,
+    refuse,
+    whole,
+)
 from airground_drake.report import folder
 from airground_drake.scenarios import plugins
 from airground_drake.scenarios.estimate import DEFAULT_LIMITS, GIB, Limits
@@ -80,7 +89,7 @@ def _reported(options: argparse.Namespace, command: str) -> int:
     kept = None if options.no_cache else cache_folder()
     output = options.output or Path("reports") / scenario.name
     limits = Limits(options.limit_steps, options.limit_memory * GIB)
-    wanted = make.Wanted(options.format, command, kept, audited, limits)
+    wanted = make.Wanted(options.format, command, kept, audited, limits, options.seeds)
     with (
         plugins.admitted(scenario, options.scenario, allow=options.allow_plugins),
         progress_bar(quiet=options.quiet, verbose=options.verbose) as progress,
@@ -115,6 +124,10 @@ def parser() -> argparse.ArgumentParser:
     )
     overridable(parser)
     parser.add_argument("--seed", type=int, metavar="N", help="seed of the decision noise")
+    parser.add_argument(
+        "--seeds", type=whole(1), default=0, metavar="N",
+        help="also simulate every run with the seeds 1 to N, and say how many keep all distances and bring all home",
+    )  # fmt: skip
     parser.add_argument(
         "--no-cache", action="store_true", help="redo every proof instead of reusing one whose inputs are unchanged"
     )

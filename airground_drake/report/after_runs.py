@@ -14,13 +14,14 @@ from airground_drake import audit
 from airground_drake.base import files
 from airground_drake.base.parallel import start_in_process
 from airground_drake.base.progress import Progress
-from airground_drake.report import document, folder, junit
+from airground_drake.report import document, folder, junit, metrics
 from airground_drake.report.figures.draw import draw
 from airground_drake.report.figures.panels import Figure
 from airground_drake.report.folder import PAGES
 from airground_drake.report.make import Wanted
 from airground_drake.report.page import page
 from airground_drake.run import trace
+from airground_drake.run.runs import simulate_seeds
 from airground_drake.run.trace import Trace
 from airground_drake.scenarios import plugins
 from airground_drake.scenarios.schema import Scenario
@@ -39,21 +40,35 @@ class Judged(NamedTuple):
     verdicts: Sequence[Verdict]
     findings: Sequence[dict[str, Any]]
     figures: Sequence[Figure]
+    seeds: Sequence[dict[str, Any]]
 
 
 def judge(scenario: Scenario, traces: Mapping[str, Trace], wanted: Wanted, progress: Progress) -> Judged:
-    """Judge the runs and the model and, if asked for, the paper; draw the runs at the same time.
+    """Judge the runs and the model and, if asked for, the paper and other seeds; draw the runs at the same time.
 
     Raises:
         PluginError: if a claim of the scenario cannot be made.
         AirgroundError: if a process dies.
     """
+    of_seeds = with_seeds(scenario, traces, wanted.seeds, progress) if wanted.seeds else ()
     figures = start_in_process(partial(draw, scenario, traces)) if "html" in wanted.formats else list
     verdicts = verify_all(scenario, traces.values(), kept=wanted.kept, progress=progress)
     if wanted.audited:
         progress.stage("auditing the paper")
     findings = audit.whole(scenario, verdicts) if wanted.audited else ()
-    return Judged(traces, verdicts, findings, figures())
+    return Judged(traces, verdicts, findings, figures(), of_seeds)
+
+
+def with_seeds(scenario: Scenario, own: Mapping[str, Trace], number: int, progress: Progress) -> list[dict[str, Any]]:
+    """The outcome of every run with each of the seeds 1 to `number`, by run, then by seed; see `metrics.outcome`.
+
+    Of the runs with the scenario's own seed, the traces `own` are taken.
+    """
+    others = [seed for seed in range(1, number + 1) if seed != scenario.seed]
+    found = [metrics.outcome(trace) for trace in simulate_seeds(scenario, others, progress=progress)]
+    found += [metrics.outcome(trace) for trace in own.values() if 1 <= scenario.seed <= number]
+    order = {name: k for k, name in enumerate(scenario.runs)}
+    return sorted(found, key=lambda row: (order[row["run"]], row["seed"]))
 
 
 def write(
@@ -67,8 +82,11 @@ def write(
     dot = graphviz.dot(build_diagram(plugins.without(scenario), most_complete(scenario)))
     pages = {"diagram.dot": dot, "diagram.svg": graphviz.svg(dot)}
     required = [claim.id for claim in model_claims(added=scenario.claims)]
-    traces, findings = judged.traces, judged.findings
-    report = document.build(scenario, digest, traces, judged.verdicts, provenance, audit=findings, required=required)
+    traces = judged.traces
+    report = document.build(
+        scenario, digest, traces, judged.verdicts, provenance,
+        audit=judged.findings, required=required, seeds=judged.seeds,
+    )  # fmt: skip
     if "junit" in formats:
         pages[PAGES["junit"]] = junit.render(report)
     if "html" in formats:

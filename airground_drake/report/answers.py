@@ -7,9 +7,9 @@ from itertools import chain
 from math import dist, log
 from typing import Any, NamedTuple
 
-from airground_drake.base.statuses import PASSING, UNDECIDED
+from airground_drake.base.statuses import NOTHING, PASSING, UNDECIDED
 from airground_drake.report.attention import in_words
-from airground_drake.report.outcomes import Course, Document, Proof, claims, tolerance, triggers
+from airground_drake.report.outcomes import Course, Document, Proof, claims, distance, tolerance, triggers
 from airground_drake.report.phrases import (
     MAX_NAMES,
     Line,
@@ -43,7 +43,12 @@ def answers(document: Document, every: Sequence[Course], *, tabulated: bool) -> 
     """The questions that the report has something to say about; `tabulated`: those that no table of runs answers."""
     asked = {"Safe?": _safe(document, every), "Arrived?": _arrived(document, every), "Runs": _runs(document, every)}
     asked = {} if tabulated else asked
-    asked |= {"Zeno-free?": _zeno(document), "Threshold?": _threshold(document), "Paper?": _paper(document)}
+    asked |= {
+        "Seeds?": _seeds(document),
+        "Zeno-free?": _zeno(document),
+        "Threshold?": _threshold(document),
+        "Paper?": _paper(document),
+    }
     return [Answer(question, lines) for question, found in asked.items() if (lines := list(found))]
 
 
@@ -150,6 +155,40 @@ def _off_the_paper(document: Document, run: str, robot: str) -> str:
         and row["status"] in _MATCHES
     ]
     return f", {off[0]:.2f} m from the paper's" if off else ""
+
+
+def _seeds(document: Document) -> Iterator[Line]:
+    """How many seeds keep every distance, and how many bring all home; runs with the same answer together."""
+    of_runs = grouped((row["run"], row) for row in document["seeds"])
+    for (mark, says), runs in grouped((_over_seeds(document, rows), run) for run, rows in of_runs.items()).items():
+        yield Line(mark, f"{', '.join(runs)}: {says}.")
+    if of_runs and not _noisy(document):
+        yield Line("", "There is no decision noise: the seed changes nothing but what third-party code makes of it.")
+
+
+def _over_seeds(document: Document, rows: Sequence[Mapping[str, Any]]) -> Line:
+    """What came of a run with several seeds, rows of `seeds` in report.json."""
+    count = len(rows)
+    kept, home = (sum(row[key] for row in rows) for key in ("kept", "home"))
+    if kept == home == count:
+        return Line("yes", f"all {counted(count, 'seed')} keep every distance and bring all home")
+    said = f"{kept} of {counted(count, 'seed')} keep every distance, {home} bring all home"
+    if kept < count:
+        worst = min(rows, key=lambda row: row["min_distance_m"] - row["safe_distance_m"])
+        apart, required = distance(worst["min_distance_m"], worst["safe_distance_m"]), worst["safe_distance_m"]
+        said += (
+            f"; worst: {apart} ({worst['first']} to {worst['second']}, seed {worst['seed']}), required {required:g} m"
+        )
+    promises = {claim["expected"] for claim in claims(document, "SAFE-TRACE", run=rows[0]["run"])}
+    said += "; no distance is promised" * (promises == {NOTHING})
+    return Line("partly" if kept else "no", said)
+
+
+def _noisy(document: Document) -> bool:
+    """Whether any run has decision noise, which the seed determines."""
+    resolved = document["scenario"]["resolved"]
+    noise = resolved["decision"]["noise_m_sqrt_s"]
+    return any(run["set"].get("decision.noise_m_sqrt_s", noise) > 0.0 for run in resolved["runs"].values())
 
 
 def _runs(document: Document, every: Sequence[Course]) -> Iterator[Line]:

@@ -39,6 +39,7 @@ def build(
     *,
     audit: Sequence[Mapping[str, Any]] = (),
     required: Iterable[str] = (),
+    seeds: Sequence[Mapping[str, Any]] = (),
 ) -> dict[str, Any]:
     """The document.
 
@@ -51,6 +52,7 @@ def build(
         audit: findings about the paper from elsewhere, added to those that the runs show; with any, all must be
             demonstrated.
         required: claims about the model that must have a verdict.
+        seeds: outcomes of the runs with several seeds, see `metrics.outcome`.
 
     Returns:
         Strict JSON; numbers that are not finite have become None.
@@ -74,6 +76,7 @@ def build(
         "provenance": dict(provenance),
         "overall": overall(claims, missing(scenario, traces, claims, required), items if audit else ()),
         "runs": {name: _run(scenario, trace) for name, trace in traces.items()},
+        "seeds": list(seeds),
         "claims": claims,
         "reproduction": reproduction.rows(scenario, traces),
         "choices": [{**asdict(choice), "ours": _lookup(resolved, choice.key)} for choice in scenario.choices],

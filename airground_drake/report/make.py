@@ -29,6 +29,7 @@ class Wanted(NamedTuple):
         kept: folder of kept findings about the model, see `verify_model`; None: everything anew.
         audited: whether to add all findings about the paper, also those that take other runs.
         limits: what the scenario may ask for.
+        seeds: with how many seeds, from 1 on, distances and arrivals are counted; 0: none.
     """
 
     formats: tuple[str, ...] = tuple(folder.PAGES)
@@ -36,6 +37,7 @@ class Wanted(NamedTuple):
     kept: Path | None = None
     audited: bool = False
     limits: Limits = DEFAULT_LIMITS
+    seeds: int = 0
 
 
 def write_report(
@@ -59,7 +61,7 @@ def write_report(
         PluginError: if the scenario names a policy, route or task that cannot be made.
         OSError: if something cannot be written, after all.
     """
-    within(scenario, wanted.limits)
+    within(scenario, wanted.limits, 1 + wanted.seeds)
     started, clock = datetime.now(UTC), time.perf_counter()
     if scenario.claims:  # a claim that cannot be made is refused before the work
         from airground_drake.verify.registry import model_claims, run_claims

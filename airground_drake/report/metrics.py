@@ -15,6 +15,7 @@ from airground_drake.verify.engines.geometry import interpolate
 from airground_drake.verify.runs.instants import without_proposals
 from airground_drake.verify.runs.live_goal import AT_REST_M, AT_REST_S, moved_at_the_end
 from airground_drake.verify.runs.pairs import (
+    DISTANCE_TOLERANCE_M,
     Gap,
     apart_of,
     gap_over_time,
@@ -109,6 +110,30 @@ def _way_left_m(trace: Trace, ugv: str, time_s: float) -> float:
     aside[travelled < 0.0] = np.inf
     aside, rest = min(zip(aside.tolist(), (lengths.sum() - begins - along).tolist(), strict=True))
     return float(aside + rest + np.linalg.norm(corners[-1] - own.target_m))
+
+
+def outcome(trace: Trace) -> dict[str, Any]:
+    """What came of a run.
+
+    Returns:
+        `run`, `seed`, `kept` (whether every pair kept its distance), `home` (whether every robot arrived), and the pair of least margin: `first`, `second`, `min_distance_m` (the gap between their surfaces),
+        `safe_distance_m`, `t_s`.
+    """
+    pairs = pairs_of(trace)
+    bounds = apart_of(trace) - [pair.safe_m for pair in pairs]
+    (k,) = least_of(bounds, 1, lambda k: least_gap(trace, pairs[k]).margin_m)
+    least = least_gap(trace, pairs[k])
+    return {
+        "run": trace.run,
+        "seed": int(trace.meta["seed"]),
+        "kept": least.margin_m >= -DISTANCE_TOLERANCE_M,
+        "home": {*trace.robots} == {event["robot"] for event in trace.events if event["kind"] == "arrival"},
+        "first": least.pair.first,
+        "second": least.pair.second,
+        "min_distance_m": least.gap_m,
+        "safe_distance_m": least.pair.required_m,
+        "t_s": least.t_s,
+    }
 
 
 def gatekeeper(trace: Trace) -> dict[str, Any] | None:

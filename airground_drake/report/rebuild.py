@@ -46,7 +46,7 @@ def lines(folder: Path, judge: Judge | None = None) -> Iterator[Line]:
     Raises:
         ScenarioError, TraceError, OSError: if a file cannot be used.
     """
-    from airground_drake.report import document
+    from airground_drake.report import document, metrics
     from airground_drake.run import trace
     from airground_drake.scenarios.load import from_data
     from airground_drake.verify import verify_all
@@ -65,6 +65,7 @@ def lines(folder: Path, judge: Judge | None = None) -> Iterator[Line]:
         (judge or verify_all)(own, judged),
         report["provenance"],
         audit=_from_other_runs(report, scenario, traces),
+        seeds=[metrics.outcome(traces[row["run"]]) if row["seed"] == scenario.seed else row for row in report["seeds"]],
     )
     other_code = _other_code(report["provenance"])
     parts = [_with_note(line, other_code) for line in _parts(report, again, third_party)]

@@ -209,10 +209,10 @@ def as_declared(document: Document) -> Line:
         counted(failed, "deliberate failure") if failed else "",
         f"{undecided} undecided" if undecided else "",
         f"{idle} not tested" if idle else "",
-        f"and {counted(len(unpromised), 'claim')} about which nothing is promised" if unpromised else "",
     ]
     told = ", ".join(filter(None, parts))
-    return Line("yes", f"{overall['checks']} checks as declared{': ' if told else ''}{told}.")
+    more = f" For {counted(len(unpromised), 'more claim')} nothing is promised." if unpromised else ""
+    return Line("yes", f"{overall['checks']} checks as declared{': ' if told else ''}{told}.{more}")
 
 
 def text(document: Document) -> str:

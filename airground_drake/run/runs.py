@@ -13,8 +13,9 @@ import signal
 import time
 import warnings
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
+from dataclasses import replace
 from functools import partial
 from multiprocessing.connection import wait
 from multiprocessing.process import BaseProcess
@@ -47,7 +48,7 @@ class _Process:
     def __init__(self, scenario: Scenario, name: str, folder: Path) -> None:
         """Start it; it leaves its trace in `folder`, or a note on why there is no trace."""
         context = multiprocessing.get_context("fork") if forks() else multiprocessing.get_context("spawn")
-        self._name, self._folder, self._what = name, folder, f"run {name} of {scenario.name}"
+        self._name, self._folder, self._what = name, folder, f"run {name} of {scenario.name}, seed {scenario.seed}"
         self._clock = context.RawValue("d")  # simulated time, s
         self._before, self._since = 0.0, time.monotonic()
         self.process = context.Process(target=_simulate, args=(scenario, name, folder, self._clock))
@@ -107,31 +108,55 @@ def simulate_all(
         AirgroundError: if its process dies.
     """
     scenario = validated(scenario)
+    work = [(scenario, name) for name in scenario.runs]
+    traces = {trace.run: trace for trace in _simulated(work, ", ".join(scenario.runs), jobs, progress, meanwhile)}
+    return {name: traces[name] for name in scenario.runs}
+
+
+def simulate_seeds(
+    scenario: Scenario, seeds: Iterable[int], jobs: int | None = None, progress: Progress = SILENT
+) -> Iterator[Trace]:
+    """Simulate every run of a scenario with each of some seeds, and yield each trace when it is there.
+
+    Arguments and errors as of `simulate_all`.
+    """
+    several = [validated(replace(scenario, seed=seed)) for seed in seeds]
+    work = [(each, name) for each in several for name in each.runs]
+    return _simulated(work, f"{len(several)} more seeds", jobs, progress)
+
+
+def _simulated(
+    work: Sequence[tuple[Scenario, str]],
+    what: str,
+    jobs: int | None,
+    progress: Progress,
+    meanwhile: Callable[[], object] | None = None,
+) -> Iterator[Trace]:
+    """Simulate runs of validated scenarios, each in a process of its own; arguments as of `simulate_all`."""
     most = processors() if jobs is None else max(1, jobs)
     if not _compiled():
         progress.stage("compiling, once, about half a minute")
     if forks():
         warm_up()
-    progress.stage(f"simulating {', '.join(scenario.runs)}", scenario.duration_s * len(scenario.runs), "s")
-    waiting, running = deque(scenario.runs), dict[str, _Process]()
-    traces: dict[str, Trace] = {}
+    progress.stage(f"simulating {what}", sum(scenario.duration_s for scenario, _ in work), "s")
+    waiting, running = deque(enumerate(work)), dict[int, _Process]()
     with files.temporary_folder() as made, warnings.catch_warnings():
         warnings.simplefilter("ignore", DeprecationWarning)  # idle threads of numerical libraries survive a fork
         try:
             while waiting or running:
                 while waiting and len(running) < most:
-                    name = waiting.popleft()
-                    running[name] = _Process(scenario, name, made / name)
+                    number, (scenario, name) = waiting.popleft()
+                    running[number] = _Process(scenario, name, made / str(number))
                 if meanwhile is not None:
                     meanwhile()
                     meanwhile = None
                 wait([each.process.sentinel for each in running.values()], TOLD_S)
-                ended = [name for name, each in running.items() if not each.process.is_alive()]
+                ended = [number for number, each in running.items() if not each.process.is_alive()]
                 progress.advance(sum(each.advanced() for each in running.values()))
-                traces |= {name: running.pop(name).trace() for name in ended}
+                for number in ended:
+                    yield running.pop(number).trace()
         finally:
             _stop([each.process for each in running.values()])
-    return {name: traces[name] for name in scenario.runs}
 
 
 def _simulate(scenario: Scenario, run: str, folder: Path, clock: Any) -> None:
@@ -143,7 +168,9 @@ def _simulate(scenario: Scenario, run: str, folder: Path, clock: Any) -> None:
     try:
         trace.save(simulate(scenario, run, watch=partial(setattr, clock, "value")), folder)
     except BaseException as error:
-        stopped = [error.run, error.t, error.what] if isinstance(error, SimulationError) else None
+        stopped = (
+            [error.run, error.t, f"{error.what} (seed {scenario.seed})"] if isinstance(error, SimulationError) else None
+        )
         plain = str(error) if isinstance(error, AirgroundError) else described(error)
         refused = isinstance(error, PluginError | ScenarioError)
         with suppress(OSError):  # a full disk: the parent reports that this process died

@@ -97,13 +97,19 @@ def estimate(scenario: Scenario) -> Estimate:
     return Estimate(rows, steps, decisions, predicted, PROGRAM + memory + _planning(scenario))
 
 
-def within(scenario: Scenario, limits: Limits) -> Estimate:
+def within(scenario: Scenario, limits: Limits, times: int = 1) -> Estimate:
     """The estimate of a validated scenario that keeps to the limits.
+
+    Args:
+        scenario: what is simulated.
+        limits: what it may ask for.
+        times: how often each run is simulated, with one trace at a time in memory.
 
     Raises:
         LimitError: if the scenario asks for more; says how much it asks for and how much is allowed.
     """
-    found = estimate(scenario)
+    *counts, memory = estimate(scenario)
+    found = Estimate(*(times * count for count in counts), memory)
     if not (found.work <= limits.work and found.memory <= limits.memory):
         raise LimitError(scenario.name, str(found), f"{limits.work:.2g} steps, {limits.memory / GIB:.2g} GiB")
     return found

@@ -39,6 +39,9 @@ from check.forging import (
     write_table,
 )
 
+from airground_drake.report import metrics
+from airground_drake.run.trace import load
+
 RUNS = ("b", "c", "c_literal", "d")
 """Runs of case B."""
 ROW, BETWEEN, LATE = 300, 215, 450
@@ -224,7 +227,7 @@ UNMENDED = {"page with other bytes", "file outside named"}
 """Forgeries after which the list of files is left as it is."""
 RULES: dict[str, tuple[str, Edit]] = {
     # report.json
-    "another schema": ("it is a report of this version", report("schema", value="airground_drake.report/3")),
+    "another schema": ("it is a report of this version", report("schema", value="airground_drake.report/2")),
     "crash called safe": ("verdict", crash_called_safe),
     "crash left undecided": ("verdict: recorded 'inconclusive'", crash_left_undecided),
     "margin": ("margin", claim("SAFE-TRACE", margin=lambda old: old + 1e-5)),
@@ -241,6 +244,7 @@ RULES: dict[str, tuple[str, Edit]] = {
         "folders of traces", lambda folder: shutil.copytree(trace(folder), trace(folder, "e")),
     ),
     "seed": ("seed", report("provenance", "seed", value=7)),
+    "seeds left out": ("runs and seeds", report("seeds", value=[{"run": RUN, "seed": 1, "kept": True}])),
     "overall": ("verdict over all", report("overall", "as_expected", value=lambda old: old - 1)),
     # files
     "page with other bytes": ("SHA-256 of a file", words("report.html", "<title>", "<title> ")),
@@ -394,6 +398,13 @@ def refusal_called_acceptance(folder: Path) -> None:
         entries[0]["metrics"]["event_counts"][UGV].update(accept=2, refuse=0)
 
 
+def seed_called_safe(folder: Path) -> None:
+    """Outcomes of the report's own seed, the first of them false."""
+    with edited_report(folder) as document:
+        document["seeds"] = [metrics.outcome(load(trace(folder, run))) for run in RUNS]
+        document["seeds"][0]["kept"] = True
+
+
 def bound_lowered(folder: Path) -> None:
     """A bound that is far from the best one, with the gap that follows from it."""
     with edited_table(folder, "decisions", "c") as frame:
@@ -428,6 +439,7 @@ CONCERTED: dict[str, Edit] = {
         report("overall", "counts", value=lambda old: old | {"holds": old["holds"] - 1, "refuted": old["refuted"] + 1}),
     ),
     "renamed": renamed,
+    "crash with the report's own seed called safe": seed_called_safe,
     # pages
     "diagram of the page": words("diagram.svg", "gatekeeper", "keeper"),
     "label of a drawing": words("report.html", ">ugv1</text>", ">ugv7</text>"),

@@ -4,13 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
-from report.cases import make_scenario, make_trace
+from report.cases import GOING_ROUND, event, make_scenario, make_trace
 
-from airground_drake.report import metrics
+from airground_drake.base.progress import SILENT
+from airground_drake.report import after_runs, metrics
+from airground_drake.run.simulation import simulate
 from airground_drake.run.trace import Trace
+from airground_drake.scenarios.load import load
 
 
 def test_metrics_of_robot_pairs_and_events(traces: dict[str, Trace]) -> None:
@@ -43,3 +47,35 @@ def test_decisions_are_counted_by_their_gap_and_those_that_met_their_budget(
     assert found["gaps"] == {"zero": 2, "up_to_1_percent": 1, "more": 2}
     assert (found["budget_spent"], found["solver_failures"], found["max_gap"]) == (2, 1, 1.0)
     assert found["refusals"] == {"ugv1": {"waits": 2, "kept": 1}}  # first answers only
+
+
+@pytest.mark.parametrize(
+    ("collisions", "home"),
+    [([], True), ([event(25.0, "collision")], True), ([event(9.0, "collision")], False),
+     ([event(9.0, "collision", "ugv2") | {"other": "ugv1"}], False)],
+)  # fmt: skip
+def test_a_robot_that_collides_on_its_way_is_not_home(collisions: list[dict[str, Any]], home: bool) -> None:
+    arrivals = [event(t, "arrival", robot) for t, robot in ((23.0, "ugv1"), (23.5, "ugv2"), (24.0, "uav"))]
+    happened = sorted([*arrivals, *collisions], key=lambda each: each["t_s"])
+    trace = make_trace(make_scenario(), "c", GOING_ROUND, happened)
+    assert metrics.outcome(trace)["home"] is home
+    assert not metrics.outcome(
+        replace(trace, meta=trace.meta | {"events": [each for each in happened if each["t_s"] < 24.0]})
+    )["home"]
+
+
+@pytest.mark.parametrize("own", [0, 2])
+def test_seeds_are_those_from_1_on_and_the_reports_own_runs_serve_for_theirs(own: int) -> None:
+    runs, noise = "runs={a: {method: a}, b: {method: b}}", "decision.noise_m_sqrt_s=1"
+    scenario, _ = load(
+        "case_b", [f"seed={own}", "duration_s=12", "arrival_tolerance_m=99", noise, "reproduction=[]", runs]
+    )
+    traces = {name: simulate(scenario, name) for name in scenario.runs}
+    marked = {name: replace(trace, meta=trace.meta | {"events": []}) for name, trace in traces.items()}
+    found = after_runs.with_seeds(scenario, marked, 2, SILENT)
+    assert [(row["run"], row["seed"]) for row in found] == [("a", 1), ("a", 2), ("b", 1), ("b", 2)]
+    for row in found:
+        again = metrics.outcome(simulate(scenario, row["run"], seed=row["seed"]))
+        assert row == again | ({"home": False} if row["seed"] == own else {})
+    crash = {row["seed"]: row["t_s"] for row in found if row["run"] == "b"}
+    assert crash[1] != crash[2]  # the noise decides when the wrong intervention begins

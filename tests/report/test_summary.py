@@ -51,18 +51,23 @@ def document(runs: dict[str, Document | None], *claims: Document, **more: Any) -
     kept = {name: each["metrics"]["min_distance_m"]["ugv1"]["rock"]["value"] >= D for name, each in there.items()}
     judged = [claim("SAFE-TRACE", name, "holds" if kept[name] else "refuted") for name in there]
     specs = {
-        name: {"method": each["method"] if each else "c", "composition": PRINTED if "printed" in name else PLAIN}
+        name: {
+            "method": each["method"] if each else "c",
+            "composition": PRINTED if "printed" in name else PLAIN,
+            "set": {},
+        }
         for name, each in runs.items()
     }
     resolved = {
         "runs": specs, "ugvs": {"ugv1": {"target_m": TARGET}}, "uav": {"name": "uav", "target_m": [0.0, 9.0, 2.0]},
-        "arrival_tolerance_m": 0.1, "decision": {"min_inter_event_s": 0.5, "trigger": "automaton"},
+        "arrival_tolerance_m": 0.1,
+        "decision": {"min_inter_event_s": 0.5, "trigger": "automaton", "noise_m_sqrt_s": 0.004},
         "gatekeeper": {"route": "mixed_integer", "rule": "hysteresis"},
     }  # fmt: skip
     return {
         "scenario": {"resolved": resolved}, "runs": there, "reproduction": [row("reproduced")],
         "claims": [*claims, *(each for each in judged if ("SAFE-TRACE", each["run"]) not in given)],
-        "overall": {"status": "as_expected", "why": "", "unpromised": [], "checks": 1}, **more,
+        "overall": {"status": "as_expected", "why": "", "unpromised": [], "checks": 1}, "seeds": [], **more,
     }  # fmt: skip
 
 
@@ -263,3 +268,42 @@ def test_a_run_is_described_by_how_it_decides() -> None:
     )]  # fmt: skip
     found["scenario"]["resolved"]["gatekeeper"] = {key.partition(".")[2]: value for key, value in literal.items()}
     assert f"c: MPC gatekeeper, (21)-(26), {how};" in lines(found, "Runs")[0].text
+
+
+def of_seeds(name: str, *of: tuple[float, bool]) -> list[Document]:
+    """Outcomes of a run with the seeds from 1 on: how near ugv1 came to the rock, m, and whether all are home."""
+    pair = {"first": "ugv1", "second": "rock", "safe_distance_m": D, "t_s": 9.0}
+    return [
+        {"run": name, "seed": k, "kept": near_m >= D, "home": home, "min_distance_m": near_m, **pair}
+        for k, (near_m, home) in enumerate(of, start=1)
+    ]
+
+
+def test_several_seeds_are_counted_beside_what_is_promised() -> None:
+    rows = [
+        *of_seeds("b", (D, True), (1.5, True), (-0.25, False)), *of_seeds("c", *[(0.5, False)] * 3),
+        *of_seeds("a", (D, True), (D, False), (3.0, True)), *of_seeds("d", *[(D, True)] * 3),
+    ]  # fmt: skip
+    runs = {name: run(name) for name in "abcd"}
+    open_ = claim("SAFE-TRACE", "b", expected="nothing", as_expected=None)
+    assert lines(document(runs, open_, seeds=rows), "Seeds?") == [
+        ("partly", "b: 1 of 3 seeds keep every distance, 2 bring all home; worst: -0.250 m (overlap) (ugv1 to rock, "
+         "seed 3), required 2 m; no distance is promised."),
+        ("no", "c: 0 of 3 seeds keep every distance, 0 bring all home; worst: 0.500 m (ugv1 to rock, seed 1), "
+         "required 2 m."),
+        ("partly", "a: 3 of 3 seeds keep every distance, 2 bring all home."),
+        ("yes", "d: all 3 seeds keep every distance and bring all home."),
+    ]  # fmt: skip
+    silent = document(runs, open_, seeds=rows)
+    silent["scenario"]["resolved"]["decision"]["noise_m_sqrt_s"] = 0.0
+    assert "the seed changes nothing" in lines(silent, "Seeds?")[-1].text
+    assert not lines(document(runs), "Seeds?")
+
+
+def test_what_is_not_promised_is_neither_a_failure_nor_as_declared() -> None:
+    unsafe = claim("SAFE-TRACE", "b", "refuted", expected="nothing", as_expected=None)
+    overall = {"status": "as_expected", "why": "", "unpromised": [{"id": "SAFE-TRACE", "run": "b"}], "checks": 0}
+    found = document({"b": run("b", 0.5)}, unsafe, overall=overall)
+    assert "(expected)" not in lines(found, "Safe?")[0].text
+    assert "not as declared" not in summary.headline(found).text
+    assert summary.as_declared(found).text == "0 checks as declared. For 1 more claim nothing is promised."
