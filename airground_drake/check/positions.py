@@ -12,6 +12,7 @@ import numpy as np
 import pandas as pd
 
 from .files import Json
+from .limits import LARGEST
 from .rules import SMALL, Array
 from .safety import distances_m, gain_of, lost_m, shortfall_m
 from .scenario import pairs_of, robots_of
@@ -39,7 +40,7 @@ class Judged(NamedTuple):
         least_m: distance that was kept at all times, with straight motion between samples.
         missed_m: e, by how much the samples miss the avoidance inequalities, m per sampling period; None if the law
             says nothing, since samples are not equally spaced.
-        guarantee_m: distance that follows from the law with that e; None as above.
+        guarantee_m: distance that follows from the law with that e; None as above, or if it is not above 0.
     """
 
     first: str
@@ -55,7 +56,21 @@ class Judged(NamedTuple):
         return self.least_m >= self.safe_m - SMALL
 
 
-def judge(table: pd.DataFrame, scenario: Json) -> list[Judged]:
+class Coverage(NamedTuple):
+    """The times of the samples.
+
+    Attributes:
+        first_s: of the first sample, as written.
+        lasting_s: from the first to the last.
+        duration_s: of the scenario.
+    """
+
+    first_s: float
+    lasting_s: float
+    duration_s: float
+
+
+def judge(table: pd.DataFrame, scenario: Json) -> tuple[list[Judged], Coverage]:
     """Judge the positions of a table.
 
     Args:
@@ -64,7 +79,7 @@ def judge(table: pd.DataFrame, scenario: Json) -> list[Judged]:
         scenario: as resolved; says which distances are to be kept, and the gain of the law.
 
     Returns:
-        One entry per pair, the least margin first.
+        One entry per pair, the least margin first; and the times that the samples cover.
 
     Raises:
         UnusableError: if the table lacks something.
@@ -72,8 +87,8 @@ def judge(table: pd.DataFrame, scenario: Json) -> list[Judged]:
     t_s, places = _sampled(table, scenario)
     spacing, control_s = np.diff(t_s), float(scenario["control"]["period_s"])
     period: float | None = None
-    if np.ptp(spacing) <= SMALL:
-        period = control_s if abs(spacing[0] - control_s) <= SMALL else float(spacing.mean())
+    if np.ptp(spacing) <= (within := _resolution_s(t_s)):
+        period = control_s if abs(spacing[0] - control_s) <= within else float(spacing.mean())
     found = []
     for pair in pairs_of(scenario):
         own, other = places[pair.robot], places[pair.other]
@@ -83,9 +98,16 @@ def judge(table: pd.DataFrame, scenario: Json) -> list[Judged]:
             gain = gain_of(scenario, period)
             e = shortfall_m(own, other, pair, gain)
             short = max(0.0, pair.safe_m - float(np.linalg.norm(own[0] - other[0])))
-            missed, guarantee = float(e), pair.gap_m - max(lost_m(e, gain, len(spacing)), short)
+            promised = pair.gap_m - max(lost_m(e, gain, len(spacing)), short)
+            missed, guarantee = float(e), promised if promised > 0.0 else None
         found.append(Judged(pair.robot, pair.other, pair.gap_m, least_m, missed, guarantee))
-    return sorted(found, key=lambda one: one.least_m - one.safe_m)
+    covered = Coverage(float(t_s[0]), float(t_s[-1] - t_s[0]), float(scenario["duration_s"]))
+    return sorted(found, key=lambda one: one.least_m - one.safe_m), covered
+
+
+def _resolution_s(t_s: Array) -> float:
+    """Largest difference of two spacings that rounding explains, s: since 1970 the resolution is 2.4e-7 s."""
+    return max(SMALL, 2.0 * float(np.spacing(np.abs(t_s).max())))
 
 
 def _sampled(table: pd.DataFrame, scenario: Json) -> tuple[Array, Mapping[str, Array]]:
@@ -111,7 +133,7 @@ def _sampled(table: pd.DataFrame, scenario: Json) -> tuple[Array, Mapping[str, A
             raise UnusableError(f"{robot}: t_s = {times[robot][k]:g} does not come after the row before")
     first = next(iter(robots))
     for robot, own in times.items():
-        if len(own) != len(times[first]) or not np.allclose(own, times[first], rtol=0.0, atol=SMALL):
+        if len(own) != len(times[first]) or not np.allclose(own, times[first], rtol=0.0, atol=_resolution_s(own)):
             raise UnusableError(f"{robot} and {first} are not sampled at the same times; wanted: equal t_s")
     for name, body in obstacles.items():
         found[name] = np.tile(np.array(body["position_m"], dtype=np.float64), (len(times[first]), 1))
@@ -126,4 +148,7 @@ def _numbers(rows: pd.DataFrame, robot: str) -> Any:
     if not np.isfinite(numbers).all():
         k = int(np.argmax(~np.isfinite(numbers).all(axis=1)))
         raise UnusableError(f"{robot}: row {rows.index[k]} has a value that is not a finite number")
+    if not (within := (np.abs(numbers) <= LARGEST).all(axis=1)).all():
+        k = int(np.argmin(within))
+        raise UnusableError(f"{robot}: row {rows.index[k]} has a value beyond {LARGEST:g}; wanted: seconds and metres")
     return numbers

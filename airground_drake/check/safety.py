@@ -88,7 +88,7 @@ def shortfall_m(own_m: Array, other_m: Array, pair: Pair, gain: Fraction, last: 
     """
     reach = np.linalg.norm(np.diff(own_m, axis=0), axis=1) + np.linalg.norm(np.diff(other_m, axis=0), axis=1)
     reach[-1] /= float(last)
-    near = np.linalg.norm(own_m - other_m, axis=1)[:-1] < pair.safe_m + reach + FAR_M
+    near = ~(np.linalg.norm(own_m - other_m, axis=1)[:-1] - reach >= pair.safe_m + FAR_M)  # also if it is not a number
     safe, share, worst = Fraction(pair.safe_m), Fraction(pair.share), Fraction()
     for k in np.flatnonzero(near):
         here, there, after, beyond = (

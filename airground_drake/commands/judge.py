@@ -47,19 +47,23 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
     scenario = resolved(load(options.scenario, options.set)[0])
     try:
-        found = positions.judge(_table(options.positions), scenario)
+        found, covered = positions.judge(_table(options.positions), scenario)
     except (positions.UnusableError, ValueError) as error:
         return refuse(f"{options.positions}: {str(error)[:FAULT_WIDTH]}")
     broken = [one for one in found if not one.kept]
     if options.json:
         pairs = [{**one._asdict(), "kept": one.kept} for one in found]
-        print(json.dumps({"kept": not broken, "pairs": pairs, "not_judged": positions.NOT_JUDGED}, indent=1))
+        document = {"kept": not broken, "covered": covered._asdict(), "pairs": pairs}
+        print(json.dumps(document | {"not_judged": positions.NOT_JUDGED}, indent=1))
         return int(bool(broken))
+    print(f"The samples cover {covered.lasting_s:g} s, from t = {covered.first_s:.10g} s; "
+          f"the scenario lasts {covered.duration_s:g} s.")  # fmt: skip
     print(f"{len(found) - len(broken)} of {len(found)} distances were kept. Least margins first:")
     for one in found[:MOST_LISTED]:
         law = "the law is not judged: samples are not equally spaced"
         if one.missed_m is not None:
-            law = f"misses the law by e = {one.missed_m:.6g} m per period, which promises {one.guarantee_m:.6g} m"
+            promised = f"{one.guarantee_m:.6g} m" if one.guarantee_m else "no distance"
+            law = f"misses the law by e = {one.missed_m:.6g} m per period, which promises {promised}"
         verdict = "kept" if one.kept else "NOT KEPT"
         print(one_line(f"{one.first}, {one.second}: {verdict}, {one.least_m:.6g} of {one.safe_m:.6g} m; {law}"))
     print("".join(f"Not judged: {each}.\n" for each in positions.NOT_JUDGED), end="")

@@ -53,10 +53,34 @@ def test_a_run_that_hits_an_obstacle_is_exit_code_1(run: Run, judged: Callable[.
     assert worst["missed_m"] > 0.1
 
 
+def test_stamps_since_1970_are_judged_like_those_from_zero_and_the_text_says_what_they_cover(
+    run: Run, tmp_path: Path, airground: Airground
+) -> None:
+    table = sampled(run("case_a", "d"))
+    table["t_s"] = [f"{t + 1311875572.406161:.6f}" for t in table["t_s"]]
+    said = []
+    for name, rows in (("whole", table), ("second", table[table["t_s"].astype(float) < 1311875573.4])):
+        rows.to_csv(tmp_path / name, index=False)
+        said.append(airground("judge", tmp_path / name, "--scenario", "case_a"))
+    assert "not equally spaced" not in said[0]
+    assert "misses the law by e = 0 m per period, which promises 2 m" in said[0]
+    assert said[1].startswith("The samples cover 0.95 s, from t = 1311875572 s; the scenario lasts 30 s.")
+
+
+def test_no_distance_below_zero_is_promised(run: Run, tmp_path: Path, airground: Airground) -> None:
+    sampled(run("case_b", "b")).to_csv(tmp_path / "positions.csv", index=False)
+    said = airground("judge", tmp_path / "positions.csv", "--scenario", "case_b", "--set",
+                     "control.avoidance_gain_1_s=1", code=1)  # fmt: skip
+    assert "promises no distance" in said
+    assert "promises -" not in said
+
+
 def test_parquet_and_the_text_for_people(run: Run, tmp_path: Path, airground: Airground) -> None:
     sampled(run("case_a", "d")).to_parquet(tmp_path / "positions.parquet")
     said = airground("judge", tmp_path / "positions.parquet", "--scenario", "case_a")
-    assert said.startswith("12 of 12 distances were kept.")
+    assert said.startswith(
+        "The samples cover 30 s, from t = 0 s; the scenario lasts 30 s.\n12 of 12 distances were kept."
+    )
     assert "Not judged: how bodies moved between samples: motion is taken as straight." in said
 
 
@@ -71,6 +95,7 @@ def test_parquet_and_the_text_for_people(run: Run, tmp_path: Path, airground: Ai
             lambda table: table.assign(x_m=table["x_m"].where(table.index != 7)),
             "row 7 has a value that is not a finite",
         ),
+        (lambda table: table.assign(x_m=table["x_m"] * 1e155), "has a value beyond 1e+12; wanted: seconds and metres"),
         (lambda table: table.iloc[::-1], "does not come after the row before"),
         (lambda table: table.drop(index=3), "are not sampled at the same times"),
     ],

@@ -140,7 +140,7 @@ def test_thinning_keeps_ends_and_extremes_cut_names_both_ends_and_labels_their_o
 STYLE = "fill: #123456; font: 700 9px 'A', sans-serif; text-anchor: middle; background: url(http://e); x: y"
 SOURCE = (
     '<?xml version="1.0"?><svg xmlns="http://www.w3.org/2000/svg" xmlns:x="http://www.w3.org/1999/xlink" '
-    'width="9pt" viewBox="0 0 9 9" onload="a()"><script>a()</script><style>@import "http://e"</style>'
+    'width="9pt" viewBox="0 0 9 9" onload="a()" overflow="visible" class="skip"><script>a()</script><style>@import "http://e"</style>'
     '<image href="http://e/i.png"/><defs><path id="p" d="M 0.123456 1"/><path id="unused" d="M 0 1"/></defs>'
     '<a x:href="http://e"><use x:href="#p" fill="url(#p)"/></a><rect fill="url(http://e)"/>'
     f'<text style="{STYLE}"/></svg>'
@@ -149,7 +149,7 @@ SOURCE = (
 
 def test_svg_becomes_inert_and_named_and_keeps_its_looks() -> None:
     text = svg.inline(SOURCE, "n", "T & t", "D")
-    for word in ("script", "style", "onload", "http://e", "image", "unused", "width", "background"):
+    for word in ("script", "style", "onload", "http://e", "image", "unused", "width", "background", "overflow", "skip"):
         assert word not in text
     assert text.count("href=") == text.count('href="#n-p"') == 1
     for part in (

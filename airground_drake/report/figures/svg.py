@@ -30,8 +30,9 @@ def inline(
     """An SVG document as an element for HTML.
 
     Scripts, style sheets, handlers and references to anything outside the document are removed (a style sheet would
-    apply to the whole page). Inline styles become attributes. Ids get a prefix, so that several drawings can share a
-    page; unused ids are removed. Coordinates are rounded to 0.01 units.
+    apply to the whole page), and attributes with which it could leave its place. Inline styles become attributes. Ids
+    get a prefix, so that several drawings can share a page; unused ids are removed. Coordinates are rounded to 0.01
+    units.
 
     Args:
         svg: the document; `viewBox` must be set.
@@ -56,7 +57,7 @@ def inline(
     used = {name for element in root.iter() for value in element.attrib.values() for name in _references(value)}
     for element in root.iter():
         _clean(element, prefix, used)
-    for name in ("version",) if natural_size else ("version", "width", "height"):
+    for name in ("version", "class") if natural_size else ("version", "class", "width", "height"):
         root.attrib.pop(name, None)
     if scale:
         root.set("width", f"{scale * float(root.get('viewBox', '0 0 0 0').split()[2]):.0f}")
@@ -101,7 +102,7 @@ def _clean(element: ET.Element, prefix: str, used: set[str]) -> None:
     for name, value in list(element.attrib.items()):
         if name == "id" and value in used:
             element.set(name, f"{prefix}-{value}")
-        elif name == "id" or name.lower().startswith(("on", _XLINK)) or _leads_outside(value):
+        elif name in ("id", "overflow") or name.lower().startswith(("on", _XLINK)) or _leads_outside(value):
             del element.attrib[name]
         elif "url(" in value:
             element.set(name, _REFERENCE.sub(rf"url(#{prefix}-\1)", value))
