@@ -3,20 +3,27 @@
 For each row of a scenario's reproduction table: the paper's value, the median and the 5 % and 95 % quantiles over the
 seeds, and the number of seeds within the tolerance. `airground report NAME --seeds N` counts the seeds that keep all
 distances and bring all home.
+
+`--policies` prints which policy of the behaviour database helped how often instead, in the runs with a gatekeeper.
 """
 
 from __future__ import annotations
 
 import argparse
+from collections import Counter, defaultdict
+from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
 from functools import partial
 from typing import Any
 
 import numpy as np
 
+from airground_drake.registry import METHODS
 from airground_drake.report.reproduction import rows
 from airground_drake.run.simulation import Recorder
 from airground_drake.scenarios.load import load
+
+ANSWERS = ("proposal", "accept", "refuse")
 
 
 def of_run(name: str, run: str, seeds: int) -> list[list[dict[str, Any]]]:
@@ -25,6 +32,34 @@ def of_run(name: str, run: str, seeds: int) -> list[list[dict[str, Any]]]:
     recorder = Recorder(scenario, run)
     of_seeds = (rows(scenario, {run: recorder.simulate(seed)}) for seed in range(1, seeds + 1))
     return [[row for row in each if row["run"] == run] for each in of_seeds]
+
+
+def of_policies(name: str, run: str, seeds: int, changes: Sequence[str]) -> dict[str, Counter[str]]:
+    """Per policy of the behaviour database: proposals, answers, and arrivals of UGVs that followed it last."""
+    recorder = Recorder(load(name, changes)[0], run)
+    found: defaultdict[str, Counter[str]] = defaultdict(Counter)
+    for seed in range(1, seeds + 1):
+        followed: dict[str, str] = {}
+        for event in recorder.simulate(seed).events:
+            if event["kind"] in ANSWERS:
+                found[event["policy"]][event["kind"]] += 1
+            if event["kind"] == "accept":
+                followed[event["robot"]] = event["policy"]
+            if event["kind"] == "arrival" and event["robot"] in followed:
+                found[followed[event["robot"]]]["arrival"] += 1
+    return dict(found)
+
+
+def print_policies(name: str, seeds: int, changes: Sequence[str]) -> None:
+    """A table with a row per run with a gatekeeper and policy."""
+    runs = [run for run, spec in load(name)[0].runs.items() if METHODS[spec.method].gated]
+    with ProcessPoolExecutor() as pool:
+        found = list(pool.map(partial(of_policies, name, seeds=seeds, changes=changes), runs))
+    print("| scenario | run | policy | proposed | accepted | refused | arrived |\n|" + " --- |" * 7)
+    for run, policies in zip(runs, found, strict=True):
+        for policy, counts in policies.items():
+            told = " | ".join(str(counts[kind]) for kind in (*ANSWERS, "arrival"))
+            print(f"| {name} | {run} | {policy} | {told} |")
 
 
 def summary(values: list[list[float]]) -> str:
@@ -38,7 +73,13 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("scenarios", nargs="+")
     parser.add_argument("-n", "--seeds", type=int, default=50, help="seeds 1 to N (default: %(default)s)")
+    parser.add_argument("--policies", action="store_true", help="count proposals, answers and arrivals per policy")
+    parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", help="for --policies")
     options = parser.parse_args()
+    if options.policies:
+        for name in options.scenarios:
+            print_policies(name, options.seeds, options.set)
+        return
     for name in options.scenarios:
         runs = list(dict.fromkeys(row.run for row in load(name)[0].reproduction))
         with ProcessPoolExecutor() as pool:

@@ -241,8 +241,8 @@ def _literal_rule() -> Item:
         "The paper's gatekeeper, taken literally, solves (27) by multiple shooting, rounds it by (28)-(29), and "
         "executes the first stage of the rounded plan at every sample. In both cases it takes an acceptance back about "
         "a second later and then accepts again, because the UGV's own task is cheaper for a moment. The paper "
-        "describes one lasting acceptance in Figures 6 and 10. Here an answer changes only by a margin and after a dwell. "
-        "The finding holds for our weights and speeds; the paper gives none.",
+        "describes one lasting acceptance in Figures 6 and 10. Here an answer changes only by a margin and after a "
+        "dwell. The finding holds for our weights and speeds; the paper gives none.",
         {"acceptances_taken_back": literal}, {"acceptances_taken_back": ours},
         min(literal) > 0 and max(ours) == 0,
         {

@@ -217,7 +217,7 @@ DEVIATIONS: tuple[Deviation, ...] = (
     Deviation("Figure 1", "geometry of the composition", (), "not realised", "A sketch; see (5)."),
     Deviation(
         "Figure 2", "framework in three layers", ("systems.diagram:build_diagram",), "faithful",
-        "Every block is a Drake system; `airground diagram case_a` draws them.",
+        "Every block is a Drake system; `airground diagram case_a` draws those of method (c).",
     ),
     Deviation(
         "Figures 3 and 7", "trajectories", ("report.figures.maps:plane",), "faithful",
@@ -241,6 +241,14 @@ DEVIATIONS: tuple[Deviation, ...] = (
         "each half-plane problem of (26) to optimality, keeps the best plan by (26) itself, and has hysteresis. "
         "Method (d), avoidance on top with an outcome gatekeeper, is ours.",
         "Method (b) has the MPC in section 5.1, but not in 5.2.", (23,),
+    ),
+    Deviation(
+        "section 6, behaviour database", "how the UAV selects an intervention, left open",
+        ("intervention.database:BehaviourDatabase",), "changed",
+        "The UAV asks its policies in turn (`intervention.ranking: listed`), or all of them and takes the best by its "
+        "own prediction (`predicted`). After a refusal the next one gets its turn. [Which policy helped how "
+        "often](paper.md#the-behaviour-database).",
+        "The paper leaves the selection to future work.", (24,),
     ),
     Deviation(
         "section 6", "Zeno behaviour, left open", ("decision.trigger:Trigger",), "changed",

@@ -19,7 +19,9 @@ def parser() -> argparse.ArgumentParser:
     """Make the parser."""
     parser = Parser(prog="airground diagram", description="Draw the diagram of a scenario.")
     parser.add_argument("scenario", help="name of a shipped scenario, or path to a YAML file")
-    parser.add_argument("--method", choices=tuple(METHODS), help="default: the most complete of its runs")
+    parser.add_argument(
+        "--method", choices=tuple(METHODS), help="default: c, the paper's Figure 2, if it has such a run"
+    )
     parser.add_argument("--part", metavar="NAME", help="only the layer of that name, with all ports")
     parser.add_argument("--format", action="append", choices=FORMATS, help="may be repeated (default: dot and svg)")
     parser.add_argument(
@@ -35,11 +37,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = parser().parse_args(arguments)
     from airground_drake.scenarios.load import load
     from airground_drake.systems import graphviz
-    from airground_drake.systems.diagram import build_diagram, most_complete
+    from airground_drake.systems.diagram import build_diagram, method_drawn
 
     scenario, _ = load(options.scenario, options.set)
     with plugins.admitted(scenario, options.scenario, allow=options.allow_plugins):
-        method = most_complete(scenario) if options.method is None else options.method
+        method = method_drawn(scenario) if options.method is None else options.method
         diagram, name = build_diagram(scenario, method=method), scenario.name
     if options.part is not None:
         parts = [system.get_name() for system in diagram.GetSystems()]

@@ -26,7 +26,7 @@ from airground_drake.run.trace import Trace
 from airground_drake.scenarios import plugins
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.systems import graphviz
-from airground_drake.systems.diagram import build_diagram, most_complete
+from airground_drake.systems.diagram import build_diagram, method_drawn
 from airground_drake.verify import Verdict, verify_all
 from airground_drake.verify.registry import model_claims
 
@@ -79,7 +79,7 @@ def write(
     Raises:
         OSError: if something cannot be written.
     """
-    dot = graphviz.dot(build_diagram(plugins.without(scenario), most_complete(scenario)))
+    dot = graphviz.dot(build_diagram(plugins.without(scenario), method_drawn(scenario)))
     pages = {"diagram.dot": dot, "diagram.svg": graphviz.svg(dot)}
     required = [claim.id for claim in model_claims(added=scenario.claims)]
     traces = judged.traces

@@ -25,6 +25,8 @@ STILL_M = 1e-3
 STILL_S = 1.0
 TRIGGER_TOLERANCE_M = 1e-5
 """A trigger counts as at the threshold if the decision variable is at most this much below: event isolation."""
+SHIFTED_M = 0.1
+"""A path that leaves its straight line by this is shifted."""
 YES_NO = "yes/no"
 """Unit of a row that is compared exactly."""
 
@@ -73,6 +75,32 @@ def grows_past_threshold(trace: Trace, robot: str) -> list[float]:
     moving = np.flatnonzero((np.diff(trace.reference(robot), axis=0) != 0.0).any(axis=1))
     reference_end = int(moving[-1]) + 1 if moving.size else len(x) - 1
     return [float(x[-1] > zeta and x[reference_end] > x[above[0]])]
+
+
+@measure
+def grows_until_acceptance(trace: Trace, robot: str) -> list[float]:
+    """1 if the decision variable grew from first trigger to first acceptance, and later fell below the threshold.
+
+    Empty without an acceptance.
+    """
+    triggers, accepted = (_times(trace, robot, kind)[:1] for kind in ("trigger", "accept"))
+    if not triggers or not accepted:
+        return []
+    x, zeta = _decision_variable(trace, robot)
+    before, at = np.interp([*triggers, *accepted], trace.t, x)
+    return [float(at > before and x[trace.t > accepted[0]].min(initial=np.inf) < zeta)]
+
+
+@measure
+def path_shifts(trace: Trace, robot: str) -> list[float]:
+    """1 if the robot's path leaves a straight line by SHIFTED_M while interventions are executed; empty without any."""
+    executed = np.flatnonzero(np.any([trace.column(f"{ugv}.accepted") > 0.0 for ugv in trace.ugvs], axis=0))
+    if not executed.size:
+        return []
+    path = trace.position(robot)[max(executed[0] - 1, 0) : executed[-1] + 1, :2]
+    along = (path[-1] - path[0]) / max(float(np.linalg.norm(path[-1] - path[0])), 1e-12)
+    away = path - path[0]
+    return [float(np.linalg.norm(away - np.outer(away @ along, along), axis=1).max() >= SHIFTED_M)]
 
 
 @measure

@@ -171,9 +171,13 @@ def build_model(
     return Model(diagram, world, block, trigger, planner, gatekeeper, controllers)
 
 
-def most_complete(scenario: Scenario) -> str:
-    """Identifier of the method with the most parts among the scenario's runs: the one that pictures show."""
-    return max((run.method for run in scenario.runs.values()), key=list(METHODS).index)
+def method_drawn(scenario: Scenario) -> str:
+    """Identifier of the method that pictures show: (c), the paper's Figure 2, if there is a run of it, else the last.
+
+    The last is that with the most parts among the scenario's runs.
+    """
+    methods = {run.method for run in scenario.runs.values()}
+    return "c" if "c" in methods else max(methods, key=list(METHODS).index)
 
 
 def _chosen(scenario: Scenario, method: str | None, composition: str | None) -> tuple[Method, Composition]:

@@ -17,7 +17,7 @@ from pydrake.systems.framework import Diagram
 from airground_drake.base import files
 from airground_drake.scenarios.load import load
 from airground_drake.systems import schematic
-from airground_drake.systems.diagram import build_diagram, most_complete
+from airground_drake.systems.diagram import build_diagram, method_drawn
 
 _PICTURE = re.compile(r'<svg width="(\d+)pt" height="(\d+)pt".*?>\s*(<g .*</g>)\s*</svg>', re.DOTALL)
 _ID = re.compile(r' id="[^"]*"')
@@ -99,7 +99,7 @@ def pictures() -> dict[str, str]:
     content = {}
     for name in ("case_a", "case_b"):
         scenario = load(name)[0]
-        text = dot(build_diagram(scenario, most_complete(scenario)))
+        text = dot(build_diagram(scenario, method_drawn(scenario)))
         content[f"{name}.dot"] = text
         content[f"{name}.svg"] = svg(text)
     return content

@@ -90,9 +90,12 @@ def test_diagram_writes_the_formats_and_the_part_that_are_named(tmp_path: Path, 
     assert "ugv2_plant" in (tmp_path / "minimal_vehicles.dot").read_text(encoding="utf-8")
 
 
-def test_diagram_shows_the_most_complete_method(tmp_path: Path, airground: Airground) -> None:
-    """The last run of case_a has method (a); the committed diagram is of (d), see tests/test_diagram.py."""
+def test_diagram_shows_figure_2_of_the_paper(tmp_path: Path, airground: Airground) -> None:
+    """Method (c), whose gatekeeper is an MPC, where the scenario has it; else the most complete method."""
     airground("diagram", "case_a", "--format", "dot", "-o", tmp_path)
+    assert "MPC, (21)-(29)" in (tmp_path / "case_a.dot").read_text(encoding="utf-8")
+    airground("diagram", "contact", "--format", "dot", "-o", tmp_path)
+    assert "contact_method_d" in (tmp_path / "contact.dot").read_text(encoding="utf-8")
     assert (tmp_path / "case_a.dot").read_bytes() == Path(__file__).parents[2].joinpath(
         "diagrams/case_a.dot"
     ).read_bytes()

@@ -29,6 +29,7 @@ TWO = [float(np.hypot(3.9 - x, 5.3 - y)) for x, y in ((1.7, 4.0), (4.0, 7.0))]
 TIMES = [event(3, "trigger", "ugv2"), event(5, "refuse"), event(6, "accept"), event(7, "trigger")]
 RECOVERY = {0: 0.0, 9.9: 2.0, 10.0: 3.0 - 2e-9, 10.1: 3.0 - 1e-9, 11.0: 4.0, 12.0: 3.04, 12.1: 2.94, 30.0: 0.0}
 TRIGGERED = [event(10.0, "trigger")]
+ANSWERED = [*TRIGGERED, event(12.0, "accept")]
 
 
 @pytest.mark.parametrize(
@@ -47,6 +48,19 @@ TRIGGERED = [event(10.0, "trigger")]
         ("grows_past_threshold", [0], STALLING, [event(20, "release")], {}),
         ("grows_past_threshold", [0], STALLING, [], {"x": {0: 0.0, 30: 2.9}}),  # stays below
         ("grows_past_threshold", [0], STALLING, [], {"x": {0: 0.0, 10: 4.0, 20: 3.9, 24: 2.0, 30: 3.5}}),  # shrinks
+        ("grows_until_acceptance", [1], GOING_ROUND, ANSWERED, {"x": {0: 0.0, 10: 3.0, 12: 4.0, 20: 0.0}}),
+        (
+            "grows_until_acceptance",
+            [0],
+            GOING_ROUND,
+            ANSWERED,
+            {"x": {0: 0.0, 10: 3.0, 12: 2.9, 20: 0.0}},
+        ),  # fell before
+        ("grows_until_acceptance", [0], GOING_ROUND, ANSWERED, {"x": {0: 0.0, 10: 3.0, 12: 4.0, 20: 5.0}}),  # no help
+        ("grows_until_acceptance", [], GOING_ROUND, TRIGGERED, {}),
+        ("path_shifts", [1], GOING_ROUND, SUCCESS, {}),
+        ("path_shifts", [0], MOVING, SUCCESS, {}),
+        ("path_shifts", [], [(0, *STALL), (10, *STALL)], [], {}),  # ends before any is executed
         ("arrives", [1], GOING_ROUND, [], {}),
         ("arrives", [0], STALLING, [], {}),
         ("trigger_time", [7], STALLING, TIMES, {}),
