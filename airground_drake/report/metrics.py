@@ -116,8 +116,8 @@ def outcome(trace: Trace) -> dict[str, Any]:
     """What came of a run.
 
     Returns:
-        `run`, `seed`, `kept` (whether every pair kept its distance), `home` (whether every robot arrived), and the pair of
-        least margin: `first`, `second`, `min_distance_m` (the gap between their surfaces), `safe_distance_m`, `t_s`.
+        `run`, `seed`, `kept` (whether every pair kept its distance), `home` (whether every robot arrived), and the pair
+        of least margin: `first`, `second`, `min_distance_m` (the gap between their surfaces), `safe_distance_m`, `t_s`.
     """
     pairs = pairs_of(trace)
     bounds = apart_of(trace) - [pair.safe_m for pair in pairs]
