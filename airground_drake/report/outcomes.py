@@ -216,12 +216,14 @@ def triggers(document: Document) -> list[Mapping[str, Any]]:
 
 
 def distance(value_m: float, required_m: float) -> str:
-    """A distance in words, below 0 as an overlap.
+    """A distance in words, below 0 as an overlap."""
+    told = metres(value_m, required_m)
+    return f"{told} (overlap)" if told.startswith("-") else told
 
-    If it falls short, it has enough decimals to show a smaller number than the required one.
-    """
+
+def metres(value_m: float, required_m: float) -> str:
+    """A distance; if it falls short, with enough decimals to show a smaller number than the required one."""
     decimals = 3
     while value_m < required_m - SLACK_M and float(f"{value_m:.{decimals}f}") >= required_m and decimals < 9:
         decimals += 1
-    shown = round(value_m, decimals) + 0.0  # no -0
-    return f"{shown:.{decimals}f} m{' (overlap)' * (shown < 0.0)}"
+    return f"{round(value_m, decimals) + 0.0:.{decimals}f} m"  # + 0.0: no -0.000

@@ -27,7 +27,7 @@ from airground_drake.report.figures.canvas import (
     time_line,
 )
 from airground_drake.report.metrics import Nearby, closest_obstacle, events_of, gap_m
-from airground_drake.report.outcomes import SLACK_M, distance
+from airground_drake.report.outcomes import SLACK_M, metres
 from airground_drake.run.trace import Trace
 
 MARKS = {"trigger": "^", "release": "v", "proposal": "D", "accept": "o", "refuse": "X"}
@@ -92,7 +92,7 @@ def distances(
             least.t_s, least.value, marker="o", markersize=9, markerfacecolor="none", markeredgewidth=1.6,
             color=ALARM if below else INK, zorder=5, clip_on=False,
         )  # fmt: skip
-        value = distance(least.value, least.required_m)
+        value = metres(least.value, least.required_m)
         note = f"{short(ugv)}: minimum {value} to {short(least.other, 14)}, {least.t_s:.2f} s"
         note += f", required {least.required_m:g} m" if below else ""
         axes.set_title(note, color=ALARM if below else INK)
