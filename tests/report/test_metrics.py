@@ -7,10 +7,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from builders.scenarios import lone
+from builders.simulation import simulate
 from report.cases import make_scenario, make_trace
 
 from airground_drake.report import metrics
 from airground_drake.run.trace import Trace
+from airground_drake.scenarios.schema import Preset
 
 
 def test_metrics_of_robot_pairs_and_events(traces: dict[str, Trace]) -> None:
@@ -43,3 +46,19 @@ def test_decisions_are_counted_by_their_gap_and_those_that_met_their_budget(
     assert found["gaps"] == {"zero": 2, "up_to_1_percent": 1, "more": 2}
     assert (found["budget_spent"], found["solver_failures"], found["max_gap"]) == (2, 1, 1.0)
     assert found["refusals"] == {"ugv1": {"waits": 2, "kept": 1}}  # first answers only
+
+
+@pytest.mark.parametrize(
+    ("speed", "stands", "left_m", "left_s"),
+    [(1.0, False, 29.0, 29.0), (0.0, True, 31.0, None), (-1.0, False, 33.0, None)],
+)
+def test_how_far_a_ugv_has_come_and_how_long_it_would_need(
+    speed: float, stands: bool, left_m: float, left_s: float | None
+) -> None:
+    """Along its preset, which passes near its start again: the part that is not due yet does not count."""
+    preset = Preset([[0.0, 0.0, 0.0], [10.0, 0.0, 0.0], [10.0, 5.0, 0.0], [0.0, 5.0, 0.0], [0.0, -1.0, 0.0]], 1.0)
+    scenario = lone([0.0] * 3, [0.0, -1.0, 0.0], preset, 2.0)
+    trace = simulate(scenario, drive=lambda t: [[speed, 0.0, 0.0], [0.0] * 3])
+    found = metrics.on_the_way(trace)["ugv1"]
+    assert (found["stands"], found["left_m"]) == (stands, pytest.approx(left_m))
+    assert found["left_s"] == (None if left_s is None else pytest.approx(left_s))
