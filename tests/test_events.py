@@ -8,13 +8,18 @@ from typing import Any
 
 import numpy as np
 import pytest
+from builders.edits import with_meta
 from builders.runs import passing_by
+from builders.scenarios import STILL, lone
+from builders.simulation import simulate
 from hypothesis import given
 from hypothesis import strategies as st
 from properties import examples
 
 from airground_drake.run import events
 from airground_drake.run.trace import Trace
+from airground_drake.scenarios.schema import Obstacle
+from airground_drake.verify import verify
 from airground_drake.world.motion import Motion
 from airground_drake.world.shape import Ball
 
@@ -65,3 +70,34 @@ def test_bodies_collide_when_their_surfaces_come_near(share: float, gap_m: float
         found = collisions(replace(trace, meta={**trace.meta, "scenario": given}))
         hit = [event.get("obstacle") or event.get("other") for event in found]
         assert (other in hit) == (gap_m < 0.0)
+
+
+def crossing(flight: float = 0.0, **more: Any) -> Trace:
+    """A UGV at its target, which a UAV hits at 1 s if it comes at 4 m/s; both go on for 1 s at 1 m/s."""
+    scenario = lone([0.0] * 3, [0.0] * 3, STILL, 2.0, **more)
+    scenario["uav"] |= {"start_m": [-4.0, 0.0, 0.0], "target_m": [-4.0, 0.0, 0.0]}
+    return simulate(scenario, drive=lambda t: [[float(t >= 1.0), 0.0, 0.0], [flight * (t < 1.0), 0.0, 0.0]])
+
+
+def test_nothing_after_a_collision_counts() -> None:
+    """A UGV arrives, then a UAV hits it and it drives on. Without the hit it does not arrive."""
+    hit, missed = crossing(4.0), crossing()
+    for trace, arrivals in ((hit, {"ugv1"}), (missed, {"uav"})):
+        found = events.extract(trace, ())
+        assert {event["robot"] for event in found if event["kind"] == "arrival"} == arrivals
+        (verdict,) = verify(with_meta(trace, events=found), ["LIVE-GOAL"])
+        worst = verdict.finding.counterexample or {}
+        assert verdict.finding.status == "refuted"
+        assert (worst["robot"], "collided_s" in worst) == (("uav", True) if arrivals == {"ugv1"} else ("ugv1", False))
+
+
+def test_an_arrival_after_a_collision_is_none() -> None:
+    """Through an obstacle to its target: the collision is named, with its time."""
+    scenario = lone([-1.0, 0.0, 0.0], [1.0, 0.0, 0.0], STILL, 2.0, obstacles={"rock": Obstacle([0.0] * 3)})
+    trace = simulate(scenario, drive=lambda t: [[1.0, 0.0, 0.0], [0.0] * 3])
+    found = events.extract(trace, ())
+    assert [event["robot"] for event in found if event["kind"] == "arrival"] == ["uav"]
+    finding = verify(with_meta(trace, events=found), ["LIVE-GOAL"])[0].finding
+    assert finding.status == "refuted"
+    assert finding.where["robot"] == "ugv1"
+    assert finding.where["collided_s"] == pytest.approx(1.0 - trace.scenario.safe_distance.collision_m, abs=0.026)

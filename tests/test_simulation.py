@@ -176,6 +176,14 @@ def test_a_trace_survives_saving_and_a_changed_file_does_not(run: Runs, tmp_path
         trace.load(tmp_path)
 
 
+def test_events_are_isolated_far_better_than_the_claims_ask(run: Runs) -> None:
+    """Against Brent's method on the recorded signals; a hundredth of the accuracy would give 1e-8 s."""
+    (verdict,) = verify(run("dwell", "d"), ["THR-TRIG"])
+    (ugv,) = verdict.finding.evidence["ugvs"]
+    assert len(ugv["events"]) > 3
+    assert ugv["worst_time_difference_s"] < 1e-9
+
+
 @pytest.mark.parametrize(("period", "noise_period"), [(0.01, 0.05), (0.05, 0.01), (0.025, 0.05)])
 def test_claims_do_not_depend_on_the_periods(case_a: Scenario, period: float, noise_period: float) -> None:
     """Periods that are not binary fractions give steps of 1e-17 s; event times may coincide with samples."""

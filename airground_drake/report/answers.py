@@ -133,16 +133,16 @@ def _whereabouts(document: Document, course: Course) -> Line:
     resolved, ends = document["scenario"]["resolved"], []
     for robot, end in list(course.away.items())[:MAX_NAMES]:
         hit = course.hits.get(robot)
-        at = hit["position_m"] if hit else end
-        place = ", ".join(f"{round(x, 2) + 0.0:.2f}" for x in (at if robot == resolved["uav"]["name"] else at[:2]))
+        who, at = (hit["robot"], hit["position_m"]) if hit else (robot, end)
+        place = ", ".join(f"{round(x, 2) + 0.0:.2f}" for x in (at if who == resolved["uav"]["name"] else at[:2]))
         what = f"{collision(hit)}," if hit else f"{robot} is {ending(course, robot)}"
         then = _VOID if hit else f"; {found_no_way([robot])}" if robot in course.no_way else ""
-        ends.append(f"{what} at ({place}) m{_off_the_paper(document, course.name, robot)}{then}")
+        ends.append(f"{what} at ({place}) m{_off_the_paper(document, course.name, who)}{then}")
     if len(course.away) > MAX_NAMES:
         ends.append(f"{len(course.away) - MAX_NAMES} more")
     ugvs = len(resolved["ugvs"])
     count = f"{course.there} of {ugvs} UGVs; " if ugvs > 2 else ""
-    return Line("no" if course.helped or course.hits else "none", count + "; ".join(ends))
+    return Line("no" if course.helped or course.hits else "none", count + "; ".join(dict.fromkeys(ends)))
 
 
 def _off_the_paper(document: Document, run: str, robot: str) -> str:

@@ -122,7 +122,7 @@ def beforehand(document: Mapping[str, Any]) -> Iterator[Item]:
     yield from _of_faults(document["runs"])
     for name, run in document["runs"].items():
         if lost := no_way(run):
-            yield Item("not_exercised", found_no_way(lost), run=name, anchor="happened")
+            yield Item("no_way", found_no_way(lost), run=name, anchor="happened")
     scenario = document["scenario"]["resolved"]
     longer = {name: preset_s(**ugv["preset"]) for name, ugv in scenario["ugvs"].items()}
     longer = {name: time_s for name, time_s in longer.items() if time_s > scenario["duration_s"]}

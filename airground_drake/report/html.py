@@ -79,6 +79,7 @@ CHIPS = {
     "by_construction": ("=", "by construction", "tuned"),
     "ambiguous": ("?", "ambiguous", "open"),
     "not_reproduced": ("✗", "not reproduced", "bad"),
+    "no_way": ("?", "no way found", "open"),
     "demonstrated": ("✓", "demonstrated", "good"),
     "not_demonstrated": ("✗", "not demonstrated", "bad"),
 }

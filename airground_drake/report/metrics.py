@@ -101,7 +101,7 @@ def _way_left_m(trace: Trace, ugv: str, time_s: float) -> float:
     own = trace.scenario.ugvs[ugv]
     corners, place = np.array(own.preset.waypoints_m), interpolate(trace.t, trace.position(ugv), time_s)
     legs = np.diff(corners, axis=0)
-    lengths = np.linalg.norm(legs, axis=1)
+    lengths = np.maximum(np.linalg.norm(legs, axis=1), 1e-12)  # corners may coincide
     begins = np.cumsum(lengths) - lengths
     travelled = own.preset.speed_m_s * time_s - begins
     past = np.clip(travelled, 0.0, lengths)

@@ -102,27 +102,30 @@ def _outcome(every: Sequence[Course]) -> Line:
     helped, alone = ([course for course in main if course.helped is way] for way in (True, False))
     if not main:
         return Line("open", "Nothing was run.")
+    could_not = f"un{'s' * (len(unknown) > 1)} {', '.join(unknown)} could not be judged."
     if unknown and not unsafe:
-        return Line("open", f"Not decided: run{'s' * (len(unknown) > 1)} {', '.join(unknown)} could not be judged.")
+        return Line("open", f"Not decided: r{could_not}")
+    unjudged = f" R{could_not}" if unknown else ""
     if len(fine) == len(main):
         told = "With and without help, all arrive safely." if helped and alone else "All arrive safely."
         return _unless_one_crashed(every, told)
     if helped and all(course.fine for course in helped):
-        return _unless_one_crashed(every, f"With help, all arrive safely{_failures(alone, alone, '. Without it, ')}")
+        told = f"With help, all arrive safely{_failures(alone, alone, '. Without it, ')}"
+        return _unless_one_crashed(every, told + unjudged)
     short = [course for course in main if course.away and course not in unsafe]
     if fine:
-        who = subject(fine, main)
-        bring = "brings" if who.endswith("is") else "bring"
-        return Line("partly", f"Only {who} safe and {bring} everyone home{_failures([*unsafe, *short], main)}")
+        who = subject(fine, main) if unjudged else f"only {subject(fine, main)}"
+        told = f"{who} safe and {'brings' if who.endswith('is') else 'bring'} everyone home"
+        return Line("partly", f"{told[0].upper()}{told[1:]}{_failures([*unsafe, *short], main)}{unjudged}")
     if unsafe:
-        told = "No method brings everyone home safely" if len(main) > 1 else "Not safe"
-        return Line("no", f"{told}{_failures(unsafe, main)}")
+        told = "No method brings everyone home safely" if len(main) > 1 and not unjudged else "Not safe"
+        return Line("no", f"{told}{_failures(unsafe, main)}{unjudged}")
     return Line("no", f"Safe, but not all arrive{_failures(short, main, ': ')}")
 
 
 def _failures(those: Iterable[Course], among: Sequence[Course], same: str = "") -> str:
     """What went wrong in those runs, as a sentence; `same`: begins it if the same went wrong in all of `among`."""
-    told = grouped((trouble(course), course) for course in those if not course.fine)
+    told = grouped((trouble(course), course) for course in those if course.safe is False or course.away)
     if same and [len(alike) for alike in told.values()] == [len(among)]:
         return f"{same}{next(iter(told))}."
     return ". " + _sentence(f"{under(alike, among)}, {what}" for what, alike in told.items())

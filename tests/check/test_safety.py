@@ -60,3 +60,12 @@ def test_the_shortfall_is_what_the_inequality_lacks(way_m: list[float], missed_m
     approach = run(way_m)
     found = safety.shortfall_m(*approach.position_m.values(), approach.pairs[0], Fraction(1, 2))
     assert abs(found - Fraction(missed_m)) < Fraction(1, 2**100)
+
+
+@pytest.mark.parametrize(("step_m", "status"), [(2.0**-32, "holds"), (0.53e-9, "refuted")])
+def test_all_of_a_shortfall_counts(step_m: float, status: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A step into the safe distance costs e / (A h); 1e-9 m are allowed."""
+    for rule in ("_constants", "_motion"):
+        monkeypatch.setattr(safety, rule, lambda run: None)
+    found = safety.safe_hyp(run([2.0, 2.0 - step_m]))
+    assert (found.status, found.margin) == (status, -2.0 * step_m if status == "holds" else None)

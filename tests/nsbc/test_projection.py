@@ -133,6 +133,14 @@ def test_robots_in_contact_slide_along() -> None:
         assert kernels.avoid_one(lower, normal, np.zeros(1), kernels.AUGMENTED) @ lower == pytest.approx(4.0, abs=1e-9)
 
 
+@pytest.mark.parametrize("apart", [1e-8, 1e-6, 1e-4])
+def test_a_small_contradiction_is_one(apart: float) -> None:
+    """Between two walls that both push, by little: no wish has a say, or a hostile one would set the speed."""
+    normal = np.array([[1.0, 0.0, 0.0], [-1.0, 0.0, 0.0]])
+    found = kernels._closest_feasible(np.array([0.0, 100.0, 0.0]), normal, np.full(2, apart))
+    assert np.abs(found).max() < 1e-9
+
+
 @examples(80, fuzz=2000)
 @given(SEEDS, st.booleans(), st.sampled_from([0.0, 1e-6, 1e-4, 1e-2]), st.sampled_from([1e-6, 1e-3, 1.0]))
 def test_contradicting_constraints_are_missed_as_little_and_as_slowly_as_can_be(

@@ -100,12 +100,13 @@ def verdict(run: str, status: Status = "holds", expected: str = "holds", **findi
     return Verdict(Kept(), run, Finding(status, **finding), expected)
 
 
-SUCCESS = [event(14.5, "trigger"), event(14.6, "proposal"), event(14.65, "accept"), event(17, "release")]
+ASKED = [event(14.6, "proposal"), event(14.6, "proposal", "ugv2")]
+SUCCESS = [event(14.5, "trigger"), *ASKED, event(14.65, "accept"), event(17, "release")]
 
 
 def make_traces(scenario: Scenario) -> dict[str, Trace]:
     ugv1 = next(iter(scenario.ugvs))
-    success = [{**each, "robot": ugv1} for each in SUCCESS]
+    success = [each if each["robot"] == "ugv2" else {**each, "robot": ugv1} for each in SUCCESS]
     return {
         "a": make_trace(scenario, "a", STALLING, [event(14.5, "trigger", ugv1)]),
         "c": make_trace(scenario, "c", GOING_ROUND, success),

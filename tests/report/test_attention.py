@@ -24,6 +24,10 @@ AVOIDANCE = {"hypothesis": "avoidance", "margin": -0.5}
     [
         ("refuted", {"counterexample": AT | TOO_NEAR}, "ugv1 and obstacle_1 at 0.000 m, 2 m required, 7.717 s"),
         ("refuted", {"counterexample": END}, "ugv1 ended 4.20 m from where it must end, 0.1 m allowed"),
+        ("refuted", {"counterexample": END | {"collided_s": 5.78}},
+         "ugv1 collided at 5.78 s, 4.20 m from where it must end, 0.1 m allowed"),
+        ("refuted", {"counterexample": {"robot": "ugv1", "parameter": "share", "built": 0.4, "scenario": 0.5}},
+         "ugv1: share was built as 0.4, the scenario has 0.5"),
         ("refuted", {"margin": -3.0, "unit": "m/s", "counterexample": AT | AVOIDANCE},
          "ugv1 and obstacle_1: avoidance missed by 0.5 m/s, 7.717 s"),
         ("refuted", {"counterexample": {"kind": "stray", "t_s": 1.0}}, "stray, 1.000 s"),
@@ -68,6 +72,16 @@ def test_what_is_missing_or_faulty_or_ends_too_early(scenario: Scenario, traces:
     ]  # fmt: skip
     report["runs"]["c"]["faults"] = faults(*((f"ValueError: {k}", 1.0) for k in range(100)))
     assert attention.items(report)[3].words == "97 more kinds of faults"
+
+
+def test_for_whom_the_uav_found_no_way(scenario: Scenario, traces: dict[str, Trace]) -> None:
+    """A policy that failed has found nothing either: that is said apart."""
+    report = built(scenario, traces, FINE)
+    report["runs"]["c"]["metrics"]["without_proposals"] = ["ugv1", "ugv2"]
+    (item,) = attention.items(report)
+    assert (item.words, item.run) == ("the UAV found no way for ugv1 and ugv2", "c")
+    report["runs"]["c"]["faults"] = [{"t_s": 1.0, "robot": "ugv1", "policy": "mine", "what": "no"}]
+    assert [item.words for item in attention.items(report)][1:] == ["the UAV found no way for ugv2"]
 
 
 KEYS = st.sampled_from([*attention._NAMES, *TOO_NEAR, *END, "t_s", "hypothesis", "margin", "unit", "kind"])

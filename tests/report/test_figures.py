@@ -14,7 +14,7 @@ import pytest
 from builders.paths import Corners, along
 from report.cases import FLIGHT, event, make_trace
 
-from airground_drake.report.figures import canvas, draw, labels, overlay, svg
+from airground_drake.report.figures import canvas, draw, labels, maps, overlay, svg
 from airground_drake.report.figures.panels import Figure
 from airground_drake.run.trace import Trace
 from airground_drake.scenarios.schema import Run, Scenario
@@ -108,6 +108,18 @@ def test_of_two_reports_the_ugvs_that_moved_most(scenario: Scenario, traces: dic
     drawn = overlay.draw("c", 0, traces["a"], traces["c"])
     farthest = np.linalg.norm(traces["a"].position("ugv1") - traces["c"].position("ugv1"), axis=1).max()
     assert drawn.panels[0].table.rows[0][:2] == ("ugv1", f"{farthest:.4g}")
+
+
+def test_a_path_is_dashed_from_a_collision_on(scenario: Scenario) -> None:
+    trace = make_trace(scenario, events=[event(9.0, "collision")])
+    frame = maps.frame_of([trace], trace.robots)
+    (axes,) = maps.plane(trace, ["ugv1"], frame, 4.0).axes
+    own = [line for line in axes.lines if line.get_color() == canvas.look(0).color and len(line.get_xdata()) > 1]
+    before, after = own
+    hit = trace.position("ugv1")[trace.counting_rows("ugv1") - 1, :2]
+    for line, end in ((before, -1), (after, 0)):
+        assert np.column_stack(line.get_data())[end].tolist() == hit.tolist()
+    assert (before.get_linestyle(), after.get_linestyle()) == ("-", "--")
 
 
 def test_labels_keep_off_each_other() -> None:

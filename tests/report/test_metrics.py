@@ -8,6 +8,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from builders.scenarios import lone
+from builders.simulation import simulate as drive
 from report.cases import GOING_ROUND, event, make_scenario, make_trace
 
 from airground_drake.base.progress import SILENT
@@ -15,6 +17,7 @@ from airground_drake.report import after_runs, metrics
 from airground_drake.run.simulation import simulate
 from airground_drake.run.trace import Trace
 from airground_drake.scenarios.load import load
+from airground_drake.scenarios.schema import Preset
 
 
 def test_metrics_of_robot_pairs_and_events(traces: dict[str, Trace]) -> None:
@@ -49,19 +52,11 @@ def test_decisions_are_counted_by_their_gap_and_those_that_met_their_budget(
     assert found["refusals"] == {"ugv1": {"waits": 2, "kept": 1}}  # first answers only
 
 
-@pytest.mark.parametrize(
-    ("collisions", "home"),
-    [([], True), ([event(25.0, "collision")], True), ([event(9.0, "collision")], False),
-     ([event(9.0, "collision", "ugv2") | {"other": "ugv1"}], False)],
-)  # fmt: skip
-def test_a_robot_that_collides_on_its_way_is_not_home(collisions: list[dict[str, Any]], home: bool) -> None:
+def test_a_run_is_home_if_every_robot_arrives() -> None:
     arrivals = [event(t, "arrival", robot) for t, robot in ((23.0, "ugv1"), (23.5, "ugv2"), (24.0, "uav"))]
-    happened = sorted([*arrivals, *collisions], key=lambda each: each["t_s"])
-    trace = make_trace(make_scenario(), "c", GOING_ROUND, happened)
-    assert metrics.outcome(trace)["home"] is home
-    assert not metrics.outcome(
-        replace(trace, meta=trace.meta | {"events": [each for each in happened if each["t_s"] < 24.0]})
-    )["home"]
+    for count in (2, 3):
+        trace = make_trace(make_scenario(), "c", GOING_ROUND, arrivals[:count])
+        assert metrics.outcome(trace)["home"] is (count == 3)
 
 
 @pytest.mark.parametrize("own", [0, 2])
@@ -79,3 +74,19 @@ def test_seeds_are_those_from_1_on_and_the_reports_own_runs_serve_for_theirs(own
         assert row == again | ({"home": False} if row["seed"] == own else {})
     crash = {row["seed"]: row["t_s"] for row in found if row["run"] == "b"}
     assert crash[1] != crash[2]  # the noise decides when the wrong intervention begins
+
+
+@pytest.mark.parametrize(
+    ("speed", "stands", "left_m", "left_s"),
+    [(1.0, False, 29.0, 29.0), (0.0, True, 31.0, None), (-1.0, False, 33.0, None)],
+)
+def test_how_far_a_ugv_has_come_and_how_long_it_would_need(
+    speed: float, stands: bool, left_m: float, left_s: float | None
+) -> None:
+    """Along its preset, which passes near its start again: the part that is not due yet does not count."""
+    preset = Preset([[0.0, 0.0, 0.0], [10.0, 0.0, 0.0], [10.0, 5.0, 0.0], [0.0, 5.0, 0.0], [0.0, -1.0, 0.0]], 1.0)
+    scenario = lone([0.0] * 3, [0.0, -1.0, 0.0], preset, 2.0)
+    trace = drive(scenario, drive=lambda t: [[speed, 0.0, 0.0], [0.0] * 3])
+    found = metrics.on_the_way(trace)["ugv1"]
+    assert (found["stands"], found["left_m"]) == (stands, pytest.approx(left_m))
+    assert found["left_s"] == (None if left_s is None else pytest.approx(left_s))

@@ -1,207 +1,771 @@
-"""The first screen of a report: what happened decides its marks, and it says nothing that was not seen."""
+"""The first screen of a report: each of its sentences follows from what was drawn, and nothing is left out.
+
+`World` is drawn and made into a report. `SAYS` lists the sentences that the screen may have, each with what must then
+be true of the world; it knows nothing of the code that writes them. A sentence that is not listed fails.
+"""
 
 from __future__ import annotations
 
-from typing import Any
+import re
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
+from math import inf, log
+from typing import Any, NamedTuple
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from airground_drake.base.statuses import PASSING, STATUSES, UNDECIDED
+from airground_drake.registry import METHODS
 from airground_drake.report import summary
 from airground_drake.report.phrases import Line
 
 Document = dict[str, Any]
-TARGET, STUCK, D = [0.0, 9.0, 0.0], [3.369, 5.102, 0.0], 2.0
-PLAIN, PRINTED = "augmented", "recursion_listed"
+TARGETS = {"ugv1": [0.0, 9.0, 0.0], "ugv2": [5.0, 9.0, 0.0], "uav": [0.0, 9.0, 2.0]}
+STUCK, D, T = [3.369, 5.102, 0.0], 2.0, 11.35
+RUNS, ROBOT = r"(\w+(?:, \w+)*(?: and \w+)?)", r"(?:ugv\d|uav)"
+ROBOTS = rf"{ROBOT}(?:(?:, | and ){ROBOT})*"
 
 
-def event(kind: str, t_s: float = 11.35) -> Document:
-    return {"t_s": t_s, "robot": "ugv1", "kind": kind}
+def names(text: str | None) -> list[str]:
+    return re.findall(r"\w+", (text or "").replace(" and ", " "))
+
+
+class End(NamedTuple):
+    """How a robot ended: `home` since t_s, or `stuck`, `stands`, `moves` (with left_s to go)."""
+
+    how: str = "home"
+    t_s: float = 20.0
+    left_s: float | None = None
+
+
+class Hit(NamedTuple):
+    """A collision of a robot with an obstacle or another robot."""
+
+    t_s: float
+    robot: str
+    other: str
+
+
+@dataclass
+class Ran:
+    """What a scenario says of a run, and what happened in it."""
+
+    method: str = "d"
+    printed: bool = False
+    there: bool = True
+    near: tuple[float, float, float] = (D, T, 3.0)
+    """Distance of ugv1 to the rock, m, and when, s; distance to the UAV, m, 1 m needed."""
+    ends: dict[str, End] = field(default_factory=dict)
+    hits: list[Hit] = field(default_factory=list)
+    triggers_s: list[float] = field(default_factory=list)
+    unasked: list[str] = field(default_factory=list)
+    """UGVs that got no proposal although the UAV was called; for ugv1 a policy may have failed."""
+    failed: bool = False
+    claims: dict[str, tuple[str, int, bool, float]] = field(default_factory=dict)
+    """Verdicts by claim: status, how often tested, as expected, smallest gap between triggers, s."""
+
+    def end(self, robot: str) -> End:
+        return self.ends.get(robot, End())
+
+    @property
+    def first(self) -> dict[str, Hit]:
+        """The first collision of each robot."""
+        return {body: hit for hit in sorted(self.hits, reverse=True) for body in (hit.robot, hit.other)
+                if body in TARGETS}  # fmt: skip
+
+    def arrived(self, robot: str) -> bool:
+        end = self.end(robot)
+        return end.how == "home" and end.t_s < (self.first[robot].t_s if robot in self.first else inf)
+
+    @property
+    def away(self) -> set[str]:
+        found = {robot for robot in TARGETS if not self.arrived(robot)}
+        return found - {"uav"} if len(found) > 1 and "uav" not in self.first else found
+
+    @property
+    def lost(self) -> set[str]:
+        """UGVs that the UAV found no way for."""
+        return {*self.unasked} - ({"ugv1"} if self.failed else set())
+
+    @property
+    def margin_m(self) -> float:
+        return min(self.near[0] - D, self.near[2] - 1.0)
+
+    @property
+    def short(self) -> int:
+        """How many pairs came too near."""
+        return (self.near[0] < D) + (self.near[2] < 1.0)
+
+    @property
+    def safe(self) -> bool | None:
+        status = self.claims["SAFE-TRACE"][0] if "SAFE-TRACE" in self.claims else ""
+        if not self.there or not (self.hits or self.short or status in (*PASSING, "refuted")):
+            return None
+        return not (self.hits or self.short or status == "refuted")
+
+    @property
+    def fine(self) -> bool:
+        return self.safe is True and not self.away
+
+
+@dataclass
+class World:
+    """A report: runs, theorems, and rows of the comparison with the paper (status, of run, distance from it, m)."""
+
+    runs: dict[str, Ran]
+    theorems: dict[str, str] = field(default_factory=dict)
+    """Verdicts of SAFE-INV, SAFE-GATE and ZENO-PROOF, as far as they were judged."""
+    rows: list[tuple[str, str, float]] = field(default_factory=list)
+    tolerance_m: float = 0.1
+    drifts: dict[str, float] = field(default_factory=dict)
+
+    def named(self, text: str | None) -> list[Ran]:
+        """The runs that a list names, and which were run."""
+        return [self.runs[name] for name in names(text)]
+
+    @property
+    def main(self) -> dict[str, Ran]:
+        return {name: ran for name, ran in self.runs.items() if not ran.printed} or self.runs
+
+    def meant(self, text: str, among: Iterable[str]) -> set[str]:
+        """The runs that a text means, by name or by method, "(d)", which stands for all of its runs."""
+        text, methods = re.sub(r"\((\w)\)", "", text), re.findall(r"\((\w)\)", text)
+        found = {name for name in among if self.runs[name].method in methods or re.search(rf"\b{name}\b", text)}
+        assert {self.runs[name].method for name in found} >= {*methods}
+        return found
+
+    @property
+    def fired_s(self) -> list[float]:
+        """Times of all triggers, s."""
+        return sorted(t_s for ran in self.runs.values() if ran.there for t_s in ran.triggers_s)
+
+    @property
+    def unjudged(self) -> bool:
+        return any(ran.safe is None for ran in self.main.values())
+
+    @property
+    def unproved(self) -> set[str]:
+        """Safety theorems that are not proved."""
+        return {name for name in ("SAFE-INV", "SAFE-GATE") if self.theorems.get(name) != "proved"}
+
+    def proof(self, name: str) -> str:
+        """Whether a run of (d) is proved safe."""
+        status, count, *_ = self.runs[name].claims.get("SAFE-HYP", ("", 0)) if self.runs[name].there else ("", 0)
+        if self.unproved:
+            return "unproved"
+        return "refuted" if status == "refuted" else ("tested" if count else "idle") if status in PASSING else "open"
+
+    @property
+    def judged(self) -> list[tuple[str, str, str, int, bool]]:
+        """All claims: which, on which run, status, how often tested, as expected."""
+        found = [(name, "", status, 6, True) for name, status in self.theorems.items()]
+        return found + [(name, run, *verdict[:3]) for run, ran in self.runs.items() if ran.there
+                        for name, verdict in ran.claims.items()]  # fmt: skip
+
+    @property
+    def differing(self) -> int:
+        return sum(not fine and status not in UNDECIDED for _, _, status, _, fine in self.judged)
 
 
 def claim(name: str, run: str = "", status: str = "holds", **more: Any) -> Document:
     known = {"id": name, "run": run, "status": status, "expected": status, "as_expected": True, "exercised": 6}
-    return {**known, "evidence": {}, "counterexample": None, **more}
+    place = {"where": {}, "margin": -0.5, "unit": "m", "quantity": "", "exercised_by": "things"}
+    return {**known, **place, "evidence": {}, "counterexample": None, **more}
 
 
-def run(method: str, least_m: float = D, end: list[float] = TARGET, *events: Document, **more: Any) -> Document:
-    """A run in which ugv1 comes so near to a rock, and ends somewhere."""
-    apart = {"value": 3.0, "t_s": 0.0, "safe_distance_m": 1.0}
-    metrics = {
-        "min_distance_m": {"ugv1": {"rock": {"value": least_m, "t_s": 11.35, "safe_distance_m": D}}, "uav": {}},
-        "min_robot_distance_m": {"ugv1": {"uav": apart}, "uav": {"ugv1": apart}},
-        "final_position_m": {"ugv1": end, "uav": [0.0, 9.0, 2.0]},
-        "gatekeeper": None,
-    }
-    arrival = [event("arrival", 23.6)] * (end == TARGET)
-    return {"method": method, "zeta_m": 3.0, "events": [*events, *arrival], "metrics": metrics | more}
-
-
-HIT, TRIGGER = event("collision"), event("trigger", 14.479)
-CRASH = run("b", 0.0, STUCK, HIT)
-PROVED = [claim(name, status="proved") for name in ("SAFE-INV", "SAFE-GATE", "ZENO-PROOF")]
-
-
-def document(runs: dict[str, Document | None], *claims: Document, **more: Any) -> Document:
-    """A report of these runs (None: one that is missing), each judged as its distance says unless a claim is given."""
-    given = {(each["id"], each["run"]) for each in claims}
-    there = {name: each for name, each in runs.items() if each}
-    kept = {name: each["metrics"]["min_distance_m"]["ugv1"]["rock"]["value"] >= D for name, each in there.items()}
-    judged = [claim("SAFE-TRACE", name, "holds" if kept[name] else "refuted") for name in there]
-    specs = {
-        name: {
-            "method": each["method"] if each else "c",
-            "composition": PRINTED if "printed" in name else PLAIN,
-            "set": {},
-        }
-        for name, each in runs.items()
-    }
+def document(world: World) -> Document:
+    """report.json as far as its first screen looks at it."""
+    given = []
+    for name, run, status, count, fine in world.judged:
+        gap_s = world.runs[run].claims[name][3] if run else 0.0
+        missed = {"hypothesis": "avoidance", "first": f"first_of_{run}", "margin": -0.5, "t_s": 7.0}
+        found = {
+            "ZENO-TRACE": {"evidence": {"smallest_gap": {"gap_s": gap_s}}, "counterexample": {"gap_s": gap_s}},
+            "SAFE-HYP": {"counterexample": missed},
+        }  # fmt: skip
+        given.append(claim(name, run, status, exercised=count, as_expected=fine, **found.get(name, {})))
+    for run, ran in world.runs.items():
+        stands = [{"robot": r, "condition": "stands", "margin_m": 0.0} for r in TARGETS if ran.end(r).how == "stuck"]
+        given.append(claim("LIVE-GOAL", run, evidence={"conditions": stands}))
+    if world.drifts:
+        of_runs = {name: {"optimum_for_this_drift_m": best, "drift_m_s": 0.56} for name, best in world.drifts.items()}
+        found = {"kind": "bayes", "threshold_in_force_m": 3.0, "optimal_threshold_m": 3.0, "extra_risk": 0.0}
+        given.append(claim("THR-CHOICE", evidence={**found, "least_risk": 1.0, "runs": of_runs}, inputs={}))
+    specs = {name: {"method": ran.method, "composition": "recursion" if ran.printed else "augmented", "set": {}}
+             for name, ran in world.runs.items()}  # fmt: skip
     resolved = {
-        "runs": specs, "ugvs": {"ugv1": {"target_m": TARGET}}, "uav": {"name": "uav", "target_m": [0.0, 9.0, 2.0]},
-        "arrival_tolerance_m": 0.1,
+        "runs": specs, "ugvs": {name: {"target_m": TARGETS[name]} for name in ("ugv1", "ugv2")},
+        "uav": {"name": "uav", "target_m": TARGETS["uav"]}, "arrival_tolerance_m": world.tolerance_m,
         "decision": {"min_inter_event_s": 0.5, "trigger": "automaton", "noise_m_sqrt_s": 0.004},
         "gatekeeper": {"route": "mixed_integer", "rule": "hysteresis"},
     }  # fmt: skip
-    return {
-        "scenario": {"resolved": resolved}, "runs": there, "reproduction": [row("reproduced")],
-        "claims": [*claims, *(each for each in judged if ("SAFE-TRACE", each["run"]) not in given)],
-        "overall": {"status": "as_expected", "why": "", "unpromised": [], "checks": 1}, "seeds": [], **more,
+    rows = [
+        {"id": f"A{k}", "status": status, "run": run, "robot": "ugv1", "measure": "stall_position",
+         "ours": STUCK[:2], "paper": [STUCK[0], STUCK[1] - off]} for k, (status, run, off) in enumerate(world.rows)
+    ]  # fmt: skip
+    overall = {"status": "as_expected", "why": "", "unpromised": [], "checks": 1}
+    runs = {name: _run(ran) for name, ran in world.runs.items() if ran.there}
+    return {"scenario": {"resolved": resolved}, "runs": runs, "reproduction": rows, "claims": given, "overall": overall,
+            "seeds": []}  # fmt: skip
+
+
+def _run(ran: Ran) -> Document:
+    def event(kind: str, t_s: float, robot: str, **more: Any) -> Document:
+        return {"kind": kind, "t_s": t_s, "robot": robot, "position_m": STUCK, **more}
+
+    body = {True: "other", False: "obstacle"}
+    events = [event("collision", t, r, **{body[o in TARGETS]: o}) for t, r, o in ran.hits]
+    events += [event("arrival", ran.end(robot).t_s, robot) for robot in TARGETS if ran.arrived(robot)]
+    events += [event("trigger", t_s, "ugv1") for t_s in ran.triggers_s]
+    least, when, apart = ran.near
+    rock = {"rock": {"value": least, "t_s": when, "safe_distance_m": D}}
+    uav = {"uav": {"value": apart, "t_s": 0.0, "safe_distance_m": 1.0}}
+    metrics = {
+        "min_distance_m": {"ugv1": rock, "uav": {}}, "min_robot_distance_m": {"ugv1": uav, "uav": {}},
+        "final_position_m": {r: TARGETS[r] if ran.end(r).how == "home" else STUCK for r in TARGETS},
+        "on_the_way": {r: {"stands": ran.end(r).how != "moves", "left_m": 9.0, "left_s": ran.end(r).left_s}
+                       for r in ("ugv1", "ugv2") if not ran.arrived(r) and r not in ran.first},
+        "without_proposals": ran.unasked, "gatekeeper": None,
     }  # fmt: skip
+    faults = [{"robot": "ugv1", "policy": "mine", "what": "no", "t_s": 1.0}] * ran.failed
+    return {"method": ran.method, "zeta_m": 3.0, "events": sorted(events, key=lambda e: e["t_s"]), "metrics": metrics,
+            "faults": faults}  # fmt: skip
 
 
-def row(status: str, name: str = "A1") -> Document:
-    return {"id": name, "status": status, "run": "a", "robot": "ugv1", "measure": "stall_position"}
+Says = Callable[..., Any]
+SAYS: dict[str, list[tuple[re.Pattern[str], Says]]] = {}
+"""By question: the sentences, as patterns, and what each says. A function gets the world, the mark, and the groups."""
 
 
-def answered(screen: summary.FirstScreen, question: str) -> list[Line]:
-    return [line for answer in screen.answers if answer.question == question for line in answer.lines]
+def says(question: str, pattern: str) -> Callable[[Says], Says]:
+    def add(check: Says) -> Says:
+        SAYS.setdefault(question, []).append((re.compile(pattern), check))
+        return check
+
+    return add
 
 
-def lines(found: Document, question: str) -> list[Line]:
-    return answered(summary.first_screen(found), question)
+def follows(world: World, question: str, line: Line) -> bool:
+    """Whether a sentence is listed, once, and true."""
+    found = [(check, match) for pattern, check in SAYS[question] if (match := pattern.fullmatch(line.text))]
+    return len(found) == 1 and bool(found[0][0](world, line.mark, *found[0][1].groups()))
 
 
-RUNS = st.none() | st.builds(
-    run, st.sampled_from("aabcddd"), st.sampled_from([0.5, D, D, 8.0]), st.sampled_from([TARGET, TARGET, STUCK]),
-    st.sampled_from([TRIGGER, TRIGGER, HIT]),
-)  # fmt: skip
-JUDGED = st.builds(
-    claim, st.sampled_from(["SAFE-TRACE", "SAFE-HYP", "SAFE-HYP"]), st.sampled_from(["a", "b", "c", "d", "printed"]),
-    st.sampled_from([*STATUSES, *PASSING]), as_expected=st.booleans(), exercised=st.sampled_from([0, 6, 6]),
-)  # fmt: skip
-ROWS = st.lists(
-    st.builds(row, st.sampled_from(["reproduced", "reproduced", "calibrated", "not_reproduced"])), max_size=2
+COLLISION, AT = r"(\w+) collides with (\w+) at ([\d.]+) s", r"at \(3\.37, 5\.10(?:, 0\.00)?\) m"
+WITHIN, MORE = r"(\w+) comes within ([\d.]+) m of (\w+)", r"(?:; (\d+) more pairs? too close)?( \(expected\))?\."
+HOW = r"(stuck|standing still|short of its target|still moving at the end)(?: \(about ([\d.]+) s more\))?"
+
+
+def is_hit(ran: Ran, robot: str, other: str, time: str) -> bool:
+    return any((hit.robot, hit.other, f"{hit.t_s:.2f}") == (robot, other, time) for hit in ran.first.values())
+
+
+def is_declared(ran: Ran, expected: str | None) -> bool:
+    status, _, fine, _ = ran.claims.get("SAFE-TRACE", ("", 0, False, 0.0))
+    return bool(expected) == (status == "refuted" and fine)
+
+
+def is_nearest(ran: Ran, robot: str, value: str, other: str) -> bool:
+    apart, due = {"rock": (ran.near[0], D), "uav": (ran.near[2], 1.0)}[other]
+    return (robot, ran.margin_m) == ("ugv1", apart - due) and abs(float(value) - apart) < 5e-4
+
+
+def is_end(ran: Ran, robot: str, how: str, left: str | None) -> bool:
+    end = ran.end(robot)
+    if robot == "uav":
+        return how == ("stuck" if end.how == "stuck" else "short of its target") and not left
+    due = {"stuck": "stuck", "stands": "standing still", "moves": "still moving at the end"}[end.how]
+    time = end.left_s if end.how == "moves" else None
+    return how == due and (None if left is None else float(left)) == time
+
+
+def is_trouble(ran: Ran, text: str) -> bool:
+    """Whether a text says what went wrong in a run, all of it."""
+    text, _, lost = text.partition(": the UAV found no way for ")
+    told = re.findall(rf"({ROBOTS}) (?:is|are) {HOW}", text)
+    ended = [(robot, how, left or None) for those, how, left in told for robot in names(those)]
+    away = ran.away - ran.first.keys()
+    right = {robot for robot, *_ in ended} == away and all(is_end(ran, *each) for each in ended)
+    right = right and {*names(lost)} == {*ran.lost} & away
+    if ran.safe is not False:
+        return right
+    if ran.first:
+        return right and {*names(text.partition(" collide")[0])} == {*ran.first}
+    if ran.short:
+        return right and (near := re.match(WITHIN, text)) is not None and is_nearest(ran, *near.groups())
+    return right and text.startswith("SAFE-TRACE is refuted")
+
+
+@says("headline", r"Nothing was run\.")
+def _(world: World, mark: str) -> bool:
+    return not world.runs
+
+
+@says("headline", rf"(?:Not decided: r|R)uns? {RUNS} could not be judged\.")
+def _(world: World, mark: str, runs: str) -> bool:
+    return {*names(runs)} == {name for name, ran in world.main.items() if ran.safe is None}
+
+
+@says("headline", r"(With and without help, all|All) arrive safely\.")
+def _(world: World, mark: str, who: str) -> bool:
+    both = len({ran.method == "a" for ran in world.main.values()}) == 2
+    return all(ran.fine for ran in world.main.values()) and both == (who != "All")
+
+
+@says("headline", r"With help, all arrive safely\.")
+def _(world: World, mark: str) -> bool:
+    return all(ran.fine == (ran.method != "a") or ran.fine for ran in world.main.values())
+
+
+@says("headline", r"Without it, (.*)\.")
+def _(world: World, mark: str, told: str) -> bool:
+    return all(is_trouble(ran, told) and not ran.fine for ran in world.main.values() if ran.method == "a")
+
+
+@says(
+    "headline", r"(Only )?(?:([Mm]ethod \(\w\)|[Rr]un \w+) is safe and brings|(.*) are safe and bring) everyone home\."
+)
+def _(world: World, mark: str, only: str | None, one: str | None, several: str | None) -> bool:
+    fine = {name for name, ran in world.main.items() if ran.fine}
+    return bool(fine) and world.meant(one or several or "", world.main) == fine and bool(only) != world.unjudged
+
+
+@says("headline", r"(No method brings everyone home safely|Not safe)\.")
+def _(world: World, mark: str, who: str) -> bool:
+    unsafe = any(ran.safe is False for ran in world.main.values())
+    due = "No method" if len(world.main) > 1 and not world.unjudged else "Not safe"
+    return unsafe and not any(ran.fine for ran in world.main.values()) and who.startswith(due)
+
+
+@says("headline", r"Safe, but not all arrive(?:: (.*))?\.")
+def _(world: World, mark: str, told: str | None) -> bool:
+    every = world.main.values()
+    return all(ran.safe and ran.away for ran in every) and (not told or all(is_trouble(ran, told) for ran in every))
+
+
+@says("headline", r"((?:Under \(|In run).*)\.")
+def _(world: World, mark: str, clauses: str) -> bool:
+    """What went wrong in runs: in all that are unsafe, or else in all where not all arrive."""
+    told = dict(re.fullmatch(rf"(.*?), ((?:{ROBOT}|SAFE).*)", clause).groups() for clause in clauses.split("; "))  # type: ignore[union-attr]
+    unsafe = {name for name, ran in world.main.items() if ran.safe is False}
+    away = {name for name, ran in world.main.items() if ran.safe is not False and ran.there and ran.away}
+    meant = {name: text for runs, text in told.items() for name in world.meant(runs, world.main)}
+    if not meant:  # good news, but for collisions in runs with the printed recursion
+        crashed = {name for name, ran in world.runs.items() if ran.hits and ran.printed}
+        return {name for runs in told for name in world.meant(runs, world.runs)} == crashed
+    right = all(is_trouble(world.runs[name], text) for name, text in meant.items())
+    return right and {*meant} in (unsafe, unsafe | away, {n for n in unsafe | away if world.runs[n].method == "a"})
+
+
+@says("headline", r"(\d+) checks? (?:is|are) not as declared\.")
+def _(world: World, mark: str, count: str) -> bool:
+    return int(count) == world.differing
+
+
+@says("Safe?", rf"(\w+): (\w+ collides .*?){MORE}")
+def _(world: World, mark: str, run: str, told: str, more: str | None, expected: str | None) -> bool:
+    ran, hits = world.runs[run], re.findall(COLLISION, told)
+    assert all(re.fullmatch(COLLISION, each) for each in told.split("; "))
+    complete = len({*hits}) == len(hits) == len({*ran.first.values()}) and all(is_hit(ran, *hit) for hit in hits)
+    return mark == "no" and complete and int(more or 0) == max(0, ran.short - len(hits)) and is_declared(ran, expected)
+
+
+@says("Safe?", rf"(\w+): {WITHIN} at ([\d.]+) s, required ([\d.]+) m{MORE}")
+def _(world: World, mark: str, run: str, robot: str, value: str, other: str, *at: str | None) -> bool:
+    ran, (time, due, more, expected) = world.runs[run], at
+    right = (float(time or 0), float(due or 0)) == {"rock": (ran.near[1], D), "uav": (0.0, 1.0)}[other]
+    right = right and not ran.hits and int(more or 0) == ran.short - 1 and is_declared(ran, expected)
+    return mark == "no" and right and is_nearest(ran, robot, value, other)
+
+
+@says("Safe?", r"(\w+): SAFE-TRACE is refuted( \(expected\))?\.")
+def _(world: World, mark: str, run: str, expected: str | None) -> bool:
+    ran = world.runs[run]
+    return mark == "no" and not (ran.hits or ran.short) and ran.safe is False and is_declared(ran, expected)
+
+
+@says("Safe?", rf"{RUNS}: not known, (.*)\.")
+@says("Arrived?", rf"{RUNS}: not known, (it was not run)\.")
+def _(world: World, mark: str, runs: str, why: str) -> bool:
+    ran = [world.runs[name] for name in names(runs)]
+    return mark == "open" and all(each.safe is None and each.there == (why != "it was not run") for each in ran)
+
+
+@says("Safe?", rf"{RUNS}: minimum distance ([\d.]+) m \(ugv1 to (\w+)(, at the start)?\), required ([\d.]+) m(; .*)?\.")
+def _(
+    world: World, mark: str, runs: str, value: str, other: str, start: str | None, due: str, idle: str | None
+) -> bool:
+    kept = [ran for ran in world.runs.values() if ran.safe]
+    least = min(kept, key=lambda ran: ran.margin_m)
+    tested = any(ran.claims["SAFE-TRACE"][1] for ran in kept)
+    right = [world.runs[name] for name in names(runs)] == kept and bool(start) == (other == "uav")
+    right = right and any(is_nearest(ran, "ugv1", value, other) for ran in kept if ran.margin_m == least.margin_m)
+    return (
+        right
+        and float(due) == {"rock": D, "uav": 1.0}[other]
+        and (mark, bool(idle)) == ("yes" if tested else "none", not tested)
+    )
+
+
+@says("Safe?", r"(\d+) runs? with recursion \(5\) as printed: (all arrive, but )?(.*)\.")
+def _(world: World, mark: str, count: str, home: str | None, told: str) -> bool:
+    bad = [ran for ran in world.runs.values() if ran.printed and ran.safe is False and not ran.hits]
+    right = int(count) == len(bad) and bool(home) == all(not ran.away for ran in bad)
+    near = re.match(WITHIN, told)
+    return mark == "no" and right and (not near or any(is_nearest(ran, *near.groups()) for ran in bad))
+
+
+def proof(status: str, mark: str, pattern: str) -> None:
+    """A sentence about the proof: its runs are those of (d) with that status, all of them if it says "(d)"."""
+
+    @says("Safe?", pattern)
+    def _(world: World, given: str, runs: str, why: str = "") -> bool:
+        of_d = {name for name, ran in world.runs.items() if ran.method == "d"}
+        meant = of_d if runs == "(d)" else {*names(runs)}
+        told = {"refuted": "first_of_{}: avoidance missed by 0.5 m", "unproved": ""}.get(status, "")
+        return (
+            given == ("no" if status == "unproved" and "refuted" in map(world.theorems.get, world.unproved) else mark)
+            and meant <= of_d
+            and all(world.proof(name) == status and told.format(name) in why for name in meant)
+            and (status != "unproved" or {*re.findall(r"(SAFE-\w+):", why)} == world.unproved)
+        )
+
+
+PROOF = re.compile(
+    r"(?:Proved for|The proof does not apply to|Not (?:proved for|known whether the proof applies to)) "
+    r"(\(d\)|[\w, ]+?)(?:,? (?:\(|whatever)|, but|: )"
 )
 
 
-@settings(max_examples=400)
-@given(
-    st.dictionaries(st.sampled_from(["a", "b", "c", "d", "printed"]), RUNS, max_size=4),
-    st.lists(JUDGED, max_size=4, unique_by=lambda each: (each["id"], each["run"])),
-    st.sampled_from(["proved", "proved", "refuted"]), ROWS,
-)  # fmt: skip
-def test_a_mark_is_good_only_where_nothing_failed(
-    runs: dict[str, Document | None], judged: list[Document], gate: str, rows: list[Document]
-) -> None:
-    """Against an oracle that knows nothing but collisions, distances, ends and statuses."""
-    theorems = [claim("SAFE-INV", status="proved"), claim("SAFE-GATE", status=gate)]
-    found = document(runs, *theorems, *(each for each in judged if each["run"] in runs), reproduction=rows)
-    trace, hypotheses = (
-        {each["run"]: each for each in found["claims"] if each["id"] == name} for name in ("SAFE-TRACE", "SAFE-HYP")
-    )
-    near = {name: each["metrics"]["min_distance_m"]["ugv1"]["rock"]["value"] for name, each in found["runs"].items()}
-    hit = {name for name, each in found["runs"].items() if HIT in each["events"]}
-    safe = {name for name in near if near[name] >= D and name not in hit and trace[name]["status"] in PASSING}
-    unsafe = {name for name in near if near[name] < D or name in hit or trace[name]["status"] == "refuted"}
-    home = {name for name in near if found["runs"][name]["metrics"]["final_position_m"]["ugv1"] == TARGET}
-    main = {name for name in runs if name != "printed"} or {*runs}
-    helped = {name for name in main if not runs[name] or runs[name]["method"] != "a"} or main
-    differs = any(not each["as_expected"] and each["status"] not in UNDECIDED for each in found["claims"])
+proof("tested", "yes", r"Proved for (.*), whatever the UAV asks for\.")
+proof("idle", "none", r"Proved for (.*), but nothing came near: its conditions hold with nothing to check\.")
+proof("refuted", "no", r"The proof does not apply to (.*): its conditions did not hold \((SAFE-HYP: .*)\)\.")
+proof("open", "open", r"Not known whether the proof applies to (.*) \((SAFE-HYP: .*)\)\.")
+proof("unproved", "open", r"Not proved for (.*) \((.*)\)\.")
 
+
+@says("Arrived?", rf"{RUNS}: all(?: within ([\d.]+) m of their targets)?, by ([\d.]+) s\.")
+def _(world: World, mark: str, runs: str, within: str | None, by: str) -> bool:
+    home = {name for name, ran in world.runs.items() if ran.there and not ran.away and not ran.printed}
+    last = max(world.runs[name].end(robot).t_s for name in home for robot in TARGETS)
+    shown = float(within) if within else 0.1
+    return mark == "yes" and {*names(runs)} == home and by == f"{last:.1f}" and shown == world.tolerance_m
+
+
+@says("Arrived?", rf"(\w+): (\w+) arrives at ([\d.]+) s; {COLLISION}: nothing after that counts\.")
+def _(world: World, mark: str, run: str, who: str, since: str, *hit: str) -> bool:
+    ran = world.runs[run]
+    return (
+        mark == "partly"
+        and who in hit
+        and is_hit(ran, *hit)
+        and ran.arrived(who)
+        and since == f"{ran.end(who).t_s:.1f}"
+    )
+
+
+@says("Arrived?", rf"{RUNS}: ({ROBOT} (?:is|collides) .*)\.")
+def _(world: World, mark: str, runs: str, told: str) -> bool:
+    """Each robot that did not arrive, where it is, and how far that is from the paper's place."""
+    place = r"at \(3\.37, 5\.10(?:, 0\.00)?\) m(?:, ([\d.]+) m from the paper's)?"
+    said = told.split("; ")
+    hits = {m[:3]: m[3] for each in said for m in re.findall(rf"{COLLISION}, {place}: nothing after that counts", each)}
+    ends = {m[:3]: m[3] for each in said for m in re.findall(rf"({ROBOT}) is {HOW} {place}", each)}
+    lost = [found[1] for each in said if (found := re.fullmatch("the UAV found no way for (.*)", each))]
+    assert len(hits) + len(ends) + len(lost) == len(said)
+    for name in names(runs):
+        ran = world.runs[name]
+        off = [
+            f"{off:.2f}" for status, run, off in world.rows if run == name and status in ("reproduced", "calibrated")
+        ]
+        right = {robot for robot, *_ in ends} == ran.away - ran.first.keys() and {*lost} == ran.lost & {
+            robot for robot, *_ in ends
+        }
+        right = right and all(is_end(ran, robot, how, left or None) for robot, how, left in ends)
+        due = {(h.robot, h.other, f"{h.t_s:.2f}") for robot, h in ran.first.items() if robot in ran.away}
+        near = [of for (robot, *_), of in [*ends.items(), *hits.items()] if robot == "ugv1"]
+        if not (right and {*hits} == due and (not near or (near[0] or None) == (off[0] if off else None))):
+            return False
+        if mark != ("no" if ran.method != "a" or ran.hits else "none"):
+            return False
+    return True
+
+
+@says("Runs", r"(.*)\.")
+def _(world: World, mark: str, told: str) -> bool:
+    ours = ", half-plane problems of (26) solved to optimality, best plan by (26) kept, our hysteresis"
+    due = [f"{name}: {METHODS[ran.method].says}{ours * (ran.method == 'c')}" for name, ran in world.runs.items()
+           if not ran.printed]  # fmt: skip
+    return told.split("; ") == due
+
+
+def runs_with(world: World, claim: str, *statuses: str) -> list[str]:
+    return [run for name, run, status, *_ in world.judged if name == claim and status in statuses and run]
+
+
+@says("Zeno-free?", r"(Proved: triggers are at least 0\.5 s apart|Not proved \(ZENO-PROOF: (.*)\))\.")
+def _(world: World, mark: str, told: str, status: str | None) -> bool:
+    found = world.theorems["ZENO-PROOF"]
+    due = {"proved": "yes", "refuted": "no"}.get(found, "open")
+    return mark == due and (status or "proved") == found.replace("_", " ")
+
+
+@says("Zeno-free?", r"(\w+): two triggers ([\d.]+) s apart\.")
+def _(world: World, mark: str, run: str, gap: str) -> bool:
+    status, *_, gap_s = world.runs[run].claims["ZENO-TRACE"]
+    return (mark, status, float(gap)) == ("no", "refuted", gap_s)
+
+
+@says("Zeno-free?", r"Seen: (\d+) gaps between triggers; the smallest is ([\d.]+) s\.")
+def _(world: World, mark: str, count: str, least: str) -> bool:
+    seen = [world.runs[run].claims["ZENO-TRACE"] for run in runs_with(world, "ZENO-TRACE", *PASSING)]
+    tested = [each for each in seen if each[1]]
+    return mark == "" and (int(count), float(least)) == (sum(e[1] for e in tested), min(e[3] for e in tested))
+
+
+@says("Zeno-free?", r"These runs cannot show it: (no UGV triggers twice|nothing triggered)\. Scenario dwell does\.")
+def _(world: World, mark: str, why: str) -> bool:
+    tested = any(world.runs[run].claims["ZENO-TRACE"][1] for run in runs_with(world, "ZENO-TRACE", *PASSING))
+    return (
+        not tested and not runs_with(world, "ZENO-TRACE", "refuted") and bool(world.fired_s) == why.startswith("no UGV")
+    )
+
+
+@says("Threshold?", r"(\w+): a trigger is missed, spurious or at the wrong time \(THR-TRIG\)\.")
+def _(world: World, mark: str, run: str) -> bool:
+    return mark == "no" and run in runs_with(world, "THR-TRIG", "refuted")
+
+
+@says("Threshold?", rf"{RUNS}: not known whether triggers are missed \(THR-TRIG\)\.")
+def _(world: World, mark: str, runs: str) -> bool:
+    return mark == "open" and names(runs) == runs_with(world, "THR-TRIG", *UNDECIDED)
+
+
+@says("Threshold?", r"Not tested here: nothing reached the 3 m\.")
+def _(world: World, mark: str) -> bool:
+    return mark == "none" and not world.fired_s
+
+
+@says(
+    "Threshold?",
+    r"Fired at 3 m, (?:(\d+) times(?: in (\d+) runs)?, first )?at ([\d.]+) s; none missed, none spurious\.",
+)
+def _(world: World, mark: str, count: str | None, runs: str | None, first: str) -> bool:
+    fired, sure = world.fired_s, not runs_with(world, "THR-TRIG", "refuted", *UNDECIDED)
+    there = sum(ran.there for ran in world.runs.values())
+    numbers = (int(count or len(fired)), int(runs or there)) == (len(fired), there)
+    return (
+        mark == "yes" and sure and bool(runs_with(world, "THR-TRIG", *PASSING)) and float(first) == fired[0] and numbers
+    )
+
+
+@says("Threshold?", r"3 m is the Bayes optimum for the assumed drift and noise\.")
+def _(world: World, mark: str) -> bool:
+    return mark == "yes" and bool(world.drifts)
+
+
+@says(
+    "Threshold?",
+    r"In run (\w+), ugv1 drifted at 0\.56 m/s: for that, ([\d.]+) m is best, and 3 m calls the UAV (\w+)\.",
+)
+def _(world: World, mark: str, run: str, best: str, when: str) -> bool:
+    """The run whose drift calls for another threshold the most."""
+    most = max(abs(log(other / 3.0)) for other in world.drifts.values())
+    wanted = world.drifts[f"{run} ugv1"]
+    return (
+        mark == "partly"
+        and float(best) == wanted
+        and abs(log(wanted / 3.0)) == most
+        and (when == "late") == (wanted < 3.0)
+    )
+
+
+@says("Paper?", r"(\d+) of (\d+) results match(.*)\.")
+def _(world: World, mark: str, matched: str, of: str, rest: str) -> bool:
+    found = [status for status, *_ in world.rows]
+    plain, tuned, bad = (found.count(each) for each in ("reproduced", "calibrated", "not_reproduced"))
+    due = "yes" if plain == len(found) else "partly" if plain + tuned else "no"
+    counts = {"without tuning": plain, "after calibration": tuned}
+    told = {says: int(count) for count, says in re.findall(r"(\d+) (without tuning|after calibration)", rest)}
+    named = {f"A{k}" for k, status in enumerate(found) if status == "not_reproduced"}
+    right = told == {says: count for says, count in counts.items() if count} and {*re.findall(r"A\d", rest)} == named
+    return right and (mark, int(matched), int(of)) == (due, plain + tuned, len(found)) and bad == len(named)
+
+
+@says("beware", r"real vehicles are safe: the model is first-order, its sensing perfect")
+def _(world: World, mark: str) -> bool:
+    return True
+
+
+@says("beware", r"(.*) (?:is|are) also safe elsewhere: that was only seen in these runs")
+def _(world: World, mark: str, who: str) -> bool:
+    proved = {name for name in world.main if world.runs[name].method == "d" and world.proof(name) in ("tested", "idle")}
+    return world.meant(who, world.main) == {name for name, ran in world.main.items() if ran.safe} - proved
+
+
+@says(
+    "beware",
+    r"(all|those that arrive here) also arrive from other starts or with other seeds: arrival is seen, not proved",
+)
+def _(world: World, mark: str, who: str) -> bool:
+    home = [ran.there and not ran.away for ran in world.runs.values()]
+    return any(home) and all(home) == (who == "all")
+
+
+@says("beware", r"the UAV helps: it was never called")
+def _(world: World, mark: str) -> bool:
+    return not world.fired_s
+
+
+@says("beware", r"what could not be judged is fine")
+def _(world: World, mark: str) -> bool:
+    return any(ran.safe is None for ran in world.runs.values())
+
+
+HOME = st.builds(End, st.just("home"), st.sampled_from([5.0, 20.0, 23.6]), st.none())
+ELSEWHERE = st.builds(
+    End, st.sampled_from(["stuck", "stands", "moves"]), st.just(0.0), st.none() | st.sampled_from([0.5, 30.0, 120.0])
+)
+HIT_S, WHOM = st.sampled_from([2.0, 11.4, 22.0]), st.sampled_from(["rock", "ugv2", "uav"])
+HITS = st.lists(
+    st.builds(Hit, HIT_S, st.sampled_from(["ugv1", "ugv2"]), WHOM), max_size=3,
+    unique_by=(lambda hit: hit.t_s, lambda hit: (hit.robot, hit.other)),
+).map(lambda hits: [hit for hit in hits if hit.robot != hit.other])  # fmt: skip
+CLAIMS = st.sampled_from(["SAFE-TRACE", "SAFE-HYP", "SAFE-HYP", "ZENO-TRACE", "THR-TRIG"])
+VERDICTS = st.tuples(st.sampled_from([*STATUSES, "holds", "holds", "holds"]), st.sampled_from([0, 6, 6]),
+                     st.sampled_from([True, True, True, False]), st.sampled_from([0.11, 0.61, 2.5]))  # fmt: skip
+FINE: tuple[str, int, bool, float] = ("holds", 6, True, 0.61)
+DISTANCES = st.tuples(
+    st.sampled_from([0.5, 1.97664, D, D, 8.0]), st.sampled_from([T, 25.0]), st.sampled_from([0.4, 3.0, 3.0, 3.0])
+)
+JUDGED = st.dictionaries(CLAIMS, VERDICTS)
+RANS = st.builds(
+    Ran,
+    st.sampled_from("abcddd"),
+    st.sampled_from([False] * 4 + [True]),
+    st.sampled_from([True] * 5 + [False]),
+    DISTANCES,
+    st.dictionaries(st.sampled_from([*TARGETS]), HOME | HOME | ELSEWHERE),
+    st.just([]) | st.just([]) | HITS,
+    st.lists(st.sampled_from([14.479, 16.0]), max_size=1),
+    st.lists(st.sampled_from(["ugv1", "ugv2"]), max_size=1),
+    st.booleans(),
+    JUDGED | JUDGED.map(lambda given: {"SAFE-TRACE": FINE, "SAFE-HYP": FINE} | given),
+)
+THEOREM = st.sampled_from(["proved", "proved", "proved", "proved", "refuted", "inconclusive"])
+THEOREMS = ("SAFE-INV", "SAFE-GATE", "ZENO-PROOF")
+ROWS = st.tuples(
+    st.sampled_from(["reproduced", "calibrated", "not_reproduced"]),
+    st.sampled_from("klmn"),
+    st.sampled_from([0.0, 0.07]),
+)
+WORLDS = st.builds(
+    World,
+    st.dictionaries(st.sampled_from("klmn"), RANS, max_size=4),
+    st.fixed_dictionaries({}, optional=dict.fromkeys(THEOREMS, THEOREM)) | st.just(dict.fromkeys(THEOREMS, "proved")),
+    st.lists(ROWS, max_size=3),
+    st.sampled_from([0.1, 0.1, 3.0]),
+    st.dictionaries(st.sampled_from(["k ugv1", "l ugv1", "m ugv1"]), st.sampled_from([0.28, 2.0, 4.0, 20.0])),
+)
+
+
+def told(world: World, question: str, lines: Iterable[Line]) -> list[Line]:
+    """The lines of a question, each of which follows from the world."""
+    found = list(lines)
+    for line in found:
+        assert follows(world, question, line), (question, line)
+    return found
+
+
+@settings(max_examples=400)
+@given(WORLDS)
+def test_each_sentence_follows_from_what_happened_and_from_nothing_else(world: World) -> None:
+    found = document(world)
     screen = summary.first_screen(found)
-    mark = screen.headline.mark
-    good = bool(runs) and helped <= safe & home and not hit and not differs
-    assert mark != "yes" or good
-    assert mark == "yes" or not (good and main <= safe & home)
-    assert mark != "no" or not main & safe & home
-    marked = [(line.mark, line.text, {*line.text.partition(":")[0].split(", ")}) for line in answered(screen, "Safe?")]
-    assert all(names <= safe for of, _, names in marked if of in ("yes", "none"))
-    assert screen.rows or unsafe - ({"printed"} - hit) <= {
-        name for of, _, names in marked for name in names if of == "no"
-    }
-    assert all(
-        {*says.partition(":")[0].split(", ")} <= home for of, says in answered(screen, "Arrived?") if of == "yes"
-    )
-    assert all(
-        (of == "yes") == ({each["status"] for each in rows} == {"reproduced"}) for of, _ in answered(screen, "Paper?")
-    )
-    for each in screen.rows:
-        assert (each.safe.mark == "yes") == (each.run in safe and trace[each.run]["exercised"] > 0)
-        assert (each.safe.mark == "no") == (each.run in unsafe)
-        assert (each.arrived.mark == "yes") == (each.run in home)
-    of_d = {name for name in runs if (runs[name] or {"method": "c"})["method"] == "d"}
-    met = {name for name, each in hypotheses.items() if each["status"] in PASSING and each["exercised"]}
+    runs, of_d = world.runs, {name for name, ran in world.runs.items() if ran.method == "d"}
+    unsafe = {name for name, ran in runs.items() if ran.safe is False}
+
+    assert screen.headline.mark == due_mark(world)
+    sentences = re.split(r"(?<=\.) ", screen.headline.text)
+    told(world, "headline", (Line(screen.headline.mark, each) for each in sentences))
+    assert any(each.endswith("not as declared.") for each in sentences) == (world.differing > 0)
+    told(world, "beware", (Line("", each) for each in screen.beware))
+    assert any(line.startswith("what could") for line in screen.beware) == any(r.safe is None for r in runs.values())
+
+    answers = {each.question: told(world, each.question, each.lines) for each in screen.answers}
+    assert bool(screen.rows) == (len(runs) > 1 and not world.rows) == ("Safe?" not in answers and len(runs) > 1)
+    said = {question: [(line.mark, line.text) for line in lines] for question, lines in answers.items()}
+    if not screen.rows:
+        safe = [
+            (mark, {*names(text.partition(":")[0])})
+            for mark, text in said.get("Safe?", [])
+            if "proof" not in text.lower()
+        ]
+        crashed = {name for name in unsafe if not runs[name].printed or runs[name].hits}
+        assert crashed <= {name for mark, those in safe if mark == "no" for name in those}
+        proofs = [of[1] for _, text in said.get("Safe?", []) if (of := PROOF.match(text))]
+        assert sorted(name for those in proofs for name in (of_d if those == "(d)" else names(those))) == sorted(of_d)
+        where = {name for _, text in said.get("Arrived?", []) for name in names(text.partition(":")[0])}
+        assert where >= {name for name, ran in runs.items() if not ran.printed or ran.away}
+    for row in screen.rows:
+        ran = runs[row.run]
+        tested = ran.safe and ran.claims["SAFE-TRACE"][1] > 0
+        due = "open" if ran.safe is None else "no" if not ran.safe else "yes" if tested else "none"
+        assert (row.safe.mark, row.arrived.mark) == (due, "open" if not ran.there else "no" if ran.away else "yes")
+        proved = ran.method == "d" and world.proof(row.run) in ("tested", "idle")
+        assert not ran.safe or (", proved" in row.safe.text) == proved
+        count = len({"ugv1", "ugv2"} - ran.away)
+        assert not ran.there or row.arrived.text.startswith(f"{count} of 2")
+        assert not ran.there or ("no way" in row.interventions) == bool(ran.lost)
+    assert screen.within == ("3 m" if world.tolerance_m == 3.0 else "")
+    assert [mark for mark, _ in said.get("Paper?", [])] == ([] if not world.rows else [said["Paper?"][0][0]])
+    for claim, question in (("ZENO-TRACE", "Zeno-free?"), ("THR-TRIG", "Threshold?")):
+        bad = runs_with(world, claim, "refuted")
+        assert bad == [
+            text.partition(":")[0] for mark, text in said.get(question, []) if mark == "no" and ":" in text[:3]
+        ]
     printed = " ".join(summary.text(found).split())
-    assert "Proved for (d)" not in printed or (of_d <= met and gate == "proved")
-    assert ", proved" not in printed or (of_d & met and gate == "proved")
-    assert all(line.text in printed for answer in screen.answers for line in answer.lines)
+    assert all(text in printed for lines in said.values() for _, text in lines)
+
+
+def due_mark(world: World) -> str:
+    """The mark of the headline."""
+    main = world.main.values()
+    helped = [ran for ran in main if ran.method != "a"] or main
+    if not main or (any(ran.safe is None for ran in main) and not any(ran.safe is False for ran in main)):
+        return "open"
+    if not any(ran.fine for ran in main):
+        return "no"
+    crashed = any(ran.hits for ran in world.runs.values() if ran.there)
+    return "partly" if crashed or world.differing or not all(ran.fine for ran in helped) else "yes"
+
+
+HIT, STANDS = Ran("b", near=(0.0, 25.0, 3.0), hits=[Hit(11.4, "ugv1", "rock")]), {"ugv1": End("stands", 0.0)}
+MOVES, FINE_RUN = {"ugv1": End("moves", 0.0, 30.0)}, Ran("d", claims={"SAFE-TRACE": FINE, "SAFE-HYP": FINE})
+STANDING = {way: Ran(way, ends=STANDS, unasked=["ugv1"] * (way == "d"), claims=FINE_RUN.claims) for way in "ad"}
 
 
 @pytest.mark.parametrize(
-    ("runs", "claims", "mark", "says"),
+    ("runs", "says"),
     [
-        ({"b": CRASH, "d": run("d")}, [], "partly",
-         "Only method (d) is safe and brings everyone home. Under (b), ugv1 collides."),
-        ({"b": CRASH}, [claim("SAFE-TRACE", "b", "refuted", expected="holds", as_expected=False)], "no",
-         "Not safe. Under (b), ugv1 collides. 1 check is not as declared."),
-        ({"b": CRASH, "d": run("d")}, [claim("SAFE-TRACE", "d", "error")], "no",
-         "No method brings everyone home safely. Under (b), ugv1 collides."),
-        ({"a": run("a"), "printed": run("a", 0.0, TARGET, HIT)}, [], "partly",
-         "All arrive safely. In run printed, ugv1 collides."),
-        ({"a": run("a"), "d": run("d"), "printed": run("a", 1.78)}, [], "yes",
-         "With and without help, all arrive safely."),
-        ({"d": run("d", end=STUCK)}, [], "no", "Safe, but not all arrive: ugv1 does not arrive."),
-        ({"d": run("d", 1.99996)}, [], "no", "Not safe. Under (d), ugv1 comes within 1.99996 m of rock."),
-        ({"d": run("d")}, [claim("SAFE-TRACE", "d", "refuted")], "no", "Not safe. Under (d), SAFE-TRACE is refuted."),
-        ({"d": run("d")}, [claim("SAFE-TRACE", "d", "error")], "open", "Not decided: run d could not be judged."),
-        ({"d": run("d"), "c": None}, [], "open", "Not decided: run c could not be judged."),
-        ({}, [], "open", "Nothing was run."),
-        ({"a": run("a", end=STUCK), "b": run("b", 0.495), "c": run("c", end=STUCK), "d": run("d")}, [], "partly",
-         "Only method (d) is safe and brings everyone home. Under (b), ugv1 comes within 0.495 m of rock; "
-         "under (a) and (c), ugv1 does not arrive."),
+        ({"b": HIT, "d": FINE_RUN}, "Only method (d) is safe and brings everyone home. Under (b), ugv1 collides."),
+        ({"c": FINE_RUN, "d": Ran("d", ends=MOVES, claims=FINE_RUN.claims)},
+         "Only run c is safe and brings everyone home. In run d, ugv1 is still moving at the end (about 30 s more)."),
+        (STANDING, "Safe, but not all arrive. Under (a), ugv1 is standing still; "
+                   "under (d), ugv1 is standing still: the UAV found no way for ugv1."),
     ],
 )  # fmt: skip
-def test_the_headline(runs: dict[str, Document | None], claims: list[Document], mark: str, says: str) -> None:
-    assert summary.headline(document(runs, *claims)) == (mark, says)
+def test_a_headline_in_full(runs: dict[str, Ran], says: str) -> None:
+    assert summary.headline(document(World(runs))).text == says
 
 
-def test_who_did_not_arrive_and_where_it_is() -> None:
-    found = document({"b": CRASH, "c": None, "d": run("d")})
-    found["runs"]["d"]["metrics"]["final_position_m"]["uav"] = [0.0, 9.0, 2.5]
-    assert lines(found, "Arrived?") == [
-        ("no", "b: ugv1 collided, ended at (3.37, 5.10) m."),
-        ("open", "c: not known, it was not run."),
-        ("no", "d: uav ended short of its target, at (0.00, 9.00, 2.50) m."),
-    ]
-
-
-def test_what_nothing_tested_is_not_good() -> None:
-    idle = [claim(name, "d", exercised=0) for name in ("SAFE-TRACE", "THR-TRIG", "ZENO-TRACE")]
-    found = document({"d": run("d", 8.0)}, *idle)
-    first = [lines(found, question)[0] for question in ("Safe?", "Zeno-free?", "Threshold?")]
-    assert [mark for mark, _ in first] == ["none", "", "none"]
-    assert "the UAV helps: it was never called" in summary.first_screen(found).beware
-
-
-def test_refuted_triggers_and_gaps() -> None:
-    bad = [claim("THR-TRIG", "d", "refuted"), claim("ZENO-TRACE", "d", "refuted", counterexample={"gap_s": 0.2})]
-    found = document({"d": run("d", D, TARGET, TRIGGER)}, *bad, claim("SAFE-HYP", "d", "refuted"), *PROVED[:2])
-    assert [lines(found, question)[-1][0] for question in ("Threshold?", "Zeno-free?", "Safe?")] == ["no"] * 3
-    seen = claim("ZENO-TRACE", "d", exercised=3, evidence={"smallest_gap": {"gap_s": 0.61}})
-    assert lines(document({"d": run("d")}, seen), "Zeno-free?") == [
-        ("", "Seen: 3 gaps between triggers; the smallest is 0.610 s.")
+def test_a_collision_has_the_time_of_the_event_and_nothing_after_it_counts() -> None:
+    answers = summary.first_screen(document(World({"b": HIT}))).answers
+    assert [line.text for answer in answers[:2] for line in answer.lines] == [
+        "b: ugv1 collides with rock at 11.40 s.",
+        "b: ugv1 collides with rock at 11.40 s, at (3.37, 5.10) m: nothing after that counts.",
     ]
 
 
@@ -220,46 +784,37 @@ def test_a_threshold_is_good_or_bad_for_the_assumed_drift_and_for_that_of_the_ru
         "kind": "declared", "threshold_in_force_m": 3.0, "optimal_threshold_m": 2.992, "extra_risk": extra,
         "least_risk": 0.4, "runs": {"a ugv1": {"optimum_for_this_drift_m": real, "drift_m_s": 0.56}},
     }  # fmt: skip
-    chosen = claim("THR-CHOICE", evidence=evidence, inputs={"drift_m_s": 6.05})
-    found = lines(document({"a": run("a", D, TARGET, TRIGGER)}, chosen), "Threshold?")
-    assert [mark for mark, _ in found] == marks
-    assert told in found[-1][1]
+    found = document(World({"a": Ran("a", triggers_s=[14.479])}))
+    found["claims"].append(claim("THR-CHOICE", evidence=evidence, inputs={"drift_m_s": 6.05}))
+    (lines,) = (each.lines for each in summary.first_screen(found).answers if each.question == "Threshold?")
+    assert [mark for mark, _ in lines] == marks
+    assert told in lines[-1].text
 
 
-def test_a_scenario_without_a_counterpart_has_a_table_of_methods() -> None:
-    proposed, accepted, refused = event("proposal"), event("accept"), event("refuse")
-    waits = {"refusals": {"ugv1": {"waits": 2, "no_plan": 1}}}
-    runs = {
-        "a": run("a", end=STUCK), "b": run("b", 0.495, TARGET, proposed), "d": run("d", D, TARGET, proposed, accepted),
-        "c": run("c", D, STUCK, proposed, refused, refused, gatekeeper=waits),
-    }  # fmt: skip
-    screen = summary.first_screen(document(runs, *PROVED, claim("SAFE-HYP", "d"), reproduction=[]))
-    assert [(each.run, *each.safe, each.arrived.text, each.interventions) for each in screen.rows] == [
-        ("a", "yes", "2.000 m, not proved", "0 of 1", "none"),
-        ("b", "no", "0.495 m (ugv1 to rock)", "1 of 1", "1 obeyed"),
-        ("d", "yes", "2.000 m, proved", "1 of 1", "1 accepted"),
-        ("c", "yes", "2.000 m, not proved", "0 of 1", "2 refused: waiting looked cheaper"),
-    ]
-    assert screen.required == "1 to 2 m"
-    assert [answer.question for answer in screen.answers] == ["Zeno-free?", "Threshold?"]
-
-
-def test_the_pair_of_least_margin_counts_not_that_of_least_distance() -> None:
-    near = {"ugv1": {"uav": {"value": 1.2, "t_s": 3.0, "safe_distance_m": 1.0}}, "uav": {}}
-    found = document({"d": run("d", 2.5, min_robot_distance_m=near)})
-    assert "1.200 m (ugv1 to uav), required 1 m" in lines(found, "Safe?")[0][1]
+def test_what_became_of_proposals() -> None:
+    found = document(World({"b": Ran("b"), "c": Ran("c"), "d": Ran("d")}))
+    for run, kinds in {"b": ["proposal"], "c": ["proposal", "refuse", "refuse"], "d": ["proposal", "accept"]}.items():
+        found["runs"][run]["events"] = [{"kind": kind, "t_s": 15.0, "robot": "ugv1"} for kind in kinds]
+    found["runs"]["c"]["metrics"]["gatekeeper"] = {"refusals": {"ugv1": {"waits": 2, "no_plan": 1}}}
+    rows = summary.first_screen(found).rows
+    assert [row.interventions for row in rows] == ["1 obeyed", "2 refused: waiting looked cheaper", "1 accepted"]
 
 
 def test_what_is_not_as_declared_says_so() -> None:
     for status, mark in (("not_as_expected", "no"), ("inconclusive", "open")):
-        overall = {"status": status, "why": "1 check differs.", "unpromised": [], "checks": 1}
-        assert summary.as_declared(document({"d": run("d")}, overall=overall)) == (mark, "1 check differs.")
+        found = {"overall": {"status": status, "why": "1 check differs.", "unpromised": []}, "claims": []}
+        assert summary.as_declared(found) == (mark, "1 check differs.")
+
+
+def lines(found: Document, question: str) -> list[Line]:
+    """What the first screen answers."""
+    return [line for each in summary.first_screen(found).answers if each.question == question for line in each.lines]
 
 
 def test_a_run_is_described_by_how_it_decides() -> None:
     """The paper's gatekeeper to the letter is told apart from ours, whichever of the two a scenario has by default."""
     literal = {"gatekeeper.route": "nonlinear", "gatekeeper.rule": "first_stage"}
-    found = document({"a": run("a"), "c": run("c"), "c_literal": run("c")})
+    found = document(World({"a": Ran("a"), "c": Ran("c"), "c_literal": Ran("c")}, rows=[("reproduced", "a", 0.0)]))
     found["scenario"]["resolved"]["runs"]["c_literal"]["set"] = {**literal, "decision.leak_1_s": 0.1}
     how = "(27) by multiple shooting, sum-up rounding (28)-(29), first stage applied"
     assert lines(found, "Runs") == [Line(
@@ -284,9 +839,11 @@ def test_several_seeds_are_counted_beside_what_is_promised() -> None:
         *of_seeds("b", (D, True), (1.5, True), (-0.25, False)), *of_seeds("c", *[(0.5, False)] * 3),
         *of_seeds("a", (D, True), (D, False), (3.0, True)), *of_seeds("d", *[(D, True)] * 3),
     ]  # fmt: skip
-    runs = {name: run(name) for name in "abcd"}
-    open_ = claim("SAFE-TRACE", "b", expected="nothing", as_expected=None)
-    assert lines(document(runs, open_, seeds=rows), "Seeds?") == [
+    found = document(World({name: Ran(name) for name in "abcd"}))
+    assert not lines(found, "Seeds?")
+    found["claims"].append(claim("SAFE-TRACE", "b", expected="nothing", as_expected=None))
+    found["seeds"] = rows
+    assert lines(found, "Seeds?") == [
         ("partly", "b: 1 of 3 seeds keep every distance, 2 bring all home; worst: -0.250 m (overlap) (ugv1 to rock, "
          "seed 3), required 2 m; no distance is promised."),
         ("no", "c: 0 of 3 seeds keep every distance, 0 bring all home; worst: 0.500 m (ugv1 to rock, seed 1), "
@@ -294,16 +851,16 @@ def test_several_seeds_are_counted_beside_what_is_promised() -> None:
         ("partly", "a: 3 of 3 seeds keep every distance, 2 bring all home."),
         ("yes", "d: all 3 seeds keep every distance and bring all home."),
     ]  # fmt: skip
-    silent = document(runs, open_, seeds=rows)
-    silent["scenario"]["resolved"]["decision"]["noise_m_sqrt_s"] = 0.0
-    assert "the seed changes nothing" in lines(silent, "Seeds?")[-1].text
-    assert not lines(document(runs), "Seeds?")
+    found["scenario"]["resolved"]["decision"]["noise_m_sqrt_s"] = 0.0
+    assert "the seed changes nothing" in lines(found, "Seeds?")[-1].text
 
 
 def test_what_is_not_promised_is_neither_a_failure_nor_as_declared() -> None:
-    unsafe = claim("SAFE-TRACE", "b", "refuted", expected="nothing", as_expected=None)
-    overall = {"status": "as_expected", "why": "", "unpromised": [{"id": "SAFE-TRACE", "run": "b"}], "checks": 0}
-    found = document({"b": run("b", 0.5)}, unsafe, overall=overall)
+    found = document(World({"b": Ran("b", near=(0.5, T, 3.0))}))
+    found["claims"].append(claim("SAFE-TRACE", "b", "refuted", expected="nothing", as_expected=None))
+    found["overall"] = {
+        "status": "as_expected", "why": "", "unpromised": [{"id": "SAFE-TRACE", "run": "b"}], "checks": 0,
+    }  # fmt: skip
     assert "(expected)" not in lines(found, "Safe?")[0].text
     assert "not as declared" not in summary.headline(found).text
     assert summary.as_declared(found).text == "0 checks as declared. For 1 more claim nothing is promised."

@@ -10,7 +10,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from verify.judging import CLAIMS
+from builders.edits import with_meta, with_signals
+from verify.judging import CLAIMS, judge
 
 from airground_drake.base.statuses import NOTHING, declared, meets, outcome
 from airground_drake.check import verdicts
@@ -58,6 +59,20 @@ def test_a_run_with_several_triggers_and_proposals_exercises_every_claim(
     assert count
     assert verdict.as_expected
     assert {"ZENO-TRACE": 2, "THR-TRIG": 7, "LIVE-GOAL": 2}.get(claim, count) == count
+
+
+def without_messages(trace: Trace) -> Trace:
+    """The same triggers, but the UAV has sent nothing."""
+    tables = {name: getattr(trace, name).iloc[:0] for name in ("decisions", "problems", "proposals")}
+    kept = [event for event in trace.events if event["kind"] not in ("proposal", "accept", "refuse")]
+    idle = with_signals(trace, lambda signals: signals.assign(**{f"{ugv}.accepted": 0.0 for ugv in trace.ugvs}))
+    return replace(with_meta(idle, events=kept), **tables)
+
+
+@pytest.mark.parametrize("claim", ["COMM", "GATE-FEAS", "GATE-MODEL", "LIVE-PROG"])
+def test_where_the_uav_found_no_way_there_was_nothing_to_decide(claim: str, run: Callable[[str, str], Trace]) -> None:
+    found = judge(claim, without_messages(run("minimal", "d")))
+    assert (found.status, found.exercised) == ("holds", 0)
 
 
 @pytest.mark.parametrize(

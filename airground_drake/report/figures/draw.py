@@ -284,7 +284,7 @@ def _ends(chosen: _Selection) -> str:
     for heading, trace in chosen.shown.items():
         hits = first_collisions(trace.events)
         words = [
-            f"{ugv} collides at {hits[ugv]['t_s']:.2f} s, from where on its path is dashed"
+            f"{ugv} collides at {hits[ugv]['t_s']:.2f} s (dashed from there: it does not count)"
             for ugv in trace.ugvs
             if ugv in hits
         ]
