@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from commands.conftest import Airground
 
-TABLES = ("decisions", "events", "problems", "proposals", "signals")
+TABLES = ("decisions", "distances", "events", "problems", "proposals", "signals")
 
 
 @pytest.mark.parametrize(

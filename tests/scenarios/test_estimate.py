@@ -83,3 +83,10 @@ def test_what_would_never_end_is_refused_in_one_line(key: str, value: object, me
     with pytest.raises(LimitError, match=r"^small asks for about [^\n]*; allowed: 1e\+07 steps, 8 GiB$"):
         within(scenario, DEFAULT_LIMITS)
     assert within(scenario, Limits(math.inf, math.inf)) == estimate(scenario)
+
+
+def test_more_seeds_are_more_work_in_the_same_memory() -> None:
+    once, thrice = (within(small(), DEFAULT_LIMITS, times) for times in (1, 3))
+    assert (thrice.work, thrice.memory) == (3.0 * once.work, once.memory)
+    with pytest.raises(LimitError):
+        within(small(), DEFAULT_LIMITS, 10**6)
