@@ -42,6 +42,10 @@ NOT_BEGUN = -1.0
 SHORTEST_S = 1e-9
 """Events are not isolated within steps shorter than this, s; they happen at the step's end. Ticks of different periods
 can be one unit in the last place apart, and Drake stops when it must isolate an event in such a step."""
+SHORT = 0.01
+"""A shorter step is short, in sampling periods. Isolating an event takes about twenty, each half as long as before."""
+MOST_SHORT = 1000
+"""Largest number of short steps in a row without a transition."""
 
 
 class DecisionBlock(LeafSystem):
@@ -210,21 +214,25 @@ class EventTrigger(LeafSystem):
     Ports (n UGVs):
         in  `decision_variable` (n) m; `decision_range` (2n) m, the smallest since the step began, then the largest.
         out `status` (4n): a `Status` per UGV.
-    State: the status; the times at which the step and the run began, s.
+    State: the status; the times at which the step and the run began, s; the number of short steps in a row.
     Parameters: `TriggerLevels`; by default those of the trigger.
     Rate: one update per step of the simulator.
+    Raises: RuntimeError after `MOST_SHORT` short steps in a row without a transition. While an event is isolated, steps
+    become so short that robots far from the origin no longer move in them: their coordinates are rounded. Then x never
+    gets to its level.
     """
 
-    def __init__(self, count: int, trigger: Trigger) -> None:
-        """Declare ports, state and events for `count` UGVs."""
+    def __init__(self, count: int, trigger: Trigger, period: float = 1e-3) -> None:
+        """Declare ports, state and events for `count` UGVs; `period` is the shortest of the diagram's, s."""
         super().__init__()
-        self._count = count
+        self._count, self._short = count, SHORT * period
         self.DeclareNumericParameter(BasicVector([trigger.zeta, trigger.release, trigger.dwell]))
         self._variable = self.DeclareVectorInputPort("decision_variable", count)
         self._range = self.DeclareVectorInputPort("decision_range", 2 * count)
         status = self.DeclareDiscreteState(_pack([TriggerState()] * count))
         self.DeclareDiscreteState([NOT_BEGUN])
         self.DeclareDiscreteState([NOT_BEGUN])
+        self.DeclareDiscreteState([0.0])
         self.DeclareStateOutputPort("status", status)
         self.DeclareInitializationUnrestrictedUpdateEvent(weakly(self._start))
         self.DeclarePerStepDiscreteUpdateEvent(weakly(self.update))
@@ -278,8 +286,21 @@ class EventTrigger(LeafSystem):
         if anything_due(before, t, spans, levels):
             least, most = spans[: self._count], spans[self._count :]
             discrete.set_value(0, self._after(context, before, self._variable.Eval(context), least, most))
+            discrete.set_value(3, [0.0])
+        else:
+            self._count_short(t - context.get_discrete_state(1)[0], discrete)
         discrete.set_value(1, [t])
         return EventStatus.Succeeded()
+
+    def _count_short(self, lasted: float, discrete: DiscreteValues) -> None:
+        """Count a step without a transition, which lasted so long, s, if it was short."""
+        short = discrete.value(3)[0] + 1.0 if lasted < self._short else 0.0
+        if short > MOST_SHORT:
+            raise RuntimeError(
+                "an event cannot be isolated: coordinates are rounded too coarsely for so slow a motion; wanted: "
+                "coordinates nearer to the origin"
+            )
+        discrete.set_value(3, [short])
 
     def _after(self, context: Context, before: Array, x: Array, least: Array, most: Array) -> Array:
         """Status after the transitions that became due in a step."""

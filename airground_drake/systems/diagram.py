@@ -145,7 +145,8 @@ def build_model(
     law = components.make_law(scenario, chosen, composition)
     # first, so that the seed of its noise does not depend on what a plant may draw
     block = _checked_block(n, decision_block(world, presets))
-    trigger = EventTrigger(n, components.make_trigger(scenario, components.threshold(scenario)))
+    shortest = min(scenario.control.period_s, scenario.decision.noise_period_s)
+    trigger = EventTrigger(n, components.make_trigger(scenario, components.threshold(scenario)), shortest)
     decision = _decision_making(scenario, n, block, trigger)
     made = {body.name: _plant(body, plants, scenario.control.period_s) for body in world.moving}
     vehicles = _vehicles(world, made, disturbed=disturbed)

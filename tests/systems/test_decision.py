@@ -19,12 +19,12 @@ from pydrake.trajectories import PiecewisePolynomial
 from verify.judging import judge
 
 from airground_drake.base.arrays import Array
-from airground_drake.base.errors import PluginError
+from airground_drake.base.errors import PluginError, SimulationError
 from airground_drake.decision.trigger import Trigger
 from airground_drake.geometry.motion import Motion
 from airground_drake.run.simulation import simulate
 from airground_drake.run.trace import Trace
-from airground_drake.scenarios.load import load
+from airground_drake.scenarios.load import from_data, load
 from airground_drake.systems.components import integrated_noise
 from airground_drake.systems.decision import DecisionBlock, DecisionVariable, EventTrigger
 from airground_drake.systems.diagram import build_diagram
@@ -227,3 +227,21 @@ def test_a_recorded_signal_drives_the_trigger_and_its_crossings_are_isolated() -
 def test_a_decision_block_without_a_range_is_refused() -> None:
     with pytest.raises(PluginError, match=r"the decision block has output ports of sizes .*'decision_range': 4"):
         build_diagram(load("case_a")[0], decision_block=lambda bodies, presets: PassThrough(len(bodies.names("ugv"))))
+
+
+def test_where_rounding_keeps_an_event_from_being_isolated_the_run_ends_with_the_reason() -> None:
+    """A UGV falls to the release level in steps that are too short to move it: its coordinates have 1e-8 m at most."""
+    far = 1e8
+    on, ahead = [far, 0.0, 0.0], [far + 10.0, 0.0, 0.0]
+    ugv = {
+        "start_m": [far - 1.0, 0.0, 0.0],
+        "target_m": ahead,
+        "preset": {"waypoints_m": [on, ahead], "speed_m_s": 1.0},
+    }
+    data = {
+        "name": "far", "duration_s": 5.0, "ugvs": {"ugv1": ugv}, "uav": {"start_m": [far, 9.0, 2.0]},
+        "control": {"avoidance_gain_1_s": 0.0}, "runs": {"a": {"method": "a"}},
+        "decision": {"threshold": {"zeta_m": 0.5}, "release_m": 0.1, "min_inter_event_s": 0.1},
+    }  # fmt: skip
+    with pytest.raises(SimulationError, match="an event cannot be isolated: coordinates are rounded too coarsely"):
+        simulate(from_data(data, "far"), "a")

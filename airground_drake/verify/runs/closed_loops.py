@@ -16,6 +16,12 @@ AT_ONCE = 5_000_000
 """Largest number of coordinates of points that are rolled out side by side, so that they fit into memory."""
 FAR_M = 1e9
 """A coordinate beyond every sensing range."""
+NUDGES_M = 1e-12 * np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
+"""Two algorithms that round differently move a robot by less than this differently in a control period, m. A prediction
+that so small a push in every period changes is unstable: a robot that heads straight for another one, say."""
+APART = 5.0
+"""Ways under opposite pushes that move apart by such a factor in one control period are unstable, too: this happens
+where a robot covers many safe distances in a period."""
 T = TypeVar("T")
 
 
@@ -68,8 +74,11 @@ def stacked(scenes: Sequence[Scene]) -> Scene:
     return Scene(*(np.stack(part) for part in zip(*map(padded, scenes), strict=True)))
 
 
-def roll_out(trace: Trace, scenes: Scene) -> Iterator[Array]:
-    """Places of R stacked closed loops after each control period, (R, 3), m, by the law of the run."""
+def roll_out(trace: Trace, scenes: Scene, nudge: Array | float = 0.0) -> Iterator[Array]:
+    """Places of R stacked closed loops after each control period, (R, 3), m, by the law of the run.
+
+    In every period each is pushed by `nudge`, (R, 3), m.
+    """
     control, h, place = trace.scenario.control, trace.scenario.control.period_s, scenes.here
     rates, wishes = (np.diff(part, axis=1) / h for part in (scenes.preset, scenes.wanted))
     for k in range(scenes.executed.shape[1]):
@@ -77,8 +86,19 @@ def roll_out(trace: Trace, scenes: Scene) -> Iterator[Array]:
         own = tracking(place, scenes.preset[:, k], rates[:, k], control.motion_gain_1_s, scenes.limit)
         rows = np.flatnonzero(scenes.executed[:, k])
         asked = Asked(scenes.wanted[rows, k], wishes[rows, k], scenes.chosen[rows])
-        place = place + h * commanded(trace, place, own, given, rows, asked, scenes.limit)
+        place = place + h * commanded(trace, place, own, given, rows, asked, scenes.limit) + nudge
         yield place
+
+
+def move_apart(ways: Sequence[Array]) -> bool:
+    """Whether ways (S + 1, 3), m, under `NUDGES_M` move apart from those under the opposite push."""
+    half = len(NUDGES_M) // 2
+    for one, opposite in zip(ways[:half], ways[half:], strict=True):
+        last = min(len(one), len(opposite))
+        apart = np.linalg.norm(one[1:last] - opposite[1:last], axis=1)
+        if (apart[1:] > APART * np.maximum(apart[:-1], 2.0 * np.abs(NUDGES_M).max())).any():
+            return True
+    return False
 
 
 def in_batches(items: Iterable[T], scenes_of: Callable[[T], Sequence[Scene]]) -> Iterator[list[T]]:

@@ -12,7 +12,7 @@ from airground_drake.base.arrays import Array
 from airground_drake.run.trace import Trace
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.verify.runs.beginnings import Beginning, beginning
-from airground_drake.verify.runs.closed_loops import Scene, in_batches, roll_out, stacked
+from airground_drake.verify.runs.closed_loops import NUDGES_M, Scene, in_batches, roll_out, stacked
 from airground_drake.verify.runs.way_left import bounds_of_way_left
 
 STILL_M = 0.05
@@ -46,13 +46,21 @@ def _foreseen(trace: Trace) -> Iterator[tuple[Key, tuple[Foreseen, Foreseen]]]:
         yield from zip([key for key, _ in batch], found, strict=True)
 
 
-def _rolled_out(trace: Trace, begun: Sequence[Beginning]) -> list[tuple[Foreseen, Foreseen]]:
-    """Outcomes of refusing and of accepting, for some decisions."""
+def nudged(trace: Trace, t: float, number: int) -> list[tuple[Foreseen, Foreseen]]:
+    """Outcomes of refusing and of accepting, under each of `NUDGES_M`, for the decision at t, s, about a proposal."""
+    begun = [beginning(trace, t, number)] * len(NUDGES_M)
+    return _rolled_out(trace, begun, np.concatenate([NUDGES_M, NUDGES_M]))
+
+
+def _rolled_out(
+    trace: Trace, begun: Sequence[Beginning], nudge: Array | float = 0.0
+) -> list[tuple[Foreseen, Foreseen]]:
+    """Outcomes of refusing and of accepting, for some decisions; `nudge` as of `roll_out`."""
     h, scenes = trace.scenario.control.period_s, [each.refused for each in begun]
     scenes += [each.accepted for each in begun]
     goal, settled = np.array([each.goal for each in begun] * 2), np.array([each.settled for each in begun] * 2)
     loops, lasting = stacked(scenes), np.array([len(one.executed) for one in scenes])
-    way, done = _followed(trace, loops, goal, settled, lasting)
+    way, done = _followed(trace, loops, goal, settled, lasting, nudge)
     away = np.square(loops.preset.swapaxes(0, 1)[1 : len(way)] - way[1:]).sum(axis=2)
     integral = np.concatenate([np.zeros((1, away.shape[1])), np.cumsum(h * away, axis=0)])
     found = [
@@ -62,7 +70,9 @@ def _rolled_out(trace: Trace, begun: Sequence[Beginning]) -> list[tuple[Foreseen
     return list(zip(found[: len(begun)], found[len(begun) :], strict=True))
 
 
-def _followed(trace: Trace, loops: Scene, goal: Array, settled: Counts, lasting: Counts) -> tuple[Array, Counts]:
+def _followed(
+    trace: Trace, loops: Scene, goal: Array, settled: Counts, lasting: Counts, nudge: Array | float
+) -> tuple[Array, Counts]:
     """Where R closed loops lead, (T + 1, R, 3), m, and the period after which each ends, (R,); T is the last.
 
     Args:
@@ -71,10 +81,11 @@ def _followed(trace: Trace, loops: Scene, goal: Array, settled: Counts, lasting:
         goal: (R, 3), m.
         settled: periods after which each may end, once it is at rest, (R,).
         lasting: periods after which each ends, (R,).
+        nudge: as of `roll_out`.
     """
     second = max(1, round(1.0 / trace.scenario.control.period_s))
     ways, done, still = [loops.here], lasting, np.minimum(STILL_M, loops.limit / 10.0)
-    for k, place in enumerate(roll_out(trace, loops)):
+    for k, place in enumerate(roll_out(trace, loops, nudge)):
         ways.append(place)
         if k < settled.min():
             continue

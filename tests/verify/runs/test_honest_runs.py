@@ -187,3 +187,23 @@ def test_random_motions_and_noise(trigger: str, seed: int) -> None:
     )  # fmt: skip
     assert held("THR-TRIG", trace)
     assert trace.events
+
+
+@pytest.mark.parametrize(("run", "safe_m", "duration_s"), [("d", 1e-6, 1.2), ("c", 1e-3, 1.6)])
+def test_a_prediction_that_depends_on_rounding_is_not_compared(run: str, safe_m: float, duration_s: float) -> None:
+    """Four UGVs head for one point: where they get round each other depends on the last digits."""
+    corners = {"e": (1.0, 0.0), "n": (0.0, 1.0), "w": (-1.0, 0.0), "s": (0.0, -1.0)}
+    data = {
+        "name": "meeting", "duration_s": duration_s, "decision": {"threshold": {"zeta_m": 0.2}, "release_m": 0.1},
+        "ugvs": {
+            name: {"start_m": [x, y, 0.0], "target_m": [-x, -y, 0.0], "max_speed_m_s": 6.0}
+            | {"preset": {"waypoints_m": [[x, y, 0.0], [-x, -y, 0.0]], "speed_m_s": 1.0}}
+            for name, (x, y) in ((name, (0.7071068518972258 * x, 0.7071068518972258 * y))
+                                 for name, (x, y) in corners.items())
+        },
+        "uav": {"start_m": [0.0, 0.0, 2.0], "target_m": [0.0, 0.0, 2.0], "altitude_m": 2.0, "max_speed_m_s": 10.0},
+        "safe_distance": dict.fromkeys(("obstacle_m", "ugv_m", "air_ground_m"), safe_m) | {"collision_m": safe_m / 50},
+        "control": {"sensing_range_m": 2.0}, "runs": {run: {"method": run}},
+        "intervention": {"policies": [{"name": "towards", "parameters": {"x_m": 0.0, "y_m": 0.0, "speed_m_s": 1e5}}]},
+    }  # fmt: skip
+    assert held("GATE-MODEL", simulate(from_data(data, "meeting"), run))["unstable"] > 0
