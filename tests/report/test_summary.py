@@ -55,8 +55,10 @@ def document(runs: dict[str, Document | None], *claims: Document, **more: Any) -
         for name, each in runs.items()
     }
     resolved = {
-        "runs": specs, "ugvs": {"ugv1": {"target_m": TARGET}}, "uav": {"name": "uav", "target_m": [0.0, 9.0, 2.0]},
+        "runs": specs, "ugvs": {"ugv1": {"target_m": TARGET, "max_speed_m_s": 9.0, "preset": {"speed_m_s": 1.0}}},
+        "uav": {"name": "uav", "target_m": [0.0, 9.0, 2.0]},
         "arrival_tolerance_m": 0.1, "decision": {"min_inter_event_s": 0.5, "trigger": "automaton"},
+        "control": {"period_s": 0.05},
     }  # fmt: skip
     return {
         "scenario": {"resolved": resolved}, "runs": there, "reproduction": [row("reproduced")],
@@ -199,25 +201,97 @@ def test_refuted_triggers_and_gaps() -> None:
     ]
 
 
+def quality(run: str, status: str = "holds", margin: float = 0.9, **found: Any) -> Document:
+    """THR-QUALITY of a run, with so many decisions of each kind."""
+    counts = {kind: found.pop(kind, 0) for kind in ("served", "early", "false", "missed")}
+    evidence = {"counts": counts, "latest": None, "earliest": None, "ddm": {}} | found
+    return claim("THR-QUALITY", run, status, margin=margin, evidence=evidence)
+
+
+AGAINST = "Against the task error without noise"
+BEST = "the Bayes optimum 2.992 m for the assumed 6 m/s and 10 m/√s."
+OFTEN_WRONG: Document = {
+    "drift_m_s": 0.56, "noise_m_sqrt_s": 10.0, "error_rate": 5 / 7, "error_rate_of_18": 0.4916, "decision_time_s": 8.3,
+    "decision_time_of_17_s": 0.09, "decision_time_without_noise_s": 5.35,
+}  # fmt: skip
+
+
+def test_the_trigger_follows_its_variable_and_that_is_not_the_task_error() -> None:
+    """Both are said: none missed by its own variable, and how late, early, false and missed without the noise."""
+    late, early = {"late_s": 5.07, "error_m": 5.84}, {"late_s": -0.2, "error_m": 2.5}
+    runs = {name: run(name, D, TARGET, TRIGGER) for name in "abcd"}
+    found = document(
+        runs, *(claim("THR-TRIG", name) for name in runs),
+        quality("a", "refuted", -3.9, served=2, false=8, missed=1, latest=late, ddm={"ugv1": OFTEN_WRONG}),
+        quality("b", served=1, earliest=early), quality("d", served=1, earliest=early),
+        claim("THR-QUALITY", "c", "error"),
+    )  # fmt: skip
+    assert lines(found, "Threshold?") == [
+        ("yes", "Fired at 3 m, at 14.479 s. Follows its own variable exactly: none missed, none spurious."),
+        ("open", "c: not compared with the task error without noise (THR-QUALITY)."),
+        ("no", f"{AGAINST} (a): up to 5.07 s late (at 5.84 m), 8 of 10 false alarms, 1 missed."),
+        ("yes", f"{AGAINST} (b, d): up to 0.20 s early (at 2.50 m), no false alarm, none missed."),
+        ("", "Decisions about ugv1 in run a: 71 % wrong, 8.3 s in the mean. "
+             "By (17)-(18), for its 0.56 m/s and 10 m/√s: 49 % wrong, 0.09 s."),
+    ]  # fmt: skip
+
+
 @pytest.mark.parametrize(
-    ("extra", "real", "marks", "told"),
+    ("rule", "kind", "extra", "drift", "told"),
     [
-        (3e-7, 0.28, ["yes", "partly"], "3 m calls the UAV late"),
-        (0.02, 4.0, ["partly", "partly"], "3 m calls the UAV early"),
-        (0.02, None, ["partly"], "the risk is 5 % higher"),
+        ("fixed", "declared", 3e-7, 6.0, ("yes", f"3 m, set by hand (rule fixed), costs no more than {BEST}")),
+        ("printed", "declared", 0.02, 6.0,
+         ("partly", f"3 m, by (19) as printed (rule printed), costs 5 % more risk than {BEST}")),
+        ("printed", "declared", 1.0, 6.0,
+         ("partly", f"3 m, by (19) as printed (rule printed), costs 3.5 times the risk of {BEST}")),
+        ("bayes", "optimal", 0.0, 6.0, ("yes", "3 m is the Bayes optimum for the assumed 6 m/s and 10 m/√s.")),
+        ("bayes", "optimal", 0.0, 11.0, ("none", "3 m is the Bayes optimum for the assumed 11 m/s and 10 m/√s; no task "
+                                                 "error here grows faster than 10 m/s.")),
+    ],
+)  # fmt: skip
+def test_which_rule_gave_the_threshold_and_what_it_costs_for_the_assumed_numbers(
+    rule: str, kind: str, extra: float, drift: float, told: tuple[str, str]
+) -> None:
+    assert lines(chosen(rule, kind, extra, {}, drift), "Threshold?")[-1] == told
+
+
+@pytest.mark.parametrize(
+    ("noise", "best", "extra", "mark", "told"),
+    [
+        (0.004, 0.00016, 2.68, "partly", "0.00016 m is best, and 3 m costs as much as a delay of 5.4 s."),
+        (0.0, 0.0, 2.68, "partly", "the lower, the better, and 3 m costs as much as a delay of 5.4 s."),
+        (10.0, 2.99, 1e-4, "yes", "too, no threshold is better."),
     ],
 )
-def test_a_threshold_is_good_or_bad_for_the_assumed_drift_and_for_that_of_the_run(
-    extra: float, real: float | None, marks: list[str], told: str
+def test_what_the_threshold_costs_for_the_numbers_of_the_run(
+    noise: float, best: float, extra: float, mark: str, told: str
 ) -> None:
+    """The drift and the noise are both the run's."""
+    row = {"drift_m_s": 0.56, "noise_m_sqrt_s": noise, "threshold_m": 3.0, "optimum_m": best, "extra_risk": extra}
+    better = row | {"drift_m_s": 0.9, "extra_risk": 0.0}
+    found = lines(chosen("fixed", "declared", 0.0, {"a ugv1": row, "b ugv1": better}), "Threshold?")
+    assert found[-1][0] == mark
+    assert found[-1][1].startswith(f"ugv1 had 0.56 m/s and {noise:g} m/√s in run a: for these, ")
+    assert found[-1][1].endswith(told)
+
+
+def chosen(rule: str, kind: str, extra: float, runs: Document, drift: float = 6.0) -> Document:
+    """A report in which THR-CHOICE compares thresholds."""
     evidence = {
-        "kind": "declared", "threshold_in_force_m": 3.0, "optimal_threshold_m": 2.992, "extra_risk": extra,
-        "least_risk": 0.4, "runs": {"a ugv1": {"optimum_for_this_drift_m": real, "drift_m_s": 0.56}},
+        "kind": kind, "rule": rule, "threshold_in_force_m": 3.0, "optimal_threshold_m": 2.992, "extra_risk": extra,
+        "least_risk": 0.4, "runs": runs,
     }  # fmt: skip
-    chosen = claim("THR-CHOICE", evidence=evidence, inputs={"drift_m_s": 6.05})
-    found = lines(document({"a": run("a", D, TARGET, TRIGGER)}, chosen), "Threshold?")
-    assert [mark for mark, _ in found] == marks
-    assert told in found[-1][1]
+    inputs = {"drift_m_s": drift, "noise_m_sqrt_s": 10.0, "c1_1_s": 0.5, "c2": 1.0}
+    return document({"a": run("a", D, TARGET, TRIGGER)}, claim("THR-CHOICE", evidence=evidence, inputs=inputs))
+
+
+@pytest.mark.parametrize(("dwell_s", "mark"), [(0.5, "yes"), (0.05, "yes"), (0.049, "partly"), (1e-6, "partly")])
+def test_a_dwell_below_the_control_period_is_no_protection(dwell_s: float, mark: str) -> None:
+    found = document({"d": run("d")}, *PROVED)
+    found["scenario"]["resolved"]["decision"]["min_inter_event_s"] = dwell_s
+    (first, *_) = lines(found, "Zeno-free?")
+    assert first[0] == mark
+    assert ("No practical protection: that is shorter than the control period, 0.05 s" in first[1]) == (mark != "yes")
 
 
 def test_a_scenario_without_a_counterpart_has_a_table_of_methods() -> None:
