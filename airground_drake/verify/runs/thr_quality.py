@@ -150,15 +150,15 @@ class ThrQuality(TraceClaim):
             if drift is not None and drift > 0.0:
                 ddm[ugv] = _ddm(own, zeta, drift, trace.scenario.decision.noise_m_sqrt_s)
         counts = Counter(one.kind for one in decisions)
-        timed = [one for one in decisions if one.late_s is not None and one.kind != "missed"]
-        late = [one for one in timed if one.late_s > EVENT_TOLERANCE_S]
-        early = [one for one in timed if one.late_s < -EVENT_TOLERANCE_S]
+        timed = [(one.late_s, k) for k, one in enumerate(decisions) if one.late_s is not None and one.kind != "missed"]
+        late = max((each for each in timed if each[0] > EVENT_TOLERANCE_S), default=None)
+        early = min((each for each in timed if each[0] < -EVENT_TOLERANCE_S), default=None)
         evidence = Quality(
             zeta,
             tolerance,
             {kind: counts[kind] for kind in ("served", "early", "false", "missed")},
-            max(late, key=lambda one: one.late_s, default=None),
-            min(early, key=lambda one: one.late_s, default=None),
+            decisions[late[1]] if late else None,
+            decisions[early[1]] if early else None,
             decisions,
             ddm,
         )
