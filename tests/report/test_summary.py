@@ -300,13 +300,18 @@ def test_a_scenario_without_a_counterpart_has_a_table_of_methods() -> None:
     runs = {
         "a": run("a", end=STUCK), "b": run("b", 0.495, TARGET, proposed), "d": run("d", D, TARGET, proposed, accepted),
         "c": run("c", D, STUCK, proposed, refused, refused, gatekeeper=waits),
+        "d2": run("d", D, STUCK) | {"faults": [{}, {}]},
+        "d3": run("d", D, TARGET, proposed, accepted) | {"faults": [{}]},
     }  # fmt: skip
-    screen = summary.first_screen(document(runs, *PROVED, claim("SAFE-HYP", "d"), reproduction=[]))
+    met = [claim("SAFE-HYP", name) for name in ("d", "d2", "d3")]
+    screen = summary.first_screen(document(runs, *PROVED, *met, reproduction=[]))
     assert [(each.run, *each.safe, each.arrived.text, each.interventions) for each in screen.rows] == [
         ("a", "yes", "2.000 m, not proved", "0 of 1", "none"),
         ("b", "no", "0.495 m (ugv1 to rock)", "1 of 1", "1 obeyed"),
         ("d", "yes", "2.000 m, proved", "1 of 1", "1 accepted"),
         ("c", "yes", "2.000 m, not proved", "0 of 1", "2 refused: waiting looked cheaper"),
+        ("d2", "yes", "2.000 m, proved", "0 of 1", "policy failed 2 times"),
+        ("d3", "yes", "2.000 m, proved", "1 of 1", "1 accepted; policy failed 1 time"),
     ]
     assert screen.required == "1 to 2 m"
     assert [answer.question for answer in screen.answers] == ["Zeno-free?", "Threshold?"]
