@@ -303,6 +303,7 @@ RUN_CLAIMS = Registry(
         "EXEC": "airground_drake.verify.runs.exec:Exec",
         "ZENO-TRACE": "airground_drake.verify.runs.zeno_trace:ZenoTrace",
         "THR-TRIG": "airground_drake.verify.runs.thr_trig:ThrTrig",
+        "THR-QUALITY": "airground_drake.verify.runs.thr_quality:ThrQuality",
         "GATE-OPT": "airground_drake.verify.runs.gate_opt:GateOpt",
         "GATE-FEAS": "airground_drake.verify.runs.gate_feas:GateFeas",
         "GATE-MODEL": "airground_drake.verify.runs.gate_model:GateModel",

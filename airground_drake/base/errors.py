@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from pathlib import PurePath
-from traceback import walk_tb
+from traceback import extract_tb, format_list, walk_tb
 
 VALUE_WIDTH = 120
 """Longer values are cut in messages, characters."""
 FAULT_WIDTH = 300
 """Longer messages of third-party code are cut, characters."""
+TRACEBACK_CHARS = 4000
+"""Of longer tracebacks of third-party code only the end is kept, characters."""
 
 
 class AirgroundError(Exception):
@@ -75,7 +77,16 @@ class PluginError(AirgroundError):
 
 
 class PolicyError(AirgroundError):
-    """A policy's process failed: the policy's own exception, or how the process ended, in words."""
+    """A policy's process failed: the policy's own exception, or how the process ended, in words.
+
+    Attributes:
+        traceback: of the policy's own exception, see `traceback_of`; '' if there is none.
+    """
+
+    def __init__(self, what: str, traceback: str = "") -> None:
+        """See the attributes."""
+        super().__init__(what)
+        self.traceback = traceback
 
 
 class ReportError(AirgroundError):
@@ -131,6 +142,23 @@ def described(error: BaseException, function: object = None) -> str:
     except BaseException:  # its text is third-party code, too
         text = "an exception that cannot be put into words"
     return one_line(text)
+
+
+def traceback_of(error: BaseException) -> str:
+    """The traceback of an exception of third-party code, from the function that this package called.
+
+    Its lines are printable, its length is bounded, and files are named without their folders.
+    """
+    frames = extract_tb(error.__traceback__)[1:]
+    for frame in frames:
+        frame.filename = PurePath(frame.filename).name
+    lines = "".join(format_list(frames)).splitlines()
+    return printable("\n".join(["Traceback (most recent call last):", *lines, described(error)]))
+
+
+def printable(text: str) -> str:
+    """The last `TRACEBACK_CHARS` of a text of third-party code, with each line as by `one_line`."""
+    return "\n".join(map(one_line, text[-TRACEBACK_CHARS:].split("\n")))
 
 
 def _place(error: BaseException, function: object) -> str:

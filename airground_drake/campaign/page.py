@@ -135,8 +135,8 @@ def _histogram(values: Array, title: str, label: str, mark: float | None) -> tup
     with canvas.style():
         figure = Figure(figsize=(canvas.WIDE_IN, 2.2))
         axes = figure.add_axes((0.16, 0.26, 0.8, 0.6))
-        low, high = float(values.min()), float(values.max())
-        span = max(high - low, 1e-9 * max(1.0, abs(high)))
+        low, high = canvas.interval(values)
+        span = high - low
         counts, edges = np.histogram(values, bins=BARS, range=(low - 0.01 * span, high + 0.01 * span))
         axes.stairs(counts, edges, fill=True, color="#9db8d2", edgecolor=canvas.INK, linewidth=0.6)
         ends = [edges[0], edges[-1], *([] if mark is None else [mark])]

@@ -10,7 +10,7 @@ judged again by the claims' own code from the same files.
     run                   a trace that belongs to its run and obeys its law of motion
     safety                SAFE-TRACE: distances in continuous time; SAFE-HYP: the avoidance inequalities, exactly
     positions             positions that come from elsewhere: `airground judge`
-    triggers              ZENO-TRACE, THR-TRIG
+    triggers              ZENO-TRACE, THR-TRIG, THR-QUALITY
     events                triggers, messages, answers, arrivals, collisions
     verdicts              expectations, and the verdict over all claims
     report, command       all checks, one line each; the command line

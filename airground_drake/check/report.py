@@ -15,7 +15,7 @@ from .limits import at_most_s, is_of_a_size
 from .rules import SMALL, Disagreement, Found, NotEstablished, close, holds, same
 from .run import Run, read_run
 from .safety import safe_hyp, safe_trace
-from .triggers import thr_trig, zeno_trace
+from .triggers import thr_quality, thr_trig, zeno_trace
 from .verdicts import NOT_EXERCISED, UNDECIDED, check_expectation, check_files, check_overall, outcome_of
 
 AGREES, DISAGREES, OPEN = "agrees", "DISAGREES", "cannot be checked"
@@ -25,6 +25,7 @@ DECIDED: Mapping[str, Callable[[Run], Found]] = {
     "SAFE-HYP": safe_hyp,
     "ZENO-TRACE": zeno_trace,
     "THR-TRIG": thr_trig,
+    "THR-QUALITY": thr_quality,
 }
 """The claims that the checker decides by its own formulas; for the others it checks the expectation only."""
 

@@ -1,7 +1,11 @@
-"""ZENO-TRACE and THR-TRIG: the trigger (20), run again on the decision variable of (15)."""
+"""ZENO-TRACE and THR-TRIG: the trigger (20), run again on the decision variable of (15).
+
+THR-QUALITY: the same triggers against the task error without noise.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise, zip_longest
 from typing import NamedTuple
@@ -64,10 +68,15 @@ class Variable:
 
 
 def decision_variable(run: Run, ugv: str) -> Variable:
-    """The decision variable from positions, preset and noise, cut at the preset's corners and at x's turning points."""
+    """The decision variable from positions, preset and noise."""
+    return _variable(run, ugv, run.column(f"{ugv}.noise_m"))
+
+
+def _variable(run: Run, ugv: str, noise_m: Array) -> Variable:
+    """x with this noise, (T,), m, cut at the preset's corners and at x's turning points."""
     corners = run.presets[ugv].corner_s
     t = np.union1d(run.t_s, corners[(corners > run.t_s[0]) & (corners < run.t_s[-1])])
-    moving = np.column_stack([run.position_m[ugv], run.column(f"{ugv}.noise_m")])
+    moving = np.column_stack([run.position_m[ugv], noise_m])
     parts = _interpolated(run.t_s, moving, t)
     parts[:, :3] = run.presets[ugv].position_m(t) - parts[:, :3]
     knots = np.union1d(t, _turning_points_s(t, parts))
@@ -223,3 +232,62 @@ def _columns_follow_the_events(run: Run, ugv: str) -> None:
         if kind == "trigger":
             count = run.column(f"{ugv}.triggers")
             holds("column triggers", (count == before) | (count == after), count, after, about=ugv, t_s=run.t_s)
+
+
+def thr_quality(run: Run) -> Found:
+    """THR-QUALITY: at triggers, and where none comes, the error without noise is within w of the threshold.
+
+    w is the width of the hysteresis; half the threshold for the bare trigger.
+    """
+    zeta, release = run.levels.zeta_m, run.levels.release_m
+    tolerance = zeta - release if release < zeta else zeta / 2.0
+    off: list[float] = []
+    for ugv in run.ugvs:
+        error = _variable(run, ugv, np.zeros(len(run.t_s)))
+        triggers, releases = run.times_s(ugv, "trigger").tolist(), run.times_s(ugv, "release").tolist()
+        off += _off_m(error, run.levels, tolerance, triggers, releases)
+    if not off:
+        return Found("holds", exercised=(0, 0))
+    margin = tolerance - max(off)
+    return Found("holds" if margin >= 0.0 else "refuted", margin, (len(off), len(off)))
+
+
+def _off_m(
+    error: Variable, levels: Levels, tolerance: float, triggers: list[float], releases: list[float]
+) -> Iterator[float]:
+    """How far the error was from the threshold: at each trigger, and in each excursion that is missed."""
+    begin_s, end_s = float(error.t_s[0]), float(error.t_s[-1])
+    for trigger in [*triggers, None]:
+        until = end_s if trigger is None else trigger
+        found = list(_excursions(error, levels, min(begin_s, until), until))
+        serves = trigger is not None and bool(found) and found[-1][1] == until
+        missed = [_largest(error, *each) - levels.zeta_m for each in (found[:-1] if serves else found)]
+        yield from (above for above in missed if above > tolerance)
+        if trigger is None:
+            continue
+        if not serves:
+            yield max(levels.zeta_m - error.at(trigger), 0.0)
+        else:
+            late = trigger - found[-1][0] > EVENT_S
+            yield max(_largest(error, found[-1][0], trigger) - levels.zeta_m, 0.0) if late else 0.0
+        after = [release for release in releases if release >= trigger]
+        if not after:  # triggered to the end
+            return
+        begin_s = max(after[0], trigger + levels.dwell_s)
+
+
+def _excursions(error: Variable, levels: Levels, begin_s: float, end_s: float) -> Iterator[tuple[float, float]]:
+    """When the error reaches the threshold or is there, and when it falls below the release level, at most the end."""
+    at_s: float | None = begin_s
+    while at_s is not None and at_s <= end_s:
+        start = at_s if error.at(at_s) >= levels.zeta_m else error.reaches(levels.zeta_m, at_s, above=True)
+        if start is None or start > end_s:
+            return
+        at_s = error.reaches(levels.release_m, start, above=False)
+        yield start, end_s if at_s is None else min(at_s, end_s)
+
+
+def _largest(error: Variable, begin_s: float, end_s: float) -> float:
+    """Largest error between two times, m."""
+    inside = error.x_m[(error.t_s >= begin_s) & (error.t_s <= end_s)]
+    return max(error.at(begin_s), error.at(end_s), *inside.tolist())

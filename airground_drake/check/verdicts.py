@@ -15,7 +15,7 @@ EXIT_CODES = {"as_expected": 0, "not_as_expected": 1, "inconclusive": 3}
 FINDINGS = 25
 """Number of findings about the paper in a report of `report audit`."""
 
-EVERY_RUN = ("SAFE-TRACE", "SAFE-HYP", "EXEC", "ZENO-TRACE", "THR-TRIG", "LIVE-GOAL")
+EVERY_RUN = ("SAFE-TRACE", "SAFE-HYP", "EXEC", "ZENO-TRACE", "THR-TRIG", "THR-QUALITY", "LIVE-GOAL")
 BY_METHOD = {
     "a": (),
     "b": ("COMM",),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import sys
 from collections.abc import Iterator, Sequence
 from threading import Event
 from typing import TYPE_CHECKING
@@ -31,6 +32,7 @@ def parser() -> argparse.ArgumentParser:
     overridable(parser)
     parser.add_argument("--seed", type=int, metavar="N", help="seed of the decision noise")
     parser.add_argument(plugins.OPTION, action="store_true", help=plugins.HELP)
+    parser.add_argument(plugins.SHOW, action="store_true", help=plugins.SHOW_HELP)
     return parser
 
 
@@ -52,7 +54,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     from airground_drake.run import trace as traces
     from airground_drake.run.simulation import simulate
 
-    with plugins.admitted(scenario, options.scenario, allow=options.allow_plugins):
+    with (
+        plugins.admitted(scenario, options.scenario, allow=options.allow_plugins),
+        plugins.shown(options.show_policy_output),
+    ):
         if options.meshcat:
             from airground_drake.view.draw import served
             from airground_drake.view.live_view import LiveView
@@ -68,6 +73,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if options.output is not None:
         traces.save(trace, options.output)
     print("\n".join(_said(trace)), flush=True)
+    if trace.meta["faults"]:
+        from airground_drake.report import attention
+
+        print("\n".join(attention.failures({name: trace.meta["faults"]})), file=sys.stderr)
     if options.meshcat:
         Event().wait()  # the page stays until the process is interrupted
     return 0

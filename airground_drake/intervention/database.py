@@ -12,7 +12,7 @@ from typing import Any, Literal, Self, get_args
 
 import numpy as np
 
-from airground_drake.base.errors import PolicyError, described
+from airground_drake.base.errors import PolicyError, described, traceback_of
 from airground_drake.geometry.motion import Motion
 from airground_drake.intervention.guest.process import GuestPolicy
 from airground_drake.intervention.guest.time_limit import OutOfTime, time_limit
@@ -84,12 +84,13 @@ class Negotiation:
 
 @dataclass(frozen=True)
 class Fault:
-    """A policy's failure, which counted as no intervention: time, s, UGV, policy, and what went wrong."""
+    """A policy's failure, which counted as no intervention: time, s, UGV, policy, what went wrong, traceback."""
 
     t: float
     robot: str
     policy: str
     what: str
+    traceback: str = ""
 
 
 class BehaviourDatabase:
@@ -194,9 +195,10 @@ class BehaviourDatabase:
             with nullcontext() if policy.counted else time_limit(self.budget):
                 return motions_of(policy.propose(seen if isinstance(policy, GuestPolicy) else seen.fresh()), seen)
         except PolicyError as fault:
-            faults.append(Fault(seen.t, seen.robot, name, str(fault)))
+            faults.append(Fault(seen.t, seen.robot, name, str(fault), fault.traceback))
         except (Exception, OutOfTime, SystemExit) as error:  # no failure of a policy may stop the UAV
-            faults.append(Fault(seen.t, seen.robot, name, described(error, type(policy).propose)))
+            what = described(error, type(policy).propose)
+            faults.append(Fault(seen.t, seen.robot, name, what, traceback_of(error)))
         return {}
 
 

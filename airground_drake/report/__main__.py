@@ -92,10 +92,13 @@ def _reported(options: argparse.Namespace, command: str) -> int:
     wanted = make.Wanted(options.format, command, kept, audited, limits, options.seeds)
     with (
         plugins.admitted(scenario, options.scenario, allow=options.allow_plugins),
+        plugins.shown(options.show_policy_output),
         progress_bar(quiet=options.quiet, verbose=options.verbose) as progress,
     ):
         report = make.write_report(scenario, digest, output, wanted, progress)
     overall = report["overall"]
+    for line in attention.failures({name: run["faults"] for name, run in report["runs"].items()}):
+        print(line, file=sys.stderr)
     if not options.quiet:
         for item in attention.beforehand(report):
             print(f"{item.words}{f', run {item.run}' if item.run else ''}")
@@ -132,6 +135,7 @@ def parser() -> argparse.ArgumentParser:
         "--no-cache", action="store_true", help="redo every proof instead of reusing one whose inputs are unchanged"
     )
     parser.add_argument(plugins.OPTION, action="store_true", help=plugins.HELP)
+    parser.add_argument(plugins.SHOW, action="store_true", help=plugins.SHOW_HELP)
     parser.add_argument(
         "--limit-steps", type=positive, default=DEFAULT_LIMITS.work, metavar="N",
         help="refuse a scenario that asks for more: robots moved by one step, over all runs (default: %(default).0g)",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import chain
-from math import dist, log
+from math import dist
 from typing import Any, NamedTuple
 
 from airground_drake.base.statuses import NOTHING, PASSING, UNDECIDED
@@ -27,6 +27,12 @@ from airground_drake.report.phrases import (
 
 NEGLIGIBLE = 1e-3
 """A risk that exceeds the smallest one by less than this share counts as the smallest."""
+NEGLIGIBLE_S = 0.01
+"""A risk that exceeds the smallest one by less than this delay costs counts as the smallest, s."""
+MAX_TOLD = 2
+"""Maximum number of lines about triggers and the task error."""
+RULES = {"fixed": "set by hand (rule fixed)", "printed": "by (19) as printed (rule printed)", "bayes": "rule bayes"}
+"""Where a threshold comes from, by rule."""
 _MATCHES = {"reproduced": "without tuning", "calibrated": "after calibration"}
 _VOID = ": nothing after that counts"
 _REST = {"by_construction": "by construction", "ambiguous": "ambiguous", "not_reproduced": "not reproduced"}
@@ -199,10 +205,11 @@ def _runs(document: Document, every: Sequence[Course]) -> Iterator[Line]:
 
 
 def _zeno(document: Document) -> Iterator[Line]:
-    decision = document["scenario"]["resolved"]["decision"]
+    resolved = document["scenario"]["resolved"]
+    decision = resolved["decision"]
     for status in (claim["status"] for claim in claims(document, "ZENO-PROOF", run="")):
         if status == "proved":
-            yield Line("yes", f"Proved: triggers are at least {decision['min_inter_event_s']:g} s apart.")
+            yield _dwell(decision["min_inter_event_s"], resolved["control"]["period_s"])
         else:
             bare = ", as the trigger is the bare threshold" if decision["trigger"] == "bare" else ""
             mark = "no" if status == "refuted" else "open"
@@ -222,6 +229,14 @@ def _zeno(document: Document) -> Iterator[Line]:
         yield Line("", f"These runs cannot show it: {why}. Scenario dwell does.")
 
 
+def _dwell(dwell_s: float, period_s: float) -> Line:
+    """The proved minimum inter-event time; shorter than a control period it keeps nothing apart that matters."""
+    told = f"Proved: triggers are at least {dwell_s:g} s apart"
+    if dwell_s >= period_s:
+        return Line("yes", f"{told}.")
+    return Line("partly", f"{told}. No practical protection: that is shorter than the control period, {period_s:g} s.")
+
+
 def _threshold(document: Document) -> Iterator[Line]:
     of_runs = claims(document, "THR-TRIG")
     bad = [claim for claim in of_runs if claim["status"] == "refuted"]
@@ -238,31 +253,95 @@ def _threshold(document: Document) -> Iterator[Line]:
         times = sorted({round(event["t_s"], 3) for event in fired})
         in_runs = f" in {len(runs)} runs" if len(runs) > 1 else ""
         when = f"at {times[0]:.3f} s" if len(times) == 1 else f"{len(fired)} times{in_runs}, first at {times[0]:.3f} s"
-        yield Line("yes", f"Fired at {zeta} m, {when}; none missed, none spurious.")
+        yield Line("yes", f"Fired at {zeta} m, {when}. Follows its own variable exactly: none missed, none spurious.")
+    yield from _quality(document)
     for claim in claims(document, "THR-CHOICE"):
         if "optimal_threshold_m" in claim["evidence"]:
-            yield from _choice(claim["evidence"], claim["inputs"])
+            yield _choice(document, claim["evidence"], claim["inputs"])
+            yield from _for_own_numbers(claim["evidence"], claim["inputs"])
 
 
-def _choice(found: Mapping[str, Any], assumed: Mapping[str, Any]) -> Iterator[Line]:
-    """How good the threshold is: for the assumed drift, and for the drift in the runs that calls for another most."""
+def _quality(document: Document) -> Iterator[Line]:
+    """How the triggers compare with the task error without noise; where badly, beside (17)-(18)."""
+    of_runs = claims(document, "THR-QUALITY")
+    if unknown := [claim["run"] for claim in of_runs if claim["status"] in UNDECIDED]:
+        yield Line("open", f"{', '.join(unknown)}: not compared with the task error without noise (THR-QUALITY).")
+    tested = [claim for claim in of_runs if claim["status"] not in UNDECIDED and claim["exercised"]]
+    tested.sort(key=lambda claim: float(claim["margin"]))
+    told = grouped(((claim["status"] == "refuted", _timing(claim["evidence"])), claim["run"]) for claim in tested)
+    for (bad, timing), names in list(told.items())[:MAX_TOLD]:
+        where = f" ({', '.join(names)})" if len(told) > 1 else ""
+        yield Line("no" if bad else "yes", f"Against the task error without noise{where}: {timing}.")
+    if others := [name for names in list(told.values())[MAX_TOLD:] for name in names]:
+        yield Line("", f"{', '.join(others)}: less far off.")
+    if tested and tested[0]["status"] == "refuted" and (ddm := tested[0]["evidence"]["ddm"]):
+        ugv = max(ddm, key=lambda name: ddm[name]["error_rate"] or 0.0)
+        yield Line("", _beside_the_ddm(tested[0]["run"], ugv, ddm[ugv]))
+
+
+def _timing(found: Mapping[str, Any]) -> str:
+    """How late, how early, how often false or missed the triggers of a run were."""
+    off = []
+    for side, word in (("latest", "late"), ("earliest", "early")):
+        if (one := found[side]) and abs(one["late_s"]) >= 0.005:
+            off.append(f"up to {abs(one['late_s']):.2f} s {word} (at {one['error_m']:.2f} m)")
+    counts = found["counts"]
+    fired = sum(counts.values()) - counts["missed"]
+    wrong = f"{counts['false']} of {fired} false alarms" if counts["false"] else "no false alarm"
+    missed = f"{counts['missed']} missed" if counts["missed"] else "none missed"
+    return ", ".join([*off, wrong, missed])
+
+
+def _beside_the_ddm(run: str, ugv: str, of: Mapping[str, Any]) -> str:
+    """Error rate and decision time of a UGV beside (17)-(18)."""
+    given = f"{of['drift_m_s']:.2g} m/s and {of['noise_m_sqrt_s']:g} m/√s"
+    mean = f", {of['decision_time_s']:.2g} s in the mean" if of["decision_time_s"] is not None else ""
+    due = f"{100 * of['error_rate_of_18']:.2g} % wrong, {of['decision_time_of_17_s']:.2g} s"
+    wrong = f"{100 * (of['error_rate'] or 0):.2g} % wrong"
+    return f"Decisions about {ugv} in run {run}: {wrong}{mean}. By (17)-(18), for its {given}: {due}."
+
+
+def _choice(document: Document, found: Mapping[str, Any], assumed: Mapping[str, Any]) -> Line:
+    """Which rule gave the threshold, for which drift and noise, and what it costs against the optimum for these."""
     zeta, best = found["threshold_in_force_m"], found["optimal_threshold_m"]
     excess = found["extra_risk"] / found["least_risk"]
+    given = f"{assumed['drift_m_s']:.4g} m/s and {assumed['noise_m_sqrt_s']:.4g} m/√s"
+    fastest = max(ugv["max_speed_m_s"] + ugv["preset"]["speed_m_s"] for ugv in _ugvs(document))
+    too_fast = assumed["drift_m_s"] > fastest
+    mark = "none" if too_fast else "yes" if excess < NEGLIGIBLE else "partly"
     if found["kind"] != "declared":
-        yield Line("yes", f"{zeta:.4g} m is the Bayes optimum for the assumed drift and noise.")
-    elif excess < NEGLIGIBLE:
-        told = f"is as good as the Bayes optimum {best:.4g} m for the assumed drift"
-        yield Line("yes", f"{zeta:.4g} m, set by hand, {told}, {assumed['drift_m_s']:.4g} m/s.")
+        told = f" is the Bayes optimum for the assumed {given}"
     else:
-        told = f"the Bayes optimum for the assumed drift of {assumed['drift_m_s']:.4g} m/s is {best:.4g} m"
-        yield Line("partly", f"{zeta:.4g} m was chosen by hand; {told}, and the risk is {100 * excess:.2g} % higher.")
-    wanted = {name: row["optimum_for_this_drift_m"] for name, row in found.get("runs", {}).items()}
-    if off := {name: abs(log(other / zeta)) for name, other in wanted.items() if other}:
-        name = max(off, key=off.__getitem__)
-        run, _, robot = name.partition(" ")
-        late = f"{zeta:.4g} m calls the UAV {'late' if zeta > wanted[name] else 'early'}"
-        told = f"{robot} drifted at {found['runs'][name]['drift_m_s']:.2g} m/s: for that, {wanted[name]:.2g} m is best"
-        yield Line("partly", f"In run {run}, {told}, and {late}.")
+        cost = "costs no more than" if excess < NEGLIGIBLE else f"costs {_more(excess)}"
+        told = f", {RULES[found['rule']]}, {cost} the Bayes optimum {best:.4g} m for the assumed {given}"
+    never = f"; no task error here grows faster than {fastest:.3g} m/s" if too_fast else ""
+    return Line(mark, f"{zeta:.4g} m{told}{never}.")
+
+
+def _ugvs(document: Document) -> list[Mapping[str, Any]]:
+    return list(document["scenario"]["resolved"]["ugvs"].values())
+
+
+def _more(excess: float) -> str:
+    """An excess, relative, in words before "the optimum"."""
+    return f"{100 * excess:.2g} % more risk than" if excess < 1.0 else f"{1.0 + excess:.2g} times the risk of"
+
+
+def _for_own_numbers(found: Mapping[str, Any], assumed: Mapping[str, Any]) -> Iterator[Line]:
+    """What the threshold costs for the drift and the noise of the run that asks for another one most, in seconds."""
+    rows = found.get("runs", {})
+    if not rows:
+        return
+    name = max(rows, key=lambda name: rows[name]["extra_risk"])
+    row, (run, _, robot) = rows[name], name.partition(" ")
+    cost_s, best = row["extra_risk"] / assumed["c1_1_s"], row["optimum_m"]
+    told = f"{robot} had {row['drift_m_s']:.2g} m/s and {row['noise_m_sqrt_s']:g} m/√s in run {run}"
+    if cost_s < NEGLIGIBLE_S:
+        yield Line("yes", f"{told}: for these, too, no threshold is better.")
+    else:
+        ideal = f"{best:.2g} m is best" if best else "the lower, the better"
+        cost = f"{row['threshold_m']:.4g} m costs as much as a delay of {cost_s:.2g} s"
+        yield Line("partly", f"{told}: for these, {ideal}, and {cost}.")
 
 
 def _paper(document: Document) -> Iterator[Line]:

@@ -133,6 +133,19 @@ def beforehand(document: Mapping[str, Any]) -> Iterator[Item]:
         yield Item("inconclusive", f"{ends} ({max(longer.values()):.3g} s): they cannot be expected to arrive")
 
 
+def failures(faults: Mapping[str, Sequence[Mapping[str, Any]]]) -> Iterator[str]:
+    """For the terminal, from the faults of each run: how often each policy failed, and its first traceback, once."""
+    seen = set[str]()
+    for run, those in faults.items():
+        for policy, alike in grouped((str(fault["policy"]), fault) for fault in those).items():
+            often = f"failed {counted(len(alike), 'time')}, first at {alike[0]['t_s']:.2f} s"
+            yield one_line(f"run {run}: policy {policy} {often}: {alike[0]['what'][:MAX_FAULT_CHARS]}")
+            traceback = next((fault["traceback"] for fault in alike if fault.get("traceback")), "")
+            if traceback and traceback not in seen:
+                seen.add(traceback)
+                yield traceback
+
+
 def _of_faults(runs: Mapping[str, Mapping[str, Any]]) -> Iterator[Item]:
     for name, run in runs.items():
         kinds = faults_together(run["faults"])

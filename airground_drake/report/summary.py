@@ -170,10 +170,12 @@ def _interventions(document: Document, course: Course) -> str:
     """What became of the proposals of the UAV in a run."""
     run = document["runs"][course.name]
     kinds = Counter(event["kind"] for event in run["events"])
+    failed = f"policy failed {counted(len(run['faults']), 'time')}" if run.get("faults") else ""
     if not kinds["proposal"]:
-        return "none: no way found" if course.no_way else "none"
+        return f"{failed or 'none'}{': no way found' * bool(course.no_way)}"
+    failed = f"; {failed}" if failed else ""
     if course.method in METHODS and not METHODS[course.method].gated:
-        return f"{kinds['proposal']} obeyed"
+        return f"{kinds['proposal']} obeyed{failed}"
     answers = {"accepted": kinds["accept"], "refused": kinds["refuse"]}
     answered = [f"{count} {answer}" for answer, count in answers.items() if count]
     reasons = Counter[str]()
@@ -181,7 +183,7 @@ def _interventions(document: Document, course: Course) -> str:
         for reason, count in found.items():
             reasons[refusal(reason)] += count
     why = f": {reasons.most_common(1)[0][0]}" if kinds["refuse"] and reasons else ""
-    return f"{', '.join(answered) or 'no answer'}{why}"
+    return f"{', '.join(answered) or 'no answer'}{why}{failed}"
 
 
 def _beware(document: Document, every: Sequence[Course]) -> list[str]:

@@ -23,6 +23,7 @@ from airground_drake.gatekeeper.problem import Horizon, predicted_problem
 from airground_drake.gatekeeper.rollout import View
 from airground_drake.gatekeeper.routes.mixed_integer import MixedIntegerRoute
 from airground_drake.geometry.motion import Motion
+from airground_drake.intervention.database import Fault
 from airground_drake.intervention.policy import Proposal
 from airground_drake.nsbc.avoidance import Avoidance, Composition, Surroundings
 from airground_drake.nsbc.kernels import distances, news_within, within
@@ -172,12 +173,24 @@ class Recorder:
             "events": [],
             **read_back(model, context),
             "decision_block": "" if (kind := type(model.decision_block)) is DecisionVariable else kind.__qualname__,
-            "faults": [{"t_s": f.t, "robot": f.robot, "policy": f.policy, "what": f.what} for f in memory.faults],
+            "faults": _faults(memory.faults),
         }
         signals, proposals = _signals(t[keep], data, ugvs, robots), _proposals(ugvs, memory.sent)
         trace = Trace(meta, signals, decisions, timings, _problems(decided), proposals)
         meta["events"] = extract(trace, sent)
         return trace
+
+
+def _faults(faults: Sequence[Fault]) -> list[dict[str, Any]]:
+    """Entries of `Trace.meta["faults"]`; the first fault of each policy has a traceback, if it is known."""
+    told, found = set[str](), []
+    for fault in faults:
+        entry = {"t_s": fault.t, "robot": fault.robot, "policy": fault.policy, "what": fault.what}
+        if fault.traceback and fault.policy not in told:
+            entry["traceback"] = fault.traceback
+            told.add(fault.policy)
+        found.append(entry)
+    return found
 
 
 def read_back(model: Model, root: Context) -> dict[str, Any]:

@@ -123,7 +123,8 @@ class Trace:
             resolved scenario as nested dicts), `events` (list, by time), `controllers` (what the controllers were
             built with, read back from the diagram: see `systems.controllers.read_back`), `decision_block` (name of
             the class that computes the decision variables, read back from the diagram; empty for that of (15)),
-            `faults` (list of errors in policies and solvers).
+            `faults` (list of errors in policies: `t_s`, `robot`, `policy`, `what`; the first of a policy may have a
+            `traceback`).
         signals: see the module's docstring.
         decisions: see DECISION_COLUMNS.
         problems: see PROBLEM_ARRAYS.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import os
 import re
 import sys
 from collections.abc import Collection, Iterator
@@ -19,6 +20,8 @@ if TYPE_CHECKING:  # pydantic, which the schema imports, would delay `report --l
 
 OPTION = "--allow-plugins"
 HELP = "import and run what is named as module:Class or file.py:Class; looked for beside the scenario or spec, too"
+SHOW = "--show-policy-output"
+SHOW_HELP = "pass on what third-party policies print, to standard error"
 _POLICY = re.compile(r"intervention\.policies\.\d+\.name")
 WANTED = f"third-party code is imported and run only with {OPTION}"
 
@@ -74,6 +77,20 @@ def admitted(scenario: Scenario, source: str, *, allow: bool, keys: Collection[s
         refuse(scenario, source, keys)
     with beside(source, allow=allow):
         yield
+
+
+@contextmanager
+def shown(show: bool) -> Iterator[None]:
+    """In the body, and in processes that start there, what third-party policies print goes to standard error."""
+    from airground_drake.intervention.guest.process import SHOWN
+
+    before = dict(os.environ)
+    os.environ |= {SHOWN: "1"} if show else {}
+    try:
+        yield
+    finally:
+        if SHOWN not in before:
+            os.environ.pop(SHOWN, None)
 
 
 @contextmanager

@@ -16,6 +16,8 @@ from airground_drake.verify.model.theorem import Proof
 from airground_drake.verify.runs.followed import followed
 from airground_drake.verify.runs.proposals import accepted_at
 from airground_drake.verify.runs.safe_hyp import guarantees
+from airground_drake.verify.runs.thr_quality import drift_of
+from airground_drake.verify.runs.triggers import task_error
 
 Count = tuple[int, int]
 """How often a premise was met, and how many times it could have been."""
@@ -69,11 +71,21 @@ def with_counts(claim: str, finding: Finding, of_runs: Iterable[dict[str, Count]
 
 
 def measured(trace: Trace) -> dict[str, thr_choice.Measured]:
-    """What THR-CHOICE shows of a run: `thr_choice.of_run`; {} where records are missing or wrong, as in `counts`."""
+    """What THR-CHOICE shows of a run, by `run UGV`; {} where records are missing or wrong, as in `counts`.
+
+    A UGV whose task error did not grow to the threshold is left out.
+    """
+    found, decision = {}, trace.scenario.decision
     try:
-        return thr_choice.of_run(trace)
+        zeta = float(trace.meta["zeta_m"])
+        for ugv in trace.ugvs:
+            drift = drift_of(task_error(trace, ugv), zeta)
+            if drift is not None and drift > 0.0:
+                of_ugv = thr_choice.measured(zeta, drift, decision.noise_m_sqrt_s, decision.threshold)
+                found[f"{trace.run} {ugv}"] = of_ugv
     except (Exception, SystemExit):
         return {}
+    return found
 
 
 def with_runs(finding: Finding, of_runs: Iterable[dict[str, thr_choice.Measured]]) -> Finding:

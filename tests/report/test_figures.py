@@ -12,9 +12,12 @@ import matplotlib.figure
 import numpy as np
 import pytest
 from builders.paths import Corners, along
-from report.cases import FLIGHT, event, make_trace
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
+from report.cases import FLIGHT, event, make_scenario, make_trace
 
-from airground_drake.report.figures import canvas, draw, labels, maps, overlay, svg
+from airground_drake.campaign.page import _histogram
+from airground_drake.report.figures import canvas, draw, labels, maps, overlay, svg, thumbnail
 from airground_drake.report.figures.panels import Figure
 from airground_drake.run.trace import Trace
 from airground_drake.scenarios.schema import Run, Scenario
@@ -61,6 +64,50 @@ def team(scenario: Scenario, size: int, *, triggered: str = "") -> tuple[Scenari
     ways: list[Corners] = [[(0, 20.0 + 3.0 * k, 0.5), (30, 20.0 + 3.0 * k, 13.0)] for k in range(size)]
     happened = [event(14.5, "trigger", triggered)] if triggered else []
     return own, {"a": along(asdict(own), "a", [*ways, FLIGHT], happened)}
+
+
+@settings(max_examples=5)
+@given(
+    size=st.sampled_from([1, 2, 7, 13]),
+    scale_m=st.sampled_from([0.0, 1e-12, 1e-3, 10.0, 1e4, 1e9]),
+    apart_m=st.sampled_from([0.0, 1e-12, 3.0, 1e9]),
+    end_s=st.sampled_from([1e-6, 30.0, 1e5]),
+    rows=st.sampled_from([1, 2, 300]),
+    triggered=st.booleans(),
+    alone=st.booleans(),
+    x_m=st.none() | st.sampled_from([0.0, -1e-9, 2.0, 1e12]),
+)
+@example(size=7, scale_m=0.0, apart_m=0.0, end_s=30.0, rows=300, triggered=False, alone=True, x_m=2.0)
+@example(size=7, scale_m=1e9, apart_m=1e9, end_s=1e5, rows=2, triggered=True, alone=False, x_m=1e12)
+@example(size=1, scale_m=1e9, apart_m=0.0, end_s=1e-6, rows=1, triggered=True, alone=True, x_m=None)
+@example(size=13, scale_m=1e-12, apart_m=1e-12, end_s=30.0, rows=2, triggered=False, alone=True, x_m=None)
+def test_every_figure_is_drawn_of_equal_empty_single_and_huge_data(
+    size: int, scale_m: float, apart_m: float, end_s: float, rows: int, triggered: bool, alone: bool, x_m: float | None
+) -> None:
+    """Teams that go so far in parallel, side by side; `alone`: without obstacles; `x_m`: nearly that of every UGV."""
+    scenario = make_scenario()
+    names = [f"ugv{k}" for k in range(1, size + 1)]
+    own = replace(
+        scenario, reproduction=[], ugvs={name: replace(scenario.ugvs["ugv1"]) for name in names},
+        obstacles={} if alone else scenario.obstacles, runs={"a": Run("a"), "a_printed": Run("a", "recursion_listed")},
+    )  # fmt: skip
+    ways: list[Corners] = [[(0.0, apart_m * k, 0.0), (end_s, apart_m * k, scale_m)] for k in range(size)]
+    flight: Corners = [(0.0, 0.0, 0.0, 2.0), (end_s, 0.0, scale_m, 2.0)]
+    happened = [event(0.0, kind, name) for name in names for kind in ("trigger", "arrival")] if triggered else []
+    traces = {
+        name: along(asdict(own), name, [*ways, flight], happened, step_s=2.0 * end_s / max(rows - 1, 0.5))
+        for name in own.runs
+    }
+    if x_m is not None:
+        values = {f"{name}.decision_variable_m": x_m * (1.0 + 2.0**-52 * (k % 2)) for k, name in enumerate(names)}
+        traces = {name: replace(trace, signals=trace.signals.assign(**values)) for name, trace in traces.items()}
+    figures = [*draw.draw(own, traces), overlay.draw("a", 0, *traces.values())]
+    texts = [panel.svg for figure in figures for panel in figure.panels]
+    texts.append(thumbnail.draw(traces["a"], "p"))
+    texts += [_histogram(np.array(values), "t", "s", 0.0)[1] for values in ([scale_m], [apart_m, apart_m + scale_m])]
+    for text in texts:
+        ET.fromstring(text)
+        assert not re.search(r"[\s\"](nan|-?inf)\b", text)
 
 
 def test_a_small_team_is_drawn_by_name_and_a_large_one_in_histograms_with_who_was_triggered(scenario: Scenario) -> None:

@@ -121,6 +121,37 @@ def test_third_party_code_is_refused_unless_it_is_allowed(
     assert not out.exists()
 
 
+CRASHES = """
+from airground_drake.intervention.policy import Policy
+class It(Policy):
+    def propose(self, seen):
+        print("asked")
+        return self.helper()
+    def helper(self):
+        raise KeyError("no\x1b[31m plan")
+"""
+
+
+@pytest.mark.parametrize("command", ["run", "report"])
+def test_a_policy_that_crashes_is_told_with_its_first_traceback_and_may_be_heard(
+    command: str, module: Callable[[str], str], tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    name = module(CRASHES)
+    file = f"{name.partition(':')[0]}.py"
+    shown = ["--show-policy-output", "--set", f"intervention.policies=[{{name: '{name}'}}]", "--allow-plugins"]
+    words = ["run", "minimal", "d"] if command == "run" else ["report", "minimal", "-q", "-o", str(tmp_path / "out")]
+    for more in (shown, shown[1:]):
+        commands.main([*words, *more])
+        lines = capfd.readouterr().err.splitlines()
+        assert lines.count("asked") == (4 if more is shown else 0)
+        said = [line for line in lines if line != "asked"]
+        assert said[0].startswith(f"run d: policy {name} failed 4 times, first at 6.05 s: {file}:8 KeyError: ")
+        assert said[1:3] == ["Traceback (most recent call last):", f'  File "{file}", line 6, in propose']
+        assert said[-1] == r"KeyError: 'no\x1b[31m plan'"
+        assert sum("Traceback" in line for line in said) == 1
+        assert all(line.isprintable() for line in said)
+
+
 @pytest.mark.parametrize("name", ["..:x", "a b:x", "a:x:y", ":x", "a:x()"])
 def test_names_of_no_module_are_one_line(name: str, capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     change = f"intervention.policies.0.name={json.dumps(name)}"

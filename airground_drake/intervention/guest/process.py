@@ -20,7 +20,7 @@ from multiprocessing import Pipe
 from multiprocessing.connection import Connection
 from typing import Any
 
-from airground_drake.base.errors import FAULT_WIDTH, PluginError, PolicyError, one_line
+from airground_drake.base.errors import FAULT_WIDTH, PluginError, PolicyError, one_line, printable
 from airground_drake.base.interruption import ended_how
 from airground_drake.geometry.motion import Motion
 from airground_drake.intervention.guest.codec import LONGEST, decoded, encoded
@@ -33,6 +33,9 @@ COUNTED_S = 60.0
 """Time limit for a proposal of a policy that bounds its effort by counts, s; at least its budget."""
 LIVES = 3
 """A policy's process is started at most this many times in a run; then the policy is not asked again."""
+SHOWN = "AIRGROUND_SHOW_POLICY_OUTPUT"
+"""Environment variable: if it is set, what a policy prints goes to the standard error of this process."""
+STDERR = 2
 MEMORY = 4 * 2**30
 """Address space of the process, bytes."""
 
@@ -91,7 +94,8 @@ class GuestPolicy(Policy):
             self._end()
             what = str(error) if isinstance(error, PolicyError | PluginError) else "its process sent no proposal"
             raise PolicyError(what + "; not asked again in this run" * (self._used >= LIVES)) from None
-        raise PolicyError(_words(answer["fault"]))
+        told = answer.get("traceback")
+        raise PolicyError(_words(answer["fault"]), printable(told) if isinstance(told, str) else "")
 
     def close(self) -> None:
         """End the process and its process group. A later question belongs to a new run."""
@@ -113,12 +117,13 @@ class GuestPolicy(Policy):
         reader, writer = Pipe(duplex=False)
         path = json.dumps([each for each in sys.path if isinstance(each, str)])
         handles = [theirs.fileno(), reader.fileno()]
+        output = STDERR if os.environ.get(SHOWN) else subprocess.DEVNULL
         with theirs, reader:
             self._process = subprocess.Popen(
                 [sys.executable, "-P", "-c", _PROGRAM, path, *map(str, handles), str(MEMORY)],
                 stdin=subprocess.DEVNULL,
-                stdout=subprocess.DEVNULL,
-                stderr=subprocess.DEVNULL,
+                stdout=output,
+                stderr=output,
                 pass_fds=handles,
                 start_new_session=True,
                 env={**_ENVIRONMENT, **os.environ},

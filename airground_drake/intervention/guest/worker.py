@@ -11,7 +11,7 @@ from contextlib import suppress
 from multiprocessing.connection import Connection
 from typing import Any
 
-from airground_drake.base.errors import AirgroundError, described
+from airground_drake.base.errors import AirgroundError, described, traceback_of
 from airground_drake.intervention.guest.codec import KINDS, LONGEST, decoded, encoded
 from airground_drake.intervention.policy import Policy, motions_of
 from airground_drake.registry import POLICIES
@@ -34,12 +34,16 @@ def main(channel: int) -> None:
 
 
 def answer(policy: Policy, data: bytes) -> dict[str, Any]:
-    """The policy's answer to an encoded observation: `motions`, a list of names and motions, or a `fault`."""
+    """The policy's answer to an encoded observation.
+
+    Returns:
+        `motions`, a list of names and motions, or a `fault` and its `traceback`.
+    """
     try:
         seen = decoded(data, KINDS)
         found = {"motions": list(motions_of(policy.propose(seen), seen).items())}
         if (size := len(encoded(found))) > LONGEST:
             raise ValueError(f"a proposal of {size} bytes; at most {LONGEST} are allowed")
     except BaseException as error:  # any failure counts as no intervention
-        return {"fault": described(error, type(policy).propose)}
+        return {"fault": described(error, type(policy).propose), "traceback": traceback_of(error)}
     return found

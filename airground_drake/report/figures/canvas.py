@@ -19,6 +19,9 @@ from airground_drake.base.arrays import Array
 MAX_POINTS = 600
 """Maximum number of points of a line: two per pixel of a panel."""
 
+NARROWEST, TINY = 1e-4, 1e-9
+"""Smallest width of a histogram, relative and absolute: floating point divides it, and numbers on its axis differ."""
+
 MAP_IN, WIDE_IN, FULL_IN, TALLEST_IN = 3.3, 4.4, 11.6, 8.0
 """Widths of a narrow map and of panels on half and on the whole page; maximum height of a map; inches."""
 
@@ -123,6 +126,13 @@ def thin(values: Array, limit: int = MAX_POINTS) -> npt.NDArray[np.intp]:
         for column in columns:
             kept.update((int(bucket[column[bucket].argmin()]), int(bucket[column[bucket].argmax()])))
     return np.array(sorted(kept), dtype=np.intp)
+
+
+def interval(values: Array) -> tuple[float, float]:
+    """Least and largest value; nearly equal values get an interval around them that is wide enough to draw."""
+    low, high = float(values.min()), float(values.max())
+    missing = max(TINY, NARROWEST * max(abs(low), abs(high))) - (high - low)
+    return low - max(missing, 0.0) / 2.0, high + max(missing, 0.0) / 2.0
 
 
 def time_line(axes: Axes, t: Array, values: Array, appearance: Look, **options: Any) -> None:

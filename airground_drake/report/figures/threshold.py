@@ -42,15 +42,11 @@ def draw(inputs: Mapping[str, Any], evidence: Mapping[str, Any]) -> Figure | Non
 
 
 def _as_it_was(runs: Mapping[str, Any]) -> str:
-    """Drift and noise of the first UGV that triggered, and the thresholds that are optimal for them."""
+    """Drift and noise of the first UGV whose error reached the threshold, and the threshold that is best for them."""
     for name, row in runs.items():
-        optima = {
-            "the assumed noise": row["optimum_for_this_drift_m"],
-            "the run's own": row["optimum_for_this_drift_and_noise_m"],
-        }
-        best = [f"{zeta:.3g} m with {noise}" for noise, zeta in optima.items() if zeta is not None]
+        best = f"{row['optimum_m']:.3g} m is best" if row["optimum_m"] else "the lower, the better"
         return (
             f" In run {name.replace(' ', ', ')} had a drift of {row['drift_m_s']:.4g} m/s and a noise of "
-            f"{row['noise_m_sqrt_s']:g} m/√s; best for that drift: {' and '.join(best) or 'no threshold'}."
+            f"{row['noise_m_sqrt_s']:g} m/√s; for these, {best}."
         )
-    return " No run triggered: the real drift is not known."
+    return " In no run did a task error grow to the threshold: the real drift is not known."

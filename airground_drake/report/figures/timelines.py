@@ -18,6 +18,7 @@ from airground_drake.report.figures.canvas import (
     INK,
     MUTED,
     WIDE_IN,
+    interval,
     label_right,
     level,
     look,
@@ -142,7 +143,7 @@ def histogram(quantity: str, of_runs: Mapping[str, Sequence[float]]) -> Figure:
     figure = Figure(figsize=(WIDE_IN, 2.0))
     axes = figure.add_axes((0.13, 0.24, 0.6, 0.7))
     every = np.concatenate([np.asarray(values) for values in of_runs.values()])
-    edges = np.histogram_bin_edges(every, bins=min(20, max(4, len(every) // 3)))
+    edges = np.histogram_bin_edges(every, bins=min(20, max(4, len(every) // 3)), range=interval(every))
     top, labels = 1.0, []
     for position, (name, values) in enumerate(of_runs.items()):
         counts, _ = np.histogram(values, edges)

@@ -5,12 +5,9 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass
 from typing import Any
 
-import numpy as np
-
 from airground_drake.base.statuses import Status
 from airground_drake.decision.bayes import bayes_risk, optimal_threshold, printed_threshold
-from airground_drake.run.trace import Trace
-from airground_drake.scenarios.schema import Scenario
+from airground_drake.scenarios.schema import Scenario, Threshold
 from airground_drake.verify.claim import ModelClaim
 from airground_drake.verify.finding import Evidence, Finding
 from airground_drake.verify.model.levels import NUMBERS
@@ -22,25 +19,20 @@ EQUAL = 1e-6
 DIGITS = 12
 """Decimals of a difference of risks: it is rounded in floating point."""
 
-BEFORE_S = 1.0
-"""The drift of a run is the growth of the task error over this time before the first trigger, s."""
-
 
 @dataclass(frozen=True)
 class Measured(Evidence):
-    """Drift and noise that a UGV had in a run before its first trigger, and what they say of the threshold.
+    """Drift and noise of a UGV whose task error reached the threshold in a run, and what they say of the threshold.
 
-    Thresholds, m, are the optima for this drift: with the noise that the rule assumes, and with the run's own. The
-    extra risk is that of the threshold in force. None: the task error does not grow, or the run has no noise.
+    The optimum, m, is that for this drift and this noise, 0 without noise. The extra risk is that of the threshold in
+    force, m, against this optimum, with the scenario's c1 and c2.
     """
 
-    first_trigger_s: float
     drift_m_s: float
     noise_m_sqrt_s: float
     threshold_m: float
-    optimum_for_this_drift_m: float | None
-    optimum_for_this_drift_and_noise_m: float | None
-    extra_risk: float | None
+    optimum_m: float
+    extra_risk: float
 
 
 @dataclass(frozen=True)
@@ -75,7 +67,7 @@ class ThrChoice(ModelClaim):
         "The optimum is the root of (19) with c2/c1, enclosed by two signs in ball arithmetic (THR-ROOT, THR-OPT). The "
         "threshold in force equals it to 1e-6 (relative), or it is declared. A declared threshold cannot be refuted, "
         "so it counts as not exercised. Each run then shows the drift that the task error had in the last second "
-        "before the first trigger, its noise, and the optima for these."
+        "before it first reached the threshold, the noise, the optimum for both, and what the threshold costs."
     )
     equations = "(16)-(20), Table 1"
     assumptions = ("Drift and noise of the rule are those that the user assumes; (16)-(18) without initial deviation.",)
@@ -122,25 +114,11 @@ class ThrChoice(ModelClaim):
         )
 
 
-def of_run(trace: Trace) -> dict[str, Measured]:
-    """What was measured in a run, for each UGV that triggered, by `run UGV`."""
-    decision = trace.scenario.decision
-    rule, noise, zeta = decision.threshold, decision.noise_m_sqrt_s, float(trace.meta["zeta_m"])
-    costs = rule.c1_1_s, rule.c2
-    found = dict[str, Measured]()
-    for ugv in trace.ugvs:
-        times = [float(event["t_s"]) for event in trace.events if (event["robot"], event["kind"]) == (ugv, "trigger")]
-        if not times or times[0] <= trace.t[0]:
-            continue
-        begin = max(times[0] - BEFORE_S, float(trace.t[0]))
-        error = np.linalg.norm(trace.reference(ugv) - trace.position(ugv), axis=1)
-        before, after = np.interp([begin, times[0]], trace.t, error)
-        drift = float(after - before) / (times[0] - begin)
-        optima = [optimal_threshold(drift, each, *costs) if drift > 0.0 and each > 0.0 else None
-                  for each in (rule.noise_m_sqrt_s, noise)]  # fmt: skip
-        extra = None
-        if optima[1] is not None:
-            more = bayes_risk(zeta, drift, noise, *costs) - bayes_risk(optima[1], drift, noise, *costs)
-            extra = max(round(float(more), DIGITS), 0.0)
-        found[f"{trace.run} {ugv}"] = Measured(times[0], drift, noise, zeta, optima[0], optima[1], extra)
-    return found
+def measured(zeta: float, drift: float, noise: float, rule: Threshold) -> Measured:
+    """What a drift, m/s, positive, and a noise, m/sqrt(s), say of a threshold, m, with the costs of a rule."""
+    optimum, extra = 0.0, rule.c1_1_s * zeta / drift  # without noise: decided after zeta / drift, never wrongly
+    if noise > 0.0:
+        numbers = drift, noise, rule.c1_1_s, rule.c2
+        optimum = optimal_threshold(*numbers)
+        extra = max(round(float(bayes_risk(zeta, *numbers) - bayes_risk(optimum, *numbers)), DIGITS), 0.0)
+    return Measured(drift, noise, zeta, optimum, extra)

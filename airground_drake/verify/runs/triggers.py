@@ -54,10 +54,20 @@ def column_conflict(trace: Trace, ugv: str, events: list[Transition]) -> Conflic
 
 def decision_variable(trace: Trace, ugv: str) -> NormSignal:
     """x(t) of (15) from positions and noise of the trace and the preset of its scenario, not the recorded one."""
+    return _signal(trace, ugv, trace.column(f"{ugv}.noise_m"))
+
+
+def task_error(trace: Trace, ugv: str) -> NormSignal:
+    """The task error e(t) = ||rho_rd(t) - rho(t)||: the decision variable without noise."""
+    return _signal(trace, ugv, np.zeros(len(trace.t)))
+
+
+def _signal(trace: Trace, ugv: str, noise: Array) -> NormSignal:
+    """||rho_rd(t) - rho(t)|| + n(t) with this n at the rows, (T,), m."""
     rows, (waypoints, speed) = trace.t, preset_of(trace, ugv)
     corners = corner_times(waypoints, speed)
     t = np.union1d(rows, corners[(corners > rows[0]) & (corners < rows[-1])])
-    parts = interpolate(rows, np.column_stack([trace.position(ugv), trace.column(f"{ugv}.noise_m")]), t)
+    parts = interpolate(rows, np.column_stack([trace.position(ugv), noise]), t)
     parts[:, :3] = travelled(waypoints, speed, t) - parts[:, :3]
     return NormSignal.of(t, parts)
 

@@ -242,6 +242,22 @@ def late(row: int, robot: str, *offset: float) -> Edit:
     return lambda trace: moved(trace, robot, len(trace.t) - row, list(offset))
 
 
+def without_triggers(every: list[dict[str, Any]]) -> None:
+    every[:] = [event for event in every if event["kind"] not in ("trigger", "release")]
+
+
+def false_alarm(every: list[dict[str, Any]]) -> None:
+    """A trigger near the beginning that is released before the error is at the threshold."""
+    first = first_of(every, "trigger")
+    every[:0] = [{**first, "t_s": 0.2}, {**first, "t_s": 0.3, "kind": "release"}]
+
+
+def released_too_soon(every: list[dict[str, Any]]) -> None:
+    """A release while the error is large, and no trigger afterwards."""
+    first_of(every, "release")["t_s"] = 1.6
+    del every[every.index(first_of(every, "release")) + 1 :]
+
+
 # ---------------------------------------------------------------------------------------------------- the table
 
 R, E, N, H, I = "refuted", "error", "not_run", "holds", "inconclusive"  # noqa: E741
@@ -299,6 +315,17 @@ BREAKAGES: dict[str, tuple[tuple[str, str, Edit, str, str], ...]] = {
         ("not the root", D, scenario(decision__threshold__rule="bayes"), E, ""),
         ("the root", D, scenario(decision__threshold__rule="bayes", decision__threshold__drift_m_s=6.066688755667553),
          H, ""),
+    ),
+    "THR-QUALITY": (
+        ("trigger lost", "refractory", events(without_triggers), R, "missed"),
+        ("too late", A, events(lambda e: first_of(e, "trigger").update(t_s=10.0)), R, "served"),
+        ("too early", A, events(lambda e: first_of(e, "trigger").update(t_s=6.0)), R, "early"),
+        ("false alarm", "refractory", events(false_alarm), R, "false"),
+        ("released by noise", "refractory", events(released_too_soon), R, "missed"),
+        ("in the dwell", "refractory", scenario(decision__min_inter_event_s=1.8), R, "served"),
+        ("at the end of the dwell", "refractory", lambda t: t, H, ""),
+        ("preset", D, scenario(ugvs__ugv1__preset__speed_m_s=0.5), R, ""),
+        ("threshold", D, meta(zeta_m=2.9), E, ""),
     ),
     "GATE-OPT": (
         ("loser inflated", RELAXED, column(objective_accept=lambda v: 2.0 * v, objective_refuse=lambda v: 2.0 * v), R,

@@ -189,6 +189,8 @@ CASES: tuple[tuple[str, str, str, float, Edit, str], ...] = (
     ("THR-TRIG", "variable", A_D, VARIABLE_TOLERANCE_M, signal("ugv1.decision_variable_m", 100), "variable"),
     ("THR-TRIG", "noise at the start", A_D, NOISE_TOLERANCE_M, signal("ugv1.noise_m", 0), "noise"),
     ("THR-TRIG", "noise within a period", A_D, NOISE_TOLERANCE_M, signal("ugv1.noise_m", at_the_trigger), "noise"),
+    ("THR-QUALITY", "error at a trigger", "synthetic a", 1.5, lambda t, by: triggered_later(t, -by), "early"),
+    ("THR-QUALITY", "error before a trigger", "synthetic a", 1.5, triggered_later, "served"),
     ("LIVE-GOAL", "distance from the target", A_D, 0.1, from_the_end("ugvs__ugv1__target_m"), "target"),
     ("LIVE-GOAL", "distance from the stall", A, 0.1, from_the_end("runs__a__stalls_m"), "stall"),
     ("LIVE-GOAL", "motion at the end", A, AT_REST_M,
@@ -241,6 +243,7 @@ def test_every_claim_is_in_the_table_and_no_tolerance_is_wide() -> None:
     """LIVE-PROG compares answers, reasons and counts, which are equal or not."""
     assert {claim for claim, *_ in CASES} == set(CLAIMS) - {"LIVE-PROG"}
     assert {f"{claim}: {what}": tolerance for claim, what, _, tolerance, *_ in CASES if tolerance > 1e-5} == {
+        "THR-QUALITY: error at a trigger": 1.5, "THR-QUALITY: error before a trigger": 1.5,
         "LIVE-GOAL: distance from the target": 0.1, "LIVE-GOAL: distance from the stall": 0.1,
         "LIVE-GOAL: motion at the end": 1e-3, "COMM: decision after a release, within both periods": 0.1,
         "GATE-FEAS: cost of refusing": 1.0, "GATE-FEAS: cost of the plan": 1.0, "GATE-FEAS: speed": 1e-4,

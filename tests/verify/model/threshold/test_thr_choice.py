@@ -16,7 +16,8 @@ from airground_drake.report.figures import threshold
 from airground_drake.run.trace import Trace
 from airground_drake.scenarios.load import load
 from airground_drake.verify import verify_all, verify_model
-from airground_drake.verify.model.thr_choice import ThrChoice, of_run
+from airground_drake.verify.applications import measured
+from airground_drake.verify.model.thr_choice import ThrChoice
 
 
 @pytest.mark.parametrize(
@@ -60,15 +61,14 @@ def test_shipped_scenarios(scenario: str, run: str, rule: str, in_force: float, 
 
 
 def test_runs_show_the_drift_and_the_noise_that_they_had(run: Callable[[str, str], Trace]) -> None:
-    found = of_run(run("case_a", "b"))["b ugv1"]
+    found = measured(run("case_a", "b"))["b ugv1"]
     assert found.drift_m_s == pytest.approx(0.5606, abs=5e-4)
     assert found.noise_m_sqrt_s == 0.004
-    assert found.optimum_for_this_drift_m == pytest.approx(0.2802, abs=5e-4)
-    assert found.optimum_for_this_drift_and_noise_m == pytest.approx(0.00016, abs=5e-6)
+    assert found.optimum_m == pytest.approx(0.00016, abs=5e-6)
     assert found.extra_risk == pytest.approx(0.5 * 3.0 / 0.5606, rel=1e-2)  # c1 times the time to reach 3 m
-    quiet = of_run(with_scenario(run_of("d"), decision__noise_m_sqrt_s=0.0))["d ugv1"]
-    assert quiet.optimum_for_this_drift_m > 0.0
-    assert quiet.optimum_for_this_drift_and_noise_m is quiet.extra_risk is None
+    quiet = measured(with_scenario(run_of("d"), decision__noise_m_sqrt_s=0.0))["d ugv1"]
+    assert quiet.optimum_m == 0.0
+    assert quiet.extra_risk == pytest.approx(0.5 * 3.0 / quiet.drift_m_s)
 
 
 def test_a_report_has_the_runs_beside_the_numbers_of_the_rule(run: Callable[[str, str], Trace]) -> None:
@@ -76,22 +76,23 @@ def test_a_report_has_the_runs_beside_the_numbers_of_the_rule(run: Callable[[str
     verdicts = verify_all(scenario, [run("bayes_threshold", name) for name in scenario.runs])
     found, printed = [verdict.finding.evidence for verdict in verdicts if verdict.claim.id == "THR-CHOICE"]
     assert (set(found.runs), set(printed.runs)) == ({"a ugv1", "d ugv1"}, {"d_printed ugv1"})
-    for row in (*found.runs.values(), *printed.runs.values()):
+    for row in (found.runs["a ugv1"], printed.runs["d_printed ugv1"]):
         assert row.drift_m_s == pytest.approx(1.0, abs=1e-6)
-        assert row.optimum_for_this_drift_and_noise_m == pytest.approx(found.threshold_in_force_m)
+        assert row.optimum_m == pytest.approx(found.threshold_in_force_m)
+    early = found.runs["d ugv1"]  # an intervention begins before the error is at the threshold
+    assert early.drift_m_s == pytest.approx(1.0213, abs=1e-4)
 
 
 def test_the_figure_marks_three_thresholds_and_says_what_the_runs_had() -> None:
     shown = ThrChoice().judge(TABLE_1).to_json()["evidence"]
-    optima = {"optimum_for_this_drift_m": 0.2803, "optimum_for_this_drift_and_noise_m": None}
-    runs = {"b ugv1": {"drift_m_s": 0.5606, "noise_m_sqrt_s": 0.004} | optima}
+    runs = {"b ugv1": {"drift_m_s": 0.5606, "noise_m_sqrt_s": 0.004, "optimum_m": 0.00016}}
     figure, without = threshold.draw(TABLE_1, {**shown, "runs": runs}), threshold.draw(TABLE_1, shown)
     assert figure is not None
     assert without is not None
     rows = {row[0]: row[1:] for row in figure.panels[0].table.rows[-3:]}
     assert rows == {"in force": ("3", "0.4547"), "optimal": ("2.992", "0.4547"), "(19) as printed": ("0.7557", "0.48")}
-    assert "In run b, ugv1 had a drift of 0.5606 m/s" in figure.caption
-    assert without.caption.endswith("No run triggered: the real drift is not known.")
+    assert "In run b, ugv1 had a drift of 0.5606 m/s and a noise of 0.004 m/√s; for these, 0.00016 m" in figure.caption
+    assert without.caption.endswith("In no run did a task error grow to the threshold: the real drift is not known.")
     assert threshold.draw(TABLE_1, {"error": "failed"}) is None
 
 
