@@ -72,7 +72,7 @@ def test_an_unexpected_verdict_is_exit_code_1(tmp_path: Path, capsys: pytest.Cap
     assert main(["case_a", "-o", str(tmp_path), *one, "--format", "json"]) == 1
     said = capsys.readouterr()
     assert "SAFE-TRACE" in said.out
-    assert said.out.startswith("[✗] Safe, but not all arrive: ugv1 does not arrive.")
+    assert said.out.startswith("[✗] Safe, but not all arrive: ugv1 is standing still.")
     assert said.err == ""  # no terminal: no progress
     assert not {"report.html", "junit.xml"} & {path.name for path in tmp_path.iterdir()}
 
