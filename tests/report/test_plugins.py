@@ -130,7 +130,7 @@ def test_code_that_ends_a_process_is_one_line_and_no_report(
 ) -> None:
     name, *settings = (part.replace("IT", module(text)) for part in scenario)
     options = [part for setting in settings for part in ("--set", setting)]
-    command = [sys.executable, "-m", "airground_drake.report", name, "-o", str(tmp_path / "out"), *options]
+    command = [sys.executable, "-m", "airground_drake.report", name, "-q", "-o", str(tmp_path / "out"), *options]
     done = subprocess.run(
         [*command, "--format", "json", "--allow-plugins"], env={**os.environ, "PYTHONPATH": str(tmp_path)},
         capture_output=True, text=True, check=False,
