@@ -56,3 +56,12 @@ def test_elsewhere_there_are_lines_only_if_they_are_asked_for(
     monkeypatch.setattr(progress, "SHOWN_S", 1.0)  # on a busy machine a stage may take longer than the package's 0.01 s
     work(**asked)
     assert file.getvalue() == "    1.50 s  THEIRS a\n" * lines
+
+
+def test_elsewhere_a_stage_that_lasts_gets_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sys, "stderr", file := io.StringIO())
+    monkeypatch.setattr(progress, "TOLD_S", 0.0)
+    work()
+    assert file.getvalue() == "simulating: 10 of 40 s done\nchecking: 1 of 3 claims done\n"
+    work(quiet=True)
+    assert file.getvalue().count("\n") == 2

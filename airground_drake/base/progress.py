@@ -12,7 +12,9 @@ from typing import Any
 SHOWN_S = 0.01
 """Shorter parts get no line, s."""
 _FORMAT = "{desc} {percentage:3.0f}% |{bar}| {n:.4g}/{total:.4g} {unit}, {elapsed}, {remaining} left{postfix}"
-_WITHOUT_AMOUNT = "{desc} {elapsed}"
+_WITHOUT_AMOUNT = "{desc} {elapsed}{postfix}"
+TOLD_S = 3.0
+"""Where standard error is no terminal, a stage that lasts longer gets one line, s."""
 
 
 class Progress:
@@ -46,25 +48,32 @@ SILENT = Progress()
 
 
 class ProgressBar(Progress):
-    """Shows progress on standard error: a bar for the stage, a line for each part that took time, or both."""
+    """Shows progress on standard error: a bar or a line for the stage, a line for each part that took time."""
 
-    def __init__(self, *, bar: bool, lines: bool) -> None:
-        """Choose a bar for the current stage, lines for finished parts, or both."""
-        self._shows_bar, self._shows_lines = bar, lines
+    def __init__(self, *, bar: bool, lines: bool, stages: bool = False) -> None:
+        """Choose a bar for the current stage, lines for finished parts, and one line for a stage that takes long."""
+        self._shows_bar, self._shows_lines, self._shows_stages = bar, lines, stages
         self._bar: Any = None
-        self._stage, self._since = "", 0.0
+        self._stage, self._since, self._done, self._of = "", 0.0, 0.0, ""
+        self._waits_for_line = False
         self._lock = threading.RLock()
 
     def stage(self, name: str, amount: float = 0.0, unit: str = "") -> None:
         """Replace the bar of the stage before."""
         self.close()
-        self._stage, self._since = name, time.perf_counter()
+        self._stage, self._since, self._done = name, time.perf_counter(), 0.0
+        self._of = f" of {amount:.4g} {unit}" if amount else ""
+        self._waits_for_line = self._shows_stages
         if self._shows_bar:
             self._bar = _bar(name, amount, unit)
 
     def advance(self, amount: float, what: str = "") -> None:
-        """Move the bar."""
+        """Move the bar, or print the line of the stage once it is due."""
         with self._lock:
+            self._done += amount
+            if self._waits_for_line and time.perf_counter() - self._since >= TOLD_S:
+                self._waits_for_line = False
+                print(f"{self._stage}: {self._done:.4g}{self._of} done", file=sys.stderr, flush=True)
             if self._bar is not None:
                 self._bar.set_postfix_str(what, refresh=False)
                 self._bar.update(amount)
@@ -90,8 +99,13 @@ class ProgressBar(Progress):
 
 @contextmanager
 def progress_bar(*, quiet: bool = False, verbose: bool = False) -> Iterator[Progress]:
-    """A bar if standard error is a terminal and `quiet` is not set; with `verbose`, a line for each part."""
-    progress = ProgressBar(bar=not quiet and sys.stderr.isatty(), lines=verbose)
+    """Progress on standard error.
+
+    On a terminal it is a bar, elsewhere one line for each stage that lasts longer than `TOLD_S`; with `quiet` neither.
+    With `verbose` it is a line for each part, beside the bar.
+    """
+    terminal = sys.stderr.isatty()
+    progress = ProgressBar(bar=terminal and not quiet, lines=verbose, stages=not (terminal or quiet or verbose))
     try:
         yield progress
     finally:

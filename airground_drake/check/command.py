@@ -8,7 +8,7 @@ import math
 import sys
 import warnings
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import asdict
 from pathlib import Path
@@ -94,8 +94,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return verdict(lines)
 
 
-def checked(folder: Path, limit_s: float) -> list[Line]:
-    """All checks of a report, without warnings of numpy.
+def checked(folder: Path, limit_s: float, told: Callable[[Line], object] = bool) -> list[Line]:
+    """All checks of a report, without warnings of numpy; `told` is called with each when it is done.
 
     Raises:
         UsageError: if the folder is no report.
@@ -108,7 +108,7 @@ def checked(folder: Path, limit_s: float) -> list[Line]:
     try:
         with np.errstate(all="ignore"), warnings.catch_warnings():
             warnings.simplefilter("ignore")  # numbers out of all proportion are refused by the rules, not by numpy
-            return check_report(folder, limit_s)
+            return check_report(folder, limit_s, told)
     except Disagreement as broken:
         raise UsageError(f"{folder} is no report: {broken.rule}: {broken.about} is {broken.recorded}") from None
     except NotEstablished as error:

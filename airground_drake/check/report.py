@@ -66,12 +66,13 @@ class Line:
     by: str = "checker"
 
 
-def check_report(folder: Path, limit_s: float = LIMIT_S) -> list[Line]:
+def check_report(folder: Path, limit_s: float = LIMIT_S, told: Callable[[Line], object] = bool) -> list[Line]:
     """All checks of a report.
 
     Args:
         folder: with report.json and trace/.
         limit_s: CPU time for each check; one that takes longer is not established.
+        told: is called with each check when it is done.
 
     Raises:
         Disagreement, NotEstablished: if report.json is not strict JSON, or is not of the shape of a report, or there
@@ -80,7 +81,11 @@ def check_report(folder: Path, limit_s: float = LIMIT_S) -> list[Line]:
     report = read_json(folder / "report.json")
     _is_shaped_like_a_report(report)
     is_of_a_size(report["scenario"]["resolved"])
-    return [*_lines(folder, names_in(folder), report, limit_s)]
+    found = []
+    for line in _lines(folder, names_in(folder), report, limit_s):
+        told(line)
+        found.append(line)
+    return found
 
 
 def _is_shaped_like_a_report(report: Any) -> None:

@@ -10,11 +10,13 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
+import tempfile
 from collections.abc import Iterator, Sequence
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from airground_drake.base.progress import SILENT, Progress, progress_bar
 from airground_drake.base.usage import refuse
 from airground_drake.check import command as checker
 
@@ -35,6 +37,7 @@ def parser() -> argparse.ArgumentParser:
     found.prog = "airground check"
     found.description = "Check a report from its files alone, then have its claims judged again by their own code."
     found.add_argument("--coq", action="store_true", help="prove the safety of the runs again with Coq")
+    found.add_argument("-q", "--quiet", action="store_true", help="no progress")
     return found
 
 
@@ -46,39 +49,52 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """
     try:
         options = parser().parse_args(arguments)
-        lines = checker.checked(options.report, options.limit_s)
+        with progress_bar(quiet=options.quiet) as progress:
+            progress.stage("checking")
+            lines = checker.checked(options.report, options.limit_s, lambda line: progress.advance(1.0, line.claim))
+            progress.stage("judging again")
+            lines += judged_again(options.report, lines, options.limit_s, progress)
+            if options.coq:
+                progress.stage("proving with Coq")
+                lines += _proved_again(options.report)
     except checker.UsageError as error:
         return refuse(error)
     except SystemExit:  # --help has been printed
         return 0
-    lines += judged_again(options.report, lines, options.limit_s)
-    if options.coq:
-        lines += _proved_again(options.report)
     checker.show(lines, options.report, as_json=options.json)
     return checker.verdict(lines)
 
 
-def judged_again(folder: Path, lines: Sequence[Line], limit_s: float) -> Iterator[Line]:
+def judged_again(folder: Path, lines: Sequence[Line], limit_s: float, progress: Progress = SILENT) -> Iterator[Line]:
     """Each claim and each other part of a report, judged by its own code in a process without Drake.
 
     Args:
         folder: of the report.
         lines: results of the checker.
         limit_s: CPU time for each process that judges, s.
+        progress: is told of each claim.
     """
     from airground_drake.check.report import AGREES, OPEN, Line
+    from airground_drake.report.rebuild import JUDGED
 
     line = partial(Line, by="judged again")
     if any(each.outcome != AGREES for each in lines if each.claim in NEEDED):
         yield line("report", "", OPEN, "not judged again, since a check above failed", "the files are the report's")
         return
     command = [sys.executable, "-P", "-m", "airground_drake.report.rebuild", str(folder), str(limit_s)]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
-    for text in done.stdout.splitlines():
-        yield line(**json.loads(text))
-    if done.returncode:
-        why = done.stderr.strip().splitlines()[-1:] or [f"its process ended with {done.returncode}"]
-        yield line("report", "", OPEN, f"not all was judged again: {why[0]}", "the files can be judged")
+    with (
+        tempfile.TemporaryFile("w+") as said,
+        subprocess.Popen(command, stdout=subprocess.PIPE, stderr=said, text=True) as process,
+    ):
+        for found in map(json.loads, process.stdout or ()):
+            if JUDGED in found:
+                progress.advance(1.0, found[JUDGED])
+            else:
+                yield line(**found)
+        if process.wait():
+            said.seek(0)
+            why = said.read().strip().splitlines()[-1:] or [f"its process ended with {process.returncode}"]
+            yield line("report", "", OPEN, f"not all was judged again: {why[0]}", "the files can be judged")
 
 
 def _proved_again(folder: Path) -> Iterator[Line]:

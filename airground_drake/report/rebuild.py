@@ -14,6 +14,7 @@ import sys
 import xml.etree.ElementTree as ET
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from importlib.metadata import version
 from itertools import zip_longest
 from pathlib import Path
@@ -25,6 +26,8 @@ WITHIN = 1e-8
 """Numbers agree to this times 1 plus their size: versions of numpy, scipy and solvers round differently."""
 WITHIN_PX = 0.02
 """Coordinates in drawings agree to this: they are rounded to 0.01."""
+JUDGED = "judged"
+"""Key of a line about progress."""
 TAKEN_AS_RECORDED = ("provenance", "files")
 """Parts of report.json that do not follow from its traces: the clock, versions, and the digests of files."""
 
@@ -235,7 +238,7 @@ def _short(value: Any, most: int = 120) -> str:
 
 
 def main(arguments: Sequence[str]) -> int:
-    """Print the lines of a report, one JSON object each.
+    """Print the lines of a report, one JSON object each; before them, one with the key `JUDGED` for each claim.
 
     Args:
         arguments: the folder of the report, and the CPU time that each process may take, s.
@@ -244,11 +247,19 @@ def main(arguments: Sequence[str]) -> int:
         Exit code: 0, or 2 if a file cannot be used.
     """
     from airground_drake.base.errors import AirgroundError
+    from airground_drake.base.progress import Progress
+    from airground_drake.verify import verify_all
+
+    class Told(Progress):
+        """Prints a line for each claim that is judged."""
+
+        def advance(self, amount: float, what: str = "") -> None:
+            print(json.dumps({JUDGED: what}), flush=True)
 
     folder, limit_s = Path(arguments[0]), int(float(arguments[1])) + 1
     resource.setrlimit(resource.RLIMIT_CPU, (limit_s, limit_s))
     try:
-        for line in lines(folder):
+        for line in lines(folder, partial(verify_all, progress=Told())):
             print(json.dumps(line, allow_nan=False), flush=True)
     except (AirgroundError, OSError) as error:
         print(f"error: {error}", file=sys.stderr)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import resource
 import signal
 import socket
 import stat
@@ -180,8 +181,16 @@ NO_WORDS = "an exception that cannot be put into words"
 wild, tame = Kind, partial(Kind, tame=True)
 late = partial(Kind, "OutOfTime: not done after", hangs=True)
 
-KILLS_OTHERS = "kills_its_parent"
-"""Needs Landlock; on systems without it a policy can do so, and the report says that the simulation died."""
+TO_PARENT: dict[str, Callable[[int], object]] = {
+    "signals_its_parent": lambda pid: os.kill(pid, signal.SIGCONT),
+    "takes_limits_from_its_parent": lambda pid: resource.prlimit(pid, resource.RLIMIT_CORE, (0, 0)),
+    "changes_the_priority_of_its_parent": lambda pid: os.setpriority(os.PRIO_PROCESS, pid, 0),
+    "changes_the_priority_of_all_processes": lambda pid: os.setpriority(os.PRIO_USER, os.getuid(), 0),
+    "takes_processors_from_its_parent": lambda pid: os.sched_setaffinity(pid, os.sched_getaffinity(pid)),
+    "gives_its_parent_away_when_memory_is_short": lambda pid: Path(f"/proc/{pid}/oom_score_adj").write_text("0"),
+}
+"""What a policy may not do to the process that has started it, where the system can keep it from that; all of it is
+harmless if it works."""
 
 KINDS: dict[str, Kind] = {
     # ends
@@ -251,5 +260,5 @@ KINDS: dict[str, Kind] = {
     "patches_the_avoidance_layer": wild(None, patch("nsbc.avoidance", "Avoidance", "apply")),
     "patches_the_claims": wild(None, patch("verify.claim", "TraceClaim", "judge")),
     "leaves_a_child_behind": wild(None, lambda seen: fork(lambda: None, forever)),
-    KILLS_OTHERS: wild("PermissionError", lambda seen: os.kill(os.getppid(), signal.SIGCONT)),  # harmless if allowed
+    **{name: wild("PermissionError", lambda seen, does=does: does(os.getppid())) for name, does in TO_PARENT.items()},
 }

@@ -14,6 +14,8 @@ from check.forgeries import HOSTILE
 from check.forging import copy, mend
 from commands.conftest import Airground
 
+from airground_drake.base import progress
+from airground_drake.commands import main
 from airground_drake.report.__main__ import main as report
 
 
@@ -31,6 +33,16 @@ def test_both_go_over_an_untouched_report(short: Path, airground: Airground) -> 
     claims = {(claim["id"], claim["run"]) for claim in json.loads((short / "report.json").read_text())["claims"]}
     for by in ("checker", "judged again"):
         assert claims <= {(line["claim"], line["run"]) for line in lines if line["by"] == by}
+
+
+def test_what_takes_long_is_told(
+    short: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(progress, "TOLD_S", 0.0)
+    assert main(["check", str(short)]) == 0
+    assert capsys.readouterr().err == "checking: 1 done\njudging again: 1 done\n"
+    assert main(["check", "-q", str(short)]) == 0
+    assert capsys.readouterr().err == ""
 
 
 def test_what_the_checker_does_not_decide_is_refused_when_it_is_judged_again(
