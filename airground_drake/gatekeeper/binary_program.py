@@ -13,6 +13,8 @@ from airground_drake.gatekeeper.problem import Problem
 from airground_drake.gatekeeper.relaxation import offsets, within_reach
 
 AXES = 2  # UGVs move in their plane
+_IDLE = 1e-7
+"""A block whose choice moves the later positions by less than this share of the largest move is idle."""
 
 
 def block_of_stage(stages: int, blocks: int) -> npt.NDArray[np.int64]:
@@ -29,12 +31,15 @@ class BinaryProgram:
     over omega and u: n.(rho(omega) - o) >= d - u. As constraints, the positions would make a solver ten times slower.
 
     Attributes:
-        program: what a solver takes.
-        omega: binary variables (24), (26c), (B,): 1 accepts, and 1 - omega is the other mode; in (27), shares.
+        program: (26).
+        relaxation: (27): the same costs and constraints, with shares in place of binary variables.
+        omega: binary variables (24), (26c), of the program, (B,): 1 accepts, and 1 - omega is the other mode.
+        shares: in [0, 1], of the relaxation, (B,).
         u: slack (26e), (N,), m.
         error: cost of task errors in (25).
         slack: cost of slack in (25).
         half_planes: (26d), one row per half-plane that some plan can violate, over (omega, u).
+        choices: 0 and 1 are allowed where the choice moves the UGV, else 0 only, so that no solver need try both.
         within: which half-planes these are, (N, m).
         block: of each stage, (N,).
     """
@@ -51,7 +56,17 @@ class BinaryProgram:
         self.half_planes = self.program.AddLinearConstraint(
             np.zeros((1, b + n)), np.full(1, -np.inf), np.full(1, np.inf), np.concatenate([self.omega, self.u])
         )
+        self.choices = self.program.AddBoundingBoxConstraint(0.0, 1.0, self.omega)  # (26c)
         self.program.AddBoundingBoxConstraint(0.0, np.inf, self.u)  # (26e)
+        self.relaxation = MathematicalProgram()
+        self.shares: Any = self.relaxation.NewContinuousVariables(b, "omega")
+        self.relaxation.AddDecisionVariables(self.u)
+        self.relaxation.AddCost(self.error.evaluator(), self.shares)
+        self.relaxation.AddCost(self.slack.evaluator(), self.u)
+        self.relaxation.AddConstraint(self.half_planes.evaluator(), np.concatenate([self.shares, self.u]))
+        self.relaxation.AddConstraint(self.choices.evaluator(), self.shares)  # (27c)
+        self.relaxation.AddBoundingBoxConstraint(0.0, np.inf, self.u)  # (27e)
+        self._live = np.ones(b, dtype=bool)
         self.within = np.zeros((n, 0), dtype=bool)
         self._of_block = np.equal.outer(self.block, np.arange(b)).astype(np.float64)
 
@@ -70,6 +85,8 @@ class BinaryProgram:
         gradient = self._of_block.T @ (steps * force).sum(axis=1)
         height = refused[:, 2] - problem.reference[:, 2]  # no choice changes it
         constant = 0.5 * float(weights @ (np.square(away).sum(axis=1) + np.square(height)))
+        self._live = hessian.diagonal() > _IDLE**2 * hessian.diagonal().max()
+        self.choices.evaluator().UpdateUpperBound(self._live.astype(np.float64))
         self.error.evaluator().UpdateCoefficients(hessian, gradient, constant, is_convex=True)
         of_slack = np.full(n, 2.0 * problem.dt * problem.slack_weight)
         self.slack.evaluator().UpdateCoefficients(np.diag(of_slack), np.zeros(n), is_convex=True)
@@ -96,9 +113,23 @@ class BinaryProgram:
         lower = offsets(problem, normals)[stage, point] - (normal[:, :AXES] * away[stage, :AXES]).sum(axis=1)
         return np.hstack([of_omega, of_u]), lower
 
+    def guess(self, problem: Problem, plan: Array, normals: Array) -> Array:
+        """Values of the program's variables for a plan (N,): a solution that satisfies all constraints, (B + N,)."""
+        away = problem.positions(plan)[:, None] - problem.centres
+        lacking = problem.distances - np.einsum("kmi,kmi->km", normals, away)
+        slack = np.where(self.within, lacking, 0.0).max(axis=1, initial=0.0)
+        return np.concatenate([np.where(self._live, self.blocked(plan), 0.0), slack])
+
     def plan(self, values: Array) -> Array:
-        """The value of each stage, (N,), from those of the blocks, (B,)."""
-        return np.take(values, self.block)
+        """The value of each stage, (N,), from those of the blocks, (B,).
+
+        Idle blocks get the value of the next one that is not, or of the last, so that they are no switch.
+        """
+        live = np.flatnonzero(self._live)
+        if len(live) == 0:
+            return np.take(values, self.block)
+        following = np.minimum(np.searchsorted(live, np.arange(len(values))), len(live) - 1)
+        return values[live[following]][self.block]
 
     def blocked(self, plan: Array) -> Array:
         """The mode that a plan (N,) has in most stages of each block, (B,), 0 or 1; accepting on a tie."""

@@ -19,16 +19,17 @@ class Budget:
 
     Attributes:
         iterations: of each call of the solver of a relaxation.
-        search_iterations: of a search by branch and bound; the result of a longer one is not used, so that the same
-            searches count on every machine.
-        search_s: time after which a search is stopped, s: several times what `search_iterations` take.
+        search_iterations: of all searches by branch and bound; the result of a longer one is not used, so that the
+            same searches count on every machine.
+        search_s: time after which they are stopped, s: several times what `search_iterations` take. No signal ends the
+            process during a search, so it is not long.
         deadline_s: time on `clock` at which the solution must stand, s; inf: counted work only.
         clock: what `deadline_s` refers to.
     """
 
     iterations: int = 100
-    search_iterations: int = 20_000
-    search_s: float = 10.0
+    search_iterations: int = 4_000
+    search_s: float = 1.0
     deadline_s: float = math.inf
     clock: Clock = field(default=time.monotonic, compare=False)
 

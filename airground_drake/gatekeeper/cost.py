@@ -44,6 +44,18 @@ def add_stage(total: float, terms: Terms, k: int, x: float, y: float, z: float, 
 
 
 @njit(cache=True)
+def slack_at(terms: Terms, k: int, x: float, y: float, z: float) -> float:
+    """Slack u of (26e) that (26d) needs at the end of stage k in (x, y, z), m."""
+    slack = 0.0
+    for m in range(len(terms.distances)):
+        ox, oy, oz = terms.centres[k, m, 0], terms.centres[k, m, 1], terms.centres[k, m, 2]
+        squared = (x - ox) ** 2 + (y - oy) ** 2 + (z - oz) ** 2
+        if squared < terms.distances[m] ** 2:
+            slack = max(slack, terms.distances[m] - np.sqrt(squared))
+    return slack
+
+
+@njit(cache=True)
 def plan_cost(terms: Terms, positions: Array) -> tuple[float, float]:
     """(25) by the right-hand rectangle rule through positions (N, 3), m, and the least distance minus d, m.
 

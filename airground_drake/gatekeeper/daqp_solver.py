@@ -1,115 +1,194 @@
-"""DAQP, a dual active-set solver with branch and bound, on the numbers of a `BinaryProgram`."""
+"""DAQP, a dual active-set solver with branch and bound, as a solver of Drake.
+
+It solves convex quadratic and linear programs, also with binary variables, to a proven optimum, and needs no licence:
+
+    result = DaqpSolver().Solve(program)
+
+A program may have linear costs, convex quadratic costs, linear constraints, bounds and binary variables. The result
+says whether it is infeasible or unbounded, or whether a limit stopped the search. `active_set` has the method.
+"""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import Literal
+from typing import Any
 
-import daqp
 import numpy as np
-import numpy.typing as npt
+from pydrake.solvers import (
+    ClpSolver,
+    MathematicalProgram,
+    MathematicalProgramResult,
+    ProgramAttribute,
+    SolutionResult,
+    SolverId,
+    SolverInterface,
+    SolverOptions,
+)
+from pydrake.symbolic import Expression, Variable
 
 from airground_drake.base.arrays import Array
-from airground_drake.gatekeeper.binary_program import BinaryProgram
+from airground_drake.gatekeeper.active_set import Answer, Details, Limits, minimise
+from airground_drake.gatekeeper.standard_form import StandardForm
 
-_BINARY, _SOFT, _NO_BOUND = 16, 8, 1e30
-_OPTIMAL, _SPENT = (1, 2), (5, -7, -4)
-"""Flags of DAQP; 5: stopped with a solution, -7: stopped without one, -4: too many iterations."""
-_ITERATIONS = 10_000
-"""DAQP's own limit."""
-
-_IDLE = 1e-7
-"""A stage whose choice moves the later positions by less than this share of the largest move is left out: it would make
-the Hessian singular, and DAQP may then say "infeasible"."""
-
-_TOLERANCE = 1e-9
-"""Of constraints, in the scaled variables."""
-
-
-@dataclass(frozen=True, eq=False)
-class Found:
-    """The solver's result.
-
-    Attributes:
-        omega: values of the accept variables, (B,); None without a solution.
-        ended: 'optimal' only with a proof.
-        iterations: of the active-set method over all nodes; 0 if the solver does not say.
-        multipliers: of the relaxation's half-planes, one per row, 1/m.
-    """
-
-    omega: Array | None
-    ended: Literal["optimal", "budget_spent", "solver_failed"]
-    iterations: int = 0
-    multipliers: Array | None = None
-
-
-def minimise(
-    binary: BinaryProgram,
-    *,
-    relaxed: bool = False,
-    known: float = math.inf,
-    seconds: float = math.inf,
-    iterations: int = _ITERATIONS,
-) -> Found:
-    """The optimum of the program, or of its relaxation.
-
-    DAQP sees each accept variable scaled to a unit diagonal of the Hessian. The slack of a stage with one half-plane
-    is a soft row, which is exact; only slack that several rows share stays a variable.
-
-    Args:
-        binary: the program, with data.
-        relaxed: shares of accepting in [0, 1] in place of binaries.
-        known: cost that can be reached; branches above it are cut.
-        seconds: how long the search may take by the clock; DAQP looks at it every 32 nodes.
-        iterations: of the active-set method at each node, at most.
-    """
-    error, soft, rows = (one.evaluator() for one in (binary.error, binary.slack, binary.half_planes))
-    hessian, gradient, lower, matrix = error.Q(), error.b(), rows.lower_bound(), rows.GetDenseA()
-    asked = np.isfinite(lower)
-    matrix, lower, weights = matrix[asked], lower[asked], soft.Q().diagonal()
-    blocks, diagonal = len(gradient), hessian.diagonal()
-    largest = diagonal.max(initial=0.0)
-    live = np.flatnonzero(diagonal > _IDLE**2 * largest)
-    omega = np.zeros(blocks)
-    if len(live) == 0:
-        return Found(omega, "optimal")
-    of_omega, of_u = matrix[:, live], matrix[:, blocks:]
-    shared = np.flatnonzero((of_u != 0.0).sum(axis=0) > 1)
-    stage = of_u.argmax(axis=1) if len(lower) else np.zeros(0, dtype=np.intp)
-    is_soft = ~np.isin(stage, shared)
-    scale, count = np.sqrt(diagonal[live] / largest), len(live)
-    root = np.sqrt(weights[shared] / largest)
-    cost = np.eye(count + len(shared))
-    cost[:count, :count] = hessian[np.ix_(live, live)] / np.outer(scale, scale) / largest
-    slope = np.concatenate([gradient[live] / scale / largest, np.zeros(len(shared))])
-    constraints = np.ascontiguousarray(np.hstack([of_omega / scale, of_u[:, shared] / root]))
-    sense = np.concatenate([np.full(count, 0 if relaxed else _BINARY), np.where(is_soft, _SOFT, 0)])
-    solver = daqp.Model()
-    solver.settings = {
-        "presolve": 0,
-        "primal_tol": _TOLERANCE,
-        "iter_limit": min(iterations, _ITERATIONS),
-        "time_limit": 0.0 if seconds == math.inf else max(seconds, 1e-6),
-        "fval_bound": _NO_BOUND if known == math.inf else (known * (1.0 + 1e-7) - error.c()) / largest,
+SUPPORTED = frozenset(
+    {
+        ProgramAttribute.kLinearCost, ProgramAttribute.kQuadraticCost, ProgramAttribute.kLinearConstraint,
+        ProgramAttribute.kLinearEqualityConstraint, ProgramAttribute.kBinaryVariable, ProgramAttribute.kCallback,
     }
-    upper = np.concatenate([scale, np.full(len(lower), _NO_BOUND)])
-    least = np.concatenate([np.zeros(count), lower])
-    solver.setup(cost, slope, constraints, upper, least, sense.astype(np.intc))
-    if is_soft.any():
-        reciprocal = np.concatenate([np.ones(count), largest / weights[stage]])
-        solver.soft_weights(rho_l=reciprocal, rho_u=reciprocal)
-    x, _, flag, info = solver.solve()
-    if flag not in _OPTIMAL:
-        return Found(None, "budget_spent" if flag in _SPENT else "solver_failed")
-    omega[live] = np.clip(x[:count] / scale, 0.0, 1.0)
-    omega = _with_idle(omega, live)
-    multipliers = largest * np.abs(info["lam"][count:])
-    return Found(omega if relaxed else np.round(omega), "optimal", int(info["iterations"]), multipliers)
+)  # fmt: skip
+"""What a program may have. Visualization callbacks are not called."""
 
 
-def _with_idle(omega: Array, live: npt.NDArray[np.intp]) -> Array:
-    """Each idle entry (B,) with the value of the next live one, or of the last, so that it is no switch."""
-    following = np.minimum(np.searchsorted(live, np.arange(len(omega))), len(live) - 1)
-    filled: Array = omega[live[following]]
-    return filled
+_StandIns = dict[int, tuple[Variable, Variable]]
+"""Binary variables, each with the continuous one in its place, by the identifier of the former."""
+
+
+class DaqpResult(MathematicalProgramResult):  # type: ignore[misc]
+    """A result that Python can fill, also for programs with binary variables.
+
+    Python can set the solution of a result only if a solver of Drake has filled it before, and none that is free takes
+    binary variables. So CLP fills it for a program that has a continuous variable in place of each binary one, and
+    `GetSolution` looks them up.
+    """
+
+    def __init__(self) -> None:
+        """An empty result."""
+        super().__init__()
+        self._for_binary: _StandIns = {}
+        self._details = Details()
+
+    def fill(self, program: MathematicalProgram, answer: Answer, cost: float) -> None:
+        """Put in the answer to a program."""
+        self._for_binary = _fill(self, program, answer, cost)
+        self._details = answer.details
+
+    def GetSolution(self, *what: Any) -> Any:  # noqa: N802
+        """As `MathematicalProgramResult.GetSolution`: all values, or those of variables or expressions."""
+        if not what or not self._for_binary:
+            return super().GetSolution(*what)
+        replaced = np.vectorize(self._without_binary, otypes=[object])(what[0])
+        return super().GetSolution(replaced if isinstance(what[0], np.ndarray) else replaced.item())
+
+    def get_solver_id(self) -> SolverId:
+        """DAQP."""
+        return DaqpSolver.id()
+
+    def get_solver_details(self) -> Details:
+        """Iterations, nodes and multipliers."""
+        return self._details
+
+    def _without_binary(self, value: Any) -> Any:
+        if isinstance(value, Variable):
+            return self._for_binary.get(value.get_id(), (value, value))[1]
+        if isinstance(value, Expression):
+            for old, new in self._for_binary.values():
+                value = value.Substitute(old, Expression(new))
+        return value
+
+
+class DaqpSolver(SolverInterface):  # type: ignore[misc]
+    """DAQP for any `MathematicalProgram` that is a convex quadratic program, with binary variables or without.
+
+    An initial guess that satisfies all constraints bounds the search: more expensive branches are cut. It is the
+    solution if a limit is reached before anything cheaper was found.
+
+    Its options in `SolverOptions` are those of `Limits`, under `DaqpSolver.id()`. Common options have no effect: it
+    runs in one thread and prints nothing.
+    """
+
+    NAME = "DAQP"
+    _ID = SolverId(NAME)
+
+    @classmethod
+    def id(cls) -> SolverId:
+        """What the options of this solver are stored under."""
+        return cls._ID
+
+    def solver_id(self) -> SolverId:
+        """As `id`."""
+        return self._ID
+
+    def available(self) -> bool:
+        """Always: it comes with this package."""
+        return True
+
+    def enabled(self) -> bool:
+        """Always: it needs no licence."""
+        return True
+
+    def AreProgramAttributesSatisfied(self, prog: MathematicalProgram) -> bool:  # noqa: N802
+        """Whether it solves programs of this kind."""
+        return not self.ExplainUnsatisfiedProgramAttributes(prog)
+
+    def ExplainUnsatisfiedProgramAttributes(self, prog: MathematicalProgram) -> str:  # noqa: N802
+        """Why it does not solve programs of this kind; '' if it does."""
+        if beyond := sorted(one.name.removeprefix("k") for one in prog.required_capabilities() - SUPPORTED):
+            found = ", ".join(beyond)
+            return f"DaqpSolver is unable to solve because a {found} was declared but is not supported."
+        if not all(binding.evaluator().is_convex() for binding in prog.quadratic_costs()):
+            return "DaqpSolver is unable to solve because a quadratic cost is not convex."
+        return ""
+
+    def Solve(  # noqa: N802
+        self,
+        prog: MathematicalProgram,
+        initial_guess: Array | None = None,
+        solver_options: SolverOptions | None = None,
+        result: MathematicalProgramResult | None = None,
+    ) -> DaqpResult | None:
+        """Solve a program; as the two overloads of `SolverInterface.Solve`.
+
+        Args:
+            prog: the program.
+            initial_guess: for all of its variables; by default, the program's own.
+            solver_options: count more than those of the program.
+            result: to be filled; None: a new one is returned. One that is not a `DaqpResult` has the values of binary
+                variables in `get_x_val()` only.
+
+        Raises:
+            ValueError: if this solver does not solve such programs, or has no such options.
+        """
+        if why := self.ExplainUnsatisfiedProgramAttributes(prog):
+            raise ValueError(why)
+        limits = _limits(prog.solver_options(), solver_options)
+        guess = prog.initial_guess() if initial_guess is None else np.asarray(initial_guess, dtype=np.float64)
+        form = StandardForm.of(prog)
+        answer = minimise(form, guess, limits)
+        filled = DaqpResult() if result is None else result
+        cost = _COSTS.get(answer.ended) or form.cost(answer.x)
+        if isinstance(filled, DaqpResult):
+            filled.fill(prog, answer, cost)
+        else:
+            _fill(filled, prog, answer, cost)
+        return filled if result is None else None
+
+
+_COSTS = {SolutionResult.kInfeasibleConstraints: math.inf, SolutionResult.kUnbounded: -math.inf}
+
+
+def _limits(*given: SolverOptions | None) -> Limits:
+    """From options of Drake, the later ones counting more.
+
+    Raises:
+        ValueError: if there is an option that DAQP does not have.
+    """
+    chosen = {name: value for one in given if one for name, value in one.options.get(DaqpSolver.NAME, {}).items()}
+    if unknown := sorted(set(chosen) - set(Limits._fields)):
+        raise ValueError(f"{DaqpSolver.NAME}: no options {', '.join(unknown)}; allowed: {', '.join(Limits._fields)}")
+    return Limits(**chosen)
+
+
+def _fill(
+    result: MathematicalProgramResult, program: MathematicalProgram, answer: Answer, cost: float
+) -> _StandIns:
+    """Put an answer into a result by way of CLP; returns the variables that stand for binary ones."""
+    variables = program.decision_variables()
+    binary = [x for x in variables if x.get_type() == Variable.Type.BINARY]
+    stand_ins = {x.get_id(): (x, Variable(x.get_name())) for x in binary}
+    shell = MathematicalProgram()
+    shell.AddDecisionVariables(np.array([stand_ins.get(x.get_id(), (x, x))[1] for x in variables], dtype=object))
+    shell.AddLinearCost(np.zeros(len(variables)), cost, shell.decision_variables())
+    ClpSolver().Solve(shell, None, None, result)
+    result.set_x_val(answer.x)
+    result.set_solution_result(answer.ended)
+    return stand_ins

@@ -1,24 +1,28 @@
-"""Gurobi and Mosek on a `BinaryProgram`, through Drake, where it was built with them and there is a licence."""
+"""Solvers of Drake on a `BinaryProgram`, chosen by name."""
 
 from __future__ import annotations
 
 import math
 import time
-from typing import Any
+from dataclasses import dataclass
+from typing import Any, Literal
 
-from pydrake.solvers import CommonSolverOption, GurobiSolver, MosekSolver, SolverOptions
+from pydrake.solvers import CommonSolverOption, GurobiSolver, MosekSolver, SolutionResult, SolverOptions
 
+from airground_drake.base.arrays import Array
+from airground_drake.gatekeeper.active_set import Details
 from airground_drake.gatekeeper.binary_program import BinaryProgram
-from airground_drake.gatekeeper.daqp_solver import Found
+from airground_drake.gatekeeper.daqp_solver import DaqpSolver
 
-SOLVERS: dict[str, Any] = {"gurobi": GurobiSolver, "mosek": MosekSolver}
-"""Drake's classes by the name in `gatekeeper.solver`."""
+SOLVERS: dict[str, Any] = {"daqp": DaqpSolver, "gurobi": GurobiSolver, "mosek": MosekSolver}
+"""Classes of solvers by the name in `gatekeeper.solver`."""
 
 OPTIONS: dict[str, tuple[str, dict[str, float]]] = {
+    "daqp": ("time_limit", {}),
     "gurobi": ("TimeLimit", {"MIPGap": 0.0, "MIPGapAbs": 0.0}),
     "mosek": ("MSK_DPAR_MIO_MAX_TIME", {"MSK_DPAR_MIO_TOL_REL_GAP": 0.0, "MSK_DPAR_MIO_TOL_ABS_GAP": 0.0}),
 }
-"""Their options for a limit in time, s, and for a proven optimum: by default they stop at a gap."""
+"""Their options for a limit in time, s, and for a proven optimum: Gurobi and Mosek stop at a gap by default."""
 
 
 def lacking(name: str) -> str:
@@ -29,8 +33,25 @@ def lacking(name: str) -> str:
     return "" if solver.enabled() else "Drake found no licence for it"
 
 
-class DrakeSearch:
-    """The search for the optimum by a solver of Drake, with one thread; it holds the licence."""
+@dataclass(frozen=True, eq=False)
+class Found:
+    """A solver's result.
+
+    Attributes:
+        omega: values of the accept variables, or shares, (B,); None without a solution.
+        ended: 'optimal' only with a proof.
+        iterations: of the active-set method over all nodes; 0 if the solver does not say.
+        multipliers: of the half-planes, 1/m, one per row; none if the solver does not say.
+    """
+
+    omega: Array | None
+    ended: Literal["optimal", "budget_spent", "solver_failed"]
+    iterations: int = 0
+    multipliers: Array | None = None
+
+
+class Search:
+    """The search for the optimum by one solver, with one thread; it holds the licence, if the solver needs one."""
 
     def __init__(self, name: str) -> None:
         """Take the licence.
@@ -43,11 +64,12 @@ class DrakeSearch:
         """
         if why := lacking(name):
             raise ValueError(why)
-        self._solver, self._licence = SOLVERS[name](), SOLVERS[name].AcquireLicense()
+        self._solver = SOLVERS[name]()
+        self._licence = self._solver.AcquireLicense() if hasattr(self._solver, "AcquireLicense") else None
         self._limit, self._exact = OPTIONS[name]
 
-    def minimise(self, binary: BinaryProgram, *, known: float = math.inf, seconds: float = math.inf) -> Found:
-        """The optimum of the program; arguments as of `daqp_solver.minimise`, but these solvers ignore `known`."""
+    def minimise(self, binary: BinaryProgram, guess: Array, seconds: float = math.inf) -> Found:
+        """The optimum of (26), searched for no longer than `seconds` by the clock; DAQP looks at it every 32 nodes."""
         options = SolverOptions()
         options.SetOption(CommonSolverOption.kMaxThreads, 1)
         for option, value in self._exact.items():
@@ -55,7 +77,24 @@ class DrakeSearch:
         if seconds < math.inf:
             options.SetOption(self._solver.solver_id(), self._limit, max(seconds, 1e-6))
         started = time.monotonic()
-        result = self._solver.Solve(binary.program, None, options)
-        if result.is_success():
-            return Found(result.GetSolution(binary.omega).round(), "optimal")
-        return Found(None, "budget_spent" if time.monotonic() - started >= seconds else "solver_failed")
+        found = _found(self._solver.Solve(binary.program, guess, options), binary.omega)
+        late = found.ended == "solver_failed" and time.monotonic() - started >= seconds
+        return Found(None, "budget_spent") if late else found
+
+
+def relax(binary: BinaryProgram, seconds: float = math.inf, iterations: int = 10_000) -> Found:
+    """The optimum of (27), by DAQP, within `iterations` of the active-set method and `seconds` by the clock."""
+    options = SolverOptions()
+    options.SetOption(DaqpSolver.id(), "iter_limit", iterations)
+    if seconds < math.inf:
+        options.SetOption(DaqpSolver.id(), "time_limit", max(seconds, 1e-6))
+    return _found(DaqpSolver().Solve(binary.relaxation, None, options), binary.shares)
+
+
+def _found(result: Any, variables: Any) -> Found:
+    details = result.get_solver_details() if hasattr(result, "get_solver_details") else None
+    more = (details.iterations, details.multipliers) if isinstance(details, Details) else (0, None)
+    if result.is_success():
+        return Found(result.GetSolution(variables), "optimal", *more)
+    limited = result.get_solution_result() == SolutionResult.kIterationLimit
+    return Found(None, "budget_spent" if limited else "solver_failed", *more)

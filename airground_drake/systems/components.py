@@ -101,7 +101,7 @@ def make_route(scenario: Scenario) -> Route:
     chosen: dict[str, Any] = {"blocks": gate.blocks} if gate.blocks else {}
     if gate.solver != "daqp":
         if why := lacking(gate.solver):
-            allowed = ", ".join(["daqp", *(name for name in SOLVERS if not lacking(name))])
+            allowed = ", ".join(name for name in SOLVERS if not lacking(name))
             raise ScenarioError(scenario.name, "gatekeeper.solver", gate.solver, f"{why}; allowed here: {allowed}")
         chosen["solver"] = gate.solver
     return ROUTES.make(gate.route, of=Route, **chosen)

@@ -1,43 +1,64 @@
-"""(26) with its binary variables, solved to a proven optimum: the default route."""
+"""(26) with its binary variables, solved to a proven optimum along half-planes, again and again: the default route."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+import time
+from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
-from numba import njit
 
 from airground_drake.base.arrays import Array
 from airground_drake.gatekeeper.binary_program import BinaryProgram
 from airground_drake.gatekeeper.budget import Budget
-from airground_drake.gatekeeper.cost import Terms, half_plane_cost
-from airground_drake.gatekeeper.daqp_solver import Found, minimise
-from airground_drake.gatekeeper.drake_solvers import DrakeSearch
+from airground_drake.gatekeeper.drake_solvers import Search, relax
+from airground_drake.gatekeeper.plan_search import cheap_plan, improve
 from airground_drake.gatekeeper.problem import Problem
 from airground_drake.gatekeeper.relaxation import dual_bound, normals_along, sum_up_rounding, unavoidable_cost
 from airground_drake.gatekeeper.routes.guard import guarded
 from airground_drake.gatekeeper.solution import ConstantPlans, Solution, Status, cheapest
 
 _AGREE = 1e-6
-"""A plan cheaper than a proven optimum by more than this, relative, shows that the solver is wrong."""
+"""Costs that differ by less than this, relative, are equal: the solver's tolerances and ours."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Solved:
+    """The outcome of linearising again and again.
+
+    Attributes:
+        plans: all plans found, (N,) each.
+        status: whether the last optimum was proved.
+        bound: lower bound along the last half-planes.
+        normals: of these, (N, m, 3).
+    """
+
+    plans: list[Array]
+    status: Status
+    bound: float
+    normals: Array
 
 
 class MixedIntegerRoute:
-    """Mixed-integer quadratic program with one binary per stage, or per block of stages, and a proof of optimality.
+    """Mixed-integer quadratic programs with one binary per stage, or per block of stages, and a proof of optimality.
 
-    First the relaxation is solved, as by `RelaxedRoute`. The best of sum-up rounding, the constant plans and the rest
-    of the previous plan is improved by changing one choice at a time. Its cost, that of the incumbent, cuts the search
-    by branch and bound: DAQP's, or that of Gurobi or Mosek where Drake has them.
+    With half-planes for the exact distances, (26) is a convex program but for its binary variables. Half-planes at
+    another plan allow other plans, so that the optimum of one program need not be that of (26). So the route begins
+    with the cheapest plan by (26) itself that `plan_search` finds: by a beam, and by changes of one and two choices of
+    sum-up rounding, the constant plans and the rest of the previous plan. Then it repeats:
 
-    The plan returned is the cheapest by exact distances of the optimum, the incumbent, the plans that it was chosen
-    from, and each of these with the other first choice. `route_bound` is the optimum along the half-planes; the gap
-    is 0.
+    - It puts half-planes at the plan. Along these the plan costs what it costs by (26).
+    - A solver looks for the optimum, starting from the plan. It costs no more by (26) than along the half-planes.
+    - If that is cheaper, it is improved by changes of one and two choices, and is the next plan. Else the plan is the
+      optimum along its own half-planes, and the route ends.
 
-    Budget: only the clock can stop DAQP during a search, but it says how many iterations it took. If they are more than
-    `search_iterations`, or the time `search_s` was up, or the solver fails, the incumbent decides. It does not depend
-    on the clock; its bound is that of the relaxation.
+    Each plan is cheaper than the one before it. Nearly always the first is the last. The plan returned is the cheapest
+    by (26) of all these and of the same with the other first choice. `route_bound` is the optimum along the last
+    half-planes, and the gap is 0.
+
+    Budget: only the clock can stop DAQP during a search, but it says how many iterations it took. If all searches
+    together take more than `search_iterations`, or the time `search_s` is up, or the solver fails, the best plan so far
+    decides. It does not depend on the clock; its bound is that of the relaxation along half-planes at it.
     """
 
     def __init__(self, blocks: int | None = None, solver: str = "daqp") -> None:
@@ -45,7 +66,7 @@ class MixedIntegerRoute:
 
         Args:
             blocks: binaries, each for a block of stages; they need not divide the stages. None: one per stage.
-            solver: of the search; 'daqp' or one of `drake_solvers.SOLVERS`. Relaxations are DAQP's.
+            solver: of the search; one of `drake_solvers.SOLVERS`. Relaxations are DAQP's.
 
         Raises:
             ValueError: if there is less than one block, or the solver cannot be used here.
@@ -53,7 +74,7 @@ class MixedIntegerRoute:
         if blocks is not None and blocks < 1:
             raise ValueError(f"blocks: {blocks}, allowed: 1 or more")
         self._blocks = blocks
-        self._search: Callable[..., Found] = minimise if solver == "daqp" else DrakeSearch(solver).minimise
+        self._search = Search(solver)
         self._programs: dict[tuple[int, int], BinaryProgram] = {}
 
     def solve(self, problem: Problem, budget: Budget = Budget()) -> Solution:  # noqa: B008 (immutable)
@@ -61,33 +82,46 @@ class MixedIntegerRoute:
         return guarded(problem, budget, self._solve)
 
     def _solve(self, problem: Problem, constants: ConstantPlans, budget: Budget) -> Solution:
-        normals = normals_along(problem, constants.better.positions)
         binary = self._program(problem)
-        binary.update(problem, normals)
-        bound, known_plans = _known(binary, problem, normals)
-        costs = [problem.evaluate_half_planes(problem.positions(plan), normals) for plan in known_plans]
-        start = known_plans[int(np.argmin(costs))]
-        incumbent = _improved(problem.terms, normals, binary.block, start)
-        known = problem.evaluate_half_planes(problem.positions(incumbent), normals)
-        found = self._search(binary, known=known, seconds=min(budget.search_s, budget.left_s()))
-        status: Status = found.ended if found.iterations <= budget.search_iterations else "budget_spent"
-        plans = [incumbent, *known_plans]
-        if found.omega is not None and status == "optimal":
-            optimum = binary.plan(found.omega)
-            cost = problem.evaluate_half_planes(problem.positions(optimum), normals)
-            if abs(cost - known) <= _AGREE * known or cost < known:
-                plans, bound = [optimum, *plans], min(cost, known)
-            else:
-                status = "solver_failed"
+        known = _known(binary, problem, constants)
+        start = cheap_plan(problem.terms, binary.block, known)
+        solved = self._solve_again_and_again(binary, problem, start, budget)
+        plans = [*solved.plans, *known]
         turned = [np.where(binary.block == 0, 1.0 - plan[0], plan) for plan in plans]
         evaluated = [problem.evaluate(plan) for plan in (*plans, *turned)]
         return cheapest(
             problem,
             (constants.accept, constants.refuse, *evaluated),
-            status=status,
-            route_bound=max(bound, unavoidable_cost(problem)),
-            normals=normals,
+            status=solved.status,
+            route_bound=max(solved.bound, unavoidable_cost(problem)),
+            normals=solved.normals,
         )
+
+    def _solve_again_and_again(self, binary: BinaryProgram, problem: Problem, plan: Array, budget: Budget) -> _Solved:
+        """Optima along half-planes at a plan (N,), then at the optimum, while that becomes cheaper."""
+        plans, iterations, until = [plan], budget.search_iterations, time.monotonic() + budget.search_s
+        while True:
+            positions = problem.positions(plan)
+            normals = normals_along(problem, positions)
+            binary.update(problem, normals)
+            seconds = min(until - time.monotonic(), budget.left_s())
+            if seconds <= 0.0:
+                return _Solved(plans, "budget_spent", _relaxed_bound(binary, problem, normals), normals)
+            found = self._search.minimise(binary, binary.guess(problem, plan, normals), seconds)
+            iterations -= found.iterations
+            status: Status = found.ended if iterations >= 0 else "budget_spent"
+            if found.omega is None or status != "optimal":
+                return _Solved(plans, status, _relaxed_bound(binary, problem, normals), normals)
+            optimum = binary.plan(found.omega.round())
+            before = problem.evaluate_half_planes(positions, normals)
+            cost = problem.evaluate_half_planes(problem.positions(optimum), normals)
+            if cost > before * (1.0 + _AGREE):
+                return _Solved(plans, "solver_failed", _relaxed_bound(binary, problem, normals), normals)
+            plans.append(optimum)
+            if cost >= before * (1.0 - _AGREE):
+                return _Solved(plans, "optimal", min(cost, before), normals)
+            plan, _ = improve(problem.terms, binary.block, optimum, pairs=True)
+            plans.append(plan)
 
     def _program(self, problem: Problem) -> BinaryProgram:
         """Built once for a number of stages and blocks; then only its coefficients change."""
@@ -98,48 +132,20 @@ class MixedIntegerRoute:
         return self._programs[size]
 
 
-def _known(binary: BinaryProgram, problem: Problem, normals: Array) -> tuple[float, list[Array]]:
-    """A lower bound by the relaxation, and plans (N,) that need no search."""
+def _known(binary: BinaryProgram, problem: Problem, constants: ConstantPlans) -> list[Array]:
+    """Plans (N,) that need no search: constant ones, the rest of the previous one, and sum-up rounding."""
     count = len(binary.omega)
     known = [np.ones(count), np.zeros(count)]
     if problem.previous is not None:
         known.append(binary.blocked(problem.previous))
-    bound, relaxed = -math.inf, minimise(binary, relaxed=True).omega
-    if relaxed is not None:
-        known.append(sum_up_rounding(relaxed))
-        bound = dual_bound(problem, normals, binary.plan(relaxed))
-    return bound, [binary.plan(values) for values in known]
+    binary.update(problem, normals_along(problem, constants.better.positions))
+    shares = relax(binary).omega
+    if shares is not None:
+        known.append(sum_up_rounding(shares.clip(0.0, 1.0)))
+    return [binary.plan(values) for values in known]
 
 
-@njit(cache=True)
-def _improved(terms: Terms, normals: Array, block: npt.NDArray[np.int64], start: Array) -> Array:
-    """A plan (N,) that no change of a single block makes cheaper, with distances along the half-planes.
-
-    Args:
-        terms: of the problem.
-        normals: (N, m, 3).
-        block: that each stage belongs to, (N,).
-        start: where to begin, (N,), constant on each block.
-    """
-    plan, best, changed = start.copy(), _cost_turned(terms, normals, block, start, -1), True
-    while changed:
-        changed = False
-        for turned in range(block[-1] + 1):
-            cost = _cost_turned(terms, normals, block, plan, turned)
-            if cost < best * (1.0 - 1e-12):
-                plan, best, changed = np.where(block == turned, 1.0 - plan, plan), cost, True
-    return plan
-
-
-@njit(cache=True)
-def _cost_turned(terms: Terms, normals: Array, block: npt.NDArray[np.int64], plan: Array, turned: int) -> float:
-    """Cost of a plan along the half-planes, with the opposite choice in one block; -1: in no block."""
-    positions = np.empty((len(plan), 3))
-    x, y, z = terms.initial[0], terms.initial[1], terms.initial[2]
-    for k in range(len(plan)):
-        mode = int(plan[k]) if block[k] != turned else 1 - int(plan[k])
-        x += terms.dt * terms.velocities[mode, k, 0]
-        y += terms.dt * terms.velocities[mode, k, 1]
-        z += terms.dt * terms.velocities[mode, k, 2]
-        positions[k, 0], positions[k, 1], positions[k, 2] = x, y, z
-    return half_plane_cost(terms, positions, normals)
+def _relaxed_bound(binary: BinaryProgram, problem: Problem, normals: Array) -> float:
+    """Lower bound along half-planes, which are those of the program, by its relaxation; -inf if that fails."""
+    shares = relax(binary).omega
+    return -math.inf if shares is None else dual_bound(problem, normals, binary.plan(shares.clip(0.0, 1.0)))

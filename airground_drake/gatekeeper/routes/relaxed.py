@@ -9,7 +9,7 @@ import numpy as np
 
 from airground_drake.gatekeeper.binary_program import BinaryProgram
 from airground_drake.gatekeeper.budget import Budget
-from airground_drake.gatekeeper.daqp_solver import minimise
+from airground_drake.gatekeeper.drake_solvers import relax
 from airground_drake.gatekeeper.problem import Problem
 from airground_drake.gatekeeper.relaxation import dual_bound, normals_along, sum_up_rounding, unavoidable_cost
 from airground_drake.gatekeeper.routes.guard import guarded, without_optimum
@@ -49,14 +49,14 @@ class RelaxedRoute:
             self._programs[stages] = BinaryProgram(stages, stages)
         program = self._programs[stages]
         program.update(problem, normals)
-        found = minimise(program, relaxed=True, seconds=budget.left_s(), iterations=ACTIVE_SETS * budget.iterations)
-        relaxed = found.omega
-        if relaxed is None:
+        found = relax(program, budget.left_s(), ACTIVE_SETS * budget.iterations)
+        if found.omega is None:
             return without_optimum(problem, constants, budget, normals, ended=found.ended)
+        relaxed = found.omega.clip(0.0, 1.0)
         bound = dual_bound(problem, normals, relaxed)
         if found.multipliers is not None and program.within.any():  # better where half-planes share the slack
             multipliers = np.zeros(program.within.shape)
-            multipliers[program.within] = found.multipliers
+            multipliers[program.within] = found.multipliers.clip(0.0)
             bound = max(bound, dual_bound(problem, normals, relaxed, multipliers))
         rounded = sum_up_rounding(relaxed)
         other = np.append(1.0 - rounded[0], rounded[1:])
