@@ -8,7 +8,17 @@ from typing import Any, NamedTuple
 
 from airground_drake.base.statuses import PASSING, UNDECIDED
 from airground_drake.report.outcomes import Course, Document, claims, proved_for_d, triggers
-from airground_drake.report.phrases import MAX_NAMES, Line, colliding, counted, grouped, intrusion, more_pairs, of_run
+from airground_drake.report.phrases import (
+    MAX_NAMES,
+    Line,
+    colliding,
+    counted,
+    gatekeeper,
+    grouped,
+    intrusion,
+    more_pairs,
+    of_run,
+)
 
 NEGLIGIBLE = 1e-3
 """A risk that exceeds the smallest one by less than this share counts as the smallest."""
@@ -109,7 +119,12 @@ def _whereabouts(document: Document, course: Course) -> Line:
 def _runs(document: Document, every: Sequence[Course]) -> Iterator[Line]:
     """What each run is, for readers who do not know its letter."""
     resolved = document["scenario"]["resolved"]
-    if told := [f"{course.name}: {of_run(resolved, course)}" for course in every if course.plain]:
+    told = []
+    for course in every:
+        if course.plain:
+            own = course.method == "c" and not resolved["runs"][course.name].get("set")
+            told.append(f"{course.name}: {of_run(resolved, course)}{f', {gatekeeper(resolved)}' if own else ''}")
+    if told:
         yield Line("", f"{'; '.join(told)}.")
 
 

@@ -133,7 +133,7 @@ def closest_obstacle(trace: Trace, robot: str) -> Nearby | None:
 
 def close_by(trace: Trace, robot: str) -> list[Nearby]:
     """Smallest distances of a robot to its nearest obstacles and robots, exact, those of least margin first."""
-    found = _distances(trace, robot, list(trace.scenario.obstacles), NEAR_OBSTACLES)
+    found = _distances(trace, robot, _obstacles(trace), NEAR_OBSTACLES)
     found |= _distances(trace, robot, _others(trace, robot), NEAR_ROBOTS)
     return sorted(_surfaces(trace, robot, found), key=lambda at: at.value - at.required_m)
 
@@ -146,8 +146,12 @@ def _surfaces(trace: Trace, robot: str, found: dict[str, dict[str, float]]) -> I
 
 
 def gap_m(trace: Trace, robot: str, other: str) -> Array:
-    """Distance of the surfaces of a robot and an obstacle or another robot at the rows, (T,), m."""
+    """Distance of the surfaces of a robot and an obstacle or another robot at the rows, (T,), m.
+
+    NaN before an obstacle appears.
+    """
     apart: Array = np.linalg.norm(trace.position(robot) - place(trace, other), axis=1)
+    apart[: trace.there_from(other)] = np.nan
     return apart - (radius_m(trace, robot) + radius_m(trace, other))
 
 
@@ -170,7 +174,12 @@ def radius_m(trace: Trace, name: str) -> float:
 
 
 def _to_obstacles(trace: Trace, robot: str) -> dict[str, dict[str, float]]:
-    return _distances(trace, robot, list(trace.scenario.obstacles), MOST_OBSTACLES)
+    return _distances(trace, robot, _obstacles(trace), MOST_OBSTACLES)
+
+
+def _obstacles(trace: Trace) -> list[str]:
+    """The obstacles that are there before the end."""
+    return [name for name in trace.scenario.obstacles if trace.there_from(name) < len(trace.t)]
 
 
 def _others(trace: Trace, robot: str) -> list[str]:
@@ -189,13 +198,16 @@ def _distances(trace: Trace, robot: str, among: Sequence[str], most: int) -> dic
 
     @cache
     def closest(k: int) -> Approach:
-        return closest_approach(trace.t, trace.position(robot), place(trace, among[k]))
+        other, row = place(trace, among[k]), trace.there_from(among[k])
+        return closest_approach(trace.t[row:], trace.position(robot)[row:], other if other.ndim == 1 else other[row:])
 
     least = np.array([bound[frozenset((robot, other))] - required[other] for other in among])
     near = least_of(least, most, lambda k: closest(k).distance_m - required[among[k]])
+    appears = {k: trace.t[row] for k in near if (row := trace.there_from(among[k]))}
     return {
         among[k]: {
             "value": closest(k).distance_m, "t_s": closest(k).t_s, "safe_distance_m": required[among[k]],
+            **({"appeared": True} if closest(k).t_s == appears.get(k) else {}),
         }
         for k in near
     }  # fmt: skip

@@ -17,7 +17,7 @@ Document = Mapping[str, Any]
 
 
 class Near(NamedTuple):
-    """The smallest distance of a pair, of centres."""
+    """The smallest distance of a pair, of centres; `appeared`: at the instant at which the other one appeared."""
 
     margin_m: float
     robot: str
@@ -25,6 +25,7 @@ class Near(NamedTuple):
     value_m: float
     required_m: float
     t_s: float
+    appeared: bool = False
 
     @property
     def is_short(self) -> bool:
@@ -143,7 +144,8 @@ def pairs(run: Mapping[str, Any]) -> Iterator[Near]:
         for robot, others in run["metrics"][kind].items():
             for other, found in others.items():
                 value, required = found["value"], found["safe_distance_m"]
-                yield Near(value - required, robot, other, value, required, found["t_s"])
+                appeared = bool(found.get("appeared"))
+                yield Near(value - required, robot, other, value, required, found["t_s"], appeared)
 
 
 def claims(document: Document, *names: str, run: str | None = None) -> list[Mapping[str, Any]]:

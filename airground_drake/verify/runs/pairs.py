@@ -23,6 +23,7 @@ class Pair(NamedTuple):
         safe_m: safe distance of the centres: that of the kind of pair, plus both radii.
         share: part of the avoidance inequality that each robot takes: all beside an obstacle, half beside a robot.
         reach_m: how far they can approach each other in one control period.
+        row: from which on both are there.
     """
 
     first: str
@@ -30,24 +31,29 @@ class Pair(NamedTuple):
     safe_m: float
     share: float
     reach_m: float
+    row: int = 0
 
 
 def pairs_of(trace: Trace) -> tuple[Pair, ...]:
     """All robot/obstacle and robot/robot pairs of a run, with the safe distances of its scenario.
 
+    Obstacles that do not appear before the end are in none.
+
     Those of one robot come in the order in which its controller lists them: obstacles, then robots in array order.
     """
-    return trace.derived("pairs", lambda: tuple(_pairs_of(trace)))
+    return trace.derived("pairs", lambda: tuple(pair for pair in declared_pairs(trace) if pair.row < len(trace.t)))
 
 
-def _pairs_of(trace: Trace) -> Iterator[Pair]:
+def declared_pairs(trace: Trace) -> Iterator[Pair]:
+    """The same with obstacles that do not appear before the end."""
     safe, uav, period = trace.scenario.safe_distance, trace.scenario.uav.name, trace.scenario.control.period_s
     radius = {name: body.radius_m for name, body in trace.scenario.bodies.items()}
     limit = {name: robot.max_speed_m_s for name, robot in trace.scenario.robots.items()}
+    there = {name: trace.there_from(name) for name in trace.scenario.obstacles}
     for robot in trace.robots:
-        for obstacle in trace.scenario.obstacles:
+        for obstacle, row in there.items():
             distance = safe.obstacle_m + (radius[robot] + radius[obstacle])
-            yield Pair(robot, obstacle, distance, 1.0, limit[robot] * period)
+            yield Pair(robot, obstacle, distance, 1.0, limit[robot] * period, row)
     for robot, other in combinations(trace.robots, 2):
         apart = safe.air_ground_m if uav in (robot, other) else safe.ugv_m
         distance = apart + (radius[robot] + radius[other])
@@ -55,7 +61,10 @@ def _pairs_of(trace: Trace) -> Iterator[Pair]:
 
 
 def apart_of(trace: Trace) -> Array:
-    """A lower bound of the distance of each pair over the whole run, (P,), m, in the order of `pairs_of`."""
+    """A lower bound of the distance of each pair over the whole run, (P,), m, in the order of `pairs_of`.
+
+    Obstacles count as there from the start on.
+    """
     return trace.derived("apart", lambda: _apart_of(trace))
 
 
@@ -135,6 +144,12 @@ def places_of(trace: Trace) -> dict[str, Array]:
 def centres_of(trace: Trace) -> Array:
     """Centres of the obstacles, (m, 3), m."""
     return np.array([o.position_m for o in trace.scenario.obstacles.values()], dtype=np.float64).reshape(-1, 3)
+
+
+def appears_of(trace: Trace) -> Array:
+    """When each obstacle appears, (m,), s; inf: not before the end."""
+    rows = [trace.there_from(name) for name in trace.scenario.obstacles]
+    return np.array([trace.t[row] if row < len(trace.t) else np.inf for row in rows], dtype=np.float64)
 
 
 def snapshot(trace: Trace, names: Iterable[str], t_s: float) -> dict[str, Any]:

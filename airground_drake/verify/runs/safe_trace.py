@@ -49,7 +49,8 @@ class SafeTrace(TraceClaim):
         "Between two rows every robot moves on a straight line at constant speed (integrator plant, zero-order hold).",
         "Robots and obstacles are balls of the scenario's radii (`radius_m`; by default points): d_ij is the safe "
         "distance of the kind of pair and both radii, and distances are of centres.",
-        "Obstacles stand still for the whole run, as the scenario lists them.",
+        "Obstacles stand still for the whole run, as the scenario lists them. One with `appears_s` is judged from the "
+        "first control sample at or after that time on, the instant itself included.",
     )
     does_not_establish = (
         "Safety of any other run, start or seed, or of a plant that does not follow its velocity exactly (SAFE-DIST); "
@@ -74,7 +75,7 @@ class SafeTrace(TraceClaim):
             unit="m",
             quantity="least distance of a pair less its safe distance",
             where={"first": worst.first, "second": worst.second, "t_s": worst.t_s},
-            counterexample=None if safe else asdict(worst) | snapshot(trace, both, worst.t_s),
+            counterexample=None if safe else asdict(worst) | _why(trace, worst) | snapshot(trace, both, worst.t_s),
             evidence={
                 "pairs": [asdict(each) for each in listed],
                 "pairs_in_all": len(pairs),
@@ -105,7 +106,18 @@ def _entry(trace: Trace, places: Mapping[str, Array], pairs: Sequence[Pair], k: 
     """Where the k-th pair was closest."""
     pair = pairs[k]
     off_m = off_m_of(trace, pair.first) + off_m_of(trace, pair.second)
-    nearest = closest_approach(trace.t, places[pair.first], places[pair.second], off_m)
+    both = places[pair.first], places[pair.second]
+    first, second = (place[pair.row :] if place.ndim == 2 else place for place in both)
+    nearest = closest_approach(trace.t[pair.row :], first, second, off_m)
     margin = nearest.distance_m - pair.safe_m
     reached = bool(margin < pair.reach_m)
-    return Distance(pair.first, pair.second, pair.safe_m, nearest.distance_m, margin, nearest.t_s, nearest.row, reached)
+    row = nearest.row + pair.row
+    return Distance(pair.first, pair.second, pair.safe_m, nearest.distance_m, margin, nearest.t_s, row, reached)
+
+
+def _why(trace: Trace, worst: Distance) -> dict[str, str]:
+    """That a pair was nearest when its obstacle appeared, if so: no robot's doing."""
+    row = trace.there_from(worst.second)
+    if not row or worst.t_s > trace.t[row]:
+        return {}
+    return {"why": f"{worst.second} appeared at {worst.t_s:.9g} s this near to {worst.first}: nobody's doing"}
