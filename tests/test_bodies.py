@@ -15,6 +15,7 @@ from builders.misbuilt import neighbours
 from report.cases import built
 
 from airground_drake.base.arrays import Array
+from airground_drake.base.errors import TraceError
 from airground_drake.check import positions
 from airground_drake.export import tables
 from airground_drake.gatekeeper.outcome_gatekeeper import OutcomeGatekeepers
@@ -22,12 +23,14 @@ from airground_drake.proofs.export import recorded
 from airground_drake.proofs.too_near import too_near
 from airground_drake.report import attention, summary
 from airground_drake.report.figures.draw import draw
+from airground_drake.report.metrics import closest_obstacle
 from airground_drake.report.page import page
 from airground_drake.run.simulation import simulate
 from airground_drake.run.trace import Trace
 from airground_drake.scenarios.load import load, validated
 from airground_drake.scenarios.schema import Policy, Run, Scenario
 from airground_drake.verify import verify
+from airground_drake.world.world import World
 
 ROCK, OWN, FLIER = 0.5, 0.25, 0.25
 """Radii, m, whose sums are exact."""
@@ -156,3 +159,68 @@ def test_running_code_that_forgets_radii_is_refuted(name: str, monkeypatch: pyte
     assert refuting <= found
     if name == "radii in the gatekeeper only":
         assert not found & {"SAFE-TRACE", "SAFE-HYP", "EXEC"}
+
+
+def sudden(appears_s: float, *more: str) -> Scenario:
+    """The minimal scenario, in which the rock appears under way; ugv1 tracks its preset, to 5 m at 5 s, until then."""
+    return load("minimal", [f"obstacles.rock.appears_s={appears_s}", "duration_s=11", *more])[0]
+
+
+def test_an_obstacle_is_there_from_the_control_sample_at_which_it_appears() -> None:
+    """Until then the motion is that without it, nobody knows of it, and no claim is about it."""
+    late, never = simulate(sudden(2.01), "d"), simulate(sudden(99.0), "d")
+    row = late.there_from("rock")
+    assert late.t[row] == pytest.approx(2.025)
+    assert never.there_from("rock") == len(never.t)
+    np.testing.assert_array_equal(late.position("ugv1")[: row + 1], never.position("ugv1")[: row + 1])
+    assert statuses(late) | {"LIVE-GOAL": ""} == {**dict.fromkeys(statuses(late), "holds"), "LIVE-GOAL": ""}
+    assert closest_obstacle(never, "ugv1") is None
+    assert {**statuses(never)}["SAFE-HYP"] == "holds"
+    there = simulate(sudden(0.0), "d")
+    assert late.position("ugv1")[-1] == pytest.approx(there.position("ugv1")[-1], abs=0.1)
+
+
+def test_where_it_appears_too_near_is_nobodys_doing() -> None:
+    """It appears 0.8 m ahead, where 2 m are required: refuted with this reason, and the robot makes way at its gain."""
+    trace = simulate(sudden(4.2), "d")
+    found = {verdict.claim.id: verdict.finding for verdict in verify(trace, ("SAFE-TRACE", "SAFE-HYP", "EXEC"))}
+    seen = found["SAFE-TRACE"].counterexample or {}
+    assert (seen["t_s"], seen["min_distance_m"]) == pytest.approx((4.2, 0.8))
+    assert seen["why"] == "rock appeared at 4.2 s this near to ugv1: nobody's doing"
+    broken = found["SAFE-HYP"].counterexample or {}
+    assert (broken["hypothesis"], broken["t_s"]) == ("safe start", pytest.approx(4.2))
+    assert found["EXEC"].status == "holds"
+
+
+def test_it_collides_with_nobody_before_it_appears() -> None:
+    """ugv1 drives over the place at 5 s."""
+    passed, hit = (simulate(sudden(t, "runs={d: {method: d}}"), "d") for t in (8.0, 5.0))
+    assert [event["kind"] for event in passed.events if event["kind"] == "collision"] == []
+    assert [event["t_s"] for event in hit.events if event["kind"] == "collision"] == pytest.approx([5.0])
+
+
+def test_the_uav_knows_it_from_then_on() -> None:
+    """Its map has the rock in a proposal after it appeared, and not before."""
+    for appears_s, known in ((2.0, 1), (8.0, 0)):
+        changes = (
+            "obstacles.wall={position_m: [2.5, 0.5, 0.0]}", "obstacles.gate={position_m: [2.5, -0.5, 0.0]}",
+            "ugvs.ugv1.preset.speed_m_s=1.5",
+        )  # fmt: skip
+        sent = simulate(sudden(appears_s, *changes), "d").proposals
+        assert len(sent)
+        assert len(np.reshape(sent.iloc[0]["mapped_m"], (-1, 3))) == 2 + known
+
+
+def test_a_controller_that_knows_of_it_too_early_or_late_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    ahead = "obstacles.rock.position_m=[3.0, 0.0, 0.0]"
+    for shift, claim in ((-1.0, "EXEC"), (0.5, "SAFE-HYP")):
+        with monkeypatch.context() as patched:
+            at = World.at
+            patched.setattr(World, "at", lambda self, near, t, at=at, shift=shift: at(self, near, t - shift))
+            trace = simulate(sudden(1.0 if shift > 0.0 else 2.0, ahead), "a")
+        assert statuses(trace)[claim] == "refuted"
+
+
+def test_coq_is_not_asked_about_it() -> None:
+    with pytest.raises(TraceError, match=r"rock appears under way; .* bodies that are always there"):
+        recorded(simulate(sudden(2.0), "d"))

@@ -118,12 +118,13 @@ def _collisions(run: Run) -> Iterator[Event]:
         within = float(run.scenario["safe_distance"]["collision_m"]) + pair.radii_m
         if run.apart_m[pair.robot, pair.other] >= within:
             continue
-        away = run.position_m[pair.robot] - run.position_m[pair.other]
+        first = run.there_from(pair.other)
+        away = (run.position_m[pair.robot] - run.position_m[pair.other])[first:]
         near = np.linalg.norm(away, axis=1) < within
         enters = near & ~np.append(False, near[:-1])
         passes = np.append((distances_m(away) < within) & ~near[:-1] & ~near[1:], False)
         hit = {"other" if pair.other in run.robots else "obstacle": pair.other}
-        for when in run.t_s[enters | passes]:
+        for when in run.t_s[first:][enters | passes]:
             yield Event(float(when), pair.robot, "collision", **hit)
 
 

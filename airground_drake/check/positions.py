@@ -136,6 +136,8 @@ def _sampled(table: pd.DataFrame, scenario: Json) -> tuple[Array, Mapping[str, A
         if len(own) != len(times[first]) or not np.allclose(own, times[first], rtol=0.0, atol=_resolution_s(own)):
             raise UnusableError(f"{robot} and {first} are not sampled at the same times; wanted: equal t_s")
     for name, body in obstacles.items():
+        if body.get("appears_s"):
+            raise UnusableError(f"{name} appears under way (appears_s); wanted: obstacles that are always there")
         found[name] = np.tile(np.array(body["position_m"], dtype=np.float64), (len(times[first]), 1))
     return times[first], found
 

@@ -103,8 +103,8 @@ class Run:
 
     @cached_property
     def pairs(self) -> list[Pair]:
-        """Pairs of bodies and the distances that they must keep."""
-        return pairs_of(self.scenario)
+        """Pairs of bodies that are there before the end, and the distances that they must keep."""
+        return [pair for pair in pairs_of(self.scenario) if self.there_from(pair.other) < len(self.t_s)]
 
     @cached_property
     def apart_m(self) -> dict[tuple[str, str], float]:
@@ -135,6 +135,17 @@ class Run:
         for name, obstacle in self.scenario["obstacles"].items():
             places[name] = np.tile(np.array(obstacle["position_m"], dtype=np.float64), (len(self.t_s), 1))
         return places
+
+    def there_from(self, name: str) -> int:
+        """Row from which on a body is there, the number of rows if not before the end.
+
+        An obstacle with `appears_s` is there from the first control sample at or after that time on.
+        """
+        appears = float(self.scenario["obstacles"].get(name, {}).get("appears_s", 0.0))
+        if appears == 0.0:
+            return 0
+        later = self.sample_row[self.sample_s >= appears - SMALL]
+        return int(later[0]) if len(later) else len(self.t_s)
 
     @cached_property
     def sample_s(self) -> Array:

@@ -37,7 +37,8 @@ def safe_trace(run: Run) -> Found:
         closing = pair.closing_m_s * run.scenario["control"]["period_s"]
         if run.apart_m[pair.robot, pair.other] - pair.safe_m > max(margin, closing + SMALL):
             continue  # neither the nearest pair nor near enough to count
-        of_pair = float(distances_m(run.position_m[pair.robot] - run.position_m[pair.other]).min()) - pair.safe_m
+        apart = (run.position_m[pair.robot] - run.position_m[pair.other])[run.there_from(pair.other) :]
+        of_pair = float(distances_m(apart).min()) - pair.safe_m
         margin = min(margin, of_pair)
         least += of_pair - closing < -SMALL
         most += of_pair - closing <= SMALL
@@ -123,7 +124,8 @@ def safe_hyp(run: Run) -> Found:
     for pair in run.pairs:
         if run.apart_m[pair.robot, pair.other] > pair.safe_m + pair.closing_m_s * period + FAR_M:
             continue
-        own, other = run.position_m[pair.robot][rows], run.position_m[pair.other][rows]
+        there = rows[rows >= run.there_from(pair.other)]
+        own, other = run.position_m[pair.robot][there], run.position_m[pair.other][there]
         lost = max(lost, lost_m(shortfall_m(own, other, pair, gain, last), gain, len(run.sample_row)))
     return Found("holds" if lost <= SMALL else "refuted", -lost if lost <= SMALL else None)
 
@@ -138,7 +140,8 @@ def _constants(run: Run) -> None:
         about, speed = f"{pair.robot}, {pair.other}", written(limit[pair.robot]) + written(limit.get(pair.other, 0.0))
         least = written(pair.safe_m) + speed * period
         holds("sensing range", reach >= least, float(reach), f"{float(least)} at least", about=about)
-        start = float(np.linalg.norm(run.position_m[pair.robot][0] - run.position_m[pair.other][0]))
+        row = run.there_from(pair.other)
+        start = float(np.linalg.norm(run.position_m[pair.robot][row] - run.position_m[pair.other][row]))
         holds("safe start", start >= pair.safe_m - SMALL, start, f"{pair.safe_m} at least", about=about)
 
 

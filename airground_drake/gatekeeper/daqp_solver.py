@@ -178,9 +178,7 @@ def _limits(*given: SolverOptions | None) -> Limits:
     return Limits(**chosen)
 
 
-def _fill(
-    result: MathematicalProgramResult, program: MathematicalProgram, answer: Answer, cost: float
-) -> _StandIns:
+def _fill(result: MathematicalProgramResult, program: MathematicalProgram, answer: Answer, cost: float) -> _StandIns:
     """Put an answer into a result by way of CLP; returns the variables that stand for binary ones."""
     variables = program.decision_variables()
     binary = [x for x in variables if x.get_type() == Variable.Type.BINARY]

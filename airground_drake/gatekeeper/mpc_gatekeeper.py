@@ -99,19 +99,19 @@ class Gatekeepers(abc.ABC):
     def sample(self, now: Inputs, before: GatekeeperState) -> GatekeeperState:
         """Judge every proposal in force, with the state from the sample before."""
 
-    def idle(self, proposals: Proposals, positions: Array, before: GatekeeperState) -> bool:
-        """Whether a sample changes nothing: no proposal, no answer to take back, nothing new to remember."""
+    def idle(self, t: float, proposals: Proposals, positions: Array, before: GatekeeperState) -> bool:
+        """Whether a sample at t, s, changes nothing: no proposal, no answer to take back, nothing new to remember."""
         return not any(proposals) and not any(before.answers[::2])
 
     def _report(self, position: Array, decision: Decision) -> Report:
         """The report with an answer: the obstacles within sensing range, and the reason."""
-        near = distances(self._near.still, position) <= self.law.avoidance.sensing_range
+        near = distances(self._world.at(self._near, decision.t).still, position) <= self.law.avoidance.sensing_range
         discs: tuple[Disc, ...] = tuple((x, y, z, radius) for x, y, z, radius in self._discs[near].tolist())
         return Report(discs, decision.reason, in_words(decision))
 
     def _view(self, now: Inputs, i: int) -> View:
         """All obstacles and robots around a UGV, whether within sensing range or not."""
-        near = self._near
+        near = self._world.at(self._near, now.t)
         return View(
             t=now.t,
             position=now.positions[i].copy(),

@@ -50,13 +50,14 @@ class OutcomeGatekeepers(Gatekeepers):
         self._outlook, self._patience = outlook, patience
         self._ugvs = world.names("ugv")
 
-    def idle(self, proposals: Proposals, positions: Array, before: GatekeeperState) -> bool:
+    def idle(self, t: float, proposals: Proposals, positions: Array, before: GatekeeperState) -> bool:
         """Whether a sample changes nothing."""
-        return super().idle(proposals, positions, before) and before.sensed is self._remembered(positions, before)
+        nothing = super().idle(t, proposals, positions, before)
+        return nothing and before.sensed is self._remembered(t, positions, before)
 
     def sample(self, now: Inputs, before: GatekeeperState) -> GatekeeperState:
         """Judge every new proposal by its outcome; keep to the answer to every other."""
-        sensed = self._remembered(now.positions, before)
+        sensed = self._remembered(now.t, now.positions, before)
         known = replace(before, sensed=sensed)
         answers: list[float] = []
         reports: list[Report] = []
@@ -81,9 +82,10 @@ class OutcomeGatekeepers(Gatekeepers):
             known, answers=tuple(answers), reports=tuple(reports), decisions=tuple(decisions), commitments=tuple(held)
         )
 
-    def _remembered(self, positions: Array, before: GatekeeperState) -> np.ndarray:
-        """Which obstacles each UGV has sensed up to now, (n, m); the very same array if nothing is new."""
-        points, own, reach = self._near.still, positions[self._near.members], self.law.avoidance.sensing_range
+    def _remembered(self, t: float, positions: Array, before: GatekeeperState) -> np.ndarray:
+        """Which obstacles each UGV has sensed up to time t, s, (n, m); the very same array if nothing is new."""
+        points, own = self._world.at(self._near, t).still, positions[self._near.members]
+        reach = self.law.avoidance.sensing_range
         if before.sensed.shape != (len(own), len(points)):
             return within(points, own, reach)
         if news_within(points, own, reach, before.sensed):

@@ -17,6 +17,7 @@ from airground_drake.geometry.motion import Motion
 from airground_drake.intervention.database import BehaviourDatabase, Fault, Negotiation
 from airground_drake.intervention.messages import ACCEPT, DONE, REFUSE, SILENT, Disc, Proposals, Reports, answer_to
 from airground_drake.intervention.policy import Answered, Observation, Proposal, Teammate
+from airground_drake.world.world import SAME_S
 
 _WORDS: dict[float, Answered] = {ACCEPT: "accepted", REFUSE: "refused"}
 
@@ -88,6 +89,7 @@ class Planner:
         max_speed: speed limits of the UGVs, (n,), m/s.
         radius: radii of the UGVs' bodies, (n,), m, or one for all.
         mapped_radii: radii of `mapped`, (m,), m, or one for all.
+        mapped_from: when each of `mapped` appears, (m,), s, or one time for all.
     """
 
     ugvs: tuple[str, ...]
@@ -101,6 +103,7 @@ class Planner:
     max_speed: Array
     radius: Array | float = 0.0
     mapped_radii: Array | float = 0.0
+    mapped_from: Array | float = 0.0
 
     @property
     def radii(self) -> Array:
@@ -139,7 +142,8 @@ class Planner:
         said = [answer_to(talk.proposal, answers, i) for i, talk in enumerate(memory.talks)]
         heard = [report for report, answer in zip(reports, said, strict=True) if answer != SILENT]
         reported = {disc for report in heard for disc in report.sensed}
-        mapped = np.column_stack([self.mapped, np.broadcast_to(self.mapped_radii, len(self.mapped))])
+        there = np.broadcast_to(self.mapped_from, len(self.mapped)) <= t + SAME_S
+        mapped = np.column_stack([self.mapped, np.broadcast_to(self.mapped_radii, len(self.mapped))])[there]
         fresh = tuple(sorted(reported - set(memory.learnt) - set(map(tuple, mapped.tolist()))))
         learnt = memory.learnt + fresh
         discs = np.concatenate([mapped, np.array(learnt).reshape(-1, 4)])
@@ -156,7 +160,7 @@ class Planner:
                 target=self.targets[i],
                 preset=self.presets[i],
                 obstacles=np.ascontiguousarray(discs[:, :3]),
-                mapped=self.mapped,
+                mapped=np.ascontiguousarray(mapped[:, :3]),
                 others=np.delete(positions, i, axis=0),
                 safe_distance=self.safe_distance,
                 refusals=talks[i].refusals,

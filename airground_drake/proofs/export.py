@@ -11,6 +11,7 @@ from itertools import combinations, groupby, pairwise
 from math import isqrt, lcm
 from typing import NamedTuple
 
+from airground_drake.base.errors import TraceError
 from airground_drake.base.exact import decimal
 from airground_drake.proofs.record import FOLDER
 from airground_drake.run.trace import Trace
@@ -81,9 +82,13 @@ def recorded(trace: Trace) -> Recorded:
     """A run with its positions rounded to 1/PARTS m; nothing else is rounded.
 
     Raises:
-        TraceError: if a column is missing or not finite.
+        TraceError: if a column is missing or not finite, or an obstacle appears under way.
     """
     control = trace.scenario.control
+    if late := [name for name, obstacle in trace.scenario.obstacles.items() if obstacle.appears_s]:
+        raise TraceError(
+            f"run {trace.run}: {late[0]} appears under way; theorems are about bodies that are always there"
+        )
     places: dict[str, tuple[Place, ...]] = {
         name: (_rounded(obstacle.position_m),) for name, obstacle in trace.scenario.obstacles.items()
     }

@@ -17,6 +17,7 @@ from airground_drake.report.phrases import (
     counted,
     ending,
     found_no_way,
+    gatekeeper,
     grouped,
     intrusion,
     joined,
@@ -200,7 +201,12 @@ def _noisy(document: Document) -> bool:
 def _runs(document: Document, every: Sequence[Course]) -> Iterator[Line]:
     """What each run is, for readers who do not know its letter."""
     resolved = document["scenario"]["resolved"]
-    if told := [f"{course.name}: {of_run(resolved, course)}" for course in every if course.plain]:
+    told = []
+    for course in every:
+        if course.plain:
+            own = course.method == "c" and not resolved["runs"][course.name].get("set")
+            told.append(f"{course.name}: {of_run(resolved, course)}{f', {gatekeeper(resolved)}' if own else ''}")
+    if told:
         yield Line("", f"{'; '.join(told)}.")
 
 

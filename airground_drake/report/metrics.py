@@ -58,10 +58,10 @@ def of_run(trace: Trace) -> dict[str, Any]:
     counts = {robot: Counter(e["kind"] for e in trace.events if e["robot"] == robot) for robot in trace.robots}
     return {
         "min_distance_m": {
-            robot: _listed(_least(trace, robot, [*trace.scenario.obstacles], MOST_OBSTACLES)) for robot in trace.robots
+            robot: _listed(trace, _least(trace, robot, _obstacles(trace), MOST_OBSTACLES)) for robot in trace.robots
         },
         "min_robot_distance_m": {
-            robot: _listed(_least(trace, robot, _others(trace, robot), NEAR_ROBOTS)) for robot in trace.robots
+            robot: _listed(trace, _least(trace, robot, _others(trace, robot), NEAR_ROBOTS)) for robot in trace.robots
         },
         "final_position_m": {robot: trace.position(robot)[-1].tolist() for robot in trace.robots},
         "duration_s": duration_s,
@@ -205,12 +205,12 @@ def _closest_call(trace: Trace) -> dict[str, Any] | None:
 
 def closest_obstacle(trace: Trace, robot: str) -> Nearby | None:
     """Smallest distance of a robot to any obstacle over continuous time, exact; None without obstacles."""
-    return min(_nearby(_least(trace, robot, [*trace.scenario.obstacles], MOST_OBSTACLES)), default=None)
+    return min(_nearby(_least(trace, robot, _obstacles(trace), MOST_OBSTACLES)), default=None)
 
 
 def close_by(trace: Trace, robot: str) -> list[Nearby]:
     """Smallest distances of a robot to its nearest obstacles and robots, exact, those of least margin first."""
-    found = _least(trace, robot, [*trace.scenario.obstacles], NEAR_OBSTACLES)
+    found = _least(trace, robot, _obstacles(trace), NEAR_OBSTACLES)
     found |= _least(trace, robot, _others(trace, robot), NEAR_ROBOTS)
     return sorted(_nearby(found), key=lambda at: at.value - at.required_m)
 
@@ -220,13 +220,21 @@ def _nearby(found: dict[str, Gap]) -> Iterator[Nearby]:
 
 
 def gap_m(trace: Trace, robot: str, other: str) -> Array:
-    """Distance of the surfaces of a robot and an obstacle or another robot at the rows, (T,), m."""
+    """Distance of the surfaces of a robot and an obstacle or another robot at the rows, (T,), m.
+
+    NaN before an obstacle appears.
+    """
     return gap_over_time(trace, pair_of(trace, robot, other))
 
 
 def radius_m(trace: Trace, name: str) -> float:
     """Radius of a robot or an obstacle, m."""
     return trace.scenario.bodies[name].radius_m
+
+
+def _obstacles(trace: Trace) -> list[str]:
+    """The obstacles that are there before the end."""
+    return [name for name in trace.scenario.obstacles if trace.there_from(name) < len(trace.t)]
 
 
 def _others(trace: Trace, robot: str) -> list[str]:
@@ -247,8 +255,12 @@ def _least(trace: Trace, robot: str, among: Sequence[str], most: int) -> dict[st
     return {among[k]: least_gap(trace, pairs[k]) for k in near}
 
 
-def _listed(found: dict[str, Gap]) -> dict[str, dict[str, float]]:
+def _listed(trace: Trace, found: dict[str, Gap]) -> dict[str, dict[str, Any]]:
+    """The same for report.json; `appeared`: the gap was smallest at the instant at which the obstacle appeared."""
     return {
-        other: {"value": least.gap_m, "t_s": least.t_s, "safe_distance_m": least.pair.required_m}
+        other: {
+            "value": least.gap_m, "t_s": least.t_s, "safe_distance_m": least.pair.required_m,
+            **({"appeared": True} if least.at_appearance(trace.t) else {}),
+        }
         for other, least in found.items()
-    }
+    }  # fmt: skip

@@ -24,7 +24,10 @@ Document = Mapping[str, Any]
 
 
 class Near(NamedTuple):
-    """The smallest distance of a pair: the gap between the surfaces, below 0 if they overlap."""
+    """The smallest distance of a pair: the gap between the surfaces, below 0 if they overlap.
+
+    `appeared`: at the instant at which the other one appeared.
+    """
 
     margin_m: float
     robot: str
@@ -32,6 +35,7 @@ class Near(NamedTuple):
     value_m: float
     required_m: float
     t_s: float
+    appeared: bool = False
 
     @property
     def is_short(self) -> bool:
@@ -196,7 +200,8 @@ def pairs(run: Mapping[str, Any]) -> Iterator[Near]:
         for robot, others in run["metrics"][kind].items():
             for other, found in others.items():
                 value, required = found["value"], found["safe_distance_m"]
-                yield Near(value - required, robot, other, value, required, found["t_s"])
+                appeared = bool(found.get("appeared"))
+                yield Near(value - required, robot, other, value, required, found["t_s"], appeared)
 
 
 def claims(document: Document, *names: str, run: str | None = None) -> list[Mapping[str, Any]]:

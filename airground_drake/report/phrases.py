@@ -51,11 +51,13 @@ def of_run(resolved: Mapping[str, Any], course: Course) -> str:
     if changed := resolved["runs"][course.name].get("set"):
         says = [SETTINGS.get((key, str(value)), f"{key} {value}") for key, value in changed.items()]
         return f"({course.method}) with {', '.join(says)}"
-    says = [METHODS[course.method].says]
-    if course.method == "c":
-        gate = ((f"gatekeeper.{key}", resolved["gatekeeper"][key]) for key in ("route", "rule"))
-        says += [SETTINGS.get(pair, " ".join(pair)) for pair in gate]
-    return ", ".join(says)
+    return METHODS[course.method].says
+
+
+def gatekeeper(resolved: Mapping[str, Any]) -> str:
+    """How the gatekeeper of method (c) solves and answers, unless a run sets it differently."""
+    pairs = ((f"gatekeeper.{key}", resolved["gatekeeper"][key]) for key in ("route", "rule"))
+    return ", ".join(SETTINGS.get(pair, " ".join(pair)) for pair in pairs)
 
 
 def refusal(reason: str) -> str:
@@ -117,6 +119,8 @@ def intrusion(course: Course) -> str:
     """Who came how near to what in a run that was not safe."""
     if course.near and course.near[0].is_short:
         least = course.near[0]
+        if least.appeared:
+            return f"{least.other} appears {least} from {least.robot} (nobody's doing)"
         return f"{least.robot} comes within {least} of {least.other}"
     return course.why
 

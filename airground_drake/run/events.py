@@ -71,7 +71,9 @@ def _add_collisions(trace: Trace, add: Any) -> None:
         for k in sorted(near.tolist(), key=lambda k: world.bodies[k].kind in ROBOTS):
             body = world.bodies[k]
             role = "other" if body.kind in ROBOTS else "obstacle"
-            for row in visits(ways[i].seen_from(ways[k]), body.shape, within):
+            first, apart = trace.there_from(body.name), ways[i].seen_from(ways[k])
+            apart = apart._replace(start=apart.start[first:], end=apart.end[first:])
+            for row in first + visits(apart, body.shape, within) if first < len(trace.t) else ():
                 add(trace.t[row], own.name, "collision", **{role: body.name})
 
 

@@ -29,6 +29,7 @@ import json
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from html import escape
+from math import ceil
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -40,6 +41,7 @@ from airground_drake.base.arrays import Array, read_only
 from airground_drake.base.errors import TraceError, one_line
 from airground_drake.scenarios.recorded import of_run
 from airground_drake.scenarios.schema import Scenario
+from airground_drake.world.world import SAME_S
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -215,6 +217,18 @@ class Trace:
     def position(self, robot: str) -> Array:
         """Positions, (T, 3), m, world frame."""
         return self.vector(robot)
+
+    def there_from(self, name: str) -> int:
+        """Row from which on a body is there: the first control sample at or after an obstacle's `appears_s`, or row 0.
+
+        The number of rows if there is no such sample before the end: then nothing of the run is about the body.
+        """
+        obstacle = self.scenario.obstacles.get(name)
+        if obstacle is None or obstacle.appears_s == 0.0:
+            return 0
+        period = self.scenario.control.period_s
+        row = int(np.searchsorted(self.t, period * ceil((obstacle.appears_s - SAME_S) / period) - SAME_S))
+        return row if row < len(self.t) - 1 else len(self.t)
 
     def command(self, robot: str) -> Array:
         """Commands in force up to each row, (T, 3), m/s."""

@@ -108,6 +108,8 @@ class Obstacle:
     """Whether it is on the UAV's map from the beginning."""
     radius_m: NotNegative = 0.0
     """Radius of its body, added to the safe distances of its pairs; 0: a point."""
+    appears_s: NotNegative = 0.0
+    """It is there from the first control sample at or after this time on; before that, it is nowhere."""
 
 
 @dataclass(slots=True)

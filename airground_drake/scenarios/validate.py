@@ -277,8 +277,12 @@ class _Round(NamedTuple):
 
 def _clearances(scenario: Scenario) -> Problems:
     """No robot may start or end within the safe distance of an obstacle or of another robot."""
-    fixed = [_Round("", name, each.position_m, each.radius_m) for name, each in scenario.obstacles.items()]
     for attribute, verb in (("start_m", "starts"), ("target_m", "would end")):
+        fixed = [
+            _Round("", name, each.position_m, each.radius_m)
+            for name, each in scenario.obstacles.items()
+            if not each.appears_s or attribute == "target_m"  # where robots are when it appears is judged in each run
+        ]
         ugvs = [
             _Round(f"ugvs.{name}", name, getattr(ugv, attribute), ugv.radius_m) for name, ugv in scenario.ugvs.items()
         ]

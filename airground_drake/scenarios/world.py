@@ -16,9 +16,12 @@ def make_world(scenario: Scenario) -> World:
     robots = [_robot(name, "ugv", ugv) for name, ugv in scenario.ugvs.items()]
     robots += [_robot(scenario.uav.name, "uav", scenario.uav)]
     obstacles = [
-        Body(name, "obstacle", np.array(each.position_m, dtype=np.float64), Ball(each.radius_m))
+        Body(
+            name, "obstacle", np.array(each.position_m, dtype=np.float64), Ball(each.radius_m),
+            appears_s=each.appears_s,
+        )
         for name, each in scenario.obstacles.items()
-    ]
+    ]  # fmt: skip
     apart: dict[frozenset[Kind], float] = {
         frozenset(("ugv",)): safe.ugv_m,
         frozenset(("ugv", "uav")): safe.air_ground_m,

@@ -54,7 +54,7 @@ def make_planner(scenario: Scenario, method: Method) -> Planner:
     Raises:
         UnknownNameError, PluginError: if the scenario names a policy that cannot be made.
     """
-    mapped, radii = make_map(scenario)
+    mapped, radii, appears = make_map(scenario)
     given = scenario.intervention
     policies = given.policies if method.intervenes else []
     database = BehaviourDatabase(
@@ -72,6 +72,7 @@ def make_planner(scenario: Scenario, method: Method) -> Planner:
         targets=positions([ugv.target_m for ugv in scenario.ugvs.values()]),
         mapped=mapped,
         mapped_radii=radii,
+        mapped_from=appears,
         safe_distance=scenario.safe_distance.obstacle_m,
         robot_distance=scenario.safe_distance.ugv_m,
         max_speed=np.array([ugv.max_speed_m_s for ugv in scenario.ugvs.values()]),
@@ -79,15 +80,17 @@ def make_planner(scenario: Scenario, method: Method) -> Planner:
     )
 
 
-def make_map(scenario: Scenario) -> tuple[Array, Array]:
+def make_map(scenario: Scenario) -> tuple[Array, Array, Array]:
     """The UAV's map: obstacles that it knows, and phantoms, which exist on the map only and have no radius.
 
     Returns:
-        Centres, (m, 3), m, and radii, (m,), m.
+        Centres, (m, 3), m, radii, (m,), m, and when each appears, (m,), s.
     """
     known = [obstacle for obstacle in scenario.obstacles.values() if obstacle.known_to_uav]
+    nothing = [0.0] * len(scenario.uav.phantoms_m)
     centres = [*(obstacle.position_m for obstacle in known), *scenario.uav.phantoms_m]
-    return positions(centres), np.array([*(o.radius_m for o in known), *(0.0 for _ in scenario.uav.phantoms_m)])
+    radii, appears = ([getattr(each, key) for each in known] + nothing for key in ("radius_m", "appears_s"))
+    return positions(centres), np.array(radii), np.array(appears)
 
 
 def make_route(scenario: Scenario) -> Route:

@@ -83,7 +83,7 @@ class UgvController(_Controller):
         """Declare ports, state and the periodic update."""
         super().__init__()
         n = len(world.names("ugv"))
-        self.law, self.avoidance = law, law.avoidance
+        self.law, self.avoidance, self._world = law, law.avoidance, world
         self._near = world.around(world.select("ugv"))
         self._bodies = declare_bodies(self, world)
         self._reference = self.DeclareVectorInputPort("reference", 6 * n)
@@ -143,7 +143,7 @@ class UgvController(_Controller):
         """
         law = self.law if law is None else law
         asked = [None if p is None else Intervention(*p.motion.at(t), p.chosen) for p in accepted]
-        return law.velocity(positions, self._near, reference, rate, asked)
+        return law.velocity(positions, self._world.at(self._near, t), reference, rate, asked)
 
 
 class UavController(_Controller):
@@ -183,7 +183,7 @@ class UavController(_Controller):
         self._task = task
         self._gain = gain
         self._altitude = altitude
-        self._ugvs, self._own = world.select("ugv"), world.select("uav")
+        self._world, self._ugvs, self._own = world, world.select("ugv"), world.select("uav")
         self._near = world.around(self._own)
         self._bodies = declare_bodies(self, world)
         self._ugv_command = self.DeclareVectorInputPort("ugv_command", 3 * len(world.names("ugv")))
@@ -203,14 +203,20 @@ class UavController(_Controller):
     def _update(self, context: Context, discrete: DiscreteValues) -> None:
         positions = _finite(self._bodies.Eval(context)).reshape(-1, 3)
         commands = self._ugv_command.Eval(context).reshape(-1, 3)
-        discrete.set_value(0, self.velocity(positions, commands, *self._in_force(context)))
+        discrete.set_value(0, self.velocity(context.get_time(), positions, commands, *self._in_force(context)))
 
     def velocity(
-        self, positions: Array, ugv_commands: Array, avoidance: Avoidance | None = None, gain: float | None = None
+        self,
+        t: float,
+        positions: Array,
+        ugv_commands: Array,
+        avoidance: Avoidance | None = None,
+        gain: float | None = None,
     ) -> Array:
         """Command of the law, (3,), m/s.
 
         Args:
+            t: time, s.
             positions: of all bodies that move, (M, 3), m.
             ugv_commands: of the UGVs, at the sample before, (n, 3), m/s.
             avoidance: the set-based layer; default: with the default gain.
@@ -221,7 +227,8 @@ class UavController(_Controller):
         """
         avoidance = self.avoidance if avoidance is None else avoidance
         gain = self._gain if gain is None else gain
-        velocity: Array = avoidance.command(self._asked(positions, ugv_commands, gain), positions, self._near)[0]
+        near = self._world.at(self._near, t)
+        velocity: Array = avoidance.command(self._asked(positions, ugv_commands, gain), positions, near)[0]
         return velocity
 
     def _asked(self, positions: Array, ugv_commands: Array, gain: float) -> Array:

@@ -105,7 +105,7 @@ class Gatekeeper(LeafSystem):
             return EventStatus.DidNothing()
         proposals, before = self._proposals.Eval(context), self._memory(context)
         positions = self._bodies.Eval(context).reshape(-1, 3)
-        if self._gatekeepers.idle(proposals, positions, before):
+        if self._gatekeepers.idle(context.get_time(), proposals, positions, before):
             return EventStatus.DidNothing()
         velocities = self._command.Eval(context).reshape(-1, 3)
         law = self._gatekeepers.law.with_gains(*self._gains.Eval(context).tolist())

@@ -79,11 +79,12 @@ class Laws:
     Attributes:
         ugvs: commands (n, 3), m/s, from the time, positions (M, 3), preset positions and velocities (n, 3) each, and
             the accepted proposal or None of each UGV.
-        uav: command (3,), m/s, from positions (M, 3), m, and the UGVs' commands (n, 3), m/s, one sample earlier.
+        uav: command (3,), m/s, from the time, positions (M, 3), m, and the UGVs' commands (n, 3), m/s, one sample
+            earlier.
     """
 
     ugvs: Callable[[float, Array, Array, Array, Sequence[Proposal | None]], Array]
-    uav: Callable[[Array, Array], Array]
+    uav: Callable[[float, Array, Array], Array]
 
 
 class Monitor(LeafSystem):
@@ -118,7 +119,7 @@ class Monitor(LeafSystem):
         """
         super().__init__()
         n = len(world.names("ugv"))
-        self._robots, self._ugvs, self._uav = world.robots, world.select("ugv"), world.select("uav")
+        self._world, self._robots, self._ugvs, self._uav = world, world.robots, world.select("ugv"), world.select("uav")
         self._near = world.around(world.select(*ROBOTS))
         self._avoidance, self._laws, self._terminate = avoidance, laws, terminate
         self._bodies = declare_bodies(self, world)
@@ -161,7 +162,7 @@ class Monitor(LeafSystem):
     def _first(self, context: Context, sample: Sample) -> Violation | None:
         """The largest violation by the commands that were chosen at `sample` and are held until now."""
         commands = self._command.Eval(context).reshape(-1, 3)
-        near = self._near
+        near = self._world.at(self._near, sample.t)
         own = sample.positions[near.members]
         spaces = self._avoidance.half_spaces(own, near.mobility, Surroundings.of(near, sample.positions))
         speed = np.linalg.norm(commands, axis=1)
@@ -191,5 +192,5 @@ class Monitor(LeafSystem):
             accepted = accepted_proposals(self._proposals.Eval(context), self._answers.Eval(context))
             reference, rate = sample.reference.reshape(2, -1, 3)
             due[self._ugvs] = laws.ugvs(sample.t, sample.positions, reference, rate, accepted)
-        due[self._uav] = laws.uav(sample.positions, sample.commands_before[self._ugvs])
+        due[self._uav] = laws.uav(sample.t, sample.positions, sample.commands_before[self._ugvs])
         return due

@@ -42,6 +42,7 @@ class Pillar:
     radius_m: float
     safe_m: float
     known_to_uav: bool
+    appears_s: float = 0.0
 
     @property
     def color(self) -> str:
@@ -80,7 +81,8 @@ def stage(scenario: Scenario, visited_m: Array | None = None) -> Stage:
     )
     obstacles = tuple(
         Pillar(
-            name, np.array(spec.position_m), max(mark, spec.radius_m), safe_m(scenario, spec), spec.known_to_uav
+            name, np.array(spec.position_m), max(mark, spec.radius_m), safe_m(scenario, spec), spec.known_to_uav,
+            spec.appears_s,
         )
         for name, spec in scenario.obstacles.items()
     )  # fmt: skip

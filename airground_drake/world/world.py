@@ -18,6 +18,10 @@ Kind = Literal["ugv", "uav", "obstacle"]
 KINDS: tuple[Kind, ...] = get_args(Kind)
 ROBOTS: tuple[Kind, ...] = ("ugv", "uav")
 """Kinds of bodies that are commanded."""
+SAME_S = 1e-9
+"""Times closer than this are one instant, s."""
+NOWHERE_M = 1e150
+"""Coordinates of a body that has not appeared yet: beyond any sensing range, and its square is still finite."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,6 +35,7 @@ class Body:
         shape: the room that it takes up around its centre.
         plant: how it moves; None: it never moves.
         max_speed_m_s: speed limit.
+        appears_s: time from which on it is there, s; only for a body that never moves.
     """
 
     name: str
@@ -39,6 +44,7 @@ class Body:
     shape: Shape = field(default_factory=Ball)
     plant: Plant | None = None
     max_speed_m_s: float = 0.0
+    appears_s: float = 0.0
 
     @property
     def mobility(self) -> Array:
@@ -137,6 +143,25 @@ class World:
     def moving(self) -> tuple[Body, ...]:
         """The M bodies that move, those of the port `bodies`."""
         return tuple(body for body in self.bodies if body.plant is not None)
+
+    def at(self, near: Neighbours, t: float) -> Neighbours:
+        """The same neighbours at time t, s: bodies at rest that have not appeared yet are at NOWHERE_M.
+
+        A controller that asks at its samples has a body from the first sample at or after `appears_s` on.
+        """
+        if t >= self._complete_s:
+            return near
+        return near._replace(still=np.where((self._appears <= t + SAME_S)[:, None], near.still, NOWHERE_M))
+
+    @cached_property
+    def _appears(self) -> Array:
+        """When each body at rest appears, (m,), s."""
+        return np.array([body.appears_s for body in self.bodies if body.plant is None], dtype=np.float64)
+
+    @cached_property
+    def _complete_s(self) -> float:
+        """Time from which on all bodies are there, s."""
+        return float(self._appears.max(initial=0.0)) - SAME_S
 
     @property
     def robots(self) -> tuple[str, ...]:

@@ -35,6 +35,8 @@ GATED = ("runs={c: {method: c}, d: {method: d}}", "reproduction=[]")
         (["ugvs.ugv1.preset.speed_m_s=0.2", "ugvs.ugv2.preset.speed_m_s=0.2"], set()),  # nothing triggers
         (["obstacles={}", "choices=[]", *GATED], set()),  # those of SAFE-DIST's experiment are its own
         (["gatekeeper.period_s=30", *GATED], set()),  # a proposal, and the run ends before a decision is due
+        # near UGV1's preset from 7 s on, and never: an obstacle counts from where it appears
+        (["obstacles.obstacle_2.appears_s=7.02", "obstacles.sudden.appears_s=99", *GATED], {"not_cheaper"}),
         (["decision.trigger=bare", "duration_s=11.01"], {"not_cheaper"}),  # ZENO-PROOF is refuted by a run
     ],
 )

@@ -33,7 +33,7 @@ class Team:
     def sees(self, proposal: Proposal | None, x: float = 20.0) -> Commitment:
         self.t += 0.05
         places = np.array([[x, 0.0, 0.0], [0.0, 90.0, 0.0], [x, 0.0, 9.0]])
-        if not self.gate.idle((proposal, None), places, self.memory):
+        if not self.gate.idle(self.t, (proposal, None), places, self.memory):
             now = Inputs(self.t, (proposal, None), places, np.zeros((3, 3)), self.gate.law)
             self.memory, self.calls = self.gate.sample(now, self.memory), self.calls + 1
         return self.memory.commitments[0]

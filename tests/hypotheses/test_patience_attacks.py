@@ -92,7 +92,7 @@ def _attack(name: str, patience: Patience, period: float) -> Outcomes:
             executed += period
             worst = max(worst, executed)
         positions = np.stack([place] * 3)
-        if not gatekeepers.idle((proposal, None), positions, memory):
+        if not gatekeepers.idle(t, (proposal, None), positions, memory):
             memory = gatekeepers.sample(Inputs(t, (proposal, None), positions, np.zeros((3, 3)), law), memory)
             reasons |= {decision.reason for decision in memory.decisions}
         accepted = answer_to(proposal, memory.answers, 0) == ACCEPT

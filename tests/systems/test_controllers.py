@@ -60,7 +60,7 @@ def test_a_task_that_asks_for_no_velocity_or_moves_robots_is_stopped(
     case_a = load("case_a")[0]
     controller = UavController(make_world(case_a), make_avoidance(case_a), gain=1.0, altitude=2.0, task=Odd)
     with pytest.raises(error, match=said):
-        controller.velocity(np.zeros((3, 3)), np.zeros((2, 3)))
+        controller.velocity(0.0, np.zeros((3, 3)), np.zeros((2, 3)))
 
 
 def test_a_robot_that_is_nowhere_ends_the_run() -> None:

@@ -29,7 +29,7 @@ from airground_drake.report.figures.labels import Label, place
 from airground_drake.report.metrics import events_of, radius_m
 from airground_drake.report.reproduction import MEASURES
 from airground_drake.run.trace import Trace
-from airground_drake.scenarios.schema import Scenario
+from airground_drake.scenarios.schema import Obstacle, Scenario
 from airground_drake.view.stage import safe_m
 
 MAX_NAMED_OBSTACLES = 12
@@ -166,10 +166,17 @@ def _obstacles(scenario: Scenario) -> list[Label]:
     named = scenario.obstacles if len(scenario.obstacles) <= MAX_NAMED_OBSTACLES else {}
     hint = {True: "", False: "\n(unseen by the UAV)"}
     places = [
-        *((obstacle.position_m, short(name, 12) + hint[obstacle.known_to_uav]) for name, obstacle in named.items()),
+        *(
+            (obstacle.position_m, short(name, 12) + _since(obstacle) + hint[obstacle.known_to_uav])
+            for name, obstacle in named.items()
+        ),
         *((at, "(only on the UAV's map)") for at in scenario.uav.phantoms_m),
     ]
     return [Label(np.array(at), text, size_pt=7.5) for at, text in places]
+
+
+def _since(obstacle: Obstacle) -> str:
+    return f", from {obstacle.appears_s:g} s" if obstacle.appears_s else ""
 
 
 def _body(axes: Axes, at: Sequence[float] | Array, radius: float, color: str) -> None:

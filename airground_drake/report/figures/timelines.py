@@ -80,7 +80,7 @@ def distances(
             gap, appearance = gap_m(trace, ugv, found.other), look(looks[ugv][found.other])
             time_line(axes, trace.t, gap, appearance)
             labels.append((min(float(gap[-1]), top), short(found.other, 12), appearance.color))
-            highest = max(highest, float(gap.max()))
+            highest = max(highest, float(np.nanmax(gap)))
         axes.set_ylim(bottom, min(1.05 * highest, top))
         rule(axes, "time, s" if axes is every[-1] else "", "distance, m")
         label_right(axes, labels)
@@ -185,7 +185,7 @@ def compared_distances(runs: Mapping[str, Trace], robot: str) -> Figure:
 
 def nearest_distance(trace: Trace, robot: str) -> Array:
     """Distance between surfaces to the nearest obstacle, (T,), m."""
-    nearest: Array = np.min([gap_m(trace, robot, name) for name in trace.scenario.obstacles], axis=0)
+    nearest: Array = np.fmin.reduce([gap_m(trace, robot, name) for name in trace.scenario.obstacles])
     return nearest
 
 

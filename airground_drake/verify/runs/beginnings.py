@@ -12,7 +12,7 @@ from airground_drake.verify.claim import TIME_TOLERANCE_S
 from airground_drake.verify.engines.geometry import corner_times, interpolate, travelled
 from airground_drake.verify.runs.closed_loops import Scene
 from airground_drake.verify.runs.instants import row_at
-from airground_drake.verify.runs.pairs import Pair, around, centres_of, pairs_of, places_of, preset_of
+from airground_drake.verify.runs.pairs import Pair, appears_of, around, centres_of, pairs_of, places_of, preset_of
 from airground_drake.verify.runs.proposals import ProposalRecord, answers_to, proposal_of, proposals_of
 
 MOST_CLAIMED = 64
@@ -110,7 +110,10 @@ def sensed(trace: Trace, robot: str, t: float, after: Array) -> list[Sensed]:
     here, found = interpolate(trace.t, trace.position(robot), t), []
     for other, pair in around(trace, robot):
         place, velocity = _moves(trace, other, t)
-        if np.linalg.norm(place - here) <= trace.scenario.control.sensing_range_m:
+        if (
+            t >= trace.t[pair.row] - TIME_TOLERANCE_S
+            and np.linalg.norm(place - here) <= trace.scenario.control.sensing_range_m
+        ):
             found.append(Sensed(other, pair, place + after[:, None] * velocity))
     return found
 
@@ -140,7 +143,8 @@ def known_discs(trace: Trace, robot: str, t: float, on: ProposalRecord) -> tuple
     samples = gate_s * np.arange(round(t / gate_s) + 1.0)
     was = interpolate(trace.t, trace.position(robot), np.minimum(samples, t))
     obstacles = centres_of(trace)
-    seen = (np.linalg.norm(was[:, None] - obstacles, axis=2) <= sensing).any(axis=0)
+    there = samples[:, None] >= appears_of(trace) - TIME_TOLERANCE_S
+    seen = (there & (np.linalg.norm(was[:, None] - obstacles, axis=2) <= sensing)).any(axis=0)
     hidden = np.linalg.norm(on.mapped_m - was[-1], axis=1) > sensing
     told = np.column_stack([on.mapped_m, on.mapped_radius_m])[hidden & (on.mapped_radius_m >= 0.0)]
     apart = np.linalg.norm(told[:, None, :3] - obstacles[seen], axis=2)
@@ -173,7 +177,8 @@ def _first_sensed(trace: Trace, robot: str) -> Array:
     samples = period_s * np.arange(np.floor(trace.t[-1] / period_s + 1e-9) + 1.0)
     was = interpolate(trace.t, trace.position(robot), np.minimum(samples, trace.t[-1]))
     away = np.linalg.norm(was[:, None] - centres_of(trace), axis=2)
-    seen = away <= trace.scenario.control.sensing_range_m
+    there = samples[:, None] >= appears_of(trace) - TIME_TOLERANCE_S
+    seen = there & (away <= trace.scenario.control.sensing_range_m)
     return np.where(seen.any(axis=0), samples[seen.argmax(axis=0)], np.inf)
 
 

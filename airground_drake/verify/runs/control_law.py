@@ -65,7 +65,7 @@ def inequalities_of(trace: Trace, robot: str, samples: npt.NDArray[np.intp]) -> 
     """The inequalities of a robot at rows (B,) of its run, beside the bodies of `around` in their order."""
     places, beside = places_of(trace), around(trace, robot)
     others = [np.broadcast_to(places[other], (len(trace.t), 3))[samples] for other, _ in beside]
-    return inequalities(
+    found = inequalities(
         places[robot][samples],
         np.stack(others, axis=1) if others else np.empty((len(samples), 0, 3)),
         np.array([pair.safe_m for _, pair in beside]),
@@ -73,6 +73,8 @@ def inequalities_of(trace: Trace, robot: str, samples: npt.NDArray[np.intp]) -> 
         trace.scenario.control,
         planar=robot in trace.ugvs,
     )
+    there = samples[:, None] >= np.array([pair.row for _, pair in beside])
+    return found._replace(bound=np.where(there, found.bound, -np.inf))
 
 
 def spare(given: Inequalities, velocity: Array) -> Array:

@@ -13,7 +13,7 @@ import numpy as np
 
 from airground_drake.run.trace import Trace
 from airground_drake.verify.runs.control_law import ON_TOP
-from airground_drake.verify.runs.pairs import pairs_of
+from airground_drake.verify.runs.pairs import declared_pairs
 
 CONTROLLERS = ("ugv_controller", "uav_controller")
 NO_INTERVENTION = "a"
@@ -32,7 +32,7 @@ def demanded(trace: Trace) -> dict[str, dict[str, Any]]:
     everybody, m = np.arange(len(robots)), len(obstacles)
     number = {name: k for k, name in enumerate([*obstacles, *robots])}
     safe, share = np.zeros((2, len(robots), len(number)))
-    for pair in pairs_of(trace):
+    for pair in declared_pairs(trace):
         first, second = number[pair.first], number[pair.second]
         for i, j in ((first, second), (second, first)):
             if i >= m:  # an obstacle avoids nothing

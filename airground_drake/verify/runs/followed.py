@@ -11,7 +11,7 @@ from airground_drake.run.trace import Trace
 from airground_drake.verify.claim import TIME_TOLERANCE_S
 from airground_drake.verify.runs.beginnings import known_discs
 from airground_drake.verify.runs.instants import samples_of
-from airground_drake.verify.runs.pairs import centres_of
+from airground_drake.verify.runs.pairs import appears_of, centres_of
 from airground_drake.verify.runs.proposals import accepted_at, proposal_of
 
 METHOD = "d"
@@ -58,9 +58,10 @@ def _followed(trace: Trace, given: dict[Any, Any]) -> Followed:
     begin = int(np.searchsorted(trace.t[samples], t_s - TIME_TOLERANCE_S))
     executed = [one is on for one in accepted_at(trace, ugv)[begin:]]
     lasts = executed.index(False) if False in executed else len(executed)
-    places = trace.position(ugv)[np.append(samples, len(trace.t) - 1)[begin : begin + lasts + 1]]
+    rows = np.append(samples, len(trace.t) - 1)[begin : begin + lasts + 1]
+    places, there = trace.position(ugv)[rows], trace.t[rows, None] >= appears_of(trace) - TIME_TOLERANCE_S
     centres, reach = centres_of(trace), trace.scenario.control.sensing_range_m
     known, _ = known_discs(trace, ugv, t_s, on)
-    sensed = (np.linalg.norm(places[:, None] - centres, axis=2) <= reach).any(axis=0)
+    sensed = (there & (np.linalg.norm(places[:, None] - centres, axis=2) <= reach)).any(axis=0)
     strange = (np.linalg.norm(centres[:, None] - known, axis=2) > SAME_M).all(axis=1)
     return Followed(ugv, t_s, list(compress(trace.scenario.obstacles, sensed & strange)))

@@ -28,6 +28,7 @@ class Pair(NamedTuple):
         radii_m: sum of both radii.
         share: part of the avoidance inequality that each robot takes: all beside an obstacle, half beside a robot.
         reach_m: how far they can approach each other in one control period.
+        row: from which on both are there.
     """
 
     first: str
@@ -36,6 +37,7 @@ class Pair(NamedTuple):
     radii_m: float
     share: float
     reach_m: float
+    row: int = 0
 
     @property
     def safe_m(self) -> float:
@@ -60,22 +62,31 @@ class Gap(NamedTuple):
     t_s: float
     row: int
 
+    def at_appearance(self, t: Array) -> bool:
+        """Whether it was smallest when the obstacle appeared; t: times of the rows, (T,), s."""
+        return self.pair.row > 0 and self.t_s <= t[self.pair.row]
+
 
 def pairs_of(trace: Trace) -> tuple[Pair, ...]:
     """All robot/obstacle and robot/robot pairs of a run, with the safe distances of its scenario.
 
+    Obstacles that do not appear before the end are in none.
+
     Those of one robot come in the order in which its controller lists them: obstacles, then robots in array order.
     """
-    return trace.derived("pairs", lambda: tuple(_pairs_of(trace)))
+    return trace.derived("pairs", lambda: tuple(pair for pair in declared_pairs(trace) if pair.row < len(trace.t)))
 
 
-def _pairs_of(trace: Trace) -> Iterator[Pair]:
+def declared_pairs(trace: Trace) -> Iterator[Pair]:
+    """The same with obstacles that do not appear before the end."""
     safe, uav, period = trace.scenario.safe_distance, trace.scenario.uav.name, trace.scenario.control.period_s
     radius = {name: body.radius_m for name, body in trace.scenario.bodies.items()}
     limit = {name: robot.max_speed_m_s for name, robot in trace.scenario.robots.items()}
+    there = {name: trace.there_from(name) for name in trace.scenario.obstacles}
     for robot in trace.robots:
-        for obstacle in trace.scenario.obstacles:
-            yield Pair(robot, obstacle, safe.obstacle_m, radius[robot] + radius[obstacle], 1.0, limit[robot] * period)
+        for obstacle, row in there.items():
+            radii = radius[robot] + radius[obstacle]
+            yield Pair(robot, obstacle, safe.obstacle_m, radii, 1.0, limit[robot] * period, row)
     for robot, other in combinations(trace.robots, 2):
         apart = safe.air_ground_m if uav in (robot, other) else safe.ugv_m
         yield Pair(robot, other, apart, radius[robot] + radius[other], 0.5, (limit[robot] + limit[other]) * period)
@@ -100,22 +111,28 @@ def least_gap(trace: Trace, pair: Pair) -> Gap:
 
     def found() -> Gap:
         places, off_m = places_of(trace), off_m_of(trace, pair.first) + off_m_of(trace, pair.second)
-        nearest = closest_approach(trace.t, places[pair.first], places[pair.second], off_m)
+        both = places[pair.first], places[pair.second]
+        first, second = (place[pair.row :] if place.ndim == 2 else place for place in both)
+        nearest = closest_approach(trace.t[pair.row :], first, second, off_m)
         gap, margin = nearest.distance_m - pair.radii_m, nearest.distance_m - pair.safe_m
-        return Gap(pair, gap, margin, nearest.t_s, nearest.row)
+        return Gap(pair, gap, margin, nearest.t_s, nearest.row + pair.row)
 
     return trace.derived(("least gap", pair.first, pair.second), found)
 
 
 def gap_over_time(trace: Trace, pair: Pair) -> Array:
-    """The gap of a pair at the rows of a trace, (T,), m."""
+    """The gap of a pair at the rows of a trace, (T,), m; NaN before an obstacle appears."""
     places = places_of(trace)
     apart: Array = np.linalg.norm(places[pair.first] - places[pair.second], axis=1)
+    apart[: pair.row] = np.nan
     return apart - pair.radii_m
 
 
 def apart_of(trace: Trace) -> Array:
-    """A lower bound of the distance of the centres of each pair over the run, (P,), m, in the order of `pairs_of`."""
+    """A lower bound of the distance of the centres of each pair over the run, (P,), m, in the order of `pairs_of`.
+
+    Obstacles count as there from the start on.
+    """
     return trace.derived("apart", lambda: _apart_of(trace))
 
 
@@ -195,6 +212,12 @@ def places_of(trace: Trace) -> dict[str, Array]:
 def centres_of(trace: Trace) -> Array:
     """Centres of the obstacles, (m, 3), m."""
     return np.array([o.position_m for o in trace.scenario.obstacles.values()], dtype=np.float64).reshape(-1, 3)
+
+
+def appears_of(trace: Trace) -> Array:
+    """When each obstacle appears, (m,), s; inf: not before the end."""
+    rows = [trace.there_from(name) for name in trace.scenario.obstacles]
+    return np.array([trace.t[row] if row < len(trace.t) else np.inf for row in rows], dtype=np.float64)
 
 
 def snapshot(trace: Trace, names: Iterable[str], t_s: float) -> dict[str, Any]:

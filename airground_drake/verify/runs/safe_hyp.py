@@ -81,7 +81,7 @@ class Guarantee(NamedTuple):
     Attributes:
         pair: the two bodies.
         missed_m: how far each sample misses the inequalities, e_i + e_j, (K,), m per control period; 0: both are met.
-        short_m: how much too close the pair started, m.
+        short_m: how much too close the pair started, or was when its obstacle appeared, m.
         gap_m: d - max(e / a, short_m) with d the gap required, e the largest of `missed_m` and a = min(A h, 1).
             Without a gain nothing is restored: d - K e - short_m.
     """
@@ -151,6 +151,8 @@ class SafeHyp(TraceClaim):
     assumptions = (
         "The command of a row is the velocity applied since the row before (the trace's convention).",
         "Robots move straight from row to row.",
+        "Beside an obstacle with `appears_s` the hypotheses are those from the first control sample at or after that "
+        "time on, and the safe start is that D >= d at that sample: where it appears nearer, nothing is promised.",
     )
     does_not_establish = (
         "The theorem (SAFE-INV) and the outcome (SAFE-TRACE). Broken hypotheses do not mean that the distance was "
@@ -250,8 +252,10 @@ def _guarantees(trace: Trace) -> Iterator[Guarantee]:
     reach = np.array([pair.safe_m + longest[pair.first] + longest[pair.second] for pair in pairs])
     for k in np.flatnonzero(apart_of(trace) <= reach + SCREEN_M).tolist():
         pair = pairs[k]
-        first, second = places[pair.first], places[pair.second]
+        begin = int(np.searchsorted(samples, pair.row))
+        first, second = (p if p.ndim == 1 else p[begin:] for p in (places[pair.first], places[pair.second]))
         missed = shortfalls(first, second, pair.safe_m, Fraction(pair.share), gain, last)
+        missed = np.concatenate([np.zeros(begin), missed])
         e = Fraction(float(missed.max()))
         short = shortage(first[0], second if second.ndim == 1 else second[0], pair.safe_m)
         lost = max(e / gain, short) if gain else len(missed) * e + short
@@ -301,13 +305,14 @@ def _static(trace: Trace) -> Iterator[_Hypothesis]:
         return float(reach - decimal(safe) - sum(map(decimal, speeds)) * period)
 
     order = {robot: k for k, robot in enumerate(trace.robots)}
-    starts = {name: place if place.ndim == 1 else place[0] for name, place in places.items()}
     pairs = sorted(pairs_of(trace), key=lambda pair: order[pair.first])
     for robot, own in groupby(pairs, key=lambda pair: pair.first):
         beside = list(own)
         others = [pair.second for pair in beside]
-        away = starts[robot] - np.array([starts[other] for other in others])
-        start, about = np.full(len(beside), trace.t[0]), {"first": robot}
+        rows = [pair.row for pair in beside]
+        there = [places[other] if places[other].ndim == 1 else places[other][0] for other in others]
+        away = places[robot][rows] - np.array(there)
+        start, about = trace.t[rows], {"first": robot}
         excess = np.linalg.norm(away, axis=1) - np.array([pair.safe_m for pair in beside])
         yield _Hypothesis("safe start", "m", start, excess, DISTANCE_TOLERANCE_M, about, others)
         left = [room(pair.safe_m, limit[robot], limit.get(pair.second, 0.0)) for pair in beside]

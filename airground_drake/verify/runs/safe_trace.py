@@ -15,6 +15,7 @@ from airground_drake.verify.runs.pairs import (
     apart_of,
     least_gap,
     least_of,
+    pair_of,
     pairs_of,
     snapshot,
 )
@@ -47,7 +48,8 @@ class SafeTrace(TraceClaim):
         "Between two rows every robot moves on a straight line at constant speed (integrator plant, zero-order hold).",
         "Robots and obstacles are balls of the scenario's radii r (`radius_m`; by default points). A distance is the "
         "gap between their surfaces; below 0 they overlap. d_ij is the safe distance of the kind of pair.",
-        "Obstacles stand still for the whole run, as the scenario lists them.",
+        "Obstacles stand still for the whole run, as the scenario lists them. One with `appears_s` is judged from the "
+        "first control sample at or after that time on, the instant itself included.",
     )
     does_not_establish = (
         "Safety of any other run, start or seed, or of a plant that does not follow its velocity exactly (SAFE-DIST); "
@@ -76,7 +78,7 @@ class SafeTrace(TraceClaim):
             unit="m",
             quantity="least distance of a pair less its safe distance",
             where={"first": worst.first, "second": worst.second, "t_s": worst.t_s},
-            counterexample=None if safe else asdict(worst) | snapshot(trace, both, worst.t_s),
+            counterexample=None if safe else asdict(worst) | _why(trace, worst) | snapshot(trace, both, worst.t_s),
             evidence={
                 "pairs": [asdict(each) for each in listed],
                 "pairs_in_all": len(pairs),
@@ -107,3 +109,10 @@ def _entry(trace: Trace, k: int) -> Distance:
     """Where the k-th pair was closest."""
     pair, gap_m, margin_m, t_s, row = least_gap(trace, pairs_of(trace)[k])
     return Distance(pair.first, pair.second, pair.required_m, gap_m, margin_m, t_s, row, margin_m < pair.reach_m)
+
+
+def _why(trace: Trace, worst: Distance) -> dict[str, str]:
+    """That a pair was nearest when its obstacle appeared, if so: no robot's doing."""
+    if not least_gap(trace, pair_of(trace, worst.first, worst.second)).at_appearance(trace.t):
+        return {}
+    return {"why": f"{worst.second} appeared at {worst.t_s:.9g} s this near to {worst.first}: nobody's doing"}

@@ -13,6 +13,7 @@ from airground_drake.scenarios.schema import Obstacle
 from airground_drake.verify.claim import TIME_TOLERANCE_S
 from airground_drake.verify.engines.geometry import interpolate
 from airground_drake.verify.runs.instants import row_at
+from airground_drake.verify.runs.pairs import appears_of
 from airground_drake.verify.runs.proposals import answers_to, parts_of, proposals_of, withdrawn_s
 
 SENSED_M = 1e-9
@@ -28,12 +29,15 @@ def map_conflicts(trace: Trace) -> Iterator[dict[str, Any]]:
     until then.
     """
     scenario = trace.scenario
-    known = [_disc(each) for each in scenario.obstacles.values() if each.known_to_uav]
-    known += [(*map(float, place), 0.0) for place in scenario.uav.phantoms_m]
+    appears = dict(zip(scenario.obstacles, appears_of(trace).tolist(), strict=True))
+    phantoms = [(*map(float, place), 0.0) for place in scenario.uav.phantoms_m]
     surely, perhaps = _told(trace)
     for sent in proposals_of(trace):
         listed = [tuple(row) for row in np.column_stack([sent.mapped_m, sent.mapped_radius_m]).tolist()]
-        learnt, t = listed[len(known) :], sent.issued_s
+        t = sent.issued_s
+        there = [each for name, each in scenario.obstacles.items() if appears[name] <= t + TIME_TOLERANCE_S]
+        known = [*(_disc(each) for each in there if each.known_to_uav), *phantoms]
+        learnt = listed[len(known) :]
         least = {disc for disc, noticed in surely.items() if noticed <= t + TIME_TOLERANCE_S}
         most = {disc for disc, answered in perhaps.items() if answered < t - TIME_TOLERANCE_S}
         right = listed[: len(known)] == known and len({*learnt}) == len(learnt)
@@ -87,6 +91,7 @@ def _told(trace: Trace) -> tuple[dict[Disc, float], dict[Disc, float]]:
         for answer in answers_to(trace, sent):
             here = interpolate(trace.t, trace.position(sent.ugv), answer.t_s)
             away = np.linalg.norm(centres - here, axis=1) - reach
+            away = np.where(appears_of(trace) <= answer.t_s + TIME_TOLERANCE_S, away, np.inf)
             for disc, far in zip(discs, away.tolist(), strict=True):
                 if far <= SENSED_M:
                     perhaps[disc] = min(answer.t_s, perhaps.get(disc, np.inf))
