@@ -19,7 +19,8 @@ NOT_EXERCISED = "not_exercised"
 EXPECTATIONS: tuple[str, ...] = (*STATUSES, EXERCISED)
 """Allowed alternatives of an expectation."""
 NOTHING = "nothing"
-"""The expectation of a claim about which the method promises nothing: no verdict meets it, none differs from it."""
+"""The expectation of a claim about which the method promises nothing: whether it holds does not count, but a claim that
+could not be judged does."""
 
 
 def alternatives(expected: str) -> tuple[str, ...]:
@@ -45,11 +46,11 @@ def outcome(status: str, exercised: float | None) -> str:
 
 
 def meets(expected: str, status: str, exercised: int | None) -> bool | None:
-    """Whether an expectation admits a verdict; None if nothing is expected.
+    """Whether an expectation admits a verdict; None if nothing is expected and the claim was judged.
 
     An expected status ignores how often the claim was tested.
     """
     if expected == NOTHING:
-        return None
+        return False if status in ("error", "not_run") else None
     put_to_the_test = status in PASSING and bool(exercised)
     return any(status == each or (each == EXERCISED and put_to_the_test) for each in alternatives(expected))

@@ -63,9 +63,12 @@ def is_foreign(claim: str, scenario: Json) -> bool:
 
 
 def meets(expected: str, claim: Json) -> bool | None:
-    """Whether an expectation such as "holds", "holds or supported" or "exercised" admits the verdict; None: nothing."""
+    """Whether an expectation such as "holds", "holds or supported" or "exercised" admits the verdict.
+
+    None: nothing is expected, and the claim was judged.
+    """
     if expected == NOTHING:
-        return None
+        return False if claim["status"] in ("error", "not_run") else None
     admitted = expected.split(" or ")
     status, count = claim["status"], claim["exercised"]
     return status in admitted or (EXERCISED in admitted and status in PASSING and count is not None and count > 0)
@@ -170,7 +173,7 @@ def _overall(report: Json) -> Json:
     claims, audit = report["claims"], report["audit"]
     keys = ("id", "run", "status", "expected", "exercised")
     unexpected = [{key: claim[key] for key in keys} for claim in claims if meets(claim["expected"], claim) is False]
-    unpromised = [{"id": claim["id"], "run": claim["run"]} for claim in claims if claim["expected"] == NOTHING]
+    unpromised = [{"id": claim["id"], "run": claim["run"]} for claim in claims if meets(claim["expected"], claim) is None]
     undecided = [entry for entry in unexpected if entry["status"] in UNDECIDED]
     differs = [entry for entry in unexpected if entry["status"] not in UNDECIDED]
     whole = len(audit) >= FINDINGS

@@ -14,7 +14,7 @@ import numpy as np
 
 from airground_drake.audit import of_runs
 from airground_drake.base.files import sha256
-from airground_drake.base.statuses import NOT_EXERCISED, NOTHING, STATUSES, UNDECIDED, outcome
+from airground_drake.base.statuses import NOT_EXERCISED, STATUSES, UNDECIDED, outcome
 from airground_drake.registry import method_of
 from airground_drake.report import metrics, reproduction
 from airground_drake.report.phrases import counted
@@ -143,7 +143,7 @@ def overall(
         "as_expected": checks - len(unexpected),
         "counts": {name: counts[name] for name in (*STATUSES, NOT_EXERCISED) if counts[name]},
         "not_exercised": _named(claim for found, claim in outcomes if found == NOT_EXERCISED),
-        "unpromised": _named(claim for claim in claims if claim["expected"] == NOTHING),
+        "unpromised": _named(claim for claim in claims if claim["as_expected"] is None),
         "differs": differs,
         "undecided": undecided,
         "missing": list(absent),
