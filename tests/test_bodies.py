@@ -92,7 +92,8 @@ def test_a_pair_has_one_distance_wherever_users_see_it(ends_at: float, gap_m: fl
     evidence = {verdict.claim.id: asdict(verdict.finding)["evidence"] for verdict in found}
     places = [pd.DataFrame(trace.position(name), columns=["x_m", "y_m", "z_m"]) for name in trace.robots]
     table = pd.concat([each.assign(t_s=trace.t, body=name) for each, name in zip(places, trace.robots, strict=True)])
-    judged = next(one for one in positions.judge(table, asdict(given)) if (one.first, one.second) == ("ugv1", "rock"))
+    all_judged, _ = positions.judge(table, asdict(given))
+    judged = next(one for one in all_judged if (one.first, one.second) == ("ugv1", "rock"))
     listed = next(each for each in evidence["SAFE-TRACE"]["pairs"] if pair.items() <= each.items())
     metric = report["runs"]["b"]["metrics"]["min_distance_m"]["ugv1"]["rock"]
     exported = pd.read_csv([*tables.write(trace, tmp_path)][-1]).query("first == 'ugv1' and second == 'rock'").iloc[0]

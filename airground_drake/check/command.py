@@ -18,11 +18,20 @@ if TYPE_CHECKING:
     from .report import Line
 
 SCHEMA = "airground_drake.check/2"
-EPILOG = """\
+TAKEN_AS_RECORDED = (
+    "that a run was simulated as the scenario says (nothing is simulated again)",
+    "seed, noise, policies and their parameters, faults, what the scenario expects, values that no check uses",
+    "provenance, the SHA-256 of the scenario's file, measured times",
+    "motions of refused proposals, the block diagram, findings of `report audit` that rest on other runs",
+)
+"""What no check can find out: a forger may change it in all its places, unnoticed."""
+EPILOG = f"""\
 Each line says what was checked, on which run, and
   agrees              the files bear out what the report says
   DISAGREES           the files contradict the report or each other: the rule, the time, both values
   cannot be checked   a file cannot be read, or the report itself decides nothing
+Taken as recorded, so that a forger may change it in all its places, unnoticed:
+{"".join(f"  - {each}{chr(10)}" for each in TAKEN_AS_RECORDED)}
 Exit codes: 0 all agree; 1 not all; 2 usage, or no report; 4 a fault of the checker."""
 LIMIT_S = 300.0
 """CPU time that a check may take, s. Checks of a run of minutes take seconds."""
@@ -144,6 +153,7 @@ def _printable(text: str) -> str:
 def _print(lines: Sequence[Line]) -> None:
     for line in lines:
         print(_printable(f"{line.claim:<12}{line.run or '-':<8} {line.outcome} ({line.by}): {line.text}"))
+    print(f"Taken as recorded: {'; '.join(TAKEN_AS_RECORDED)}.")
     counts = _counts(lines)
     print(f"{len(lines)} checks: {', '.join(f'{count} {outcome}' for outcome, count in counts.items())}")
 
@@ -157,7 +167,10 @@ def _counts(lines: Sequence[Line]) -> dict[str, int]:
 
 def _document(folder: Path, lines: Sequence[Line]) -> dict[str, Any]:
     checks = [_strict(asdict(line)) for line in lines]
-    return {"schema": SCHEMA, "report": str(folder), "checks": checks, "summary": _counts(lines)}
+    taken = list(TAKEN_AS_RECORDED)
+    return {
+        "schema": SCHEMA, "report": str(folder), "checks": checks, "taken_as_recorded": taken, "summary": _counts(lines)
+    }  # fmt: skip
 
 
 def _strict(value: Any) -> Any:

@@ -173,7 +173,7 @@ def _overall(report: Json) -> Json:
     claims, audit = report["claims"], report["audit"]
     keys = ("id", "run", "status", "expected", "exercised")
     unexpected = [{key: claim[key] for key in keys} for claim in claims if meets(claim["expected"], claim) is False]
-    unpromised = [{"id": claim["id"], "run": claim["run"]} for claim in claims if meets(claim["expected"], claim) is None]
+    unpromised = [{"id": each["id"], "run": each["run"]} for each in claims if meets(each["expected"], each) is None]
     undecided = [entry for entry in unexpected if entry["status"] in UNDECIDED]
     differs = [entry for entry in unexpected if entry["status"] not in UNDECIDED]
     whole = len(audit) >= FINDINGS

@@ -16,10 +16,11 @@ from airground_drake.report.__main__ import main as write
 
 def test_an_untouched_report_agrees_everywhere(report: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert check.main([str(report)]) == 0
-    *lines, summary = capsys.readouterr().out.splitlines()
+    *lines, taken, summary = capsys.readouterr().out.splitlines()
     claims = json.loads((report / "report.json").read_text())["claims"]
     assert {(claim["id"], claim["run"] or "-") for claim in claims} <= {tuple(line.split()[:2]) for line in lines}
     assert all(" agrees (checker): " in line for line in lines)
+    assert taken.startswith("Taken as recorded: that a run was simulated")
     assert summary == f"{len(lines)} checks: {len(lines)} agrees, 0 DISAGREES, 0 cannot be checked"
 
 
