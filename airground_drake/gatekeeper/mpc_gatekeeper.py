@@ -12,13 +12,14 @@ import numpy as np
 import numpy.typing as npt
 
 from airground_drake.base.arrays import Array
+from airground_drake.base.errors import PluginError, described, one_line, short
 from airground_drake.gatekeeper.answer import Decision, Rules, in_words, settle
 from airground_drake.gatekeeper.budget import Budget
 from airground_drake.gatekeeper.patience import Commitment
-from airground_drake.gatekeeper.problem import Horizon, predicted_problem
+from airground_drake.gatekeeper.problem import Horizon, Problem, predicted_problem
 from airground_drake.gatekeeper.rollout import View
 from airground_drake.gatekeeper.routes.route import Route
-from airground_drake.gatekeeper.solution import ConstantPlans, after_failure
+from airground_drake.gatekeeper.solution import ConstantPlans, Solution, after_failure
 from airground_drake.geometry.motion import Motion
 from airground_drake.intervention.messages import ACCEPT, REFUSE, SILENT, Disc, Proposals, Report, Reports, answer_to
 from airground_drake.intervention.policy import Proposal
@@ -163,7 +164,7 @@ class PaperGatekeepers(Gatekeepers):
         started = thread_time()
         problem = predicted_problem(self._view(now, i), now.law, proposal, self._horizon)
         problem = replace(problem, previous=_rest_of_plan(before, now.t, i, proposal))
-        solution = self._route.solve(problem, next(budgets))
+        solution = self._solved(problem, next(budgets))
         if solution.status == "solver_failed":
             solution = after_failure(problem, solution)
         self.times_s.append(thread_time() - started)
@@ -172,6 +173,23 @@ class PaperGatekeepers(Gatekeepers):
         throughout = (constants.accept.objective, constants.refuse.objective) if solution.has_plan else (-1.0, -1.0)
         accepted, reason = settle(solution, throughout, standing, stood, self._rules)
         return Decision(now.t, i, proposal, accepted, reason, problem, solution, throughout)
+
+    def _solved(self, problem: Problem, budget: Budget) -> Solution:
+        """The route's solution.
+
+        Raises:
+            PluginError: if the route breaks its contract: it raises, or returns anything but a `Solution`.
+        """
+        kind = type(self._route)
+        try:
+            found: object = self._route.solve(problem, budget)
+        except Exception as error:
+            raise PluginError(f"route {kind.__qualname__} raised {described(error, kind.solve)}") from error
+        if not isinstance(found, Solution):
+            returned = f"{short(repr(found))}, of type {type(found).__qualname__}"
+            allowed = f"{Solution.__module__}.{Solution.__qualname__}"
+            raise PluginError(one_line(f"route {kind.__qualname__} returned {returned}; allowed: {allowed}"))
+        return found
 
 
 def _rest_of_plan(before: GatekeeperState, t: float, i: int, proposal: Proposal) -> Array | None:

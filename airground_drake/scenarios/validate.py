@@ -86,6 +86,18 @@ def _runs(scenario: Scenario) -> Problems:
         yield from _one_of(f"expected.{claim}", claim, known, "one of the claims about the model")
 
 
+def _route(scenario: Scenario) -> Problems:
+    """A third-party route that no run uses is a mistake: only method (c) solves problem (26)."""
+    key, allowed = "gatekeeper.route", ", ".join(ROUTES.own)
+    runs = ", ".join(f"{name} ({run.method})" for name, run in scenario.runs.items())
+    if ROUTES.is_foreign(scenario.gatekeeper.route) and all(run.method != "c" for run in scenario.runs.values()):
+        yield key, scenario.gatekeeper.route, f"no run would use it, of {runs}: add one of method c, or use {allowed}"
+    for name, run in scenario.runs.items():
+        route = str(run.set.get(key, ""))
+        if route and ROUTES.is_foreign(route) and run.method != "c":
+            yield f"runs.{name}.set.{key}", route, f"this run is of method {run.method}: only method c uses a route"
+
+
 def _presets(scenario: Scenario) -> Problems:
     for name, ugv in scenario.ugvs.items():
         key = f"ugvs.{name}.preset.waypoints_m"
@@ -336,7 +348,7 @@ def _keys(value: object, above: str = "") -> Iterator[str]:
 
 
 CHECKS: tuple[Callable[[Scenario], Problems], ...] = (
-    _names, _blocks, _runs, _presets, _ends, _gains, _periods, _release, _distances, _sensing, _extent, _clearances,
-    _reproduction, _choices,
+    _names, _blocks, _route, _runs, _presets, _ends, _gains, _periods, _release, _distances, _sensing, _extent,
+    _clearances, _reproduction, _choices,
 )  # fmt: skip
 """Every rule; later ones rely on earlier ones."""

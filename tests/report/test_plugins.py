@@ -98,7 +98,9 @@ def test_third_party_code_is_refused_unless_it_is_allowed(
         assert main(["case_a", "-o", str(out), "--set", f"{key}={name}"]) == 2
         assert capsys.readouterr().err == f"error: case_a: {key}: '{name}' is not allowed; {ONLY}\n"
     assert main(["case_a", "-o", str(out), "--set", f"claims={{MINE: '{name}'}}"]) == 2
-    minimal = resources.files(scenarios).joinpath("minimal.yaml").read_text()
+    minimal = (
+        resources.files(scenarios).joinpath("minimal.yaml").read_text().replace("runs:", "runs:\n  c: {method: c}")
+    )
     (tmp_path / "mine.yaml").write_text(f"{minimal}\ngatekeeper: {{route: '{name}'}}\n")
     assert commands.main(["diagram", str(tmp_path / "mine.yaml"), "-o", str(out)]) == 2
     assert capsys.readouterr().err.count("--allow-plugins") == 2
@@ -150,6 +152,8 @@ def test_names_of_no_module_are_one_line(name: str, capsys: pytest.CaptureFixtur
     [
         (f"{ROUTE}import os; os._exit(0)", IN_C, 4, "died (exit code 0)"),
         (f"{ROUTE}raise SystemExit(0)", IN_C, 4, "SystemExit: 0"),
+        (f"{ROUTE}return True", IN_C, 4, "route It returned True, of type bool; allowed: airground_drake.gatekeeper."),
+        (f"{ROUTE}raise KeyError(7)", IN_C, 4, "route It raised evil_"),
         ("import sys; sys.exit(0)", IN_C, 2, "cannot be imported: SystemExit: 0"),
         ("import os; os._exit(0)", JUDGED, 4, "the process of this command died (exit code 0)"),
         (CLAIM, JUDGED, 4, "the process of this command died (exit code 0)"),

@@ -83,6 +83,8 @@ EDITS: list[tuple[str, object]] = [
     ("gatekeeper.blocks", 61),
     ("gatekeeper", {"route": "relaxed", "blocks": 10}),
     ("gatekeeper.route", "exact"),
+    ("gatekeeper.route", "mine.py:Mine"),
+    ("runs.d.set", {"gatekeeper.route": "mine.py:Mine"}),
     ("gatekeeper.rule", "x"),
     ("intervention.ranking", "x"),
     ("uav.task", "hover"),

@@ -77,7 +77,7 @@ def test_code_of_others_is_found_beside_the_scenario_file_wherever_it_runs(tmp_p
         "gatekeeper.route": "beside_helper.py:Route",
         "intervention.policies": [{"name": "tricks.py:Mine"}],
         "claims": {"OWN": "claims/own.py:Own"},
-        "runs": {"d": {"method": "d"}},
+        "runs": {"c": {"method": "c"}, "d": {"method": "d"}},
         "duration_s": 6.0,
         "decision.threshold.zeta_m": 0.5,
         "decision.release_m": 0.2,
