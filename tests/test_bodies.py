@@ -23,13 +23,16 @@ from airground_drake.proofs.export import recorded
 from airground_drake.proofs.too_near import too_near
 from airground_drake.report import attention, summary
 from airground_drake.report.figures.draw import draw
-from airground_drake.report.metrics import closest_obstacle
+from airground_drake.report.metrics import closest_obstacle, gap_m, of_run
+from airground_drake.report.outcomes import Course, Near
 from airground_drake.report.page import page
+from airground_drake.report.phrases import intrusion
 from airground_drake.run.simulation import simulate
 from airground_drake.run.trace import Trace
 from airground_drake.scenarios.load import load, validated
 from airground_drake.scenarios.schema import Policy, Run, Scenario
 from airground_drake.verify import verify
+from airground_drake.view.stage import stage
 from airground_drake.world.world import World
 
 ROCK, OWN, FLIER = 0.5, 0.25, 0.25
@@ -225,3 +228,15 @@ def test_a_controller_that_knows_of_it_too_early_or_late_is_found(monkeypatch: p
 def test_coq_is_not_asked_about_it() -> None:
     with pytest.raises(TraceError, match=r"rock appears under way; .* bodies that are always there"):
         recorded(simulate(sudden(2.0), "d"))
+
+
+def test_the_page_says_that_it_appeared_there() -> None:
+    """On its first screen, and as a gap in the distances; replays show it from then on."""
+    trace = simulate(sudden(4.2), "d")
+    metrics = of_run(trace)["min_distance_m"]["ugv1"]["rock"]
+    assert metrics["appeared"] is True
+    course = Course("d", "d", plain=True, near=[Near(-1.2, "ugv1", "rock", 0.8, 2.0, 4.2, appeared=True)])
+    assert intrusion(course) == "rock appears 0.800 m from ugv1 (nobody's doing)"
+    gap = gap_m(trace, "ugv1", "rock")
+    np.testing.assert_array_equal(np.isnan(gap), np.arange(len(gap)) < trace.there_from("rock"))
+    assert stage(trace.scenario).obstacles[0].appears_s == 4.2

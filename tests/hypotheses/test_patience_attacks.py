@@ -192,7 +192,7 @@ def test_a_gatekeeper_that_miscounts_is_noticed(monkeypatch: pytest.MonkeyPatch,
     ("kind", "method", "wrong"),
     [
         (Patience, "rested", lambda _, now, __: now if now.executing else replace(now, tries=0)),  # needs no rest
-        (Gatekeepers, "idle", lambda _, proposals, *__: not any(proposals)),  # does not notice withdrawals
+        (Gatekeepers, "idle", lambda _, t, proposals, *__: not any(proposals)),  # does not notice withdrawals
         (Patience, "over", lambda _, now, t: t - PERIOD >= now.until),  # a sample late
         (Patience, "exhausted", lambda self, now: now.tries > self.most),  # a try too many
     ],

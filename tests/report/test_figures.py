@@ -137,7 +137,7 @@ def test_a_shortfall_says_from_whom(scenario: Scenario, traces: dict[str, Trace]
     assert {"ugv1 to obstacle_2", "ugv1 to uav"} <= set(drawn[1].panels[0].table.columns)
     one = {"printed": replace(traces["a_printed"], meta={**traces["a_printed"].meta, "run": "printed"})}
     _, distances, *_ = draw.draw(replace(scenario, runs={"printed": Run("a")}), one)
-    assert distances.caption.startswith("Too close: ugv1 comes to 1.")
+    assert distances.caption.startswith("Too close: ugv1 is 1.")
     assert "required 2 m" in distances.panels[0].svg
     assert canvas.ALARM in distances.panels[0].svg
 

@@ -184,7 +184,7 @@ def _distances(chosen: _Selection) -> Figure | None:
     pairs = [(*each[0], ugv, heading) for (heading, ugv), each in near.items() if each]
     value, t_s, other, needed, ugv, heading = min(pairs, key=lambda pair: pair[0] - pair[3])
     least = "Too close" if value < needed - SLACK_M else "Closest"
-    least += f": {ugv} comes to {distance(value, needed)} of {other} at {t_s:.2f} s, {needed:g} m required"
+    least += f": {ugv} is {distance(value, needed)} from {other} at {t_s:.2f} s, {needed:g} m required"
     caption = (
         f"{least} ({_runs(heading).lower()}). No line may enter the hatched band. "
         f"Circle: the smallest distance, exact; red: too small.{_left_out(chosen, chosen.ugvs)}"
