@@ -170,7 +170,7 @@ class ThrQuality(TraceClaim):
             "holds" if good else "refuted",
             margin=tolerance - worst.off_m,
             unit="m",
-            quantity="tolerance left between task error and threshold",
+            quantity="task error within the tolerance of the threshold",
             where={"robot": worst.robot, "t_s": worst.t_s},
             counterexample=None if good else {"what": f"{worst.kind} at the task error without noise", **asdict(worst)},
             evidence=evidence,
