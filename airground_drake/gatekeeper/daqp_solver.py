@@ -66,8 +66,9 @@ class DaqpResult(MathematicalProgramResult):  # type: ignore[misc]
         """As `MathematicalProgramResult.GetSolution`: all values, or those of variables or expressions."""
         if not what or not self._for_binary:
             return super().GetSolution(*what)
-        replaced = np.vectorize(self._without_binary, otypes=[object])(what[0])
-        return super().GetSolution(replaced if isinstance(what[0], np.ndarray) else replaced.item())
+        asked = np.asarray(what[0], dtype=object)
+        replaced = np.array([self._without_binary(one) for one in asked.ravel()] or asked, dtype=object)
+        return super().GetSolution(replaced.reshape(asked.shape) if asked.shape else replaced[0])
 
     def get_solver_id(self) -> SolverId:
         """DAQP."""

@@ -92,7 +92,7 @@ def relax(binary: BinaryProgram, seconds: float = math.inf, iterations: int = 10
 
 
 def _found(result: Any, variables: Any) -> Found:
-    details = result.get_solver_details() if hasattr(result, "get_solver_details") else None
+    details = result.get_solver_details()
     more = (details.iterations, details.multipliers) if isinstance(details, Details) else (0, None)
     if result.is_success():
         return Found(result.GetSolution(variables), "optimal", *more)
