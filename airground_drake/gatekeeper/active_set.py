@@ -2,7 +2,7 @@
 
 Before DAQP sees a program, four things change it without changing its solutions:
 
-- *Fixed variables*, whose bounds are equal, become constants.
+- *Constants.* A variable whose bounds are equal is one; so is one with a quadratic cost of its own and no constraint.
 - *Slack.* DAQP has soft rows, which are far quicker than variables. A continuous variable becomes one if it has a
   quadratic cost of its own, and no other, and stands in a single one-sided constraint that it can always meet.
 - *Scale.* Variables are scaled to a unit diagonal of the Hessian.
@@ -190,7 +190,7 @@ class _Scaled:
         slack: the variable that a soft row stands for, (p,), -1: the row is hard.
         free: which of the k variables are binary, (k,).
         bounded: how many variables have bounds.
-        base: values of the fixed variables, 0 for others, (n,).
+        base: values of the variables that are fixed or found without DAQP, 0 for others, (n,).
         scale: of the variables, (k,).
         largest: scale of the cost.
         hessian: with added curvature, (k, k).
@@ -215,13 +215,14 @@ class _Scaled:
     def of(cls, form: StandardForm, curvature: float = _CURVATURES[0]) -> _Scaled:
         """Find fixed variables and slack, scale, and add curvature."""
         rows = np.flatnonzero((np.isfinite(form.lower) | np.isfinite(form.upper)) & form.rows.any(axis=1))
-        slack = form.slack()[rows]
-        fixed = form.least == form.most
-        seen = ~fixed
+        unconstrained, slack = form.separate()
+        slack, fixed = slack[rows], form.least == form.most
+        seen = ~(fixed | unconstrained)
         seen[slack[slack >= 0]] = False
         with_bounds = np.isfinite(form.least) | np.isfinite(form.most)
         kept = np.concatenate([np.flatnonzero(seen & with_bounds), np.flatnonzero(seen & ~with_bounds)])
-        base = np.where(fixed, form.least, 0.0)
+        base, u = np.where(fixed, form.least, 0.0), np.flatnonzero(unconstrained & ~fixed)
+        base[u] = (-form.gradient[u] / form.hessian[u, u]).clip(form.least[u], form.most[u])
         gradient = (form.gradient + form.hessian @ base)[kept]
         diagonal = form.hessian.diagonal()[kept]
         largest = float(diagonal.max(initial=0.0)) or float(np.abs(gradient).max(initial=0.0)) or 1.0

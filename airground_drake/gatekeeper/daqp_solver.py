@@ -28,7 +28,7 @@ from pydrake.symbolic import Expression, Variable
 
 from airground_drake.base.arrays import Array
 from airground_drake.gatekeeper.active_set import Answer, Details, Limits, minimise
-from airground_drake.gatekeeper.standard_form import StandardForm
+from airground_drake.gatekeeper.standard_form import Layout, StandardForm
 
 SUPPORTED = frozenset(
     {
@@ -39,35 +39,61 @@ SUPPORTED = frozenset(
 """What a program may have. Visualization callbacks are not called."""
 
 
-_StandIns = dict[int, tuple[Variable, Variable]]
-"""Binary variables, each with the continuous one in its place, by the identifier of the former."""
+class _Shell:
+    """A program without constraints, by which CLP fills results: Python cannot set their variables, nor their cost.
+
+    It has a continuous variable in place of each binary one, which CLP does not take.
+    """
+
+    def __init__(self, layout: Layout) -> None:
+        """For programs with these variables."""
+        self.layout = layout
+        self._program, self._solver = MathematicalProgram(), ClpSolver()
+        self._program.AddDecisionVariables(self._stand_ins())
+        self._cost = self._program.AddLinearCost(np.zeros(len(layout.index)), self._program.decision_variables())
+
+    def _stand_ins(self) -> Any:
+        pairs = zip(self.layout.variables, self.layout.binary, strict=True)
+        return np.array([Variable(x.get_name()) if binary else x for x, binary in pairs], dtype=object)
+
+    def fill(self, result: MathematicalProgramResult, answer: Answer, cost: float) -> None:
+        """Put in an answer and its cost."""
+        self._cost.evaluator().UpdateCoefficients(np.zeros(len(answer.x)), cost)
+        self._solver.Solve(self._program, None, None, result)
+        result.set_x_val(answer.x)
+        result.set_solution_result(answer.ended)
 
 
 class DaqpResult(MathematicalProgramResult):  # type: ignore[misc]
-    """A result that Python can fill, also for programs with binary variables.
-
-    Python can set the solution of a result only if a solver of Drake has filled it before, and none that is free takes
-    binary variables. So CLP fills it for a program that has a continuous variable in place of each binary one, and
-    `GetSolution` looks them up.
-    """
+    """A result that also has the values of binary variables, and the details of the solution."""
 
     def __init__(self) -> None:
         """An empty result."""
         super().__init__()
-        self._for_binary: _StandIns = {}
-        self._details = Details()
+        self._x, self._index, self._details = np.zeros(0), dict[int, int](), Details()
 
-    def fill(self, program: MathematicalProgram, answer: Answer, cost: float) -> None:
-        """Put in the answer to a program."""
-        self._for_binary = _fill(self, program, answer, cost)
-        self._details = answer.details
+    def fill(self, shell: _Shell, answer: Answer, cost: float) -> None:
+        """Put in an answer and its cost."""
+        shell.fill(self, answer, cost)
+        self._x, self._index, self._details = answer.x, shell.layout.index, answer.details
 
     def GetSolution(self, *what: Any) -> Any:  # noqa: N802
-        """As `MathematicalProgramResult.GetSolution`: all values, or those of variables or expressions."""
-        if not what or not self._for_binary:
-            return super().GetSolution(*what)
-        replaced = np.vectorize(self._without_binary, otypes=[object])(what[0])
-        return super().GetSolution(replaced if isinstance(what[0], np.ndarray) else replaced.item())
+        """As `MathematicalProgramResult.GetSolution`: all values, or those of a variable, an expression, or arrays."""
+        if not what:
+            return super().GetSolution()
+        if not isinstance(what[0], np.ndarray):
+            return self._value(what[0])
+        values = np.array([self._value(one) for one in what[0].ravel()])
+        return values.reshape(what[0].shape)
+
+    def _value(self, what: Any) -> Any:
+        if isinstance(what, Variable) and what.get_id() in self._index:
+            return self._x[self._index[what.get_id()]]
+        if isinstance(what, Expression):
+            for x in what.GetVariables():
+                what = what.Substitute(x, self._value(x))
+            return what
+        return super().GetSolution(what)
 
     def get_solver_id(self) -> SolverId:
         """DAQP."""
@@ -76,14 +102,6 @@ class DaqpResult(MathematicalProgramResult):  # type: ignore[misc]
     def get_solver_details(self) -> Details:
         """Iterations, nodes and multipliers."""
         return self._details
-
-    def _without_binary(self, value: Any) -> Any:
-        if isinstance(value, Variable):
-            return self._for_binary.get(value.get_id(), (value, value))[1]
-        if isinstance(value, Expression):
-            for old, new in self._for_binary.values():
-                value = value.Substitute(old, Expression(new))
-        return value
 
 
 class DaqpSolver(SolverInterface):  # type: ignore[misc]
@@ -98,6 +116,11 @@ class DaqpSolver(SolverInterface):  # type: ignore[misc]
 
     NAME = "DAQP"
     _ID = SolverId(NAME)
+
+    def __init__(self) -> None:
+        """Keep the layout of the last program: with other coefficients it is solved sooner."""
+        super().__init__()
+        self._shell = _Shell(Layout(MathematicalProgram()))
 
     @classmethod
     def id(cls) -> SolverId:
@@ -152,14 +175,16 @@ class DaqpSolver(SolverInterface):  # type: ignore[misc]
             raise ValueError(why)
         limits = _limits(prog.solver_options(), solver_options)
         guess = prog.initial_guess() if initial_guess is None else np.asarray(initial_guess, dtype=np.float64)
-        form = StandardForm.of(prog)
+        if not self._shell.layout.fits(prog):
+            self._shell = _Shell(Layout(prog))
+        form = StandardForm.of(prog, self._shell.layout)
         answer = minimise(form, guess, limits)
         filled = DaqpResult() if result is None else result
         cost = _COSTS.get(answer.ended) or form.cost(answer.x)
         if isinstance(filled, DaqpResult):
-            filled.fill(prog, answer, cost)
+            filled.fill(self._shell, answer, cost)
         else:
-            _fill(filled, prog, answer, cost)
+            self._shell.fill(filled, answer, cost)
         return filled if result is None else None
 
 
@@ -176,17 +201,3 @@ def _limits(*given: SolverOptions | None) -> Limits:
     if unknown := sorted(set(chosen) - set(Limits._fields)):
         raise ValueError(f"{DaqpSolver.NAME}: no options {', '.join(unknown)}; allowed: {', '.join(Limits._fields)}")
     return Limits(**chosen)
-
-
-def _fill(result: MathematicalProgramResult, program: MathematicalProgram, answer: Answer, cost: float) -> _StandIns:
-    """Put an answer into a result by way of CLP; returns the variables that stand for binary ones."""
-    variables = program.decision_variables()
-    binary = [x for x in variables if x.get_type() == Variable.Type.BINARY]
-    stand_ins = {x.get_id(): (x, Variable(x.get_name())) for x in binary}
-    shell = MathematicalProgram()
-    shell.AddDecisionVariables(np.array([stand_ins.get(x.get_id(), (x, x))[1] for x in variables], dtype=object))
-    shell.AddLinearCost(np.zeros(len(variables)), cost, shell.decision_variables())
-    ClpSolver().Solve(shell, None, None, result)
-    result.set_x_val(answer.x)
-    result.set_solution_result(answer.ended)
-    return stand_ins

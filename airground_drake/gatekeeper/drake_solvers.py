@@ -82,17 +82,20 @@ class Search:
         return Found(None, "budget_spent") if late else found
 
 
+_RELAXING = DaqpSolver()
+
+
 def relax(binary: BinaryProgram, seconds: float = math.inf, iterations: int = 10_000) -> Found:
     """The optimum of (27), by DAQP, within `iterations` of the active-set method and `seconds` by the clock."""
     options = SolverOptions()
     options.SetOption(DaqpSolver.id(), "iter_limit", iterations)
     if seconds < math.inf:
         options.SetOption(DaqpSolver.id(), "time_limit", max(seconds, 1e-6))
-    return _found(DaqpSolver().Solve(binary.relaxation, None, options), binary.shares)
+    return _found(_RELAXING.Solve(binary.relaxation, None, options), binary.shares)
 
 
 def _found(result: Any, variables: Any) -> Found:
-    details = result.get_solver_details() if hasattr(result, "get_solver_details") else None
+    details = result.get_solver_details()
     more = (details.iterations, details.multipliers) if isinstance(details, Details) else (0, None)
     if result.is_success():
         return Found(result.GetSolution(variables), "optimal", *more)
