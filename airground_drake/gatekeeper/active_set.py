@@ -315,7 +315,7 @@ class _Scaled:
         flag: int,
         scaled: Array,
         info: dict[str, Any],
-        before: Details = Details(),  # noqa: B008 (immutable)
+        before: Details = Details(),
     ) -> Answer:
         """The answer by DAQP's flag and solution; `before`: what it took until then."""
         form = self.form
