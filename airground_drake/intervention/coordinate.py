@@ -22,8 +22,9 @@ SHARE = 0.8
 MOST_PLANS = 4
 """Largest number of joint plans that are tried for one proposal, each with more UGVs."""
 NARROWER = (1.0, 0.1, 0.01)
-"""Shares of the clearance. The next share is tried if the UGV has no way even alone: its own task may have led it
-through a gap that is too narrow for the full clearance."""
+"""Shares of the clearance, and of the spacing. The next share of the clearance is tried if the UGV has no way even
+alone: its own task may have led it through a gap that is too narrow for the full clearance. The next share of the
+spacing is tried if a joint plan helps nobody: UGVs that have met stand nearer to each other than the full spacing."""
 ON_PRESET_M = 0.5
 """A motion that ends this near to the preset, m, is predicted to go on along the preset."""
 BLEND_S = 1.0
@@ -46,6 +47,8 @@ class Coordinate(Policy):
     3. If no plan gives every UGV a way, the plan with the fewest UGVs left behind is proposed.
     4. If the UGV `seen.robot` finds no way even alone, less clearance is tried. Without any way, it is not planned for
        again until it has moved or the map has changed.
+    5. If it has a way alone, but the joint plan helps nobody, less spacing is tried. A plan that helps nobody is not
+       made again until a UGV has moved, is asked for something else, or the map has changed.
 
     Attributes:
         speed: largest speed, m/s; no UGV uses more than SHARE of its limit.
@@ -74,15 +77,19 @@ class Coordinate(Policy):
         self.spacing = spacing_m
         self.follow = follow_s
         self._shut_in: dict[str, Observation] = {}
+        self._in_vain: dict[tuple[str, ...], Observation] = {}
         warm_up()
 
     def propose(self, seen: Observation) -> dict[str, Motion] | None:
         """Motions by UGV; None if no triggered UGV can be helped."""
         if not seen.team or self._is_known_to_be_shut_in(seen):
             return None
+        waiting = tuple(seen.team[i].name for i in self._first_group(seen))
+        if (before := self._in_vain.get(waiting)) is not None and _is_as_before(before, seen):
+            return None
         own, tried = [mate.name for mate in seen.team].index(seen.robot), []
         for share in NARROWER:
-            space = self._space(seen, share * self.clearance)
+            space = self._space(seen, share * self.clearance, self.spacing)
             alone = cache(partial(self._alone, seen, space))
             tried.append(self._joint(seen, space, alone))
             lost = tried[-1][0][0]
@@ -91,7 +98,19 @@ class Coordinate(Policy):
         else:
             self._shut_in[seen.robot] = seen
         _, group, found = min(tried, key=lambda each: each[0])
-        return self._proposals(seen, group, found)
+        motions = self._proposals(seen, group, found)
+        if motions is None and alone(own) is not None:
+            for spacing in NARROWER[1:]:
+                space = self._space(seen, share * self.clearance, spacing * self.spacing)
+                _, group, found = self._joint(seen, space, cache(partial(self._alone, seen, space)))
+                if (motions := self._proposals(seen, group, found)) is not None:
+                    return motions
+            self._in_vain[waiting] = seen
+        return motions
+
+    def _first_group(self, seen: Observation) -> list[int]:
+        """The indices of the UGVs of the first joint plan."""
+        return [i for i, mate in enumerate(seen.team) if mate.name == seen.robot or _waits(mate, seen.t)]
 
     def _is_known_to_be_shut_in(self, seen: Observation) -> bool:
         """Whether the UGV has already found no way from here on the same map, even alone.
@@ -101,16 +120,13 @@ class Coordinate(Policy):
         before = self._shut_in.get(seen.robot)
         return (
             before is not None
-            and before.t <= seen.t
             and math.dist(before.position, seen.position) <= SAME_PLACE_M
-            and np.array_equal(before.obstacles, seen.obstacles)
-            and np.array_equal(before.obstacle_radii, seen.obstacle_radii)
+            and _has_the_map_of(before, seen)
         )
 
     def _joint(self, seen: Observation, space: Space, alone: Alone) -> tuple[tuple[float, ...], list[int], Plan]:
         """The best joint plan: its cost, the indices of its UGVs, and the plan."""
-        everyone = range(len(seen.team))
-        group = [i for i in everyone if seen.team[i].name == seen.robot or _waits(seen.team[i], seen.t)]
+        group = self._first_group(seen)
         best: tuple[list[int], Plan] | None = None
         least: tuple[float, ...] = ()
         for _ in range(MOST_PLANS):
@@ -150,7 +166,7 @@ class Coordinate(Policy):
         near = []
         for j in others:
             other, ahead = seen.team[j], predicted(seen.team[j], seen.start)
-            apart = self.spacing + space.apart
+            apart = space.spacing + space.apart
             if any(distance(way.motion, ahead) < apart + (mate.radius + other.radius) for mate, way in ways):
                 near.append(j)
         return near or others
@@ -171,11 +187,35 @@ class Coordinate(Policy):
         helped = any(seen.team[i].triggered and seen.team[i].name in motions for i in group)
         return motions if helped else None
 
-    def _space(self, seen: Observation, clearance: float) -> Space:
+    def _space(self, seen: Observation, clearance: float, spacing: float) -> Space:
         """Obstacles and distances for a UGV without a body, in the plane of `seen.robot`."""
         radii = seen.safe_distance + np.broadcast_to(seen.obstacle_radii, len(seen.obstacles))
         above = seen.obstacles[:, 2] - float(seen.position[2])
-        return Space(seen.obstacles[:, :2], radii, clearance, seen.robot_distance, self.spacing, above)
+        return Space(seen.obstacles[:, :2], radii, clearance, seen.robot_distance, spacing, above)
+
+
+def _has_the_map_of(before: Observation, seen: Observation) -> bool:
+    """Whether the obstacles are those of an earlier observation."""
+    same = np.array_equal(before.obstacles, seen.obstacles)
+    return before.t <= seen.t and same and np.array_equal(before.obstacle_radii, seen.obstacle_radii)
+
+
+def _is_as_before(before: Observation, seen: Observation) -> bool:
+    """Whether the map is that of an earlier observation, and every UGV stands where it stood, asked for the same."""
+    return (
+        _has_the_map_of(before, seen)
+        and [_state(mate) for mate in before.team] == [_state(mate) for mate in seen.team]
+        and all(
+            math.dist(one.position, other.position) <= SAME_PLACE_M
+            for one, other in zip(before.team, seen.team, strict=True)
+        )
+    )
+
+
+def _state(mate: Teammate) -> tuple[object, ...]:
+    """What a plan depends on besides the UGV's position."""
+    asked = mate.proposal and (mate.proposal.issued, mate.proposal.number)
+    return mate.name, mate.triggered, mate.standing, mate.resting, mate.answered, asked
 
 
 def task_of(mate: Teammate, start: float) -> RobotTask:

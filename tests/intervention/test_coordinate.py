@@ -18,6 +18,7 @@ from airground_drake.intervention.coordinate import NARROWER, Coordinate, predic
 from airground_drake.intervention.coordination.joint import Plan, plan
 from airground_drake.intervention.policy import Observation, Proposal, Teammate
 from airground_drake.run.simulation import simulate
+from airground_drake.scenarios.load import from_data
 from airground_drake.scenarios.schema import (
     Control,
     Decision,
@@ -110,6 +111,51 @@ def test_a_robot_that_is_shut_in_is_planned_for_again_only_elsewhere_or_on_anoth
     assert plans_for([replace(shut_in, position=shut_in.position + 1e-9), other], 20.0) == 0
     assert plans_for([moved, other], 20.0) > 0
     assert plans_for([shut_in, other], 21.0, obstacles=4) > 0
+
+
+def test_a_joint_plan_in_vain_is_made_again_only_in_another_situation(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Two UGVs face each other in a corridor without a bay: each has a way alone, together they have none."""
+    plans: list[Plan] = []
+
+    def counted(*given: Any, **options: Any) -> Plan:
+        plans.append(plan(*given, **options))
+        return plans[-1]
+
+    monkeypatch.setattr(coordinate, "plan", counted)
+    policy, corridor = Coordinate(), [(x, y) for x in np.arange(-30.0, 30.1, 1.4) for y in (-2.2, 2.2)]
+    one, other = mate("one", [-1.1, 0.0], [12.0, 0.0]), mate("other", [1.1, 0.0], [-12.0, 0.0])
+
+    def plans_for(team: list[Teammate], at: float, *, robot: int = 0, obstacles: int = len(corridor)) -> int:
+        before = len(plans)
+        assert policy.propose(replace(seen(team, corridor[:obstacles], robot=robot), t=at, start=at + 0.05)) is None
+        return len(plans) - before
+
+    assert plans_for([one, other], 10.0) >= len(NARROWER)
+    assert plans_for([one, other], 20.0) == plans_for([one, other], 20.0, robot=1) == 0
+    assert plans_for([one, replace(other, resting=True)], 20.0) > 0
+    assert plans_for([one, other], 20.0, obstacles=len(corridor) - 1) > 0
+
+
+def test_ugvs_that_have_met_are_planned_for_with_less_spacing() -> None:
+    """Twelve on a tight circle, which drive through its centre: where they stop, the full spacing has no room."""
+    ends = [(4.8 * math.cos(k * math.pi / 6.0), 4.8 * math.sin(k * math.pi / 6.0)) for k in range(12)]
+    ugvs = {
+        f"r{k}": {"start_m": [x, y, 0.0], "target_m": [-x, -y, 0.0], "max_speed_m_s": 2.0, "radius_m": 0.2}
+        | {"preset": {"waypoints_m": [[x, y, 0.0], [-x, -y, 0.0]], "speed_m_s": 1.0}}
+        for k, (x, y) in enumerate(ends)
+    }
+    scenario = from_data(
+        {
+            "name": "tight", "duration_s": 5.5, "ugvs": ugvs, "runs": {"d": {"method": "d"}},
+            "uav": {"start_m": [0.0, 0.0, 3.0], "altitude_m": 3.0, "max_speed_m_s": 6.0},
+            "safe_distance": {"obstacle_m": 0.1, "ugv_m": 0.1, "air_ground_m": 0.5, "collision_m": 0.01},
+            "control": {"period_s": 0.05, "sensing_range_m": 3.0},
+            "intervention": {"policies": [{"name": "coordinate"}]},
+            "decision": {"threshold": {"zeta_m": 1.5}, "release_m": 1.0, "noise_period_s": 0.05},
+        },
+        "tight",
+    )  # fmt: skip
+    assert set(simulate(scenario, "d").proposals["robot"]) == set(ugvs)
 
 
 @pytest.mark.parametrize(
