@@ -19,6 +19,7 @@ from airground_drake.run.trace import Trace
 from airground_drake.verify.finding import Finding
 from airground_drake.verify.runs.convex_bounds import Enclosure, enclose
 from airground_drake.verify.runs.gate_record import (
+    LEAST_COST,
     POSITION_TOLERANCE_M,
     DecisionRecord,
     Deviation,
@@ -37,7 +38,7 @@ GAP_TOLERANCE = 1e-6
 """Recorded and recomputed gaps may differ by this."""
 
 BLOCKS = 10
-"""Blocks of stages whose plans are tried where a gap is wide."""
+"""Blocks of stages whose plans are tried where a gap is wide; all plans of so many choices are tried in any case."""
 
 MOST_BLOCKS = 12
 """All plans of so many blocks can be evaluated."""
@@ -51,9 +52,13 @@ HALF_PLANE_ROUTES = (*PROVED_ROUTES, "relaxed")
 
 @dataclass(frozen=True)
 class Bounds:
-    """The evidence; gaps and enclosures are relative to the cheaper constant plan's cost.
+    """The evidence; gaps and enclosures are relative to the cheaper constant plan's cost, but for the two last ones.
 
-    The first stage of a plan is certified if every plan with the other first stage costs more.
+    Attributes:
+        first_stage_certified: plans whose first stage every plan with the other one costs more than.
+        largest_gap_to_half_planes: of a plan to the route's bound, both along the half-planes, relative to the plan.
+        enumerated: decisions with at most `BLOCKS` choices, for which all plans were evaluated by exact distances.
+        largest_gap_to_enumeration: of such a plan to the best of all, relative to the best.
     """
 
     decisions: int
@@ -66,6 +71,9 @@ class Bounds:
     widest_enclosure: float
     first_stage_certified: int
     largest_gaps: list[dict[str, Any]]
+    largest_gap_to_half_planes: float | None
+    enumerated: int
+    largest_gap_to_enumeration: float | None
 
 
 class GateOpt(GateClaim):
@@ -102,7 +110,8 @@ class GateOpt(GateClaim):
         "bound U; its multipliers give L by weak duality, evaluated in numpy, whatever their quality. Route "
         "'mixed_integer' says that its bound is the optimum over binary plans: the recorded plan, the constant plans "
         "and every plan that differs from the recorded one in one choice are evaluated, and none may be cheaper; with "
-        "up to 12 blocks, all plans are. Other routes bound nothing, and the claim is inconclusive."
+        "up to 12 blocks, all plans are. Other routes bound nothing, and the claim is inconclusive. Where a problem has at "
+        "most 10 choices, the evidence also compares the plan with the best of all by the exact distances of (26d)."
     )
     equations = "(25)-(27)"
     assumptions = (
@@ -113,7 +122,8 @@ class GateOpt(GateClaim):
     does_not_establish = (
         "The claim is about the route's own problem. Mode velocities and half-planes are data of that problem "
         "(GATE-MODEL says what they are worth). Not established: optimality for the exact distances of (26d) "
-        "(half-planes are conservative: another choice of normals may allow a cheaper plan), for another dwell, or "
+        "(half-planes are conservative: another choice of normals may allow a cheaper plan) but for problems that were "
+        "enumerated, for another dwell, or "
         "for the nonlinear closed loop; nor that the first stage is the optimal one, unless counted as certified. A "
         "plan may cost less by exact distances than the bound; its gap is then negative. Refusals for want of a plan "
         "are only listed."
@@ -142,7 +152,7 @@ class GateOpt(GateClaim):
             compared += compare_bounds(each.row, each.optimum, gate.blocks)
             if each.gap > self.largest_gap and not gate.blocks:
                 compared.append(compare_with_blocks(each, self.largest_gap))
-        evidence = self._bounds(rows, bounded, lacking)
+        evidence = self._bounds(rows, bounded, lacking, gate.blocks)
         undecided = not bounded or lacking or evidence.gap_too_wide_to_decide
         decided = not undecided and evidence.widest_enclosure <= self.widest
         worst = evidence.largest_gaps[0] if bounded else {}
@@ -158,9 +168,10 @@ class GateOpt(GateClaim):
         return conclude(finding, compared)
 
     def _bounds(
-        self, rows: Sequence[DecisionRecord], bounded: Sequence[Bounded], lacking: Sequence[DecisionRecord]
+        self, rows: Sequence[DecisionRecord], bounded: Sequence[Bounded], lacking: Sequence[DecisionRecord], blocks: int
     ) -> Bounds:
-        gaps = [each.gap for each in bounded]
+        gaps, planned = [each.gap for each in bounded], [each.row for each in bounded]
+        beside_all = [above_the_best(row, blocks) for row in planned if min(blocks or row.stages, row.stages) <= BLOCKS]
         largest = [bounded[i] for i in np.argsort(gaps)[:-6:-1]]
         return Bounds(
             decisions=len(rows),
@@ -173,6 +184,9 @@ class GateOpt(GateClaim):
             widest_enclosure=max((each.width for each in bounded), default=0.0),
             first_stage_certified=sum(each.first_stage_certified for each in bounded),
             largest_gaps=[{"t_s": each.row.t_s, "robot": each.row.robot, "gap": each.gap} for each in largest],
+            largest_gap_to_half_planes=max((float(row.given["gap"]) for row in planned), default=None),
+            enumerated=len(beside_all),
+            largest_gap_to_enumeration=max(beside_all, default=None),
         )
 
 
@@ -259,10 +273,20 @@ def neighbours(plan: Array, blocks: int) -> Array:
 
 def cheapest_of_blocks(row: DecisionRecord, blocks: int) -> Enclosure:
     """The cheapest along the half-planes of all plans that are constant on blocks, by evaluating each."""
-    stages = row.stages
-    blocks = min(blocks, stages)
-    modes = (np.arange(2**blocks)[:, None] >> np.arange(blocks)) % 2
-    omega = modes[:, np.arange(stages) * blocks // stages].astype(np.float64)
+    omega = plans_of_blocks(row.stages, blocks)
     cost = row.cost(row.positions(omega), row.half_planes)
     least = float(cost.min())
     return Enclosure(least, least, float(cost[omega[:, 0] != row["plan"][0]].min()))
+
+
+def above_the_best(row: DecisionRecord, blocks: int) -> float:
+    """How much the plan costs more than the best of all plans, by exact distances, relative to the best."""
+    best = float(row.cost(row.positions(plans_of_blocks(row.stages, blocks or row.stages))).min())
+    return (float(row.cost(row["positions_m"])) - best) / max(best, LEAST_COST)
+
+
+def plans_of_blocks(stages: int, blocks: int) -> Array:
+    """All plans of so many stages that are constant on blocks, (2^B, N)."""
+    blocks = min(blocks, stages)
+    modes = (np.arange(2**blocks)[:, None] >> np.arange(blocks)) % 2
+    return modes[:, np.arange(stages) * blocks // stages].astype(np.float64)
