@@ -14,8 +14,8 @@ from airground_drake.gatekeeper.cost import Terms, add_stage, slack_at
 Blocks = npt.NDArray[np.int64]
 
 BEAM = 64
-"""Partial plans that the beam search keeps. On random ten-stage problems 64 find the best of all 1,024 plans; 16 miss it
-in one of 25. Among 60 stages, 256 find hardly more."""
+"""Partial plans that the beam search keeps. On random ten-stage problems 64 find the best of all 1,024 plans; 16 miss
+it in one of 25. Among 60 stages, 256 find hardly more."""
 
 
 def cheap_plan(terms: Terms, block: Blocks, known: Sequence[Array]) -> Array:
@@ -56,7 +56,7 @@ def beam_search(terms: Terms, block: Blocks, width: int = BEAM) -> Array:
 
 @njit(cache=True)
 def improve(terms: Terms, block: Blocks, start: Array, pairs: bool) -> tuple[Array, float]:
-    """A plan (N,), constant on each block, that no change of one block makes cheaper, nor of two (`pairs`); its cost."""
+    """A plan (N,), constant on each block, that neither a change of one block nor of two (`pairs`) makes cheaper."""
     plan, blocks = start.copy(), block[-1] + 1
     best, changed = _cost_changed(terms, block, plan, -1, -1, np.inf), True
     while changed:
