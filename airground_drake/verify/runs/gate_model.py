@@ -167,7 +167,7 @@ def _is_unstable(trace: Trace, row: DecisionRecord, both: tuple[Array, Array]) -
         loops = stacked([scene_of(trace, row, np.full(row.stages, float(choice)))] * len(NUDGES_M))
         pushed = np.array([loops.here, *roll_out(trace, loops, NUDGES_M)]).swapaxes(0, 1)
         off = [np.abs(velocities(one, row) - velocities(places, row)).max() for one in pushed]
-        if max(off) > VELOCITY_TOLERANCE_M_S or move_apart(pushed):
+        if max(off) > VELOCITY_TOLERANCE_M_S or move_apart([*pushed]):
             return True
     return False
 
