@@ -311,7 +311,11 @@ class _Scaled:
         return bool(falls and not curved and not stopped)
 
     def _answer(
-        self, flag: int, scaled: Array, info: dict[str, Any], before: Details = Details()  # noqa: B008 (immutable)
+        self,
+        flag: int,
+        scaled: Array,
+        info: dict[str, Any],
+        before: Details = Details(),  # noqa: B008 (immutable)
     ) -> Answer:
         """The answer by DAQP's flag and solution; `before`: what it took until then."""
         form = self.form

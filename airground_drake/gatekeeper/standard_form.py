@@ -108,7 +108,10 @@ class StandardForm(NamedTuple):
     def contradicts_itself(self) -> bool:
         """Whether a lower bound is above an upper one, or a row without coefficients demands something."""
         empty = ~self.rows.any(axis=1)
-        lower, upper = np.where(empty, np.maximum(self.lower, 0.0), self.lower), np.where(empty, np.minimum(self.upper, 0.0), self.upper)
+        lower, upper = (
+            np.where(empty, np.maximum(self.lower, 0.0), self.lower),
+            np.where(empty, np.minimum(self.upper, 0.0), self.upper),
+        )
         return bool((self.least > self.most).any() or (lower > upper).any())
 
     def separate(self) -> tuple[Flags, Indices]:
