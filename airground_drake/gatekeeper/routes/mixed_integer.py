@@ -1,4 +1,4 @@
-"""(26) with its binary variables, solved to a proven optimum along half-planes, beside a search by its own cost: the default route."""
+"""(26) with its binary variables: a proven optimum along half-planes, and a search by its own cost. The default route."""
 
 from __future__ import annotations
 
@@ -89,7 +89,8 @@ class MixedIntegerRoute:
         proof = search.along(constants.better.positions, [plan, *known], bound)
         plans = [plan, *known]
         while proof.optimum is not None:
-            plans += [proof.optimum, improve(problem.terms, binary.block, proof.optimum, pairs=True)[0]]
+            if not any(np.array_equal(proof.optimum, one) for one in plans):
+                plans += [proof.optimum, improve(problem.terms, binary.block, proof.optimum, True)[0]]
             plan = min(plans, key=lambda one: problem.evaluate(one).objective)
             if problem.evaluate(plan).objective >= proof.bound * (1.0 - _AGREE):
                 break
