@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -27,8 +28,8 @@ def cheap_plan(terms: Terms, block: Blocks, known: Sequence[Array]) -> Array:
         known: plans (N,), constant on each block.
     """
     starts = [beam_search(terms, block), *known]
-    improved = [improve(terms, block, plan, pairs=False) for plan in starts]
-    return improve(terms, block, min(improved, key=lambda one: one[1])[0], pairs=True)[0]
+    improved = [improve(terms, block, plan, False) for plan in starts]
+    return improve(terms, block, min(improved, key=lambda one: one[1])[0], True)[0]
 
 
 @njit(cache=True)
@@ -56,36 +57,64 @@ def beam_search(terms: Terms, block: Blocks, width: int = BEAM) -> Array:
 
 @njit(cache=True)
 def improve(terms: Terms, block: Blocks, start: Array, pairs: bool) -> tuple[Array, float]:
+<<<<<<< HEAD
     """A plan (N,), constant on each block, that neither a change of one block nor of two (`pairs`) makes cheaper."""
+=======
+    """A plan (N,), constant on blocks, that no change of one block makes cheaper, nor of two (`pairs`); its cost."""
+>>>>>>> solver
     plan, blocks = start.copy(), block[-1] + 1
-    best, changed = _cost_changed(terms, block, plan, -1, -1, np.inf), True
+    before = _Beginnings(np.empty((len(plan) + 1, 3)), np.empty(len(plan) + 1))
+    _begin(terms, plan, before)
+    changed = True
     while changed:
         changed = False
         for i in range(blocks):
             for j in range(i, blocks if pairs else i + 1):
-                cost = _cost_changed(terms, block, plan, i, j, best)
-                if cost < best * (1.0 - 1e-12):
-                    plan, best, changed = np.where((block == i) | (block == j), 1.0 - plan, plan), cost, True
-    return plan, best
+                if _cost_changed(terms, block, plan, before, i, j) < before.cost[-1] * (1.0 - 1e-12):
+                    plan, changed = np.where((block == i) | (block == j), 1.0 - plan, plan), True
+                    _begin(terms, plan, before)
+    return plan, terms.dt * before.cost[-1]
+
+
+class _Beginnings(NamedTuple):
+    """Ends of a plan's first stages, (N + 1, 3), m, and their cost so far, (N + 1,), without the factor dt."""
+
+    end: Array
+    cost: Array
 
 
 @njit(cache=True)
-def _cost_changed(terms: Terms, block: Blocks, plan: Array, i: int, j: int, most: float) -> float:
-    """Cost of a plan with the opposite choice in blocks i and j (-1: in none); at least `most` if it is above that."""
-    x, y, z = terms.initial[0], terms.initial[1], terms.initial[2]
-    total = 0.0
+def _begin(terms: Terms, plan: Array, before: _Beginnings) -> None:
+    """Write the beginnings of a plan."""
+    before.end[0], before.cost[0] = terms.initial, 0.0
     for k in range(len(plan)):
+        for a in range(3):
+            before.end[k + 1, a] = before.end[k, a] + terms.dt * terms.velocities[int(plan[k]), k, a]
+        x, y, z = before.end[k + 1, 0], before.end[k + 1, 1], before.end[k + 1, 2]
+        before.cost[k + 1] = _cost_to(before.cost[k], terms, k, x, y, z)
+
+
+@njit(cache=True)
+def _cost_changed(terms: Terms, block: Blocks, plan: Array, before: _Beginnings, i: int, j: int) -> float:
+    """Cost of a plan with the opposite choice in blocks i <= j, without the factor dt; of a part that costs more."""
+    dt, velocities, centres, distances = terms.dt, terms.velocities, terms.centres, terms.distances
+    weights, slack_weight, reference = terms.error_weights, terms.slack_weight, terms.reference
+    first, most = np.searchsorted(block, i), before.cost[-1]
+    x, y, z, total = before.end[first, 0], before.end[first, 1], before.end[first, 2], before.cost[first]
+    for k in range(first, len(plan)):
         mode = 1 - int(plan[k]) if block[k] == i or block[k] == j else int(plan[k])
-        x += terms.dt * terms.velocities[mode, k, 0]
-        y += terms.dt * terms.velocities[mode, k, 1]
-        z += terms.dt * terms.velocities[mode, k, 2]
-        total = _cost_to(total, terms, k, x, y, z)
-        if terms.dt * total > most:
+        x += dt * velocities[mode, k, 0]
+        y += dt * velocities[mode, k, 1]
+        z += dt * velocities[mode, k, 2]
+        slack = slack_at(centres, distances, k, x, y, z)
+        total = add_stage(total, weights, slack_weight, reference, k, x, y, z, slack)
+        if total > most:
             break
-    return terms.dt * total
+    return total
 
 
 @njit(cache=True)
 def _cost_to(total: float, terms: Terms, k: int, x: float, y: float, z: float) -> float:
-    """`total` and the cost of stage k that ends in (x, y, z), m."""
-    return add_stage(total, terms, k, x, y, z, slack_at(terms, k, x, y, z))
+    """`total` and the cost of stage k that ends in (x, y, z), m, without the factor dt."""
+    slack = slack_at(terms.centres, terms.distances, k, x, y, z)
+    return add_stage(total, terms.error_weights, terms.slack_weight, terms.reference, k, x, y, z, slack)

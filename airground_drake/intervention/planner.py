@@ -17,7 +17,7 @@ from airground_drake.geometry.motion import Motion
 from airground_drake.intervention.database import BehaviourDatabase, Fault, Negotiation
 from airground_drake.intervention.messages import ACCEPT, DONE, REFUSE, SILENT, Disc, Proposals, Reports, answer_to
 from airground_drake.intervention.policy import Answered, Observation, Proposal, Teammate
-from airground_drake.world.world import SAME_S
+from airground_drake.world.motion import SAME_S
 
 _WORDS: dict[float, Answered] = {ACCEPT: "accepted", REFUSE: "refused"}
 

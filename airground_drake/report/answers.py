@@ -8,7 +8,6 @@ from math import dist
 from typing import Any, NamedTuple
 
 from airground_drake.base.statuses import NOTHING, PASSING, UNDECIDED
-from airground_drake.report.attention import in_words
 from airground_drake.report.outcomes import Course, Document, Proof, claims, distance, tolerance, triggers
 from airground_drake.report.phrases import (
     MAX_NAMES,
@@ -19,6 +18,7 @@ from airground_drake.report.phrases import (
     found_no_way,
     gatekeeper,
     grouped,
+    in_words,
     intrusion,
     joined,
     labels,

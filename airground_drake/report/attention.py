@@ -6,15 +6,23 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 from airground_drake.base.errors import one_line
-from airground_drake.base.statuses import PASSING, UNDECIDED, outcome
-from airground_drake.report.outcomes import distance, no_way
-from airground_drake.report.phrases import MAX_NAMES, counted, found_no_way, grouped, refusal
+from airground_drake.base.statuses import UNDECIDED, outcome
+from airground_drake.report.outcomes import no_way
+from airground_drake.report.phrases import (
+    MAX_NAMES,
+    bodies_of,
+    counted,
+    found_no_way,
+    grouped,
+    in_words,
+    place_of,
+    refusal,
+)
 from airground_drake.scenarios.validate import preset_s
 
 MAX_FAULT_CHARS = 300
 MAX_FAULTS = 3
 """Maximum number of kinds of faults listed per run; its section of the page has more."""
-_NAMES = ("first", "second", "robot", "other")
 
 
 class Item(NamedTuple):
@@ -54,7 +62,7 @@ def items(document: Mapping[str, Any]) -> list[Item]:
 
 def _of_claim(claim: Mapping[str, Any], run: Mapping[str, Any]) -> Item:
     words = in_words(claim)
-    if "condition" in _place(claim) and run and (bodies := _bodies(claim)):
+    if "condition" in place_of(claim) and run and (bodies := bodies_of(claim)):
         words += _refused(run, bodies[0])
     return Item(
         outcome(claim["status"], claim["exercised"]),
@@ -64,47 +72,6 @@ def _of_claim(claim: Mapping[str, Any], run: Mapping[str, Any]) -> Item:
         about=f"expected: {str(claim['expected']).replace('_', ' ')}",
         anchor=f"claim-{claim['id']}",
     )
-
-
-def _place(claim: Mapping[str, Any]) -> dict[str, Any]:
-    """Where the margin of a claim is, and its counterexample."""
-    return {**claim["where"], **(claim["counterexample"] or {})}
-
-
-def _bodies(claim: Mapping[str, Any]) -> list[str]:
-    """The bodies that a claim names."""
-    place = _place(claim)
-    return list(dict.fromkeys(str(place[name]) for name in _NAMES if isinstance(place.get(name), str)))
-
-
-def in_words(claim: Mapping[str, Any]) -> str:
-    """What came of a claim, as far as it is known: who, how far from what was allowed, when."""
-    place, who = _place(claim), " and ".join(_bodies(claim))
-    known = {name: value for name, value in place.items() if isinstance(value, float | int)}
-    at = f", {known['t_s']:.3f} s" if "t_s" in known else ""
-    if claim["status"] in PASSING:
-        idle = claim["exercised"] == 0
-        return f"nothing put it to the test: no {claim['exercised_by']}" if idle else f"{claim['status']} all the same"
-    if claim["status"] != "refuted":
-        why = claim["evidence"].get("reason") or claim["evidence"].get("error")
-        return why if isinstance(why, str) else "could not be decided"
-    if {"min_distance_m", "safe_distance_m"} <= known.keys():
-        apart = distance(known["min_distance_m"], known["safe_distance_m"])
-        return f"{who} at {apart}, {known['safe_distance_m']:g} m required{at}"
-    if {"distance_m", "margin_m"} <= known.keys() and "condition" in place:
-        allowed = known["distance_m"] + known["margin_m"]
-        ended = f"collided at {known['collided_s']:.2f} s," if "collided_s" in known else "ended"
-        return f"{who} {ended} {known['distance_m']:.2f} m from where it must end, {allowed:g} m allowed"
-    who = f"{who}: " if who else ""
-    if {"parameter", "built", "scenario"} <= place.keys():
-        return f"{who}{place['parameter']} was built as {place['built']}, the scenario has {place['scenario']}"
-    margin, unit = known.get("margin", claim["margin"]), place.get("unit", claim["unit"])
-    if margin is not None:
-        quantity = place.get("hypothesis") or place.get("condition") or claim["quantity"] or "margin"
-        missed = f"missed by {-margin:.3g} {unit}" if margin < 0.0 else f"{margin:.3g} {unit} left"
-        return f"{who}{quantity} {missed}{at}"
-    what = next((str(place[key]) for key in ("quantity", "what", "kind", "reason") if place.get(key)), "refuted")
-    return f"{who}{what}{at}"
 
 
 def _refused(run: Mapping[str, Any], robot: str) -> str:

@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, NamedTuple, TypeVar
 
+from airground_drake.base.statuses import PASSING
 from airground_drake.registry import METHODS
-from airground_drake.report.outcomes import Course
+from airground_drake.report.outcomes import Course, distance
 
 K = TypeVar("K")
 V = TypeVar("V")
@@ -35,6 +36,10 @@ SETTINGS = {
     ("gatekeeper.rule", "first_stage"): "first stage applied",
 }
 """What keys of the gatekeeper of method (c) mean, in a few words."""
+
+
+ROLES = ("first", "second", "robot", "other")
+"""Keys that hold the name of a body in the place of a claim."""
 
 
 class Line(NamedTuple):
@@ -174,3 +179,44 @@ def found_no_way(names: Sequence[str]) -> str:
 
 def _robots(names: Sequence[str]) -> str:
     return joined(names) if len(names) <= MAX_NAMES else f"{len(names)} robots"
+
+
+def place_of(claim: Mapping[str, Any]) -> dict[str, Any]:
+    """Where the margin of a claim is, and its counterexample."""
+    return {**claim["where"], **(claim["counterexample"] or {})}
+
+
+def bodies_of(claim: Mapping[str, Any]) -> list[str]:
+    """The bodies that a claim names."""
+    place = place_of(claim)
+    return list(dict.fromkeys(str(place[name]) for name in ROLES if isinstance(place.get(name), str)))
+
+
+def in_words(claim: Mapping[str, Any]) -> str:
+    """What came of a claim, as far as it is known: who, how far from what was allowed, when."""
+    place, who = place_of(claim), " and ".join(bodies_of(claim))
+    known = {name: value for name, value in place.items() if isinstance(value, float | int)}
+    at = f", {known['t_s']:.3f} s" if "t_s" in known else ""
+    if claim["status"] in PASSING:
+        idle = claim["exercised"] == 0
+        return f"nothing put it to the test: no {claim['exercised_by']}" if idle else f"{claim['status']} all the same"
+    if claim["status"] != "refuted":
+        why = claim["evidence"].get("reason") or claim["evidence"].get("error")
+        return why if isinstance(why, str) else "could not be decided"
+    if {"min_distance_m", "safe_distance_m"} <= known.keys():
+        apart = distance(known["min_distance_m"], known["safe_distance_m"])
+        return f"{who} at {apart}, {known['safe_distance_m']:g} m required{at}"
+    if {"distance_m", "margin_m"} <= known.keys() and "condition" in place:
+        allowed = known["distance_m"] + known["margin_m"]
+        ended = f"collided at {known['collided_s']:.2f} s," if "collided_s" in known else "ended"
+        return f"{who} {ended} {known['distance_m']:.2f} m from where it must end, {allowed:g} m allowed"
+    who = f"{who}: " if who else ""
+    if {"parameter", "built", "scenario"} <= place.keys():
+        return f"{who}{place['parameter']} was built as {place['built']}, the scenario has {place['scenario']}"
+    margin, unit = known.get("margin", claim["margin"]), place.get("unit", claim["unit"])
+    if margin is not None:
+        quantity = place.get("hypothesis") or place.get("condition") or claim["quantity"] or "margin"
+        missed = f"missed by {-margin:.3g} {unit}" if margin < 0.0 else f"{margin:.3g} {unit} left"
+        return f"{who}{quantity} {missed}{at}"
+    what = next((str(place[key]) for key in ("quantity", "what", "kind", "reason") if place.get(key)), "refuted")
+    return f"{who}{what}{at}"

@@ -41,7 +41,7 @@ from airground_drake.base.arrays import Array, read_only
 from airground_drake.base.errors import TraceError, one_line
 from airground_drake.scenarios.recorded import of_run
 from airground_drake.scenarios.schema import Scenario
-from airground_drake.world.world import SAME_S
+from airground_drake.world.motion import SAME_S
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -8,6 +8,9 @@ import numpy as np
 
 from airground_drake.base.arrays import Array
 
+SAME_S = 1e-9
+"""Times closer than this are one instant, s."""
+
 
 class Motion(NamedTuple):
     """A centre that stays within `off_m` of a point in uniform straight motion; exact if that is 0.

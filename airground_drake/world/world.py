@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from airground_drake.base.arrays import Array
+from airground_drake.world.motion import SAME_S
 from airground_drake.world.plant import Plant
 from airground_drake.world.shape import Ball, Shape
 
@@ -18,8 +19,6 @@ Kind = Literal["ugv", "uav", "obstacle"]
 KINDS: tuple[Kind, ...] = get_args(Kind)
 ROBOTS: tuple[Kind, ...] = ("ugv", "uav")
 """Kinds of bodies that are commanded."""
-SAME_S = 1e-9
-"""Times closer than this are one instant, s."""
 NOWHERE_M = 1e150
 """Coordinates of a body that has not appeared yet: beyond any sensing range, and its square is still finite."""
 

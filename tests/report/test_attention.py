@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from report.cases import FINE, built, verdict
 
-from airground_drake.report import attention
+from airground_drake.report import attention, phrases
 from airground_drake.run.trace import Trace
 from airground_drake.scenarios.schema import Scenario
 
@@ -84,7 +84,7 @@ def test_for_whom_the_uav_found_no_way(scenario: Scenario, traces: dict[str, Tra
     assert [item.words for item in attention.items(report)][1:] == ["the UAV found no way for ugv2"]
 
 
-KEYS = st.sampled_from([*attention._NAMES, *TOO_NEAR, *END, "t_s", "hypothesis", "margin", "unit", "kind"])
+KEYS = st.sampled_from([*phrases.ROLES, *TOO_NEAR, *END, "t_s", "hypothesis", "margin", "unit", "kind"])
 VALUES = st.none() | st.booleans() | st.floats() | st.text() | st.sampled_from(["ugv1", "uav", "obstacle_1"])
 
 

@@ -61,7 +61,7 @@ def test_yaml_is_read_by_version_1_2_with_anchors_merges_and_templates(write: Wr
         ("intervention.policies.0.name=my.module:Policy", "my.module:Policy"),
         ("obstacles.obstacle_3.known_to_uav=false", False),
         ("obstacles._box={position_m: [-9, -9, 0], known_to_uav: true, radius_m: 0}",
-         {"position_m": [-9.0, -9.0, 0.0], "known_to_uav": True, "radius_m": 0.0}),
+         {"position_m": [-9.0, -9.0, 0.0], "known_to_uav": True, "radius_m": 0.0, "appears_s": 0.0}),
         ("title=a = b", "a = b"),
         ("runs.b.expected={SAFE-TRACE: refuted}", {"SAFE-TRACE": "refuted"}),
         ("runs.d.expected.LIVE-GOAL=refuted", "refuted"),

@@ -103,7 +103,8 @@ def test_a_claim_that_says_what_exercises_it_must_count_it(
         ("exercised", "holds", None, False), ("exercised", "refuted", 5, False),
         ("exercised or error", "error", 5, True), ("exercised or error", "holds", 0, False),
         ("holds", "holds", 0, True), ("holds or supported", "supported", None, True),
-        *(("nothing", status, count, None) for status in ("holds", "refuted", "error") for count in (0, 5)),
+        *(("nothing", status, count, None) for status in ("holds", "refuted") for count in (0, 5)),
+        ("nothing", "inconclusive", None, None), ("nothing", "error", None, False), ("nothing", "not_run", None, False),
     ],
 )  # fmt: skip
 def test_exercised_is_established_on_something(expected: str, status: Any, count: int | None, met: bool | None) -> None:

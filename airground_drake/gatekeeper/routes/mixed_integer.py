@@ -1,10 +1,11 @@
-"""(26) with its binary variables, solved to a proven optimum along half-planes, again and again: the default route."""
+"""(26) with its binary variables: a proven optimum along half-planes, and a search by its own cost. The default route."""
 
 from __future__ import annotations
 
 import math
 import time
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -20,45 +21,44 @@ from airground_drake.gatekeeper.solution import ConstantPlans, Solution, Status,
 
 _AGREE = 1e-6
 """Costs that differ by less than this, relative, are equal: the solver's tolerances and ours."""
+_WORTH = 0.02
+"""Another search is made only if the relaxation comes nearer to the plan than this, relative: it is long otherwise."""
 
 
 @dataclass(frozen=True, eq=False)
-class _Solved:
-    """The outcome of linearising again and again.
+class _Proof:
+    """The outcome of a search along half-planes.
 
     Attributes:
-        plans: all plans found, (N,) each.
-        status: whether the last optimum was proved.
-        bound: lower bound along the last half-planes.
+        status: 'optimal' if the bound is the optimum.
+        bound: lower bound along the half-planes.
         normals: of these, (N, m, 3).
+        optimum: plan, (N,); None without one.
     """
 
-    plans: list[Array]
     status: Status
     bound: float
     normals: Array
+    optimum: Array | None = None
 
 
 class MixedIntegerRoute:
     """Mixed-integer quadratic programs with one binary per stage, or per block of stages, and a proof of optimality.
 
-    With half-planes for the exact distances, (26) is a convex program but for its binary variables. Half-planes at
-    another plan allow other plans, so that the optimum of one program need not be that of (26). So the route begins
-    with the cheapest plan by (26) itself that `plan_search` finds: by a beam, and by changes of one and two choices of
-    sum-up rounding, the constant plans and the rest of the previous plan. Then it repeats:
+    With half-planes for the exact distances, (26) is convex but for its binary variables. A solver finds the optimum
+    along half-planes at the better constant plan. That need not be the optimum of (26): it may cost several times as
+    much. So the route also looks for plans by (26) itself. `plan_search` takes the best of a beam, sum-up rounding, the
+    constant plans, the rest of the previous plan and the solver's optimum, and changes one or two choices while that
+    makes it cheaper. If the result is cheaper than the optimum along the half-planes, there are better half-planes: at
+    that plan, which along these costs what it costs by (26). The route solves again along these, improves what it
+    finds, and goes on until nothing becomes cheaper, unless the relaxation shows that the search would be long.
 
-    - It puts half-planes at the plan. Along these the plan costs what it costs by (26).
-    - A solver looks for the optimum, starting from the plan. It costs no more by (26) than along the half-planes.
-    - If that is cheaper, it is improved by changes of one and two choices, and is the next plan. Else the plan is the
-      optimum along its own half-planes, and the route ends.
-
-    Each plan is cheaper than the one before it. Nearly always the first is the last. The plan returned is the cheapest
-    by (26) of all these and of the same with the other first choice. `route_bound` is the optimum along the last
-    half-planes, and the gap is 0.
+    The plan returned is the cheapest by (26) of all these and of the same with the other first choice. `route_bound`
+    is the optimum along the half-planes of the last search that ended; the gap is 0.
 
     Budget: only the clock can stop DAQP during a search, but it says how many iterations it took. If all searches
     together take more than `search_iterations`, or the time `search_s` is up, or the solver fails, the best plan so far
-    decides. It does not depend on the clock; its bound is that of the relaxation along half-planes at it.
+    decides. It does not depend on the clock. If no search ended, its bound is that of the relaxation.
     """
 
     def __init__(self, blocks: int | None = None, solver: str = "daqp") -> None:
@@ -83,45 +83,31 @@ class MixedIntegerRoute:
 
     def _solve(self, problem: Problem, constants: ConstantPlans, budget: Budget) -> Solution:
         binary = self._program(problem)
-        known = _known(binary, problem, constants)
-        start = cheap_plan(problem.terms, binary.block, known)
-        solved = self._solve_again_and_again(binary, problem, start, budget)
-        plans = [*solved.plans, *known]
+        known, bound = _known(binary, problem, constants)
+        plan = cheap_plan(problem.terms, binary.block, known)
+        search = _Searches(self._search, binary, problem, budget)
+        proof = search.along(constants.better.positions, [plan, *known], bound)
+        plans = [plan, *known]
+        while proof.optimum is not None:
+            if not any(np.array_equal(proof.optimum, one) for one in plans):
+                plans += [proof.optimum, improve(problem.terms, binary.block, proof.optimum, True)[0]]
+            plan = min(plans, key=lambda one: problem.evaluate(one).objective)
+            if problem.evaluate(plan).objective >= proof.bound * (1.0 - _AGREE):
+                break
+            again = search.again(plan)
+            if again is None or again.status != "optimal":
+                proof = replace(proof, status=again.status if again else proof.status)
+                break
+            proof = again
         turned = [np.where(binary.block == 0, 1.0 - plan[0], plan) for plan in plans]
         evaluated = [problem.evaluate(plan) for plan in (*plans, *turned)]
         return cheapest(
             problem,
             (constants.accept, constants.refuse, *evaluated),
-            status=solved.status,
-            route_bound=max(solved.bound, unavoidable_cost(problem)),
-            normals=solved.normals,
+            status=proof.status,
+            route_bound=max(proof.bound, unavoidable_cost(problem)),
+            normals=proof.normals,
         )
-
-    def _solve_again_and_again(self, binary: BinaryProgram, problem: Problem, plan: Array, budget: Budget) -> _Solved:
-        """Optima along half-planes at a plan (N,), then at the optimum, while that becomes cheaper."""
-        plans, iterations, until = [plan], budget.search_iterations, time.monotonic() + budget.search_s
-        while True:
-            positions = problem.positions(plan)
-            normals = normals_along(problem, positions)
-            binary.update(problem, normals)
-            seconds = min(until - time.monotonic(), budget.left_s())
-            if seconds <= 0.0:
-                return _Solved(plans, "budget_spent", _relaxed_bound(binary, problem, normals), normals)
-            found = self._search.minimise(binary, binary.guess(problem, plan, normals), seconds)
-            iterations -= found.iterations
-            status: Status = found.ended if iterations >= 0 else "budget_spent"
-            if found.omega is None or status != "optimal":
-                return _Solved(plans, status, _relaxed_bound(binary, problem, normals), normals)
-            optimum = binary.plan(found.omega.round())
-            before = problem.evaluate_half_planes(positions, normals)
-            cost = problem.evaluate_half_planes(problem.positions(optimum), normals)
-            if cost > before * (1.0 + _AGREE):
-                return _Solved(plans, "solver_failed", _relaxed_bound(binary, problem, normals), normals)
-            plans.append(optimum)
-            if cost >= before * (1.0 - _AGREE):
-                return _Solved(plans, "optimal", min(cost, before), normals)
-            plan, _ = improve(problem.terms, binary.block, optimum, pairs=True)
-            plans.append(plan)
 
     def _program(self, problem: Problem) -> BinaryProgram:
         """Built once for a number of stages and blocks; then only its coefficients change."""
@@ -132,20 +118,66 @@ class MixedIntegerRoute:
         return self._programs[size]
 
 
-def _known(binary: BinaryProgram, problem: Problem, constants: ConstantPlans) -> list[Array]:
-    """Plans (N,) that need no search: constant ones, the rest of the previous one, and sum-up rounding."""
+class _Searches:
+    """Searches for the optimum of one problem along several half-planes, which share a budget."""
+
+    def __init__(self, search: Search, binary: BinaryProgram, problem: Problem, budget: Budget) -> None:
+        """With all of the budget left."""
+        self._search, self._binary, self._problem, self._budget = search, binary, problem, budget
+        self._iterations, self._until = budget.search_iterations, time.monotonic() + budget.search_s
+
+    def along(self, guide: Array, known: Sequence[Array], relaxed: float) -> _Proof:
+        """Search along half-planes at a trajectory (N, 3), m, from the best of known plans (N,).
+
+        The program has these half-planes; `relaxed` is the lower bound by its relaxation.
+        """
+        problem, normals = self._problem, normals_along(self._problem, guide)
+        costs = [problem.evaluate_half_planes(problem.positions(plan), normals) for plan in known]
+        best = int(np.argmin(costs))
+        seconds = min(self._until - time.monotonic(), self._budget.left_s())
+        if seconds <= 0.0:
+            return _Proof("budget_spent", relaxed, normals)
+        found = self._search.minimise(self._binary, self._binary.guess(problem, known[best], normals), seconds)
+        self._iterations -= found.iterations
+        status: Status = found.ended if self._iterations >= 0 else "budget_spent"
+        if found.omega is None or status != "optimal":
+            return _Proof(status, relaxed, normals)
+        optimum = self._binary.plan(found.omega.round())
+        cost = problem.evaluate_half_planes(problem.positions(optimum), normals)
+        if cost > costs[best] * (1.0 + _AGREE):  # the solver is wrong
+            return _Proof("solver_failed", relaxed, normals)
+        return _Proof("optimal", min(cost, costs[best]), normals, optimum)
+
+    def again(self, plan: Array) -> _Proof | None:
+        """Search along half-planes at a plan (N,); None if the relaxation shows that this would be long."""
+        guide = self._problem.positions(plan)
+        bound = _relaxed(self._binary, self._problem, guide)[1]
+        if bound < (1.0 - _WORTH) * self._problem.evaluate(plan).objective:
+            return None
+        return self.along(guide, [plan], bound)
+
+
+def _known(binary: BinaryProgram, problem: Problem, constants: ConstantPlans) -> tuple[list[Array], float]:
+    """Plans (N,) that need no search: constant ones, the rest of the previous one, and sum-up rounding; a lower bound.
+
+    Half-planes are at the better constant plan.
+    """
     count = len(binary.omega)
     known = [np.ones(count), np.zeros(count)]
     if problem.previous is not None:
         known.append(binary.blocked(problem.previous))
-    binary.update(problem, normals_along(problem, constants.better.positions))
-    shares = relax(binary).omega
+    shares, bound = _relaxed(binary, problem, constants.better.positions)
     if shares is not None:
-        known.append(sum_up_rounding(shares.clip(0.0, 1.0)))
-    return [binary.plan(values) for values in known]
+        known.append(sum_up_rounding(shares))
+    return [binary.plan(values) for values in known], bound
 
 
-def _relaxed_bound(binary: BinaryProgram, problem: Problem, normals: Array) -> float:
-    """Lower bound along half-planes, which are those of the program, by its relaxation; -inf if that fails."""
+def _relaxed(binary: BinaryProgram, problem: Problem, guide: Array) -> tuple[Array | None, float]:
+    """Shares (B,) of the relaxation along half-planes at a trajectory (N, 3), m, and its lower bound."""
+    normals = normals_along(problem, guide)
+    binary.update(problem, normals)
     shares = relax(binary).omega
-    return -math.inf if shares is None else dual_bound(problem, normals, binary.plan(shares.clip(0.0, 1.0)))
+    if shares is None:
+        return None, -math.inf
+    shares = shares.clip(0.0, 1.0)
+    return shares, dual_bound(problem, normals, binary.plan(shares))
