@@ -15,8 +15,8 @@ from airground_drake.gatekeeper.cost import Terms, add_stage, slack_at
 Blocks = npt.NDArray[np.int64]
 
 BEAM = 64
-"""Partial plans that the beam search keeps. On random ten-stage problems 64 find the best of all 1,024 plans; 16 miss
-it in one of 25. Among 60 stages, 256 find hardly more."""
+"""Partial plans that the beam search keeps. On random ten-stage problems 64 find the best of all 1,024 plans; 16 miss it
+in one of 25. Among 60 stages, 256 find hardly more."""
 
 
 def cheap_plan(terms: Terms, block: Blocks, known: Sequence[Array]) -> Array:
@@ -57,11 +57,7 @@ def beam_search(terms: Terms, block: Blocks, width: int = BEAM) -> Array:
 
 @njit(cache=True)
 def improve(terms: Terms, block: Blocks, start: Array, pairs: bool) -> tuple[Array, float]:
-<<<<<<< HEAD
-    """A plan (N,), constant on each block, that neither a change of one block nor of two (`pairs`) makes cheaper."""
-=======
     """A plan (N,), constant on blocks, that no change of one block makes cheaper, nor of two (`pairs`); its cost."""
->>>>>>> solver
     plan, blocks = start.copy(), block[-1] + 1
     before = _Beginnings(np.empty((len(plan) + 1, 3)), np.empty(len(plan) + 1))
     _begin(terms, plan, before)
