@@ -315,11 +315,7 @@ class _Scaled:
         flag: int,
         scaled: Array,
         info: dict[str, Any],
-<<<<<<< HEAD
         before: Details = Details(),
-=======
-        before: Details = Details(),  # noqa: B008 (immutable)
->>>>>>> solver
     ) -> Answer:
         """The answer by DAQP's flag and solution; `before`: what it took until then."""
         form = self.form
