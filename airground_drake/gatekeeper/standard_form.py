@@ -187,7 +187,7 @@ def _bounds(program: MathematicalProgram, layout: Layout) -> tuple[Array, Array]
     return least, most
 
 
-def _add(total: Array, where: tuple[Indices | slice, ...], values: Array) -> None:
+def _add(total: Array, where: Any, values: Array) -> None:
     """Add values at indices, some of which may be equal unless they are slices."""
     if all(isinstance(one, slice) for one in where):
         total[where] += values

@@ -346,7 +346,7 @@ BREAKAGES: dict[str, tuple[tuple[str, str, Edit, str, str], ...]] = {
         ("fractional", RELAXED, problem(plan=at(3, 0.5)), R, "omega is not binary"),
         ("first stage", RELAXED, column(first_stage=swapped), R, "first stage"),
         ("obstacle forgotten", RELAXED, without_point, R, "left out"),
-        ("moving robot stands", SWAP, problem(13, centres_m=lambda v: np.tile(v[: len(v) // 60], 60)), R, "UGV senses"),
+        ("moving robot stands", SWAP, problem(9, centres_m=lambda v: np.tile(v[: len(v) // 60], 60)), R, "UGV senses"),
         ("slack", RELAXED, problem(slack_weight_1_m2_s=lambda v: 1.1 * v), R, "weight of slack"),
         ("terminal", RELAXED, problem(terminal_weight_s=lambda v: v + 0.1), R, "weight of the terminal cost"),
         ("contrary answer", RELAXED, column(decision=swapped), R, "answer or reason"),
