@@ -10,7 +10,8 @@ import numpy as np
 
 from airground_drake.base.arrays import Array
 from airground_drake.registry import method_of
-from airground_drake.run.trace import Trace, first_collisions
+from airground_drake.run.collisions import first_collisions
+from airground_drake.run.trace import Trace
 from airground_drake.verify.engines.geometry import interpolate
 from airground_drake.verify.runs.instants import without_proposals
 from airground_drake.verify.runs.live_goal import AT_REST_M, AT_REST_S, moved_at_the_end

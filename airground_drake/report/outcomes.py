@@ -9,7 +9,7 @@ from typing import Any, Literal, NamedTuple
 
 from airground_drake.base.statuses import PASSING
 from airground_drake.registry import METHODS
-from airground_drake.run.trace import first_collisions
+from airground_drake.run.collisions import first_collisions
 from airground_drake.scenarios.schema import Scenario
 
 SLACK_M = 1e-9

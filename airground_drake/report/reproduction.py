@@ -15,7 +15,8 @@ import numpy as np
 from airground_drake.base.arrays import Array
 from airground_drake.base.errors import TraceError
 from airground_drake.report.metrics import closest_obstacle, events_of, gap_m
-from airground_drake.run.trace import Trace, first_collisions
+from airground_drake.run.collisions import first_collisions
+from airground_drake.run.trace import Trace
 from airground_drake.scenarios.schema import Reproduction, Scenario
 
 Measure = Callable[[Trace, str], list[float]]

@@ -9,7 +9,8 @@ import numpy as np
 import numpy.typing as npt
 
 from airground_drake.base.arrays import Array
-from airground_drake.run.trace import Trace, first_collisions
+from airground_drake.run.collisions import first_collisions
+from airground_drake.run.trace import Trace
 from airground_drake.scenarios.world import make_world
 from airground_drake.world.motion import Motion
 from airground_drake.world.shape import Shape

@@ -26,7 +26,7 @@ from __future__ import annotations
 
 import io
 import json
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from html import escape
 from math import ceil
@@ -39,6 +39,7 @@ import pandas as pd
 from airground_drake.base import files
 from airground_drake.base.arrays import Array, read_only
 from airground_drake.base.errors import TraceError, one_line
+from airground_drake.run.collisions import first_collisions
 from airground_drake.scenarios.recorded import of_run
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.world.motion import SAME_S
@@ -269,15 +270,6 @@ class Trace:
         rows = [(f"{event['t_s']:.3f}", event["robot"], event["kind"]) for event in self.events]
         table = pd.DataFrame(rows, columns=["time, s", "robot", "event"]).to_html(index=False, border=0)
         return f"<p>{escape(repr(self))}</p>{table}"
-
-
-def first_collisions(events: Iterable[Mapping[str, Any]]) -> dict[str, Mapping[str, Any]]:
-    """The first collision, an event, of each robot that collided, with an obstacle or with another robot."""
-    found: dict[str, Mapping[str, Any]] = {}
-    for event in sorted((event for event in events if event["kind"] == "collision"), key=lambda event: event["t_s"]):
-        for robot in filter(None, (event["robot"], event.get("other"))):
-            found.setdefault(robot, event)
-    return found
 
 
 def save(trace: Trace, folder: Path) -> list[str]:

@@ -20,7 +20,8 @@ from airground_drake.report.metrics import Nearby, close_by, events_of, gap_m, r
 from airground_drake.report.outcomes import SLACK_M, distance
 from airground_drake.report.reproduction import MEASURES
 from airground_drake.report.scrubber import tracks
-from airground_drake.run.trace import Trace, first_collisions
+from airground_drake.run.collisions import first_collisions
+from airground_drake.run.trace import Trace
 from airground_drake.scenarios.schema import Scenario
 
 MAX_RUNS, MAX_UGVS, MAX_TEAM = 6, 4, 6

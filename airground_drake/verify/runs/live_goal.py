@@ -9,7 +9,8 @@ import numpy as np
 
 from airground_drake.base.arrays import Array
 from airground_drake.base.errors import TraceError
-from airground_drake.run.trace import Trace, first_collisions
+from airground_drake.run.collisions import first_collisions
+from airground_drake.run.trace import Trace
 from airground_drake.verify.claim import TraceClaim
 from airground_drake.verify.engines.geometry import interpolate
 from airground_drake.verify.finding import Finding
