@@ -167,6 +167,7 @@ class BranchAndBound:
         return object()
 
     def Solve(self, program: Any, guess: Any, options: Any) -> Any:
+        self.variables = program.decision_variables()
         self.search = MixedIntegerBranchAndBound(program, ClarabelSolver.id())
         self.ended = self.search.Solve()
         return self
@@ -180,8 +181,8 @@ class BranchAndBound:
     def get_solver_details(self) -> None:
         return None
 
-    def GetSolution(self, variables: Any) -> Any:
-        return self.search.GetSolution(variables)
+    def get_x_val(self) -> Any:
+        return self.search.GetSolution(self.variables)
 
 
 @pytest.fixture
