@@ -305,7 +305,7 @@ class _Scaled:
         flag: int,
         scaled: Array,
         info: dict[str, Any],
-        before: Details = Details(),  # noqa: B008 (immutable)
+        before: Details = Details(),
     ) -> Answer:
         """The answer by DAQP's flag and solution; `before`: what it took until then."""
         form = self.form
@@ -353,9 +353,7 @@ def _kept(form: StandardForm, unconstrained: Flags, slack: Indices) -> tuple[Ind
 
 
 @njit(cache=True)
-def _scaled(
-    form: StandardForm, rows: Indices, kept: Indices, base: Array
-) -> tuple[float, Array, Array, Array, Array]:
+def _scaled(form: StandardForm, rows: Indices, kept: Indices, base: Array) -> tuple[float, Array, Array, Array, Array]:
     """Scale of the cost and of the variables (k,); Hessian (k, k), gradient (k,), coefficients of rows (p, k)."""
     k, largest = len(kept), 0.0
     gradient, scale = np.empty(k), np.ones(k)

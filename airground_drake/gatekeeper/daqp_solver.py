@@ -77,7 +77,7 @@ class DaqpResult(MathematicalProgramResult):  # type: ignore[misc]
         shell.fill(self, answer, cost)
         self._x, self._index, self._details = answer.x, shell.layout.index, answer.details
 
-    def GetSolution(self, *what: Any) -> Any:  # noqa: N802
+    def GetSolution(self, *what: Any) -> Any:
         """As `MathematicalProgramResult.GetSolution`: all values, or those of a variable, an expression, or arrays."""
         if not what:
             return super().GetSolution()
@@ -139,11 +139,11 @@ class DaqpSolver(SolverInterface):  # type: ignore[misc]
         """Always: it needs no licence."""
         return True
 
-    def AreProgramAttributesSatisfied(self, prog: MathematicalProgram) -> bool:  # noqa: N802
+    def AreProgramAttributesSatisfied(self, prog: MathematicalProgram) -> bool:
         """Whether it solves programs of this kind."""
         return not self.ExplainUnsatisfiedProgramAttributes(prog)
 
-    def ExplainUnsatisfiedProgramAttributes(self, prog: MathematicalProgram) -> str:  # noqa: N802
+    def ExplainUnsatisfiedProgramAttributes(self, prog: MathematicalProgram) -> str:
         """Why it does not solve programs of this kind; '' if it does."""
         if beyond := sorted(one.name.removeprefix("k") for one in prog.required_capabilities() - SUPPORTED):
             found = ", ".join(beyond)
@@ -152,7 +152,7 @@ class DaqpSolver(SolverInterface):  # type: ignore[misc]
             return "DaqpSolver is unable to solve because a quadratic cost is not convex."
         return ""
 
-    def Solve(  # noqa: N802
+    def Solve(
         self,
         prog: MathematicalProgram,
         initial_guess: Array | None = None,

@@ -167,10 +167,10 @@ def _violation(form: StandardForm, x: Array) -> float:
 def _contradicts_itself(form: StandardForm) -> bool:
     if (form.least > form.most).any() or (form.lower > form.upper).any():
         return True
+    found = False
     for r in range(len(form.lower)):
-        if (form.lower[r] > 0.0 or form.upper[r] < 0.0) and not form.rows[r].any():
-            return True
-    return False
+        found |= (form.lower[r] > 0.0 or form.upper[r] < 0.0) and not form.rows[r].any()
+    return found
 
 
 @njit(cache=True)
@@ -244,4 +244,4 @@ def _add(total: Array, where: tuple[Indices | slice, ...], values: Array) -> Non
     if all(isinstance(one, slice) for one in where):
         total[where] += values
     else:
-        np.add.at(total, where, values)
+        np.add.at(total, where, values)  # type: ignore[arg-type]

@@ -83,3 +83,16 @@ def test_what_would_never_end_is_refused_in_one_line(key: str, value: object, me
     with pytest.raises(LimitError, match=r"^small asks for about [^\n]*; allowed: 1e\+07 steps, 8 GiB$"):
         within(scenario, DEFAULT_LIMITS)
     assert within(scenario, Limits(math.inf, math.inf)) == estimate(scenario)
+
+
+def test_long_searches_are_announced() -> None:
+    """Four UGVs among 57 obstacles: method (c) takes minutes where the others take seconds."""
+    crowd = small("c")
+    (ugv,) = crowd.ugvs.values()
+    crowd = replace(
+        crowd, duration_s=30.0, ugvs={f"u{i}": ugv for i in range(4)},
+        obstacles={f"o{i}": Obstacle([0.0, 3.0 + i, 0.0]) for i in range(57)},
+    )  # fmt: skip
+    assert "method (c) searches for a plan at up to 2.4e+03 decisions: about" in estimate(crowd).announcement
+    assert estimate(replace(crowd, runs={"d": Run(method="d")})).announcement == ""
+    assert estimate(small("c")).announcement == ""

@@ -1,4 +1,4 @@
-"""(26) with its binary variables: a proven optimum along half-planes, and a search by its own cost. The default route."""
+"""(26) with its binary variables: a proven optimum along half-planes, and a search by its own cost."""
 
 from __future__ import annotations
 
