@@ -88,7 +88,7 @@ def test_what_would_never_end_is_refused_in_one_line(key: str, value: object, me
 def test_long_searches_are_announced() -> None:
     """Four UGVs among 57 obstacles: method (c) takes minutes where the others take seconds."""
     crowd = small("c")
-    (ugv,) = crowd.ugvs.values()
+    ugv = next(iter(crowd.ugvs.values()))
     crowd = replace(
         crowd, duration_s=30.0, ugvs={f"u{i}": ugv for i in range(4)},
         obstacles={f"o{i}": Obstacle([0.0, 3.0 + i, 0.0]) for i in range(57)},
