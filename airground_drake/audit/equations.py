@@ -172,7 +172,7 @@ DEVIATIONS: tuple[Deviation, ...] = (
         "(26)", "gatekeeper: mixed-integer optimal control problem",
         (*_PROGRAM, "gatekeeper.mpc_gatekeeper:PaperGatekeepers"), "changed",
         "The kinematics (23) are among the constraints. (26d) is a half-plane for each point and stage, which implies "
-        "the distance; the route `nonlinear` has the circles.",
+        "the distance, and plans are also sought by the exact distances; the route `nonlinear` has the circles.",
         "Without kinematics the decision does not matter. With half-planes only the binary omega is not convex.",
         (10, 11, 22),
     ),

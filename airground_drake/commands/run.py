@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from threading import Event
 from typing import TYPE_CHECKING
 
@@ -13,6 +14,7 @@ from airground_drake.base.errors import UnknownNameError
 from airground_drake.base.usage import Parser, output_folder, overridable, positive, refuse
 from airground_drake.registry import METHODS
 from airground_drake.scenarios import plugins
+from airground_drake.scenarios.estimate import estimate
 
 if TYPE_CHECKING:
     from airground_drake.run.trace import Trace
@@ -51,6 +53,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         raise UnknownNameError("run", name, methods)
     if options.output is not None:
         files.make_folder(options.output, "the trace")
+    if announced := estimate(replace(scenario, runs={name: scenario.runs[name]})).announcement:
+        print(announced, file=sys.stderr)
     from airground_drake.run import trace as traces
     from airground_drake.run.simulation import simulate
 

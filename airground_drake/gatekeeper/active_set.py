@@ -20,10 +20,11 @@ from typing import Any, NamedTuple
 
 import daqp
 import numpy as np
+from numba import njit
 from pydrake.solvers import SolutionResult
 
 from airground_drake.base.arrays import Array
-from airground_drake.gatekeeper.standard_form import Flags, Indices, StandardForm
+from airground_drake.gatekeeper.standard_form import Flags, Indices, StandardForm, times
 
 _BINARY, _SOFT, _NO_BOUND = 16, 8, 1e30
 _ENDED = {
@@ -195,6 +196,7 @@ class _Scaled:
         largest: scale of the cost.
         hessian: with added curvature, (k, k).
         gradient: at the base, with what added curvature of binary variables needs, (k,).
+        matrix: coefficients of the rows, (p, k).
         curvature: that continuous variables have got.
     """
 
@@ -209,34 +211,23 @@ class _Scaled:
     largest: float
     hessian: Array
     gradient: Array
+    matrix: Array
     curvature: float
 
     @classmethod
     def of(cls, form: StandardForm, curvature: float = _CURVATURES[0]) -> _Scaled:
         """Find fixed variables and slack, scale, and add curvature."""
-        rows = np.flatnonzero((np.isfinite(form.lower) | np.isfinite(form.upper)) & form.rows.any(axis=1))
-        unconstrained, slack = form.separate()
-        slack, fixed = slack[rows], form.least == form.most
-        seen = ~(fixed | unconstrained)
-        seen[slack[slack >= 0]] = False
-        with_bounds = np.isfinite(form.least) | np.isfinite(form.most)
-        kept = np.concatenate([np.flatnonzero(seen & with_bounds), np.flatnonzero(seen & ~with_bounds)])
-        base, u = np.where(fixed, form.least, 0.0), np.flatnonzero(unconstrained & ~fixed)
-        base[u] = (-form.gradient[u] / form.hessian[u, u]).clip(form.least[u], form.most[u])
-        gradient = (form.gradient + form.hessian @ base)[kept]
-        diagonal = form.hessian.diagonal()[kept]
-        largest = float(diagonal.max(initial=0.0)) or float(np.abs(gradient).max(initial=0.0)) or 1.0
-        scale = np.sqrt(np.where(diagonal > _FLAT * largest, diagonal / largest, 1.0))
-        hessian = form.hessian[np.ix_(kept, kept)] / np.outer(scale, scale) / largest
-        gradient = gradient / scale / largest
-        free, bounded, added = form.binary[kept], int((seen & with_bounds).sum()), 0.0
+        unconstrained, of_rows = form.separate()
+        rows, kept, bounded, base = _kept(form, unconstrained, of_rows)
+        largest, scale, hessian, gradient, matrix = _scaled(form, rows, kept, base)
+        free, added, slack = form.binary[kept], 0.0, of_rows[rows]
         if not _is_definite(hessian):
             hessian[np.diag_indices(len(kept))] += np.where(free, _BINARY_CURVATURE, 0.0)
             gradient = gradient - np.where(free, 0.5 * _BINARY_CURVATURE * scale, 0.0)
             if not (free.any() and _is_definite(hessian)):
                 hessian[np.diag_indices(len(kept))] += np.where(free, 0.0, curvature)
                 added = curvature
-        return cls(form, kept, rows, slack, free, bounded, base, scale, largest, hessian, gradient, added)
+        return cls(form, kept, rows, slack, free, bounded, base, scale, largest, hessian, gradient, matrix, added)
 
     @property
     def branches(self) -> bool:
@@ -270,8 +261,7 @@ class _Scaled:
             return 1, np.zeros(0), {"lam": np.zeros(len(self.rows))}
         form, k, soft = self.form, self.kept[: self.bounded], self.slack >= 0
         scale, sense = self.scale[: self.bounded], np.where(self.free, _BINARY, 0)[: self.bounded]
-        matrix = np.ascontiguousarray(form.rows[np.ix_(self.rows, self.kept)] / self.scale)
-        at = form.rows[self.rows] @ self.base
+        at = times(form.rows, self.rows, self.base)
         bounds = [
             np.concatenate([form_bounds[k] * scale, of_rows[self.rows] - at]).clip(-_NO_BOUND, _NO_BOUND)
             for form_bounds, of_rows in ((form.most, form.upper), (form.least, form.lower))
@@ -282,7 +272,7 @@ class _Scaled:
             "time_limit": max(limits.time_limit, 1e-6) if 0.0 < limits.time_limit < math.inf else 0.0,
         }  # fmt: skip
         senses = np.concatenate([sense, np.where(soft, _SOFT, 0)]).astype(np.intc)
-        flag, _ = model.setup(self.hessian, gradient, matrix, *bounds, senses)
+        flag, _ = model.setup(self.hessian, gradient, self.matrix, *bounds, senses)
         if flag < 0:
             return flag, np.zeros(len(self.kept)), {}
         if soft.any():
@@ -335,14 +325,72 @@ class _Scaled:
         soft = self.slack >= 0
         j, r = self.slack[soft], self.rows[soft]
         x[j] = 0.0
-        at, of_slack = self.form.rows[r] @ x, self.form.rows[r, j]
+        at, of_slack = times(self.form.rows, r, x), self.form.rows[r, j]
         x[j] = (np.maximum(0.0, self.form.lower[r] - at) - np.maximum(0.0, at - self.form.upper[r])) / of_slack
 
 
+@njit(cache=True)
+def _kept(form: StandardForm, unconstrained: Flags, slack: Indices) -> tuple[Indices, Indices, int, Array]:
+    """Rows (p,) and variables (k,) that DAQP sees, how many of these have bounds, and the base (n,): see `_Scaled`."""
+    count, base = len(form.gradient), np.zeros(len(form.gradient))
+    seen = np.ones(count, dtype=np.bool_)
+    for row in range(len(slack)):
+        if slack[row] >= 0:
+            seen[slack[row]] = False
+    for j in range(count):
+        if form.least[j] == form.most[j]:
+            seen[j], base[j] = False, form.least[j]
+        elif unconstrained[j]:
+            best = -form.gradient[j] / form.hessian[j, j]
+            seen[j], base[j] = False, min(max(best, form.least[j]), form.most[j])
+    with_bounds = np.isfinite(form.least) | np.isfinite(form.most)
+    first = np.flatnonzero(seen & with_bounds)
+    wanted = np.isfinite(form.lower) | np.isfinite(form.upper)
+    for row in range(len(wanted)):
+        wanted[row] = wanted[row] and form.rows[row].any()
+    kept = np.concatenate((first, np.flatnonzero(seen & ~with_bounds)))
+    return np.flatnonzero(wanted), kept, len(first), base
+
+
+@njit(cache=True)
+def _scaled(form: StandardForm, rows: Indices, kept: Indices, base: Array) -> tuple[float, Array, Array, Array, Array]:
+    """Scale of the cost and of the variables (k,); Hessian (k, k), gradient (k,), coefficients of rows (p, k)."""
+    k, largest = len(kept), 0.0
+    gradient, scale = np.empty(k), np.ones(k)
+    for i in range(k):
+        gradient[i] = form.gradient[kept[i]]
+        for j in range(len(base)):
+            if base[j] != 0.0:
+                gradient[i] += form.hessian[kept[i], j] * base[j]
+        largest = max(largest, form.hessian[kept[i], kept[i]])
+    if largest == 0.0:
+        largest = np.abs(gradient).max() if k and gradient.any() else 1.0
+    for i in range(k):
+        diagonal = form.hessian[kept[i], kept[i]]
+        if diagonal > _FLAT * largest:
+            scale[i] = np.sqrt(diagonal / largest)
+    hessian, matrix = np.empty((k, k)), np.empty((len(rows), k))
+    for i in range(k):
+        gradient[i] = gradient[i] / scale[i] / largest
+        for j in range(k):
+            hessian[i, j] = form.hessian[kept[i], kept[j]] / (scale[i] * scale[j]) / largest
+        for r in range(len(rows)):
+            matrix[r, i] = form.rows[rows[r], kept[i]] / scale[i]
+    return largest, scale, hessian, gradient, matrix
+
+
+@njit(cache=True)
 def _is_definite(hessian: Array) -> bool:
-    """Whether a matrix is positive definite by a margin."""
-    try:
-        factor = np.linalg.cholesky(hessian)
-    except np.linalg.LinAlgError:
-        return False
-    return bool(np.square(factor.diagonal()).min(initial=1.0) > _SINGULAR)
+    """Whether a matrix (k, k) is positive definite by a margin, by its Cholesky factor."""
+    factor = hessian.copy()
+    for j in range(len(factor)):
+        for i in range(j, len(factor)):
+            for k in range(j):
+                factor[i, j] -= factor[i, k] * factor[j, k]
+            if i == j:
+                if factor[j, j] <= _SINGULAR:
+                    return False
+                factor[j, j] = np.sqrt(factor[j, j])
+            else:
+                factor[i, j] /= factor[j, j]
+    return True

@@ -77,7 +77,7 @@ class Search:
         if seconds < math.inf:
             options.SetOption(self._solver.solver_id(), self._limit, max(seconds, 1e-6))
         started = time.monotonic()
-        found = _found(self._solver.Solve(binary.program, guess, options), binary.omega)
+        found = _found(self._solver.Solve(binary.program, guess, options), len(binary.omega))
         late = found.ended == "solver_failed" and time.monotonic() - started >= seconds
         return Found(None, "budget_spent") if late else found
 
@@ -91,13 +91,14 @@ def relax(binary: BinaryProgram, seconds: float = math.inf, iterations: int = 10
     options.SetOption(DaqpSolver.id(), "iter_limit", iterations)
     if seconds < math.inf:
         options.SetOption(DaqpSolver.id(), "time_limit", max(seconds, 1e-6))
-    return _found(_RELAXING.Solve(binary.relaxation, None, options), binary.shares)
+    return _found(_RELAXING.Solve(binary.relaxation, None, options), len(binary.shares))
 
 
-def _found(result: Any, variables: Any) -> Found:
+def _found(result: Any, count: int) -> Found:
+    """A result; the accept variables, or shares, are the first `count` variables of their program."""
     details = result.get_solver_details()
     more = (details.iterations, details.multipliers) if isinstance(details, Details) else (0, None)
     if result.is_success():
-        return Found(result.GetSolution(variables), "optimal", *more)
+        return Found(result.get_x_val()[:count], "optimal", *more)
     limited = result.get_solution_result() == SolutionResult.kIterationLimit
     return Found(None, "budget_spent" if limited else "solver_failed", *more)

@@ -6,6 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
+from numba import njit
 from pydrake.solvers import MathematicalProgram
 from pydrake.symbolic import Variable
 
@@ -81,16 +82,11 @@ class StandardForm(NamedTuple):
 
     def cost(self, x: Array) -> float:
         """The cost at x, (n,)."""
-        return float(0.5 * x @ self.hessian @ x + self.gradient @ x + self.constant)
+        return float(_cost_at(self, x))
 
     def violation(self, x: Array) -> float:
         """Largest violation of a constraint at x, (n,), relative to the row where its entries are above 1."""
-        size = np.maximum(1.0, np.abs(self.rows).max(axis=1, initial=0.0) * max(1.0, np.abs(x).max(initial=0.0)))
-        at = self.rows @ x
-        of_rows = (np.maximum(self.lower - at, at - self.upper) / size).max(initial=0.0)
-        of_bounds = np.maximum(self.least - x, x - self.most).max(initial=0.0)
-        own = x[self.binary]
-        return float(max(of_rows, of_bounds, np.minimum(np.abs(own), np.abs(own - 1.0)).max(initial=0.0)))
+        return float(_violation(self, x))
 
     def relaxed(self) -> StandardForm:
         """The program with shares in [0, 1] for the binary variables."""
@@ -107,12 +103,7 @@ class StandardForm(NamedTuple):
 
     def contradicts_itself(self) -> bool:
         """Whether a lower bound is above an upper one, or a row without coefficients demands something."""
-        empty = ~self.rows.any(axis=1)
-        lower, upper = (
-            np.where(empty, np.maximum(self.lower, 0.0), self.lower),
-            np.where(empty, np.minimum(self.upper, 0.0), self.upper),
-        )
-        return bool((self.least > self.most).any() or (lower > upper).any())
+        return bool(_contradicts_itself(self))
 
     def separate(self) -> tuple[Flags, Indices]:
         """Continuous variables with a quadratic cost of their own and no other.
@@ -122,25 +113,86 @@ class StandardForm(NamedTuple):
             The one that is the slack of each row, (m,), -1 where there is none. Its cost is least at 0, it stands in no
             other row, and it may grow without bound in the direction that the one bound of its row needs.
         """
-        diagonal, slack = self.hessian.diagonal(), np.full(len(self.rows), -1, dtype=np.intp)
-        alone = (diagonal > 0.0) & (np.count_nonzero(self.hessian, axis=0) == 1) & ~self.binary
-        uses = np.count_nonzero(self.rows, axis=0)
-        j = np.flatnonzero(alone & (uses == 1) & (self.gradient == 0.0))
-        if len(j):
-            row = (self.rows[:, j] != 0.0).argmax(axis=0)
-            from_below = np.isfinite(self.lower[row])
-            one_sided = from_below != np.isfinite(self.upper[row])
-            grows = (self.least[j] <= 0.0) & (self.most[j] == np.inf)
-            falls = (self.most[j] >= 0.0) & (self.least[j] == -np.inf)
-            fits = one_sided & np.where((self.rows[row, j] > 0.0) == from_below, grows, falls)
-            slack[row[fits]] = j[fits]
-        return alone & (uses == 0), slack
+        unconstrained, slack = _separate(self)
+        return unconstrained, slack
 
     def is_number(self) -> bool:
         """Whether all coefficients are finite and no bound is NaN."""
-        finite = (self.hessian, self.gradient, np.array(self.constant), self.rows)
+        finite = all(np.isfinite(one).all() for one in (self.hessian, self.gradient, self.rows, self.constant))
         bounds = (self.lower, self.upper, self.least, self.most)
-        return all(np.isfinite(one).all() for one in finite) and not any(np.isnan(one).any() for one in bounds)
+        return finite and not any(np.isnan(one).any() for one in bounds)
+
+
+@njit(cache=True)
+def _cost_at(form: StandardForm, x: Array) -> float:
+    """By loops, as all here: BLAS would start threads, which cost more than such small programs."""
+    total = form.constant
+    for i in range(len(x)):
+        slope = form.gradient[i]
+        for j in range(len(x)):
+            slope += 0.5 * form.hessian[i, j] * x[j]
+        total += slope * x[i]
+    return total
+
+
+@njit(cache=True)
+def times(matrix: Array, which: Indices, x: Array) -> Array:
+    """The products of some rows of a matrix with x, (p,)."""
+    found = np.zeros(len(which))
+    for r in range(len(which)):
+        for i in range(len(x)):
+            found[r] += matrix[which[r], i] * x[i]
+    return found
+
+
+@njit(cache=True)
+def _violation(form: StandardForm, x: Array) -> float:
+    largest, most = 1.0, 0.0
+    rows, lower, upper = form.rows, form.lower, form.upper
+    for i in range(len(x)):
+        largest = max(largest, abs(x[i]))
+        most = max(most, form.least[i] - x[i], x[i] - form.most[i])
+        if form.binary[i]:
+            most = max(most, min(abs(x[i]), abs(x[i] - 1.0)))
+    for r in range(len(lower)):
+        at, entry = 0.0, 0.0
+        for i in range(len(x)):
+            at += rows[r, i] * x[i]
+            entry = max(entry, abs(rows[r, i]))
+        most = max(most, max(lower[r] - at, at - upper[r]) / max(1.0, entry * largest))
+    return most
+
+
+@njit(cache=True)
+def _contradicts_itself(form: StandardForm) -> bool:
+    if (form.least > form.most).any() or (form.lower > form.upper).any():
+        return True
+    found = False
+    for r in range(len(form.lower)):
+        found |= (form.lower[r] > 0.0 or form.upper[r] < 0.0) and not form.rows[r].any()
+    return found
+
+
+@njit(cache=True)
+def _separate(form: StandardForm) -> tuple[Flags, Indices]:
+    hessian, rows = form.hessian, form.rows
+    unconstrained, slack = np.zeros(len(hessian), dtype=np.bool_), np.full(len(rows), -1, dtype=np.intp)
+    for j in range(len(hessian)):
+        if form.binary[j] or hessian[j, j] <= 0.0 or np.count_nonzero(hessian[j]) > 1:
+            continue
+        uses, row = 0, -1
+        for r in range(len(rows)):
+            if rows[r, j] != 0.0:
+                uses, row = uses + 1, r
+        unconstrained[j] = uses == 0
+        if uses == 1 and form.gradient[j] == 0.0:
+            from_below = np.isfinite(form.lower[row])
+            one_sided = from_below != np.isfinite(form.upper[row])
+            grows = form.least[j] <= 0.0 and form.most[j] == np.inf
+            falls = form.most[j] >= 0.0 and form.least[j] == -np.inf
+            if one_sided and (grows if (rows[row, j] > 0.0) == from_below else falls):
+                slack[row] = j
+    return unconstrained, slack
 
 
 def _cost(program: MathematicalProgram, layout: Layout) -> tuple[Array, Array, float]:
@@ -192,4 +244,4 @@ def _add(total: Array, where: Any, values: Array) -> None:
     if all(isinstance(one, slice) for one in where):
         total[where] += values
     else:
-        np.add.at(total, where, values)
+        np.add.at(total, where, values)  # type: ignore[arg-type]

@@ -36,7 +36,7 @@ from airground_drake.base.usage import (
 )
 from airground_drake.report import folder
 from airground_drake.scenarios import plugins
-from airground_drake.scenarios.estimate import DEFAULT_LIMITS, GIB, Limits
+from airground_drake.scenarios.estimate import DEFAULT_LIMITS, GIB, Limits, estimate
 from airground_drake.scenarios.shipped import AUDIT, shipped
 
 FORMATS = tuple(folder.PAGES)
@@ -89,6 +89,8 @@ def _reported(options: argparse.Namespace, command: str) -> int:
     kept = None if options.no_cache else cache_folder()
     output = options.output or Path("reports") / scenario.name
     limits = Limits(options.limit_steps, options.limit_memory * GIB)
+    if not options.quiet and (announced := estimate(scenario).announcement):
+        print(announced, file=sys.stderr)
     wanted = make.Wanted(options.format, command, kept, audited, limits, options.seeds)
     with (
         plugins.admitted(scenario, options.scenario, allow=options.allow_plugins),

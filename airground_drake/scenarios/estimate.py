@@ -8,6 +8,7 @@ K = n + m points. The run asks for:
     decisions   n (T / gatekeeper's period + 1) at most, if the method has a gatekeeper
     predictions a decision of method (c) predicts both choices for horizon / h periods; one of method (d), made once
                 per proposal, predicts them for (longest + settling) / h periods
+    searches    a decision of method (c) also looks for a plan, the longer the more points are near
     memory      tables of the trace, one number per pair and row for distances, records of the decisions of method (c),
                 the longest prediction, and tangents of the discs on a shortest path
 
@@ -20,6 +21,7 @@ import math
 from typing import TYPE_CHECKING, NamedTuple
 
 from airground_drake.base.errors import LimitError
+from airground_drake.gatekeeper.budget import Budget
 from airground_drake.registry import METHODS
 
 if TYPE_CHECKING:  # pydantic, which the schema imports, would delay `report --list`
@@ -27,6 +29,13 @@ if TYPE_CHECKING:  # pydantic, which the schema imports, would delay `report --l
 
 PREDICTED = 2e-4
 """Work to predict one period of one UGV beside one point (30 ns, compiled), in simulated steps (0.2 ms)."""
+
+SEARCHED, SEARCHED_POINT = 25.0, 5.0
+"""Work to look for a plan of 60 stages (5 ms), and more for each point in sight (1 ms), in simulated steps."""
+STEP_S = 2e-4
+"""What a simulated step takes, s, roughly: on slow machines it is several times as much."""
+LONG_S = 60.0
+"""Searches that take longer than this together are announced."""
 
 GIB = 2**30
 FLOAT = 8  # bytes of a number
@@ -66,6 +75,7 @@ class Estimate(NamedTuple):
         steps: robots moved by one step.
         decisions: largest number of gatekeepers' decisions.
         predicted: largest number of predicted periods of a UGV, times the points that it keeps away from.
+        searched: largest work of all searches for plans, in steps.
         memory: bytes.
     """
 
@@ -73,12 +83,24 @@ class Estimate(NamedTuple):
     steps: float
     decisions: float
     predicted: float
+    searched: float
     memory: float
 
     @property
     def work(self) -> float:
-        """Steps, with predictions counted as steps."""
-        return self.steps + PREDICTED * self.predicted
+        """Steps, with predictions and searches counted as steps."""
+        return self.steps + PREDICTED * self.predicted + self.searched
+
+    @property
+    def announcement(self) -> str:
+        """What will take long, in one line; '' if nothing will."""
+        seconds = STEP_S * self.searched
+        if seconds < LONG_S:
+            return ""
+        return (
+            f"method (c) searches for a plan at up to {self.decisions:.2g} decisions: about {seconds:.2g} s if the UAV "
+            f"proposes all the time, more if searches are hard; each ends after {Budget().search_s:g} s"
+        )
 
     def __str__(self) -> str:
         """In words, on one line."""
@@ -93,8 +115,8 @@ def estimate(scenario: Scenario) -> Estimate:
     from airground_drake.scenarios.load import own
 
     of_runs = [_of_run(own(scenario, name), run) for name, run in scenario.runs.items()]
-    rows, steps, decisions, predicted, memory = (sum(column) for column in zip(*of_runs, strict=True))
-    return Estimate(rows, steps, decisions, predicted, PROGRAM + memory + _planning(scenario))
+    rows, steps, decisions, predicted, searched, memory = (sum(column) for column in zip(*of_runs, strict=True))
+    return Estimate(rows, steps, decisions, predicted, searched, PROGRAM + memory + _planning(scenario))
 
 
 def within(scenario: Scenario, limits: Limits, times: int = 1) -> Estimate:
@@ -123,7 +145,7 @@ def _of_run(scenario: Scenario, run: Run) -> Estimate:
     columns = 1 + 6 * (n + 1) + 10 * n
     memory = FLOAT * COPIES * rows * (columns + (n + 1) * points)
     if not METHODS[run.method].gated:
-        return Estimate(rows, (n + 1) * rows, 0.0, 0.0, memory)
+        return Estimate(rows, (n + 1) * rows, 0.0, 0.0, 0.0, memory)
 
     decisions = n * (duration / gate.period_s + 1.0)
     periods = ((gate.longest_s + gate.settling_s) if by_outcome else gate.horizon_s) / h
@@ -131,7 +153,8 @@ def _of_run(scenario: Scenario, run: Run) -> Estimate:
     prediction = FLOAT * periods * 3 * (points + 4)
     problem = 0.0 if by_outcome else FLOAT * gate.stages * (18 + 6 * points) + prediction
     memory += decisions * (OF_A_DECISION + problem) + 2.0 * prediction
-    return Estimate(rows, (n + 1) * rows, decisions, judged * 2.0 * periods * points, memory)
+    searched = 0.0 if by_outcome else decisions * (SEARCHED + SEARCHED_POINT * points)
+    return Estimate(rows, (n + 1) * rows, decisions, judged * 2.0 * periods * points, searched, memory)
 
 
 def _planning(scenario: Scenario) -> float:

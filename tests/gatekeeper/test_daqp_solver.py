@@ -110,8 +110,8 @@ def rows_without_variables() -> Made:
     ("make", "cost", "solution"),
     [
         (linear, 3.75, [1.0, 0.25]), (degenerate, -3.0, None), (repeated, 1.0, [2.0, -1.0]),
-        (slack, 7.0, [-1 / 3, 5 / 3, 2 / 3, 0.0]), (knapsack, -12.0, [1.0, 1.0, 1.0, 0.0]),
-        (nearest_corner, 0.29, [0.0, 1.0, 0.0]),
+        (slack, 7.0, [-1 / 3, 5 / 3, 2 / 3, 0.0]),
+        (knapsack, -12.0, [1.0, 1.0, 1.0, 0.0]), (nearest_corner, 0.29, [0.0, 1.0, 0.0]),
         (idle, 0.49 - 0.5, None), (rows_without_variables, 0.0, [1.0, 2.0]), (lambda: program(0), 0.0, []),
     ],
 )  # fmt: skip

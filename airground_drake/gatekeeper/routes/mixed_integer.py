@@ -1,4 +1,4 @@
-"""(26) with its binary variables, the default route: a proven optimum along half-planes, then a search by (26)."""
+"""(26) with its binary variables: a proven optimum along half-planes, and a search by its own cost."""
 
 from __future__ import annotations
 

@@ -110,8 +110,8 @@ class GateOpt(GateClaim):
         "bound U; its multipliers give L by weak duality, evaluated in numpy, whatever their quality. Route "
         "'mixed_integer' says that its bound is the optimum over binary plans: the recorded plan, the constant plans "
         "and every plan that differs from the recorded one in one choice are evaluated, and none may be cheaper; with "
-        "up to 12 blocks, all plans are. Other routes bound nothing, and the claim is inconclusive. Where a problem "
-        "has at most 10 choices, the evidence compares the plan with the best of all by exact distances of (26d)."
+        "up to 12 blocks, all plans are. Other routes bound nothing, and the claim is inconclusive. If a problem has "
+        "at most 10 choices, the evidence also compares the plan with the best of all by the exact distances of (26d)."
     )
     equations = "(25)-(27)"
     assumptions = (

@@ -95,7 +95,8 @@ def test_without_a_proof_the_incumbent_decides(name: str, found: Found, status: 
     problem, optimal = INSTANCES[name], MixedIntegerRoute().solve(INSTANCES[name])
     solution = check_contract(ending(found), problem)
     assert solution.status == status
-    assert 0.0 <= solution.route_bound <= optimal.route_bound * (1.0 + 1e-9)
+    assert optimal.plan is not None
+    assert 0.0 <= solution.route_bound <= cost(problem, optimal.plan, solution.normals) * (1.0 + 1e-9)
     assert solution.gap >= 0.0
     with_it = ending(found).solve(replace(problem, previous=optimal.plan))
     assert optimal.objective <= with_it.objective <= solution.objective
@@ -167,6 +168,7 @@ class BranchAndBound:
         return object()
 
     def Solve(self, program: Any, guess: Any, options: Any) -> Any:
+        self.variables = program.decision_variables()
         self.search = MixedIntegerBranchAndBound(program, ClarabelSolver.id())
         self.ended = self.search.Solve()
         return self
@@ -180,8 +182,8 @@ class BranchAndBound:
     def get_solver_details(self) -> None:
         return None
 
-    def GetSolution(self, variables: Any) -> Any:
-        return self.search.GetSolution(variables)
+    def get_x_val(self) -> Any:
+        return self.search.GetSolution(self.variables)
 
 
 @pytest.fixture
