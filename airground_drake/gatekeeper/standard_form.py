@@ -244,4 +244,4 @@ def _add(total: Array, where: Any, values: Array) -> None:
     if all(isinstance(one, slice) for one in where):
         total[where] += values
     else:
-        np.add.at(total, where, values)  # type: ignore[arg-type]
+        np.add.at(total, where, values)

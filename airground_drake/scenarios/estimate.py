@@ -130,8 +130,8 @@ def within(scenario: Scenario, limits: Limits, times: int = 1) -> Estimate:
     Raises:
         LimitError: if the scenario asks for more; says how much it asks for and how much is allowed.
     """
-    rows, steps, decisions, predicted, memory = estimate(scenario)
-    found = Estimate(times * rows, times * steps, times * decisions, times * predicted, memory)
+    *counts, memory = estimate(scenario)
+    found = Estimate(*(times * count for count in counts), memory)
     if not (found.work <= limits.work and found.memory <= limits.memory):
         raise LimitError(scenario.name, str(found), f"{limits.work:.2g} steps, {limits.memory / GIB:.2g} GiB")
     return found
