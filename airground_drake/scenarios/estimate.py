@@ -130,8 +130,8 @@ def within(scenario: Scenario, limits: Limits, times: int = 1) -> Estimate:
     Raises:
         LimitError: if the scenario asks for more; says how much it asks for and how much is allowed.
     """
-    *counts, memory = estimate(scenario)
-    found = Estimate(*(times * count for count in counts), memory)
+    once = estimate(scenario)
+    found = Estimate._make([*(times * count for count in once[:-1]), once.memory])
     if not (found.work <= limits.work and found.memory <= limits.memory):
         raise LimitError(scenario.name, str(found), f"{limits.work:.2g} steps, {limits.memory / GIB:.2g} GiB")
     return found
