@@ -10,7 +10,6 @@ from typing import Any, Literal, NamedTuple
 from airground_drake.base.statuses import PASSING
 from airground_drake.registry import METHODS
 from airground_drake.run.collisions import first_collisions
-from airground_drake.scenarios.schema import Scenario
 
 SLACK_M = 1e-9
 """A distance counts as kept if it falls short of the required one by less, as in SAFE-TRACE."""
@@ -18,7 +17,6 @@ SLACK_M = 1e-9
 THEOREMS, CONDITIONS = ("SAFE-INV", "SAFE-GATE"), "SAFE-HYP"
 """The claims that prove the safety of method (d), and the one that a run met their conditions."""
 
-_DEFAULT_TOLERANCE_M = next(each.default for each in fields(Scenario) if each.name == "arrival_tolerance_m")
 
 Document = Mapping[str, Any]
 
@@ -211,8 +209,11 @@ def claims(document: Document, *names: str, run: str | None = None) -> list[Mapp
 
 def tolerance(document: Document) -> str:
     """The arrival tolerance of the scenario with its unit, '' if it is the default."""
+    from airground_drake.scenarios.schema import Scenario  # pydantic would delay `index --help`
+
     value = document["scenario"]["resolved"]["arrival_tolerance_m"]
-    return "" if value == _DEFAULT_TOLERANCE_M else f"{value:g} m"
+    default = next(each.default for each in fields(Scenario) if each.name == "arrival_tolerance_m")
+    return "" if value == default else f"{value:g} m"
 
 
 def triggers(document: Document) -> list[Mapping[str, Any]]:

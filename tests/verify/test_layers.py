@@ -16,8 +16,8 @@ ALLOWED: dict[str, set[str]] = {
         "base.arrays", "base.interruption", "base.statuses", "verify.engines", "verify.finding", "world.motion",
     },
     "runs": {
-        "base.arrays", "base.errors", "base.exact", "run.trace", "scenarios.plants", "scenarios.schema",
-        "verify.engines", "verify.runs", "verify.claim", "verify.finding",
+        "base.arrays", "base.errors", "base.exact", "run.collisions", "run.trace", "scenarios.plants",
+        "scenarios.schema", "verify.engines", "verify.runs", "verify.claim", "verify.finding",
     },
 }  # fmt: skip
 """By folder of verify/, what its modules may import of this package."""
