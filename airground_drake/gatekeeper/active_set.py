@@ -34,7 +34,7 @@ _ENDED = {
 }  # fmt: skip
 """What DAQP's flags mean; 5: stopped with a solution, -7: stopped without one. Others are failures."""
 
-_FLAT = 1e-14
+_FLAT = 1e-24
 """A variable with less curvature than this share of the largest has none."""
 _SINGULAR = 1e-10
 """Least square of a pivot in a Cholesky factorisation, with a unit diagonal, of a Hessian that is taken as it is."""

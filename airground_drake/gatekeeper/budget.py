@@ -28,7 +28,7 @@ class Budget:
     """
 
     iterations: int = 100
-    search_iterations: int = 4_000
+    search_iterations: int = 2_000
     search_s: float = 1.0
     deadline_s: float = math.inf
     clock: Clock = field(default=time.monotonic, compare=False)

@@ -227,9 +227,9 @@ class Gatekeeper:
     Under method (c) a decision on a proposal is reversed only for a plan that is cheaper by the (relative) switching
     margin, and not before `min_dwell_s` have passed. This rule is ours. The paper's rule, `first_stage`, executes the
     first stage of each rounded plan, whatever the earlier answers were; with the route `nonlinear` that is (27)-(29) to
-    the letter. A decision may take `budget_iterations` iterations of the solver of a relaxation and 4,000 iterations of
+    the letter. A decision may take `budget_iterations` iterations of the solver of a relaxation and 2,000 iterations of
     the searches of `mixed_integer`. The budget 'counted' has no other limit: a run is the same on every machine on
-    which these iterations take less than 1 s, five times the usual. The budget 'wall_clock', for real time, also limits
+    which these iterations take less than 1 s, ten times the usual. The budget 'wall_clock', for real time, also limits
     a decision to the share `budget_share` of the sampling period. `terminal_weight_s` is the w of a terminal cost w a
     ||rho_rd - rho_N||^2 besides (25); the paper has no such cost.
 
