@@ -80,7 +80,7 @@ class PolicyError(AirgroundError):
     """A policy's process failed: the policy's own exception, or how the process ended, in words.
 
     Attributes:
-        traceback: of the policy's own exception, see `traceback_of`; '' if there is none.
+        traceback: of the policy's own exception, see `traceback_of`; '' without one.
     """
 
     def __init__(self, what: str, traceback: str = "") -> None:

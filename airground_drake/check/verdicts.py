@@ -140,7 +140,7 @@ def _own_claims(scenario: Json, found: Sequence[tuple[str, str]]) -> set[tuple[s
 def _left_out(scenario: Json, foreign: set[tuple[str, str]]) -> list[str]:
     """Claims that the scenario adds and the report leaves out: everywhere, or where the scenario expects a verdict.
 
-    Whether such a claim applies to a run of which nothing is expected, only its own code says.
+    For a run without an expectation, only the claim's own code says whether it applies.
     """
     judged = {name for _, name in foreign}
     found = [name for name in scenario["claims"] if is_foreign(name, scenario) and name not in judged]

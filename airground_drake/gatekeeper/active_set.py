@@ -35,7 +35,7 @@ _ENDED = {
 """What DAQP's flags mean; 5: stopped with a solution, -7: stopped without one. Others are failures."""
 
 _FLAT = 1e-24
-"""A variable with less curvature than this share of the largest has none."""
+"""A variable counts as linear if its curvature is below this share of the largest."""
 _SINGULAR = 1e-10
 """Least square of a pivot in a Cholesky factorisation, with a unit diagonal, of a Hessian that is taken as it is."""
 _BINARY_CURVATURE = 1e-6
@@ -92,7 +92,7 @@ class Details:
 
 
 class Answer(NamedTuple):
-    """The answer to a program: x (n,), NaN if there is none."""
+    """The answer to a program: x (n,), NaN without a solution."""
 
     ended: SolutionResult
     x: Array

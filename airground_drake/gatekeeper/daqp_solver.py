@@ -110,6 +110,9 @@ class DaqpSolver(SolverInterface):  # type: ignore[misc]
     An initial guess that satisfies all constraints bounds the search: more expensive branches are cut. It is the
     solution if a limit is reached before anything cheaper was found.
 
+    Scale the program: where coefficients differ by a factor of about 1e6, it may fail, or call a program unbounded
+    that is not (on random programs of this kind, about once in a thousand).
+
     Its options in `SolverOptions` are those of `Limits`, under `DaqpSolver.id()`. Common options have no effect: it
     runs in one thread and prints nothing.
     """

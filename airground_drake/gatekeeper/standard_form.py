@@ -58,10 +58,10 @@ class StandardForm(NamedTuple):
         gradient: f, (n,).
         constant: added to the cost.
         rows: A, (m, n): the rows of all linear constraints, then those of all linear equality constraints.
-        lower: (m,), -inf where there is none.
-        upper: (m,), inf where there is none.
-        least: (n,), -inf where there is none.
-        most: (n,), inf where there is none.
+        lower: bounds of the rows, (m,), -inf without one.
+        upper: bounds of the rows, (m,), inf without one.
+        least: bounds of the variables, (n,), -inf without one.
+        most: bounds of the variables, (n,), inf without one.
         binary: (n,).
     """
 
@@ -110,7 +110,7 @@ class StandardForm(NamedTuple):
 
         Returns:
             Those that stand in no row, (n,).
-            The one that is the slack of each row, (m,), -1 where there is none. Its cost is least at 0, it stands in no
+            The one that is the slack of each row, (m,), -1 without one. Its cost is least at 0, it stands in no
             other row, and it may grow without bound in the direction that the one bound of its row needs.
         """
         unconstrained, slack = _separate(self)
@@ -240,7 +240,7 @@ def _bounds(program: MathematicalProgram, layout: Layout) -> tuple[Array, Array]
 
 
 def _add(total: Array, where: Any, values: Array) -> None:
-    """Add values at indices, some of which may be equal unless they are slices."""
+    """Add values at indices; indices, but not slices, may repeat."""
     if all(isinstance(one, slice) for one in where):
         total[where] += values
     else:

@@ -229,7 +229,7 @@ def _zeno(document: Document) -> Iterator[Line]:
         gaps = [claim["evidence"].get("smallest_gap", {}).get("gap_s") for claim in seen]
         least = min((gap for gap in gaps if gap is not None), default=None)
         smallest = f"; the smallest is {least:.3f} s" if least is not None else ""
-        yield Line("", f"Seen: {sum(claim['exercised'] for claim in seen)} gaps between triggers{smallest}.")
+        yield Line("", f"Seen: {counted(sum(claim['exercised'] for claim in seen), 'gap')} between triggers{smallest}.")
     elif of_runs and not bad:
         why = "no UGV triggers twice" if triggers(document) else "nothing triggered"
         yield Line("", f"These runs cannot show it: {why}. Scenario dwell does.")

@@ -544,7 +544,7 @@ def _(world: World, mark: str, run: str, gap: str) -> bool:
     return (mark, status, float(gap)) == ("no", "refuted", gap_s)
 
 
-@says("Zeno-free?", r"Seen: (\d+) gaps between triggers; the smallest is ([\d.]+) s\.")
+@says("Zeno-free?", r"Seen: (\d+) gaps? between triggers; the smallest is ([\d.]+) s\.")
 def _(world: World, mark: str, count: str, least: str) -> bool:
     seen = [world.runs[run].claims["ZENO-TRACE"] for run in runs_with(world, "ZENO-TRACE", *PASSING)]
     tested = [each for each in seen if each[1]]

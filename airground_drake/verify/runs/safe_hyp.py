@@ -143,7 +143,7 @@ class SafeHyp(TraceClaim):
     method = (
         "Exact arithmetic on the recorded positions at the control samples, which are rational numbers; square roots "
         "are enclosed. Pairs and samples are left out if floats find them far apart, or an inequality met by more than "
-        "1e-9 m. D and d are distances of centres, of which the law is; the distances promised are listed less the "
+        "1e-9 m. D and d are distances of centres, as in the law; the distances promised are listed less the "
         "radii. The parameters of the controllers were read back from the diagram and are compared with the scenario. "
         "Rows less than 1e-9 s apart count as one instant."
     )
