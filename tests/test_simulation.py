@@ -56,7 +56,7 @@ def test_ugv1_goes_through_what_the_paper_tells(
 def test_every_run_has_the_verdicts_that_its_scenario_declares(run: Runs, scenario: str) -> None:
     for name in load(scenario)[0].runs:
         for verdict in verify(run(scenario, name)):
-            assert verdict.as_expected, (name, verdict.claim.id, verdict.finding)
+            assert verdict.as_expected is not False, (name, verdict.claim.id, verdict.finding)
 
 
 @pytest.mark.parametrize("name", ["case_a", "case_b"])
