@@ -9,7 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from playwright.sync_api import Browser, sync_playwright
+from playwright.sync_api import Browser, Page, sync_playwright
 
 from airground_drake.replay import page as pages
 from airground_drake.replay.scene import Scene
@@ -35,6 +35,15 @@ def browser() -> Iterator[Browser]:
         started.close()
 
 
+@pytest.fixture
+def page(browser: Browser) -> Iterator[Page]:
+    """A page that is closed at the end: one that goes on drawing by software takes the processor from the next."""
+    opened = browser.new_page()
+    opened.set_default_timeout(WAIT_MS)
+    yield opened
+    opened.close()
+
+
 @pytest.fixture(scope="module")
 def file(scene: Scene, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The page of a scene whose robots and obstacles have the names of what every JavaScript object has."""
@@ -45,25 +54,25 @@ def file(scene: Scene, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
-def test_any_name_is_shown_and_the_policy_blocks_nothing_of_the_page(browser: Browser, file: Path) -> None:
-    page, errors, said = browser.new_page(), list[str](), list[str]()
+def test_any_name_is_shown_and_the_policy_blocks_nothing_of_the_page(page: Page, file: Path) -> None:
+    errors, said = list[str](), list[str]()
     page.on("pageerror", lambda error: errors.append(str(error)))
     page.on("console", lambda message: said.append(message.text))
     page.goto(file.as_uri())
     if page.inner_text("#replay-clock") == "no WebGL":
         pytest.skip("this browser has no WebGL")
-    page.locator(".replay-name.state0").first.wait_for(state="attached", timeout=WAIT_MS)
+    page.locator(".replay-name.state0").first.wait_for(state="attached")
     shown = [text.split()[0] for text in page.locator(".replay-name").all_inner_texts()]
     assert sorted(shown) == sorted([*NAMES, *OBSTACLES])
     assert not errors
     assert not [line for line in said if "Content Security Policy" in line]
 
 
-def test_a_script_that_is_slipped_in_does_not_run(browser: Browser, file: Path, tmp_path: Path) -> None:
+def test_a_script_that_is_slipped_in_does_not_run(page: Page, file: Path, tmp_path: Path) -> None:
     slipped_in = "<script>document.title = 'taken'</script><img src='https://example.org/x.png'></body>"
     spoilt = tmp_path / "spoilt.html"
     spoilt.write_text(file.read_text("utf-8").replace("</body>", slipped_in), "utf-8")
-    page, said = browser.new_page(), list[str]()
+    said: list[str] = []
     page.on("console", lambda message: said.append(message.text))
     page.goto(spoilt.as_uri())
     assert page.title() != "taken"

@@ -23,7 +23,7 @@ from airground_drake.run.trace import Trace
 from airground_drake.scenarios.schema import Scenario
 
 CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
-NARROW, WIDE = 390, 1280
+NARROW, WIDE, WAIT_MS = 390, 1280, 120_000
 
 pytestmark = [
     pytest.mark.slow,
@@ -64,6 +64,7 @@ def browser() -> Iterator[Browser]:
 
 def opened(browser: Browser, file: Path, anchor: str = "", width: int = WIDE, **options: Any) -> Page:
     page = browser.new_context(viewport={"width": width, "height": 900}, **options).new_page()
+    page.set_default_timeout(WAIT_MS)
     page.goto(f"{file.as_uri()}{anchor}")
     return page
 
@@ -89,9 +90,9 @@ def test_the_policy_blocks_nothing_of_the_page_and_whatever_else_is_slipped_in(
     browser: Browser, page_file: Path, tmp_path: Path
 ) -> None:
     said: list[str] = []
-    page = browser.new_page()
+    page = opened(browser, page_file)
     page.on("console", lambda message: said.append(message.text))
-    page.goto(page_file.as_uri())
+    page.reload()
     assert said == []
     spoilt = tmp_path / "spoilt.html"
     slipped_in = "<script>document.title = 'taken'</script><img src='https://example.org/x.png'></main>"
