@@ -62,7 +62,7 @@ def bodies() -> Trace:
 
 def test_bodies_move_as_points_that_keep_as_much_more(bodies: Trace) -> None:
     points = simulate(scenario(points=True), "d")
-    assert bodies.signals.equals(points.signals)
+    assert bodies.states.equals(points.states)
     assert bodies.decisions.equals(points.decisions)
     assert bodies.events == points.events
     assert "accept" in set(bodies.decisions["decision"])

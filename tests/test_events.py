@@ -27,7 +27,7 @@ PLACES = st.lists(st.tuples(*[st.integers(-4, 4)] * 2), min_size=2, max_size=12)
 
 
 def collisions(trace: Trace) -> list[dict[str, Any]]:
-    return [event for event in events.extract(trace, ()) if event["kind"] == "collision"]
+    return [event for event in events.extract(trace) if event["kind"] == "collision"]
 
 
 @examples(200)
@@ -83,7 +83,7 @@ def test_nothing_after_a_collision_counts() -> None:
     """A UGV arrives, then a UAV hits it and it drives on. Without the hit it does not arrive."""
     hit, missed = crossing(4.0), crossing()
     for trace, arrivals in ((hit, {"ugv1"}), (missed, {"uav"})):
-        found = events.extract(trace, ())
+        found = events.extract(trace)
         assert {event["robot"] for event in found if event["kind"] == "arrival"} == arrivals
         (verdict,) = verify(with_meta(trace, events=found), ["LIVE-GOAL"])
         worst = verdict.finding.counterexample or {}
@@ -95,7 +95,7 @@ def test_an_arrival_after_a_collision_is_none() -> None:
     """Through an obstacle to its target: the collision is named, with its time."""
     scenario = lone([-1.0, 0.0, 0.0], [1.0, 0.0, 0.0], STILL, 2.0, obstacles={"rock": Obstacle([0.0] * 3)})
     trace = simulate(scenario, drive=lambda t: [[1.0, 0.0, 0.0], [0.0] * 3])
-    found = events.extract(trace, ())
+    found = events.extract(trace)
     assert [event["robot"] for event in found if event["kind"] == "arrival"] == ["uav"]
     finding = verify(with_meta(trace, events=found), ["LIVE-GOAL"])[0].finding
     assert finding.status == "refuted"

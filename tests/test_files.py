@@ -42,9 +42,9 @@ def test_a_full_disk_names_the_path_and_leaves_the_old_file(
 def test_the_temporary_files_of_a_killed_process_are_swept_and_nothing_else(tmp_path: Path) -> None:
     with subprocess.Popen([sys.executable, "-c", ""]) as ended:
         pass
-    left = tmp_path / f".signals.parquet.{ended.pid}.abc_12.partial"
+    left = tmp_path / f".states.parquet.{ended.pid}.abc_12.partial"
     kept = [
-        tmp_path / f".signals.parquet.{os.getpid()}.abc_12.partial",
+        tmp_path / f".states.parquet.{os.getpid()}.abc_12.partial",
         tmp_path / ".x.partial",
         tmp_path / "a.1.b.partial",
     ]

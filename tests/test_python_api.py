@@ -207,7 +207,7 @@ def test_a_table_that_changed_is_judged_anew(case_a: Scenario) -> None:
     case_a.duration_s = 1.0
     trace = simulate(case_a, "d")
     assert verify(trace, claims=["SAFE-TRACE"])[0].finding.status == "holds"
-    trace.signals["ugv1.x_m"] += 0.1 * trace.signals["t_s"]  # a robot that disobeys
+    trace.states["ugv1.x_m"] += 0.1 * trace.states["t_s"]  # a robot that disobeys
     assert verify(trace, claims=["SAFE-TRACE"])[0].finding.status == "error"
 
 

@@ -73,7 +73,7 @@ def test_same_seed_same_bytes_other_seed_other_trigger(case_a: Scenario, run: Ru
     other_diagram = run("case_a", "d")
     for name, made in (("one", recorder.simulate()), ("two", recorder.simulate()), ("three", other_diagram)):
         trace.save(made, tmp_path / name)
-    for name in ("signals.parquet", "decisions.parquet", "meta.json"):
+    for name in ("states.parquet", "decisions.parquet", "meta.json"):
         assert len({(tmp_path / folder / name).read_bytes() for folder in ("one", "two", "three")}) == 1, name
     other = recorder.simulate(seed=7)
     assert times(other, "trigger")[0] != times(other_diagram, "trigger")[0]
@@ -95,7 +95,7 @@ def test_runs_in_several_processes_are_those_in_one(
     assert sum(told) == pytest.approx(2.0 * case_a.duration_s)
     assert stages == ["compiling, once, about half a minute", "simulating a, d"]
     for name in case_a.runs:
-        assert one[name].signals.equals(two[name].signals)
+        assert one[name].states.equals(two[name].states)
         assert one[name].decisions.equals(two[name].decisions)
         assert one[name].meta["events"] == two[name].meta["events"] == run("case_a", name).meta["events"]
 
@@ -163,10 +163,10 @@ def test_a_trace_survives_saving_and_a_changed_file_does_not(run: Runs, tmp_path
     of_run = run("case_a", "c")
     trace.save(of_run, tmp_path)
     back = trace.load(tmp_path)
-    assert back.signals.equals(of_run.signals)
+    assert back.states.equals(of_run.states)
     assert back.decisions.equals(of_run.decisions)
     assert back.meta == of_run.meta
-    (tmp_path / "signals.parquet").write_bytes((tmp_path / "signals.parquet").read_bytes()[:-1])
+    (tmp_path / "states.parquet").write_bytes((tmp_path / "states.parquet").read_bytes()[:-1])
     with pytest.raises(TraceError, match="SHA-256"):
         trace.load(tmp_path)
     with pytest.raises(TraceError, match=r"nowhere/meta\.json: No such file or directory"):

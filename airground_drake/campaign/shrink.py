@@ -136,7 +136,7 @@ def _from(data: Json, trace: Trace, t: float) -> Json:
     for name, ugv in later["ugvs"].items():
         waypoints = np.asarray(ugv["preset"]["waypoints_m"], dtype=np.float64)
         motion = Motion.at_speed(waypoints, ugv["preset"]["speed_m_s"], start=0.0)
-        here = trace.signals.loc[row, [f"{name}.ref_{axis}_m" for axis in "xyz"]].to_numpy(np.float64)
+        here = motion.sample(np.array([t]))[0]
         ahead = motion.positions[motion.times > t + 1e-6]
         if not len(ahead):  # its preset has ended
             ahead = here[None] + [BESIDE_M, 0.0, 0.0]

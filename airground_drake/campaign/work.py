@@ -158,4 +158,4 @@ def _happened(trace: Trace) -> Row:
 
 def _intervened(trace: Trace, ugv: str) -> float:
     """How long a UGV followed the UAV, s; each row has the state of the interval before it."""
-    return float(np.diff(trace.t) @ (trace.column(f"{ugv}.accepted")[1:] != 0.0))
+    return float(np.diff(trace.t) @ (trace.executing(ugv)[1:] >= 0))

@@ -45,7 +45,7 @@ _SCENE = _object(deletions=_array(_object()), entities=_array(_ENTITY))
 _LOG = _object(timestamp=_TIME, level={"type": "integer"}, message=_TEXT, name=_TEXT)
 _SIGNALS = _object(
     position_m=_VECTOR, command_m_s=_VECTOR, decision_variable_m=_NUMBER, noise_m=_NUMBER, mode=_NUMBER,
-    accepted=_NUMBER,
+    executing=_NUMBER,
 )  # fmt: skip
 
 
@@ -121,8 +121,9 @@ def _signals(trace: Trace, robot: str, k: int) -> dict[str, Any]:
         "command_m_s": _vector(trace.command(robot)[k].tolist()),
     }
     if robot in trace.ugvs:
-        for name in ("decision_variable_m", "noise_m", "mode", "accepted"):
+        for name in ("decision_variable_m", "noise_m", "mode"):
             found[name] = float(trace.column(f"{robot}.{name}")[k])
+        found["executing"] = float(trace.executing(robot)[k])
     return found
 
 

@@ -11,7 +11,8 @@ import numpy as np
 import pandas as pd
 
 from airground_drake.base import files
-from airground_drake.run.trace import TABLES, Trace
+from airground_drake.run.tables import TABLES
+from airground_drake.run.trace import Trace
 from airground_drake.verify.runs.pairs import least_gap, pairs_of
 
 TOLD = {"distances_m": "distances_of_centres_m"}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
-from typing import Literal
+from typing import Literal, NamedTuple
 
 from airground_drake.gatekeeper.budget import Budget
 from airground_drake.gatekeeper.outcome import USELESS, Outcome
@@ -67,6 +67,24 @@ WORDS: dict[Reason, str] = {
 """The reasons in words."""
 
 
+class Basis(NamedTuple):
+    """What a prediction rested on; empty where nothing was predicted. Obstacles are indices in the order of the world.
+
+    Attributes:
+        sensed: obstacles within sensing range.
+        known: under method (d), obstacles sensed so far.
+        new: of these, those sensed for the first time that are not on the proposal's map.
+        told: rows of the proposal's map that the UGV believed.
+        asked: under method (d), the proposals that other UGVs had and had not refused: number, and whether accepted.
+    """
+
+    sensed: tuple[int, ...] = ()
+    known: tuple[int, ...] = ()
+    new: tuple[int, ...] = ()
+    told: tuple[int, ...] = ()
+    asked: tuple[tuple[int, bool], ...] = ()
+
+
 @dataclass(frozen=True)
 class Decision:
     """The decision about one proposal for one UGV at one sample: a row of the trace's table `decisions`.
@@ -85,6 +103,8 @@ class Decision:
         refuse: outcome of refusing; None if no outcomes were compared.
         accept: outcome of accepting; None if no outcomes were compared.
         tries: acceptances since the last rest, with this decision.
+        answer: number of the answer, which counts the answers of all UGVs.
+        basis: what the prediction rested on.
     """
 
     t: float
@@ -98,6 +118,8 @@ class Decision:
     refuse: Outcome | None = None
     accept: Outcome | None = None
     tries: int = 0
+    answer: int = -1
+    basis: Basis = field(default_factory=Basis)
 
 
 def in_words(decision: Decision) -> str:

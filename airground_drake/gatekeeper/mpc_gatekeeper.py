@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from airground_drake.base.arrays import Array
 from airground_drake.base.errors import PluginError, described, one_line, short
-from airground_drake.gatekeeper.answer import Decision, Rules, in_words, settle
+from airground_drake.gatekeeper.answer import Basis, Decision, Rules, in_words, settle
 from airground_drake.gatekeeper.budget import Budget
 from airground_drake.gatekeeper.patience import Commitment
 from airground_drake.gatekeeper.problem import Horizon, Problem, predicted_problem
@@ -40,6 +40,7 @@ class GatekeeperState:
         decisions: those of the last sample that was not idle.
         commitments: under method (d), each UGV's tries and rests.
         sensed: under method (d), which obstacles each UGV has sensed so far, (n, m).
+        count: number of answers so far.
     """
 
     answers: tuple[float, ...]
@@ -48,6 +49,7 @@ class GatekeeperState:
     decisions: tuple[Decision, ...] = ()
     commitments: tuple[Commitment, ...] = ()
     sensed: npt.NDArray[np.bool_] = field(default_factory=lambda: np.zeros((0, 0), dtype=bool))
+    count: int = 0
 
     @classmethod
     def empty(cls, count: int) -> GatekeeperState:
@@ -104,11 +106,15 @@ class Gatekeepers(abc.ABC):
         """Whether a sample at t, s, changes nothing: no proposal, no answer to take back, nothing new to remember."""
         return not any(proposals) and not any(before.answers[::2])
 
+    def _in_range(self, t: float, position: Array) -> npt.NDArray[np.bool_]:
+        """Which obstacles are there at time t, s, and within sensing range, (m,)."""
+        return distances(self._world.at(self._near, t).still, position) <= self.law.avoidance.sensing_range
+
     def _report(self, position: Array, decision: Decision) -> Report:
         """The report with an answer: the obstacles within sensing range, and the reason."""
-        near = distances(self._world.at(self._near, decision.t).still, position) <= self.law.avoidance.sensing_range
-        discs: tuple[Disc, ...] = tuple((x, y, z, radius) for x, y, z, radius in self._discs[near].tolist())
-        return Report(discs, decision.reason, in_words(decision))
+        near = self._discs[self._in_range(decision.t, position)]
+        discs: tuple[Disc, ...] = tuple((x, y, z, radius) for x, y, z, radius in near.tolist())
+        return Report(decision.answer, discs, decision.reason, in_words(decision))
 
     def _view(self, now: Inputs, i: int) -> View:
         """All obstacles and robots around a UGV, whether within sensing range or not."""
@@ -149,14 +155,16 @@ class PaperGatekeepers(Gatekeepers):
                 reports.append(Report())
                 continue
             decision = self._decide(now, before, i, proposal, budgets)
+            decision = replace(decision, answer=before.count + len(decisions))
             decisions.append(decision)
             answer = ACCEPT if decision.accepted else REFUSE
             answers += [answer, proposal.number]
             since.append(before.since[i] if answer == answer_to(proposal, before.answers, i) else now.t)
             reports.append(self._report(now.positions[i], decision))
         return replace(
-            before, answers=tuple(answers), since=tuple(since), reports=tuple(reports), decisions=tuple(decisions)
-        )
+            before, answers=tuple(answers), since=tuple(since), reports=tuple(reports), decisions=tuple(decisions),
+            count=before.count + len(decisions),
+        )  # fmt: skip
 
     def _decide(
         self, now: Inputs, before: GatekeeperState, i: int, proposal: Proposal, budgets: Iterator[Budget]
@@ -172,7 +180,8 @@ class PaperGatekeepers(Gatekeepers):
         constants = ConstantPlans.of(problem)
         throughout = (constants.accept.objective, constants.refuse.objective) if solution.has_plan else (-1.0, -1.0)
         accepted, reason = settle(solution, throughout, standing, stood, self._rules)
-        return Decision(now.t, i, proposal, accepted, reason, problem, solution, throughout)
+        basis = Basis(tuple(np.flatnonzero(self._in_range(now.t, now.positions[i])).tolist()))
+        return Decision(now.t, i, proposal, accepted, reason, problem, solution, throughout, basis=basis)
 
     def _solved(self, problem: Problem, budget: Budget) -> Solution:
         """The route's solution.

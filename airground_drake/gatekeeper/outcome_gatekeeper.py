@@ -19,7 +19,7 @@ import numpy as np
 import numpy.typing as npt
 
 from airground_drake.base.arrays import Array
-from airground_drake.gatekeeper.answer import Decision, Reason
+from airground_drake.gatekeeper.answer import Basis, Decision, Reason
 from airground_drake.gatekeeper.mpc_gatekeeper import Gatekeepers, GatekeeperState, Inputs
 from airground_drake.gatekeeper.outcome import Outcome, Outlook, outcomes
 from airground_drake.gatekeeper.patience import Commitment, Patience
@@ -75,12 +75,14 @@ class OutcomeGatekeepers(Gatekeepers):
             started = thread_time()
             decision, held[i] = self._decide(now, known, before, i, proposal, standing, held[i])
             self.times_s.append(thread_time() - started)
+            decision = replace(decision, answer=before.count + len(decisions))
             decisions.append(decision)
             answers += [_answer(decision, standing), proposal.number]
             reports.append(self._report(now.positions[i], decision))
         return replace(
-            known, answers=tuple(answers), reports=tuple(reports), decisions=tuple(decisions), commitments=tuple(held)
-        )
+            known, answers=tuple(answers), reports=tuple(reports), decisions=tuple(decisions), commitments=tuple(held),
+            count=before.count + len(decisions),
+        )  # fmt: skip
 
     def _remembered(self, t: float, positions: Array, before: GatekeeperState) -> np.ndarray:
         """Which obstacles each UGV has sensed up to time t, s, (n, m); the very same array if nothing is new."""
@@ -92,13 +94,15 @@ class OutcomeGatekeepers(Gatekeepers):
             return before.sensed | within(points, own, reach)
         return before.sensed
 
-    def _discovers(self, sensed: npt.NDArray[np.bool_], before: GatekeeperState, i: int, proposal: Proposal) -> bool:
-        """Whether a UGV senses an obstacle for the first time that is not on the proposal's map."""
-        if sensed is before.sensed:
-            return False
-        new = self._near.still[sensed[i] & ~before.sensed[i]]
-        apart = np.linalg.norm(new[:, None] - proposal.mapped, axis=2)
-        return not (apart <= SAME_M).any(axis=1).all()
+    def _discovered(
+        self, sensed: npt.NDArray[np.bool_], before: GatekeeperState, i: int, proposal: Proposal
+    ) -> tuple[int, ...]:
+        """Obstacles that a UGV senses for the first time and that are not on the proposal's map."""
+        if sensed is before.sensed or before.sensed.shape != sensed.shape:
+            return ()
+        new = np.flatnonzero(sensed[i] & ~before.sensed[i])
+        apart = np.linalg.norm(self._near.still[new, None] - proposal.mapped, axis=2)
+        return tuple(new[~(apart <= SAME_M).any(axis=1)].tolist())
 
     def _decide(
         self,
@@ -113,12 +117,15 @@ class OutcomeGatekeepers(Gatekeepers):
         """Judge a new proposal, watch over an accepted one, keep to a refusal: the decision, and the new commitment."""
         reason: Reason = "kept"
         refuse = accept = None
+        basis, new = Basis(), self._discovered(known.sensed, before, i, proposal)
         if standing == ACCEPT and self._patience.over(held, now.t):
             reason = "over"
         elif standing == SILENT and self._patience.exhausted(held):
             reason = "exhausted"
-        elif standing == SILENT or (standing == ACCEPT and self._discovers(known.sensed, before, i, proposal)):
-            refuse, accept = self.foresee(self._view_of(now, known, i, proposal), now.law, proposal)
+        elif standing == SILENT or (standing == ACCEPT and new):
+            seen, basis = self._view_of(now, known, i, proposal)
+            basis = basis._replace(new=new)
+            refuse, accept = self.foresee(seen, now.law, proposal)
             favour = proposal.cause in self._ugvs and proposal.cause != self._ugvs[i]
             reason = reason_of(refuse, accept, favour=favour)
         accepted = reason in ACCEPTING or (reason == "kept" and standing == ACCEPT)
@@ -126,22 +133,34 @@ class OutcomeGatekeepers(Gatekeepers):
             held = self._patience.accept(held, now.t, proposal.motion.end)
         elif standing == ACCEPT and not accepted:
             held = self._patience.stop(held, now.t)
-        return Decision(now.t, i, proposal, accepted, reason, refuse=refuse, accept=accept, tries=held.tries), held
+        decision = Decision(
+            now.t, i, proposal, accepted, reason, refuse=refuse, accept=accept, tries=held.tries, basis=basis
+        )
+        return decision, held
 
     def foresee(self, seen: View, law: UgvLaw, proposal: Proposal) -> tuple[Outcome, Outcome]:
         """The outcomes of refusing and of accepting, from what a UGV knows."""
         return outcomes(seen, law, proposal, self._outlook)
 
-    def _view_of(self, now: Inputs, known: GatekeeperState, i: int, proposal: Proposal) -> View:
+    def _view_of(self, now: Inputs, known: GatekeeperState, i: int, proposal: Proposal) -> tuple[View, Basis]:
         """A UGV's knowledge: obstacles sensed or told of, other robots and the motions asked of them."""
         around, m = self._view(now, i), len(self._near.still)
-        discs, distances = self._known(now.positions[i], known.sensed[i], i, proposal)
-        asked = []
+        told = self._believed(now.positions[i], known.sensed[i], proposal)
+        discs, distances = self._known(known.sensed[i], told, i, proposal)
+        asked: list[tuple[Motion, bool] | None] = []
+        numbers = list[tuple[int, bool]]()
         for j in self._near.others[i].tolist():
             other = now.proposals[j] if j < len(now.proposals) else None
             answer = answer_to(other, known.answers, j)
-            asked.append((other.motion, answer == ACCEPT) if other and answer in (ACCEPT, SILENT) else None)
-        return replace(
+            if other and answer in (ACCEPT, SILENT):
+                numbers.append((other.number, answer == ACCEPT))
+                asked.append((other.motion, answer == ACCEPT))
+            else:
+                asked.append(None)
+        sensed = np.flatnonzero(self._in_range(now.t, now.positions[i])).tolist()
+        remembered = np.flatnonzero(known.sensed[i]).tolist()
+        basis = Basis(tuple(sensed), tuple(remembered), (), tuple(told.tolist()), tuple(numbers))
+        seen = replace(
             around,
             centres=np.concatenate([discs, around.centres[m:]]),
             velocities=np.concatenate([np.zeros_like(discs), around.velocities[m:]]),
@@ -149,15 +168,13 @@ class OutcomeGatekeepers(Gatekeepers):
             shares=np.concatenate([np.ones(len(discs)), around.shares[m:]]),
             asked=tuple(asked),
         )
+        return seen, basis
 
-    def _known(self, position: Array, sensed: npt.NDArray[np.bool_], i: int, proposal: Proposal) -> tuple[Array, Array]:
-        """Obstacles that a UGV has sensed, and those of the UAV's map that are out of its sight.
+    def _believed(self, position: Array, sensed: npt.NDArray[np.bool_], proposal: Proposal) -> npt.NDArray[np.intp]:
+        """Rows of the UAV's map that are out of a UGV's sight and that it has not sensed itself.
 
         Only the `MOST_CLAIMED` of these that are nearest count, so that no map makes a decision take long. Obstacles
         whose radius is negative or not finite are left out.
-
-        Returns:
-            Centres, (k, 3), and safe distances, (k,), m.
         """
         own, claimed = self._near.still[sensed], proposal.mapped
         radii = np.broadcast_to(proposal.mapped_radii, len(claimed))
@@ -165,10 +182,16 @@ class OutcomeGatekeepers(Gatekeepers):
         apart = np.linalg.norm(claimed[:, None] - own, axis=2)
         new = np.flatnonzero(hidden & (apart > SAME_M).all(axis=1) & np.isfinite(radii) & (radii >= 0.0))
         nearest = np.argsort(np.linalg.norm(claimed[new] - position, axis=1), kind="stable")[:MOST_CLAIMED]
-        new = new[np.sort(nearest)]
-        away = self._world.apart("ugv", "obstacle") + (self._world.radius[self._near.members[i]] + radii[new])
+        return new[np.sort(nearest)]
+
+    def _known(
+        self, sensed: npt.NDArray[np.bool_], told: npt.NDArray[np.intp], i: int, proposal: Proposal
+    ) -> tuple[Array, Array]:
+        """Centres, (k, 3), and safe distances, (k,), m, of the obstacles that a UGV has sensed, and of those told."""
+        radii = np.broadcast_to(proposal.mapped_radii, len(proposal.mapped))[told]
+        away = self._world.apart("ugv", "obstacle") + (self._world.radius[self._near.members[i]] + radii)
         distances = np.concatenate([self._near.distance[i, : len(sensed)][sensed], away])
-        return np.concatenate([own, claimed[new]]), distances
+        return np.concatenate([self._near.still[sensed], proposal.mapped[told]]), distances
 
 
 def _answer(decision: Decision, standing: float) -> float:

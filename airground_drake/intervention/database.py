@@ -28,9 +28,6 @@ PREDICTION_S = 3.0
 INTRUSION = 1000.0
 """Weight of squared intrusion against squared task error; the gatekeeper's default is the same."""
 
-Candidate = tuple[int, str, dict[str, Motion]]
-"""A proposal: its turn, the policy's name, and motions by UGV."""
-
 
 def make_policy(name: str, parameters: Mapping[str, float], budget: float = 2.0) -> Policy:
     """Build a policy: in this process if it comes with the package or was added here, else in a process of its own.
@@ -83,14 +80,30 @@ class Negotiation:
 
 
 @dataclass(frozen=True)
-class Fault:
-    """A policy's failure, which counted as no intervention: time, s, UGV, policy, what went wrong, traceback."""
+class Asked:
+    """A policy that was asked for a plan for a UGV.
+
+    Attributes:
+        t: time, s.
+        robot: name of the UGV.
+        policy: name of the policy.
+        party: UGVs for which it proposed motions.
+        chosen: whether the plan was sent.
+        what: what went wrong; empty if nothing did. A failure counts as no intervention.
+        traceback: of the failure.
+    """
 
     t: float
     robot: str
     policy: str
-    what: str
+    party: tuple[str, ...] = ()
+    chosen: bool = False
+    what: str = ""
     traceback: str = ""
+
+
+Candidate = tuple[int, Asked, dict[str, Motion]]
+"""A plan: its turn, the policy that was asked, and motions by UGV."""
 
 
 class BehaviourDatabase:
@@ -139,7 +152,7 @@ class BehaviourDatabase:
         turn = 0 if learnt and self.ranking == "predicted" else held.turn + 1
         return Negotiation(turn=turn, refusals=held.refusals + 1, retry_at=t + self.retry, cause=held.cause)
 
-    def plan(self, held: Negotiation, seen: Observation) -> tuple[dict[str, Negotiation], list[Fault]]:
+    def plan(self, held: Negotiation, seen: Observation) -> tuple[dict[str, Negotiation], list[Asked]]:
         """Ask the policies for the next proposal to a UGV; a joint plan brings proposals to other UGVs, too.
 
         If no policy has a proposal, the UGV rests for `retry`, and twice as long each time in a row.
@@ -149,57 +162,59 @@ class BehaviourDatabase:
             seen: what the UAV sees.
 
         Returns:
-            The negotiations that change, by UGV, and the faults of the policies that were asked.
+            The negotiations that change, by UGV, and the policies that were asked.
         """
         seen = replace(seen, refusals=held.refusals)
-        candidates, faults = self._ranked(seen, held.turn) if self.ranking == "predicted" else self._next(seen, held)
+        candidates, asked = self._ranked(seen, held.turn) if self.ranking == "predicted" else self._next(seen, held)
         in_vain = 0 if candidates else held.in_vain + 1
         rest = self.retry * 2.0 ** min(max(0, in_vain - 1), MOST_DOUBLINGS)
         found = {seen.robot: replace(held, in_vain=in_vain, retry_at=seen.t + rest)}
-        for turn, name, motions in candidates[:1]:
+        for turn, chosen, motions in candidates[:1]:
+            asked = [replace(each, chosen=True) if each is chosen else each for each in asked]
             party = tuple(sorted(motions)) if self.joint and len(motions) > 1 else ()
             for robot, motion in motions.items():
                 mate = None if robot == seen.robot else next(each for each in seen.team if each.name == robot)
                 before = held if mate is None else Negotiation(refusals=mate.refusals)
                 cause = robot if mate is None or mate.triggered else seen.robot
                 proposal = Proposal(
-                    name, seen.t, motion, cause=cause, mapped=seen.obstacles, mapped_radii=seen.obstacle_radii,
+                    chosen.policy, seen.t, motion, cause=cause, mapped=seen.obstacles, mapped_radii=seen.obstacle_radii,
                     party=party,
                 )  # fmt: skip
                 found[robot] = replace(before, proposal=proposal, turn=turn, in_vain=0, cause=cause)
-        return found, faults
+        return found, asked
 
-    def _next(self, seen: Observation, held: Negotiation) -> tuple[list[Candidate], list[Fault]]:
+    def _next(self, seen: Observation, held: Negotiation) -> tuple[list[Candidate], list[Asked]]:
         """The proposal of the first policy, from the negotiation's turn on, that has one."""
-        faults: list[Fault] = []
+        asked: list[Asked] = []
         for step in range(len(self.policies)):
             turn = (held.turn + step) % len(self.policies)
-            motions = self._ask(turn, seen, faults)
+            motions = self._ask(turn, seen, asked)
             if motions:
-                return [(turn, self.policies[turn][0], motions)], faults
-        return [], faults
+                return [(turn, asked[-1], motions)], asked
+        return [], asked
 
-    def _ranked(self, seen: Observation, turn: int) -> tuple[list[Candidate], list[Fault]]:
+    def _ranked(self, seen: Observation, turn: int) -> tuple[list[Candidate], list[Asked]]:
         """All proposals from best to worst, rotated so that the proposal with the index `turn` comes first."""
-        faults: list[Fault] = []
-        asked = [(name, self._ask(i, seen, faults)) for i, (name, _) in enumerate(self.policies)]
-        found = [(name, motions) for name, motions in asked if motions]
+        asked: list[Asked] = []
+        every = [self._ask(i, seen, asked) for i in range(len(self.policies))]
+        found = [(each, motions) for each, motions in zip(asked, every, strict=True) if motions]
         found.sort(key=lambda entry: predicted_cost(entry[1], seen))
-        ranked = [(i, name, motions) for i, (name, motions) in enumerate(found)]
+        ranked = [(i, each, motions) for i, (each, motions) in enumerate(found)]
         first = turn % len(ranked) if ranked else 0
-        return ranked[first:] + ranked[:first], faults
+        return ranked[first:] + ranked[:first], asked
 
-    def _ask(self, index: int, seen: Observation, faults: list[Fault]) -> dict[str, Motion]:
-        name, policy = self.policies[index]
+    def _ask(self, index: int, seen: Observation, asked: list[Asked]) -> dict[str, Motion]:
+        """What a policy proposes; adds to `asked`."""
+        (name, policy), motions, what, traceback = self.policies[index], dict[str, Motion](), "", ""
         try:
             with nullcontext() if policy.counted else time_limit(self.budget):
-                return motions_of(policy.propose(seen if isinstance(policy, GuestPolicy) else seen.fresh()), seen)
+                motions = motions_of(policy.propose(seen if isinstance(policy, GuestPolicy) else seen.fresh()), seen)
         except PolicyError as fault:
-            faults.append(Fault(seen.t, seen.robot, name, str(fault), fault.traceback))
+            what, traceback = str(fault), fault.traceback
         except (Exception, OutOfTime, SystemExit) as error:  # no failure of a policy may stop the UAV
-            what = described(error, type(policy).propose)
-            faults.append(Fault(seen.t, seen.robot, name, what, traceback_of(error)))
-        return {}
+            what, traceback = described(error, type(policy).propose), traceback_of(error)
+        asked.append(Asked(seen.t, seen.robot, name, tuple(motions), what=what, traceback=traceback))
+        return motions
 
 
 def predicted_cost(motions: Mapping[str, Motion], seen: Observation) -> float:

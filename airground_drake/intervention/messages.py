@@ -16,6 +16,8 @@ from airground_drake.base.arrays import Array
 from airground_drake.intervention.policy import Proposal
 
 ACCEPT, SILENT, REFUSE, DONE = 1.0, 0.0, -1.0, 2.0
+NOTHING = -1.0
+"""Number of the proposal that a UGV executes if it executes none."""
 
 Point = tuple[float, float, float]
 """A place, m, world frame."""
@@ -28,11 +30,13 @@ class Report(NamedTuple):
     """A UGV's report, sent with its answer.
 
     Attributes:
+        number: of the answer, which counts the answers of all UGVs; -1: no answer.
         sensed: obstacles that the UGV sensed when it decided.
         reason: why it answers so, see `gatekeeper.answer.Reason`; empty before it has decided.
         words: the reason as a sentence.
     """
 
+    number: int = -1
     sensed: tuple[Disc, ...] = ()
     reason: str = ""
     words: str = ""

@@ -14,7 +14,7 @@ import numpy as np
 
 from airground_drake.base.arrays import Array
 from airground_drake.geometry.motion import Motion
-from airground_drake.intervention.database import BehaviourDatabase, Fault, Negotiation
+from airground_drake.intervention.database import Asked, BehaviourDatabase, Negotiation
 from airground_drake.intervention.messages import ACCEPT, DONE, REFUSE, SILENT, Disc, Proposals, Reports, answer_to
 from airground_drake.intervention.policy import Answered, Observation, Proposal, Teammate
 from airground_drake.world.motion import SAME_S
@@ -30,17 +30,26 @@ class PlannerState:
         talks: negotiations, one per UGV.
         learnt: obstacles from UGVs' reports that are not on the map.
         sent: all proposals with the index of their UGV, in order of sending.
-        faults: failures of policies, in order.
+        asked: policies that were asked, in order.
+        read: answers that were read: their number, and when, s.
+        withdrawn: proposals that were withdrawn: their number, and when, s.
     """
 
     talks: tuple[Negotiation, ...]
     learnt: tuple[Disc, ...] = ()
     sent: tuple[tuple[int, Proposal], ...] = ()
-    faults: tuple[Fault, ...] = ()
+    asked: tuple[Asked, ...] = ()
+    read: tuple[tuple[int, float], ...] = ()
+    withdrawn: tuple[tuple[int, float], ...] = ()
 
     def __deepcopy__(self, memo: dict[int, Any]) -> Self:
         """Immutable: the copy is the object itself."""
         return self
+
+    @property
+    def faults(self) -> list[Asked]:
+        """Failures of policies, in order."""
+        return [each for each in self.asked if each.what]
 
     @property
     def proposals(self) -> Proposals:
@@ -49,7 +58,7 @@ class PlannerState:
 
 
 def sent_after(before: PlannerState, after: PlannerState, t: float) -> PlannerState:
-    """Number the new proposals of a planning instant, and note them as sent.
+    """Number the new proposals of a planning instant, and note what was sent and withdrawn.
 
     Every new proposal gets the next number and the time t, even if the planner has set others. So no planner can send
     another motion under a number that a UGV has already answered.
@@ -59,13 +68,17 @@ def sent_after(before: PlannerState, after: PlannerState, t: float) -> PlannerSt
         after: memory as the planner returns it.
         t: time, s.
     """
-    sent, talks = list(before.sent), list(after.talks)
+    sent, talks, withdrawn = list(before.sent), list(after.talks), list(before.withdrawn)
     for i, (old, talk) in enumerate(zip(before.talks, after.talks, strict=True)):
-        if talk.proposal is not None and talk.proposal is not old.proposal:
+        if talk.proposal is old.proposal:
+            continue
+        if old.proposal is not None:
+            withdrawn.append((old.proposal.number, t))
+        if talk.proposal is not None:
             proposal = replace(talk.proposal, number=len(sent), issued=t)
             talks[i] = replace(talk, proposal=proposal)
             sent.append((i, proposal))
-    return replace(after, talks=tuple(talks), sent=tuple(sent)) if len(sent) > len(before.sent) else after
+    return replace(after, talks=tuple(talks), sent=tuple(sent), withdrawn=tuple(withdrawn))
 
 
 @dataclass(frozen=True, eq=False)
@@ -148,7 +161,9 @@ class Planner:
         learnt = memory.learnt + fresh
         discs = np.concatenate([mapped, np.array(learnt).reshape(-1, 4)])
         talks = self._after_answers(memory.talks, t, intervening, said, learnt=bool(fresh))
-        faults = list(memory.faults)
+        asked = list(memory.asked)
+        newest = max((number for number, _ in memory.read[-len(self.ugvs) :]), default=-1)
+        read = [(report.number, t) for report in heard if report.number > newest]
         for i, robot in enumerate(self.ugvs):
             if not (intervening[i] and talks[i].is_due(t)):
                 continue
@@ -170,10 +185,10 @@ class Planner:
                 obstacle_radii=discs[:, 3],
                 mapped_radii=mapped[:, 3],
             )
-            changed, wrong = self.database.plan(talks[i], seen)
-            faults += wrong
+            changed, policies = self.database.plan(talks[i], seen)
+            asked += policies
             talks = [changed.get(name, talk) for name, talk in zip(self.ugvs, talks, strict=True)]
-        return replace(memory, talks=tuple(talks), learnt=learnt, faults=tuple(faults))
+        return replace(memory, talks=tuple(talks), learnt=learnt, asked=tuple(asked), read=(*memory.read, *read))
 
     def _after_answers(
         self,

@@ -51,7 +51,7 @@ def _spans(trace: Trace, row: Mapping[Any, Any]) -> Iterator[Span]:
     robot, issued = row["robot"], float(row["issued_s"])
     issues = trace.proposals["issued_s"][trace.proposals["robot"] == robot].to_numpy(dtype=np.float64)
     until = float(min(issues[issues > issued], default=trace.t[-1]))
-    changes, last_s = _answers(trace, row, until)
+    changes, last_s = _answers(trace, row)
     ends = [change for change, _ in changes[1:]]
     ends.append(last_s if changes[-1][1] == "accepted" else max(last_s, changes[-1][0] + LINGER_S))
     for (start, outcome), end in zip(changes, ends, strict=True):
@@ -59,9 +59,9 @@ def _spans(trace: Trace, row: Mapping[Any, Any]) -> Iterator[Span]:
             yield Span(start, min(end, until), outcome)
 
 
-def _answers(trace: Trace, row: Mapping[Any, Any], until: float) -> tuple[list[tuple[float, Outcome]], float]:
+def _answers(trace: Trace, row: Mapping[Any, Any]) -> tuple[list[tuple[float, Outcome]], float]:
     """Times, s, at which the outcome of a proposal changed, with the new outcome; and the last time known, s."""
-    robot, issued = row["robot"], float(row["issued_s"])
+    issued = float(row["issued_s"])
     changes: list[tuple[float, Outcome]] = [(issued, "asked")]
     decided = trace.decisions[trace.decisions["number"] == row["number"]]
     for t, decision in zip(decided["t_s"], decided["decision"], strict=True):
@@ -69,7 +69,7 @@ def _answers(trace: Trace, row: Mapping[Any, Any], until: float) -> tuple[list[t
             changes.append((float(t), _ANSWERS[decision]))
     if len(decided):
         return changes, float(decided["t_s"].iloc[-1])
-    carried_out = trace.t[(trace.column(f"{robot}.accepted") > 0) & (trace.t > issued) & (trace.t <= until)]
+    carried_out = trace.t[trace.executing(row["robot"]) == row["number"]]
     if not len(carried_out):
         return changes, issued
     return [*changes, (float(carried_out[0]), "accepted")], float(carried_out[-1])

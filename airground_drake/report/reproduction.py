@@ -74,7 +74,7 @@ def grows_past_threshold(trace: Trace, robot: str) -> list[float]:
     if not above.size or _times(trace, robot, "release"):
         return [0.0]
     moving = np.flatnonzero((np.diff(trace.reference(robot), axis=0) != 0.0).any(axis=1))
-    reference_end = int(moving[-1]) + 1 if moving.size else len(x) - 1
+    reference_end = trace.sample_rows[moving[-1] + 1] if moving.size else len(x) - 1
     return [float(x[-1] > zeta and x[reference_end] > x[above[0]])]
 
 
@@ -95,7 +95,7 @@ def grows_until_acceptance(trace: Trace, robot: str) -> list[float]:
 @measure
 def path_shifts(trace: Trace, robot: str) -> list[float]:
     """1 if the robot's path leaves a straight line by SHIFTED_M while interventions are executed; empty without any."""
-    executed = np.flatnonzero(np.any([trace.column(f"{ugv}.accepted") > 0.0 for ugv in trace.ugvs], axis=0))
+    executed = np.flatnonzero(np.any([trace.executing(ugv) >= 0 for ugv in trace.ugvs], axis=0))
     if not executed.size:
         return []
     path = trace.position(robot)[max(executed[0] - 1, 0) : executed[-1] + 1, :2]
@@ -167,7 +167,7 @@ def refusal_time(trace: Trace, robot: str) -> list[float]:
 @measure
 def execution_time(trace: Trace, robot: str) -> list[float]:
     """Time at which an intervention is first executed, s."""
-    rows = np.flatnonzero(trace.column(f"{robot}.accepted") > 0.0)
+    rows = np.flatnonzero(trace.executing(robot) >= 0)
     return [float(trace.t[max(rows[0] - 1, 0)])] if len(rows) else []
 
 

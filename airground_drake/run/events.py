@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -17,13 +16,8 @@ from airground_drake.world.shape import Shape
 from airground_drake.world.world import ROBOTS, Body
 
 
-def extract(trace: Trace, sent: Iterable[tuple[str, float, str]]) -> list[dict[str, Any]]:
-    """All events of a run in the order of time, from its signals and decisions.
-
-    Args:
-        trace: the run.
-        sent: proposals as (robot, time of issue in s, policy).
-    """
+def extract(trace: Trace) -> list[dict[str, Any]]:
+    """All events of a run in the order of time, from its states, proposals and decisions."""
     t, order = trace.t, {robot: k for k, robot in enumerate(trace.robots)}
     found: list[dict[str, Any]] = []
 
@@ -36,7 +30,8 @@ def extract(trace: Trace, sent: Iterable[tuple[str, float, str]]) -> list[dict[s
             for when in np.unique(trace.column(f"{ugv}.{name}")):
                 if when >= 0.0:
                     add(when, ugv, kind)
-    for ugv, issued, policy in sent:
+    sent = (trace.proposals[name].tolist() for name in ("robot", "issued_s", "policy"))
+    for ugv, issued, policy in zip(*sent, strict=True):
         add(issued, ugv, "proposal", policy=policy)
     previous: dict[int, str] = {}
     for row in trace.decisions[["t_s", "robot", "policy", "number", "decision", "status"]].to_dict("records"):

@@ -4,18 +4,16 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import cache
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
-import pandas as pd
 from pydrake.common import RandomGenerator
 from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorConfig
 from pydrake.systems.framework import Context, DiagramBuilder, LeafSystem
 from pydrake.systems.primitives import LogVectorOutput, Multiplexer
 
-from airground_drake.base.arrays import Array
 from airground_drake.base.errors import SimulationError, UnknownNameError, described
 from airground_drake.gatekeeper.answer import Decision
 from airground_drake.gatekeeper.outcome import Outlook, outcomes
@@ -23,35 +21,25 @@ from airground_drake.gatekeeper.problem import Horizon, predicted_problem
 from airground_drake.gatekeeper.rollout import View
 from airground_drake.gatekeeper.routes.mixed_integer import MixedIntegerRoute
 from airground_drake.geometry.motion import Motion
-from airground_drake.intervention.database import Fault
 from airground_drake.intervention.policy import Proposal
 from airground_drake.nsbc.avoidance import Avoidance, Composition, Surroundings
 from airground_drake.nsbc.kernels import distances, news_within, within
 from airground_drake.nsbc.law import UgvLaw
+from airground_drake.run import recording
 from airground_drake.run.events import extract
-from airground_drake.run.trace import (
-    DECISION_COLUMNS,
-    PROBLEM_ARRAYS,
-    PROBLEM_SCALARS,
-    PROPOSAL_COLUMNS,
-    SCHEMA,
-    Trace,
-)
+from airground_drake.run.tables import SCHEMA
+from airground_drake.run.trace import Trace
 from airground_drake.scenarios.load import own, resolved, validated
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.systems.components import GatekeepersFactory, make_gatekeepers
 from airground_drake.systems.decision import DecisionVariable
 from airground_drake.systems.diagram import RECORDED, DecisionFactory, Model, build_model
 from airground_drake.systems.lifetime import untie
-from airground_drake.systems.signals import FIELDS, Status
 from airground_drake.world.plant import FirstOrder
 from airground_drake.world.world import Body, World
 
 EVENT_ACCURACY = 1e-6
 """Accuracy of the Context: events are isolated to this, relative to the time scale of 1 s."""
-
-MERGE_S = 1e-9
-"""Rows closer than this are merged, s: periods that are not binary fractions give steps of about 1e-17 s."""
 
 
 class Recorder:
@@ -150,7 +138,7 @@ class Recorder:
         ends = np.cumsum([model.diagram.GetOutputPort(name).size() for name in RECORDED])
         data = dict(zip(RECORDED, np.split(log.data(), ends[:-1]), strict=True))
         t = log.sample_times()
-        keep = _distinct(t, data["team_command"])
+        keep = recording.distinct(t, data["team_command"])
         data = {name: rows[:, keep] for name, rows in data.items()}
         decided: list[Decision] = []
         timings: dict[str, Any] = {"wall_s": wall, "decision_times_s": []}
@@ -158,9 +146,6 @@ class Recorder:
             decided = gatekeeper.decisions(gatekeeper.GetMyContextFromRoot(context))
             timings["decision_times_s"] = list(gatekeeper.decision_times_s)
         memory = model.planner.memory(model.planner.GetMyContextFromRoot(context))
-        rows = [_decision(made, ugvs[made.robot], self._own.gatekeeper.route) for made in decided]
-        decisions = pd.DataFrame(rows, columns=list(DECISION_COLUMNS)).astype(DECISION_COLUMNS)
-        sent = [(ugvs[i], proposal.issued, proposal.policy) for i, proposal in memory.sent]
         meta: dict[str, Any] = {
             "schema": SCHEMA,
             "run": self._name,
@@ -173,24 +158,22 @@ class Recorder:
             "events": [],
             **read_back(model, context),
             "decision_block": "" if (kind := type(model.decision_block)) is DecisionVariable else kind.__qualname__,
-            "faults": _faults(memory.faults),
+            "faults": recording.faults(memory.asked),
         }
-        signals, proposals = _signals(t[keep], data, ugvs, robots), _proposals(ugvs, memory.sent)
-        trace = Trace(meta, signals, decisions, timings, _problems(decided), proposals)
-        meta["events"] = extract(trace, sent)
+        uav, t = model.world.names("uav")[0], t[keep]
+        trace = Trace(
+            meta,
+            states=recording.states(t, data, ugvs, robots),
+            samples=recording.samples(t, self._scenario.control.period_s, data, ugvs, robots),
+            decisions=recording.decisions(decided, ugvs, self._own.gatekeeper.route),
+            timings=timings,
+            problems=recording.problems(decided),
+            proposals=recording.proposals(ugvs, memory.sent),
+            plans=recording.plans(memory.asked, memory.sent, ugvs, uav),
+        )
+        trace = replace(trace, messages=recording.messages(memory, trace, uav))
+        meta["events"] = extract(trace)
         return trace
-
-
-def _faults(faults: Sequence[Fault]) -> list[dict[str, Any]]:
-    """Entries of `Trace.meta["faults"]`; the first fault of each policy has a traceback, if it is known."""
-    told, found = set[str](), []
-    for fault in faults:
-        entry = {"t_s": fault.t, "robot": fault.robot, "policy": fault.policy, "what": fault.what}
-        if fault.traceback and fault.policy not in told:
-            entry["traceback"] = fault.traceback
-            told.add(fault.policy)
-        found.append(entry)
-    return found
 
 
 def read_back(model: Model, root: Context) -> dict[str, Any]:
@@ -198,82 +181,6 @@ def read_back(model: Model, root: Context) -> dict[str, Any]:
     levels = model.trigger.levels(model.trigger.GetMyContextFromRoot(root))
     ran = {each.get_name(): each.parameters(each.GetMyContextFromRoot(root)) for each in model.controllers}
     return {"zeta_m": float(levels.zeta_m), "controllers": ran}
-
-
-def _decision(decision: Decision, robot: str, route: str) -> dict[str, Any]:
-    """A row of `Trace.decisions`."""
-    row: dict[str, Any] = {name: "" if kind == "str" else -1.0 for name, kind in DECISION_COLUMNS.items()}
-    row |= {
-        "t_s": decision.t,
-        "robot": robot,
-        "policy": decision.proposal.policy,
-        "number": decision.proposal.number,
-        "issued_s": decision.proposal.issued,
-        "decision": "accept" if decision.accepted else "refuse",
-        "reason": decision.reason,
-    }
-    solution = decision.solution
-    if solution is None:
-        row |= {"tries": decision.tries}
-        for choice, outcome in (("refuse", decision.refuse), ("accept", decision.accept)):
-            if outcome is not None:
-                row |= {
-                    f"{choice}_outcome_m2_s": outcome.cost,
-                    f"{choice}_stalls": float(outcome.stalls),
-                    f"{choice}_left_m": outcome.left,
-                }
-        return row
-    return row | {
-        "status": solution.status,
-        "route": route,
-        "first_stage": "accept" if solution.accept_first else "refuse",
-        "relaxed_first_stage": solution.relaxed_first_stage,
-        "objective": solution.objective,
-        "route_bound": solution.route_bound,
-        "gap": solution.gap,
-        "objective_accept": solution.objective_accept,
-        "objective_refuse": solution.objective_refuse,
-        "accept_throughout": decision.throughout[0],
-        "refuse_throughout": decision.throughout[1],
-        "rounding_deviation_s": solution.rounding_deviation,
-        "predicted_clearance_m": solution.clearance,
-    }
-
-
-def _proposals(ugvs: Sequence[str], sent: Sequence[tuple[int, Proposal]]) -> pd.DataFrame:
-    """`Trace.proposals` of the proposals sent, each with the index of its UGV."""
-    rows = [
-        (
-            proposal.number, ugvs[i], proposal.policy, float(proposal.issued), proposal.motion.times.tolist(),
-            proposal.motion.positions.ravel().tolist(),
-            np.asarray(proposal.selection, dtype=np.float64).ravel().tolist(),
-            np.asarray(proposal.mapped, dtype=np.float64).ravel().tolist(),
-            np.broadcast_to(proposal.mapped_radii, len(proposal.mapped)).tolist(), proposal.cause or ugvs[i],
-            [float(ugvs.index(name)) for name in proposal.party],
-        )
-        for i, proposal in sent
-    ]  # fmt: skip
-    return pd.DataFrame(rows, columns=list(PROPOSAL_COLUMNS))
-
-
-def _problems(decided: Sequence[Decision]) -> pd.DataFrame:
-    """`Trace.problems` of the decisions."""
-
-    def flat(array: Array | None) -> list[float]:
-        return [] if array is None else array.ravel().tolist()
-
-    planned = [(r.problem, r.solution) for r in decided if r.problem is not None and r.solution is not None]
-    rows = [
-        (
-            p.dt, p.error_weight, p.slack_weight, p.terminal_weight,
-            *map(flat, (
-                p.initial, p.accept, p.refuse, p.reference, p.centres, p.distances,
-                s.plan, s.positions, s.relaxed, s.rounded, s.normals,
-            )),
-        )
-        for p, s in planned
-    ]  # fmt: skip
-    return pd.DataFrame(rows, columns=[*PROBLEM_SCALARS, *PROBLEM_ARRAYS])
 
 
 @cache
@@ -325,29 +232,3 @@ def simulate(
     if seed is not None:
         scenario = validated(scenario, {"seed": seed})
     return Recorder(scenario, run, decision_block, observers).simulate(watch=watch, speed=speed)
-
-
-def _distinct(t: Array, command: Array) -> npt.NDArray[np.intp]:
-    """Indices of rows (T,) at distinct times, for commands (3 r, T) of r robots.
-
-    Among rows within MERGE_S of each other, the last row that has the command of the first is kept: the command that
-    led there.
-    """
-    cluster = np.concatenate([[0], np.cumsum(np.diff(t) > MERGE_S)])
-    first = np.searchsorted(cluster, cluster)
-    led = (command == command[:, first]).all(axis=0)
-    return np.unique(np.maximum.accumulate(np.where(led, np.arange(len(t)), 0))[np.append(np.diff(cluster) > 0, True)])
-
-
-def _signals(t: Array, data: dict[str, Array], ugvs: tuple[str, ...], robots: tuple[str, ...]) -> pd.DataFrame:
-    columns: dict[str, Array] = {"t_s": t}
-    for i, robot in enumerate(robots):
-        columns |= {f"{robot}.{axis}_m": data["bodies"][3 * i + a] for a, axis in enumerate("xyz")}
-        columns |= {f"{robot}.v{axis}_m_s": data["team_command"][3 * i + a] for a, axis in enumerate("xyz")}
-    for i, ugv in enumerate(ugvs):
-        columns |= {f"{ugv}.ref_{axis}_m": data["reference"][3 * i + a] for a, axis in enumerate("xyz")}
-        columns[f"{ugv}.noise_m"] = data["noise"][i]
-        columns[f"{ugv}.decision_variable_m"] = data["decision_variable"][i]
-        columns |= {f"{ugv}.{name}": data["status"][FIELDS * i + k] for k, name in enumerate(Status.get_fields())}
-        columns[f"{ugv}.accepted"] = data["accepted"][i]
-    return pd.DataFrame(columns)

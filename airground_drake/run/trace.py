@@ -1,25 +1,26 @@
-"""The record of a run: signals, events, gatekeeper decisions; saved and loaded.
+"""The record of a run: what happened and what each component acted on; saved and loaded.
 
-Rows of `signals` are the ends of the simulator's steps: all control periods, and the isolated event times in
-between. A row's command is the velocity that was applied between the previous row and this one, so that
-position[k] = position[k-1] + (t[k] - t[k-1]) * command[k]: between rows every robot moves on a straight line.
-The other held signals (mode, accepted, ...) are likewise those in force just before the row's time, so an event
-at the last row's time may be missing. Noise is linear between rows. Row 0's command means nothing.
+`states` has a row at the end of each of the simulator's steps: all control periods, and the isolated event times in
+between. Its values are true values just before the row's time, so an event at the last row's time may be missing. Rows
+closer than 1e-9 s are merged. Between two rows every first-order robot moves on a straight line, and noise is linear.
 
-Columns (units in the names; one set per robot or UGV):
     t_s
     <robot>.x_m .y_m .z_m                     position, world frame
-    <robot>.vx_m_s .vy_m_s .vz_m_s            command in force up to this row
-    <ugv>.ref_x_m .ref_y_m .ref_z_m           preset trajectory rho_rd(t)
     <ugv>.noise_m                             integrated noise of (15)
     <ugv>.decision_variable_m                 x, input of the trigger: ||rho_rd - rho|| + noise, unless another
                                               block computes it
     <ugv>.mode                                0 supervising, 1 intervening, 2 refractory
     <ugv>.triggers                            number of triggers so far
     <ugv>.triggered_at_s .released_at_s       time of the last trigger and release, -1 before the first
-    <ugv>.accepted                            1 while an intervention is accepted
 
-Rows closer than 1e-9 s are merged.
+`samples` has a row per control sample, at the time of a row of `states`: what each controller acted on, and what it
+chose, which is held until the next sample.
+
+    t_s
+    <robot>.vx_m_s .vy_m_s .vz_m_s            command chosen at this sample
+    <ugv>.ref_x_m .ref_y_m .ref_z_m           preset trajectory rho_rd(t)
+    <ugv>.ref_vx_m_s .ref_vy_m_s .ref_vz_m_s  its velocity
+    <ugv>.executing                           number of the proposal executed from this sample on, -1 without one
 """
 
 from __future__ import annotations
@@ -34,12 +35,24 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
+import numpy.typing as npt
 import pandas as pd
 
 from airground_drake.base import files
 from airground_drake.base.arrays import Array, read_only
 from airground_drake.base.errors import TraceError, one_line
 from airground_drake.run.collisions import first_collisions
+from airground_drake.run.tables import (
+    MESSAGE_COLUMNS,
+    PLAN_COLUMNS,
+    PROBLEM_ARRAYS,
+    PROBLEM_SCALARS,
+    PROPOSAL_COLUMNS,
+    SCHEMA,
+    SEEN_COLUMNS,
+    TABLES,
+    typed,
+)
 from airground_drake.scenarios.recorded import of_run
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.world.motion import SAME_S
@@ -48,69 +61,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 T = TypeVar("T")
-
-SCHEMA = "airground_drake.trace/7"
-
-DECISION_COLUMNS = {
-    "t_s": "float64",
-    "robot": "str",
-    "policy": "str",
-    "number": "int64",
-    "issued_s": "float64",
-    "decision": "str",
-    "reason": "str",
-    "status": "str",
-    "route": "str",
-    "first_stage": "str",
-    "relaxed_first_stage": "float64",
-    "objective": "float64",
-    "route_bound": "float64",
-    "gap": "float64",
-    "objective_accept": "float64",
-    "objective_refuse": "float64",
-    "accept_throughout": "float64",
-    "refuse_throughout": "float64",
-    "rounding_deviation_s": "float64",
-    "predicted_clearance_m": "float64",
-    "refuse_outcome_m2_s": "float64",
-    "accept_outcome_m2_s": "float64",
-    "refuse_stalls": "float64",
-    "accept_stalls": "float64",
-    "refuse_left_m": "float64",
-    "accept_left_m": "float64",
-    "tries": "float64",
-}
-"""Columns of `Trace.decisions`, one row per robot and gatekeeper call; -1 where a number does not apply. `number` is
-that of the proposal in `Trace.proposals`. Columns up to `predicted_clearance_m` belong to decisions by problem (26),
-the others to decisions by outcomes: the outcome of either choice by `gatekeeper.outcome` (cost, 1 if the UGV comes to
-rest short of its goal, way left), and the number of tries since the UGV last rested."""
-
-PROBLEM_SCALARS = ("dt_s", "error_weight_1_m2_s", "slack_weight_1_m2_s", "terminal_weight_s")
-PROBLEM_ARRAYS = (
-    "initial_m", "accept_m_s", "refuse_m_s", "reference_m", "centres_m", "distances_m",
-    "plan", "positions_m", "relaxed", "rounded", "normals",
-)  # fmt: skip
-"""Columns of `Trace.problems` (empty under method (d)): the data of (26) for each row of `decisions`, and the result of
-the route. Arrays are flattened in C order: initial (3), accept, refuse and reference (N x 3), centres and normals
-(N x m x 3), distances (m), plan, relaxed and rounded omega (N), positions of the plan (N x 3). An array that the route
-does not give is empty. The normals are those of the half-planes of `route_bound`."""
-
-PROPOSAL_COLUMNS = (
-    "number", "robot", "policy", "issued_s", "times_s", "positions_m", "selection", "mapped_m", "mapped_radius_m",
-    "cause", "party",
-)  # fmt: skip
-"""Columns of `Trace.proposals`, one row per proposal sent; arrays are flattened in C order:
-- number: identifies the proposal; counts from 0 in the order of sending.
-- robot, policy, issued_s: its UGV, its policy, the time of sending.
-- times_s (M), positions_m (M x 3): vertices of the requested motion.
-- selection (m x 3): J_int of (12)-(14), the directions that the motion concerns.
-- mapped_m (k x 3), mapped_radius_m (k): centres and radii of the obstacles on the UAV's map.
-- cause: the UGV whose trigger led to it: this UGV, or another UGV for which it makes way.
-- party: indices in `ugvs` of all UGVs in the same joint plan; empty if the proposal stands alone."""
-
-
-TABLES = ("signals", "decisions", "problems", "proposals")
-"""Attributes of `Trace` that are tables, each saved as a Parquet file of its name."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -128,21 +78,28 @@ class Trace:
             the class that computes the decision variables, read back from the diagram; empty for that of (15)),
             `faults` (list of errors in policies: `t_s`, `robot`, `policy`, `what`; the first of a policy may have a
             `traceback`).
-        signals: see the module's docstring.
+        states, samples: see the module's docstring.
         decisions: see DECISION_COLUMNS.
         problems: see PROBLEM_ARRAYS.
         proposals: see PROPOSAL_COLUMNS.
+        messages: see MESSAGE_COLUMNS.
+        plans: see PLAN_COLUMNS.
+        seen: see SEEN_COLUMNS.
         timings: what may differ between identical runs: `wall_s`, duration of the run by the clock, and
             `decision_times_s`, CPU time of each row of `decisions`, in order.
     """
 
     meta: dict[str, Any]
-    signals: pd.DataFrame
+    states: pd.DataFrame
+    samples: pd.DataFrame
     decisions: pd.DataFrame
     timings: dict[str, Any] = field(default_factory=dict, compare=False)
     problems: pd.DataFrame = field(default_factory=lambda: pd.DataFrame(columns=[*PROBLEM_SCALARS, *PROBLEM_ARRAYS]))
     proposals: pd.DataFrame = field(default_factory=lambda: pd.DataFrame(columns=list(PROPOSAL_COLUMNS)))
-    _read: dict[str, Array] = field(default_factory=dict, init=False, repr=False, compare=False)
+    messages: pd.DataFrame = field(default_factory=lambda: typed([], MESSAGE_COLUMNS))
+    plans: pd.DataFrame = field(default_factory=lambda: typed([], PLAN_COLUMNS, "sent"))
+    seen: pd.DataFrame = field(default_factory=lambda: typed([], SEEN_COLUMNS))
+    _read: dict[tuple[str, str], Array] = field(default_factory=dict, init=False, repr=False, compare=False)
     _derived: dict[Any, Any] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     @property
@@ -185,20 +142,28 @@ class Trace:
         return self.column("t_s")
 
     def column(self, name: str) -> Array:
-        """One column as float64, (T,), read-only and cached.
+        """One column of `states` as float64, (T,), read-only and cached.
 
         Raises:
             TraceError: if it is missing or not finite.
         """
-        if name in self._read:
-            return self._read[name]
-        if name not in self.signals:
-            raise TraceError(f"run {self.meta.get('run')}: the trace has no column {name!r}")
-        values = self.signals[name].to_numpy(dtype=np.float64, copy=True)
+        return self._column("states", name)
+
+    def sampled(self, name: str) -> Array:
+        """One column of `samples` as float64, (S,), read-only and cached; raises as `column`."""
+        return self._column("samples", name)
+
+    def _column(self, of: str, name: str) -> Array:
+        if (of, name) in self._read:
+            return self._read[of, name]
+        table: pd.DataFrame = getattr(self, of)
+        if name not in table:
+            raise TraceError(f"run {self.meta.get('run')}: the trace has no column {name!r} in its {of}")
+        values = table[name].to_numpy(dtype=np.float64, copy=True)
         if not np.isfinite(values).all():
             raise TraceError(f"run {self.meta.get('run')}: column {name!r} has values that are not finite")
         values.setflags(write=False)
-        self._read[name] = values
+        self._read[of, name] = values
         return values
 
     def derived(self, key: Any, work_out: Callable[[], T]) -> T:
@@ -208,16 +173,14 @@ class Trace:
         found: T = self._derived[key]
         return found
 
-    def vector(self, robot: str, stem: str = "", unit: str = "m") -> Array:
-        """Three columns as (T, 3), read-only: positions by default; stem 'v' and unit 'm_s' for commands, 'ref_'."""
-        columns = (f"{robot}.{stem}{axis}_{unit}" for axis in "xyz")
-        return self.derived(
-            ("vector", robot, stem, unit), lambda: read_only(np.column_stack([self.column(name) for name in columns]))
-        )
+    def _vectors(self, column: Callable[[str], Array], robot: str, stem: str, unit: str) -> Array:
+        """Three columns side by side, (., 3), read-only."""
+        names = [f"{robot}.{stem}{axis}_{unit}" for axis in "xyz"]
+        return self.derived(("vectors", *names), lambda: read_only(np.column_stack([column(name) for name in names])))
 
     def position(self, robot: str) -> Array:
         """Positions, (T, 3), m, world frame."""
-        return self.vector(robot)
+        return self._vectors(self.column, robot, "", "m")
 
     def there_from(self, name: str) -> int:
         """Row from which on a body is there: the first control sample at or after an obstacle's `appears_s`, or row 0.
@@ -231,13 +194,56 @@ class Trace:
         row = int(np.searchsorted(self.t, period * ceil((obstacle.appears_s - SAME_S) / period) - SAME_S))
         return row if row < len(self.t) - 1 else len(self.t)
 
+    @property
+    def sample_rows(self) -> npt.NDArray[np.intp]:
+        """Rows of `states` at the control samples, (S,).
+
+        Raises:
+            TraceError: if a sample is not at the time of a row.
+        """
+        return self.derived("sample rows", self._sample_rows)
+
+    def _sample_rows(self) -> npt.NDArray[np.intp]:
+        samples = self.sampled("t_s")
+        rows = np.searchsorted(self.t, samples)
+        if (rows >= len(self.t)).any() or (self.t[rows] != samples).any():
+            raise TraceError(f"run {self.meta.get('run')}: a control sample is at the time of no row of the states")
+        return rows
+
+    def _held(self, values: Array, before: float) -> Array:
+        """Values chosen at the samples, (S, ...), as in force up to each row, (T, ...); `before` the first sample."""
+        last = np.cumsum(np.bincount(self.sample_rows + 1, minlength=len(self.t) + 1))[: len(self.t)]
+        return np.concatenate([np.full_like(values[:1], before), values])[last]
+
+    def chosen(self, robot: str) -> Array:
+        """Commands chosen at the control samples, (S, 3), m/s."""
+        return self._vectors(self.sampled, robot, "v", "m_s")
+
     def command(self, robot: str) -> Array:
-        """Commands in force up to each row, (T, 3), m/s."""
-        return self.vector(robot, "v", "m_s")
+        """Commands in force up to each row, (T, 3), m/s; 0 at the first."""
+        return self.derived(("command", robot), lambda: read_only(self._held(self.chosen(robot), 0.0)))
+
+    def executing(self, ugv: str) -> Array:
+        """Number of the proposal that a UGV executes up to each row, (T,), -1 without one."""
+        return self.derived(("executing", ugv), lambda: read_only(self._held(self.sampled(f"{ugv}.executing"), -1.0)))
 
     def reference(self, ugv: str) -> Array:
-        """Preset trajectory, (T, 3), m."""
-        return self.vector(ugv, "ref_")
+        """Preset trajectory at the control samples, (S, 3), m."""
+        return self._vectors(self.sampled, ugv, "ref_", "m")
+
+    def reference_rate(self, ugv: str) -> Array:
+        """Velocity of the preset trajectory at the control samples, (S, 3), m/s."""
+        return self._vectors(self.sampled, ugv, "ref_v", "m_s")
+
+    def as_seen(self, by: str, of: str) -> Array:
+        """Where a robot saw a robot at the control samples, (S, 3), m: its true place, unless `seen` says otherwise."""
+        places = self.position(of)[self.sample_rows]
+        mine = self.seen[(self.seen["by"] == by) & (self.seen["of"] == of)]
+        if len(mine):
+            places = places.copy()
+            at = np.searchsorted(self.sampled("t_s"), mine["t_s"])
+            places[at] = mine[["x_m", "y_m", "z_m"]].to_numpy(dtype=np.float64)
+        return places
 
     def rows_before(self, t_s: float) -> int:
         """Number of rows before a time, s; at least one."""
@@ -248,8 +254,8 @@ class Trace:
         return self.rows_before(first_collisions(self.events).get(robot, {"t_s": np.inf})["t_s"])
 
     def to_pandas(self) -> pd.DataFrame:
-        """The signals as a new table: a row per time, the index `t_s`; columns by robot, then by signal."""
-        table = self.signals.set_index("t_s")
+        """The states as a new table: a row per time, the index `t_s`; columns by robot, then by signal."""
+        table = self.states.set_index("t_s")
         parts = [tuple(str(name).split(".", 1)) for name in table]
         table.columns = pd.MultiIndex.from_tuples(parts, names=["robot", "signal"])
         return table
@@ -263,7 +269,7 @@ class Trace:
     def __repr__(self) -> str:
         """Run, scenario, numbers of rows and events in one line."""
         scenario, events = self.meta.get("scenario", {}).get("name"), self.meta.get("events", [])
-        return f"<Trace: run {self.meta.get('run')!r} of {scenario!r}, {len(self.signals)} rows, {len(events)} events>"
+        return f"<Trace: run {self.meta.get('run')!r} of {scenario!r}, {len(self.states)} rows, {len(events)} events>"
 
     def _repr_html_(self) -> str:
         """For notebooks: the line of `repr` and a table of the events."""

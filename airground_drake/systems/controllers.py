@@ -26,7 +26,7 @@ from pydrake.systems.framework import (
 
 from airground_drake.base.arrays import Array, read_only
 from airground_drake.base.errors import PluginError, short
-from airground_drake.intervention.messages import accepted_proposals
+from airground_drake.intervention.messages import NOTHING, accepted_proposals
 from airground_drake.intervention.policy import Proposal
 from airground_drake.nsbc.avoidance import Avoidance
 from airground_drake.nsbc.law import Intervention, UgvLaw
@@ -69,8 +69,8 @@ class UgvController(_Controller):
     Ports (n UGVs, M bodies that move, world frame):
         in  `bodies` (3M) m; `reference` (6n): preset positions m, then velocities m/s;
             `proposals` abstract, n of Proposal or None; `answers` (2n), see `messages`.
-        out `command` (3n) m/s; `accepted` (n), 1 while an intervention is executed; both held. `gains`, the
-            `UgvGains` in force, for the gatekeeper, which predicts the command.
+        out `command` (3n) m/s; `executing` (n), number of the proposal executed, -1 without one; both held.
+            `gains`, the `UgvGains` in force, for the gatekeeper, which predicts the command.
     Parameters: `UgvGains`; by default those of the law.
     Rate: one update per control period, from t = 0.
 
@@ -90,9 +90,9 @@ class UgvController(_Controller):
         self._proposals = self.DeclareAbstractInputPort("proposals", no_proposals(n))
         self._answers = self.DeclareVectorInputPort("answers", 2 * n)
         command = self.DeclareDiscreteState(3 * n)
-        accepted = self.DeclareDiscreteState(n)
+        executing = self.DeclareDiscreteState([NOTHING] * n)
         self.DeclareStateOutputPort("command", command)
-        self.DeclareStateOutputPort("accepted", accepted)
+        self.DeclareStateOutputPort("executing", executing)
         gains = law.avoidance.gain, law.motion_gain, law.intervention_gain
         self._declare_gains(UgvGains, gains, law)
         given = {self._gains_ticket}
@@ -117,7 +117,7 @@ class UgvController(_Controller):
         proposals = accepted_proposals(self._proposals.Eval(context), self._answers.Eval(context))
         velocity = self.velocity(context.get_time(), positions, reference, rate, proposals, self._in_force(context))
         discrete.set_value(0, velocity.ravel())
-        discrete.set_value(1, [float(proposal is not None) for proposal in proposals])
+        discrete.set_value(1, [NOTHING if proposal is None else float(proposal.number) for proposal in proposals])
 
     def velocity(
         self,

@@ -39,7 +39,7 @@ from airground_drake.systems.plant import PLANTS
 from airground_drake.world.world import ROBOTS, Body, World
 
 RECORDED = (
-    "bodies", "team_command", "reference", "noise", "decision_variable", "status", "accepted",
+    "bodies", "team_command", "reference", "noise", "decision_variable", "status", "executing",
 )  # fmt: skip
 """Exported output ports of the diagram: the signals of a trace."""
 
@@ -221,7 +221,7 @@ def _task_planning(
         "reference": reference.get_output_port(),
         "proposals": planner.GetOutputPort("proposals"),
         "ugv_command": ugvs.GetOutputPort("command"),
-        "accepted": ugvs.GetOutputPort("accepted"),
+        "executing": ugvs.GetOutputPort("executing"),
         "gains": ugvs.GetOutputPort("gains"),
         "uav_command": uav.GetOutputPort("command"),
     }

@@ -6,6 +6,7 @@ import abc
 import json
 from dataclasses import dataclass, field
 from html import escape
+from math import ceil
 from typing import Any
 
 import numpy as np
@@ -241,3 +242,7 @@ def require_whole_run(trace: Trace) -> None:
     gap = np.diff(t)
     if gap.max() > period + TIME_TOLERANCE_S:
         raise TraceError(f"the trace has no row in the {gap.max()} s before t = {t[1:][np.argmax(gap)]} s")
+    sampled = trace.t[trace.sample_rows]
+    instants = period * np.arange(ceil((t[-1] - TIME_TOLERANCE_S) / period))
+    if len(sampled) != len(instants) or (np.abs(sampled - instants) > TIME_TOLERANCE_S).any():
+        raise TraceError(f"the trace has {len(sampled)} control samples, not one every {period} s: {len(instants)}")

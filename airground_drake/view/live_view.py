@@ -21,7 +21,7 @@ class LiveView(LeafSystem):
     """Draws a scenario in a Meshcat, and moves its robots there as the simulation goes on.
 
     Input ports (n UGVs, M moving bodies), named like the output ports that they belong to: `bodies` (3M), m;
-    `status` (4n), of the event trigger; `accepted` (n), 1 while an intervention is accepted.
+    `status` (4n), of the event trigger; `executing` (n), see `UgvController`.
 
     It publishes at the ends of the simulator's steps, at most FRAMES_PER_S times per second of simulated time. It adds
     no step, so it does not change the run. `meshcat.StartRecording()` records the motion.
@@ -38,7 +38,7 @@ class LiveView(LeafSystem):
         self._meshcat, self._robots = meshcat, world.select(*ROBOTS)
         self._bodies = declare_bodies(self, world)
         self._status = self.DeclareVectorInputPort("status", FIELDS * n)
-        self._accepted = self.DeclareVectorInputPort("accepted", n)
+        self._executing = self.DeclareVectorInputPort("executing", n)
         self._shown_s = -math.inf
         self.DeclareInitializationPublishEvent(weakly(self._begin))
         self.DeclarePerStepPublishEvent(weakly(self._publish))
@@ -55,11 +55,11 @@ class LiveView(LeafSystem):
             return
         self._shown_s = t
         positions = self._bodies.Eval(context).reshape(-1, 3)
-        modes, accepted = self._status.Eval(context)[::FIELDS], self._accepted.Eval(context)
+        modes, executing = self._status.Eval(context)[::FIELDS], self._executing.Eval(context)
         for k, position in enumerate(positions[self._robots]):
             self._meshcat.SetTransform(robot_path(k), RigidTransform(position), t)
         for k, above in enumerate(positions[self._uavs], start=self._uavs.start):
             self._meshcat.SetTransform(shadow_path(k), RigidTransform(above * [1.0, 1.0, 0.0]), t)
-        for k, state in enumerate(states_of(accepted, modes)):
+        for k, state in enumerate(states_of(executing, modes)):
             for each in range(len(STATES)):
                 self._meshcat.SetProperty(state_path(k, each), "visible", bool(each == state), t)

@@ -102,12 +102,12 @@ def safe_m(scenario: Scenario, obstacle: Obstacle) -> float:
 def states(trace: Trace, ugv: str, times: Array) -> npt.NDArray[np.intp]:
     """Indices of STATES (F,) in force just before times (F,), s."""
     rows = np.minimum(np.searchsorted(trace.t, times - 1e-9), len(trace.t) - 1)
-    return states_of(trace.column(f"{ugv}.accepted")[rows], trace.column(f"{ugv}.mode")[rows])
+    return states_of(trace.executing(ugv)[rows], trace.column(f"{ugv}.mode")[rows])
 
 
-def states_of(accepted: Array, mode: Array) -> npt.NDArray[np.intp]:
-    """Indices of STATES, from `accepted`, 1 while a proposal is executed, and the trigger's mode, of equal shapes."""
-    return np.where(accepted > 0, INTERVENED, np.where(mode == Mode.INTERVENING, TRIGGERED, OWN))
+def states_of(executing: Array, mode: Array) -> npt.NDArray[np.intp]:
+    """Indices of STATES, from numbers of the proposals executed (-1: none) and the trigger's modes, of equal shapes."""
+    return np.where(executing >= 0, INTERVENED, np.where(mode == Mode.INTERVENING, TRIGGERED, OWN))
 
 
 def _bounds(scenario: Scenario, visited_m: Array) -> tuple[Array, Array]:

@@ -78,5 +78,5 @@ def test_triggers_never_pile_up_whatever_the_noise():
 def test_our_claim_can_fail(airground_trace):
     """A check that cannot fail is a defect."""
     trace = airground_trace(DEPOT, "d")
-    elsewhere = replace(trace, signals=trace.signals.assign(**{"cart2.y_m": trace.column("cart2.y_m") + 1.0}))
+    elsewhere = replace(trace, states=trace.states.assign(**{"cart2.y_m": trace.column("cart2.y_m") + 1.0}))
     assert Lane().check(elsewhere).status == "refuted"

@@ -10,16 +10,24 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from airground_drake.run.trace import PROBLEM_ARRAYS, PROBLEM_SCALARS, Trace
+from airground_drake.run.tables import PROBLEM_ARRAYS, PROBLEM_SCALARS
+from airground_drake.run.trace import Trace
 from builders.layout import decision_table
 from builders.scenarios import changed
 
 
-def with_signals(trace: Trace, edit: Callable[[pd.DataFrame], pd.DataFrame | None]) -> Trace:
-    """A copy whose signals were edited, in place or by returning new ones."""
-    signals = trace.signals.copy()
-    edited = edit(signals)
-    return replace(trace, signals=signals if edited is None else edited)
+def with_states(trace: Trace, edit: Callable[[pd.DataFrame], pd.DataFrame | None]) -> Trace:
+    """A copy whose states were edited, in place or by returning new ones."""
+    states = trace.states.copy()
+    edited = edit(states)
+    return replace(trace, states=states if edited is None else edited)
+
+
+def with_samples(trace: Trace, edit: Callable[[pd.DataFrame], pd.DataFrame | None]) -> Trace:
+    """A copy whose samples were edited, in place or by returning new ones."""
+    samples = trace.samples.copy()
+    edited = edit(samples)
+    return replace(trace, samples=samples if edited is None else edited)
 
 
 def with_meta(trace: Trace, **changes: Any) -> Trace:
@@ -38,39 +46,61 @@ def with_events(trace: Trace, change: Callable[[list[dict[str, Any]]], list[dict
 
 
 def moved(trace: Trace, robot: str, row: int, offset: list[float]) -> Trace:
-    """A copy in which a robot is elsewhere at one row, with commands that lead there and back."""
+    """A copy in which a robot is elsewhere at one row, with commands that lead there and back.
 
-    def edit(signals: pd.DataFrame) -> None:
-        dt = np.diff(signals["t_s"].to_numpy())
-        for axis, delta in zip("xyz", offset, strict=True):
-            signals.loc[row, f"{robot}.{axis}_m"] += delta
-            signals.loc[row, f"{robot}.v{axis}_m_s"] += delta / dt[row - 1]
-            if row + 1 < len(signals):
-                signals.loc[row + 1, f"{robot}.v{axis}_m_s"] -= delta / dt[row]
+    Where an event divides a control period, the commands lead to the nearest row that a control sample follows.
+    """
+    t, offsets = trace.t, dict(zip("xyz", offset, strict=True))
+    ends = np.append(trace.sample_rows, len(t) - 1)
+    k = int(np.searchsorted(ends, row))  # the period before ends[k] leads there, the next one back
+    before, after = ends[k - 1], ends[min(k + 1, len(ends) - 1)]
+    nodes = [before, ends[k], after] if after > ends[k] else [before, ends[k]]
+    reached = np.interp(t, t[nodes], [0.0, 1.0, 0.0][: len(nodes)], left=0.0)
 
-    return with_signals(trace, edit)
+    def elsewhere(states: pd.DataFrame) -> None:
+        for axis, delta in offsets.items():
+            states[f"{robot}.{axis}_m"] += delta * reached
+
+    def commanded(samples: pd.DataFrame) -> None:
+        for axis, delta in offsets.items():
+            samples.loc[k - 1, f"{robot}.v{axis}_m_s"] += delta / (t[ends[k]] - t[before])
+            if after > ends[k]:
+                samples.loc[k, f"{robot}.v{axis}_m_s"] -= delta / (t[after] - t[ends[k]])
+
+    return with_samples(with_states(trace, elsewhere), commanded)
 
 
 def set_nan(column: str) -> Callable[[Trace], Trace]:
-    def edit(signals: pd.DataFrame) -> None:
-        signals.loc[300, column] = np.nan
+    def edit(table: pd.DataFrame) -> None:
+        table.loc[300, column] = np.nan
 
-    return lambda trace: with_signals(trace, edit)
+    return lambda trace: _with_column(trace, column, edit)
 
 
 def dropped(column: str) -> Callable[[Trace], Trace]:
-    return lambda trace: with_signals(trace, lambda signals: signals.drop(columns=column))
+    return lambda trace: _with_column(trace, column, lambda table: table.drop(columns=column))
 
 
 def bumped(column: str, by: float, row: int = 500) -> Callable[[Trace], Trace]:
-    def edit(signals: pd.DataFrame) -> None:
-        signals[column] += by * (signals.index == row)
+    def edit(table: pd.DataFrame) -> None:
+        table[column] += by * (table.index == row)
 
-    return lambda trace: with_signals(trace, edit)
+    return lambda trace: _with_column(trace, column, edit)
+
+
+def _with_column(trace: Trace, column: str, edit: Callable[[pd.DataFrame], pd.DataFrame | None]) -> Trace:
+    return with_samples(trace, edit) if column in trace.samples else with_states(trace, edit)
 
 
 def rows(keep: Callable[[pd.DataFrame], pd.DataFrame]) -> Callable[[Trace], Trace]:
-    return lambda trace: with_signals(trace, lambda signals: keep(signals).reset_index(drop=True))
+    """An edit that keeps some rows of the states, and the control samples at these."""
+
+    def edit(trace: Trace) -> Trace:
+        states = keep(trace.states).reset_index(drop=True)
+        samples = trace.samples[trace.samples["t_s"].isin(states["t_s"][:-1])].reset_index(drop=True)
+        return replace(trace, states=states, samples=samples)
+
+    return edit
 
 
 def first_of(events: list[dict[str, Any]], kind: str) -> dict[str, Any]:

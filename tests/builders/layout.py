@@ -12,11 +12,13 @@ import numpy as np
 import pandas as pd
 
 from airground_drake.base.arrays import Array
-from airground_drake.run.trace import DECISION_COLUMNS, SCHEMA, Trace
+from airground_drake.run.recording import sample_rows
+from airground_drake.run.tables import DECISION_COLUMNS, DECISION_LISTS, SCHEMA, typed
+from airground_drake.run.trace import Trace
 from airground_drake.verify.runs.demands import demanded
 
-HELD = ("noise_m", "decision_variable_m", "mode", "triggers", "triggered_at_s", "released_at_s", "accepted")
-"""Columns of a UGV after its reference."""
+HELD = ("noise_m", "decision_variable_m", "mode", "triggers", "triggered_at_s", "released_at_s")
+"""Columns of a UGV after its position."""
 
 
 def laid_out(
@@ -38,19 +40,24 @@ def laid_out(
         t: times of the rows, (T,), s.
         position: of all robots, UAV last, (T, n + 1, 3), m.
         velocity: held up to a row, (T, n + 1, 3), m/s.
-        held: of the UGVs, by column, (T, n); 0, or -1 for a time, where a column is left out.
+        held: of the UGVs, by column, (T, n), and `executing`; 0, or -1 for a time, where a column is left out.
         events: in any order.
         decisions: what is known of each.
         timings: as measured.
     """
     ugvs = list(scenario["ugvs"])
     robots = [*ugvs, scenario["uav"]["name"]]
-    columns = {"t_s": t}
-    for name, values in (("{}_m", position), ("v{}_m_s", velocity)):
-        columns |= {f"{r}.{name.format(a)}": values[:, i, k] for i, r in enumerate(robots) for k, a in enumerate("xyz")}
+    at = sample_rows(t, scenario["control"]["period_s"]) if len(t) > 1 else np.zeros(0, dtype=np.intp)
+    columns, sampled = {"t_s": t}, {"t_s": t[at]}
+    for i, robot in enumerate(robots):
+        columns |= {f"{robot}.{axis}_m": position[:, i, k] for k, axis in enumerate("xyz")}
+        sampled |= {f"{robot}.v{axis}_m_s": velocity[at + 1, i, k] for k, axis in enumerate("xyz")}
     for i, ugv in enumerate(ugvs):
-        reference = np.array([reference_at(scenario["ugvs"][ugv]["preset"], time) for time in t])
-        columns |= {f"{ugv}.ref_{axis}_m": reference[:, k] for k, axis in enumerate("xyz")}
+        preset = scenario["ugvs"][ugv]["preset"]
+        reference, soon = (np.array([reference_at(preset, s) for s in t[at] + d]).reshape(-1, 3) for d in (0.0, 1e-6))
+        sampled |= {f"{ugv}.ref_{axis}_m": reference[:, k] for k, axis in enumerate("xyz")}
+        sampled |= {f"{ugv}.ref_v{axis}_m_s": (soon - reference)[:, k] / 1e-6 for k, axis in enumerate("xyz")}
+        sampled[f"{ugv}.executing"] = held["executing"][at + 1, i] if "executing" in held else np.full(len(at), -1.0)
         for name in HELD:
             left_out = np.full(len(t), -1.0 if name.endswith("_at_s") else 0.0)
             columns[f"{ugv}.{name}"] = held[name][:, i] if name in held else left_out
@@ -58,7 +65,8 @@ def laid_out(
     meta = {"schema": SCHEMA, "run": run, "method": of_run["method"], "composition": of_run["composition"], "seed": 0}
     meta |= {"robots": robots, "ugvs": ugvs, "zeta_m": scenario["decision"]["threshold"]["zeta_m"], "faults": []}
     meta |= {"scenario": scenario, "events": sorted(events, key=lambda event: float(event["t_s"]))}
-    return rebuilt(Trace(meta, pd.DataFrame(columns), decision_table(decisions), timings or {}))
+    tables = pd.DataFrame(columns), pd.DataFrame(sampled), decision_table(decisions)
+    return rebuilt(Trace(meta, *tables, timings or {}))
 
 
 def rebuilt(trace: Trace) -> Trace:
@@ -75,8 +83,9 @@ def as_read_back(parameters: dict[str, Any]) -> dict[str, Any]:
 
 def decision_table(decisions: Sequence[dict[str, Any]]) -> pd.DataFrame:
     """Recorded decisions; what is left out is empty, or -1."""
-    empty = {name: "" if kind == "str" else -1.0 for name, kind in DECISION_COLUMNS.items()}
-    return pd.DataFrame([empty | each for each in decisions], columns=list(DECISION_COLUMNS)).astype(DECISION_COLUMNS)
+    empty: dict[str, Any] = {name: "" if kind == "str" else -1.0 for name, kind in DECISION_COLUMNS.items()}
+    empty |= {name: [] for name in DECISION_LISTS}
+    return typed([empty | each for each in decisions], DECISION_COLUMNS, *DECISION_LISTS)
 
 
 def reference_at(preset: dict[str, Any], t: float) -> list[float]:

@@ -53,5 +53,5 @@ def along(
     if x is not None:
         variable[:, 0] = np.interp(t, list(x), list(x.values()))
     intervening = np.repeat(((t > intervention_s[0]) & (t < intervention_s[1]))[:, None].astype(float), len(presets), 1)
-    held = {"decision_variable_m": variable, "mode": intervening, "accepted": intervening}
+    held = {"decision_variable_m": variable, "mode": intervening, "executing": intervening - 1.0}
     return laid_out(scenario, run, t, position, velocity, held, events, decisions, timings)

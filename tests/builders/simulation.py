@@ -145,12 +145,12 @@ class _Simulation:
 
     def record(self, t: float) -> None:
         x = [self.x(i, self.position[i], self.noise[i], t) for i in range(self.n)]
-        held = np.column_stack([self.noise, x, self.status, self.accepted])
+        held = np.column_stack([self.noise, x, self.status, self.accepted - 1.0])
         self.rows.append((t, self.position, self.command, held))
 
     def finish(self) -> Trace:
         t, position, velocity, held = (np.array(values) for values in zip(*self.rows, strict=True))
         times = [] if not self.decisions else (0.002 + 0.001 * self.rng.random(len(self.decisions))).tolist()
-        columns = {name: held[:, :, k] for k, name in enumerate(HELD)}
+        columns = {name: held[:, :, k] for k, name in enumerate([*HELD, "executing"])}
         timings = {"decision_times_s": times}
         return laid_out(self.scenario, self.run, t, position, velocity, columns, self.events, self.decisions, timings)

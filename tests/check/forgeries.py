@@ -258,7 +258,7 @@ RULES: dict[str, tuple[str, Edit]] = {
     "digest left out": (
         "files of the trace", meta("files", value=lambda old: {name: old[name] for name in [*old][1:]}),
     ),
-    "table with other bytes": ("SHA-256 of a table", meta("files", "signals.parquet", value="0" * 64)),
+    "table with other bytes": ("SHA-256 of a table", meta("files", "states.parquet", value="0" * 64)),
     "column added": ("columns of a table", rows(lambda frame: frame.assign(true_x_m=0.0))),
     "column added to decisions": ("columns of a table", rows(lambda frame: frame.assign(by="me"), "decisions")),
     **{
@@ -526,7 +526,7 @@ def signals(change: Callable[[pa.Table], pa.Table]) -> Edit:
     def edit(folder: Path) -> None:
         table, buffer = pa.Table.from_pandas(read_table(folder)), io.BytesIO()
         pq.write_table(change(table), buffer)
-        write(trace(folder) / "signals.parquet", buffer.getvalue())
+        write(trace(folder) / "states.parquet", buffer.getvalue())
         seal(folder)
 
     return edit
@@ -540,7 +540,7 @@ def times(values: list[Any], kind: pa.DataType | None = None) -> Edit:
 STONE = {"position_m": [0.0, 0.0, 0.0], "radius_m": 0.0, "known_to_uav": True}
 HOSTILE: dict[str, tuple[str, Edit]] = {
     "fifo added": ("regular files", special("trace/pipe", os.mkfifo)),
-    "signals are a fifo": ("regular files", special("trace/d/signals.parquet", os.mkfifo)),
+    "signals are a fifo": ("regular files", special("trace/d/states.parquet", os.mkfifo)),
     "page is a device": ("regular files", special("report.html", lambda path: path.symlink_to("/dev/zero"))),
     "folder leads to itself": ("regular files", special("trace/more", lambda path: path.symlink_to(path.parent))),
     "report is a fifo": ("the file can be read", special("report.json", os.mkfifo)),
@@ -583,7 +583,7 @@ HOSTILE: dict[str, tuple[str, Edit]] = {
             ("gatekeeper", "stages", 10**9),
         )
     },
-    "table cut off": ("the file is a table", raw("trace/d/signals.parquet", lambda content: content[:-100])),
+    "table cut off": ("the file is a table", raw("trace/d/states.parquet", lambda content: content[:-100])),
     "times are texts": ("the files are well formed", times(["x"])),
     "times are lists": ("the files are well formed", times([[0.0]])),
     "times are structures": ("the file is a table", times([{"a": {"b": 1}}])),

@@ -21,7 +21,7 @@ from airground_drake import check
 pytestmark = pytest.mark.slow
 
 FILES = (
-    "report.json", "trace/d/meta.json", "trace/c/meta.json", "trace/d/timings.json", "trace/d/signals.parquet",
+    "report.json", "trace/d/meta.json", "trace/c/meta.json", "trace/d/timings.json", "trace/d/states.parquet",
     "trace/d/decisions.parquet", "trace/c/problems.parquet", "trace/d/proposals.parquet", "report.html",
 )  # fmt: skip
 VALUES: tuple[Any, ...] = (

@@ -86,7 +86,7 @@ def test_a_report_json(kind: str, honest: Path, hostile: Path, airground: Airgro
 
 @pytest.mark.parametrize(
     ("name", "kind"),
-    [("meta.json", "pipe"), ("timings.json", "device"), *(("signals.parquet", kind) for kind in FILES)],
+    [("meta.json", "pipe"), ("timings.json", "device"), *(("states.parquet", kind) for kind in FILES)],
 )
 def test_a_file_of_a_trace(name: str, kind: str, honest: Path, hostile: Path, airground: Airground) -> None:
     run, page = hostile / "trace" / "c", hostile.parent / "changes.html"
@@ -116,7 +116,7 @@ def test_a_table_that_is_small_until_it_is_read(
 def test_a_trace_is_of_its_own_files(hostile: Path, airground: Airground) -> None:
     path = hostile / "trace" / "c" / "meta.json"
     path.write_text(json.dumps(json.loads(path.read_text()) | {"files": {"/dev/zero": ""}}))
-    assert "signals.parquet" in airground("verify", path.parent, "SAFE-TRACE", code=2)
+    assert "states.parquet" in airground("verify", path.parent, "SAFE-TRACE", code=2)
 
 
 @pytest.mark.parametrize("kind", FILES)

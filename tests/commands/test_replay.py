@@ -49,7 +49,7 @@ def test_a_video(folder: Path, tmp_path: Path, airground: Airground) -> None:
 
 
 def test_a_report_without_runs_and_a_changed_trace_are_refused(folder: Path, airground: Airground) -> None:
-    (folder / "trace" / "d" / "signals.parquet").write_bytes(b"else")
+    (folder / "trace" / "d" / "states.parquet").write_bytes(b"else")
     assert "SHA-256" in airground("replay", folder, "d", "-o", folder.parent, code=2)
     shutil.rmtree(folder / "trace")
     assert "has no runs to replay" in airground("replay", folder, "-o", folder.parent, code=2)

@@ -44,9 +44,9 @@ def test_case_a_keeps_its_distances_and_obeys_the_law(name: str, run: Simulation
 
 def moved(of: Trace, row: int, place: Array) -> Trace:
     """The run with UGV1 at another place in one row."""
-    signals = of.signals.copy()
-    signals.loc[row, [f"{UGV}.{axis}_m" for axis in "xyz"]] = place
-    return replace(of, signals=signals)
+    table = of.states.copy()
+    table.loc[row, [f"{UGV}.{axis}_m" for axis in "xyz"]] = place
+    return replace(of, states=table)
 
 
 def near_the_rock(of: Trace) -> tuple[int, Array, Array]:
@@ -104,7 +104,7 @@ def test_every_pair_that_comes_too_near_is_named_with_its_distance_and_time(run:
 
 def short(of: Trace, rows: int = 5) -> Trace:
     """Its first rows."""
-    return replace(of, signals=of.signals.iloc[:rows].reset_index(drop=True))
+    return replace(of, states=of.states.iloc[:rows].reset_index(drop=True))
 
 
 @pytest.mark.slow
@@ -121,11 +121,11 @@ def test_names_that_mean_something_in_coq_are_replaced(run: Simulations, worksho
     few = short(run("case_a", "d"))
     names = {"ugv1": "norm", "ugv2": "ugv1_and_uav", "obstacle_2": "forall", "obstacle_3": "Type"}
     meta = json.dumps(few.meta, ensure_ascii=False)
-    signals = few.signals
+    table = few.states
     for old, new in names.items():
         meta = meta.replace(f'"{old}"', f'"{new}"')
-        signals = signals.rename(columns=lambda name, old=old, new=new: name.replace(f"{old}.", f"{new}."))
-    distances, law, _ = prove(workshop, replace(few, meta=json.loads(meta), signals=signals))
+        table = table.rename(columns=lambda name, old=old, new=new: name.replace(f"{old}.", f"{new}."))
+    distances, law, _ = prove(workshop, replace(few, meta=json.loads(meta), states=table))
     assert distances.proved, distances.why
     assert law.proved, law.why
 
@@ -229,7 +229,7 @@ def test_what_cannot_be_proved_for_want_of_coq_or_of_files_is_said(
         said = capsys.readouterr().err
         assert said.count("\n") == 1
         assert re.search(why, said), said
-    (report / "trace" / "d" / "signals.parquet").write_bytes(b"")
+    (report / "trace" / "d" / "states.parquet").write_bytes(b"")
     assert main(["prove", str(report)]) == 2
     assert "SHA-256" in capsys.readouterr().err
     monkeypatch.setenv("PATH", str(tmp_path))

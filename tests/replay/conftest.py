@@ -11,7 +11,8 @@ from report.cases import GOING_ROUND, SUCCESS, make_scenario, make_trace
 
 from airground_drake.replay import scene as scenes
 from airground_drake.replay.scene import Scene
-from airground_drake.run.trace import DECISION_COLUMNS, PROPOSAL_COLUMNS, Trace
+from airground_drake.run.tables import DECISION_COLUMNS, PROPOSAL_COLUMNS
+from airground_drake.run.trace import Trace
 from airground_drake.scenarios.schema import Scenario
 
 
@@ -24,8 +25,10 @@ def with_proposals(trace: Trace, issued: list[float], decisions: list[tuple[floa
         {"t_s": t, "robot": "ugv1", "number": issued.index(at), "issued_s": at, "decision": what}
         for t, at, what in decisions
     ]
+    latest = pd.Series(np.searchsorted(issued, trace.samples["t_s"]) - 1.0)  # -1 before the first
     return replace(
         trace,
+        samples=trace.samples.assign(**{"ugv1.executing": latest.where(trace.samples["ugv1.executing"] >= 0, -1.0)}),
         proposals=pd.DataFrame(rows, columns=list(PROPOSAL_COLUMNS)),
         decisions=pd.DataFrame(found, columns=list(DECISION_COLUMNS)),
     )

@@ -36,7 +36,7 @@ def test_states(scene: Scene, trace: Trace, scenario: Scenario) -> None:
     by_time = dict(zip(scene.times_s.round(3), scene.robots[0].states, strict=True))
     assert [by_time[t] for t in (14.0, 15.0, 18.0)] == [OWN, INTERVENED, OWN]
     assert not scene.robots[-1].states.any()
-    alone = replace(trace, signals=trace.signals.assign(**{"ugv1.accepted": 0.0}))
+    alone = replace(trace, samples=trace.samples.assign(**{"ugv1.executing": -1.0}))
     assert {*scenes.scene(alone, scenario).robots[0].states} == {OWN, TRIGGERED}
 
 
@@ -60,7 +60,7 @@ def test_bodies_are_drawn_as_large_as_they_are(trace: Trace) -> None:
 
 def test_points_that_keep_their_safe_distance_are_drawn_apart(trace: Trace, scenario: Scenario) -> None:
     """Also in a scene so large that a point is small in it."""
-    far = replace(trace, signals=trace.signals.assign(**{"uav.x_m": trace.signals["uav.x_m"] + 120.0}))
+    far = replace(trace, states=trace.states.assign(**{"uav.x_m": trace.states["uav.x_m"] + 120.0}))
     made = scenes.scene(far, scenario)
     assert (made.high_m - made.low_m).max() > 100.0
     radii = [body.radius_m for body in (*made.robots, *made.obstacles)]

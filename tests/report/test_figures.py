@@ -100,7 +100,7 @@ def test_every_figure_is_drawn_of_equal_empty_single_and_huge_data(
     }
     if x_m is not None:
         values = {f"{name}.decision_variable_m": x_m * (1.0 + 2.0**-52 * (k % 2)) for k, name in enumerate(names)}
-        traces = {name: replace(trace, signals=trace.signals.assign(**values)) for name, trace in traces.items()}
+        traces = {name: replace(trace, states=trace.states.assign(**values)) for name, trace in traces.items()}
     figures = [*draw.draw(own, traces), overlay.draw("a", 0, *traces.values())]
     texts = [panel.svg for figure in figures for panel in figure.panels]
     texts.append(thumbnail.draw(traces["a"], "p"))

@@ -47,7 +47,7 @@ def test_new_empty_and_own_folders_are_taken(holds: dict[str, str], tmp_path: Pa
         ({"thesis.tex": ""}, "and no report"),
         ({"report.json": '{"schema": "other.report/1"}', "x": ""}, "and no report"),
         ({"diagram.svg": "", "x\n\u202e": ""}, "and no report"),
-        ({"trace/d/signals.parquet": "", "trace/d/notes.txt": "mine"}, "and no report"),
+        ({"trace/d/states.parquet": "", "trace/d/notes.txt": "mine"}, "and no report"),
         ({"proofs/notes.txt": "mine"}, "and no report"),
         ({"report.json": OURS, "trace": ""}, "in the way"),
         ({"report.json": OURS, "diagram.svg/x": ""}, "in the way"),
@@ -70,7 +70,7 @@ def test_a_link_to_a_folder_elsewhere_is_in_the_way(tmp_path: Path) -> None:
 
 def test_nothing_stays_of_an_old_report_and_everything_else_does(tmp_path: Path) -> None:
     old = (
-        "report.html", "report.json", "junit.xml", "diagram.svg", "trace/d/meta.json", "trace/killed/signals.parquet",
+        "report.html", "report.json", "junit.xml", "diagram.svg", "trace/d/meta.json", "trace/killed/states.parquet",
         "proofs/proofs.json", "proofs/run_d.v",
     )  # fmt: skip
     mine = {"notes.txt": "a", "trace/d/notes.txt": "b", "certificates/ssl/key.pem": "c", "report.html.bak": "d"}

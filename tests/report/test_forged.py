@@ -29,8 +29,8 @@ def forge(part: str, folder: Path) -> None:
         for name in ("ugv1", "trigger", "c"):
             text = text.replace(json.dumps(name), json.dumps(HOSTILE))
         meta[key] = json.loads(text)
-    columns = {name: name.replace("ugv1.", f"{HOSTILE}.") for name in made.signals if part == "robots"}
-    trace.save(replace(made, meta=meta, signals=made.signals.rename(columns=columns)), folder / "trace" / "c")
+    columns = {name: name.replace("ugv1.", f"{HOSTILE}.") for name in made.states if part == "robots"}
+    trace.save(replace(made, meta=meta, states=made.states.rename(columns=columns)), folder / "trace" / "c")
     (folder / "report.json").write_text(json.dumps(built(scenario, make_traces(scenario), FINE)))
 
 

@@ -41,7 +41,7 @@ def test_runs_keep_to_the_estimate(name: str, run_name: str, run: Callable[[str,
     assert asked.rows - 1.5 <= len(trace.t) <= EVENTS * asked.rows
     assert asked.steps == (len(trace.ugvs) + 1) * asked.rows
     assert len(trace.decisions) <= asked.decisions
-    tables = sum(int(table.memory_usage(deep=True).sum()) for table in (trace.signals, trace.decisions, trace.problems))
+    tables = sum(int(table.memory_usage(deep=True).sum()) for table in (trace.states, trace.decisions, trace.problems))
     assert PROGRAM + tables <= asked.memory
 
 

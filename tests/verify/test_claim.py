@@ -43,10 +43,10 @@ BROKEN: dict[str, Callable[[Trace], Trace]] = {
     "NaN in a position": set_nan("ugv1.x_m"),
     "no column of commands": dropped("ugv2.vy_m_s"),
     "one position altered": bumped("uav.z_m", 1e-8),
-    "truncated at the end": rows(lambda signals: signals.iloc[:-1]),
-    "truncated at the start": rows(lambda signals: signals.iloc[1:]),
-    "time runs backwards": rows(lambda signals: signals.iloc[[0, 2, 1, *range(3, len(signals))]]),
-    "no rows": rows(lambda signals: signals.iloc[:0]),
+    "truncated at the end": rows(lambda states: states.iloc[:-1]),
+    "truncated at the start": rows(lambda states: states.iloc[1:]),
+    "time runs backwards": rows(lambda states: states.iloc[[0, 2, 1, *range(3, len(states))]]),
+    "no rows": rows(lambda states: states.iloc[:0]),
     "a robot left out": lambda trace: with_meta(trace, robots=["ugv1", "uav"], ugvs=["ugv1"]),
     "no scenario": lambda trace: with_meta(trace, scenario={}),
     "another run": lambda trace: with_meta(trace, run="none"),
@@ -84,6 +84,6 @@ def test_a_check_that_fails_is_an_error(returned: Any, error: str) -> None:
 
 
 def test_half_a_run_can_refute_but_not_pass() -> None:
-    cut = rows(lambda signals: signals[signals["t_s"] < 0.8])
+    cut = rows(lambda states: states[states["t_s"] < 0.8])
     assert judge("SAFE-TRACE", cut(passing_by(-1e-3))).status == "refuted"
     assert judge("SAFE-TRACE", cut(passing_by(+1e-3))).status == "error"

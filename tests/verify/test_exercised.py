@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from builders.edits import with_meta, with_signals
+from builders.edits import with_meta, with_samples
 from verify.judging import CLAIMS, judge
 
 from airground_drake.base.statuses import NOTHING, declared, meets, outcome
@@ -65,7 +65,7 @@ def without_messages(trace: Trace) -> Trace:
     """The same triggers, but the UAV has sent nothing."""
     tables = {name: getattr(trace, name).iloc[:0] for name in ("decisions", "problems", "proposals")}
     kept = [event for event in trace.events if event["kind"] not in ("proposal", "accept", "refuse")]
-    idle = with_signals(trace, lambda signals: signals.assign(**{f"{ugv}.accepted": 0.0 for ugv in trace.ugvs}))
+    idle = with_samples(trace, lambda samples: samples.assign(**{f"{ugv}.executing": -1.0 for ugv in trace.ugvs}))
     return replace(with_meta(idle, events=kept), **tables)
 
 

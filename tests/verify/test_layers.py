@@ -16,7 +16,7 @@ ALLOWED: dict[str, set[str]] = {
         "base.arrays", "base.interruption", "base.statuses", "verify.engines", "verify.finding", "world.motion",
     },
     "runs": {
-        "base.arrays", "base.errors", "base.exact", "run.collisions", "run.trace", "scenarios.plants",
+        "base.arrays", "base.errors", "base.exact", "run.collisions", "run.tables", "run.trace", "scenarios.plants",
         "scenarios.schema", "verify.engines", "verify.runs", "verify.claim", "verify.finding",
     },
 }  # fmt: skip

@@ -29,7 +29,7 @@ def test_the_run_is_the_same_and_the_robots_are_where_it_ends() -> None:
     scenario, _ = load("case_a", ["duration_s=15.0"])
     meshcat = served()
     watched = simulate(scenario, "d", observers=[LiveView(meshcat, scenario)])
-    pd.testing.assert_frame_equal(watched.signals, simulate(scenario, "d").signals, check_exact=True)
+    pd.testing.assert_frame_equal(watched.states, simulate(scenario, "d").states, check_exact=True)
     for k, robot in enumerate(watched.robots):
         assert place(meshcat, k) == watched.position(robot)[-1].tolist()
     assert shown(meshcat, 0) == [state == INTERVENED for state in range(len(STATES))]

@@ -97,5 +97,5 @@ def test_a_plant_that_leaves_the_straight_line_costs_what_it_may_be_off(monkeypa
         both = 4.0 if pair["second"] in trace.robots else 2.0
         assert pair["min_distance_m"] == max(least[pair["first"], pair["second"]] - both, 0.0)
     assert off.finding.status == "refuted"
-    told = {event["kind"] for event in events.extract(trace, ())} - {event["kind"] for event in trace.events}
+    told = {event["kind"] for event in events.extract(trace)} - {event["kind"] for event in trace.events}
     assert told == {"collision"}

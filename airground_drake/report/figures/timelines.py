@@ -112,7 +112,7 @@ def events(rows: Sequence[tuple[Trace, str]]) -> Figure:
         axes.text(-0.1 / size_in(axes)[0], y, name, transform=across, ha="right", va="center")
         axes.text(1.0 + 0.1 / size_in(axes)[0], y, told(trace, ugv), transform=across, va="center", fontsize=8.5)
         _bars(axes, trace, trace.column(f"{ugv}.mode") == 1, y - 0.17, facecolor="#dddddd")
-        _bars(axes, trace, trace.column(f"{ugv}.accepted") == 1, y + 0.17, facecolor="#cfe6dc", hatch="////")
+        _bars(axes, trace, trace.executing(ugv) >= 0, y + 0.17, facecolor="#cfe6dc", hatch="////")
         for kind, marker in MARKS.items():
             times = [event["t_s"] for event in events_of(trace, ugv, kind)]
             color = {"refuse": ALARM, "release": MUTED}.get(kind, "#0060a8")

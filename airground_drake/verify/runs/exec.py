@@ -212,7 +212,7 @@ def _judge_ugv(trace: Trace, ugv: str, samples: npt.NDArray[np.intp]) -> Judged:
         off = np.linalg.norm(recorded - ours, axis=1)
         closer = ~(off >= away)
         away[closer], law[closer] = off[closer], ours[closer]
-    said = _said(trace.column(f"{ugv}.accepted") != 0.0, chosen, executing)
+    said = _said(trace.executing(ugv) >= 0, chosen, executing)
     return Judged(ugv, t, away, law, recorded, executing, said, _binding(given, law))
 
 

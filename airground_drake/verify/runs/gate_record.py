@@ -15,7 +15,8 @@ import numpy as np
 
 from airground_drake.base.arrays import Array
 from airground_drake.base.errors import TraceError
-from airground_drake.run.trace import PROBLEM_ARRAYS, PROBLEM_SCALARS, Trace
+from airground_drake.run.tables import PROBLEM_ARRAYS, PROBLEM_SCALARS
+from airground_drake.run.trace import Trace
 from airground_drake.verify.claim import TraceClaim
 from airground_drake.verify.finding import Finding
 from airground_drake.verify.runs.control_law import ON_TOP
@@ -274,7 +275,7 @@ def without_decisions(trace: Trace) -> list[str]:
     executed.
     """
     asked = [ugv for ugv in trace.ugvs if talk_is_due(trace, ugv) and ugv not in without_proposals(trace)]
-    called = [ugv for ugv in trace.ugvs if (trace.column(f"{ugv}.accepted") != 0.0).any() or ugv in asked]
+    called = [ugv for ugv in trace.ugvs if (trace.executing(ugv) >= 0).any() or ugv in asked]
     return [ugv for ugv in called if not (trace.decisions["robot"] == ugv).any()]
 
 

@@ -18,12 +18,8 @@ GATED_METHODS = ("c", "d")
 
 
 def samples_of(trace: Trace) -> npt.NDArray[np.intp]:
-    """Rows of the control samples, (S,): the nearest to each multiple of the period before the last row."""
-    t, period = trace.t, trace.scenario.control.period_s
-    instants = np.arange(int((t[-1] - MERGE_S) / period) + 1) * period
-    right = np.searchsorted(t, instants).clip(1, len(t) - 1)
-    nearest = right - (instants - t[right - 1] < t[right] - instants)
-    return np.asarray(nearest[np.abs(t[nearest] - instants) <= TIME_TOLERANCE_S])
+    """Rows of the control samples, (S,)."""
+    return trace.sample_rows
 
 
 def row_at(trace: Trace, t_s: float) -> int:

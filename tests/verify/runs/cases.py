@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 from builders.decisions import STAGES
-from builders.edits import first_of, with_decision, with_meta, with_scenario, with_signals
+from builders.edits import first_of, with_decision, with_meta, with_samples, with_scenario, with_states
 from builders.runs import beside_a_rock, chattering, leaking, refractory, run_of
 
 from airground_drake.run.trace import Trace
@@ -38,7 +38,11 @@ def meta(**changes: Any) -> Edit:
 
 
 def signals(**columns: Any) -> Edit:
-    return lambda trace: with_signals(trace, lambda table: table.assign(**columns))
+    return lambda trace: with_states(trace, lambda table: table.assign(**columns))
+
+
+def sampled(**columns: Any) -> Edit:
+    return lambda trace: with_samples(trace, lambda table: table.assign(**columns))
 
 
 def events(edit: Callable[[list[dict[str, Any]]], object]) -> Edit:

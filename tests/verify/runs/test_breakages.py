@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from builders.decisions import ALL_PLANS, STAGES, GateData
-from builders.edits import bumped, first_of, moved, rows, with_decision, with_events, with_meta, with_signals
+from builders.edits import bumped, first_of, moved, rows, with_decision, with_events, with_meta, with_states
 from verify.judging import CLAIMS
 from verify.runs.cases import (
     B_C,
@@ -38,8 +38,8 @@ from verify.runs.cases import (
     problem,
     proposals,
     proposed,
+    sampled,
     scenario,
-    signals,
     swapped,
 )  # fmt: skip
 
@@ -121,7 +121,7 @@ def idle_normals_turned(trace: Trace) -> Trace:
 def intervened(trace: Trace) -> Trace:
     """ugv2 is intervened on in the second half of the run."""
     half = trace.t[-1] / 2.0
-    return with_signals(trace, lambda table: table.assign(**{"ugv2.mode": 1.0 * (table["t_s"] > half)}))
+    return with_states(trace, lambda table: table.assign(**{"ugv2.mode": 1.0 * (table["t_s"] > half)}))
 
 
 def without_decisions(trace: Trace) -> Trace:
@@ -188,16 +188,6 @@ def sent(*given: tuple[str, float, float]) -> Edit:
         told = [{"t_s": t, "robot": ugv, "kind": "proposal", "policy": one["policy"]} for ugv, t, _ in given]
         more = with_meta(trace, events=[*trace.events, *told])
         return replace(more, proposals=pd.concat([trace.proposals, pd.DataFrame(table)], ignore_index=True))
-
-    return edit
-
-
-def accepted_once(ugv: str, *, between: bool) -> Edit:
-    """The signal says so at a control sample, or at a row between two, and no message does."""
-
-    def edit(trace: Trace) -> Trace:
-        off = np.abs(trace.t / 0.05 - np.round(trace.t / 0.05))
-        return bumped(f"{ugv}.accepted", 1.0, int(np.flatnonzero(off > 0.1)[0]) if between else 100)(trace)
 
     return edit
 
@@ -275,9 +265,8 @@ BREAKAGES: dict[str, tuple[tuple[str, str, Edit, str, str], ...]] = {
         ("no parameters", A, lambda t: replace(t, meta={k: v for k, v in t.meta.items() if k != "controllers"}), E, ""),
     ),
     "EXEC": (
-        ("accepted at a sample", B_D, accepted_once("ugv2", between=False), R, "'accepted_by_the_signals': True"),
-        ("accepted between samples", B_D, accepted_once("ugv1", between=True), R, "'accepted_by_the_messages': False"),
-        ("acceptance hidden", B_D, signals(**{"ugv1.accepted": 0.0}), R, "'accepted_by_the_messages': True"),
+        ("accepted at a sample", B_D, bumped("ugv2.executing", 1.0, 100), R, "'accepted_by_the_signals': True"),
+        ("acceptance hidden", B_D, sampled(**{"ugv1.executing": -1.0}), R, "'accepted_by_the_messages': True"),
         ("other times", B_D, each_value(times_s=lambda v: v + 1e-3), R, "ugv1"),
         ("other places", B_D, each_value(positions_m=lambda v: v + 1e-4), R, "ugv1"),
         ("other directions", B_D, each_value(selection=lambda v: v[:3]), R, "ugv1"),

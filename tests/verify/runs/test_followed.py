@@ -33,7 +33,7 @@ def test_what_is_accepted_where_all_obstacles_are_known_meets_the_premise(
 def test_an_obstacle_that_is_sensed_later_is_no_part_of_the_premise(run: Run) -> None:
     trace = run("case_a", "d")
     (accepted,) = followed(trace)
-    rows = np.flatnonzero((trace.t >= accepted.t_s) & (trace.column("ugv1.accepted") > 0.0))
+    rows = np.flatnonzero((trace.t >= accepted.t_s) & (trace.executing("ugv1") >= 0))
     ahead = trace.position("ugv1")[rows[-1]] + np.array([0.0, 3.95, 0.0])
     away = np.linalg.norm(trace.position("ugv1") - ahead, axis=1)
     assert away[: rows[0]].min() > 4.0 > away[rows].min()  # the sensing range
@@ -53,7 +53,7 @@ def test_counts_of_several_runs_are_added() -> None:
 def test_a_run_whose_records_are_wrong_is_not_counted(run: Run) -> None:
     trace = run("case_a", "d")
     assert set(counts(trace)) == {"SAFE-INV", "SAFE-GATE", "LIVE-GATE", "LIVE-WAIT"}
-    assert set(counts(Trace(trace.meta, trace.signals, trace.decisions))) == {"SAFE-INV"}  # no proposals
+    assert set(counts(Trace(trace.meta, trace.states, trace.samples, trace.decisions))) == {"SAFE-INV"}  # no proposals
 
 
 def test_theorems_say_how_often_their_premise_was_met(report: Callable[[str], Path]) -> None:

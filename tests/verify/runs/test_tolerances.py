@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from builders.edits import bumped, moved, with_decision, with_events, with_scenario, with_signals
+from builders.edits import bumped, moved, with_decision, with_events, with_scenario, with_states
 from builders.layout import rebuilt
 from builders.runs import beside_a_rock
 from builders.scenarios import STILL, lone
@@ -80,7 +80,7 @@ def triggered_later(trace: Trace, by: float) -> Trace:
         trace, lambda every: [{**e, "t_s": e["t_s"] + by} if e["kind"] == "trigger" else e for e in every]
     )
     name = "ugv1.triggered_at_s"
-    return with_signals(shifted, lambda table: table.assign(**{name: table[name] + by * (table[name] >= 0.0)}))
+    return with_states(shifted, lambda table: table.assign(**{name: table[name] + by * (table[name] >= 0.0)}))
 
 
 def barely_in_sight(trace: Trace, by: float) -> Trace:
@@ -180,7 +180,7 @@ CASES: tuple[tuple[str, str, str, float, Edit, str], ...] = (
     ("SAFE-HYP", "inequality", "at a rock", DISTANCE_TOLERANCE_M * 0.075, lambda _, by: beside_a_rock(by), "avoidance"),
     ("SAFE-HYP", "start", "at a rock", DISTANCE_TOLERANCE_M, lambda _, by: beside_a_rock(0.0, by - 2.0), "safe start"),
     ("SAFE-HYP", "way", "synthetic a", DISTANCE_TOLERANCE_M,
-     lambda t, by: moved(t, "ugv2", at_the_trigger(t), [by, 0.0, 0.0]), "straight motion"),
+     lambda t, by: bumped("ugv2.x_m", by, at_the_trigger(t))(t), "error"),
     ("SAFE-HYP", "speed", A, safe_hyp.VELOCITY_TOLERANCE_M_S, driven_at, "speed limit"),
     ("EXEC", "command of a UGV", A_D, COMMAND_TOLERANCE_M_S, at_the_end("ugv2"), "ugv2"),
     ("EXEC", "command of the UAV", A_D, COMMAND_TOLERANCE_M_S, at_the_end("uav"), "uav"),
