@@ -69,7 +69,7 @@ def _answers(trace: Trace, row: Mapping[Any, Any]) -> tuple[list[tuple[float, Ou
             changes.append((float(t), _ANSWERS[decision]))
     if len(decided):
         return changes, float(decided["t_s"].iloc[-1])
-    carried_out = trace.t[trace.executing(row["robot"]) == row["number"]]
-    if not len(carried_out):
+    rows = np.flatnonzero(trace.executing(row["robot"]) == row["number"])
+    if not len(rows):
         return changes, issued
-    return [*changes, (float(carried_out[0]), "accepted")], float(carried_out[-1])
+    return [*changes, (float(trace.t[rows[0] - 1]), "accepted")], float(trace.t[rows[-1]])
