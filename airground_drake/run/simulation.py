@@ -33,7 +33,7 @@ from airground_drake.scenarios.load import own, resolved, validated
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.systems.components import GatekeepersFactory, make_gatekeepers
 from airground_drake.systems.decision import DecisionVariable
-from airground_drake.systems.diagram import RECORDED, DecisionFactory, Model, build_model
+from airground_drake.systems.diagram import RECORDED, DecisionFactory, Model, PlantFactory, build_model
 from airground_drake.systems.lifetime import untie
 from airground_drake.world.plant import FirstOrder
 from airground_drake.world.world import Body, World
@@ -52,11 +52,13 @@ class Recorder:
         decision_block: DecisionFactory = DecisionVariable,
         observers: Sequence[LeafSystem] = (),
         *,
+        plants: PlantFactory | None = None,
         make_gatekeepers: GatekeepersFactory = make_gatekeepers,
     ) -> None:
         """Build the model of a run of the scenario and its logger.
 
-        `decision_block` and `observers` as in `simulate`, `make_gatekeepers` as in `build_model`; raises as `simulate`.
+        `decision_block`, `observers` and `plants` as in `simulate`, `make_gatekeepers` as in `build_model`; raises as
+        `simulate`.
         """
         self._scenario, self._name = validated(scenario), name
         if name not in self._scenario.runs:
@@ -68,10 +70,12 @@ class Recorder:
             self._own,
             self._run.method,
             composition,
+            plants,
             decision_block=decision_block,
             disturbed=False,
             make_gatekeepers=make_gatekeepers,
         )
+        self._foreign = plants is not None
         builder = DiagramBuilder()
         builder.AddSystem(self._model.diagram)
         ports = [self._model.diagram.GetOutputPort(name) for name in RECORDED]
@@ -114,8 +118,9 @@ class Recorder:
         simulator = Simulator(self._root, context)
         period = self._scenario.control.period_s
         # velocities are held between samples: Euler's method is exact for straight motion
-        scheme = "explicit_euler" if model.world.moves_straight(period) else "runge_kutta3"
-        config = SimulatorConfig(integration_scheme=scheme, max_step_size=period, use_error_control=False)
+        straight = model.world.moves_straight(period) and not self._foreign
+        scheme = "explicit_euler" if straight else "runge_kutta3"
+        config = SimulatorConfig(integration_scheme=scheme, max_step_size=period, use_error_control=self._foreign)
         ApplySimulatorConfig(config, simulator)
         simulator.set_target_realtime_rate(speed)
         if model.gatekeeper is not None:
@@ -157,6 +162,7 @@ class Recorder:
             "scenario": resolved(self._scenario),
             "events": [],
             **read_back(model, context),
+            "plants": model.plants,
             "decision_block": "" if (kind := type(model.decision_block)) is DecisionVariable else kind.__qualname__,
             "faults": recording.faults(memory.asked),
         }
@@ -210,6 +216,7 @@ def simulate(
     decision_block: DecisionFactory = DecisionVariable,
     observers: Sequence[LeafSystem] = (),
     speed: float = 0.0,
+    plants: PlantFactory | None = None,
 ) -> Trace:
     """Simulate one run of a scenario.
 
@@ -222,13 +229,16 @@ def simulate(
         observers: systems that watch the run, such as `view.live_view.LiveView`: their input ports have the names of
             the model's output ports, and each has a name of its own. The run does not see them.
         speed: simulated seconds per second at most, for watching; 0: no limit.
+        plants: makes the plant of each robot, in place of those of the scenario: see `build_diagram`. Claims that rest
+            on how a robot moves are `not_run` then.
 
     Raises:
         ScenarioError: if the scenario, or the seed, is not valid.
         UnknownNameError: if it has no such run.
-        PluginError: if it names a policy, route or task that cannot be made, or the decision block has other ports.
+        PluginError: if it names a policy, route or task that cannot be made, or the decision block or a plant has
+            other ports.
         SimulationError: if Drake or a system stops; names the run and the time.
     """
     if seed is not None:
         scenario = validated(scenario, {"seed": seed})
-    return Recorder(scenario, run, decision_block, observers).simulate(watch=watch, speed=speed)
+    return Recorder(scenario, run, decision_block, observers, plants=plants).simulate(watch=watch, speed=speed)

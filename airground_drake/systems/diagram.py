@@ -65,6 +65,7 @@ class Model:
         planner: the UAV's planner.
         gatekeeper: of methods (c) and (d), else None.
         controllers: of the UGVs, and of the UAV.
+        plants: by robot, the kind of its plant, or the class of the system that was given for it.
     """
 
     diagram: Diagram
@@ -74,6 +75,7 @@ class Model:
     planner: InterventionPlanner
     gatekeeper: Gatekeeper | None
     controllers: tuple[UgvController, UavController]
+    plants: dict[str, str]
 
 
 def build_diagram(
@@ -149,6 +151,9 @@ def build_model(
     trigger = EventTrigger(n, components.make_trigger(scenario, components.threshold(scenario)), shortest)
     decision = _decision_making(scenario, n, block, trigger)
     made = {body.name: _plant(body, plants, scenario.control.period_s) for body in world.moving}
+    kinds = {body.name: body.plant.kind for body in world.moving if body.plant is not None}
+    if plants is not None:
+        kinds = {name: f"{type(plant).__module__}.{type(plant).__qualname__}" for name, plant in made.items()}
     vehicles = _vehicles(world, made, disturbed=disturbed)
     planner = InterventionPlanner(components.make_planner(scenario, chosen), world, scenario.control.period_s)
     gatekeeper = None
@@ -169,7 +174,7 @@ def build_model(
     named = {port.get_name(): port for part in parts.values() for port in _outputs(part)}
     exported = [*RECORDED, *(["violation"] if monitor is not None else [])]
     diagram = _assembled(f"{scenario.name}_method_{chosen.id}", parts, named, exported)
-    return Model(diagram, world, block, trigger, planner, gatekeeper, controllers)
+    return Model(diagram, world, block, trigger, planner, gatekeeper, controllers, kinds)
 
 
 def method_drawn(scenario: Scenario) -> str:

@@ -7,7 +7,7 @@ import json
 from dataclasses import dataclass, field
 from html import escape
 from math import ceil
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -110,9 +110,14 @@ class ModelClaim(Claim):
 
 
 class TraceClaim(Claim):
-    """A claim about one run, decided from its trace alone."""
+    """A claim about one run, decided from its trace alone.
+
+    Attributes (all of the class):
+        any_plant: whether the claim is about runs with any plants; others rest on how the scenario's plants move.
+    """
 
     expected: Status = "holds"
+    any_plant: ClassVar[bool] = False
 
     @abc.abstractmethod
     def check(self, trace: Trace) -> Finding:
@@ -128,7 +133,11 @@ class TraceClaim(Claim):
     def judge(self, trace: Trace) -> Finding:
         """`check`; a malformed trace, an exception or a pass on half a run is the status `error`."""
         try:
-            require_motion(trace)
+            others = other_plants(trace)
+            if others and not self.any_plant:
+                return Finding("not_run", evidence={"reason": f"the claim is about first-order robots, not {others}"})
+            if not others:
+                require_motion(trace)
             finding = self.check(trace)
             if finding.status in PASSING:
                 require_whole_run(trace)
@@ -203,6 +212,13 @@ def require_count(claim: Claim, finding: Finding) -> None:
         raise ValueError(f"{claim.id} passes without a count of {claim.exercised_by}")
     if count is not None and (type(count) is not int or count < 0):
         raise ValueError(f"{claim.id} was exercised {count!r} times")
+
+
+def other_plants(trace: Trace) -> str:
+    """Robots that had another plant than the scenario's, with its class, in words; empty if there are none."""
+    kinds = trace.meta.get("plants", {})
+    robots = trace.scenario.robots
+    return ", ".join(f"{name}: {kind}" for name, kind in kinds.items() if kind != plant_of(robots[name]).kind)
 
 
 def require_motion(trace: Trace) -> None:
