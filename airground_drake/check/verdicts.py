@@ -19,8 +19,8 @@ EVERY_RUN = ("SAFE-TRACE", "SAFE-HYP", "EXEC", "ZENO-TRACE", "THR-TRIG", "THR-QU
 BY_METHOD = {
     "a": (),
     "b": ("COMM",),
-    "c": ("COMM", "GATE-OPT", "GATE-FEAS", "GATE-MODEL"),
-    "d": ("COMM", "GATE-FEAS", "GATE-MODEL", "LIVE-PROG"),
+    "c": ("COMM", "GATE-PLAN", "GATE-MODEL"),
+    "d": ("COMM", "GATE-PLAN", "GATE-MODEL", "LIVE-PROG"),
 }
 """Claims about a run of each method, besides those about every run."""
 PROVED = (

@@ -72,7 +72,7 @@ def test_a_failing_solver_withdraws_no_acceptance_and_is_recorded(case_a: Scenar
     case_a.gatekeeper.route = "failing"
     with ROUTES.adding("failing", FailingLater):
         trace = simulate(case_a, "c")
-        verdicts = verify(trace, ["GATE-FEAS"])
+        verdicts = verify(trace, ["GATE-PLAN"])
     decisions = trace.decisions
     failed = decisions[decisions["status"] == "solver_failed"]
     assert len(failed) == len(decisions) // 2 > 10
@@ -80,7 +80,7 @@ def test_a_failing_solver_withdraws_no_acceptance_and_is_recorded(case_a: Scenar
     assert metrics.of_run(trace)["gatekeeper"]["solver_failures"] == len(failed)
     constant = failed[["accept_throughout", "refuse_throughout"]].min(axis=1)
     assert (failed["objective"] <= constant * (1.0 + 1e-9)).all()
-    assert [(v.claim.id, v.finding.status) for v in verdicts] == [("GATE-FEAS", "holds")]
+    assert [(v.claim.id, v.finding.status) for v in verdicts] == [("GATE-PLAN", "holds")]
 
 
 def test_after_a_failure_the_rest_of_the_plan_before_counts(case_a: Scenario, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -81,7 +81,7 @@ def test_without_claims_all_about_the_run_are_meant(stuck: Trace) -> None:
 
 
 def test_a_claim_that_says_nothing_about_the_run_is_no_pass(stuck: Trace) -> None:
-    assert said(stuck, "GATE-OPT") == "GATE-OPT: nothing is claimed about run a of minimal (method a, seed 0)"
+    assert said(stuck, "GATE-PLAN") == "GATE-PLAN: nothing is claimed about run a of minimal (method a, seed 0)"
     with pytest.raises(UnknownNameError, match="unknown claim 'SAFE'"):
         assert_holds(stuck, "SAFE")
 
