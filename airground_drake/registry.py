@@ -317,7 +317,6 @@ MODEL_CLAIMS = Registry(
     "claim",
     "model_claims",
     {
-        "SAFE-LEMMA": "airground_drake.verify.model.safe_lemma:SafeLemma",
         "SAFE-INV": "airground_drake.verify.model.safe_inv:SafeInv",
         "SAFE-GATE": "airground_drake.verify.model.safe_gate:SafeGate",
         "SAFE-DIST": "airground_drake.verify.model.safe_dist:SafeDist",
@@ -325,7 +324,6 @@ MODEL_CLAIMS = Registry(
         "ZENO-REFINE": "airground_drake.verify.model.zeno_refine:ZenoRefine",
         "LIVE-GATE": "airground_drake.verify.model.live_gate:LiveGate",
         "LIVE-WAIT": "airground_drake.verify.model.live_wait:LiveWait",
-        "THR-ISO": "airground_drake.verify.model.thr_iso:ThrIso",
         "THR-ROOT": "airground_drake.verify.model.thr_root:ThrRoot",
         "THR-OPT": "airground_drake.verify.model.thr_opt:ThrOpt",
         "THR-CHOICE": "airground_drake.verify.model.thr_choice:ThrChoice",

@@ -23,10 +23,7 @@ BY_METHOD = {
     "d": ("COMM", "GATE-PLAN", "GATE-MODEL", "LIVE-PROG"),
 }
 """Claims about a run of each method, besides those about every run."""
-PROVED = (
-    "SAFE-LEMMA", "SAFE-INV", "SAFE-GATE", "SAFE-DIST", "ZENO-PROOF", "THR-ISO", "THR-ROOT", "THR-OPT", "LIVE-GATE",
-    "LIVE-WAIT",
-)  # fmt: skip
+PROVED = ("SAFE-INV", "SAFE-GATE", "SAFE-DIST", "ZENO-PROOF", "THR-ROOT", "THR-OPT", "LIVE-GATE", "LIVE-WAIT")
 HOLDING = ("THR-CHOICE",)
 """Claims about the model that hold without a proof."""
 SUPPORTED = ("THR-DDM", "ZENO-REFINE")

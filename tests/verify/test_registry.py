@@ -49,7 +49,7 @@ def test_only_the_claims_asked_for_are_judged_in_the_order_of_the_report(case_a:
 def test_an_unknown_claim_is_refused_with_what_is_allowed(case_a: Scenario) -> None:
     with pytest.raises(UnknownNameError, match=r"unknown claim 'SAFE-INV'; allowed: SAFE-TRACE, .*COMM"):
         verify(run_of("d"), claims=["COMM", "SAFE-INV"])
-    with pytest.raises(UnknownNameError, match=r"unknown claim 'COMM'; allowed: SAFE-LEMMA, .*THR-DDM"):
+    with pytest.raises(UnknownNameError, match=r"unknown claim 'COMM'; allowed: SAFE-INV, .*THR-DDM"):
         verify_model(case_a, claims=["COMM"])
 
 

@@ -283,7 +283,7 @@ BREAKAGES: dict[str, tuple[tuple[str, str, Edit, str, str], ...]] = {
         ("stops shorter", B_D, first(refused, decision="accept", refuse_stalls=1.0, refuse_left_m=0.1), R, "farther"),
         ("refuses to get there", B_D, first(refused, refuse_stalls=1.0, accept_stalls=0.0), R, "refuse stops short"),
         ("a stop at no cost", B_D, first(refused, accept_outcome_m2_s=0.0), R, "cost of the way left, accept"),
-        ("gets there for less", B_D, first(refused, refuse_stalls=0.0, accept_stalls=0.0, refuse_left_m=99.0), R, "left"),
+        ("for less", B_D, first(refused, refuse_stalls=0.0, accept_stalls=0.0, refuse_left_m=99.0), R, "left"),
     ),
     "GATE-MODEL": (
         ("another law", B_C, scenario(control__intervention_gain_1_s=1.6), R, "velocity of mode"),
