@@ -28,11 +28,6 @@ class SafeInv(TheoremClaim):
         "need no inequality. All this rests on a lemma: on a straight line a distance is at least its value at the "
         "start plus the time times its rate of change at the start."
     )
-    formula = (
-        "D >= d, n.v >= -q (D - d)/h (sum over the pair: q = 1) => ||x + s v|| >= d for all s in [0, h]; "
-        "D <= d, n.v >= q A (d - D) => ||x + s v|| >= D and d - ||x + h v|| <= (1 - A h)(d - D); "
-        "D > R, R >= d + c h => ||x + s v|| >= d"
-    )
     latex: tuple[str, ...] = (
         r"\lVert x + s v \rVert \ge D + s \, n^\top v, \quad D = \lVert x \rVert > 0, \quad s \ge 0",
         r"D \ge d, \; n^\top v \ge -q (D - d) / h \; \Rightarrow \; \lVert x + s v \rVert \ge d \quad "

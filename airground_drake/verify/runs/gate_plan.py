@@ -113,18 +113,12 @@ class GatePlan(GateClaim):
         "the goal where the other choice would not, or would stop nearer to it. The margin is no condition: it is the "
         "largest gap between the cost of a plan and the optimum of the half-plane problem, where that is known."
     )
-    formula = (
-        "rho_0 = p(t); omega in {0, 1}; rho_k = rho_(k-1) + dt (omega_k a_k + (1 - omega_k) b_k); u_k = max(0, max_j "
-        "d_j - ||rho_k - o_jk||); objective = dt sum_k a ||rho_rd - rho_k||^2 + b u_k^2 + w a ||rho_rd - rho_N||^2; "
-        "rounded_k = 1 if D_k >= 1 - D_k else 0, D_k = sum_{r <= k} relaxed_r - sum_{r < k} rounded_r; "
-        "max_k |dt sum_{r <= k} (relaxed_r - rounded_r)| <= dt / 2; gap = (objective - L) / C, L <= min J_n"
-    )
     latex = (
         r"\rho_k = \rho_{k-1} + \Delta t (\omega_k a_k + (1 - \omega_k) b_k), \quad \rho_0 = p(t), \quad "
         r"\omega_k \in \{0, 1\}",
         r"u_k = \max(0, \max_j (d_j - \lVert \rho_k - o_{jk} \rVert))",
         r"J = \Delta t \sum_k (a \lVert \rho_{rd} - \rho_k \rVert^2 + b u_k^2) + w a \lVert \rho_{rd} - "
-        r"\rho_N \rVert^2",
+        r"\rho_N \rVert^2, \quad w = 0 \text{ unless the scenario says so}",
         r"\bar\omega_k = \begin{cases} 1 & D_k \ge 1 - D_k \\ 0 & \text{otherwise} \end{cases}, \quad "
         r"D_k = \sum_{r \le k} \tilde\omega_r - \sum_{r < k} \bar\omega_r",
         r"\max_k \left| \Delta t \sum_{r \le k} (\tilde\omega_r - \bar\omega_r) \right| \le \frac{\Delta t}{2}",

@@ -65,11 +65,6 @@ class ThrTrig(TraceClaim):
         "two updates no crossing is missed, however briefly the variable is beyond the level, and none is invented. "
         "The noise in the variable moves as (15) has it, by one sample for each of its periods."
     )
-    formula = (
-        "recorded triggers and releases = those of the automaton run on the recorded x, times equal within 1e-5 s; "
-        "recorded x(t) = ||rho_rd(t) - rho(t)|| + n(t) within 1e-6 m at every row; n(0) = 0, and between rows "
-        "n' = s w_k / sqrt(h) - leak n with one w_k, |w_k| <= 9, for each period h of the noise"
-    )
     latex = (
         r"x(t) = \lVert \rho_{rd}(t) - \rho(t) \rVert + n(t)",
         r"\text{recorded triggers and releases} = \text{automaton}(x), \quad |\Delta t| \le 10^{-5} \text{ "
