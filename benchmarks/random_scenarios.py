@@ -43,7 +43,7 @@ from airground_drake.verify import Verdict, verify
 ALWAYS = ("ZENO-TRACE", "THR-TRIG", "EXEC")
 CERTIFIED = ("SAFE-TRACE", "SAFE-HYP")
 """Claims that must hold in every run (ZENO-TRACE: with a dwell), and in every run of method (d)."""
-NEVER_REFUTED = ("GATE-FEAS", "GATE-MODEL", "LIVE-PROG", "COMM")
+NEVER_REFUTED = ("GATE-PLAN", "GATE-MODEL", "LIVE-PROG", "COMM")
 """Claims that may be undecided without a proposal, but not refuted."""
 
 RUNS_PER_PROCESS = 20

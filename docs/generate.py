@@ -10,7 +10,6 @@ import html
 import inspect
 import json
 import re
-import textwrap
 from collections import defaultdict
 from collections.abc import Callable, Iterator, Sequence
 from importlib import import_module
@@ -164,8 +163,7 @@ def claims() -> str:
             "",
             f"**{claim.summary}** {claim.statement}",
             "",
-            *(f"    {line}" for line in textwrap.wrap(claim.formula, WIDTH - 4)),
-            "",
+            *(line for row in claim.latex for line in (f"$${row}$$", "")),
             f"*Decided by:* {claim.method}",
             "",
             "*Assumes:*",

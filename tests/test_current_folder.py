@@ -29,7 +29,7 @@ def folder(tmp_path: Path) -> Path:
 @pytest.mark.parametrize(
     "command",
     [
-        "verify minimal SAFE-LEMMA",
+        "verify minimal SAFE-INV",
         "report minimal -o out --format json --set duration_s=0.5",
         "check REPORT",
         "campaign few.yaml -n 2 --jobs 2 -o out",

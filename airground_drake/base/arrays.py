@@ -15,7 +15,9 @@ ROUNDOFF = 2.0**-53
 
 
 def read_only(values: npt.ArrayLike) -> Array:
-    """A copy of the values that cannot be written to."""
-    copy = np.array(values, dtype=np.float64)
-    copy.setflags(write=False)
-    return copy
+    """A copy of the values that cannot be written to, in C order.
+
+    Its memory is that of `bytes`, so that `setflags(write=True)` fails, too.
+    """
+    array = np.asarray(values, dtype=np.float64)
+    return np.ndarray(array.shape, np.float64, buffer=array.tobytes())

@@ -19,14 +19,11 @@ EVERY_RUN = ("SAFE-TRACE", "SAFE-HYP", "EXEC", "ZENO-TRACE", "THR-TRIG", "THR-QU
 BY_METHOD = {
     "a": (),
     "b": ("COMM",),
-    "c": ("COMM", "GATE-OPT", "GATE-FEAS", "GATE-MODEL"),
-    "d": ("COMM", "GATE-FEAS", "GATE-MODEL", "LIVE-PROG"),
+    "c": ("COMM", "GATE-PLAN", "GATE-MODEL"),
+    "d": ("COMM", "GATE-PLAN", "GATE-MODEL", "LIVE-PROG"),
 }
 """Claims about a run of each method, besides those about every run."""
-PROVED = (
-    "SAFE-LEMMA", "SAFE-INV", "SAFE-GATE", "SAFE-DIST", "ZENO-PROOF", "THR-ISO", "THR-ROOT", "THR-OPT", "LIVE-GATE",
-    "LIVE-WAIT",
-)  # fmt: skip
+PROVED = ("SAFE-INV", "SAFE-GATE", "SAFE-DIST", "ZENO-PROOF", "THR-ROOT", "THR-OPT", "LIVE-GATE", "LIVE-WAIT")
 HOLDING = ("THR-CHOICE",)
 """Claims about the model that hold without a proof."""
 SUPPORTED = ("THR-DDM", "ZENO-REFINE")

@@ -184,14 +184,14 @@ class PaperGatekeepers(Gatekeepers):
         return Decision(now.t, i, proposal, accepted, reason, problem, solution, throughout, basis=basis)
 
     def _solved(self, problem: Problem, budget: Budget) -> Solution:
-        """The route's solution.
+        """The route's solution; the route gets a `Problem` of its own, so that it cannot change what is recorded.
 
         Raises:
             PluginError: if the route breaks its contract: it raises, or returns anything but a `Solution`.
         """
         kind = type(self._route)
         try:
-            found: object = self._route.solve(problem, budget)
+            found: object = self._route.solve(replace(problem), budget)
         except Exception as error:
             raise PluginError(f"route {kind.__qualname__} raised {described(error, kind.solve)}") from error
         if not isinstance(found, Solution):

@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from airground_drake.base.arrays import Array
+from airground_drake.base.arrays import Array, read_only
 from airground_drake.gatekeeper.cost import Terms, half_plane_cost, plan_cost
 from airground_drake.gatekeeper.rollout import ACCEPTED, REFUSED, View, closed_loop, follow
 from airground_drake.intervention.policy import Proposal
@@ -30,7 +30,7 @@ class Problem:
     """(26) for one UGV over N stages; stage k lasts from k dt to (k + 1) dt.
 
     (26) couples UGVs only through the predicted motion of the others, which is data here, so the sum over
-    UGVs in (25) separates and each UGV solves its own.
+    UGVs in (25) separates and each UGV solves its own. Its arrays are read-only copies.
 
     Attributes:
         dt: length of a stage, s.
@@ -57,6 +57,12 @@ class Problem:
     slack_weight: float
     terminal_weight: float = 0.0
     previous: Array | None = None
+
+    def __post_init__(self) -> None:
+        """Copy the arrays."""
+        for name, value in vars(self).items():
+            if isinstance(value, np.ndarray):
+                object.__setattr__(self, name, read_only(value))
 
     @property
     def stages(self) -> int:
@@ -126,8 +132,8 @@ def predicted_problem(seen: View, law: UgvLaw, proposal: Proposal, horizon: Hori
         initial=seen.position,
         accept=accept,
         refuse=refuse,
-        reference=np.ascontiguousarray(loop.preset[horizon.substeps :: horizon.substeps]),
-        centres=np.ascontiguousarray(centres[:, near]),  # the layout that the kernels are compiled for
+        reference=loop.preset[horizon.substeps :: horizon.substeps],
+        centres=centres[:, near],
         distances=seen.distances[near],
         error_weight=horizon.error_weight,
         slack_weight=horizon.slack_weight,

@@ -1,5 +1,5 @@
 (** Between two updates the decision variable is largest at an end, and its least value has a closed form: no crossing
-    of a level is missed. THR-ISO checks that the program uses these values. *)
+    of a level is missed. THR-TRIG checks the hypotheses. *)
 Require Import Reals Lra Psatz Safety Gate.
 Local Open Scope R_scope.
 

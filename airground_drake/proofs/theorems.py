@@ -40,12 +40,12 @@ _COSTS = ("drift, noise, c1 and c2 are positive.",)
 
 _ALL = (
     Theorem(
-        "Safety.lemma", "ours", ("SAFE-LEMMA",),
+        "Safety.lemma", "ours", ("SAFE-INV",),
         "After a time s on a straight line the distance is at least what it was plus s times its rate of change.",
         ("The two bodies are not at the same point.",),
     ),
     Theorem(
-        "Safety.lemma_in_the_plane", "ours", ("SAFE-LEMMA",),
+        "Safety.lemma_in_the_plane", "ours", ("SAFE-INV",),
         "The lemma for two coordinates.",
         ("The two bodies are not at the same point.",),
     ),
@@ -121,17 +121,17 @@ _ALL = (
         ("The dwell time is positive.", "The hypotheses of Trigger.dwell_apart."),
     ),
     Theorem(
-        "Isolation.largest_at_an_end", "(15), (20)", ("THR-ISO",),
+        "Isolation.largest_at_an_end", "(15), (20)", ("THR-TRIG",),
         "Between two updates the decision variable is nowhere above the larger of its ends.",
         ("Between two updates error and noise are linear in time.",),
     ),
     Theorem(
-        "Isolation.nowhere_below", "(15), (20)", ("THR-ISO",),
+        "Isolation.nowhere_below", "(15), (20)", ("THR-TRIG",),
         "Between two updates the decision variable is nowhere below p w, p the distance of the error's line from 0.",
         ("Between two updates error and noise are linear in time.", "w^2 + k^2 = 1, k the rate of the noise."),
     ),
     Theorem(
-        "Isolation.attained", "(15), (20)", ("THR-ISO",),
+        "Isolation.attained", "(15), (20)", ("THR-TRIG",),
         "The decision variable attains p w at one point of the line.",
         ("The hypotheses of Isolation.nowhere_below.", "w is positive."),
     ),

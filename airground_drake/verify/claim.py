@@ -43,8 +43,8 @@ class Claim(abc.ABC):
         id: stable identifier.
         summary: one plain sentence for a reader who knows no formula; '' if the statement is plain enough.
         statement: the claim in words, precisely.
-        formula: the claim as a formula (plain text).
-        latex: the same typeset, a row each; () if the plain text is to be shown.
+        formula: the claim as a formula, in plain text; '' if it is typeset.
+        latex: the claim as a formula, typeset, a row each; () if it is in plain text.
         method: how it is decided.
         equations: equation numbers of the paper that it is about.
         assumptions: what is taken for granted.
@@ -55,7 +55,6 @@ class Claim(abc.ABC):
 
     id: str
     statement: str
-    formula: str
     method: str
     equations: str
     assumptions: tuple[str, ...]
@@ -63,6 +62,7 @@ class Claim(abc.ABC):
     expected: Status
     exercised_by: str = ""
     summary: str = ""
+    formula: str = ""
     latex: tuple[str, ...] = ()
 
 

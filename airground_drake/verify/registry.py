@@ -70,4 +70,4 @@ def _unsaid(claim: Claim) -> str:
             TypeAdapter(kind).validate_python(getattr(claim, name))
         except ValidationError as error:
             return f"has {name!r} {short(repr(getattr(claim, name)))}: {error.errors()[0]['msg']}"
-    return ""
+    return "" if claim.formula or claim.latex else "has neither 'formula' nor 'latex'"

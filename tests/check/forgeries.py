@@ -446,8 +446,8 @@ CONCERTED: dict[str, Edit] = {
     "other drift": everywhere("decision", "threshold", "drift_m_s", value=5.0),
     "a stall where none was": everywhere("runs", RUN, "stalls_m", value={UGV: [3.3, 13.0, 0.0]}),
     "a refutation by no rule": all_of(
-        everywhere("runs", RUN, "expected", "GATE-FEAS", value="refuted"),
-        claim("GATE-FEAS", status="refuted", expected="refuted", counterexample={"t_s": 1.0}, margin=None),
+        everywhere("runs", RUN, "expected", "GATE-PLAN", value="refuted"),
+        claim("GATE-PLAN", status="refuted", expected="refuted", counterexample={"t_s": 1.0}, margin=None),
         report("overall", "counts", value=lambda old: old | {"holds": old["holds"] - 1, "refuted": old["refuted"] + 1}),
     ),
     "renamed": renamed,

@@ -62,7 +62,7 @@ def _with_a_third_party_claim(report: Path, folder: Path, expected: str) -> None
             scenario["claims"] = {"MINE": "mine:Mine"}
     with edited_report(folder) as document:
         for run in ("d", ""):
-            entry = dict(claim_of(document, "ZENO-TRACE" if run else "SAFE-LEMMA", run))
+            entry = dict(claim_of(document, "ZENO-TRACE" if run else "SAFE-INV", run))
             document["claims"].append(entry | {"id": "MINE", "status": expected, "expected": expected, "evidence": {}})
             document["claims"][-1]["counterexample"] = {"what": "shown"} if expected == "refuted" else None
             document["claims"][-1]["exercised"] = 1

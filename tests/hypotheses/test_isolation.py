@@ -1,4 +1,4 @@
-"""The running trigger takes what was due in a step, and nothing else (THR-ISO): against an evaluation in 256 bits."""
+"""The running trigger takes what was due in a step, and nothing else (THR-TRIG): against an evaluation in 256 bits."""
 
 from __future__ import annotations
 

@@ -167,7 +167,7 @@ def test_no_motion_is_executed_that_was_not_decided_on(monkeypatch: pytest.Monke
     trace = simulate(load("case_a", ["duration_s=17"])[0], "d")
     assert len(trace.proposals) > 2
     assert (trace.executing("ugv1") >= 0).any()
-    assert [verdict.finding.status for verdict in verify(trace, ["EXEC", "GATE-FEAS"])] == ["holds", "holds"]
+    assert [verdict.finding.status for verdict in verify(trace, ["EXEC", "GATE-PLAN"])] == ["holds", "holds"]
 
 
 def test_who_refuses_its_own_rests_before_the_next() -> None:

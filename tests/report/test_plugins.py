@@ -44,8 +44,8 @@ import os
 from airground_drake.verify.claim import Finding, TraceClaim
 class It(TraceClaim):
     id = "MINE"
-    statement = formula = method = equations = does_not_establish = summary = ""
-    assumptions = latex = ()
+    statement = method = equations = does_not_establish = summary = ""
+    assumptions, formula = (), "x = x"
     def applies(self, trace): os._exit(0)
     def check(self, trace): ...
 """

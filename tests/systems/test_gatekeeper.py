@@ -12,6 +12,7 @@ from gatekeeper.oracles import Enumeration
 from pydrake.common import RandomGenerator
 from pydrake.systems.analysis import Simulator
 
+from airground_drake.base.errors import SimulationError
 from airground_drake.gatekeeper import mpc_gatekeeper
 from airground_drake.gatekeeper.answer import Rules
 from airground_drake.gatekeeper.budget import Budget
@@ -52,6 +53,55 @@ def test_opposite_answers_of_a_run_are_a_dwell_apart(case_a: Scenario, dwell: fl
     assert ("dwell" in set(decisions["reason"])) == (dwell > 0.05)
 
 
+class Writing:
+    """A route that makes accepting look free: it writes into the problem."""
+
+    def solve(self, problem: Problem, budget: Budget) -> Solution:
+        self.write(problem)
+        return MixedIntegerRoute().solve(problem, budget)
+
+    def write(self, problem: Problem) -> None:
+        problem.accept[:] = 0.0
+
+
+class Unlocking(Writing):
+    """Makes the arrays writable before."""
+
+    def write(self, problem: Problem) -> None:
+        problem.accept.setflags(write=True)
+        super().write(problem)
+
+
+class Exchanging(Writing):
+    """Puts other arrays in their place, in a frozen record."""
+
+    def write(self, problem: Problem) -> None:
+        object.__setattr__(problem, "accept", np.zeros_like(problem.accept))
+
+
+@pytest.mark.parametrize("route", [Writing, Unlocking])
+def test_a_route_that_writes_into_its_problem_is_named(case_a: Scenario, route: type) -> None:
+    case_a.gatekeeper.route, case_a.duration_s = "hostile", 16.0
+    with (
+        ROUTES.adding("hostile", route),
+        pytest.raises(SimulationError, match=rf"route {route.__name__} raised"),
+    ):
+        simulate(case_a, "c")
+
+
+def test_a_route_cannot_change_the_problem_that_is_recorded(case_a: Scenario) -> None:
+    case_a.duration_s = 16.0
+    honest = simulate(case_a, "c").problems
+    case_a.gatekeeper.route = "hostile"
+    with ROUTES.adding("hostile", Exchanging):
+        trace = simulate(case_a, "c")
+    assert any(honest["accept_m_s"][0])
+    assert trace.problems["accept_m_s"][0] == honest["accept_m_s"][0]
+    (verdict,) = verify(trace, ["GATE-PLAN"])
+    assert verdict.finding.status == "refuted"
+    assert "positions are not those of (23)" in str(verdict.finding.counterexample)
+
+
 @dataclass
 class FailingLater:
     """A route whose solver fails at every second call, and that returns no plan then."""
@@ -72,7 +122,7 @@ def test_a_failing_solver_withdraws_no_acceptance_and_is_recorded(case_a: Scenar
     case_a.gatekeeper.route = "failing"
     with ROUTES.adding("failing", FailingLater):
         trace = simulate(case_a, "c")
-        verdicts = verify(trace, ["GATE-FEAS"])
+        verdicts = verify(trace, ["GATE-PLAN"])
     decisions = trace.decisions
     failed = decisions[decisions["status"] == "solver_failed"]
     assert len(failed) == len(decisions) // 2 > 10
@@ -80,7 +130,7 @@ def test_a_failing_solver_withdraws_no_acceptance_and_is_recorded(case_a: Scenar
     assert metrics.of_run(trace)["gatekeeper"]["solver_failures"] == len(failed)
     constant = failed[["accept_throughout", "refuse_throughout"]].min(axis=1)
     assert (failed["objective"] <= constant * (1.0 + 1e-9)).all()
-    assert [(v.claim.id, v.finding.status) for v in verdicts] == [("GATE-FEAS", "holds")]
+    assert [(v.claim.id, v.finding.status) for v in verdicts] == [("GATE-PLAN", "holds")]
 
 
 def test_after_a_failure_the_rest_of_the_plan_before_counts(case_a: Scenario, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -81,14 +81,14 @@ def test_without_claims_all_about_the_run_are_meant(stuck: Trace) -> None:
 
 
 def test_a_claim_that_says_nothing_about_the_run_is_no_pass(stuck: Trace) -> None:
-    assert said(stuck, "GATE-OPT") == "GATE-OPT: nothing is claimed about run a of minimal (method a, seed 0)"
+    assert said(stuck, "GATE-PLAN") == "GATE-PLAN: nothing is claimed about run a of minimal (method a, seed 0)"
     with pytest.raises(UnknownNameError, match="unknown claim 'SAFE'"):
         assert_holds(stuck, "SAFE")
 
 
 def test_claims_about_the_model() -> None:
-    assert_proved(load("minimal")[0], "SAFE-LEMMA", set={"duration_s": 5})
+    assert_proved(load("minimal")[0], "SAFE-INV", set={"duration_s": 5})
     with pytest.raises(ClaimError, match=r"ZENO-PROOF is refuted, for minimal\n  claim: Triggers i < j"):
         assert_proved("minimal", "ZENO-PROOF", set={"decision.min_inter_event_s": 0.0})
     with pytest.raises(ScenarioError, match="from 1e-09"):
-        assert_proved(load("minimal")[0], "SAFE-LEMMA", set={"control.period_s": 0.0})
+        assert_proved(load("minimal")[0], "SAFE-INV", set={"control.period_s": 0.0})

@@ -18,12 +18,12 @@ class Judged(Protocol):
 
 CLAIMS = {claim.id: claim for claim in TRACE_CLAIMS}
 
-GATE = {"GATE-OPT", "GATE-FEAS", "GATE-MODEL"}
+GATE = {"GATE-PLAN", "GATE-MODEL"}
 """Claims about recorded problems, which the synthetic runs do not have: see runs/test_breakages.py."""
 
 UNRECORDED = {
     "c": dict.fromkeys(GATE, "not_run"),
-    "d": dict.fromkeys(("GATE-FEAS", "GATE-MODEL", "LIVE-PROG"), "error"),
+    "d": dict.fromkeys(("GATE-MODEL", "LIVE-PROG"), "error"),
 }
 """By method, what claims say where problems, or proposals and outcomes, are not in the trace, as in synthetic runs."""
 

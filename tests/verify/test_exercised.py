@@ -53,7 +53,7 @@ def test_a_run_without_anything_to_check_exercises_no_claim(claim: str, idle: di
 def test_a_run_with_several_triggers_and_proposals_exercises_every_claim(
     claim: str, run: Callable[[str, str], Trace]
 ) -> None:
-    of = {"GATE-OPT": ("case_b", "c"), "LIVE-PROG": ("contact", "d")}
+    of = {"LIVE-PROG": ("contact", "d")}
     (verdict,) = verify(run(*of.get(claim, ("dwell", "d"))), [claim])
     count = verdict.finding.exercised
     assert count
@@ -69,7 +69,7 @@ def without_messages(trace: Trace) -> Trace:
     return replace(with_meta(idle, events=kept), **tables)
 
 
-@pytest.mark.parametrize("claim", ["COMM", "GATE-FEAS", "GATE-MODEL", "LIVE-PROG"])
+@pytest.mark.parametrize("claim", ["COMM", "GATE-PLAN", "GATE-MODEL", "LIVE-PROG"])
 def test_where_the_uav_found_no_way_there_was_nothing_to_decide(claim: str, run: Callable[[str, str], Trace]) -> None:
     found = judge(claim, without_messages(run("minimal", "d")))
     assert (found.status, found.exercised) == ("holds", 0)

@@ -25,13 +25,10 @@ class LiveGate(LiveWait):
         "Under method (d) an accepted intervention is never reversed as long as no obstacle is sensed that was not "
         "known at its acceptance, and is over when its motion is, or when it has lasted as long as it may."
     )
-    formula = (
-        "without news: accepted(t) for t0 <= t < min(end of motion, t0 + longest_s), and not from the first sample "
-        "after on, at t0 + longest_s + h at the latest, h the period of the gatekeeper"
-    )
     latex = (
         r"\text{accepted}(t) \text{ for } t_0 \le t < \min(t_{\text{motion}}, t_0 + \tau_{\text{longest}})",
-        r"t_{\text{over}} \le \min(t_{\text{motion}}, t_0 + \tau_{\text{longest}}) + h",
+        r"t_{\text{over}} \le \min(t_{\text{motion}}, t_0 + \tau_{\text{longest}}) + h, \quad "
+        r"h \text{ the period of the gatekeeper}",
     )
     method = (
         "Theorems in Coq about the transitions of a commitment. Tests compare those of the running `Patience` with the "

@@ -26,10 +26,10 @@ class LiveWait(TheoremClaim):
         "Under method (d) no UAV keeps a UGV from its own task for longer than a bound, whatever it proposes, "
         "withdraws, says of its map or names as its cause: after so long the UGV is on its own until it has rested."
     )
-    formula = (
-        "between two rests of rest_s on its own: time executed <= tries (longest_s + h), h the period of the gatekeeper"
+    latex: tuple[str, ...] = (
+        r"\text{time executed between two rests} \le N (\tau_{\text{longest}} + h), \quad N \text{ tries}, \; "
+        r"h \text{ the period of the gatekeeper}",
     )
-    latex: tuple[str, ...] = (r"\text{time executed between two rests} \le N (\tau_{\text{longest}} + h)",)
     method = (
         "Theorems in Coq, by induction over any messages at any samples; the bounds follow from the scenario. Tests "
         "compare the transitions of the running `Patience` with the theorem's, and attack running gatekeepers that "

@@ -37,7 +37,6 @@ class SafeDist(TheoremClaim):
         "With several points, each with D >= d - W/A, all inequalities can be met at once if there is a unit vector g "
         "with n.g >= m > 0 for every point with D < d + h W/m; then all these bounds are kept together."
     )
-    formula = "A h <= 1, ||e|| <= w, D(0) >= d - W/A, inequality met at each sample => D(t) >= d - W/A for all t"
     latex = (
         r"A h \le 1, \; \lVert e \rVert \le w, \; D(0) \ge d - \frac{W}{A} \; \Rightarrow \; D(t) \ge d - "
         r"\frac{W}{A} \text{ for all } t",

@@ -22,7 +22,6 @@ class SafeGate(SafeInv):
         "Neither the optimiser nor its horizon, nor the UAV as an adviser is trusted; as a robot the UAV must keep its "
         "own share of each inequality."
     )
-    formula = "b_k <= 0 for all k, 0 <= c <= b_k / (n_k.u) wherever n_k.u < b_k => n_k.(c u) >= b_k for all k"
     latex = (
         r"b_k \le 0, \; 0 \le c \le \frac{b_k}{n_k^\top u} \text{ wherever } n_k^\top u < b_k \; \Rightarrow \; "
         r"n_k^\top (c u) \ge b_k \text{ for all } k",

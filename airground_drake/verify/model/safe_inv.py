@@ -25,14 +25,11 @@ class SafeInv(TheoremClaim):
         "every sample each pair in sensing range meets its avoidance inequalities and velocities are held until the "
         "next. Inside a safe distance the deficit shrinks by the factor 1 - A h per period and never grows. Two robots "
         "take half of an inequality each; a UGV under a UAV has no vertical velocity. Pairs beyond the sensing range "
-        "need no inequality."
-    )
-    formula = (
-        "D >= d, n.v >= -q (D - d)/h (sum over the pair: q = 1) => ||x + s v|| >= d for all s in [0, h]; "
-        "D <= d, n.v >= q A (d - D) => ||x + s v|| >= D and d - ||x + h v|| <= (1 - A h)(d - D); "
-        "D > R, R >= d + c h => ||x + s v|| >= d"
+        "need no inequality. All this rests on a lemma: on a straight line a distance is at least its value at the "
+        "start plus the time times its rate of change at the start."
     )
     latex: tuple[str, ...] = (
+        r"\lVert x + s v \rVert \ge D + s \, n^\top v, \quad D = \lVert x \rVert > 0, \quad s \ge 0",
         r"D \ge d, \; n^\top v \ge -q (D - d) / h \; \Rightarrow \; \lVert x + s v \rVert \ge d \quad "
         r"\text{for all } s \in [0, h]",
         r"D \le d, \; n^\top v \ge q A (d - D) \; \Rightarrow \; \lVert x + s v \rVert \ge D, \; d - \lVert x "
@@ -42,7 +39,8 @@ class SafeInv(TheoremClaim):
     )
     method = (
         "Theorems in Coq, for all positions, times and numbers of bodies. The hypotheses about the scenario are "
-        "checked here in exact arithmetic; those about a run are SAFE-HYP."
+        "checked here in exact arithmetic, safe distances above 0 among them: no pair is at one point. Those about a "
+        "run are SAFE-HYP."
     )
     equations = "(7)-(8), (11) in the inequality form of the package (set-based avoidance)"
     assumptions: tuple[str, ...] = (
@@ -59,6 +57,8 @@ class SafeInv(TheoremClaim):
     )
 
     theorems: tuple[str, ...] = (
+        "Safety.lemma",
+        "Safety.lemma_in_the_plane",
         "Safety.safe_always",
         "Safety.recovers",
         "Safety.obstacle",
@@ -73,7 +73,7 @@ class SafeInv(TheoremClaim):
         return constants(scenario)
 
     def hypotheses(self, inputs: dict[str, Any]) -> list[Hypothesis]:
-        """A h is at most 1, shares add up to 1, the sensing range covers d + c h."""
+        """A h is at most 1, shares add up to 1, d is above 0, the sensing range covers d + c h."""
         gain, h = decimal(inputs["avoidance_gain_1_s"]), decimal(inputs["period_s"])
         reach = decimal(inputs["sensing_range_m"])
         pairs = kinds_of(inputs)
@@ -85,6 +85,10 @@ class SafeInv(TheoremClaim):
             )
             for kind in dict.fromkeys(each.kind for each in pairs)
         ]
+        apart = [
+            Hypothesis.of("safe distance", f"{each.kind}: the safe distance is above 0", each.safe_m, "m", strict=True)
+            for each in pairs
+        ]
         ranges = [
             Hypothesis.of(
                 self.margin_of,
@@ -95,7 +99,7 @@ class SafeInv(TheoremClaim):
             )
             for each in pairs
         ]
-        return [*stable(gain, h), *shares, *ranges]
+        return [*stable(gain, h), *shares, *apart, *ranges]
 
 
 def stable(gain: Fraction, h: Fraction) -> list[Hypothesis]:

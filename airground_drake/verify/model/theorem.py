@@ -58,6 +58,18 @@ class Proof(Evidence):
     of: int | None = None
 
 
+def grounds(theorems: Sequence[str], hypotheses: Sequence[Hypothesis]) -> dict[str, Any]:
+    """The fields of a `Proof`; `reason` says why the theorems prove nothing here, and is None if they do."""
+    stands, broken = standing(*theorems), next((each for each in hypotheses if not each.holds), None)
+    reason = None if stands.checked else f"the theorems are {stands.words}"
+    return {
+        "proof": stands.words,
+        "theorems": {name: THEOREMS[name].statement for name in theorems},
+        "hypotheses": hypotheses,
+        "reason": reason if broken is None else f"a hypothesis fails: {broken.says}",
+    }
+
+
 class TheoremClaim(ModelClaim):
     """A theorem and its hypotheses.
 
@@ -90,15 +102,10 @@ class TheoremClaim(ModelClaim):
         found = self.hypotheses(inputs)
         named = [each for each in found if each.hypothesis == self.margin_of]
         shown = next((each for each in found if not each.holds), None) or min(named, key=lambda each: each.margin)
-        stands = standing(*self.theorems)
-        statements = {name: THEOREMS[name].statement for name in self.theorems}
-        evidence = self.evidence(inputs, proof=stands.words, theorems=statements, hypotheses=found)
+        evidence = self.evidence(inputs, **grounds(self.theorems, found))
         finding = Finding(
             "proved", shown.margin, shown.unit, evidence=evidence, quantity=shown.hypothesis, exercised=len(found)
         )
-        if shown.holds and stands.checked:
-            return finding
         if not shown.holds and (against := self.counterexample(inputs, shown)) is not None:
-            return replace(finding, status="refuted", counterexample=against)
-        reason = f"the theorems are {stands.words}" if shown.holds else f"a hypothesis fails: {shown.says}"
-        return replace(finding, status="inconclusive", evidence=replace(evidence, reason=reason))
+            return replace(finding, status="refuted", counterexample=against, evidence=replace(evidence, reason=None))
+        return finding if evidence.reason is None else replace(finding, status="inconclusive")

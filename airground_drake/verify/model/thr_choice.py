@@ -59,7 +59,6 @@ class ThrChoice(ModelClaim):
         "The threshold in force minimises the Bayes risk for the scenario's own c1, c2, drift and noise, or somebody "
         "declared it: the rule `fixed` takes a number, the rule `printed` takes (19) as the paper prints it."
     )
-    formula = "rule bayes: B(zeta; drift, noise, c1, c2) = min B; otherwise B(zeta) - min B is shown"
     latex = (
         r"\text{rule bayes: } B(\zeta) = \min_z B(z), \quad \text{otherwise } B(\zeta) - \min_z B(z) \text{ is shown}",
     )

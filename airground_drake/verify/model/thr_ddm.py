@@ -67,7 +67,6 @@ class ThrDdm(ModelClaim):
         "Simulated paths of the decision variable, with and without initial deviation, have the mean decision time and "
         "the error rate of the formulas that the threshold rests on."
     )
-    formula = "E[min t: |x(t)| >= zeta] = T of (17), P[x(t) = -zeta] = E of (18), dx = drift dt + noise dW, x(0) = y0"
     latex = (
         r"\mathbb{E}[\min \{t : |x(t)| \ge \zeta\}] = T_{(17)}, \quad \mathbb{P}[x(t) = -\zeta] = E_{(18)}",
         r"d x = \mu \, d t + \sigma \, d W, \quad x(0) = y_0",

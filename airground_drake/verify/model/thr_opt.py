@@ -44,10 +44,6 @@ class ThrOpt(TheoremClaim):
         "zeta; the root of the printed equation has a higher risk. With any initial deviation smaller than the root, "
         "the risk is lower at some other threshold."
     )
-    formula = (
-        "B(zeta) > B(root) for every zeta other than the root; B(printed root) > B(root); for y0 other than 0, |y0| < "
-        "root: B(zeta, y0) < B(root, y0) for some zeta"
-    )
     latex = (
         r"B(\zeta) > B(\zeta_{\text{root}}) \text{ for every } \zeta \ne \zeta_{\text{root}}, \quad "
         r"B(\zeta_{\text{printed}}) > B(\zeta_{\text{root}})",

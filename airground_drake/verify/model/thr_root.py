@@ -31,7 +31,6 @@ class ThrRoot(TheoremClaim):
     id = "THR-ROOT"
     summary = "The threshold equation has exactly one solution, and the program finds it."
     statement = "The threshold equation, with c2/c1 on the right, has exactly one root, and the code returns it."
-    formula = "noise^2/drift^2 (sinh u + u) = c2/c1 for one u > 0 only; zeta = u noise^2/(2 drift)"
     latex = (
         r"\frac{\sigma^2}{\mu^2} (\sinh u + u) = \frac{c_2}{c_1} \text{ for one } u > 0 \text{ only}, \quad "
         r"\zeta = \frac{u \sigma^2}{2 \mu}",

@@ -31,7 +31,6 @@ class ZenoProof(TheoremClaim):
         "Triggers i < j of a UGV are at least (j - i) times the minimum inter-event time apart, whatever the decision "
         "variable does, so that there are at most floor(T/dwell) + 1 in a time T and no run is Zeno."
     )
-    formula = "for every x: [0, inf) -> R: t_j - t_i >= (j - i) min_inter_event_s, number in T <= floor(T/dwell) + 1"
     latex = (
         r"x : [0, \infty) \to \mathbb{R} \text{ arbitrary} \; \Rightarrow \; t_j - t_i \ge (j - i) \tau_{\min}",
         r"N(T) \le \lfloor T / \tau_{\min} \rfloor + 1",

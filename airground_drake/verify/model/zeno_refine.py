@@ -105,10 +105,6 @@ class ZenoRefine(ModelClaim):
         "As the step of the decision noise is refined, the number of events of the bare threshold grows without bound, "
         "like one over the square root of the step; that of the trigger in use tends to a limit."
     )
-    formula = (
-        "E[triggers of x >= zeta] ~ dt^p with p = -1/2; E[triggers of the automaton] ~ dt^0, and never more than "
-        "duration / min_inter_event_s + 1"
-    )
     latex = (
         r"\mathbb{E}[N_{\text{bare}}] \sim \Delta t^{p}, \; p = -\frac{1}{2}; \quad "
         r"\mathbb{E}[N_{\text{automaton}}] \sim \Delta t^{0}, \quad N_{\text{automaton}} \le "

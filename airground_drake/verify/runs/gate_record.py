@@ -6,7 +6,7 @@ The paper's formulas are written again in plain numpy; N is the number of stages
 from __future__ import annotations
 
 import abc
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
@@ -107,6 +107,13 @@ class DecisionRecord:
         reach = np.einsum("...kmi,kmi->...km", away, normals)
         return np.where(normals.any(axis=-1), reach - self["distances_m"], 0.0)
 
+    @property
+    def unit_normals(self) -> bool:
+        """Whether unit normals were recorded, along which the optimum can be bounded."""
+        if self.data["normals"] is None:
+            return False
+        return bool((np.abs(np.linalg.norm(self["normals"], axis=2) - 1.0) <= POSITION_TOLERANCE_M).all())
+
     @cached_property
     def half_planes(self) -> Array:
         """Normals of the half-planes in place of (26d), (N, m, 3): 0 where no plan can come nearer than d.
@@ -175,16 +182,6 @@ def rows_of(trace: Trace) -> list[DecisionRecord]:
         if row.robot not in trace.ugvs:
             raise TraceError(f"{row.label}: not of a UGV of the trace")
     return rows
-
-
-def in_turn(trace: Trace, rows: Iterable[DecisionRecord]) -> Iterator[tuple[DecisionRecord, DecisionRecord | None]]:
-    """Each decision, by UGV and time, with the one before it on the same proposal, if there is one."""
-    rows = list(rows)
-    for ugv in trace.ugvs:
-        last: DecisionRecord | None = None
-        for row in (row for row in rows if row.robot == ugv):
-            yield row, last if last and last.number == row.number else None
-            last = row
 
 
 def reasons_of(trace: Trace) -> dict[str, int]:
@@ -271,8 +268,7 @@ def conclude(finding: Finding, compared: Iterable[Deviation]) -> Finding:
 def without_decisions(trace: Trace) -> list[str]:
     """UGVs that never decided, though they executed something, or got a proposal and were intervened on long enough.
 
-    This is no refutation. GATE-FEAS refutes it where a proposal stood for long enough, EXEC where something was
-    executed.
+    This is no refutation: their proposals may have been withdrawn at once.
     """
     asked = [ugv for ugv in trace.ugvs if talk_is_due(trace, ugv) and ugv not in without_proposals(trace)]
     called = [ugv for ugv in trace.ugvs if (trace.executing(ugv) >= 0).any() or ugv in asked]

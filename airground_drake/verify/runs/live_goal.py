@@ -31,12 +31,6 @@ class LiveGoal(TraceClaim):
         "Every robot ended the run at its target, or standing where the scenario declares that it stalls. For a robot "
         "that collided, its motion before the first collision counts."
     )
-    formula = (
-        "||p_i(end) - target_i|| <= arrival tolerance; for a declared stall ||p_i(end) - s_i|| <= stall tolerance, "
-        "farther than the arrival tolerance from the target, and within 1e-3 m of p_i(end) during the last second; "
-        "the UAV then within the arrival tolerance of the UGVs' centroid raised by its altitude; end: of the run, or "
-        "the last row before the first collision of i"
-    )
     latex = (
         r"\lVert p_i(T) - \text{target}_i \rVert \le \varepsilon_{\text{arrival}}",
         r"\text{declared stall: } \lVert p_i(T) - s_i \rVert \le \varepsilon_{\text{stall}}, \quad \lVert "

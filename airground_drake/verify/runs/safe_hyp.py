@@ -124,12 +124,6 @@ class SafeHyp(TraceClaim):
         "At every control sample of the run the hypotheses of the safety theorem held, up to e per pair of bodies: so "
         "each pair kept d - e / (A h) at all times of the run. The controllers were built with what the scenario says."
     )
-    formula = (
-        "step_i = p_i[k+1] - p_i[k]; n.step_i >= q b - e_i where b = A h (d - D) if D <= d, else d - D, or D >= d + "
-        "||step_i|| + ||step_j|| (q = 1 obstacle, 1/2 robot; e = max over k of e_i + e_j); D(0) >= d; p straight "
-        "between samples; z constant for a UGV; ||v|| <= v_max; A h <= 1; range >= d + (closing speed) h; then D >= d "
-        "- e / (A h), and d - e / (A h) >= d - 1e-9 m"
-    )
     latex = (
         r"n^\top (p_i^{k+1} - p_i^k) \ge q\, b - e_i, \quad b = \begin{cases} A h (d - D) & D \le d \\ d - D & D > d "
         r"\end{cases}",

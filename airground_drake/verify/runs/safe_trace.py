@@ -30,10 +30,6 @@ class SafeTrace(TraceClaim):
     id = "SAFE-TRACE"
     summary = "No robot came closer to an obstacle or to another robot than the safe distance."
     statement = "During the whole run every robot kept the safe distance from every obstacle and every other robot."
-    formula = (
-        "min over t in [0, duration] of ||p_i(t) - q_j(t)|| - (r_i + r_j) >= d_ij for every pair (i, j), tolerance "
-        "1e-9 m"
-    )
     latex = (
         r"\min_{t \in [0, T]} \lVert p_i(t) - q_j(t) \rVert - (r_i + r_j) \ge d_{ij} - 10^{-9} \text{ m} \quad "
         r"\text{for every pair } (i, j)",

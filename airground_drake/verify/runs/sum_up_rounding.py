@@ -1,4 +1,4 @@
-"""Sum-up rounding (28)-(29) of a recorded decision, a part of GATE-FEAS."""
+"""Sum-up rounding (28)-(29) of a recorded decision, a part of GATE-PLAN."""
 
 from __future__ import annotations
 
@@ -26,14 +26,6 @@ def is_rounded(row: DecisionRecord) -> bool:
     if row.data["relaxed"] is None and row.given["status"] == "optimal":
         raise TraceError(f"{row.label} claims to be complete, but has no relaxation")
     return row.data["relaxed"] is not None
-
-
-def compare_without_rounding(row: DecisionRecord) -> Iterator[Deviation]:
-    """A route that proves its optimum rounds nothing, and records nothing of the kind."""
-    if row.given["route"] == "mixed_integer":
-        arrays = [name for name in ("relaxed", "rounded") if row.data[name] is not None]
-        numbers = [row.given[name] + 1.0 for name in ("rounding_deviation_s", "relaxed_first_stage")]
-        yield Deviation(row, "a relaxation that the route has not", [len(arrays), *numbers], 0.0)
 
 
 def integrated_error_s(row: DecisionRecord) -> float:

@@ -102,10 +102,6 @@ class ThrQuality(TraceClaim):
         "has it, to within the width of the hysteresis: no trigger came at a smaller error, no larger error went "
         "without a trigger."
     )
-    formula = (
-        "e(T) >= zeta - w at a trigger T outside an excursion of e = ||rho_rd - rho||; e(t) <= zeta + w in an "
-        "excursion until its trigger; w = zeta - release level, or zeta / 2 for the bare threshold"
-    )
     latex = (
         r"e(t) = \lVert \rho_{rd}(t) - \rho(t) \rVert, \quad w = \zeta - \zeta_{release} \quad "
         r"(\zeta / 2 \text{ if bare})",

@@ -12,11 +12,13 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from airground_drake.base.errors import TraceError
+from airground_drake.base.exact import decimal
 from airground_drake.run.trace import Trace
 from airground_drake.scenarios.schema import Threshold
 from airground_drake.verify.claim import TraceClaim
 from airground_drake.verify.engines.geometry import NormSignal
 from airground_drake.verify.finding import Finding
+from airground_drake.verify.model.theorem import Hypothesis, Proof, grounds
 from airground_drake.verify.runs.triggers import (
     Conflict,
     Transition,
@@ -37,6 +39,9 @@ VARIABLE_TOLERANCE_M = 1e-6
 MODES = {"trigger": 1, "release": 0, "refractory": 2, "resume": 0}
 """Mode after each kind of transition: 'refractory' is a release before the dwell is over, 'resume' the end of it."""
 
+THEOREMS = ("Isolation.largest_at_an_end", "Isolation.nowhere_below", "Isolation.attained")
+"""Why no crossing in a step is missed."""
+
 EVENT_KINDS = {"trigger": "trigger", "release": "release", "refractory": "release"}
 """Event that the trace has for a transition."""
 
@@ -56,19 +61,17 @@ class ThrTrig(TraceClaim):
     summary = "The UAV stepped in exactly when the error reached the threshold: never late, never without cause."
     statement = (
         "The UAV triggered exactly when the decision variable reached the threshold, none missing and none spurious; "
-        "a crossing inside the minimum inter-event time triggers at its end if the variable is still above. The noise "
-        "in the variable moves as (15) has it, by one sample for each of its periods."
-    )
-    formula = (
-        "recorded triggers and releases = those of the automaton run on the recorded x, times equal within 1e-5 s; "
-        "recorded x(t) = ||rho_rd(t) - rho(t)|| + n(t) within 1e-6 m at every row; n(0) = 0, and between rows "
-        "n' = s w_k / sqrt(h) - leak n with one w_k, |w_k| <= 9, for each period h of the noise"
+        "a crossing inside the minimum inter-event time triggers at its end if the variable is still above. Between "
+        "two updates no crossing is missed, however briefly the variable is beyond the level, and none is invented. "
+        "The noise in the variable moves as (15) has it, by one sample for each of its periods."
     )
     latex = (
         r"x(t) = \lVert \rho_{rd}(t) - \rho(t) \rVert + n(t)",
         r"\text{recorded triggers and releases} = \text{automaton}(x), \quad |\Delta t| \le 10^{-5} \text{ "
         r"s}, \quad |\Delta x| \le 10^{-6} \text{ m}",
         r"n(0) = 0, \quad \dot n = \sigma w_k / \sqrt{h} - \lambda n, \quad |w_k| \le 9",
+        r"x(s) = \lVert e_0 + s (e_1 - e_0) \rVert + n_0 + s (n_1 - n_0), \; s \in [0, 1]: \quad "
+        r"\max x = \max(x(0), x(1)), \quad \min x = \min(x(0), x(1), p w + \text{const})",
     )
     method = (
         "(15) is rebuilt from positions, noise and the scenario's preset. The recorded x, the signal that the trigger "
@@ -77,7 +80,10 @@ class ThrTrig(TraceClaim):
         "at the preset's corners and at its turning points (closed form) into monotone pieces; crossings are then sign "
         "changes, located by Brent's method to 1e-12 s. The automaton is run again on x, and its events and the mode "
         "column are compared one by one. If a period of the noise has several rows, all must have the same sample, "
-        "given the leak."
+        "given the leak. Theorems in Coq say why the running trigger misses nothing in a step: its largest value is at "
+        "an end, and its least one has a closed form, with p the distance of the error's line from 0, "
+        "k = (n1 - n0)/|e1 - e0| and w = sqrt(1 - k^2). `isolation` in the evidence has their hypotheses: the noise "
+        "changes its rate at control samples only. Tests compare the running trigger with dense sampling."
     )
     equations = "(15), (20)"
     assumptions = (
@@ -85,11 +91,15 @@ class ThrTrig(TraceClaim):
         "The threshold in force is the one recorded in the trace: the scenario's, or the root of (19) by its rule.",
         "Events in the last 1e-5 s of the run may be on either side of its end.",
         "Where another block computes x (`decision_block` in the trace), x is linear in time between rows.",
+        "Drake isolates a witness that has changed its sign over a step; crossings are then late by 1e-6 s at most, "
+        "and by 1e-9 s in steps shorter than that, which are not looked into.",
     )
     does_not_establish = (
         "That the threshold is a good one (THR-CHOICE); that the noise has the stated distribution (THR-DDM), "
         "or the stated leak if no period of the noise has a row within; or anything about a Wiener path between the "
-        "noise samples. If x only touches a level up to rounding, 1e-12 m, the verdict follows the rounding."
+        "noise samples. If x only touches a level up to rounding, 1e-12 m, the verdict follows the rounding. Two "
+        "crossings closer than the isolation, 1e-6 s, may be taken at one instant. Where a hypothesis of `isolation` "
+        "fails, the theorems say nothing about other runs of the scenario."
     )
 
     exercised_by = "transitions of the automaton that were due"
@@ -110,9 +120,24 @@ class ThrTrig(TraceClaim):
             quantity="time left by which an event may differ from the crossing",
             where={"robot": worst[1]} if worst else {},
             counterexample=min(wrong, key=lambda conflict: float(conflict["t_s"])) if wrong else None,
-            evidence=asdict(Replay(replayed, _block(trace) or "that of (15)", *levels, dict(due))),
+            evidence={
+                **asdict(Replay(replayed, _block(trace) or "that of (15)", *levels, dict(due))),
+                "isolation": isolation(trace.scenario.decision.noise_period_s, trace.scenario.control.period_s, levels),
+            },
             exercised=due.total(),
         )
+
+
+def isolation(noise_period_s: float, period_s: float, levels: Levels) -> Proof:
+    """Why no crossing between two updates is missed (proofs/Isolation.v), and whether that applies here."""
+    steps = decimal(noise_period_s) / decimal(period_s)
+    says = f"the noise period is a whole number of control periods: {float(steps):g}"
+    hypotheses = [
+        Hypothesis.of("threshold", "the threshold is above 0", decimal(levels.zeta_m), "m", strict=True),
+        Hypothesis.of("noise periods beside control samples", says, -(steps % 1)),
+        Hypothesis.of("control periods in a noise period", "there is at least one", steps - 1),
+    ]
+    return Proof(**grounds(THEOREMS, hypotheses))
 
 
 class Levels(NamedTuple):

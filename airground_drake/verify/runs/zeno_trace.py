@@ -45,7 +45,6 @@ class ZenoTrace(TraceClaim):
     id = "ZENO-TRACE"
     summary = "No UGV was triggered twice within the minimum inter-event time."
     statement = "In this run no UGV was triggered twice within the minimum inter-event time."
-    formula = "t_(k+1) - t_k >= min_inter_event_s for consecutive triggers of each UGV, tolerance 1e-9 s"
     latex = (r"t_{k+1} - t_k \ge \tau_{\min} - 10^{-9} \text{ s} \quad \text{for consecutive triggers of each UGV}",)
     method = (
         "Differences of the recorded trigger times; the events must agree with the columns triggers, triggered_at_s "

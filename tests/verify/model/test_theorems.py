@@ -13,6 +13,7 @@ from airground_drake.scenarios.load import load, shipped
 from airground_drake.verify.claim import ModelClaim
 from airground_drake.verify.model import safe_inv, theorem
 from airground_drake.verify.model.theorem import TheoremClaim
+from airground_drake.verify.runs.thr_trig import Levels, isolation
 
 CLAIMS: dict[str, TheoremClaim] = {
     name: claim for name in MODEL_CLAIMS if isinstance(claim := MODEL_CLAIMS.make(name, of=ModelClaim), TheoremClaim)
@@ -22,7 +23,7 @@ LAYER = ("SAFE-INV", "SAFE-GATE")
 
 
 def test_theorems_and_claims_name_each_other() -> None:
-    assert len(CLAIMS) == 10
+    assert len(CLAIMS) == 8
     for name, claim in CLAIMS.items():
         assert any(name in THEOREMS[each].checked_where for each in claim.theorems), name
 
@@ -59,7 +60,7 @@ GAINED = (*LAYER, "SAFE-DIST")
 @pytest.mark.parametrize(
     ("names", "change", "status"),
     [
-        (["SAFE-LEMMA"], {"pairs": pair("obstacle", 0.0, 1.0)}, "inconclusive"),
+        (["SAFE-INV", "SAFE-GATE"], {"pairs": pair("obstacle", 0.0, 1.0)}, "inconclusive"),
         (GAINED, {"avoidance_gain_1_s": 20.1}, "inconclusive"),
         (GAINED, {"avoidance_gain_1_s": 20.0}, "proved"),
         (GAINED, {"avoidance_gain_1_s": -0.1}, "inconclusive"),
@@ -72,9 +73,6 @@ GAINED = (*LAYER, "SAFE-DIST")
         (["LIVE-GATE", "LIVE-WAIT"], {"longest_s": 0.0}, "inconclusive"),
         (["LIVE-GATE", "LIVE-WAIT"], {"period_s": 0.0}, "inconclusive"),
         (["ZENO-PROOF"], {"released_below_m": 3.0}, "proved"),
-        (["THR-ISO"], {"noise_period_s": 0.06}, "inconclusive"),
-        (["THR-ISO"], {"noise_period_s": 0.0}, "inconclusive"),
-        (["THR-ISO"], {"noise_period_s": 0.15}, "proved"),  # 3 * 0.05, decimal
     ],
 )
 def test_a_hypothesis_that_fails_leaves_the_claim_open(names: list[str], change: dict[str, Any], status: str) -> None:
@@ -85,6 +83,18 @@ def test_a_hypothesis_that_fails_leaves_the_claim_open(names: list[str], change:
             assert finding.evidence.reason.startswith("a hypothesis fails: ")
             assert finding.margin is not None
             assert finding.margin <= 0.0
+
+
+@pytest.mark.parametrize(
+    ("noise_period_s", "zeta_m", "failing"),
+    [(0.15, 3.0, None), (0.06, 3.0, "a whole number"), (0.025, 3.0, "a whole number"), (0.05, 0.0, "above 0")],
+)  # 0.15 is 3 * 0.05 in decimals only
+def test_isolation_applies_where_noise_changes_at_control_samples(
+    noise_period_s: float, zeta_m: float, failing: str | None
+) -> None:
+    found = isolation(noise_period_s, 0.05, Levels(zeta_m, 1.0, 0.5))
+    assert list(found.theorems) == [name for name in THEOREMS if THEOREMS[name].checked_where == ("THR-TRIG",)]
+    assert found.reason is None if failing is None else failing in str(found.reason)
 
 
 def test_shares_that_do_not_add_up_leave_the_claim_open(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
-from builders.decisions import ALL_PLANS, STAGES, GateData
 from builders.edits import bumped, first_of, moved, rows, with_decision, with_events, with_meta, with_states
 from verify.judging import CLAIMS
 from verify.runs.cases import (
@@ -21,7 +20,6 @@ from verify.runs.cases import (
     LOCAL,
     RELAXED,
     SIXTH,
-    SWAP,
     A,
     D,
     Edit,
@@ -32,7 +30,6 @@ from verify.runs.cases import (
     decisions,
     events,
     first,
-    kept,
     meta,
     one_more,
     problem,
@@ -47,18 +44,6 @@ from airground_drake.run.trace import Trace
 from airground_drake.verify.runs.gate_record import rows_of
 
 # ---------------------------------------------------------------------------------------------------- single edits
-
-
-def without_point(trace: Trace) -> Trace:
-    """The decision forgets the nearest obstacle."""
-    row = rows_of(trace)[SIXTH]
-    j = int(np.argmin(np.linalg.norm(row["initial_m"] - row["centres_m"][0], axis=1) - row["distances_m"]))
-    m = len(row["distances_m"])
-    return problem(
-        centres_m=lambda v: np.delete(v.reshape(STAGES, m, 3), j, axis=1).ravel(),
-        normals=lambda v: np.delete(v.reshape(STAGES, m, 3), j, axis=1).ravel(),
-        distances_m=lambda v: np.delete(v, j),
-    )(trace)
 
 
 def without_a_plan(row: dict[str, Any], given: dict[str, Any]) -> None:
@@ -78,36 +63,6 @@ def no_plan_at_all(trace: Trace) -> Trace:
     for row in range(len(trace.decisions)):
         trace = with_decision(trace, without_a_plan, row)
     return trace
-
-
-def budget_spent(row: dict[str, Any], given: dict[str, Any]) -> None:
-    row["status"] = "budget_spent"
-    given |= {"relaxed": [], "rounded": [], "normals": []}
-
-
-def other_plan(choose: Callable[[GateData], Any], *, bounded: bool) -> Edit:
-    """A consistent record of another plan; `bounded`: it is said to be the optimum."""
-
-    def edit(trace: Trace) -> Trace:
-        data = GateData.of(rows_of(trace)[SIXTH])
-        plan = choose(data)
-        new = {"objective": data.plan_cost(plan)}
-        if bounded:
-            new |= {"route_bound": data.plan_cost(plan, along=True), "gap": 0.0}
-        return both(column(**new), problem(plan=lambda _: plan, positions_m=lambda _: data.positions(plan).ravel()))(
-            trace
-        )
-
-    return edit
-
-
-def worst(data: GateData) -> Any:
-    return max(ALL_PLANS, key=data.plan_cost)
-
-
-def beside_the_best(data: GateData) -> Any:
-    best = min(ALL_PLANS, key=lambda plan: data.plan_cost(plan, along=True))
-    return np.where(np.arange(STAGES) == STAGES // 2, 1.0 - best, best)
 
 
 def idle_normals_turned(trace: Trace) -> Trace:
@@ -167,29 +122,6 @@ def refusal_later(by: float) -> Edit:
         return pd.concat([table, refused.assign(t_s=refused["t_s"] + by)], ignore_index=True)
 
     return decisions(edit)
-
-
-def undecided(trace: Trace) -> Trace:
-    """Nothing is decided on the first proposal."""
-    silent = (trace.decisions["issued_s"] != trace.decisions["issued_s"].min()).to_numpy()
-    left = replace(trace, decisions=trace.decisions[silent])
-    return replace(left, problems=trace.problems[silent]) if len(trace.problems) else left
-
-
-def sent(*given: tuple[str, float, float]) -> Edit:
-    """Proposals more, (to whom, when, end of the motion), while ugv1 is intervened on and nothing is in force."""
-
-    def edit(trace: Trace) -> Trace:
-        one = trace.proposals.iloc[0].to_dict()
-        table = [
-            {**one, "number": 90 + k, "robot": ugv, "issued_s": t, "times_s": [t, end], "positions_m": [0.0] * 6}
-            for k, (ugv, t, end) in enumerate(given)
-        ]
-        told = [{"t_s": t, "robot": ugv, "kind": "proposal", "policy": one["policy"]} for ugv, t, _ in given]
-        more = with_meta(trace, events=[*trace.events, *told])
-        return replace(more, proposals=pd.concat([trace.proposals, pd.DataFrame(table)], ignore_index=True))
-
-    return edit
 
 
 def each_value(**changes: Callable[[Any], Any]) -> Edit:
@@ -316,37 +248,13 @@ BREAKAGES: dict[str, tuple[tuple[str, str, Edit, str, str], ...]] = {
         ("preset", D, scenario(ugvs__ugv1__preset__speed_m_s=0.5), R, ""),
         ("threshold", D, meta(zeta_m=2.9), E, ""),
     ),
-    "GATE-OPT": (
-        ("loser inflated", RELAXED, column(objective_accept=lambda v: 2.0 * v, objective_refuse=lambda v: 2.0 * v), R,
-         "throughout"),
-        ("worst plan", RELAXED, other_plan(worst, bounded=False), R, "objective above"),
-        ("worse plan proved", BINARY, other_plan(beside_the_best, bounded=True), R, "lower bound overstated"),
-        ("bound too high", BINARY, column(route_bound=lambda v: 1.001 * v, gap=0.0), R, "lower bound"),
-        ("optimal with a gap", BINARY, column(route_bound=lambda v: 0.9999 * v, gap=1e-4), R, "but with a gap"),
-        ("no normals", RELAXED, problem(normals=lambda _: []), E, ""),
-        ("idle normals", RELAXED, idle_normals_turned, H, ""),
-        ("budget spent", RELAXED, decision(budget_spent), I, ""),
-        ("no plan at all", RELAXED, no_plan_at_all, I, ""),
-        ("a refusal without a plan", RELAXED, last_without_a_plan("refuse"), H, ""),
-        ("no problems", RELAXED, lambda t: replace(t, problems=t.problems.iloc[:0]), N, ""),
-        ("no decisions", RELAXED, without_decisions, N, ""),
-    ),
-    "GATE-FEAS": (
+    "GATE-PLAN": (
         ("fractional", RELAXED, problem(plan=at(3, 0.5)), R, "omega is not binary"),
         ("first stage", RELAXED, column(first_stage=swapped), R, "first stage"),
-        ("obstacle forgotten", RELAXED, without_point, R, "left out"),
-        ("moving robot stands", SWAP, problem(9, centres_m=lambda v: np.tile(v[: len(v) // 60], 60)), R, "UGV senses"),
-        ("slack", RELAXED, problem(slack_weight_1_m2_s=lambda v: 1.1 * v), R, "weight of slack"),
-        ("terminal", RELAXED, problem(terminal_weight_s=lambda v: v + 0.1), R, "weight of the terminal cost"),
-        ("contrary answer", RELAXED, column(decision=swapped), R, "answer or reason"),
-        ("reason", RELAXED, column(reason="dwell"), R, "answer or reason"),
         ("rounded otherwise", RELAXED, problem(rounded=at(4, lambda v: 1.0 - v)), R, "rounded against the rule"),
         ("not rounded", RELAXED, problem(rounded=at(4, 0.5)), R, "rounded omega is not binary"),
         ("relaxed outside", RELAXED, problem(relaxed=at(0, 1.0 + 1e-6)), R, "outside [0, 1]"),
-        ("rounded nevertheless", BINARY, column(rounding_deviation_s=0.0), R, "a relaxation that the route has not"),
-        ("first one lost", RELAXED, kept(*range(1, 11)), R, "missing"),
-        ("one lost", RELAXED, kept(0, 1, *range(3, 11)), R, "missing"),
-        ("one twice", RELAXED, kept(0, 1, 1, *range(2, 11)), R, "too many"),
+        ("weight of slack", RELAXED, problem(slack_weight_1_m2_s=lambda v: 1.1 * v), R, "objective"),
         ("problems exchanged", RELAXED, lambda t: replace(t, problems=t.problems.iloc[[*range(9), 10, 9]]), R, ""),
         ("NaN", RELAXED, problem(accept_m_s=at(0, np.nan)), E, ""),
         ("cost NaN", RELAXED, column(objective=np.nan), E, ""),
@@ -355,18 +263,16 @@ BREAKAGES: dict[str, tuple[tuple[str, str, Edit, str, str], ...]] = {
         ("optimal without a relaxation", RELAXED, problem(relaxed=lambda _: []), E, ""),
         ("another route", RELAXED, column(route="nonlinear"), E, ""),
         ("a problem lost", RELAXED, lambda t: replace(t, problems=t.problems.iloc[1:]), E, ""),
+        ("idle normals", RELAXED, idle_normals_turned, H, ""),
         ("a refusal without a plan", RELAXED, last_without_a_plan("refuse"), H, ""),
-        ("accepted without a plan", RELAXED, last_without_a_plan("accept"), R, "answer or reason"),
+        ("no plan at all", RELAXED, no_plan_at_all, H, ""),
         ("no problems", RELAXED, lambda t: replace(t, problems=t.problems.iloc[:0]), N, ""),
         ("no decisions", RELAXED, without_decisions, N, ""),
-        ("undecided", B_C, undecided, R, "nothing is decided"),
-        ("undecided under (d)", B_D, undecided, R, "nothing is decided"),
-        ("another one undecided", B_D, sent(("ugv1", 11.5, 99.0)), R, "nothing is decided"),
-        ("making way undecided", B_D, sent(("ugv2", 11.5, 99.0)), R, "nothing is decided"),
-        ("over at once", B_D, sent(("ugv1", 11.5, 11.55)), H, ""),
-        ("replaced at once", B_D, sent(("ugv1", 11.5, 99.0), ("ugv1", 11.55, 11.6)), H, ""),
-        ("released at 15.36 s", B_D, sent(("ugv1", 15.3, 99.0)), H, ""),
-        ("released, making way", B_D, sent(("ugv2", 15.3, 99.0)), H, ""),
+        ("stops short", B_D, first(accepted, accept_stalls=1.0, refuse_stalls=0.0), R, "accept stops short"),
+        ("stops shorter", B_D, first(refused, decision="accept", refuse_stalls=1.0, refuse_left_m=0.1), R, "farther"),
+        ("refuses to get there", B_D, first(refused, refuse_stalls=1.0, accept_stalls=0.0), R, "refuse stops short"),
+        ("a stop at no cost", B_D, first(refused, accept_outcome_m2_s=0.0), R, "cost of the way left, accept"),
+        ("for less", B_D, first(refused, refuse_stalls=0.0, accept_stalls=0.0, refuse_left_m=99.0), R, "left"),
     ),
     "GATE-MODEL": (
         ("another law", B_C, scenario(control__intervention_gain_1_s=1.6), R, "velocity of mode"),
@@ -442,10 +348,8 @@ def test_an_edited_record_is_found_out(base: Callable[[str], Trace], claim: str,
 
 
 HONEST = {(claim, name) for claim, table in BREAKAGES.items() for _, name, *_ in table} - {("ZENO-TRACE", "chattering")}
-HONEST |= {
-    (claim, name) for claim in ("GATE-FEAS", "GATE-MODEL", "GATE-OPT") for name in (RELAXED, BINARY, BLOCKS, B_C)
-}
-HONEST |= {("GATE-FEAS", LOCAL), ("THR-TRIG", "chattering")}
+HONEST |= {(claim, name) for claim in ("GATE-MODEL", "GATE-PLAN") for name in (RELAXED, BINARY, BLOCKS, B_C)}
+HONEST |= {("GATE-PLAN", LOCAL), ("THR-TRIG", "chattering")}
 
 
 @pytest.mark.parametrize(("claim", "name"), sorted(HONEST))

@@ -106,7 +106,7 @@ def test_the_nearest_obstacles_of_an_endless_map_count() -> None:
 def test_a_ugv_goes_along_as_often_and_as_long_as_it_may() -> None:
     trace = simulate(load("case_b", PATIENCE)[0], "d")
     assert {"over", "exhausted"} <= set(trace.decisions["reason"])
-    for claim in ("GATE-MODEL", "GATE-FEAS", "EXEC", "COMM", "SAFE-TRACE"):
+    for claim in ("GATE-MODEL", "GATE-PLAN", "EXEC", "COMM", "SAFE-TRACE"):
         held(claim, trace)
     assert held("LIVE-PROG", trace)["accepted_interventions_ended"]["over"] >= 1
 
@@ -121,7 +121,7 @@ def test_an_accepted_intervention_is_reconsidered_when_an_obstacle_is_new(
     mine = trace.decisions[trace.decisions["number"] == trace.decisions["number"].iloc[0]]
     first, again = (row for _, row in mine[mine["accept_stalls"] >= 0.0].iterrows())
     assert (first["decision"], again["decision"], first["tries"], again["tries"]) == ("accept", answer, 1.0, 1.0)
-    for claim in ("LIVE-PROG", "GATE-MODEL", "GATE-FEAS"):
+    for claim in ("LIVE-PROG", "GATE-MODEL", "GATE-PLAN"):
         held(claim, trace)
     trace.decisions.loc[again.name, ["decision", "reason"]] = ["accept", "kept"]
     assert judge("LIVE-PROG", replace(trace)).status == "refuted"

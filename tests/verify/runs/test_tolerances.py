@@ -14,13 +14,13 @@ from builders.runs import beside_a_rock
 from builders.scenarios import STILL, lone
 from builders.simulation import simulate
 from verify.judging import CLAIMS
-from verify.runs.cases import A_D, B_C, B_D, D, at, one_more, problem
+from verify.runs.cases import A_D, B_C, B_D, D, at, first, one_more, problem
 
 from airground_drake.run.trace import Trace
 from airground_drake.verify.claim import MOTION_TOLERANCE_M, TIME_TOLERANCE_S
-from airground_drake.verify.runs import gate_model, gate_opt, safe_hyp
+from airground_drake.verify.runs import gate_model, safe_hyp
 from airground_drake.verify.runs.exec import COMMAND_TOLERANCE_M_S
-from airground_drake.verify.runs.gate_feas import SPEED_TOLERANCE
+from airground_drake.verify.runs.gate_plan import LONGER, SPEED_TOLERANCE
 from airground_drake.verify.runs.gate_record import POSITION_TOLERANCE_M, cost_tolerance, rows_of
 from airground_drake.verify.runs.live_goal import AT_REST_M
 from airground_drake.verify.runs.outcome_rolls import foreseen
@@ -113,18 +113,6 @@ def of_throughout(mode: int) -> Callable[[Trace], float]:
     return lambda trace: cost_tolerance(float((row := rows_of(trace)[LAST]).cost(row.constant[mode])))
 
 
-def with_bound(worked_out: Callable[[gate_opt.Bounded, float], float]) -> Edit:
-    """Another lower bound, and the gap that goes with it."""
-
-    def edit(trace: Trace, by: float) -> Trace:
-        row = rows_of(trace)[LAST]
-        (bounded,) = gate_opt.bound([row], 0)
-        lower, cost = worked_out(bounded, by * row.scale), float(row.cost(row["positions_m"], row.half_planes))
-        return with_decision(trace, lambda given, _: given.update(route_bound=lower, gap=(cost - lower) / cost), LAST)
-
-    return edit
-
-
 def faster_than_allowed(trace: Trace, by: float) -> Trace:
     """The last step of the constant plan that refuses, by the speed limit and so much more."""
     row = rows_of(trace)[LAST]
@@ -148,6 +136,25 @@ def rounded_up_too_early(trace: Trace, by: float) -> Trace:
         given |= {"relaxed_first_stage": 0.5 - by, "rounding_deviation_s": of["dt_s"] * (0.5 + by)}
 
     return with_decision(trace, change, LAST)
+
+
+def stops_farther(trace: Trace, by: float) -> Trace:
+    """Both choices of the first decision stop short of the goal, the one taken farther from it by so much."""
+    given = trace.decisions.iloc[0]
+    left, speed = given["refuse_left_m"], trace.scenario.ugvs[given["robot"]].preset.speed_m_s
+    changes = {}
+    for choice in ("accept", "refuse"):
+        here = left * (1.0 + by) if given["decision"] == choice else left
+        changes |= {f"{choice}_stalls": 1.0, f"{choice}_left_m": here, f"{choice}_outcome_m2_s": here**3 / 3.0 / speed}
+    return first(lambda table: table["t_s"] == given["t_s"], **changes)(trace)
+
+
+def dearer_stop(trace: Trace, by: float) -> Trace:
+    """A choice that stops short of the goal costs more than the way left, by so many tolerances."""
+    given, decisions = trace.decisions.iloc[0], trace.decisions.copy()
+    ahead = given["refuse_left_m"] ** 3 / 3.0 / trace.scenario.ugvs[given["robot"]].preset.speed_m_s
+    decisions.loc[0, ["refuse_stalls", "refuse_outcome_m2_s"]] = 1.0, ahead + by * cost_tolerance(ahead)
+    return replace(trace, decisions=decisions)
 
 
 def longer_way_left(trace: Trace, by: float) -> Trace:
@@ -198,26 +205,17 @@ CASES: tuple[tuple[str, str, str, float, Edit, str], ...] = (
     ("COMM", "sight of an obstacle", B_D, SENSED_M, barely_in_sight, "map"),
     ("COMM", "decision after a release, within both periods", D, 0.1, lambda t, by: one_more(
         t_s=next(e["t_s"] for e in t.events if e["kind"] == "release") + by)(t), "decision"),
-    ("GATE-FEAS", "time of a decision", B_D, TIME_TOLERANCE_S, column("t_s"), "decision"),
-    ("GATE-FEAS", "initial position", B_C, POSITION_TOLERANCE_M, array("initial_m", 0), "initial position"),
-    ("GATE-FEAS", "reference", B_C, POSITION_TOLERANCE_M, array("reference_m", -2), "reference"),
-    ("GATE-FEAS", "place of a point", B_C, POSITION_TOLERANCE_M, array("centres_m", 0), "point"),
-    ("GATE-FEAS", "safe distance", B_C, POSITION_TOLERANCE_M, array("distances_m", 0), "point"),
-    ("GATE-FEAS", "predicted position", B_C, POSITION_TOLERANCE_M, array("positions_m", 3), "positions"),
-    ("GATE-FEAS", "clearance", B_C, POSITION_TOLERANCE_M, column("predicted_clearance_m"), "clearance"),
-    ("GATE-FEAS", "cost of refusing", B_C, 1.0, column("refuse_throughout", of_throughout(0)), "refuse throughout"),
-    ("GATE-FEAS", "cost of the plan", B_C, 1.0, column("objective_accept", of_throughout(1)), "objective"),
-    ("GATE-FEAS", "speed", B_C, SPEED_TOLERANCE, faster_than_allowed, "faster"),
-    ("GATE-FEAS", "rounding against the rule", RELAXED, TIE, rounded_up_too_early, "rounded against the rule"),
-    ("GATE-FEAS", "rounding error", RELAXED, TIE, column("rounding_deviation_s"), "rounding error"),
-    ("GATE-FEAS", "first stage", RELAXED, TIE, column("relaxed_first_stage"), "first stage"),
-    ("GATE-OPT", "gap", RELAXED, gate_opt.GAP_TOLERANCE, column("gap"), "gap"),
-    ("GATE-OPT", "length of a normal", RELAXED, POSITION_TOLERANCE_M, array("normals", slice(3), relative=True),
-     "normal"),
-    ("GATE-OPT", "bound too high", RELAXED, gate_opt.OVERSTATED,
-     with_bound(lambda of, by: of.optimum.upper + by), "overstated"),
-    ("GATE-OPT", "bound too low", RELAXED, gate_opt.UNDERSTATED,
-     with_bound(lambda of, by: of.optimum.lower - by), "understated"),
+    ("GATE-PLAN", "initial position", B_C, POSITION_TOLERANCE_M, array("initial_m", 0), "initial position"),
+    ("GATE-PLAN", "predicted position", B_C, POSITION_TOLERANCE_M, array("positions_m", 3), "positions"),
+    ("GATE-PLAN", "clearance", B_C, POSITION_TOLERANCE_M, column("predicted_clearance_m"), "clearance"),
+    ("GATE-PLAN", "cost of refusing", B_C, 1.0, column("refuse_throughout", of_throughout(0)), "refuse throughout"),
+    ("GATE-PLAN", "cost of the plan", B_C, 1.0, column("objective_accept", of_throughout(1)), "objective"),
+    ("GATE-PLAN", "speed", B_C, SPEED_TOLERANCE, faster_than_allowed, "faster"),
+    ("GATE-PLAN", "rounding against the rule", RELAXED, TIE, rounded_up_too_early, "rounded against the rule"),
+    ("GATE-PLAN", "rounding error", RELAXED, TIE, column("rounding_deviation_s"), "rounding error"),
+    ("GATE-PLAN", "first stage", RELAXED, TIE, column("relaxed_first_stage"), "first stage"),
+    ("GATE-PLAN", "longer way from a stop", B_D, LONGER, stops_farther, "farther"),
+    ("GATE-PLAN", "cost of the way left", B_D, 1.0, dearer_stop, "way left"),
     ("GATE-MODEL", "velocity", B_C, gate_model.VELOCITY_TOLERANCE_M_S, array("accept_m_s", 0), "velocity"),
     ("GATE-MODEL", "outcome", B_D, gate_model.OUTCOME_TOLERANCE, outcome, "outcome"),
     ("GATE-MODEL", "way left", B_D, gate_model.LEFT_TOLERANCE_M, longer_way_left, "way left"),
@@ -246,7 +244,7 @@ def test_every_claim_is_in_the_table_and_no_tolerance_is_wide() -> None:
         "THR-QUALITY: error at a trigger": 1.5, "THR-QUALITY: error before a trigger": 1.5,
         "LIVE-GOAL: distance from the target": 0.1, "LIVE-GOAL: distance from the stall": 0.1,
         "LIVE-GOAL: motion at the end": 1e-3, "COMM: decision after a release, within both periods": 0.1,
-        "GATE-FEAS: cost of refusing": 1.0, "GATE-FEAS: cost of the plan": 1.0, "GATE-FEAS: speed": 1e-4,
-        "GATE-OPT: bound too low": 1e-3, "GATE-MODEL: way left": 1e-3,
+        "GATE-PLAN: cost of refusing": 1.0, "GATE-PLAN: cost of the plan": 1.0, "GATE-PLAN: speed": 1e-4,
+        "GATE-PLAN: cost of the way left": 1.0, "GATE-MODEL: way left": 1e-3,
     }  # fmt: skip
     assert cost_tolerance(1.0) < 1e-8

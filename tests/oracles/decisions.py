@@ -1,0 +1,246 @@
+"""The gatekeeper's decisions as its code has to make them: situations, answers, times, and the bounds of its routes.
+
+GATE-PLAN judges plans for the problem that was recorded. Here that problem is compared with the run, the answer with
+the rules, and what a route says of its own plan with bounds of the optimum.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from airground_drake.base.arrays import Array
+from airground_drake.run.trace import Trace
+from airground_drake.scenarios.schema import Gatekeeper
+from airground_drake.verify.claim import TIME_TOLERANCE_S
+from airground_drake.verify.engines.geometry import interpolate, travelled
+from airground_drake.verify.runs.control_law import ON_TOP
+from airground_drake.verify.runs.convex_bounds import Enclosure
+from airground_drake.verify.runs.gate_plan import BLOCKS, Bounded, bound, cheapest_of_blocks
+from airground_drake.verify.runs.gate_record import (
+    POSITION_TOLERANCE_M,
+    DecisionRecord,
+    Deviation,
+    cost_tolerance,
+    rows_of,
+)
+from airground_drake.verify.runs.instants import GATED_METHODS, intervening, row_at
+from airground_drake.verify.runs.pairs import around, places_of, preset_of
+from airground_drake.verify.runs.proposals import proposals_of
+
+NO_DIFFERENCE = 1e-6
+"""Relative gain from which on a new proposal makes a difference."""
+OVERSTATED, UNDERSTATED = 1e-5, 1e-3
+"""A recorded lower bound may be above the optimum by the first, relative: a solver's primal cost errs by 1e-6 or less.
+If it is below it by more than the second, it is not the optimum of the relaxation."""
+GAP_TOLERANCE = 1e-6
+"""Recorded and recomputed gaps may differ by this."""
+LARGEST_GAP = 0.05
+"""A plan may cost so much more than the optimum of its relaxation, of the cheaper constant plan's cost; where rounding
+costs more, no plan of a few blocks of stages may be cheaper than the plan by so much."""
+PROVED_ROUTES = ("mixed_integer",)
+"""Routes whose bound is the optimum over binary plans."""
+
+
+def wrong_decisions(trace: Trace) -> list[str]:
+    """Everything about the decisions of a run that is not as it should be, a sentence each.
+
+    Raises:
+        TraceError: if the tables of decisions, problems and proposals do not belong together.
+    """
+    if trace.meta["method"] not in GATED_METHODS:
+        return []
+    rows = rows_of(trace)
+    compared = [*compare_times(trace, rows)]
+    if trace.meta["method"] in ON_TOP:
+        compared += [one for row in rows for one in compare_situation(trace, row)]
+        compared += compare_answers(trace, rows)
+        compared += compare_routes(trace, [row for row in rows if row.planned])
+    return [f"{one.row.label}: {one.what}, off by {one.off:.3g}" for one in compared if one.wrong]
+
+
+def compare_times(trace: Trace, rows: Sequence[DecisionRecord]) -> Iterator[Deviation]:
+    """The first decision is within a period of the proposal, the others a period apart; none that is due is missing."""
+    period = trace.scenario.gatekeeper.period_s
+    for row, last in in_turn(trace, rows):
+        early = row.given["issued_s"] if last is None else last.t_s + period
+        late = early + period if last is None else early
+        yield Deviation(row, "a decision is missing before this one, s", max(0.0, row.t_s - late), TIME_TOLERANCE_S)
+        yield Deviation(row, "a decision too many, s", max(0.0, early - row.t_s), TIME_TOLERANCE_S)
+    yield from compare_proposals(trace, rows)
+
+
+def compare_proposals(trace: Trace, rows: Sequence[DecisionRecord]) -> Iterator[Deviation]:
+    """A proposal that stands for a period of the planner and one of the gatekeeper is decided on.
+
+    It does not stand so long if another one is sent meanwhile, if its motion is over, if neither the UGV nor its cause
+    is intervened on all the time, or if the run ends.
+    """
+    allowed = trace.scenario.intervention.period_s + trace.scenario.gatekeeper.period_s + TIME_TOLERANCE_S
+    decided = {row.given["number"] for row in rows}
+    sent = proposals_of(trace)
+    for one in sent:
+        until = one.issued_s + allowed
+        stays = np.concatenate([intervening(trace, ugv) for ugv in sorted({one.ugv, one.cause})])
+        called = ((stays[:, 0] <= one.issued_s + TIME_TOLERANCE_S) & (stays[:, 1] > until)).any()
+        replaced = any(other.ugv == one.ugv and one.issued_s < other.issued_s <= until for other in sent)
+        if called and not replaced and one.times_s[-1] > until:
+            row = DecisionRecord({"t_s": one.issued_s, "robot": one.ugv})
+            yield Deviation(row, "nothing is decided on a proposal", float(one.number not in decided), 0.0)
+
+
+def compare_situation(trace: Trace, row: DecisionRecord) -> Iterator[Deviation]:
+    """The data of (26) against the scenario and the signals at the time of the decision."""
+    gate = trace.scenario.gatekeeper
+    t, robot = row.t_s, row.robot
+    after = gate.horizon_s / gate.stages * np.arange(1.0, gate.stages + 1.0)
+    yield Deviation(row, "length of a stage, s", row.dt - after[0], TIME_TOLERANCE_S)
+    yield Deviation(row, "weight of task errors", row.error_weight - gate.error_weight_1_m2_s, 0.0)
+    yield Deviation(row, "weight of slack", row.slack_weight - gate.slack_weight_1_m2_s, 0.0)
+    yield Deviation(row, "weight of the terminal cost", row.terminal_weight - gate.terminal_weight_s, 0.0)
+    own = interpolate(trace.t, trace.position(robot), t)
+    yield Deviation(row, "initial position, m", row["initial_m"] - own, POSITION_TOLERANCE_M)
+    reference = travelled(*preset_of(trace, robot), t + after)
+    yield Deviation(row, "reference, m", row["reference_m"] - reference, POSITION_TOLERANCE_M)
+    left = list(_sensed(trace, robot, t, after))
+    for j, distance in enumerate(row["distances_m"]):
+        differ = [max(np.abs(at - row["centres_m"][:, j]).max(), abs(safe - distance)) for _, at, safe in left]
+        nearest = int(np.argmin(differ)) if left else -1
+        found = float(differ[nearest]) if left else np.inf
+        yield Deviation(row, f"point {j}: nothing that the UGV senses, m", min(found, 1e9), POSITION_TOLERANCE_M)
+        if found <= POSITION_TOLERANCE_M:
+            left.pop(nearest)
+    fastest = np.linalg.norm(np.stack([row["accept_m_s"], row["refuse_m_s"]]), axis=2).max(axis=0)
+    reach = row.dt * np.cumsum(fastest)
+    for name, at, safe in left:
+        lacking = np.minimum(
+            safe + reach - np.linalg.norm(at - own, axis=1),
+            safe - np.abs(at[:, 2] - own[2]),  # UGVs keep their height
+        ).max()
+        if row.planned:
+            lacking = max(lacking, (safe - np.linalg.norm(row["positions_m"] - at, axis=1)).max())
+        yield Deviation(row, f"{name} is left out though within reach, m", max(0.0, lacking), POSITION_TOLERANCE_M)
+
+
+def _sensed(trace: Trace, robot: str, t: float, after: Array) -> Iterator[tuple[str, Array, float]]:
+    """What a UGV senses at a time: its name, its places (N, 3), m, if it moves on as it does, and its safe distance."""
+    here, now = interpolate(trace.t, trace.position(robot), t), row_at(trace, t)
+    for other, pair in around(trace, robot):
+        place, velocity = places_of(trace)[other], np.zeros(3)
+        if place.ndim == 2:
+            place, velocity = interpolate(trace.t, place, t), trace.command(other)[now]
+        near = np.linalg.norm(place - here) <= trace.scenario.control.sensing_range_m
+        if near and t >= trace.t[pair.row] - TIME_TOLERANCE_S:
+            yield other, place + after[:, None] * velocity, pair.safe_m
+
+
+def compare_answers(trace: Trace, rows: Sequence[DecisionRecord]) -> Iterator[Deviation]:
+    """The answers against the rules, decision by decision."""
+    gate, since = trace.scenario.gatekeeper, 0.0
+    for row, last in in_turn(trace, rows):
+        standing = None if last is None else str(last.given["decision"])
+        accept, reason = rule(row, standing, row.t_s - since, gate)
+        ours, theirs = ("accept" if accept else "refuse", reason), (row.given["decision"], row.given["reason"])
+        yield Deviation(row, "answer or reason", float(ours != theirs), 0.0)
+        since = since if row.given["decision"] == standing else row.t_s
+
+
+def rule(row: DecisionRecord, standing: str | None, stood: float, gate: Gatekeeper) -> tuple[bool, str]:
+    """Whether a proposal is accepted and why, from the recorded costs.
+
+    Args:
+        row: the decision.
+        standing: the answer to this proposal so far, or None.
+        stood: for how long it has been that, s.
+        gate: the scenario's rule and margins.
+    """
+    given = row.given
+    if not row.planned:
+        return False, "no_plan"
+    if gate.rule == "first_stage":  # of the rounded plan, whatever stands; of the plan if none was rounded
+        plan = row["plan"] if row.data["rounded"] is None else row["rounded"]
+        return bool(plan[0] == 1.0), "first_stage"
+    if standing is None:
+        gains = given["objective"] < (1.0 - NO_DIFFERENCE) * given["refuse_throughout"]
+        if row["plan"][0] != 1.0:
+            return False, "waits" if gains else "not_cheaper"
+        return gains, "cheaper" if gains else "no_difference"
+    accepted = standing == "accept"
+    enough = (1.0 - gate.switching_margin) * given[f"{standing}_throughout"]
+    cheaper = (row["plan"][0] == 1.0) != accepted and given["objective"] < enough
+    if not cheaper:
+        return accepted, "kept"
+    if stood < gate.min_dwell_s - TIME_TOLERANCE_S:
+        return accepted, "dwell"
+    return not accepted, "reversed"
+
+
+def compare_routes(trace: Trace, planned: Sequence[DecisionRecord]) -> Iterator[Deviation]:
+    """What the shipped routes promise of their plans: no constant plan is cheaper, and bounds and gaps are right."""
+    blocks = int(trace.scenario.gatekeeper.blocks)
+    for row in planned:
+        for name, constant in zip(("refuse", "accept"), row.cost(row.constant).tolist(), strict=True):
+            for column in ("objective", f"objective_{name}"):
+                excess = max(0.0, row.given[column] - constant)
+                yield Deviation(row, f"{column} above {name} throughout", excess, cost_tolerance(constant))
+        if row.given["route"] in PROVED_ROUTES:
+            arrays = [name for name in ("relaxed", "rounded") if row.data[name] is not None]
+            numbers = [row.given[name] + 1.0 for name in ("rounding_deviation_s", "relaxed_first_stage")]
+            yield Deviation(row, "a relaxation that the route has not", [len(arrays), *numbers], 0.0)
+        if row.given["route_bound"] != -1.0:
+            yield Deviation(row, "a bound without unit normals", float(not row.unit_normals), 0.0)
+    for each in bound([row for row in planned if row.given["route_bound"] != -1.0 and row.unit_normals], blocks):
+        yield from compare_bounds(each.row, each.optimum, blocks)
+        if each.gap > LARGEST_GAP and not blocks:
+            yield compare_with_blocks(each)
+
+
+def compare_bounds(row: DecisionRecord, found: Enclosure, blocks: int) -> Iterator[Deviation]:
+    """The recorded lower bound and gap; `blocks`: binaries of the route, 0: one per stage."""
+    given, normals = row.given, row.half_planes
+    proved = given["route"] in PROVED_ROUTES
+    lower, scale = float(given["route_bound"]), row.scale
+    own = float(row.cost(row["positions_m"], normals))
+    known = [*row.constant, *([row.positions(row["rounded"])] if row.data["rounded"] is not None else [])]
+    # the losing choice's plan is not recorded, but along normals it costs no less than by exact distances
+    loser = max(given["objective_accept"], given["objective_refuse"])
+    best = min(own, loser, *(float(row.cost(positions, normals)) for positions in known))
+    upper = found.upper
+    if proved:  # the optimum may be another plan, which exact distances make no cheaper than the one recorded
+        best = min(best, given["objective"])
+        upper = float(row.cost(row.positions(neighbours(row["plan"], blocks)), normals).min())
+    yield Deviation(row, "lower bound above the plan's cost", max(0.0, lower - own) / scale, OVERSTATED)
+    yield Deviation(row, "lower bound overstated", max(0.0, lower - upper) / scale, OVERSTATED)
+    if given["status"] == "optimal":
+        short = max(0.0, found.lower - lower) / scale
+        yield Deviation(row, "lower bound understated", short, UNDERSTATED)
+    if given["status"] == "optimal" and proved:
+        yield Deviation(row, "optimal, but with a gap", max(0.0, given["gap"]), GAP_TOLERANCE)
+    least, most = ((cost - lower) / max(cost, 1e-12) for cost in (best, own))
+    beyond = max(0.0, least - given["gap"], given["gap"] - most)
+    yield Deviation(row, "recorded gap", beyond, GAP_TOLERANCE)
+
+
+def compare_with_blocks(each: Bounded) -> Deviation:
+    """A gap that is too wide is wrong only if the route's problem has a cheaper plan: rounding may cost that much."""
+    row = each.row
+    shown = (float(row.cost(row["positions_m"])) - cheapest_of_blocks(row, BLOCKS).lower) / row.scale
+    return Deviation(row, "a plan of blocks is cheaper", max(0.0, shown), LARGEST_GAP)
+
+
+def neighbours(plan: Array, blocks: int) -> Array:
+    """The plan (N,), those that differ from it in one block, and the constant ones, (B + 3, N)."""
+    stages = len(plan)
+    count = min(blocks or stages, stages)
+    turned = np.arange(stages) * count // stages == np.arange(count)[:, None]
+    return np.vstack([plan, np.where(turned, 1.0 - plan, plan), np.zeros(stages), np.ones(stages)])
+
+
+def in_turn(trace: Trace, rows: Sequence[DecisionRecord]) -> Iterator[tuple[DecisionRecord, DecisionRecord | None]]:
+    """Each decision, by UGV and time, with the one before it on the same proposal, if there is one."""
+    for ugv in trace.ugvs:
+        last: DecisionRecord | None = None
+        for row in (row for row in rows if row.robot == ugv):
+            yield row, last if last and last.number == row.number else None
+            last = row

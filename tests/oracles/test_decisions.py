@@ -1,0 +1,240 @@
+"""The oracle of decisions: silent on honest runs, and not on records that a faulty gatekeeper would leave."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+from builders.decisions import ALL_PLANS, STAGES, GateData
+from builders.edits import with_decision, with_meta
+from hypothesis import given
+from hypothesis import strategies as st
+from oracles.decisions import GAP_TOLERANCE, OVERSTATED, UNDERSTATED, rule, wrong_decisions
+from verify.runs.cases import (
+    B_C,
+    B_D,
+    BINARY,
+    BLOCKS,
+    EIGHT,
+    LOCAL,
+    RELAXED,
+    SIXTH,
+    SWAP,
+    Edit,
+    at,
+    both,
+    column,
+    kept,
+    problem,
+    swapped,
+)
+
+from airground_drake.gatekeeper.answer import Rules, settle
+from airground_drake.gatekeeper.solution import Solution
+from airground_drake.intervention.messages import ACCEPT, REFUSE, SILENT
+from airground_drake.run.trace import Trace
+from airground_drake.scenarios.schema import Gatekeeper
+from airground_drake.verify.claim import TIME_TOLERANCE_S
+from airground_drake.verify.runs.gate_plan import Bounded, bound
+from airground_drake.verify.runs.gate_record import POSITION_TOLERANCE_M, DecisionRecord, rows_of
+
+Base = Callable[[str], Trace]
+COSTS = st.floats(0.1, 10.0)
+LAST = -1
+
+
+@pytest.fixture(scope="module")
+def base(run: Any) -> Base:
+    """`base(name)`: a shipped run, or one of method (c) with few stages, by route."""
+
+    def get(name: str) -> Trace:
+        if name == BLOCKS:
+            return run("soft_gate", "c", set=[*EIGHT, "gatekeeper.route=mixed_integer", "gatekeeper.blocks=4"])
+        if " " not in name:
+            return run("soft_gate", "c", set=[*EIGHT, f"gatekeeper.route={name}"])
+        return run(*name.split())
+
+    return get
+
+
+@pytest.mark.parametrize("name", [RELAXED, BINARY, LOCAL, BLOCKS, B_C, B_D, SWAP, "case_b c_literal", "case_a a"])
+def test_an_honest_run_has_no_faults(base: Base, name: str) -> None:
+    assert wrong_decisions(base(name)) == []
+
+
+def without_point(trace: Trace) -> Trace:
+    """The decision forgets the nearest obstacle."""
+    row = rows_of(trace)[SIXTH]
+    j = int(np.argmin(np.linalg.norm(row["initial_m"] - row["centres_m"][0], axis=1) - row["distances_m"]))
+    m = len(row["distances_m"])
+    return problem(
+        centres_m=lambda v: np.delete(v.reshape(STAGES, m, 3), j, axis=1).ravel(),
+        normals=lambda v: np.delete(v.reshape(STAGES, m, 3), j, axis=1).ravel(),
+        distances_m=lambda v: np.delete(v, j),
+    )(trace)
+
+
+def budget_spent(row: dict[str, Any], given: dict[str, Any]) -> None:
+    row["status"] = "budget_spent"
+    given |= {"relaxed": [], "rounded": [], "normals": []}
+
+
+def other_plan(choose: Callable[[GateData], Any], *, bounded: bool) -> Edit:
+    """A consistent record of another plan; `bounded`: it is said to be the optimum."""
+
+    def edit(trace: Trace) -> Trace:
+        data = GateData.of(rows_of(trace)[SIXTH])
+        plan = choose(data)
+        new = {"objective": data.plan_cost(plan)}
+        if bounded:
+            new |= {"route_bound": data.plan_cost(plan, along=True), "gap": 0.0}
+        return both(column(**new), problem(plan=lambda _: plan, positions_m=lambda _: data.positions(plan).ravel()))(
+            trace
+        )
+
+    return edit
+
+
+def worst(data: GateData) -> Any:
+    return max(ALL_PLANS, key=data.plan_cost)
+
+
+def beside_the_best(data: GateData) -> Any:
+    best = min(ALL_PLANS, key=lambda plan: data.plan_cost(plan, along=True))
+    return np.where(np.arange(STAGES) == STAGES // 2, 1.0 - best, best)
+
+
+def undecided(trace: Trace) -> Trace:
+    """Nothing is decided on the first proposal."""
+    silent = (trace.decisions["issued_s"] != trace.decisions["issued_s"].min()).to_numpy()
+    left = replace(trace, decisions=trace.decisions[silent])
+    return replace(left, problems=trace.problems[silent]) if len(trace.problems) else left
+
+
+def sent(*given: tuple[str, float, float]) -> Edit:
+    """Proposals more, (to whom, when, end of the motion), while ugv1 is intervened on and nothing is in force."""
+
+    def edit(trace: Trace) -> Trace:
+        one = trace.proposals.iloc[0].to_dict()
+        table = [
+            {**one, "number": 90 + k, "robot": ugv, "issued_s": t, "times_s": [t, end], "positions_m": [0.0] * 6}
+            for k, (ugv, t, end) in enumerate(given)
+        ]
+        told = [{"t_s": t, "robot": ugv, "kind": "proposal", "policy": one["policy"]} for ugv, t, _ in given]
+        more = with_meta(trace, events=[*trace.events, *told])
+        return replace(more, proposals=pd.concat([trace.proposals, pd.DataFrame(table)], ignore_index=True))
+
+    return edit
+
+
+FAULTY: tuple[tuple[str, str, Edit, str], ...] = (
+    ("obstacle forgotten", RELAXED, without_point, "left out"),
+    ("moving robot stands", SWAP, problem(9, centres_m=lambda v: np.tile(v[: len(v) // 60], 60)), "UGV senses"),
+    ("weight of slack", RELAXED, problem(slack_weight_1_m2_s=lambda v: 1.1 * v), "weight of slack"),
+    ("terminal", RELAXED, problem(terminal_weight_s=lambda v: v + 0.1), "weight of the terminal cost"),
+    ("contrary answer", RELAXED, column(decision=swapped), "answer or reason"),
+    ("reason", RELAXED, column(reason="dwell"), "answer or reason"),
+    ("rounded nevertheless", BINARY, column(rounding_deviation_s=0.0), "a relaxation that the route has not"),
+    ("first one lost", RELAXED, kept(*range(1, 11)), "missing"),
+    ("one lost", RELAXED, kept(0, 1, *range(3, 11)), "missing"),
+    ("one twice", RELAXED, kept(0, 1, 1, *range(2, 11)), "too many"),
+    ("undecided", B_C, undecided, "nothing is decided"),
+    ("undecided under (d)", B_D, undecided, "nothing is decided"),
+    ("another one undecided", B_D, sent(("ugv1", 11.5, 99.0)), "nothing is decided"),
+    ("making way undecided", B_D, sent(("ugv2", 11.5, 99.0)), "nothing is decided"),
+    ("over at once", B_D, sent(("ugv1", 11.5, 11.55)), ""),
+    ("replaced at once", B_D, sent(("ugv1", 11.5, 99.0), ("ugv1", 11.55, 11.6)), ""),
+    ("released at 15.36 s", B_D, sent(("ugv1", 15.3, 99.0)), ""),
+    ("released, making way", B_D, sent(("ugv2", 15.3, 99.0)), ""),
+    ("loser inflated", RELAXED, column(objective_accept=lambda v: 2.0 * v, objective_refuse=lambda v: 2.0 * v),
+     "throughout"),
+    ("worst plan", RELAXED, other_plan(worst, bounded=False), "objective above"),
+    ("worse plan proved", BINARY, other_plan(beside_the_best, bounded=True), "lower bound overstated"),
+    ("bound too high", BINARY, column(route_bound=lambda v: 1.001 * v, gap=0.0), "lower bound"),
+    ("optimal with a gap", BINARY, column(route_bound=lambda v: 0.9999 * v, gap=1e-4), "but with a gap"),
+    ("no normals", RELAXED, problem(normals=lambda _: []), "a bound without unit normals"),
+)  # fmt: skip
+"""What is edited, in which run, how, and a word of the fault; '': there is none."""
+
+
+@pytest.mark.parametrize(("name", "edit", "shown"), [row[1:] for row in FAULTY], ids=[row[0] for row in FAULTY])
+def test_an_edited_record_has_faults(base: Base, name: str, edit: Edit, shown: str) -> None:
+    found = wrong_decisions(edit(base(name)))
+    assert any(shown in fault for fault in found) if shown else found == []
+
+
+def changed(name: str, index: Any, *, factor: bool = False) -> Callable[[Trace, float], Trace]:
+    """A number of the last decision's problem, moved by so much."""
+    return lambda trace, by: problem(LAST, **{name: at(index, lambda v: v * (1.0 + by) if factor else v + by)})(trace)
+
+
+def moved(name: str) -> Callable[[Trace, float], Trace]:
+    """A number of the last decision, moved by so much."""
+
+    def edit(trace: Trace, by: float) -> Trace:
+        decisions = trace.decisions.copy()
+        decisions.loc[len(decisions) - 1, name] += by
+        return replace(trace, decisions=decisions)
+
+    return edit
+
+
+def with_bound(worked_out: Callable[[Bounded, float], float]) -> Edit:
+    """Another lower bound, and the gap that goes with it."""
+
+    def edit(trace: Trace, by: float) -> Trace:
+        row = rows_of(trace)[LAST]
+        (bounded,) = bound([row], 0)
+        lower, cost = worked_out(bounded, by * row.scale), float(row.cost(row["positions_m"], row.half_planes))
+        return with_decision(trace, lambda given, _: given.update(route_bound=lower, gap=(cost - lower) / cost), LAST)
+
+    return edit
+
+
+TOLERANCES: tuple[tuple[str, float, Callable[[Trace, float], Trace], str], ...] = (
+    (B_D, TIME_TOLERANCE_S, moved("t_s"), "a decision"),
+    (B_C, POSITION_TOLERANCE_M, changed("initial_m", 0), "initial position"),
+    (B_C, POSITION_TOLERANCE_M, changed("reference_m", -2), "reference"),
+    (B_C, POSITION_TOLERANCE_M, changed("centres_m", 0), "point"),
+    (B_C, POSITION_TOLERANCE_M, changed("distances_m", 0), "point"),
+    (RELAXED, POSITION_TOLERANCE_M, changed("normals", slice(3), factor=True), "normals"),
+    (RELAXED, GAP_TOLERANCE, moved("gap"), "gap"),
+    (RELAXED, OVERSTATED, with_bound(lambda of, by: of.optimum.upper + by), "overstated"),
+    (RELAXED, UNDERSTATED, with_bound(lambda of, by: of.optimum.lower - by), "understated"),
+)
+
+
+@pytest.mark.parametrize(("name", "tolerance", "edit", "shown"), TOLERANCES)
+def test_twice_the_tolerance_is_a_fault_and_half_of_it_is_none(
+    base: Base, name: str, tolerance: float, edit: Callable[[Trace, float], Trace], shown: str
+) -> None:
+    assert tolerance <= 1e-3
+    assert wrong_decisions(edit(base(name), 0.5 * tolerance)) == []
+    assert any(shown in fault for fault in wrong_decisions(edit(base(name), 2.0 * tolerance)))
+
+
+@given(
+    st.tuples(COSTS, COSTS), st.tuples(COSTS, COSTS), st.sampled_from([SILENT, ACCEPT, REFUSE]),
+    st.sampled_from([0.0, 0.1, 0.2, 0.3]), st.sampled_from([0.0, 0.05, 0.2]), st.booleans(), st.booleans(),
+    st.booleans(), st.sampled_from([None, 0.0, 1.0]),
+)  # fmt: skip
+def test_the_rules_are_those_of_the_running_gatekeeper(
+    costs: tuple[float, float], throughout: tuple[float, float], standing: float, stood: float, margin: float,
+    equal: bool, planned: bool, literal: bool, rounded: float | None,
+) -> None:  # fmt: skip
+    accept, refuse = (costs[0], costs[0]) if equal else costs
+    plan = np.array([float(accept <= refuse)]) if planned else None
+    first = None if rounded is None else np.array([rounded])
+    status: Any = "optimal" if planned else "refused_not_finite"
+    decision = Solution(accept <= refuse, status, objective=min(costs), plan=plan, rounded=first)
+    given = {"objective": min(costs), "accept_throughout": throughout[0], "refuse_throughout": throughout[1]}
+    row = DecisionRecord(given, 1.0, 1.0, 1.0, 0.0, {"plan": plan, "rounded": first})
+    gate = Gatekeeper(switching_margin=margin, min_dwell_s=0.2, rule="first_stage" if literal else "hysteresis")
+    stands = {SILENT: None, ACCEPT: "accept", REFUSE: "refuse"}[standing]
+    rules = Rules(switching_margin=margin, min_dwell=0.2, first_stage=literal)
+    ours = rule(row, stands, stood, gate)
+    assert ours == settle(decision, throughout, standing, stood, rules)
