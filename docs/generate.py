@@ -36,6 +36,8 @@ from airground_drake.registry import (
 from airground_drake.report.figures import thumbnail
 from airground_drake.scenarios import json_schema
 from airground_drake.scenarios.shipped import shipped
+from airground_drake.systems import graphviz
+from airground_drake.systems.diagram import build_diagram, method_drawn
 from airground_drake.verify.claim import Claim
 
 DOCS = Path(__file__).parent
@@ -52,15 +54,27 @@ _NUMBER = re.compile(r"(?<!` )(?<![\w\]])\((\d{1,2})[a-e]?\)(?:-\((\d{1,2})[a-e]
 
 
 def main() -> None:
-    """Write the generated pages that are committed."""
-    for name, text in pages().items():
-        files.write_text(DOCS / name, text)
+    """Write the generated files that are committed and not current."""
+    for name, text in (pages() | diagrams()).items():
+        path = DOCS / name
+        if not (path.exists() and graphviz.is_current(name, text, path.read_text(encoding="utf-8"))):
+            files.write_text(path, text)
 
 
 def pages() -> dict[str, str]:
     """Committed files that follow from the code, by name."""
     schema = json_schema.text(installed=False)
     return {"extending.md": extending(), "../airground_drake/scenarios/scenario.schema.json": schema}
+
+
+def diagrams() -> dict[str, str]:
+    """The block diagrams of the paper's two cases, as reports show them, by name."""
+    content: dict[str, str] = {}
+    for name in ("case_a", "case_b"):
+        scenario, _ = load(name)
+        text = graphviz.dot(build_diagram(scenario, method_drawn(scenario)))
+        content |= {f"../diagrams/{name}.dot": text, f"../diagrams/{name}.svg": graphviz.svg(text)}
+    return content
 
 
 def parts() -> dict[str, Callable[[], str]]:
