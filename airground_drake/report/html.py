@@ -20,7 +20,6 @@ from markupsafe import Markup
 from airground_drake.base.statuses import PASSING, outcome
 from airground_drake.gatekeeper.answer import WORDS
 from airground_drake.report import attention, evidence, phrases, summary
-from airground_drake.report.compare import is_rounding
 from airground_drake.report.figures import svg
 from airground_drake.report.figures.canvas import DARK
 from airground_drake.report.figures.panels import Figure, Table
@@ -140,7 +139,6 @@ def environment() -> Environment:
         num=number, value=value, yaml=as_yaml, together=attention.faults_together, inline=Markup, mathml=mathml,
         evidence=evidence_tables, proof=place, records=partial(evidence.tables, number=number), brief=brief,
     )  # fmt: skip
-    environment.tests["rounding"] = is_rounding
     environment.globals.update(
         chips=CHIPS, shown=_shown, reasons=WORDS, max_faults=MAX_FAULTS,
         marks=phrases.MARKS, kinds=LOOKS, names=phrases.MEANINGS,

@@ -16,7 +16,6 @@ from airground_drake.report.figures.canvas import (
     ALARM,
     INK,
     MUTED,
-    TALLEST_IN,
     UAV_LOOK,
     WIDE_IN,
     Look,
@@ -113,20 +112,6 @@ def compared_paths(runs: Mapping[str, Trace], robot: str, frame: Frame) -> Figur
             labels.append(Label(path[-1], "stands still"))
     place(axes, [*labels, *_obstacles(first.scenario)], [trace.position(robot) for trace in runs.values()])
     axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), frameon=False, handlelength=4.0, borderaxespad=0.0)
-    return figure
-
-
-def two_versions(before: Trace, after: Trace, ugvs: Sequence[str]) -> Figure:
-    """Trajectories of UGVs in two versions of a run: before thin and dashed, after thick."""
-    frame = frame_of([before, after], ugvs)
-    figure, axes = _map(after, frame, frame.width_in(WIDE_IN, TALLEST_IN))
-    names = list[Label]()
-    for position, ugv in enumerate(ugvs):
-        appearance = look(position)
-        _path(axes, before, ugv, appearance._replace(dash=(0, (3, 2))), linewidth=1.0)
-        _path(axes, after, ugv, appearance._replace(dash="-"), linewidth=1.8)
-        names.append(_name(ugv, after.position(ugv)[-1], appearance))
-    place(axes, [*names, *_obstacles(after.scenario)], [after.position(ugv) for ugv in ugvs])
     return figure
 
 
