@@ -33,12 +33,12 @@ from airground_drake.registry import (
     UAV_TASKS,
     Registry,
 )
-from airground_drake.report.figures import thumbnail
 from airground_drake.scenarios import json_schema
 from airground_drake.scenarios.shipped import shipped
 from airground_drake.systems import graphviz
 from airground_drake.systems.diagram import build_diagram, method_drawn
 from airground_drake.verify.claim import Claim
+from airground_drake.view.plane import thumbnail_of
 
 DOCS = Path(__file__).parent
 EXAMPLES = DOCS.parent / "examples"
@@ -91,14 +91,14 @@ def gallery(scenarios: Sequence[str] = ()) -> str:
         "# Gallery",
         "",
         "The shipped scenarios, each with the paths of its first and of its last run. A line is the way of a UGV and "
-        "ends in a dot, a cross is a target, grey is an obstacle in its safe circle.",
+        "begins in a ring, a cross is its target, grey is an obstacle in its safe circle.",
     ]
     for name in scenarios or shipped():
         scenario, _ = load(name)
         runs = [run for run, spec in scenario.runs.items() if spec.composition == "augmented"]
         lines += ["", f"## {html.escape(scenario.title or name, quote=False)}", "", '<div class="gallery">']
         for run in dict.fromkeys((runs[0], runs[-1])):
-            drawn = thumbnail.draw(simulate(scenario, run), f"{name}-{run}")
+            drawn = thumbnail_of(simulate(scenario, run), f"{name}-{run}")
             says = METHODS[scenario.runs[run].method].says
             lines.append(f"<figure>{drawn}<figcaption>Run {run}: {says}</figcaption></figure>")
         lines += ["</div>", "", f"    airground report {name}"]

@@ -49,7 +49,7 @@ def test_generated_parts_are_current() -> None:
     assert blocks(ROOT / "README.md", "yaml") == [re.sub(r"^#.*\n", "", shipped, flags=re.MULTILINE)]
     generate = runpy.run_path(str(ROOT / "docs" / "generate.py"))
     gallery = generate["gallery"](["minimal"])
-    assert gallery.count("<polyline") == 2  # one UGV in two runs
+    assert gallery.count("<svg") == 2  # two runs
     assert "    airground report minimal\n" in gallery
     for name, text in generate["pages"]().items():
         assert (ROOT / "docs" / name).read_text(encoding="utf-8") == text, "run python docs/generate.py"

@@ -58,13 +58,18 @@ _PICTURE = re.compile(r'<svg width="(\d+)pt" height="(\d+)pt".*?>\s*(<g .*</g>)\
 _ID = re.compile(r' id="[^"]*"')
 
 
+def has_layers(diagram: Diagram) -> bool:
+    """Whether a diagram is that of a scenario."""
+    return all(diagram.HasSubsystemNamed(layer) for layer in LAYERS)
+
+
 def dot(diagram: Diagram) -> str:
     """Graphviz text: layers and blocks for a scenario's diagram, Drake's own text for any other diagram.
 
     The text of a scenario's diagram depends on the scenario and the method only.
     """
     whole, name = str(diagram.GetGraphvizString(max_depth=1)), diagram.get_name()
-    if not all(diagram.HasSubsystemNamed(layer) for layer in LAYERS):
+    if not has_layers(diagram):
         return whole
     layers = {layer: diagram.GetSubsystemByName(layer) for layer in LAYERS}
     shown = {layer: {each.get_name(): each for each in parts.GetSystems()} for layer, parts in layers.items()}

@@ -10,10 +10,11 @@ import pytest
 from airground_drake.audit.formulas import formula_findings
 from airground_drake.audit.runs import findings as findings_of_runs
 from airground_drake.audit.thresholds import threshold_findings
-from airground_drake.report.figures import canvas, findings
+from airground_drake.report.figures import findings
 from airground_drake.report.figures.findings.lines import Lines
 from airground_drake.scenarios.load import load
 from airground_drake.testing.plugin import Simulations
+from airground_drake.view import canvas
 
 
 def test_what_is_computed_is_drawn_with_its_marks() -> None:

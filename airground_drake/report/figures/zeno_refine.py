@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from airground_drake.report.figures import canvas
 from airground_drake.report.figures.findings.lines import Lines
 from airground_drake.report.figures.panels import Figure
+from airground_drake.view import canvas
 
 FEWEST = 0.05
 """Smaller mean counts are drawn as this one: the axis is logarithmic."""

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from airground_drake.report.figures import canvas
 from airground_drake.report.figures.findings.pictures import PICTURES
 from airground_drake.report.figures.panels import Figure
+from airground_drake.view import canvas
 
 
 def draw(items: Sequence[Mapping[str, Any]]) -> list[Figure]:
