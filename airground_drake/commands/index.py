@@ -87,5 +87,5 @@ def _thumbnail(report: Path, document: Mapping[str, Any], prefix: str) -> str:
     runs = [run for run in document["runs"] if run.isidentifier()]
     try:
         return thumbnail_of(trace.load(report / "trace" / runs[-1]), prefix)
-    except (TraceError, OSError, IndexError):
+    except (TraceError, OSError, LookupError, ValueError):
         return ""
