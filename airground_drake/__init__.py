@@ -11,6 +11,7 @@
 
 from __future__ import annotations
 
+import sys
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
     from airground_drake.scenarios.load import load
     from airground_drake.scenarios.schema import Scenario
     from airground_drake.systems.diagram import build_diagram
+    from airground_drake.view.plane import plot
 
 __all__ = [
     "AirgroundError",
@@ -40,6 +42,7 @@ __all__ = [
     "UnknownNameError",
     "build_diagram",
     "load",
+    "plot",
     "simulate",
 ]
 
@@ -54,6 +57,7 @@ _HOME = {
     "UnknownNameError": "base.errors",
     "build_diagram": "systems.diagram",
     "load": "scenarios.load",
+    "plot": "view.plane",
     "simulate": "run.simulation",
 }
 
@@ -67,3 +71,7 @@ def __getattr__(name: str) -> Any:
 
 def __dir__() -> list[str]:
     return sorted(__all__)
+
+
+if "IPython" in sys.modules:
+    import_module(f"{__name__}.notebook").register()

@@ -265,7 +265,7 @@ def print_lies(found: list[Told]) -> None:
 
 def stolen_s(trace: Trace, ugv: str) -> float:
     """The longest that a UGV executed interventions between two rests, s."""
-    t, busy = trace.t, trace.column(f"{ugv}.accepted") != 0.0
+    t, busy = trace.t, trace.executing(ugv) >= 0
     rest_s = trace.scenario.gatekeeper.rest_s - 1e-9
     worst, sum_s, alone_s = 0.0, 0.0, 0.0
     for k in range(1, len(t)):

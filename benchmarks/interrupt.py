@@ -23,6 +23,7 @@ from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
 
+from airground_drake.check.command import LIMIT_S
 from airground_drake.check.report import AGREES, check_report
 
 SHORT = {"duration_s": "1", "runs": "{a: {method: a}, d: {method: d}}", "reproduction": "[]", "choices": "[]"}
@@ -91,7 +92,7 @@ def trial(folder: Path, number: signal.Signals, delay_s: float, *, writing: bool
         wrong.append("temporary files left")
     if not page.exists():
         return "none", wrong
-    wrong += [str(line) for line in check_report(folder) if line.outcome != AGREES]
+    wrong += [str(line) for line in check_report(folder, LIMIT_S) if line.outcome != AGREES]
     return "new" if page.stat().st_mtime_ns != before else "earlier", wrong
 
 
@@ -123,7 +124,7 @@ def main() -> int:
                 print(f"kill {k}, {number.name} after {delay:.2f} s{' of writing' if writing else ''}: {each}")
         report(folder).communicate()
         left = [str(path) for path in folder.rglob(".*") if path.is_file()]
-        last = [line for line in check_report(folder) if line.outcome != AGREES]
+        last = [line for line in check_report(folder, LIMIT_S) if line.outcome != AGREES]
     for (name, became), count in sorted(counts.items()):
         print(f"{name:8} {became:8} {count}")
     print(f"{options.kills} kills, {failures} failures; after a last report {len(left)} temporary files, "

@@ -29,6 +29,7 @@ import yaml
 
 from airground_drake.base import files
 from airground_drake.base.errors import AirgroundError, ScenarioError
+from airground_drake.check.command import LIMIT_S
 from airground_drake.check.report import AGREES, check_report
 from airground_drake.decision.bayes import optimal_threshold
 from airground_drake.registry import METHODS, ROUTES
@@ -260,7 +261,7 @@ def _checker(scenario: Scenario, of_run: Trace, verdicts: Sequence[Verdict]) -> 
         trace.save(of_run, folder / "trace" / of_run.run)
         report = document.build(scenario, "", {of_run.run: of_run}, verdicts, {"seed": scenario.seed})
         files.write_json(folder / "report.json", report)
-        lines = [line for line in check_report(folder) if line.run]
+        lines = [line for line in check_report(folder, LIMIT_S) if line.run]
     return [f"checker on {line.claim}: {line.outcome}: {line.text}"[:300] for line in lines if line.outcome != AGREES]
 
 

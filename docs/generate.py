@@ -32,10 +32,12 @@ from airground_drake.registry import (
     UAV_TASKS,
     Registry,
 )
-from airground_drake.report.figures import thumbnail
 from airground_drake.scenarios import json_schema
 from airground_drake.scenarios.shipped import shipped
+from airground_drake.systems import graphviz
+from airground_drake.systems.diagram import build_diagram, method_drawn
 from airground_drake.verify.claim import Claim
+from airground_drake.view.plane import thumbnail_of
 
 DOCS = Path(__file__).parent
 EXAMPLES = DOCS.parent / "examples"
@@ -51,15 +53,27 @@ _NUMBER = re.compile(r"(?<!` )(?<![\w\]])\((\d{1,2})[a-e]?\)(?:-\((\d{1,2})[a-e]
 
 
 def main() -> None:
-    """Write the generated pages that are committed."""
-    for name, text in pages().items():
-        files.write_text(DOCS / name, text)
+    """Write the generated files that are committed and not current."""
+    for name, text in (pages() | diagrams()).items():
+        path = DOCS / name
+        if not (path.exists() and graphviz.is_current(name, text, path.read_text(encoding="utf-8"))):
+            files.write_text(path, text)
 
 
 def pages() -> dict[str, str]:
     """Committed files that follow from the code, by name."""
     schema = json_schema.text(installed=False)
     return {"extending.md": extending(), "../airground_drake/scenarios/scenario.schema.json": schema}
+
+
+def diagrams() -> dict[str, str]:
+    """The block diagrams of the paper's two cases, as reports show them, by name."""
+    content: dict[str, str] = {}
+    for name in ("case_a", "case_b"):
+        scenario, _ = load(name)
+        text = graphviz.dot(build_diagram(scenario, method_drawn(scenario)))
+        content |= {f"../diagrams/{name}.dot": text, f"../diagrams/{name}.svg": graphviz.svg(text)}
+    return content
 
 
 def parts() -> dict[str, Callable[[], str]]:
@@ -76,14 +90,14 @@ def gallery(scenarios: Sequence[str] = ()) -> str:
         "# Gallery",
         "",
         "The shipped scenarios, each with the paths of its first and of its last run. A line is the way of a UGV and "
-        "ends in a dot, a cross is a target, grey is an obstacle in its safe circle.",
+        "begins in a ring, a cross is its target, grey is an obstacle in its safe circle.",
     ]
     for name in scenarios or shipped():
         scenario, _ = load(name)
         runs = [run for run, spec in scenario.runs.items() if spec.composition == "augmented"]
         lines += ["", f"## {html.escape(scenario.title or name, quote=False)}", "", '<div class="gallery">']
         for run in dict.fromkeys((runs[0], runs[-1])):
-            drawn = thumbnail.draw(simulate(scenario, run), f"{name}-{run}")
+            drawn = thumbnail_of(simulate(scenario, run), f"{name}-{run}")
             says = METHODS[scenario.runs[run].method].says
             lines.append(f"<figure>{drawn}<figcaption>Run {run}: {says}</figcaption></figure>")
         lines += ["</div>", "", f"    airground report {name}"]

@@ -16,6 +16,7 @@ from airground_drake.campaign.spec import load_spec
 from airground_drake.commands.falsify import main as falsify
 from airground_drake.report.__main__ import main
 from airground_drake.scenarios.load import load
+from airground_drake.systems import graphviz
 
 ROOT = Path(__file__).parent.parent
 PAGES = sorted(path for folder in (".", "docs", "examples") for path in (ROOT / folder).glob("*.md"))
@@ -48,10 +49,16 @@ def test_generated_parts_are_current() -> None:
     assert blocks(ROOT / "README.md", "yaml") == [re.sub(r"^#.*\n", "", shipped, flags=re.MULTILINE)]
     generate = runpy.run_path(str(ROOT / "docs" / "generate.py"))
     gallery = generate["gallery"](["minimal"])
-    assert gallery.count("<polyline") == 2  # one UGV in two runs
+    assert gallery.count("<svg") == 2  # two runs
     assert "    airground report minimal\n" in gallery
     for name, text in generate["pages"]().items():
         assert (ROOT / "docs" / name).read_text(encoding="utf-8") == text, "run python docs/generate.py"
+    diagrams = generate["diagrams"]()
+    assert {f"../diagrams/{path.name}" for path in (ROOT / "diagrams").iterdir()} == set(diagrams)
+    for name, text in diagrams.items():
+        assert graphviz.is_current(name, text, (ROOT / "docs" / name).read_text(encoding="utf-8")), "run it, too"
+        other = next(text for each, text in diagrams.items() if each != name and each[-4:] == name[-4:])
+        assert not graphviz.is_current(name, text, other)
     marks = [mark for page in PAGES for mark in re.findall(r"<!-- (\w+): made", page.read_text(encoding="utf-8"))]
     assert sorted(marks) == sorted(generate["parts"]())
     for part in generate["parts"]().values():

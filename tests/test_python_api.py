@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable
+from importlib import import_module, reload
+from types import SimpleNamespace
 from typing import Any
 from xml.etree import ElementTree
 
@@ -14,7 +17,7 @@ from pydrake.systems.framework import Context, Diagram, DiagramBuilder, System
 from pydrake.systems.primitives import ConstantVectorSource, Integrator, LinearSystem
 
 import airground_drake
-from airground_drake import ScenarioError, UnknownNameError, build_diagram, load, simulate
+from airground_drake import ScenarioError, UnknownNameError, build_diagram, load, notebook, plot, simulate
 from airground_drake.base.errors import PluginError
 from airground_drake.nsbc.task import Array
 from airground_drake.nsbc.tasks import PositionTask
@@ -217,20 +220,48 @@ def test_traces_verdicts_scenarios_and_diagrams_as_tables_figures_and_in_a_noteb
     table = trace.to_pandas()
     assert table["ugv1"]["x_m"].tolist() == trace.position("ugv1")[:, 0].tolist()
     assert (table.index.name, set(table.columns.get_level_values("robot"))) == ("t_s", set(trace.robots))
-    assert "<td>trigger</td>" in trace._repr_html_()
+    assert "<td>trigger</td>" in notebook.trace_html(trace)
     verdicts = verify(trace, ["SAFE-TRACE"])
-    assert "Does not establish" in verdicts[0]._repr_html_()
+    assert "Does not establish" in notebook.verdict_html(verdicts[0])
     found = verdicts_to_pandas(verdicts)
     assert found.loc[0, ["claim", "run", "status"]].tolist() == ["SAFE-TRACE", "b", "holds"]
     assert found.loc[0, "margin"] == verdicts[0].finding.margin
     axes = Figure().subplots()
-    assert trace.plot(axes) is axes
+    assert plot(trace, axes) is axes
     drawn = {line.get_label(): line.get_xydata() for line in axes.get_lines()}
     assert np.array_equal(drawn["ugv1"], trace.position("ugv1")[:, :2])
-    assert len(axes.patches) == 2 * len(scenario.obstacles)
-    shown = scenario._repr_html_()
-    drawing = ElementTree.fromstring(shown[shown.index("<svg") : shown.index("</svg>") + 6])
-    tags = [element.tag.rpartition("}")[2] for element in drawing]
-    assert tags.count("circle") == 2 * len(scenario.obstacles) + len(scenario.ugvs)
-    assert tags.count("polyline") == len(scenario.ugvs)
-    assert ElementTree.fromstring(build_diagram(scenario)._repr_html_()).tag == "{http://www.w3.org/2000/svg}svg"
+    (circles,) = axes.collections
+    assert len(circles.get_paths()) == len(scenario.obstacles)
+    low, high = np.reshape([axes.get_xlim(), axes.get_ylim()], (2, 2)).T
+    assert all((low < trace.position(robot)[:, :2]).all() for robot in trace.robots)
+    assert all((trace.position(robot)[:, :2] < high).all() for robot in trace.robots)
+    scenario.title = "<b>"
+    shown = notebook.scenario_html(scenario)
+    assert "&lt;b&gt;" in shown
+    assert shown.count("<li>ugv") == 2
+    ElementTree.fromstring(shown[shown.index("<svg") : shown.index("</svg>") + 6])
+    diagram = build_diagram(scenario)
+    drawing = notebook.diagram_html(diagram)
+    assert drawing is not None
+    assert ElementTree.fromstring(drawing).tag == "{http://www.w3.org/2000/svg}svg"
+    assert notebook.diagram_html(diagram.GetSubsystemByName("vehicles")) is None
+
+
+def test_a_notebook_knows_what_to_show_once_the_package_is_imported(monkeypatch: pytest.MonkeyPatch) -> None:
+    told = dict[type, object]()
+
+    class Formatter:
+        def for_type_by_name(self, module: str, name: str, show: object) -> None:
+            kind = getattr(import_module(module), name)
+            assert (kind.__module__, kind.__name__) == (module, name)  # IPython compares these
+            told[kind] = show
+
+    display = SimpleNamespace(formatters={"text/html": Formatter()})
+    shell = SimpleNamespace(display_formatter=display)
+    monkeypatch.setitem(sys.modules, "IPython", SimpleNamespace(get_ipython=lambda: shell))
+    reload(airground_drake)
+    assert told[type(load("minimal")[0])] is notebook.scenario_html
+    assert told[Diagram] is notebook.diagram_html
+    assert {kind.__name__ for kind in told} == {"Scenario", "Trace", "Verdict", "Diagram"}
+    monkeypatch.setitem(sys.modules, "IPython", SimpleNamespace(get_ipython=lambda: None))  # imported, but no shell
+    reload(airground_drake)

@@ -16,7 +16,6 @@ from airground_drake.gatekeeper.outcome_gatekeeper import OutcomeGatekeepers
 from airground_drake.gatekeeper.rollout import View
 from airground_drake.intervention.policy import Proposal
 from airground_drake.nsbc.law import UgvLaw
-from airground_drake.report.figures.canvas import thin
 from airground_drake.report.figures.timelines import nearest_distance
 from airground_drake.report.metrics import closest_obstacle
 from airground_drake.report.reproduction import MEASURES
@@ -26,6 +25,7 @@ from airground_drake.scenarios.load import load
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.scenarios.world import make_world
 from airground_drake.systems.components import make_outlook, make_patience, make_presets
+from airground_drake.view.canvas import thin
 
 PAPERS_ROUTE = "gatekeeper.route=relaxed"
 """Relaxation (27), with half-planes, and rounding (28)-(29), whatever the default of a scenario."""

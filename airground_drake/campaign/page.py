@@ -14,10 +14,10 @@ from matplotlib.figure import Figure
 
 from airground_drake.base.arrays import Array
 from airground_drake.campaign.rows import JUDGED
-from airground_drake.report.figures import canvas, svg
 from airground_drake.report.html import LOOKS, number
 from airground_drake.report.phrases import MARKS, MEANINGS, Line
 from airground_drake.report.templating import environment_of
+from airground_drake.view import canvas, svg
 
 BARS = 40
 MOST_TOLD = 8

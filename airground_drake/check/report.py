@@ -8,7 +8,6 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from .command import LIMIT_S
 from .events import check_events
 from .files import Json, is_plain, names_in, read_json
 from .limits import at_most_s, is_of_a_size
@@ -66,7 +65,7 @@ class Line:
     by: str = "checker"
 
 
-def check_report(folder: Path, limit_s: float = LIMIT_S, told: Callable[[Line], object] = bool) -> list[Line]:
+def check_report(folder: Path, limit_s: float, told: Callable[[Line], object] = bool) -> list[Line]:
     """All checks of a report.
 
     Args:

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from airground_drake.base import files
-from airground_drake.base.errors import TraceError, one_line
+from airground_drake.base.errors import one_line
 from airground_drake.base.usage import Parser, output_file
 from airground_drake.report import compare
 
@@ -33,9 +33,7 @@ def parser() -> argparse.ArgumentParser:
     parser.add_argument("before", type=Path, metavar="BEFORE", help="folder of a report")
     parser.add_argument("after", type=Path, metavar="AFTER", help="folder of another")
     parser.add_argument("--json", action="store_true", help="print all of it as JSON")
-    parser.add_argument(
-        "--html", type=output_file, metavar="FILE", help="write a page, with the runs drawn one over the other"
-    )
+    parser.add_argument("--html", type=output_file, metavar="FILE", help="write a page")
     parser.add_argument("--exact", action="store_true", help="exit code 1 if anything differs, to the last digit")
     return parser
 
@@ -91,10 +89,8 @@ def _side(value: Any) -> str:
 def _page(
     folders: tuple[Path, Path], before: compare.Document, after: compare.Document, found: Mapping[str, Any]
 ) -> str:
-    """The comparison as a page, with the runs that both reports have traces of."""
-    from airground_drake.report.figures import overlay
+    """The comparison as a page."""
     from airground_drake.report.html import render_beside
-    from airground_drake.run import trace
 
     worse = [
         _line(change).removeprefix("worse: ")
@@ -102,14 +98,8 @@ def _page(
         for change in found[part]
         if change["worse"]
     ]
-    figures, problems = [], []
-    for position, run in enumerate(name for name in after["runs"] if name in before["runs"] and name.isidentifier()):
-        try:
-            one, two = (trace.load(folder / "trace" / run) for folder in folders)
-            figures.append(overlay.draw(run, position, one, two))
-        except (TraceError, OSError) as error:
-            problems.append(f"Run {run} cannot be drawn: {error}")
     return render_beside(
-        "compare.html.j2", before=before, after=after, found=found, figures=figures, problems=problems, parts=PARTS,
-        places=[str(folder) for folder in folders], most=MOST_ROWS, regressions=worse,
+        "compare.html.j2", before=before, after=after, found=found, parts=PARTS, most=MOST_ROWS, regressions=worse,
+        rounded={part: [change for change in found[part] if compare.is_rounding(change)] for part in PARTS},
+        places=[str(folder) for folder in folders],
     )  # fmt: skip

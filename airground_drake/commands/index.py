@@ -81,11 +81,11 @@ def _headline(document: Mapping[str, Any]) -> Line | None:
 
 def _thumbnail(report: Path, document: Mapping[str, Any], prefix: str) -> str:
     """The last run as a picture; '' if it has no trace that can be used."""
-    from airground_drake.report.figures import thumbnail
     from airground_drake.run import trace
+    from airground_drake.view.plane import thumbnail_of
 
     runs = [run for run in document["runs"] if run.isidentifier()]
     try:
-        return thumbnail.draw(trace.load(report / "trace" / runs[-1]), prefix)
-    except (TraceError, OSError, IndexError):
+        return thumbnail_of(trace.load(report / "trace" / runs[-1]), prefix)
+    except (TraceError, OSError, LookupError, ValueError):
         return ""

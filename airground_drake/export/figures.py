@@ -10,10 +10,11 @@ from typing import Any
 from airground_drake.base import files
 from airground_drake.base.statuses import PASSING, outcome
 from airground_drake.export import latex
-from airground_drake.report.figures import canvas, draw
+from airground_drake.report.figures import draw
 from airground_drake.report.figures.panels import Figure
 from airground_drake.run.trace import Trace
 from airground_drake.scenarios.schema import Scenario
+from airground_drake.view import canvas
 
 FORMATS = ("pdf", "png", "svg")
 STYLES: dict[str, dict[str, Any]] = {

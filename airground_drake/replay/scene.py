@@ -36,7 +36,7 @@ class Scene(Stage):
     """A run. `times_s` (F,) are those of the frames, the last one the end."""
 
     robots: tuple[Body, ...]
-    scenario: str
+    scenario: Scenario
     run: str
     says: str
     times_s: Array
@@ -68,7 +68,7 @@ def scene(trace: Trace, scenario: Scenario) -> Scene:
     method = str(trace.meta["method"])
     return Scene(
         **{**vars(still), "robots": bodies},
-        scenario=scenario.name,
+        scenario=scenario,
         run=trace.run,
         says=f"method ({method}), {method_of(method).says}",
         times_s=times,

@@ -15,18 +15,12 @@ from matplotlib.patches import Circle
 from airground_drake.base import files
 from airground_drake.base.errors import ReplayError
 from airground_drake.replay.proposals import Sent
-from airground_drake.replay.scene import MAX_NAMED_OBSTACLES, Body, Scene
-from airground_drake.report.figures import canvas
-from airground_drake.view.looks import (
-    OUTCOME_COLORS,
-    PATH_COLOR,
-    SAFE_COLOR,
-    STATE_COLORS,
-    STATE_MARKS,
-    UAV_COLOR,
-    UNSEEN_COLOR,
-)
-from airground_drake.view.stage import Pillar
+from airground_drake.replay.scene import Body, Scene
+from airground_drake.scenarios.schema import Scenario
+from airground_drake.view import canvas
+from airground_drake.view.labels import place
+from airground_drake.view.looks import OUTCOME_COLORS, PATH_COLOR, STATE_COLORS, STATE_MARKS, UAV_COLOR
+from airground_drake.view.plane import draw_obstacles, draw_robot
 
 PICTURES_PER_S = 15
 """Pictures in a second of the video."""
@@ -35,6 +29,7 @@ MOST_PICTURES = 600
 WIDTH_PX, DPI, MOST_PX = 640, 100, 1000
 SUFFIXES = (".webp", ".mp4")
 
+_WAY = canvas.Look(PATH_COLOR, "-", "")
 _BOX = {"facecolor": "white", "edgecolor": "none", "alpha": 0.7, "pad": 1.0}
 
 Update = Callable[[int], None]
@@ -88,12 +83,10 @@ def _picture(scene: Scene) -> tuple[Figure, Update]:
     axes = figure.add_axes((0.0, 0.0, 1.0, 1.0 - 50.0 / size[1]))
     axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal")
     axes.set_axis_off()
-    for obstacle in scene.obstacles:
-        _pillar(axes, obstacle, named=len(scene.obstacles) <= MAX_NAMED_OBSTACLES)
-    axes.plot(*scene.phantoms_m[:, :2].T, linestyle="none", marker="x", color=UNSEEN_COLOR)
+    place(axes, draw_obstacles(axes, scene.scenario), [body.positions for body in scene.robots])
     updates = [_proposal(axes, scene, proposal) for proposal in scene.proposals]
-    updates += [_robot(axes, body) for body in scene.robots]
-    figure.text(8.0 / size[0], 1.0 - 10.0 / size[1], f"{scene.scenario}, run {scene.run}: {scene.says}", va="top")
+    updates += [_robot(axes, scene.scenario, body) for body in scene.robots]
+    figure.text(8.0 / size[0], 1.0 - 10.0 / size[1], f"{scene.scenario.name}, run {scene.run}: {scene.says}", va="top")
     clock = figure.text(8.0 / size[0], 1.0 - 30.0 / size[1], "", va="top", fontweight="bold")
 
     def update(frame: int) -> None:
@@ -104,20 +97,8 @@ def _picture(scene: Scene) -> tuple[Figure, Update]:
     return figure, update
 
 
-def _pillar(axes: Axes, obstacle: Pillar, *, named: bool) -> None:
-    place = (float(obstacle.centre_m[0]), float(obstacle.centre_m[1]))
-    axes.add_patch(Circle(place, obstacle.safe_m, facecolor=f"{SAFE_COLOR}22", edgecolor=SAFE_COLOR, linewidth=0.8))
-    axes.add_patch(Circle(place, obstacle.radius_m, color=obstacle.color))
-    if named:
-        offset = (0.0, -4.0)
-        axes.annotate(obstacle.name, (place[0], place[1] - obstacle.radius_m), offset, textcoords="offset points",
-                      ha="center", va="top", fontsize=7.5)  # fmt: skip
-
-
-def _robot(axes: Axes, body: Body) -> Update:
-    axes.plot(*body.positions[:, :2].T, color=PATH_COLOR, linewidth=0.7)
-    if body.kind == "UGV":
-        axes.plot(*body.target_m[:2], marker="x", markersize=7, color=PATH_COLOR)
+def _robot(axes: Axes, scenario: Scenario, body: Body) -> Update:
+    draw_robot(axes, scenario, body.name, body.positions, _WAY, linewidth=0.7)
     shape = Circle((0.0, 0.0), body.radius_m, zorder=4, linewidth=2.0, fill=body.kind == "UGV")
     axes.add_patch(shape)
     name = axes.annotate(
@@ -125,11 +106,11 @@ def _robot(axes: Axes, body: Body) -> Update:
     )
 
     def update(frame: int) -> None:
-        place, state = body.positions[frame, :2], body.states[frame]
+        at, state = body.positions[frame, :2], body.states[frame]
         color = STATE_COLORS[state] if body.kind == "UGV" else UAV_COLOR
-        shape.set_center((float(place[0]), float(place[1])))
+        shape.set_center((float(at[0]), float(at[1])))
         shape.set(facecolor=color, edgecolor=color)
-        name.xy = (float(place[0]), float(place[1]) + body.radius_m)
+        name.xy = (float(at[0]), float(at[1]) + body.radius_m)
         name.set_text(f"{body.name} {STATE_MARKS[state]}".rstrip())
 
     return update

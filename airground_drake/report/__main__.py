@@ -11,8 +11,10 @@ import argparse
 import shlex
 import sys
 import webbrowser
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from airground_drake.base.errors import (
     AirgroundError,
@@ -23,7 +25,7 @@ from airground_drake.base.errors import (
     UnknownNameError,
     one_line,
 )
-from airground_drake.base.progress import progress_bar
+from airground_drake.base.progress import Progress, progress_bar
 from airground_drake.base.usage import (
     EXIT_TOOL,
     Parser,
@@ -38,6 +40,11 @@ from airground_drake.report import folder
 from airground_drake.scenarios import plugins
 from airground_drake.scenarios.estimate import DEFAULT_LIMITS, GIB, Limits, estimate
 from airground_drake.scenarios.shipped import AUDIT, shipped
+
+if TYPE_CHECKING:  # slow to import
+    from airground_drake.run.trace import Trace
+    from airground_drake.scenarios.schema import Scenario
+    from airground_drake.verify import Verdict
 
 FORMATS = tuple(folder.PAGES)
 AUDITED = "case_a"
@@ -91,12 +98,13 @@ def _reported(options: argparse.Namespace, command: str) -> int:
     limits = Limits(options.limit_steps, options.limit_memory * GIB)
     if not options.quiet and (announced := estimate(scenario).announcement):
         print(announced, file=sys.stderr)
-    wanted = make.Wanted(options.format, command, kept, audited, limits, options.seeds)
     with (
         plugins.admitted(scenario, options.scenario, allow=options.allow_plugins),
         plugins.shown(options.show_policy_output),
         progress_bar(quiet=options.quiet, verbose=options.verbose) as progress,
     ):
+        findings = partial(_findings, progress, audited=audited)
+        wanted = make.Wanted(options.format, command, kept, findings, audited, limits, options.seeds)
         report = make.write_report(scenario, digest, output, wanted, progress)
     overall = report["overall"]
     for line in attention.failures({name: run["faults"] for name, run in report["runs"].items()}):
@@ -110,6 +118,23 @@ def _reported(options: argparse.Namespace, command: str) -> int:
     if options.open and "html" in options.format:
         webbrowser.open((output / "report.html").resolve().as_uri())
     return int(overall["exit_code"])
+
+
+def _findings(
+    progress: Progress,
+    scenario: Scenario,
+    traces: Mapping[str, Trace],
+    verdicts: Sequence[Verdict],
+    *,
+    audited: bool,
+) -> list[dict[str, Any]]:
+    """Findings about the paper: those that the runs show and, if it is `audited`, all others."""
+    from airground_drake import audit
+
+    if not audited:
+        return audit.of_runs(scenario, traces)
+    progress.stage("auditing the paper")
+    return [*audit.of_runs(scenario, traces), *audit.whole(scenario, verdicts)]
 
 
 def parser() -> argparse.ArgumentParser:

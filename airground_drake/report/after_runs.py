@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import platform
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from datetime import datetime
 from functools import partial
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from airground_drake import audit
 from airground_drake.base import files
 from airground_drake.base.parallel import start_in_process
 from airground_drake.base.progress import Progress
@@ -18,7 +17,6 @@ from airground_drake.report import document, folder, junit, metrics
 from airground_drake.report.figures.draw import draw
 from airground_drake.report.figures.panels import Figure
 from airground_drake.report.folder import PAGES
-from airground_drake.report.make import Wanted
 from airground_drake.report.page import page
 from airground_drake.run import trace
 from airground_drake.run.runs import simulate_seeds
@@ -38,24 +36,40 @@ class Judged(NamedTuple):
 
     traces: Mapping[str, Trace]
     verdicts: Sequence[Verdict]
-    findings: Sequence[dict[str, Any]]
+    findings: Sequence[Mapping[str, Any]]
     figures: Sequence[Figure]
     seeds: Sequence[dict[str, Any]]
 
 
-def judge(scenario: Scenario, traces: Mapping[str, Trace], wanted: Wanted, progress: Progress) -> Judged:
+def judge(
+    scenario: Scenario,
+    traces: Mapping[str, Trace],
+    progress: Progress,
+    *,
+    drawn: bool,
+    kept: Path | None,
+    seeds: int,
+    audit: Callable[[Scenario, Mapping[str, Trace], Sequence[Verdict]], Sequence[Mapping[str, Any]]] | None,
+) -> Judged:
     """Judge the runs and the model and, if asked for, the paper and other seeds; draw the runs at the same time.
+
+    Args:
+        scenario: of the runs.
+        traces: its runs by name.
+        progress: is told what is done.
+        drawn: whether to draw figures.
+        kept: as in `make.Wanted`.
+        seeds: likewise.
+        audit: likewise.
 
     Raises:
         PluginError: if a claim of the scenario cannot be made.
         AirgroundError: if a process dies.
     """
-    of_seeds = with_seeds(scenario, traces, wanted.seeds, progress) if wanted.seeds else ()
-    figures = start_in_process(partial(draw, scenario, traces)) if "html" in wanted.formats else list
-    verdicts = verify_all(scenario, traces.values(), kept=wanted.kept, progress=progress)
-    if wanted.audited:
-        progress.stage("auditing the paper")
-    findings = audit.whole(scenario, verdicts) if wanted.audited else ()
+    of_seeds = with_seeds(scenario, traces, seeds, progress) if seeds else ()
+    figures = start_in_process(partial(draw, scenario, traces)) if drawn else list
+    verdicts = verify_all(scenario, traces.values(), kept=kept, progress=progress)
+    findings = audit(scenario, traces, verdicts) if audit else ()
     return Judged(traces, verdicts, findings, figures(), of_seeds)
 
 
@@ -72,7 +86,14 @@ def with_seeds(scenario: Scenario, own: Mapping[str, Trace], number: int, progre
 
 
 def write(
-    scenario: Scenario, digest: str, output: Path, formats: Sequence[str], judged: Judged, provenance: dict[str, Any]
+    scenario: Scenario,
+    digest: str,
+    output: Path,
+    formats: Sequence[str],
+    judged: Judged,
+    provenance: dict[str, Any],
+    *,
+    audited: bool,
 ) -> dict[str, Any]:
     """Write the folder, and return the document; arguments as of `make.write_report` and `document.build`.
 
@@ -85,7 +106,7 @@ def write(
     traces = judged.traces
     report = document.build(
         scenario, digest, traces, judged.verdicts, provenance,
-        audit=judged.findings, required=required, seeds=judged.seeds,
+        audit=judged.findings, audited=audited, required=required, seeds=judged.seeds,
     )  # fmt: skip
     if "junit" in formats:
         pages[PAGES["junit"]] = junit.render(report)

@@ -18,7 +18,6 @@ from airground_drake.base import files
 from airground_drake.base.errors import ReportError, one_line
 from airground_drake.base.statuses import UNDECIDED, outcome
 from airground_drake.report.folder import PAGES
-from airground_drake.report.rebuild import WITHIN
 
 SCHEMA = "airground_drake.comparison/1"
 REPORT = "airground_drake.report/3"
@@ -29,6 +28,8 @@ ROWS = (("reproduced",), ("calibrated",), ("by_construction",), ("ambiguous",), 
 """Rows of the reproduction table, likewise."""
 OVERALL = (("as_expected",), ("inconclusive",), ("not_as_expected",))
 """Over all claims, likewise."""
+WITHIN = 1e-8
+"""Numbers agree to this times 1 plus their size: versions of numpy, scipy and solvers round differently."""
 LONGEST_INTEGER = 18
 """Maximum number of digits of an integer."""
 

@@ -12,7 +12,6 @@ from typing import Any
 
 import numpy as np
 
-from airground_drake.audit import of_runs
 from airground_drake.base.files import sha256
 from airground_drake.base.statuses import NOT_EXERCISED, STATUSES, UNDECIDED, outcome
 from airground_drake.registry import method_of
@@ -38,6 +37,7 @@ def build(
     provenance: Mapping[str, Any],
     *,
     audit: Sequence[Mapping[str, Any]] = (),
+    audited: bool = False,
     required: Iterable[str] = (),
     seeds: Sequence[Mapping[str, Any]] = (),
 ) -> dict[str, Any]:
@@ -49,8 +49,8 @@ def build(
         traces: by run, in the order of the scenario; a run without a trace makes the report inconclusive.
         verdicts: all of them; a claim that the scenario expects and that is missing makes it inconclusive.
         provenance: versions, seed, time, `command` and the like.
-        audit: findings about the paper from elsewhere, added to those that the runs show; with any, all must be
-            demonstrated.
+        audit: findings about the paper.
+        audited: whether these are all findings: then each must be demonstrated.
         required: claims about the model that must have a verdict.
         seeds: outcomes of the runs with several seeds, see `metrics.outcome`.
 
@@ -67,14 +67,14 @@ def build(
         }
         for verdict in verdicts
     ]
-    items = sorted([*of_runs(scenario, traces), *map(dict, audit)], key=lambda item: item["id"])
+    items = sorted(map(dict, audit), key=lambda item: item["id"])
     resolved = asdict(scenario)
     about = {key: resolved[key] for key in ("name", "title", "description")}
     document = {
         "schema": SCHEMA,
         "scenario": {**about, "sha256": digest, "resolved": resolved},
         "provenance": dict(provenance),
-        "overall": overall(claims, missing(scenario, traces, claims, required), items if audit else ()),
+        "overall": overall(claims, missing(scenario, traces, claims, required), items if audited else ()),
         "runs": {name: _run(scenario, trace) for name, trace in traces.items()},
         "seeds": list(seeds),
         "claims": claims,

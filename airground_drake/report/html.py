@@ -1,7 +1,7 @@
 """report.html: one self-contained page that renders report.json, the figures and the diagram.
 
-Its content security policy admits only its own style sheet and scripts, by their digests. Without scripts it lacks the
-filter of claims and the marks that move over the trajectories, nothing else.
+Its content security policy admits only its own style sheet and script, by their digests. Without the script it lacks
+the filter of claims, nothing else.
 """
 
 from __future__ import annotations
@@ -20,9 +20,6 @@ from markupsafe import Markup
 from airground_drake.base.statuses import PASSING, outcome
 from airground_drake.gatekeeper.answer import WORDS
 from airground_drake.report import attention, evidence, phrases, summary
-from airground_drake.report.compare import is_rounding
-from airground_drake.report.figures import svg
-from airground_drake.report.figures.canvas import DARK
 from airground_drake.report.figures.panels import Figure, Table
 from airground_drake.report.mathml import mathml
 from airground_drake.report.outcomes import pairs
@@ -30,9 +27,11 @@ from airground_drake.report.phrases import grouped
 from airground_drake.report.proved import place
 from airground_drake.report.reproduction import YES_NO
 from airground_drake.report.templating import environment_of
+from airground_drake.view import svg
+from airground_drake.view.canvas import DARK
 
-STYLE, SCRIPTS = "report.css", ("report.js", "scrubber.js")
-"""The style sheet and the scripts of the page, among the templates."""
+STYLE, SCRIPT = "report.css", "report.js"
+"""The style sheet and the script of the page, among the templates."""
 NOTHING = "'none'"
 """In a content security policy: no source at all."""
 MAX_DIAGRAM_CHARS = 500_000
@@ -127,7 +126,7 @@ def render(document: Mapping[str, Any], figures: Sequence[Figure], diagram_svg: 
 def render_beside(template: str, **content: Any) -> str:
     """A page beside the report, without scripts, from a template of this package."""
     policy = Markup(security_policy(stylesheet()))
-    return environment().get_template(template).render(policy=policy, scripts=(), **content)
+    return environment().get_template(template).render(policy=policy, script="", **content)
 
 
 @cache
@@ -135,16 +134,15 @@ def environment() -> Environment:
     """Renders the report's page and those beside it."""
     environment = environment_of("airground_drake.report")
     style = stylesheet()
-    scripts = [_template(name) for name in SCRIPTS]
+    script = _template(SCRIPT)
     environment.filters.update(
         num=number, value=value, yaml=as_yaml, together=attention.faults_together, inline=Markup, mathml=mathml,
         evidence=evidence_tables, proof=place, records=partial(evidence.tables, number=number), brief=brief,
     )  # fmt: skip
-    environment.tests["rounding"] = is_rounding
     environment.globals.update(
         chips=CHIPS, shown=_shown, reasons=WORDS, max_faults=MAX_FAULTS,
         marks=phrases.MARKS, kinds=LOOKS, names=phrases.MEANINGS,
-        policy=Markup(security_policy(style, scripts)), style=Markup(style), scripts=list(map(Markup, scripts)),
+        policy=Markup(security_policy(style, script)), style=Markup(style), script=Markup(script),
     )  # fmt: skip
     return environment
 
@@ -165,10 +163,10 @@ def _template(name: str) -> str:
     return resources.files(__package__).joinpath("templates", name).read_text(encoding="utf-8")
 
 
-def security_policy(style: str, scripts: Sequence[str] = ()) -> str:
-    """A page's content security policy: nothing but this style sheet and these scripts, from nowhere else."""
+def security_policy(style: str, script: str = "") -> str:
+    """A page's content security policy: nothing but this style sheet and this script, from nowhere else."""
     return (
-        f"default-src 'none'; style-src {digest(style)}; script-src {' '.join(map(digest, scripts)) or NOTHING}; "
+        f"default-src 'none'; style-src {digest(style)}; script-src {digest(script) if script else NOTHING}; "
         "base-uri 'none'; form-action 'none'"
     )
 

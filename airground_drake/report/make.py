@@ -7,7 +7,7 @@ from datetime import UTC, datetime
 from functools import partial
 from importlib import import_module
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 from airground_drake.base import files
 from airground_drake.base.progress import SILENT, Progress
@@ -16,8 +16,18 @@ from airground_drake.run.runs import simulate_all
 from airground_drake.scenarios.estimate import DEFAULT_LIMITS, Limits, within
 from airground_drake.scenarios.schema import Scenario
 
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping, Sequence
+
+    from airground_drake.run.trace import Trace
+    from airground_drake.verify import Verdict
+
 _NEXT = "airground_drake.report.after_runs"
 """Slow to import, and needed after the simulation: it is imported while the runs are simulated."""
+
+
+Audit: TypeAlias = "Callable[[Scenario, Mapping[str, Trace], Sequence[Verdict]], Sequence[Mapping[str, Any]]]"
+"""Makes findings about the paper from a scenario, its runs and the verdicts on them."""
 
 
 class Wanted(NamedTuple):
@@ -27,7 +37,8 @@ class Wanted(NamedTuple):
         formats: which of html, json and junit to write; traces and diagram are always written.
         command: how to make this report again.
         kept: folder of kept findings about the model, see `verify_model`; None: everything anew.
-        audited: whether to add all findings about the paper, also those that take other runs.
+        audit: makes the findings about the paper; None: there are none.
+        audited: whether these are all findings, so that each must be demonstrated.
         limits: what the scenario may ask for.
         seeds: with how many seeds, from 1 on, distances and arrivals are counted; 0: none.
     """
@@ -35,6 +46,7 @@ class Wanted(NamedTuple):
     formats: tuple[str, ...] = tuple(folder.PAGES)
     command: str = ""
     kept: Path | None = None
+    audit: Audit | None = None
     audited: bool = False
     limits: Limits = DEFAULT_LIMITS
     seeds: int = 0
@@ -74,8 +86,11 @@ def write_report(
         traces = simulate_all(scenario, progress=progress, meanwhile=partial(import_module, _NEXT))
         from airground_drake.report import after_runs
 
-        judged = after_runs.judge(scenario, traces, wanted, progress)
+        judged = after_runs.judge(
+            scenario, traces, progress,
+            drawn="html" in wanted.formats, kept=wanted.kept, seeds=wanted.seeds, audit=wanted.audit,
+        )  # fmt: skip
         progress.stage("writing")
         provenance = after_runs.provenance(scenario, started, wanted.command)
         provenance["wall_s"] = time.perf_counter() - clock
-        return after_runs.write(scenario, digest, output, wanted.formats, judged, provenance)
+        return after_runs.write(scenario, digest, output, wanted.formats, judged, provenance, audited=wanted.audited)

@@ -7,8 +7,7 @@ from dataclasses import replace
 from typing import Any
 
 from airground_drake.report import html
-from airground_drake.report.figures import threshold, zeno_refine
-from airground_drake.report.figures.findings import draw as draw_findings
+from airground_drake.report.figures import findings, model
 from airground_drake.report.figures.panels import Figure
 
 BESIDE = 9
@@ -23,12 +22,12 @@ def page(report: Mapping[str, Any], figures: Sequence[Figure], diagram_svg: str 
         figures: of the runs, see `figures.draw`.
         diagram_svg: the drawing of the block diagram.
     """
-    model = {claim["id"]: claim for claim in report["claims"] if not claim["run"]}
+    claims = {claim["id"]: claim for claim in report["claims"] if not claim["run"]}
     plates = [*figures]
-    if "ZENO-REFINE" in model and (refined := zeno_refine.draw(model["ZENO-REFINE"]["evidence"])):
+    if "ZENO-REFINE" in claims and (refined := model.refinement(claims["ZENO-REFINE"]["evidence"])):
         audited = any(item["id"] == BESIDE for item in report["audit"])
         plates.append(replace(refined, beside=f"audit-{BESIDE}") if audited else refined)
-    if "THR-CHOICE" in model:
-        chosen = threshold.draw(model["THR-CHOICE"]["inputs"], model["THR-CHOICE"]["evidence"])
+    if "THR-CHOICE" in claims:
+        chosen = model.bayes_risks(claims["THR-CHOICE"]["inputs"], claims["THR-CHOICE"]["evidence"])
         plates += [chosen] if chosen else []
-    return html.render(report, [*plates, *draw_findings(report["audit"])], diagram_svg)
+    return html.render(report, [*plates, *findings.draw(report["audit"])], diagram_svg)

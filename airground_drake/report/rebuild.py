@@ -21,9 +21,8 @@ from pathlib import Path
 from typing import Any
 
 from airground_drake.base import files
+from airground_drake.report.compare import WITHIN
 
-WITHIN = 1e-8
-"""Numbers agree to this times 1 plus their size: versions of numpy, scipy and solvers round differently."""
 WITHIN_PX = 0.02
 """Coordinates in drawings agree to this: they are rounded to 0.01."""
 JUDGED = "judged"
@@ -50,6 +49,7 @@ def lines(folder: Path, judge: Judge | None = None) -> Iterator[Line]:
     Raises:
         ScenarioError, TraceError, OSError: if a file cannot be used.
     """
+    from airground_drake.audit import of_runs
     from airground_drake.report import document, metrics
     from airground_drake.run import trace
     from airground_drake.scenarios.load import from_data
@@ -62,13 +62,16 @@ def lines(folder: Path, judge: Judge | None = None) -> Iterator[Line]:
     judged = [
         replace(each, meta=each.meta | {"scenario": each.meta["scenario"] | {"claims": {}}}) for each in traces.values()
     ]
+    here = of_runs(scenario, traces)
+    others = [item for item in report["audit"] if item.get("id") not in {each["id"] for each in here}]
     again = document.build(
         scenario,
         report["scenario"]["sha256"],
         traces,
         (judge or verify_all)(own, judged),
         report["provenance"],
-        audit=_from_other_runs(report, scenario, traces),
+        audit=[*here, *others],
+        audited=bool(others),
         seeds=[metrics.outcome(traces[row["run"]]) if row["seed"] == scenario.seed else row for row in report["seeds"]],
     )
     other_code = _other_code(report["provenance"])
@@ -187,14 +190,6 @@ def _kinds(drawing: str) -> set[tuple[str, str, str]]:
         for element in elements
         for name, value in [("", ""), *element.items()]
     }
-
-
-def _from_other_runs(report: Mapping[str, Any], scenario: Any, traces: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """The recorded findings about the paper that rest on other runs than those of the report."""
-    from airground_drake.audit import of_runs
-
-    here = {item["id"] for item in of_runs(scenario, traces)}
-    return [item for item in report["audit"] if item.get("id") not in here]
 
 
 def _compared(claim: str, run: str, recorded: Any, rebuilt: Any) -> Line:

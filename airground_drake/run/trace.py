@@ -29,10 +29,9 @@ import io
 import json
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from html import escape
 from math import ceil
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -56,9 +55,6 @@ from airground_drake.run.tables import (
 from airground_drake.scenarios.recorded import of_run
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.world.motion import SAME_S
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
 T = TypeVar("T")
 
@@ -261,22 +257,10 @@ class Trace:
         table.columns = pd.MultiIndex.from_tuples(parts, names=["robot", "signal"])
         return table
 
-    def plot(self, axes: Axes | None = None) -> Axes:
-        """Draw the paths of the run on given or new axes: see `run.plot`."""
-        from airground_drake.run.plot import paths  # matplotlib takes half a second to import
-
-        return paths(self, axes)
-
     def __repr__(self) -> str:
         """Run, scenario, numbers of rows and events in one line."""
         scenario, events = self.meta.get("scenario", {}).get("name"), self.meta.get("events", [])
         return f"<Trace: run {self.meta.get('run')!r} of {scenario!r}, {len(self.states)} rows, {len(events)} events>"
-
-    def _repr_html_(self) -> str:
-        """For notebooks: the line of `repr` and a table of the events."""
-        rows = [(f"{event['t_s']:.3f}", event["robot"], event["kind"]) for event in self.events]
-        table = pd.DataFrame(rows, columns=["time, s", "robot", "event"]).to_html(index=False, border=0)
-        return f"<p>{escape(repr(self))}</p>{table}"
 
 
 def save(trace: Trace, folder: Path) -> list[str]:

@@ -6,9 +6,7 @@ key without a default. Positions are in the world frame, z up, the ground at z =
 """
 
 # No `from __future__ import annotations` here: pydantic needs the types themselves, not their names.
-from collections.abc import Sequence
 from dataclasses import dataclass, field
-from html import escape
 from typing import Annotated, ClassVar
 
 from pydantic import ConfigDict, Field
@@ -35,7 +33,6 @@ from airground_drake.scenarios.kinds import (
     settings_of,
 )
 from airground_drake.scenarios.limits import MAX_STAGES, MAX_UGVS
-from airground_drake.scenarios.picture import picture
 
 Vector = list[float]
 
@@ -418,17 +415,3 @@ class Scenario:
         """One line with the numbers of robots and obstacles, and the runs."""
         things = f"{len(self.ugvs)} UGVs, the UAV, {len(self.obstacles)} obstacles"
         return f"<Scenario {self.name!r}: {things}, runs {', '.join(self.runs)}>"
-
-    def _repr_html_(self) -> str:
-        """The view in a notebook: title, map with the preset trajectories, robots and runs."""
-        ugvs = [
-            f"{name} from {_place(ugv.start_m)} to {_place(ugv.target_m)}, at most {ugv.max_speed_m_s:g} m/s"
-            for name, ugv in self.ugvs.items()
-        ]
-        told = [f"run {name}: ({run.method}) {METHODS[run.method].says}" for name, run in self.runs.items()]
-        listed = "".join(f"<li>{escape(line)}</li>" for line in (*ugvs, f"{self.uav.name}, the UAV", *told))
-        return f"<p><b>{escape(self.title or self.name)}</b> {escape(repr(self))}</p>{picture(self)}<ul>{listed}</ul>"
-
-
-def _place(at: Sequence[float]) -> str:
-    return f"({at[0]:g}, {at[1]:g}) m"

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from weakref import ref
 
 from pydrake.systems.framework import Diagram, DiagramBuilder, InputPort, OutputPort, System
 from pydrake.systems.primitives import Demultiplexer, Multiplexer, TrajectorySource
@@ -109,20 +108,7 @@ def build_diagram(
         PluginError: if a policy, route or task of the scenario cannot be made, or a plant or the decision block does
             not have the ports of one.
     """
-    diagram = build_model(validated(scenario), method, composition, plants, monitor, decision_block).diagram
-    of = ref(diagram)
-    vars(diagram)["_repr_html_"] = lambda: _picture(of())  # for notebooks
-    return diagram
-
-
-def _picture(diagram: Diagram | None) -> str:
-    """The picture of a diagram; '' if the diagram has been freed."""
-    if diagram is None:
-        return ""
-    from airground_drake.systems import graphviz  # which builds diagrams itself
-
-    drawn = graphviz.svg(graphviz.dot(diagram))
-    return drawn[drawn.index("<svg") :]
+    return build_model(validated(scenario), method, composition, plants, monitor, decision_block).diagram
 
 
 def build_model(

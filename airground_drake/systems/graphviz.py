@@ -1,35 +1,135 @@
-"""Graphviz pictures of diagrams: `python -m airground_drake.systems.graphviz` writes those of the shipped scenarios."""
+"""Graphviz pictures of diagrams, from Drake's own text.
+
+In the picture of a scenario's diagram the paper's layers are clusters with their blocks, a wire through a port of a
+layer is drawn as one, and the blocks stand in a fixed order. All else is Drake's text.
+"""
 
 from __future__ import annotations
 
-import argparse
 import os
 import re
 import sys
 import warnings
-from collections.abc import Iterator, Sequence
+from collections import ChainMap
+from collections.abc import Iterator, Mapping, Set
 from contextlib import contextmanager
-from pathlib import Path
+from html import escape
 
 import pygraphviz
-from pydrake.systems.framework import Diagram
+from pydrake.systems.framework import Diagram, PortDataType, System
 
 from airground_drake.base import files
-from airground_drake.scenarios.load import load
-from airground_drake.systems import schematic
-from airground_drake.systems.diagram import build_diagram, method_drawn
 
+LAYERS = {"decision_making": "#e1ebf6", "task_planning": "#e7f1e1", "optimisation": "#fbefdc"}
+"""The layers that are shown with their blocks, and their colours. Any other part of the diagram is one block."""
+HIDDEN = "noise_source"
+"""A block without inputs that would take a column of its own."""
+ORDER = (
+    "vehicles", "reference", "decision_noise", "decision_variable", "event_trigger", "intervention_planner",
+    "gatekeeper", "ugv_controller", "uav_controller",
+)  # fmt: skip
+"""Blocks from left to right. A wire to the left is drawn after its ends have their places."""
+COLUMNS = (ORDER[:3], ORDER[-2:])
+"""Blocks that stand below each other."""
+REALISES = {
+    "AffineSystem": "integrated noise",
+    "DecisionVariable": "DDM, (15)",
+    "EventTrigger": "threshold, (19), (20)",
+    "InterventionPlanner": "proposals, (12)-(14)",
+    "PaperGatekeepers": "MPC, (21)-(29)",
+    "OutcomeGatekeepers": "by outcomes",
+    "DirectAcceptance": "accepts all",
+    "UgvController": "NSBC, (5)-(8), (20)",
+    "UavController": "NSBC, (9)-(11)",
+    "TrajectorySource": "preset trajectories",
+    "Diagram": "plants, disturbances",
+}
+"""What a system does, by the name of its class. The picture shows the class name of any other system."""
+RECORDED, INK, MUTED = "#0060a8", "#1a1a1a", "#666666"
+"""Colours of recorded signals, of wires, and of wires from the vehicles, which lead nearly everywhere."""
+LEGEND = "dashed: messages, grey: from the vehicles, blue: recorded"
+WIDTH_IN = 10.9
+"""Maximum width of a picture: that of a landscape page of A4 with margins of 1 cm."""
+
+_WIRE = re.compile(r"^(\w+:\w+):e -> (\w+:\w+):w", re.MULTILINE)
+_HEAD = re.compile(r"<B>.*?</B><BR/>\nname=\w+")
+_DISTURBANCE = re.compile(r'<TR>\n<TD PORT="u\d+"[^>]*>disturbance_\w+</TD>\n(<TD [^>]*></TD>\n)?</TR>\n')
 _PICTURE = re.compile(r'<svg width="(\d+)pt" height="(\d+)pt".*?>\s*(<g .*</g>)\s*</svg>', re.DOTALL)
 _ID = re.compile(r' id="[^"]*"')
 
 
+def has_layers(diagram: Diagram) -> bool:
+    """Whether a diagram is that of a scenario."""
+    return all(diagram.HasSubsystemNamed(layer) for layer in LAYERS)
+
+
 def dot(diagram: Diagram) -> str:
-    """Graphviz text: the picture of the layers for a scenario's diagram, Drake's own for any other diagram.
+    """Graphviz text: layers and blocks for a scenario's diagram, Drake's own text for any other diagram.
 
     The text of a scenario's diagram depends on the scenario and the method only.
     """
-    layered = all(diagram.HasSubsystemNamed(layer) for layer in schematic.LAYERS)
-    return schematic.graph(diagram) if layered else str(diagram.GetGraphvizString(max_depth=1))
+    whole, name = str(diagram.GetGraphvizString(max_depth=1)), diagram.get_name()
+    if not has_layers(diagram):
+        return whole
+    layers = {layer: diagram.GetSubsystemByName(layer) for layer in LAYERS}
+    shown = {layer: {each.get_name(): each for each in parts.GetSystems()} for layer, parts in layers.items()}
+    beside = {each.get_name(): each for each in diagram.GetSystems() if each.get_name() not in LAYERS}
+    blocks = {n: each for n, each in ChainMap(beside, *shown.values()).items() if n != HIDDEN}
+    texts = {n: "".join(each.GetGraphvizFragment(max_depth=0).fragments) for n, each in blocks.items()}
+    # Drake's numbers of systems depend on what the process has built before
+    wired = "".join([whole, *(str(layer.GetGraphvizString(max_depth=1)) for layer in layers.values())])
+    for n, text in texts.items():
+        wired = re.sub(rf"\b{text.split(' ', 1)[0]}:", f"{n}:", wired)
+    wired = re.sub(r"\b(s\d+)out:", r"\1:y", re.sub(r"\b(s\d+)in:", r"\1:u", wired))  # ports of layers
+    feeds = {end: start for start, end in _WIRE.findall(wired)}
+
+    def origin(port: str) -> str:
+        """The output port from which the signal at a port comes."""
+        return origin(feeds[port]) if port in feeds else port
+
+    wires = sorted((origin(end), end) for end in feeds if _block(end) in blocks and _block(origin(end)) in blocks)
+    outputs = whole.split(maxsplit=2)[1].replace("_", "s") + ":y"
+    recorded = {origin(end) for end in feeds if end.startswith(outputs)}
+    lines = [
+        f'digraph "{name}" {{',
+        f'graph [rankdir=LR, newrank=true, nodesep=0.15, ranksep=0.3, size="{WIDTH_IN},100", labelloc=t, '
+        f"label=<<B>{name}</B><BR/>{LEGEND}>, fontname=Helvetica, fontsize=10]",
+        "node [shape=none, margin=0, fontname=Helvetica, fontsize=8]",
+        f'edge [arrowsize=0.6, color="{INK}"]',
+        *(_node(n, each, texts[n], recorded) for n, each in blocks.items()),
+    ]
+    for layer, color in LAYERS.items():
+        look = f'style=filled; color="{color}"; label=<<B>{layer.replace("_", " ").capitalize()}</B>>'
+        lines.append(f'subgraph "cluster_{layer}" {{ {look}; {"; ".join(n for n in shown[layer] if n in blocks)} }}')
+    lines += [f"{{ rank=same; {'; '.join(column)} }}" for column in COLUMNS]
+    return "\n".join([*lines, *(_edge(start, end, blocks) for start, end in wires), "}", ""])
+
+
+def _block(port: str) -> str:
+    return port.partition(":")[0]
+
+
+def _node(name: str, system: System, text: str, recorded: Set[str]) -> str:
+    """Drake's text of a block, with what it does in place of its class, and without inputs for disturbances."""
+    kind = str(getattr(system, "judges", type(system).__name__.rstrip("_")))
+    text = _HEAD.sub(f"<B>{name}</B><BR/>{escape(REALISES.get(kind, kind))}", _DISTURBANCE.sub("", text))
+    for port in (port for port in recorded if _block(port) == name):
+        cell = re.compile(rf'(PORT="{port.partition(":")[2]}"[^>]*>)(\w+)')
+        text = cell.sub(rf'\1<FONT COLOR="{RECORDED}">\2</FONT>', text)
+    text = text.replace('COLOR="grey"', "").replace('BORDER="0"', 'BORDER="0" BGCOLOR="white"', 1)
+    return f"{name} {text.partition(' ')[2]}".strip()
+
+
+def _edge(start: str, end: str, blocks: Mapping[str, System]) -> str:
+    """A wire from an output port of a block to an input port."""
+    order = [*ORDER, *blocks]
+    source = blocks[_block(start)].get_output_port(int(start.partition(":y")[2]))
+    looks = {
+        "style=dashed": source.get_data_type() == PortDataType.kAbstractValued,
+        f'color="{MUTED}"': _block(start) == ORDER[0],
+        "constraint=false": order.index(_block(end)) < order.index(_block(start)),
+    }
+    return f"{start}:e -> {end}:w [{', '.join(look for look, holds in looks.items() if holds)}]"
 
 
 def svg(dot_text: str) -> str:
@@ -92,38 +192,3 @@ def _silent_stderr() -> Iterator[None]:
         os.dup2(saved, 2)
         os.close(saved)
         os.close(nothing)
-
-
-def pictures() -> dict[str, str]:
-    """Contents by file name: `.dot` and `.svg` of the paper's two cases, as reports show them."""
-    content = {}
-    for name in ("case_a", "case_b"):
-        scenario = load(name)[0]
-        text = dot(build_diagram(scenario, method_drawn(scenario)))
-        content[f"{name}.dot"] = text
-        content[f"{name}.svg"] = svg(text)
-    return content
-
-
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Write the pictures, or with --check only compare: exit code 1 if one is not current."""
-    parser = argparse.ArgumentParser(prog="python -m airground_drake.systems.graphviz", description=__doc__)
-    parser.add_argument("-o", "--output", type=Path, default=Path("diagrams"), help="folder (default: %(default)s)")
-    parser.add_argument("--check", action="store_true", help="write nothing; fail if a file is not current")
-    options = parser.parse_args(arguments)
-    stale = []
-    for name, content in pictures().items():
-        path = options.output / name
-        if path.exists() and is_current(name, content, path.read_text(encoding="utf-8")):
-            continue
-        stale.append(str(path))
-        if not options.check:
-            files.write_text(path, content)
-    if options.check and stale:
-        print(f"not current: {', '.join(stale)}; run python -m airground_drake.systems.graphviz", file=sys.stderr)
-        return 1
-    return 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -5,7 +5,6 @@ from __future__ import annotations
 import abc
 import json
 from dataclasses import dataclass, field
-from html import escape
 from math import ceil
 from typing import Any, ClassVar
 
@@ -170,11 +169,6 @@ class Verdict:
         """In one line: which claim, on which run, what was found."""
         about = f"run {self.run!r}" if self.run else "the model"
         return f"<Verdict: {self.claim.id} on {about}: {outcome(self.finding.status, self.finding.exercised)}>"
-
-    def _repr_html_(self) -> str:
-        """What a notebook shows: the line of `repr`, what the claim says, and what it does not establish."""
-        says = (repr(self), self.claim.statement, f"Does not establish: {self.claim.does_not_establish}")
-        return "".join(f"<p>{escape(line)}</p>" for line in says)
 
     @property
     def as_expected(self) -> bool | None:

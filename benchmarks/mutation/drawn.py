@@ -22,8 +22,8 @@ RUNNING = (
     "scenarios/world.py", "decision", "gatekeeper", "geometry", "intervention", "nsbc", "systems", "world",
 )  # fmt: skip
 """Files and folders of the code that produces a run."""
-PICTURES = ("systems/graphviz.py", "systems/schematic.py")
-"""Files in these folders that only draw diagrams."""
+PICTURES = "systems/graphviz.py"
+"""The file in these folders that only draws diagrams."""
 PROBES = ("crowd d", "crowd c", "bodies d", "case_b d", "soft_gate c", "crowd b")
 HYPOTHESES = {
     "systems/components.py": ("test_wiring.py",),
@@ -203,7 +203,7 @@ def files(root: Path, only: Sequence[str] = ()) -> list[str]:
         file for name in RUNNING for file in ((package / name).rglob("*.py") if "." not in name else [package / name])
     ]
     paths = sorted(file.relative_to(package).as_posix() for file in found)
-    running = [path for path in paths if path not in PICTURES]
+    running = [path for path in paths if path != PICTURES]
     return [path for path in running if not only or any(word in path for word in only)]
 
 

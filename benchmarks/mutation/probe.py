@@ -61,6 +61,7 @@ def runs(names: list[str]) -> Findings:
     """Every verdict, and every check of the independent checker that does not agree."""
     from airground_drake.base import files
     from airground_drake.base.errors import AirgroundError
+    from airground_drake.check.command import LIMIT_S
     from airground_drake.check.report import AGREES, check_report
     from airground_drake.report import document
     from airground_drake.run import trace
@@ -81,7 +82,7 @@ def runs(names: list[str]) -> Findings:
             trace.save(of_run, folder / "trace" / run)
             report = document.build(scenario, "", {run: of_run}, verdicts, {"seed": scenario.seed})
             files.write_json(folder / "report.json", report)
-            lines = [line for line in check_report(folder) if line.run]
+            lines = [line for line in check_report(folder, LIMIT_S) if line.run]
         found += [[f"checker: {line.claim}", name, "disagrees", line.rule] for line in lines if line.outcome != AGREES]
     return found
 

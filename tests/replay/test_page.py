@@ -33,7 +33,12 @@ def test_it_has_names_events_and_a_time_slider_and_asks_nothing_of_a_network(pag
 
 
 def test_names_are_escaped(scene: Scene) -> None:
-    hostile = replace(scene, scenario=HOSTILE, run=HOSTILE, events=({**scene.events[0], "robot": HOSTILE},))
+    hostile = replace(
+        scene,
+        scenario=replace(scene.scenario, name=HOSTILE),
+        run=HOSTILE,
+        events=({**scene.events[0], "robot": HOSTILE},),
+    )
     assert HOSTILE not in pages.page(hostile)
 
 

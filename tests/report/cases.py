@@ -8,6 +8,7 @@ from typing import Any
 
 from builders.paths import Corners, along
 
+from airground_drake.audit import of_runs
 from airground_drake.base.statuses import Status
 from airground_drake.report import document
 from airground_drake.run.trace import Trace
@@ -118,4 +119,5 @@ FINE = [verdict("a"), verdict("c", margin=float("nan")), verdict("a_printed", "r
 
 
 def built(scenario: Scenario, traces: dict[str, Trace], verdicts: list[Verdict]) -> dict[str, Any]:
-    return document.build(scenario, "ab" * 32, traces, verdicts, {"package": "0.1.0", "seed": 1, "started": "now"})
+    about = {"package": "0.1.0", "seed": 1, "started": "now"}
+    return document.build(scenario, "ab" * 32, traces, verdicts, about, audit=of_runs(scenario, traces))

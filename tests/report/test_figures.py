@@ -17,10 +17,12 @@ from hypothesis import strategies as st
 from report.cases import FLIGHT, event, make_scenario, make_trace
 
 from airground_drake.campaign.page import _histogram
-from airground_drake.report.figures import canvas, draw, labels, maps, overlay, svg, thumbnail
+from airground_drake.report.figures import draw, maps
 from airground_drake.report.figures.panels import Figure
 from airground_drake.run.trace import Trace
 from airground_drake.scenarios.schema import Run, Scenario
+from airground_drake.view import canvas, labels, svg
+from airground_drake.view.plane import frame_of, thumbnail_of
 
 
 def test_bytes_do_not_depend_on_the_time_or_the_user(
@@ -101,9 +103,9 @@ def test_every_figure_is_drawn_of_equal_empty_single_and_huge_data(
     if x_m is not None:
         values = {f"{name}.decision_variable_m": x_m * (1.0 + 2.0**-52 * (k % 2)) for k, name in enumerate(names)}
         traces = {name: replace(trace, states=trace.states.assign(**values)) for name, trace in traces.items()}
-    figures = [*draw.draw(own, traces), overlay.draw("a", 0, *traces.values())]
+    figures = draw.draw(own, traces)
     texts = [panel.svg for figure in figures for panel in figure.panels]
-    texts.append(thumbnail.draw(traces["a"], "p"))
+    texts.append(thumbnail_of(traces["a"], "p"))
     texts += [_histogram(np.array(values), "t", "s", 0.0)[1] for values in ([scale_m], [apart_m, apart_m + scale_m])]
     for text in texts:
         ET.fromstring(text)
@@ -151,15 +153,9 @@ def test_no_trace_and_a_single_row(scenario: Scenario) -> None:
     assert draw.draw(scenario, {"a": make_trace(scenario, "a", [(0, 3.3, 0.5), (0.1, 3.3, 0.5)], step_s=0.3)})
 
 
-def test_of_two_reports_the_ugvs_that_moved_most(scenario: Scenario, traces: dict[str, Trace]) -> None:
-    drawn = overlay.draw("c", 0, traces["a"], traces["c"])
-    farthest = np.linalg.norm(traces["a"].position("ugv1") - traces["c"].position("ugv1"), axis=1).max()
-    assert drawn.panels[0].table.rows[0][:2] == ("ugv1", f"{farthest:.4g}")
-
-
 def test_a_path_is_dashed_from_a_collision_on(scenario: Scenario) -> None:
     trace = make_trace(scenario, events=[event(9.0, "collision")])
-    frame = maps.frame_of([trace], trace.robots)
+    frame = frame_of(scenario, ((robot, trace.position(robot)) for robot in trace.robots))
     (axes,) = maps.plane(trace, ["ugv1"], frame, 4.0).axes
     own = [line for line in axes.lines if line.get_color() == canvas.look(0).color and len(line.get_xdata()) > 1]
     before, after = own

@@ -13,6 +13,7 @@ from airground_drake.report.metrics import closest_obstacle
 from airground_drake.run.trace import Trace
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.verify.runs.pairs import centres_of
+from airground_drake.view.plane import Frame
 
 MAX_RUNS = 6
 
@@ -63,7 +64,7 @@ def _how(scenario: Scenario, run: str) -> str:
     return f"run {run} ({printed if composition.startswith('recursion_') else composition})"
 
 
-def _frame(runs: Mapping[str, Trace], robot: str, gaps: Mapping[str, Array]) -> maps.Frame:
+def _frame(runs: Mapping[str, Trace], robot: str, gaps: Mapping[str, Array]) -> Frame:
     """The rectangle around the closest approaches of the runs and the two nearest obstacles."""
     closest = np.array([trace.position(robot)[int(gaps[name].argmin()), :2] for name, trace in runs.items()])
     first = next(iter(runs.values()))
@@ -72,4 +73,4 @@ def _frame(runs: Mapping[str, Trace], robot: str, gaps: Mapping[str, Array]) -> 
     points = np.concatenate([closest, centres[np.argsort(reach, kind="stable")[:2]]])
     pad = 0.4 * float(first.scenario.safe_distance.obstacle_m)
     (left, bottom), (right, top) = points.min(axis=0) - pad, points.max(axis=0) + pad
-    return maps.Frame(left, right, bottom, top)
+    return Frame(left, right, bottom, top)

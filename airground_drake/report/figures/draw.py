@@ -14,15 +14,16 @@ import numpy as np
 
 from airground_drake.base.errors import TraceError, one_line
 from airground_drake.registry import method_of
-from airground_drake.report.figures import canvas, comparison, maps, timelines
+from airground_drake.report.figures import comparison, maps, timelines
 from airground_drake.report.figures.panels import MAX_TABLE_ROWS, Figure, Panel, Table, panel, series
 from airground_drake.report.metrics import Nearby, close_by, events_of, gap_m, radius_m
 from airground_drake.report.outcomes import SLACK_M, distance
 from airground_drake.report.reproduction import MEASURES
-from airground_drake.report.scrubber import tracks
 from airground_drake.run.collisions import first_collisions
 from airground_drake.run.trace import Trace
 from airground_drake.scenarios.schema import Scenario
+from airground_drake.view import canvas
+from airground_drake.view.plane import frame_of
 
 MAX_RUNS, MAX_UGVS, MAX_TEAM = 6, 4, 6
 """Maximum numbers of runs, of UGVs in the figure of distances, and of UGVs by name. Larger teams get histograms."""
@@ -138,7 +139,9 @@ def _runs(heading: str) -> str:
 
 def _trajectories(chosen: _Selection) -> Figure:
     first = chosen.first
-    frame = maps.frame_of(list(chosen.runs.values()), first.robots)
+    frame = frame_of(
+        first.scenario, ((robot, trace.position(robot)) for trace in chosen.runs.values() for robot in first.robots)
+    )
     roomy = len(first.ugvs) > 2
     width_in = frame.width_in(canvas.WIDE_IN if roomy else canvas.MAP_IN, canvas.TALLEST_IN)
     circles = "safe circle dashed"
@@ -157,8 +160,8 @@ def _trajectories(chosen: _Selection) -> Figure:
         columns = {f"{r} {a}": trace.position(r)[:, k] for r in robots for k, a in enumerate("xy")}
         finals = ", ".join(f"{r} ({x:.2f}, {y:.2f}) m" for r in robots for x, y, _ in [trace.position(r)[-1]])
         says = f"Paths of {', '.join(robots)} in the ground plane; final positions: {finals}."
-        table, ways = series(trace, "Positions, m", columns), tracks(drawing, trace, chosen.team)
-        panels.append(panel(drawing, f"trajectories-{position}", f"Map of {heading}", says, heading, table, ways))
+        table = series(trace, "Positions, m", columns)
+        panels.append(panel(drawing, f"trajectories-{position}", f"Map of {heading}", says, heading, table))
     return Figure("trajectories", "Maps", caption, tuple(panels), look="" if roomy else "narrow")
 
 

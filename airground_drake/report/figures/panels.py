@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure as Drawing
 
 from airground_drake.base.arrays import Array
-from airground_drake.report.figures import canvas, svg
 from airground_drake.run.trace import Trace
+from airground_drake.view import canvas, svg
 
 MAX_TABLE_ROWS = 31
 """Maximum number of rows of a data table; the trace has all rows."""
@@ -35,8 +34,6 @@ class Panel:
     table: Table
     drawing: Drawing = field(compare=False, repr=False)
     """Source of the SVG, for files of other formats."""
-    tracks: Mapping[str, Any] | None = None
-    """For drawings of the ground plane: places of the robots, see `report.scrubber`."""
 
 
 @dataclass(frozen=True)
@@ -67,14 +64,13 @@ def panel(
     says: str,
     heading: str,
     table: Table,
-    tracks: Mapping[str, Any] | None = None,
     scale: float = 0.0,
 ) -> Panel:
     """A panel of a drawing; call it inside `canvas.style`.
 
     `name` is unique in the page; `title` and `says` are for readers who cannot see it.
     """
-    return Panel(heading, svg.inline(canvas.svg(drawing), name, title, says, scale=scale), table, drawing, tracks)
+    return Panel(heading, svg.inline(canvas.svg(drawing), name, title, says, scale=scale), table, drawing)
 
 
 def series(trace: Trace, caption: str, columns: Mapping[str, Array]) -> Table:

@@ -12,7 +12,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from airground_drake.base.arrays import Array
-from airground_drake.report.figures.canvas import (
+from airground_drake.report.metrics import Nearby, closest_obstacle, events_of, gap_m
+from airground_drake.report.outcomes import SLACK_M, metres
+from airground_drake.run.trace import Trace
+from airground_drake.view.canvas import (
     ALARM,
     FULL_IN,
     INK,
@@ -27,9 +30,6 @@ from airground_drake.report.figures.canvas import (
     size_in,
     time_line,
 )
-from airground_drake.report.metrics import Nearby, closest_obstacle, events_of, gap_m
-from airground_drake.report.outcomes import SLACK_M, metres
-from airground_drake.run.trace import Trace
 
 MARKS = {"trigger": "^", "release": "v", "proposal": "D", "accept": "o", "refuse": "X"}
 """Markers of events by kind."""

@@ -1,27 +1,25 @@
-"""What is drawn beside each finding about the paper: a function of the finding for each number."""
+"""Pictures of findings about the paper, each from its evidence in report.json alone."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from airground_drake.base.arrays import Array
-from airground_drake.decision.bayes import bayes_risk, decision_time, optimal_threshold
-from airground_drake.report.figures.findings.lines import Lines
+from airground_drake.decision.bayes import decision_time, optimal_threshold
+from airground_drake.report.figures.lines import Lines
+from airground_drake.report.figures.panels import Figure
+from airground_drake.view import canvas
 
 POINTS = 200
 
 
-def risk(item: Mapping[str, Any]) -> Lines:
-    """Item 2: where the printed and the corrected (19) put the threshold on the curve of the Bayes risk."""
-    known, roots = item["evidence"], {"root as printed, c1/c2": item["paper"], "root with c2/c1": item["ours"]}
-    constants = known["drift_m_s"], known["noise_m_sqrt_s"], known["c1_1_s"], known["c2"]
-    zeta = np.linspace(0.02, 2.5 * item["ours"]["root_m"], POINTS)
-    marks = {name: (root["root_m"], root["risk"]) for name, root in roots.items()}
-    curve = _curve(lambda z: bayes_risk(z, *constants), zeta)
-    return Lines("Bayes risk (16) over the threshold", "threshold, m", "Bayes risk", {"risk (16)": curve}, marks)
+def draw(items: Sequence[Mapping[str, Any]]) -> list[Figure]:
+    """A figure beside each finding that has a picture of its own."""
+    with canvas.style():
+        return [PICTURES[item["id"]](item).figure(item["id"]) for item in items if item["id"] in PICTURES]
 
 
 def time(item: Mapping[str, Any]) -> Lines:
@@ -115,69 +113,6 @@ def task_error(item: Mapping[str, Any]) -> Lines:
     return Lines("Task error along the horizon", "time from the decision, s", "task error, m", lines)
 
 
-def feed_forward(item: Mapping[str, Any]) -> Lines:
-    """Item 12: both sides of (6) over the velocity, for some error: they meet where there is a solution."""
-    known = item["evidence"]
-    correction, solution = known["gain_1_s"] * known["error_m"], known["velocities_m_s"]["corrected"][0]
-    v = np.linspace(0.0, 2.0 * solution, 50)
-    corrected = np.full(len(v), known["desired_rate_m_s"] + correction)
-    return Lines(
-        f"Both sides of (6), J = I, for an error of {known['error_m']:g} m", "velocity, m/s", "side of (6), m/s",
-        {"left, v": (v, v), "right, as printed": (v, v + correction), "right, corrected": (v, corrected)},
-        {"solution, corrected": (solution, solution)},
-    )  # fmt: skip
-
-
-def centroid(item: Mapping[str, Any]) -> Lines:
-    """Item 13: the task value (9) over the UAV's own position."""
-    known = item["evidence"]["task_values"]
-    lines = {name: (np.array(known["uav_x_m"]), np.array(known[f"{name.replace(' ', '_')}_m"]))
-             for name in ("as printed", "corrected")}  # fmt: skip
-    return Lines("Task value (9) over the UAV's position", "x of the UAV, m", "task value, m", lines)
-
-
-def sums(item: Mapping[str, Any]) -> Lines:
-    """Item 14: what the sum (27a) makes of the integrand 1, over the number of stages."""
-    known = item["evidence"]
-    stages, printed, corrected = (np.array(known["sums"][key]) for key in ("stages", "as_printed", "corrected_s"))
-    return Lines(
-        "The cost of the integrand 1 over the number of stages", "stages N", "sum",
-        {"as printed": (stages, printed), "corrected, s": (stages, corrected)},
-        {
-            f"printed, N = {known['stages']}": (known["stages"], item["paper"]),
-            "integral, s": (known["stages"], known["integral_s"]),
-        },
-    )  # fmt: skip
-
-
-def dimensions(item: Mapping[str, Any]) -> Lines:
-    """Item 15: total dimension of the tasks over the lowest one's, where rule (3) admits it and where not."""
-    known = item["evidence"]
-    lowest, total, admitted = (np.array(known["totals"][key]) for key in ("lowest_task", "total", "admitted"))
-    return Lines(
-        f"Total dimension of the tasks, {known['higher_tasks']} of them taken", "dimension of the lowest task",
-        "total dimension",
-        {
-            "rule (3) admits": (lowest[admitted], total[admitted]),
-            "rule (3) excludes": (lowest[~admitted], total[~admitted]),
-            "n, of the velocity": (lowest, np.full(len(lowest), known["n"])),
-        },
-        {"example": (known["lowest_task"], known["total"])},
-    )  # fmt: skip
-
-
-def null_space(item: Mapping[str, Any]) -> Lines:
-    """Item 16: the part of the own task's velocity, in any direction, that an intervention leaves."""
-    angle = np.linspace(0.0, 2.0 * np.pi, 73)
-    own = np.stack([np.cos(angle), np.sin(angle), np.zeros_like(angle)])
-    one, left = (np.array(item["evidence"][key]) @ own for key in ("projector_for_one_direction", "projector"))
-    return Lines(
-        "What is left of the own task's velocity of 1 m/s under an intervention", "x, m/s", "y, m/s",
-        {"own, any direction": (own[0], own[1]), "left: y intervened on": (one[0], one[1])},
-        {"left: position, J = I": (float(left[0, 0]), float(left[1, 0]))},
-    )  # fmt: skip
-
-
 def speeds(item: Mapping[str, Any]) -> Lines:
     """Item 17: when the trigger is due over the reference's speed, and what the paper reports."""
     known, printed, ours = item["evidence"]["reference_travelled_at_the_trigger_m"], item["paper"], item["ours"]
@@ -209,7 +144,6 @@ def _curve(value: Callable[[float], float], x: Array) -> tuple[Array, Array]:
 
 
 PICTURES: dict[int, Callable[[Mapping[str, Any]], Lines]] = {
-    2: risk, 3: time, 4: optimum, 5: first_passage, 6: due, 7: sides, 10: intrusion, 11: task_error,
-    12: feed_forward, 13: centroid, 14: sums, 15: dimensions, 16: null_space, 17: speeds, 18: one_or_two,
+    3: time, 4: optimum, 5: first_passage, 6: due, 7: sides, 10: intrusion, 11: task_error, 17: speeds, 18: one_or_two,
 }  # fmt: skip
-"""By number of the finding. Pictures of 1 and 9 are drawn from runs and from ZENO-REFINE."""
+"""By number of the finding. Those of 1, 2 and 9 are drawn from runs, from THR-CHOICE and from ZENO-REFINE."""

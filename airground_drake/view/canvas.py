@@ -81,8 +81,8 @@ DARK = {
     "#cfe6dc": "#1f4436",
     "#0060a8": "#6db8ff", "#b34700": "#ff9d5c", "#00705a": "#4fd1b0", "#8b3a8b": "#e08ee0", "#6b5900": "#d9c24d",
     "#303030": "#d0d0d0", "#666666": "#a8a8a8",
-    "black": "#e8e8e8", "white": "#16181c", "#444444": "#b0b4bb",
-    "#e1ebf6": "#1c2c3e", "#e7f1e1": "#1f3323", "#fbefdc": "#3d3020", "#ececec": "#2c2f36",
+    "black": "#e8e8e8", "white": "#16181c",
+    "#e1ebf6": "#1c2c3e", "#e7f1e1": "#1f3323", "#fbefdc": "#3d3020",
 }  # fmt: skip
 """Colours of the figures and the block diagram on a dark page."""
 

@@ -10,7 +10,7 @@ import textalloc
 from matplotlib.axes import Axes
 
 from airground_drake.base.arrays import Array
-from airground_drake.report.figures.canvas import INK, MUTED, thin
+from airground_drake.view.canvas import INK, MUTED, thin
 
 MAX_LINE_POINTS = 80
 """Number of points of a line that labels avoid."""

@@ -1,4 +1,4 @@
-"""The figure of THR-CHOICE: the Bayes risk over the threshold; threshold in force, optimal, and by (19) as printed."""
+"""Figures of claims about the model, from their inputs and their evidence."""
 
 from __future__ import annotations
 
@@ -8,17 +8,22 @@ from typing import Any
 import numpy as np
 
 from airground_drake.decision.bayes import bayes_risk
-from airground_drake.report.figures import canvas
-from airground_drake.report.figures.findings.lines import Lines
+from airground_drake.report.figures.lines import Lines
 from airground_drake.report.figures.panels import Figure
+from airground_drake.view import canvas
 
 POINTS = 200
 BEYOND = 1.6
 """Length of the axis, relative to the largest mark."""
+FEWEST = 0.05
+"""Smaller mean counts are drawn as this one: the axis is logarithmic."""
 
 
-def draw(inputs: Mapping[str, Any], evidence: Mapping[str, Any]) -> Figure | None:
-    """The figure from the inputs and the evidence of the claim; None without evidence."""
+def bayes_risks(inputs: Mapping[str, Any], evidence: Mapping[str, Any]) -> Figure | None:
+    """THR-CHOICE: the Bayes risk over the threshold; threshold in force, optimal, and by (19) as printed.
+
+    None without evidence.
+    """
     if "optimal_threshold_m" not in evidence:
         return None
     constants = inputs["drift_m_s"], inputs["noise_m_sqrt_s"], inputs["c1_1_s"], inputs["c2"]
@@ -39,6 +44,34 @@ def draw(inputs: Mapping[str, Any], evidence: Mapping[str, Any]) -> Figure | Non
     )
     with canvas.style():
         return shown.plate("threshold-choice", "", caption)
+
+
+def refinement(evidence: Mapping[str, Any]) -> Figure | None:
+    """ZENO-REFINE: triggers against the noise step, bare threshold and automaton; None without evidence."""
+    if not evidence.get("fit"):
+        return None
+    counts = {
+        "bare threshold": evidence["bare"]["mean"],
+        "bare, theory": evidence["expected_bare"],
+        "automaton": evidence["automaton"]["mean"],
+    }
+    steps = np.array(evidence["dt_s"])
+    shown = Lines(
+        "Triggers under refinement of the noise step", "noise step, s", "triggers per path",
+        {name: (steps, np.maximum(count, FEWEST)) for name, count in counts.items()}, log="xy",
+    )  # fmt: skip
+    exponents = (
+        f"{name}: exponent {fit['exponent']:.3f}, {100 * evidence['level']:g} % interval "
+        f"[{fit['interval'][0]:.3f}, {fit['interval'][1]:.3f}]"
+        for name, fit in (("Bare threshold", evidence["fit"]["bare"]), ("automaton", evidence["fit"]["automaton"]))
+    )
+    caption = (
+        f"The task error stays at the threshold; means of {evidence['paths']} paths of {evidence['duration_s']:.3g} s. "
+        "With finer noise the bare threshold triggers without bound, like one over the square root of the step; the "
+        f"automaton does not. {'; '.join(exponents)}."
+    )
+    with canvas.style():
+        return shown.plate("refinement", "", caption, beside="ZENO-REFINE")
 
 
 def _as_it_was(runs: Mapping[str, Any]) -> str:

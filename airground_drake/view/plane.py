@@ -1,0 +1,204 @@
+"""A scenario and the ways of its robots seen from above, drawn by matplotlib: the one way to draw the ground plane.
+
+Figures of reports, replays and notebooks are drawn inside `canvas.style`, which gives them the same looks.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.collections import PatchCollection
+from matplotlib.figure import Figure
+from matplotlib.patches import Circle
+
+from airground_drake.base.arrays import Array
+from airground_drake.run.trace import Trace
+from airground_drake.scenarios.schema import Scenario
+from airground_drake.view import canvas, svg
+from airground_drake.view.canvas import INK, MUTED, UAV_LOOK, Look, look, rule, short, thin
+from airground_drake.view.labels import Label, place
+from airground_drake.view.stage import safe_m
+
+MAX_NAMED_OBSTACLES = 12
+THUMBNAIL_IN = (2.5, 1.9)
+"""Width and height of a small picture, inches."""
+MAX_THUMBNAIL_UGVS, MAX_THUMBNAIL_POINTS = 20, 200
+_LEFT_IN, _BESIDE_IN, _BELOW_IN = 0.5, 0.65, 0.42
+"""Margin left of a map, both side margins together, margin below it, inches."""
+_VOID_DASH = (0, (1.5, 2.5))
+
+
+class Frame(NamedTuple):
+    """A rectangle of the ground plane, m."""
+
+    left: float
+    right: float
+    bottom: float
+    top: float
+
+    def width_in(self, widest: float, tallest: float) -> float:
+        """Width of its largest map within these limits, inches."""
+        return min(widest, tallest * (self.right - self.left) / (self.top - self.bottom) + _BESIDE_IN)
+
+    def show(self, axes: Axes) -> None:
+        """Set the limits of axes, with equal scales."""
+        axes.set(xlim=(self.left, self.right), ylim=(self.bottom, self.top), aspect="equal")
+
+
+def frame_of(scenario: Scenario, ways: Iterable[tuple[str, Array]]) -> Frame:
+    """The rectangle around the ways (T, 3), m, of robots, by name, their targets and all safe circles."""
+    points = list[Array]()
+    for name, way in ways:
+        points += [way[:, :2] + side * scenario.robots[name].radius_m for side in (-1.0, 1.0)]
+        points += [np.array([scenario.ugvs[name].target_m[:2]])] if name in scenario.ugvs else []
+    for obstacle in scenario.obstacles.values():
+        points.append(np.array(obstacle.position_m[:2]) + np.outer([-1.0, 1.0], [safe_m(scenario, obstacle)] * 2))
+    every = np.concatenate(points)
+    (left, bottom), (right, top) = every.min(axis=0) - 0.4, every.max(axis=0) + 0.4
+    return Frame(left, right, bottom - 0.6, top + 0.8)
+
+
+def axes_over(frame: Frame, width_in: float, above_in: float = 0.1) -> tuple[Figure, Axes]:
+    """A figure with axes over a part of the ground plane."""
+    inner_in = width_in - _BESIDE_IN
+    inner_height_in = inner_in * (frame.top - frame.bottom) / (frame.right - frame.left)
+    height_in = inner_height_in + _BELOW_IN + above_in
+    figure = Figure(figsize=(width_in, height_in))
+    box = (_LEFT_IN / width_in, _BELOW_IN / height_in, inner_in / width_in, inner_height_in / height_in)
+    axes = figure.add_axes(box)
+    frame.show(axes)
+    rule(axes, "x, m", "y, m")
+    return figure, axes
+
+
+def draw_obstacles(axes: Axes, scenario: Scenario) -> list[Label]:
+    """Draw obstacles as hexagons in their safe circles, hollow ones if the UAV does not know them, and phantoms.
+
+    Returns:
+        Labels: the names of the obstacles, unless they are many, and of phantoms.
+    """
+    obstacles = scenario.obstacles.values()
+    circles = [Circle((each.position_m[0], each.position_m[1]), safe_m(scenario, each)) for each in obstacles]
+    axes.add_collection(
+        PatchCollection(circles, facecolor="#f3f3f3", edgecolor=MUTED, linestyle=(0, (2, 2)), linewidth=1.0, zorder=1.0)
+    )
+    hexagon: dict[str, Any] = {"linestyle": "none", "marker": "h", "markersize": 6, "color": INK, "zorder": 3}
+    labels = list[Label]()
+    for name, each in scenario.obstacles.items():
+        _disc(axes, each.position_m, each.radius_m, INK)
+        axes.plot(*each.position_m[:2], **hexagon, markerfacecolor=INK if each.known_to_uav else "white")
+        since = f", from {each.appears_s:g} s" if each.appears_s else ""
+        hint = "" if each.known_to_uav else "\n(unseen by the UAV)"
+        labels.append(Label(np.array(each.position_m), f"{short(name, 12)}{since}{hint}", size_pt=7.5))
+    labels = labels if len(labels) <= MAX_NAMED_OBSTACLES else []
+    for at in scenario.uav.phantoms_m:
+        axes.plot(*at[:2], marker="x", markersize=6, color=MUTED, zorder=3)
+        labels.append(Label(np.array(at), "(only on the UAV's map)", size_pt=7.5))
+    return labels
+
+
+def draw_way(axes: Axes, way: Array, appearance: Look, rows: int | None = None, **options: Any) -> None:
+    """Draw a way (T, 2) or (T, 3), m: the first `rows` as a line, the others, which do not count, in short dashes."""
+    rows = len(way) if rows is None else rows
+    parts = [(way[:rows, :2], appearance.dash, options), (way[rows - 1 :, :2], _VOID_DASH, {"linewidth": 0.9})]
+    for part, dash, of_line in parts[: 1 + (rows < len(way))]:
+        axes.plot(*part[thin(part)].T, color=appearance.color, linestyle=dash, **of_line)
+
+
+def draw_robot(
+    axes: Axes, scenario: Scenario, name: str, way: Array, appearance: Look, rows: int | None = None, **options: Any
+) -> list[Label]:
+    """Draw the way (T, 2) or (T, 3), m, of a robot: its start o, a UGV's target x, its size at both ends.
+
+    Args:
+        axes: where to draw.
+        scenario: has the robot.
+        name: of the robot.
+        way: its positions.
+        appearance: of the line.
+        rows: number of positions that count; see `draw_way`.
+        options: of the line.
+
+    Returns:
+        Labels: its name at both ends.
+    """
+    draw_way(axes, way, appearance, rows, **{"linewidth": 1.9 if name in scenario.ugvs else 1.1, **options})
+    ends = [way[0], way[-1]]
+    for at in ends:
+        _disc(axes, at, scenario.robots[name].radius_m, appearance.color)
+    axes.plot(*way[0][:2], marker="o", markersize=6, color=appearance.color, markerfacecolor="white", zorder=4)
+    if name in scenario.ugvs:
+        ends[1] = np.array(scenario.ugvs[name].target_m)
+        axes.plot(*ends[1][:2], marker="x", markersize=7, markeredgewidth=2, color=appearance.color, zorder=4)
+    return [Label(at, short(name, 9), appearance.color, weight="bold") for at in ends[name not in scenario.ugvs :]]
+
+
+def looks_of(scenario: Scenario, ugvs: Iterable[str]) -> dict[str, Look]:
+    """The look of each of some UGVs, in turn, and of the UAV."""
+    return {**{ugv: look(k) for k, ugv in enumerate(ugvs)}, scenario.uav.name: UAV_LOOK}
+
+
+def plot(trace: Trace, axes: Axes | None = None) -> Axes:
+    """Draw a run in the ground plane, in m: ways, starts o, targets x, obstacles in their safe circles.
+
+    Args:
+        trace: the run.
+        axes: where to draw; default: those of a new figure of pyplot.
+
+    Returns:
+        The axes.
+
+    Raises:
+        TraceError: if the trace lacks a column or holds numbers that are not finite.
+    """
+    if axes is None:
+        from matplotlib import pyplot
+
+        _, axes = pyplot.subplots()
+    scenario = trace.scenario
+    ways = {robot: trace.position(robot) for robot in trace.robots}
+    frame_of(scenario, ways.items()).show(axes)
+    labels = draw_obstacles(axes, scenario)
+    for robot, appearance in looks_of(scenario, trace.ugvs).items():
+        rows = trace.counting_rows(robot)
+        labels += draw_robot(axes, scenario, robot, ways[robot], appearance, rows, label=robot)
+    place(axes, labels, list(ways.values()))
+    axes.set(xlabel="x, m", ylabel="y, m", title=f"{scenario.name}, run {trace.run}")
+    return axes
+
+
+def thumbnail(scenario: Scenario, ways: Mapping[str, Array] | None = None) -> str:
+    """A small picture as an SVG document.
+
+    Args:
+        scenario: has the obstacles and targets.
+        ways: positions (T, 3), m, by UGV; default: the preset trajectories. Those of the first UGVs are drawn.
+    """
+    if ways is None:
+        ways = {name: np.array(ugv.preset.waypoints_m) for name, ugv in scenario.ugvs.items()}
+    drawn: Sequence[tuple[str, Array]] = [*ways.items()][:MAX_THUMBNAIL_UGVS]
+    with canvas.style():
+        figure = Figure(figsize=THUMBNAIL_IN)
+        axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
+        axes.set_axis_off()
+        frame_of(scenario, drawn).show(axes)
+        draw_obstacles(axes, scenario)
+        for k, (name, way) in enumerate(drawn):
+            draw_robot(axes, scenario, name, way[thin(way, MAX_THUMBNAIL_POINTS)], look(k), linewidth=1.4)
+        return canvas.svg(figure)
+
+
+def thumbnail_of(trace: Trace, prefix: str) -> str:
+    """The thumbnail of a run as an element for HTML; `prefix` is unique in the page."""
+    drawn = thumbnail(trace.scenario, {ugv: trace.position(ugv) for ugv in trace.ugvs})
+    says = "Ways of the UGVs from above; rings: starts; crosses: targets; grey: obstacles in their safe circles."
+    return svg.inline(drawn, prefix, f"Run {trace.run}", says, natural_size=True)
+
+
+def _disc(axes: Axes, at: Sequence[float] | Array, radius: float, color: str) -> None:
+    """A robot or an obstacle in its true size."""
+    if radius:
+        axes.add_patch(Circle((at[0], at[1]), radius, facecolor=color, edgecolor=color, alpha=0.35, zorder=1.5))
