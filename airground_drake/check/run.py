@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -13,52 +12,19 @@ import numpy.typing as npt
 import pandas as pd
 
 from .files import Json, parse_table, read_bytes, read_json, sha256
-from .nearness import least_apart_m
 from .rules import SMALL, Array, NotEstablished, close, holds, same
 from .scenario import Levels, Pair, Preset, as_run, levels_of, pairs_of, preset_of, robots_of
 
 Rows = npt.NDArray[np.intp]
 SCHEMA = "airground_drake.trace/7"
-TABLES = ("signals.parquet", "decisions.parquet", "problems.parquet", "proposals.parquet")
-OF_ROBOT = ("x_m", "y_m", "z_m", "vx_m_s", "vy_m_s", "vz_m_s")
-OF_UGV = (
-    "ref_x_m", "ref_y_m", "ref_z_m", "noise_m", "decision_variable_m", "mode", "triggers", "triggered_at_s",
-    "released_at_s", "accepted",
-)  # fmt: skip
-"""Signals of each robot, and of each UGV besides."""
-OF_SOLUTIONS = ("status", "route", "first_stage")
-"""Columns of decisions that only method (c) fills, in words."""
-OF_MPC = (
-    "relaxed_first_stage", "objective", "route_bound", "gap", "objective_accept", "objective_refuse",
-    "accept_throughout", "refuse_throughout", "rounding_deviation_s", "predicted_clearance_m",
-)  # fmt: skip
-"""Columns of decisions that method (c) fills: it solves problem (26)."""
-OF_OUTCOMES = (
-    "refuse_outcome_m2_s", "accept_outcome_m2_s", "refuse_stalls", "accept_stalls", "refuse_left_m", "accept_left_m",
-    "tries",
-)  # fmt: skip
-"""Columns of decisions that method (d) fills: it compares outcomes."""
-COLUMNS = {
-    "decisions.parquet": (
-        "t_s", "robot", "policy", "number", "issued_s", "decision", "reason",
-        *OF_SOLUTIONS, *OF_MPC, *OF_OUTCOMES,
-    ),
-    "problems.parquet": (
-        "dt_s", "error_weight_1_m2_s", "slack_weight_1_m2_s", "terminal_weight_s", "initial_m", "accept_m_s",
-        "refuse_m_s", "reference_m", "centres_m", "distances_m", "plan", "positions_m", "relaxed", "rounded", "normals",
-    ),
-    "proposals.parquet": (
-        "number", "robot", "policy", "issued_s", "times_s", "positions_m", "selection", "mapped_m", "mapped_radius_m",
-        "cause", "party",
-    ),
-}  # fmt: skip
-"""Columns of the tables other than the signals."""
-META = (
-    "schema", "run", "method", "composition", "seed", "robots", "ugvs", "scenario", "events", "zeta_m", "controllers",
-    "decision_block", "faults", "files",
-)  # fmt: skip
+TABLE = "signals.parquet"
+"""The table that is read: positions, velocities, references, noise and triggers."""
 SHARED = ("method", "composition", "seed", "zeta_m", "events", "faults")
 """Keys that meta.json and the run's entry in report.json share."""
+ROWS = 50
+"""Rows of a slice of a run."""
+ROUNDING_M = 1e-6
+"""Bounds are lowered by this, because of rounding."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,21 +36,12 @@ class Run:
         scenario: as resolved, with the values that the run sets.
         events: by time.
         signals: see airground_drake/run/trace.py for the columns.
-        decisions: a row per decision of the gatekeeper.
-        proposals: a row per proposal of the UAV.
     """
 
     name: str
     scenario: Json
     events: list[Json]
     signals: pd.DataFrame
-    decisions: pd.DataFrame
-    proposals: pd.DataFrame
-
-    @cached_property
-    def method(self) -> str:
-        """a: no intervention, b: no gatekeeper, c: the paper's, d: by outcomes, avoidance on top."""
-        return str(self.scenario["runs"][self.name]["method"])
 
     @cached_property
     def ugvs(self) -> list[str]:
@@ -162,8 +119,11 @@ class Run:
         """A column of the signals, (T,).
 
         Raises:
+            NotEstablished: if it is missing.
             Disagreement: if a number is not finite.
         """
+        if name not in self.signals:
+            raise NotEstablished("columns of a table", f"there is no {name}", TABLE)
         values = self.signals[name].to_numpy(dtype=np.float64)
         holds("numbers are finite", np.isfinite(values), values, "a finite number", about=name)
         return values
@@ -195,38 +155,18 @@ def read_run(folder: Path, name: str, report: Json) -> Run:
         NotEstablished: if a file cannot be read.
     """
     scenario, meta = report["scenario"]["resolved"], read_json(folder / "meta.json")
-    same("keys of meta.json", sorted(meta), sorted(META))
-    same("keys of timings.json", sorted(read_json(folder / "timings.json")), ["decision_times_s", "wall_s"])
-    same("files of the trace", sorted(meta["files"]), sorted(TABLES))
-    tables = {file: _table(folder / file, meta["files"][file], _columns(file, scenario)) for file in TABLES}
+    content = read_bytes(folder / TABLE)
+    same("SHA-256 of a table", meta["files"][TABLE], sha256(content), about=TABLE)
     _is_of_the_run(meta, report["runs"][name], scenario, name)
-    signals, decisions, _, proposals = tables.values()
-    run = Run(name, as_run(scenario, name), meta["events"], signals, decisions, proposals)
+    run = Run(name, as_run(scenario, name), meta["events"], parse_table(content, TABLE))
     close("threshold in force", meta["zeta_m"], run.levels.zeta_m, within=SMALL)
     _rows_cover_the_run(run)
     for robot in run.robots:
         _moves_as_commanded(run, robot)
     for ugv, preset in run.presets.items():
-        recorded, flags = run.vector(ugv, "ref_", "m"), run.column(f"{ugv}.accepted")
+        recorded = run.vector(ugv, "ref_", "m")
         close("preset trajectory", recorded, preset.position_m(run.t_s), within=SMALL, about=ugv, t_s=run.t_s)
-        holds("flag of an intervention", np.isin(flags, (0.0, 1.0)), flags, "0 or 1", about=ugv, t_s=run.t_s)
     return run
-
-
-def _table(path: Path, digest: str, columns: Sequence[str]) -> pd.DataFrame:
-    """The table in a file that has the digest and the columns."""
-    content = read_bytes(path)
-    same("SHA-256 of a table", digest, sha256(content), about=path.name)
-    table = parse_table(content, path.name)
-    same("columns of a table", sorted(table.columns), sorted(columns), about=path.name)
-    return table
-
-
-def _columns(file: str, scenario: Json) -> Sequence[str]:
-    """Columns of a table; those of the signals follow from the robots."""
-    of_robots = [f"{robot}.{name}" for robot in robots_of(scenario) for name in OF_ROBOT]
-    of_ugvs = [f"{ugv}.{name}" for ugv in scenario["ugvs"] for name in OF_UGV]
-    return COLUMNS.get(file) or ["t_s", *of_robots, *of_ugvs]
 
 
 def _is_of_the_run(meta: Json, entry: Json, scenario: Json, name: str) -> None:
@@ -256,3 +196,22 @@ def _moves_as_commanded(run: Run, robot: str) -> None:
     close("command before the start", command[0], np.zeros(3), within=0.0, about=robot, t_s=float(run.t_s[0]))
     led = place[:-1] + np.diff(run.t_s)[:, None] * command[1:]
     close("law of motion", place[1:], led, within=SMALL, about=robot, t_s=run.t_s[1:])
+
+
+def least_apart_m(position_m: dict[str, Array], pairs: list[Pair]) -> Array:
+    """Lower bounds of the distances of pairs over a whole run, (P,).
+
+    On a slice of the run each body stays in a ball around its positions. Two bodies are at least as far apart as their
+    balls.
+    """
+    number = {name: k for k, name in enumerate(position_m)}
+    one = np.array([number[pair.robot] for pair in pairs], dtype=np.intp)
+    other = np.array([number[pair.other] for pair in pairs], dtype=np.intp)
+    found, places = np.full(len(pairs), np.inf), list(position_m.values())
+    for begin in range(0, max(len(places[0]) - 1, 1), ROWS):
+        parts = [place[begin : begin + ROWS + 1] for place in places]
+        middle = np.array([0.5 * (part.min(axis=0) + part.max(axis=0)) for part in parts])
+        reach = np.array([np.linalg.norm(part - at, axis=1).max() for part, at in zip(parts, middle, strict=True)])
+        apart = np.linalg.norm(middle[one] - middle[other], axis=1) - reach[one] - reach[other]
+        found = np.minimum(found, apart)
+    return found - ROUNDING_M
