@@ -132,10 +132,6 @@ class Run:
         """Three columns of the signals, (T, 3), such as `ugv1.vx_m_s`: stem `v`, unit `m_s`."""
         return np.stack([self.column(f"{robot}.{stem}{axis}_{unit}") for axis in "xyz"], axis=1)
 
-    def place_m(self, name: str, t_s: float) -> Array:
-        """Place of a robot or an obstacle at any time, (3,)."""
-        return np.array([np.interp(t_s, self.t_s, axis) for axis in self.position_m[name].T])
-
     def times_s(self, robot: str, kind: str) -> Array:
         """Times of the recorded events of a kind, increasing."""
         found = [float(event["t_s"]) for event in self.events if (event["robot"], event["kind"]) == (robot, kind)]
@@ -199,7 +195,7 @@ def _moves_as_commanded(run: Run, robot: str) -> None:
 
 
 def least_apart_m(position_m: dict[str, Array], pairs: list[Pair]) -> Array:
-    """Lower bounds of the distances of pairs over a whole run, (P,).
+    """Lower bounds of the distances of pairs over a whole run, (P,), so that only near pairs are looked at closely.
 
     On a slice of the run each body stays in a ball around its positions. Two bodies are at least as far apart as their
     balls.

@@ -36,9 +36,7 @@ ALWAYS = (
     "findings of `report audit` that rest on other runs"
 )
 """What is taken as recorded: a forger may change it in all its places, unnoticed."""
-NOT_SIMULATED = (
-    "policies, seeds and faults, messages and decisions; other seeds, third-party claims, the block diagram (--simulate)"
-)
+NOT_SIMULATED = "policies, seeds and faults; messages and decisions; other seeds, third-party claims, block diagram"
 """The same without `--simulate`."""
 EPILOG = f"""\
 Each line says what was checked, on which run, and by whom:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -125,7 +125,7 @@ def _equal(theirs: Any, ours: Any) -> bool:
     """Whether two cells are equal, as numbers, texts or arrays; one that is not a number equals another."""
     if isinstance(theirs, np.ndarray) and isinstance(ours, np.ndarray):
         return theirs.shape == ours.shape and theirs.tolist() == ours.tolist()
-    return bool(theirs == ours or (theirs != theirs and ours != ours))  # noqa: PLR0124
+    return bool(theirs == ours or (theirs != theirs and ours != ours))
 
 
 def _plain(value: Any) -> Any:
@@ -136,14 +136,14 @@ def _plain(value: Any) -> Any:
 
 def _first(recorded: Any, made: Any, path: str = "") -> Difference | None:
     """The first part in which two JSON values differ, with its dotted path."""
+    pairs: Iterable[tuple[Any, Any, Any]]
     if isinstance(recorded, dict) and isinstance(made, dict):
-        keys: Sequence[Any] = [*{**recorded, **made}]
-        both: Any = ((recorded.get(key, "nothing"), made.get(key, "nothing")) for key in keys)
+        pairs = ((key, recorded.get(key, "nothing"), made.get(key, "nothing")) for key in {**recorded, **made})
     elif isinstance(recorded, list) and isinstance(made, list) and len(recorded) == len(made):
-        keys, both = range(len(made)), zip(recorded, made, strict=True)
+        pairs = zip(range(len(made)), recorded, made, strict=True)
     else:
         return None if recorded == made and type(recorded) is type(made) else (path or "it", recorded, made)
-    found = (_first(*each, f"{path}.{key}".strip(".")) for key, each in zip(keys, both, strict=True))
+    found = (_first(theirs, ours, f"{path}.{key}".strip(".")) for key, theirs, ours in pairs)
     return next(filter(None, found), None)
 
 
