@@ -129,24 +129,17 @@ def _lines(folder: Path, there: Sequence[str], report: Json, limit_s: float) -> 
         runs[name] = read_run(folder / "trace" / name, name, report)
         return f"{len(runs[name].t_s)} rows"
 
-    def loaded(name: str) -> Run:
-        if name not in runs:
-            raise NotEstablished("the trace can be used", "it was refused above")
-        return runs[name]
-
-    def events(name: str) -> str:
-        return check_events(loaded(name))
-
     def judge(claim: str, name: str) -> str:
         entries = [each for each in report["claims"] if (each["id"], each["run"]) == (claim, name)]
         same("claims that there are", len(entries), 1, about=claim)
-        return _judged(entries[0], DECIDED[claim](loaded(name)))
+        return _judged(entries[0], DECIDED[claim](runs[name]))
 
     for name in report["scenario"]["resolved"]["runs"]:
         yield attempt("trace", name, partial(load, name))
-        yield attempt("events", name, partial(events, name))
-        for claim in DECIDED:
-            yield attempt(claim, name, partial(judge, claim, name))
+        if name in runs:  # nothing can be said of a trace that is refused
+            yield attempt("events", name, partial(check_events, runs[name]))
+            for claim in DECIDED:
+                yield attempt(claim, name, partial(judge, claim, name))
 
 
 def check_files(folder: Path, there: Sequence[str], report: Json) -> str:

@@ -59,8 +59,8 @@ def lines(folder: Path, judge: Judge | None = None) -> Iterator[Line]:
 
     report = json.loads(files.read_text(folder / "report.json"))
     scenario = from_data(report["scenario"]["resolved"], str(folder / "report.json"))
-    traces = {name: _with_events(trace.load(folder / "trace" / name)) for name in scenario.runs}
-    again = _again(report, scenario, traces, judge or verify_all)
+    traces = {name: with_events(trace.load(folder / "trace" / name)) for name in scenario.runs}
+    again = document_again(report, scenario, traces, judge or verify_all)
     other_code = _other_code(report["provenance"])
     parts = [_with_note(line, other_code) for line in _parts(report, again, scenario.claims)]
     yield from parts
@@ -74,7 +74,7 @@ def lines(folder: Path, judge: Judge | None = None) -> Iterator[Line]:
         yield line_of("report.html", "", OPEN, f"the pages cannot be made again: {short(why)}", "pages")
 
 
-def _with_events(trace: Any) -> Any:
+def with_events(trace: Any) -> Any:
     """The trace with the events that follow from its tables."""
     from airground_drake.run.events import extract
 
@@ -82,7 +82,7 @@ def _with_events(trace: Any) -> Any:
     return replace(trace, meta=trace.meta | {"events": extract(trace, sent)})
 
 
-def _again(report: Mapping[str, Any], scenario: Any, traces: Mapping[str, Any], judge: Judge) -> dict[str, Any]:
+def document_again(report: Mapping[str, Any], scenario: Any, traces: Mapping[str, Any], judge: Judge) -> dict[str, Any]:
     """report.json from the traces; what only other runs or third-party code can tell is taken from the recorded one."""
     from airground_drake.audit import of_runs
     from airground_drake.report import document, metrics
@@ -244,20 +244,24 @@ def different(claim: str, run: str, about: str, theirs: Any, ours: Any) -> Line:
     return line_of(claim, run, DISAGREES, text, "the files give what is recorded") | values
 
 
-def differences(recorded: Any, rebuilt: Any, path: str = "") -> Iterator[tuple[str, Any, Any]]:
-    """Each value that differs, with its dotted path: numbers by more than `WITHIN`, anything else at all."""
+def differences(
+    recorded: Any, rebuilt: Any, path: str = "", *, within: float = WITHIN
+) -> Iterator[tuple[str, Any, Any]]:
+    """Each value of two JSON documents that differs, with its dotted path: numbers by more than `within`."""
+    pairs: list[tuple[Any, Any, Any]] = []
     if isinstance(recorded, dict) and isinstance(rebuilt, dict):
-        for key in {**rebuilt, **recorded}:
-            both = recorded.get(key, "nothing"), rebuilt.get(key, "nothing")
-            yield from differences(*both, f"{path}.{key}".strip("."))
-    elif isinstance(recorded, list) and isinstance(rebuilt, list) and len(recorded) == len(rebuilt):
-        for k, (theirs, ours) in enumerate(zip(recorded, rebuilt, strict=True)):
-            yield from differences(theirs, ours, f"{path}.{k}".strip("."))
+        pairs = [(key, recorded.get(key, "nothing"), rebuilt.get(key, "nothing")) for key in {**rebuilt, **recorded}]
+    elif isinstance(recorded, list) and isinstance(rebuilt, list):
+        pairs = [(k, *both) for k, both in enumerate(zip(recorded, rebuilt, strict=False))]
     elif _is_number(recorded) and _is_number(rebuilt):
-        if not abs(recorded - rebuilt) <= WITHIN * (1.0 + abs(rebuilt)):
+        if not abs(recorded - rebuilt) <= within * (1.0 + abs(rebuilt)):
             yield path, recorded, rebuilt
     elif type(recorded) is not type(rebuilt) or recorded != rebuilt:
         yield path, recorded, rebuilt
+    for key, theirs, ours in pairs:
+        yield from differences(theirs, ours, f"{path}.{key}".strip("."), within=within)
+    if isinstance(recorded, list) and isinstance(rebuilt, list) and len(recorded) != len(rebuilt):
+        yield f"{path}: number of entries", len(recorded), len(rebuilt)
 
 
 def _is_number(value: Any) -> bool:

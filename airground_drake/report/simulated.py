@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -21,7 +21,7 @@ from airground_drake.base import files
 from airground_drake.base.progress import SILENT, Progress
 from airground_drake.check.report import AGREES, NOT_HERE
 from airground_drake.report.after_runs import versions, with_seeds
-from airground_drake.report.rebuild import Line, line_of, print_lines, short
+from airground_drake.report.rebuild import Line, differences, line_of, print_lines, short
 from airground_drake.run import trace
 from airground_drake.run.runs import simulate_all
 from airground_drake.run.trace import TABLES, Trace
@@ -86,7 +86,7 @@ def _line(claim: str, run: str, found: Difference | None, exactly: str, note: st
     if found is None:
         return line_of(claim, run, AGREES, exactly)
     about, theirs, ours = found
-    text = f"{about} is {short(ours)} here, recorded {short(theirs)}{note}"
+    text = f"{about or 'it'} is {short(ours)} here, recorded {short(theirs)}{note}"
     values = {"about": about, "recorded": theirs, "recomputed": ours}
     return line_of(claim, run, NOT_HERE, text, "the same scenario gives the same run") | json.loads(json.dumps(values))
 
@@ -136,15 +136,7 @@ def _plain(value: Any) -> Any:
 
 def _first(recorded: Any, made: Any, path: str = "") -> Difference | None:
     """The first part in which two JSON values differ, with its dotted path."""
-    pairs: Iterable[tuple[Any, Any, Any]]
-    if isinstance(recorded, dict) and isinstance(made, dict):
-        pairs = ((key, recorded.get(key, "nothing"), made.get(key, "nothing")) for key in {**recorded, **made})
-    elif isinstance(recorded, list) and isinstance(made, list) and len(recorded) == len(made):
-        pairs = zip(range(len(made)), recorded, made, strict=True)
-    else:
-        return None if recorded == made and type(recorded) is type(made) else (path or "it", recorded, made)
-    found = (_first(theirs, ours, f"{path}.{key}".strip(".")) for key, theirs, ours in pairs)
-    return next(filter(None, found), None)
+    return next(differences(recorded, made, path, within=0.0), None)
 
 
 def _third_party(
@@ -155,12 +147,15 @@ def _third_party(
     about_model = {each.id for each in model_claims(added=scenario.claims)} & {*scenario.claims}
     verdicts = [verdict for run in traces.values() for verdict in verify(run, about_runs)] if about_runs else []
     verdicts += verify_model(scenario, claims=about_model) if about_model else []
-    made = {(verdict.claim.id, verdict.run): json.loads(json.dumps(verdict.to_json())) for verdict in verdicts}
+    made = {
+        (verdict.claim.id, verdict.run): json.loads(json.dumps(verdict.to_json() | {"rerun": ""}))
+        for verdict in verdicts
+    }
     recorded = {(each["id"], each["run"]): each for each in claims if each["id"] in scenario.claims}
     for key in {**recorded, **made}:
-        theirs = {name: value for name, value in recorded.get(key, {}).items() if name != "rerun"}
-        ours = made.get(key, {})
-        yield _line(*key, _first(theirs, ours), f"{ours.get('status')}, exactly", note)
+        ours = made.get(key)
+        theirs = {**recorded[key], "rerun": ""} if key in recorded else None
+        yield _line(*key, _first(theirs, ours), f"{ours and ours['status']}, exactly", note)
 
 
 def main(arguments: Sequence[str]) -> int:

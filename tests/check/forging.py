@@ -17,7 +17,7 @@ import pandas as pd
 import pytest
 
 from airground_drake.check import command as checker
-from airground_drake.check.report import AGREES, Line
+from airground_drake.check.report import AGREES, RECORDED, Line
 from airground_drake.report import rebuild
 from airground_drake.run.trace import Trace
 from airground_drake.scenarios.schema import Scenario
@@ -124,24 +124,32 @@ def mend(folder: Path) -> None:
 def attempt(report: Path, edit: Edit, *, mended: bool = True) -> tuple[int, str]:
     """Forge a copy of a report, beside it, and check it: the exit code, and a line for each check that fails.
 
+    The report is made again from its traces only if the checker agrees.
+
     Args:
         report: folder of the report.
         edit: the forgery.
         mended: whether the list of files is made right afterwards.
     """
-    folder = copy(report, report.with_name(f"forged_{os.getpid()}"))
-    edit(folder)
-    if mended:
-        mend(folder)
+    folder = forged(report, edit, mended=mended)
     try:
         found = checker.checked(folder, checker.LIMIT_S)
     except checker.UsageError as error:
         return 2, str(error)
     if all(line.outcome == AGREES for line in found):
-        found = [Line(**line, by="judged again") for line in rebuild.lines(folder, judge=judged)]
-    refused = [line for line in found if line.outcome != AGREES]
+        found = [Line(**line, by="made again") for line in rebuild.lines(folder, judge=judged)]
+    refused = [line for line in found if line.outcome not in (AGREES, RECORDED)]
     assert all(line.rule and line.text for line in refused)
     return int(bool(refused)), "\n".join(f"{line.by}: {line.claim}: {line.text}" for line in refused)
+
+
+def forged(report: Path, edit: Edit, *, mended: bool = True) -> Path:
+    """A forged copy of a report, beside it; arguments as of `attempt`."""
+    folder = copy(report, report.with_name(f"forged_{os.getpid()}"))
+    edit(folder)
+    if mended:
+        mend(folder)
+    return folder
 
 
 _JUDGED: dict[str, Any] = {}
