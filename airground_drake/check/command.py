@@ -17,22 +17,10 @@ from typing import TYPE_CHECKING, Any, NoReturn
 if TYPE_CHECKING:
     from .report import Line
 
-SCHEMA = "airground_drake.check/2"
-TAKEN_AS_RECORDED = (
-    "that a run was simulated as the scenario says (nothing is simulated again)",
-    "seed, noise, policies and their parameters, faults, what the scenario expects, values that no check uses",
-    "provenance, the SHA-256 of the scenario's file, measured times",
-    "motions of refused proposals, the block diagram, findings of `report audit` that rest on other runs",
-)
-"""What no check can find out: a forger may change it in all its places, unnoticed."""
-EPILOG = f"""\
-Each line says what was checked, on which run, and
-  agrees              the files bear out what the report says
-  DISAGREES           the files contradict the report or each other: the rule, the time, both values
-  cannot be checked   a file cannot be read, or the report itself decides nothing
-Taken as recorded, so that a forger may change it in all its places, unnoticed:
-{"".join(f"  - {each}{chr(10)}" for each in TAKEN_AS_RECORDED)}
-Exit codes: 0 all agree; 1 not all; 2 usage, or no report; 4 a fault of the checker."""
+SCHEMA = "airground_drake.check/3"
+ALONE = ("policies, seeds and faults", "every part of the report that no line above names")
+"""What the checker alone takes as recorded: a forger may change it in all its places, unnoticed."""
+CODES = "Exit codes: 0 all agree; 1 not all; 2 usage, or no report; 4 a fault of the checker."
 LIMIT_S = 300.0
 """CPU time that a check may take, s. Checks of a run of minutes take seconds."""
 MOST_S = 1e6
@@ -47,37 +35,27 @@ class _Parser(argparse.ArgumentParser):
     """Raises instead of printing and exiting."""
 
     def error(self, message: str) -> NoReturn:
-        raise UsageError(message)
+        raise UsageError(f"{message}; usage: {self.prog} [options] DIR")
 
 
-def parser() -> argparse.ArgumentParser:
+def parser(prog: str, description: str, epilog: str) -> argparse.ArgumentParser:
     """What the command line takes; it raises `UsageError`."""
     parser = _Parser(
-        prog="python -m airground_drake.check",
-        description="Check a report from its files alone: distances, hypotheses, triggers, events, and its verdict.",
-        epilog=EPILOG,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
+        prog=prog, description=description, epilog=epilog, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("report", metavar="DIR", type=Path, help="folder with report.json and trace/")
     parser.add_argument(
-        "--limit-s",
-        type=_limit_s,
-        default=LIMIT_S,
-        metavar="S",
-        help="CPU time for each check (default: %(default)g)",
+        "--limit-s", type=_limit_s, default=LIMIT_S, metavar="S", help="CPU time for each check (default: %(default)g)"
     )
     parser.add_argument("--json", action="store_true", help="write strict JSON to standard output")
     return parser
 
 
 def _limit_s(text: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        value = 0.0
-    if not 0.0 < value <= MOST_S:
-        raise argparse.ArgumentTypeError(f"{text!r} is not allowed; wanted: a number above 0, at most {MOST_S:g}")
-    return value
+    with suppress(ValueError):
+        if 0.0 < (value := float(text)) <= MOST_S:
+            return value
+    raise argparse.ArgumentTypeError(f"{text!r} is not allowed; wanted: a number above 0, at most {MOST_S:g}")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -89,17 +67,17 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Returns:
         The exit code: 0 all agree, 1 not all, 2 usage or no report.
     """
+    says = "Judge distances, hypotheses, triggers, dwell, arrivals and collisions of a report again, from its files."
     try:
-        options = parser().parse_args(arguments)
-    except UsageError as error:
-        return _refuse(f"{error}; usage: airground check [--json] DIR")
-    except SystemExit:  # --help has been printed
-        return 0
-    try:
+        options = parser("python -m airground_drake.check", says, CODES).parse_args(arguments)
         lines = checked(options.report, options.limit_s)
     except UsageError as error:
-        return _refuse(str(error))
-    show(lines, options.report, as_json=options.json)
+        with suppress(OSError):
+            print("error:", _printable(str(error)), file=sys.stderr)
+        return 2
+    except SystemExit:  # --help has been printed
+        return 0
+    show(lines, options.report, ALONE, as_json=options.json)
     return verdict(lines)
 
 
@@ -124,53 +102,31 @@ def checked(folder: Path, limit_s: float, told: Callable[[Line], object] = bool)
         raise UsageError(f"{folder} is no report: {error.rule}: {error.about}: {error.why}") from None
 
 
-def show(lines: Sequence[Line], folder: Path, *, as_json: bool) -> None:
-    """Print the checks, a line each, or as strict JSON."""
-    if as_json:
-        print(json.dumps(_document(folder, lines), indent=1, allow_nan=False))
-    else:
-        _print(lines)
-
-
 def verdict(lines: Sequence[Line]) -> int:
-    """The exit code: 0 if all agree, else 1."""
-    from .report import AGREES
+    """The exit code: 1 if a line disagrees or cannot be checked, else 3 if one is not reproduced here, else 0."""
+    from .report import DISAGREES, NOT_HERE, OPEN
 
-    return int(any(line.outcome != AGREES for line in lines))
+    found = {line.outcome for line in lines}
+    return 1 if found & {DISAGREES, OPEN} else 3 if NOT_HERE in found else 0
 
 
-def _refuse(why: str) -> int:
-    with suppress(OSError):
-        print("error:", _printable(why), file=sys.stderr)
-    return 2
+def show(lines: Sequence[Line], folder: Path, taken: Sequence[str], *, as_json: bool) -> None:
+    """Print the checks, a line each, or as strict JSON; and what is taken as recorded."""
+    counts = Counter(line.outcome for line in lines)
+    if as_json:
+        checks = [_strict(asdict(line)) for line in lines]
+        about = {"schema": SCHEMA, "report": str(folder), "taken_as_recorded": taken, "summary": counts}
+        print(json.dumps(about | {"checks": checks}, indent=1, allow_nan=False))
+        return
+    for line in lines:
+        print(_printable(f"{line.claim:<12}{line.run or '-':<8} {line.outcome} ({line.by}): {line.text}"))
+    print(f"{len(lines)} checks: {', '.join(f'{count} {outcome}' for outcome, count in counts.items())}")
+    print(f"Taken as recorded: {'; '.join(taken)}.")
 
 
 def _printable(text: str) -> str:
     """Make one line without control characters, whatever names are in it."""
     return "".join(c if c.isprintable() else " " if c.isspace() else c.encode("unicode_escape").decode() for c in text)
-
-
-def _print(lines: Sequence[Line]) -> None:
-    for line in lines:
-        print(_printable(f"{line.claim:<12}{line.run or '-':<8} {line.outcome} ({line.by}): {line.text}"))
-    print(f"Taken as recorded: {'; '.join(TAKEN_AS_RECORDED)}.")
-    counts = _counts(lines)
-    print(f"{len(lines)} checks: {', '.join(f'{count} {outcome}' for outcome, count in counts.items())}")
-
-
-def _counts(lines: Sequence[Line]) -> dict[str, int]:
-    from .report import AGREES, DISAGREES, OPEN
-
-    found = Counter(line.outcome for line in lines)
-    return {outcome: found[outcome] for outcome in (AGREES, DISAGREES, OPEN)}
-
-
-def _document(folder: Path, lines: Sequence[Line]) -> dict[str, Any]:
-    checks = [_strict(asdict(line)) for line in lines]
-    taken = list(TAKEN_AS_RECORDED)
-    return {
-        "schema": SCHEMA, "report": str(folder), "checks": checks, "taken_as_recorded": taken, "summary": _counts(lines)
-    }  # fmt: skip
 
 
 def _strict(value: Any) -> Any:
@@ -179,8 +135,6 @@ def _strict(value: Any) -> Any:
         return {str(key): _strict(item) for key, item in value.items()}
     if isinstance(value, (list, tuple)):
         return [_strict(item) for item in value]
-    if isinstance(value, float) and not math.isfinite(value):
-        return str(value)
-    if value is None or isinstance(value, (str, int, float)):
+    if value is None or isinstance(value, (str, int)) or (isinstance(value, float) and math.isfinite(value)):
         return value
     return str(value)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -9,15 +10,16 @@ from pathlib import Path
 from typing import Any
 
 from .events import check_events
-from .files import Json, is_plain, names_in, read_json
+from .files import Json, is_plain, names_in, read_bytes, read_json, sha256
 from .limits import at_most_s, is_of_a_size
 from .rules import SMALL, Disagreement, Found, NotEstablished, close, holds, same
 from .run import Run, read_run
 from .safety import safe_hyp, safe_trace
 from .triggers import thr_quality, thr_trig, zeno_trace
-from .verdicts import NOT_EXERCISED, UNDECIDED, check_expectation, check_files, check_overall, outcome_of
 
 AGREES, DISAGREES, OPEN = "agrees", "DISAGREES", "cannot be checked"
+RECORDED, NOT_HERE = "as recorded", "not reproduced here"
+"""Outcomes; the last two are those of `airground check`: nothing to compare with, and another run when simulated."""
 
 DECIDED: Mapping[str, Callable[[Run], Found]] = {
     "SAFE-TRACE": safe_trace,
@@ -26,14 +28,21 @@ DECIDED: Mapping[str, Callable[[Run], Found]] = {
     "THR-TRIG": thr_trig,
     "THR-QUALITY": thr_quality,
 }
-"""The claims that the checker decides by its own formulas; for the others it checks the expectation only."""
+"""The claims that the checker decides by its own formulas, on every run."""
 
 SCHEMA = "airground_drake.report/3"
 SHAPE: Mapping[str, type] = {
     **dict.fromkeys(("scenario", "provenance", "overall", "runs", "files"), dict),
     **dict.fromkeys(("claims", "audit", "choices", "seeds"), list),
 }
-"""Type of each part of report.json that the checker reads; lists have objects."""
+"""Type of each part of report.json that is read; lists have objects."""
+OF_A_REPORT = re.compile(
+    r"report\.json|report\.html|junit\.xml|diagram\.(dot|svg)|proofs/(proofs\.json|run_\w+\.v)"
+    r"|trace/([^/]+)/((meta|timings)\.json|\w+\.parquet)"
+)
+"""Files that a report may have; the third group is a run."""
+ADDED_LATER = "proofs/"
+"""Folder of the files that `airground prove` adds to a report."""
 
 
 @dataclass(frozen=True)
@@ -43,14 +52,14 @@ class Line:
     Attributes:
         claim: identifier of the claim, or what else was checked: report, files, trace, events.
         run: on which run; '' for the report and the model.
-        outcome: AGREES, DISAGREES or OPEN.
+        outcome: see above.
         text: what was found, or why nothing was.
         rule: the rule that is broken or cannot be applied; '' if all agrees.
         about: the robot, pair, event, decision or file.
         t_s: when in the run; None where there is no time.
         recorded: what the files say, if a rule is broken.
         recomputed: what follows from them.
-        by: who checked: "checker", "judged again" (the claims' own code), or "Coq".
+        by: who checked: "checker", "made again", "simulated again" or "Coq".
     """
 
     claim: str
@@ -95,16 +104,13 @@ def _is_shaped_like_a_report(report: Any) -> None:
             raise NotEstablished(rule, why, "report.json")
 
     require(isinstance(report, dict), f"it is a {type(report).__name__}")
-    this_version = report.get("schema") == SCHEMA and "mutants" not in report
     why = f"its schema is not {SCHEMA}: make the report again (CHANGELOG.md)"
-    require(this_version, why, "it is a report of this version")
+    require(report.get("schema") == SCHEMA, why, "it is a report of this version")
     for key, kind in SHAPE.items():
         part: Any = report.get(key)
         entries = part if isinstance(part, list) else []
-        require(
-            isinstance(part, kind) and all(isinstance(entry, dict) for entry in entries),
-            f"its {key!r} is missing or has another type",
-        )
+        held = isinstance(part, kind) and all(isinstance(entry, dict) for entry in entries)
+        require(held, f"its {key!r} is missing or has another type")
     scenario = report["scenario"].get("resolved")
     runs: Any = scenario.get("runs") if isinstance(scenario, dict) else None
     require(isinstance(runs, dict), "it has no resolved scenario with runs")
@@ -114,68 +120,69 @@ def _is_shaped_like_a_report(report: Any) -> None:
 
 
 def _lines(folder: Path, there: Sequence[str], report: Json, limit_s: float) -> Iterator[Line]:
-    scenario = report["scenario"]["resolved"]
     attempt = partial(_attempt, limit_s)
-    yield attempt("report", "", lambda: check_overall(folder, report))
-    yield attempt("files", "", lambda: check_files(folder, there, report["files"]))
+    yield attempt("files", "", lambda: check_files(folder, there, report))
     runs: dict[str, Run] = {}
 
     def load(name: str) -> str:
         runs[name] = read_run(folder / "trace" / name, name, report)
         return f"{len(runs[name].t_s)} rows"
 
-    def loaded(name: str) -> Run:
-        if name not in runs:
-            raise NotEstablished("the trace can be used", "it was refused above")
-        return runs[name]
+    def judge(claim: str, name: str) -> str:
+        entries = [each for each in report["claims"] if (each["id"], each["run"]) == (claim, name)]
+        same("claims that there are", len(entries), 1, about=claim)
+        return _judged(entries[0], DECIDED[claim](runs[name]))
 
-    def events(name: str) -> str:
-        return check_events(loaded(name))
-
-    for name in scenario["runs"]:
+    for name in report["scenario"]["resolved"]["runs"]:
         yield attempt("trace", name, partial(load, name))
-        yield attempt("events", name, partial(events, name))
-    for claim in report["claims"]:
-        yield attempt(claim["id"], claim["run"], partial(_judge, claim, scenario, loaded))
+        if name in runs:  # nothing can be said of a trace that is refused
+            yield attempt("events", name, partial(check_events, runs[name]))
+            for claim in DECIDED:
+                yield attempt(claim, name, partial(judge, claim, name))
 
 
-def _judge(claim: Json, scenario: Json, loaded: Callable[[str], Run]) -> str:
-    """Compare a recorded verdict with the scenario's expectation and, for some claims, with the checker's own."""
-    check_expectation(claim, scenario)
-    name, status = claim["id"], claim["status"]
-    if name not in DECIDED:
-        return f"{status}, expected {claim['expected']}; not decided by the checker"
-    found = DECIDED[name](loaded(claim["run"]))
-    if status in UNDECIDED and found.status != status:
-        raise NotEstablished("verdict", f"recorded {status!r}, which decides nothing; here it is {found.status!r}")
+def check_files(folder: Path, there: Sequence[str], report: Json) -> str:
+    """Require the files that report.json names, and no others, with their SHA-256.
+
+    Raises:
+        Disagreement, NotEstablished: if one is missing, has other content or none of a report, or cannot be read.
+    """
+    for name in there:
+        known = OF_A_REPORT.fullmatch(name)
+        held = known is not None and (known[3] is None or known[3] in report["runs"])
+        holds("a report has such a file", held, "a file", "nothing", about=name)
+    recorded = report["files"]
+    found = {name for name in there if name != "report.json" and not name.startswith(ADDED_LATER)}
+    for name in sorted({*recorded} | found):
+        same("a file is named if it is there", name in recorded, name in found, about=name)
+        same("SHA-256 of a file", recorded[name], sha256(read_bytes(folder / name)), about=name)
+    return f"{len(found)} files"
+
+
+def _judged(claim: Json, found: Found) -> str:
+    """Compare a recorded verdict with the checker's own."""
+    status, margin, count = claim["status"], claim["margin"], claim["exercised"]
     if found.because is not None and status == "holds":
         raise found.because
     same("verdict", status, found.status)
     if found.because is not None:
         return f"{status} (broken: {found.because.rule})"
     if status == "refuted" and found.margin is None:
-        return status
-    _counted_as_here(claim, found)
-    if found.margin is None or claim["margin"] is None:
-        same("margin", claim["margin"], found.margin)
-        return f"{status}, nothing to check" if outcome_of(claim) == NOT_EXERCISED else status
-    close("margin", claim["margin"], found.margin, within=SMALL + 1e-6 * abs(found.margin))
+        return str(status)
+    if found.exercised is not None:
+        least, most = found.exercised
+        possible, due = type(count) is int and least <= count <= most, f"{least}, at most {most}"
+        holds("how often the claim was exercised", possible, count, due)
+    if found.margin is None or margin is None:
+        same("margin", margin, found.margin)
+        return str(status)
+    close("margin", margin, found.margin, within=SMALL + 1e-6 * abs(found.margin))
     return f"{status}, margin {found.margin:.6g} {claim['unit']}".rstrip()
 
 
-def _counted_as_here(claim: Json, found: Found) -> None:
-    """Compare how often the claim was exercised, if the checker counts that."""
-    recorded, rule = claim["exercised"], "how often the claim was exercised"
-    if found.exercised is None:
-        return
-    least, most = found.exercised
-    possible = type(recorded) is int and least <= recorded <= most
-    holds(rule, possible, recorded, f"{least}" if least == most else f"{least} to {most}")
-
-
-def _attempt(limit_s: float, claim: str, run: Any, check: Callable[[], str]) -> Line:
+def _attempt(limit_s: float, claim: str, run: str, check: Callable[[], str]) -> Line:
     """The line of a check; an exception in it is not agreement."""
-    line = partial(Line, claim, str(run))
+    line = partial(Line, claim, run)
     try:
         with at_most_s(limit_s):
             return line(AGREES, check())
@@ -183,8 +190,9 @@ def _attempt(limit_s: float, claim: str, run: Any, check: Callable[[], str]) -> 
         when = "" if broken.t_s is None else f" at t = {broken.t_s:.9g} s"
         values = f"recorded {_short(broken.recorded)}, recomputed {_short(broken.recomputed)}"
         text = f"{broken.rule}{_in_brackets(broken.about)}{when}: {values}"
-        both = broken.recorded, broken.recomputed
-        return line(DISAGREES, text, broken.rule, broken.about, broken.t_s, *both)
+        return line(
+            DISAGREES, text, broken.rule, broken.about, broken.t_s, broken.recorded, broken.recomputed
+        )  # fmt: skip
     except NotEstablished as error:
         return line(OPEN, f"{error.rule}{_in_brackets(error.about)}: {error.why}", error.rule, error.about)
     except Exception as error:  # files can be wrong in more ways than can be listed

@@ -1,6 +1,6 @@
 """Rules of the checker, and what is said when one is broken: its name, where and when, and both values.
 
-A rule is a call of `same`, `close`, `at_most` or `holds` with a name, the recorded and the recomputed value.
+A rule is a call of `same`, `close` or `holds` with a name, the recorded and the recomputed value.
 """
 
 from __future__ import annotations
@@ -99,18 +99,6 @@ def close(
     if theirs.shape != ours.shape:
         raise Disagreement(f"{rule}: number of values", list(theirs.shape), list(ours.shape), about)
     holds(rule, np.abs(theirs - ours) <= within, theirs, ours, about=about, t_s=t_s)
-
-
-def at_most(
-    rule: str, recorded: Any, limit: Any, *, within: float = 0.0, about: str = "", t_s: float | Array | None = None
-) -> None:
-    """Require numbers that exceed their limits by at most `within`; a nan exceeds everything.
-
-    Raises:
-        Disagreement: with the first entry along the first axis that is too large.
-    """
-    theirs, most = np.broadcast_arrays(np.asarray(recorded, dtype=np.float64), np.asarray(limit, dtype=np.float64))
-    holds(f"{rule} (at most)", theirs <= most + within, theirs, most, about=about, t_s=t_s)
 
 
 def holds(

@@ -1,8 +1,9 @@
-"""`airground check DIR`: the checker, then every claim judged again by its own code, from the files alone.
+"""`airground check DIR`: the checker; the report made again from its traces; on request the runs simulated again.
 
-The checker (`airground_drake.check`) is separate code for the most important rules. Then a process without Drake
-(`airground_drake.report.rebuild`) builds the report again and compares each value. With `--coq` the safety of the runs
-is proved again, too. Each line names its source among these three.
+The checker (`airground_drake.check`) is a separate program for the most important rules. Then a process without Drake
+(`airground_drake.report.rebuild`) makes the report again and compares each value. With `--simulate`, another process
+(`airground_drake.report.simulated`) simulates the runs again, and with `--coq` the safety of the runs is proved again.
+Each line names its source among these four.
 """
 
 from __future__ import annotations
@@ -16,26 +17,53 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from airground_drake.base.progress import SILENT, Progress, progress_bar
+from airground_drake.base.progress import Progress, progress_bar
 from airground_drake.base.usage import refuse
 from airground_drake.check import command as checker
+from airground_drake.scenarios import plugins
 
 if TYPE_CHECKING:
     import argparse
 
     from airground_drake.check.report import Line
 
-NEEDED = ("report", "files", "trace")
-"""Checks that must agree before claims are judged again: otherwise the files do not belong to the report."""
+NEEDED = ("files", "trace")
+"""Checks that must agree before a report is made again: otherwise the files do not belong to the report."""
 EXIT_UNUSABLE = 2
 """Exit code of `airground prove` without Coq, or with a report that it cannot read."""
+ALWAYS = (
+    "what the scenario asks for and expects; provenance, measured times, the SHA-256 of the scenario's file; "
+    "findings of `report audit` that rest on other runs"
+)
+"""What is taken as recorded: a forger may change it in all its places, unnoticed."""
+NOT_SIMULATED = "policies, seeds and faults; messages and decisions; other seeds, third-party claims, block diagram"
+"""The same without `--simulate`."""
+EPILOG = f"""\
+Each line says what was checked, on which run, and by whom:
+  (checker)           a separate program: distances, hypotheses, triggers, dwell, arrivals, collisions, digests
+  (made again)        the report from its recorded traces, by its own code: claims, numbers, pages, figures
+  (simulated again)   with --simulate, within the size limits of `airground report`: every run, other seeds,
+                      third-party claims, the block diagram
+  (Coq)               with --coq: the distances of every run
+and what came out:
+  agrees              the files bear out what the report says
+  DISAGREES           the files contradict the report or each other: the rule, the time, both values
+  cannot be checked   a file cannot be read, or something is not allowed or too large
+  as recorded         nothing to compare with: third-party claims without --simulate --allow-plugins
+  not reproduced here the simulation gives another run; the first row that differs. Honest runs differ, too, on
+                      other processors and with other versions of libraries, so this alone proves nothing.
+Taken as recorded, so that a forger may change it in all its places, unnoticed:
+  always              {ALWAYS}
+  without --simulate  {NOT_SIMULATED}
+Exit codes: 0 all agree; 1 not all; 2 usage, or no report; 3 not reproduced here; 4 a fault of the checker."""
 
 
 def parser() -> argparse.ArgumentParser:
-    """Make the parser: that of the checker, and `--coq`."""
-    found = checker.parser()
-    found.prog = "airground check"
-    found.description = "Check a report from its files alone, then have its claims judged again by their own code."
+    """Make the parser: that of the checker, and further options."""
+    says = "Check a report from its files alone; with --simulate, simulate its runs again."
+    found = checker.parser("airground check", says, EPILOG)
+    found.add_argument("--simulate", action="store_true", help="simulate the runs again: all tables must agree exactly")
+    found.add_argument(plugins.OPTION, action="store_true", help="with --simulate: import and run third-party code")
     found.add_argument("--coq", action="store_true", help="prove the safety of the runs again with Coq")
     found.add_argument("-q", "--quiet", action="store_true", help="no progress")
     return found
@@ -45,15 +73,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Check, and print a line for each check.
 
     Returns:
-        Exit code: 0 all agree, 1 not all, 2 usage or no report, 4 a fault of the checker.
+        Exit code: 0 all agree, 1 not all, 2 usage or no report, 3 not reproduced here, 4 a fault of the checker.
     """
     try:
         options = parser().parse_args(arguments)
         with progress_bar(quiet=options.quiet) as progress:
             progress.stage("checking")
             lines = checker.checked(options.report, options.limit_s, lambda line: progress.advance(1.0, line.claim))
-            progress.stage("judging again")
-            lines += judged_again(options.report, lines, options.limit_s, progress)
+            again = partial(made_again, options.report, [*lines], options.limit_s, progress)
+            lines += again("made again", "airground_drake.report.rebuild")
+            if options.simulate:
+                allowed = [plugins.OPTION] if options.allow_plugins else []
+                lines += again("simulated again", "airground_drake.report.simulated", *allowed)
             if options.coq:
                 progress.stage("proving with Coq")
                 lines += _proved_again(options.report)
@@ -61,27 +92,34 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return refuse(error)
     except SystemExit:  # --help has been printed
         return 0
-    checker.show(lines, options.report, as_json=options.json)
+    taken = [ALWAYS] if options.simulate else [NOT_SIMULATED, ALWAYS]
+    checker.show(lines, options.report, taken, as_json=options.json)
     return checker.verdict(lines)
 
 
-def judged_again(folder: Path, lines: Sequence[Line], limit_s: float, progress: Progress = SILENT) -> Iterator[Line]:
-    """Each claim and each other part of a report, judged by its own code in a process without Drake.
+def made_again(
+    folder: Path, lines: Sequence[Line], limit_s: float, progress: Progress, by: str, module: str, *options: str
+) -> Iterator[Line]:
+    """The lines of a program that makes parts of the report again, in a process of its own.
 
     Args:
         folder: of the report.
         lines: results of the checker.
-        limit_s: CPU time for each process that judges, s.
-        progress: is told of each claim.
+        limit_s: CPU time for each process, s.
+        progress: is told of each part.
+        by: what the lines say who checked.
+        module: of the program.
+        options: of the program.
     """
     from airground_drake.check.report import AGREES, OPEN, Line
     from airground_drake.report.rebuild import JUDGED
 
-    line = partial(Line, by="judged again")
+    line = partial(Line, by=by)
     if any(each.outcome != AGREES for each in lines if each.claim in NEEDED):
-        yield line("report", "", OPEN, "not judged again, since a check above failed", "the files are the report's")
+        yield line("report", "", OPEN, f"not {by}, since a check above failed", "the files are the report's")
         return
-    command = [sys.executable, "-P", "-m", "airground_drake.report.rebuild", str(folder), str(limit_s)]
+    progress.stage(by)
+    command = [sys.executable, "-P", "-m", module, str(folder), str(limit_s), *options]
     with (
         tempfile.TemporaryFile("w+") as said,
         subprocess.Popen(command, stdout=subprocess.PIPE, stderr=said, text=True) as process,
@@ -94,7 +132,7 @@ def judged_again(folder: Path, lines: Sequence[Line], limit_s: float, progress: 
         if process.wait():
             said.seek(0)
             why = said.read().strip().splitlines()[-1:] or [f"its process ended with {process.returncode}"]
-            yield line("report", "", OPEN, f"not all was judged again: {why[0]}", "the files can be judged")
+            yield line("report", "", OPEN, f"not all was {by}: {why[0]}", "the files can be used")
 
 
 def _proved_again(folder: Path) -> Iterator[Line]:

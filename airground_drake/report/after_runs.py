@@ -126,24 +126,30 @@ def write(
 
 def provenance(scenario: Scenario, started: datetime, command: str) -> dict[str, Any]:
     """Where the report comes from: versions, machine, commit, seed, begin, command."""
-    versions = {}
-    for name in PACKAGES:
-        try:
-            versions[name] = version(name)
-        except PackageNotFoundError:
-            versions[name] = "not installed"
+    packages = versions()
     return {
-        "package": versions.pop("airground_drake"),
-        "drake": versions.pop("drake"),
+        "package": packages.pop("airground_drake"),
+        "drake": packages.pop("drake"),
         "python": platform.python_version(),
-        "packages": versions,
-        "solver": _solver(scenario, versions["daqp"]),
+        "packages": packages,
+        "solver": _solver(scenario, packages["daqp"]),
         "platform": platform.platform(),
         "git": document.commit(),
         "seed": scenario.seed,
         "started": started.isoformat(timespec="seconds"),
         "command": command,
     }
+
+
+def versions() -> dict[str, str]:
+    """Versions of the package and of the libraries that its numbers depend on."""
+    found = {}
+    for name in PACKAGES:
+        try:
+            found[name] = version(name)
+        except PackageNotFoundError:
+            found[name] = "not installed"
+    return found
 
 
 def _solver(scenario: Scenario, daqp: str) -> str:

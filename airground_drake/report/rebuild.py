@@ -1,8 +1,7 @@
-"""A report built again from its own files: each claim judged anew by its own code, and compared value by value.
+"""A report made again from its recorded traces: claims judged anew, pages rendered from the recorded report.json.
 
 `python -P -m airground_drake.report.rebuild DIR LIMIT_S` does this in a process that cannot import Drake: nothing is
-simulated, and only the code of the claims and of the report runs. It prints what it found as JSON lines, which
-`airground check` shows.
+simulated, and no third-party code is imported. It prints what it found as JSON lines, which `airground check` shows.
 """
 
 from __future__ import annotations
@@ -21,14 +20,17 @@ from pathlib import Path
 from typing import Any
 
 from airground_drake.base import files
+from airground_drake.base.errors import AirgroundError
+from airground_drake.base.progress import Progress
+from airground_drake.base.statuses import meets
+from airground_drake.check.report import AGREES, DISAGREES, OPEN, RECORDED
+from airground_drake.registry import MODEL_CLAIMS
 from airground_drake.report.compare import WITHIN
 
 WITHIN_PX = 0.02
 """Coordinates in drawings agree to this: they are rounded to 0.01."""
 JUDGED = "judged"
 """Key of a line about progress."""
-TAKEN_AS_RECORDED = ("provenance", "files")
-"""Parts of report.json that do not follow from its traces: the clock, versions, and the digests of files."""
 
 _DRAWING = re.compile(r"(<svg\b.*?</svg>)", re.DOTALL)
 _TEXT = re.compile(r">\s*([^<>\s][^<>]*)<")
@@ -40,7 +42,7 @@ Judge = Callable[[Any, Sequence[Any]], Sequence[Any]]
 
 
 def lines(folder: Path, judge: Judge | None = None) -> Iterator[Line]:
-    """Build report.json again and compare it: a line for each claim and each other part.
+    """Make a report again and compare it: a line for each claim and each other part.
 
     Args:
         folder: of a report whose files are those that it names.
@@ -49,16 +51,40 @@ def lines(folder: Path, judge: Judge | None = None) -> Iterator[Line]:
     Raises:
         ScenarioError, TraceError, OSError: if a file cannot be used.
     """
-    from airground_drake.audit import of_runs
-    from airground_drake.report import document, metrics
     from airground_drake.run import trace
     from airground_drake.scenarios.load import from_data
     from airground_drake.verify import verify_all
 
     report = json.loads(files.read_text(folder / "report.json"))
     scenario = from_data(report["scenario"]["resolved"], str(folder / "report.json"))
-    third_party, own = scenario.claims, replace(scenario, claims={})
-    traces = {name: trace.load(folder / "trace" / name) for name in scenario.runs}
+    traces = {name: with_events(trace.load(folder / "trace" / name)) for name in scenario.runs}
+    again = document_again(report, scenario, traces, judge or verify_all)
+    other_code = _other_code(report["provenance"])
+    parts = [_with_note(line, other_code) for line in _parts(report, again, scenario.claims)]
+    yield from parts
+    if any(line["outcome"] == DISAGREES for line in parts):
+        return  # pages that show a wrong report.json need no comparison
+    try:
+        for line in _pages(folder, report, scenario, traces):
+            yield _with_note(line, other_code)
+    except Exception as error:  # the parts that are taken as recorded may have any content
+        why = f"{type(error).__name__}: {error}"
+        yield line_of("report.html", "", OPEN, f"the pages cannot be made again: {short(why)}", "pages")
+
+
+def with_events(trace: Any) -> Any:
+    """The trace with the events that follow from its tables."""
+    from airground_drake.run.events import extract
+
+    return replace(trace, meta=trace.meta | {"events": extract(trace)})
+
+
+def document_again(report: Mapping[str, Any], scenario: Any, traces: Mapping[str, Any], judge: Judge) -> dict[str, Any]:
+    """report.json from the traces; what only other runs or third-party code can tell is taken from the recorded one."""
+    from airground_drake.audit import of_runs
+    from airground_drake.report import document, metrics
+
+    own = replace(scenario, claims={})
     judged = [
         replace(each, meta=each.meta | {"scenario": each.meta["scenario"] | {"claims": {}}}) for each in traces.values()
     ]
@@ -68,24 +94,29 @@ def lines(folder: Path, judge: Judge | None = None) -> Iterator[Line]:
         scenario,
         report["scenario"]["sha256"],
         traces,
-        (judge or verify_all)(own, judged),
-        report["provenance"],
+        judge(own, judged),
+        report["provenance"] | {"seed": scenario.seed},
         audit=[*here, *others],
         audited=bool(others),
         seeds=[metrics.outcome(traces[row["run"]]) if row["seed"] == scenario.seed else row for row in report["seeds"]],
     )
-    other_code = _other_code(report["provenance"])
-    parts = [_with_note(line, other_code) for line in _parts(report, again, third_party)]
-    yield from parts
-    if any(line["outcome"] == "DISAGREES" for line in parts):
-        return  # pages that show a wrong report.json need no comparison
-    try:
-        for line in _pages(folder, report, scenario, traces):
-            yield _with_note(line, other_code)
-    except Exception as error:  # the parts that are taken as recorded may have any content
-        why = f"{type(error).__name__}: {error}"
-        text = f"the pages cannot be made again: {_short(why)}"
-        yield {"claim": "report.html", "run": "", "outcome": "cannot be checked", "text": text, "rule": "pages"}
+    cached = {(entry["id"], entry["run"]) for entry in report["claims"] if entry["from_cache"] is True}
+    for entry in again["claims"]:
+        entry["from_cache"] = entry["id"] in MODEL_CLAIMS and (entry["id"], entry["run"]) in cached
+    again["claims"] += [_expected(entry, scenario) for entry in report["claims"] if entry["id"] in scenario.claims]
+    order = {(entry["id"], entry["run"]): k for k, entry in enumerate(report["claims"])}
+    again["claims"].sort(key=lambda entry: order.get((entry["id"], entry["run"]), len(order)))
+    missing = document.missing(scenario, traces, again["claims"])
+    again["overall"] = document.overall(again["claims"], missing, again["audit"] if others else ())
+    return again
+
+
+def _expected(entry: Mapping[str, Any], scenario: Any) -> dict[str, Any]:
+    """A recorded third-party claim, with the expectation that the scenario declares for it, if any."""
+    declared = (scenario.runs[entry["run"]] if entry["run"] else scenario).expected
+    expected = declared.get(entry["id"], entry["expected"])
+    met = meets(expected, entry["status"], entry["exercised"])
+    return {**entry, "expected": expected, "as_expected": met}
 
 
 def _other_code(provenance: Any) -> str:
@@ -100,22 +131,21 @@ def _other_code(provenance: Any) -> str:
 
 
 def _with_note(line: Line, note: str) -> Line:
-    return line | {"text": line["text"] + note} if line["outcome"] == "DISAGREES" else line
+    return line | {"text": line["text"] + note} if line["outcome"] == DISAGREES else line
 
 
 def _parts(report: Mapping[str, Any], again: Mapping[str, Any], third_party: Mapping[str, Any]) -> Iterator[Line]:
-    """Each claim and each other part of report.json, compared with what was built again."""
-    recorded = {(entry["id"], entry["run"]): entry | {"from_cache": False} for entry in report["claims"]}
-    rebuilt = {(entry["id"], entry["run"]): entry for entry in again["claims"]}
+    """Each claim and each other part of report.json, compared with what was made again."""
+    recorded, rebuilt = ({(each["id"], each["run"]): each for each in of["claims"]} for of in (report, again))
+    if len(report["claims"]) != len(recorded):
+        yield different("claims", "", "number of claims", len(report["claims"]), len(recorded))
     for claim, run in {**recorded, **rebuilt}:
-        if claim in third_party:
-            text = "a third-party claim: `airground verify --allow-plugins` judges it"
-            yield {"claim": claim, "run": run, "outcome": "cannot be checked", "text": text, "rule": "own claims"}
-        else:
-            yield _compared(claim, run, recorded.get((claim, run)), rebuilt.get((claim, run)))
+        line = _compared(claim, run, recorded.get((claim, run)), rebuilt.get((claim, run)))
+        taken = claim in third_party and line["outcome"] == AGREES
+        said = f"{line['text']}: third-party code, run only with --simulate --allow-plugins"
+        yield line | {"outcome": RECORDED, "text": said} if taken else line
     for part in {**again, **report}:
-        # with third-party claims, `overall` counts verdicts that are not judged here; the checker derives it
-        if part not in ("claims", *TAKEN_AS_RECORDED) and not (part == "overall" and third_party):
+        if part not in ("claims", "files"):
             yield _compared(part, "", report.get(part), again.get(part))
 
 
@@ -134,10 +164,10 @@ def _pages(folder: Path, report: Mapping[str, Any], scenario: Any, traces: Mappi
         except (KeyError, TypeError, ValueError, AttributeError) as error:
             broken = [("proofs.json", "what `airground prove` writes", repr(error))]
         for about, ours, theirs in broken:
-            yield _different("proofs", "", about, theirs, ours)
+            yield different("proofs", "", about, theirs, ours)
         if broken:
             return
-        yield {"claim": "proofs", "run": "", "outcome": "agrees", "text": "the files are about the recorded runs"}
+        yield line_of("proofs", "", AGREES, "the files are about the recorded runs")
     if "junit.xml" in report["files"]:
         yield _same_text("junit.xml", folder, junit.render(made))
     if "report.html" in report["files"]:
@@ -158,17 +188,17 @@ def _same_text(name: str, folder: Path, rebuilt: str, *, other_drawings: bool = 
         if theirs == ours or (drawings and _is_same_drawing(theirs, ours, shapes=not other_drawings)):
             continue
         both = zip_longest((theirs or "").splitlines(), (ours or "").splitlines(), fillvalue="")
-        return _different(name, "", "the page", *next(lines for lines in both if lines[0] != lines[1]))
+        return different(name, "", "the page", *next(lines for lines in both if lines[0] != lines[1]))
     how = "; drawings by another version of matplotlib: only texts and kinds of elements were compared, no shapes"
     how *= other_drawings
-    return {"claim": name, "run": "", "outcome": "agrees", "text": f"as recorded{how}"}
+    return line_of(name, "", AGREES, f"as recorded{how}")
 
 
 def _is_same_drawing(theirs: str, ours: str, *, shapes: bool) -> bool:
     """Whether two drawings have the same texts and, with `shapes`, the same elements at the same places.
 
-    Without `shapes`, theirs has at least no other kinds of elements and attributes than ours: nothing that is painted
-    outside of the drawing, is active, or leads to another page.
+    Without `shapes`, theirs has no other kinds of elements and attributes than ours: so nothing is painted outside of
+    the drawing, is active, or leads to another page.
     """
     if _TEXT.findall(theirs) != _TEXT.findall(ours):
         return False
@@ -194,72 +224,88 @@ def _kinds(drawing: str) -> set[tuple[str, str, str]]:
 
 def _compared(claim: str, run: str, recorded: Any, rebuilt: Any) -> Line:
     for about, theirs, ours in differences(recorded, rebuilt):
-        return _different(claim, run, about, theirs, ours)
+        return different(claim, run, about, theirs, ours)
     status = rebuilt.get("status", "as recorded") if isinstance(rebuilt, dict) else "as recorded"
     exactly = "exactly" if recorded == rebuilt else f"numbers to {WITHIN:g}"
-    return {"claim": claim, "run": run, "outcome": "agrees", "text": f"{status}, {exactly}"}
+    return line_of(claim, run, AGREES, f"{status}, {exactly}")
 
 
-def _different(claim: str, run: str, about: str, theirs: Any, ours: Any) -> Line:
+def line_of(claim: str, run: str, outcome: str, text: str, rule: str = "") -> Line:
+    """A line without values."""
+    return {"claim": claim, "run": run, "outcome": outcome, "text": text, "rule": rule}
+
+
+def different(claim: str, run: str, about: str, theirs: Any, ours: Any) -> Line:
     """A line about a value that is not as recorded."""
-    text = f"judged again, {about or 'it'} is {_short(ours)}; recorded {_short(theirs)}"
-    broken = {"rule": "the files give what is recorded", "about": about, "recorded": theirs, "recomputed": ours}
-    return {"claim": claim, "run": run, "outcome": "DISAGREES", "text": text, **broken}
+    text = f"judged again, {about or 'it'} is {short(ours)}; recorded {short(theirs)}"
+    values = {"about": about, "recorded": theirs, "recomputed": ours}
+    return line_of(claim, run, DISAGREES, text, "the files give what is recorded") | values
 
 
-def differences(recorded: Any, rebuilt: Any, path: str = "") -> Iterator[tuple[str, Any, Any]]:
-    """Each value that differs, with its dotted path: numbers by more than `WITHIN`, anything else at all."""
+def differences(
+    recorded: Any, rebuilt: Any, path: str = "", *, within: float = WITHIN
+) -> Iterator[tuple[str, Any, Any]]:
+    """Each value of two JSON documents that differs, with its dotted path: numbers by more than `within`."""
+    pairs: list[tuple[Any, Any, Any]] = []
     if isinstance(recorded, dict) and isinstance(rebuilt, dict):
-        for key in {**rebuilt, **recorded}:
-            both = recorded.get(key, "nothing"), rebuilt.get(key, "nothing")
-            yield from differences(*both, f"{path}.{key}".strip("."))
-    elif isinstance(recorded, list) and isinstance(rebuilt, list) and len(recorded) == len(rebuilt):
-        for k, (theirs, ours) in enumerate(zip(recorded, rebuilt, strict=True)):
-            yield from differences(theirs, ours, f"{path}.{k}".strip("."))
+        pairs = [(key, recorded.get(key, "nothing"), rebuilt.get(key, "nothing")) for key in {**rebuilt, **recorded}]
+    elif isinstance(recorded, list) and isinstance(rebuilt, list):
+        pairs = [(k, *both) for k, both in enumerate(zip(recorded, rebuilt, strict=False))]
     elif _is_number(recorded) and _is_number(rebuilt):
-        if not abs(recorded - rebuilt) <= WITHIN * (1.0 + abs(rebuilt)):
+        if not abs(recorded - rebuilt) <= within * (1.0 + abs(rebuilt)):
             yield path, recorded, rebuilt
     elif type(recorded) is not type(rebuilt) or recorded != rebuilt:
         yield path, recorded, rebuilt
+    for key, theirs, ours in pairs:
+        yield from differences(theirs, ours, f"{path}.{key}".strip("."), within=within)
+    if isinstance(recorded, list) and isinstance(rebuilt, list) and len(recorded) != len(rebuilt):
+        yield f"{path}: number of entries", len(recorded), len(rebuilt)
 
 
 def _is_number(value: Any) -> bool:
     return isinstance(value, (int, float)) and not isinstance(value, bool)
 
 
-def _short(value: Any, most: int = 120) -> str:
+def short(value: Any, most: int = 120) -> str:
+    """A value for reading, cut if it is long."""
     text = repr(value)
     return text if len(text) <= most else f"{text[:most]}..."
 
 
-def main(arguments: Sequence[str]) -> int:
-    """Print the lines of a report, one JSON object each; before them, one with the key `JUDGED` for each claim.
+def print_lines(found: Callable[[Progress], Iterator[Line]], limit_s: str) -> int:
+    """Print lines, one JSON object each; before them, one with the key `JUDGED` for each step of the progress.
 
     Args:
-        arguments: the folder of the report, and the CPU time that each process may take, s.
+        found: makes the lines, and tells the progress.
+        limit_s: CPU time that this process and each of its children may take, s.
 
     Returns:
         Exit code: 0, or 2 if a file cannot be used.
     """
-    from airground_drake.base.errors import AirgroundError
-    from airground_drake.base.progress import Progress
-    from airground_drake.verify import verify_all
 
     class Told(Progress):
-        """Prints a line for each claim that is judged."""
+        """Prints a line for each finished part."""
 
         def advance(self, amount: float, what: str = "") -> None:
             print(json.dumps({JUDGED: what}), flush=True)
 
-    folder, limit_s = Path(arguments[0]), int(float(arguments[1])) + 1
-    resource.setrlimit(resource.RLIMIT_CPU, (limit_s, limit_s))
+    most = int(float(limit_s)) + 1
+    resource.setrlimit(resource.RLIMIT_CPU, (most, most))
     try:
-        for line in lines(folder, partial(verify_all, progress=Told())):
+        for line in found(Told()):
             print(json.dumps(line, allow_nan=False), flush=True)
     except (AirgroundError, OSError) as error:
         print(f"error: {error}", file=sys.stderr)
         return 2
     return 0
+
+
+def main(arguments: Sequence[str]) -> int:
+    """Print the lines of a report, see `print_lines`; the arguments are its folder and the limit, s."""
+    from airground_drake.verify import verify_all
+
+    folder, limit_s = arguments
+    return print_lines(lambda told: lines(Path(folder), partial(verify_all, progress=told)), limit_s)
 
 
 if __name__ == "__main__":

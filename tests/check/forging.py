@@ -17,7 +17,7 @@ import pandas as pd
 import pytest
 
 from airground_drake.check import command as checker
-from airground_drake.check.report import AGREES, Line
+from airground_drake.check.report import AGREES, RECORDED, Line
 from airground_drake.report import rebuild
 from airground_drake.run.trace import Trace
 from airground_drake.scenarios.schema import Scenario
@@ -74,12 +74,12 @@ def claim_of(report: Any, claim: str, run: str = RUN) -> Any:
     return next(entry for entry in report["claims"] if (entry["id"], entry["run"]) == (claim, run))
 
 
-def read_table(folder: Path, table: str = "signals", run: str = RUN) -> pd.DataFrame:
+def read_table(folder: Path, table: str = "states", run: str = RUN) -> pd.DataFrame:
     """A table of a trace."""
     return pd.read_parquet(trace(folder, run) / f"{table}.parquet")
 
 
-def write_table(folder: Path, frame: pd.DataFrame, table: str = "signals", run: str = RUN) -> None:
+def write_table(folder: Path, frame: pd.DataFrame, table: str = "states", run: str = RUN) -> None:
     """Put a table in the place of another."""
     buffer = io.BytesIO()
     frame.to_parquet(buffer, index=False)
@@ -88,7 +88,7 @@ def write_table(folder: Path, frame: pd.DataFrame, table: str = "signals", run: 
 
 
 @contextlib.contextmanager
-def edited_table(folder: Path, table: str = "signals", run: str = RUN) -> Iterator[pd.DataFrame]:
+def edited_table(folder: Path, table: str = "states", run: str = RUN) -> Iterator[pd.DataFrame]:
     """A table, to be changed in place."""
     frame = read_table(folder, table, run)
     yield frame
@@ -124,24 +124,32 @@ def mend(folder: Path) -> None:
 def attempt(report: Path, edit: Edit, *, mended: bool = True) -> tuple[int, str]:
     """Forge a copy of a report, beside it, and check it: the exit code, and a line for each check that fails.
 
+    The report is made again from its traces only if the checker agrees.
+
     Args:
         report: folder of the report.
         edit: the forgery.
         mended: whether the list of files is made right afterwards.
     """
-    folder = copy(report, report.with_name(f"forged_{os.getpid()}"))
-    edit(folder)
-    if mended:
-        mend(folder)
+    folder = forged(report, edit, mended=mended)
     try:
         found = checker.checked(folder, checker.LIMIT_S)
     except checker.UsageError as error:
         return 2, str(error)
     if all(line.outcome == AGREES for line in found):
-        found = [Line(**line, by="judged again") for line in rebuild.lines(folder, judge=judged)]
-    refused = [line for line in found if line.outcome != AGREES]
+        found = [Line(**line, by="made again") for line in rebuild.lines(folder, judge=judged)]
+    refused = [line for line in found if line.outcome not in (AGREES, RECORDED)]
     assert all(line.rule and line.text for line in refused)
     return int(bool(refused)), "\n".join(f"{line.by}: {line.claim}: {line.text}" for line in refused)
+
+
+def forged(report: Path, edit: Edit, *, mended: bool = True) -> Path:
+    """A forged copy of a report, beside it; arguments as of `attempt`."""
+    folder = copy(report, report.with_name(f"forged_{os.getpid()}"))
+    edit(folder)
+    if mended:
+        mend(folder)
+    return folder
 
 
 _JUDGED: dict[str, Any] = {}

@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from airground_drake.check.nearness import ROWS, least_apart_m
+from airground_drake.check.run import ROWS, least_apart_m
 from airground_drake.check.scenario import Pair
 from airground_drake.verify.engines.geometry import closest_approach
 

@@ -10,18 +10,20 @@ import pytest
 from check.forging import claim_of, copy, edited_report, edited_scenarios, judged, mend
 
 from airground_drake import check
+from airground_drake.check.report import DECIDED
 from airground_drake.report import rebuild
 from airground_drake.report.__main__ import main as write
 
 
 def test_an_untouched_report_agrees_everywhere(report: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert check.main([str(report)]) == 0
-    *lines, taken, summary = capsys.readouterr().out.splitlines()
-    claims = json.loads((report / "report.json").read_text())["claims"]
-    assert {(claim["id"], claim["run"] or "-") for claim in claims} <= {tuple(line.split()[:2]) for line in lines}
+    *lines, summary, taken = capsys.readouterr().out.splitlines()
+    runs = json.loads((report / "report.json").read_text())["runs"]
+    due = {(claim, run) for claim in ("trace", "events", *DECIDED) for run in runs}
+    assert due <= {tuple(line.split()[:2]) for line in lines}
     assert all(" agrees (checker): " in line for line in lines)
-    assert taken.startswith("Taken as recorded: that a run was simulated")
-    assert summary == f"{len(lines)} checks: {len(lines)} agrees, 0 DISAGREES, 0 cannot be checked"
+    assert taken.startswith("Taken as recorded: policies, seeds and faults")
+    assert summary == f"{len(lines)} checks: {len(lines)} agrees"
 
 
 GATED = ("runs={c: {method: c}, d: {method: d}}", "reproduction=[]")
@@ -73,13 +75,23 @@ def _with_a_third_party_claim(report: Path, folder: Path, expected: str) -> None
     mend(folder)
 
 
-def test_third_party_claims_are_counted_and_not_judged_again(report: Path, tmp_path: Path) -> None:
+def test_third_party_claims_are_taken_as_recorded_and_counted(report: Path, tmp_path: Path) -> None:
     _with_a_third_party_claim(report, tmp_path / "r", "holds")
     assert check.main([str(tmp_path / "r")]) == 0
     again = [line for line in rebuild.lines(tmp_path / "r", judge=judged) if line["outcome"] != "agrees"]
     assert [(line["claim"], line["run"], line["outcome"]) for line in again] == [
-        ("MINE", "d", "cannot be checked"), ("MINE", "", "cannot be checked"),
+        ("MINE", "d", "as recorded"), ("MINE", "", "as recorded"),
     ]  # fmt: skip
+
+
+def test_the_scenario_says_what_is_expected_of_a_third_party_claim(report: Path, tmp_path: Path) -> None:
+    _with_a_third_party_claim(report, tmp_path / "r", "holds")
+    with edited_scenarios(tmp_path / "r") as scenarios:
+        for scenario in scenarios:
+            scenario["runs"]["d"]["expected"]["MINE"] = "refuted"
+    mend(tmp_path / "r")
+    (line,) = (line for line in rebuild.lines(tmp_path / "r", judge=judged) if line["claim"] == "MINE" and line["run"])
+    assert (line["outcome"], line["about"], line["recomputed"]) == ("DISAGREES", "expected", "refuted")
 
 
 def test_a_difference_says_where_other_code_wrote_the_report(report: Path, tmp_path: Path) -> None:
@@ -93,12 +105,3 @@ def test_a_difference_says_where_other_code_wrote_the_report(report: Path, tmp_p
             document["provenance"]["git"] = commit or document["provenance"]["git"]
         said += [line["text"] for line in rebuild.lines(folder, judge=judged) if line["claim"] == "report.html"]
     assert ["; other code wrote the report (0.1.0, c933ccd); this is" in text for text in said] == [False, True]
-
-
-def test_the_scenario_says_what_is_expected_of_a_third_party_claim(
-    report: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    _with_a_third_party_claim(report, tmp_path / "r", "refuted")
-    assert check.main(["--json", str(tmp_path / "r")]) == 1
-    found = [one for one in json.loads(capsys.readouterr().out)["checks"] if one["claim"] == "MINE"]
-    assert [one["rule"] for one in found] == ["expected verdict"] * 2

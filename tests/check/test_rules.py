@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from airground_drake.check.rules import Disagreement, at_most, close, holds, same
+from airground_drake.check.rules import Disagreement, close, holds, same
 
 
 def test_the_first_part_that_differs_is_named() -> None:
@@ -34,13 +34,10 @@ def test_different_values_are_refused(recorded: Any, recomputed: Any) -> None:
         same("rule", recorded, recomputed)
 
 
-@pytest.mark.parametrize(
-    ("rule", "arguments"),
-    [(close, ([math.nan], [math.nan])), (close, ([1.0, 2.0], [1.0])), (at_most, ([math.nan], 1.0))],
-)
-def test_a_nan_is_close_to_nothing_and_below_no_limit_and_shapes_must_agree(rule: Any, arguments: Any) -> None:
+@pytest.mark.parametrize(("recorded", "recomputed"), [([math.nan], [math.nan]), ([1.0, 2.0], [1.0])])
+def test_a_nan_is_close_to_nothing_and_shapes_must_agree(recorded: Any, recomputed: Any) -> None:
     with pytest.raises(Disagreement):
-        rule("rule", *arguments, within=9.0)
+        close("rule", recorded, recomputed, within=9.0)
 
 
 def test_nothing_breaks_no_rule() -> None:

@@ -10,13 +10,17 @@ import sys
 from pathlib import Path
 
 import pytest
-from check.forgeries import HOSTILE
-from check.forging import copy, mend
+from check.concerted import made_again
+from check.forgeries import HOSTILE, both, everywhere
+from check.forging import claim_of, copy, edited_report, mend
 from commands.conftest import Airground
 
 from airground_drake.base import progress
 from airground_drake.commands import main
 from airground_drake.report.__main__ import main as report
+
+GONE = {"name": "no_such.module:It", "parameters": {}}
+"""A policy that is not there."""
 
 
 @pytest.fixture(scope="module")
@@ -31,8 +35,8 @@ def short(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_both_go_over_an_untouched_report(short: Path, airground: Airground) -> None:
     lines = json.loads(airground("check", "--json", short))["checks"]
     claims = {(claim["id"], claim["run"]) for claim in json.loads((short / "report.json").read_text())["claims"]}
-    for by in ("checker", "judged again"):
-        assert claims <= {(line["claim"], line["run"]) for line in lines if line["by"] == by}
+    assert claims <= {(line["claim"], line["run"]) for line in lines if line["by"] == "made again"}
+    assert ("SAFE-TRACE", "d") in {(line["claim"], line["run"]) for line in lines if line["by"] == "checker"}
 
 
 def test_what_takes_long_is_told(
@@ -40,30 +44,64 @@ def test_what_takes_long_is_told(
 ) -> None:
     monkeypatch.setattr(progress, "TOLD_S", 0.0)
     assert main(["check", str(short)]) == 0
-    assert capsys.readouterr().err == "checking: 1 done\njudging again: 1 done\n"
+    assert capsys.readouterr().err == "checking: 1 done\nmade again: 1 done\n"
     assert main(["check", "-q", str(short)]) == 0
     assert capsys.readouterr().err == ""
 
 
-def test_what_the_checker_does_not_decide_is_refused_when_it_is_judged_again(
+def test_what_the_checker_does_not_decide_is_refused_when_the_report_is_made_again(
     short: Path, tmp_path: Path, airground: Airground
 ) -> None:
-    path = copy(short, tmp_path / "copy") / "report.json"
-    document = json.loads(path.read_text())
-    next(claim for claim in document["claims"] if claim["id"] == "EXEC")["statement"] += " They say."
-    path.unlink()
-    path.write_text(json.dumps(document))
-    (refused,) = (line for line in airground("check", path.parent, code=1).splitlines() if " DISAGREES (" in line)
-    assert refused.startswith("EXEC        d        DISAGREES (judged again): ")
+    folder = copy(short, tmp_path / "copy")
+    with edited_report(folder) as document:
+        claim_of(document, "LIVE-GOAL")["statement"] += " They say."
+    (refused,) = (line for line in airground("check", folder, code=1).splitlines() if " DISAGREES (" in line)
+    assert refused.startswith("LIVE-GOAL   d        DISAGREES (made again): ")
 
 
 def test_foreign_files_are_not_judged_again(short: Path, tmp_path: Path, airground: Airground) -> None:
     folder = copy(short, tmp_path / "copy")
     HOSTILE["table cut off"][1](folder)
     mend(folder)
-    said = airground("check", folder, code=1)
-    assert "not judged again, since a check above failed" in said
-    assert said.count("(judged again)") == 1
+    said = airground("check", folder, "--simulate", code=1)
+    for by in ("made again", "simulated again"):
+        assert f"not {by}, since a check above failed" in said
+        assert said.count(f"({by})") == 1
+
+
+def test_runs_that_are_simulated_again_agree_and_the_last_line_says_what_was_not(
+    short: Path, airground: Airground
+) -> None:
+    *_, seeds = airground("check", short).splitlines()
+    assert seeds.startswith("Taken as recorded: policies, seeds and faults;")
+    *lines, taken = airground("check", "--simulate", short).splitlines()
+    again = [line for line in lines if "(simulated again)" in line]
+    assert [line.split()[0] for line in again] == ["trace", "diagram.dot", "diagram.svg"]
+    assert all(line.endswith("exactly") for line in again)
+    assert "seeds and faults" not in taken
+
+
+def test_another_seed_is_not_reproduced_which_is_exit_code_3(short: Path, tmp_path: Path, airground: Airground) -> None:
+    folder = copy(short, tmp_path / "copy")
+    made_again(everywhere("seed", value=7), both("seed", value=7))(folder)
+    mend(folder)
+    said = airground("check", folder, "--simulate", code=3)
+    (line,) = (line for line in said.splitlines() if "not reproduced here (" in line)
+    assert line.startswith(
+        "trace       d        not reproduced here (simulated again): signals, row 1, t = 0.05 s: ugv"
+    )
+
+
+def test_third_party_code_is_simulated_only_where_it_is_allowed(
+    short: Path, tmp_path: Path, airground: Airground
+) -> None:
+    folder = copy(short, tmp_path / "copy")
+    made_again(everywhere("intervention", "policies", value=lambda old: [*old, GONE]))(folder)
+    mend(folder)
+    (refused,) = (line for line in airground("check", folder, "--simulate", code=1).splitlines() if "cannot be" in line)
+    assert "third-party code is imported and run only with --allow-plugins" in refused
+    said = airground("check", folder, "--simulate", "--allow-plugins", code=1)
+    assert "no_such" in said
 
 
 @pytest.mark.slow

@@ -11,7 +11,8 @@ from report.cases import FINE, built
 
 from airground_drake.base import files
 from airground_drake.base.errors import ReportError
-from airground_drake.check.verdicts import check_files
+from airground_drake.check.files import names_in
+from airground_drake.check.report import check_files
 from airground_drake.report import document, html, proved
 from airground_drake.run import trace
 from airground_drake.run.trace import Trace
@@ -53,10 +54,8 @@ def rows(folder: Path) -> dict[str, str]:
 
 def consistent(folder: Path) -> None:
     """The checker finds every file as report.json names it."""
-    recorded = json.loads((folder / "report.json").read_text(encoding="utf-8"))["files"]
-    check_files(
-        folder, sorted(path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file()), recorded
-    )
+    recorded = json.loads((folder / "report.json").read_text(encoding="utf-8"))
+    check_files(folder, names_in(folder), recorded)
 
 
 def test_each_run_has_a_line_of_its_own_and_the_files_are_still_those_of_the_report(report: Path) -> None:

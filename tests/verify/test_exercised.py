@@ -14,7 +14,6 @@ from builders.edits import with_meta, with_samples
 from verify.judging import CLAIMS, judge
 
 from airground_drake.base.statuses import NOTHING, declared, meets, outcome
-from airground_drake.check import verdicts
 from airground_drake.run.simulation import simulate
 from airground_drake.run.trace import Trace
 from airground_drake.scenarios.load import load
@@ -109,7 +108,6 @@ def test_a_claim_that_says_what_exercises_it_must_count_it(
 )  # fmt: skip
 def test_exercised_is_established_on_something(expected: str, status: Any, count: int | None, met: bool | None) -> None:
     assert meets(expected, status, count) is met
-    assert verdicts.meets(expected, {"status": status, "exercised": count}) is met
     assert Verdict(CLAIMS["COMM"], "d", Finding(status, exercised=count), expected).as_expected is met
 
 

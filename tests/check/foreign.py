@@ -1,0 +1,30 @@
+"""Third-party code in the report that is forged: a policy that fails, and a claim."""
+
+from __future__ import annotations
+
+from typing import NoReturn
+
+from airground_drake.intervention.policy import Observation, Policy
+from airground_drake.run.trace import Trace
+from airground_drake.verify.claim import TraceClaim
+from airground_drake.verify.finding import Finding
+
+
+class Fails(Policy):
+    """Raises whenever it is asked."""
+
+    def propose(self, seen: Observation) -> NoReturn:
+        raise KeyError("no plan")
+
+
+class Short(TraceClaim):
+    """The run lasts less than a minute."""
+
+    id = "MINE"
+    summary = statement = "The run is short."
+    formula = "T < 60"
+    method = equations = does_not_establish = exercised_by = ""
+    assumptions = ()
+
+    def check(self, trace: Trace) -> Finding:
+        return Finding("holds" if trace.t[-1] < 60.0 else "refuted", margin=float(60.0 - trace.t[-1]), unit="s")
