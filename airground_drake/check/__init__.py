@@ -2,7 +2,8 @@
 
 It reads report.json and, of each run, meta.json, states.parquet and samples.parquet, and judges distances, hypotheses,
 triggers, dwell, arrivals and collisions again by formulas of its own. It uses the standard library, numpy, pandas and
-pyarrow, and nothing else of this package. `airground check DIR` runs it first, then makes the report again from its traces.
+pyarrow, and nothing else of this package. `airground check DIR` runs it first, then makes the report again from its
+traces.
 
     files, limits         strict reading; sizes and times beyond which a report is refused
     rules, scenario       how a broken rule is told; what a scenario declares
