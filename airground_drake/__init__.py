@@ -3,7 +3,7 @@
     from airground_drake import load, simulate
     from airground_drake.verify import verify
 
-    scenario, digest = load("case_a")
+    scenario = load("case_a")
     verdicts = verify(simulate(scenario, "d"))
 
 `build_diagram(scenario)` gives the Drake Diagram; `python -m airground_drake.report case_a` does everything.

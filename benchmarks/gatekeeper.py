@@ -64,7 +64,7 @@ def recorded(case: str, run: str, most: int) -> list[Sample]:
             seen.append([problem])
             return super().solve(problem, budget)
 
-    scenario = load(case)[0]
+    scenario = load(case)
     scenario.gatekeeper.route = "listening"
     with ROUTES.adding("listening", Listening):
         Recorder(scenario, run).simulate()

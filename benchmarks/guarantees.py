@@ -26,7 +26,7 @@ def main() -> None:
     print("| scenario | run | SAFE-HYP | pair | d, m | e, m/period | e/(A h), m | guarantee, m | LIVE-GATE |")
     print("| --- | --- | --- | --- | --- | --- | --- | --- | --- |")
     for name in parser.parse_args().scenarios:
-        scenario, _ = load(name)
+        scenario = load(name)
         for run in scenario.runs:
             trace = simulate(scenario, run)
             (verdict,) = verify(trace, ["SAFE-HYP"])

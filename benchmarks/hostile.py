@@ -70,7 +70,7 @@ def attack(random: np.random.Generator, start: Array, centres: Array, t: float) 
 def at_decision_level(seed: int, proposals: int) -> tuple[float, int, int]:
     """Worst margin under (d), m; number of proposals that (c) accepted; number of these with a distance below d."""
     random = np.random.default_rng(seed)
-    scenario = load("case_a")[0]
+    scenario = load("case_a")
     base, presets = make_world(scenario), make_presets(scenario)
     gate = scenario.gatekeeper
     horizon = Horizon(gate.stages, 1, gate.error_weight_1_m2_s, gate.slack_weight_1_m2_s)
@@ -132,7 +132,7 @@ def execute(
 def whole_run(seed: int) -> tuple[float, int, float, float, float]:
     """Margin under (d), m, proposals that it executed, margin under (c), m, time stolen and the bound of it, s."""
     random = np.random.default_rng(seed)
-    scenario = load("case_a", ["duration_s=20", f"seed={seed}"])[0]
+    scenario = load("case_a", ["duration_s=20", f"seed={seed}"])
     x, y = random.uniform([-1.0, 3.0], [6.0, 10.0])
     scenario.intervention.policies = [
         [
@@ -187,7 +187,7 @@ class Told:
 def told(lie: Lie) -> Told:
     """Make the run."""
     random = np.random.default_rng(lie.seed)
-    scenario = load("case_a", [f"seed={lie.seed}"])[0]
+    scenario = load("case_a", [f"seed={lie.seed}"])
     gate = scenario.gatekeeper
     gate.tries, gate.longest_s = int(random.integers(1, 5)), float(random.uniform(0.5, 4.0))
     gate.rest_s, gate.period_s = float(random.uniform(0.3, 3.0)), float(random.choice([0.05, 0.1, 0.15]))

@@ -259,7 +259,7 @@ def _checker(scenario: Scenario, of_run: Trace, verdicts: Sequence[Verdict]) -> 
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         trace.save(of_run, folder / "trace" / of_run.run)
-        report = document.build(scenario, "", {of_run.run: of_run}, verdicts, {"seed": scenario.seed})
+        report = document.build(scenario, {of_run.run: of_run}, verdicts, {"seed": scenario.seed})
         files.write_json(folder / "report.json", report)
         lines = [line for line in check_report(folder, LIMIT_S) if line.run]
     return [f"checker on {line.claim}: {line.outcome}: {line.text}"[:300] for line in lines if line.outcome != AGREES]

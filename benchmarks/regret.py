@@ -37,7 +37,7 @@ def main() -> None:
     print("| scenario | decisions | regret against constant plans | against plans of 6 blocks |")
     print("| --- | --- | --- | --- |")
     for name in options.scenarios:
-        trace = simulate(load(name, [f"gatekeeper.route={options.route}"] if options.route else [])[0], "c")
+        trace = simulate(load(name, [f"gatekeeper.route={options.route}"] if options.route else []), "c")
         planned = [row for row in rows_of(trace) if row.planned]
         chosen = np.linspace(0, len(planned) - 1, min(MOST, len(planned))).round().astype(int)
         found = [regrets(trace, planned[k]) for k in dict.fromkeys(chosen.tolist())]

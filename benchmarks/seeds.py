@@ -28,7 +28,7 @@ ANSWERS = ("proposal", "accept", "refuse")
 
 def of_run(name: str, run: str, seeds: int) -> list[list[dict[str, Any]]]:
     """The rows about a run, for each seed."""
-    scenario = load(name)[0]
+    scenario = load(name)
     recorder = Recorder(scenario, run)
     of_seeds = (rows(scenario, {run: recorder.simulate(seed)}) for seed in range(1, seeds + 1))
     return [[row for row in each if row["run"] == run] for each in of_seeds]
@@ -36,7 +36,7 @@ def of_run(name: str, run: str, seeds: int) -> list[list[dict[str, Any]]]:
 
 def of_policies(name: str, run: str, seeds: int, changes: Sequence[str]) -> dict[str, Counter[str]]:
     """Per policy of the behaviour database: proposals, answers, and arrivals of UGVs that followed it last."""
-    recorder = Recorder(load(name, changes)[0], run)
+    recorder = Recorder(load(name, changes), run)
     found: defaultdict[str, Counter[str]] = defaultdict(Counter)
     for seed in range(1, seeds + 1):
         followed: dict[str, str] = {}
@@ -52,7 +52,7 @@ def of_policies(name: str, run: str, seeds: int, changes: Sequence[str]) -> dict
 
 def print_policies(name: str, seeds: int, changes: Sequence[str]) -> None:
     """A table with a row per run with a gatekeeper and policy."""
-    runs = [run for run, spec in load(name)[0].runs.items() if METHODS[spec.method].gated]
+    runs = [run for run, spec in load(name).runs.items() if METHODS[spec.method].gated]
     with ProcessPoolExecutor() as pool:
         found = list(pool.map(partial(of_policies, name, seeds=seeds, changes=changes), runs))
     print("| scenario | run | policy | proposed | accepted | refused | arrived |\n|" + " --- |" * 7)
@@ -81,7 +81,7 @@ def main() -> None:
             print_policies(name, options.seeds, options.set)
         return
     for name in options.scenarios:
-        runs = list(dict.fromkeys(row.run for row in load(name)[0].reproduction))
+        runs = list(dict.fromkeys(row.run for row in load(name).reproduction))
         with ProcessPoolExecutor() as pool:
             found = dict(zip(runs, pool.map(partial(of_run, name, seeds=options.seeds), runs), strict=True))
         print(f"\n{name}, {options.seeds} seeds: paper, median (5 % to 95 %), seeds within the tolerance")

@@ -70,7 +70,7 @@ def diagrams() -> dict[str, str]:
     """The block diagrams of the paper's two cases, as reports show them, by name."""
     content: dict[str, str] = {}
     for name in ("case_a", "case_b"):
-        scenario, _ = load(name)
+        scenario = load(name)
         text = graphviz.dot(build_diagram(scenario, method_drawn(scenario)))
         content |= {f"../diagrams/{name}.dot": text, f"../diagrams/{name}.svg": graphviz.svg(text)}
     return content
@@ -93,7 +93,7 @@ def gallery(scenarios: Sequence[str] = ()) -> str:
         "begins in a ring, a cross is its target, grey is an obstacle in its safe circle.",
     ]
     for name in scenarios or shipped():
-        scenario, _ = load(name)
+        scenario = load(name)
         runs = [run for run, spec in scenario.runs.items() if spec.composition == "augmented"]
         lines += ["", f"## {html.escape(scenario.title or name, quote=False)}", "", '<div class="gallery">']
         for run in dict.fromkeys((runs[0], runs[-1])):

@@ -6,7 +6,7 @@ from airground_drake.scenarios.load import load
 from airground_drake.systems.diagram import build_diagram
 
 builder = DiagramBuilder()
-team = builder.AddNamedSystem("team", build_diagram(load("minimal")[0], "d"))
+team = builder.AddNamedSystem("team", build_diagram(load("minimal"), "d"))
 wind = builder.AddNamedSystem("wind", ConstantVectorSource([0.1, 0.0, 0.0]))
 builder.Connect(wind.get_output_port(), team.GetInputPort("disturbance_ugv1"))
 simulator = Simulator(builder.Build())

@@ -13,6 +13,6 @@ class LargestCoordinate(DecisionBlock):
         return np.abs(parts[:, :3]).max(axis=1) + parts[:, 3]
 
 
-trace = simulate(load("case_a")[0], "b", decision_block=LargestCoordinate)
+trace = simulate(load("case_a"), "b", decision_block=LargestCoordinate)
 first = next(event["t_s"] for event in trace.events if event["kind"] == "trigger")
 assert 14.4795 < first < 14.482  # with the norm of (15): 14.4791 s

@@ -52,6 +52,6 @@ def nearest_to_the_rock(scenario: Scenario) -> float:
 
 if __name__ == "__main__":
     for wished in (2.0, 2.25):
-        nearest = nearest_to_the_rock(load("minimal", {"safe_distance.obstacle_m": wished})[0])
+        nearest = nearest_to_the_rock(load("minimal", {"safe_distance.obstacle_m": wished}))
         kept = "kept" if nearest >= NEEDED_M else "broken"
         print(f"told to keep {wished:g} m, it keeps {nearest:.3f} m: {NEEDED_M:g} m are {kept}")

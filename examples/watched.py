@@ -3,7 +3,7 @@ from pydrake.systems.analysis import Simulator
 from airground_drake.scenarios.load import load
 from airground_drake.systems.diagram import build_diagram, make_monitor
 
-wanted, built = load("case_a")[0], load("case_a")[0]
+wanted, built = load("case_a"), load("case_a")
 built.control.motion_gain_1_s *= 0.9  # a mistake
 monitor = make_monitor(wanted, "d", terminate=True)
 simulator = Simulator(build_diagram(built, "d", monitor=monitor))

@@ -41,7 +41,7 @@ ROCK, OWN, FLIER = 0.5, 0.25, 0.25
 
 def scenario(*, points: bool = False) -> Scenario:
     """The minimal scenario with bodies, or with points that keep as much more."""
-    found = load("minimal", ["duration_s=11"])[0]
+    found = load("minimal", ["duration_s=11"])
     safe = found.safe_distance
     safe.obstacle_m, safe.air_ground_m, safe.ugv_m = 1.25, 0.75, 1.75
     found.ugvs["ugv1"].radius_m, found.uav.radius_m, found.obstacles["rock"].radius_m = OWN, FLIER, ROCK
@@ -167,7 +167,7 @@ def test_running_code_that_forgets_radii_is_refuted(name: str, monkeypatch: pyte
 
 def sudden(appears_s: float, *more: str) -> Scenario:
     """The minimal scenario, in which the rock appears under way; ugv1 tracks its preset, to 5 m at 5 s, until then."""
-    return load("minimal", [f"obstacles.rock.appears_s={appears_s}", "duration_s=11", *more])[0]
+    return load("minimal", [f"obstacles.rock.appears_s={appears_s}", "duration_s=11", *more])
 
 
 def test_an_obstacle_is_there_from_the_control_sample_at_which_it_appears() -> None:

@@ -72,7 +72,7 @@ def drawn(text: str) -> tuple[set[str], list[tuple[str, str]]]:
 
 @pytest.mark.parametrize(("name", "method"), [("minimal", "a"), ("case_a", "b"), ("doorway", "c"), ("case_a", "d")])
 def test_the_picture_has_every_block_and_each_input_is_fed_by_the_signal_of_its_name(name: str, method: str) -> None:
-    diagram = build_diagram(load(name)[0], method)
+    diagram = build_diagram(load(name), method)
     blocks, wires = drawn(graphviz.dot(diagram))
     parts = {part.get_name(): part for part in diagram.GetSystems()}
     inner = [each for layer in graphviz.LAYERS for each in parts[layer].GetSystems()]
@@ -93,7 +93,7 @@ def test_the_picture_has_every_block_and_each_input_is_fed_by_the_signal_of_its_
 
 
 def test_messages_are_dashed_recorded_signals_blue_and_no_wire_moves_a_block_to_the_left() -> None:
-    text = graphviz.dot(build_diagram(load("case_a")[0], "c"))
+    text = graphviz.dot(build_diagram(load("case_a"), "c"))
     dashed = {start.partition(":")[0] for start in re.findall(r"^(\S+):e -> .*style=dashed", text, re.MULTILINE)}
     assert dashed == {"intervention_planner", "gatekeeper"}
     blue = set(re.findall(rf'COLOR="{graphviz.RECORDED}">(\w+)<', text))
@@ -104,7 +104,7 @@ def test_messages_are_dashed_recorded_signals_blue_and_no_wire_moves_a_block_to_
 
 
 def test_the_text_does_not_depend_on_what_was_built_before() -> None:
-    scenario = load("case_a")[0]
+    scenario = load("case_a")
     assert graphviz.dot(build_diagram(scenario, "c")) == graphviz.dot(build_diagram(scenario, "c"))
 
 
@@ -114,7 +114,7 @@ def test_a_block_of_ones_own_is_drawn_with_what_feeds_it_and_a_monitor() -> None
             super().__init__(world, presets)
             self.DeclareVectorInputPort("uav_command", 3)
 
-    scenario = load("case_a")[0]
+    scenario = load("case_a")
     text = graphviz.dot(build_diagram(scenario, "d", decision_block=Model, monitor=make_monitor(scenario)))
     assert "<BR/>Model\n" in text
     blocks, wires = drawn(text)
@@ -124,7 +124,7 @@ def test_a_block_of_ones_own_is_drawn_with_what_feeds_it_and_a_monitor() -> None
 
 def test_pictures_fit_a_landscape_page() -> None:
     for name in shipped():
-        width = re.search(r'<svg [^>]*width="(\d+)pt"', graphviz.svg(graphviz.dot(build_diagram(load(name)[0], "d"))))
+        width = re.search(r'<svg [^>]*width="(\d+)pt"', graphviz.svg(graphviz.dot(build_diagram(load(name), "d"))))
         assert width, name
         assert int(width[1]) <= PAGE_PT, name
 

@@ -96,7 +96,7 @@ def test_everything_that_can_be_added_works_from_a_folder_of_its_own(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.syspath_prepend(str(EXAMPLES))
-    assert load(str(EXAMPLES / "shelves.yaml"))[0].obstacles["shelf"].radius_m == 3.0
+    assert load(str(EXAMPLES / "shelves.yaml")).obstacles["shelf"].radius_m == 3.0
     options = ["-o", str(tmp_path / "report"), "--format", "json", "--allow-plugins"]
     assert main([str(EXAMPLES / "mine.yaml"), *options]) == 0
     document = json.loads((tmp_path / "report" / "report.json").read_text())

@@ -79,7 +79,7 @@ def test_a_plant_of_ones_own_needs_more_room() -> None:
     own = imported("own_plant")
     distances = []
     for wished in (2.0, 2.25):
-        scenario = load("minimal", {"safe_distance.obstacle_m": wished, "duration_s": 8.0})[0]
+        scenario = load("minimal", {"safe_distance.obstacle_m": wished, "duration_s": 8.0})
         distances.append(own.nearest_to_the_rock(scenario))
     assert distances[0] < own.NEEDED_M <= distances[1]
     assert distances == pytest.approx([1.867, 2.117], abs=2e-3)
@@ -112,7 +112,7 @@ def test_a_learned_policy_is_trained_and_proposes_ways(monkeypatch: pytest.Monke
     kept = np.array(json.loads(learned.WEIGHTS.read_text()))
     assert learned.price(kept, *learned.situations(np.random.default_rng(7), 500, 2.0), 2.0) < 0.8 * min(history)
     scenario = load("minimal", {"intervention.policies": [{"name": "learned_policy:Learned",
-                                                           "parameters": {"speed_m_s": 3.0}}]})[0]  # fmt: skip
+                                                           "parameters": {"speed_m_s": 3.0}}]})  # fmt: skip
     trace = simulate(scenario, "d")
     assert [event["t_s"] for event in trace.events if event["kind"] == "arrival" and event["robot"] == "ugv1"]
 

@@ -108,7 +108,7 @@ def test_robots_begin_at_their_starts_and_move_without_the_recorder(case_a: Scen
 
 def test_another_simulator_goes_on_with_a_run() -> None:
     """With a clone of the context in the middle of an intervention: triggers so far, and when, are not forgotten."""
-    diagram = build_diagram(load("minimal")[0], "d")
+    diagram = build_diagram(load("minimal"), "d")
     simulator = advanced(diagram, 7.0)
     clone = simulator.get_context().Clone()
     simulator.AdvanceTo(8.0)
@@ -120,7 +120,7 @@ def test_another_simulator_goes_on_with_a_run() -> None:
 
 
 def test_a_simulator_initialised_again_begins_anew_before_its_first_step_and_goes_on_after_it() -> None:
-    diagram = build_diagram(load("minimal")[0], "d")
+    diagram = build_diagram(load("minimal"), "d")
     simulator = Simulator(diagram)
     context = simulator.get_mutable_context()
     context.SetAccuracy(1e-6)
@@ -215,7 +215,7 @@ def test_a_table_that_changed_is_judged_anew(case_a: Scenario) -> None:
 
 
 def test_traces_verdicts_scenarios_and_diagrams_as_tables_figures_and_in_a_notebook() -> None:
-    scenario, _ = load("case_a", {"duration_s": 15.0})
+    scenario = load("case_a", {"duration_s": 15.0})
     trace = simulate(scenario, "b")
     table = trace.to_pandas()
     assert table["ugv1"]["x_m"].tolist() == trace.position("ugv1")[:, 0].tolist()
@@ -260,7 +260,7 @@ def test_a_notebook_knows_what_to_show_once_the_package_is_imported(monkeypatch:
     shell = SimpleNamespace(display_formatter=display)
     monkeypatch.setitem(sys.modules, "IPython", SimpleNamespace(get_ipython=lambda: shell))
     reload(airground_drake)
-    assert told[type(load("minimal")[0])] is notebook.scenario_html
+    assert told[type(load("minimal"))] is notebook.scenario_html
     assert told[Diagram] is notebook.diagram_html
     assert {kind.__name__ for kind in told} == {"Scenario", "Trace", "Verdict", "Diagram"}
     monkeypatch.setitem(sys.modules, "IPython", SimpleNamespace(get_ipython=lambda: None))  # imported, but no shell

@@ -56,7 +56,7 @@ def test_ugv1_goes_through_what_the_paper_tells(
 @pytest.mark.slow
 @pytest.mark.parametrize("scenario", sorted(set(shipped()) - set(DEADLOCKS)))
 def test_every_run_has_the_verdicts_that_its_scenario_declares(run: Runs, scenario: str) -> None:
-    for name in load(scenario)[0].runs:
+    for name in load(scenario).runs:
         for verdict in verify(run(scenario, name)):
             assert verdict.as_expected is not False, (name, verdict.claim.id, verdict.finding)
 
@@ -118,7 +118,7 @@ def compiled():
 simulation.warm_up()
 before = compiled()
 for method in "cd":
-    simulation.simulate(load("case_a")[0], method)
+    simulation.simulate(load("case_a"), method)
 assert before and compiled() == before, (before, compiled())
 """
 
@@ -208,12 +208,12 @@ def test_a_uav_without_a_target_of_its_own_arrives_where_its_task_leads() -> Non
 
 def test_with_plants_of_ones_own_only_claims_about_any_plant_are_judged() -> None:
     """Motors that lag by 0.2 s: the trace names them, and a theorem about first-order robots says nothing."""
-    made = simulate(load("minimal")[0], "d", plants=lagging)
+    made = simulate(load("minimal"), "d", plants=lagging)
     assert set(made.meta["plants"].values()) == {"pydrake.systems.primitives.LinearSystem"}
     found = {verdict.claim.id: verdict.finding.status for verdict in verify(made)}
     assert found.pop("ZENO-TRACE") == "holds"
     assert set(found.values()) == {"not_run"}
-    assert simulate(load("minimal")[0], "d").meta["plants"] == {"ugv1": "first_order", "uav": "first_order"}
+    assert simulate(load("minimal"), "d").meta["plants"] == {"ugv1": "first_order", "uav": "first_order"}
 
 
 def lagging(_: str, start: Array) -> LinearSystem:

@@ -59,7 +59,7 @@ def companion_findings() -> list[Item]:
 
 
 def _run(name: str, run: str, *changes: str) -> Trace:
-    return simulate(load(name, ("reproduction=[]", *changes))[0], run)
+    return simulate(load(name, ("reproduction=[]", *changes)), run)
 
 
 def _sign() -> Item:
@@ -88,7 +88,7 @@ def _sign() -> Item:
 
 def _soft_gate() -> Item:
     """Item 10: (c) accepts an intervention although it predicts a distance below d; (d) makes it harmless."""
-    scenario = load("soft_gate")[0]
+    scenario = load("soft_gate")
     d, gate = scenario.safe_distance.obstacle_m, scenario.gatekeeper
     traces = {name: _run("soft_gate", name, PAPERS_ROUTE) for name in ("c", "d")} | {
         EVERYTHING: Recorder(scenario, "d", make_gatekeepers=Believing.of).simulate()
@@ -207,7 +207,7 @@ def _method_b(direct: Trace, gated: Trace) -> Item:
 def _proper_tasks(direct: Trace) -> Item:
     """Item 24: the paper calls interventions proper and bidirectional, but no equation says so."""
     ends = np.asarray(direct.proposals.iloc[0]["positions_m"]).reshape(-1, 3)[-1]
-    scenario = load("case_b")[0]
+    scenario = load("case_b")
     obstacle = np.asarray(scenario.obstacles["sudden"].position_m)
     away, d = float(np.linalg.norm(ends - obstacle)), scenario.safe_distance.obstacle_m
     return item(
@@ -247,7 +247,7 @@ def _literal_rule() -> Item:
         min(literal) > 0 and max(ours) == 0,
         {
             "answers": answers, "runs": "c_literal and c of case_a (18 s) and case_b (16 s)", "figures": "by reading",
-            "literal": {name: load(name)[0].runs["c_literal"].set for name in answers},
+            "literal": {name: load(name).runs["c_literal"].set for name in answers},
         },
     )  # fmt: skip
 

@@ -138,7 +138,7 @@ def _null_space() -> Item:
 
 def _one_speed(scenario: Scenario) -> Item:
     """Item 17: the times of cases A and B need two speeds of the same preset trajectory, or three."""
-    speed = {name: load(name)[0].ugvs["ugv1"].preset.speed_m_s for name in ("case_a", "case_b")}
+    speed = {name: load(name).ugvs["ugv1"].preset.speed_m_s for name in ("case_a", "case_b")}
     travelled = {name: speed[name] * time for name, time in (("case_a", 14.45), ("case_b", 10.6))}
     crossed = {"case_a": travelled["case_a"] / speed["case_b"], "case_b": travelled["case_b"] / speed["case_a"]}
     late_s = 18.1

@@ -62,7 +62,7 @@ def conduct(
     if stopping is not None and spec.dependent:
         raise ValueError(f"--stop-when needs independent draws; not independent: {', '.join(spec.dependent)}")
     wanted = range(spec.combinations if number is None else number)
-    asked = wanted.stop * len(spec.runs or spec.base()[0].runs) * len(spec.claims or tuple(RUN_CLAIMS))
+    asked = wanted.stop * len(spec.runs or spec.base().runs) * len(spec.claims or tuple(RUN_CLAIMS))
     if asked > MOST_ROWS:
         allowed = f"{MOST_ROWS:g} rows, one for each draw, run and claim"
         raise LimitError(spec.name, f"{wanted.stop:.3g} draws ({asked:.3g} rows)", allowed)
@@ -106,7 +106,7 @@ def _manifest(spec: Spec, limits: Limits) -> dict[str, Any]:
     return {
         "name": spec.name,
         "spec_sha256": spec.digest,
-        "scenario_sha256": spec.base()[1],
+        "scenario_sha256": spec.base().digest,
         "package": version("airground_drake"),
         "drake": version("drake"),
         "limits": {name: value for name, value in limits._asdict().items() if name != "plugins"},

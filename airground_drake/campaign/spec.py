@@ -133,8 +133,8 @@ class Spec(File):
         """
         return self.scenario_of(self.values(index), index)
 
-    def base(self) -> tuple[Scenario, str]:
-        """The scenario before anything is drawn, and the SHA-256 of its file and of `fixed`.
+    def base(self) -> Scenario:
+        """The scenario before anything is drawn, with the values of `fixed`.
 
         Raises:
             ScenarioError: if it cannot be loaded.
@@ -164,7 +164,7 @@ class Spec(File):
         Raises:
             ScenarioError: if any is named; says where, and how to allow it.
         """
-        plugins.refuse(self.base()[0], self.scenario)
+        plugins.refuse(self.base(), self.scenario)
         first = self.values(0)
         for key, drawn in self.drawn.items():
             for value in drawn.choices:
@@ -219,7 +219,7 @@ def _check_overrides(spec: Spec, document: Document) -> None:
 
 def _check_names(spec: Spec, document: Document) -> None:
     """Refuse runs, claims and columns of times that do not exist."""
-    for key, names, allowed in (("runs", spec.runs, spec.base()[0].runs), ("claims", spec.claims, RUN_CLAIMS)):
+    for key, names, allowed in (("runs", spec.runs, spec.base().runs), ("claims", spec.claims, RUN_CLAIMS)):
         for index, name in enumerate(names):
             if name not in allowed:
                 raise _unknown(document.where(key, str(index)), key, name, allowed)

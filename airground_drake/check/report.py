@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -122,6 +123,7 @@ def _is_shaped_like_a_report(report: Any) -> None:
 def _lines(folder: Path, there: Sequence[str], report: Json, limit_s: float) -> Iterator[Line]:
     attempt = partial(_attempt, limit_s)
     yield attempt("files", "", lambda: check_files(folder, there, report))
+    yield attempt("scenario", "", lambda: check_digest(report["scenario"]))
     runs: dict[str, Run] = {}
 
     def load(name: str) -> str:
@@ -139,6 +141,13 @@ def _lines(folder: Path, there: Sequence[str], report: Json, limit_s: float) -> 
             yield attempt("events", name, partial(check_events, runs[name]))
             for claim in DECIDED:
                 yield attempt(claim, name, partial(judge, claim, name))
+
+
+def check_digest(scenario: Json) -> str:
+    """Require the SHA-256 of the resolved scenario, in strict JSON without spaces."""
+    text = json.dumps(scenario["resolved"], separators=(",", ":"), allow_nan=False)
+    same("SHA-256 of the scenario", scenario.get("sha256"), sha256(text.encode()))
+    return "has its SHA-256"
 
 
 def check_files(folder: Path, there: Sequence[str], report: Json) -> str:

@@ -39,7 +39,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     from airground_drake.systems import graphviz
     from airground_drake.systems.diagram import build_diagram, method_drawn
 
-    scenario, _ = load(options.scenario, options.set)
+    scenario = load(options.scenario, options.set)
     with plugins.admitted(scenario, options.scenario, allow=options.allow_plugins):
         method = method_drawn(scenario) if options.method is None else options.method
         diagram, name = build_diagram(scenario, method=method), scenario.name

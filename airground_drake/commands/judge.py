@@ -45,7 +45,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     from airground_drake.check import positions
     from airground_drake.scenarios.load import load, resolved
 
-    scenario = resolved(load(options.scenario, options.set)[0])
+    scenario = resolved(load(options.scenario, options.set))
     try:
         found, covered = positions.judge(_table(options.positions), scenario)
     except (positions.UnusableError, ValueError) as error:

@@ -46,7 +46,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     from airground_drake.scenarios.load import load
 
     overrides = [*options.set, *([] if options.seed is None else [f"seed={options.seed}"])]
-    scenario, _ = load(options.scenario, overrides)
+    scenario = load(options.scenario, overrides)
     methods = {name: run.method for name, run in scenario.runs.items()}
     name = options.run or max(methods, key=lambda run: list(METHODS).index(methods[run]))
     if name not in methods:

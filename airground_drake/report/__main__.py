@@ -87,7 +87,7 @@ def _reported(options: argparse.Namespace, command: str) -> int:
 
     overrides = [*options.set, *([] if options.seed is None else [f"seed={options.seed}"])]
     audited = options.scenario == AUDIT
-    scenario, digest = load(AUDITED if audited else options.scenario, overrides)
+    scenario = load(AUDITED if audited else options.scenario, overrides)
     if audited:
         scenario.name, scenario.title, scenario.description = AUDIT, AUDIT_TITLE, AUDIT_DESCRIPTION
     from airground_drake.report import attention, make, summary  # slow to import: only for a valid scenario
@@ -105,7 +105,7 @@ def _reported(options: argparse.Namespace, command: str) -> int:
     ):
         findings = partial(_findings, progress, audited=audited)
         wanted = make.Wanted(options.format, command, kept, findings, audited, limits, options.seeds)
-        report = make.write_report(scenario, digest, output, wanted, progress)
+        report = make.write_report(scenario, output, wanted, progress)
     overall = report["overall"]
     for line in attention.failures({name: run["faults"] for name, run in report["runs"].items()}):
         print(line, file=sys.stderr)

@@ -87,7 +87,6 @@ def with_seeds(scenario: Scenario, own: Mapping[str, Trace], number: int, progre
 
 def write(
     scenario: Scenario,
-    digest: str,
     output: Path,
     formats: Sequence[str],
     judged: Judged,
@@ -105,7 +104,7 @@ def write(
     required = [claim.id for claim in model_claims(added=scenario.claims)]
     traces = judged.traces
     report = document.build(
-        scenario, digest, traces, judged.verdicts, provenance,
+        scenario, traces, judged.verdicts, provenance,
         audit=judged.findings, audited=audited, required=required, seeds=judged.seeds,
     )  # fmt: skip
     if "junit" in formats:

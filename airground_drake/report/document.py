@@ -31,7 +31,6 @@ EXIT_CODES = {"as_expected": 0, "not_as_expected": 1, "inconclusive": 3}
 
 def build(
     scenario: Scenario,
-    digest: str,
     traces: Mapping[str, Trace],
     verdicts: Iterable[Verdict],
     provenance: Mapping[str, Any],
@@ -45,7 +44,6 @@ def build(
 
     Args:
         scenario: as resolved (after command-line settings).
-        digest: SHA-256 of the scenario file.
         traces: by run, in the order of the scenario; a run without a trace makes the report inconclusive.
         verdicts: all of them; a claim that the scenario expects and that is missing makes it inconclusive.
         provenance: versions, seed, time, `command` and the like.
@@ -72,7 +70,7 @@ def build(
     about = {key: resolved[key] for key in ("name", "title", "description")}
     document = {
         "schema": SCHEMA,
-        "scenario": {**about, "sha256": digest, "resolved": resolved},
+        "scenario": {**about, "sha256": scenario.digest, "resolved": resolved},
         "provenance": dict(provenance),
         "overall": overall(claims, missing(scenario, traces, claims, required), items if audited else ()),
         "runs": {name: _run(scenario, trace) for name, trace in traces.items()},

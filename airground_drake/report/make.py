@@ -53,15 +53,14 @@ class Wanted(NamedTuple):
 
 
 def write_report(
-    scenario: Scenario, digest: str, output: Path, wanted: Wanted, progress: Progress = SILENT
+    scenario: Scenario, output: Path, wanted: Wanted | None = None, progress: Progress = SILENT
 ) -> dict[str, Any]:
     """Simulate every run, judge it, and write everything to a folder.
 
     Args:
         scenario: validated scenario.
-        digest: SHA-256 of its file.
         output: folder, created if need be; an earlier report in it is removed.
-        wanted: what the report should have.
+        wanted: what the report should have; default: all pages, with every claim judged anew.
         progress: is told what is done.
 
     Returns:
@@ -73,6 +72,7 @@ def write_report(
         PluginError: if the scenario names a policy, route or task that cannot be made.
         OSError: if something cannot be written, after all.
     """
+    wanted = Wanted() if wanted is None else wanted
     within(scenario, wanted.limits, 1 + wanted.seeds)
     started, clock = datetime.now(UTC), time.perf_counter()
     if scenario.claims:  # a claim that cannot be made is refused before the work
@@ -93,4 +93,4 @@ def write_report(
         progress.stage("writing")
         provenance = after_runs.provenance(scenario, started, wanted.command)
         provenance["wall_s"] = time.perf_counter() - clock
-        return after_runs.write(scenario, digest, output, wanted.formats, judged, provenance, audited=wanted.audited)
+        return after_runs.write(scenario, output, wanted.formats, judged, provenance, audited=wanted.audited)

@@ -92,7 +92,6 @@ def document_again(report: Mapping[str, Any], scenario: Any, traces: Mapping[str
     others = [item for item in report["audit"] if item.get("id") not in {each["id"] for each in here}]
     again = document.build(
         scenario,
-        report["scenario"]["sha256"],
         traces,
         judge(own, judged),
         report["provenance"] | {"seed": scenario.seed},

@@ -17,7 +17,6 @@ from typing import Any
 from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
-from airground_drake.base import files
 from airground_drake.base.errors import Fault, ScenarioError
 from airground_drake.base.exact import decimal
 from airground_drake.scenarios import json_schema, validate
@@ -32,7 +31,7 @@ Overrides = Sequence[str] | Mapping[str, Any]
 """`dotted.key=value` with the value in YAML, or values by dotted key."""
 
 
-def load(name_or_path: str | Path, overrides: Overrides = ()) -> tuple[Scenario, str]:
+def load(name_or_path: str | Path, overrides: Overrides = ()) -> Scenario:
     """Load and validate a scenario.
 
     Args:
@@ -40,17 +39,10 @@ def load(name_or_path: str | Path, overrides: Overrides = ()) -> tuple[Scenario,
         overrides: applied in order; list items are addressed by index. A key must be a key of the schema, an existing
             item of a list, or an old or new entry of a mapping with free names, such as `obstacles`.
 
-    Returns:
-        The scenario, and the SHA-256 of the file's bytes followed by a NUL byte and the text of each override.
-
     Raises:
         ScenarioError: if the file cannot be read or an override or the scenario is not valid.
     """
-    document, data = read(name_or_path)
-    texts = _texts(overrides)
-    scenario = _build(document, texts)
-    digest = files.sha256(b"\0".join([data, *(override.encode() for override in texts)]))
-    return scenario, digest
+    return _build(read(name_or_path)[0], _texts(overrides))
 
 
 def validated(scenario: Scenario, overrides: Overrides = ()) -> Scenario:

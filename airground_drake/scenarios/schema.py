@@ -6,11 +6,13 @@ key without a default. Positions are in the world frame, z up, the ground at z =
 """
 
 # No `from __future__ import annotations` here: pydantic needs the types themselves, not their names.
-from dataclasses import dataclass, field
+import json
+from dataclasses import asdict, dataclass, field
 from typing import Annotated, ClassVar
 
 from pydantic import ConfigDict, Field
 
+from airground_drake.base.files import sha256
 from airground_drake.registry import METHODS, MODEL_CLAIMS, POLICIES, ROUTES, RUN_CLAIMS, UAV_TASKS
 from airground_drake.scenarios.kinds import (
     CLAIMS,
@@ -400,6 +402,12 @@ class Scenario:
     """The paper's numbers to compare with."""
     choices: list[Choice] = field(default_factory=list)
     """Origins of values that are not from the paper."""
+
+    @property
+    def digest(self) -> str:
+        """SHA-256 of the scenario as nested dicts and lists in strict JSON, with all defaults and without spaces."""
+        text = json.dumps(asdict(self), separators=(",", ":"), allow_nan=False)
+        return sha256(text.encode())
 
     @property
     def robots(self) -> dict[str, Ugv | Uav]:

@@ -17,7 +17,7 @@ def chosen(scenario: str | Path | Scenario, overrides: Overrides = ()) -> Scenar
     Raises:
         ScenarioError: if the scenario or an override is not valid.
     """
-    return validated(scenario, overrides) if isinstance(scenario, Scenario) else load(scenario, overrides)[0]
+    return validated(scenario, overrides) if isinstance(scenario, Scenario) else load(scenario, overrides)
 
 
 def digest(scenario: Scenario, run: str) -> str:

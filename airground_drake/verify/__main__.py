@@ -92,7 +92,7 @@ def _judge(target: str, wanted: Sequence[str], progress: Progress, *, allow_plug
 
     folder = Path(target)
     run = trace.load(folder) if os.path.lexists(folder / "meta.json") else None
-    scenario = load(target)[0] if run is None else from_data(run.meta["scenario"], target)
+    scenario = load(target) if run is None else from_data(run.meta["scenario"], target)
     added = {name: place for name, place in scenario.claims.items() if not wanted or name in wanted}
     imported = None if run is None else [f"claims.{name}" for name in added]
     with plugins.admitted(scenario, target, allow=allow_plugins, keys=imported):

@@ -80,7 +80,7 @@ def runs(names: list[str]) -> Findings:
         with tempfile.TemporaryDirectory() as there:
             folder = Path(there)
             trace.save(of_run, folder / "trace" / run)
-            report = document.build(scenario, "", {run: of_run}, verdicts, {"seed": scenario.seed})
+            report = document.build(scenario, {run: of_run}, verdicts, {"seed": scenario.seed})
             files.write_json(folder / "report.json", report)
             lines = [line for line in check_report(folder, LIMIT_S) if line.run]
         found += [[f"checker: {line.claim}", name, "disagrees", line.rule] for line in lines if line.outcome != AGREES]
@@ -93,7 +93,7 @@ def _simulated(name: str) -> tuple[Any, Any]:
     from airground_drake.scenarios.load import load
 
     source, run = PROBES[name]
-    scenario = load(source)[0]
+    scenario = load(source)
     scenario.runs = {run: scenario.runs[run]}
     scenario.reproduction, scenario.choices = [], []
     return scenario, simulate(scenario, run)

@@ -67,7 +67,7 @@ def test_objectives() -> None:
 
 
 def test_what_does_not_matter_goes() -> None:
-    data = resolved(load("warehouse")[0])
+    data = resolved(load("warehouse"))
     data["runs"] = {"d": data["runs"]["d"]}
     matters = sorted(data["obstacles"])[2]
     data["obstacles"][matters]["position_m"][0] += 0.123456
@@ -92,7 +92,7 @@ def test_what_does_not_matter_goes() -> None:
 
 
 def test_a_run_gets_no_shorter_than_a_control_period() -> None:
-    data = resolved(load("minimal")[0])
+    data = resolved(load("minimal"))
     period = data["control"]["period_s"]
     shorter = [each["duration_s"] for each in module._shorter(lambda data: None, data | {"duration_s": 1.5 * period})]
     assert shorter

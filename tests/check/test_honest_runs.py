@@ -68,7 +68,7 @@ def test_a_proposal_at_the_very_beginning_is_not_one_too_many() -> None:
         "duration_s": 0.2,
         "runs": {"d": {"method": "d"}},
     }
-    trace, verdicts, wrong = tried(load("minimal", at_once)[0])
+    trace, verdicts, wrong = tried(load("minimal", at_once))
     assert wrong == []
     assert len(trace.proposals) == 1
     assert next(each.finding.status for each in verdicts if each.claim.id == "COMM") == "holds"

@@ -53,7 +53,7 @@ def test_it_runs_goes_on_and_says_what_it_found(spec: Path, tmp_path: Path, airg
 def test_one_draw_alone_is_the_same_draw_and_a_scenario(spec: Path, tmp_path: Path, airground: Airground) -> None:
     for _ in range(2):  # the same file again
         assert "SAFE-TRACE" in airground("campaign", spec, "--only", 1, "-o", tmp_path / "one.yaml")
-    scenario = load(tmp_path / "one.yaml")[0]
+    scenario = load(tmp_path / "one.yaml")
     assert (scenario.name, scenario.duration_s) == ("small_1", 1.0)
 
 

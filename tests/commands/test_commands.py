@@ -67,17 +67,17 @@ def test_init_writes_a_scenario_and_prints_what_runs_it(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     assert airground("init", "--", file).endswith(f"next: airground report {taken}\n")
-    scenario = load(*shlex.split(taken))[0]
+    scenario = load(*shlex.split(taken))
     assert (scenario.name, list(scenario.ugvs)) == (name, ["ugv1"])
     assert not Path("nowhere").exists()
 
 
 def test_init_writes_a_fleet(tmp_path: Path, airground: Airground) -> None:
     airground("init", tmp_path / "field.yaml", "--fleet", 4, "--obstacles", 6, "--seed", 2)
-    scenario = load(tmp_path / "field.yaml")[0]
+    scenario = load(tmp_path / "field.yaml")
     assert (scenario.name, len(scenario.ugvs), len(scenario.obstacles)) == ("field", 4, 6)
     airground("init", tmp_path / "large.yaml", "--fleet", MAX_UGVS)
-    assert len(load(tmp_path / "large.yaml")[0].ugvs) == MAX_UGVS
+    assert len(load(tmp_path / "large.yaml").ugvs) == MAX_UGVS
 
 
 def test_diagram_writes_the_formats_and_the_part_that_are_named(tmp_path: Path, airground: Airground) -> None:

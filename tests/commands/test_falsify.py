@@ -57,7 +57,7 @@ def falsified(tmp_path: Path, airground: Airground) -> Airground:
 def test_a_violation_is_found_and_made_small(falsified: Airground, tmp_path: Path) -> None:
     assert "made small" in falsified("b", "--sampler", "halton", code=1)
     for name in ("found", "found_small"):
-        scenario = load(tmp_path / f"{name}.yaml")[0]
+        scenario = load(tmp_path / f"{name}.yaml")
         (verdict,) = verify(simulate(scenario, "b"), claims=["SAFE-TRACE"])
         assert verdict.finding.status == "refuted"
     assert scenario.duration_s < 8.0
@@ -82,7 +82,7 @@ def test_a_name_that_is_too_long_for_the_small_scenario_is_refused_before_the_se
 @pytest.mark.usefixtures("in_this_process")
 def test_without_a_violation_the_worst_is_kept(falsified: Airground, tmp_path: Path) -> None:
     falsified("d", code=0)
-    assert load(tmp_path / "found.yaml")[0].name == "pushed_0"
+    assert load(tmp_path / "found.yaml").name == "pushed_0"
     assert not (tmp_path / "found_small.yaml").exists()
 
 
@@ -97,7 +97,7 @@ def test_a_sampler_beside_the_spec_is_used(falsified: Airground, tmp_path: Path)
     assert "--allow-plugins" in falsified("d", *OWN[:2], code=2)
     said = falsified("d", *OWN, code=0, tell="points += 1")  # it may change its copy
     assert "2 tried by corner.py:Corner" in said
-    assert load(tmp_path / "found.yaml")[0].obstacles["rock"].position_m == [5.0, 0.0, 0.0]
+    assert load(tmp_path / "found.yaml").obstacles["rock"].position_m == [5.0, 0.0, 0.0]
 
 
 @pytest.mark.usefixtures("in_this_process")

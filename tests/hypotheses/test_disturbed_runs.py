@@ -42,7 +42,7 @@ class Tally(NamedTuple):
 
 def scene(name: str) -> tuple[Demands, Array]:
     obstacles, robots = (np.array(rows, dtype=np.float64).reshape(-1, 3) for rows in SCENES[name])
-    scenario, m, n = load("case_a")[0], len(obstacles), len(robots)
+    scenario, m, n = load("case_a"), len(obstacles), len(robots)
     known = Demands.of(scenario)
     share = np.hstack([np.ones((n, m)), np.full((n, n), 0.5)])
     safe = np.hstack([np.full((n, m), D), np.full((n, n), PAIR)])
@@ -60,7 +60,7 @@ def run(
 ) -> Tally:
     """Drive all robots towards the nearest thing, at up to their speed limits, with disturbances at their bound."""
     demands, positions = scene(name)
-    scenario = load("case_a")[0]
+    scenario = load("case_a")
     w = SafeDist().inputs(scenario)["disturbance_m_s"]
     layer = Avoidance(demands.gain, demands.period, demands.reach, "augmented")
     rng, count, m = np.random.default_rng(5), len(positions), len(demands.obstacles)

@@ -150,7 +150,7 @@ def gets_through() -> bool:
 
 def test_no_attack_gets_through_with_the_numbers_of_case_b() -> None:
     claim = LiveWait()
-    inputs = claim.inputs(load("case_b")[0])
+    inputs = claim.inputs(load("case_b"))
     patience = Patience(*(inputs[name] for name in ("tries", "rest_s", "longest_s")))
     for each in attacks(patience, inputs["period_s"]).values():
         assert each.executed_s <= claim.judge(inputs).evidence.bound_s + 1e-9, each

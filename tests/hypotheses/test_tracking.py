@@ -23,7 +23,7 @@ PUSHED_M = 0.5
 LEGS = 3
 """Of each way; corners lie on control samples, so that the rates of motion and sampled motion are the same."""
 FAR = np.array([0.0, -1e3, 0.0])
-CASE_B = load("case_b")[0]
+CASE_B = load("case_b")
 
 
 class Stalled(OutcomeGatekeepers):

@@ -68,7 +68,7 @@ MUTANTS: dict[str, Patch] = {name: patch for name, (patch, _) in MISBUILT.items(
 
 @pytest.mark.parametrize("name", ["case_a", "case_b"])
 def test_the_built_diagram_is_what_the_scenario_says(name: str) -> None:
-    scenario = load(name)[0]
+    scenario = load(name)
     wrong, bound = differences(scenario)
     assert wrong == []
     robots = [*scenario.ugvs, scenario.uav.name]
@@ -79,7 +79,7 @@ def test_the_built_diagram_is_what_the_scenario_says(name: str) -> None:
 @pytest.mark.parametrize("name", MUTANTS)
 def test_running_code_that_differs_from_the_scenario_is_noticed(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     MUTANTS[name](monkeypatch)
-    assert differences(load("case_a")[0])[0]
+    assert differences(load("case_a"))[0]
 
 
 def test_plants_that_are_faster_than_commanded_are_noticed() -> None:
@@ -90,5 +90,5 @@ def test_plants_that_are_faster_than_commanded_are_noticed() -> None:
         found.configure_default_state(start)
         return found
 
-    wrong, _ = differences(load("case_a")[0], partial(diagram.build_model, plants=plant))
+    wrong, _ = differences(load("case_a"), partial(diagram.build_model, plants=plant))
     assert "a plant does not move as its robot is commanded" in wrong

@@ -164,7 +164,7 @@ def test_no_motion_is_executed_that_was_not_decided_on(monkeypatch: pytest.Monke
 
     honest = Planner.plan
     monkeypatch.setattr(Planner, "plan", swapping)
-    trace = simulate(load("case_a", ["duration_s=17"])[0], "d")
+    trace = simulate(load("case_a", ["duration_s=17"]), "d")
     assert len(trace.proposals) > 2
     assert (trace.executing("ugv1") >= 0).any()
     assert [verdict.finding.status for verdict in verify(trace, ["EXEC", "GATE-PLAN"])] == ["holds", "holds"]
@@ -275,7 +275,7 @@ def test_a_policy_sees_each_robot_as_it_is() -> None:
 
 
 def test_the_planner_has_each_ugv_s_own_limits() -> None:
-    scenario = load("case_a", ["ugvs.ugv1.max_speed_m_s=2.5", "ugvs.ugv2.radius_m=0.1", "safe_distance.ugv_m=1.0"])[0]
+    scenario = load("case_a", ["ugvs.ugv1.max_speed_m_s=2.5", "ugvs.ugv2.radius_m=0.1", "safe_distance.ugv_m=1.0"])
     made = make_planner(scenario, METHODS["d"])
     assert made.max_speed.tolist() == [2.5, scenario.ugvs["ugv2"].max_speed_m_s] != [2.5, 2.5]
     assert made.radii.tolist() == [0.0, 0.1]

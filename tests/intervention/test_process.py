@@ -222,7 +222,7 @@ def test_all_that_is_seen_and_proposed_arrives_to_the_bit() -> None:
 def test_a_run_with_a_policy_in_another_process_is_the_same_to_the_bit() -> None:
     traces = []
     for name in ("detour", "airground_drake.intervention.detour:Detour"):
-        scenario = load("case_a", ["duration_s=18"])[0]
+        scenario = load("case_a", ["duration_s=18"])
         scenario.intervention.policies[0].name = name
         traces.append(simulate(scenario, "d"))
     one, other = traces

@@ -120,4 +120,4 @@ FINE = [verdict("a"), verdict("c", margin=float("nan")), verdict("a_printed", "r
 
 def built(scenario: Scenario, traces: dict[str, Trace], verdicts: list[Verdict]) -> dict[str, Any]:
     about = {"package": "0.1.0", "seed": 1, "started": "now"}
-    return document.build(scenario, "ab" * 32, traces, verdicts, about, audit=of_runs(scenario, traces))
+    return document.build(scenario, traces, verdicts, about, audit=of_runs(scenario, traces))

@@ -24,7 +24,7 @@ COMPANIONS = (7, 10, 11, 23, 24, 25)
 
 
 def from_formulas(proofs: dict[str, Finding]) -> list[dict[str, Any]]:
-    scenario = load("case_a")[0]
+    scenario = load("case_a")
     return [
         *thresholds.threshold_findings(scenario, proofs),
         *formulas.formula_findings(scenario),
@@ -35,7 +35,7 @@ def from_formulas(proofs: dict[str, Finding]) -> list[dict[str, Any]]:
 @pytest.fixture(scope="module")
 def proofs(report: Callable[[str], Path]) -> dict[str, Finding]:
     report("case_a")  # whose proofs these are
-    return {verdict.claim.id: verdict.finding for verdict in verify_model(load("case_a")[0], kept=cache_folder())}
+    return {verdict.claim.id: verdict.finding for verdict in verify_model(load("case_a"), kept=cache_folder())}
 
 
 @pytest.fixture(scope="module")

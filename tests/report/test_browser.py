@@ -44,7 +44,7 @@ def page_file(scenario: Scenario, traces: dict[str, Trace], tmp_path_factory: py
     verdicts = [verdict("a", exercised=0), failed, FINE[2]]
     about = {"package": "0.1.0"}
     both = [*audit.of_runs(scenario, faulty), *items]
-    report = document.build(scenario, "ab" * 32, faulty, verdicts, about, audit=both, required=["SAFE-INV"])
+    report = document.build(scenario, faulty, verdicts, about, audit=both, required=["SAFE-INV"])
     figures = draw.draw(scenario, traces)
     for k, figure in enumerate(figures):
         cut = [replace(panel, table=replace(panel.table, rows=panel.table.rows[:4])) for panel in figure.panels]

@@ -30,7 +30,7 @@ def test_everything_is_written_and_the_readme_shows_the_first_screen(report: Rep
     names = {path.name for path in folder.iterdir()}
     assert names == {"report.html", "report.json", "junit.xml", "diagram.dot", "diagram.svg", "trace"}
     assert (folder / "diagram.dot").read_text() == (ROOT / "diagrams" / "case_a.dot").read_text()
-    for name in load("case_a")[0].runs:
+    for name in load("case_a").runs:
         assert trace.load(folder / "trace" / name).run == name
     readme = (ROOT / "README.md").read_text(encoding="utf-8")
     assert re.findall(r"```text\n(.*?)```", readme, re.DOTALL) == [summary.text(document_of(folder)) + "\n"]
@@ -123,7 +123,7 @@ def test_exit_codes_of_judging_again(tmp_path: Path, capsys: pytest.CaptureFixtu
     for arguments, said in ((["case_a", "SAFE-TRACE"], "says nothing about case_a"), (["x"], "no such scenario")):
         assert judge.main(arguments) == 2
         assert said in capsys.readouterr().err
-    trace.save(simulate(load("minimal", ["decision.trigger=bare", "duration_s=1"])[0], "a"), tmp_path / "a")
+    trace.save(simulate(load("minimal", ["decision.trigger=bare", "duration_s=1"]), "a"), tmp_path / "a")
     assert judge.main([str(tmp_path / "a"), "ZENO-PROOF"]) == 1
     assert judge.main([str(tmp_path / "a"), "SAFE-TRACE", "EXEC"]) == 0
     assert "ZENO-PROOF: refuted" in capsys.readouterr().out

@@ -108,7 +108,7 @@ def test_audit_is_made_from_the_runs_and_leaves_out_what_they_do_not_show(
     assert timing["ours"] == pytest.approx((STALL[1] + np.sqrt(1.0 - 0.069**2)) / 0.5606)
     moving = {"a": make_trace(scenario, "a", GOING_ROUND), "c": traces["c"]}
     extra = {"id": 2, "finding": "f", "paper": 1, "ours": 2, "evidence": {}, "demonstrated": False}
-    report = document.build(scenario, "", moving, FINE, {}, audit=[*of_runs(scenario, moving), extra], audited=True)
+    report = document.build(scenario, moving, FINE, {}, audit=[*of_runs(scenario, moving), extra], audited=True)
     assert [item["id"] for item in report["audit"]] == [2]
     assert (report["overall"]["status"], report["overall"]["undemonstrated"]) == ("not_as_expected", [2])
 

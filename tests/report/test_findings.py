@@ -18,7 +18,7 @@ from airground_drake.view import canvas
 
 
 def test_what_is_computed_is_drawn_with_its_marks() -> None:
-    scenario = load("case_a")[0]
+    scenario = load("case_a")
     drawn = {
         figure.id: figure for figure in findings.draw([*threshold_findings(scenario, {}), *formula_findings(scenario)])
     }
@@ -36,7 +36,7 @@ def test_what_is_computed_is_drawn_with_its_marks() -> None:
 
 def test_what_the_papers_table_says_no_override_changes() -> None:
     overrides = ["decision.threshold.zeta_m=4", "decision.threshold.noise_m_sqrt_s=2", "decision.threshold.drift_m_s=1"]
-    kept, changed = (threshold_findings(load("case_a", given)[0], {}) for given in ([], overrides))
+    kept, changed = (threshold_findings(load("case_a", given), {}) for given in ([], overrides))
     for number in (4, 5, 18):
         before, after = (next(each for each in found if each["id"] == number) for found in (kept, changed))
         assert (before["paper"], before["ours"], before["finding"]) == (after["paper"], after["ours"], after["finding"])
@@ -63,7 +63,7 @@ def test_what_comes_of_runs_is_drawn_from_what_is_kept_of_them() -> None:
 
 
 def test_the_due_time_is_where_the_reference_leaves_the_threshold(run: Simulations) -> None:
-    items = findings_of_runs(load("case_a")[0], {"a": run("case_a", "a")})
+    items = findings_of_runs(load("case_a"), {"a": run("case_a", "a")})
     (figure,), known = findings.draw(items), items[0]["evidence"]
     reference = known["reference"]
     assert np.interp(

@@ -161,7 +161,7 @@ def test_sections_that_would_say_nothing_are_absent(scenario: Scenario, traces: 
     bare = replace(scenario, name="mine", reproduction=[], choices=[], runs={"a": scenario.runs["a"]})
     text = html.render(built(bare, {"a": traces["a"]}, FINE[:1]), [])
     assert re.findall(r'<h2 id="(\w+)">', text) == ["happened", "safe", "claims", "provenance"]
-    empty = html.render(document.build(replace(bare, runs={}), "", {}, [], {}), [], "no svg")
+    empty = html.render(document.build(replace(bare, runs={}), {}, [], {}), [], "no svg")
     assert "Nothing was run." in first(empty)
     assert Page(empty).unbalanced == []
 

@@ -61,7 +61,7 @@ def test_a_run_is_home_if_every_robot_arrives() -> None:
 @pytest.mark.parametrize("own", [0, 2])
 def test_seeds_are_those_from_1_on_and_the_reports_own_runs_serve_for_theirs(own: int) -> None:
     runs, noise = "runs={a: {method: a}, b: {method: b}}", "decision.noise_m_sqrt_s=1"
-    scenario, _ = load(
+    scenario = load(
         "case_b", [f"seed={own}", "duration_s=12", "arrival_tolerance_m=99", noise, "reproduction=[]", runs]
     )
     traces = {name: simulate(scenario, name) for name in scenario.runs}

@@ -18,7 +18,7 @@ ROOM_M = 0.1
 
 @pytest.mark.parametrize("name", DEADLOCKS)
 def test_everybody_can_arrive_with_room_to_spare(name: str) -> None:
-    scenario = load(name)[0]
+    scenario = load(name)
     safe, ugvs = scenario.safe_distance, scenario.ugvs.values()
     real = positions([each.position_m for each in scenario.obstacles.values()])
     centres = np.concatenate([real, make_map(scenario)[0]])[:, :2]
@@ -43,7 +43,7 @@ def test_everybody_can_arrive_with_room_to_spare(name: str) -> None:
 @pytest.mark.parametrize("name", ["pocket", "swap", "doorway"])
 def test_under_method_d_everybody_arrives_and_every_claim_holds(name: str) -> None:
     """Of the smaller ones; `.ci/run` has the reports of all."""
-    trace = simulate(load(name)[0], "d")
+    trace = simulate(load(name), "d")
     for ugv in trace.ugvs:
         assert kinds(trace, ugv)[-1] == "arrival"
     for verdict in verify(trace):
@@ -51,13 +51,13 @@ def test_under_method_d_everybody_arrives_and_every_claim_holds(name: str) -> No
 
 
 def test_the_map_of_the_warehouse_is_wrong() -> None:
-    scenario = load("warehouse")[0]
+    scenario = load("warehouse")
     real = {tuple(each.position_m) for each in scenario.obstacles.values()}
     on_map = set(map(tuple, make_map(scenario)[0].tolist()))
     assert (len(real - on_map), len(on_map - real)) == (1, 1)
 
 
 def test_two_are_stuck_without_the_uav() -> None:
-    alone = simulate(load("swap", ["duration_s=15"])[0], "a")
+    alone = simulate(load("swap", ["duration_s=15"]), "a")
     assert [kinds(alone, ugv) for ugv in alone.ugvs] == [["trigger"], ["trigger"]]
     assert np.linalg.norm(alone.position("ugv1")[-1] - alone.position("ugv2")[-1]) == pytest.approx(1.0, abs=1e-6)

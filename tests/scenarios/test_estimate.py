@@ -29,14 +29,14 @@ def small(method: str = "d") -> Scenario:
 
 @pytest.mark.parametrize("name", shipped())
 def test_shipped_scenarios_are_well_within_the_default_limits(name: str) -> None:
-    asked = within(load(name)[0], DEFAULT_LIMITS)
+    asked = within(load(name), DEFAULT_LIMITS)
     assert asked.work < DEFAULT_LIMITS.work / 10.0
     assert asked.memory < DEFAULT_LIMITS.memory / 2.0
 
 
 @pytest.mark.parametrize(("name", "run_name"), [("case_a", "a"), ("case_a", "c"), ("case_b", "d"), ("contact", "d")])
 def test_runs_keep_to_the_estimate(name: str, run_name: str, run: Callable[[str, str], Trace]) -> None:
-    scenario, trace = load(name)[0], run(name, run_name)
+    scenario, trace = load(name), run(name, run_name)
     asked = estimate(replace(scenario, runs={run_name: scenario.runs[run_name]}))
     assert asked.rows - 1.5 <= len(trace.t) <= EVENTS * asked.rows
     assert asked.steps == (len(trace.ugvs) + 1) * asked.rows

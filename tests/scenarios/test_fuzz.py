@@ -54,13 +54,13 @@ def loads_or_explains(path: Path, content: bytes, overrides: Sequence[str] = ())
     path.write_bytes(content)
     refusal = ""
     try:
-        scenario = load(str(path), overrides)[0]
+        scenario = load(str(path), overrides)
     except ScenarioError as error:
         refusal = str(error)
     assert refusal.isprintable()
     if not refusal:
         path.write_text(text_of(resolved(scenario)), encoding="utf-8")
-        assert load(str(path))[0] == scenario
+        assert load(str(path)) == scenario
 
 
 @examples(40, fuzz=3000)

@@ -37,7 +37,7 @@ def test_every_shipped_scenario_names_it_and_is_valid(name: str) -> None:
     text = (resources.files("airground_drake.scenarios") / f"{name}.yaml").read_text()
     assert text.startswith("# yaml-language-server: $schema=scenario.schema.json\n")
     assert not list(VALIDATOR.iter_errors(yaml.safe_load(text)))  # aliases and merges expanded, as an editor does
-    assert not list(VALIDATOR.iter_errors(asdict(load(name)[0])))
+    assert not list(VALIDATOR.iter_errors(asdict(load(name))))
 
 
 def test_every_key_is_there_and_described_with_the_registered_names() -> None:

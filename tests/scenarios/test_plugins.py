@@ -82,7 +82,7 @@ def test_code_of_others_is_found_beside_the_scenario_file_wherever_it_runs(tmp_p
         "decision.threshold.zeta_m": 0.5,
         "decision.release_m": 0.2,
     }
-    scenario = load(file, changes)[0]
+    scenario = load(file, changes)
     before = list(sys.path)
     with admitted(scenario, str(file), allow=True):
         trace = simulate_all(scenario)["d"]

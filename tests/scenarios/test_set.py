@@ -28,7 +28,7 @@ def test_a_run_is_simulated_judged_and_shown_with_what_it_sets() -> None:
     assert trace.meta["scenario"]["decision"]["threshold"]["zeta_m"] == 3.0
     (verdict,) = verify(trace, ["THR-TRIG"])
     assert verdict.finding.status == "holds"
-    shown: dict[str, Any] = document.build(scenario, "0", {"other": trace}, [verdict], {})["runs"]["other"]
+    shown: dict[str, Any] = document.build(scenario, {"other": trace}, [verdict], {})["runs"]["other"]
     assert shown["set"] == settings
     trace.meta["scenario"]["runs"]["other"]["set"]["decision.threshold.zeta_m"] = 2.5
     assert verify(trace, ["THR-TRIG"])[0].finding.status == "error"  # another threshold

@@ -44,7 +44,7 @@ def test_every_claim_is_exercised_in_at_least_one_shipped_scenario(
         often.update({name: verdict.finding.exercised or 0 for name, verdict in found.items()})
     for claim in json.loads((report("case_b") / "report.json").read_text(encoding="utf-8"))["claims"]:
         often[claim["id"]] += claim["exercised"] or 0
-    choice, _ = verify_model(load("bayes_threshold")[0], claims=["THR-CHOICE"])  # the others declare their threshold
+    choice, _ = verify_model(load("bayes_threshold"), claims=["THR-CHOICE"])  # the others declare their threshold
     often["THR-CHOICE"] += choice.finding.exercised or 0
     assert [name for name in (*RUN_CLAIMS.own, *MODEL_CLAIMS.own) if not often[name]] == []
 
@@ -58,7 +58,7 @@ def test_every_kind_of_pair_has_an_inequality_that_binds(verdicts: dict[str, dic
 
 def test_the_spread_of_the_trigger_over_seeds_is_what_case_a_says() -> None:
     """As `python benchmarks/seeds.py case_a -n 12` prints it; the intervention comes after the trigger."""
-    scenario = load("case_a")[0]
+    scenario = load("case_a")
     (row,) = [row for row in scenario.reproduction if row.id == "A5"]
     recorder = Recorder(replace(scenario, duration_s=15.0), "a")
     times = [MEASURES["trigger_time"](recorder.simulate(seed), "ugv1")[0] for seed in range(1, 13)]
@@ -84,5 +84,5 @@ def test_accepted_proposals_are_executed_where_inequalities_bind_and_where_none_
 
 @pytest.mark.parametrize("scenario", shipped())
 def test_every_shipped_scenario_says_what_it_is_meant_to_put_to_the_test(scenario: str) -> None:
-    runs = load(scenario)[0].runs
+    runs = load(scenario).runs
     assert any("exercised" in expected for expected in runs["d"].expected.values())

@@ -40,7 +40,7 @@ def test_a_gain_of_one_over_the_period_is_accepted_whatever_becomes_of_its_last_
     common = dict.fromkeys(("control.period_s", "gatekeeper.period_s", "intervention.period_s"), period)
     common |= {"gatekeeper.horizon_s": 10 * period, "gatekeeper.stages": 10, "decision.noise_period_s": period}
     gains = {f"control.{name}": 1.0 / period for name in validate.GAINS}
-    control = load("minimal", {**common, **gains, "control.sensing_range_m": 20.0})[0].control
+    control = load("minimal", {**common, **gains, "control.sensing_range_m": 20.0}).control
     for name in validate.GAINS:
         gain = getattr(control, name)
         assert gain == pytest.approx(1.0 / period, rel=1e-15)
@@ -80,10 +80,10 @@ def test_coordinates_far_away_are_refused_and_the_message_says_what_is_allowed(c
         validated(moved(case_a, 1.6e7))
     allowed = float(str(caught.value).split("coordinates of at most ")[1].split(" m")[0])
     assert 1e3 < allowed < 1e4
-    validated(moved(load("case_a")[0], allowed - 13.0))
+    validated(moved(load("case_a"), allowed - 13.0))
     with pytest.raises(ScenarioError):
-        validated(moved(load("case_a")[0], 1.001 * allowed))
-    validated(moved(load("case_a", {"control.avoidance_gain_1_s": 0.0, "duration_s": 1e4})[0], 1e7))
+        validated(moved(load("case_a"), 1.001 * allowed))
+    validated(moved(load("case_a", {"control.avoidance_gain_1_s": 0.0, "duration_s": 1e4}), 1e7))
 
 
 @pytest.mark.parametrize(("key", "value"), [("duration_s", 1e5), ("control.avoidance_gain_1_s", 1e-6)])

@@ -45,7 +45,7 @@ def ends(model: Model, context: Context) -> list[Any]:
 
 @pytest.mark.parametrize("method", ["c", "d"])
 def test_a_cloned_context_goes_on_identically(method: str) -> None:
-    scenario = load("case_a")[0]
+    scenario = load("case_a")
     model = build_model(scenario, method)
     simulator = advanced(model.diagram, begun(model.diagram, scenario.seed), HALF_S)
     clone = simulator.get_context().Clone()
@@ -57,7 +57,7 @@ def test_a_cloned_context_goes_on_identically(method: str) -> None:
 
 
 def test_two_simulators_of_one_diagram_do_not_disturb_each_other() -> None:
-    scenario = load("case_a")[0]
+    scenario = load("case_a")
     model = build_model(scenario, "d")
     simulators = [advanced(model.diagram, begun(model.diagram, seed), HALF_S) for seed in (scenario.seed, 7)]
     for until in (16.0, 17.0, END_S):

@@ -57,7 +57,7 @@ def test_a_task_that_asks_for_no_velocity_or_moves_robots_is_stopped(
         def velocity(self, position: Array) -> Any:
             return does({**self.given, "own": position})
 
-    case_a = load("case_a")[0]
+    case_a = load("case_a")
     controller = UavController(make_world(case_a), make_avoidance(case_a), gain=1.0, altitude=2.0, task=Odd)
     with pytest.raises(error, match=said):
         controller.velocity(0.0, np.zeros((3, 3)), np.zeros((2, 3)))
@@ -73,6 +73,6 @@ def test_a_robot_that_is_nowhere_ends_the_run() -> None:
         builder.ExportInput(sink.get_input_port())
         return builder.Build()
 
-    simulator = Simulator(build_diagram(load("case_a")[0], "d", plants=lost))
+    simulator = Simulator(build_diagram(load("case_a"), "d", plants=lost))
     with pytest.raises(PluginError, match="positions are not finite"):
         simulator.AdvanceTo(1.0)

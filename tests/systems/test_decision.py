@@ -161,7 +161,7 @@ def test_events_are_those_of_the_replay(seed: int, zeta: float, share: float, dw
 
 def test_what_is_above_the_threshold_at_the_start_is_intervened_on_at_the_first_tick() -> None:
     """The trigger comes before the planner's first update, not with the first step after it."""
-    scenario = load(pathlib.Path(__file__).parents[2] / "benchmarks/mutation/crowd.yaml")[0]
+    scenario = load(pathlib.Path(__file__).parents[2] / "benchmarks/mutation/crowd.yaml")
     proposals = simulate(scenario, "b").proposals
     assert proposals["issued_s"].min() == 0.0
 
@@ -193,7 +193,7 @@ def of_kind(trace: Trace, kind: str) -> list[float]:
 
 
 def test_a_decision_block_that_returns_0_triggers_nothing_and_does_not_pass_for_15() -> None:
-    trace = simulate(load("case_a", {"duration_s": 15.0})[0], "b", decision_block=Silent)
+    trace = simulate(load("case_a", {"duration_s": 15.0}), "b", decision_block=Silent)
     assert of_kind(trace, "trigger") == []
     assert trace.meta["decision_block"] == "Silent"
     finding = judge("THR-TRIG", trace)
@@ -208,13 +208,13 @@ def test_a_subclass_of_the_built_in_block_has_its_own_say() -> None:
         def value(self, t: float, parts: Array) -> Array:
             return np.zeros(len(parts))
 
-    trace = simulate(load("case_a", {"duration_s": 15.0})[0], "b", decision_block=Nothing)
+    trace = simulate(load("case_a", {"duration_s": 15.0}), "b", decision_block=Nothing)
     assert of_kind(trace, "trigger") == []
     assert not trace.column("ugv1.decision_variable_m").any()
 
 
 def test_a_recorded_signal_drives_the_trigger_and_its_crossings_are_isolated() -> None:
-    scenario = load("case_a", {"duration_s": 5.0, "decision.release_m": 1.0})[0]
+    scenario = load("case_a", {"duration_s": 5.0, "decision.release_m": 1.0})
     trace = simulate(scenario, "b", decision_block=Played)
     ugvs = len(trace.ugvs)
     assert of_kind(trace, "trigger") == pytest.approx([scenario.decision.threshold.zeta_m / 2.0] * ugvs, abs=2e-6)
@@ -226,7 +226,7 @@ def test_a_recorded_signal_drives_the_trigger_and_its_crossings_are_isolated() -
 
 def test_a_decision_block_without_a_range_is_refused() -> None:
     with pytest.raises(PluginError, match=r"the decision block has output ports of sizes .*'decision_range': 4"):
-        build_diagram(load("case_a")[0], decision_block=lambda bodies, presets: PassThrough(len(bodies.names("ugv"))))
+        build_diagram(load("case_a"), decision_block=lambda bodies, presets: PassThrough(len(bodies.names("ugv"))))
 
 
 def test_where_rounding_keeps_an_event_from_being_isolated_the_run_ends_with_the_reason() -> None:

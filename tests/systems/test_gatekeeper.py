@@ -182,7 +182,7 @@ def test_gains_changed_in_a_context_count_in_the_prediction(run: str) -> None:
     gains = {"avoidance_gain_1_s": 2.0, "motion_gain_1_s": 1.0, "intervention_gain_1_s": 3.0}
     decided = []
     for changed in (True, False):
-        scenario = load("case_b", () if changed else [f"control.{name}={value}" for name, value in gains.items()])[0]
+        scenario = load("case_b", () if changed else [f"control.{name}={value}" for name, value in gains.items()])
         model = build_model(scenario, scenario.runs[run].method, disturbed=False)
         simulator = Simulator(model.diagram)
         context = simulator.get_mutable_context()

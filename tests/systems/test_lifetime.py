@@ -12,7 +12,7 @@ from airground_drake.scenarios.load import load
 
 @pytest.mark.parametrize("run", ["b", "c", "d"])
 def test_a_recorder_is_freed_with_all_its_systems(run: str) -> None:
-    recorder = Recorder(load("case_a", {"duration_s": 0.2})[0], run)
+    recorder = Recorder(load("case_a", {"duration_s": 0.2}), run)
     recorder.simulate()
     systems = [*_within(recorder._root)]
     assert len(systems) > 15

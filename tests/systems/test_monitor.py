@@ -41,14 +41,14 @@ def watched(
 
 @pytest.mark.parametrize(("name", "method"), [("case_a", "a"), ("case_b", "c"), ("case_b", "d")])
 def test_it_is_silent_on_honest_runs(name: str, method: str) -> None:
-    assert watched(load(name)[0], method)[0] is None
+    assert watched(load(name), method)[0] is None
 
 
 @pytest.mark.parametrize(("name", "method"), [("case_b", "b"), ("soft_gate", "c")])
 def test_it_finds_what_safe_hyp_finds_and_can_end_the_simulation_there(
     run: Callable[[str, str], Trace], name: str, method: str
 ) -> None:
-    scenario = load(name)[0]
+    scenario = load(name)
     found, status = watched(scenario, method, terminate=True)
     finding = verify(run(name, method), ["SAFE-HYP"])[0].finding
     assert finding.status == "refuted"
@@ -76,7 +76,7 @@ def test_it_finds_what_safe_hyp_finds_and_can_end_the_simulation_there(
 def test_another_parameter_than_the_scenarios_is_a_violation(
     part: str, key: str, factor: float, expected: tuple[Rule, int]
 ) -> None:
-    honest, built = load("case_b")[0], load("case_b")[0]
+    honest, built = load("case_b"), load("case_b")
     setattr(getattr(built, part), key, factor * getattr(getattr(built, part), key))
     found, _ = watched(built, "d", honest)
     assert found is not None
@@ -94,7 +94,7 @@ def test_another_parameter_than_the_scenarios_is_a_violation(
 )
 def test_it_can_be_wired_into_any_diagram(command: list[float], rule: Rule | None, robot: int) -> None:
     """Without laws, with only positions and commands connected."""
-    scenario = load("case_a")[0]
+    scenario = load("case_a")
     builder = DiagramBuilder()
     world = make_world(scenario)
     monitor = builder.AddSystem(Monitor(world, components.make_avoidance(scenario)))

@@ -13,7 +13,7 @@ from airground_drake.scenarios.load import load
 from airground_drake.systems.diagram import Model, build_model
 from airground_drake.verify.judge import verify
 
-SCENARIO = load("case_a", ["duration_s=1.0"])[0]
+SCENARIO = load("case_a", ["duration_s=1.0"])
 
 
 def prepared() -> tuple[Model, Context]:
@@ -48,14 +48,14 @@ def test_what_the_controllers_ran_with_is_read_from_the_context_and_refutes_safe
 
 
 def test_the_threshold_in_a_context_is_the_one_that_triggers() -> None:
-    scenario = load("case_a")[0]
+    scenario = load("case_a")
     model = build_model(scenario, "b")
     context = begun(model.diagram, scenario.seed)
     levels = model.trigger.mutable_levels(model.trigger.GetMyMutableContextFromRoot(context))
     levels.zeta_m, levels.release_m = 2.0, 1.0
     simulator = advanced(model.diagram, context, 15.0)
     status = model.diagram.GetOutputPort("status").Eval(simulator.get_context()).reshape(-1, 4)
-    lower = load("case_a", ["decision.threshold.zeta_m=2.0", "decision.release_m=1.0"])[0]
+    lower = load("case_a", ["decision.threshold.zeta_m=2.0", "decision.release_m=1.0"])
     triggers = [e["t_s"] for e in simulate(lower, "b").events if e["kind"] == "trigger"]
     assert status[:, 2].max() == triggers[-1] > triggers[0] == 0.0
     assert read_back(model, simulator.get_context())["zeta_m"] == 2.0

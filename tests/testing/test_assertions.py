@@ -87,8 +87,8 @@ def test_a_claim_that_says_nothing_about_the_run_is_no_pass(stuck: Trace) -> Non
 
 
 def test_claims_about_the_model() -> None:
-    assert_proved(load("minimal")[0], "SAFE-INV", set={"duration_s": 5})
+    assert_proved(load("minimal"), "SAFE-INV", set={"duration_s": 5})
     with pytest.raises(ClaimError, match=r"ZENO-PROOF is refuted, for minimal\n  claim: Triggers i < j"):
         assert_proved("minimal", "ZENO-PROOF", set={"decision.min_inter_event_s": 0.0})
     with pytest.raises(ScenarioError, match="from 1e-09"):
-        assert_proved(load("minimal")[0], "SAFE-INV", set={"control.period_s": 0.0})
+        assert_proved(load("minimal"), "SAFE-INV", set={"control.period_s": 0.0})

@@ -26,12 +26,12 @@ def test_a_run_is_simulated_once_however_it_is_named(
 ) -> None:
     first = airground_trace("minimal", "a", set=SHORT)
     monkeypatch.setattr(simulation, "simulate", None)
-    file, scenario = tmp_path / "mine.yaml", load("minimal", SHORT)[0]
+    file, scenario = tmp_path / "mine.yaml", load("minimal", SHORT)
     file.write_bytes((Path(simulation.__file__).parents[1] / "scenarios" / "minimal.yaml").read_bytes())
     assert airground_trace("minimal", "a", set=["duration_s=0.1"]) is first
     assert airground_trace(file, "a", set=SHORT) is first
     assert airground_trace(scenario, "a") is first
-    for other in (load("minimal", {**SHORT, "seed": 1})[0], scenario):
+    for other in (load("minimal", {**SHORT, "seed": 1}), scenario):
         scenario.duration_s = 0.05
         with pytest.raises(TypeError):  # another run would have to be simulated
             airground_trace(other, "a")

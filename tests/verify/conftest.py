@@ -20,7 +20,7 @@ def judged() -> Judged:
 
     Tests that patch something must judge themselves.
     """
-    case_a = load("case_a")[0]
+    case_a = load("case_a")
     made: dict[tuple[str, str], Finding] = {}
 
     def get(claim: ModelClaim, inputs: dict[str, Any] | None = None) -> Finding:

@@ -34,7 +34,7 @@ IDLE = [
 
 @pytest.fixture(scope="module")
 def idle() -> dict[str, Verdict]:
-    scenario = load("dwell", IDLE)[0]
+    scenario = load("dwell", IDLE)
     return {verdict.claim.id: verdict for name in scenario.runs for verdict in verify(simulate(scenario, name))}
 
 
@@ -114,7 +114,7 @@ def test_exercised_is_established_on_something(expected: str, status: Any, count
 def test_an_expectation_that_admits_either_verdict_expects_nothing() -> None:
     for expected in ("holds or refuted", "exercised or refuted", "refuted or supported or error", NOTHING):
         assert declared(expected) == NOTHING
-        run = load("minimal", [f"runs.d.expected.LIVE-GOAL={expected}"])[0].runs["d"]
+        run = load("minimal", [f"runs.d.expected.LIVE-GOAL={expected}"]).runs["d"]
         assert run.expected["LIVE-GOAL"] == NOTHING
     for expected in ("holds", "refuted", "holds or supported", "refuted or error"):
         assert declared(expected) == expected

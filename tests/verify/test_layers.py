@@ -70,7 +70,7 @@ def test_judging_loads_no_drake() -> None:
         "from airground_drake.registry import MODEL_CLAIMS; "
         "from airground_drake.verify.registry import run_claims; run_claims(); "
         "ids = [name for name in MODEL_CLAIMS if name != 'ZENO-REFINE']; "
-        "verify_model(load('case_a')[0], claims=ids); print('pydrake' in sys.modules)"
+        "verify_model(load('case_a'), claims=ids); print('pydrake' in sys.modules)"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "False"

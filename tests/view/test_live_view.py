@@ -26,7 +26,7 @@ def shown(meshcat: Meshcat, k: int) -> list[bool]:
 
 
 def test_the_run_is_the_same_and_the_robots_are_where_it_ends() -> None:
-    scenario, _ = load("case_a", ["duration_s=15.0"])
+    scenario = load("case_a", ["duration_s=15.0"])
     meshcat = served()
     watched = simulate(scenario, "d", observers=[LiveView(meshcat, scenario)])
     pd.testing.assert_frame_equal(watched.states, simulate(scenario, "d").states, check_exact=True)

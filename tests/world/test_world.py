@@ -88,7 +88,7 @@ def test_no_point_of_two_motions_is_nearer_than_the_least_distance(
 
 def test_a_plant_that_leaves_the_straight_line_costs_what_it_may_be_off(monkeypatch: pytest.MonkeyPatch) -> None:
     """SAFE-TRACE and the events of collisions ask the plant how robots move between the rows."""
-    trace = simulate(load("minimal", ["duration_s=4.0"])[0], "d")
+    trace = simulate(load("minimal", ["duration_s=4.0"]), "d")
     (straight,) = verify(trace, ["SAFE-TRACE"])
     least = {(p["first"], p["second"]): p["min_distance_m"] for p in straight.finding.evidence["pairs"]}
     monkeypatch.setattr(FirstOrder, "motion", lambda self, start, end, period_s: Motion(start, end, 2.0))

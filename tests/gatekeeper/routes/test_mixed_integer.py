@@ -218,7 +218,7 @@ def test_a_solver_that_is_not_here_is_refused(
 ) -> None:
     monkeypatch.setattr(gurobi, "there", there)
     monkeypatch.setattr(gurobi, "licensed", False)
-    scenario = load("swap", {"gatekeeper.solver": "gurobi"})[0]  # the file itself is good, and so are its reports
+    scenario = load("swap", {"gatekeeper.solver": "gurobi"})  # the file itself is good, and so are its reports
     with pytest.raises(ScenarioError, match=f"solver: 'gurobi' is not allowed; .*{why}; allowed here: daqp"):
         simulate(scenario, "c")
 

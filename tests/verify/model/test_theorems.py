@@ -18,7 +18,7 @@ from airground_drake.verify.runs.thr_trig import Levels, isolation
 CLAIMS: dict[str, TheoremClaim] = {
     name: claim for name in MODEL_CLAIMS if isinstance(claim := MODEL_CLAIMS.make(name, of=ModelClaim), TheoremClaim)
 }
-INPUTS = {name: claim.inputs(load("case_a")[0]) for name, claim in CLAIMS.items()}
+INPUTS = {name: claim.inputs(load("case_a")) for name, claim in CLAIMS.items()}
 LAYER = ("SAFE-INV", "SAFE-GATE")
 
 
@@ -31,7 +31,7 @@ def test_theorems_and_claims_name_each_other() -> None:
 @pytest.mark.parametrize("scenario", shipped())
 def test_shipped_scenarios_meet_all_hypotheses(scenario: str) -> None:
     for claim in CLAIMS.values():
-        inputs = claim.inputs(load(scenario)[0])
+        inputs = claim.inputs(load(scenario))
         assert json.loads(json.dumps(inputs, allow_nan=False)) == inputs
         finding = claim.judge(inputs)
         assert finding.status == "proved", (claim.id, finding)
@@ -120,6 +120,6 @@ def test_numbers_that_follow() -> None:
     assert found["ZENO-PROOF"].most_triggers == 61
     assert found["LIVE-WAIT"].bound_s == 5 * (30.0 + 0.05)
     assert found["SAFE-DIST"].least_distances_of_centres_m == {"obstacle": 1.75, "uav_ugv": 0.5, "ugv_ugv": 1.5}
-    scenario = load("case_a", ["uav.radius_m=0.25", "obstacles.obstacle_1.radius_m=0.1"])[0]
+    scenario = load("case_a", ["uav.radius_m=0.25", "obstacles.obstacle_1.radius_m=0.1"])
     safe = {(each["kind"], each["distance_of_centres_m"]) for each in CLAIMS["SAFE-INV"].inputs(scenario)["pairs"]}
     assert {("obstacle", 2.35), ("obstacle", 2.0), ("uav_ugv", 1.25)} <= safe  # both radii: the farthest, the nearest

@@ -60,7 +60,7 @@ def test_a_uav_with_another_task_is_not_judged(case_a: Any) -> None:
 
 
 def test_stages_of_several_control_periods_hold() -> None:
-    trace = simulate(load("case_a", ["gatekeeper.stages=20", "duration_s=16.0", "reproduction=[]"])[0], "c")
+    trace = simulate(load("case_a", ["gatekeeper.stages=20", "duration_s=16.0", "reproduction=[]"]), "c")
     assert held("GATE-MODEL", trace)["decisions"] > 5
     assert held("GATE-MODEL", trace)["farthest_from_predicted"]["away_m"] > 0.0
 
@@ -71,7 +71,7 @@ def test_a_queue_along_an_axis_is_squeezed_and_holds() -> None:
 
     Each is in contact with two others: predicted to be pushed by both, it may leap for kilometres.
     """
-    data = resolved(load("minimal")[0])
+    data = resolved(load("minimal"))
     ends = [([-6.0 - 3.0 * i, 1e-9 * (-1) ** i, 0.0], [14.0 - 3.0 * i, 0.0, 0.0]) for i in range(7)]
     data["ugvs"] = {
         f"u{i}": {
@@ -93,7 +93,7 @@ def test_a_queue_along_an_axis_is_squeezed_and_holds() -> None:
 
 def test_the_nearest_obstacles_of_an_endless_map_count() -> None:
     assert outcome_gatekeeper.MOST_CLAIMED == beginnings.MOST_CLAIMED == 64
-    scenario = load("case_a", ["duration_s=15.5", "reproduction=[]", "choices=[]"])[0]
+    scenario = load("case_a", ["duration_s=15.5", "reproduction=[]", "choices=[]"])
     scenario.intervention.policies = [Policy("towards", {"x_m": 6.0, "y_m": 5.0, "speed_m_s": 2.0})]
     scenario.uav.phantoms_m = [[float(x), float(y), 0.0] for x in range(10, 20) for y in range(0, 20, 2)]
     trace = simulate(scenario, "d")
@@ -104,7 +104,7 @@ def test_the_nearest_obstacles_of_an_endless_map_count() -> None:
 
 
 def test_a_ugv_goes_along_as_often_and_as_long_as_it_may() -> None:
-    trace = simulate(load("case_b", PATIENCE)[0], "d")
+    trace = simulate(load("case_b", PATIENCE), "d")
     assert {"over", "exhausted"} <= set(trace.decisions["reason"])
     for claim in ("GATE-MODEL", "GATE-PLAN", "EXEC", "COMM", "SAFE-TRACE"):
         held(claim, trace)

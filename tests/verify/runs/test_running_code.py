@@ -34,7 +34,7 @@ PATIENCE = ["gatekeeper.tries=1", "gatekeeper.longest_s=1.0", "gatekeeper.rest_s
 
 def judged(claim: str, run: str = "d", scenario: str = "case_b", given: Sequence[str] = ()) -> Finding:
     """The finding about a new run."""
-    return CLAIMS[claim].judge(simulation.simulate(load(scenario, list(given))[0], run))
+    return CLAIMS[claim].judge(simulation.simulate(load(scenario, list(given)), run))
 
 
 # ---------------------------------------------------------------------------------------------------- EXEC
@@ -270,7 +270,7 @@ def test_a_shorter_distance_between_robots_is_refuted_though_no_robots_come_near
 ) -> None:
     """This once passed every claim."""
     distances(0.9, "ugv")(monkeypatch)
-    scenario = load("case_b", ["duration_s=1.0"])[0]
+    scenario = load("case_b", ["duration_s=1.0"])
     for run in scenario.runs:
         trace, built = verify(simulation.simulate(scenario, run), ["SAFE-TRACE", "SAFE-HYP"])
         assert (trace.finding.status, built.finding.status) == ("holds", "refuted")

@@ -9,7 +9,7 @@ from airground_drake.scenarios.load import load
 from airground_drake.verify.model.levels import NUMBERS
 from airground_drake.verify.model.thr_root import ThrRoot
 
-TABLE_1: dict[str, Any] = ThrRoot().inputs(load("case_a")[0])
+TABLE_1: dict[str, Any] = ThrRoot().inputs(load("case_a"))
 
 
 def rule(name: str, zeta: float, *numbers: float) -> dict[str, Any]:

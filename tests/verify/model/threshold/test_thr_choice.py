@@ -48,7 +48,7 @@ def test_a_threshold_is_optimal_or_declared(
     ],
 )
 def test_shipped_scenarios(scenario: str, run: str, rule: str, in_force: float, extra: float) -> None:
-    verdicts = verify_model(load(scenario)[0], claims=["THR-CHOICE"])
+    verdicts = verify_model(load(scenario), claims=["THR-CHOICE"])
     (verdict,) = [each for each in verdicts if each.run == run]
     found = verdict.finding.evidence
     assert verdict.as_expected
@@ -72,7 +72,7 @@ def test_runs_show_the_drift_and_the_noise_that_they_had(run: Callable[[str, str
 
 
 def test_a_report_has_the_runs_beside_the_numbers_of_the_rule(run: Callable[[str, str], Trace]) -> None:
-    scenario = load("bayes_threshold")[0]
+    scenario = load("bayes_threshold")
     verdicts = verify_all(scenario, [run("bayes_threshold", name) for name in scenario.runs])
     found, printed = [verdict.finding.evidence for verdict in verdicts if verdict.claim.id == "THR-CHOICE"]
     assert (set(found.runs), set(printed.runs)) == ({"a ugv1", "d ugv1"}, {"d_printed ugv1"})
