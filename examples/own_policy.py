@@ -1,0 +1,33 @@
+"""A policy of one's own: the UAV asks the stuck UGV to go round on one side.
+
+    python examples/own_policy.py
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from airground_drake import Motion, Policy, load, simulate
+from airground_drake.intervention.policy import Observation
+from airground_drake.registry import POLICIES
+
+
+class Aside(Policy):
+    """A polyline that passes everything ahead at a distance, and ends at the target."""
+
+    def __init__(self, *, speed_m_s: float = 2.0, aside_m: float = 3.5) -> None:
+        """Speed, m/s, and how far it goes to the right, m."""
+        self.speed, self.aside = speed_m_s, aside_m
+
+    def propose(self, seen: Observation) -> Motion:
+        """Beside the UGV, beside its target, then its target."""
+        right = np.array([self.aside, 0.0, 0.0])
+        corners = [seen.position, seen.position + right, seen.target + right, seen.target]
+        return Motion.at_speed(np.array(corners), self.speed, start=seen.start)
+
+
+if __name__ == "__main__":
+    with POLICIES.adding("aside", Aside):
+        trace = simulate(load("minimal", {"intervention.policies": [{"name": "aside"}]}), "d")
+    for event in trace.events:
+        print(f"{event['t_s']:7.3f} s  {event['robot']:5}  {event['kind']}")
