@@ -1,12 +1,12 @@
 """Event-triggered UAV-to-UGV intervention on Drake, with verification reports.
 
-    from airground_drake import load, simulate
-    from airground_drake.verify import verify
+    from airground_drake import judge, load, simulate
 
     scenario = load("case_a")
-    verdicts = verify(simulate(scenario, "d"))
+    findings = judge(simulate(scenario, "d"))
 
-`build_diagram(scenario)` gives the Drake Diagram; `python -m airground_drake.report case_a` does everything.
+`build_diagram(scenario)` gives the Drake Diagram; `write_report(scenario, folder)` and
+`python -m airground_drake.report case_a` do everything.
 """
 
 from __future__ import annotations
@@ -24,41 +24,61 @@ if TYPE_CHECKING:
         TraceError,
         UnknownNameError,
     )
+    from airground_drake.geometry.motion import Motion
+    from airground_drake.intervention.policy import Policy, Proposal
+    from airground_drake.report.make import write_report
     from airground_drake.run.simulation import simulate
     from airground_drake.run.trace import Trace
     from airground_drake.scenarios.load import load
     from airground_drake.scenarios.schema import Scenario
     from airground_drake.systems.diagram import build_diagram
+    from airground_drake.verify.claim import TraceClaim
+    from airground_drake.verify.finding import Finding
+    from airground_drake.verify.judging import judge
     from airground_drake.view.plane import plot
 
 __all__ = [
     "AirgroundError",
+    "Finding",
+    "Motion",
     "PluginError",
+    "Policy",
+    "Proposal",
     "Scenario",
     "ScenarioError",
     "SimulationError",
     "Trace",
+    "TraceClaim",
     "TraceError",
     "UnknownNameError",
     "build_diagram",
+    "judge",
     "load",
     "plot",
     "simulate",
+    "write_report",
 ]
 
 _HOME = {
     "AirgroundError": "base.errors",
+    "Finding": "verify.finding",
+    "Motion": "geometry.motion",
     "PluginError": "base.errors",
+    "Policy": "intervention.policy",
+    "Proposal": "intervention.policy",
     "Scenario": "scenarios.schema",
     "ScenarioError": "base.errors",
     "SimulationError": "base.errors",
     "Trace": "run.trace",
+    "TraceClaim": "verify.claim",
     "TraceError": "base.errors",
     "UnknownNameError": "base.errors",
     "build_diagram": "systems.diagram",
+    "judge": "verify.judging",
     "load": "scenarios.load",
     "plot": "view.plane",
     "simulate": "run.simulation",
+    "write_report": "report.make",
 }
 
 

@@ -14,7 +14,7 @@ import argparse
 from airground_drake.run.simulation import simulate
 from airground_drake.scenarios.load import load
 from airground_drake.scenarios.shipped import shipped
-from airground_drake.verify import verify
+from airground_drake.verify import judge
 from airground_drake.verify.runs.followed import followed
 
 
@@ -29,8 +29,8 @@ def main() -> None:
         scenario = load(name)
         for run in scenario.runs:
             trace = simulate(scenario, run)
-            (verdict,) = verify(trace, ["SAFE-HYP"])
-            evidence, found = verdict.finding.evidence, followed(trace)
+            (verdict,) = judge(trace, ["SAFE-HYP"])
+            evidence, found = verdict.evidence, followed(trace)
             met = sum(one.met for one in found)
             applies_to, accepted = applies_to + met, accepted + len(found)
             count = f"{met} of {len(found)}" if found else ""
@@ -42,7 +42,7 @@ def main() -> None:
                     f"{worst['first']}, {worst['second']} | {safe:.6g} | {worst['e_m']:.6g} | {safe - promised:.6g} | "
                 )
                 row += f"{promised:.6g}"
-            print(f"| {scenario.name} | {run} | {verdict.finding.status} | {row} | {count} |", flush=True)
+            print(f"| {scenario.name} | {run} | {verdict.status} | {row} | {count} |", flush=True)
     print(f"\nThe premise of LIVE-GATE was met by {applies_to} of {accepted} accepted interventions.")
 
 

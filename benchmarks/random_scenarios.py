@@ -39,7 +39,7 @@ from airground_drake.run.simulation import simulate
 from airground_drake.run.trace import Trace
 from airground_drake.scenarios.load import from_data, resolved
 from airground_drake.scenarios.schema import Scenario
-from airground_drake.verify import Verdict, verify
+from airground_drake.verify import Verdict, judge
 
 ALWAYS = ("ZENO-TRACE", "THR-TRIG", "EXEC")
 CERTIFIED = ("SAFE-TRACE", "SAFE-HYP")
@@ -226,8 +226,8 @@ def judged(number: int) -> Row:
         row.seconds = time.perf_counter() - started
     row.triggers, row.releases = (sum(e["kind"] == kind for e in of_run.events) for kind in ("trigger", "release"))
     row.decisions, row.accepted = len(of_run.decisions), int((of_run.decisions["decision"] == "accept").sum())
-    row.statuses = {verdict.claim.id: verdict.finding.status for verdict in verdicts}
-    row.margin_m = next(verdict.finding.margin for verdict in verdicts if verdict.claim.id == "SAFE-TRACE")
+    row.statuses = {verdict.claim.id: verdict.status for verdict in verdicts}
+    row.margin_m = next(verdict.margin for verdict in verdicts if verdict.claim.id == "SAFE-TRACE")
     return row
 
 
@@ -235,7 +235,7 @@ def tried(scenario: Scenario) -> tuple[Trace, list[Verdict], list[str]]:
     """The run of a scenario, its verdicts, and its faults."""
     (name,) = scenario.runs
     of_run = simulate(scenario, name)
-    verdicts = verify(of_run)
+    verdicts = judge(of_run)
     method = scenario.runs[name].method
     return of_run, verdicts, [*_claims(scenario, method, verdicts), *_checker(scenario, of_run, verdicts)]
 
@@ -245,12 +245,12 @@ def _claims(scenario: Scenario, method: str, verdicts: Sequence[Verdict]) -> lis
     wrong = []
     dwells = scenario.decision.trigger == "automaton" and scenario.decision.min_inter_event_s > 0.0
     for verdict in verdicts:
-        status, name = verdict.finding.status, verdict.claim.id
+        status, name = verdict.status, verdict.claim.id
         must = name in ALWAYS or (name in CERTIFIED and method == "d")
         must = must and not (name == "ZENO-TRACE" and not dwells)
         wrongly = status == "refuted" and name in NEVER_REFUTED
         if status == "error" or wrongly or (must and status != "holds"):
-            wrong.append(f"{name} {status}: {verdict.finding.counterexample or verdict.finding.evidence}"[:300])
+            wrong.append(f"{name} {status}: {verdict.counterexample or verdict.evidence}"[:300])
     return wrong
 
 

@@ -1,6 +1,6 @@
 """A claim of one's own about a run: what it states, how it is decided, and what it does not establish.
 
-    python examples/own_claim.py
+python examples/own_claim.py
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """One block in a diagram of one's own: the event trigger, driven by a sine, without a scenario.
 
-    python examples/own_diagram.py
+python examples/own_diagram.py
 """
 
 from __future__ import annotations

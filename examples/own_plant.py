@@ -1,6 +1,6 @@
 """A plant of one's own: motors that lag. The theorems are about robots that move as they are told, and do not apply.
 
-    python examples/own_plant.py
+python examples/own_plant.py
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """A policy of one's own: the UAV asks the stuck UGV to go round on one side.
 
-    python examples/own_policy.py
+python examples/own_policy.py
 """
 
 from __future__ import annotations

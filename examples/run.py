@@ -1,6 +1,6 @@
 """A run: simulate it, look at it, judge it.
 
-    python examples/run.py
+python examples/run.py
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """A sweep: one key of a scenario with several values, and what becomes of the run.
 
-    python examples/sweep.py
+python examples/sweep.py
 """
 
 from __future__ import annotations

@@ -31,7 +31,7 @@ from airground_drake.run.simulation import simulate
 from airground_drake.run.trace import Trace
 from airground_drake.scenarios.load import load, validated
 from airground_drake.scenarios.schema import Policy, Run, Scenario
-from airground_drake.verify import verify
+from airground_drake.verify import judge
 from airground_drake.view.stage import stage
 from airground_drake.world.world import World
 
@@ -52,7 +52,7 @@ def scenario(*, points: bool = False) -> Scenario:
 
 
 def statuses(trace: Trace) -> dict[str, str]:
-    return {verdict.claim.id: verdict.finding.status for verdict in verify(trace)}
+    return {verdict.claim.id: verdict.status for verdict in judge(trace)}
 
 
 @pytest.fixture(scope="module")
@@ -66,9 +66,9 @@ def test_bodies_move_as_points_that_keep_as_much_more(bodies: Trace) -> None:
     assert bodies.decisions.equals(points.decisions)
     assert bodies.events == points.events
     assert "accept" in set(bodies.decisions["decision"])
-    for one, other in zip(verify(bodies), verify(points), strict=True):
-        assert (one.finding.status, one.finding.margin) == (other.finding.status, other.finding.margin)
-        assert one.finding.status in ("holds", "refuted" if one.claim.id == "LIVE-GOAL" else "holds")
+    for one, other in zip(judge(bodies), judge(points), strict=True):
+        assert (one.status, one.margin) == (other.status, other.margin)
+        assert one.status in ("holds", "refuted" if one.claim.id == "LIVE-GOAL" else "holds")
 
 
 @pytest.mark.parametrize(("kind", "name"), [("ugvs", "ugv1"), ("obstacles", "rock")])
@@ -90,9 +90,9 @@ def test_a_pair_has_one_distance_wherever_users_see_it(ends_at: float, gap_m: fl
     given.intervention.policies = [Policy("towards", {"x_m": ends_at, "y_m": 0.0, "speed_m_s": 1.0})]
     given = validated(given)
     trace, required_m = simulate(given, "b"), given.safe_distance.obstacle_m
-    traces, found = {"b": trace}, verify(trace)
+    traces, found = {"b": trace}, judge(trace)
     report = built(given, traces, found)
-    evidence = {verdict.claim.id: asdict(verdict.finding)["evidence"] for verdict in found}
+    evidence = {verdict.claim.id: asdict(verdict)["evidence"] for verdict in found}
     places = [pd.DataFrame(trace.position(name), columns=["x_m", "y_m", "z_m"]) for name in trace.robots]
     table = pd.concat([each.assign(t_s=trace.t, body=name) for each, name in zip(places, trace.robots, strict=True)])
     all_judged, _ = positions.judge(table, asdict(given))
@@ -187,7 +187,7 @@ def test_an_obstacle_is_there_from_the_control_sample_at_which_it_appears() -> N
 def test_where_it_appears_too_near_is_nobodys_doing() -> None:
     """It appears 0.8 m ahead, where 2 m are required: refuted with this reason, and the robot makes way at its gain."""
     trace = simulate(sudden(4.2), "d")
-    found = {verdict.claim.id: verdict.finding for verdict in verify(trace, ("SAFE-TRACE", "SAFE-HYP", "EXEC"))}
+    found = {verdict.claim.id: verdict for verdict in judge(trace, ("SAFE-TRACE", "SAFE-HYP", "EXEC"))}
     seen = found["SAFE-TRACE"].counterexample or {}
     assert (seen["t_s"], seen["min_distance_m"]) == pytest.approx((4.2, 0.8))
     assert seen["why"] == "rock appeared at 4.2 s this near to ugv1: nobody's doing"

@@ -19,7 +19,7 @@ from properties import examples
 from airground_drake.run import events
 from airground_drake.run.trace import Trace
 from airground_drake.scenarios.schema import Obstacle
-from airground_drake.verify import verify
+from airground_drake.verify import judge
 from airground_drake.world.motion import Motion
 from airground_drake.world.shape import Ball
 
@@ -85,9 +85,9 @@ def test_nothing_after_a_collision_counts() -> None:
     for trace, arrivals in ((hit, {"ugv1"}), (missed, {"uav"})):
         found = events.extract(trace)
         assert {event["robot"] for event in found if event["kind"] == "arrival"} == arrivals
-        (verdict,) = verify(with_meta(trace, events=found), ["LIVE-GOAL"])
-        worst = verdict.finding.counterexample or {}
-        assert verdict.finding.status == "refuted"
+        (verdict,) = judge(with_meta(trace, events=found), ["LIVE-GOAL"])
+        worst = verdict.counterexample or {}
+        assert verdict.status == "refuted"
         assert (worst["robot"], "collided_s" in worst) == (("uav", True) if arrivals == {"ugv1"} else ("ugv1", False))
 
 
@@ -97,7 +97,7 @@ def test_an_arrival_after_a_collision_is_none() -> None:
     trace = simulate(scenario, drive=lambda t: [[1.0, 0.0, 0.0], [0.0] * 3])
     found = events.extract(trace)
     assert [event["robot"] for event in found if event["kind"] == "arrival"] == ["uav"]
-    finding = verify(with_meta(trace, events=found), ["LIVE-GOAL"])[0].finding
+    finding = judge(with_meta(trace, events=found), ["LIVE-GOAL"])[0]
     assert finding.status == "refuted"
     assert finding.where["robot"] == "ugv1"
     assert finding.where["collided_s"] == pytest.approx(1.0 - trace.scenario.safe_distance.collision_m, abs=0.026)

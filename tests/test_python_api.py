@@ -24,7 +24,7 @@ from airground_drake.nsbc.tasks import PositionTask
 from airground_drake.scenarios.load import resolved, validated
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.systems.plant import first_order_plant
-from airground_drake.verify import verdicts_to_pandas, verify
+from airground_drake.verify import judge, verdicts_to_pandas
 
 
 @pytest.mark.parametrize(
@@ -209,9 +209,9 @@ def test_another_task_of_the_uav(case_a: Scenario) -> None:
 def test_a_table_that_changed_is_judged_anew(case_a: Scenario) -> None:
     case_a.duration_s = 1.0
     trace = simulate(case_a, "d")
-    assert verify(trace, claims=["SAFE-TRACE"])[0].finding.status == "holds"
+    assert judge(trace, claims=["SAFE-TRACE"])[0].status == "holds"
     trace.states["ugv1.x_m"] += 0.1 * trace.states["t_s"]  # a robot that disobeys
-    assert verify(trace, claims=["SAFE-TRACE"])[0].finding.status == "error"
+    assert judge(trace, claims=["SAFE-TRACE"])[0].status == "error"
 
 
 def test_traces_verdicts_scenarios_and_diagrams_as_tables_figures_and_in_a_notebook() -> None:
@@ -221,11 +221,11 @@ def test_traces_verdicts_scenarios_and_diagrams_as_tables_figures_and_in_a_noteb
     assert table["ugv1"]["x_m"].tolist() == trace.position("ugv1")[:, 0].tolist()
     assert (table.index.name, set(table.columns.get_level_values("robot"))) == ("t_s", set(trace.robots))
     assert "<td>trigger</td>" in notebook.trace_html(trace)
-    verdicts = verify(trace, ["SAFE-TRACE"])
+    verdicts = judge(trace, ["SAFE-TRACE"])
     assert "Does not establish" in notebook.verdict_html(verdicts[0])
     found = verdicts_to_pandas(verdicts)
     assert found.loc[0, ["claim", "run", "status"]].tolist() == ["SAFE-TRACE", "b", "holds"]
-    assert found.loc[0, "margin"] == verdicts[0].finding.margin
+    assert found.loc[0, "margin"] == verdicts[0].margin
     axes = Figure().subplots()
     assert plot(trace, axes) is axes
     drawn = {line.get_label(): line.get_xydata() for line in axes.get_lines()}

@@ -23,7 +23,7 @@ from airground_drake.run.simulation import Recorder, simulate
 from airground_drake.run.trace import Trace
 from airground_drake.scenarios.load import load, shipped
 from airground_drake.scenarios.schema import Preset, Run, Scenario, Uav, Ugv
-from airground_drake.verify import verify
+from airground_drake.verify import judge
 
 Runs = Callable[[str, str], Trace]
 FREED = ["release", "arrival"]
@@ -57,14 +57,14 @@ def test_ugv1_goes_through_what_the_paper_tells(
 @pytest.mark.parametrize("scenario", sorted(set(shipped()) - set(DEADLOCKS)))
 def test_every_run_has_the_verdicts_that_its_scenario_declares(run: Runs, scenario: str) -> None:
     for name in load(scenario).runs:
-        for verdict in verify(run(scenario, name)):
-            assert verdict.as_expected is not False, (name, verdict.claim.id, verdict.finding)
+        for verdict in judge(run(scenario, name)):
+            assert verdict.as_expected is not False, (name, verdict.claim.id, verdict)
 
 
 @pytest.mark.parametrize("name", ["case_a", "case_b"])
 def test_events_are_isolated_far_more_precisely_than_claims_ask_for(run: Runs, name: str) -> None:
-    (verdict,) = verify(run(name, "d"), ["THR-TRIG"])
-    found = {each["robot"]: each for each in verdict.finding.evidence["ugvs"]}["ugv1"]
+    (verdict,) = judge(run(name, "d"), ["THR-TRIG"])
+    found = {each["robot"]: each for each in verdict.evidence["ugvs"]}["ugv1"]
     assert len(found["events"]) == 2
     assert found["worst_time_difference_s"] < 1e-7
     assert times(run(name, "d"), "trigger")[0] % 0.05 > 1e-6
@@ -79,7 +79,7 @@ def test_same_seed_same_bytes_other_seed_other_trigger(case_a: Scenario, run: Ru
         assert len({(tmp_path / folder / name).read_bytes() for folder in ("one", "two", "three")}) == 1, name
     other = recorder.simulate(seed=7)
     assert times(other, "trigger")[0] != times(other_diagram, "trigger")[0]
-    assert all(verdict.as_expected for verdict in verify(other))
+    assert all(verdict.as_expected for verdict in judge(other))
 
 
 @pytest.mark.slow
@@ -155,7 +155,7 @@ def test_bare_trigger_chatters_where_the_automaton_does_not(case_a: Scenario) ->
     for case_a.decision.trigger in ("bare", "automaton"):
         of_run = simulate(case_a, "a")
         counts[case_a.decision.trigger] = len(times(of_run, "trigger"))
-        verdicts = {v.claim.id: v.finding.status for v in verify(of_run, ["THR-TRIG", "ZENO-TRACE"])}
+        verdicts = {v.claim.id: v.status for v in judge(of_run, ["THR-TRIG", "ZENO-TRACE"])}
         expected = "refuted" if case_a.decision.trigger == "bare" else "holds"
         assert verdicts == {"THR-TRIG": "holds", "ZENO-TRACE": expected}
     assert counts["bare"] > 2 * counts["automaton"]
@@ -180,8 +180,8 @@ def test_a_trace_survives_saving_and_a_changed_file_does_not(run: Runs, tmp_path
 
 def test_events_are_isolated_far_better_than_the_claims_ask(run: Runs) -> None:
     """Against Brent's method on the recorded signals; a hundredth of the accuracy would give 1e-8 s."""
-    (verdict,) = verify(run("dwell", "d"), ["THR-TRIG"])
-    (ugv,) = verdict.finding.evidence["ugvs"]
+    (verdict,) = judge(run("dwell", "d"), ["THR-TRIG"])
+    (ugv,) = verdict.evidence["ugvs"]
     assert len(ugv["events"]) > 3
     assert ugv["worst_time_difference_s"] < 1e-9
 
@@ -191,7 +191,7 @@ def test_claims_do_not_depend_on_the_periods(case_a: Scenario, period: float, no
     """Periods that are not binary fractions give steps of 1e-17 s; event times may coincide with samples."""
     case_a.control.period_s, case_a.decision.noise_period_s = period, noise_period
     of_run = simulate(case_a, "d")
-    assert {verdict.finding.status for verdict in verify(of_run)} == {"holds"}
+    assert {verdict.status for verdict in judge(of_run)} == {"holds"}
     assert times(of_run, "trigger")[0] == pytest.approx(14.45, abs=0.1)
 
 
@@ -202,15 +202,15 @@ def test_a_uav_without_a_target_of_its_own_arrives_where_its_task_leads() -> Non
         name="new", duration_s=12.0, runs={"a": Run("a")}, uav=Uav(start_m=[0.0, 2.0, 2.0]),
         ugvs={name: Ugv(start, end, Preset([start, end])) for name, (start, end) in ways.items()},
     )  # fmt: skip
-    (verdict,) = verify(simulate(scenario, "a"), ["LIVE-GOAL"])
-    assert verdict.finding.status == "holds"
+    (verdict,) = judge(simulate(scenario, "a"), ["LIVE-GOAL"])
+    assert verdict.status == "holds"
 
 
 def test_with_plants_of_ones_own_only_claims_about_any_plant_are_judged() -> None:
     """Motors that lag by 0.2 s: the trace names them, and a theorem about first-order robots says nothing."""
     made = simulate(load("minimal"), "d", plants=lagging)
     assert set(made.meta["plants"].values()) == {"pydrake.systems.primitives.LinearSystem"}
-    found = {verdict.claim.id: verdict.finding.status for verdict in verify(made)}
+    found = {verdict.claim.id: verdict.status for verdict in judge(made)}
     assert found.pop("ZENO-TRACE") == "holds"
     assert set(found.values()) == {"not_run"}
     assert simulate(load("minimal"), "d").meta["plants"] == {"ugv1": "first_order", "uav": "first_order"}

@@ -35,6 +35,6 @@ def whole(scenario: Scenario, verdicts: Sequence[Verdict]) -> list[dict[str, Any
     from airground_drake.audit.readings import reading_findings
     from airground_drake.audit.thresholds import threshold_findings
 
-    proofs = {verdict.claim.id: verdict.finding for verdict in verdicts if not verdict.run}
+    proofs = {verdict.claim.id: verdict for verdict in verdicts if not verdict.run}
     computed = [*threshold_findings(scenario, proofs), *formula_findings(scenario), *reading_findings(scenario)]
     return typeset([*computed, *companion_findings()])

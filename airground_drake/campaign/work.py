@@ -22,7 +22,7 @@ from airground_drake.run.trace import Trace
 from airground_drake.scenarios import plugins
 from airground_drake.scenarios.estimate import Limits, within
 from airground_drake.scenarios.schema import Scenario
-from airground_drake.verify import Verdict, verify
+from airground_drake.verify import Verdict, judge
 
 
 class DrawOutOfTime(BaseException):
@@ -115,7 +115,7 @@ def _rows_of_run(scenario: Scenario, run: str, claims: Collection[str], common: 
     started = time.perf_counter()
     try:
         trace = simulate(scenario, run)
-        verdicts = verify(trace, claims=claims or None)
+        verdicts = judge(trace, claims=claims or None)
     except (Exception, SystemExit) as error:
         return [common | {"ended": STOPPED, "what": described(error)}]
     common |= {"ended": JUDGED, "wall_s": time.perf_counter() - started, **_happened(trace)}
@@ -128,7 +128,7 @@ def died(index: int) -> list[Row]:
 
 
 def _of_claim(verdict: Verdict) -> Row:
-    finding = verdict.finding
+    finding = verdict
     return {
         "claim": verdict.claim.id,
         "status": finding.status,

@@ -25,7 +25,7 @@ from airground_drake.scenarios import plugins
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.systems import graphviz
 from airground_drake.systems.diagram import build_diagram, method_drawn
-from airground_drake.verify import Verdict, verify_all
+from airground_drake.verify import Verdict, judge_all
 from airground_drake.verify.registry import model_claims
 
 PACKAGES = ("airground_drake", "drake", "numpy", "scipy", "numba", "pandas", "matplotlib", "daqp")
@@ -68,7 +68,7 @@ def judge(
     """
     of_seeds = with_seeds(scenario, traces, seeds, progress) if seeds else ()
     figures = start_in_process(partial(draw, scenario, traces)) if drawn else list
-    verdicts = verify_all(scenario, traces.values(), kept=kept, progress=progress)
+    verdicts = judge_all(scenario, traces.values(), kept=kept, progress=progress)
     findings = audit(scenario, traces, verdicts) if audit else ()
     return Judged(traces, verdicts, findings, figures(), of_seeds)
 

@@ -36,7 +36,7 @@ class Wanted(NamedTuple):
     Attributes:
         formats: which of html, json and junit to write; traces and diagram are always written.
         command: how to make this report again.
-        kept: folder of kept findings about the model, see `verify_model`; None: everything anew.
+        kept: folder of kept findings about the model, see `judge_model`; None: everything anew.
         audit: makes the findings about the paper; None: there are none.
         audited: whether these are all findings, so that each must be demonstrated.
         limits: what the scenario may ask for.
@@ -53,7 +53,7 @@ class Wanted(NamedTuple):
 
 
 def write_report(
-    scenario: Scenario, output: Path, wanted: Wanted | None = None, progress: Progress = SILENT
+    scenario: Scenario, output: Path | str, wanted: Wanted | None = None, progress: Progress = SILENT
 ) -> dict[str, Any]:
     """Simulate every run, judge it, and write everything to a folder.
 
@@ -72,7 +72,7 @@ def write_report(
         PluginError: if the scenario names a policy, route or task that cannot be made.
         OSError: if something cannot be written, after all.
     """
-    wanted = Wanted() if wanted is None else wanted
+    wanted, output = Wanted() if wanted is None else wanted, Path(output)
     within(scenario, wanted.limits, 1 + wanted.seeds)
     started, clock = datetime.now(UTC), time.perf_counter()
     if scenario.claims:  # a claim that cannot be made is refused before the work

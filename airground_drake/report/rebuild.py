@@ -38,7 +38,7 @@ _NUMBER = re.compile(r"(-?\d+(?:\.\d+)?)")
 Line = dict[str, Any]
 """Keys `claim`, `run`, `outcome` and `text`; a difference has `rule`, `about`, `recorded` and `recomputed` besides."""
 Judge = Callable[[Any, Sequence[Any]], Sequence[Any]]
-"""From a scenario and its traces to verdicts, like `verify_all`."""
+"""From a scenario and its traces to verdicts, like `judge_all`."""
 
 
 def lines(folder: Path, judge: Judge | None = None) -> Iterator[Line]:
@@ -46,19 +46,19 @@ def lines(folder: Path, judge: Judge | None = None) -> Iterator[Line]:
 
     Args:
         folder: of a report whose files are those that it names.
-        judge: judges the claims; default: `verify_all`, without its cache.
+        judge: judges the claims; default: `judge_all`, without its cache.
 
     Raises:
         ScenarioError, TraceError, OSError: if a file cannot be used.
     """
     from airground_drake.run import trace
     from airground_drake.scenarios.load import from_data
-    from airground_drake.verify import verify_all
+    from airground_drake.verify import judge_all
 
     report = json.loads(files.read_text(folder / "report.json"))
     scenario = from_data(report["scenario"]["resolved"], str(folder / "report.json"))
     traces = {name: with_events(trace.load(folder / "trace" / name)) for name in scenario.runs}
-    again = document_again(report, scenario, traces, judge or verify_all)
+    again = document_again(report, scenario, traces, judge or judge_all)
     other_code = _other_code(report["provenance"])
     parts = [_with_note(line, other_code) for line in _parts(report, again, scenario.claims)]
     yield from parts
@@ -301,10 +301,10 @@ def print_lines(found: Callable[[Progress], Iterator[Line]], limit_s: str) -> in
 
 def main(arguments: Sequence[str]) -> int:
     """Print the lines of a report, see `print_lines`; the arguments are its folder and the limit, s."""
-    from airground_drake.verify import verify_all
+    from airground_drake.verify import judge_all
 
     folder, limit_s = arguments
-    return print_lines(lambda told: lines(Path(folder), partial(verify_all, progress=told)), limit_s)
+    return print_lines(lambda told: lines(Path(folder), partial(judge_all, progress=told)), limit_s)
 
 
 if __name__ == "__main__":

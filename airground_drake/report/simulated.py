@@ -32,7 +32,7 @@ from airground_drake.scenarios.load import from_data
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.systems import graphviz
 from airground_drake.systems.diagram import build_diagram, method_drawn
-from airground_drake.verify import verify, verify_model
+from airground_drake.verify import judge, judge_model
 from airground_drake.verify.registry import model_claims, run_claims
 
 Difference = tuple[str, Any, Any]
@@ -146,8 +146,8 @@ def _third_party(
     """The verdicts of the claims that the scenario adds, judged on the recorded runs."""
     about_runs = {each.id for each in run_claims(added=scenario.claims)} & {*scenario.claims}
     about_model = {each.id for each in model_claims(added=scenario.claims)} & {*scenario.claims}
-    verdicts = [verdict for run in traces.values() for verdict in verify(run, about_runs)] if about_runs else []
-    verdicts += verify_model(scenario, claims=about_model) if about_model else []
+    verdicts = [verdict for run in traces.values() for verdict in judge(run, about_runs)] if about_runs else []
+    verdicts += judge_model(scenario, claims=about_model) if about_model else []
     made = {
         (verdict.claim.id, verdict.run): json.loads(json.dumps(verdict.to_json() | {"rerun": ""}))
         for verdict in verdicts

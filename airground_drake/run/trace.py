@@ -64,7 +64,7 @@ class Trace:
     """One run.
 
     Values read from its tables are cached. To change a table, make another run with `dataclasses.replace`;
-    `verify` and `verify_all` read them anew.
+    `judge` and `judge_all` read them anew.
 
     Attributes:
         meta: strict JSON: `schema`, `run` (identifier), `method`, `composition`, `seed`, `robots`, `ugvs`

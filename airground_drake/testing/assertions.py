@@ -13,7 +13,7 @@ from airground_drake.scenarios.schema import Scenario
 from airground_drake.testing.scenario import chosen
 from airground_drake.testing.words import told
 from airground_drake.verify.claim import TraceClaim, Verdict
-from airground_drake.verify.judge import verify, verify_model
+from airground_drake.verify.judging import judge, judge_model
 
 
 class ClaimError(AssertionError):
@@ -52,8 +52,8 @@ def assert_holds(trace: Trace, *claims: str | TraceClaim, exercised: bool = Fals
     __tracebackhide__ = True
     named = [claim for claim in claims if isinstance(claim, str)]
     objects = [claim for claim in claims if not isinstance(claim, str)]
-    verdicts = verify(trace, named or None) if named or not claims else []
-    verdicts += [Verdict(claim, trace.run, claim.judge(trace), claim.expected) for claim in objects]
+    verdicts = judge(trace, named or None) if named or not claims else []
+    verdicts += [Verdict.of(claim, trace.run, claim.judge(trace), claim.expected) for claim in objects]
     place = f"run {trace.run} of {trace.scenario.name} (method {trace.meta['method']}, seed {trace.meta['seed']})"
     if silent := sorted(set(named) - {verdict.claim.id for verdict in verdicts}):
         raise ClaimError(f"{', '.join(silent)}: nothing is claimed about {place}")
@@ -82,7 +82,7 @@ def assert_proved(
     """
     __tracebackhide__ = True
     wanted = chosen(scenario, set)
-    _require(verify_model(wanted, kept=kept, claims=claims or None), f"for {wanted.name}", exercised=False)
+    _require(judge_model(wanted, kept=kept, claims=claims or None), f"for {wanted.name}", exercised=False)
 
 
 def _require(verdicts: Iterable[Verdict], place: str, *, exercised: bool) -> None:
@@ -90,10 +90,10 @@ def _require(verdicts: Iterable[Verdict], place: str, *, exercised: bool) -> Non
     __tracebackhide__ = True
     failed = []
     for verdict in verdicts:
-        passed = verdict.finding.status in PASSING
-        if not passed or (exercised and not verdict.finding.exercised):
+        passed = verdict.status in PASSING
+        if not passed or (exercised and not verdict.exercised):
             failed.append(verdict)
-        elif verdict.finding.exercised == 0:
+        elif verdict.exercised == 0:
             warnings.warn(NotExercisedWarning(told(verdict, place).partition("\n")[0]), stacklevel=3)
     if failed:
         raise ClaimError("\n".join(told(verdict, place) for verdict in failed), failed)

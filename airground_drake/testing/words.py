@@ -25,7 +25,7 @@ def told(verdict: Verdict, place: str) -> str:
 
     `place` is a phrase such as "on run d of case_a".
     """
-    claim, finding = verdict.claim, verdict.finding
+    claim, finding = verdict.claim, verdict
     lines = [f"{claim.id} {_found(verdict)}, {place}", f"  claim: {claim.statement}"]
     seen = finding.counterexample or finding.where
     if names := [str(seen[key]) for key in WHO if key in seen]:
@@ -44,7 +44,7 @@ def told(verdict: Verdict, place: str) -> str:
 
 
 def _found(verdict: Verdict) -> str:
-    finding = verdict.finding
+    finding = verdict
     if finding.status not in PASSING:
         return _FOUND[finding.status]
     by = verdict.claim.exercised_by

@@ -1,6 +1,6 @@
 """Claims about the model and about runs.
 
-`verify(trace)` judges a run from its trace alone. `verify_model(scenario)` checks the hypotheses of theorems for the
+`judge(trace)` judges a run from its trace alone. `judge_model(scenario)` checks the hypotheses of theorems for the
 constants of a scenario, or runs experiments. Claims about a run share no code with the controllers, the simulator and
 the optimiser that they judge.
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from airground_drake.verify.cache import cache_folder
     from airground_drake.verify.claim import Claim, ModelClaim, TraceClaim, Verdict
     from airground_drake.verify.finding import Finding
-    from airground_drake.verify.judge import verdicts_to_pandas, verify, verify_all, verify_model
+    from airground_drake.verify.judging import judge, judge_all, judge_model, verdicts_to_pandas
 
     MODEL_CLAIMS: tuple[ModelClaim, ...]
     TRACE_CLAIMS: tuple[TraceClaim, ...]
@@ -31,15 +31,15 @@ __all__ = [
     "TraceClaim",
     "Verdict",
     "cache_folder",
+    "judge",
+    "judge_all",
+    "judge_model",
     "verdicts_to_pandas",
-    "verify",
-    "verify_all",
-    "verify_model",
 ]
 
 _HOME = {
     "cache": ("cache_folder",),
-    "judge": ("verdicts_to_pandas", "verify", "verify_all", "verify_model"),
+    "judging": ("judge", "judge_all", "judge_model", "verdicts_to_pandas"),
     "claim": ("Claim", "ModelClaim", "TraceClaim", "Verdict"),
     "finding": ("Finding",),
 }

@@ -65,7 +65,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _line(verdict: Verdict) -> str:
     """A verdict in one line."""
-    finding = verdict.finding
+    finding = verdict
     name = f"{verdict.claim.id} {verdict.run}" if verdict.run else verdict.claim.id
     margin = "" if finding.margin is None else f", margin {finding.margin:.6g} {finding.unit}".rstrip()
     of = f" ({finding.quantity})" if margin and finding.quantity else ""
@@ -87,7 +87,7 @@ def _judge(target: str, wanted: Sequence[str], progress: Progress, *, allow_plug
     """
     from airground_drake.run import trace
     from airground_drake.scenarios.load import from_data, load
-    from airground_drake.verify import verify, verify_model
+    from airground_drake.verify import judge, judge_model
     from airground_drake.verify.registry import model_claims, run_claims
 
     folder = Path(target)
@@ -104,8 +104,8 @@ def _judge(target: str, wanted: Sequence[str], progress: Progress, *, allow_plug
         about_run = [name for name in about_run if run is not None and name in (wanted or about_run)]
         about_model = [name for name in about_model if name in (wanted or about_model)]
         progress.stage("judging", len(about_run) + len(about_model), "claims")
-        verdicts = [] if run is None else verify(run, about_run, progress)
-        return verdicts + verify_model(scenario, claims=about_model, progress=progress)
+        verdicts = [] if run is None else judge(run, about_run, progress)
+        return verdicts + judge_model(scenario, claims=about_model, progress=progress)
 
 
 if __name__ == "__main__":

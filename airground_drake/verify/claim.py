@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import abc
 import json
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from math import ceil
 from typing import Any, ClassVar
 
@@ -147,28 +147,34 @@ class TraceClaim(Claim):
         return finding
 
 
-@dataclass(frozen=True, repr=False)
-class Verdict:
-    """A claim and what was found.
+@dataclass(frozen=True, repr=False, kw_only=True)
+class Verdict(Finding):
+    """What was found of a claim, on a run or about the model.
 
     Attributes:
         claim: the claim.
         run: on which run; '' for a claim about the model.
-        finding: what was found.
         expected: the status that the scenario expects, `exercised`, or `nothing`.
         inputs: the constants that a claim about the model is about.
     """
 
     claim: Claim
     run: str
-    finding: Finding
     expected: str
     inputs: dict[str, Any] = field(default_factory=dict)
+
+    @classmethod
+    def of(
+        cls, claim: Claim, run: str, finding: Finding, expected: str, inputs: dict[str, Any] | None = None
+    ) -> Verdict:
+        """The finding, with what it is about."""
+        found = {each.name: getattr(finding, each.name) for each in fields(Finding)}
+        return cls(**found, claim=claim, run=run, expected=expected, inputs=inputs or {})
 
     def __repr__(self) -> str:
         """In one line: which claim, on which run, what was found."""
         about = f"run {self.run!r}" if self.run else "the model"
-        return f"<Verdict: {self.claim.id} on {about}: {outcome(self.finding.status, self.finding.exercised)}>"
+        return f"<Verdict: {self.claim.id} on {about}: {outcome(self.status, self.exercised)}>"
 
     @property
     def as_expected(self) -> bool | None:
@@ -176,7 +182,7 @@ class Verdict:
 
         None if nothing is expected.
         """
-        return meets(self.expected, self.finding.status, self.finding.exercised)
+        return meets(self.expected, self.status, self.exercised)
 
     def to_json(self) -> dict[str, Any]:
         """The entry of `claims` in report.json."""
@@ -189,7 +195,7 @@ class Verdict:
             "expected": self.expected,
             "as_expected": self.as_expected,
             "inputs": self.inputs,
-            **self.finding.to_json(),
+            **super().to_json(),
         }
 
 

@@ -58,7 +58,7 @@ class Finding:
 
     def to_json(self) -> dict[str, Any]:
         """All fields, with records as objects."""
-        return {name: _in_json(value) for name, value in vars(self).items()}
+        return {each.name: _in_json(getattr(self, each.name)) for each in fields(Finding)}
 
 
 def _in_json(value: Any) -> Any:

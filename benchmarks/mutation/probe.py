@@ -65,7 +65,7 @@ def runs(names: list[str]) -> Findings:
     from airground_drake.check.report import AGREES, check_report
     from airground_drake.report import document
     from airground_drake.run import trace
-    from airground_drake.verify import verify
+    from airground_drake.verify import judge
 
     found: Findings = []
     for name in names:
@@ -75,8 +75,8 @@ def runs(names: list[str]) -> Findings:
         except AirgroundError as error:
             found.append(["run", name, "stops", str(error)])
             continue
-        verdicts = verify(of_run)
-        found += [[v.claim.id, name, v.finding.status, ""] for v in verdicts]
+        verdicts = judge(of_run)
+        found += [[v.claim.id, name, v.status, ""] for v in verdicts]
         with tempfile.TemporaryDirectory() as there:
             folder = Path(there)
             trace.save(of_run, folder / "trace" / run)

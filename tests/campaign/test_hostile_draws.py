@@ -8,7 +8,7 @@ import pytest
 
 from airground_drake.campaign.spec import load_spec
 from airground_drake.run.simulation import simulate
-from airground_drake.verify import verify
+from airground_drake.verify import judge
 
 pytestmark = pytest.mark.slow
 
@@ -19,5 +19,5 @@ HOSTILE = Path(__file__).parents[2] / "benchmarks" / "campaigns" / "hostile.yaml
 def test_roll_outs_agree(index: int) -> None:
     """A UGV is squeezed between robots predicted in nearly one direction, or in nearly opposite ones."""
     trace = simulate(load_spec(HOSTILE).draw(index), "d")
-    for verdict in verify(trace, claims=["GATE-MODEL", "LIVE-PROG", "SAFE-TRACE"]):
-        assert verdict.finding.status == "holds", verdict.finding
+    for verdict in judge(trace, claims=["GATE-MODEL", "LIVE-PROG", "SAFE-TRACE"]):
+        assert verdict.status == "holds", verdict

@@ -21,7 +21,7 @@ from airground_drake.check.report import AGREES, RECORDED, Line
 from airground_drake.report import rebuild
 from airground_drake.run.trace import Trace
 from airground_drake.scenarios.schema import Scenario
-from airground_drake.verify import Verdict, judge, verify_all
+from airground_drake.verify import Verdict, judge, judge_all
 
 RUN, UGV = "d", "ugv1"
 """The run and the UGV that are forged unless others are named."""
@@ -156,7 +156,7 @@ _JUDGED: dict[str, Any] = {}
 
 
 def judged(scenario: Scenario, traces: Sequence[Trace]) -> list[Verdict]:
-    """As `verify_all`, but equal work is done once: most forgeries leave most runs as they are."""
+    """As `judge_all`, but equal work is done once: most forgeries leave most runs as they are."""
 
     def once(piece: Any) -> Any:
         key = joblib.hash((piece.func.__name__, piece.args))
@@ -166,4 +166,4 @@ def judged(scenario: Scenario, traces: Sequence[Trace]) -> list[Verdict]:
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(judge, "run_parallel", lambda pieces, **_: list(map(once, pieces)))
-        return verify_all(scenario, traces)
+        return judge_all(scenario, traces)

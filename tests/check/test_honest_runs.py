@@ -71,4 +71,4 @@ def test_a_proposal_at_the_very_beginning_is_not_one_too_many() -> None:
     trace, verdicts, wrong = tried(load("minimal", at_once))
     assert wrong == []
     assert len(trace.proposals) == 1
-    assert next(each.finding.status for each in verdicts if each.claim.id == "COMM") == "holds"
+    assert next(each.status for each in verdicts if each.claim.id == "COMM") == "holds"

@@ -10,7 +10,7 @@ from commands.conftest import Airground
 from airground_drake.commands import falsify as module
 from airground_drake.run.simulation import simulate
 from airground_drake.scenarios.load import load
-from airground_drake.verify import verify
+from airground_drake.verify import judge
 
 SPEC = """
 name: pushed
@@ -58,8 +58,8 @@ def test_a_violation_is_found_and_made_small(falsified: Airground, tmp_path: Pat
     assert "made small" in falsified("b", "--sampler", "halton", code=1)
     for name in ("found", "found_small"):
         scenario = load(tmp_path / f"{name}.yaml")
-        (verdict,) = verify(simulate(scenario, "b"), claims=["SAFE-TRACE"])
-        assert verdict.finding.status == "refuted"
+        (verdict,) = judge(simulate(scenario, "b"), claims=["SAFE-TRACE"])
+        assert verdict.status == "refuted"
     assert scenario.duration_s < 8.0
 
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 from builders.observations import mate, seen
-from verify.judging import judge
+from verify.judging import decided
 
 from airground_drake.geometry.motion import Motion
 from airground_drake.intervention import coordinate
@@ -32,7 +32,7 @@ from airground_drake.scenarios.schema import (
     Uav,
     Ugv,
 )
-from airground_drake.verify import verify
+from airground_drake.verify import judge
 
 BAY = [
     *((x, y) for x in np.arange(-14.0, 14.1, 1.4) for y in (-2.2, 2.2) if not (y > 0.0 and 3.0 < x < 8.0)),
@@ -228,7 +228,7 @@ def test_under_method_d_it_consents_because_it_gets_home_again() -> None:
     assert (first["accept_outcome_m2_s"] > first["refuse_outcome_m2_s"]).all()  # it has nothing to gain
     for ugv, target in (("parked", 2.0), ("comes", 12.0)):
         assert math.dist(of_run.position(ugv)[-1], (target, 0.0, 0.0)) < 0.1
-    for verdict in verify(of_run):
-        assert verdict.finding.status == "holds", verdict
+    for verdict in judge(of_run):
+        assert verdict.status == "holds", verdict
     own = of_run.proposals.assign(cause=of_run.proposals["robot"])
-    assert judge("LIVE-PROG", replace(of_run, proposals=own)).status in ("refuted", "error")
+    assert decided("LIVE-PROG", replace(of_run, proposals=own)).status in ("refuted", "error")

@@ -21,7 +21,7 @@ from airground_drake.registry import POLICIES
 from airground_drake.run.simulation import simulate
 from airground_drake.scenarios.schema import Policy as PolicyEntry
 from airground_drake.scenarios.schema import Scenario
-from airground_drake.verify import verify
+from airground_drake.verify import judge
 
 
 class Raises(Policy):
@@ -131,7 +131,7 @@ def test_no_wrong_policy_gets_past_method_d(case_a: Scenario, name: str, paramet
     case_a.duration_s = 20.0
     of_run = simulate(case_a, "d")
     assert "proposal" in kinds(of_run, "ugv1")
-    statuses = {v.claim.id: v.finding.status for v in verify(of_run)}
+    statuses = {v.claim.id: v.status for v in judge(of_run)}
     assert statuses["SAFE-TRACE"] == statuses["SAFE-HYP"] == "holds"
 
 

@@ -98,7 +98,7 @@ class Kept(TraceClaim):
 
 
 def verdict(run: str, status: Status = "holds", expected: str = "holds", **finding: Any) -> Verdict:
-    return Verdict(Kept(), run, Finding(status, **finding), expected)
+    return Verdict.of(Kept(), run, Finding(status, **finding), expected)
 
 
 ASKED = [event(14.6, "proposal"), event(14.6, "proposal", "ugv2")]

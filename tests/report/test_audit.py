@@ -15,7 +15,7 @@ from airground_drake.audit import companions, formulas, readings, thresholds
 from airground_drake.audit.typeset import typeset
 from airground_drake.decision import bayes
 from airground_drake.scenarios.load import load
-from airground_drake.verify import Finding, cache_folder, verify_model
+from airground_drake.verify import Finding, cache_folder, judge_model
 
 DOCS = Path(__file__).parent.parent.parent / "docs"
 FINDINGS = 25
@@ -35,7 +35,7 @@ def from_formulas(proofs: dict[str, Finding]) -> list[dict[str, Any]]:
 @pytest.fixture(scope="module")
 def proofs(report: Callable[[str], Path]) -> dict[str, Finding]:
     report("case_a")  # whose proofs these are
-    return {verdict.claim.id: verdict.finding for verdict in verify_model(load("case_a"), kept=cache_folder())}
+    return {verdict.claim.id: verdict for verdict in judge_model(load("case_a"), kept=cache_folder())}
 
 
 @pytest.fixture(scope="module")

@@ -85,7 +85,7 @@ def test_missing_data_is_listed(scenario: Scenario, traces: dict[str, Trace]) ->
         ("c", "the run has no trace"),
         ("a_printed", "no claim was checked on the run"),
     ]
-    other = Verdict(type("Other", (Kept,), {"id": "OTHER"})(), "a_printed", Finding("holds"), "holds")
+    other = Verdict.of(type("Other", (Kept,), {"id": "OTHER"})(), "a_printed", Finding("holds"), "holds")
     (item,) = built(scenario, traces, [*FINE[:2], other])["overall"]["missing"]
     assert (item["run"], item["id"]) == ("a_printed", "SAFE-TRACE")
     (item,) = built(replace(scenario, claims={"MINE": "m:M"}), traces, FINE)["overall"]["missing"]

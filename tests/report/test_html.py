@@ -66,7 +66,7 @@ def hostile_page() -> str:
     latex = (HOSTILE, rf"\text{{{HOSTILE}}} \href{{javascript:alert(1)}}{{x}}")
     claim = type("Hostile", (Kept,), {**texts, "latex": latex, "assumptions": (HOSTILE,)})
     finding = Finding("refuted", -1.0, HOSTILE, {HOSTILE: HOSTILE}, {"x": HOSTILE}, {HOSTILE: [HOSTILE]})
-    report = built(scenario, traces, [*FINE, Verdict(claim(), PLACEHOLDER, finding, "holds")])
+    report = built(scenario, traces, [*FINE, Verdict.of(claim(), PLACEHOLDER, finding, "holds")])
     figures = draw.draw(scenario, traces)
     report = json.loads(json.dumps(report).replace(PLACEHOLDER, HOSTILE))
     report["provenance"][HOSTILE] = report["provenance"]["command"] = HOSTILE

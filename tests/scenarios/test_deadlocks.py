@@ -11,7 +11,7 @@ from timeline import kinds
 from airground_drake.run.simulation import simulate
 from airground_drake.scenarios.load import load
 from airground_drake.systems.components import make_map, positions
-from airground_drake.verify import verify
+from airground_drake.verify import judge
 
 ROOM_M = 0.1
 
@@ -46,8 +46,8 @@ def test_under_method_d_everybody_arrives_and_every_claim_holds(name: str) -> No
     trace = simulate(load(name), "d")
     for ugv in trace.ugvs:
         assert kinds(trace, ugv)[-1] == "arrival"
-    for verdict in verify(trace):
-        assert verdict.as_expected, (verdict.claim.id, verdict.finding)
+    for verdict in judge(trace):
+        assert verdict.as_expected, (verdict.claim.id, verdict)
 
 
 def test_the_map_of_the_warehouse_is_wrong() -> None:

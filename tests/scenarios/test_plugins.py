@@ -18,7 +18,7 @@ from airground_drake.scenarios.plugins import admitted, plugins, refuse, without
 from airground_drake.scenarios.schema import Policy, Scenario
 from airground_drake.systems import graphviz
 from airground_drake.systems.diagram import build_diagram
-from airground_drake.verify import verify
+from airground_drake.verify import judge
 
 
 def test_all_that_can_be_named_is_looked_at(case_a: Scenario) -> None:
@@ -86,7 +86,7 @@ def test_code_of_others_is_found_beside_the_scenario_file_wherever_it_runs(tmp_p
     before = list(sys.path)
     with admitted(scenario, str(file), allow=True):
         trace = simulate_all(scenario)["d"]
-        assert [verdict.finding.status for verdict in verify(trace, ["OWN"])] == ["holds"]
+        assert [verdict.status for verdict in judge(trace, ["OWN"])] == ["holds"]
         twice = [POLICIES.load("tricks.py:Mine", of=policy.Policy) for _ in range(2)]
         assert twice[0] is twice[1]
     assert sys.path == before

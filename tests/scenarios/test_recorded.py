@@ -11,7 +11,7 @@ from scenarios.cases import edit
 
 from airground_drake.base.errors import TraceError
 from airground_drake.scenarios.load import from_data
-from airground_drake.verify import verify
+from airground_drake.verify import judge
 
 
 def test_a_trace_has_the_scenario_that_its_metadata_hold_and_makes_it_once() -> None:
@@ -32,4 +32,4 @@ def test_metadata_that_hold_no_scenario_are_refused_in_one_line(key: str, value:
     broken = replace(trace, meta=trace.meta | {"scenario": edit(trace.meta["scenario"], key, value)})
     with pytest.raises(TraceError, match=f"^run d: the scenario in its metadata: .*{says}[^\n]*$"):
         _ = broken.scenario
-    assert {each.finding.status for each in verify(broken)} == {"error"}
+    assert {each.status for each in judge(broken)} == {"error"}

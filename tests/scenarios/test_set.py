@@ -10,7 +10,7 @@ from airground_drake.report import document
 from airground_drake.run.simulation import simulate
 from airground_drake.scenarios.load import from_data
 from airground_drake.scenarios.schema import Scenario
-from airground_drake.verify import verify, verify_model
+from airground_drake.verify import judge, judge_model
 
 
 def with_run(settings: dict[str, float], expected: dict[str, str]) -> Scenario:
@@ -26,17 +26,17 @@ def test_a_run_is_simulated_judged_and_shown_with_what_it_sets() -> None:
     assert trace.column("one.noise_m").any()
     assert not simulate(scenario, "d").column("one.noise_m").any()
     assert trace.meta["scenario"]["decision"]["threshold"]["zeta_m"] == 3.0
-    (verdict,) = verify(trace, ["THR-TRIG"])
-    assert verdict.finding.status == "holds"
+    (verdict,) = judge(trace, ["THR-TRIG"])
+    assert verdict.status == "holds"
     shown: dict[str, Any] = document.build(scenario, {"other": trace}, [verdict], {})["runs"]["other"]
     assert shown["set"] == settings
     trace.meta["scenario"]["runs"]["other"]["set"]["decision.threshold.zeta_m"] = 2.5
-    assert verify(trace, ["THR-TRIG"])[0].finding.status == "error"  # another threshold
+    assert judge(trace, ["THR-TRIG"])[0].status == "error"  # another threshold
 
 
 def test_claims_about_the_model_are_judged_for_a_run_that_changes_their_constants() -> None:
     scenario = with_run({"decision.threshold.zeta_m": 2}, {"THR-CHOICE": "exercised"})
-    _, choice, other = verify_model(scenario, claims=["SAFE-INV", "THR-CHOICE"])
-    assert [each.finding.evidence.threshold_in_force_m for each in (choice, other)] == [3.0, 2.0]
+    _, choice, other = judge_model(scenario, claims=["SAFE-INV", "THR-CHOICE"])
+    assert [each.evidence.threshold_in_force_m for each in (choice, other)] == [3.0, 2.0]
     assert [(each.run, each.expected) for each in (choice, other)] == [("", "holds"), ("other", "exercised")]
     assert not other.as_expected  # it is declared

@@ -17,7 +17,7 @@ from airground_drake.report.reproduction import MEASURES
 from airground_drake.run.simulation import Recorder
 from airground_drake.run.trace import Trace
 from airground_drake.scenarios.load import load, shipped
-from airground_drake.verify import verify, verify_model
+from airground_drake.verify import judge, judge_model
 from airground_drake.verify.claim import Verdict
 
 SHORT = (("dwell", "a"), ("dwell", "d"), ("contact", "d"))
@@ -27,12 +27,12 @@ SHORT = (("dwell", "a"), ("dwell", "d"), ("contact", "d"))
 @pytest.fixture(scope="module")
 def verdicts(run: Callable[[str, str], Trace]) -> dict[str, dict[str, Verdict]]:
     """By `scenario run` and claim."""
-    judged = {f"{scenario} {name}": verify(run(scenario, name)) for scenario, name in SHORT}
+    judged = {f"{scenario} {name}": judge(run(scenario, name)) for scenario, name in SHORT}
     return {of: {verdict.claim.id: verdict for verdict in found} for of, found in judged.items()}
 
 
 def evidence(verdicts: dict[str, dict[str, Verdict]], of: str, claim: str) -> dict[str, Any]:
-    return verdicts[of][claim].finding.evidence
+    return verdicts[of][claim].evidence
 
 
 def test_every_claim_is_exercised_in_at_least_one_shipped_scenario(
@@ -41,11 +41,11 @@ def test_every_claim_is_exercised_in_at_least_one_shipped_scenario(
     assert {scenario for scenario, _ in SHORT} <= set(shipped())
     often: Counter[str] = Counter()
     for found in verdicts.values():
-        often.update({name: verdict.finding.exercised or 0 for name, verdict in found.items()})
+        often.update({name: verdict.exercised or 0 for name, verdict in found.items()})
     for claim in json.loads((report("case_b") / "report.json").read_text(encoding="utf-8"))["claims"]:
         often[claim["id"]] += claim["exercised"] or 0
-    choice, _ = verify_model(load("bayes_threshold"), claims=["THR-CHOICE"])  # the others declare their threshold
-    often["THR-CHOICE"] += choice.finding.exercised or 0
+    choice, _ = judge_model(load("bayes_threshold"), claims=["THR-CHOICE"])  # the others declare their threshold
+    often["THR-CHOICE"] += choice.exercised or 0
     assert [name for name in (*RUN_CLAIMS.own, *MODEL_CLAIMS.own) if not often[name]] == []
 
 
@@ -71,7 +71,7 @@ def test_the_spread_of_the_trigger_over_seeds_is_what_case_a_says() -> None:
 def test_every_transition_of_the_automaton_comes_up(of: str, verdicts: dict[str, dict[str, Verdict]]) -> None:
     due = evidence(verdicts, of, "THR-TRIG")["transitions_due"]
     assert due == {"trigger": 2, "release": 1, "refractory": 2, "resume": 1, "retrigger": 1}
-    assert verdicts[of]["ZENO-TRACE"].finding.margin == pytest.approx(0.0, abs=1e-9)  # as soon as it may be
+    assert verdicts[of]["ZENO-TRACE"].margin == pytest.approx(0.0, abs=1e-9)  # as soon as it may be
 
 
 def test_accepted_proposals_are_executed_where_inequalities_bind_and_where_none_does(

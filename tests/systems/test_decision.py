@@ -16,7 +16,7 @@ from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorC
 from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.primitives import Integrator, LogVectorOutput, PassThrough, TrajectorySource, ZeroOrderHold
 from pydrake.trajectories import PiecewisePolynomial
-from verify.judging import judge
+from verify.judging import decided
 
 from airground_drake.base.arrays import Array
 from airground_drake.base.errors import PluginError, SimulationError
@@ -196,10 +196,10 @@ def test_a_decision_block_that_returns_0_triggers_nothing_and_does_not_pass_for_
     trace = simulate(load("case_a", {"duration_s": 15.0}), "b", decision_block=Silent)
     assert of_kind(trace, "trigger") == []
     assert trace.meta["decision_block"] == "Silent"
-    finding = judge("THR-TRIG", trace)
+    finding = decided("THR-TRIG", trace)
     assert (finding.status, finding.exercised) == ("holds", 0)
     assert finding.evidence["ugvs"][0]["port_against_15"]["status"] == "not_run"
-    passed_off = judge("THR-TRIG", replace(trace, meta={**trace.meta, "decision_block": ""}))
+    passed_off = decided("THR-TRIG", replace(trace, meta={**trace.meta, "decision_block": ""}))
     assert passed_off.status == passed_off.evidence["ugvs"][0]["port_against_15"]["status"] == "refuted"
 
 
@@ -219,9 +219,9 @@ def test_a_recorded_signal_drives_the_trigger_and_its_crossings_are_isolated() -
     ugvs = len(trace.ugvs)
     assert of_kind(trace, "trigger") == pytest.approx([scenario.decision.threshold.zeta_m / 2.0] * ugvs, abs=2e-6)
     assert of_kind(trace, "release") == pytest.approx([3.5] * ugvs, abs=2e-6)
-    assert judge("THR-TRIG", trace).status == "holds"
+    assert decided("THR-TRIG", trace).status == "holds"
     late = [{**e, "t_s": e["t_s"] + 0.001 * (e["kind"] == "release")} for e in trace.events]
-    assert judge("THR-TRIG", replace(trace, meta={**trace.meta, "events": late})).status == "refuted"
+    assert decided("THR-TRIG", replace(trace, meta={**trace.meta, "events": late})).status == "refuted"
 
 
 def test_a_decision_block_without_a_range_is_refused() -> None:

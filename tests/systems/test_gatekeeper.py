@@ -26,7 +26,7 @@ from airground_drake.scenarios.load import load
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.systems import components
 from airground_drake.systems.diagram import build_model
-from airground_drake.verify.judge import verify
+from airground_drake.verify.judging import judge
 
 
 @dataclass
@@ -97,9 +97,9 @@ def test_a_route_cannot_change_the_problem_that_is_recorded(case_a: Scenario) ->
         trace = simulate(case_a, "c")
     assert any(honest["accept_m_s"][0])
     assert trace.problems["accept_m_s"][0] == honest["accept_m_s"][0]
-    (verdict,) = verify(trace, ["GATE-PLAN"])
-    assert verdict.finding.status == "refuted"
-    assert "positions are not those of (23)" in str(verdict.finding.counterexample)
+    (verdict,) = judge(trace, ["GATE-PLAN"])
+    assert verdict.status == "refuted"
+    assert "positions are not those of (23)" in str(verdict.counterexample)
 
 
 @dataclass
@@ -122,7 +122,7 @@ def test_a_failing_solver_withdraws_no_acceptance_and_is_recorded(case_a: Scenar
     case_a.gatekeeper.route = "failing"
     with ROUTES.adding("failing", FailingLater):
         trace = simulate(case_a, "c")
-        verdicts = verify(trace, ["GATE-PLAN"])
+        verdicts = judge(trace, ["GATE-PLAN"])
     decisions = trace.decisions
     failed = decisions[decisions["status"] == "solver_failed"]
     assert len(failed) == len(decisions) // 2 > 10
@@ -130,7 +130,7 @@ def test_a_failing_solver_withdraws_no_acceptance_and_is_recorded(case_a: Scenar
     assert metrics.of_run(trace)["gatekeeper"]["solver_failures"] == len(failed)
     constant = failed[["accept_throughout", "refuse_throughout"]].min(axis=1)
     assert (failed["objective"] <= constant * (1.0 + 1e-9)).all()
-    assert [(v.claim.id, v.finding.status) for v in verdicts] == [("GATE-PLAN", "holds")]
+    assert [(v.claim.id, v.status) for v in verdicts] == [("GATE-PLAN", "holds")]
 
 
 def test_after_a_failure_the_rest_of_the_plan_before_counts(case_a: Scenario, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -18,7 +18,7 @@ from airground_drake.scenarios.schema import Scenario
 from airground_drake.scenarios.world import make_world
 from airground_drake.systems import Monitor, Rule, Violation, components
 from airground_drake.systems.diagram import build_diagram, make_monitor
-from airground_drake.verify import verify
+from airground_drake.verify import judge
 
 
 def watched(
@@ -50,7 +50,7 @@ def test_it_finds_what_safe_hyp_finds_and_can_end_the_simulation_there(
 ) -> None:
     scenario = load(name)
     found, status = watched(scenario, method, terminate=True)
-    finding = verify(run(name, method), ["SAFE-HYP"])[0].finding
+    finding = judge(run(name, method), ["SAFE-HYP"])[0]
     assert finding.status == "refuted"
     assert finding.counterexample is not None
     assert found is not None

@@ -11,7 +11,7 @@ from systems.test_context import advanced, begun
 from airground_drake.run.simulation import read_back, simulate
 from airground_drake.scenarios.load import load
 from airground_drake.systems.diagram import Model, build_model
-from airground_drake.verify.judge import verify
+from airground_drake.verify.judging import judge
 
 SCENARIO = load("case_a", ["duration_s=1.0"])
 
@@ -38,13 +38,13 @@ def test_what_the_controllers_ran_with_is_read_from_the_context_and_refutes_safe
     trace = simulate(SCENARIO, "d")
     honest = read_back(model, context)
     assert {name: trace.meta[name] for name in honest} == honest
-    assert [v.finding.status for v in verify(trace, ["SAFE-HYP"])] == ["holds"]
+    assert [v.status for v in judge(trace, ["SAFE-HYP"])] == ["holds"]
     uav = model.controllers[1]
     uav.mutable_gains(uav.GetMyMutableContextFromRoot(context)).avoidance_gain_1_s = 2.9
     told = replace(trace, meta={**trace.meta, **read_back(model, context)})
-    (verdict,) = verify(told, ["SAFE-HYP"])
-    assert verdict.finding.status == "refuted"
-    assert [each["parameter"] for each in verdict.finding.evidence["different_parameters"]] == ["gain_1_s"]
+    (verdict,) = judge(told, ["SAFE-HYP"])
+    assert verdict.status == "refuted"
+    assert [each["parameter"] for each in verdict.evidence["different_parameters"]] == ["gain_1_s"]
 
 
 def test_the_threshold_in_a_context_is_the_one_that_triggers() -> None:

@@ -61,7 +61,7 @@ def test_a_refutation_says_who_when_and_what_was_needed(stuck: Trace) -> None:
 def test_an_undecided_claim_is_no_pass(stuck: Trace, status: str) -> None:
     with pytest.raises(ClaimError, match=r"FOUND (is inconclusive|could not be decided|was not decided)") as caught:
         assert_holds(stuck, Found(Finding(status, evidence={"reason": "no robots"})))  # type: ignore[arg-type]
-    assert [verdict.finding.status for verdict in caught.value.verdicts] == [status]
+    assert [verdict.status for verdict in caught.value.verdicts] == [status]
     assert "no robots" in str(caught.value)
 
 

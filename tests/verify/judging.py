@@ -31,6 +31,6 @@ LAW = {"EXEC"}
 """Claims about the control law, which the synthetic runs do not follow to the letter: see runs/test_running_code.py."""
 
 
-def judge(claim: str, trace: Trace) -> Finding:
+def decided(claim: str, trace: Trace) -> Finding:
     """One claim on one trace."""
     return CLAIMS[claim].judge(trace)

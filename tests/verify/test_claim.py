@@ -9,17 +9,17 @@ from typing import Any
 import pytest
 from builders.edits import bumped, dropped, rows, set_nan, with_meta, with_scenario
 from builders.runs import passing_by, run_of
-from verify.judging import CLAIMS, GATE, LAW, UNRECORDED, judge
+from verify.judging import CLAIMS, GATE, LAW, UNRECORDED, decided
 
 from airground_drake.run.trace import Trace, load, save
-from airground_drake.verify import Finding, verify
+from airground_drake.verify import Finding, judge
 from airground_drake.verify.finding import Failure
 
 
 @pytest.mark.parametrize("method", "abcd")
 def test_every_claim_holds_on_a_valid_run(method: str) -> None:
-    verdicts = {verdict.claim.id: verdict for verdict in verify(run_of(method))}
-    found = {name: verdict.finding.status for name, verdict in verdicts.items() if name not in LAW}
+    verdicts = {verdict.claim.id: verdict for verdict in judge(run_of(method))}
+    found = {name: verdict.status for name, verdict in verdicts.items() if name not in LAW}
     assert found == {name: UNRECORDED.get(method, {}).get(name, "holds") for name in found}
     ungated = {"LIVE-PROG", *GATE}
     left_out = {"a": {"COMM", *ungated}, "b": ungated, "c": {"LIVE-PROG"}, "d": set[str]()}[method]
@@ -31,12 +31,12 @@ def test_every_claim_holds_on_a_valid_run(method: str) -> None:
 def test_verdicts_survive_saving(run: Callable[[str, str], Trace], tmp_path: Any, name: str) -> None:
     trace = run("case_b", name)
     save(trace, tmp_path)
-    assert [v.finding for v in verify(load(tmp_path))] == [v.finding for v in verify(trace)]
+    assert [v.to_json() for v in judge(load(tmp_path))] == [v.to_json() for v in judge(trace)]
 
 
 def test_expected_status_is_the_scenarios() -> None:
     trace = with_scenario(run_of("a"), runs__a__expected={"SAFE-TRACE": "refuted"})
-    assert {v.claim.id for v in verify(trace) if not v.as_expected} - LAW == {"SAFE-TRACE"}
+    assert {v.claim.id for v in judge(trace) if not v.as_expected} - LAW == {"SAFE-TRACE"}
 
 
 BROKEN: dict[str, Callable[[Trace], Trace]] = {
@@ -56,7 +56,7 @@ BROKEN: dict[str, Callable[[Trace], Trace]] = {
 
 @pytest.mark.parametrize("name", BROKEN)
 def test_of_a_broken_trace_no_claim_passes(name: str) -> None:
-    found = {claim: judge(claim, BROKEN[name](run_of("d"))) for claim in CLAIMS}
+    found = {claim: decided(claim, BROKEN[name](run_of("d"))) for claim in CLAIMS}
     assert {f.status for f in found.values()} <= {"refuted", "not_run", "error"}, found
     assert all(f.evidence.error for f in found.values() if f.status == "error")
 
@@ -85,5 +85,5 @@ def test_a_check_that_fails_is_an_error(returned: Any, error: str) -> None:
 
 def test_half_a_run_can_refute_but_not_pass() -> None:
     cut = rows(lambda states: states[states["t_s"] < 0.8])
-    assert judge("SAFE-TRACE", cut(passing_by(-1e-3))).status == "refuted"
-    assert judge("SAFE-TRACE", cut(passing_by(+1e-3))).status == "error"
+    assert decided("SAFE-TRACE", cut(passing_by(-1e-3))).status == "refuted"
+    assert decided("SAFE-TRACE", cut(passing_by(+1e-3))).status == "error"

@@ -11,13 +11,13 @@ from typing import Any
 
 import pytest
 from builders.edits import with_meta, with_samples
-from verify.judging import CLAIMS, judge
+from verify.judging import CLAIMS, decided
 
 from airground_drake.base.statuses import NOTHING, declared, meets, outcome
 from airground_drake.run.simulation import simulate
 from airground_drake.run.trace import Trace
 from airground_drake.scenarios.load import load
-from airground_drake.verify import Finding, verify
+from airground_drake.verify import Finding, judge
 from airground_drake.verify.__main__ import main
 from airground_drake.verify.claim import Verdict, require_count
 
@@ -35,13 +35,13 @@ IDLE = [
 @pytest.fixture(scope="module")
 def idle() -> dict[str, Verdict]:
     scenario = load("dwell", IDLE)
-    return {verdict.claim.id: verdict for name in scenario.runs for verdict in verify(simulate(scenario, name))}
+    return {verdict.claim.id: verdict for name in scenario.runs for verdict in judge(simulate(scenario, name))}
 
 
 @pytest.mark.parametrize("claim", CLAIMS)
 def test_a_run_without_anything_to_check_exercises_no_claim(claim: str, idle: dict[str, Verdict]) -> None:
     """A claim that always says that it was exercised does not pass here."""
-    finding = idle[claim].finding
+    finding = idle[claim]
     assert (finding.status, finding.exercised) == ("holds", 0), finding
     assert outcome(finding.status, finding.exercised) == "not_exercised"
     assert idle[claim].as_expected
@@ -53,8 +53,8 @@ def test_a_run_with_several_triggers_and_proposals_exercises_every_claim(
     claim: str, run: Callable[[str, str], Trace]
 ) -> None:
     of = {"LIVE-PROG": ("contact", "d")}
-    (verdict,) = verify(run(*of.get(claim, ("dwell", "d"))), [claim])
-    count = verdict.finding.exercised
+    (verdict,) = judge(run(*of.get(claim, ("dwell", "d"))), [claim])
+    count = verdict.exercised
     assert count
     assert verdict.as_expected
     assert {"ZENO-TRACE": 2, "THR-TRIG": 7, "LIVE-GOAL": 2}.get(claim, count) == count
@@ -70,7 +70,7 @@ def without_messages(trace: Trace) -> Trace:
 
 @pytest.mark.parametrize("claim", ["COMM", "GATE-PLAN", "GATE-MODEL", "LIVE-PROG"])
 def test_where_the_uav_found_no_way_there_was_nothing_to_decide(claim: str, run: Callable[[str, str], Trace]) -> None:
-    found = judge(claim, without_messages(run("minimal", "d")))
+    found = decided(claim, without_messages(run("minimal", "d")))
     assert (found.status, found.exercised) == ("holds", 0)
 
 
@@ -108,7 +108,7 @@ def test_a_claim_that_says_what_exercises_it_must_count_it(
 )  # fmt: skip
 def test_exercised_is_established_on_something(expected: str, status: Any, count: int | None, met: bool | None) -> None:
     assert meets(expected, status, count) is met
-    assert Verdict(CLAIMS["COMM"], "d", Finding(status, exercised=count), expected).as_expected is met
+    assert Verdict.of(CLAIMS["COMM"], "d", Finding(status, exercised=count), expected).as_expected is met
 
 
 def test_an_expectation_that_admits_either_verdict_expects_nothing() -> None:

@@ -66,11 +66,11 @@ def test_what_runs_may_import_loads_nothing_that_is_judged() -> None:
 def test_judging_loads_no_drake() -> None:
     """Claims can be judged again where Drake is not installed."""
     code = (
-        "import sys; from airground_drake.scenarios.load import load; from airground_drake.verify import verify_model; "
+        "import sys; from airground_drake.scenarios.load import load; from airground_drake.verify import judge_model; "
         "from airground_drake.registry import MODEL_CLAIMS; "
         "from airground_drake.verify.registry import run_claims; run_claims(); "
         "ids = [name for name in MODEL_CLAIMS if name != 'ZENO-REFINE']; "
-        "verify_model(load('case_a'), claims=ids); print('pydrake' in sys.modules)"
+        "judge_model(load('case_a'), claims=ids); print('pydrake' in sys.modules)"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "False"

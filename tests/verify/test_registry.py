@@ -15,7 +15,7 @@ import airground_drake.verify
 from airground_drake.base.errors import PluginError, UnknownNameError
 from airground_drake.registry import MODEL_CLAIMS, RUN_CLAIMS
 from airground_drake.scenarios.schema import Scenario
-from airground_drake.verify import registry, verify, verify_model
+from airground_drake.verify import judge, judge_model, registry
 from airground_drake.verify.claim import Claim, ModelClaim, TraceClaim
 
 FOLDER = Path(airground_drake.verify.__file__).parent
@@ -40,17 +40,17 @@ def test_every_claim_is_in_the_file_of_its_name_is_registered_and_says_what_it_i
 
 
 def test_only_the_claims_asked_for_are_judged_in_the_order_of_the_report(case_a: Scenario) -> None:
-    asked = [verdict.claim.id for verdict in verify(run_of("d"), claims=["THR-TRIG", "SAFE-TRACE"])]
+    asked = [verdict.claim.id for verdict in judge(run_of("d"), claims=["THR-TRIG", "SAFE-TRACE"])]
     assert asked == ["SAFE-TRACE", "THR-TRIG"]
-    assert verify(run_of("d"), claims=[]) == []
-    assert [verdict.claim.id for verdict in verify_model(case_a, claims=["THR-ROOT"])] == ["THR-ROOT"]
+    assert judge(run_of("d"), claims=[]) == []
+    assert [verdict.claim.id for verdict in judge_model(case_a, claims=["THR-ROOT"])] == ["THR-ROOT"]
 
 
 def test_an_unknown_claim_is_refused_with_what_is_allowed(case_a: Scenario) -> None:
     with pytest.raises(UnknownNameError, match=r"unknown claim 'SAFE-INV'; allowed: SAFE-TRACE, .*COMM"):
-        verify(run_of("d"), claims=["COMM", "SAFE-INV"])
+        judge(run_of("d"), claims=["COMM", "SAFE-INV"])
     with pytest.raises(UnknownNameError, match=r"unknown claim 'COMM'; allowed: SAFE-INV, .*THR-DDM"):
-        verify_model(case_a, claims=["COMM"])
+        judge_model(case_a, claims=["COMM"])
 
 
 def test_nothing_is_imported_before_use() -> None:

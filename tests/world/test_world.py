@@ -15,7 +15,7 @@ from airground_drake.nsbc.avoidance import Avoidance
 from airground_drake.run import events
 from airground_drake.run.simulation import simulate
 from airground_drake.scenarios.load import load
-from airground_drake.verify import verify
+from airground_drake.verify import judge
 from airground_drake.world.motion import Motion
 from airground_drake.world.plant import FirstOrder
 from airground_drake.world.shape import Ball
@@ -89,13 +89,13 @@ def test_no_point_of_two_motions_is_nearer_than_the_least_distance(
 def test_a_plant_that_leaves_the_straight_line_costs_what_it_may_be_off(monkeypatch: pytest.MonkeyPatch) -> None:
     """SAFE-TRACE and the events of collisions ask the plant how robots move between the rows."""
     trace = simulate(load("minimal", ["duration_s=4.0"]), "d")
-    (straight,) = verify(trace, ["SAFE-TRACE"])
-    least = {(p["first"], p["second"]): p["min_distance_m"] for p in straight.finding.evidence["pairs"]}
+    (straight,) = judge(trace, ["SAFE-TRACE"])
+    least = {(p["first"], p["second"]): p["min_distance_m"] for p in straight.evidence["pairs"]}
     monkeypatch.setattr(FirstOrder, "motion", lambda self, start, end, period_s: Motion(start, end, 2.0))
-    (off,) = verify(replace(trace), ["SAFE-TRACE"])
-    for pair in off.finding.evidence["pairs"]:
+    (off,) = judge(replace(trace), ["SAFE-TRACE"])
+    for pair in off.evidence["pairs"]:
         both = 4.0 if pair["second"] in trace.robots else 2.0
         assert pair["min_distance_m"] == max(least[pair["first"], pair["second"]] - both, 0.0)
-    assert off.finding.status == "refuted"
+    assert off.status == "refuted"
     told = {event["kind"] for event in events.extract(trace)} - {event["kind"] for event in trace.events}
     assert told == {"collision"}

@@ -10,7 +10,7 @@ from builders.edits import moved, with_scenario
 from builders.runs import beside_a_rock, passing_by, run_of
 from builders.scenarios import case_a
 from builders.simulation import simulate
-from verify.judging import judge
+from verify.judging import decided
 
 from airground_drake.base.arrays import Array
 from airground_drake.nsbc.avoidance import Avoidance, Surroundings
@@ -22,7 +22,7 @@ from airground_drake.nsbc.avoidance import Avoidance, Surroundings
 def test_a_dip_between_two_rows_is_seen(offset: float, status: str) -> None:
     trace = passing_by(offset)
     assert np.linalg.norm(trace.position("ugv1"), axis=1).min() > 2.0  # no row shows it
-    finding = judge("SAFE-TRACE", trace)
+    finding = decided("SAFE-TRACE", trace)
     assert finding.status == status
     assert finding.margin == pytest.approx(offset, abs=1e-12)
     assert finding.where["t_s"] == pytest.approx(0.5125, abs=1e-9)
@@ -33,7 +33,7 @@ def test_a_dip_between_two_rows_is_seen(offset: float, status: str) -> None:
 
 def test_every_pair_is_listed_with_its_distance_and_seen() -> None:
     trace = run_of("d")
-    pairs = judge("SAFE-TRACE", trace).evidence["pairs"]
+    pairs = decided("SAFE-TRACE", trace).evidence["pairs"]
     robots = {("ugv1", "ugv2"): 2.0, ("ugv1", "uav"): 1.0, ("ugv2", "uav"): 1.0}
     wanted = robots | {(r, f"obstacle_{i}"): 2.0 for r in ("ugv1", "ugv2", "uav") for i in (1, 2, 3)}
     assert {(each["first"], each["second"]): each["safe_distance_m"] for each in pairs} == wanted
@@ -41,11 +41,11 @@ def test_every_pair_is_listed_with_its_distance_and_seen() -> None:
     for (robot, other), distance in wanted.items():
         there = np.array(obstacles[other].position_m) if other in obstacles else trace.position(other)[row]
         offset = there + np.array([0.0, 0.0, distance - 1e-6]) - trace.position(robot)[row]
-        assert judge("SAFE-TRACE", moved(trace, robot, row, offset.tolist())).status == "refuted", (robot, other)
+        assert decided("SAFE-TRACE", moved(trace, robot, row, offset.tolist())).status == "refuted", (robot, other)
 
 
 def test_what_the_uav_knows_does_not_matter() -> None:
-    assert judge("SAFE-TRACE", with_scenario(passing_by(-1e-6), obstacles__o__known_to_uav=False)).status == "refuted"
+    assert decided("SAFE-TRACE", with_scenario(passing_by(-1e-6), obstacles__o__known_to_uav=False)).status == "refuted"
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -57,7 +57,7 @@ def test_what_is_missed_is_what_the_controllers_inequalities_lack(seed: int) -> 
     starts = {f"{name}.start_m": s.tolist() for name, s in zip(("ugvs.ugv1", "ugvs.ugv2", "uav"), start, strict=True)}
     velocity = rng.normal(0.0, 1.5, (20, 3, 3)) * [[1.0, 1.0, 0.0], [1.0, 1.0, 0.0], [1.0, 1.0, 1.0]]
     trace = simulate(case_a(starts | {"duration_s": 0.5}), drive=lambda t: velocity[round(t / h)].tolist())
-    found = {(entry["first"], entry["second"]): entry for entry in judge("SAFE-HYP", trace).evidence["pairs"]}
+    found = {(entry["first"], entry["second"]): entry for entry in decided("SAFE-HYP", trace).evidence["pairs"]}
     avoidance = Avoidance(gain=3.0, period=h, sensing_range=100.0)
     ticks = np.flatnonzero(np.abs(trace.t / h - np.round(trace.t / h)) < 1e-6)
     still = {name: np.array([o.position_m] * len(ticks)) for name, o in trace.scenario.obstacles.items()}
@@ -89,21 +89,21 @@ def test_what_is_missed_is_what_the_controllers_inequalities_lack(seed: int) -> 
 
 
 def test_hypotheses_may_be_broken_although_the_distance_is_kept() -> None:
-    assert judge("SAFE-HYP", passing_by(1e-6)).status == "refuted"
-    assert judge("SAFE-TRACE", passing_by(1e-6)).status == "holds"
+    assert decided("SAFE-HYP", passing_by(1e-6)).status == "refuted"
+    assert decided("SAFE-TRACE", passing_by(1e-6)).status == "holds"
 
 
 def test_a_shortfall_costs_what_the_theorem_says() -> None:
-    finding = judge("SAFE-HYP", beside_a_rock(0.015))  # A h = 0.075
+    finding = decided("SAFE-HYP", beside_a_rock(0.015))  # A h = 0.075
     (pair,) = finding.evidence["pairs"]
     assert (pair["first"], pair["second"], pair["t_s"]) == ("ugv1", "o", pytest.approx(0.175))
     assert (pair["e_m"], pair["guarantee_m"]) == (pytest.approx(0.015, abs=1e-15), pytest.approx(1.8, abs=1e-12))
     assert finding.margin == pytest.approx(-0.2, abs=1e-12)
-    kept = judge("SAFE-HYP", beside_a_rock())
+    kept = decided("SAFE-HYP", beside_a_rock())
     assert (kept.status, kept.margin, kept.evidence["e_m"], kept.evidence["guarantee_m"]) == ("holds", 0.0, 0.0, 2.0)
 
 
 def test_without_a_gain_all_samples_count() -> None:
     trace = with_scenario(beside_a_rock(2.0**-10), control__avoidance_gain_1_s=0.0)
-    (pair,) = judge("SAFE-HYP", trace).evidence["pairs"]
+    (pair,) = decided("SAFE-HYP", trace).evidence["pairs"]
     assert pair["guarantee_m"] == pytest.approx(2.0 - round(3.0 / 0.025) * 2.0**-10, abs=1e-12)

@@ -12,7 +12,7 @@ from builders.edits import with_meta, with_scenario
 from builders.runs import at_rest, chattering, refractory, run_of
 from builders.scenarios import STILL, changed, lone
 from builders.simulation import simulate as simulate_synthetic
-from verify.judging import judge
+from verify.judging import decided
 from verify.runs.test_running_code import PATIENCE
 
 from airground_drake.gatekeeper import outcome_gatekeeper
@@ -28,7 +28,7 @@ Run = Callable[..., Trace]
 
 def held(claim: str, trace: Trace) -> dict[str, Any]:
     """The evidence of a claim that must hold."""
-    finding = judge(claim, trace)
+    finding = decided(claim, trace)
     assert finding.status == "holds", finding
     return dict(finding.evidence)
 
@@ -40,7 +40,7 @@ def held(claim: str, trace: Trace) -> dict[str, Any]:
 )  # fmt: skip
 def test_commands_are_the_laws_also_where_inequalities_bind(run: Run, scenario: str, run_name: str) -> None:
     assert held("EXEC", run(scenario, run_name))["robots"]["ugv1"]["binding"] > 100
-    assert judge("EXEC", run(scenario, run_name)).margin == pytest.approx(1e-6, rel=1e-4)
+    assert decided("EXEC", run(scenario, run_name)).margin == pytest.approx(1e-6, rel=1e-4)
 
 
 def test_the_uavs_avoidance_and_contradicting_inequalities_are_judged(case_a: Any) -> None:
@@ -124,7 +124,7 @@ def test_an_accepted_intervention_is_reconsidered_when_an_obstacle_is_new(
     for claim in ("LIVE-PROG", "GATE-MODEL", "GATE-PLAN"):
         held(claim, trace)
     trace.decisions.loc[again.name, ["decision", "reason"]] = ["accept", "kept"]
-    assert judge("LIVE-PROG", replace(trace)).status == "refuted"
+    assert decided("LIVE-PROG", replace(trace)).status == "refuted"
 
 
 def test_messages_are_counted() -> None:
@@ -132,7 +132,7 @@ def test_messages_are_counted() -> None:
     found = held("COMM", run_of("d"))
     assert found["spent"] == {"proposal": 1, "decision": decided}
     assert found["always_on"] == {"proposal": 720, "decision": 720}
-    assert judge("COMM", run_of("d")).margin == pytest.approx(1.0 - decided / 720)
+    assert decided("COMM", run_of("d")).margin == pytest.approx(1.0 - decided / 720)
 
 
 @pytest.mark.parametrize("noise", [0.0, 0.01])
@@ -142,11 +142,11 @@ def test_a_crossing_inside_the_dwell_triggers_at_its_end(noise: float) -> None:
     assert np.diff(times) == pytest.approx([4.0], abs=1e-9)
     assert held("THR-TRIG", trace)
     assert set(trace.column("ugv1.mode")) == {0.0, 1.0, 2.0}
-    assert judge("ZENO-TRACE", trace).margin == pytest.approx(0.0, abs=1e-12)
+    assert decided("ZENO-TRACE", trace).margin == pytest.approx(0.0, abs=1e-12)
 
 
 def test_a_bare_trigger_chatters() -> None:
-    found = judge("ZENO-TRACE", chattering())
+    found = decided("ZENO-TRACE", chattering())
     assert found.evidence["triggers"]["ugv1"]["count"] > found.evidence["most_triggers_possible"]
     assert 0.0 < found.evidence["smallest_gap"]["gap_s"] < 0.5
 
@@ -155,7 +155,7 @@ def test_above_the_threshold_at_the_start_triggers_at_once() -> None:
     trace = simulate_synthetic(lone([4.0, 0.0, 0.0], [4.0, 0.0, 0.0], STILL, 1.0), drive=at_rest)
     assert [event["t_s"] for event in trace.events if event["kind"] != "proposal"] == [0.0]
     assert held("THR-TRIG", trace)
-    assert judge("THR-TRIG", with_meta(trace, events=[])).status == "refuted"
+    assert decided("THR-TRIG", with_meta(trace, events=[])).status == "refuted"
 
 
 def test_a_corner_of_the_preset_inside_a_row_interval() -> None:
@@ -169,7 +169,7 @@ def test_a_corner_of_the_preset_inside_a_row_interval() -> None:
     assert held("THR-TRIG", trace)
     never = simulate_synthetic(changed(trace.meta["scenario"], {"decision.threshold.zeta_m": 99.0}), drive=at_rest)
     unseen = with_meta(with_scenario(never, decision__threshold__zeta_m=3.005), zeta_m=3.005)
-    found = judge("THR-TRIG", unseen).counterexample or {}
+    found = decided("THR-TRIG", unseen).counterexample or {}
     assert (found["what"], found["t_s"]) == ("missing trigger", pytest.approx(3.005, abs=1e-9))
 
 

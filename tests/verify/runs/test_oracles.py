@@ -11,7 +11,7 @@ from builders.decisions import ALL_PLANS, STAGES, GateData
 from hypothesis import given
 from hypothesis import strategies as st
 from properties import examples
-from verify.judging import judge
+from verify.judging import decided
 from verify.runs.cases import B_D, BINARY, LOCAL, RELAXED, SIXTH, Edit, decision, problem
 
 from airground_drake.run.trace import Trace
@@ -94,7 +94,7 @@ def test_a_bad_solution_gives_no_margin(base: Callable[[str], Trace], monkeypatc
 
     monkeypatch.setattr(convex_bounds, "_solve", nothing)
     monkeypatch.setattr(convex_bounds, "_minimiser", lambda row, _: np.full(STAGES, 0.5))
-    found = judge("GATE-PLAN", base(RELAXED))
+    found = decided("GATE-PLAN", base(RELAXED))
     assert (found.status, found.margin) == ("holds", None)
     assert found.evidence["optimum"].startswith("unknown: the bounds of an optimum are")
 
@@ -105,7 +105,7 @@ def test_the_margin_is_the_largest_gap_and_refutes_nothing(
     bounded = gate_plan.bound(rows_of(base(RELAXED)), 0)
     bounded[1].__dict__["gap"] = 0.4  # a cached property
     monkeypatch.setattr(gate_plan, "bound", lambda rows, blocks: bounded)
-    found = judge("GATE-PLAN", base(RELAXED))
+    found = decided("GATE-PLAN", base(RELAXED))
     assert (found.status, found.margin, found.where["t_s"]) == ("holds", 0.4, bounded[1].row.t_s)
 
 
@@ -121,7 +121,7 @@ def test_the_margin_is_the_largest_gap_and_refutes_nothing(
 def test_where_the_optimum_is_unknown_there_is_no_margin(
     base: Callable[[str], Trace], name: str, edit: Edit, why: str
 ) -> None:
-    found = judge("GATE-PLAN", edit(base(name)))
+    found = decided("GATE-PLAN", edit(base(name)))
     assert (found.status, found.margin, found.evidence["optimum"]) == ("holds", None, why)
 
 
@@ -137,7 +137,7 @@ def test_the_gap_to_the_best_of_all_plans_is_evidence(base: Callable[[str], Trac
         row |= {"first_stage": "accept" if plan[0] == 1.0 else "refuse"}
         row |= {"predicted_clearance_m": float(rows_of(base(BINARY))[SIXTH].clearance(data.positions(plan)).min())}
 
-    found = judge("GATE-PLAN", decision(other)(base(BINARY)))
+    found = decided("GATE-PLAN", decision(other)(base(BINARY)))
     assert found.status == "holds", found.counterexample
     assert found.evidence["largest_gap_to_enumeration"] == pytest.approx(max(costs) / min(costs) - 1.0)
 

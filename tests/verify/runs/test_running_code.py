@@ -24,7 +24,7 @@ from airground_drake.run import simulation
 from airground_drake.scenarios.load import load
 from airground_drake.systems import components, controllers, diagram
 from airground_drake.systems.diagram import Model
-from airground_drake.verify import verify
+from airground_drake.verify import judge
 from airground_drake.verify.finding import Finding
 from airground_drake.world.world import Kind, Neighbours, World
 
@@ -272,9 +272,9 @@ def test_a_shorter_distance_between_robots_is_refuted_though_no_robots_come_near
     distances(0.9, "ugv")(monkeypatch)
     scenario = load("case_b", ["duration_s=1.0"])
     for run in scenario.runs:
-        trace, built = verify(simulation.simulate(scenario, run), ["SAFE-TRACE", "SAFE-HYP"])
-        assert (trace.finding.status, built.finding.status) == ("holds", "refuted")
-        assert built.finding.evidence["different_parameters"] == [{
+        trace, built = judge(simulation.simulate(scenario, run), ["SAFE-TRACE", "SAFE-HYP"])
+        assert (trace.status, built.status) == ("holds", "refuted")
+        assert built.evidence["different_parameters"] == [{
             "controller": "ugv_controller", "parameter": "safe_m", "robot": "ugv1", "other": "ugv2", "built": 1.8,
             "scenario": 2.0,
         }]  # fmt: skip

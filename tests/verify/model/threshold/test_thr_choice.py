@@ -15,7 +15,7 @@ from airground_drake.report import html
 from airground_drake.report.figures import threshold
 from airground_drake.run.trace import Trace
 from airground_drake.scenarios.load import load
-from airground_drake.verify import verify_all, verify_model
+from airground_drake.verify import judge_all, judge_model
 from airground_drake.verify.applications import measured
 from airground_drake.verify.model.thr_choice import ThrChoice
 
@@ -48,9 +48,9 @@ def test_a_threshold_is_optimal_or_declared(
     ],
 )
 def test_shipped_scenarios(scenario: str, run: str, rule: str, in_force: float, extra: float) -> None:
-    verdicts = verify_model(load(scenario), claims=["THR-CHOICE"])
+    verdicts = judge_model(load(scenario), claims=["THR-CHOICE"])
     (verdict,) = [each for each in verdicts if each.run == run]
-    found = verdict.finding.evidence
+    found = verdict.evidence
     assert verdict.as_expected
     assert verdict.expected == ("exercised" if rule == "bayes" else "holds")
     assert (found.rule, found.kind) == (rule, "optimal" if rule == "bayes" else "declared")
@@ -73,8 +73,8 @@ def test_runs_show_the_drift_and_the_noise_that_they_had(run: Callable[[str, str
 
 def test_a_report_has_the_runs_beside_the_numbers_of_the_rule(run: Callable[[str, str], Trace]) -> None:
     scenario = load("bayes_threshold")
-    verdicts = verify_all(scenario, [run("bayes_threshold", name) for name in scenario.runs])
-    found, printed = [verdict.finding.evidence for verdict in verdicts if verdict.claim.id == "THR-CHOICE"]
+    verdicts = judge_all(scenario, [run("bayes_threshold", name) for name in scenario.runs])
+    found, printed = [verdict.evidence for verdict in verdicts if verdict.claim.id == "THR-CHOICE"]
     assert (set(found.runs), set(printed.runs)) == ({"a ugv1", "d ugv1"}, {"d_printed ugv1"})
     for row in (found.runs["a ugv1"], printed.runs["d_printed ugv1"]):
         assert row.drift_m_s == pytest.approx(1.0, abs=1e-6)

@@ -27,15 +27,15 @@ def verdicts_to_pandas(verdicts: Iterable[Verdict]) -> pd.DataFrame:
     columns = ["claim", "run", "status", "exercised", "margin", "unit", "quantity", "expected"]
     rows = [
         (
-            verdict.claim.id, verdict.run, verdict.finding.status, verdict.finding.exercised, verdict.finding.margin,
-            verdict.finding.unit, verdict.finding.quantity, verdict.expected,
+            verdict.claim.id, verdict.run, verdict.status, verdict.exercised, verdict.margin,
+            verdict.unit, verdict.quantity, verdict.expected,
         )
         for verdict in verdicts
     ]  # fmt: skip
     return pd.DataFrame(rows, columns=columns)
 
 
-def verify(trace: Trace, claims: Collection[str] | None = None, progress: Progress = SILENT) -> list[Verdict]:
+def judge(trace: Trace, claims: Collection[str] | None = None, progress: Progress = SILENT) -> list[Verdict]:
     """Judge the claims that apply to the run's method.
 
     Args:
@@ -68,12 +68,12 @@ def _verdicts(trace: Trace, claims: Sequence[TraceClaim], findings: Sequence[Fin
     run = str(trace.meta.get("run"))
     expected = trace.meta.get("scenario", {}).get("runs", {}).get(run, {}).get("expected", {})
     return [
-        Verdict(claim, run, finding, expected.get(claim.id, claim.expected))
+        Verdict.of(claim, run, finding, expected.get(claim.id, claim.expected))
         for claim, finding in zip(claims, findings, strict=True)
     ]
 
 
-def verify_model(
+def judge_model(
     scenario: Scenario, *, kept: Path | None = None, claims: Collection[str] | None = None, progress: Progress = SILENT
 ) -> list[Verdict]:
     """Judge the claims about the model of a scenario.
@@ -99,17 +99,17 @@ def verify_model(
     return [each.verdict(scenario, finding) for each, finding in zip(asked, findings, strict=True)]
 
 
-def verify_all(
+def judge_all(
     scenario: Scenario, traces: Iterable[Trace], *, kept: Path | None = None, progress: Progress = SILENT
 ) -> list[Verdict]:
     """Judge every claim: on runs of a scenario, and then about its model.
 
-    The same as `verify` and `verify_model`, in parallel processes.
+    The same as `judge` and `judge_model`, in parallel processes.
 
     Args:
         scenario: its constants.
         traces: its runs.
-        kept: see `verify_model`.
+        kept: see `judge_model`.
         progress: is told of each claim about the model and of the claims about each run.
 
     Raises:
@@ -117,7 +117,7 @@ def verify_all(
         AirgroundError: if a process dies.
     """
     asked = _asked(scenario)
-    of_runs = [(replace(trace), _applicable(trace)) for trace in traces]  # as in `verify`
+    of_runs = [(replace(trace), _applicable(trace)) for trace in traces]  # as in `judge`
     pieces: list[Callable[[], Any]] = [partial(found, each.claim, each.inputs, kept) for each in asked]
     pieces += [partial(_Judged.of, trace, claims) for trace, claims in of_runs]
     names = [*(each.name for each in asked), *(f"claims about run {trace.run}" for trace, _ in of_runs)]
@@ -156,7 +156,7 @@ class _Asked(NamedTuple):
     def verdict(self, scenario: Scenario, finding: Finding) -> Verdict:
         """With what the scenario expects."""
         expected = scenario.runs[self.run].expected if self.run else scenario.expected
-        return Verdict(self.claim, self.run, finding, expected.get(self.claim.id, self.claim.expected), self.inputs)
+        return Verdict.of(self.claim, self.run, finding, expected.get(self.claim.id, self.claim.expected), self.inputs)
 
 
 def _asked(scenario: Scenario, claims: Collection[str] | None = None) -> list[_Asked]:
