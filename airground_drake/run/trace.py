@@ -210,7 +210,7 @@ class Trace:
     def _held(self, values: Array, before: float) -> Array:
         """Values chosen at the samples, (S, ...), as in force up to each row, (T, ...); `before` the first sample."""
         last = np.cumsum(np.bincount(self.sample_rows + 1, minlength=len(self.t) + 1))[: len(self.t)]
-        return np.concatenate([np.full_like(values[:1], before), values])[last]
+        return np.concatenate([np.full((1, *values.shape[1:]), before), values])[last]
 
     def chosen(self, robot: str) -> Array:
         """Commands chosen at the control samples, (S, 3), m/s."""
