@@ -18,7 +18,7 @@ from airground_drake.scenarios.schema import Threshold
 from airground_drake.verify.claim import TraceClaim
 from airground_drake.verify.engines.geometry import NormSignal
 from airground_drake.verify.finding import Finding
-from airground_drake.verify.model.theorem import Hypothesis, Proof, grounds
+from airground_drake.verify.model.theorem import Hypothesis, grounds
 from airground_drake.verify.runs.triggers import (
     Conflict,
     Transition,
@@ -82,8 +82,8 @@ class ThrTrig(TraceClaim):
         "column are compared one by one. If a period of the noise has several rows, all must have the same sample, "
         "given the leak. Theorems in Coq say why the running trigger misses nothing in a step: its largest value is at "
         "an end, and its least one has a closed form, with p the distance of the error's line from 0, "
-        "k = (n1 - n0)/|e1 - e0| and w = sqrt(1 - k^2). `isolation` in the evidence has their hypotheses: the noise "
-        "changes its rate at control samples only. Tests compare the running trigger with dense sampling."
+        "k = (n1 - n0)/|e1 - e0| and w = sqrt(1 - k^2). The evidence has their hypotheses: the noise changes its rate "
+        "at control samples only. Tests compare the running trigger with dense sampling."
     )
     equations = "(15), (20)"
     assumptions = (
@@ -98,8 +98,8 @@ class ThrTrig(TraceClaim):
         "That the threshold is a good one (THR-CHOICE); that the noise has the stated distribution (THR-DDM), "
         "or the stated leak if no period of the noise has a row within; or anything about a Wiener path between the "
         "noise samples. If x only touches a level up to rounding, 1e-12 m, the verdict follows the rounding. Two "
-        "crossings closer than the isolation, 1e-6 s, may be taken at one instant. Where a hypothesis of `isolation` "
-        "fails, the theorems say nothing about other runs of the scenario."
+        "crossings closer than the isolation, 1e-6 s, may be taken at one instant. Where a hypothesis fails, "
+        "the theorems say nothing about other runs of the scenario."
     )
 
     exercised_by = "transitions of the automaton that were due"
@@ -122,14 +122,14 @@ class ThrTrig(TraceClaim):
             counterexample=min(wrong, key=lambda conflict: float(conflict["t_s"])) if wrong else None,
             evidence={
                 **asdict(Replay(replayed, _block(trace) or "that of (15)", *levels, dict(due))),
-                "isolation": isolation(trace.scenario.decision.noise_period_s, trace.scenario.control.period_s, levels),
+                **isolation(trace.scenario.decision.noise_period_s, trace.scenario.control.period_s, levels),
             },
             exercised=due.total(),
         )
 
 
-def isolation(noise_period_s: float, period_s: float, levels: Levels) -> Proof:
-    """Why no crossing between two updates is missed (proofs/Isolation.v), and whether that applies here."""
+def isolation(noise_period_s: float, period_s: float, levels: Levels) -> dict[str, Any]:
+    """Whether the theorems of Isolation.v apply here, in words, and their hypotheses."""
     steps = decimal(noise_period_s) / decimal(period_s)
     says = f"the noise period is a whole number of control periods: {float(steps):g}"
     hypotheses = [
@@ -137,7 +137,8 @@ def isolation(noise_period_s: float, period_s: float, levels: Levels) -> Proof:
         Hypothesis.of("noise periods beside control samples", says, -(steps % 1)),
         Hypothesis.of("control periods in a noise period", "there is at least one", steps - 1),
     ]
-    return Proof(**grounds(THEOREMS, hypotheses))
+    found = grounds(THEOREMS, hypotheses)
+    return {"isolation": found["reason"] or found["proof"], "hypotheses": hypotheses}
 
 
 class Levels(NamedTuple):

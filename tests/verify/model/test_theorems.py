@@ -93,8 +93,16 @@ def test_isolation_applies_where_noise_changes_at_control_samples(
     noise_period_s: float, zeta_m: float, failing: str | None
 ) -> None:
     found = isolation(noise_period_s, 0.05, Levels(zeta_m, 1.0, 0.5))
-    assert list(found.theorems) == [name for name in THEOREMS if THEOREMS[name].checked_where == ("THR-TRIG",)]
-    assert found.reason is None if failing is None else failing in str(found.reason)
+    assert all(each.holds for each in found["hypotheses"]) == (failing is None)
+    assert (failing or "checked by Coq") in found["isolation"]
+
+
+def test_isolation_of_a_theory_that_coq_has_not_checked_is_doubted(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[str] = []
+    unchecked = Standing(False, "not checked", {})
+    monkeypatch.setattr(theorem, "standing", lambda *names: asked.extend(names) or unchecked)
+    assert isolation(0.05, 0.05, Levels(3.0, 2.0, 0.5))["isolation"] == "the theorems are not checked"
+    assert asked == [name for name in THEOREMS if THEOREMS[name].checked_where == ("THR-TRIG",)]
 
 
 def test_shares_that_do_not_add_up_leave_the_claim_open(monkeypatch: pytest.MonkeyPatch) -> None:
