@@ -68,7 +68,7 @@ WORDS: dict[Reason, str] = {
 
 
 @dataclass(frozen=True)
-class Decision:
+class GatekeeperDecision:
     """The decision about one proposal for one UGV at one sample: a row of the trace's table `decisions`.
 
     Under method (c) it rests on `problem`, `solution` and `throughout`; under (d), on `refuse`, `accept` and `tries`.
@@ -100,7 +100,7 @@ class Decision:
     tries: int = 0
 
 
-def in_words(decision: Decision) -> str:
+def in_words(decision: GatekeeperDecision) -> str:
     """The reason as a sentence for the UAV."""
     words = WORDS[decision.reason]
     if decision.reason == "waits" and decision.solution is not None:

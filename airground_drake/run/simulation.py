@@ -17,7 +17,7 @@ from pydrake.systems.primitives import LogVectorOutput, Multiplexer
 
 from airground_drake.base.arrays import Array
 from airground_drake.base.errors import SimulationError, UnknownNameError, described
-from airground_drake.gatekeeper.answer import Decision
+from airground_drake.gatekeeper.answer import GatekeeperDecision
 from airground_drake.gatekeeper.outcome import Outlook, outcomes
 from airground_drake.gatekeeper.problem import Horizon, predicted_problem
 from airground_drake.gatekeeper.rollout import View
@@ -152,7 +152,7 @@ class Recorder:
         t = log.sample_times()
         keep = _distinct(t, data["team_command"])
         data = {name: rows[:, keep] for name, rows in data.items()}
-        decided: list[Decision] = []
+        decided: list[GatekeeperDecision] = []
         timings: dict[str, Any] = {"wall_s": wall, "decision_times_s": []}
         if (gatekeeper := model.gatekeeper) is not None:
             decided = gatekeeper.decisions(gatekeeper.GetMyContextFromRoot(context))
@@ -200,7 +200,7 @@ def read_back(model: Model, root: Context) -> dict[str, Any]:
     return {"zeta_m": float(levels.zeta_m), "controllers": ran}
 
 
-def _decision(decision: Decision, robot: str, route: str) -> dict[str, Any]:
+def _decision(decision: GatekeeperDecision, robot: str, route: str) -> dict[str, Any]:
     """A row of `Trace.decisions`."""
     row: dict[str, Any] = {name: "" if kind == "str" else -1.0 for name, kind in DECISION_COLUMNS.items()}
     row |= {
@@ -256,7 +256,7 @@ def _proposals(ugvs: Sequence[str], sent: Sequence[tuple[int, Proposal]]) -> pd.
     return pd.DataFrame(rows, columns=list(PROPOSAL_COLUMNS))
 
 
-def _problems(decided: Sequence[Decision]) -> pd.DataFrame:
+def _problems(decided: Sequence[GatekeeperDecision]) -> pd.DataFrame:
     """`Trace.problems` of the decisions."""
 
     def flat(array: Array | None) -> list[float]:

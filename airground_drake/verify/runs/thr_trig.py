@@ -128,7 +128,7 @@ class ThrTrig(TraceClaim):
         )
 
 
-def isolation(noise_period_s: float, period_s: float, levels: Levels) -> dict[str, Any]:
+def isolation(noise_period_s: float, period_s: float, levels: TriggerLevels) -> dict[str, Any]:
     """Whether the theorems of Isolation.v apply here, in words, and their hypotheses."""
     steps = decimal(noise_period_s) / decimal(period_s)
     says = f"the noise period is a whole number of control periods: {float(steps):g}"
@@ -141,7 +141,7 @@ def isolation(noise_period_s: float, period_s: float, levels: Levels) -> dict[st
     return {"isolation": found["reason"] or found["proof"], "hypotheses": hypotheses}
 
 
-class Levels(NamedTuple):
+class TriggerLevels(NamedTuple):
     """Threshold and release level of the trigger in force, m, and its dwell, s."""
 
     zeta_m: float
@@ -149,7 +149,7 @@ class Levels(NamedTuple):
     dwell_s: float
 
 
-def levels_of(trace: Trace) -> Levels:
+def levels_of(trace: Trace) -> TriggerLevels:
     """The levels of a run by its scenario.
 
     Raises:
@@ -162,8 +162,8 @@ def levels_of(trace: Trace) -> Levels:
     if rule.rule != "fixed" and not _is_root(rule, zeta):
         raise TraceError(f"the threshold in force, {zeta} m, is not what the scenario's rule computes")
     if decision.trigger == "bare":
-        return Levels(zeta, zeta, 0.0)
-    return Levels(zeta, decision.release_m, decision.min_inter_event_s)
+        return TriggerLevels(zeta, zeta, 0.0)
+    return TriggerLevels(zeta, decision.release_m, decision.min_inter_event_s)
 
 
 def _block(trace: Trace) -> str:
@@ -202,7 +202,7 @@ class Replay:
     transitions_due: dict[str, int]
 
 
-class Judged(NamedTuple):
+class Reconstruction(NamedTuple):
     """The trigger of a UGV, run again: the evidence, the automaton's transitions, and all that disagrees."""
 
     evidence: Replayed
@@ -210,7 +210,7 @@ class Judged(NamedTuple):
     wrong: list[Conflict]
 
 
-def _judged(trace: Trace, ugv: str, levels: Levels) -> Judged:
+def _judged(trace: Trace, ugv: str, levels: TriggerLevels) -> Reconstruction:
     """Run the automaton again for a UGV, and compare all records with that."""
     x, against_15, off = _variable(trace, ugv)
     predicted = list(transitions(x, *levels))
@@ -221,7 +221,7 @@ def _judged(trace: Trace, ugv: str, levels: Levels) -> Judged:
     found = (off, mismatch, columns, modes, noise_conflict(trace, ugv))
     wrong = [{"robot": ugv, **conflict} for conflict in found if conflict is not None]
     events = [{"t_s": time, "kind": kind} for time, kind in expected]
-    return Judged(Replayed(ugv, events, lag, float(x.x.max()), against_15), predicted, wrong)
+    return Reconstruction(Replayed(ugv, events, lag, float(x.x.max()), against_15), predicted, wrong)
 
 
 def _as_transitions(predicted: list[Transition]) -> Iterator[str]:
