@@ -55,7 +55,7 @@ _AGAIN = 1e-7
 """A search finds the guess again if nothing is cheaper: its cost may be this much above that of the guess, relative."""
 
 
-class Limits(NamedTuple):
+class SolverLimits(NamedTuple):
     """Limits of a solution, by the names of DAQP's own settings.
 
     Attributes:
@@ -91,7 +91,7 @@ class Details:
         return replace(self, iterations=before.iterations + self.iterations, nodes=before.nodes + self.nodes)
 
 
-class Answer(NamedTuple):
+class ProgramSolution(NamedTuple):
     """The answer to a program: x (n,), NaN without a solution."""
 
     ended: SolutionResult
@@ -99,7 +99,7 @@ class Answer(NamedTuple):
     details: Details
 
 
-def minimise(form: StandardForm, guess: Array, limits: Limits) -> Answer:
+def minimise(form: StandardForm, guess: Array, limits: SolverLimits) -> ProgramSolution:
     """The optimum of a program in standard form.
 
     Args:
@@ -109,9 +109,9 @@ def minimise(form: StandardForm, guess: Array, limits: Limits) -> Answer:
     """
     nothing = np.full(len(form.gradient), np.nan)
     if not form.is_number():
-        return Answer(SolutionResult.kInvalidInput, nothing, Details())
+        return ProgramSolution(SolutionResult.kInvalidInput, nothing, Details())
     if form.contradicts_itself():
-        return Answer(SolutionResult.kInfeasibleConstraints, nothing, Details())
+        return ProgramSolution(SolutionResult.kInfeasibleConstraints, nothing, Details())
     if not np.isfinite(guess).all() or form.violation(guess) > _FEASIBLE:
         answer = _search(form, limits)
         doubtful = answer.ended == SolutionResult.kInfeasibleConstraints and limits.fval_bound == math.inf
@@ -127,7 +127,7 @@ def minimise(form: StandardForm, guess: Array, limits: Limits) -> Answer:
     return answer
 
 
-def _search(form: StandardForm, limits: Limits) -> Answer:
+def _search(form: StandardForm, limits: SolverLimits) -> ProgramSolution:
     """The optimum, with a check that it satisfies the constraints."""
     scaled = _Scaled.of(form)
     if not scaled.branches:
@@ -135,16 +135,16 @@ def _search(form: StandardForm, limits: Limits) -> Answer:
     else:
         answer = _branch(form, limits) if scaled.curvature else scaled.branch(limits)
     if len(scaled.kept) == 0 and answer.ended == SolutionResult.kSolutionFound and form.violation(answer.x) > _FEASIBLE:
-        return Answer(SolutionResult.kInfeasibleConstraints, np.full(len(answer.x), np.nan), answer.details)
+        return ProgramSolution(SolutionResult.kInfeasibleConstraints, np.full(len(answer.x), np.nan), answer.details)
     if answer.ended == SolutionResult.kSolutionFound and not form.violation(answer.x) <= _FEASIBLE:
         return answer._replace(ended=SolutionResult.kSolverSpecificError)
     return answer
 
 
-def _branch(form: StandardForm, limits: Limits) -> Answer:
+def _branch(form: StandardForm, limits: SolverLimits) -> ProgramSolution:
     """The optimum by depth-first branch and bound, with the proximal point method at each node."""
     until = time.monotonic() + (limits.time_limit or math.inf)
-    best = Answer(SolutionResult.kInfeasibleConstraints, np.full(len(form.gradient), np.nan), Details())
+    best = ProgramSolution(SolutionResult.kInfeasibleConstraints, np.full(len(form.gradient), np.nan), Details())
     known, nodes, counted = limits.fval_bound, [form.relaxed()], Details()
     while nodes:
         if time.monotonic() > until:
@@ -170,7 +170,7 @@ def _branch(form: StandardForm, limits: Limits) -> Answer:
     return best._replace(details=counted)
 
 
-def _approach(form: StandardForm, limits: Limits) -> Answer:
+def _approach(form: StandardForm, limits: SolverLimits) -> ProgramSolution:
     """The optimum of a program without binary variables."""
     until = time.monotonic() + (limits.time_limit or math.inf)
     for curvature in _CURVATURES:
@@ -234,12 +234,12 @@ class _Scaled:
         """Whether there are binary variables to branch on."""
         return bool(self.free.any())
 
-    def branch(self, limits: Limits) -> Answer:
+    def branch(self, limits: SolverLimits) -> ProgramSolution:
         """The optimum by branch and bound."""
         known = (limits.fval_bound - self.form.cost(self.base)) / self.largest
         return self._answer(*self._solved(limits, self.gradient, min(known, _NO_BOUND)))
 
-    def approach(self, limits: Limits, until: float) -> Answer:
+    def approach(self, limits: SolverLimits, until: float) -> ProgramSolution:
         """The optimum without binary variables, by the proximal point method where curvature was added."""
         centre, before = np.zeros(len(self.kept)), Details()
         for _ in range(_STEPS):
@@ -255,7 +255,9 @@ class _Scaled:
             centre, before = x, answer.details
         return answer._replace(ended=SolutionResult.kIterationLimit)
 
-    def _solved(self, limits: Limits, gradient: Array, known: float = _NO_BOUND) -> tuple[int, Array, dict[str, Any]]:
+    def _solved(
+        self, limits: SolverLimits, gradient: Array, known: float = _NO_BOUND
+    ) -> tuple[int, Array, dict[str, Any]]:
         """DAQP's flag, x (k,), and information."""
         if len(self.kept) == 0:
             return 1, np.zeros(0), {"lam": np.zeros(len(self.rows))}
@@ -306,7 +308,7 @@ class _Scaled:
         scaled: Array,
         info: dict[str, Any],
         before: Details = Details(),
-    ) -> Answer:
+    ) -> ProgramSolution:
         """The answer by DAQP's flag and solution; `before`: what it took until then."""
         form = self.form
         multipliers, x = np.zeros(len(form.rows)), np.full(len(form.gradient), np.nan)
@@ -318,7 +320,7 @@ class _Scaled:
             self._take_up_slack(x)
             multipliers[self.rows] = -self.largest * info["lam"][self.bounded :]
         details = Details(int(info.get("iterations", 0)), int(info.get("nodes", 0)), multipliers)
-        return Answer(_ENDED.get(flag, SolutionResult.kSolverSpecificError), x, details.after(before))
+        return ProgramSolution(_ENDED.get(flag, SolutionResult.kSolverSpecificError), x, details.after(before))
 
     def _take_up_slack(self, x: Array) -> None:
         """Give slack variables the least values with which their rows hold."""

@@ -86,7 +86,7 @@ class Basis(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Decision:
+class GatekeeperDecision:
     """The decision about one proposal for one UGV at one sample: a row of the trace's table `decisions`.
 
     Under method (c) it rests on `problem`, `solution` and `throughout`; under (d), on `refuse`, `accept` and `tries`.
@@ -122,7 +122,7 @@ class Decision:
     basis: Basis = field(default_factory=Basis)
 
 
-def in_words(decision: Decision) -> str:
+def in_words(decision: GatekeeperDecision) -> str:
     """The reason as a sentence for the UAV."""
     words = WORDS[decision.reason]
     if decision.reason == "waits" and decision.solution is not None:

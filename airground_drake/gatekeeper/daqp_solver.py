@@ -27,7 +27,7 @@ from pydrake.solvers import (
 from pydrake.symbolic import Expression, Variable
 
 from airground_drake.base.arrays import Array
-from airground_drake.gatekeeper.active_set import Answer, Details, Limits, minimise
+from airground_drake.gatekeeper.active_set import Details, ProgramSolution, SolverLimits, minimise
 from airground_drake.gatekeeper.standard_form import Layout, StandardForm
 
 SUPPORTED = frozenset(
@@ -49,14 +49,12 @@ class _Shell:
         """For programs with these variables."""
         self.layout = layout
         self._program, self._solver = MathematicalProgram(), ClpSolver()
-        self._program.AddDecisionVariables(self._stand_ins())
+        pairs = zip(layout.variables, layout.binary, strict=True)
+        stand_ins = [Variable(x.get_name()) if binary else x for x, binary in pairs]
+        self._program.AddDecisionVariables(np.array(stand_ins, dtype=object))
         self._cost = self._program.AddLinearCost(np.zeros(len(layout.index)), self._program.decision_variables())
 
-    def _stand_ins(self) -> Any:
-        pairs = zip(self.layout.variables, self.layout.binary, strict=True)
-        return np.array([Variable(x.get_name()) if binary else x for x, binary in pairs], dtype=object)
-
-    def fill(self, result: MathematicalProgramResult, answer: Answer, cost: float) -> None:
+    def fill(self, result: MathematicalProgramResult, answer: ProgramSolution, cost: float) -> None:
         """Put in an answer and its cost."""
         self._cost.evaluator().UpdateCoefficients(np.zeros(len(answer.x)), cost)
         self._solver.Solve(self._program, None, None, result)
@@ -72,7 +70,7 @@ class DaqpResult(MathematicalProgramResult):  # type: ignore[misc]
         super().__init__()
         self._x, self._index, self._details = np.zeros(0), dict[int, int](), Details()
 
-    def fill(self, shell: _Shell, answer: Answer, cost: float) -> None:
+    def fill(self, shell: _Shell, answer: ProgramSolution, cost: float) -> None:
         """Put in an answer and its cost."""
         shell.fill(self, answer, cost)
         self._x, self._index, self._details = answer.x, shell.layout.index, answer.details
@@ -113,8 +111,8 @@ class DaqpSolver(SolverInterface):  # type: ignore[misc]
     Scale the program: where coefficients differ by a factor of about 1e6, it may fail, or call a program unbounded
     that is not (on random programs of this kind, about once in a thousand).
 
-    Its options in `SolverOptions` are those of `Limits`, under `DaqpSolver.id()`. Common options have no effect: it
-    runs in one thread and prints nothing.
+    Its options in `SolverOptions` are those of `SolverLimits`, under `DaqpSolver.id()`. Common options have no effect:
+    it runs in one thread and prints nothing.
     """
 
     NAME = "DAQP"
@@ -194,13 +192,15 @@ class DaqpSolver(SolverInterface):  # type: ignore[misc]
 _COSTS = {SolutionResult.kInfeasibleConstraints: math.inf, SolutionResult.kUnbounded: -math.inf}
 
 
-def _limits(*given: SolverOptions | None) -> Limits:
+def _limits(*given: SolverOptions | None) -> SolverLimits:
     """From options of Drake, the later ones counting more.
 
     Raises:
         ValueError: if there is an option that DAQP does not have.
     """
     chosen = {name: value for one in given if one for name, value in one.options.get(DaqpSolver.NAME, {}).items()}
-    if unknown := sorted(set(chosen) - set(Limits._fields)):
-        raise ValueError(f"{DaqpSolver.NAME}: no options {', '.join(unknown)}; allowed: {', '.join(Limits._fields)}")
-    return Limits(**chosen)
+    if unknown := sorted(set(chosen) - set(SolverLimits._fields)):
+        raise ValueError(
+            f"{DaqpSolver.NAME}: no options {', '.join(unknown)}; allowed: {', '.join(SolverLimits._fields)}"
+        )
+    return SolverLimits(**chosen)

@@ -34,7 +34,7 @@ def lacking(name: str) -> str:
 
 
 @dataclass(frozen=True, eq=False)
-class Found:
+class SolverResult:
     """A solver's result.
 
     Attributes:
@@ -50,7 +50,7 @@ class Found:
     multipliers: Array | None = None
 
 
-class Search:
+class Minimiser:
     """The search for the optimum by one solver, with one thread; it holds the licence, if the solver needs one."""
 
     def __init__(self, name: str) -> None:
@@ -68,7 +68,7 @@ class Search:
         self._licence = self._solver.AcquireLicense() if hasattr(self._solver, "AcquireLicense") else None
         self._limit, self._exact = OPTIONS[name]
 
-    def minimise(self, binary: BinaryProgram, guess: Array, seconds: float = math.inf) -> Found:
+    def minimise(self, binary: BinaryProgram, guess: Array, seconds: float = math.inf) -> SolverResult:
         """The optimum of (26), searched for no longer than `seconds` by the clock; DAQP looks at it every 32 nodes."""
         options = SolverOptions()
         options.SetOption(CommonSolverOption.kMaxThreads, 1)
@@ -79,13 +79,13 @@ class Search:
         started = time.monotonic()
         found = _found(self._solver.Solve(binary.program, guess, options), len(binary.omega))
         late = found.ended == "solver_failed" and time.monotonic() - started >= seconds
-        return Found(None, "budget_spent") if late else found
+        return SolverResult(None, "budget_spent") if late else found
 
 
 _RELAXING = DaqpSolver()
 
 
-def relax(binary: BinaryProgram, seconds: float = math.inf, iterations: int = 10_000) -> Found:
+def relax(binary: BinaryProgram, seconds: float = math.inf, iterations: int = 10_000) -> SolverResult:
     """The optimum of (27), by DAQP, within `iterations` of the active-set method and `seconds` by the clock."""
     options = SolverOptions()
     options.SetOption(DaqpSolver.id(), "iter_limit", iterations)
@@ -94,11 +94,11 @@ def relax(binary: BinaryProgram, seconds: float = math.inf, iterations: int = 10
     return _found(_RELAXING.Solve(binary.relaxation, None, options), len(binary.shares))
 
 
-def _found(result: Any, count: int) -> Found:
+def _found(result: Any, count: int) -> SolverResult:
     """A result; the accept variables, or shares, are the first `count` variables of their program."""
     details = result.get_solver_details()
     more = (details.iterations, details.multipliers) if isinstance(details, Details) else (0, None)
     if result.is_success():
-        return Found(result.get_x_val()[:count], "optimal", *more)
+        return SolverResult(result.get_x_val()[:count], "optimal", *more)
     limited = result.get_solution_result() == SolutionResult.kIterationLimit
-    return Found(None, "budget_spent" if limited else "solver_failed", *more)
+    return SolverResult(None, "budget_spent" if limited else "solver_failed", *more)

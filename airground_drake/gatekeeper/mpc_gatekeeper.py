@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from airground_drake.base.arrays import Array
 from airground_drake.base.errors import PluginError, described, one_line, short
-from airground_drake.gatekeeper.answer import Basis, Decision, Rules, in_words, settle
+from airground_drake.gatekeeper.answer import Basis, GatekeeperDecision, Rules, in_words, settle
 from airground_drake.gatekeeper.budget import Budget
 from airground_drake.gatekeeper.patience import Commitment
 from airground_drake.gatekeeper.problem import Horizon, Problem, predicted_problem
@@ -46,7 +46,7 @@ class GatekeeperState:
     answers: tuple[float, ...]
     since: tuple[float, ...]
     reports: Reports
-    decisions: tuple[Decision, ...] = ()
+    decisions: tuple[GatekeeperDecision, ...] = ()
     commitments: tuple[Commitment, ...] = ()
     sensed: npt.NDArray[np.bool_] = field(default_factory=lambda: np.zeros((0, 0), dtype=bool))
     count: int = 0
@@ -110,7 +110,7 @@ class Gatekeepers(abc.ABC):
         """Which obstacles are there at time t, s, and within sensing range, (m,)."""
         return distances(self._world.at(self._near, t).still, position) <= self.law.avoidance.sensing_range
 
-    def _report(self, position: Array, decision: Decision) -> Report:
+    def _report(self, position: Array, decision: GatekeeperDecision) -> Report:
         """The report with an answer: the obstacles within sensing range, and the reason."""
         near = self._discs[self._in_range(decision.t, position)]
         discs: tuple[Disc, ...] = tuple((x, y, z, radius) for x, y, z, radius in near.tolist())
@@ -146,7 +146,7 @@ class PaperGatekeepers(Gatekeepers):
         answers: list[float] = []
         since: list[float] = []
         reports: list[Report] = []
-        decisions: list[Decision] = []
+        decisions: list[GatekeeperDecision] = []
         budgets = self._rules.budgets(sum(p is not None for p in now.proposals))
         for i, proposal in enumerate(now.proposals):
             if proposal is None:
@@ -168,7 +168,7 @@ class PaperGatekeepers(Gatekeepers):
 
     def _decide(
         self, now: Inputs, before: GatekeeperState, i: int, proposal: Proposal, budgets: Iterator[Budget]
-    ) -> Decision:
+    ) -> GatekeeperDecision:
         started = thread_time()
         problem = predicted_problem(self._view(now, i), now.law, proposal, self._horizon)
         problem = replace(problem, previous=_rest_of_plan(before, now.t, i, proposal))
@@ -181,7 +181,7 @@ class PaperGatekeepers(Gatekeepers):
         throughout = (constants.accept.objective, constants.refuse.objective) if solution.has_plan else (-1.0, -1.0)
         accepted, reason = settle(solution, throughout, standing, stood, self._rules)
         basis = Basis(tuple(np.flatnonzero(self._in_range(now.t, now.positions[i])).tolist()))
-        return Decision(now.t, i, proposal, accepted, reason, problem, solution, throughout, basis=basis)
+        return GatekeeperDecision(now.t, i, proposal, accepted, reason, problem, solution, throughout, basis=basis)
 
     def _solved(self, problem: Problem, budget: Budget) -> Solution:
         """The route's solution; the route gets a `Problem` of its own, so that it cannot change what is recorded.

@@ -19,7 +19,7 @@ import numpy as np
 import numpy.typing as npt
 
 from airground_drake.base.arrays import Array
-from airground_drake.gatekeeper.answer import Basis, Decision, Reason
+from airground_drake.gatekeeper.answer import Basis, GatekeeperDecision, Reason
 from airground_drake.gatekeeper.mpc_gatekeeper import Gatekeepers, GatekeeperState, Inputs
 from airground_drake.gatekeeper.outcome import Outcome, Outlook, outcomes
 from airground_drake.gatekeeper.patience import Commitment, Patience
@@ -62,7 +62,7 @@ class OutcomeGatekeepers(Gatekeepers):
         answers: list[float] = []
         reports: list[Report] = []
         held = list(before.commitments)
-        decisions: list[Decision] = []
+        decisions: list[GatekeeperDecision] = []
         for i, proposal in enumerate(now.proposals):
             standing = answer_to(proposal, before.answers, i)
             if held[i].executing and standing != ACCEPT:  # withdrawn
@@ -113,7 +113,7 @@ class OutcomeGatekeepers(Gatekeepers):
         proposal: Proposal,
         standing: float,
         held: Commitment,
-    ) -> tuple[Decision, Commitment]:
+    ) -> tuple[GatekeeperDecision, Commitment]:
         """Judge a new proposal, watch over an accepted one, keep to a refusal: the decision, and the new commitment."""
         reason: Reason = "kept"
         refuse = accept = None
@@ -133,7 +133,7 @@ class OutcomeGatekeepers(Gatekeepers):
             held = self._patience.accept(held, now.t, proposal.motion.end)
         elif standing == ACCEPT and not accepted:
             held = self._patience.stop(held, now.t)
-        decision = Decision(
+        decision = GatekeeperDecision(
             now.t, i, proposal, accepted, reason, refuse=refuse, accept=accept, tries=held.tries, basis=basis
         )
         return decision, held
@@ -194,7 +194,7 @@ class OutcomeGatekeepers(Gatekeepers):
         return np.concatenate([self._near.still[sensed], proposal.mapped[told]]), distances
 
 
-def _answer(decision: Decision, standing: float) -> float:
+def _answer(decision: GatekeeperDecision, standing: float) -> float:
     """The answer that follows from a decision; DONE stays DONE."""
     if decision.accepted:
         return ACCEPT

@@ -10,7 +10,7 @@ import numpy.typing as npt
 import pandas as pd
 
 from airground_drake.base.arrays import Array
-from airground_drake.gatekeeper.answer import Decision
+from airground_drake.gatekeeper.answer import GatekeeperDecision
 from airground_drake.intervention.database import Asked
 from airground_drake.intervention.planner import PlannerState
 from airground_drake.intervention.policy import Proposal
@@ -81,12 +81,12 @@ def sample_rows(t: Array, period_s: float) -> npt.NDArray[np.intp]:
     return np.asarray(nearest[(np.abs(t[nearest] - instants) <= SAME_S) & (nearest < len(t) - 1)])
 
 
-def decisions(decided: Sequence[Decision], ugvs: Sequence[str], route: str) -> pd.DataFrame:
+def decisions(decided: Sequence[GatekeeperDecision], ugvs: Sequence[str], route: str) -> pd.DataFrame:
     """`Trace.decisions`; the route is the name of method (c)'s."""
     return typed([_decision(made, ugvs[made.robot], route) for made in decided], DECISION_COLUMNS, *DECISION_LISTS)
 
 
-def _decision(decision: Decision, robot: str, route: str) -> dict[str, Any]:
+def _decision(decision: GatekeeperDecision, robot: str, route: str) -> dict[str, Any]:
     """A row of `Trace.decisions`."""
     row: dict[str, Any] = {name: "" if kind == "str" else -1.0 for name, kind in DECISION_COLUMNS.items()}
     rested_on = decision.basis
@@ -134,7 +134,7 @@ def _decision(decision: Decision, robot: str, route: str) -> dict[str, Any]:
     }
 
 
-def problems(decided: Sequence[Decision]) -> pd.DataFrame:
+def problems(decided: Sequence[GatekeeperDecision]) -> pd.DataFrame:
     """`Trace.problems` of the decisions."""
 
     def flat(array: Array | None) -> list[float]:

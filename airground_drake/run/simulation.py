@@ -15,7 +15,7 @@ from pydrake.systems.framework import Context, DiagramBuilder, LeafSystem
 from pydrake.systems.primitives import LogVectorOutput, Multiplexer
 
 from airground_drake.base.errors import SimulationError, UnknownNameError, described
-from airground_drake.gatekeeper.answer import Decision
+from airground_drake.gatekeeper.answer import GatekeeperDecision
 from airground_drake.gatekeeper.outcome import Outlook, outcomes
 from airground_drake.gatekeeper.problem import Horizon, predicted_problem
 from airground_drake.gatekeeper.rollout import View
@@ -145,7 +145,7 @@ class Recorder:
         t = log.sample_times()
         keep = recording.distinct(t, data["team_command"])
         data = {name: rows[:, keep] for name, rows in data.items()}
-        decided: list[Decision] = []
+        decided: list[GatekeeperDecision] = []
         timings: dict[str, Any] = {"wall_s": wall, "decision_times_s": []}
         if (gatekeeper := model.gatekeeper) is not None:
             decided = gatekeeper.decisions(gatekeeper.GetMyContextFromRoot(context))

@@ -7,7 +7,7 @@ from typing import Any, Self
 from pydrake.common.value import AbstractValue, Value
 from pydrake.systems.framework import BasicVector, Context, EventStatus, LeafSystem, State, ValueProducer
 
-from airground_drake.gatekeeper.answer import Decision
+from airground_drake.gatekeeper.answer import GatekeeperDecision
 from airground_drake.gatekeeper.mpc_gatekeeper import Gatekeepers, GatekeeperState, Inputs
 from airground_drake.intervention.messages import ACCEPT, SILENT, Report
 from airground_drake.systems.lifetime import weakly
@@ -16,7 +16,7 @@ from airground_drake.systems.ticks import Ticks
 from airground_drake.world.world import World
 
 
-class DecisionLog(list[Decision]):
+class DecisionLog(list[GatekeeperDecision]):
     """Decisions in the order of time, for the trace."""
 
     def __deepcopy__(self, memo: dict[int, Any]) -> Self:

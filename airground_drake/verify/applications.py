@@ -90,7 +90,7 @@ def measured(trace: Trace) -> dict[str, thr_choice.Measured]:
 
 def with_runs(finding: Finding, of_runs: Iterable[dict[str, thr_choice.Measured]]) -> Finding:
     """The finding on THR-CHOICE with what was measured in the runs; other findings as they are."""
-    if not isinstance(finding.evidence, thr_choice.Choice):
+    if not isinstance(finding.evidence, thr_choice.ThresholdChoice):
         return finding
     runs = {name: row for each in of_runs for name, row in each.items()}
     return replace(finding, evidence=replace(finding.evidence, runs=runs))

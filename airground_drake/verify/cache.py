@@ -34,7 +34,7 @@ ENGINES = ("numpy", "scipy", "numba")
 """Packages whose versions are part of a finding's key."""
 
 
-def found(claim: ModelClaim, inputs: dict[str, Any], folder: Path | None = None) -> Finding:
+def cached_finding(claim: ModelClaim, inputs: dict[str, Any], folder: Path | None = None) -> Finding:
     """The finding of a claim for its inputs.
 
     Args:

@@ -16,7 +16,7 @@ from airground_drake.run.trace import Trace
 from airground_drake.scenarios.load import own
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.verify.applications import Count, counts, measured, with_counts, with_runs
-from airground_drake.verify.cache import found
+from airground_drake.verify.cache import cached_finding
 from airground_drake.verify.claim import ModelClaim, TraceClaim, Verdict
 from airground_drake.verify.finding import Finding
 from airground_drake.verify.registry import model_claims, run_claims
@@ -94,7 +94,7 @@ def judge_model(
         PluginError: if a claim of the scenario cannot be made.
     """
     asked = _asked(scenario, claims)
-    pieces = [partial(found, each.claim, each.inputs, kept) for each in asked]
+    pieces = [partial(cached_finding, each.claim, each.inputs, kept) for each in asked]
     findings = run_parallel(pieces, names=[each.name for each in asked], progress=progress)
     return [each.verdict(scenario, finding) for each, finding in zip(asked, findings, strict=True)]
 
@@ -118,7 +118,7 @@ def judge_all(
     """
     asked = _asked(scenario)
     of_runs = [(replace(trace), _applicable(trace)) for trace in traces]  # as in `judge`
-    pieces: list[Callable[[], Any]] = [partial(found, each.claim, each.inputs, kept) for each in asked]
+    pieces: list[Callable[[], Any]] = [partial(cached_finding, each.claim, each.inputs, kept) for each in asked]
     pieces += [partial(_Judged.of, trace, claims) for trace, claims in of_runs]
     names = [*(each.name for each in asked), *(f"claims about run {trace.run}" for trace, _ in of_runs)]
     progress.stage("judging", len(pieces), "claims about the model or a run")

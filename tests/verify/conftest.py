@@ -9,7 +9,7 @@ import pytest
 from verify.judging import Judged
 
 from airground_drake.scenarios.load import load
-from airground_drake.verify.cache import cache_folder, found
+from airground_drake.verify.cache import cache_folder, cached_finding
 from airground_drake.verify.claim import ModelClaim
 from airground_drake.verify.finding import Finding
 
@@ -27,7 +27,7 @@ def judged() -> Judged:
         given = claim.inputs(case_a) if inputs is None else inputs
         key = claim.id, json.dumps(given, sort_keys=True)
         if key not in made:
-            made[key] = found(claim, given, cache_folder())
+            made[key] = cached_finding(claim, given, cache_folder())
         return made[key]
 
     return get

@@ -12,7 +12,7 @@ import numpy as np
 from airground_drake.base.arrays import Array
 from airground_drake.gatekeeper.binary_program import BinaryProgram
 from airground_drake.gatekeeper.budget import Budget
-from airground_drake.gatekeeper.drake_solvers import Search, relax
+from airground_drake.gatekeeper.drake_solvers import Minimiser, relax
 from airground_drake.gatekeeper.plan_search import cheap_plan, improve
 from airground_drake.gatekeeper.problem import Problem
 from airground_drake.gatekeeper.relaxation import dual_bound, normals_along, sum_up_rounding, unavoidable_cost
@@ -74,7 +74,7 @@ class MixedIntegerRoute:
         if blocks is not None and blocks < 1:
             raise ValueError(f"blocks: {blocks}, allowed: 1 or more")
         self._blocks = blocks
-        self._search = Search(solver)
+        self._search = Minimiser(solver)
         self._programs: dict[tuple[int, int], BinaryProgram] = {}
 
     def solve(self, problem: Problem, budget: Budget = Budget()) -> Solution:  # noqa: B008 (immutable)
@@ -121,7 +121,7 @@ class MixedIntegerRoute:
 class _Searches:
     """Searches for the optimum of one problem along several half-planes, which share a budget."""
 
-    def __init__(self, search: Search, binary: BinaryProgram, problem: Problem, budget: Budget) -> None:
+    def __init__(self, search: Minimiser, binary: BinaryProgram, problem: Problem, budget: Budget) -> None:
         """With all of the budget left."""
         self._search, self._binary, self._problem, self._budget = search, binary, problem, budget
         self._iterations, self._until = budget.search_iterations, time.monotonic() + budget.search_s

@@ -23,7 +23,7 @@ Function = Callable[[Any], Any]
 """From a ball u to a ball that contains the value there."""
 
 
-class Ends(NamedTuple):
+class RootInterval(NamedTuple):
     """Two rational numbers with a root between them, and the signs there: -1 or 1."""
 
     low: Fraction
@@ -31,7 +31,7 @@ class Ends(NamedTuple):
     signs: tuple[int, int]
 
 
-class Rule(NamedTuple):
+class ThresholdRule(NamedTuple):
     """The numbers of the threshold rule, as the decimals that they print as."""
 
     drift: Fraction
@@ -53,12 +53,12 @@ class Rule(NamedTuple):
         return lambda u: ball(k) * (u.sinh() + u) - ball(ratio)
 
     @property
-    def root(self) -> Ends:
+    def root(self) -> RootInterval:
         """The root of (19) with c2/c1, in u."""
         return enclose(self.residual(self.c2 / self.c1), Fraction(0))
 
     @property
-    def printed_root(self) -> Ends:
+    def printed_root(self) -> RootInterval:
         """The root of (19) as printed, with c1/c2, in u."""
         return enclose(self.residual(self.c1 / self.c2), Fraction(0))
 
@@ -86,7 +86,7 @@ def sign(function: Function, u: Fraction) -> int:
     return int(bool(found > 0)) - int(bool(found < 0))
 
 
-def enclose(function: Function, low: Fraction, high: Fraction | None = None) -> Ends:
+def enclose(function: Function, low: Fraction, high: Fraction | None = None) -> RootInterval:
     """Rational ends, NARROW apart or less, around a sign change of the function, by bisection.
 
     Args:
@@ -114,4 +114,4 @@ def enclose(function: Function, low: Fraction, high: Fraction | None = None) -> 
     while high - low > NARROW * low:
         middle = (low + high) / 2
         low, high = (middle, high) if sure(middle) == before else (low, middle)
-    return Ends(low, high, (before, sure(high)))
+    return RootInterval(low, high, (before, sure(high)))

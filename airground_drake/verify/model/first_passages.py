@@ -55,7 +55,7 @@ class PassageExperiment:
 
 
 @dataclass(frozen=True)
-class Sample:
+class PassageSample:
     """Wrong decisions of an experiment, sum and sum of squares of the noise periods to the decision."""
 
     experiment: PassageExperiment
@@ -94,7 +94,7 @@ def running(experiment: PassageExperiment) -> tuple[float, float]:
 
 
 @lru_cache(maxsize=16)
-def simulate(experiment: PassageExperiment) -> Sample:
+def simulate(experiment: PassageExperiment) -> PassageSample:
     """Decide all paths of an experiment.
 
     Raises:
@@ -113,5 +113,5 @@ def simulate(experiment: PassageExperiment) -> Sample:
         squares += periods**2 * decided
         x = x[inside]
         if not len(x):
-            return Sample(experiment, wrong, total, squares)
+            return PassageSample(experiment, wrong, total, squares)
     raise ArithmeticError(f"{experiment.name}: {len(x)} paths are undecided after {MOST_PERIODS} noise periods")

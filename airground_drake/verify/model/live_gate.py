@@ -10,7 +10,7 @@ from airground_drake.verify.model.theorem import Proof
 
 
 @dataclass(frozen=True, kw_only=True)
-class Ends(Proof):
+class LatestEnd(Proof):
     """After how long an accepted intervention is over at the latest, s."""
 
     over_after_s: float
@@ -51,4 +51,4 @@ class LiveGate(LiveWait):
 
     def evidence(self, inputs: dict[str, Any], **proof: Any) -> Proof:
         """Add the longest that an accepted intervention may last."""
-        return Ends(over_after_s=float(inputs["longest_s"] + inputs["period_s"]), **proof)
+        return LatestEnd(over_after_s=float(inputs["longest_s"] + inputs["period_s"]), **proof)

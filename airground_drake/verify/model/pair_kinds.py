@@ -17,7 +17,7 @@ SHARES = {"obstacle": (Fraction(1), Fraction(0)), "uav_ugv": (Fraction(1, 2),) *
 """By kind of pair, the parts of an inequality that its two bodies take; an obstacle stands still and takes none."""
 
 
-class Kind(NamedTuple):
+class PairKind(NamedTuple):
     """Pairs of one kind with the same safe distance of centres, m, and closing speed, m/s."""
 
     kind: str
@@ -39,15 +39,15 @@ def constants(scenario: Scenario) -> dict[str, Any]:
     }
 
 
-def kinds_of(inputs: dict[str, Any]) -> list[Kind]:
+def kinds_of(inputs: dict[str, Any]) -> list[PairKind]:
     """The pairs among a claim's inputs, as the decimals that their numbers print as."""
     return [
-        Kind(each["kind"], decimal(each["distance_of_centres_m"]), decimal(each["closing_m_s"]))
+        PairKind(each["kind"], decimal(each["distance_of_centres_m"]), decimal(each["closing_m_s"]))
         for each in inputs["pairs"]
     ]
 
 
-def _kinds(scenario: Scenario) -> Iterator[Kind]:
+def _kinds(scenario: Scenario) -> Iterator[PairKind]:
     """The extreme pairs of each kind: the hypotheses hold for all pairs if they hold for these.
 
     Kept are pairs that no other pair exceeds in both distance and speed, and the nearest pair.
@@ -70,4 +70,4 @@ def _kinds(scenario: Scenario) -> Iterator[Kind]:
         if found:
             nearest = min(found, key=lambda each: (each[0], -each[1]))
             kept += [nearest] if nearest not in kept else []
-        yield from (Kind(kind, *each) for each in kept)
+        yield from (PairKind(kind, *each) for each in kept)

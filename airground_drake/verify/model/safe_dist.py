@@ -13,7 +13,7 @@ from typing import Any
 
 from airground_drake.base.exact import decimal
 from airground_drake.scenarios.schema import Scenario
-from airground_drake.verify.model.pair_kinds import Kind, constants, kinds_of
+from airground_drake.verify.model.pair_kinds import PairKind, constants, kinds_of
 from airground_drake.verify.model.safe_inv import stable
 from airground_drake.verify.model.theorem import Hypothesis, Proof, TheoremClaim
 
@@ -100,7 +100,7 @@ class SafeDist(TheoremClaim):
         return LeastDistances(least_distances_of_centres_m=least, **proof)
 
 
-def left_m(inputs: dict[str, Any], pair: Kind) -> Fraction:
+def left_m(inputs: dict[str, Any], pair: PairKind) -> Fraction:
     """d - W/A, m."""
     disturbed = 1 if pair.kind == "obstacle" else 2
     pushed = disturbed * decimal(inputs["disturbance_m_s"])

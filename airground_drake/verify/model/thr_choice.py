@@ -36,7 +36,7 @@ class Measured(Evidence):
 
 
 @dataclass(frozen=True)
-class Choice(Evidence):
+class ThresholdChoice(Evidence):
     """Thresholds, m, their Bayes risks, and what was measured in the runs of a report, by `run UGV`."""
 
     kind: str
@@ -89,7 +89,7 @@ class ThrChoice(ModelClaim):
         least, risk = (float(bayes_risk(each, *numbers)) for each in (optimum, zeta))
         off = abs(zeta - optimum)
         optimal = off <= EQUAL * optimum
-        evidence = Choice(
+        evidence = ThresholdChoice(
             "optimal" if optimal else "declared",
             inputs["rule"],
             zeta,

@@ -18,7 +18,7 @@ from scipy.special import betainccinv, betaincinv, ndtri
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.verify.claim import ModelClaim
 from airground_drake.verify.finding import Evidence, Finding
-from airground_drake.verify.model.first_passages import PassageExperiment, Sample, experiments, running, simulate
+from airground_drake.verify.model.first_passages import PassageExperiment, PassageSample, experiments, running, simulate
 from airground_drake.verify.model.levels import NUMBERS
 
 LEVEL = 0.99
@@ -120,7 +120,7 @@ def compare(chosen: tuple[PassageExperiment, ...], formulas: Formulas) -> Findin
     )
 
 
-def _rows(sample: Sample, formula: tuple[float, float], comparisons: int) -> list[Comparison]:
+def _rows(sample: PassageSample, formula: tuple[float, float], comparisons: int) -> list[Comparison]:
     """Compare the mean decision time and the error rate of an experiment with the formula's."""
     each, wrong = sample.experiment, sample.wrong
     count, period = each.paths, each.period

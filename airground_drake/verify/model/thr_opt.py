@@ -9,7 +9,7 @@ from typing import Any
 from airground_drake.base.exact import decimal
 from airground_drake.decision.bayes import bayes_risk
 from airground_drake.scenarios.schema import Scenario
-from airground_drake.verify.engines.signs import Ends, Rule, ball, enclose, sign, value
+from airground_drake.verify.engines.signs import RootInterval, ThresholdRule, ball, enclose, sign, value
 from airground_drake.verify.model.levels import NUMBERS
 from airground_drake.verify.model.theorem import Hypothesis, Proof, TheoremClaim
 from airground_drake.verify.model.thr_root import ThrRoot, as_floats, rule_of, two_signs
@@ -105,14 +105,14 @@ class ThrOpt(TheoremClaim):
         )
 
 
-def _gap(rule: Rule, printed: Ends) -> Fraction:
+def _gap(rule: ThresholdRule, printed: RootInterval) -> Fraction:
     """A lower bound of the risk at the printed root less that at the root: of the ends next to each other."""
     root = rule.root
     v, u = (printed.high, root.low) if rule.c1 < rule.c2 else (printed.low, root.high)
     return Fraction(float((value(rule.risk, v) - value(rule.risk, u)).lower()))
 
 
-def _drifts(rule: Rule, zeta: Fraction) -> list[list[float]]:
+def _drifts(rule: ThresholdRule, zeta: Fraction) -> list[list[float]]:
     """Enclosures of the drifts, m/s, for which zeta, m, solves the equation: two, or none.
 
     The equation is (sinh u + u)/u^2 = m at the drift u noise^2 / (2 zeta), m = c2/c1 noise^2/(4 zeta^2). The left side

@@ -9,7 +9,7 @@ from typing import Any
 from airground_drake.base.exact import decimal
 from airground_drake.decision.bayes import optimal_threshold
 from airground_drake.scenarios.schema import Scenario
-from airground_drake.verify.engines.signs import Ends, Rule, value
+from airground_drake.verify.engines.signs import RootInterval, ThresholdRule, value
 from airground_drake.verify.model.levels import NUMBERS, threshold_m
 from airground_drake.verify.model.theorem import Hypothesis, Proof, TheoremClaim
 
@@ -96,12 +96,12 @@ class ThrRoot(TheoremClaim):
         return float(optimal_threshold(*(inputs[name] for name in NUMBERS)))
 
 
-def rule_of(inputs: dict[str, Any]) -> Rule:
+def rule_of(inputs: dict[str, Any]) -> ThresholdRule:
     """The threshold rule of a claim's inputs, exactly."""
-    return Rule(*(decimal(inputs[name]) for name in NUMBERS))
+    return ThresholdRule(*(decimal(inputs[name]) for name in NUMBERS))
 
 
-def two_signs(what: str, ends: Ends) -> list[Hypothesis]:
+def two_signs(what: str, ends: RootInterval) -> list[Hypothesis]:
     """That a function is below 0 at the lower end of an enclosure, and above 0 at the upper one."""
     found = zip(("below", "above"), ends[:2], (-ends.signs[0], ends.signs[1]), strict=True)
     return [
@@ -110,7 +110,7 @@ def two_signs(what: str, ends: Ends) -> list[Hypothesis]:
     ]
 
 
-def as_floats(rule: Rule, root: Ends, prefix: str = "") -> dict[str, list[float]]:
+def as_floats(rule: ThresholdRule, root: RootInterval, prefix: str = "") -> dict[str, list[float]]:
     """The enclosures of u and of the threshold, m."""
     return {
         f"{prefix}u": [float(u) for u in root[:2]],

@@ -78,7 +78,6 @@ class Plans(Choices):
 
     Attributes:
         without_a_plan: refusals for want of a plan.
-        without_a_bound: plans without unit normals, along which the optimum could be enclosed.
         largest_slack_m: how far a plan leads inside a safe distance at most.
         plans_with_slack: how many do.
         rounded_plans: decisions with a relaxed plan.
@@ -90,7 +89,6 @@ class Plans(Choices):
     """
 
     without_a_plan: list[str]
-    without_a_bound: list[str]
     largest_slack_m: float
     plans_with_slack: int
     rounded_plans: int
@@ -201,7 +199,6 @@ def _plans(
         enumerated=len(beside_all),
         largest_gap_to_enumeration=max(beside_all, default=None),
         without_a_plan=[row.label for row in rows if not row.planned],
-        without_a_bound=[row.label for row in planned if not row.unit_normals],
         largest_slack_m=max(slack, default=0.0),
         plans_with_slack=sum(value > 0.0 for value in slack),
         rounded_plans=len(rounded),

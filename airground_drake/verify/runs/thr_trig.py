@@ -18,7 +18,7 @@ from airground_drake.scenarios.schema import Threshold
 from airground_drake.verify.claim import TraceClaim
 from airground_drake.verify.engines.geometry import NormSignal
 from airground_drake.verify.finding import Finding
-from airground_drake.verify.model.theorem import Hypothesis, Proof, grounds
+from airground_drake.verify.model.theorem import Hypothesis, grounds
 from airground_drake.verify.runs.triggers import (
     Conflict,
     Transition,
@@ -82,8 +82,8 @@ class ThrTrig(TraceClaim):
         "column are compared one by one. If a period of the noise has several rows, all must have the same sample, "
         "given the leak. Theorems in Coq say why the running trigger misses nothing in a step: its largest value is at "
         "an end, and its least one has a closed form, with p the distance of the error's line from 0, "
-        "k = (n1 - n0)/|e1 - e0| and w = sqrt(1 - k^2). `isolation` in the evidence has their hypotheses: the noise "
-        "changes its rate at control samples only. Tests compare the running trigger with dense sampling."
+        "k = (n1 - n0)/|e1 - e0| and w = sqrt(1 - k^2). The evidence has their hypotheses: the noise changes its rate "
+        "at control samples only. Tests compare the running trigger with dense sampling."
     )
     equations = "(15), (20)"
     assumptions = (
@@ -98,8 +98,8 @@ class ThrTrig(TraceClaim):
         "That the threshold is a good one (THR-CHOICE); that the noise has the stated distribution (THR-DDM), "
         "or the stated leak if no period of the noise has a row within; or anything about a Wiener path between the "
         "noise samples. If x only touches a level up to rounding, 1e-12 m, the verdict follows the rounding. Two "
-        "crossings closer than the isolation, 1e-6 s, may be taken at one instant. Where a hypothesis of `isolation` "
-        "fails, the theorems say nothing about other runs of the scenario."
+        "crossings closer than the isolation, 1e-6 s, may be taken at one instant. Where a hypothesis fails, "
+        "the theorems say nothing about other runs of the scenario."
     )
 
     exercised_by = "transitions of the automaton that were due"
@@ -122,14 +122,14 @@ class ThrTrig(TraceClaim):
             counterexample=min(wrong, key=lambda conflict: float(conflict["t_s"])) if wrong else None,
             evidence={
                 **asdict(Replay(replayed, _block(trace) or "that of (15)", *levels, dict(due))),
-                "isolation": isolation(trace.scenario.decision.noise_period_s, trace.scenario.control.period_s, levels),
+                **isolation(trace.scenario.decision.noise_period_s, trace.scenario.control.period_s, levels),
             },
             exercised=due.total(),
         )
 
 
-def isolation(noise_period_s: float, period_s: float, levels: Levels) -> Proof:
-    """Why no crossing between two updates is missed (proofs/Isolation.v), and whether that applies here."""
+def isolation(noise_period_s: float, period_s: float, levels: TriggerLevels) -> dict[str, Any]:
+    """Whether the theorems of Isolation.v apply here, in words, and their hypotheses."""
     steps = decimal(noise_period_s) / decimal(period_s)
     says = f"the noise period is a whole number of control periods: {float(steps):g}"
     hypotheses = [
@@ -137,10 +137,11 @@ def isolation(noise_period_s: float, period_s: float, levels: Levels) -> Proof:
         Hypothesis.of("noise periods beside control samples", says, -(steps % 1)),
         Hypothesis.of("control periods in a noise period", "there is at least one", steps - 1),
     ]
-    return Proof(**grounds(THEOREMS, hypotheses))
+    found = grounds(THEOREMS, hypotheses)
+    return {"isolation": found["reason"] or found["proof"], "hypotheses": hypotheses}
 
 
-class Levels(NamedTuple):
+class TriggerLevels(NamedTuple):
     """Threshold and release level of the trigger in force, m, and its dwell, s."""
 
     zeta_m: float
@@ -148,7 +149,7 @@ class Levels(NamedTuple):
     dwell_s: float
 
 
-def levels_of(trace: Trace) -> Levels:
+def levels_of(trace: Trace) -> TriggerLevels:
     """The levels of a run by its scenario.
 
     Raises:
@@ -161,8 +162,8 @@ def levels_of(trace: Trace) -> Levels:
     if rule.rule != "fixed" and not _is_root(rule, zeta):
         raise TraceError(f"the threshold in force, {zeta} m, is not what the scenario's rule computes")
     if decision.trigger == "bare":
-        return Levels(zeta, zeta, 0.0)
-    return Levels(zeta, decision.release_m, decision.min_inter_event_s)
+        return TriggerLevels(zeta, zeta, 0.0)
+    return TriggerLevels(zeta, decision.release_m, decision.min_inter_event_s)
 
 
 def _block(trace: Trace) -> str:
@@ -201,7 +202,7 @@ class Replay:
     transitions_due: dict[str, int]
 
 
-class Judged(NamedTuple):
+class Reconstruction(NamedTuple):
     """The trigger of a UGV, run again: the evidence, the automaton's transitions, and all that disagrees."""
 
     evidence: Replayed
@@ -209,7 +210,7 @@ class Judged(NamedTuple):
     wrong: list[Conflict]
 
 
-def _judged(trace: Trace, ugv: str, levels: Levels) -> Judged:
+def _judged(trace: Trace, ugv: str, levels: TriggerLevels) -> Reconstruction:
     """Run the automaton again for a UGV, and compare all records with that."""
     x, against_15, off = _variable(trace, ugv)
     predicted = list(transitions(x, *levels))
@@ -220,7 +221,7 @@ def _judged(trace: Trace, ugv: str, levels: Levels) -> Judged:
     found = (off, mismatch, columns, modes, noise_conflict(trace, ugv))
     wrong = [{"robot": ugv, **conflict} for conflict in found if conflict is not None]
     events = [{"t_s": time, "kind": kind} for time, kind in expected]
-    return Judged(Replayed(ugv, events, lag, float(x.x.max()), against_15), predicted, wrong)
+    return Reconstruction(Replayed(ugv, events, lag, float(x.x.max()), against_15), predicted, wrong)
 
 
 def _as_transitions(predicted: list[Transition]) -> Iterator[str]:

@@ -21,7 +21,7 @@ class Triggers:
 
 
 @dataclass(frozen=True, order=True)
-class Gap:
+class TriggerGap:
     """Two consecutive triggers of a UGV, s."""
 
     gap_s: float
@@ -75,7 +75,7 @@ class ZenoTrace(TraceClaim):
             triggers[ugv] = Triggers(len(times), times)
         evidence = asdict(Gaps(triggers, bound, int(trace.scenario.duration_s / bound) + 1))
         gaps = [
-            Gap(after - before, ugv, before, after)
+            TriggerGap(after - before, ugv, before, after)
             for ugv, found in triggers.items()
             for before, after in pairwise(found.t_s)
         ]

@@ -18,7 +18,7 @@ from properties import examples
 from pydrake.solvers import SolutionResult
 
 from airground_drake.gatekeeper.budget import Budget
-from airground_drake.gatekeeper.drake_solvers import Found
+from airground_drake.gatekeeper.drake_solvers import SolverResult
 from airground_drake.gatekeeper.problem import Problem
 from airground_drake.gatekeeper.relaxation import unavoidable_cost
 from airground_drake.gatekeeper.routes import relaxed
@@ -139,7 +139,7 @@ def test_without_an_optimum_the_better_constant_plan_decides(
 ) -> None:
     route, problem = MAKERS[name](), random_problem(0)
     if name == "relaxed":
-        monkeypatch.setattr(relaxed, "relax", lambda *_, **__: Found(None, solver))
+        monkeypatch.setattr(relaxed, "relax", lambda *_, **__: SolverResult(None, solver))
     else:
         monkeypatch.setattr(route, "_solver", solver)
     solution = check_contract(route, problem)

@@ -18,7 +18,7 @@ from airground_drake.base.errors import ScenarioError
 from airground_drake.gatekeeper import drake_solvers
 from airground_drake.gatekeeper.binary_program import BinaryProgram, block_of_stage
 from airground_drake.gatekeeper.budget import Budget
-from airground_drake.gatekeeper.drake_solvers import SOLVERS, Found, Search, lacking, relax
+from airground_drake.gatekeeper.drake_solvers import SOLVERS, Minimiser, SolverResult, lacking, relax
 from airground_drake.gatekeeper.problem import Problem
 from airground_drake.gatekeeper.relaxation import normals_along
 from airground_drake.gatekeeper.routes.mixed_integer import MixedIntegerRoute
@@ -74,7 +74,7 @@ def test_the_program_is_the_problem(blocks: int) -> None:
             assert not made.CheckSatisfied(binary.half_planes, every, 1e-9)
 
 
-def ending(found: Found) -> MixedIntegerRoute:
+def ending(found: SolverResult) -> MixedIntegerRoute:
     """A route whose search ends like this."""
     route = MixedIntegerRoute()
     route._search.minimise = lambda *_: found  # type: ignore[method-assign]
@@ -85,12 +85,12 @@ def ending(found: Found) -> MixedIntegerRoute:
 @pytest.mark.parametrize(
     ("found", "status"),
     [
-        (Found(None, "budget_spent"), "budget_spent"),
-        (Found(None, "solver_failed"), "solver_failed"),
-        (Found(np.ones(60), "optimal", 10**9), "budget_spent"),  # a machine that came to its end does not matter
+        (SolverResult(None, "budget_spent"), "budget_spent"),
+        (SolverResult(None, "solver_failed"), "solver_failed"),
+        (SolverResult(np.ones(60), "optimal", 10**9), "budget_spent"),  # a machine that came to its end does not matter
     ],
 )
-def test_without_a_proof_the_incumbent_decides(name: str, found: Found, status: str) -> None:
+def test_without_a_proof_the_incumbent_decides(name: str, found: SolverResult, status: str) -> None:
     """It costs no more than sum-up rounding and the constant plans, and has the relaxation for a bound."""
     problem, optimal = INSTANCES[name], MixedIntegerRoute().solve(INSTANCES[name])
     solution = check_contract(ending(found), problem)
@@ -103,18 +103,20 @@ def test_without_a_proof_the_incumbent_decides(name: str, found: Found, status: 
 
 
 def test_an_optimum_that_a_known_plan_beats_is_a_failure() -> None:
-    assert ending(Found(np.ones(24), "optimal")).solve(INSTANCES["a point at the robot"]).status == "solver_failed"
+    assert (
+        ending(SolverResult(np.ones(24), "optimal")).solve(INSTANCES["a point at the robot"]).status == "solver_failed"
+    )
 
 
 def test_searches_and_relaxations_stop_at_their_limits() -> None:
     binary, _ = program(rolled_out(1))
-    nowhere, search = np.full(binary.program.num_vars(), np.nan), Search("daqp")
+    nowhere, search = np.full(binary.program.num_vars(), np.nan), Minimiser("daqp")
     assert search.minimise(binary, nowhere, 1e-9).ended == "budget_spent"
     assert relax(binary, iterations=1).ended == "budget_spent"
     route, counts = MixedIntegerRoute(), []
     minimise = route._search.minimise
 
-    def counting(*given: Any) -> Found:
+    def counting(*given: Any) -> SolverResult:
         found = minimise(*given)
         counts.append(found.iterations)
         return found
@@ -201,7 +203,7 @@ def test_a_solver_of_drake_takes_the_program_as_it_is(
         problem = random_problem(seed, 12, 1 + seed % 3)
         binary, normals = program(problem)
         nowhere = np.full(binary.program.num_vars(), np.nan)
-        omegas = [Search(name).minimise(binary, nowhere).omega for name in ("daqp", "gurobi")]
+        omegas = [Minimiser(name).minimise(binary, nowhere).omega for name in ("daqp", "gurobi")]
         ours, its = (float(cost(problem, binary.plan(omega), normals)) for omega in omegas if omega is not None)
         assert ours * (1.0 - 1e-9) <= its <= 1.011 * ours + 0.011
     found, ours = (check_contract(MixedIntegerRoute(solver=name), random_problem(0, 12)) for name in ("gurobi", "daqp"))

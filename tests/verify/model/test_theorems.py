@@ -13,7 +13,7 @@ from airground_drake.scenarios.load import load, shipped
 from airground_drake.verify.claim import ModelClaim
 from airground_drake.verify.model import safe_inv, theorem
 from airground_drake.verify.model.theorem import TheoremClaim
-from airground_drake.verify.runs.thr_trig import Levels, isolation
+from airground_drake.verify.runs.thr_trig import TriggerLevels, isolation
 
 CLAIMS: dict[str, TheoremClaim] = {
     name: claim for name in MODEL_CLAIMS if isinstance(claim := MODEL_CLAIMS.make(name, of=ModelClaim), TheoremClaim)
@@ -92,9 +92,17 @@ def test_a_hypothesis_that_fails_leaves_the_claim_open(names: list[str], change:
 def test_isolation_applies_where_noise_changes_at_control_samples(
     noise_period_s: float, zeta_m: float, failing: str | None
 ) -> None:
-    found = isolation(noise_period_s, 0.05, Levels(zeta_m, 1.0, 0.5))
-    assert list(found.theorems) == [name for name in THEOREMS if THEOREMS[name].checked_where == ("THR-TRIG",)]
-    assert found.reason is None if failing is None else failing in str(found.reason)
+    found = isolation(noise_period_s, 0.05, TriggerLevels(zeta_m, 1.0, 0.5))
+    assert all(each.holds for each in found["hypotheses"]) == (failing is None)
+    assert (failing or "checked by Coq") in found["isolation"]
+
+
+def test_isolation_of_a_theory_that_coq_has_not_checked_is_doubted(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[str] = []
+    unchecked = Standing(False, "not checked", {})
+    monkeypatch.setattr(theorem, "standing", lambda *names: asked.extend(names) or unchecked)
+    assert isolation(0.05, 0.05, TriggerLevels(3.0, 2.0, 0.5))["isolation"] == "the theorems are not checked"
+    assert asked == [name for name in THEOREMS if THEOREMS[name].checked_where == ("THR-TRIG",)]
 
 
 def test_shares_that_do_not_add_up_leave_the_claim_open(monkeypatch: pytest.MonkeyPatch) -> None:
