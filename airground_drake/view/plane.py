@@ -26,8 +26,8 @@ MAX_NAMED_OBSTACLES = 12
 THUMBNAIL_IN = (2.5, 1.9)
 """Width and height of a small picture, inches."""
 MAX_THUMBNAIL_UGVS, MAX_THUMBNAIL_POINTS = 20, 200
-_LEFT_IN, _BESIDE_IN, _BELOW_IN = 0.5, 0.65, 0.42
-"""Margin left of a map, both side margins together, margin below it, inches."""
+_LEFT_IN, _BESIDE_IN, _BELOW_IN, _ABOVE_IN = 0.5, 0.65, 0.42, 0.1
+"""Margin left of a map, both side margins together, margins below and above it, inches."""
 _VOID_DASH = (0, (1.5, 2.5))
 
 
@@ -61,11 +61,11 @@ def frame_of(scenario: Scenario, ways: Iterable[tuple[str, Array]]) -> Frame:
     return Frame(left, right, bottom - 0.6, top + 0.8)
 
 
-def axes_over(frame: Frame, width_in: float, above_in: float = 0.1) -> tuple[Figure, Axes]:
+def axes_over(frame: Frame, width_in: float) -> tuple[Figure, Axes]:
     """A figure with axes over a part of the ground plane."""
     inner_in = width_in - _BESIDE_IN
     inner_height_in = inner_in * (frame.top - frame.bottom) / (frame.right - frame.left)
-    height_in = inner_height_in + _BELOW_IN + above_in
+    height_in = inner_height_in + _BELOW_IN + _ABOVE_IN
     figure = Figure(figsize=(width_in, height_in))
     box = (_LEFT_IN / width_in, _BELOW_IN / height_in, inner_in / width_in, inner_height_in / height_in)
     axes = figure.add_axes(box)
@@ -100,14 +100,6 @@ def draw_obstacles(axes: Axes, scenario: Scenario) -> list[Label]:
     return labels
 
 
-def draw_way(axes: Axes, way: Array, appearance: Look, rows: int | None = None, **options: Any) -> None:
-    """Draw a way (T, 2) or (T, 3), m: the first `rows` as a line, the others, which do not count, in short dashes."""
-    rows = len(way) if rows is None else rows
-    parts = [(way[:rows, :2], appearance.dash, options), (way[rows - 1 :, :2], _VOID_DASH, {"linewidth": 0.9})]
-    for part, dash, of_line in parts[: 1 + (rows < len(way))]:
-        axes.plot(*part[thin(part)].T, color=appearance.color, linestyle=dash, **of_line)
-
-
 def draw_robot(
     axes: Axes, scenario: Scenario, name: str, way: Array, appearance: Look, rows: int | None = None, **options: Any
 ) -> list[Label]:
@@ -119,13 +111,17 @@ def draw_robot(
         name: of the robot.
         way: its positions.
         appearance: of the line.
-        rows: number of positions that count; see `draw_way`.
+        rows: number of positions that count, by default all; the others are drawn in short dashes.
         options: of the line.
 
     Returns:
         Labels: its name at both ends.
     """
-    draw_way(axes, way, appearance, rows, **{"linewidth": 1.9 if name in scenario.ugvs else 1.1, **options})
+    rows = len(way) if rows is None else rows
+    options = {"linewidth": 1.9 if name in scenario.ugvs else 1.1, **options}
+    parts = [(way[:rows, :2], appearance.dash, options), (way[rows - 1 :, :2], _VOID_DASH, {"linewidth": 0.9})]
+    for part, dash, of_line in parts[: 1 + (rows < len(way))]:
+        axes.plot(*part[thin(part)].T, color=appearance.color, linestyle=dash, **of_line)
     ends = [way[0], way[-1]]
     for at in ends:
         _disc(axes, at, scenario.robots[name].radius_m, appearance.color)

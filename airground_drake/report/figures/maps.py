@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -13,9 +13,9 @@ from airground_drake.base.arrays import Array
 from airground_drake.report.metrics import events_of
 from airground_drake.report.reproduction import MEASURES
 from airground_drake.run.trace import Trace
-from airground_drake.view.canvas import ALARM, INK, MUTED, WIDE_IN, look, short
+from airground_drake.view.canvas import ALARM, INK, MUTED
 from airground_drake.view.labels import Label, place
-from airground_drake.view.plane import Frame, axes_over, draw_obstacles, draw_robot, draw_way, looks_of
+from airground_drake.view.plane import Frame, axes_over, draw_obstacles, draw_robot, looks_of
 
 
 def plane(trace: Trace, ugvs: Sequence[str], frame: Frame, width_in: float) -> Figure:
@@ -36,25 +36,6 @@ def plane(trace: Trace, ugvs: Sequence[str], frame: Frame, width_in: float) -> F
     for ugv in ugvs:
         labels += _happenings(axes, trace, ugv)
     place(axes, [*labels, *of_obstacles], [trace.position(robot) for robot in robots])
-    return figure
-
-
-def compared_paths(runs: Mapping[str, Trace], robot: str, frame: Frame) -> Figure:
-    """The ways of one robot in several runs, near the obstacles."""
-    figure, axes = axes_over(frame, WIDE_IN, above_in=0.22 * len(runs))
-    of_obstacles, labels = draw_obstacles(axes, next(iter(runs.values())).scenario), list[Label]()
-    for position, (name, trace) in enumerate(runs.items()):
-        path, appearance = trace.position(robot), look(position)
-        draw_way(axes, path, appearance, trace.counting_rows(robot), linewidth=2.0, label=f"run {short(name, 24)}")
-        inside = (path[:, 0] > frame.left) & (path[:, 0] < frame.right)
-        inside &= (path[:, 1] > frame.bottom) & (path[:, 1] < frame.top)
-        marked = np.flatnonzero(inside)[:: max(1, int(inside.sum()) // 7)]
-        axes.plot(*path[marked, :2].T, linestyle="none", marker=appearance.marker, markersize=5, color=appearance.color)
-        if MEASURES["stall_position"](trace, robot):
-            axes.plot(*path[-1, :2], marker="s", markersize=11, markerfacecolor="none", color=INK, markeredgewidth=1.6)
-            labels.append(Label(path[-1], "stands still"))
-    place(axes, [*labels, *of_obstacles], [trace.position(robot) for trace in runs.values()])
-    axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), frameon=False, handlelength=4.0, borderaxespad=0.0)
     return figure
 
 
