@@ -86,18 +86,17 @@ def document_again(report: Mapping[str, Any], scenario: Any, traces: Mapping[str
     """report.json from the traces; what only other runs or third-party code can tell is taken from the recorded one."""
     from airground_drake.audit import of_runs
     from airground_drake.report import document, metrics
+    from airground_drake.scenarios.load import from_data
 
-    own = replace(scenario, claims={})
-    judged = [
-        replace(each, meta=each.meta | {"scenario": each.meta["scenario"] | {"claims": {}}}) for each in traces.values()
-    ]
+    own = _without_claims(report["scenario"]["resolved"])
+    judged = [replace(each, meta=each.meta | {"scenario": own}) for each in traces.values()]
     here = {item["id"] for item in of_runs(scenario, traces)}
     audit = [item for item in report["audit"] if item.get("id") not in here]
     again = document.build(
         scenario,
         report["scenario"]["sha256"],
         traces,
-        judge(own, judged),
+        judge(from_data(own, scenario.name), judged),
         report["provenance"] | {"seed": scenario.seed},
         audit=audit,
         seeds=[metrics.outcome(traces[row["run"]]) if row["seed"] == scenario.seed else row for row in report["seeds"]],
@@ -111,6 +110,17 @@ def document_again(report: Mapping[str, Any], scenario: Any, traces: Mapping[str
     missing = document.missing(scenario, traces, again["claims"])
     again["overall"] = document.overall(again["claims"], missing, again["audit"] if audit else ())
     return again
+
+
+def _without_claims(scenario: Mapping[str, Any]) -> dict[str, Any]:
+    """A resolved scenario without the claims that it adds, and without what it expects of them."""
+
+    def expecting_less(part: Mapping[str, Any]) -> dict[str, Any]:
+        expected = {name: value for name, value in part["expected"].items() if name not in scenario["claims"]}
+        return {**part, "expected": expected}
+
+    runs = {name: expecting_less(run) for name, run in scenario["runs"].items()}
+    return {**expecting_less(scenario), "runs": runs, "claims": {}}
 
 
 def _expected(entry: Mapping[str, Any], scenario: Any) -> dict[str, Any]:
