@@ -12,8 +12,8 @@ from check.forging import claim_of, copy, edited_report, edited_scenarios, judge
 from airground_drake import check
 from airground_drake.check.report import DECIDED
 from airground_drake.report import rebuild
-from airground_drake.report.document import overall
 from airground_drake.report.__main__ import main as write
+from airground_drake.report.document import overall
 
 
 def test_an_untouched_report_agrees_everywhere(report: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -19,7 +19,6 @@ from airground_drake.base import progress
 from airground_drake.commands import main
 from airground_drake.report.__main__ import main as report
 
-
 GONE = {"name": "no_such.module:It", "parameters": {}}
 """A policy that is not there."""
 
