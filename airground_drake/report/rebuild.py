@@ -249,7 +249,7 @@ def line_of(claim: str, run: str, outcome: str, text: str, rule: str = "") -> Li
 
 def different(claim: str, run: str, about: str, theirs: Any, ours: Any) -> Line:
     """A line about a value that is not as recorded."""
-    text = f"judged again, {about or 'it'} is {short(ours)}; recorded {short(theirs)}"
+    text = f"made again, {about or 'it'} is {short(ours)}; recorded {short(theirs)}"
     values = {"about": about, "recorded": theirs, "recomputed": ours}
     return line_of(claim, run, DISAGREES, text, "the files give what is recorded") | values
 
