@@ -44,9 +44,8 @@ def parser(prog: str, description: str, epilog: str) -> argparse.ArgumentParser:
         prog=prog, description=description, epilog=epilog, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("report", metavar="DIR", type=Path, help="folder with report.json and trace/")
-    parser.add_argument(
-        "--limit-s", type=_limit_s, default=LIMIT_S, metavar="S", help="CPU time for each check (default: %(default)g)"
-    )
+    says = "CPU time for each check and each process (default: %(default)g)"
+    parser.add_argument("--limit-s", type=_limit_s, default=LIMIT_S, metavar="S", help=says)
     parser.add_argument("--json", action="store_true", help="write strict JSON to standard output")
     return parser
 

@@ -49,7 +49,7 @@ and what came out:
   agrees              the files bear out what the report says
   DISAGREES           the files contradict the report or each other: the rule, the time, both values
   cannot be checked   a file cannot be read, or something is not allowed or too large
-  as recorded         nothing to compare with: third-party claims without --simulate --allow-plugins
+  as recorded         nothing to compare with, such as third-party claims without --simulate --allow-plugins
   not reproduced here the simulation gives another run; the first row that differs. Honest runs differ, too, on
                       other processors and with other versions of libraries, so this alone proves nothing.
 Taken as recorded, so that a forger may change it in all its places, unnoticed:

@@ -60,7 +60,7 @@ def lines(folder: Path, judge: Judge | None = None) -> Iterator[Line]:
     traces = {name: with_events(trace.load(folder / "trace" / name)) for name in scenario.runs}
     again = document_again(report, scenario, traces, judge or judge_all)
     other_code = _other_code(report["provenance"])
-    parts = [_with_note(line, other_code) for line in _parts(report, again, scenario.claims)]
+    parts = [_with_note(line, other_code) for line in _parts(report, again, scenario)]
     yield from parts
     if any(line["outcome"] == DISAGREES for line in parts):
         return  # pages that show a wrong report.json need no comparison
@@ -83,17 +83,16 @@ def document_again(report: Mapping[str, Any], scenario: Any, traces: Mapping[str
     """report.json from the traces; what only other runs or third-party code can tell is taken from the recorded one."""
     from airground_drake.audit import of_runs
     from airground_drake.report import document, metrics
+    from airground_drake.scenarios.load import from_data
 
-    own = replace(scenario, claims={})
-    judged = [
-        replace(each, meta=each.meta | {"scenario": each.meta["scenario"] | {"claims": {}}}) for each in traces.values()
-    ]
+    own = _without_claims(report["scenario"]["resolved"])
+    judged = [replace(each, meta=each.meta | {"scenario": own}) for each in traces.values()]
     here = of_runs(scenario, traces)
     others = [item for item in report["audit"] if item.get("id") not in {each["id"] for each in here}]
     again = document.build(
         scenario,
         traces,
-        judge(own, judged),
+        judge(from_data(own, scenario.name), judged),
         report["provenance"] | {"seed": scenario.seed},
         audit=[*here, *others],
         audited=bool(others),
@@ -108,6 +107,17 @@ def document_again(report: Mapping[str, Any], scenario: Any, traces: Mapping[str
     missing = document.missing(scenario, traces, again["claims"])
     again["overall"] = document.overall(again["claims"], missing, again["audit"] if others else ())
     return again
+
+
+def _without_claims(scenario: Mapping[str, Any]) -> dict[str, Any]:
+    """A resolved scenario without the claims that it adds, and without what it expects of them."""
+
+    def expecting_less(part: Mapping[str, Any]) -> dict[str, Any]:
+        expected = {name: value for name, value in part["expected"].items() if name not in scenario["claims"]}
+        return {**part, "expected": expected}
+
+    runs = {name: expecting_less(run) for name, run in scenario["runs"].items()}
+    return {**expecting_less(scenario), "runs": runs, "claims": {}}
 
 
 def _expected(entry: Mapping[str, Any], scenario: Any) -> dict[str, Any]:
@@ -133,19 +143,27 @@ def _with_note(line: Line, note: str) -> Line:
     return line | {"text": line["text"] + note} if line["outcome"] == DISAGREES else line
 
 
-def _parts(report: Mapping[str, Any], again: Mapping[str, Any], third_party: Mapping[str, Any]) -> Iterator[Line]:
+def _parts(report: Mapping[str, Any], again: Mapping[str, Any], scenario: Any) -> Iterator[Line]:
     """Each claim and each other part of report.json, compared with what was made again."""
     recorded, rebuilt = ({(each["id"], each["run"]): each for each in of["claims"]} for of in (report, again))
     if len(report["claims"]) != len(recorded):
         yield different("claims", "", "number of claims", len(report["claims"]), len(recorded))
     for claim, run in {**recorded, **rebuilt}:
         line = _compared(claim, run, recorded.get((claim, run)), rebuilt.get((claim, run)))
-        taken = claim in third_party and line["outcome"] == AGREES
-        said = f"{line['text']}: third-party code, run only with --simulate --allow-plugins"
-        yield line | {"outcome": RECORDED, "text": said} if taken else line
+        yield _taken(line, "third-party code, run only with --simulate --allow-plugins", claim in scenario.claims)
     for part in {**again, **report}:
         if part not in ("claims", "files"):
-            yield _compared(part, "", report.get(part), again.get(part))
+            line = _compared(part, "", report.get(part), again.get(part))
+            line = _taken(line, "all but the seed", part == "provenance")
+            others = any(row["seed"] != scenario.seed for row in report["seeds"])
+            yield _taken(line, "other seeds, simulated again with --simulate", part == "seeds" and others)
+
+
+def _taken(line: Line, why: str, applies: bool) -> Line:
+    """If it applies, the line of what agrees with itself only, since it was taken as recorded."""
+    if not applies or line["outcome"] != AGREES:
+        return line
+    return line | {"outcome": RECORDED, "text": f"{line['text']}: {why}"}
 
 
 def _pages(folder: Path, report: Mapping[str, Any], scenario: Any, traces: Mapping[str, Any]) -> Iterator[Line]:
@@ -224,7 +242,7 @@ def _kinds(drawing: str) -> set[tuple[str, str, str]]:
 def _compared(claim: str, run: str, recorded: Any, rebuilt: Any) -> Line:
     for about, theirs, ours in differences(recorded, rebuilt):
         return different(claim, run, about, theirs, ours)
-    status = rebuilt.get("status", "as recorded") if isinstance(rebuilt, dict) else "as recorded"
+    status = rebuilt.get("status", "the same") if isinstance(rebuilt, dict) else "the same"
     exactly = "exactly" if recorded == rebuilt else f"numbers to {WITHIN:g}"
     return line_of(claim, run, AGREES, f"{status}, {exactly}")
 
@@ -236,7 +254,7 @@ def line_of(claim: str, run: str, outcome: str, text: str, rule: str = "") -> Li
 
 def different(claim: str, run: str, about: str, theirs: Any, ours: Any) -> Line:
     """A line about a value that is not as recorded."""
-    text = f"judged again, {about or 'it'} is {short(ours)}; recorded {short(theirs)}"
+    text = f"made again, {about or 'it'} is {short(ours)}; recorded {short(theirs)}"
     values = {"about": about, "recorded": theirs, "recomputed": ours}
     return line_of(claim, run, DISAGREES, text, "the files give what is recorded") | values
 

@@ -53,13 +53,12 @@ def lines(folder: Path, *, allow_plugins: bool = False, progress: Progress = SIL
         AirgroundError, OSError: if a file cannot be used, or a run stops.
     """
     report = json.loads(files.read_text(folder / "report.json"))
-    source = str(folder / "report.json")
-    scenario = from_data(report["scenario"]["resolved"], source)
+    scenario = from_data(report["scenario"]["resolved"], str(folder))
     seeds = max((row["seed"] for row in report["seeds"]), default=0)
     within(scenario, DEFAULT_LIMITS, 1 + seeds)
     recorded = {name: trace.load(folder / "trace" / name) for name in scenario.runs}
     others = _other_versions(report["provenance"])
-    with plugins.admitted(scenario, source, allow=allow_plugins):
+    with plugins.admitted(scenario, str(folder), allow=allow_plugins):
         made = simulate_all(scenario, progress=progress)
         for name, run in recorded.items():
             rows = f"{len(run.t)} rows and {len(run.events)} events, exactly"

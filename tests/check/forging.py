@@ -16,6 +16,7 @@ import joblib
 import pandas as pd
 import pytest
 
+from airground_drake.base.errors import AirgroundError
 from airground_drake.check import command as checker
 from airground_drake.check.report import AGREES, RECORDED, Line
 from airground_drake.report import rebuild
@@ -134,10 +135,12 @@ def attempt(report: Path, edit: Edit, *, mended: bool = True) -> tuple[int, str]
     folder = forged(report, edit, mended=mended)
     try:
         found = checker.checked(folder, checker.LIMIT_S)
+        if all(line.outcome == AGREES for line in found):
+            found = [Line(**line, by="made again") for line in rebuild.lines(folder, judge=judged)]
     except checker.UsageError as error:
         return 2, str(error)
-    if all(line.outcome == AGREES for line in found):
-        found = [Line(**line, by="made again") for line in rebuild.lines(folder, judge=judged)]
+    except AirgroundError as error:
+        return 1, str(error)
     refused = [line for line in found if line.outcome not in (AGREES, RECORDED)]
     assert all(line.rule and line.text for line in refused)
     return int(bool(refused)), "\n".join(f"{line.by}: {line.claim}: {line.text}" for line in refused)
