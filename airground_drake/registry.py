@@ -300,15 +300,12 @@ RUN_CLAIMS = Registry(
     {
         "SAFE-TRACE": "airground_drake.verify.runs.safe_trace:SafeTrace",
         "SAFE-HYP": "airground_drake.verify.runs.safe_hyp:SafeHyp",
-        "EXEC": "airground_drake.verify.runs.exec:Exec",
         "ZENO-TRACE": "airground_drake.verify.runs.zeno_trace:ZenoTrace",
         "THR-TRIG": "airground_drake.verify.runs.thr_trig:ThrTrig",
         "THR-QUALITY": "airground_drake.verify.runs.thr_quality:ThrQuality",
         "GATE-PLAN": "airground_drake.verify.runs.gate_plan:GatePlan",
-        "GATE-MODEL": "airground_drake.verify.runs.gate_model:GateModel",
-        "LIVE-PROG": "airground_drake.verify.runs.live_prog:LiveProg",
+        "LIVE-HYP": "airground_drake.verify.runs.live_hyp:LiveHyp",
         "LIVE-GOAL": "airground_drake.verify.runs.live_goal:LiveGoal",
-        "COMM": "airground_drake.verify.runs.comm:Comm",
     },
 )
 """Claims about one run, in the order of the report: subclasses of `verify.claim.TraceClaim`."""

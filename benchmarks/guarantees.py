@@ -15,7 +15,7 @@ from airground_drake.run.simulation import simulate
 from airground_drake.scenarios.load import load
 from airground_drake.scenarios.shipped import shipped
 from airground_drake.verify import judge
-from airground_drake.verify.runs.followed import followed
+from airground_drake.verify.applications import without_news
 
 
 def main() -> None:
@@ -30,10 +30,9 @@ def main() -> None:
         for run in scenario.runs:
             trace = simulate(scenario, run)
             (verdict,) = judge(trace, ["SAFE-HYP"])
-            evidence, found = verdict.evidence, followed(trace)
-            met = sum(one.met for one in found)
-            applies_to, accepted = applies_to + met, accepted + len(found)
-            count = f"{met} of {len(found)}" if found else ""
+            evidence, (met, found) = verdict.evidence, without_news(trace)
+            applies_to, accepted = applies_to + met, accepted + found
+            count = f"{met} of {found}" if found else ""
             row = "all pairs | their own | 0 | 0 | their own"
             if evidence["e_m"] > 0.0:
                 worst = evidence["pairs"][0]

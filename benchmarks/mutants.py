@@ -2,10 +2,10 @@
 
 A mutant is one edit of the package, made in a temporary copy. `benchmarks/mutation/chosen.py` lists the ones that
 matter. `--drawn N --seed S` draws N others at random from the code that produces a run (`mutation/drawn.py`). On each
-copy short runs are simulated. Those that differ from the runs of the unchanged package are judged by their claims and
-by the independent checker. If nothing notices, the tests that concern the file run. Prints a line for each mutant;
-`--json` keeps the results. Exit code 1 if one survives. Most drawn ones that survive are equivalent, or within what is
-specified: a person has to look at them.
+copy short runs are simulated. Those that differ from the runs of the unchanged package are judged by their claims, by
+the oracles of the tests and by the independent checker. If nothing notices, the tests that concern the file run.
+Prints a line for each mutant; `--json` keeps the results. Exit code 1 if one survives. Most drawn ones that survive are
+equivalent, or within what is specified: a person has to look at them.
 """
 
 from __future__ import annotations
@@ -45,8 +45,8 @@ class Result:
 
     Attributes:
         name: of the mutant.
-        stage: what caught it: claim, checker, test or nothing.
-        by: the claims, rules or tests that caught it.
+        stage: what caught it: claim, oracle, checker, test or nothing.
+        by: the claims, oracles, rules or tests that caught it.
         changed: the probes whose runs differ from those of the unchanged package.
         seconds: how long it took.
         commit: of the code; empty if unknown.
@@ -156,7 +156,7 @@ class Bench:
         self.commit = subprocess.run(described, cwd=ROOT, capture_output=True, text=True, check=False).stdout.strip()
         probes = sorted({run for mutant in mutants for run in mutant.runs})
         found = here.probe("runs", *probes) + here.probe("ways", *probes)
-        if wrong := [each for each in found if each[2] in ("stops", "disagrees", "error")]:
+        if wrong := [each for each in found if each[2] in ("stops", "fault", "disagrees", "error")]:
             sys.exit(f"the package as it is does not pass: {wrong}")
         self.baseline = {(source, where): status for source, where, status, _ in found}
         for kept in (here.folder / PACKAGE).rglob("*.nb*"):  # what was compiled meanwhile
@@ -198,8 +198,8 @@ class Bench:
             names = changed
         for name in names:
             if by := self._differences(copy.probe("runs", name)):
-                claims = [each for each in by if not each.startswith("checker")]
-                return ("claim" if claims else "checker"), by
+                stages = [each.partition(":")[0] for each in by if each.startswith(("oracle:", "checker:"))]
+                return ("claim" if len(stages) < len(by) else "oracle" if "oracle" in stages else "checker"), by
         return ("test", [failed]) if mutant.tests and (failed := self._failing(mutant, copy)) else ("nothing", [])
 
     def _differences(self, found: list[list[str]], only: str = "") -> list[str]:

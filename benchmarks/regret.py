@@ -11,6 +11,8 @@ a run are printed.
 from __future__ import annotations
 
 import argparse
+import sys
+from pathlib import Path
 
 import numpy as np
 
@@ -18,9 +20,12 @@ from airground_drake.base.arrays import Array
 from airground_drake.run.simulation import simulate
 from airground_drake.run.trace import Trace
 from airground_drake.scenarios.load import load
-from airground_drake.verify.runs.closed_loops import roll_out, stacked
-from airground_drake.verify.runs.gate_model import scene_of
 from airground_drake.verify.runs.gate_record import DecisionRecord, rows_of
+
+sys.path.append(str(Path(__file__).parents[1] / "tests"))
+
+from oracles.closed_loops import roll_out, stacked
+from oracles.predictions import scene_of
 
 BLOCKS = 6
 """Blocks of stages: all plans that are constant on blocks are rolled out."""

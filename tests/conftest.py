@@ -14,9 +14,11 @@ from filelock import FileLock
 from hypothesis import HealthCheck, settings
 from hypothesis.internal.conjecture import providers
 from sharing import once
+from verify.runs.cases import BLOCKS, EIGHT, SYNTHETIC
 
 from airground_drake.gatekeeper import mpc_gatekeeper, outcome_gatekeeper
 from airground_drake.report.__main__ import main as write_report
+from airground_drake.run.trace import Trace
 from airground_drake.scenarios.load import load
 from airground_drake.scenarios.schema import Scenario
 
@@ -80,6 +82,22 @@ def _no_constants_of_modules() -> Iterator[None]:
 def run(airground_trace: Simulations) -> Simulations:
     """`run(scenario, name)`: one simulation of a shipped scenario, made once per session."""
     return airground_trace
+
+
+@pytest.fixture(scope="session")
+def base(run: Simulations) -> Callable[[str], Trace]:
+    """`base(name)`: an honest run: synthetic, shipped, or of method (c) with few stages, by route."""
+
+    def get(name: str) -> Trace:
+        if name in SYNTHETIC:
+            return SYNTHETIC[name]()
+        if name == BLOCKS:
+            return run("soft_gate", "c", set=[*EIGHT, "gatekeeper.route=mixed_integer", "gatekeeper.blocks=4"])
+        if " " not in name:
+            return run("soft_gate", "c", set=[*EIGHT, f"gatekeeper.route={name}"])
+        return run(*name.split())
+
+    return get
 
 
 @pytest.fixture(scope="session")

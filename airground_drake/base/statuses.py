@@ -18,6 +18,11 @@ NOT_EXERCISED = "not_exercised"
 """Outcome of a claim that passed because nothing could have refuted it."""
 EXPECTATIONS: tuple[str, ...] = (*STATUSES, EXERCISED)
 """Allowed alternatives of an expectation."""
+COUNTS = {
+    "interventions": "At least so many proposals that UGVs began to execute.",
+    "messages": "At least so many proposals and answers that were delivered.",
+}
+"""What a scenario may expect of a run besides verdicts, as numbers: a run in which nothing happened tests nothing."""
 NOTHING = "nothing"
 """The expectation of a claim about which the method promises nothing: whether it holds does not count, but a claim that
 could not be judged does."""

@@ -29,7 +29,7 @@ SHOWN = {
     "trajectories": ("LIVE-GOAL",),
     "distances": ("SAFE-TRACE", "SAFE-GATE"),
     "decision": ("THR-TRIG", "THR-CHOICE"),
-    "events": ("COMM", "LIVE-PROG", "ZENO-TRACE", "ZENO-PROOF"),
+    "events": ("LIVE-HYP", "ZENO-TRACE", "ZENO-PROOF"),
 }
 """Claims that a figure is about, by its identifier."""
 

@@ -51,6 +51,7 @@ def answers(document: Document, every: Sequence[Course], *, tabulated: bool) -> 
     asked = {"Safe?": _safe(document, every), "Arrived?": _arrived(document, every), "Runs": _runs(document, every)}
     asked = {} if tabulated else asked
     asked |= {
+        "Messages": _messages(document, every),
         "Seeds?": _seeds(document),
         "Zeno-free?": _zeno(document),
         "Threshold?": _threshold(document),
@@ -208,6 +209,25 @@ def _runs(document: Document, every: Sequence[Course]) -> Iterator[Line]:
             told.append(f"{course.name}: {of_run(resolved, course)}{f', {gatekeeper(resolved)}' if own else ''}")
     if told:
         yield Line("", f"{'; '.join(told)}.")
+
+
+def _messages(document: Document, every: Sequence[Course]) -> Iterator[Line]:
+    """What the UAV sent and the UGVs answered, beside a scheme without a trigger."""
+    taken = {course.name: document["runs"][course.name]["metrics"]["messages"] for course in every if course.helped
+             and course.name in document["runs"]}  # fmt: skip
+    told = grouped((_of_kinds(found), run) for run, found in taken.items() if found["proposals"])
+    if told:
+        always = [found["always_on"] for found in taken.values()]
+        most = {kind: max(each[kind] for each in always) for kind in always[0]}
+        up_to = "up to " * any(0 < each[kind] < most[kind] for each in always for kind in most)
+        runs = "; ".join(f"{', '.join(names)}: {says}" for says, names in told.items())
+        yield Line("", f"{runs}. Always-on supervision: {up_to}{_of_kinds(most)}.")
+
+
+def _of_kinds(count: Mapping[str, int]) -> str:
+    """Numbers of proposals and answers."""
+    answers = f" and {counted(count['answers'], 'answer')}" if count["answers"] else ""
+    return f"{counted(count['proposals'], 'proposal')}{answers}"
 
 
 def _zeno(document: Document) -> Iterator[Line]:

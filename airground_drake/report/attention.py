@@ -52,12 +52,17 @@ def items(document: Mapping[str, Any]) -> list[Item]:
     return [
         *beforehand(document),
         *(_of_claim(claim, document["runs"].get(claim["run"], {})) for claim in unexpected),
+        *(
+            Item("not_as_expected", f"{each['found']} {each['id']}", run=each["run"],
+                 about=f"expected: at least {each['least']}", anchor="happened")
+            for each in document["overall"]["numbers"] if not each["as_expected"]
+        ),
         *(Item("not_run", each["why"], each["id"], each["run"]) for each in document["overall"]["missing"]),
         *(
             Item("not_demonstrated", f"finding {number} about the paper", anchor="audit")
             for number in document["overall"]["undemonstrated"]
         ),
-    ]
+    ]  # fmt: skip
 
 
 def _of_claim(claim: Mapping[str, Any], run: Mapping[str, Any]) -> Item:

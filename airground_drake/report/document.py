@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from airground_drake.base.files import sha256
-from airground_drake.base.statuses import NOT_EXERCISED, STATUSES, UNDECIDED, outcome
+from airground_drake.base.statuses import COUNTS, NOT_EXERCISED, STATUSES, UNDECIDED, outcome
 from airground_drake.registry import method_of
 from airground_drake.report import metrics, reproduction
 from airground_drake.report.phrases import counted
@@ -68,12 +68,14 @@ def build(
     items = sorted(map(dict, audit), key=lambda item: item["id"])
     resolved = asdict(scenario)
     about = {key: resolved[key] for key in ("name", "title", "description")}
+    runs = {name: _run(scenario, trace) for name, trace in traces.items()}
+    found = numbers(scenario, runs)
     document = {
         "schema": SCHEMA,
         "scenario": {**about, "sha256": scenario.digest, "resolved": resolved},
         "provenance": dict(provenance),
-        "overall": overall(claims, missing(scenario, traces, claims, required), items if audited else ()),
-        "runs": {name: _run(scenario, trace) for name, trace in traces.items()},
+        "overall": overall(claims, missing(scenario, traces, claims, required), items if audited else (), found),
+        "runs": runs,
         "seeds": list(seeds),
         "claims": claims,
         "reproduction": reproduction.rows(scenario, traces),
@@ -103,19 +105,25 @@ def overall(
     claims: Sequence[Mapping[str, Any]],
     absent: Sequence[Mapping[str, Any]],
     items: Sequence[Mapping[str, Any]] = (),
+    numbers: Sequence[Mapping[str, Any]] = (),
 ) -> dict[str, Any]:
-    """The verdict over all claims, and over the findings about the paper `items`.
+    """The verdict over all claims, over the findings about the paper `items`, and over expected `numbers`.
 
     Returns:
         `status`, `exit_code`, `why`, counts, and lists of what differs, is undecided or is missing. `counts` has a
         claim that nothing put to the test under `not_exercised`, never under its status; the list of that name says
-        which these are. `checks` counts claims about which something is expected, `unpromised` lists the others. A
-        finding that was not demonstrated differs, too.
+        which these are. `checks` counts claims about which something is expected, and `numbers`; `unpromised` lists
+        the other claims. A finding that was not demonstrated differs, too, and so does a number that is too small.
     """
     undemonstrated = [item["id"] for item in items if not item["demonstrated"]]
     keys = ("id", "run", "status", "expected", "exercised")
     unexpected = [{key: claim[key] for key in keys} for claim in claims if claim["as_expected"] is False]
-    checks = sum(claim["as_expected"] is not None for claim in claims)
+    unexpected += [
+        {**{key: each[key] for key in ("id", "run")}, "status": str(each["found"]),
+         "expected": f"at least {each['least']}", "exercised": each["found"]}
+        for each in numbers if not each["as_expected"]
+    ]  # fmt: skip
+    checks = sum(claim["as_expected"] is not None for claim in claims) + len(numbers)
     differs = [claim for claim in unexpected if claim["status"] not in UNDECIDED]
     undecided = [claim for claim in unexpected if claim["status"] in UNDECIDED]
     outcomes = [(outcome(claim["status"], claim["exercised"]), claim) for claim in claims]
@@ -146,7 +154,30 @@ def overall(
         "undecided": undecided,
         "missing": list(absent),
         "undemonstrated": undemonstrated,
+        "numbers": list(numbers),
     }
+
+
+def numbers(scenario: Scenario, runs: Mapping[str, Mapping[str, Any]]) -> list[dict[str, Any]]:
+    """The numbers that a scenario expects of its runs: `id`, `run`, `found`, `least`, `as_expected`.
+
+    Args:
+        scenario: the scenario.
+        runs: entries of report.json.
+    """
+    listed = []
+    for name, run in runs.items():
+        sent = run["metrics"]["messages"] or {"proposals": 0, "answers": 0}
+        counted = {
+            "interventions": sum(each["begun_s"] is not None for each in run["metrics"]["interventions"]),
+            "messages": sent["proposals"] + sent["answers"],
+        }
+        expected = scenario.runs[name].expected
+        for kind in COUNTS:
+            if kind in expected:
+                found, least = counted[kind], expected[kind]
+                listed.append({"id": kind, "run": name, "found": found, "least": least, "as_expected": found >= least})
+    return listed
 
 
 def missing(
@@ -165,7 +196,7 @@ def missing(
         elif name not in judged:
             found.append((name, "", "no claim was checked on the run"))
         else:
-            found += [(name, claim, "expected, but not checked") for claim in run.expected]
+            found += [(name, claim, "expected, but not checked") for claim in run.expected if claim not in COUNTS]
     found += [("", claim, "not checked") for claim in dict.fromkeys([*required, *scenario.expected])]
     unjudged = {*scenario.claims} - {claim for _, claim in checked} - {claim for _, claim, _ in found}
     found += [("", claim, "the scenario adds it, and it applies to no run") for claim in sorted(unjudged)]

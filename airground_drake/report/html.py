@@ -40,6 +40,8 @@ LINE_CHARS = 110
 KINDS = ("declared", "stuck")
 """Kinds of evidence shown instead of a passing verdict, so that it does not look like more than it is."""
 MAX_DISTANCE_ROWS = 120
+MAX_INTERVENTIONS = 40
+"""Maximum number of proposals listed per run."""
 MAX_FAULTS = 40
 """Maximum number of kinds of faults listed per run."""
 
@@ -101,7 +103,7 @@ def render(document: Mapping[str, Any], figures: Sequence[Figure], diagram_svg: 
     sections = {
         "happened": bool(runs),
         "safe": bool(distances),
-        "intervened": "intervened" in plates or any(r["metrics"]["gatekeeper"] for r in runs.values()),
+        "intervened": "intervened" in plates or any(run["metrics"]["messages"] for run in runs.values()),
         "reproduction": bool(document["reproduction"]),
         "choices": bool(document["choices"]),
         "audit": bool(document["audit"]),
@@ -141,6 +143,7 @@ def environment() -> Environment:
     )  # fmt: skip
     environment.globals.update(
         chips=CHIPS, shown=_shown, reasons=WORDS, max_faults=MAX_FAULTS,
+        max_interventions=MAX_INTERVENTIONS,
         marks=phrases.MARKS, kinds=LOOKS, names=phrases.MEANINGS,
         policy=Markup(security_policy(style, script)), style=Markup(style), script=Markup(script),
     )  # fmt: skip

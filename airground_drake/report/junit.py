@@ -15,7 +15,7 @@ _NOT_XML = re.compile("[^\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]"
 
 
 def render(document: Mapping[str, Any]) -> str:
-    """JUnit XML of report.json: a suite per run.
+    """JUnit XML of report.json: a suite per run, with a case per claim and per expected number.
 
     A claim whose status is the expected one passes; it is skipped, with the reason, if nothing put it to the test.
     Otherwise it fails; an `error` is an error and a `not_run` is skipped. A run without a trace and a claim that nobody
@@ -33,6 +33,12 @@ def render(document: Mapping[str, Any]) -> str:
         for claim in document["claims"]:
             if claim["run"] == run:
                 _outcome(_case(suite, name, run, claim["id"]), claim)
+        for each in document["overall"]["numbers"]:
+            if each["run"] == run:
+                case = _case(suite, name, run, each["id"])
+                if not each["as_expected"]:
+                    message = f"{each['found']} {each['id']}, expected at least {each['least']}"
+                    ET.SubElement(case, "failure", {"message": message, "type": "number"})
         for item in missing:
             if item["run"] == run:
                 case = _case(suite, name, run, item["id"] or "run")

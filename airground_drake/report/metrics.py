@@ -10,9 +10,11 @@ import numpy as np
 
 from airground_drake.base.arrays import Array
 from airground_drake.registry import method_of
+from airground_drake.report.interventions import avoidance, farthest_from_prediction, interventions, messages
 from airground_drake.run.collisions import first_collisions
 from airground_drake.run.trace import Trace
 from airground_drake.verify.engines.geometry import interpolate
+from airground_drake.verify.runs.gate_record import without_decisions
 from airground_drake.verify.runs.instants import without_proposals
 from airground_drake.verify.runs.live_goal import AT_REST_M, AT_REST_S, moved_at_the_end
 from airground_drake.verify.runs.pairs import (
@@ -52,9 +54,11 @@ def of_run(trace: Trace) -> dict[str, Any]:
         time; at most `MOST_OBSTACLES`, those of least margin), `min_robot_distance_m` (the same for the other robot of
         least margin), `final_position_m`, `duration_s`, `wall_s` and `realtime_factor` (None if not measured),
         `event_counts` (robot -> kind -> count), `gatekeeper` (see `gatekeeper`), `on_the_way` (see `on_the_way`),
-        `without_proposals` (UGVs that were intervened on for long enough and got no proposal).
+        `interventions`, `messages` and `avoidance` (see `report.interventions`), `without_proposals` (UGVs that were
+        intervened on for long enough and got no proposal) and `without_decisions` (those that got one and did not
+        decide).
     """
-    wall_s = trace.timings.get("wall_s")
+    method, wall_s = method_of(trace.meta["method"]), trace.timings.get("wall_s")
     duration_s = float(trace.t[-1] - trace.t[0])
     counts = {robot: Counter(e["kind"] for e in trace.events if e["robot"] == robot) for robot in trace.robots}
     return {
@@ -71,7 +75,11 @@ def of_run(trace: Trace) -> dict[str, Any]:
         "event_counts": {robot: dict(sorted(count.items())) for robot, count in counts.items()},
         "gatekeeper": gatekeeper(trace),
         "on_the_way": on_the_way(trace),
-        "without_proposals": without_proposals(trace) if method_of(trace.meta["method"]).intervenes else [],
+        "interventions": interventions(trace),
+        "messages": messages(trace),
+        "avoidance": avoidance(trace),
+        "without_proposals": without_proposals(trace) if method.intervenes else [],
+        "without_decisions": without_decisions(trace) if method.gated else [],
     }
 
 
@@ -143,7 +151,8 @@ def gatekeeper(trace: Trace) -> dict[str, Any] | None:
     Returns:
         `calls`, `decisions` (decision -> count), `solver_failures` (decisions that rest on the best plan known because
         the solver failed), `budget_spent` (the same because the budget was spent), `refusals` (robot -> reason ->
-        proposals refused at the first answer), `max_gap` (largest optimality gap), `gaps` (decisions with no gap, up
+        proposals refused at the first answer), `reasons` (reason -> decisions), `farthest_from_prediction` (see
+        `report.interventions`), `max_gap` (largest optimality gap), `gaps` (decisions with no gap, up
         to 1 %, and more), `period_s` of the gatekeeper, `time_s` (CPU times: p50, p99, max, as order statistics),
         `late` (decisions that took a period or longer; simulated time waits for them) and `closest_call` (the
         decision at which the costs of accepting and refusing were closest, relative to the smaller one). None where
@@ -163,6 +172,8 @@ def gatekeeper(trace: Trace) -> dict[str, Any] | None:
         "decisions": {str(name): int(count) for name, count in table["decision"].value_counts().sort_index().items()},
         "solver_failures": int((table["status"] == "solver_failed").sum()),
         "refusals": _refusals(trace),
+        "reasons": {str(reason): int(count) for reason, count in table["reason"].value_counts().items()},
+        "farthest_from_prediction": farthest_from_prediction(trace),
         "budget_spent": int((table["status"] == "budget_spent").sum()),
         "max_gap": float(known.max()) if len(known) else None,
         "gaps": {

@@ -87,6 +87,7 @@ def headline(document: Document) -> Line:
     """The report in a sentence, and in another one if a verdict is not the one that the scenario declares."""
     mark, told = _outcome(courses(document))
     differs = sum(claim["as_expected"] is False and claim["status"] not in UNDECIDED for claim in document["claims"])
+    differs += sum(not each["as_expected"] for each in document["overall"]["numbers"])
     if not differs:
         return Line(mark, told)
     checks = f"{counted(differs, 'check')} {'is' if differs == 1 else 'are'}"

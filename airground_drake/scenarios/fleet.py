@@ -73,10 +73,10 @@ def fleet(ugvs: int, obstacles: int, seed: int = 1, name: str = "fleet") -> str:
             break
         side += 1
     middle = [sum(target[axis] for _, target in ways) / ugvs for axis in (0, 1)]
-    tested = (
-        ("COMM", "EXEC", "THR-TRIG", "LIVE-PROG", "LIVE-GOAL") if min(ugvs // BLOCKED, obstacles) else ("LIVE-GOAL",)
-    )
-    over, expected = ", ".join(f"{x:.2f}" for x in middle), ", ".join(f"{claim}: exercised" for claim in tested)
+    expected = "LIVE-GOAL: exercised"
+    if min(ugvs // BLOCKED, obstacles):
+        expected = f"interventions: 1, messages: 2, THR-TRIG: exercised, LIVE-HYP: exercised, {expected}"
+    over = ", ".join(f"{x:.2f}" for x in middle)
     head = HEAD.format(name=name, ugvs=ugvs, obstacles=obstacles, seed=seed, over=over, expected=expected)
     rows = [_ugv(number, *way) for number, way in enumerate(ways, 1)]
     rows = ["", "ugvs:", *rows, "", "obstacles:" if obstacles else "obstacles: {}"]

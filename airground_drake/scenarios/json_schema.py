@@ -14,11 +14,11 @@ from typing import Any
 
 from pydantic import TypeAdapter
 
-from airground_drake.base.statuses import EXPECTATIONS, NOTHING
-from airground_drake.registry import Registry
+from airground_drake.base.statuses import COUNTS, EXPECTATIONS, NOTHING
+from airground_drake.registry import RUN_CLAIMS, Registry
 from airground_drake.scenarios import schema
 from airground_drake.scenarios.kinds import CLAIM_PATTERN, EXPECTED, NAME_PATTERN, WANTED, unit_of
-from airground_drake.scenarios.limits import MAX_NAME, MAX_TEXT
+from airground_drake.scenarios.limits import MAX_NAME, MAX_SEED, MAX_TEXT
 
 Schema = dict[str, Any]
 
@@ -70,7 +70,10 @@ def _expectations(claims: Registry, installed: bool) -> Schema:
     """Expected verdicts by claim."""
     one = "|".join(EXPECTATIONS)
     verdict = {"anyOf": [{"enum": [*EXPECTATIONS, NOTHING]}, {"type": "string", "pattern": f"^({one})( or ({one}))*$"}]}
-    known = {name: {"description": claims.says(name), **verdict} for name in _adapted(claims, installed)}
+    known: Schema = {name: {"description": claims.says(name), **verdict} for name in _adapted(claims, installed)}
+    if claims is RUN_CLAIMS:
+        number: Schema = {"type": "integer", "minimum": 1, "maximum": MAX_SEED}
+        known |= {name: {"description": says} | number for name, says in COUNTS.items()}
     return {
         "properties": {**known, "<<": True},
         "patternProperties": {CLAIM_PATTERN: verdict},

@@ -19,7 +19,7 @@ from pydantic import (
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
 from airground_drake.base.arrays import LARGEST
-from airground_drake.base.statuses import EXPECTATIONS, NOTHING, alternatives, declared
+from airground_drake.base.statuses import COUNTS, EXPECTATIONS, NOTHING, alternatives, declared
 from airground_drake.registry import MODEL_CLAIMS, PLUGIN, PLUGIN_PATTERN, RUN_CLAIMS, Registry, is_plugin
 from airground_drake.scenarios.limits import MAX_NAME, MAX_SEED, MAX_TEXT
 
@@ -150,14 +150,21 @@ def registered(registry: Registry) -> Rule:
 
 
 def expected_of(claims: Registry) -> Rule:
-    """Expected verdicts by claim; `validate.py` checks the claims, as a scenario may add its own."""
+    """Expected verdicts by claim, and of runs also numbers; `validate.py` checks the names, as a scenario adds claims.
 
-    def check(value: dict[str, str]) -> dict[str, str]:
-        for claim, expected in value.items():
-            if expected != NOTHING and not set(alternatives(expected)) <= set(EXPECTATIONS):
+    Claims about the model have no numbers beside them.
+    """
+    counts = COUNTS if claims is RUN_CLAIMS else {}
+
+    def check(value: dict[str, Any]) -> dict[str, Any]:
+        for name, expected in value.items():
+            if name in counts:
+                if type(expected) is not int or not 1 <= expected <= MAX_SEED:
+                    raise refused(expected, f"a whole number from 1 to {MAX_SEED}", name)
+            elif expected != NOTHING and not {*alternatives(str(expected))} <= {*EXPECTATIONS}:
                 several = f"several of them, such as: holds or supported; or {NOTHING}"
-                raise refused(expected, f"one of {', '.join(EXPECTATIONS)}, {several}", claim)
-        return {claim: declared(expected) for claim, expected in value.items()}
+                raise refused(expected, f"one of {', '.join(EXPECTATIONS)}, {several}", name)
+        return {name: declared(expected) if isinstance(expected, str) else expected for name, expected in value.items()}
 
     return Rule(check, lambda: {EXPECTED: claims})
 

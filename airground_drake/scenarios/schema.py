@@ -8,7 +8,7 @@ key without a default. Positions are in the world frame, z up, the ground at z =
 # No `from __future__ import annotations` here: pydantic needs the types themselves, not their names.
 import json
 from dataclasses import asdict, dataclass, field
-from typing import Annotated, ClassVar
+from typing import Annotated, Any, ClassVar
 
 from pydantic import ConfigDict, Field
 
@@ -284,6 +284,8 @@ class Run:
     `stalls_m` names the UGVs that must end (to within `stall_tolerance_m`) at that point short of their
     target. `expected` maps claim identifiers to the expected verdict; a claim that is not named must hold.
     `nothing` is for a claim about which the method promises nothing. `exercised` means "holds, and the run tested it".
+    `interventions: 2` in `expected` demands that UGVs begin to execute at least two proposals, `messages: 5` that at
+    least five proposals and answers are delivered.
     `set: {decision.threshold.zeta_m: 2.0}` gives this run a value of its own, as `--set` does for all runs. Claims
     about the model that use a changed constant are judged for this run, too; `expected` may name them.
     """
@@ -296,8 +298,9 @@ class Run:
     """Other values in this run, by dotted key of `decision`, `gatekeeper` or `intervention`."""
     stalls_m: dict[Name, GroundPoint] = field(default_factory=dict)
     """Points at which UGVs must end short of their target, by UGV."""
-    expected: Annotated[dict[Words, Words], expected_of(RUN_CLAIMS)] = field(default_factory=dict)
-    """Expected verdicts of claims about this run, by claim; other claims must hold."""
+    expected: Annotated[dict[Words, Any], expected_of(RUN_CLAIMS)] = field(default_factory=dict)
+    """Expected verdicts of claims about this run, by claim; other claims must hold. Least numbers of interventions and
+    messages."""
 
 
 @dataclass(slots=True)

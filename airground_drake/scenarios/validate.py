@@ -19,7 +19,7 @@ import numpy as np
 
 from airground_drake.base.errors import ScenarioError
 from airground_drake.base.exact import decimal
-from airground_drake.base.statuses import NOTHING, alternatives
+from airground_drake.base.statuses import COUNTS, NOTHING, alternatives
 from airground_drake.decision.bayes import COMPUTED
 from airground_drake.registry import MODEL_CLAIMS, ROUTES, RUN_CLAIMS
 from airground_drake.scenarios.rounding import TOLERANCE_M, Rounding
@@ -79,8 +79,8 @@ def _runs(scenario: Scenario) -> Problems:
             yield from _one_of(f"runs.{name}.stalls_m.{robot}", robot, scenario.ugvs, "one of the UGVs")
         for claim in run.expected:
             key = f"runs.{name}.expected.{claim}"
-            known = (*RUN_CLAIMS, *scenario.claims, *(MODEL_CLAIMS if run.set else ()))
-            yield from _one_of(key, claim, known, "one of the claims")
+            known = (*RUN_CLAIMS, *COUNTS, *scenario.claims, *(MODEL_CLAIMS if run.set else ()))
+            yield from _one_of(key, claim, known, "one of the claims and numbers")
     for claim in scenario.expected:
         known = (*MODEL_CLAIMS, *scenario.claims)
         yield from _one_of(f"expected.{claim}", claim, known, "one of the claims about the model")

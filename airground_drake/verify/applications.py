@@ -13,8 +13,8 @@ from airground_drake.run.trace import Trace
 from airground_drake.verify.finding import Finding
 from airground_drake.verify.model import thr_choice
 from airground_drake.verify.model.theorem import Proof
-from airground_drake.verify.runs.followed import followed
-from airground_drake.verify.runs.proposals import accepted_at
+from airground_drake.verify.runs.acceptances import acceptances
+from airground_drake.verify.runs.instants import executing
 from airground_drake.verify.runs.safe_hyp import guarantees
 from airground_drake.verify.runs.thr_quality import drift_of
 from airground_drake.verify.runs.triggers import task_error
@@ -31,20 +31,20 @@ def safe_pairs(trace: Trace) -> Count:
 
 def below_avoidance(trace: Trace) -> Count:
     """Count the executed interventions, and those of them under method (d)."""
-    count = sum(len({id(one) for one in accepted_at(trace, ugv) if one is not None}) for ugv in trace.ugvs)
+    count = sum(len({*executing(trace, ugv).tolist()} - {-1, -2}) for ugv in trace.ugvs)
     return (count if trace.meta["method"] == "d" else 0), count
 
 
-def as_predicted(trace: Trace) -> Count:
-    """Count the interventions accepted under method (d), and those of them that went as predicted."""
-    found = followed(trace)
-    return sum(one.met for one in found), len(found)
+def without_news(trace: Trace) -> Count:
+    """Count the acceptances under method (d), and those of them during which no obstacle was new."""
+    found = [one for of_ugv in acceptances(trace).values() for one in of_ugv]
+    return sum(not one.new(trace) for one in found), len(found)
 
 
 COUNTED: dict[str, Callable[[Trace], Count]] = {
     "SAFE-INV": safe_pairs,
     "SAFE-GATE": below_avoidance,
-    "LIVE-GATE": as_predicted,
+    "LIVE-GATE": without_news,
     "LIVE-WAIT": below_avoidance,
 }
 """How a run counts the cases of a theorem, by claim about the model."""

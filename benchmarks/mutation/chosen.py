@@ -358,12 +358,12 @@ JUDGES = (
         tests=(f"{RUNS}/test_tolerances.py",),
     ),
     Mutant(
-        "EXEC believes the signal",
-        "verify/runs/exec.py",
-        "Judged.first_wrong",
-        "| (self.executing != self.said)",
-        "| (self.executing != self.executing)",
-        runs=("case_b d", "soft_gate c", "crowd b"),
+        "LIVE-HYP takes every reversal for one with news",
+        "verify/runs/live_hyp.py",
+        "_wrong",
+        "if early and not one.new(trace, within_s=period_s):",
+        "if False:",
+        runs=("case_b d",),
         tests=(f"{RUNS}/test_breakages.py",),
     ),
     Mutant(

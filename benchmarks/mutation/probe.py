@@ -1,11 +1,12 @@
-"""Verdicts of claims and of the checker on short runs of the package that is on the path.
+"""Verdicts of claims, oracles and the checker on short runs of the package that is on the path.
 
     python probe.py
 
 It reads requests from standard input, a line of JSON each: [file, "ways" | "runs", names of probes]. A child process
 answers each: it imports the package as it is then, and writes its findings to the file as lists of source, where,
-status and rule. The source is a claim, `checker: <claim>` or `run`. A line with the child's exit code follows on
-standard output. Other packages are imported once, before. A child that needs too much time or memory is ended.
+status and rule. The source is a claim, `oracle: <name>`, `checker: <claim>` or `run`. A line with the child's exit code
+follows on standard output. Other packages are imported once, before. A child that needs too much time or memory is
+ended.
 """
 
 from __future__ import annotations
@@ -58,7 +59,9 @@ def ways(names: list[str]) -> Findings:
 
 
 def runs(names: list[str]) -> Findings:
-    """Every verdict, and every check of the independent checker that does not agree."""
+    """Every verdict, every oracle that finds a fault, and every check of the checker that does not agree."""
+    from oracles import faults_of
+
     from airground_drake.base import files
     from airground_drake.base.errors import AirgroundError
     from airground_drake.check.command import LIMIT_S
@@ -77,6 +80,7 @@ def runs(names: list[str]) -> Findings:
             continue
         verdicts = judge(of_run)
         found += [[v.claim.id, name, v.status, ""] for v in verdicts]
+        found += [[f"oracle: {of}", name, "fault", each[0].what] for of, each in faults_of(of_run).items()]
         with tempfile.TemporaryDirectory() as there:
             folder = Path(there)
             trace.save(of_run, folder / "trace" / run)

@@ -178,12 +178,12 @@ def test_without_independent_draws_there_is_no_interval() -> None:
 
 
 def test_the_summary_says_what_is_undecided_and_gives_anytime_bounds_after_a_look() -> None:
-    rows = [row(0), row(7, "inconclusive"), row(1, claim="COMM", exercised=0.0, as_expected=False), *died(2)]
+    rows = [row(0), row(7, "inconclusive"), row(1, claim="LIVE-HYP", exercised=0.0, as_expected=False), *died(2)]
     said = [line for line in _summary(conclude(rows), looked=False).splitlines() if "undecided" in line]
     assert said == ["  undecided: 1 of 4 draws died",
                     "  undecided: SAFE-TRACE in run d: 2 of 3 runs, such as draw 7"]  # fmt: skip
     said = _summary(conclude(rows[2:3]), looked=False).splitlines()
-    assert said[-1] == "  undecided: COMM in run d: the scenario expects it to be tested, and no draw did"
+    assert said[-1] == "  undecided: LIVE-HYP in run d: the scenario expects it to be tested, and no draw did"
     found = conclude([row(i) for i in range(50)])
     for looked, bound in ((False, clopper_pearson(0, 50)), (True, confidence_sequence(0, 50))):
         assert f"violation 0 to {bound.high:.2g}" in _summary(found, looked=looked)
@@ -213,7 +213,7 @@ def test_a_bad_rule_is_refused() -> None:
     for text in ("SAFE-TRACE", "SAFE-TRACE = 0.1", "SAFE-TRACE < 2", "SAFE-TRACE < e"):
         with pytest.raises(ValueError, match="wanted: CLAIM < PROBABILITY"):
             Stopping.parse(text)
-    for text, claims in (("SAFE-INV < 0.1", ()), ("COMM < 0.1", ["SAFE-TRACE"])):
+    for text, claims in (("SAFE-INV < 0.1", ()), ("LIVE-HYP < 0.1", ["SAFE-TRACE"])):
         with pytest.raises(UnknownNameError, match="allowed: SAFE-TRACE"):
             Stopping.parse(text, claims)
 

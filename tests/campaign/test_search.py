@@ -54,7 +54,7 @@ def row(**more: Any) -> Row:
 def test_objectives() -> None:
     margin = Margin("SAFE-TRACE")
     assert margin.value([row(), row(margin=0.2)]) == 0.2
-    assert margin.value([row(margin=float("nan")), row(claim="EXEC", margin=-3.0)]) == np.inf
+    assert margin.value([row(margin=float("nan")), row(claim="SAFE-HYP", margin=-3.0)]) == np.inf
     assert margin.value([row(status="refuted", margin=float("nan"))]) < 0.0
     assert margin.value([blank()]) == np.inf
     assert (margin.found([row(margin=0.0)]), margin.found([row(status="refuted")])) == (False, True)

@@ -74,7 +74,10 @@ def test_obstacles_of_a_course_are_clear_of_a_low_uav_and_one_without_room_canno
         ("scenario: minimal\nruns: d", ":2: runs: 'd' is not allowed; wanted: a list of names"),
         ("scenario: minimal\nseed: -1", ":2: seed: -1 is not allowed; wanted: a whole number from 0 on"),
         ("scenario: minimal\nname: ../x", ":2: name: '../x' is not allowed; wanted: a name"),
-        ("scenario: minimal\nclaims:\n  - EXEC\n  - SAFE-TRAC", ":4: claims: 'SAFE-TRAC' is not allowed; did you mean"),
+        (
+            "scenario: minimal\nclaims:\n  - LIVE-HYP\n  - SAFE-T",
+            ":4: claims: 'SAFE-T' is not allowed; did you mean",
+        ),
         ("scenario: minimal\ndraw: {seed: 3}", ":2: draw.seed: 3 is not allowed; wanted: one of uniform"),
         ("scenario: minimal\ndraw: {seed: {unifrom: [0, 1]}}", ":2: draw.seed: 'unifrom' is not allowed; did you mean"),
         ("scenario: minimal\ndraw: {seed: {uniform: [1, 0]}}", "draw.seed.uniform: [1, 0] is not allowed; wanted"),

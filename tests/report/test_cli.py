@@ -125,5 +125,5 @@ def test_exit_codes_of_judging_again(tmp_path: Path, capsys: pytest.CaptureFixtu
         assert said in capsys.readouterr().err
     trace.save(simulate(load("minimal", ["decision.trigger=bare", "duration_s=1"]), "a"), tmp_path / "a")
     assert judge.main([str(tmp_path / "a"), "ZENO-PROOF"]) == 1
-    assert judge.main([str(tmp_path / "a"), "SAFE-TRACE", "EXEC"]) == 0
+    assert judge.main([str(tmp_path / "a"), "SAFE-TRACE", "SAFE-HYP"]) == 0
     assert "ZENO-PROOF: refuted" in capsys.readouterr().out

@@ -65,6 +65,14 @@ class Ran:
     failed: bool = False
     claims: dict[str, tuple[str, int, bool, float]] = field(default_factory=dict)
     """Verdicts by claim: status, how often tested, as expected, smallest gap between triggers, s."""
+    messages: tuple[int, int] = (0, 0)
+    """Proposals sent, and answers under a method with answers."""
+    wanted: int = 0
+    """How many messages the scenario expects at least; 0: it says nothing."""
+
+    @property
+    def sent(self) -> tuple[int, int]:
+        return {"a": (0, 0), "b": (self.messages[0], 0)}.get(self.method, self.messages)
 
     def end(self, robot: str) -> End:
         return self.ends.get(robot, End())
@@ -166,8 +174,16 @@ class World:
                         for name, verdict in ran.claims.items()]  # fmt: skip
 
     @property
+    def numbers(self) -> list[dict[str, Any]]:
+        """Numbers that are expected, as in report.json."""
+        return [{"id": "messages", "run": name, "found": sum(ran.sent), "least": ran.wanted,
+                 "as_expected": sum(ran.sent) >= ran.wanted} for name, ran in self.runs.items()
+                if ran.there and ran.wanted]  # fmt: skip
+
+    @property
     def differing(self) -> int:
-        return sum(not fine and status not in UNDECIDED for _, _, status, _, fine in self.judged)
+        few = sum(ran.there and sum(ran.sent) < ran.wanted for ran in self.runs.values())
+        return few + sum(not fine and status not in UNDECIDED for _, _, status, _, fine in self.judged)
 
 
 def claim(name: str, run: str = "", status: str = "holds", **more: Any) -> Document:
@@ -231,7 +247,7 @@ def document(world: World) -> Document:
         {"id": f"A{k}", "status": status, "run": run, "robot": "ugv1", "measure": "stall_position",
          "ours": STUCK[:2], "paper": [STUCK[0], STUCK[1] - off]} for k, (status, run, off) in enumerate(world.rows)
     ]  # fmt: skip
-    overall = {"status": "as_expected", "why": "", "unpromised": [], "checks": 1}
+    overall = {"status": "as_expected", "why": "", "unpromised": [], "checks": 1, "numbers": world.numbers}
     runs = {name: _run(ran) for name, ran in world.runs.items() if ran.there}
     return {"scenario": {"resolved": resolved}, "runs": runs, "reproduction": rows, "claims": given, "overall": overall,
             "seeds": []}  # fmt: skip
@@ -254,6 +270,10 @@ def _run(ran: Ran) -> Document:
         "on_the_way": {r: {"stands": ran.end(r).how != "moves", "left_m": 9.0, "left_s": ran.end(r).left_s}
                        for r in ("ugv1", "ugv2") if not ran.arrived(r) and r not in ran.first},
         "without_proposals": ran.unasked, "gatekeeper": None,
+        "messages": None if ran.method == "a" else {
+            "proposals": ran.sent[0], "answers": ran.sent[1],
+            "always_on": {"proposals": 240, "answers": 480 * (ran.method in "cd")},
+        },
     }  # fmt: skip
     faults = [{"robot": "ugv1", "policy": "mine", "what": "no", "t_s": 1.0}] * ran.failed
     return {"method": ran.method, "zeta_m": 3.0, "events": sorted(events, key=lambda e: e["t_s"]), "metrics": metrics,
@@ -388,6 +408,16 @@ def _(world: World, mark: str, clauses: str) -> bool:
 @says("headline", r"(\d+) checks? (?:is|are) not as declared\.")
 def _(world: World, mark: str, count: str) -> bool:
     return int(count) == world.differing
+
+
+@says("Messages", r"(.*)\. Always-on supervision: 240 proposals( and 480 answers)?\.")
+def _(world: World, mark: str, told: str, answers: str | None) -> bool:
+    """What each run took that sent anything, and what the scheme takes whose runs answer, too."""
+    helped = {name: ran for name, ran in world.runs.items() if ran.there and ran.method != "a"}
+    parts = [re.fullmatch(rf"{RUNS}: (\d+) proposals?(?: and (\d+) answers?)?", part) for part in told.split("; ")]
+    found = {name: (int(p[2]), int(p[3] or 0)) for p in parts if p for name in names(p[1])}
+    sent = {name: ran.sent for name, ran in helped.items() if ran.sent[0]}
+    return not mark and found == sent and bool(answers) == any(ran.method in "cd" for ran in helped.values())
 
 
 @says("Safe?", rf"(\w+): (\w+ collides .*?){MORE}")
@@ -696,6 +726,8 @@ RANS = st.builds(
     st.lists(st.sampled_from(["ugv1", "ugv2"]), max_size=1),
     st.booleans(),
     JUDGED | JUDGED.map(lambda given: {"SAFE-TRACE": FINE, "SAFE-HYP": FINE} | given),
+    st.sampled_from([(0, 0), (1, 0), (1, 1), (6, 41)]),
+    st.sampled_from([0, 0, 0, 2]),
 )
 THEOREM = st.sampled_from(["proved", "proved", "proved", "proved", "refuted", "inconclusive"])
 THEOREMS = ("SAFE-INV", "SAFE-GATE", "ZENO-PROOF")
@@ -763,6 +795,7 @@ def test_each_sentence_follows_from_what_happened_and_from_nothing_else(world: W
         assert not ran.there or row.arrived.text.startswith(f"{count} of 2")
         assert not ran.there or ("no way" in row.interventions) == bool(ran.lost)
     assert screen.within == ("3 m" if world.tolerance_m == 3.0 else "")
+    assert ("Messages" in said) == any(ran.there and ran.sent[0] for ran in runs.values())
     assert [mark for mark, _ in said.get("Paper?", [])] == ([] if not world.rows else [said["Paper?"][0][0]])
     for claim, question in (("ZENO-TRACE", "Zeno-free?"), ("THR-TRIG", "Threshold?")):
         bad = runs_with(world, claim, "refuted")
@@ -953,6 +986,7 @@ def test_what_is_not_promised_is_neither_a_failure_nor_as_declared() -> None:
     found["claims"].append(claim("SAFE-TRACE", "b", "refuted", expected="nothing", as_expected=None))
     found["overall"] = {
         "status": "as_expected", "why": "", "unpromised": [{"id": "SAFE-TRACE", "run": "b"}], "checks": 0,
+        "numbers": [],
     }  # fmt: skip
     assert "(expected)" not in lines(found, "Safe?")[0].text
     assert "not as declared" not in summary.headline(found).text

@@ -1,4 +1,4 @@
-"""The monitor: silent on honest runs, and where SAFE-HYP and EXEC find their first violation it finds the same."""
+"""The monitor: silent on honest runs, and where SAFE-HYP finds its first violation it finds the same."""
 
 from __future__ import annotations
 

@@ -18,17 +18,14 @@ class Judged(Protocol):
 
 CLAIMS = {claim.id: claim for claim in TRACE_CLAIMS}
 
-GATE = {"GATE-PLAN", "GATE-MODEL"}
+GATE = {"GATE-PLAN"}
 """Claims about recorded problems, which the synthetic runs do not have: see runs/test_breakages.py."""
 
 UNRECORDED = {
     "c": dict.fromkeys(GATE, "not_run"),
-    "d": dict.fromkeys(("GATE-MODEL", "LIVE-PROG"), "error"),
+    "d": {"LIVE-HYP": "error"},
 }
 """By method, what claims say where problems, or proposals and outcomes, are not in the trace, as in synthetic runs."""
-
-LAW = {"EXEC"}
-"""Claims about the control law, which the synthetic runs do not follow to the letter: see runs/test_running_code.py."""
 
 
 def decided(claim: str, trace: Trace) -> Finding:

@@ -52,7 +52,7 @@ def test_a_run_without_anything_to_check_exercises_no_claim(claim: str, idle: di
 def test_a_run_with_several_triggers_and_proposals_exercises_every_claim(
     claim: str, run: Callable[[str, str], Trace]
 ) -> None:
-    of = {"LIVE-PROG": ("contact", "d")}
+    of = {"LIVE-HYP": ("contact", "d")}
     (verdict,) = judge(run(*of.get(claim, ("dwell", "d"))), [claim])
     count = verdict.exercised
     assert count
@@ -68,7 +68,7 @@ def without_messages(trace: Trace) -> Trace:
     return replace(with_meta(idle, events=kept), **tables)
 
 
-@pytest.mark.parametrize("claim", ["COMM", "GATE-PLAN", "GATE-MODEL", "LIVE-PROG"])
+@pytest.mark.parametrize("claim", ["GATE-PLAN", "LIVE-HYP"])
 def test_where_the_uav_found_no_way_there_was_nothing_to_decide(claim: str, run: Callable[[str, str], Trace]) -> None:
     found = decided(claim, without_messages(run("minimal", "d")))
     assert (found.status, found.exercised) == ("holds", 0)
@@ -85,7 +85,7 @@ def test_where_the_uav_found_no_way_there_was_nothing_to_decide(claim: str, run:
 def test_a_claim_that_says_what_exercises_it_must_count_it(
     status: Any, count: Any, counted: str, allowed: bool
 ) -> None:
-    claim = type(CLAIMS["COMM"])()
+    claim = type(CLAIMS["LIVE-GOAL"])()
     claim.exercised_by = counted
     try:
         require_count(claim, Finding(status, exercised=count))
@@ -108,7 +108,7 @@ def test_a_claim_that_says_what_exercises_it_must_count_it(
 )  # fmt: skip
 def test_exercised_is_established_on_something(expected: str, status: Any, count: int | None, met: bool | None) -> None:
     assert meets(expected, status, count) is met
-    assert Verdict.of(CLAIMS["COMM"], "d", Finding(status, exercised=count), expected).as_expected is met
+    assert Verdict.of(CLAIMS["LIVE-GOAL"], "d", Finding(status, exercised=count), expected).as_expected is met
 
 
 def test_an_expectation_that_admits_either_verdict_expects_nothing() -> None:

@@ -47,10 +47,10 @@ def test_only_the_claims_asked_for_are_judged_in_the_order_of_the_report(case_a:
 
 
 def test_an_unknown_claim_is_refused_with_what_is_allowed(case_a: Scenario) -> None:
-    with pytest.raises(UnknownNameError, match=r"unknown claim 'SAFE-INV'; allowed: SAFE-TRACE, .*COMM"):
-        judge(run_of("d"), claims=["COMM", "SAFE-INV"])
-    with pytest.raises(UnknownNameError, match=r"unknown claim 'COMM'; allowed: SAFE-INV, .*THR-DDM"):
-        judge_model(case_a, claims=["COMM"])
+    with pytest.raises(UnknownNameError, match=r"unknown claim 'SAFE-INV'; allowed: SAFE-TRACE, .*LIVE-GOAL"):
+        judge(run_of("d"), claims=["LIVE-GOAL", "SAFE-INV"])
+    with pytest.raises(UnknownNameError, match=r"unknown claim 'LIVE-GOAL'; allowed: SAFE-INV, .*THR-DDM"):
+        judge_model(case_a, claims=["LIVE-GOAL"])
 
 
 def test_nothing_is_imported_before_use() -> None:
@@ -64,8 +64,8 @@ def test_claims_of_one_name_in_files_of_two_folders_are_two(tmp_path: Path) -> N
     for folder in ("one", "two"):
         (tmp_path / folder).mkdir()
         (tmp_path / folder / "claims.py").write_text(
-            "from airground_drake.verify.runs.comm import Comm\n"
-            f"class Mine(Comm):\n    id = 'MINE'\n    summary = {folder!r}\n"
+            "from airground_drake.verify.runs.live_goal import LiveGoal\n"
+            f"class Mine(LiveGoal):\n    id = 'MINE'\n    summary = {folder!r}\n"
         )
         with pytest.MonkeyPatch.context() as patch:
             patch.syspath_prepend(tmp_path / folder)

@@ -32,8 +32,8 @@ class LiveGate(LiveWait):
     )
     method = (
         "Theorems in Coq about the transitions of a commitment. Tests compare those of the running `Patience` with the "
-        "theorem's, and disturb the running gatekeeper and control law. For its runs under (d) the report counts the "
-        "accepted interventions that met the premise until they were given back or withdrawn."
+        "theorem's, and disturb the running gatekeeper and control law. LIVE-HYP checks the hypotheses on every run "
+        "under (d). The report counts the acceptances during which no obstacle was new."
     )
     equations = "(20)"
     assumptions = (
@@ -44,7 +44,7 @@ class LiveGate(LiveWait):
     )
     does_not_establish = (
         "That a proposal is accepted, or that the UGV is where it was predicted to be: that depends on the others. "
-        "LIVE-PROG says how every intervention of a run ended, and LIVE-WAIT bounds the time."
+        "LIVE-WAIT bounds the time."
     )
 
     theorems = ("Patience.kept", "Patience.over_in_time")

@@ -33,7 +33,7 @@ class LiveWait(TheoremClaim):
     method = (
         "Theorems in Coq, by induction over any messages at any samples; the bounds follow from the scenario. Tests "
         "compare the transitions of the running `Patience` with the theorem's, and attack running gatekeepers that "
-        "believe every prediction."
+        "believe every prediction. LIVE-HYP checks tries and times on every run under (d)."
     )
     equations = "(20)"
     assumptions: tuple[str, ...] = (

@@ -32,6 +32,18 @@ def chosen_at(trace: Trace, samples: npt.NDArray[np.intp]) -> npt.NDArray[np.int
     return np.searchsorted(trace.t, trace.t[samples] + MERGE_S)
 
 
+def executing(trace: Trace, ugv: str) -> npt.NDArray[np.int64]:
+    """Number of the proposal that a UGV executes from each control sample on, (S,); -1: none, -2: not known which."""
+    samples = samples_of(trace)
+    table = (
+        trace.decisions if trace.meta["method"] in GATED_METHODS else trace.proposals.assign(t_s=lambda p: p.issued_s)
+    )
+    mine = table[table["robot"] == ugv].sort_values("t_s", kind="stable")
+    times, numbers = mine["t_s"].to_numpy(dtype=np.float64), np.append(mine["number"].to_numpy(dtype=np.int64), -2)
+    last = np.searchsorted(times, trace.t[samples] + TIME_TOLERANCE_S) - 1
+    return np.where(trace.column(f"{ugv}.accepted")[chosen_at(trace, samples)] != 0.0, numbers[last], -1)
+
+
 def intervening(trace: Trace, ugv: str) -> Array:
     """Intervals of mode 1, (K, 2), s; the mode of a row is in force since the row before."""
     inside = np.concatenate([[False], trace.column(f"{ugv}.mode")[1:] == 1.0, [False]])

@@ -18,7 +18,6 @@ from airground_drake.run.trace import Trace
 from airground_drake.verify.runs import convex_bounds, gate_plan
 from airground_drake.verify.runs.convex_bounds import enclose
 from airground_drake.verify.runs.gate_record import DecisionRecord, rows_of
-from airground_drake.verify.runs.way_left import bounds_of_way_left
 
 
 @st.composite
@@ -140,10 +139,3 @@ def test_the_gap_to_the_best_of_all_plans_is_evidence(base: Callable[[str], Trac
     found = decided("GATE-PLAN", decision(other)(base(BINARY)))
     assert found.status == "holds", found.counterexample
     assert found.evidence["largest_gap_to_enumeration"] == pytest.approx(max(costs) / min(costs) - 1.0)
-
-
-def test_the_way_left_is_bounded_from_both_sides() -> None:
-    least, most = bounds_of_way_left(np.zeros(3), np.array([8.0, 0.0, 0.0]), np.array([[4.0, 0.0, 0.0]]), 2.0)
-    true = 2.0 * np.sqrt(12.0) + 2.0 * np.pi / 3.0
-    assert least == 8.0
-    assert true <= most <= 1.01 * true

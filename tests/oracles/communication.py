@@ -1,10 +1,8 @@
-"""Whether the map in each proposal is the UAV's, and whether proposals stand as long as they may."""
+"""Messages are sent only while they are needed, and carry the obstacles that the UAV knew."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from itertools import pairwise
-from typing import Any
 
 import numpy as np
 
@@ -12,9 +10,11 @@ from airground_drake.run.trace import Trace
 from airground_drake.scenarios.schema import Obstacle
 from airground_drake.verify.claim import TIME_TOLERANCE_S
 from airground_drake.verify.engines.geometry import interpolate
-from airground_drake.verify.runs.instants import row_at
+from airground_drake.verify.runs.instants import intervening
 from airground_drake.verify.runs.pairs import appears_of
-from airground_drake.verify.runs.proposals import answers_to, parts_of, proposals_of, withdrawn_s
+from airground_drake.verify.runs.proposals import proposals_of
+from oracles.fault import Fault
+from oracles.protocol import answers_to, withdrawn_s
 
 SENSED_M = 1e-9
 """Within this of the sensing range an obstacle may have been sensed or not, m."""
@@ -22,7 +22,27 @@ Disc = tuple[float, ...]
 """Centre and radius, m."""
 
 
-def map_conflicts(trace: Trace) -> Iterator[dict[str, Any]]:
+def wrong_messages(trace: Trace) -> list[Fault]:
+    """Proposals and decisions out of turn, and proposals whose map is not the UAV's."""
+    return [*_out_of_turn(trace), *_wrong_maps(trace)]
+
+
+def _out_of_turn(trace: Trace) -> Iterator[Fault]:
+    """Messages while neither the UGV nor the one that it was to make way for was being intervened on.
+
+    After a release the UAV withdraws its proposal at its next planning instant, and the gatekeeper notices at its next
+    sample: one period each is allowed.
+    """
+    allowance = trace.scenario.intervention.period_s + trace.scenario.gatekeeper.period_s
+    for sent in proposals_of(trace):
+        spans = np.concatenate([intervening(trace, ugv) for ugv in sorted({sent.ugv, sent.cause})])
+        begins, ends = spans[:, 0] - TIME_TOLERANCE_S, spans[:, 1] + allowance + TIME_TOLERANCE_S
+        messages = [("proposal", sent.issued_s), *(("decision", answer.t_s) for answer in answers_to(trace, sent))]
+        if wrong := [(kind, t) for kind, t in messages if not ((t >= begins) & (t <= ends)).any()]:
+            yield Fault(f"{wrong[0][0]} while nobody needs it", sent.ugv, wrong[0][1])
+
+
+def _wrong_maps(trace: Trace) -> Iterator[Fault]:
     """Proposals whose obstacles are not those that the UAV knew; third-party policies may send other maps.
 
     The UAV knows an obstacle that came with an answer from the next planning instant on, if the proposal is in force
@@ -43,33 +63,7 @@ def map_conflicts(trace: Trace) -> Iterator[dict[str, Any]]:
         right = listed[: len(known)] == known and len({*learnt}) == len(learnt)
         right &= least - {*known} <= {*learnt} <= most - {*known}
         if not right and ":" not in sent.policy:
-            yield {"robot": sent.ugv, "kind": "map of a proposal", "t_s": t, "learnt": learnt, "told": sorted(most)}
-
-
-def standing_conflicts(trace: Trace) -> Iterator[dict[str, Any]]:
-    """Joint plans with a part that was not sent, decisions on withdrawn proposals, replacements without a reason.
-
-    A proposal in force is replaced only by a part of a joint plan, or while another UGV is intervened on, for which the
-    policies may have been asked.
-    """
-    every = proposals_of(trace)
-    for sent in every:
-        there = {sent.ugv, *(part.ugv for part in parts_of(trace, sent))}
-        if missing := sorted(set(sent.party) - there):
-            yield {"robot": sent.ugv, "kind": "part of a joint plan not sent", "t_s": sent.issued_s, "to": missing}
-        end = withdrawn_s(trace, sent)
-        for answer in answers_to(trace, sent):
-            if answer.t_s > end + TIME_TOLERANCE_S:
-                late = {"withdrawn_s": end, "number": sent.number}
-                yield {"robot": sent.ugv, "kind": "decision on what was withdrawn", "t_s": answer.t_s, **late}
-    for ugv in trace.ugvs:
-        for before, after in pairwise(sent for sent in every if sent.ugv == ugv):
-            t = after.issued_s + TIME_TOLERANCE_S
-            row = row_at(trace, after.issued_s)
-            others = any(trace.column(f"{other}.mode")[row] == 1.0 for other in trace.ugvs if other != ugv)
-            alone = not (after.party or others) and after.cause == ugv
-            if alone and withdrawn_s(trace, before, unless_replaced=True) > t and before.times_s[-1] > t:
-                yield {"robot": ugv, "kind": "replaced while in force", "t_s": after.issued_s, "by": after.policy}
+            yield Fault("map of a proposal", sent.ugv, t, {"learnt": learnt, "told": sorted(most)})
 
 
 def _told(trace: Trace) -> tuple[dict[Disc, float], dict[Disc, float]]:

@@ -1,4 +1,4 @@
-"""Closed loops of a UGV rolled out again in plain numpy, many side by side; GATE-MODEL compares records with them."""
+"""Closed loops of a UGV rolled out again in plain numpy, many side by side."""
 
 from __future__ import annotations
 
@@ -10,7 +10,8 @@ import numpy.typing as npt
 
 from airground_drake.base.arrays import Array
 from airground_drake.run.trace import Trace
-from airground_drake.verify.runs.control_law import Asked, commanded, inequalities, tracking
+from airground_drake.verify.runs.control_law import inequalities
+from oracles.control_law import Asked, commanded, tracking
 
 AT_ONCE = 5_000_000
 """Largest number of coordinates of points that are rolled out side by side, so that they fit into memory."""

@@ -11,9 +11,9 @@ import numpy.typing as npt
 from airground_drake.base.arrays import Array
 from airground_drake.run.trace import Trace
 from airground_drake.scenarios.schema import Scenario
-from airground_drake.verify.runs.beginnings import Beginning, beginning
-from airground_drake.verify.runs.closed_loops import NUDGES_M, Scene, in_batches, roll_out, stacked
-from airground_drake.verify.runs.way_left import bounds_of_way_left
+from oracles.beginnings import Beginning, beginning
+from oracles.closed_loops import NUDGES_M, Scene, in_batches, roll_out, stacked
+from oracles.way_left import bounds_of_way_left
 
 STILL_M = 0.05
 """A UGV is at rest if it moved less than this, m, or a tenth of what it can, within the last second."""

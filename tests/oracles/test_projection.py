@@ -11,8 +11,9 @@ from hypothesis import strategies as st
 
 from airground_drake.base.arrays import Array
 from airground_drake.nsbc import kernels
-from airground_drake.verify.runs.control_law import Inequalities, avoiding
-from airground_drake.verify.runs.projection import closest, least_violation
+from airground_drake.verify.runs.control_law import Inequalities
+from oracles.control_law import avoiding
+from oracles.projection import closest, least_violation
 
 SEEDS = st.integers(0, 2**32 - 1)
 BATCH = 6
@@ -25,7 +26,7 @@ CODES = {
 def both(
     wanted: Array, normal: Array, bound: Array, composition: str = "augmented", planar: bool = True
 ) -> tuple[Array, Array]:
-    """Velocities by the claim and by the kernel."""
+    """Velocities by the oracle and by the kernel."""
     ours = avoiding(wanted, Inequalities(normal, bound), composition, planar=planar)
     running = [kernels.avoid_one(*one, CODES[composition]) for one in zip(wanted, normal, bound, strict=True)]
     return ours, np.array(running)

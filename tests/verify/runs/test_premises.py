@@ -12,10 +12,10 @@ import pytest
 from builders.edits import with_scenario
 
 from airground_drake.run.trace import Trace
-from airground_drake.verify.applications import counts, with_counts
+from airground_drake.verify.applications import counts, with_counts, without_news
 from airground_drake.verify.finding import Finding
 from airground_drake.verify.model.theorem import Proof
-from airground_drake.verify.runs.followed import followed
+from airground_drake.verify.runs.acceptances import acceptances
 
 Run = Callable[[str, str], Trace]
 
@@ -27,20 +27,21 @@ Run = Callable[[str, str], Trace]
 def test_what_is_accepted_where_all_obstacles_are_known_meets_the_premise(
     run: Run, scenario: str, run_name: str, met: int
 ) -> None:
-    assert [one.met for one in followed(run(scenario, run_name))] == [True] * met
+    assert without_news(run(scenario, run_name)) == (met, met)
 
 
 def test_an_obstacle_that_is_sensed_later_is_no_part_of_the_premise(run: Run) -> None:
     trace = run("case_a", "d")
-    (accepted,) = followed(trace)
+    (accepted,) = acceptances(trace)["ugv1"]
     rows = np.flatnonzero((trace.t >= accepted.t_s) & (trace.executing("ugv1") >= 0))
     ahead = trace.position("ugv1")[rows[-1]] + np.array([0.0, 3.95, 0.0])
     away = np.linalg.norm(trace.position("ugv1") - ahead, axis=1)
     assert away[: rows[0]].min() > 4.0 > away[rows].min()  # the sensing range
     late = {"position_m": ahead.tolist(), "radius_m": 0.0, "known_to_uav": False}
     beside = with_scenario(trace, obstacles={**trace.meta["scenario"]["obstacles"], "late": late})
-    (found,) = followed(beside)
-    assert (found.new, found.met) == (["late"], False)
+    (found,) = acceptances(beside)["ugv1"]
+    assert found.new(beside) == ["late"]
+    assert without_news(beside) == (0, 1)
 
 
 def test_counts_of_several_runs_are_added() -> None:
@@ -53,7 +54,8 @@ def test_counts_of_several_runs_are_added() -> None:
 def test_a_run_whose_records_are_wrong_is_not_counted(run: Run) -> None:
     trace = run("case_a", "d")
     assert set(counts(trace)) == {"SAFE-INV", "SAFE-GATE", "LIVE-GATE", "LIVE-WAIT"}
-    assert set(counts(Trace(trace.meta, trace.states, trace.samples, trace.decisions))) == {"SAFE-INV"}  # no proposals
+    bare = Trace(trace.meta, trace.states, trace.samples, trace.decisions)
+    assert set(counts(bare)) == {"SAFE-INV", "SAFE-GATE", "LIVE-WAIT"}
 
 
 def test_theorems_say_how_often_their_premise_was_met(report: Callable[[str], Path]) -> None:

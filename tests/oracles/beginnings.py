@@ -10,10 +10,12 @@ from airground_drake.base.arrays import Array
 from airground_drake.run.trace import Trace
 from airground_drake.verify.claim import TIME_TOLERANCE_S
 from airground_drake.verify.engines.geometry import corner_times, interpolate, travelled
-from airground_drake.verify.runs.closed_loops import Scene
-from airground_drake.verify.runs.instants import row_at
-from airground_drake.verify.runs.pairs import Pair, appears_of, around, centres_of, pairs_of, places_of, preset_of
-from airground_drake.verify.runs.proposals import ProposalRecord, answers_to, proposal_of, proposals_of
+from airground_drake.verify.runs.pairs import Pair, appears_of, centres_of, pairs_of, preset_of
+from airground_drake.verify.runs.proposals import ProposalRecord, proposal_of, proposals_of
+from airground_drake.verify.runs.sensing import moves
+from oracles.closed_loops import Scene
+from oracles.control_law import place, selected
+from oracles.protocol import answers_to
 
 MOST_CLAIMED = 64
 """Obstacles of a message that a UGV takes into account."""
@@ -87,43 +89,14 @@ def scene(
     return Scene(
         here=interpolate(trace.t, trace.position(on.ugv), t),
         preset=travelled(*preset_of(trace, on.ugv), t + after),
-        wanted=on.place(t + after),
+        wanted=place(on, t + after),
         executed=np.arange(len(after) - 1) < periods,
-        chosen=on.chosen,
+        chosen=selected(on),
         limit=np.array(trace.scenario.ugvs[on.ugv].max_speed_m_s),
         points=points,
         safe=safe,
         share=share,
     )
-
-
-class Sensed(NamedTuple):
-    """What a UGV senses when it decides: the other of a pair, and its places (S, 3), m, if it moves on as it does."""
-
-    name: str
-    pair: Pair
-    places: Array
-
-
-def sensed(trace: Trace, robot: str, t: float, after: Array) -> list[Sensed]:
-    """Obstacles and other robots within sensing range of a robot at a time, with their places at times `after` that."""
-    here, found = interpolate(trace.t, trace.position(robot), t), []
-    for other, pair in around(trace, robot):
-        place, velocity = _moves(trace, other, t)
-        if (
-            t >= trace.t[pair.row] - TIME_TOLERANCE_S
-            and np.linalg.norm(place - here) <= trace.scenario.control.sensing_range_m
-        ):
-            found.append(Sensed(other, pair, place + after[:, None] * velocity))
-    return found
-
-
-def _moves(trace: Trace, name: str, t: float) -> tuple[Array, Array]:
-    """Where an obstacle or a robot is at a time, (3,), m, and its velocity up to then, (3,), m/s."""
-    place = places_of(trace)[name]
-    if place.ndim == 1:
-        return place, np.zeros(3)
-    return interpolate(trace.t, place, t), trace.command(name)[row_at(trace, t)]
 
 
 def _among_robots(trace: Trace) -> list[Pair]:
@@ -156,32 +129,6 @@ def known_discs(trace: Trace, robot: str, t: float, on: ProposalRecord) -> tuple
     return known[:, :3], trace.scenario.safe_distance.obstacle_m + (own + known[:, 3])
 
 
-def discovers(trace: Trace, robot: str, t: float, on: ProposalRecord) -> bool:
-    """Whether a UGV senses, at a sample of the gatekeeper, an obstacle that is new and not on the message's map.
-
-    Args:
-        trace: the run.
-        robot: the UGV.
-        t: time of the sample, s.
-        on: the proposal.
-    """
-    first = trace.derived(f"first sensed by {robot}", lambda: _first_sensed(trace, robot))
-    new = centres_of(trace)[np.abs(first - t) <= TIME_TOLERANCE_S]
-    shown = (np.linalg.norm(new[:, None] - on.mapped_m, axis=2) <= 1e-9).any(axis=1)
-    return bool((~shown).any())
-
-
-def _first_sensed(trace: Trace, robot: str) -> Array:
-    """When a UGV senses each obstacle for the first time, at the gatekeeper's samples, (m,), s; inf if never."""
-    period_s = trace.scenario.gatekeeper.period_s
-    samples = period_s * np.arange(np.floor(trace.t[-1] / period_s + 1e-9) + 1.0)
-    was = interpolate(trace.t, trace.position(robot), np.minimum(samples, trace.t[-1]))
-    away = np.linalg.norm(was[:, None] - centres_of(trace), axis=2)
-    there = samples[:, None] >= appears_of(trace) - TIME_TOLERANCE_S
-    seen = there & (away <= trace.scenario.control.sensing_range_m)
-    return np.where(seen.any(axis=0), samples[seen.argmax(axis=0)], np.inf)
-
-
 def _other(
     trace: Trace, robot: str, t: float, after: Array, pair: Pair
 ) -> tuple[tuple[Array, Array], float, float, float]:
@@ -191,12 +138,12 @@ def _other(
     accepted yet counts in the latter only.
     """
     other = pair.second if pair.first == robot else pair.first
-    place, velocity = _moves(trace, other, t)
-    coasting = place + np.minimum(after, trace.scenario.gatekeeper.horizon_s)[:, None] * velocity
+    here, velocity = moves(trace, other, t)
+    coasting = here + np.minimum(after, trace.scenario.gatekeeper.horizon_s)[:, None] * velocity
     asked, accepted = asked_of(trace, other, t)
     if asked is None:
         return (coasting, coasting), pair.safe_m, pair.share, -np.inf
-    goes = asked.place(t + after) + np.exp(-after)[:, None] * (place - asked.place(t))
+    goes = place(asked, t + after) + np.exp(-after)[:, None] * (here - place(asked, t))
     return (goes if accepted else coasting, goes), pair.safe_m, pair.share, float(asked.times_s[-1])
 
 

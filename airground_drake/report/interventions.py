@@ -1,0 +1,143 @@
+"""What the help of the UAV came to in a run: interventions, messages, avoidance meanwhile; strict JSON."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from airground_drake.base.errors import TraceError
+from airground_drake.registry import method_of
+from airground_drake.run.trace import Trace
+from airground_drake.verify.claim import TIME_TOLERANCE_S
+from airground_drake.verify.engines.geometry import interpolate
+from airground_drake.verify.runs.control_law import inequalities_of, spare
+from airground_drake.verify.runs.gate_record import DecisionRecord, rows_of
+from airground_drake.verify.runs.instants import chosen_at, executing, row_at, samples_of
+
+BINDING_M_S = 1e-9
+"""An avoidance inequality binds where a command has less to spare, m/s."""
+
+
+def interventions(trace: Trace) -> list[dict[str, Any]]:
+    """Every proposal of a run, by time, and what became of it.
+
+    Returns:
+        `number`, `robot`, `policy`, `cause` (the UGV whose trigger it was sent for), `sent_s`, `accepted_s` (None: it
+        was never accepted), `begun_s` and `ended_s` (when the UGV began and ceased to execute it; None: never, or not
+        before the end), `why` (it ended, or was never executed) and `tries` (how many the UGV had used; None if it does
+        not count them).
+    """
+    samples = np.append(trace.t[samples_of(trace)], trace.t[-1])
+    numbers = {ugv: executing(trace, ugv) for ugv in trace.ugvs}
+    answers = dict(iter(trace.decisions.sort_values("t_s", kind="stable").groupby("number")))
+    gated, found = method_of(trace.meta["method"]).gated, []
+    for row in trace.proposals.sort_values("issued_s", kind="stable").to_dict("records"):
+        own, ugv, given = row["number"], row["robot"], answers.get(row["number"])
+        during = np.flatnonzero(numbers[ugv] == own)
+        begun_s = float(samples[during[0]]) if during.size else None
+        ended_s = float(samples[during[-1] + 1]) if during.size and during[-1] + 1 < len(samples) - 1 else None
+        yes = None if given is None else given[given["decision"] == "accept"]
+        accepted = yes.iloc[0] if yes is not None and len(yes) else None
+        tries = -1.0 if accepted is None else float(accepted["tries"])
+        found.append({
+            **{name: row[name] for name in ("number", "robot", "policy", "cause")},
+            "sent_s": float(row["issued_s"]),
+            "accepted_s": begun_s if not gated else None if accepted is None else float(accepted["t_s"]),
+            "begun_s": begun_s,
+            "ended_s": ended_s,
+            "why": _refused(given) or _withdrawn(trace, row, begun_s, ended_s),
+            "tries": int(tries) if tries >= 0.0 else None,
+        })  # fmt: skip
+    return found
+
+
+def _refused(answers: Any) -> str:
+    """Why a UGV refused a proposal or gave it back, by the decisions about it; '' if it did not."""
+    if answers is None or answers["decision"].iloc[-1] == "accept":
+        return ""
+    changes = answers[answers["decision"] != answers["decision"].shift()]
+    return str(changes["reason"].iloc[-1])
+
+
+def _withdrawn(trace: Trace, sent: dict[Any, Any], begun_s: float | None, ended_s: float | None) -> str:
+    """Why a UGV did not execute a proposal, or ceased to, that it did not refuse."""
+    if ended_s is None:
+        return "not executed" if begun_s is None else "end of the run"
+    if ended_s >= np.ravel(sent["times_s"])[-1] - TIME_TOLERANCE_S:
+        return "over"
+    others = trace.proposals[
+        (trace.proposals["robot"] == sent["robot"]) & (trace.proposals["number"] != sent["number"])
+    ]
+    if others["issued_s"].between(sent["issued_s"], ended_s + TIME_TOLERANCE_S, inclusive="right").any():
+        return "replaced"
+    row = row_at(trace, ended_s)
+    called = any(trace.column(f"{name}.mode")[row] == 1.0 for name in (sent["robot"], sent["cause"]))
+    return "withdrawn" if called else "released"
+
+
+def messages(trace: Trace) -> dict[str, Any] | None:
+    """How many messages a run took, and how many an always-on scheme takes; None without a UAV that intervenes.
+
+    Returns:
+        `proposals`, `answers` (each is a decision of the gatekeeper), `always_on` (the same two, if every UGV got a
+        proposal in every planning period and decided in every period of the gatekeeper), `robots` (the two by UGV).
+    """
+    method, scenario, ugvs = method_of(trace.meta["method"]), trace.scenario, trace.ugvs
+    if not method.intervenes:
+        return None
+    robots = {
+        ugv: {"proposals": int((trace.proposals["robot"] == ugv).sum()),
+              "answers": int((trace.decisions["robot"] == ugv).sum())} for ugv in ugvs
+    }  # fmt: skip
+    before_s = scenario.duration_s - TIME_TOLERANCE_S  # the first instant is at 0
+    planned, decided = (math.ceil(before_s / each.period_s) for each in (scenario.intervention, scenario.gatekeeper))
+    return {
+        **{kind: sum(each[kind] for each in robots.values()) for kind in ("proposals", "answers")},
+        "always_on": {"proposals": len(ugvs) * planned, "answers": len(ugvs) * decided * method.gated},
+        "robots": robots,
+    }
+
+
+def avoidance(trace: Trace) -> dict[str, dict[str, int]]:
+    """By UGV the numbers of control samples at which it executed a proposal, avoidance bound, and both."""
+    samples, found = samples_of(trace), {}
+    for ugv in trace.ugvs:
+        executes = executing(trace, ugv) >= 0
+        left = spare(inequalities_of(trace, ugv, samples), trace.command(ugv)[chosen_at(trace, samples)])
+        bound = (left <= BINDING_M_S).any(axis=1)
+        counts = {"executing": executes, "binding": bound, "both": executes & bound}
+        found[ugv] = {name: int(flags.sum()) for name, flags in counts.items()}
+    return found
+
+
+def farthest_from_prediction(trace: Trace) -> dict[str, Any] | None:
+    """Where a UGV was farthest from its gatekeeper's prediction while the answer stood; None where none is recorded.
+
+    Returns:
+        `robot`, `t_s` (of the decision), `decision`, `away_m`, `after_s`.
+    """
+    if not len(trace.problems):
+        return None
+    try:
+        rows = rows_of(trace)
+    except TraceError:  # which claims report
+        return None
+    numbers = {ugv: executing(trace, ugv) for ugv in trace.ugvs}
+    return max((_off_prediction(trace, row, numbers[row.robot]) for row in rows), key=lambda one: float(one["away_m"]))
+
+
+def _off_prediction(trace: Trace, row: DecisionRecord, numbers: npt.NDArray[np.int64]) -> dict[str, Any]:
+    times, yes = trace.t[samples_of(trace)], row.given["decision"] == "accept"
+    first = int(np.searchsorted(times, row.t_s - TIME_TOLERANCE_S))
+    other = np.flatnonzero(numbers[first:] != (row.number if yes else -1))
+    until = (times[first + other[0]] if other.size else trace.t[-1]) + TIME_TOLERANCE_S
+    ends = row.t_s + row.dt * np.arange(1.0, row.stages + 1.0)
+    ends = ends[ends <= until]
+    went = interpolate(trace.t, trace.position(row.robot), ends)
+    away = np.linalg.norm(went - row.constant[int(yes)][: len(ends)], axis=1)
+    k = int(np.argmax(away)) if len(ends) else 0
+    about = {"robot": row.robot, "t_s": row.t_s, "decision": str(row.given["decision"])}
+    return {**about, "away_m": float(away[k]) if len(ends) else 0.0, "after_s": row.dt * (k + 1)}

@@ -1,0 +1,99 @@
+"""What a run commanded is the control law with the proposals that each UGV should execute, evaluated again."""
+
+from __future__ import annotations
+
+from itertools import product
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from airground_drake.base.arrays import Array
+from airground_drake.run.trace import Trace
+from airground_drake.verify.claim import TIME_TOLERANCE_S
+from airground_drake.verify.engines.geometry import corner_times, travelled
+from airground_drake.verify.runs.control_law import inequalities_of
+from airground_drake.verify.runs.instants import chosen_at, samples_of
+from airground_drake.verify.runs.pairs import preset_of
+from oracles.control_law import Asked, avoiding, commanded, limited, place, rates, selected, tracking
+from oracles.fault import Fault
+from oracles.protocol import executed_at
+
+COMMAND_TOLERANCE_M_S = 1e-6
+"""A command may differ from the law by this, m/s. Both are evaluated at the same recorded positions and differ by
+rounding (1e-13 m/s). A corner of two nearly parallel inequalities divides that by the sine of their angle, which is at
+least 1e-10: the controller treats flatter ones as parallel. In 100 s the tolerance is 0.1 mm."""
+
+Rows = npt.NDArray[np.intp]
+
+
+class Law(NamedTuple):
+    """Commands by the law, (S, 3), m/s, and how far the recorded ones are from them, (S,), m/s."""
+
+    command: Array
+    away: Array
+
+
+def wrong_commands(trace: Trace) -> list[Fault]:
+    """For each robot the first control sample at which its command is not the law's."""
+    samples = samples_of(trace)
+    laws = {ugv: _law_of_ugv(trace, ugv, samples) for ugv in trace.ugvs}
+    if trace.scenario.uav.task == "formation":  # another task is third-party code
+        laws[trace.scenario.uav.name] = _law_of_uav(trace, samples)
+    found = []
+    for robot, law in laws.items():
+        if (wrong := np.flatnonzero(~(law.away <= COMMAND_TOLERANCE_M_S))).size:
+            k = int(wrong[0])
+            recorded, due = (v.tolist() for v in (trace.command(robot)[chosen_at(trace, samples)][k], law.command[k]))
+            found.append(Fault("command", robot, float(trace.t[samples][k]), {"due": due, "recorded": recorded}))
+    return found
+
+
+def _law_of_ugv(trace: Trace, ugv: str, samples: Rows) -> Law:
+    """(6) with avoidance and the proposal that the UGV should execute, if any, by the priorities of the method."""
+    scenario, t = trace.scenario, trace.t[samples]
+    position, recorded = trace.position(ugv)[samples], trace.command(ugv)[chosen_at(trace, samples)]
+    given = inequalities_of(trace, ugv, samples)
+    limit = np.full(len(samples), scenario.ugvs[ugv].max_speed_m_s)
+    executed = executed_at(trace, ugv)
+    rows = np.flatnonzero([sent is not None for sent in executed])
+    now = [(sent, float(t[k])) for k, sent in enumerate(executed) if sent is not None]
+    wanted = np.array([place(*each) for each in now]).reshape(-1, 3)
+    chosen = np.array([selected(sent) for sent, _ in now]).reshape(-1, 3, 3)
+    both = [rates(*each) for each in now]
+    asked = [Asked(wanted, np.array([each[side] for each in both]).reshape(-1, 3), chosen) for side in (0, -1)]
+    waypoints, speed = preset_of(trace, ugv)
+    preset, gain = travelled(waypoints, speed, t), scenario.control.motion_gain_1_s
+    found = Law(np.zeros((len(t), 3)), np.full(len(t), np.inf))
+    # at a corner of a motion either rate may have been used: the closer one counts
+    for rate, wish in product(_preset_rates(waypoints, speed, t), asked):
+        own = tracking(position, preset, rate, gain, limit)
+        command = commanded(trace, position, own, given, rows, wish, limit)
+        away = np.linalg.norm(recorded - command, axis=1)
+        closer = ~(away >= found.away)
+        found.command[closer], found.away[closer] = command[closer], away[closer]
+    return found
+
+
+def _preset_rates(waypoints: Array, speed: float, t: Array) -> list[Array]:
+    """Velocity of the preset trajectory, (S, 3), m/s, before and after each instant; they differ at corners only."""
+    times = corner_times(waypoints, speed)
+    legs = np.diff(waypoints, axis=0)
+    lengths = np.linalg.norm(legs, axis=1, keepdims=True)
+    slopes = np.concatenate([speed * legs / np.where(lengths > 0.0, lengths, 1.0), np.zeros((1, 3))])
+    if not len(times):
+        slopes = np.zeros((1, 3))
+    return [slopes[np.searchsorted(times, t + shift)] for shift in (-TIME_TOLERANCE_S, TIME_TOLERANCE_S)]
+
+
+def _law_of_uav(trace: Trace, samples: Rows) -> Law:
+    """(9)-(11); it feeds the UGVs' commands of the sample before forward."""
+    uav, control = trace.scenario.uav, trace.scenario.control
+    position, recorded = trace.position(uav.name)[samples], trace.command(uav.name)[chosen_at(trace, samples)]
+    centroid = np.mean([trace.position(ugv)[samples] for ugv in trace.ugvs], axis=0)
+    fed = np.mean([trace.command(ugv)[samples] for ugv in trace.ugvs], axis=0)
+    fed[trace.t[samples] <= TIME_TOLERANCE_S] = 0.0  # nothing was commanded before the first sample
+    over = centroid + np.array([0.0, 0.0, uav.altitude_m])
+    below = limited(fed + control.formation_gain_1_s * (over - position), uav.max_speed_m_s)
+    command = avoiding(below, inequalities_of(trace, uav.name, samples), "augmented", planar=False)
+    return Law(command, np.linalg.norm(recorded - command, axis=1))

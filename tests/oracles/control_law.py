@@ -1,0 +1,130 @@
+"""The robots' control law (6), (8)-(11), (14), (20), written again in numpy for many samples at once: B of them.
+
+Velocities in m/s, positions in m, world frame. Nothing of the running code is used.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from airground_drake.base.arrays import Array
+from airground_drake.run.trace import Trace
+from airground_drake.verify.claim import TIME_TOLERANCE_S
+from airground_drake.verify.engines.geometry import interpolate
+from airground_drake.verify.runs.control_law import ON_TOP, PLANE, Inequalities, spare
+from airground_drake.verify.runs.proposals import ProposalRecord
+from oracles.projection import closest, least_violation, shortened
+
+MARGIN_M_S = 1e-12
+"""The law's closest velocity keeps its inequalities by this much, m/s. Without it the corner of two nearly parallel
+inequalities (a robot squeezed between an obstacle and another robot) is elsewhere by far more."""
+
+
+class Asked(NamedTuple):
+    """Accepted interventions: wanted places (B, 3), their rates (B, 3), J_int^+ J_int (B, 3, 3)."""
+
+    wanted: Array
+    rate: Array
+    chosen: Array
+
+
+def limited(velocity: Array, limit: Array | float) -> Array:
+    """Velocities (B, 3) shortened to a speed limit, a number or (B,)."""
+    speed = np.sqrt(np.square(velocity).sum(axis=1))
+    return np.asarray(velocity * np.minimum(1.0, limit / np.maximum(speed, 1e-300))[:, None])
+
+
+def avoiding(below: Array, given: Inequalities, composition: str, *, planar: bool) -> Array:
+    """The avoidance tasks above velocities (B, 3): the closest ones, or (5) as printed for `recursion_*`."""
+    velocity = below.copy()
+    missed = (spare(given, below) < 0.0).any(axis=1)
+    if not missed.any():
+        return velocity
+    normal, bound = given.normal[missed], given.bound[missed]
+    if composition != "augmented":
+        velocity[missed] = [
+            _recursion(*one, nearest_first=composition == "recursion_nearest")
+            for one in zip(below[missed], normal, bound, strict=True)
+        ]
+        return velocity
+    axes = 2 if planar else 3
+    level = bound + MARGIN_M_S
+    found, met = closest(below[missed, :axes], normal[:, :, :axes], level)
+    if not met.all():
+        found[~met] = least_violation(normal[~met, :, :axes], level[~met])
+    velocity[missed, :axes] = shortened(found, normal[:, :, :axes], bound)
+    return velocity
+
+
+def _recursion(below: Array, normal: Array, bound: Array, *, nearest_first: bool) -> Array:
+    """(5), level by level from the lowest priority: each task corrects what the levels below it want."""
+    order = np.arange(len(bound))[::-1]  # the one listed first has the highest priority
+    if nearest_first:  # the most demanding has it; of two that demand the same, the one listed first
+        order = order[np.argsort(bound[order], kind="stable")]
+    velocity = below.copy()
+    for k in order:
+        lacking, squared = bound[k] - normal[k] @ velocity, normal[k] @ normal[k]
+        if lacking > 0.0 and squared > 0.0:
+            velocity += normal[k] * (lacking / squared)
+    return velocity
+
+
+def tracking(position: Array, preset: Array, rate: Array, gain: float, limit: Array | float) -> Array:
+    """A UGV's own task (6), within its speed limit."""
+    return limited(PLANE * (rate + gain * (preset - position)), limit)
+
+
+def intervened(position: Array, below: Array, asked: Asked, gain: float, limit: Array | float) -> Array:
+    """(14) above the velocities below it, (20): v_int + (I - J^+ J) v, within the speed limit."""
+    wish = PLANE * (asked.rate + gain * (asked.wanted - position))
+    return limited(PLANE * (below + np.einsum("bij,bj->bi", asked.chosen, wish - below)), limit)
+
+
+def commanded(
+    trace: Trace,
+    position: Array,
+    own: Array,
+    given: Inequalities,
+    rows: npt.NDArray[np.intp],
+    asked: Asked,
+    limit: Array,
+) -> Array:
+    """A UGV's commands by the law of a run, (B, 3): avoidance, and the interventions that are executed, (20).
+
+    Args:
+        trace: the run: its method says what has priority.
+        position: (B, 3).
+        own: its own task (6), (B, 3).
+        given: its avoidance inequalities.
+        rows: those in which an intervention is executed, (E,).
+        asked: the E interventions.
+        limit: speed limits, (B,).
+    """
+    composition, gain = trace.meta["composition"], trace.scenario.control.intervention_gain_1_s
+    if trace.meta["method"] in ON_TOP:
+        velocity = avoiding(own, given, composition, planar=True)
+        velocity[rows] = intervened(position[rows], velocity[rows], asked, gain, limit[rows])
+        return velocity
+    task = own.copy()
+    task[rows] = intervened(position[rows], own[rows], asked, gain, limit[rows])
+    return avoiding(task, given, composition, planar=True)
+
+
+def selected(sent: ProposalRecord) -> Array:
+    """J_int^+ J_int, (3, 3), of a proposal."""
+    return np.asarray(np.linalg.pinv(sent.selection) @ sent.selection)
+
+
+def place(sent: ProposalRecord, t: float | Array) -> Array:
+    """Where a proposal asks a UGV to be at times: (3,) or (K, 3), m; at rest before its motion and after it."""
+    return interpolate(sent.times_s, sent.positions_m, t)
+
+
+def rates(sent: ProposalRecord, t: float) -> list[Array]:
+    """Velocities of that place at a time, (3,), m/s: two at a vertex, before and after it, else one."""
+    legs = {int(np.searchsorted(sent.times_s, t + shift)) for shift in (-TIME_TOLERANCE_S, TIME_TOLERANCE_S)}
+    slopes = np.pad(np.diff(sent.positions_m, axis=0) / np.diff(sent.times_s)[:, None], ((1, 1), (0, 0)))
+    return [slopes[leg] for leg in sorted(legs)]

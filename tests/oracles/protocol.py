@@ -1,0 +1,181 @@
+"""The protocol: who had which proposal in force when, and who executed which, from messages and modes alone."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+
+from airground_drake.run.trace import Trace
+from airground_drake.verify.claim import TIME_TOLERANCE_S
+from airground_drake.verify.runs.instants import GATED_METHODS, executing, row_at, samples_of
+from airground_drake.verify.runs.proposals import ProposalRecord, proposals_of
+from oracles.fault import Fault
+
+
+class Answer(NamedTuple):
+    """A decision about a proposal: when, s; whether it accepts; whether it ends it because its motion is over."""
+
+    t_s: float
+    accepted: bool
+    done: bool
+
+    @property
+    def refused(self) -> bool:
+        """Whether it withdraws the proposal, and all other parts of its joint plan."""
+        return not (self.accepted or self.done)
+
+
+def wrong_executions(trace: Trace) -> list[Fault]:
+    """Samples at which a UGV executes another proposal than it should; messages that break the planner's rules."""
+    return [*_executed_otherwise(trace), *_misused(trace)]
+
+
+def _executed_otherwise(trace: Trace) -> Iterator[Fault]:
+    """The first control sample at which each UGV executes another proposal than messages and modes say."""
+    times = trace.t[samples_of(trace)]
+    for ugv in trace.ugvs:
+        due = [-1 if sent is None else sent.number for sent in executed_at(trace, ugv)]
+        recorded = executing(trace, ugv)
+        if (wrong := np.flatnonzero(recorded != due)).size:
+            k = int(wrong[0])
+            both = {"due": due[k], "recorded": int(recorded[k])}
+            yield Fault("executes another proposal than it should", ugv, float(times[k]), both)
+
+
+def _misused(trace: Trace) -> Iterator[Fault]:
+    """Wrong causes, joint plans not sent whole, decisions on withdrawn proposals, replacements without a reason."""
+    every = proposals_of(trace)
+    for sent in every:
+        if not _is_cause(trace, sent):
+            yield Fault("sent for a UGV that is not intervened on", sent.ugv, sent.issued_s, sent.cause)
+        if missing := {*sent.party} - {sent.ugv, *(part.ugv for part in parts_of(trace, sent))}:
+            yield Fault("part of a joint plan not sent", sent.ugv, sent.issued_s, sorted(missing))
+        end = withdrawn_s(trace, sent)
+        if late := [answer.t_s for answer in answers_to(trace, sent) if answer.t_s > end + TIME_TOLERANCE_S]:
+            yield Fault("decision on what was withdrawn", sent.ugv, late[0], end)
+    for ugv in trace.ugvs:
+        for before, after in pairwise(sent for sent in every if sent.ugv == ugv):
+            t, row = after.issued_s + TIME_TOLERANCE_S, row_at(trace, after.issued_s)
+            others = any(trace.column(f"{other}.mode")[row] == 1.0 for other in trace.ugvs if other != ugv)
+            alone = not (after.party or others) and after.cause == ugv
+            if alone and withdrawn_s(trace, before, unless_replaced=True) > t and before.times_s[-1] > t:
+                yield Fault("replaced while in force", ugv, after.issued_s, after.policy)
+
+
+def _is_cause(trace: Trace, sent: ProposalRecord) -> bool:
+    """Whether the cause is intervened on, and the UGV itself only if it is the cause.
+
+    The mode of a row is in force up to it. A trigger may be at that very instant, so the mode of the next row counts,
+    too.
+    """
+    row = row_at(trace, sent.issued_s)
+    called = {name: trace.column(f"{name}.mode")[row : row + 2] == 1.0 for name in (sent.ugv, sent.cause)}
+    return bool(called[sent.cause].any()) and (sent.cause == sent.ugv or not called[sent.ugv].all())
+
+
+def parts_of(trace: Trace, sent: ProposalRecord) -> list[ProposalRecord]:
+    """The other parts of the joint plan that a proposal is part of."""
+    same = (sent.issued_s, sent.party)
+    return [one for one in proposals_of(trace) if sent.party and one is not sent and (one.issued_s, one.party) == same]
+
+
+def executed_at(trace: Trace, ugv: str) -> list[ProposalRecord | None]:
+    """The proposal that a UGV should execute, at each control sample of the run, or None.
+
+    A proposal is in force from its sending until it is withdrawn (`withdrawn_s`). Under method (b) it is executed all
+    that time; under (c) and (d) while the gatekeeper's last decision accepts it. A part of a joint plan is executed
+    only while every other part in force is accepted or done.
+    """
+
+    def found() -> list[ProposalRecord | None]:
+        mine = [sent for sent in reversed(proposals_of(trace)) if sent.ugv == ugv]
+        return [
+            next((one for one in mine if _in_force(trace, one, now) and _is_accepted(trace, one, now)), None)
+            for now in trace.t[samples_of(trace)].tolist()
+        ]
+
+    return trace.derived(("executed", ugv), found)
+
+
+def _in_force(trace: Trace, sent: ProposalRecord, now: float) -> bool:
+    """Whether a proposal was in force after the last planning instant up to `now`, s."""
+    period = trace.scenario.intervention.period_s
+    planned = period * np.floor(now / period + 1e-6) + TIME_TOLERANCE_S
+    return bool(sent.issued_s <= planned < withdrawn_s(trace, sent))
+
+
+def _is_accepted(trace: Trace, sent: ProposalRecord, now: float) -> bool:
+    """Whether a proposal in force is accepted at `now`, s, and all other parts in force are accepted or done."""
+    if trace.meta["method"] not in GATED_METHODS:
+        return True
+    own = _answer_at(trace, sent, now)
+    if own is None or not own.accepted:
+        return False
+    others = [_answer_at(trace, part, now) for part in parts_of(trace, sent) if _in_force(trace, part, now)]
+    return not any(answer is None or answer.refused for answer in others)
+
+
+def _answer_at(trace: Trace, sent: ProposalRecord, now: float) -> Answer | None:
+    """The decision about a proposal at the gatekeeper's last sample up to `now`, s, if there is one."""
+    period = trace.scenario.gatekeeper.period_s
+    asked = period * np.floor(now / period + 1e-6)
+    answers = answers_to(trace, sent)
+    k = int(np.searchsorted([answer.t_s for answer in answers], asked - TIME_TOLERANCE_S))
+    return answers[k] if k < len(answers) and abs(answers[k].t_s - asked) <= TIME_TOLERANCE_S else None
+
+
+def answers_to(trace: Trace, sent: ProposalRecord) -> list[Answer]:
+    """Every decision about a proposal, by time."""
+    return trace.derived("answers_to", lambda: _answers(trace)).get(sent.number, [])
+
+
+def _answers(trace: Trace) -> dict[int, list[Answer]]:
+    ends = {sent.number: float(sent.times_s[-1]) for sent in proposals_of(trace)}
+    found: dict[int, list[Answer]] = {}
+    table = trace.decisions.sort_values("t_s", kind="stable")
+    columns = (table[name].tolist() for name in ("t_s", "number", "decision", "reason"))
+    for t, number, said, reason in zip(*columns, strict=True):
+        before = found.setdefault(int(number), [])
+        ran_out = t >= ends.get(int(number), np.inf) - TIME_TOLERANCE_S
+        done = said != "accept" and ran_out and (reason == "over" or bool(before and before[-1].done))
+        before.append(Answer(float(t), said == "accept", done))
+    return found
+
+
+def withdrawn_s(trace: Trace, sent: ProposalRecord, *, unless_replaced: bool = False) -> float:
+    """The planning instant at which a proposal is taken back, s; infinite if it never is.
+
+    That is the first instant at which one of these is so:
+
+    - neither the UGV nor its cause is being intervened on;
+    - the motion has run out;
+    - another proposal is sent to the UGV (not counted with `unless_replaced`);
+    - the UAV has a refusal of it, or of another part of its joint plan.
+    """
+
+    def first() -> float:
+        alone = _over(trace, sent, unless_replaced)[0]
+        return min([alone, *(t for t, refused in (_over(trace, part) for part in parts_of(trace, sent)) if refused)])
+
+    return trace.derived(("withdrawn", sent.number, unless_replaced), first)
+
+
+def _over(trace: Trace, sent: ProposalRecord, unless_replaced: bool = False) -> tuple[float, bool]:
+    """When a proposal is taken back without regard to other parts, s, and whether the UAV has its refusal then."""
+    t, period = trace.t, trace.scenario.intervention.period_s
+    called = (trace.column(f"{sent.ugv}.mode") == 1.0) | (trace.column(f"{sent.cause}.mode") == 1.0)
+    later = [one.issued_s for one in proposals_of(trace) if one.ugv == sent.ugv and one.issued_s > sent.issued_s]
+    replaced = np.inf if unless_replaced else min(later, default=np.inf)
+    for k in range(round(sent.issued_s / period) + 1, int(t[-1] / period + 1e-6) + 1):
+        now = k * period
+        row = row_at(trace, now)
+        before = [answer for answer in answers_to(trace, sent) if answer.t_s < now - TIME_TOLERANCE_S]
+        refused = bool(before) and before[-1].refused
+        # the clock's rounding decides whether a motion that ends at this very instant has run out
+        ended = t[row] >= sent.times_s[-1] or (bool(before) and before[-1].done)
+        if not called[row] or ended or refused or replaced <= now + TIME_TOLERANCE_S:
+            return now, refused
+    return np.inf, False

@@ -1,0 +1,128 @@
+"""Faults of the running code: the oracle about it notices the run that it makes, and LIVE-HYP what it must."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+import pytest
+from builders.misbuilt import Patch
+from verify.judging import decided
+
+from airground_drake.gatekeeper import outcome, problem
+from airground_drake.gatekeeper.patience import Patience
+from airground_drake.gatekeeper.rollout import ACCEPTED, REFUSED, ClosedLoop, closed_loop
+from airground_drake.run.simulation import simulate
+from airground_drake.scenarios.load import load
+from airground_drake.systems import components
+from oracles import Fault, faults_of
+from oracles.mutants import (
+    FAR_UAV,
+    PATIENCE,
+    LateByASample,
+    NoRest,
+    executed,
+    executed_whatever_the_answer,
+    formation_gain,
+    gain,
+    moved_map,
+    no_feed_forward,
+    no_limit_of,
+    not_sent,
+    not_withdrawn,
+    selection_ignored,
+    sent_with,
+    ugv2_avoids_nothing,
+    with_law,
+)
+
+
+def found(run: str = "d", scenario: str = "case_b", given: Sequence[str] = ()) -> dict[str, list[Fault]]:
+    """The faults of a new run."""
+    return faults_of(simulate(load(scenario, list(given)), run))
+
+
+COMMANDS: dict[str, tuple[Patch, str, list[str], str]] = {
+    "executed whatever the answer": (executed_whatever_the_answer, "d", [], "ugv"),
+    "intervention gain": (gain("intervention_gain", 1.2), "d", [], "ugv"),
+    "intervention gain, on top": (gain("intervention_gain", 1.2), "c", [], "ugv"),
+    "intervention gain, no gatekeeper": (gain("intervention_gain", 1.2), "b", [], "ugv"),
+    "motion gain off by 1 %": (gain("motion_gain", 0.99), "d", [], "ugv"),
+    "formation gain": (formation_gain, "d", [], "uav"),
+    "UGVs' velocity not fed forward": (no_feed_forward, "d", [FAR_UAV], "uav"),
+    "ugv2 avoids nothing": (ugv2_avoids_nothing, "d", [], "ugv2"),
+    "selection ignored": (selection_ignored, "d", [], "ugv"),
+    "no speed limit": (no_limit_of("ugv"), "d", ["ugvs.ugv1.max_speed_m_s=2.0"], "ugv1"),
+    "no speed limit of the UAV": (no_limit_of("uav"), "d", [FAR_UAV], "uav"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_other_commands_are_noticed(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    patch, run, given, robot = COMMANDS[name]
+    patch(monkeypatch)
+    faults = found(run, "case_a" if patch is selection_ignored else "case_b", given)["commands"]
+    assert any(fault.robot.startswith(robot) for fault in faults), faults
+
+
+PROTOCOL: dict[str, tuple[Patch, str, str]] = {
+    "answers not sent": (not_sent, "protocol", "executes another proposal"),
+    "not withdrawn after a release": (not_withdrawn, "protocol", "executes another proposal"),
+    "decided on after that": (not_withdrawn, "protocol", "decision on what was withdrawn"),
+    "executed late": (executed(lambda before, now: before[0]), "protocol", "executes another proposal"),
+    "executed for ever": (
+        executed(lambda before, now: [a or b for a, b in zip(now, before[1], strict=True)]),
+        "protocol", "executes another proposal",
+    ),
+    "map told wrongly": (sent_with(moved_map), "communication", "map of a proposal"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", PROTOCOL)
+def test_another_protocol_is_noticed(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    patch, oracle, what = PROTOCOL[name]
+    patch(monkeypatch)
+    scenario = "case_a" if patch is not_sent else "case_b"  # the first proposal is accepted, or refused
+    assert any(fault.what.startswith(what) for fault in found(scenario=scenario)[oracle])
+
+
+PREDICTIONS: dict[str, Callable[[ClosedLoop], ClosedLoop]] = {
+    "motion gain": with_law("motion_gain", lambda v: 1.1 * v),
+    "intervention gain": with_law("intervention_gain", lambda v: 1.1 * v),
+    "priorities": with_law("intervention_on_top", lambda v: not v),
+    "speed limit": lambda loop: loop._replace(max_speed=0.5 * loop.max_speed),
+    "no neighbours": lambda loop: loop._replace(shares=0.0 * loop.shares, distances=0.0 * loop.distances),
+    "wrong neighbours": lambda loop: loop._replace(points=loop.points + 0.1),
+    "late": lambda loop: loop._replace(wanted=np.concatenate([loop.wanted[:1], loop.wanted[:-1]])),
+}
+
+
+@pytest.mark.parametrize(
+    ("run", "name"), [*(("c", name) for name in PREDICTIONS), *(("d", n) for n in list(PREDICTIONS)[2:])]
+)
+def test_wrong_predictions_are_noticed(run: str, name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Until shortly after the first acceptance. What case B's outcomes under (d) rest on is not the gains."""
+    for module in (problem, outcome):
+        monkeypatch.setattr(module, "closed_loop", lambda *given: PREDICTIONS[name](closed_loop(*given)))
+    assert "predictions" in found(run, given=["duration_s=14.0", "reproduction=[]"])
+
+
+def test_exchanged_predictions_are_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name, other in (("ACCEPTED", REFUSED), ("REFUSED", ACCEPTED)):
+        monkeypatch.setattr(problem, name, other)
+    assert "predictions" in found("c", given=["duration_s=14.0", "reproduction=[]"])
+
+
+@pytest.mark.parametrize(
+    ("kind", "what"),
+    [(NoRest, ""), (LateByASample, "longer from its own task than allowed"), (Patience, "")],
+)
+def test_a_patience_that_is_wired_wrongly_is_noticed(
+    kind: type[Patience], what: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(components, "Patience", kind)
+    trace = simulate(load("case_b", PATIENCE), "d")
+    assert ("progress" in faults_of(trace)) == (kind is not Patience)
+    finding = decided("LIVE-HYP", trace)
+    assert (finding.status == "refuted") == bool(what), finding
+    assert what in str(finding.counterexample or "")

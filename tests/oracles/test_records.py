@@ -1,0 +1,256 @@
+"""Each rule of an oracle finds a record that was edited against it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+from builders.edits import bumped, moved, with_events, with_meta, with_scenario
+from verify.judging import decided
+from verify.runs.cases import A_D, B_C, B_D, DOORWAY, Edit, at, first, problem, proposals, scenario
+
+from airground_drake.base.errors import TraceError
+from airground_drake.run.simulation import simulate
+from airground_drake.run.trace import Trace
+from airground_drake.scenarios.schema import Obstacle, Scenario
+from airground_drake.verify.runs.proposals import proposals_of
+from oracles import ORACLES, commands, predictions
+from oracles.communication import SENSED_M
+from oracles.outcome_rolls import foreseen
+from oracles.protocol import answers_to
+
+Base = Callable[[str], Trace]
+
+
+def each_value(**changes: Callable[[Any], Any]) -> Edit:
+    """Every value of a column of the proposals."""
+    return proposals(
+        lambda table: table.assign(**{k: [f(np.asarray(v)) for v in table[k]] for k, f in changes.items()})
+    )
+
+
+def told(row: int, points: slice = slice(None), by: float = 0.0, wider: float = 0.0) -> Edit:
+    """The map of the last proposal, or a part of it, in another proposal."""
+
+    def edit(table: pd.DataFrame) -> pd.DataFrame:
+        columns = {name: table[name].tolist() for name in ("mapped_m", "mapped_radius_m")}
+        places, sizes = (np.array(columns[name][-1]) for name in columns)
+        columns["mapped_m"][row] = (places.reshape(-1, 3)[points] + [by, 0.0, 0.0]).ravel()
+        columns["mapped_radius_m"][row] = sizes[points] + wider
+        return table.assign(**columns)
+
+    return proposals(edit)
+
+
+def with_proposal(**changes: Any) -> Edit:
+    """The last proposal once more, and its event."""
+
+    def edit(trace: Trace) -> Trace:
+        more = trace.proposals.iloc[[-1]].assign(number=90, **changes)
+        event = {"t_s": float(more["issued_s"].iloc[0]), "robot": more["robot"].iloc[0], "kind": "proposal",
+                 "policy": more["policy"].iloc[0]}  # fmt: skip
+        table = pd.concat([trace.proposals, more], ignore_index=True)
+        return replace(with_meta(trace, events=[*trace.events, event]), proposals=table)
+
+    return edit
+
+
+def sent_again(trace: Trace) -> Trace:
+    return with_proposal(issued_s=trace.proposals["issued_s"].iloc[-1] + 0.2)(trace)
+
+
+def part_lost(trace: Trace) -> Trace:
+    """A part of a joint plan was not sent."""
+    gone = trace.proposals.iloc[int(np.argmax([len(party) for party in trace.proposals["party"]]))]
+    assert len(gone["party"]) > 1
+    of = ("proposal", gone["robot"], float(gone["issued_s"]))
+    left = with_events(trace, lambda every: [e for e in every if (e["kind"], e["robot"], float(e["t_s"])) != of])
+    tables = {name: getattr(trace, name) for name in ("proposals", "decisions")}
+    return replace(left, **{k: v[v["number"] != gone["number"]].reset_index(drop=True) for k, v in tables.items()})
+
+
+def one_more(where: Callable[[pd.DataFrame], Any], later_s: float) -> Edit:
+    """The last decision of some, once more, so much later."""
+
+    def edit(trace: Trace) -> Trace:
+        row = trace.decisions[where(trace.decisions)].iloc[[-1]]
+        later = row.assign(t_s=row["t_s"] + later_s)
+        return replace(trace, decisions=pd.concat([trace.decisions, later], ignore_index=True))
+
+    return edit
+
+
+def cut_short(trace: Trace) -> Trace:
+    """The decisions on an accepted proposal stop while it is in force."""
+    last = int(np.flatnonzero(executing(trace.decisions))[-1])
+    return replace(trace, decisions=trace.decisions.iloc[: last - 3])
+
+
+def accepted(table: pd.DataFrame) -> Any:
+    return table["reason"] == "cheaper"
+
+
+def refused(table: pd.DataFrame) -> Any:
+    return table["reason"] == "stalls"
+
+
+def executing(table: pd.DataFrame) -> Any:
+    return (table["reason"] == "kept") & (table["decision"] == "accept")
+
+
+def other_map(trace: Trace) -> Trace:
+    """Predictions rest on the map in the message."""
+    walls = np.ravel([[3.3, 9.5, 0.0], [5.0, 9.0, 0.0], [6.5, 7.5, 0.0]])
+    return each_value(mapped_m=lambda _: walls, mapped_radius_m=lambda _: np.zeros(3))(trace)
+
+
+RECORDS: dict[str, tuple[tuple[str, str, Edit, str], ...]] = {
+    "commands": (
+        ("other times", B_D, each_value(times_s=lambda v: v + 1e-3), "command"),
+        ("other places", B_D, each_value(positions_m=lambda v: v + 1e-4), "command"),
+        ("other directions", B_D, each_value(selection=lambda v: v[:3]), "command"),
+    ),
+    "protocol": (
+        ("accepted without a message", B_D, bumped("ugv2.accepted", 1.0, 101), "executes another proposal"),
+        ("acceptance hidden", B_D, lambda t: bumped("ugv1.accepted", -1.0, acting(t))(t), "executes another proposal"),
+        ("cause not intervened on", B_D, proposals(lambda table: table.assign(cause="ugv2")), "sent for a UGV"),
+        ("refused and not withdrawn", B_D, one_more(refused, 1.0), "decision on what was withdrawn"),
+        ("sent again", B_D, sent_again, "replaced while in force"),
+        ("part of a joint plan", DOORWAY, part_lost, "part of a joint plan not sent"),
+    ),
+    "communication": (
+        ("proposal before the trigger", B_D, with_proposal(issued_s=5.0), "proposal while nobody needs it"),
+        ("to the other UGV", B_D, with_proposal(robot="ugv2", cause="ugv2"), "proposal while nobody needs it"),
+        ("decision after the release", B_D, one_more(executing, 0.2), "decision while nobody needs it"),
+        ("map before the answer", B_D, told(0), "map of a proposal"),
+        ("map forgotten", B_D, told(-1, slice(-1)), "map of a proposal"),
+        ("map displaced", B_D, told(-1, by=1e-3), "map of a proposal"),
+        ("map inflated", B_D, told(-1, wider=1e-3), "map of a proposal"),
+    ),
+    "predictions": (
+        ("another law", B_C, scenario(control__intervention_gain_1_s=1.6), "velocity of mode"),
+        ("stalls", B_D, first(refused, refuse_stalls=0.0), "refuse: stalls"),
+        ("way left", B_D, first(refused, accept_left_m=lambda v: 0.5 * v), "accept: outcome"),
+        ("another map", B_D, other_map, ""),
+    ),
+    "progress": (
+        ("reason", B_D, first(refused, reason="not_cheaper"), "answer or reason"),
+        ("accepted", B_D, first(refused, decision="accept"), "answer or reason"),
+        ("outcome", B_D, first(refused, accept_stalls=0.0), "answer or reason"),
+        ("makes way for nobody", B_D, first(accepted, reason="makes_way"), "answer or reason"),
+        ("kept at first", B_D, first(accepted, reason="kept"), "answer or reason"),
+        ("no try", B_D, first(accepted, tries=0.0), "tries"),
+        ("another try", B_D, first(executing, tries=2.0), "tries"),
+        ("over too early", B_D, first(executing, decision="refuse", reason="over"), "answer or reason"),
+        ("just ends", B_D, cut_short, "an acceptance just ends"),
+    ),
+}  # fmt: skip
+"""By oracle: what is edited, in which run, how, and what the oracle says."""
+
+
+def acting(trace: Trace) -> int:
+    """A row at which ugv1 executes a proposal."""
+    return int(np.flatnonzero(trace.column("ugv1.accepted"))[3])
+
+
+@pytest.mark.parametrize(("oracle", "row"), [(name, row) for name, rows in RECORDS.items() for row in rows],
+                         ids=lambda value: value if isinstance(value, str) else value[0])  # fmt: skip
+def test_an_edited_record_is_noticed(base: Base, oracle: str, row: Any) -> None:
+    _, name, edit, what = row
+    assert not ORACLES[oracle](base(name))
+    assert any(fault.what.startswith(what) for fault in ORACLES[oracle](edit(base(name))))
+
+
+@pytest.mark.parametrize(
+    "edit",
+    [
+        proposals(lambda table: table.iloc[:0]),
+        proposals(lambda table: table.assign(robot="ugv9")),
+        proposals(lambda table: table.assign(cause="ugv9")),
+        each_value(positions_m=lambda v: v[:-1]),
+        each_value(times_s=lambda v: v[::-1]),
+        each_value(positions_m=lambda v: np.nan * v),
+        lambda trace: replace(trace, decisions=trace.decisions.assign(issued_s=9.0)),
+    ],
+)
+def test_malformed_proposals_are_refused(base: Base, edit: Edit) -> None:
+    with pytest.raises(TraceError):
+        proposals_of(edit(base(B_D)))
+
+
+def barely_in_sight(trace: Trace, by: float) -> Trace:
+    """The sensing range does not reach what a refusal has taught the UAV."""
+    (hidden,) = (o.position_m for o in trace.scenario.obstacles.values() if not o.known_to_uav)
+    said = [answer for sent in proposals_of(trace) if sent.ugv == "ugv1" for answer in answers_to(trace, sent)]
+    places = [trace.position("ugv1")[np.argmin(np.abs(trace.t - a.t_s))] for a in said if not a.accepted]
+    farthest = max(float(np.linalg.norm(place - hidden)) for place in places)
+    return with_scenario(trace, control__sensing_range_m=farthest - by)
+
+
+def at_the_end(robot: str) -> Callable[[Trace, float], Trace]:
+    """The last command is faster, and leads as much farther: nothing follows from it."""
+    return lambda trace, by: moved(trace, robot, len(trace.t) - 1, [by * float(np.diff(trace.t)[-1]), 0.0, 0.0])
+
+
+def longer_way_left(trace: Trace, by: float) -> Trace:
+    """Farther from the goal than is possible, with the cost of that."""
+    decisions = trace.decisions.copy()
+    k = int(np.argmax(decisions["accept_left_m"].to_numpy()))
+    given = decisions.iloc[k].to_dict()
+    left = foreseen(trace)[given["t_s"], given["number"]][1].most_left_m + by
+    speed = trace.scenario.ugvs[given["robot"]].preset.speed_m_s
+    decisions.loc[k, "accept_left_m"] = left
+    decisions.loc[k, "accept_outcome_m2_s"] += (left**3 - given["accept_left_m"] ** 3) / (3.0 * speed)
+    return replace(trace, decisions=decisions)
+
+
+def outcome(trace: Trace, by: float) -> Trace:
+    """Relative, as outcomes are compared."""
+    decisions = trace.decisions.copy()
+    decisions.loc[int(np.argmax(decisions["accept_outcome_m2_s"].to_numpy())), "accept_outcome_m2_s"] *= 1.0 + by
+    return replace(trace, decisions=decisions)
+
+
+TOLERANCES: dict[str, tuple[str, str, float, Callable[[Trace, float], Trace]]] = {
+    "command of a UGV": ("commands", A_D, commands.COMMAND_TOLERANCE_M_S, at_the_end("ugv2")),
+    "command of the UAV": ("commands", A_D, commands.COMMAND_TOLERANCE_M_S, at_the_end("uav")),
+    "sight of an obstacle": ("communication", B_D, SENSED_M, barely_in_sight),
+    "velocity": ("predictions", B_C, predictions.VELOCITY_TOLERANCE_M_S,
+                 lambda t, by: problem(-1, accept_m_s=at(0, lambda v: v + by))(t)),
+    "outcome": ("predictions", B_D, predictions.OUTCOME_TOLERANCE, outcome),
+    "way left": ("predictions", B_D, predictions.LEFT_TOLERANCE_M, longer_way_left),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("what", TOLERANCES)
+def test_twice_the_tolerance_is_noticed_and_half_of_it_is_not(base: Base, what: str) -> None:
+    oracle, name, tolerance, edit = TOLERANCES[what]
+    assert not ORACLES[oracle](edit(base(name), 0.5 * tolerance))
+    assert ORACLES[oracle](edit(base(name), 2.0 * tolerance))
+
+
+@pytest.mark.parametrize(("hidden", "answer"), [((6.5, 9.0), "refuse"), ((4.5, 10.0), "accept")])
+def test_an_accepted_intervention_is_reconsidered_when_an_obstacle_is_new(
+    case_a: Scenario, hidden: tuple[float, float], answer: str
+) -> None:
+    """The obstacle is not on the UAV's map; it comes into sight after the acceptance."""
+    case_a.obstacles["hidden"] = Obstacle(position_m=[*hidden, 0.0], known_to_uav=False)
+    trace = simulate(case_a, "d")
+    mine = trace.decisions[trace.decisions["number"] == trace.decisions["number"].iloc[0]]
+    begun, again = (row for _, row in mine[mine["accept_stalls"] >= 0.0].iterrows())
+    assert (begun["decision"], again["decision"], begun["tries"], again["tries"]) == ("accept", answer, 1.0, 1.0)
+    assert not ORACLES["progress"](trace)
+    assert not ORACLES["predictions"](trace)
+    assert decided("LIVE-HYP", trace).status == "holds"
+    told_before = each_value(
+        mapped_m=lambda v: np.append(v, [*hidden, 0.0]), mapped_radius_m=lambda v: np.append(v, 0.0)
+    )
+    found = decided("LIVE-HYP", told_before(trace))  # then it was no news
+    assert found.status == ("refuted" if answer == "refuse" else "holds")
+    assert answer == "accept" or "reversed without news" in str(found.counterexample)
+    trace.decisions.loc[again.name, ["decision", "reason"]] = ["accept", "kept"]
+    assert ORACLES["progress"](replace(trace))

@@ -1,0 +1,179 @@
+"""No oracle finds a fault in a run of the code as it is: shipped scenarios, drawn ones, unusual ones."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+from builders.edits import with_scenario
+from random_scenarios import draw
+
+from airground_drake.base.errors import ScenarioError
+from airground_drake.gatekeeper import outcome_gatekeeper
+from airground_drake.run.simulation import simulate
+from airground_drake.run.trace import Trace
+from airground_drake.scenarios.load import from_data, load, resolved
+from airground_drake.scenarios.schema import Obstacle, Policy, Scenario
+from airground_drake.scenarios.shipped import shipped
+from airground_drake.verify.runs.proposals import proposals_of
+from oracles import ORACLES, beginnings, faults_of, predictions
+from oracles.mutants import PATIENCE, one_direction
+from oracles.protocol import executed_at
+from oracles.way_left import bounds_of_way_left
+
+Run = Callable[..., Trace]
+QUICK = (
+    *(("case_a", name) for name in ("a", "b", "c", "d", "a_recursion_nearest", "a_recursion_listed")),
+    *(("case_b", name) for name in "bcd"),
+    ("contact", "d"), ("doorway", "d"), ("dwell", "d"), ("minimal", "d"), ("pocket", "d"), ("soft_gate", "c"),
+    ("swap", "c"),
+)  # fmt: skip
+"""Shipped runs that other tests need, too."""
+DRAWN = (11, 13, 14, 20, 28, 45, 50, 56)
+"""Short scenarios in which something is proposed, under (b), (c) and (d)."""
+
+
+@pytest.mark.parametrize(("scenario", "name"), QUICK)
+def test_a_shipped_run_has_no_fault(run: Run, scenario: str, name: str) -> None:
+    assert not faults_of(run(scenario, name))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("scenario", shipped())
+def test_every_shipped_run_has_no_fault(run: Run, scenario: str) -> None:
+    for name in load(scenario).runs:
+        assert not faults_of(run(scenario, name)), name
+
+
+def of_draw(number: int, most_ugvs: int = 6) -> Trace:
+    scenario = from_data(draw(number, most_ugvs), f"random {number}")
+    return simulate(scenario, *scenario.runs)
+
+
+@pytest.mark.parametrize("number", DRAWN)
+def test_a_drawn_run_has_no_fault(number: int) -> None:
+    trace = of_draw(number)
+    assert len(trace.proposals)
+    assert not faults_of(trace)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("number", range(12))
+def test_a_drawn_run_with_many_ugvs_has_no_fault(number: int) -> None:
+    try:
+        trace = of_draw(number, most_ugvs=30)
+    except ScenarioError:
+        pytest.skip("not valid")
+    assert not faults_of(trace)
+
+
+@pytest.mark.parametrize("name", "bcd")
+def test_proposals_that_concern_one_direction(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    one_direction(monkeypatch)
+    trace = simulate(load("case_a"), name)
+    assert sum(sent is not None for sent in executed_at(trace, "ugv1")) > 5
+    assert not faults_of(trace)
+
+
+def test_the_uavs_avoidance_and_contradicting_inequalities(case_a: Scenario) -> None:
+    """A pole in the UAV's way; a proposal that leads UGV1 between two obstacles, inside both safe distances."""
+    case_a.obstacles["pole"] = Obstacle([0.8, 3.6, 2.3])
+    case_a.intervention.policies = [Policy("towards", {"x_m": 2.85, "y_m": 5.5, "speed_m_s": 2.0})]
+    case_a.decision.threshold.zeta_m, case_a.decision.release_m = 1.0, 0.9
+    trace = simulate(case_a, "b")
+    inside = [np.linalg.norm(trace.position("ugv1") - o, axis=1) < 1.95 for o in ([1.7, 4, 0], [4.0, 7.0, 0.0])]
+    assert (inside[0] & inside[1]).any()
+    assert np.linalg.norm(trace.position("uav") - [0.8, 3.6, 2.3], axis=1).min() < 2.0 + 1e-9
+    assert not faults_of(trace)
+
+
+def test_a_uav_with_another_task_is_not_judged(case_a: Scenario) -> None:
+    case_a.duration_s = 1.0
+    trace = simulate(case_a, "a")
+    altered = with_scenario(trace, uav__altitude_m=3.0)
+    assert [fault.robot for fault in ORACLES["commands"](altered)] == ["uav"]
+    assert not ORACLES["commands"](with_scenario(altered, uav__task="airground_drake.nsbc.tasks:FormationTask"))
+
+
+def test_stages_of_several_control_periods() -> None:
+    trace = simulate(load("case_a", ["gatekeeper.stages=20", "duration_s=16.0", "reproduction=[]"]), "c")
+    assert len(trace.decisions) > 5
+    assert not faults_of(trace)
+
+
+def test_a_ugv_goes_along_as_often_and_as_long_as_it_may() -> None:
+    trace = simulate(load("case_b", PATIENCE), "d")
+    assert {"over", "exhausted"} <= set(trace.decisions["reason"])
+    assert not faults_of(trace)
+
+
+@pytest.mark.slow
+def test_a_queue_along_an_axis_is_squeezed() -> None:
+    """Seven UGVs behind each other but for 1e-9 m, before a gap between two obstacles that is as wide as a point.
+
+    Each is in contact with two others: predicted to be pushed by both, it may leap for kilometres.
+    """
+    data = resolved(load("minimal"))
+    ends = [([-6.0 - 3.0 * i, 1e-9 * (-1) ** i, 0.0], [14.0 - 3.0 * i, 0.0, 0.0]) for i in range(7)]
+    data["ugvs"] = {
+        f"u{i}": {
+            "start_m": start, "target_m": end, "max_speed_m_s": 3.0, "preset": {"waypoints_m": [start, end]},
+        }
+        for i, (start, end) in enumerate(ends)
+    }  # fmt: skip
+    data["obstacles"] = {f"o{i}": {"position_m": [0.0, y, 0.0]} for i, y in enumerate((2.0, -2.0))}
+    data["uav"] = {"start_m": [-15.0, 0.0, 2.0], "target_m": [5.0, 0.0, 2.0]}
+    data["control"] |= {"period_s": 0.05, "sensing_range_m": 6.0}
+    data["gatekeeper"] |= {"period_s": 0.1, "stages": 30}
+    data["intervention"]["period_s"] = 0.1
+    data["decision"] |= {"noise_period_s": 0.05, "threshold": {"zeta_m": 2.0}}
+    trace = simulate(from_data(data | {"duration_s": 9.5}, "queue"), "d")
+    assert trace.decisions["refuse_left_m"].max() > 1e3
+    assert not faults_of(trace)
+
+
+def test_the_nearest_obstacles_of_an_endless_map_count() -> None:
+    assert outcome_gatekeeper.MOST_CLAIMED == beginnings.MOST_CLAIMED == 64
+    scenario = load("case_a", ["duration_s=15.5", "reproduction=[]", "choices=[]"])
+    scenario.intervention.policies = [Policy("towards", {"x_m": 6.0, "y_m": 5.0, "speed_m_s": 2.0})]
+    scenario.uav.phantoms_m = [[float(x), float(y), 0.0] for x in range(10, 20) for y in range(0, 20, 2)]
+    trace = simulate(scenario, "d")
+    sent = proposals_of(trace)[0]
+    known = len(beginnings.known_discs(trace, "ugv1", sent.issued_s, sent)[0])
+    assert 64 <= known <= 64 + len(scenario.obstacles)
+    assert not faults_of(trace)
+
+
+@pytest.mark.parametrize(("name", "safe_m", "duration_s"), [("d", 1e-6, 1.2), ("c", 1e-3, 1.6)])
+def test_a_prediction_that_depends_on_rounding_is_not_compared(
+    name: str, safe_m: float, duration_s: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Four UGVs head for one point: where they get round each other depends on the last digits."""
+    corners = {"e": (1.0, 0.0), "n": (0.0, 1.0), "w": (-1.0, 0.0), "s": (0.0, -1.0)}
+    data: dict[str, Any] = {
+        "name": "meeting", "duration_s": duration_s, "decision": {"threshold": {"zeta_m": 0.2}, "release_m": 0.1},
+        "ugvs": {
+            ugv: {"start_m": [x, y, 0.0], "target_m": [-x, -y, 0.0], "max_speed_m_s": 6.0}
+            | {"preset": {"waypoints_m": [[x, y, 0.0], [-x, -y, 0.0]], "speed_m_s": 1.0}}
+            for ugv, (x, y) in ((ugv, (0.7071068518972258 * x, 0.7071068518972258 * y))
+                                for ugv, (x, y) in corners.items())
+        },
+        "uav": {"start_m": [0.0, 0.0, 2.0], "target_m": [0.0, 0.0, 2.0], "altitude_m": 2.0, "max_speed_m_s": 10.0},
+        "safe_distance": dict.fromkeys(("obstacle_m", "ugv_m", "air_ground_m"), safe_m) | {"collision_m": safe_m / 50},
+        "control": {"sensing_range_m": 2.0}, "runs": {name: {"method": name}},
+        "intervention": {"policies": [{"name": "towards", "parameters": {"x_m": 0.0, "y_m": 0.0, "speed_m_s": 1e5}}]},
+    }  # fmt: skip
+    trace = simulate(from_data(data, "meeting"), name)
+    assert not ORACLES["predictions"](trace)
+    for of_mode in ("_is_unstable", "_has_unstable_outcome"):
+        monkeypatch.setattr(predictions, of_mode, lambda *_: False)
+    assert ORACLES["predictions"](trace)
+
+
+def test_the_way_left_is_bounded_from_both_sides() -> None:
+    least, most = bounds_of_way_left(np.zeros(3), np.array([8.0, 0.0, 0.0]), np.array([[4.0, 0.0, 0.0]]), 2.0)
+    true = 2.0 * np.sqrt(12.0) + 2.0 * np.pi / 3.0
+    assert least == 8.0
+    assert true <= most <= 1.01 * true
