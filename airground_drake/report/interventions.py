@@ -6,8 +6,8 @@ import math
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from airground_drake.base.arrays import Array
 from airground_drake.base.errors import TraceError
 from airground_drake.registry import method_of
 from airground_drake.run.trace import Trace
@@ -15,7 +15,7 @@ from airground_drake.verify.claim import TIME_TOLERANCE_S
 from airground_drake.verify.engines.geometry import interpolate
 from airground_drake.verify.runs.control_law import inequalities_of, spare
 from airground_drake.verify.runs.gate_record import DecisionRecord, rows_of
-from airground_drake.verify.runs.instants import chosen_at, executing, row_at, samples_of
+from airground_drake.verify.runs.instants import row_at
 
 BINDING_M_S = 1e-9
 """An avoidance inequality binds where a command has less to spare, m/s."""
@@ -30,8 +30,8 @@ def interventions(trace: Trace) -> list[dict[str, Any]]:
         before the end), `why` (it ended, or was never executed) and `tries` (how many the UGV had used; None if it does
         not count them).
     """
-    samples = np.append(trace.t[samples_of(trace)], trace.t[-1])
-    numbers = {ugv: executing(trace, ugv) for ugv in trace.ugvs}
+    samples = np.append(trace.sampled("t_s"), trace.t[-1])
+    numbers = {ugv: trace.sampled(f"{ugv}.executing") for ugv in trace.ugvs}
     answers = dict(iter(trace.decisions.sort_values("t_s", kind="stable").groupby("number")))
     gated, found = method_of(trace.meta["method"]).gated, []
     for row in trace.proposals.sort_values("issued_s", kind="stable").to_dict("records"):
@@ -82,16 +82,19 @@ def messages(trace: Trace) -> dict[str, Any] | None:
     """How many messages a run took, and how many an always-on scheme takes; None without a UAV that intervenes.
 
     Returns:
-        `proposals`, `answers` (each is a decision of the gatekeeper), `always_on` (the same two, if every UGV got a
-        proposal in every planning period and decided in every period of the gatekeeper), `robots` (the two by UGV).
+        `proposals`, `answers` (each is a decision of the gatekeeper), as often as they were delivered, `always_on` (the
+        same two, if every UGV got a proposal in every planning period and decided in every period of the gatekeeper),
+        `robots` (the two by UGV).
     """
     method, scenario, ugvs = method_of(trace.meta["method"]), trace.scenario, trace.ugvs
     if not method.intervenes:
         return None
+    delivered = trace.messages[trace.messages["received_s"].notna()]
+    proposals, answers = (delivered[delivered["kind"] == kind] for kind in ("proposal", "answer"))
     robots = {
-        ugv: {"proposals": int((trace.proposals["robot"] == ugv).sum()),
-              "answers": int((trace.decisions["robot"] == ugv).sum())} for ugv in ugvs
-    }  # fmt: skip
+        ugv: {"proposals": int((proposals["receiver"] == ugv).sum()), "answers": int((answers["sender"] == ugv).sum())}
+        for ugv in ugvs
+    }
     before_s = scenario.duration_s - TIME_TOLERANCE_S  # the first instant is at 0
     planned, decided = (math.ceil(before_s / each.period_s) for each in (scenario.intervention, scenario.gatekeeper))
     return {
@@ -103,10 +106,10 @@ def messages(trace: Trace) -> dict[str, Any] | None:
 
 def avoidance(trace: Trace) -> dict[str, dict[str, int]]:
     """By UGV the numbers of control samples at which it executed a proposal, avoidance bound, and both."""
-    samples, found = samples_of(trace), {}
+    samples, found = trace.sample_rows, {}
     for ugv in trace.ugvs:
-        executes = executing(trace, ugv) >= 0
-        left = spare(inequalities_of(trace, ugv, samples), trace.command(ugv)[chosen_at(trace, samples)])
+        executes = trace.sampled(f"{ugv}.executing") >= 0
+        left = spare(inequalities_of(trace, ugv, samples), trace.chosen(ugv))
         bound = (left <= BINDING_M_S).any(axis=1)
         counts = {"executing": executes, "binding": bound, "both": executes & bound}
         found[ugv] = {name: int(flags.sum()) for name, flags in counts.items()}
@@ -125,12 +128,12 @@ def farthest_from_prediction(trace: Trace) -> dict[str, Any] | None:
         rows = rows_of(trace)
     except TraceError:  # which claims report
         return None
-    numbers = {ugv: executing(trace, ugv) for ugv in trace.ugvs}
+    numbers = {ugv: trace.sampled(f"{ugv}.executing") for ugv in trace.ugvs}
     return max((_off_prediction(trace, row, numbers[row.robot]) for row in rows), key=lambda one: float(one["away_m"]))
 
 
-def _off_prediction(trace: Trace, row: DecisionRecord, numbers: npt.NDArray[np.int64]) -> dict[str, Any]:
-    times, yes = trace.t[samples_of(trace)], row.given["decision"] == "accept"
+def _off_prediction(trace: Trace, row: DecisionRecord, numbers: Array) -> dict[str, Any]:
+    times, yes = trace.sampled("t_s"), row.given["decision"] == "accept"
     first = int(np.searchsorted(times, row.t_s - TIME_TOLERANCE_S))
     other = np.flatnonzero(numbers[first:] != (row.number if yes else -1))
     until = (times[first + other[0]] if other.size else trace.t[-1]) + TIME_TOLERANCE_S

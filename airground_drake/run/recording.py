@@ -218,7 +218,6 @@ def _messages(memory: PlannerState, trace: Trace, uav: str) -> Iterator[dict[str
             executing = trace.sampled(f"{trace.ugvs[i]}.executing") == number
             begun = trace.sampled("t_s")[executing]
             yield row("proposal", number, number, issued, float(begun[0]) if len(begun) else never)
-            yield row("answer", number, number, issued, read.get(number, never))
         else:
             yield row("proposal", number, number, issued, decided.get(number, never))
     for count, (number, t) in enumerate(memory.withdrawn):

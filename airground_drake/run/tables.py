@@ -97,7 +97,8 @@ MESSAGE_COLUMNS = {
 - sender, receiver: names of robots.
 - about: number of the proposal.
 - sent_s, received_s, read_s: times, s; NaN for a message that was lost, or never read. A UGV reads a proposal when its
-  gatekeeper decides on it for the first time; without a gatekeeper, when it begins to execute it."""
+  gatekeeper decides on it for the first time. Under method (b) it reads it when it begins to execute it, and does not
+  answer."""
 
 PLAN_COLUMNS = {"t_s": "float64", "uav": "str", "ugv": "str", "policy": "str", "outcome": "str"}
 """Columns of `Trace.plans`, one row per policy that was asked for a plan for a UGV: the outcome is proposed, passed

@@ -117,8 +117,8 @@ class Gatekeeper(LeafSystem):
 class DirectAcceptance(LeafSystem):
     """Method (b): every proposal is accepted at once.
 
-    Ports (n UGVs): in `proposals` abstract; out `answers` (2n) and `reports` (abstract), see `messages`. An answer has
-    the number of its proposal.
+    Ports (n UGVs): in `proposals` abstract; out `answers` (2n) and `reports` (abstract, always empty), see
+    `messages`.
     """
 
     def __init__(self, count: int) -> None:
@@ -131,13 +131,10 @@ class DirectAcceptance(LeafSystem):
         self.DeclareAbstractOutputPort(
             "reports",
             lambda: no_reports(count),
-            weakly(self._calc_reports),
-            prerequisites_of_calc={self._proposals.ticket()},
+            lambda context, output: output.set_value((Report(),) * count),
+            prerequisites_of_calc={self.nothing_ticket()},
         )
 
     def _calc_answers(self, context: Context, output: BasicVector) -> None:
         answers = [[SILENT, -1.0] if p is None else [ACCEPT, p.number] for p in self._proposals.Eval(context)]
         output.SetFromVector(laid_out(Answer, answers))
-
-    def _calc_reports(self, context: Context, output: AbstractValue) -> None:
-        output.set_value(tuple(Report() if p is None else Report(p.number) for p in self._proposals.Eval(context)))

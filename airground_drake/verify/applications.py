@@ -14,7 +14,6 @@ from airground_drake.verify.finding import Finding
 from airground_drake.verify.model import thr_choice
 from airground_drake.verify.model.theorem import Proof
 from airground_drake.verify.runs.acceptances import acceptances
-from airground_drake.verify.runs.instants import executing
 from airground_drake.verify.runs.safe_hyp import guarantees
 from airground_drake.verify.runs.thr_quality import drift_of
 from airground_drake.verify.runs.triggers import task_error
@@ -31,14 +30,14 @@ def safe_pairs(trace: Trace) -> Count:
 
 def below_avoidance(trace: Trace) -> Count:
     """Count the executed interventions, and those of them under method (d)."""
-    count = sum(len({*executing(trace, ugv).tolist()} - {-1, -2}) for ugv in trace.ugvs)
+    count = sum(len({*trace.sampled(f"{ugv}.executing").tolist()} - {-1.0}) for ugv in trace.ugvs)
     return (count if trace.meta["method"] == "d" else 0), count
 
 
 def without_news(trace: Trace) -> Count:
     """Count the acceptances under method (d), and those of them during which no obstacle was new."""
     found = [one for of_ugv in acceptances(trace).values() for one in of_ugv]
-    return sum(not one.new(trace) for one in found), len(found)
+    return sum(not one.news_s for one in found), len(found)
 
 
 COUNTED: dict[str, Callable[[Trace], Count]] = {

@@ -12,6 +12,7 @@ from airground_drake.run.trace import Trace
 from oracles.commands import wrong_commands
 from oracles.communication import wrong_messages
 from oracles.fault import Fault
+from oracles.inputs import wrong_inputs
 from oracles.predictions import wrong_predictions
 from oracles.progress import wrong_answers
 from oracles.protocol import wrong_executions
@@ -22,6 +23,7 @@ ORACLES: dict[str, Callable[[Trace], list[Fault]]] = {
     "progress": wrong_answers,
     "communication": wrong_messages,
     "protocol": wrong_executions,
+    "inputs": wrong_inputs,
 }
 """Every oracle, by name."""
 

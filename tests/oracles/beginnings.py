@@ -12,10 +12,10 @@ from airground_drake.verify.claim import TIME_TOLERANCE_S
 from airground_drake.verify.engines.geometry import corner_times, interpolate, travelled
 from airground_drake.verify.runs.pairs import Pair, appears_of, centres_of, pairs_of, preset_of
 from airground_drake.verify.runs.proposals import ProposalRecord, proposal_of, proposals_of
-from airground_drake.verify.runs.sensing import moves
 from oracles.closed_loops import Scene
 from oracles.control_law import place, selected
 from oracles.protocol import answers_to
+from oracles.sensing import moves
 
 MOST_CLAIMED = 64
 """Obstacles of a message that a UGV takes into account."""

@@ -13,7 +13,6 @@ from airground_drake.run.trace import Trace
 from airground_drake.verify.claim import TIME_TOLERANCE_S
 from airground_drake.verify.engines.geometry import corner_times, travelled
 from airground_drake.verify.runs.control_law import inequalities_of
-from airground_drake.verify.runs.instants import chosen_at, samples_of
 from airground_drake.verify.runs.pairs import preset_of
 from oracles.control_law import Asked, avoiding, commanded, limited, place, rates, selected, tracking
 from oracles.fault import Fault
@@ -36,7 +35,7 @@ class Law(NamedTuple):
 
 def wrong_commands(trace: Trace) -> list[Fault]:
     """For each robot the first control sample at which its command is not the law's."""
-    samples = samples_of(trace)
+    samples = trace.sample_rows
     laws = {ugv: _law_of_ugv(trace, ugv, samples) for ugv in trace.ugvs}
     if trace.scenario.uav.task == "formation":  # another task is third-party code
         laws[trace.scenario.uav.name] = _law_of_uav(trace, samples)
@@ -44,7 +43,7 @@ def wrong_commands(trace: Trace) -> list[Fault]:
     for robot, law in laws.items():
         if (wrong := np.flatnonzero(~(law.away <= COMMAND_TOLERANCE_M_S))).size:
             k = int(wrong[0])
-            recorded, due = (v.tolist() for v in (trace.command(robot)[chosen_at(trace, samples)][k], law.command[k]))
+            recorded, due = (v.tolist() for v in (trace.chosen(robot)[k], law.command[k]))
             found.append(Fault("command", robot, float(trace.t[samples][k]), {"due": due, "recorded": recorded}))
     return found
 
@@ -52,7 +51,7 @@ def wrong_commands(trace: Trace) -> list[Fault]:
 def _law_of_ugv(trace: Trace, ugv: str, samples: Rows) -> Law:
     """(6) with avoidance and the proposal that the UGV should execute, if any, by the priorities of the method."""
     scenario, t = trace.scenario, trace.t[samples]
-    position, recorded = trace.position(ugv)[samples], trace.command(ugv)[chosen_at(trace, samples)]
+    position, recorded = trace.position(ugv)[samples], trace.chosen(ugv)
     given = inequalities_of(trace, ugv, samples)
     limit = np.full(len(samples), scenario.ugvs[ugv].max_speed_m_s)
     executed = executed_at(trace, ugv)
@@ -89,7 +88,7 @@ def _preset_rates(waypoints: Array, speed: float, t: Array) -> list[Array]:
 def _law_of_uav(trace: Trace, samples: Rows) -> Law:
     """(9)-(11); it feeds the UGVs' commands of the sample before forward."""
     uav, control = trace.scenario.uav, trace.scenario.control
-    position, recorded = trace.position(uav.name)[samples], trace.command(uav.name)[chosen_at(trace, samples)]
+    position, recorded = trace.position(uav.name)[samples], trace.chosen(uav.name)
     centroid = np.mean([trace.position(ugv)[samples] for ugv in trace.ugvs], axis=0)
     fed = np.mean([trace.command(ugv)[samples] for ugv in trace.ugvs], axis=0)
     fed[trace.t[samples] <= TIME_TOLERANCE_S] = 0.0  # nothing was commanded before the first sample

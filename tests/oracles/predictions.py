@@ -11,11 +11,11 @@ from airground_drake.run.trace import Trace
 from airground_drake.verify.runs.control_law import ON_TOP
 from airground_drake.verify.runs.gate_record import DecisionRecord, rows_of
 from airground_drake.verify.runs.proposals import proposal_of
-from airground_drake.verify.runs.sensing import sensed
 from oracles.beginnings import scene
 from oracles.closed_loops import NUDGES_M, Scene, in_batches, move_apart, roll_out, stacked
 from oracles.fault import Fault, off
 from oracles.outcome_rolls import Foreseen, foreseen, nudged
+from oracles.sensing import sensed
 
 VELOCITY_TOLERANCE_M_S = 1e-6
 """Recorded and recomputed mode velocities may differ by this, m/s: rounding of two algorithms, which the closed loop

@@ -11,9 +11,9 @@ from airground_drake.verify.claim import TIME_TOLERANCE_S
 from airground_drake.verify.runs.acceptances import METHOD
 from airground_drake.verify.runs.gate_record import DecisionRecord, rows_of
 from airground_drake.verify.runs.proposals import ProposalRecord, proposal_of
-from airground_drake.verify.runs.sensing import news
 from oracles.fault import Fault
 from oracles.protocol import withdrawn_s
+from oracles.sensing import news
 
 NO_DIFFERENCE = 1e-6
 """Relative gain from which on an outcome is better."""

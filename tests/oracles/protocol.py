@@ -10,7 +10,7 @@ import numpy as np
 
 from airground_drake.run.trace import Trace
 from airground_drake.verify.claim import TIME_TOLERANCE_S
-from airground_drake.verify.runs.instants import GATED_METHODS, executing, row_at, samples_of
+from airground_drake.verify.runs.instants import GATED_METHODS, row_at
 from airground_drake.verify.runs.proposals import ProposalRecord, proposals_of
 from oracles.fault import Fault
 
@@ -30,19 +30,34 @@ class Answer(NamedTuple):
 
 def wrong_executions(trace: Trace) -> list[Fault]:
     """Samples at which a UGV executes another proposal than it should; messages that break the planner's rules."""
-    return [*_executed_otherwise(trace), *_misused(trace)]
+    return [*_executed_otherwise(trace), *_misused(trace), *_recorded_otherwise(trace)]
 
 
 def _executed_otherwise(trace: Trace) -> Iterator[Fault]:
     """The first control sample at which each UGV executes another proposal than messages and modes say."""
-    times = trace.t[samples_of(trace)]
+    times = trace.sampled("t_s")
     for ugv in trace.ugvs:
         due = [-1 if sent is None else sent.number for sent in executed_at(trace, ugv)]
-        recorded = executing(trace, ugv)
+        recorded = trace.sampled(f"{ugv}.executing")
         if (wrong := np.flatnonzero(recorded != due)).size:
             k = int(wrong[0])
             both = {"due": due[k], "recorded": int(recorded[k])}
             yield Fault("executes another proposal than it should", ugv, float(times[k]), both)
+
+
+def _recorded_otherwise(trace: Trace) -> Iterator[Fault]:
+    """Messages of the trace that are not those of its proposals and decisions, or not withdrawn when they should be."""
+    table, ends = trace.messages, trace.t[-1] - TIME_TOLERANCE_S
+    of = {kind: table[table["kind"] == kind] for kind in ("proposal", "withdrawal", "answer")}
+    if sorted(of["answer"]["number"]) != sorted(trace.decisions["answer"]):
+        yield Fault("answers are not those of the decisions")
+    withdrawn = dict(zip(of["withdrawal"]["about"].tolist(), of["withdrawal"]["sent_s"].tolist(), strict=True))
+    for sent in proposals_of(trace):
+        if sent.number not in {*of["proposal"]["number"]}:
+            yield Fault("a proposal is no message", sent.ugv, sent.issued_s)
+        due, recorded = withdrawn_s(trace, sent), withdrawn.get(sent.number, np.inf)
+        if min(due, ends) != min(recorded, ends) and abs(due - recorded) > TIME_TOLERANCE_S:
+            yield Fault("withdrawn at another time", sent.ugv, sent.issued_s, {"due": due, "recorded": recorded})
 
 
 def _misused(trace: Trace) -> Iterator[Fault]:
@@ -94,7 +109,7 @@ def executed_at(trace: Trace, ugv: str) -> list[ProposalRecord | None]:
         mine = [sent for sent in reversed(proposals_of(trace)) if sent.ugv == ugv]
         return [
             next((one for one in mine if _in_force(trace, one, now) and _is_accepted(trace, one, now)), None)
-            for now in trace.t[samples_of(trace)].tolist()
+            for now in trace.sampled("t_s").tolist()
         ]
 
     return trace.derived(("executed", ugv), found)

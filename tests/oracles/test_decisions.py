@@ -13,7 +13,6 @@ from builders.decisions import ALL_PLANS, STAGES, GateData
 from builders.edits import with_decision, with_meta
 from hypothesis import given
 from hypothesis import strategies as st
-from oracles.decisions import GAP_TOLERANCE, OVERSTATED, UNDERSTATED, rule, wrong_decisions
 from verify.runs.cases import (
     B_C,
     B_D,
@@ -41,6 +40,7 @@ from airground_drake.scenarios.schema import Gatekeeper
 from airground_drake.verify.claim import TIME_TOLERANCE_S
 from airground_drake.verify.runs.gate_plan import Bounded, bound
 from airground_drake.verify.runs.gate_record import POSITION_TOLERANCE_M, DecisionRecord, rows_of
+from oracles.decisions import GAP_TOLERANCE, OVERSTATED, UNDERSTATED, rule, wrong_decisions
 
 Base = Callable[[str], Trace]
 COSTS = st.floats(0.1, 10.0)

@@ -7,7 +7,6 @@ from typing import NamedTuple
 
 from airground_drake.run.trace import Trace
 from airground_drake.verify.runs.proposals import ProposalRecord, proposal_of
-from airground_drake.verify.runs.sensing import news
 
 METHOD = "d"
 """Only this method has tries and rests, and predicts where an accepted intervention leads."""
@@ -22,6 +21,7 @@ class Acceptance(NamedTuple):
         end_s: when the UGV gave it back, or the gatekeeper's first sample at which it was withdrawn.
         until_s: when it must be over: its motion has ended, or it has lasted as long as it may.
         given_back: whether the UGV ended it.
+        news_s: when the UGV sensed an obstacle for the first time that was not on the proposal's map, s.
     """
 
     on: ProposalRecord
@@ -29,15 +29,7 @@ class Acceptance(NamedTuple):
     end_s: float
     until_s: float
     given_back: bool
-
-    def new(self, trace: Trace, within_s: float = float("inf")) -> list[str]:
-        """Obstacles that the UGV sensed for the first time meanwhile and did not know of from the proposal's map.
-
-        Args:
-            trace: the run.
-            within_s: only those of so much time before the end, s.
-        """
-        return news(trace, self.on.ugv, self.on.mapped_m, max(self.t_s, self.end_s - within_s), self.end_s)
+    news_s: tuple[float, ...]
 
 
 def acceptances(trace: Trace) -> dict[str, list[Acceptance]]:
@@ -52,11 +44,14 @@ def acceptances(trace: Trace) -> dict[str, list[Acceptance]]:
 def _of_ugv(trace: Trace, ugv: str) -> list[Acceptance]:
     gate, found, table = trace.scenario.gatekeeper, list[Acceptance](), trace.decisions
     mine = table[table["robot"] == ugv].sort_values("t_s", kind="stable")
-    given = zip(mine["number"].tolist(), mine["decision"].tolist(), mine["t_s"].tolist(), strict=True)
-    answers = [(number, said, [t for *_, t in rows]) for (number, said), rows in groupby(given, lambda row: row[:2])]
-    for (number, said, times), following in zip_longest(answers, answers[1:]):
+    given = zip(*(mine[name].tolist() for name in ("number", "decision", "t_s", "new")), strict=True)
+    answers = [(*key, [(t, len(new)) for *_, t, new in rows]) for key, rows in groupby(given, lambda row: row[:2])]
+    for (number, said, rows), following in zip_longest(answers, answers[1:]):
         if said == "accept":
             on, back = proposal_of(trace, number), following is not None and following[0] == number
-            end_s = following[2][0] if back else min(times[-1] + gate.period_s, float(trace.t[-1]))
-            found.append(Acceptance(on, times[0], end_s, min(float(on.times_s[-1]), times[0] + gate.longest_s), back))
+            last = following[2][:1] if back else []
+            end_s = last[0][0] if back else min(rows[-1][0] + gate.period_s, float(trace.t[-1]))
+            until_s = min(float(on.times_s[-1]), rows[0][0] + gate.longest_s)
+            news_s = tuple(t for t, new in [*rows[1:], *last] if new)
+            found.append(Acceptance(on, rows[0][0], end_s, until_s, back, news_s))
     return found

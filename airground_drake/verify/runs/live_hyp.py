@@ -13,7 +13,6 @@ from airground_drake.verify.claim import TIME_TOLERANCE_S
 from airground_drake.verify.finding import Finding
 from airground_drake.verify.runs.acceptances import METHOD, Acceptance, acceptances
 from airground_drake.verify.runs.gate_record import DecisionRecord, GateClaim
-from airground_drake.verify.runs.instants import executing, samples_of
 
 
 @dataclass(frozen=True)
@@ -47,7 +46,7 @@ class LiveHyp(GateClaim):
     )
     method = (
         "Intervals of acceptance follow from the decisions of each UGV. What it executed is recorded at each control "
-        "sample. An obstacle is new at the gatekeeper's first sample at which it is within sensing range."
+        "sample. Which obstacles were new to it is recorded with its decisions."
     )
     equations = "(20)"
     assumptions = ("A proposal without a decision at a sample of the gatekeeper is no longer in force.",)
@@ -104,7 +103,7 @@ def _wrong(trace: Trace, of_ugv: list[Acceptance]) -> Iterator[dict[str, Any]]:
         if one.end_s > one.until_s + period_s + TIME_TOLERANCE_S:
             yield {**at, "what": "an acceptance was over too late"}
         early = one.given_back and one.end_s < one.until_s - TIME_TOLERANCE_S
-        if early and not one.new(trace, within_s=period_s):
+        if early and one.end_s not in one.news_s:
             yield {**at, "what": "an acceptance was reversed without news"}
 
 
@@ -117,6 +116,6 @@ def _after_rests(of_ugv: list[Acceptance], rest_s: float) -> list[float]:
 
 def _executed_s(trace: Trace, ugv: str, begins: list[float]) -> list[float]:
     """For how long a UGV executed proposals between such instants, s."""
-    followed = np.append(executing(trace, ugv) >= 0, False).astype(np.int64)
-    cuts = np.searchsorted(trace.t[samples_of(trace)], np.array(begins) - TIME_TOLERANCE_S)
+    followed = np.append(trace.sampled(f"{ugv}.executing") >= 0, False).astype(np.int64)
+    cuts = np.searchsorted(trace.sampled("t_s"), np.array(begins) - TIME_TOLERANCE_S)
     return [float(count) * trace.scenario.control.period_s for count in np.add.reduceat(followed, cuts)]

@@ -25,7 +25,6 @@ from airground_drake.verify.engines.shortfalls import SCREEN_M, rounded_up, shor
 from airground_drake.verify.finding import Finding
 from airground_drake.verify.runs.control_law import inequalities_of, spare
 from airground_drake.verify.runs.demands import differences
-from airground_drake.verify.runs.instants import chosen_at, samples_of
 from airground_drake.verify.runs.pairs import (
     DISTANCE_TOLERANCE_M,
     Pair,
@@ -218,7 +217,7 @@ def _listed(trace: Trace, one: Guarantee) -> dict[str, Any]:
     """A row of the evidence, with the sample at which the most was missed, if anything was."""
     e, k = float(one.missed_m.max()), int(np.argmax(one.missed_m))
     described = {"first": one.pair.first, "second": one.pair.second, "safe_distance_m": one.pair.required_m}
-    t = float(trace.t[samples_of(trace)[k]]) if e > 0.0 else None
+    t = float(trace.t[trace.sample_rows[k]]) if e > 0.0 else None
     return {**described, "guarantee_m": one.gap_m, "e_m": e, "t_s": t}
 
 
@@ -237,7 +236,7 @@ def guarantees(trace: Trace) -> list[Guarantee]:
 
 
 def _guarantees(trace: Trace) -> Iterator[Guarantee]:
-    samples, period = np.append(samples_of(trace), len(trace.t) - 1), trace.scenario.control.period_s
+    samples, period = np.append(trace.sample_rows, len(trace.t) - 1), trace.scenario.control.period_s
     lasting = float(trace.t[samples[-1]] - trace.t[samples[-2]])
     last = Fraction(1) if abs(lasting - period) <= TIME_TOLERANCE_S else Fraction(lasting) / Fraction(period)
     places = {name: p if p.ndim == 1 else p[samples] for name, p in places_of(trace).items()}
@@ -265,7 +264,7 @@ def _longest(places: Array, last: float) -> float:
 
 def _avoidance(trace: Trace, kept: Sequence[Guarantee]) -> Iterator[_Hypothesis]:
     """The distance that is lost, m, because a sample misses the inequalities."""
-    t, gain = trace.t[samples_of(trace)], float(_gain(trace))
+    t, gain = trace.sampled("t_s"), float(_gain(trace))
     for one in kept:
         lost = one.missed_m / gain if gain else one.missed_m * len(t)
         about = {"first": one.pair.first, "second": one.pair.second}
@@ -277,9 +276,9 @@ def _binding(trace: Trace) -> tuple[int, dict[str, int]]:
     count = {"ugv beside obstacle": 0, "uav beside obstacle": 0}
     count |= {"ugv beside ugv": 0, "ugv beside uav": 0, "uav beside ugv": 0}
     kind = dict.fromkeys(trace.ugvs, "ugv") | {trace.robots[-1]: "uav"}
-    samples, in_range = samples_of(trace), 0
+    samples, in_range = trace.sample_rows, 0
     for robot in trace.robots:
-        slack = spare(inequalities_of(trace, robot, samples), trace.command(robot)[chosen_at(trace, samples)])
+        slack = spare(inequalities_of(trace, robot, samples), trace.chosen(robot))
         in_range += int(np.isfinite(slack).sum())
         for (other, _), binds in zip(around(trace, robot), (slack <= BINDING_M_S).sum(axis=0).tolist(), strict=True):
             count[f"{kind[robot]} beside {kind.get(other, 'obstacle')}"] += binds
@@ -315,7 +314,7 @@ def _static(trace: Trace) -> Iterator[_Hypothesis]:
 
 def _sampled(trace: Trace) -> Iterator[_Hypothesis]:
     """Hypotheses at the control samples: their spacing, straight motion between them, speed limits, planar motion."""
-    period, robots, t, samples = trace.scenario.control.period_s, trace.scenario.robots, trace.t, samples_of(trace)
+    period, robots, t, samples = trace.scenario.control.period_s, trace.scenario.robots, trace.t, trace.sample_rows
     spacing = np.diff(np.append(t[samples], t[-1]))
     yield _Hypothesis("sampling", "s", t[samples], period - spacing, TIME_TOLERANCE_S, {})
     ends = np.append(samples, len(t) - 1)

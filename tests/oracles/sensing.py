@@ -57,13 +57,13 @@ def news(trace: Trace, ugv: str, mapped_m: Array, begin_s: float, end_s: float) 
         begin_s: s.
         end_s: s.
     """
-    first = trace.derived(("first sensed", ugv), lambda: _first_sensed(trace, ugv))
+    first = trace.derived(("first sensed", ugv), lambda: first_sensed(trace, ugv))
     new = (first > begin_s + TIME_TOLERANCE_S) & (first <= end_s + TIME_TOLERANCE_S)
     shown = (np.linalg.norm(centres_of(trace)[:, None] - mapped_m, axis=2) <= SAME_M).any(axis=1)
     return list(compress(trace.scenario.obstacles, new & ~shown))
 
 
-def _first_sensed(trace: Trace, ugv: str) -> Array:
+def first_sensed(trace: Trace, ugv: str) -> Array:
     """When a UGV senses each obstacle for the first time, at the gatekeeper's samples, (m,), s; inf if never."""
     period_s = trace.scenario.gatekeeper.period_s
     samples = period_s * np.arange(np.floor(trace.t[-1] / period_s + 1e-9) + 1.0)

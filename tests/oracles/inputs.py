@@ -1,0 +1,73 @@
+"""What a decision rested on, as recorded: obstacles within range, known, new and told, and what others were asked."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from airground_drake.base.arrays import Array
+from airground_drake.run.trace import Trace
+from airground_drake.verify.claim import TIME_TOLERANCE_S
+from airground_drake.verify.engines.geometry import interpolate
+from airground_drake.verify.runs.acceptances import METHOD
+from airground_drake.verify.runs.pairs import appears_of, centres_of
+from airground_drake.verify.runs.proposals import proposal_of
+from oracles.beginnings import MOST_CLAIMED, asked_of
+from oracles.fault import Fault
+from oracles.sensing import SAME_M, first_sensed
+
+EDGE_M = 1e-9
+"""Within this of the sensing range an obstacle may have been sensed or not, m."""
+
+
+def wrong_inputs(trace: Trace) -> list[Fault]:
+    """Decisions whose recorded inputs are not what positions, messages and answers say."""
+    return [
+        Fault(f"recorded as {name}", str(row["robot"]), float(row["t_s"]), {"due": due, "recorded": recorded})
+        for row in trace.decisions.to_dict("records")
+        for name, due, recorded in _compared(trace, row)
+        if due != recorded
+    ]
+
+
+def _compared(trace: Trace, row: dict[Any, Any]) -> Iterator[tuple[str, list[Any], list[Any]]]:
+    """Each recorded input of a decision with what is due; where nothing was predicted, nothing is recorded."""
+    t, ugv, period_s = float(row["t_s"]), str(row["robot"]), trace.scenario.gatekeeper.period_s
+    recorded = {name: [*row[name]] for name in ("sensed", "known", "new", "told", "asked", "asked_accepted")}
+    if trace.meta["method"] == METHOD and row["accept_stalls"] < 0.0:
+        yield from ((name, [], found) for name, found in recorded.items())
+        return
+    away, there = _away(trace, ugv, t)
+    surely = [k for k in recorded["sensed"] if abs(away[k]) <= EDGE_M]
+    yield "sensed", sorted({*np.flatnonzero(there & (away < -EDGE_M)).tolist(), *surely}), recorded["sensed"]
+    if trace.meta["method"] != METHOD:
+        return
+    on, first = proposal_of(trace, int(row["number"])), first_sensed(trace, ugv)
+    known = np.flatnonzero(first <= t + TIME_TOLERANCE_S)
+    yield "known", known.tolist(), recorded["known"]
+    shown = (np.linalg.norm(centres_of(trace)[:, None] - on.mapped_m, axis=2) <= SAME_M).any(axis=1)
+    stood = bool(((trace.decisions["number"] == on.number) & (trace.decisions["t_s"] < t - TIME_TOLERANCE_S)).any())
+    new = (first > t - period_s + TIME_TOLERANCE_S) & (first <= t + TIME_TOLERANCE_S) & ~shown
+    if stood:  # at the first decision on a proposal what is new makes no difference
+        yield "new", np.flatnonzero(new).tolist(), recorded["new"]
+    yield "told", _told(trace, ugv, t, on.mapped_m, on.mapped_radius_m, centres_of(trace)[known]), recorded["told"]
+    others = [asked_of(trace, other, t) for other in trace.ugvs if other != ugv]
+    yield "asked", [one.number for one, _ in others if one], recorded["asked"]
+    yield "asked, accepted", [int(accepted) for one, accepted in others if one], recorded["asked_accepted"]
+
+
+def _away(trace: Trace, ugv: str, t: float) -> tuple[Array, Any]:
+    """How far each obstacle is beyond the sensing range, (m,), m, and whether it is there."""
+    here = interpolate(trace.t, trace.position(ugv), t)
+    away = np.linalg.norm(centres_of(trace) - here, axis=1) - trace.scenario.control.sensing_range_m
+    return away, appears_of(trace) <= t + TIME_TOLERANCE_S
+
+
+def _told(trace: Trace, ugv: str, t: float, mapped_m: Array, radius_m: Array, known_m: Array) -> list[int]:
+    """Rows of a map that a UGV believes: out of sight, not sensed, no negative radius, and the nearest ones only."""
+    far = np.linalg.norm(mapped_m - interpolate(trace.t, trace.position(ugv), t), axis=1)
+    apart = (np.linalg.norm(mapped_m[:, None] - known_m, axis=2) > SAME_M).all(axis=1)
+    rows = np.flatnonzero((far > trace.scenario.control.sensing_range_m) & apart & (radius_m >= 0.0))
+    return sorted(rows[np.argsort(far[rows], kind="stable")[:MOST_CLAIMED]].tolist())
