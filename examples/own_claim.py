@@ -9,7 +9,7 @@ import numpy as np
 
 from airground_drake import Finding, Trace, TraceClaim, load, simulate
 
-SLOW_M_S = 3.5
+SLOW_M_S = 2.5
 
 
 class Slow(TraceClaim):
@@ -33,4 +33,5 @@ class Slow(TraceClaim):
 
 
 if __name__ == "__main__":
-    print(Slow().judge(simulate(load("case_a"), "d")))
+    finding = Slow().judge(simulate(load("case_a"), "d"))
+    print(f"SLOW is {finding.status}, margin {finding.margin:.3g} {finding.unit}")

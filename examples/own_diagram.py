@@ -23,7 +23,7 @@ def first_trigger_s(zeta_m: float) -> float:
     for port in (span.get_input_port(0), span.get_input_port(1), trigger.GetInputPort("decision_variable")):
         builder.Connect(x, port)
     builder.Connect(span.get_output_port(0), trigger.GetInputPort("decision_range"))
-    log = LogVectorOutput(trigger.GetOutputPort("status"), builder)
+    log = LogVectorOutput(trigger.GetOutputPort("status"), builder, 0.01)  # which bounds the steps
     simulator = Simulator(builder.Build())
     simulator.get_mutable_context().SetAccuracy(1e-6)
     simulator.AdvanceTo(3.0)

@@ -15,13 +15,14 @@ from airground_drake.registry import POLICIES
 class Aside(Policy):
     """A polyline that passes everything ahead at a distance, and ends at the target."""
 
-    def __init__(self, *, speed_m_s: float = 2.0, aside_m: float = 3.5) -> None:
+    def __init__(self, *, speed_m_s: float = 2.0, aside_m: float = 2.6) -> None:
         """Speed, m/s, and how far it goes to the right, m."""
         self.speed, self.aside = speed_m_s, aside_m
 
     def propose(self, seen: Observation) -> Motion:
         """Beside the UGV, beside its target, then its target."""
-        right = np.array([self.aside, 0.0, 0.0])
+        ahead = (seen.target - seen.position) / np.linalg.norm(seen.target - seen.position)
+        right = self.aside * np.array([ahead[1], -ahead[0], 0.0])
         corners = [seen.position, seen.position + right, seen.target + right, seen.target]
         return Motion.at_speed(np.array(corners), self.speed, start=seen.start)
 

@@ -1,8 +1,6 @@
 import numpy as np
 
-from airground_drake.run.trace import Trace
-from airground_drake.verify.claim import TraceClaim
-from airground_drake.verify.finding import Finding
+from airground_drake import Finding, Trace, TraceClaim
 
 
 class Corridor(TraceClaim):
