@@ -32,7 +32,7 @@ NEEDED = ("files", "trace")
 EXIT_UNUSABLE = 2
 """Exit code of `airground prove` without Coq, or with a report that it cannot read."""
 ALWAYS = (
-    "what the scenario asks for and expects; provenance, measured times, the SHA-256 of the scenario's file; "
+    "what the scenario asks for and expects; provenance, measured times; "
     "findings of `report audit` that rest on other runs"
 )
 """What is taken as recorded: a forger may change it in all its places, unnoticed."""

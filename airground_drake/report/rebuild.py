@@ -105,7 +105,9 @@ def document_again(report: Mapping[str, Any], scenario: Any, traces: Mapping[str
     order = {(entry["id"], entry["run"]): k for k, entry in enumerate(report["claims"])}
     again["claims"].sort(key=lambda entry: order.get((entry["id"], entry["run"]), len(order)))
     missing = document.missing(scenario, traces, again["claims"])
-    again["overall"] = document.overall(again["claims"], missing, again["audit"] if others else ())
+    again["overall"] = document.overall(
+        again["claims"], missing, again["audit"] if others else (), document.numbers(scenario, again["runs"])
+    )
     return again
 
 
