@@ -1,1 +1,1 @@
-"""A scenario drawn in Meshcat: while a run is simulated (`live_view`), and as a background of its replay."""
+"""A scenario drawn: from above by matplotlib (`plane`); in Meshcat (`draw`), live or as a background of its replay."""
