@@ -16,6 +16,7 @@ from airground_drake.verify.engines.geometry import interpolate
 from airground_drake.verify.runs.control_law import inequalities_of, spare
 from airground_drake.verify.runs.gate_record import DecisionRecord, rows_of
 from airground_drake.verify.runs.instants import row_at
+from airground_drake.verify.runs.proposals import ProposalRecord, proposals_of
 
 BINDING_M_S = 1e-9
 """An avoidance inequality binds where a command has less to spare, m/s."""
@@ -28,30 +29,38 @@ def interventions(trace: Trace) -> list[dict[str, Any]]:
         `number`, `robot`, `policy`, `cause` (the UGV whose trigger it was sent for), `sent_s`, `accepted_s` (None: it
         was never accepted), `begun_s` and `ended_s` (when the UGV began and ceased to execute it; None: never, or not
         before the end), `why` (it ended, or was never executed) and `tries` (how many the UGV had used; None if it does
-        not count them).
+        not count them). [] if the proposals are malformed, which claims report.
     """
-    samples = np.append(trace.sampled("t_s"), trace.t[-1])
+    try:
+        sent = proposals_of(trace)
+    except (LookupError, TraceError, TypeError, ValueError):
+        return []
     numbers = {ugv: trace.sampled(f"{ugv}.executing") for ugv in trace.ugvs}
     answers = dict(iter(trace.decisions.sort_values("t_s", kind="stable").groupby("number")))
-    gated, found = method_of(trace.meta["method"]).gated, []
-    for row in trace.proposals.sort_values("issued_s", kind="stable").to_dict("records"):
-        own, ugv, given = row["number"], row["robot"], answers.get(row["number"])
-        during = np.flatnonzero(numbers[ugv] == own)
-        begun_s = float(samples[during[0]]) if during.size else None
-        ended_s = float(samples[during[-1] + 1]) if during.size and during[-1] + 1 < len(samples) - 1 else None
-        yes = None if given is None else given[given["decision"] == "accept"]
-        accepted = yes.iloc[0] if yes is not None and len(yes) else None
-        tries = -1.0 if accepted is None else float(accepted["tries"])
-        found.append({
-            **{name: row[name] for name in ("number", "robot", "policy", "cause")},
-            "sent_s": float(row["issued_s"]),
-            "accepted_s": begun_s if not gated else None if accepted is None else float(accepted["t_s"]),
-            "begun_s": begun_s,
-            "ended_s": ended_s,
-            "why": _refused(given) or _withdrawn(trace, row, begun_s, ended_s),
-            "tries": int(tries) if tries >= 0.0 else None,
-        })  # fmt: skip
-    return found
+    return [_became(trace, one, numbers[one.ugv], answers.get(one.number)) for one in sent]
+
+
+def _became(trace: Trace, sent: ProposalRecord, numbers: Array, answers: Any) -> dict[str, Any]:
+    """What became of a proposal, from what its UGV executed (S,), and the decisions about it, if there are any."""
+    times, during = trace.sampled("t_s"), np.flatnonzero(numbers == sent.number)
+    begun_s = float(times[during[0]]) if during.size else None
+    ended_s = float(times[during[-1] + 1]) if during.size and during[-1] + 1 < len(times) else None
+    yes = None if answers is None else answers[answers["decision"] == "accept"]
+    accepted = None if yes is None or not len(yes) else yes.iloc[0]
+    tries = -1 if accepted is None else int(accepted["tries"])
+    accepted_s = None if accepted is None else float(accepted["t_s"])
+    return {
+        "number": sent.number,
+        "robot": sent.ugv,
+        "policy": sent.policy,
+        "cause": sent.cause,
+        "sent_s": sent.issued_s,
+        "accepted_s": accepted_s if method_of(trace.meta["method"]).gated else begun_s,
+        "begun_s": begun_s,
+        "ended_s": ended_s,
+        "why": _refused(answers) or _withdrawn(trace, sent, begun_s, ended_s),
+        "tries": tries if tries >= 0 else None,
+    }
 
 
 def _refused(answers: Any) -> str:
@@ -62,19 +71,17 @@ def _refused(answers: Any) -> str:
     return str(changes["reason"].iloc[-1])
 
 
-def _withdrawn(trace: Trace, sent: dict[Any, Any], begun_s: float | None, ended_s: float | None) -> str:
+def _withdrawn(trace: Trace, sent: ProposalRecord, begun_s: float | None, ended_s: float | None) -> str:
     """Why a UGV did not execute a proposal, or ceased to, that it did not refuse."""
     if ended_s is None:
         return "not executed" if begun_s is None else "end of the run"
-    if ended_s >= np.ravel(sent["times_s"])[-1] - TIME_TOLERANCE_S:
+    if ended_s >= sent.times_s[-1] - TIME_TOLERANCE_S:
         return "over"
-    others = trace.proposals[
-        (trace.proposals["robot"] == sent["robot"]) & (trace.proposals["number"] != sent["number"])
-    ]
-    if others["issued_s"].between(sent["issued_s"], ended_s + TIME_TOLERANCE_S, inclusive="right").any():
+    later = (one.issued_s for one in proposals_of(trace) if one.ugv == sent.ugv and one.issued_s > sent.issued_s)
+    if any(issued_s <= ended_s + TIME_TOLERANCE_S for issued_s in later):
         return "replaced"
     row = row_at(trace, ended_s)
-    called = any(trace.column(f"{name}.mode")[row] == 1.0 for name in (sent["robot"], sent["cause"]))
+    called = any(trace.column(f"{name}.mode")[row] == 1.0 for name in (sent.ugv, sent.cause))
     return "withdrawn" if called else "released"
 
 

@@ -1,0 +1,91 @@
+"""What the help of the UAV came to: every proposal, messages beside always-on supervision, avoidance meanwhile."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from builders.runs import run_of
+from oracles.mutants import PATIENCE
+
+from airground_drake.report.document import numbers
+from airground_drake.report.interventions import farthest_from_prediction, interventions, messages
+from airground_drake.report.metrics import of_run
+from airground_drake.run.simulation import simulate
+from airground_drake.run.trace import Trace
+from airground_drake.scenarios.load import load
+
+Run = Callable[[str, str], Trace]
+
+
+def test_what_became_of_a_proposal(run: Run) -> None:
+    (found,) = interventions(run("case_a", "d"))
+    release_s = next(event["t_s"] for event in run("case_a", "d").events if event["kind"] == "release")
+    assert found | {"ended_s": 0.0} == {
+        "number": 0, "robot": "ugv1", "policy": "detour", "cause": "ugv1", "sent_s": pytest.approx(14.5),
+        "accepted_s": pytest.approx(14.55), "begun_s": pytest.approx(14.55), "ended_s": 0.0, "why": "released",
+        "tries": 1,
+    }  # fmt: skip
+    assert 0.0 <= found["ended_s"] - release_s <= 0.05
+    (obeyed,) = interventions(run("case_a", "b"))
+    assert (obeyed["accepted_s"], obeyed["tries"]) == (pytest.approx(14.5), None)
+
+
+def test_why_proposals_end() -> None:
+    trace = simulate(load("case_b", PATIENCE)[0], "d")
+    found = interventions(trace)
+    assert {"over", "exhausted", "stalls"} <= {each["why"] for each in found}
+    for each in found:
+        began = each["begun_s"] is not None
+        assert began == (each["why"] in ("over", "released", "end of the run"))
+        assert not began or each["accepted_s"] == each["begun_s"] < (each["ended_s"] or np.inf)
+
+
+def test_parts_of_joint_plans_are_sent_for_another_ugv(run: Run) -> None:
+    found = interventions(run("doorway", "d"))
+    assert len(found) == len(run("doorway", "d").proposals)
+    assert {each["policy"] for each in found} == {"coordinate"}
+
+
+def test_malformed_proposals_are_left_to_claims(run: Run) -> None:
+    trace = run("case_a", "d")
+    assert not interventions(replace(trace, proposals=trace.proposals.assign(robot="ugv9")))
+
+
+def test_messages_beside_always_on_supervision(run: Run) -> None:
+    """`case_a` lasts 30 s, has two UGVs, and periods of 0.05 s."""
+    trace = run("case_a", "d")
+    assert messages(trace) == {
+        "proposals": 1, "answers": len(trace.decisions), "always_on": {"proposals": 1200, "answers": 1200},
+        "robots": {"ugv1": {"proposals": 1, "answers": len(trace.decisions)}, "ugv2": {"proposals": 0, "answers": 0}},
+    }  # fmt: skip
+    assert (messages(run("case_a", "b")) or {})["always_on"] == {"proposals": 1200, "answers": 0}
+    assert messages(run("case_a", "a")) is None
+
+
+def test_a_ugv_is_near_its_prediction_but_not_on_it(run: Run) -> None:
+    found = farthest_from_prediction(run("case_a", "c"))
+    assert found is not None
+    assert 0.0 < found["away_m"] < 0.1
+    assert farthest_from_prediction(run("case_a", "d")) is None
+
+
+def test_who_did_not_decide(run: Run) -> None:
+    trace = run("case_a", "d")
+    assert of_run(trace)["without_decisions"] == []
+    assert of_run(replace(trace, decisions=trace.decisions.iloc[:0]))["without_decisions"] == ["ugv1"]
+
+
+def test_numbers_that_a_scenario_expects() -> None:
+    trace = run_of("d")
+    scenario = load("case_a")[0]
+    scenario.runs["d"].expected = {"interventions": 1, "messages": 10_000}
+    sent = {"metrics": {"interventions": [{"begun_s": 1.0}, {"begun_s": None}], "messages": messages(trace)}}
+    both = numbers(scenario, {"d": sent})
+    assert [(each["id"], each["found"] >= each["least"], each["as_expected"]) for each in both] == [
+        ("interventions", True, True), ("messages", False, False),
+    ]  # fmt: skip
+    idle = {"metrics": {"interventions": [], "messages": None}}
+    assert [each["found"] for each in numbers(scenario, {"d": idle})] == [0, 0]
