@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import xml.etree.ElementTree as ET
+from copy import deepcopy
 from dataclasses import replace
 
 import numpy as np
@@ -10,7 +12,7 @@ import pytest
 from report.cases import FINE, GOING_ROUND, STALL, Kept, built, make_trace, verdict
 
 from airground_drake.audit import of_runs
-from airground_drake.report import document
+from airground_drake.report import attention, document, junit, summary
 from airground_drake.run.trace import Trace
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.verify.claim import Verdict
@@ -63,6 +65,25 @@ def test_minimum_of_the_schema_in_strict_json(scenario: Scenario, traces: dict[s
 def test_overall(verdicts: list[Verdict], status: str, code: int, scenario: Scenario, traces: dict[str, Trace]) -> None:
     report = built(scenario, traces, verdicts)
     assert (report["overall"]["status"], report["overall"]["exit_code"]) == (status, code)
+
+
+def test_too_few_interventions_or_messages_are_not_as_declared(scenario: Scenario, traces: dict[str, Trace]) -> None:
+    scenario = deepcopy(scenario)
+    scenario.runs["c"].expected = {"interventions": 1, "messages": 2}
+    report = built(scenario, traces, FINE)
+    sent = report["runs"]["c"]["metrics"]["messages"]
+    assert sent["proposals"] + sent["answers"] >= 2
+    overall = report["overall"]
+    assert (overall["status"], overall["exit_code"], overall["checks"]) == ("not_as_expected", 1, len(FINE) + 2)
+    why = "1 of 5 checks differs from what the scenario declares: interventions on run c (0, expected at least 1)."
+    assert overall["why"] == why
+    assert overall["missing"] == []
+    assert summary.headline(report).text.endswith("1 check is not as declared.")
+    (item,) = (each for each in attention.items(report) if each.run == "c" and each.chip == "not_as_expected")
+    assert (item.words, item.about) == ("0 interventions", "expected: at least 1")
+    failed = ET.fromstring(junit.render(report)).find("*/*[@name='interventions']/failure")
+    assert failed is not None
+    assert failed.get("message") == "0 interventions, expected at least 1"
 
 
 def test_what_nothing_tested_and_what_is_not_promised_is_counted_apart(
