@@ -34,7 +34,7 @@ def test_what_became_of_a_proposal(run: Run) -> None:
 
 
 def test_why_proposals_end() -> None:
-    trace = simulate(load("case_b", PATIENCE)[0], "d")
+    trace = simulate(load("case_b", PATIENCE), "d")
     found = interventions(trace)
     assert {"over", "exhausted", "stalls"} <= {each["why"] for each in found}
     for each in found:
@@ -80,7 +80,7 @@ def test_who_did_not_decide(run: Run) -> None:
 
 def test_numbers_that_a_scenario_expects() -> None:
     trace = run_of("d")
-    scenario = load("case_a")[0]
+    scenario = load("case_a")
     scenario.runs["d"].expected = {"interventions": 1, "messages": 10_000}
     sent = {"metrics": {"interventions": [{"begun_s": 1.0}, {"begun_s": None}], "messages": messages(trace)}}
     both = numbers(scenario, {"d": sent})
