@@ -123,7 +123,7 @@ def test_a_sampler_that_fails_is_no_counterexample(
 
 @pytest.mark.usefixtures("in_this_process")
 def test_a_claim_that_applies_to_no_run_is_refused(falsified: Airground) -> None:
-    said = falsified("d", "--claim", "GATE-PLAN", code=2)
+    said = falsified("b", "--claim", "GATE-PLAN", code=2)
     assert "--claim: 'GATE-PLAN' is not allowed; wanted: one that applies to a run of" in said
 
 

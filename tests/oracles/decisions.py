@@ -188,7 +188,7 @@ def compare_routes(trace: Trace, planned: Sequence[DecisionRecord]) -> Iterator[
             arrays = [name for name in ("relaxed", "rounded") if row.data[name] is not None]
             numbers = [row.given[name] + 1.0 for name in ("rounding_deviation_s", "relaxed_first_stage")]
             yield Deviation(row, "a relaxation that the route has not", [len(arrays), *numbers], 0.0)
-        if row.given["route_bound"] != -1.0:
+        if row.given["route_bound"] != -1.0 and row.given["status"] == "optimal":
             yield Deviation(row, "a bound without unit normals", float(not row.unit_normals), 0.0)
     for each in bound([row for row in planned if row.given["route_bound"] != -1.0 and row.unit_normals], blocks):
         yield from compare_bounds(each.row, each.optimum, blocks)

@@ -28,6 +28,7 @@ from verify.runs.cases import (
     at,
     both,
     column,
+    decision,
     kept,
     problem,
     swapped,
@@ -156,6 +157,7 @@ FAULTY: tuple[tuple[str, str, Edit, str], ...] = (
     ("worse plan proved", BINARY, other_plan(beside_the_best, bounded=True), "lower bound overstated"),
     ("bound too high", BINARY, column(route_bound=lambda v: 1.001 * v, gap=0.0), "lower bound"),
     ("optimal with a gap", BINARY, column(route_bound=lambda v: 0.9999 * v, gap=1e-4), "but with a gap"),
+    ("budget spent", RELAXED, decision(budget_spent), ""),
     ("no normals", RELAXED, problem(normals=lambda _: []), "a bound without unit normals"),
 )  # fmt: skip
 """What is edited, in which run, how, and a word of the fault; '': there is none."""
@@ -230,11 +232,11 @@ def test_the_rules_are_those_of_the_running_gatekeeper(
     plan = np.array([float(accept <= refuse)]) if planned else None
     first = None if rounded is None else np.array([rounded])
     status: Any = "optimal" if planned else "refused_not_finite"
-    decision = Solution(accept <= refuse, status, objective=min(costs), plan=plan, rounded=first)
+    found = Solution(accept <= refuse, status, objective=min(costs), plan=plan, rounded=first)
     given = {"objective": min(costs), "accept_throughout": throughout[0], "refuse_throughout": throughout[1]}
     row = DecisionRecord(given, 1.0, 1.0, 1.0, 0.0, {"plan": plan, "rounded": first})
     gate = Gatekeeper(switching_margin=margin, min_dwell_s=0.2, rule="first_stage" if literal else "hysteresis")
     stands = {SILENT: None, ACCEPT: "accept", REFUSE: "refuse"}[standing]
     rules = Rules(switching_margin=margin, min_dwell=0.2, first_stage=literal)
     ours = rule(row, stands, stood, gate)
-    assert ours == settle(decision, throughout, standing, stood, rules)
+    assert ours == settle(found, throughout, standing, stood, rules)
