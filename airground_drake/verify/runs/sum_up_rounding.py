@@ -16,16 +16,15 @@ ROUNDED_ROUTES = ("relaxed", "nonlinear")
 
 
 def is_rounded(row: DecisionRecord) -> bool:
-    """Whether the decision rests on a relaxed plan that was rounded.
+    """Whether a relaxed plan or a rounded one was recorded; each needs the other.
 
     Raises:
-        TraceError: if a route that rounds claims to have solved the problem, but recorded no relaxed plan.
+        TraceError: if a route that rounds claims to have solved the problem, but recorded neither.
     """
-    if row.given["route"] not in ROUNDED_ROUTES:
-        return False
-    if row.data["relaxed"] is None and row.given["status"] == "optimal":
+    found = row.data["relaxed"] is not None or row.data["rounded"] is not None
+    if not found and row.given["route"] in ROUNDED_ROUTES and row.given["status"] == "optimal":
         raise TraceError(f"{row.label} claims to be complete, but has no relaxation")
-    return row.data["relaxed"] is not None
+    return found
 
 
 def integrated_error_s(row: DecisionRecord) -> float:

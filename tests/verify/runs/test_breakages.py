@@ -9,14 +9,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
-from builders.edits import (
-    bumped,
-    first_of,
-    moved,
-    rows,
-    with_decision,
-    with_scenario,
-)
+from builders.decisions import STAGES
+from builders.edits import bumped, first_of, moved, rows, with_decision, with_scenario
 from verify.judging import CLAIMS
 from verify.runs.cases import (
     B_C,
@@ -187,7 +181,10 @@ BREAKAGES: dict[str, tuple[tuple[str, str, Edit, str, str], ...]] = {
         ("cost NaN", RELAXED, column(objective=np.nan), E, ""),
         ("cut", RELAXED, problem(positions_m=lambda v: v[:-1]), E, ""),
         ("optimal without a plan", RELAXED, problem(plan=lambda _: []), E, ""),
-        ("optimal without a relaxation", RELAXED, problem(relaxed=lambda _: []), E, ""),
+        ("not relaxed, but rounded", RELAXED, problem(relaxed=lambda _: []), E, ""),
+        ("no relaxation", RELAXED, problem(relaxed=lambda _: [], rounded=lambda _: []), E, "complete"),
+        ("relaxed nevertheless", BINARY, problem(relaxed=lambda _: np.ones(STAGES), rounded=lambda _: np.ones(STAGES)),
+         R, "recorded rounding error"),
         ("another route", RELAXED, column(route="nonlinear"), E, ""),
         ("a problem lost", RELAXED, lambda t: replace(t, problems=t.problems.iloc[1:]), E, ""),
         ("idle normals", RELAXED, idle_normals_turned, H, ""),
