@@ -152,20 +152,22 @@ def _parts(report: Mapping[str, Any], again: Mapping[str, Any], scenario: Any) -
         yield different("claims", "", "number of claims", len(report["claims"]), len(recorded))
     for claim, run in {**recorded, **rebuilt}:
         line = _compared(claim, run, recorded.get((claim, run)), rebuilt.get((claim, run)))
-        yield _taken(line, "third-party code, run only with --simulate --allow-plugins", claim in scenario.claims)
+        status = line["text"].partition(",")[0]
+        why = f"{status}, by third-party code, which runs only with --simulate --allow-plugins"
+        yield _taken(line, why, claim in scenario.claims)
     for part in {**again, **report}:
         if part not in ("claims", "files"):
             line = _compared(part, "", report.get(part), again.get(part))
-            line = _taken(line, "all but the seed", part == "provenance")
+            line = _taken(line, "but for the seed, which is the scenario's", part == "provenance")
             others = any(row["seed"] != scenario.seed for row in report["seeds"])
-            yield _taken(line, "other seeds, simulated again with --simulate", part == "seeds" and others)
+            yield _taken(line, "but for the scenario's seed; --simulate runs the others", part == "seeds" and others)
 
 
 def _taken(line: Line, why: str, applies: bool) -> Line:
     """If it applies, the line of what agrees with itself only, since it was taken as recorded."""
     if not applies or line["outcome"] != AGREES:
         return line
-    return line | {"outcome": RECORDED, "text": f"{line['text']}: {why}"}
+    return line | {"outcome": RECORDED, "text": why}
 
 
 def _pages(folder: Path, report: Mapping[str, Any], scenario: Any, traces: Mapping[str, Any]) -> Iterator[Line]:

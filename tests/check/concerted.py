@@ -22,16 +22,14 @@ import joblib
 import numpy as np
 import pytest
 from check.forgeries import (
+    RULES,
     all_of,
     both,
-    cells,
     claim,
     everywhere,
     leap,
     report,
     rows,
-    trigger_late,
-    without_event,
     words,
 )
 from check.forging import (
@@ -209,14 +207,14 @@ def seeds_row(**values: Any) -> Edit:
 FORGERIES: dict[str, tuple[str, Edit]] = {
     # statuses
     "crash called safe": ("i, ii", crash_called_safe),
-    "margin of a distance": ("i, ii", claim("SAFE-TRACE", margin=lambda old: old + 1e-5)),
+    "margin of a distance": ("i, ii", RULES["margin"][1]),
     "constants of a proof": ("ii", claim("SAFE-INV", "", inputs=lambda old: dict.fromkeys(old, 0.5))),
     "words of a claim": ("ii", claim("SAFE-GATE", "", statement="No robot can ever collide.")),
     "expectation of a claim": ("ii", claim("LIVE-GOAL", expected="nothing")),
     "verdict over all": ("ii", report("overall", "checks", value=lambda old: old + 1)),
     "outcome of a third-party claim": ("iii", made_again(claim("MINE", margin=59.0))),
     # claims left out
-    "claim about distances left out": ("i, ii", without_claim("SAFE-TRACE")),
+    "claim about distances left out": ("i, ii", RULES["claim left out"][1]),
     "proof left out": ("ii", without_claim("SAFE-INV", "")),
     "third-party claim left out of a run": ("iii", made_again(without_claim("MINE"))),
     # the scenario, in all its places
@@ -230,12 +228,12 @@ FORGERIES: dict[str, tuple[str, Edit]] = {
     "crash declared irrelevant": ("", made_again(crash_expected_by_nobody)),
     # motion
     "UGV elsewhere, and back": ("ii, iii", leap(UGV, 1e-3)),
-    "run elsewhere throughout": ("i, ii, iii", cells("x_m", lambda old: old + 5.0, slice(None), run="b")),
-    "trigger late": ("i, ii, iii", trigger_late),
+    "run elsewhere throughout": ("i, ii, iii", RULES["elsewhere throughout"][1]),
+    "trigger late": ("i, ii, iii", RULES["trigger late"][1]),
     "rows between samples left out": (
         "iii", made_again(rows(lambda f: f[np.abs(f["t_s"] / 0.05 - (f["t_s"] / 0.05).round()) < 1e-6])),
     ),
-    "collision left out": ("i, ii, iii", without_event("collision", "b")),
+    "collision left out": ("i, ii, iii", RULES["collision left out"][1]),
     "column of real positions": ("iii", made_again(columns_of_reality)),
     # messages, decisions, faults
     "refusal forgotten": ("iii", made_again(refusal_forgotten)),

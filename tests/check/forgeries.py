@@ -203,7 +203,6 @@ RULES: dict[str, tuple[str, Edit]] = {
     # report.json
     "another schema": ("it is a report of this version", report("schema", value="airground_drake.report/2")),
     "crash called safe": ("verdict", claim("SAFE-TRACE", "b", status="holds", counterexample=None)),
-    "crash left undecided": ("verdict", claim("SAFE-TRACE", "b", status="inconclusive", counterexample=None)),
     "margin": ("margin", claim("SAFE-TRACE", margin=lambda old: old + 1e-5)),
     "tests of a claim": ("how often the claim was exercised", claim("THR-TRIG", exercised=lambda old: old + 1)),
     "claim left out": ("claims that there are", report("claims", value=lambda old: old[1:])),
@@ -245,7 +244,6 @@ RULES: dict[str, tuple[str, Edit]] = {
     "smaller safe distance": ("margin", all_of(
         everywhere("safe_distance", "obstacle_m", value=1.999), claim("SAFE-TRACE", exercised=7),
     )),
-    "larger obstacle": ("verdict", everywhere("obstacles", "obstacle_1", "radius_m", value=0.01)),
     "larger robot": ("safe start", everywhere("ugvs", UGV, "radius_m", value=0.01)),
     "bent way": ("law of motion", cells("uav.x_m", lambda old: old + 1e-8, BETWEEN)),
     "too fast": ("speed limit", leap("uav", 1.0)),

@@ -98,7 +98,9 @@ def test_third_party_code_is_simulated_only_where_it_is_allowed(
     folder = copy(short, tmp_path / "copy")
     made_again(everywhere("intervention", "policies", value=lambda old: [*old, GONE]))(folder)
     mend(folder)
-    (refused,) = (line for line in airground("check", folder, "--simulate", code=1).splitlines() if "cannot be" in line)
+    (refused,) = (
+        line for line in airground("check", folder, "--simulate", code=1).splitlines() if "cannot be checked (" in line
+    )
     assert "third-party code is imported and run only with --allow-plugins" in refused
     said = airground("check", folder, "--simulate", "--allow-plugins", code=1)
     assert "no_such" in said
