@@ -41,7 +41,8 @@ LAYERS = (
 )
 """Rooms: a module imports from its own layer or from those above it."""
 PROGRAMS = {
-    f"airground_drake.{name}" for name in ("report.__main__", "report.rebuild", "verify.__main__", "check.__main__")
+    f"airground_drake.{name}"
+    for name in ("report.__main__", "report.rebuild", "report.simulated", "verify.__main__", "check.__main__")
 }
 """Modules that are run with `python -m`."""
 PAGE_PT = 785
@@ -97,7 +98,7 @@ def test_messages_are_dashed_recorded_signals_blue_and_no_wire_moves_a_block_to_
     dashed = {start.partition(":")[0] for start in re.findall(r"^(\S+):e -> .*style=dashed", text, re.MULTILINE)}
     assert dashed == {"intervention_planner", "gatekeeper"}
     blue = set(re.findall(rf'COLOR="{graphviz.RECORDED}">(\w+)<', text))
-    assert blue == {"bodies", "team_command", "y0", "decision_variable", "status", "accepted"}
+    assert blue == {"bodies", "team_command", "y0", "decision_variable", "status", "executing"}
     free = re.findall(r"^(\w+):\S+ -> (\w+):\S+ \[(?!.*constraint)", text, re.MULTILINE)
     assert free
     assert all(graphviz.ORDER.index(source) < graphviz.ORDER.index(target) for source, target in free)

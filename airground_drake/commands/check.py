@@ -112,7 +112,7 @@ def made_again(
         options: of the program.
     """
     from airground_drake.check.report import AGREES, OPEN, Line
-    from airground_drake.report.rebuild import JUDGED
+    from airground_drake.report.lines import JUDGED
 
     line = partial(Line, by=by)
     if any(each.outcome != AGREES for each in lines if each.claim in NEEDED):

@@ -8,6 +8,7 @@ from typing import Any
 from airground_drake.base.statuses import PASSING
 from airground_drake.scenarios.kinds import unit_of
 from airground_drake.verify.claim import Verdict
+from airground_drake.verify.finding import Finding
 
 WHO = ("robot", "first", "second", "other", "ugv", "obstacle")
 """Keys of evidence whose values are names of robots and obstacles."""
@@ -39,7 +40,7 @@ def told(verdict: Verdict, place: str) -> str:
     if more := [_told(key, value) for key, value in seen.items() if key not in told_already]:
         lines.append(f"  seen: {'; '.join(more)}")
     if finding.status not in ("refuted", *PASSING):
-        lines += [f"  why: {_told(key, value)}" for key, value in finding.to_json()["evidence"].items()][:5]
+        lines += [f"  why: {_told(key, value)}" for key, value in Finding.to_json(finding)["evidence"].items()][:5]
     return "\n".join(lines)
 
 

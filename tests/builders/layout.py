@@ -13,7 +13,7 @@ import pandas as pd
 
 from airground_drake.base.arrays import Array
 from airground_drake.run.recording import sample_rows
-from airground_drake.run.tables import DECISION_COLUMNS, DECISION_LISTS, SCHEMA, typed
+from airground_drake.run.tables import DECISION_COLUMNS, DECISION_LISTS, MESSAGE_COLUMNS, SCHEMA, typed
 from airground_drake.run.trace import Trace
 from airground_drake.verify.runs.demands import demanded
 
@@ -65,8 +65,9 @@ def laid_out(
     meta = {"schema": SCHEMA, "run": run, "method": of_run["method"], "composition": of_run["composition"], "seed": 0}
     meta |= {"robots": robots, "ugvs": ugvs, "zeta_m": scenario["decision"]["threshold"]["zeta_m"], "faults": []}
     meta |= {"scenario": scenario, "events": sorted(events, key=lambda event: float(event["t_s"]))}
-    tables = pd.DataFrame(columns), pd.DataFrame(sampled), decision_table(decisions)
-    return rebuilt(Trace(meta, *tables, timings or {}))
+    decided = [{"answer": k} | each for k, each in enumerate(decisions)]
+    tables = pd.DataFrame(columns), pd.DataFrame(sampled), decision_table(decided)
+    return rebuilt(Trace(meta, *tables, timings or {}, messages=message_table(meta["events"], decided, robots[-1])))
 
 
 def rebuilt(trace: Trace) -> Trace:
@@ -86,6 +87,20 @@ def decision_table(decisions: Sequence[dict[str, Any]]) -> pd.DataFrame:
     empty: dict[str, Any] = {name: "" if kind == "str" else -1.0 for name, kind in DECISION_COLUMNS.items()}
     empty |= {name: [] for name in DECISION_LISTS}
     return typed([empty | each for each in decisions], DECISION_COLUMNS, *DECISION_LISTS)
+
+
+def message_table(events: Sequence[dict[str, Any]], decisions: Sequence[dict[str, Any]], uav: str) -> pd.DataFrame:
+    """A message for each proposal among the events, and for each decision; each is read when it is sent."""
+    sent = [("proposal", k, uav, e["robot"], k, e["t_s"]) for k, e in enumerate(_proposed(events))]
+    sent += [("answer", d["answer"], d["robot"], uav, d.get("number", 0), d["t_s"]) for d in decisions]
+    names = ("kind", "number", "sender", "receiver", "about", "sent_s")
+    rows = [dict(zip(names, each, strict=True)) for each in sent]
+    return typed([row | {"copy": 0, "received_s": row["sent_s"], "read_s": row["sent_s"]} for row in rows],
+                 MESSAGE_COLUMNS)  # fmt: skip
+
+
+def _proposed(events: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
+    return [event for event in events if event["kind"] == "proposal"]
 
 
 def reference_at(preset: dict[str, Any], t: float) -> list[float]:

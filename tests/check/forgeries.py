@@ -201,6 +201,7 @@ UNMENDED = {"page with other bytes", "file outside named"}
 """Forgeries after which the list of files is left as it is."""
 RULES: dict[str, tuple[str, Edit]] = {
     # report.json
+    "another digest": ("SHA-256 of the scenario", report("scenario", "sha256", value="0" * 64)),
     "another schema": ("it is a report of this version", report("schema", value="airground_drake.report/2")),
     "crash called safe": ("verdict", claim("SAFE-TRACE", "b", status="holds", counterexample=None)),
     "margin": ("margin", claim("SAFE-TRACE", margin=lambda old: old + 1e-5)),

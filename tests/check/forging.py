@@ -22,7 +22,7 @@ from airground_drake.check.report import AGREES, RECORDED, Line
 from airground_drake.report import rebuild
 from airground_drake.run.trace import Trace
 from airground_drake.scenarios.schema import Scenario
-from airground_drake.verify import Verdict, judge, judge_all
+from airground_drake.verify import Verdict, judge_all, judging
 
 RUN, UGV = "d", "ugv1"
 """The run and the UGV that are forged unless others are named."""
@@ -63,11 +63,13 @@ def edited_entries(folder: Path, run: str = RUN) -> Iterator[list[Any]]:
 
 @contextlib.contextmanager
 def edited_scenarios(folder: Path) -> Iterator[list[Any]]:
-    """The resolved scenario in report.json and in each meta.json, to be changed in place."""
+    """The resolved scenario in report.json and in each meta.json, to be changed in place; its digest follows."""
     with contextlib.ExitStack() as stack:
         report = stack.enter_context(edited_report(folder))
         metas = [stack.enter_context(edited_json(path)) for path in sorted(folder.glob("trace/*/meta.json"))]
         yield [report["scenario"]["resolved"], *(meta["scenario"] for meta in metas)]
+        text = json.dumps(report["scenario"]["resolved"], separators=(",", ":"))
+        report["scenario"]["sha256"] = hashlib.sha256(text.encode()).hexdigest()
 
 
 def claim_of(report: Any, claim: str, run: str = RUN) -> Any:
@@ -168,5 +170,5 @@ def judged(scenario: Scenario, traces: Sequence[Trace]) -> list[Verdict]:
         return _JUDGED[key]
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(judge, "run_parallel", lambda pieces, **_: list(map(once, pieces)))
+        patch.setattr(judging, "run_parallel", lambda pieces, **_: list(map(once, pieces)))
         return judge_all(scenario, traces)

@@ -87,9 +87,7 @@ def test_another_seed_is_not_reproduced_which_is_exit_code_3(short: Path, tmp_pa
     mend(folder)
     said = airground("check", folder, "--simulate", code=3)
     (line,) = (line for line in said.splitlines() if "not reproduced here (" in line)
-    assert line.startswith(
-        "trace       d        not reproduced here (simulated again): signals, row 1, t = 0.05 s: ugv"
-    )
+    assert line.startswith("trace       d        not reproduced here (simulated again): states, row 1, t = 0.05 s: ugv")
 
 
 def test_third_party_code_is_simulated_only_where_it_is_allowed(

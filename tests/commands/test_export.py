@@ -7,13 +7,15 @@ from pathlib import Path
 import pytest
 from commands.conftest import Airground
 
-TABLES = ("decisions", "distances", "events", "problems", "proposals", "signals")
+from airground_drake.run.tables import TABLES
+
+NAMES = sorted([*TABLES, "distances", "events"])
 
 
 @pytest.mark.parametrize(
     ("words", "names"),
     [
-        ("--to csv", [f"{run}_{name}.csv" for run in "cd" for name in TABLES]),
+        ("--to csv", [f"{run}_{name}.csv" for run in "cd" for name in NAMES]),
         ("--to mcap", ["c.mcap", "d.mcap"]),
         ("d --to mcap", ["d.mcap"]),
     ],

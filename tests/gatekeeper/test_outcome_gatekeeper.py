@@ -46,7 +46,8 @@ def test_obstacles_that_were_in_sight_stay_known() -> None:
     for x, known, calls in ((-20.0, 0, 1), (-20.0, 0, 1), (0.0, 1, 2), (0.0, 1, 2), (20.0, 2, 3), (40.0, 2, 3)):
         team.sees(None, x)
         assert (team.memory.sensed[0].sum(), team.calls) == (known, calls)
-    discs, _ = team.gate._known(np.array([40.0, 0.0, 0.0]), team.memory.sensed[0], 0, proposal)
+    told = team.gate._believed(np.array([40.0, 0.0, 0.0]), team.memory.sensed[0], proposal)
+    discs, _ = team.gate._known(team.memory.sensed[0], told, 0, proposal)
     assert discs.tolist() == rocks.tolist()
 
 

@@ -18,7 +18,7 @@ from builders.observations import mate, seen
 
 from airground_drake.base.errors import PluginError, PolicyError
 from airground_drake.geometry.motion import Motion
-from airground_drake.intervention.database import BehaviourDatabase, Negotiation, make_policy
+from airground_drake.intervention.database import Asked, BehaviourDatabase, Negotiation, make_policy
 from airground_drake.intervention.guest import process
 from airground_drake.intervention.guest.codec import KINDS as CLASSES
 from airground_drake.intervention.guest.codec import decoded, encoded
@@ -48,6 +48,12 @@ def guests() -> Iterator[dict[bool, GuestPolicy]]:
         guest.close()
 
 
+def planned(database: BehaviourDatabase, held: Negotiation) -> tuple[dict[str, Negotiation], list[Asked]]:
+    """The negotiations after a question to the policies, and those that failed."""
+    found, asked = database.plan(held, TEAM)
+    return found, [each for each in asked if each.what]
+
+
 @pytest.mark.parametrize("name", KINDS)
 def test_whatever_a_policy_does_counts_as_no_intervention(name: str, guests: dict[bool, GuestPolicy]) -> None:
     if name in TO_PARENT and not _confined():
@@ -55,12 +61,12 @@ def test_whatever_a_policy_does_counts_as_no_intervention(name: str, guests: dic
     kind, before = KINDS[name], (Avoidance.apply, TraceClaim.judge)
     guest = guests[kind.hangs]
     database = BehaviourDatabase([("hostile", guest)], ranking="predicted")
-    found, faults = database.plan(Negotiation(refusals=doing(name).refusals), TEAM)
+    found, faults = planned(database, Negotiation(refusals=doing(name).refusals))
     if kind.reported is None:
         assert not faults
     else:
         # one that answers in the worker's place does so from the next question on
-        found, faults = (found, faults) if faults else database.plan(Negotiation(), TEAM)
+        found, faults = (found, faults) if faults else planned(database, Negotiation())
         (fault,) = faults
         assert re.search(kind.reported, fault.what), fault.what
         assert fault.what.isprintable()

@@ -102,6 +102,15 @@ def executing(table: pd.DataFrame) -> Any:
     return (table["reason"] == "kept") & (table["decision"] == "accept")
 
 
+def messages(edit: Callable[[pd.DataFrame], pd.DataFrame]) -> Edit:
+    return lambda trace: replace(trace, messages=edit(trace.messages))
+
+
+def later(kind: str, by_s: float) -> Edit:
+    """Messages of a kind are sent later."""
+    return messages(lambda table: table.assign(sent_s=table["sent_s"] + by_s * (table["kind"] == kind)))
+
+
 def other_map(trace: Trace) -> Trace:
     """Predictions rest on the map in the message."""
     walls = np.ravel([[3.3, 9.5, 0.0], [5.0, 9.0, 0.0], [6.5, 7.5, 0.0]])
@@ -115,12 +124,16 @@ RECORDS: dict[str, tuple[tuple[str, str, Edit, str], ...]] = {
         ("other directions", B_D, each_value(selection=lambda v: v[:3]), "command"),
     ),
     "protocol": (
-        ("accepted without a message", B_D, bumped("ugv2.accepted", 1.0, 101), "executes another proposal"),
-        ("acceptance hidden", B_D, lambda t: bumped("ugv1.accepted", -1.0, acting(t))(t), "executes another proposal"),
+        ("accepted without a message", B_D, bumped("ugv2.executing", 1.0, 101), "executes another proposal"),
+        ("acceptance hidden", B_D, lambda t: bumped("ugv1.executing", -1.0, acting(t))(t), "executes another proposal"),
         ("cause not intervened on", B_D, proposals(lambda table: table.assign(cause="ugv2")), "sent for a UGV"),
         ("refused and not withdrawn", B_D, one_more(refused, 1.0), "decision on what was withdrawn"),
         ("sent again", B_D, sent_again, "replaced while in force"),
         ("part of a joint plan", DOORWAY, part_lost, "part of a joint plan not sent"),
+        ("not withdrawn", B_D, messages(lambda table: table[table["kind"] != "withdrawal"]), "withdrawn at another"),
+        ("withdrawn later", B_D, later("withdrawal", 0.05), "withdrawn at another time"),
+        ("an answer not sent", B_D, messages(lambda table: table.drop(index=1)), "answers are not those"),
+        ("a proposal not sent", B_D, messages(lambda table: table.drop(index=0)), "a proposal is no message"),
     ),
     "communication": (
         ("proposal before the trigger", B_D, with_proposal(issued_s=5.0), "proposal while nobody needs it"),
@@ -148,13 +161,21 @@ RECORDS: dict[str, tuple[tuple[str, str, Edit, str], ...]] = {
         ("over too early", B_D, first(executing, decision="refuse", reason="over"), "answer or reason"),
         ("just ends", B_D, cut_short, "an acceptance just ends"),
     ),
+    "inputs": (
+        ("out of sight", B_D, first(accepted, sensed=[]), "recorded as sensed"),
+        ("forgotten", B_D, first(accepted, known=[]), "recorded as known"),
+        ("news", B_D, first(executing, new=[0]), "recorded as new"),
+        ("told of", B_D, first(refused, told=[0]), "recorded as told"),
+        ("asked", B_D, first(refused, asked=[7]), "recorded as asked"),
+        ("accepted", B_D, first(refused, asked_accepted=[1]), "recorded as asked, accepted"),
+    ),
 }  # fmt: skip
 """By oracle: what is edited, in which run, how, and what the oracle says."""
 
 
 def acting(trace: Trace) -> int:
-    """A row at which ugv1 executes a proposal."""
-    return int(np.flatnonzero(trace.column("ugv1.accepted"))[3])
+    """A control sample at which ugv1 executes a proposal."""
+    return int(np.flatnonzero(trace.sampled("ugv1.executing") >= 0.0)[3])
 
 
 @pytest.mark.parametrize(("oracle", "row"), [(name, row) for name, rows in RECORDS.items() for row in rows],
@@ -249,7 +270,9 @@ def test_an_accepted_intervention_is_reconsidered_when_an_obstacle_is_new(
     told_before = each_value(
         mapped_m=lambda v: np.append(v, [*hidden, 0.0]), mapped_radius_m=lambda v: np.append(v, 0.0)
     )
-    found = decided("LIVE-HYP", told_before(trace))  # then it was no news
+    assert ORACLES["inputs"](told_before(trace))  # then it was no news
+    nothing_new = trace.decisions.assign(new=[[]] * len(trace.decisions))
+    found = decided("LIVE-HYP", replace(trace, decisions=nothing_new))
     assert found.status == ("refuted" if answer == "refuse" else "holds")
     assert answer == "accept" or "reversed without news" in str(found.counterexample)
     trace.decisions.loc[again.name, ["decision", "reason"]] = ["accept", "kept"]

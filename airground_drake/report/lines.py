@@ -1,0 +1,89 @@
+"""What a program that makes a report again found: lines of JSON, which `airground check` shows."""
+
+from __future__ import annotations
+
+import json
+import resource
+import sys
+from collections.abc import Callable, Iterator
+from typing import Any
+
+from airground_drake.base.errors import AirgroundError
+from airground_drake.base.progress import Progress
+from airground_drake.check.report import DISAGREES
+from airground_drake.report.compare import WITHIN
+
+JUDGED = "judged"
+"""Key of a line about progress."""
+Line = dict[str, Any]
+"""Keys `claim`, `run`, `outcome` and `text`; a difference has `rule`, `about`, `recorded` and `recomputed` besides."""
+
+
+def line_of(claim: str, run: str, outcome: str, text: str, rule: str = "") -> Line:
+    """A line without values."""
+    return {"claim": claim, "run": run, "outcome": outcome, "text": text, "rule": rule}
+
+
+def different(claim: str, run: str, about: str, theirs: Any, ours: Any) -> Line:
+    """A line about a value that is not as recorded."""
+    text = f"made again, {about or 'it'} is {short(ours)}; recorded {short(theirs)}"
+    values = {"about": about, "recorded": theirs, "recomputed": ours}
+    return line_of(claim, run, DISAGREES, text, "the files give what is recorded") | values
+
+
+def differences(
+    recorded: Any, rebuilt: Any, path: str = "", *, within: float = WITHIN
+) -> Iterator[tuple[str, Any, Any]]:
+    """Each value of two JSON documents that differs, with its dotted path: numbers by more than `within`."""
+    pairs: list[tuple[Any, Any, Any]] = []
+    if isinstance(recorded, dict) and isinstance(rebuilt, dict):
+        pairs = [(key, recorded.get(key, "nothing"), rebuilt.get(key, "nothing")) for key in {**rebuilt, **recorded}]
+    elif isinstance(recorded, list) and isinstance(rebuilt, list):
+        pairs = [(k, *both) for k, both in enumerate(zip(recorded, rebuilt, strict=False))]
+    elif _is_number(recorded) and _is_number(rebuilt):
+        if not abs(recorded - rebuilt) <= within * (1.0 + abs(rebuilt)):
+            yield path, recorded, rebuilt
+    elif type(recorded) is not type(rebuilt) or recorded != rebuilt:
+        yield path, recorded, rebuilt
+    for key, theirs, ours in pairs:
+        yield from differences(theirs, ours, f"{path}.{key}".strip("."), within=within)
+    if isinstance(recorded, list) and isinstance(rebuilt, list) and len(recorded) != len(rebuilt):
+        yield f"{path}: number of entries", len(recorded), len(rebuilt)
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, (int, float)) and not isinstance(value, bool)
+
+
+def short(value: Any, most: int = 120) -> str:
+    """A value for reading, cut if it is long."""
+    text = repr(value)
+    return text if len(text) <= most else f"{text[:most]}..."
+
+
+def print_lines(found: Callable[[Progress], Iterator[Line]], limit_s: str) -> int:
+    """Print lines, one JSON object each; before them, one with the key `JUDGED` for each step of the progress.
+
+    Args:
+        found: makes the lines, and tells the progress.
+        limit_s: CPU time that this process and each of its children may take, s.
+
+    Returns:
+        Exit code: 0, or 2 if a file cannot be used.
+    """
+
+    class Told(Progress):
+        """Prints a line for each finished part."""
+
+        def advance(self, amount: float, what: str = "") -> None:
+            print(json.dumps({JUDGED: what}), flush=True)
+
+    most = int(float(limit_s)) + 1
+    resource.setrlimit(resource.RLIMIT_CPU, (most, most))
+    try:
+        for line in found(Told()):
+            print(json.dumps(line, allow_nan=False), flush=True)
+    except (AirgroundError, OSError) as error:
+        print(f"error: {error}", file=sys.stderr)
+        return 2
+    return 0
