@@ -58,17 +58,19 @@ def _became(trace: Trace, sent: ProposalRecord, numbers: Array, answers: Any) ->
         "accepted_s": accepted_s if method_of(trace.meta["method"]).gated else begun_s,
         "begun_s": begun_s,
         "ended_s": ended_s,
-        "why": _refused(answers) or _withdrawn(trace, sent, begun_s, ended_s),
+        "why": _refused(answers, ended_s, begun=begun_s is not None) or _withdrawn(trace, sent, begun_s, ended_s),
         "tries": tries if tries >= 0 else None,
     }
 
 
-def _refused(answers: Any) -> str:
-    """Why a UGV refused a proposal or gave it back, by the decisions about it; '' if it did not."""
-    if answers is None or answers["decision"].iloc[-1] == "accept":
+def _refused(answers: Any, ended_s: float | None, *, begun: bool) -> str:
+    """Why a UGV refused a proposal, or gave it back when it ceased to execute it; '' if it did not."""
+    if answers is None or (begun and ended_s is None):
         return ""
-    changes = answers[answers["decision"] != answers["decision"].shift()]
-    return str(changes["reason"].iloc[-1])
+    refused = answers[answers["decision"] == "refuse"]
+    if begun:
+        refused = refused[(refused["t_s"] - ended_s).abs() <= TIME_TOLERANCE_S]
+    return str(refused["reason"].iloc[0]) if len(refused) else ""
 
 
 def _withdrawn(trace: Trace, sent: ProposalRecord, begun_s: float | None, ended_s: float | None) -> str:

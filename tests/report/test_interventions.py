@@ -43,6 +43,11 @@ def test_why_proposals_end() -> None:
         assert not began or each["accepted_s"] == each["begun_s"] < (each["ended_s"] or np.inf)
 
 
+def test_a_refusal_that_is_reversed_at_once_ends_a_proposal_all_the_same(run: Run) -> None:
+    found = interventions(run("case_b", "c_literal"))[-1]
+    assert (found["why"], found["ended_s"]) == ("first_stage", pytest.approx(14.1))
+
+
 def test_parts_of_joint_plans_are_sent_for_another_ugv(run: Run) -> None:
     found = interventions(run("doorway", "d"))
     assert len(found) == len(run("doorway", "d").proposals)
