@@ -69,7 +69,7 @@ def build(
     resolved = asdict(scenario)
     about = {key: resolved[key] for key in ("name", "title", "description")}
     runs = {name: _run(scenario, trace) for name, trace in traces.items()}
-    found = numbers(scenario, runs)
+    found = expected_numbers(scenario, runs)
     document = {
         "schema": SCHEMA,
         "scenario": {**about, "sha256": scenario.digest, "resolved": resolved},
@@ -158,7 +158,7 @@ def overall(
     }
 
 
-def numbers(scenario: Scenario, runs: Mapping[str, Mapping[str, Any]]) -> list[dict[str, Any]]:
+def expected_numbers(scenario: Scenario, runs: Mapping[str, Mapping[str, Any]]) -> list[dict[str, Any]]:
     """The numbers that a scenario expects of its runs: `id`, `run`, `found`, `least`, `as_expected`.
 
     Args:
@@ -168,14 +168,14 @@ def numbers(scenario: Scenario, runs: Mapping[str, Mapping[str, Any]]) -> list[d
     listed = []
     for name, run in runs.items():
         sent = run["metrics"]["messages"] or {"proposals": 0, "answers": 0}
-        counted = {
+        counts = {
             "interventions": sum(each["begun_s"] is not None for each in run["metrics"]["interventions"]),
             "messages": sent["proposals"] + sent["answers"],
         }
         expected = scenario.runs[name].expected
         for kind in COUNTS:
             if kind in expected:
-                found, least = counted[kind], expected[kind]
+                found, least = counts[kind], expected[kind]
                 listed.append({"id": kind, "run": name, "found": found, "least": least, "as_expected": found >= least})
     return listed
 

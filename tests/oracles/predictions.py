@@ -13,7 +13,7 @@ from airground_drake.verify.runs.gate_record import DecisionRecord, rows_of
 from airground_drake.verify.runs.proposals import proposal_of
 from oracles.beginnings import scene
 from oracles.closed_loops import NUDGES_M, Scene, in_batches, move_apart, roll_out, stacked
-from oracles.fault import Fault, off
+from oracles.fault import Fault
 from oracles.outcome_rolls import Foreseen, foreseen, nudged
 from oracles.sensing import sensed
 
@@ -113,6 +113,11 @@ def scene_of(trace: Trace, row: DecisionRecord, plan: Array) -> Scene:
     safe, share = (np.array([getattr(one.pair, name) for one in there]) for name in ("safe_m", "share"))
     loop = scene(trace, on, row.t_s, after, 0, points, safe, share)
     return loop._replace(executed=np.repeat(plan == 1.0, each))
+
+
+def off(by: Array) -> float:
+    """The largest absolute difference; nan if one is not a number."""
+    return float(np.abs(by).max(initial=0.0))
 
 
 def velocities(places: Array, row: DecisionRecord) -> Array:

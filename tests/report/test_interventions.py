@@ -10,7 +10,7 @@ import pytest
 from builders.runs import run_of
 from oracles.mutants import PATIENCE
 
-from airground_drake.report.document import numbers
+from airground_drake.report.document import expected_numbers
 from airground_drake.report.interventions import farthest_from_prediction, interventions, messages
 from airground_drake.report.metrics import of_run
 from airground_drake.run.simulation import simulate
@@ -88,9 +88,9 @@ def test_numbers_that_a_scenario_expects() -> None:
     scenario = load("case_a")
     scenario.runs["d"].expected = {"interventions": 1, "messages": 10_000}
     sent = {"metrics": {"interventions": [{"begun_s": 1.0}, {"begun_s": None}], "messages": messages(trace)}}
-    both = numbers(scenario, {"d": sent})
+    both = expected_numbers(scenario, {"d": sent})
     assert [(each["id"], each["found"] >= each["least"], each["as_expected"]) for each in both] == [
         ("interventions", True, True), ("messages", False, False),
     ]  # fmt: skip
     idle = {"metrics": {"interventions": [], "messages": None}}
-    assert [each["found"] for each in numbers(scenario, {"d": idle})] == [0, 0]
+    assert [each["found"] for each in expected_numbers(scenario, {"d": idle})] == [0, 0]
