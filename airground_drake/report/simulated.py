@@ -123,7 +123,7 @@ def _first_cell(name: str, recorded: pd.DataFrame, made: pd.DataFrame) -> Differ
 def _equal(theirs: Any, ours: Any) -> bool:
     """Whether two cells are equal, as numbers, texts or arrays; one that is not a number equals another."""
     if isinstance(theirs, np.ndarray) and isinstance(ours, np.ndarray):
-        return theirs.shape == ours.shape and theirs.tolist() == ours.tolist()
+        return np.array_equal(theirs, ours, equal_nan=theirs.dtype.kind == "f")
     return bool(theirs == ours or (theirs != theirs and ours != ours))
 
 
@@ -146,14 +146,12 @@ def _third_party(
     about_model = {each.id for each in model_claims(added=scenario.claims)} & {*scenario.claims}
     verdicts = [verdict for run in traces.values() for verdict in verify(run, about_runs)] if about_runs else []
     verdicts += verify_model(scenario, claims=about_model) if about_model else []
-    made = {
-        (verdict.claim.id, verdict.run): json.loads(json.dumps(verdict.to_json() | {"rerun": ""}))
-        for verdict in verdicts
-    }
-    recorded = {(each["id"], each["run"]): each for each in claims if each["id"] in scenario.claims}
+    made = {(each.claim.id, each.run): json.loads(json.dumps(each.to_json())) for each in verdicts}
+    recorded = {(each["id"], each["run"]): dict(each) for each in claims if each["id"] in scenario.claims}
     for key in {**recorded, **made}:
-        ours = made.get(key)
-        theirs = {**recorded[key], "rerun": ""} if key in recorded else None
+        theirs, ours = recorded.get(key), made.get(key)
+        if theirs is not None and ours is not None:
+            theirs.pop("rerun", None)  # the command that judges it again is no part of a verdict
         yield _line(*key, _first(theirs, ours), f"{ours and ours['status']}, exactly", note)
 
 
