@@ -24,7 +24,7 @@ from airground_drake.base import files
 from airground_drake.base.errors import AirgroundError
 from airground_drake.base.progress import Progress
 from airground_drake.base.statuses import meets
-from airground_drake.check.report import AGREES, DISAGREES, OPEN, RECORDED
+from airground_drake.check.line import AGREES, DISAGREES, OPEN, RECORDED
 from airground_drake.registry import MODEL_CLAIMS
 
 WITHIN = 1e-8

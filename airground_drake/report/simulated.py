@@ -19,7 +19,7 @@ import pandas as pd
 
 from airground_drake.base import files
 from airground_drake.base.progress import SILENT, Progress
-from airground_drake.check.report import AGREES, NOT_HERE
+from airground_drake.check.line import AGREES, NOT_HERE
 from airground_drake.report.after_runs import versions, with_seeds
 from airground_drake.report.rebuild import Line, differences, line_of, print_lines, short
 from airground_drake.run import trace
