@@ -24,7 +24,8 @@ from collections.abc import Callable
 from pathlib import Path
 
 from airground_drake.check.command import LIMIT_S
-from airground_drake.check.report import AGREES, check_report
+from airground_drake.check.line import AGREES
+from airground_drake.check.report import check_report
 
 SHORT = {"duration_s": "1", "runs": "{a: {method: a}, d: {method: d}}", "reproduction": "[]", "choices": "[]"}
 CODES = {signal.SIGINT: 130, signal.SIGTERM: 143, signal.SIGKILL: -signal.SIGKILL}

@@ -31,7 +31,8 @@ import yaml
 from airground_drake.base import files
 from airground_drake.base.errors import AirgroundError, ScenarioError
 from airground_drake.check.command import LIMIT_S
-from airground_drake.check.report import AGREES, check_report
+from airground_drake.check.line import AGREES
+from airground_drake.check.report import check_report
 from airground_drake.decision.bayes import optimal_threshold
 from airground_drake.registry import METHODS, ROUTES
 from airground_drake.report import document

@@ -11,7 +11,7 @@ traces.
     safety                SAFE-TRACE: distances in continuous time; SAFE-HYP: the avoidance inequalities, exactly
     triggers              ZENO-TRACE, THR-TRIG, THR-QUALITY
     events                arrivals and collisions
-    report, command       all checks, one line each; the command line
+    report, line, command all checks, one line each; the command line
     positions             positions that come from elsewhere: `airground judge`
 """
 

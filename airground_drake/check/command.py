@@ -12,10 +12,9 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NoReturn
+from typing import Any, NoReturn
 
-if TYPE_CHECKING:
-    from .report import Line
+from .line import DISAGREES, NOT_HERE, OPEN, Line
 
 SCHEMA = "airground_drake.check/3"
 ALONE = ("policies, seeds and faults", "every part of the report that no line above names")
@@ -103,8 +102,6 @@ def checked(folder: Path, limit_s: float, told: Callable[[Line], object] = bool)
 
 def verdict(lines: Sequence[Line]) -> int:
     """The exit code: 1 if a line disagrees or cannot be checked, else 3 if one is not reproduced here, else 0."""
-    from .report import DISAGREES, NOT_HERE, OPEN
-
     found = {line.outcome for line in lines}
     return 1 if found & {DISAGREES, OPEN} else 3 if NOT_HERE in found else 0
 

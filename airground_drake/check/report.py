@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -13,14 +12,11 @@ from typing import Any
 from .events import check_events
 from .files import Json, is_plain, names_in, read_bytes, read_json, sha256
 from .limits import at_most_s, is_of_a_size
+from .line import AGREES, DISAGREES, OPEN, Line
 from .rules import SMALL, Disagreement, Found, NotEstablished, close, holds, same
 from .run import Run, read_run
 from .safety import safe_hyp, safe_trace
 from .triggers import thr_quality, thr_trig, zeno_trace
-
-AGREES, DISAGREES, OPEN = "agrees", "DISAGREES", "cannot be checked"
-RECORDED, NOT_HERE = "as recorded", "not reproduced here"
-"""Outcomes; the last two are those of `airground check`: nothing to compare with, and another run when simulated."""
 
 DECIDED: Mapping[str, Callable[[Run], Found]] = {
     "SAFE-TRACE": safe_trace,
@@ -44,35 +40,6 @@ OF_A_REPORT = re.compile(
 """Files that a report may have; the third group is a run."""
 ADDED_LATER = "proofs/"
 """Folder of the files that `airground prove` adds to a report."""
-
-
-@dataclass(frozen=True)
-class Line:
-    """One check.
-
-    Attributes:
-        claim: identifier of the claim, or what else was checked: report, files, trace, events.
-        run: on which run; '' for the report and the model.
-        outcome: see above.
-        text: what was found, or why nothing was.
-        rule: the rule that is broken or cannot be applied; '' if all agrees.
-        about: the robot, pair, event, decision or file.
-        t_s: when in the run; None where there is no time.
-        recorded: what the files say, if a rule is broken.
-        recomputed: what follows from them.
-        by: who checked: "checker", "made again", "simulated again" or "Coq".
-    """
-
-    claim: str
-    run: str
-    outcome: str
-    text: str
-    rule: str = ""
-    about: str = ""
-    t_s: float | None = None
-    recorded: Any = None
-    recomputed: Any = None
-    by: str = "checker"
 
 
 def check_report(folder: Path, limit_s: float, told: Callable[[Line], object] = bool) -> list[Line]:

@@ -20,12 +20,11 @@ from typing import TYPE_CHECKING
 from airground_drake.base.progress import Progress, progress_bar
 from airground_drake.base.usage import refuse
 from airground_drake.check import command as checker
+from airground_drake.check.line import AGREES, DISAGREES, OPEN, Line
 from airground_drake.scenarios import plugins
 
 if TYPE_CHECKING:
     import argparse
-
-    from airground_drake.check.report import Line
 
 NEEDED = ("files", "trace")
 """Checks that must agree before a report is made again: otherwise the files do not belong to the report."""
@@ -111,7 +110,6 @@ def made_again(
         module: of the program.
         options: of the program.
     """
-    from airground_drake.check.report import AGREES, OPEN, Line
     from airground_drake.report.lines import JUDGED
 
     line = partial(Line, by=by)
@@ -138,7 +136,6 @@ def made_again(
 def _proved_again(folder: Path) -> Iterator[Line]:
     """Have Coq prove each run, from positions written anew."""
     from airground_drake.check.files import read_json
-    from airground_drake.check.report import AGREES, DISAGREES, OPEN, Line
     from airground_drake.check.rules import Disagreement, NotEstablished
 
     line = partial(Line, "proofs", by="Coq")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import resource
 import sys
 from collections.abc import Callable, Iterator
@@ -10,7 +11,7 @@ from typing import Any
 
 from airground_drake.base.errors import AirgroundError
 from airground_drake.base.progress import Progress
-from airground_drake.check.report import DISAGREES
+from airground_drake.check.line import DISAGREES
 from airground_drake.report.compare import WITHIN
 
 JUDGED = "judged"
@@ -64,6 +65,8 @@ def short(value: Any, most: int = 120) -> str:
 def print_lines(found: Callable[[Progress], Iterator[Line]], limit_s: str) -> int:
     """Print lines, one JSON object each; before them, one with the key `JUDGED` for each step of the progress.
 
+    What other code prints meanwhile goes to standard error, so that it is not taken for a line.
+
     Args:
         found: makes the lines, and tells the progress.
         limit_s: CPU time that this process and each of its children may take, s.
@@ -71,18 +74,20 @@ def print_lines(found: Callable[[Progress], Iterator[Line]], limit_s: str) -> in
     Returns:
         Exit code: 0, or 2 if a file cannot be used.
     """
+    own = os.fdopen(os.dup(sys.stdout.fileno()), "w", encoding="utf-8")
+    os.dup2(sys.stderr.fileno(), sys.stdout.fileno())
 
     class Told(Progress):
         """Prints a line for each finished part."""
 
         def advance(self, amount: float, what: str = "") -> None:
-            print(json.dumps({JUDGED: what}), flush=True)
+            print(json.dumps({JUDGED: what}), file=own, flush=True)
 
     most = int(float(limit_s)) + 1
     resource.setrlimit(resource.RLIMIT_CPU, (most, most))
     try:
         for line in found(Told()):
-            print(json.dumps(line, allow_nan=False), flush=True)
+            print(json.dumps(line, allow_nan=False), file=own, flush=True)
     except (AirgroundError, OSError) as error:
         print(f"error: {error}", file=sys.stderr)
         return 2

@@ -20,7 +20,7 @@ from typing import Any
 
 from airground_drake.base import files
 from airground_drake.base.statuses import meets
-from airground_drake.check.report import AGREES, DISAGREES, OPEN, RECORDED
+from airground_drake.check.line import AGREES, DISAGREES, OPEN, RECORDED
 from airground_drake.registry import MODEL_CLAIMS
 from airground_drake.report.compare import WITHIN
 from airground_drake.report.lines import Line, differences, different, line_of, print_lines, short
@@ -100,7 +100,7 @@ def document_again(report: Mapping[str, Any], scenario: Any, traces: Mapping[str
     again["claims"].sort(key=lambda entry: order.get((entry["id"], entry["run"]), len(order)))
     missing = document.missing(scenario, traces, again["claims"])
     again["overall"] = document.overall(
-        again["claims"], missing, again["audit"] if others else (), document.numbers(scenario, again["runs"])
+        again["claims"], missing, again["audit"] if others else (), document.expected_numbers(scenario, again["runs"])
     )
     return again
 

@@ -19,7 +19,7 @@ import pandas as pd
 
 from airground_drake.base import files
 from airground_drake.base.progress import SILENT, Progress
-from airground_drake.check.report import AGREES, NOT_HERE
+from airground_drake.check.line import AGREES, NOT_HERE
 from airground_drake.report.after_runs import versions, with_seeds
 from airground_drake.report.lines import Line, differences, line_of, print_lines, short
 from airground_drake.run import trace
@@ -147,14 +147,12 @@ def _third_party(
     about_model = {each.id for each in model_claims(added=scenario.claims)} & {*scenario.claims}
     verdicts = [verdict for run in traces.values() for verdict in judge(run, about_runs)] if about_runs else []
     verdicts += judge_model(scenario, claims=about_model) if about_model else []
-    made = {
-        (verdict.claim.id, verdict.run): json.loads(json.dumps(verdict.to_json() | {"rerun": ""}))
-        for verdict in verdicts
-    }
-    recorded = {(each["id"], each["run"]): each for each in claims if each["id"] in scenario.claims}
+    made = {(each.claim.id, each.run): json.loads(json.dumps(each.to_json())) for each in verdicts}
+    recorded = {(each["id"], each["run"]): dict(each) for each in claims if each["id"] in scenario.claims}
     for key in {**recorded, **made}:
-        ours = made.get(key)
-        theirs = {**recorded[key], "rerun": ""} if key in recorded else None
+        theirs, ours = recorded.get(key), made.get(key)
+        if theirs is not None and ours is not None:
+            theirs.pop("rerun", None)  # the command that judges it again is no part of a verdict
         yield _line(*key, _first(theirs, ours), f"{ours and ours['status']}, exactly", note)
 
 

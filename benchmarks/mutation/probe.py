@@ -65,7 +65,8 @@ def runs(names: list[str]) -> Findings:
     from airground_drake.base import files
     from airground_drake.base.errors import AirgroundError
     from airground_drake.check.command import LIMIT_S
-    from airground_drake.check.report import AGREES, check_report
+    from airground_drake.check.line import AGREES
+    from airground_drake.check.report import check_report
     from airground_drake.report import document
     from airground_drake.run import trace
     from airground_drake.verify import judge

@@ -50,7 +50,7 @@ from check.forging import (
 
 from airground_drake.base.errors import AirgroundError
 from airground_drake.check import command as checker
-from airground_drake.check.report import AGREES, RECORDED
+from airground_drake.check.line import AGREES, RECORDED
 from airground_drake.report import junit, proved, rebuild, simulated
 from airground_drake.report.__main__ import main as write_report
 from airground_drake.report.figures.draw import draw

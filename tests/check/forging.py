@@ -18,7 +18,7 @@ import pytest
 
 from airground_drake.base.errors import AirgroundError
 from airground_drake.check import command as checker
-from airground_drake.check.report import AGREES, RECORDED, Line
+from airground_drake.check.line import AGREES, RECORDED, Line
 from airground_drake.report import rebuild
 from airground_drake.run.trace import Trace
 from airground_drake.scenarios.schema import Scenario

@@ -18,6 +18,7 @@ from commands.conftest import Airground
 from airground_drake.base import progress
 from airground_drake.commands import main
 from airground_drake.report.__main__ import main as report
+from airground_drake.scenarios import plugins
 
 GONE = {"name": "no_such.module:It", "parameters": {}}
 """A policy that is not there."""
@@ -123,3 +124,18 @@ def test_coq_proves_the_runs_again(short: Path, tmp_path: Path, airground: Airgr
     (proved,) = (line for line in lines if line["by"] == "Coq")
     assert (proved["run"], proved["outcome"]) == ("d", "agrees")
     assert proved["text"].startswith("machine-checked for this run: every distance is kept; the law is obeyed")
+
+
+@pytest.mark.slow
+def test_third_party_claims_and_other_seeds_are_made_again_where_allowed(
+    tmp_path: Path, airground: Airground, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What the claim prints is not taken for a line."""
+    monkeypatch.setenv("PYTHONPATH", str(Path(__file__).parent.parent))
+    settings = ("duration_s=1", "claims={MINE: 'check.foreign:Short'}")
+    words = [word for each in settings for word in ("--set", each)]
+    assert report(["minimal", "-o", str(tmp_path), "-q", "--seeds", "2", plugins.OPTION, *words]) in (0, 1, 3)
+    said = airground("check", tmp_path, "--simulate", plugins.OPTION)
+    again = [line for line in said.splitlines() if "(simulated again)" in line]
+    assert {"MINE", "seeds", "trace"} <= {line.split()[0] for line in again}
+    assert all(" agrees " in line for line in again)

@@ -11,6 +11,7 @@ from collections.abc import Callable
 from airground_drake.run.trace import Trace
 from oracles.commands import wrong_commands
 from oracles.communication import wrong_messages
+from oracles.decisions import wrong_decisions
 from oracles.fault import Fault
 from oracles.inputs import wrong_inputs
 from oracles.predictions import wrong_predictions
@@ -24,6 +25,7 @@ ORACLES: dict[str, Callable[[Trace], list[Fault]]] = {
     "communication": wrong_messages,
     "protocol": wrong_executions,
     "inputs": wrong_inputs,
+    "decisions": wrong_decisions,
 }
 """Every oracle, by name."""
 

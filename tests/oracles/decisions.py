@@ -28,6 +28,7 @@ from airground_drake.verify.runs.gate_record import (
 from airground_drake.verify.runs.instants import GATED_METHODS, intervening, row_at
 from airground_drake.verify.runs.pairs import around, places_of, preset_of
 from airground_drake.verify.runs.proposals import proposals_of
+from oracles.fault import Fault
 
 NO_DIFFERENCE = 1e-6
 """Relative gain from which on a new proposal makes a difference."""
@@ -43,8 +44,8 @@ PROVED_ROUTES = ("mixed_integer",)
 """Routes whose bound is the optimum over binary plans."""
 
 
-def wrong_decisions(trace: Trace) -> list[str]:
-    """Everything about the decisions of a run that is not as it should be, a sentence each.
+def wrong_decisions(trace: Trace) -> list[Fault]:
+    """Everything about the decisions of a run that is not as it should be.
 
     Raises:
         TraceError: if the tables of decisions, problems and proposals do not belong together.
@@ -57,7 +58,7 @@ def wrong_decisions(trace: Trace) -> list[str]:
         compared += [one for row in rows for one in compare_situation(trace, row)]
         compared += compare_answers(trace, rows)
         compared += compare_routes(trace, [row for row in rows if row.planned])
-    return [f"{one.row.label}: {one.what}, off by {one.off:.3g}" for one in compared if one.wrong]
+    return [Fault(one.what, one.row.robot, one.row.t_s, one.off) for one in compared if one.wrong]
 
 
 def compare_times(trace: Trace, rows: Sequence[DecisionRecord]) -> Iterator[Deviation]:

@@ -166,7 +166,7 @@ FAULTY: tuple[tuple[str, str, Edit, str], ...] = (
 @pytest.mark.parametrize(("name", "edit", "shown"), [row[1:] for row in FAULTY], ids=[row[0] for row in FAULTY])
 def test_an_edited_record_has_faults(base: Base, name: str, edit: Edit, shown: str) -> None:
     found = wrong_decisions(edit(base(name)))
-    assert any(shown in fault for fault in found) if shown else found == []
+    assert any(shown in fault.what for fault in found) if shown else found == []
 
 
 def changed(name: str, index: Any, *, factor: bool = False) -> Callable[[Trace, float], Trace]:
@@ -216,7 +216,7 @@ def test_twice_the_tolerance_is_a_fault_and_half_of_it_is_none(
 ) -> None:
     assert tolerance <= 1e-3
     assert wrong_decisions(edit(base(name), 0.5 * tolerance)) == []
-    assert any(shown in fault for fault in wrong_decisions(edit(base(name), 2.0 * tolerance)))
+    assert any(shown in fault.what for fault in wrong_decisions(edit(base(name), 2.0 * tolerance)))
 
 
 @given(
