@@ -90,7 +90,7 @@ class Run:
     @cached_property
     def position_m(self) -> dict[str, Array]:
         """Places of robots and obstacles, (T, 3) each."""
-        places = {robot: self.vector(robot, "", "m") for robot in self.robots}
+        places = {robot: np.stack([self.column(f"{robot}.{a}_m") for a in "xyz"], axis=1) for robot in self.robots}
         for name, obstacle in self.scenario["obstacles"].items():
             places[name] = np.tile(np.array(obstacle["position_m"], dtype=np.float64), (len(self.t_s), 1))
         return places
@@ -118,27 +118,31 @@ class Run:
         return np.searchsorted(self.t_s, self.sample_s - SMALL)
 
     def column(self, name: str) -> Array:
-        """A column of the states, (T,), or of the samples, (S,).
+        """A column of the states, (T,); raises as `column_of`."""
+        return column_of(self.states, name)
 
-        Raises:
-            NotEstablished: if it is missing.
-            Disagreement: if a number is not finite.
-        """
-        table = next((each for each in (self.states, self.samples) if name in each), None)
-        if table is None:
-            raise NotEstablished("columns of a table", f"there is no {name}", " or ".join(TABLES))
-        values = table[name].to_numpy(dtype=np.float64)
-        holds("numbers are finite", np.isfinite(values), values, "a finite number", about=name)
-        return values
-
-    def vector(self, robot: str, stem: str, unit: str) -> Array:
-        """Three columns side by side, such as `ugv1.vx_m_s`: stem `v`, unit `m_s`."""
-        return np.stack([self.column(f"{robot}.{stem}{axis}_{unit}") for axis in "xyz"], axis=1)
+    def sampled(self, robot: str, stem: str, unit: str) -> Array:
+        """Three columns of the samples, (S, 3), such as `ugv1.vx_m_s`: stem `v`, unit `m_s`; raises as `column_of`."""
+        return np.stack([column_of(self.samples, f"{robot}.{stem}{axis}_{unit}") for axis in "xyz"], axis=1)
 
     def times_s(self, robot: str, kind: str) -> Array:
         """Times of the recorded events of a kind, increasing."""
         found = [float(event["t_s"]) for event in self.events if (event["robot"], event["kind"]) == (robot, kind)]
         return np.array(sorted(found))
+
+
+def column_of(table: pd.DataFrame, name: str) -> Array:
+    """A column of a table.
+
+    Raises:
+        NotEstablished: if it is missing.
+        Disagreement: if a number is not finite.
+    """
+    if name not in table:
+        raise NotEstablished("columns of a table", f"there is no {name}", " or ".join(TABLES))
+    values = table[name].to_numpy(dtype=np.float64)
+    holds("numbers are finite", np.isfinite(values), values, "a finite number", about=name)
+    return values
 
 
 def read_run(folder: Path, name: str, report: Json) -> Run:
@@ -165,7 +169,7 @@ def read_run(folder: Path, name: str, report: Json) -> Run:
     for robot in run.robots:
         _moves_as_commanded(run, robot)
     for ugv, preset in run.presets.items():
-        recorded = run.vector(ugv, "ref_", "m")
+        recorded = run.sampled(ugv, "ref_", "m")
         close("preset trajectory", recorded, preset.position_m(run.sample_s), within=SMALL, about=ugv, t_s=run.sample_s)
     return run
 
@@ -182,7 +186,7 @@ def _is_of_the_run(meta: Json, entry: Json, scenario: Json, name: str) -> None:
 
 def _rows_cover_the_run(run: Run) -> None:
     """Time increases from 0 to the duration, with a row at every control sample in both tables."""
-    t, sampled = run.t_s, run.samples["t_s"].to_numpy(dtype=np.float64)
+    t, sampled = run.t_s, column_of(run.samples, "t_s")
     if len(t) < 2:
         raise NotEstablished("the rows cover the run", f"there are {len(t)} rows")
     holds("time increases from row to row", np.diff(t) > 0.0, t[1:], "later than the row before", t_s=t[1:])
@@ -195,7 +199,7 @@ def _rows_cover_the_run(run: Run) -> None:
 
 def _moves_as_commanded(run: Run, robot: str) -> None:
     """position[k] = position[k-1] + (t[k] - t[k-1]) * command, from the declared start; samples hold their command."""
-    place, chosen = run.position_m[robot], run.vector(robot, "v", "m_s")
+    place, chosen = run.position_m[robot], run.sampled(robot, "v", "m_s")
     command = chosen[np.searchsorted(run.sample_row, np.arange(len(place) - 1), side="right") - 1]
     close("start of a robot", place[0], run.robots[robot]["start_m"], within=SMALL, about=robot)
     led = place[:-1] + np.diff(run.t_s)[:, None] * command

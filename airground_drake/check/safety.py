@@ -149,7 +149,7 @@ def _motion(run: Run) -> None:
     """Robots keep their speed limits, and UGVs stay at their height; that they move straight is the law of motion."""
     for robot, spec in run.robots.items():
         place = run.position_m[robot]
-        speed = np.linalg.norm(run.vector(robot, "v", "m_s"), axis=1)
+        speed = np.linalg.norm(run.sampled(robot, "v", "m_s"), axis=1)
         slow, most = speed <= spec["max_speed_m_s"] + SMALL, f"{spec['max_speed_m_s']} at most"
         holds("speed limit", slow, speed, most, about=robot, t_s=run.sample_s)
         if robot != run.uav:
