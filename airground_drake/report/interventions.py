@@ -115,10 +115,10 @@ def messages(trace: Trace) -> dict[str, Any] | None:
 
 def avoidance(trace: Trace) -> dict[str, dict[str, int]]:
     """By UGV the numbers of control samples at which it executed a proposal, avoidance bound, and both."""
-    samples, found = trace.sample_rows, {}
+    found = {}
     for ugv in trace.ugvs:
         executes = trace.sampled(f"{ugv}.executing") >= 0
-        left = spare(inequalities_of(trace, ugv, samples), trace.chosen(ugv))
+        left = spare(inequalities_of(trace, ugv), trace.chosen(ugv))
         bound = (left <= BINDING_M_S).any(axis=1)
         counts = {"executing": executes, "binding": bound, "both": executes & bound}
         found[ugv] = {name: int(flags.sum()) for name, flags in counts.items()}

@@ -51,8 +51,8 @@ def wrong_commands(trace: Trace) -> list[Fault]:
 def _law_of_ugv(trace: Trace, ugv: str, samples: Rows) -> Law:
     """(6) with avoidance and the proposal that the UGV should execute, if any, by the priorities of the method."""
     scenario, t = trace.scenario, trace.t[samples]
-    position, recorded = trace.position(ugv)[samples], trace.chosen(ugv)
-    given = inequalities_of(trace, ugv, samples)
+    position, recorded = trace.as_seen(ugv, ugv), trace.chosen(ugv)
+    given = inequalities_of(trace, ugv, as_seen=True)
     limit = np.full(len(samples), scenario.ugvs[ugv].max_speed_m_s)
     executed = executed_at(trace, ugv)
     rows = np.flatnonzero([sent is not None for sent in executed])
@@ -88,11 +88,11 @@ def _preset_rates(waypoints: Array, speed: float, t: Array) -> list[Array]:
 def _law_of_uav(trace: Trace, samples: Rows) -> Law:
     """(9)-(11); it feeds the UGVs' commands of the sample before forward."""
     uav, control = trace.scenario.uav, trace.scenario.control
-    position, recorded = trace.position(uav.name)[samples], trace.chosen(uav.name)
-    centroid = np.mean([trace.position(ugv)[samples] for ugv in trace.ugvs], axis=0)
+    position, recorded = trace.as_seen(uav.name, uav.name), trace.chosen(uav.name)
+    centroid = np.mean([trace.as_seen(uav.name, ugv) for ugv in trace.ugvs], axis=0)
     fed = np.mean([trace.command(ugv)[samples] for ugv in trace.ugvs], axis=0)
     fed[trace.t[samples] <= TIME_TOLERANCE_S] = 0.0  # nothing was commanded before the first sample
     over = centroid + np.array([0.0, 0.0, uav.altitude_m])
     below = limited(fed + control.formation_gain_1_s * (over - position), uav.max_speed_m_s)
-    command = avoiding(below, inequalities_of(trace, uav.name, samples), "augmented", planar=False)
+    command = avoiding(below, inequalities_of(trace, uav.name, as_seen=True), "augmented", planar=False)
     return Law(command, np.linalg.norm(recorded - command, axis=1))

@@ -14,9 +14,14 @@ from verify.judging import decided
 from verify.runs.cases import A_D, B_C, B_D, DOORWAY, Edit, at, first, problem, proposals, scenario
 
 from airground_drake.base.errors import TraceError
+from airground_drake.registry import method_of
 from airground_drake.run.simulation import simulate
+from airground_drake.run.tables import SEEN_COLUMNS, typed
 from airground_drake.run.trace import Trace
 from airground_drake.scenarios.schema import Obstacle, Scenario
+from airground_drake.scenarios.world import make_world
+from airground_drake.systems import UgvController
+from airground_drake.systems.components import make_law
 from airground_drake.verify.runs.proposals import proposals_of
 from oracles import ORACLES, commands, predictions
 from oracles.communication import SENSED_M
@@ -277,3 +282,21 @@ def test_an_accepted_intervention_is_reconsidered_when_an_obstacle_is_new(
     assert answer == "accept" or "reversed without news" in str(found.counterexample)
     trace.decisions.loc[again.name, ["decision", "reason"]] = ["accept", "kept"]
     assert ORACLES["progress"](replace(trace))
+
+
+def test_a_command_is_judged_by_what_its_robot_saw(run: Callable[[str, str], Trace]) -> None:
+    """ugv1 is made to see ugv2 just ahead of it at one sample, and commanded accordingly."""
+    trace, k = run("case_a", "d"), 100
+    t, rows = float(trace.sampled("t_s")[k]), trace.sample_rows
+    places = np.array([trace.position(robot)[rows[k]] for robot in trace.robots])
+    places[1] = places[0] + [0.0, 2.01, 0.0]
+    controller = UgvController(make_world(trace.scenario), make_law(trace.scenario, method_of("d"), "augmented"))
+    wanted = (np.array([of(ugv)[k] for ugv in trace.ugvs]) for of in (trace.reference, trace.reference_rate))
+    command = controller.velocity(t, places, *wanted, [None] * len(trace.ugvs))[0]
+    samples = trace.samples.copy()
+    samples.loc[k, [f"ugv1.v{axis}_m_s" for axis in "xyz"]] = command
+    blind = replace(trace, samples=samples)
+    assert [(fault.robot, fault.t_s) for fault in ORACLES["commands"](blind)][:1] == [("ugv1", t)]
+    row = {"t_s": t, "by": "ugv1", "of": "ugv2", **dict(zip(("x_m", "y_m", "z_m"), places[1], strict=True))}
+    sighted = replace(blind, seen=typed([row | {"measured_s": t}], SEEN_COLUMNS))
+    assert "ugv1" not in [fault.robot for fault in ORACLES["commands"](sighted)]

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
+import pandas as pd
 import pytest
 from builders.runs import run_of
 from oracles.mutants import PATIENCE
@@ -94,3 +95,16 @@ def test_numbers_that_a_scenario_expects() -> None:
     ]  # fmt: skip
     idle = {"metrics": {"interventions": [], "messages": None}}
     assert [each["found"] for each in expected_numbers(scenario, {"d": idle})] == [0, 0]
+
+
+def test_a_lost_message_is_not_delivered_and_a_doubled_one_is_delivered_twice(run: Run) -> None:
+    trace = run("case_a", "d")
+    before, table = messages(trace), trace.messages
+    answers = table.index[table["kind"] == "answer"]
+    lost = table.assign(received_s=table["received_s"].where(table.index != answers[3]))
+    doubled = pd.concat([table, table.loc[answers[:2]].assign(copy=1)], ignore_index=True)
+    assert before is not None
+    for changed, by in ((lost, -1), (doubled, 2)):
+        after = messages(replace(trace, messages=changed))
+        assert after is not None
+        assert after["answers"] == before["answers"] + by

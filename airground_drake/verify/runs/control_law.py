@@ -8,7 +8,6 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from airground_drake.base.arrays import Array
 from airground_drake.run.trace import Trace
@@ -49,12 +48,21 @@ def inequalities(
     return Inequalities(normal, np.where(distance <= control.sensing_range_m, bound, -np.inf))
 
 
-def inequalities_of(trace: Trace, robot: str, samples: npt.NDArray[np.intp]) -> Inequalities:
-    """The inequalities of a robot at rows (B,) of its run, beside the bodies of `around` in their order."""
-    places, beside = places_of(trace), around(trace, robot)
-    others = [np.broadcast_to(places[other], (len(trace.t), 3))[samples] for other, _ in beside]
+def inequalities_of(trace: Trace, robot: str, *, as_seen: bool = False) -> Inequalities:
+    """The inequalities of a robot at the control samples of its run, beside the bodies of `around` in their order.
+
+    They are those of the true positions, or of the positions that the robot saw.
+    """
+    places, beside, samples = places_of(trace), around(trace, robot), trace.sample_rows
+
+    def place(body: str) -> Array:
+        if as_seen and body in trace.robots:
+            return trace.as_seen(robot, body)
+        return np.broadcast_to(places[body], (len(trace.t), 3))[samples]
+
+    others = [place(other) for other, _ in beside]
     found = inequalities(
-        places[robot][samples],
+        place(robot),
         np.stack(others, axis=1) if others else np.empty((len(samples), 0, 3)),
         np.array([pair.safe_m for _, pair in beside]),
         np.array([pair.share for _, pair in beside]),

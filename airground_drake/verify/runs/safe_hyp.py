@@ -276,9 +276,9 @@ def _binding(trace: Trace) -> tuple[int, dict[str, int]]:
     count = {"ugv beside obstacle": 0, "uav beside obstacle": 0}
     count |= {"ugv beside ugv": 0, "ugv beside uav": 0, "uav beside ugv": 0}
     kind = dict.fromkeys(trace.ugvs, "ugv") | {trace.robots[-1]: "uav"}
-    samples, in_range = trace.sample_rows, 0
+    in_range = 0
     for robot in trace.robots:
-        slack = spare(inequalities_of(trace, robot, samples), trace.chosen(robot))
+        slack = spare(inequalities_of(trace, robot), trace.chosen(robot))
         in_range += int(np.isfinite(slack).sum())
         for (other, _), binds in zip(around(trace, robot), (slack <= BINDING_M_S).sum(axis=0).tolist(), strict=True):
             count[f"{kind[robot]} beside {kind.get(other, 'obstacle')}"] += binds
