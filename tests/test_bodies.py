@@ -25,7 +25,7 @@ from airground_drake.proofs.too_near import too_near
 from airground_drake.report import attention, summary
 from airground_drake.report.figures.draw import draw
 from airground_drake.report.metrics import closest_obstacle, gap_m, of_run
-from airground_drake.report.outcomes import Course, Near
+from airground_drake.report.outcomes import Near, RunOutcome
 from airground_drake.report.page import page
 from airground_drake.report.phrases import intrusion
 from airground_drake.run.simulation import simulate
@@ -238,7 +238,7 @@ def test_the_page_says_that_it_appeared_there() -> None:
     trace = simulate(sudden(4.2), "d")
     metrics = of_run(trace)["min_distance_m"]["ugv1"]["rock"]
     assert metrics["appeared"] is True
-    course = Course("d", "d", plain=True, near=[Near(-1.2, "ugv1", "rock", 0.8, 2.0, 4.2, appeared=True)])
+    course = RunOutcome("d", "d", plain=True, near=[Near(-1.2, "ugv1", "rock", 0.8, 2.0, 4.2, appeared=True)])
     assert intrusion(course) == "rock appears 0.800 m from ugv1 (nobody's doing)"
     gap = gap_m(trace, "ugv1", "rock")
     np.testing.assert_array_equal(np.isnan(gap), np.arange(len(gap)) < trace.there_from("rock"))

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from airground_drake.audit.equations import DEVIATIONS, Deviation
+from airground_drake.audit.equations import DEVIATIONS, PaperDeviation
 
 
 def way_to(place: str) -> list[Any]:
@@ -34,7 +34,7 @@ def test_every_equation_is_there_once_and_in_order() -> None:
 
 
 @pytest.mark.parametrize("row", DEVIATIONS, ids=lambda row: row.place)
-def test_the_code_exists_and_names_the_equation_and_a_change_has_a_reason(row: Deviation) -> None:
+def test_the_code_exists_and_names_the_equation_and_a_change_has_a_reason(row: PaperDeviation) -> None:
     """The equation is named in the documentation of the code, or of the class or module around it."""
     for place in row.realised_in:
         texts = [inspect.getdoc(each) or "" for each in way_to(place)]

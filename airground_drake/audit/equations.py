@@ -11,7 +11,7 @@ from typing import Literal, NamedTuple
 Kind = Literal["faithful", "changed", "not realised"]
 
 
-class Deviation(NamedTuple):
+class PaperDeviation(NamedTuple):
     """One equation, table, figure or remark of the paper, and how the package realises it.
 
     Attributes:
@@ -35,27 +35,27 @@ class Deviation(NamedTuple):
 
 _PROGRAM = ("gatekeeper.problem:Problem", "gatekeeper.binary_program:BinaryProgram")
 
-DEVIATIONS: tuple[Deviation, ...] = (
-    Deviation("(1)", "task value sigma = f(rho)", ("nsbc.task:Task.value",), "faithful"),
-    Deviation("(2)", "its rate, through the Jacobian", ("nsbc.task:Task.jacobian",), "faithful"),
-    Deviation(
+DEVIATIONS: tuple[PaperDeviation, ...] = (
+    PaperDeviation("(1)", "task value sigma = f(rho)", ("nsbc.task:Task.value",), "faithful"),
+    PaperDeviation("(2)", "its rate, through the Jacobian", ("nsbc.task:Task.jacobian",), "faithful"),
+    PaperDeviation(
         "(3)", "velocity by the pseudoinverse", ("nsbc.task:pseudoinverse",), "changed",
         "J^+ is applied to the rate of the task, not of the configuration. It is the Moore-Penrose inverse.",
         "Otherwise the sizes do not match. J^T (J J^T)^-1 does not exist where a task is singular.", (8,),
     ),
-    Deviation(
+    PaperDeviation(
         "(4)", "the same in closed loop", ("nsbc.task:Task.velocity",), "changed",
         "Error and rate are those of the task, sigma_d - sigma, not of the configuration.",
         "Otherwise the sizes do not match.", (8,),
     ),
-    Deviation(
+    PaperDeviation(
         "(5)", "composition by null-space projection",
         ("nsbc.avoidance:Avoidance", "nsbc.kernels:avoid_one", "nsbc.law:command"), "changed",
         "Each task acts in the null space of the stacked Jacobian of all higher tasks (composition `augmented`). "
         "(5) as printed stays selectable: `recursion_nearest`, `recursion_listed`.",
         "(5) as printed is not safe with two obstacles, and does not stall where the paper's UGV1 stalls.", (1, 22),
     ),
-    Deviation(
+    PaperDeviation(
         "(6)", "move to the target",
         ("nsbc.tasks:PositionTask", "systems.controllers:UgvController", "nsbc.law:command"), "changed",
         "The desired value is the moving preset trajectory rho_rd, which ends at the target, not the fixed target. "
@@ -63,12 +63,12 @@ DEVIATIONS: tuple[Deviation, ...] = (
         "(15) and (25) measure the error from the preset trajectory. With the fixed target a UGV would leave it at "
         "once. As printed, the rate is that of the task itself, and (6) has no solution.", (12,),
     ),
-    Deviation(
+    PaperDeviation(
         "(7)", "obstacle avoidance of a UGV: task value",
         ("nsbc.tasks:DistanceTask", "systems.controllers:UgvController"), "faithful",
         "Other robots count as obstacles, each of a pair with half of the task. Bodies have radii, which add to d.",
     ),
-    Deviation(
+    PaperDeviation(
         "(8)", "obstacle avoidance of a UGV: velocity",
         ("nsbc.tasks:DistanceTask", "nsbc.avoidance:Avoidance"), "changed",
         "An inequality instead of an equality. The gain A acts only inside d, where n.v >= A (d - D). "
@@ -77,38 +77,38 @@ DEVIATIONS: tuple[Deviation, ...] = (
         "The paper does not say when avoidance is active. An equality would pull a robot back to the safe circle. "
         "With this bound the distance stays at least d between the samples, too.",
     ),
-    Deviation(
+    PaperDeviation(
         "(9)", "centroid of the UGVs: task value", ("nsbc.tasks:FormationTask",), "changed",
         "The UAV's own position minus the centroid, at a set altitude.",
         "The centroid of the UGVs does not depend on the UAV.", (13, 21),
     ),
-    Deviation(
+    PaperDeviation(
         "(10)", "centroid of the UGVs: velocity",
         ("nsbc.tasks:FormationTask", "systems.controllers:UavController"), "changed",
         "As (9); the UGVs' last commands are fed forward as the centroid's rate.",
         "The Jacobian of (9) as printed is 0.", (13,),
     ),
-    Deviation(
+    PaperDeviation(
         "(11)", "obstacle avoidance of the UAV", ("systems.controllers:UavController",), "changed",
         "As (8): an inequality, with the gain A acting only inside d.", "As (8).",
     ),
-    Deviation(
+    PaperDeviation(
         "(12)", "intervention: desired value",
         ("intervention.policy:Proposal",), "changed",
         "The desired value is where the UAV wants the UGV at each time: a timed polyline.",
         "As printed it is a function of the UGV's own position, so that the error is 0.", (19,),
     ),
-    Deviation(
+    PaperDeviation(
         "(13)", "intervention: its rate", ("nsbc.law:Intervention",), "changed",
         "The rate is the polyline's velocity. J_int is a constant selection of directions, the identity by default.",
         "As printed the rate is J v_int, which contains the velocity that (14) is to find.", (19,),
     ),
-    Deviation(
+    PaperDeviation(
         "(14)", "intervention: velocity",
         ("nsbc.law:command",), "faithful",
         "With (12) and (13) as changed. The paper does not say what J_int is.", "", (16, 19),
     ),
-    Deviation(
+    PaperDeviation(
         "(15)", "drift-diffusion model", ("systems.decision:DecisionVariable",), "changed",
         "The decision variable is the norm of the task error plus integrated noise. The scenario sets the noise "
         "intensity of a run; the noise may leak.",
@@ -116,41 +116,41 @@ DEVIATIONS: tuple[Deviation, ...] = (
         "trigger at once.",
         (5,),
     ),
-    Deviation("(16)", "Bayes risk", ("decision.bayes:bayes_risk",), "faithful"),
-    Deviation(
+    PaperDeviation("(16)", "Bayes risk", ("decision.bayes:bayes_risk",), "faithful"),
+    PaperDeviation(
         "(17)", "mean decision time", ("decision.bayes:decision_time",), "changed",
         "The initial deviation is in metres and divided by the drift. The drift is an assumed constant.",
         "As printed the formula takes seconds (Bogacz et al. 2006).", (3, 18),
     ),
-    Deviation(
+    PaperDeviation(
         "(18)", "decision error", ("decision.bayes:error_rate",), "changed",
         "As (17). Both assume two thresholds; the trigger has one.", "As (17).", (3, 18),
     ),
-    Deviation(
+    PaperDeviation(
         "(19)", "optimal threshold", ("decision.bayes:optimal_threshold",), "changed",
         "The right-hand side is c2/c1. By default the threshold is Table 1's 3 m and (19) is not used; "
         "`decision.threshold.rule: bayes` uses it.",
         "The root of (19) with c2/c1 minimises (16); the printed one does not. The paper gives no drift for its 3 m.",
         (2, 4),
     ),
-    Deviation(
+    PaperDeviation(
         "(20)", "event-triggered composition",
         ("decision.trigger:Trigger", "nsbc.law:command", "systems.decision:EventTrigger"), "changed",
         "The trigger is an automaton with hysteresis and a minimum inter-event time; `decision.trigger: bare` is the "
         "paper's. In methods (b) and (c) the intervention is above avoidance as printed, in (d) below it.",
         "A bare threshold on (15) triggers without bound. An intervention above avoidance is not safe.", (9, 16, 18),
     ),
-    Deviation(
+    PaperDeviation(
         "(21)", "gatekeeper: state", ("gatekeeper.problem:Problem",), "changed",
         "Each UGV solves a problem of its own; the predicted motion of the others is data.",
         "The UGVs are coupled only through each other's motion. Each decides by itself.",
     ),
-    Deviation(
+    PaperDeviation(
         "(22)", "gatekeeper: choice of each UGV", _PROGRAM, "changed",
         "One number omega per stage, 1 to accept. Refusing is 1 - omega. The superscript j is left out.",
         "The paper indexes the choice twice, by j and by the second subscript.", (22,),
     ),
-    Deviation(
+    PaperDeviation(
         "(23)", "gatekeeper: predicted motion under both choices",
         ("gatekeeper.problem:Problem", "gatekeeper.problem:predicted_problem"), "changed",
         "The two velocities of a stage are taken along two roll-outs of the UGV's closed loop, accepting throughout "
@@ -158,17 +158,17 @@ DEVIATIONS: tuple[Deviation, ...] = (
         "The integer program needs a motion that is linear in omega. The motion is exact for the two constant plans.",
         (11,),
     ),
-    Deviation(
+    PaperDeviation(
         "(24)", "gatekeeper: one choice per stage", _PROGRAM, "faithful",
         "Binary by default (route `mixed_integer`), in [0, 1] under the routes `relaxed` and `nonlinear`.", "", (22,),
     ),
-    Deviation(
+    PaperDeviation(
         "(25)", "gatekeeper: cost", ("gatekeeper.cost:plan_cost", "gatekeeper.problem:Problem"), "changed",
         "The integral is a sum over the ends of the stages, times their length. One slack per stage serves all "
         "points. A terminal cost can be added; its weight is 0 by default.",
         "The sum in (27a) lacks the length. The paper does not give a_i and b_i.", (10, 14, 22),
     ),
-    Deviation(
+    PaperDeviation(
         "(26)", "gatekeeper: mixed-integer optimal control problem",
         (*_PROGRAM, "gatekeeper.mpc_gatekeeper:PaperGatekeepers"), "changed",
         "The kinematics (23) are among the constraints. (26d) is a half-plane for each point and stage, which implies "
@@ -176,14 +176,14 @@ DEVIATIONS: tuple[Deviation, ...] = (
         "Without kinematics the decision does not matter. With half-planes only the binary omega is not convex.",
         (10, 11, 22),
     ),
-    Deviation(
+    PaperDeviation(
         "(27)", "its relaxation", ("gatekeeper.routes.nonlinear:relaxation", "gatekeeper.binary_program:BinaryProgram"),
         "changed",
         "The relaxation is solved under the routes `relaxed` (half-planes) and `nonlinear` (circles, "
         "multiple shooting); the default route does not need its solution.",
         "As printed, (27c) is not relaxed, and (27) has no kinematics.", (8, 11, 14, 22),
     ),
-    Deviation(
+    PaperDeviation(
         "(28)", "sum-up rounding: accumulated deficit", ("gatekeeper.relaxation:sum_up_rounding",), "changed",
         "The routes `relaxed` and `nonlinear` compute it. They return the cheapest plan by (25) among the rounded "
         "one and others, such as the two constant ones. A standing answer changes only by a margin and after a dwell. "
@@ -191,58 +191,58 @@ DEVIATIONS: tuple[Deviation, ...] = (
         "is the paper to the letter, run `c_literal` of `case_a` and `case_b`.",
         "The rounded plan can cost more than refusing throughout. The first stage alone reverses answers.", (22, 25),
     ),
-    Deviation(
+    PaperDeviation(
         "(29)", "sum-up rounding: choice", ("gatekeeper.relaxation:sum_up_rounding",), "changed", "As (28).",
         "As (28).", (22, 25),
     ),
-    Deviation(
+    PaperDeviation(
         "section 3.1.3", "rules (1) to (3) of the task hierarchy", ("nsbc.kernels:avoid_one",), "changed",
         "Rules (1) and (2) hold with the augmented projector. Rule (3) is not used.",
         "(5) as printed breaks rule (1). Rule (3) contradicts its own reason.", (1, 15),
     ),
-    Deviation(
+    PaperDeviation(
         "Assumption 1, Remark 1", "where interventions come from",
         ("intervention.policy:Policy", "registry:POLICIES"), "changed",
         "Interventions come from policies: a detour, a coordinated plan, and wrong ones for tests. None uses fuzzy "
         "logic, reinforcement learning or neural networks; you can add a policy.",
         "The paper gives no intervention task. Its case B uses an intervention that is not proper.", (24,),
     ),
-    Deviation(
+    PaperDeviation(
         "Table 1", "parameters", ("scenarios.load:load",), "changed",
         "`case_a`, `case_a_table1` and `case_b`; each lists under `choices` the values that are not the paper's. "
         "[How we read the table](paper.md#table-1).",
         "Rows are scrambled in our text of the paper, and no single preset speed gives the reported times.",
         (4, 5, 6, 7, 17, 21),
     ),
-    Deviation("Figure 1", "geometry of the composition", (), "not realised", "A sketch; see (5)."),
-    Deviation(
+    PaperDeviation("Figure 1", "geometry of the composition", (), "not realised", "A sketch; see (5)."),
+    PaperDeviation(
         "Figure 2", "framework in three layers", ("systems.diagram:build_diagram",), "faithful",
         "Every block is a Drake system; `airground diagram case_a` draws those of method (c).",
     ),
-    Deviation(
+    PaperDeviation(
         "Figures 3 and 7", "trajectories", ("report.figures.maps:plane",), "faithful",
         "Drawn from our runs, in the reports of `case_a` and `case_b`. We do not have the paper's pictures.",
     ),
-    Deviation(
+    PaperDeviation(
         "Figures 4 and 8", "decision variables", ("report.figures.timelines:decision",), "faithful",
         "As Figures 3 and 7.",
     ),
-    Deviation(
+    PaperDeviation(
         "Figures 5 and 9", "distances to obstacles", ("report.figures.timelines:distances",), "faithful",
         "As Figures 3 and 7. While stalled, both distances are 2 m here, but not at the printed place.", "", (20,),
     ),
-    Deviation(
+    PaperDeviation(
         "Figures 6 and 10", "triggers and answers", ("report.figures.timelines:events",), "faithful",
         "As Figures 3 and 7. The caption of Figure 10 is read with methods (b) and (c) swapped.", "", (8, 17, 23),
     ),
-    Deviation(
+    PaperDeviation(
         "methods (a) to (c)", "what is compared in section 5", ("registry:METHODS",), "changed",
         "(a) no intervention, (b) every intervention is executed, (c) an MPC gatekeeper, in both cases. Ours solves "
         "each half-plane problem of (26) to optimality, keeps the best plan by (26) itself, and has hysteresis. "
         "Method (d), avoidance on top with an outcome gatekeeper, is ours.",
         "Method (b) has the MPC in section 5.1, but not in 5.2.", (23,),
     ),
-    Deviation(
+    PaperDeviation(
         "section 6, behaviour database", "how the UAV selects an intervention, left open",
         ("intervention.database:BehaviourDatabase",), "changed",
         "The UAV asks its policies in turn (`intervention.ranking: listed`), or all of them and takes the best by its "
@@ -250,7 +250,7 @@ DEVIATIONS: tuple[Deviation, ...] = (
         "often](paper.md#the-behaviour-database).",
         "The paper leaves the selection to future work.", (24,),
     ),
-    Deviation(
+    PaperDeviation(
         "section 6", "Zeno behaviour, left open", ("decision.trigger:Trigger",), "changed",
         "A minimum inter-event time excludes it.", "As (20).", (9,),
     ),

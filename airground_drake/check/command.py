@@ -14,7 +14,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any, NoReturn
 
-from .line import DISAGREES, NOT_HERE, OPEN, Line
+from .line import DISAGREES, NOT_HERE, OPEN, CheckLine
 
 SCHEMA = "airground_drake.check/3"
 ALONE = ("policies, seeds and faults", "every part of the report that no line above names")
@@ -79,7 +79,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return verdict(lines)
 
 
-def checked(folder: Path, limit_s: float, told: Callable[[Line], object] = bool) -> list[Line]:
+def checked(folder: Path, limit_s: float, told: Callable[[CheckLine], object] = bool) -> list[CheckLine]:
     """All checks of a report, without warnings of numpy; `told` is called with each when it is done.
 
     Raises:
@@ -100,13 +100,13 @@ def checked(folder: Path, limit_s: float, told: Callable[[Line], object] = bool)
         raise UsageError(f"{folder} is no report: {error.rule}: {error.about}: {error.why}") from None
 
 
-def verdict(lines: Sequence[Line]) -> int:
+def verdict(lines: Sequence[CheckLine]) -> int:
     """The exit code: 1 if a line disagrees or cannot be checked, else 3 if one is not reproduced here, else 0."""
     found = {line.outcome for line in lines}
     return 1 if found & {DISAGREES, OPEN} else 3 if NOT_HERE in found else 0
 
 
-def show(lines: Sequence[Line], folder: Path, taken: Sequence[str], *, as_json: bool) -> None:
+def show(lines: Sequence[CheckLine], folder: Path, taken: Sequence[str], *, as_json: bool) -> None:
     """Print the checks, a line each, or as strict JSON; and what is taken as recorded."""
     counts = Counter(line.outcome for line in lines)
     if as_json:

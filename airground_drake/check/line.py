@@ -11,7 +11,7 @@ RECORDED, NOT_HERE = "as recorded", "not reproduced here"
 
 
 @dataclass(frozen=True)
-class Line:
+class CheckLine:
     """One check.
 
     Attributes:

@@ -30,7 +30,7 @@ class UnusableError(Exception):
     """The table cannot be judged for this scenario; the message says why, and what was wanted."""
 
 
-class Judged(NamedTuple):
+class JudgedPair(NamedTuple):
     """What was found about a pair of bodies; distances are between their surfaces, below 0 they overlap.
 
     Attributes:
@@ -70,7 +70,7 @@ class Coverage(NamedTuple):
     duration_s: float
 
 
-def judge(table: pd.DataFrame, scenario: Json) -> tuple[list[Judged], Coverage]:
+def judge(table: pd.DataFrame, scenario: Json) -> tuple[list[JudgedPair], Coverage]:
     """Judge the positions of a table.
 
     Args:
@@ -100,7 +100,7 @@ def judge(table: pd.DataFrame, scenario: Json) -> tuple[list[Judged], Coverage]:
             short = max(0.0, pair.safe_m - float(np.linalg.norm(own[0] - other[0])))
             promised = pair.gap_m - max(lost_m(e, gain, len(spacing)), short)
             missed, guarantee = float(e), promised if promised > 0.0 else None
-        found.append(Judged(pair.robot, pair.other, pair.gap_m, least_m, missed, guarantee))
+        found.append(JudgedPair(pair.robot, pair.other, pair.gap_m, least_m, missed, guarantee))
     covered = Coverage(float(t_s[0]), float(t_s[-1] - t_s[0]), float(scenario["duration_s"]))
     return sorted(found, key=lambda one: one.least_m - one.safe_m), covered
 

@@ -12,7 +12,7 @@ from typing import Any
 from .events import check_events
 from .files import Json, is_plain, names_in, read_bytes, read_json, sha256
 from .limits import at_most_s, is_of_a_size
-from .line import AGREES, DISAGREES, OPEN, Line
+from .line import AGREES, DISAGREES, OPEN, CheckLine
 from .rules import SMALL, Disagreement, Found, NotEstablished, close, holds, same
 from .run import Run, read_run
 from .safety import safe_hyp, safe_trace
@@ -42,7 +42,7 @@ ADDED_LATER = "proofs/"
 """Folder of the files that `airground prove` adds to a report."""
 
 
-def check_report(folder: Path, limit_s: float, told: Callable[[Line], object] = bool) -> list[Line]:
+def check_report(folder: Path, limit_s: float, told: Callable[[CheckLine], object] = bool) -> list[CheckLine]:
     """All checks of a report.
 
     Args:
@@ -87,7 +87,7 @@ def _is_shaped_like_a_report(report: Any) -> None:
         require(is_plain(name), f"{name!r} cannot be the name of a run or a claim")
 
 
-def _lines(folder: Path, there: Sequence[str], report: Json, limit_s: float) -> Iterator[Line]:
+def _lines(folder: Path, there: Sequence[str], report: Json, limit_s: float) -> Iterator[CheckLine]:
     attempt = partial(_attempt, limit_s)
     yield attempt("files", "", lambda: check_files(folder, there, report))
     yield attempt("scenario", "", lambda: check_digest(report["scenario"]))
@@ -156,9 +156,9 @@ def _judged(claim: Json, found: Found) -> str:
     return f"{status}, margin {found.margin:.6g} {claim['unit']}".rstrip()
 
 
-def _attempt(limit_s: float, claim: str, run: str, check: Callable[[], str]) -> Line:
+def _attempt(limit_s: float, claim: str, run: str, check: Callable[[], str]) -> CheckLine:
     """The line of a check; an exception in it is not agreement."""
-    line = partial(Line, claim, run)
+    line = partial(CheckLine, claim, run)
     try:
         with at_most_s(limit_s):
             return line(AGREES, check())

@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING
 from airground_drake.base.progress import Progress, progress_bar
 from airground_drake.base.usage import refuse
 from airground_drake.check import command as checker
-from airground_drake.check.line import AGREES, DISAGREES, OPEN, Line
+from airground_drake.check.line import AGREES, DISAGREES, OPEN, CheckLine
 from airground_drake.scenarios import plugins
 
 if TYPE_CHECKING:
@@ -97,8 +97,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def made_again(
-    folder: Path, lines: Sequence[Line], limit_s: float, progress: Progress, by: str, module: str, *options: str
-) -> Iterator[Line]:
+    folder: Path, lines: Sequence[CheckLine], limit_s: float, progress: Progress, by: str, module: str, *options: str
+) -> Iterator[CheckLine]:
     """The lines of a program that makes parts of the report again, in a process of its own.
 
     Args:
@@ -112,7 +112,7 @@ def made_again(
     """
     from airground_drake.report.lines import JUDGED
 
-    line = partial(Line, by=by)
+    line = partial(CheckLine, by=by)
     if any(each.outcome != AGREES for each in lines if each.claim in NEEDED):
         yield line("report", "", OPEN, f"not {by}, since a check above failed", "the files are the report's")
         return
@@ -133,12 +133,12 @@ def made_again(
             yield line("report", "", OPEN, f"not all was {by}: {why[0]}", "the files can be used")
 
 
-def _proved_again(folder: Path) -> Iterator[Line]:
+def _proved_again(folder: Path) -> Iterator[CheckLine]:
     """Have Coq prove each run, from positions written anew."""
     from airground_drake.check.files import read_json
     from airground_drake.check.rules import Disagreement, NotEstablished
 
-    line = partial(Line, "proofs", by="Coq")
+    line = partial(CheckLine, "proofs", by="Coq")
     command = [sys.executable, "-P", "-m", "airground_drake", "prove", str(folder)]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     try:

@@ -13,7 +13,7 @@ from airground_drake.base.arrays import Array
 from airground_drake.geometry.motion import Motion
 from airground_drake.intervention.policy import Proposal
 from airground_drake.nsbc.kernels import Points, fill_half_spaces
-from airground_drake.nsbc.law import Intervention, Numbers, Tracking, Ugv, UgvLaw, command
+from airground_drake.nsbc.law import AcceptedMotion, Numbers, Tracking, UgvLaw, UgvState, command
 
 REFUSED, ACCEPTED = 0, 1
 """Modes of a control period: whether the proposal is in force."""
@@ -156,8 +156,8 @@ def _command(loop: ClosedLoop, mode: int, k: int, position: Array, work: Workspa
     for a in range(3):
         rate[a] = (loop.preset[k + 1, a] - loop.preset[k, a]) / law.layer.period
         asked[a] = (loop.wanted[k + 1, a] - loop.wanted[k, a]) / law.layer.period
-    ugv, track = Ugv(position, mobility, loop.max_speed), Tracking(loop.preset[k], rate)
-    intervention = Intervention(loop.wanted[k], asked, loop.chosen)
+    ugv, track = UgvState(position, mobility, loop.max_speed), Tracking(loop.preset[k], rate)
+    intervention = AcceptedMotion(loop.wanted[k], asked, loop.chosen)
     return command(law, ugv, track, intervention, mode == ACCEPTED, normal, bound)
 
 

@@ -13,7 +13,7 @@ from airground_drake.base.arrays import Array
 from airground_drake.geometry.motion import Motion
 from airground_drake.intervention.coordination.joint import Effort, Plan, plan
 from airground_drake.intervention.coordination.roadmap import RobotTask, Space
-from airground_drake.intervention.coordination.single import Body, Way
+from airground_drake.intervention.coordination.single import OtherRobot, Way
 from airground_drake.intervention.coordination.timed import at_rest, distance, speed, timed, without_repeats
 from airground_drake.intervention.policy import Observation, Policy, Teammate
 
@@ -145,7 +145,7 @@ class Coordinate(Policy):
 
     def _plan(self, seen: Observation, space: Space, group: Sequence[int]) -> Plan:
         team = seen.team
-        fixed = [Body(predicted(mate, seen.start), mate.radius) for i, mate in enumerate(team) if i not in group]
+        fixed = [OtherRobot(predicted(mate, seen.start), mate.radius) for i, mate in enumerate(team) if i not in group]
         tasks = [task_of(team[i], seen.start) for i in group]
         speeds = [min(self.speed, SHARE * team[i].max_speed) for i in group]
         return plan(space, tasks, speeds, fixed, follow=self.follow, effort=Effort())

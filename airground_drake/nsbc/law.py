@@ -21,7 +21,7 @@ from airground_drake.nsbc.kernels import Layer, Points, avoid_one, fill_half_spa
 from airground_drake.world.world import Neighbours
 
 
-class Intervention(NamedTuple):
+class AcceptedMotion(NamedTuple):
     """The demand of an accepted intervention on one UGV now, (12)-(13).
 
     Attributes:
@@ -44,7 +44,7 @@ class Numbers(NamedTuple):
     layer: Layer
 
 
-class Ugv(NamedTuple):
+class UgvState(NamedTuple):
     """A UGV's position, (3,), m, mobility, (3,), 1 where it can move, else 0, and speed limit, m/s."""
 
     position: Array
@@ -89,7 +89,7 @@ class UgvLaw:
         return Numbers(*gains, self.intervention_on_top, self.avoidance.layer)
 
     def velocity(
-        self, positions: Array, near: Neighbours, target: Array, rate: Array, asked: Sequence[Intervention | None]
+        self, positions: Array, near: Neighbours, target: Array, rate: Array, asked: Sequence[AcceptedMotion | None]
     ) -> Array:
         """Commands of n UGVs, (n, 3), m/s: `command` for each.
 
@@ -114,7 +114,7 @@ class UgvLaw:
 
 @njit(cache=True)
 def command(
-    law: Numbers, ugv: Ugv, track: Tracking, asked: Intervention, executing: bool, normal: Array, bound: Array
+    law: Numbers, ugv: UgvState, track: Tracking, asked: AcceptedMotion, executing: bool, normal: Array, bound: Array
 ) -> Array:
     """Command of one UGV, (3,), m/s.
 
@@ -169,15 +169,15 @@ def _commands(
     rate: Array,
     executing: npt.NDArray[np.bool_],
 ) -> Array:
-    """`command` for n UGVs, (n, 3), m/s: the fields of `Numbers`, `Neighbours` and `Intervention`, then arrays."""
+    """`command` for n UGVs, (n, 3), m/s: the fields of `Numbers`, `Neighbours` and `AcceptedMotion`, then arrays."""
     # one by one, because numba takes 1.5 us to unpack a named tuple that Python passes, and 0.04 us for an array
     layer = Layer(avoidance_gain, period, sensing_range, composition)
     law = Numbers(motion_gain, intervention_gain, intervention_on_top, layer)
     velocity, centre = np.empty(target.shape), gather(positions, still, others)
     normal, bound = np.empty(centre.shape[1:]), np.empty(centre.shape[1])
     for i in range(len(target)):
-        ugv = Ugv(positions[members[i]], mobility[i], max_speed[i])
+        ugv = UgvState(positions[members[i]], mobility[i], max_speed[i])
         fill_half_spaces(ugv.position, ugv.mobility, Points(centre[i], distance[i], share[i]), layer, normal, bound)
-        asked = Intervention(wanted[i], wanted_rate[i], chosen[i])
+        asked = AcceptedMotion(wanted[i], wanted_rate[i], chosen[i])
         velocity[i] = command(law, ugv, Tracking(target[i], rate[i]), asked, executing[i], normal, bound)
     return velocity

@@ -21,14 +21,14 @@ class ReadbackError(AirgroundError):
     """An exported file does not say what the trace says."""
 
 
-class Rounding(NamedTuple):
+class RereadError(NamedTuple):
     """How many coordinates differ from the recorded ones, and by how much at most, m."""
 
     coordinates: int
     most_m: float
 
 
-def compare(text: str, trace: Trace) -> Rounding:
+def compare(text: str, trace: Trace) -> RereadError:
     """Compare an exported file with the run that it should be about.
 
     Raises:
@@ -54,7 +54,7 @@ def compare(text: str, trace: Trace) -> Rounding:
     spelled = dict(zip(recorded, bodies, strict=True))
     wanted = [(spelled[each.first], spelled[each.second], each.safe_m) for each in demands(trace.scenario)]
     _compare_statement(run, text, trace, wanted)
-    return Rounding(sum(each > 0 for each in off), float(max(off)))
+    return RereadError(sum(each > 0 for each in off), float(max(off)))
 
 
 def _coordinates(body: str, text: str, rows: int, unit: int, places: int) -> list[Fraction]:

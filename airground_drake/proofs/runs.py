@@ -31,7 +31,7 @@ CHECKERS = ("DistanceChecker.v", "LawChecker.v")
 
 
 @dataclass(frozen=True)
-class Answer:
+class CoqReply:
     """Coq's answer about one theorem.
 
     Attributes:
@@ -74,9 +74,9 @@ class Proved:
     expected: bool
     pairs: int
     rows: int
-    distances: Answer
-    law: Answer
-    rounded: readback.Rounding
+    distances: CoqReply
+    law: CoqReply
+    rounded: readback.RereadError
     meta_sha256: str
 
 
@@ -109,7 +109,7 @@ def workshop(limit_s: float = coq.LIMIT_S) -> Iterator[Workshop]:
         yield Workshop(folder, version, {name: digest(FOLDER / name) for name in used})
 
 
-def prove(place: Workshop, run: Trace, limit_s: float = coq.LIMIT_S) -> tuple[Answer, Answer, readback.Rounding]:
+def prove(place: Workshop, run: Trace, limit_s: float = coq.LIMIT_S) -> tuple[CoqReply, CoqReply, readback.RereadError]:
     """Have Coq decide whether a run keeps its distances and, if it does, whether it obeys the law.
 
     The exported files stay in the workshop.
@@ -128,13 +128,13 @@ def prove(place: Workshop, run: Trace, limit_s: float = coq.LIMIT_S) -> tuple[An
     if distances.refused and (found := too_near(exact)):
         words = f"Coq refuses {_pair(distances.refused)}. In exact arithmetic {'; '.join(map(str, found))}"
         distances = replace(distances, why=words, too_near=found)
-    law = Answer(False, f"{exact.name}_obeys_the_law", f"{exact.name}_law.v", "not tried: a distance is not kept")
+    law = CoqReply(False, f"{exact.name}_obeys_the_law", f"{exact.name}_law.v", "not tried: a distance is not kept")
     if distances.proved:
         law = decide(place, exact, law.file, law_file(exact), law.theorem, limit_s)
     return distances, law, rounded
 
 
-def decide(place: Workshop, run: Recorded, name: str, text: str, theorem: str, limit_s: float) -> Answer:
+def decide(place: Workshop, run: Recorded, name: str, text: str, theorem: str, limit_s: float) -> CoqReply:
     """Have Coq decide one exported file."""
     files.write_text(place.folder / name, text)
     started = time.perf_counter()
@@ -143,8 +143,8 @@ def decide(place: Workshop, run: Recorded, name: str, text: str, theorem: str, l
     except coq.CoqError as error:
         refused = _about(run, text, error.line) if COMPUTED in str(error) else None
         why = f"Coq refuses {_pair(refused)}; later pairs were not tried" if refused else str(error)
-        return Answer(False, theorem, name, why, refused)
-    return Answer(True, theorem, name, axioms=axioms, seconds=time.perf_counter() - started)
+        return CoqReply(False, theorem, name, why, refused)
+    return CoqReply(True, theorem, name, axioms=axioms, seconds=time.perf_counter() - started)
 
 
 def _pair(demand: Demand) -> str:
@@ -230,7 +230,7 @@ def document(place: Workshop, found: Sequence[Proved]) -> dict[str, Any]:
     }
 
 
-def _entry(answer: Answer) -> dict[str, Any]:
+def _entry(answer: CoqReply) -> dict[str, Any]:
     entry: dict[str, Any] = {"proved": answer.proved, "theorem": answer.theorem, "file": answer.file}
     if answer.proved:
         return entry | {"axioms": list(answer.axioms), "seconds": round(answer.seconds, 3)}

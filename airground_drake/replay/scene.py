@@ -24,7 +24,7 @@ MAX_NAMED_OBSTACLES = 8
 
 
 @dataclass(frozen=True)
-class Body(Robot):
+class DrawnBody(Robot):
     """A robot in a run: positions (F, 3), m, and states (F,), indices of STATES, one per frame."""
 
     positions: Array
@@ -35,7 +35,7 @@ class Body(Robot):
 class Scene(Stage):
     """A run. `times_s` (F,) are those of the frames, the last one the end."""
 
-    robots: tuple[Body, ...]
+    robots: tuple[DrawnBody, ...]
     scenario: Scenario
     run: str
     says: str
@@ -58,7 +58,7 @@ def scene(trace: Trace, scenario: Scenario) -> Scene:
     times = frame_times(trace.t)
     still = stage_of(trace, scenario)
     bodies = tuple(
-        Body(
+        DrawnBody(
             **vars(robot),
             positions=np.column_stack([np.interp(times, trace.t, axis) for axis in trace.position(robot.name).T]),
             states=states(trace, robot.name, times) if robot.kind == "UGV" else np.zeros(len(times), dtype=np.intp),

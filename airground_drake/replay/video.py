@@ -15,7 +15,7 @@ from matplotlib.patches import Circle
 from airground_drake.base import files
 from airground_drake.base.errors import ReplayError
 from airground_drake.replay.proposals import Sent
-from airground_drake.replay.scene import Body, Scene
+from airground_drake.replay.scene import DrawnBody, Scene
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.view import canvas
 from airground_drake.view.labels import place
@@ -97,7 +97,7 @@ def _picture(scene: Scene) -> tuple[Figure, Update]:
     return figure, update
 
 
-def _robot(axes: Axes, scenario: Scenario, body: Body) -> Update:
+def _robot(axes: Axes, scenario: Scenario, body: DrawnBody) -> Update:
     draw_robot(axes, scenario, body.name, body.positions, _WAY, linewidth=0.7)
     shape = Circle((0.0, 0.0), body.radius_m, zorder=4, linewidth=2.0, fill=body.kind == "UGV")
     axes.add_patch(shape)

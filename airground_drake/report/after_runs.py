@@ -31,7 +31,7 @@ from airground_drake.verify.registry import model_claims
 PACKAGES = ("airground_drake", "drake", "numpy", "scipy", "numba", "pandas", "matplotlib", "daqp")
 
 
-class Judged(NamedTuple):
+class JudgedRuns(NamedTuple):
     """The runs of a scenario, what is said of them, and their figures."""
 
     traces: Mapping[str, Trace]
@@ -50,7 +50,7 @@ def judge(
     kept: Path | None,
     seeds: int,
     audit: Callable[[Scenario, Mapping[str, Trace], Sequence[Verdict]], Sequence[Mapping[str, Any]]] | None,
-) -> Judged:
+) -> JudgedRuns:
     """Judge the runs and the model and, if asked for, the paper and other seeds; draw the runs at the same time.
 
     Args:
@@ -70,7 +70,7 @@ def judge(
     figures = start_in_process(partial(draw, scenario, traces)) if drawn else list
     verdicts = judge_all(scenario, traces.values(), kept=kept, progress=progress)
     findings = audit(scenario, traces, verdicts) if audit else ()
-    return Judged(traces, verdicts, findings, figures(), of_seeds)
+    return JudgedRuns(traces, verdicts, findings, figures(), of_seeds)
 
 
 def with_seeds(scenario: Scenario, own: Mapping[str, Trace], number: int, progress: Progress) -> list[dict[str, Any]]:
@@ -89,7 +89,7 @@ def write(
     scenario: Scenario,
     output: Path,
     formats: Sequence[str],
-    judged: Judged,
+    judged: JudgedRuns,
     provenance: dict[str, Any],
     *,
     audited: bool,

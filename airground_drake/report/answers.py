@@ -8,7 +8,7 @@ from math import dist
 from typing import Any, NamedTuple
 
 from airground_drake.base.statuses import NOTHING, PASSING, UNDECIDED
-from airground_drake.report.outcomes import Course, Document, Proof, claims, distance, tolerance, triggers
+from airground_drake.report.outcomes import Document, ProofOutcome, RunOutcome, claims, distance, tolerance, triggers
 from airground_drake.report.phrases import (
     MAX_NAMES,
     Line,
@@ -46,7 +46,7 @@ class Answer(NamedTuple):
     lines: list[Line]
 
 
-def answers(document: Document, every: Sequence[Course], *, tabulated: bool) -> list[Answer]:
+def answers(document: Document, every: Sequence[RunOutcome], *, tabulated: bool) -> list[Answer]:
     """The questions that the report has something to say about; `tabulated`: those that no table of runs answers."""
     asked = {"Safe?": _safe(document, every), "Arrived?": _arrived(document, every), "Runs": _runs(document, every)}
     asked = {} if tabulated else asked
@@ -60,7 +60,7 @@ def answers(document: Document, every: Sequence[Course], *, tabulated: bool) -> 
     return [Answer(question, lines) for question, found in asked.items() if (lines := list(found))]
 
 
-def _safe(document: Document, every: Sequence[Course]) -> Iterator[Line]:
+def _safe(document: Document, every: Sequence[RunOutcome]) -> Iterator[Line]:
     bad = [course for course in every if course.safe is False]
     printed = [course for course in bad if not course.plain and not course.hits]
     for course in bad:
@@ -82,7 +82,7 @@ def _safe(document: Document, every: Sequence[Course]) -> Iterator[Line]:
         yield Line("no", f"{counted(len(printed), 'run')} with recursion (5) as printed: {home}{told}.")
 
 
-def _intrusion(course: Course) -> str:
+def _intrusion(course: RunOutcome) -> str:
     """Who came how near to what, when, and how many others did."""
     hits = list(dict.fromkeys(map(collision, course.hits.values())))
     if hits:
@@ -95,7 +95,7 @@ def _intrusion(course: Course) -> str:
     return f"{told}{more}{' too close' * bool(more)}"
 
 
-def _proof(every: Sequence[Course]) -> Iterator[Line]:
+def _proof(every: Sequence[RunOutcome]) -> Iterator[Line]:
     """Whether the safety of method (d) is proved, one sentence per status."""
     of_d = [course for course in every if course.proof]
     told = grouped(((*_lacking(course.proof), course.proof.status), course) for course in of_d if course.proof)
@@ -112,13 +112,13 @@ def _proof(every: Sequence[Course]) -> Iterator[Line]:
         }[status]
 
 
-def _lacking(proof: Proof) -> tuple[str, bool]:
+def _lacking(proof: ProofOutcome) -> tuple[str, bool]:
     """What a proof lacks, by claim, and whether one of these claims is refuted."""
     told = (f"{name}: {in_words(claim) if claim else 'not checked'}" for name, claim in proof.lacking.items())
     return "; ".join(told), any(claim and claim["status"] == "refuted" for claim in proof.lacking.values())
 
 
-def _arrived(document: Document, every: Sequence[Course]) -> Iterator[Line]:
+def _arrived(document: Document, every: Sequence[RunOutcome]) -> Iterator[Line]:
     if home := [course for course in every if course.away == {} and course.plain]:
         last = max((time_s for course in home for time_s in course.arrived_s.values()), default=0.0)
         within = f" within {tolerance(document)} of their targets" if tolerance(document) else ""
@@ -134,7 +134,7 @@ def _arrived(document: Document, every: Sequence[Course]) -> Iterator[Line]:
         yield Line(mark, f"{', '.join(names)}: {says}.")
 
 
-def _whereabouts(document: Document, course: Course) -> Line:
+def _whereabouts(document: Document, course: RunOutcome) -> Line:
     """Who did not arrive, and where each is."""
     if course.away is None:
         return Line("open", f"not known, {course.why}")
@@ -199,7 +199,7 @@ def _noisy(document: Document) -> bool:
     return any(run["set"].get("decision.noise_m_sqrt_s", noise) > 0.0 for run in resolved["runs"].values())
 
 
-def _runs(document: Document, every: Sequence[Course]) -> Iterator[Line]:
+def _runs(document: Document, every: Sequence[RunOutcome]) -> Iterator[Line]:
     """What each run is, for readers who do not know its letter."""
     resolved = document["scenario"]["resolved"]
     told = []
@@ -211,7 +211,7 @@ def _runs(document: Document, every: Sequence[Course]) -> Iterator[Line]:
         yield Line("", f"{'; '.join(told)}.")
 
 
-def _messages(document: Document, every: Sequence[Course]) -> Iterator[Line]:
+def _messages(document: Document, every: Sequence[RunOutcome]) -> Iterator[Line]:
     """What the UAV sent and the UGVs answered, beside a scheme without a trigger."""
     taken = {course.name: document["runs"][course.name]["metrics"]["messages"] for course in every if course.helped
              and course.name in document["runs"]}  # fmt: skip

@@ -49,7 +49,7 @@ class Near(NamedTuple):
         return f"{self} ({self.robot} to {self.other}{', at the start' * (self.t_s == 0.0)})"
 
 
-class Proof(NamedTuple):
+class ProofOutcome(NamedTuple):
     """Whether the safety of a run of method (d) is proved.
 
     Attributes:
@@ -68,7 +68,7 @@ class Proof(NamedTuple):
 
 
 @dataclass
-class Course:
+class RunOutcome:
     """What came of a run.
 
     Attributes:
@@ -98,7 +98,7 @@ class Course:
     why: str = "it was not run"
     declared_unsafe: bool = False
     tested: bool = False
-    proof: Proof | None = None
+    proof: ProofOutcome | None = None
     hits: dict[str, Mapping[str, Any]] = field(default_factory=dict)
     arrived_s: dict[str, float] = field(default_factory=dict)
     away: dict[str, Sequence[float]] | None = None
@@ -118,11 +118,11 @@ class Course:
         return self.safe is True and self.away == {}
 
 
-def courses(document: Document) -> list[Course]:
+def courses(document: Document) -> list[RunOutcome]:
     """What came of every run that the scenario names, in its order."""
     found = []
     for name, spec in document["scenario"]["resolved"]["runs"].items():
-        course = Course(name, str(spec["method"]), spec["composition"] == "augmented")
+        course = RunOutcome(name, str(spec["method"]), spec["composition"] == "augmented")
         if name in document["runs"]:
             _judge(course, document)
             _locate(course, document)
@@ -131,7 +131,7 @@ def courses(document: Document) -> list[Course]:
     return found
 
 
-def _judge(course: Course, document: Document) -> None:
+def _judge(course: RunOutcome, document: Document) -> None:
     """Whether the run was safe, by its distances and by SAFE-TRACE."""
     run = document["runs"][course.name]
     unique = {frozenset((pair.robot, pair.other)): pair for pair in reversed([*pairs(run)])}
@@ -152,7 +152,7 @@ def _judge(course: Course, document: Document) -> None:
         course.why = f"SAFE-TRACE: {status.replace('_', ' ')}" if status else "SAFE-TRACE was not checked"
 
 
-def _locate(course: Course, document: Document) -> None:
+def _locate(course: RunOutcome, document: Document) -> None:
     """Who arrived in the run, and where the others are."""
     resolved, run = document["scenario"]["resolved"], document["runs"][course.name]
     uav, ends = resolved["uav"], run["metrics"]["final_position_m"]
@@ -176,7 +176,7 @@ def no_way(run: Mapping[str, Any]) -> list[str]:
     return [ugv for ugv in run["metrics"]["without_proposals"] if ugv not in failed]
 
 
-def _proof(document: Document, run: str) -> Proof:
+def _proof(document: Document, run: str) -> ProofOutcome:
     """Whether a run of method (d) was proved safe; theorems may have been judged for this run alone."""
 
     def judged(name: str) -> Mapping[str, Any] | None:
@@ -184,12 +184,12 @@ def _proof(document: Document, run: str) -> Proof:
 
     theorems = {name: judged(name) for name in THEOREMS}
     if unproved := {name: claim for name, claim in theorems.items() if claim is None or claim["status"] != "proved"}:
-        return Proof("unproved", unproved)
+        return ProofOutcome("unproved", unproved)
     conditions = judged(CONDITIONS)
     if conditions is None or conditions["status"] not in PASSING:
         refuted = conditions is not None and conditions["status"] == "refuted"
-        return Proof("refuted" if refuted else "undecided", {CONDITIONS: conditions})
-    return Proof("tested" if conditions["exercised"] else "idle")
+        return ProofOutcome("refuted" if refuted else "undecided", {CONDITIONS: conditions})
+    return ProofOutcome("tested" if conditions["exercised"] else "idle")
 
 
 def pairs(run: Mapping[str, Any]) -> Iterator[Near]:

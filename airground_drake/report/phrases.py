@@ -7,7 +7,7 @@ from typing import Any, NamedTuple, TypeVar
 
 from airground_drake.base.statuses import PASSING
 from airground_drake.registry import METHODS
-from airground_drake.report.outcomes import Course, distance
+from airground_drake.report.outcomes import RunOutcome, distance
 
 K = TypeVar("K")
 V = TypeVar("V")
@@ -49,7 +49,7 @@ class Line(NamedTuple):
     text: str
 
 
-def of_run(resolved: Mapping[str, Any], course: Course) -> str:
+def of_run(resolved: Mapping[str, Any], course: RunOutcome) -> str:
     """What a run is: its method, or the method's identifier and what the run sets differently."""
     if course.method not in METHODS:
         return course.method
@@ -88,21 +88,21 @@ def joined(words: Sequence[str]) -> str:
     return " and ".join(filter(None, (", ".join(words[:-1]), words[-1])))
 
 
-def labels(those: Sequence[Course], among: Sequence[Course]) -> tuple[list[str], list[str]]:
+def labels(those: Sequence[RunOutcome], among: Sequence[RunOutcome]) -> tuple[list[str], list[str]]:
     """Methods all of whose runs among `among` are those: "(d)"; and the names of the other runs of those."""
     apart = {course.method for course in among if course not in those}
     by_method = [f"({course.method})" for course in those if course.method not in apart]
     return list(dict.fromkeys(by_method)), [course.name for course in those if course.method in apart]
 
 
-def under(those: Sequence[Course], among: Sequence[Course]) -> str:
+def under(those: Sequence[RunOutcome], among: Sequence[RunOutcome]) -> str:
     """Those runs as a condition: "under (c) and (d)", "under (b) and in run c_literal"."""
     of_methods, runs = labels(those, among)
     parts = [f"under {joined(of_methods)}" if of_methods else "", f"in {_plural('run', runs)}" if runs else ""]
     return joined([part for part in parts if part])
 
 
-def subject(those: Sequence[Course], among: Sequence[Course]) -> str:
+def subject(those: Sequence[RunOutcome], among: Sequence[RunOutcome]) -> str:
     """Those runs as the subject of a sentence: "method (d) is", "methods (b) and (c) and run d_far are"."""
     of_methods, runs = labels(those, among)
     parts = [_plural("method", of_methods) if of_methods else "", _plural("run", runs) if runs else ""]
@@ -113,14 +113,14 @@ def _plural(noun: str, names: Sequence[str]) -> str:
     return f"{noun}{'s' * (len(names) != 1)} {joined(names)}"
 
 
-def trouble(course: Course) -> str:
+def trouble(course: RunOutcome) -> str:
     """What went wrong in a run: who came too near, and who did not arrive."""
     away = [robot for robot in course.away or () if robot not in course.hits]
     told = [] if course.safe is not False else [colliding(course) if course.hits else intrusion(course)]
     return ", and ".join([*told, *([_absent(course, away)] if away else [])])
 
 
-def intrusion(course: Course) -> str:
+def intrusion(course: RunOutcome) -> str:
     """Who came how near to what in a run that was not safe."""
     if course.near and course.near[0].is_short:
         least = course.near[0]
@@ -130,13 +130,13 @@ def intrusion(course: Course) -> str:
     return course.why
 
 
-def more_pairs(course: Course, named: int = 1) -> str:
+def more_pairs(course: RunOutcome, named: int = 1) -> str:
     """How many pairs besides those named came too near."""
     more = sum(near.is_short for near in course.near) - named
     return f"; {counted(more, 'more pair')}" if more > 0 else ""
 
 
-def colliding(course: Course) -> str:
+def colliding(course: RunOutcome) -> str:
     """Who collides in a run."""
     names = list(course.hits)
     return f"{_robots(names)} collide{'s' * (len(names) == 1)}"
@@ -147,7 +147,7 @@ def collision(hit: Mapping[str, Any]) -> str:
     return f"{hit['robot']} collides with {hit.get('other') or hit['obstacle']} at {hit['t_s']:.2f} s"
 
 
-def ending(course: Course, robot: str) -> str:
+def ending(course: RunOutcome, robot: str) -> str:
     """How a robot ended that neither arrived nor collided, without the verb "is"."""
     known = course.on_the_way.get(robot)
     if robot in course.stuck:
@@ -164,7 +164,7 @@ def rounded(value: float) -> str:
     return f"{float(f'{value:.2g}'):.15g}"
 
 
-def _absent(course: Course, names: Sequence[str]) -> str:
+def _absent(course: RunOutcome, names: Sequence[str]) -> str:
     """How those ended that did not arrive, and for whom the UAV found no way."""
     told = grouped((ending(course, robot), robot) for robot in names)
     clauses = [f"{_robots(alike)} {'is' if len(alike) == 1 else 'are'} {how}" for how, alike in told.items()]

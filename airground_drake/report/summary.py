@@ -15,7 +15,7 @@ from airground_drake.base.statuses import NOT_EXERCISED, UNDECIDED, outcome
 from airground_drake.registry import METHODS
 from airground_drake.report.answers import Answer
 from airground_drake.report.answers import answers as answers_of
-from airground_drake.report.outcomes import Course, Document, courses, tolerance, triggers
+from airground_drake.report.outcomes import Document, RunOutcome, courses, tolerance, triggers
 from airground_drake.report.phrases import (
     MARKS,
     MEANINGS,
@@ -94,7 +94,7 @@ def headline(document: Document) -> Line:
     return Line("partly" if mark == "yes" else mark, f"{told} {checks} not as declared.")
 
 
-def _outcome(every: Sequence[Course]) -> Line:
+def _outcome(every: Sequence[RunOutcome]) -> Line:
     """What came of the runs, in a sentence."""
     main = [course for course in every if course.plain] or every
     unknown = [course.name for course in main if course.safe is None or course.away is None]
@@ -124,7 +124,7 @@ def _outcome(every: Sequence[Course]) -> Line:
     return Line("no", f"Safe, but not all arrive{_failures(short, main, ': ')}")
 
 
-def _failures(those: Iterable[Course], among: Sequence[Course], same: str = "") -> str:
+def _failures(those: Iterable[RunOutcome], among: Sequence[RunOutcome], same: str = "") -> str:
     """What went wrong in those runs, as a sentence; `same`: begins it if the same went wrong in all of `among`."""
     told = grouped((trouble(course), course) for course in those if course.safe is False or course.away)
     if same and [len(alike) for alike in told.values()] == [len(among)]:
@@ -132,7 +132,7 @@ def _failures(those: Iterable[Course], among: Sequence[Course], same: str = "") 
     return ". " + _sentence(f"{under(alike, among)}, {what}" for what, alike in told.items())
 
 
-def _unless_one_crashed(every: Iterable[Course], told: str) -> Line:
+def _unless_one_crashed(every: Iterable[RunOutcome], told: str) -> Line:
     """Good news, unless a robot collided in any run."""
     crashed = [course for course in every if course.hits]
     hits = [f"in run {course.name}, {colliding(course)}" for course in crashed if not course.plain]
@@ -144,7 +144,7 @@ def _sentence(clauses: Iterable[str]) -> str:
     return f"{says[0].upper()}{says[1:]}."
 
 
-def _row(document: Document, course: Course) -> Row:
+def _row(document: Document, course: RunOutcome) -> Row:
     resolved = document["scenario"]["resolved"]
     says = of_run(resolved, course)
     if course.away is None:
@@ -155,7 +155,7 @@ def _row(document: Document, course: Course) -> Row:
     return Row(course.name, says, _safe(course), arrived, _interventions(document, course))
 
 
-def _safe(course: Course) -> Line:
+def _safe(course: RunOutcome) -> Line:
     near = course.near[0] if course.near else None
     if course.safe is None:
         return Line("open", f"not known, {course.why}")
@@ -167,7 +167,7 @@ def _safe(course: Course) -> Line:
     return Line("yes", told) if course.tested else Line("none", f"{told}; not tested")
 
 
-def _interventions(document: Document, course: Course) -> str:
+def _interventions(document: Document, course: RunOutcome) -> str:
     """What became of the proposals of the UAV in a run."""
     run = document["runs"][course.name]
     kinds = Counter(event["kind"] for event in run["events"])
@@ -187,7 +187,7 @@ def _interventions(document: Document, course: Course) -> str:
     return f"{', '.join(answered) or 'no answer'}{why}{failed}"
 
 
-def _beware(document: Document, every: Sequence[Course]) -> list[str]:
+def _beware(document: Document, every: Sequence[RunOutcome]) -> list[str]:
     said = ["real vehicles are safe: the model is first-order, its sensing perfect"]
     main = [course for course in every if course.plain] or every
     if seen := [course for course in main if course.safe and not (course.proof and course.proof.holds)]:

@@ -11,7 +11,7 @@ from airground_drake.base.arrays import Array
 from airground_drake.run.collisions import first_collisions
 from airground_drake.run.trace import Trace
 from airground_drake.scenarios.world import make_world
-from airground_drake.world.motion import Motion
+from airground_drake.world.motion import PeriodMotion
 from airground_drake.world.shape import Shape
 from airground_drake.world.world import ROBOTS, Body
 
@@ -73,21 +73,21 @@ def _add_collisions(trace: Trace, add: Any) -> None:
                 add(trace.t[row], own.name, "collision", **{role: body.name})
 
 
-def _way(trace: Trace, body: Body) -> Motion:
+def _way(trace: Trace, body: Body) -> PeriodMotion:
     """Motion of a body between the rows: (T - 1, 3), or (3,) if it never moves."""
     if body.plant is None:
-        return Motion(body.start_m, body.start_m)
+        return PeriodMotion(body.start_m, body.start_m)
     position = trace.position(body.name)
     return body.plant.motion(position[:-1], position[1:], np.diff(trace.t))
 
 
-def _box(way: Motion) -> tuple[Array, Array]:
+def _box(way: PeriodMotion) -> tuple[Array, Array]:
     """Two opposite corners, (3,), m, of a box around a motion."""
     places = np.concatenate([way.start.reshape(-1, 3), way.end.reshape(-1, 3)])
     return places.min(axis=0) - way.off_m, places.max(axis=0) + way.off_m
 
 
-def visits(apart: Motion, shape: Shape, within: float) -> npt.NDArray[np.intp]:
+def visits(apart: PeriodMotion, shape: Shape, within: float) -> npt.NDArray[np.intp]:
     """Rows, (K,), at which a centre comes within a distance of a shape; between two rows, the first of them.
 
     Args:

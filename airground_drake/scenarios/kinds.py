@@ -95,7 +95,7 @@ GroundPoint = Annotated[Point, AfterValidator(_on_the_ground)]
 
 
 @dataclass(frozen=True)
-class Rule:
+class ValueRule:
     """A function that returns a value or raises `refused`, and the rule in JSON Schema.
 
     A registry in the schema stands for its names; `json_schema.py` inserts them.
@@ -120,10 +120,10 @@ class Rule:
         return {**handler(schema), **self.says()}
 
 
-PointOrNone = Annotated[list[Real], Field(strict=True), Rule(_all_or_none, lambda: {"minItems": 0, "maxItems": 3})]
+PointOrNone = Annotated[list[Real], Field(strict=True), ValueRule(_all_or_none, lambda: {"minItems": 0, "maxItems": 3})]
 
 
-def one_of(options: Iterable[str], place: str = "") -> Rule:
+def one_of(options: Iterable[str], place: str = "") -> ValueRule:
     """A name from a collection, or from another one at a place, `module:NAME`, which is imported when needed."""
 
     def allowed() -> list[str]:
@@ -135,10 +135,10 @@ def one_of(options: Iterable[str], place: str = "") -> Rule:
             raise refused(value, f"one of {', '.join(each or repr(each) for each in allowed())}")
         return value
 
-    return Rule(check, lambda: {"enum": allowed()})
+    return ValueRule(check, lambda: {"enum": allowed()})
 
 
-def registered(registry: Registry) -> Rule:
+def registered(registry: Registry) -> ValueRule:
     """A name of a registry, or a plug-in."""
 
     def check(value: str) -> str:
@@ -146,10 +146,10 @@ def registered(registry: Registry) -> Rule:
             raise refused(value, f"one of {', '.join(registry.allowed)}")
         return value
 
-    return Rule(check, lambda: {"anyOf": [{"enum": registry}, PLUG_IN]})
+    return ValueRule(check, lambda: {"anyOf": [{"enum": registry}, PLUG_IN]})
 
 
-def expected_of(claims: Registry) -> Rule:
+def expected_of(claims: Registry) -> ValueRule:
     """Expected verdicts by claim, and of runs also numbers; `validate.py` checks the names, as a scenario adds claims.
 
     Claims about the model have no numbers beside them.
@@ -166,7 +166,7 @@ def expected_of(claims: Registry) -> Rule:
                 raise refused(expected, f"one of {', '.join(EXPECTATIONS)}, {several}", name)
         return {name: declared(expected) if isinstance(expected, str) else expected for name, expected in value.items()}
 
-    return Rule(check, lambda: {EXPECTED: claims})
+    return ValueRule(check, lambda: {EXPECTED: claims})
 
 
 def _one_value(value: object) -> object:
@@ -175,10 +175,10 @@ def _one_value(value: object) -> object:
     return _visible(value) if isinstance(value, str) else value
 
 
-OneValue = Annotated[Any, Rule(_one_value, lambda: {"type": ["number", "string", "boolean"]})]
+OneValue = Annotated[Any, ValueRule(_one_value, lambda: {"type": ["number", "string", "boolean"]})]
 
 
-def settings_of(sections: tuple[str, ...]) -> Rule:
+def settings_of(sections: tuple[str, ...]) -> ValueRule:
     """Values by dotted keys of some sections of a scenario."""
 
     def check(value: dict[str, object]) -> dict[str, object]:
@@ -188,7 +188,7 @@ def settings_of(sections: tuple[str, ...]) -> Rule:
                 raise refused(given, allowed, key)
         return value
 
-    return Rule(check, lambda: {"propertyNames": {"pattern": rf"^(({'|'.join(sections)})\..+|<<)$"}})
+    return ValueRule(check, lambda: {"propertyNames": {"pattern": rf"^(({'|'.join(sections)})\..+|<<)$"}})
 
 
 def _claims_of_others(value: dict[str, str]) -> dict[str, str]:
@@ -202,4 +202,6 @@ def _claims_of_others(value: dict[str, str]) -> dict[str, str]:
     return value
 
 
-CLAIMS = Rule(_claims_of_others, lambda: {"patternProperties": {CLAIM_PATTERN: PLUG_IN}, "additionalProperties": False})
+CLAIMS = ValueRule(
+    _claims_of_others, lambda: {"patternProperties": {CLAIM_PATTERN: PLUG_IN}, "additionalProperties": False}
+)

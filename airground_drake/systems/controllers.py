@@ -29,7 +29,7 @@ from airground_drake.base.errors import PluginError, short
 from airground_drake.intervention.messages import NOTHING, accepted_proposals
 from airground_drake.intervention.policy import Proposal
 from airground_drake.nsbc.avoidance import Avoidance
-from airground_drake.nsbc.law import Intervention, UgvLaw
+from airground_drake.nsbc.law import AcceptedMotion, UgvLaw
 from airground_drake.nsbc.task import Task
 from airground_drake.nsbc.tasks import FormationTask
 from airground_drake.systems.lifetime import weakly
@@ -142,7 +142,7 @@ class UgvController(_Controller):
             Commands, (n, 3), m/s.
         """
         law = self.law if law is None else law
-        asked = [None if p is None else Intervention(*p.motion.at(t), p.chosen) for p in accepted]
+        asked = [None if p is None else AcceptedMotion(*p.motion.at(t), p.chosen) for p in accepted]
         return law.velocity(positions, self._world.at(self._near, t), reference, rate, asked)
 
 

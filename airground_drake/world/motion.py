@@ -12,7 +12,7 @@ SAME_S = 1e-9
 """Times closer than this are one instant, s."""
 
 
-class Motion(NamedTuple):
+class PeriodMotion(NamedTuple):
     """A centre that stays within `off_m` of a point in uniform straight motion; exact if that is 0.
 
     The leading dimensions (...) are periods. `geometry.motion.Motion` is another thing: a plan with times.
@@ -27,9 +27,9 @@ class Motion(NamedTuple):
     end: Array
     off_m: float = 0.0
 
-    def seen_from(self, other: Motion) -> Motion:
+    def seen_from(self, other: PeriodMotion) -> PeriodMotion:
         """The same motion relative to another centre that moves during the same periods."""
-        return Motion(self.start - other.start, self.end - other.end, self.off_m + other.off_m)
+        return PeriodMotion(self.start - other.start, self.end - other.end, self.off_m + other.off_m)
 
     def least_distance(self) -> tuple[Array, Array]:
         """The least distance from the origin.

@@ -8,7 +8,7 @@ from typing import ClassVar, Protocol
 import numpy as np
 
 from airground_drake.base.arrays import Array
-from airground_drake.world.motion import Motion
+from airground_drake.world.motion import PeriodMotion
 
 
 class Plant(Protocol):
@@ -23,7 +23,7 @@ class Plant(Protocol):
     def step(self, position: Array, velocity: Array, period_s: Array | float) -> Array:
         """Where a velocity (..., 3), m/s, leads to in periods (...,), s, from positions (..., 3), m: (..., 3), m."""
 
-    def motion(self, start: Array, end: Array, period_s: Array | float) -> Motion:
+    def motion(self, start: Array, end: Array, period_s: Array | float) -> PeriodMotion:
         """How it moves between its positions at the two ends of a period, (..., 3), m."""
 
     def reach(self, speed_m_s: float, period_s: float) -> float:
@@ -40,9 +40,9 @@ class FirstOrder:
         """Exact."""
         return position + np.asarray(period_s)[..., None] * velocity
 
-    def motion(self, start: Array, end: Array, period_s: Array | float) -> Motion:
+    def motion(self, start: Array, end: Array, period_s: Array | float) -> PeriodMotion:
         """Exact."""
-        return Motion(start, end)
+        return PeriodMotion(start, end)
 
     def reach(self, speed_m_s: float, period_s: float) -> float:
         """0."""

@@ -8,7 +8,7 @@ from typing import Protocol
 import numpy as np
 
 from airground_drake.base.arrays import Array
-from airground_drake.world.motion import Motion
+from airground_drake.world.motion import PeriodMotion
 
 
 class Shape(Protocol):
@@ -21,7 +21,7 @@ class Shape(Protocol):
     def distance(self, offset: Array) -> Array:
         """Distance, (...,), m, of its surface from points at offsets (..., 3), m, from its centre."""
 
-    def least_distance(self, motion: Motion) -> Array:
+    def least_distance(self, motion: PeriodMotion) -> Array:
         """Least such distance, (...,), m, of a point that moves relative to its centre."""
 
 
@@ -39,6 +39,6 @@ class Ball:
         """See `Shape`."""
         return np.asarray(np.linalg.norm(offset, axis=-1) - self.radius_m)
 
-    def least_distance(self, motion: Motion) -> Array:
+    def least_distance(self, motion: PeriodMotion) -> Array:
         """See `Shape`."""
         return motion.least_distance()[0] - self.radius_m

@@ -18,7 +18,7 @@ import pytest
 
 from airground_drake.base.errors import AirgroundError
 from airground_drake.check import command as checker
-from airground_drake.check.line import AGREES, RECORDED, Line
+from airground_drake.check.line import AGREES, RECORDED, CheckLine
 from airground_drake.report import rebuild
 from airground_drake.run.trace import Trace
 from airground_drake.scenarios.schema import Scenario
@@ -138,7 +138,7 @@ def attempt(report: Path, edit: Edit, *, mended: bool = True) -> tuple[int, str]
     try:
         found = checker.checked(folder, checker.LIMIT_S)
         if all(line.outcome == AGREES for line in found):
-            found = [Line(**line, by="made again") for line in rebuild.lines(folder, judge=judged)]
+            found = [CheckLine(**line, by="made again") for line in rebuild.lines(folder, judge=judged)]
     except checker.UsageError as error:
         return 2, str(error)
     except AirgroundError as error:

@@ -51,6 +51,6 @@ def test_the_law_has_20_as_the_composition_of_tasks(position: np.ndarray, select
         np.arange(count), none.astype(np.intp), np.zeros((0, 3)), none, none, np.tile(plane, (count, 1)),
         np.full(count, 1e9),
     )  # fmt: skip
-    asked = [law.Intervention(wanted, wanted_rate, inverse @ selection)] * count
+    asked = [law.AcceptedMotion(wanted, wanted_rate, inverse @ selection)] * count
     commanded = law.UgvLaw(Avoidance(1.0, 0.1), 0.7, 1.5, True).velocity(position, near, target, rate, asked)
     np.testing.assert_allclose(commanded, composed, rtol=1e-9, atol=1e-9)

@@ -16,7 +16,7 @@ from airground_drake.run import events
 from airground_drake.run.simulation import simulate
 from airground_drake.scenarios.load import load
 from airground_drake.verify import judge
-from airground_drake.world.motion import Motion
+from airground_drake.world.motion import PeriodMotion
 from airground_drake.world.plant import FirstOrder
 from airground_drake.world.shape import Ball
 from airground_drake.world.world import ROBOTS, World
@@ -76,7 +76,7 @@ def test_ugvs_stay_on_the_ground_whatever_is_above_them() -> None:
 def test_no_point_of_two_motions_is_nearer_than_the_least_distance(
     start: np.ndarray, end: np.ndarray, other: np.ndarray, moved: np.ndarray, off: float
 ) -> None:
-    apart = Motion(start, end, off).seen_from(Motion(other, moved))
+    apart = PeriodMotion(start, end, off).seen_from(PeriodMotion(other, moved))
     least, share = apart.least_distance()
     change = apart.end - apart.start
     for s in np.linspace(0.0, 1.0, 9):
@@ -91,7 +91,7 @@ def test_a_plant_that_leaves_the_straight_line_costs_what_it_may_be_off(monkeypa
     trace = simulate(load("minimal", ["duration_s=4.0"]), "d")
     (straight,) = judge(trace, ["SAFE-TRACE"])
     least = {(p["first"], p["second"]): p["min_distance_m"] for p in straight.evidence["pairs"]}
-    monkeypatch.setattr(FirstOrder, "motion", lambda self, start, end, period_s: Motion(start, end, 2.0))
+    monkeypatch.setattr(FirstOrder, "motion", lambda self, start, end, period_s: PeriodMotion(start, end, 2.0))
     (off,) = judge(replace(trace), ["SAFE-TRACE"])
     for pair in off.evidence["pairs"]:
         both = 4.0 if pair["second"] in trace.robots else 2.0

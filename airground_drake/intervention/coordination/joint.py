@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from airground_drake.intervention.coordination.roadmap import RobotTask, Space, build_roadmap
-from airground_drake.intervention.coordination.single import Body, Mover, Way, find
+from airground_drake.intervention.coordination.single import Mover, OtherRobot, Way, find
 from airground_drake.intervention.coordination.smoothing import smooth
 from airground_drake.intervention.coordination.timed import at_rest
 
@@ -62,7 +62,7 @@ def plan(
     space: Space,
     tasks: Sequence[RobotTask],
     speeds: Sequence[float],
-    fixed: Sequence[Body] = (),
+    fixed: Sequence[OtherRobot] = (),
     *,
     follow: float = math.inf,
     effort: Effort | None = None,
@@ -98,15 +98,15 @@ def plan(
     return Plan(tuple(smooth(spaces, ways, [_resting(task) for task in tasks], fixed)), search.orders, search.spent)
 
 
-def _resting(task: RobotTask) -> Body:
+def _resting(task: RobotTask) -> OtherRobot:
     """A robot that stays where it is."""
-    return Body(at_rest(task.start), task.body)
+    return OtherRobot(at_rest(task.start), task.body)
 
 
 class _Search:
     """One call of `plan`: its robots, its limits, and the work done so far."""
 
-    def __init__(self, movers: list[Mover], fixed: tuple[Body, ...], follow: float, effort: Effort) -> None:
+    def __init__(self, movers: list[Mover], fixed: tuple[OtherRobot, ...], follow: float, effort: Effort) -> None:
         self._movers, self._fixed, self._follow, self._effort = movers, fixed, follow, effort
         self.orders, self.searches, self.spent = 0, 0, 0
         self._limit = effort.expansions
@@ -173,10 +173,10 @@ class _Search:
             if way is None:
                 return ways, i
             ways[i] = way
-            taken.append(Body(way.motion, self._movers[i].task.body))
+            taken.append(OtherRobot(way.motion, self._movers[i].task.body))
         return ways, None
 
-    def _leaving(self, robot: int) -> Body:
+    def _leaving(self, robot: int) -> OtherRobot:
         """A robot at its start, until it can have left."""
         mover = self._movers[robot]
         until = LEAVING * (mover.space.apart + mover.space.spacing) / mover.speed

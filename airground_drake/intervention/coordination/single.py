@@ -20,7 +20,7 @@ ROUNDING_M = 1e-9
 """Distances between robots may fall short by this, m."""
 
 
-class Body(NamedTuple):
+class OtherRobot(NamedTuple):
     """Another robot.
 
     Attributes:
@@ -81,7 +81,7 @@ class Mover:
 
 
 def find(
-    mover: Mover, fixed: Sequence[Body], follow: float, budget: int, brief: Sequence[Body] = ()
+    mover: Mover, fixed: Sequence[OtherRobot], follow: float, budget: int, brief: Sequence[OtherRobot] = ()
 ) -> tuple[Way | None, int]:
     """Find the way on which a robot is back on its preset as early as possible.
 
@@ -115,7 +115,7 @@ def find(
     return (_way(roadmap, mover, route, arrivals, joined) if len(route) else None), int(spent)
 
 
-def _blocked_times(mover: Mover, other: Body) -> tuple[Indices, Array]:
+def _blocked_times(mover: Mover, other: OtherRobot) -> tuple[Indices, Array]:
     """Nodes (B,) that another robot blocks, and when, (B, 2), s. Start and target have smaller radii, see `find`."""
     roadmap, space = mover.roadmap, mover.space
     start, target = roadmap.nodes[mover.own.start], roadmap.nodes[mover.own.target]
@@ -128,7 +128,7 @@ def _blocked_times(mover: Mover, other: Body) -> tuple[Indices, Array]:
     return nodes, np.minimum(times, other.until)
 
 
-def _joins(mover: Mover, fixed: Sequence[Body], follow: float) -> Array:
+def _joins(mover: Mover, fixed: Sequence[OtherRobot], follow: float) -> Array:
     """First and last time at which the preset can be joined at each node, (N, 2), s; see `intervals.join_time`."""
     own, roadmap, space = mover.own, mover.roadmap, mover.space
     times, places = own.preset_times, roadmap.nodes[own.preset]
@@ -151,7 +151,7 @@ def _joins(mover: Mover, fixed: Sequence[Body], follow: float) -> Array:
     return joins
 
 
-def _wished(space: Space, other: Body) -> float:
+def _wished(space: Space, other: OtherRobot) -> float:
     """Distance that a robot keeps from another one where possible, m."""
     return space.apart + other.radius + space.spacing
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from airground_drake.intervention.coordination.roadmap import Space
-from airground_drake.intervention.coordination.single import Body, Way
+from airground_drake.intervention.coordination.single import OtherRobot, Way
 from airground_drake.intervention.coordination.timed import straightened
 
 ROUNDS = 2
@@ -15,7 +15,7 @@ ROUNDS = 2
 
 
 def smooth(
-    spaces: Sequence[Space], ways: Sequence[Way | None], rests: Sequence[Body], fixed: Sequence[Body]
+    spaces: Sequence[Space], ways: Sequence[Way | None], rests: Sequence[OtherRobot], fixed: Sequence[OtherRobot]
 ) -> list[Way | None]:
     """The ways with straight pieces where these are free. The times at which robots join their presets do not change.
 
@@ -35,11 +35,11 @@ def smooth(
     return found
 
 
-def _moving(way: Way | None, rest: Body) -> Body:
+def _moving(way: Way | None, rest: OtherRobot) -> OtherRobot:
     return rest if way is None else rest._replace(motion=way.motion)
 
 
-def _straightened(space: Space, way: Way, others: Sequence[Body]) -> Way:
+def _straightened(space: Space, way: Way, others: Sequence[OtherRobot]) -> Way:
     stacked = np.concatenate([np.zeros((0, 3)), *(other.motion for other in others)])
     begins = np.concatenate([[0], np.cumsum([len(other.motion) for other in others])]).astype(np.int64)
     apart = np.array([space.apart + other.radius + space.spacing for other in others])

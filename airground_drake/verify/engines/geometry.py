@@ -16,7 +16,7 @@ import numpy.typing as npt
 from scipy.optimize import brentq
 
 from airground_drake.base.arrays import Array
-from airground_drake.world.motion import Motion
+from airground_drake.world.motion import PeriodMotion
 
 MERGE_S = 1e-9
 """Rows closer than this are one instant, s: periods that are not binary fractions give simulator steps of
@@ -53,7 +53,7 @@ def closest_approach(t: Array, first: Array, second: Array, off_m: float = 0.0) 
     relative = first - second
     if len(t) == 1:
         return Approach(float(np.linalg.norm(relative[0])), float(t[0]), 0)
-    distance, fraction = Motion(relative[:-1], relative[1:], off_m).least_distance()
+    distance, fraction = PeriodMotion(relative[:-1], relative[1:], off_m).least_distance()
     k = int(np.argmin(distance))
     instant = min(t[k] + fraction[k] * (t[k + 1] - t[k]), t[k + 1])
     return Approach(float(distance[k]), float(instant), k + 1)

@@ -15,7 +15,7 @@ from properties import examples
 
 from airground_drake.intervention.coordination.joint import Effort, Plan, plan
 from airground_drake.intervention.coordination.roadmap import RobotTask, Space
-from airground_drake.intervention.coordination.single import Body, _wished
+from airground_drake.intervention.coordination.single import OtherRobot, _wished
 from airground_drake.intervention.coordination.timed import free_pieces
 
 CORRIDOR = [(x, y) for x in np.arange(-6.0, 6.1, 1.5) for y in (-2.3, 2.3)]
@@ -36,7 +36,9 @@ def distances(one: Array, other: Array) -> Array:
     return np.sqrt(np.append(inner, np.square(offset[-1]).sum()))
 
 
-def assert_keeps_distances(room: Space, tasks: list[RobotTask], found: Plan, speed: float, fixed: list[Body]) -> None:
+def assert_keeps_distances(
+    room: Space, tasks: list[RobotTask], found: Plan, speed: float, fixed: list[OtherRobot]
+) -> None:
     """From obstacles and from each other, radii included; less only where they begin or, of robots, end nearer."""
     ways = motions(found, tasks)
     for way, one in zip(ways, tasks, strict=True):
@@ -47,7 +49,7 @@ def assert_keeps_distances(room: Space, tasks: list[RobotTask], found: Plan, spe
         for centre, radius in zip(room.centres, room.radii, strict=True):
             least = min(radius + one.body, float(np.hypot(*(one.start - centre))))
             assert distances(way, np.array([[0.0, *centre]])).min() >= least - 2e-9
-    bodies = [Body(way, one.body) for way, one in zip(ways, tasks, strict=True)]
+    bodies = [OtherRobot(way, one.body) for way, one in zip(ways, tasks, strict=True)]
     moved = [body for body, way in zip(bodies, found.ways, strict=True) if way is not None]  # others may be run into
     for one, other in [*combinations(bodies, 2), *((body, each) for body in moved for each in fixed)]:
         ends = [float(np.hypot(*(one.motion[k, 1:] - other.motion[k, 1:]))) for k in (0, -1)]
@@ -66,7 +68,7 @@ def test_every_distance_is_kept_at_all_times(
     room, tasks = random_team(seed, min(count, 1 + int(extent / 4.0)), min(obstacles, int(extent / 3.0)), extent)
     tasks = [replace(one, body=bodies[k % len(bodies)]) for k, one in enumerate(tasks)]
     room = replace(room, radii=room.radii + np.arange(len(room.radii)) % 2 * bodies[-1])
-    fixed = [Body(np.array([[0.0, -30.0, extent / 2.0], [30.0, 2.0 * extent, extent / 2.0]]), bodies[-1])]
+    fixed = [OtherRobot(np.array([[0.0, -30.0, extent / 2.0], [30.0, 2.0 * extent, extent / 2.0]]), bodies[-1])]
     found = plan(room, tasks, [1.0] * len(tasks), fixed, effort=Effort(orders=6))
     assert_keeps_distances(room, tasks, found, 1.0, fixed)
     for way, one in zip(found.ways, tasks, strict=True):
@@ -146,5 +148,5 @@ def test_a_body_in_the_way_of_a_preset(radius: float, beside: float, free: bool)
     """It stands beside the middle piece, farther away than two points must be by `beside`, m."""
     room = space()
     preset = np.array([[0.0, -9.0, 0.0], [4.0, -5.0, 0.0], [14.0, 5.0, 0.0], [18.0, 9.0, 0.0]])
-    other = Body(np.array([[0.0, 0.0, room.apart + room.spacing + beside]]), radius)
+    other = OtherRobot(np.array([[0.0, 0.0, room.apart + room.spacing + beside]]), radius)
     assert free_pieces(preset, other.motion, _wished(room, other)).tolist() == [True, free, True]
