@@ -13,11 +13,13 @@ from airground_drake.verify.claim import TIME_TOLERANCE_S
 from airground_drake.verify.engines.geometry import interpolate
 from airground_drake.verify.runs.acceptances import METHOD
 from airground_drake.verify.runs.pairs import appears_of, centres_of
-from airground_drake.verify.runs.proposals import proposal_of
-from oracles.beginnings import MOST_CLAIMED, asked_of
+from airground_drake.verify.runs.proposals import ProposalRecord, proposal_of, proposals_of
 from oracles.fault import Fault
+from oracles.protocol import answers_to
 from oracles.sensing import SAME_M, first_sensed
 
+MOST_CLAIMED = 64
+"""Obstacles of a message that a UGV takes into account."""
 EDGE_M = 1e-9
 """Within this of the sensing range an obstacle may have been sensed or not, m."""
 
@@ -71,3 +73,16 @@ def _told(trace: Trace, ugv: str, t: float, mapped_m: Array, radius_m: Array, kn
     apart = (np.linalg.norm(mapped_m[:, None] - known_m, axis=2) > SAME_M).all(axis=1)
     rows = np.flatnonzero((far > trace.scenario.control.sensing_range_m) & apart & (radius_m >= 0.0))
     return sorted(rows[np.argsort(far[rows], kind="stable")[:MOST_CLAIMED]].tolist())
+
+
+def asked_of(trace: Trace, ugv: str, t: float) -> tuple[ProposalRecord | None, bool]:
+    """The proposal in force for a UGV at a sample of the gatekeeper, unless it has refused it by the sample before.
+
+    A proposal is in force if the UGV decides about it at that sample. Besides: whether it has accepted it by then.
+    """
+    for one in proposals_of(trace):
+        answers = answers_to(trace, one) if one.ugv == ugv else []
+        if any(abs(answer.t_s - t) <= TIME_TOLERANCE_S for answer in answers):
+            before = [answer.accepted for answer in answers if answer.t_s < t - TIME_TOLERANCE_S]
+            return (one if all(before[-1:]) else None), any(before[-1:])
+    return None, False

@@ -117,7 +117,7 @@ def later(kind: str, by_s: float) -> Edit:
 
 
 def other_map(trace: Trace) -> Trace:
-    """Predictions rest on the map in the message."""
+    """What a UGV believes is a part of the map in the message."""
     walls = np.ravel([[3.3, 9.5, 0.0], [5.0, 9.0, 0.0], [6.5, 7.5, 0.0]])
     return each_value(mapped_m=lambda _: walls, mapped_radius_m=lambda _: np.zeros(3))(trace)
 
@@ -153,7 +153,6 @@ RECORDS: dict[str, tuple[tuple[str, str, Edit, str], ...]] = {
         ("another law", B_C, scenario(control__intervention_gain_1_s=1.6), "velocity of mode"),
         ("stalls", B_D, first(refused, refuse_stalls=0.0), "refuse: stalls"),
         ("way left", B_D, first(refused, accept_left_m=lambda v: 0.5 * v), "accept: outcome"),
-        ("another map", B_D, other_map, ""),
     ),
     "progress": (
         ("reason", B_D, first(refused, reason="not_cheaper"), "answer or reason"),
@@ -170,6 +169,7 @@ RECORDS: dict[str, tuple[tuple[str, str, Edit, str], ...]] = {
         ("out of sight", B_D, first(accepted, sensed=[]), "recorded as sensed"),
         ("forgotten", B_D, first(accepted, known=[]), "recorded as known"),
         ("news", B_D, first(executing, new=[0]), "recorded as new"),
+        ("another map", B_D, other_map, "recorded as told"),
         ("told of", B_D, first(refused, told=[0]), "recorded as told"),
         ("asked", B_D, first(refused, asked=[7]), "recorded as asked"),
         ("accepted", B_D, first(refused, asked_accepted=[1]), "recorded as asked, accepted"),

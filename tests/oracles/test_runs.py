@@ -16,8 +16,7 @@ from airground_drake.run.trace import Trace
 from airground_drake.scenarios.load import from_data, load, resolved
 from airground_drake.scenarios.schema import Obstacle, Policy, Scenario
 from airground_drake.scenarios.shipped import shipped
-from airground_drake.verify.runs.proposals import proposals_of
-from oracles import ORACLES, beginnings, faults_of, predictions
+from oracles import ORACLES, faults_of, inputs, predictions
 from oracles.mutants import PATIENCE, one_direction
 from oracles.protocol import executed_at
 from oracles.way_left import bounds_of_way_left
@@ -134,13 +133,14 @@ def test_a_queue_along_an_axis_is_squeezed() -> None:
 
 
 def test_the_nearest_obstacles_of_an_endless_map_count() -> None:
-    assert outcome_gatekeeper.MOST_CLAIMED == beginnings.MOST_CLAIMED == 64
+    assert outcome_gatekeeper.MOST_CLAIMED == inputs.MOST_CLAIMED == 64
     scenario = load("case_a", ["duration_s=15.5", "reproduction=[]", "choices=[]"])
     scenario.intervention.policies = [Policy("towards", {"x_m": 6.0, "y_m": 5.0, "speed_m_s": 2.0})]
     scenario.uav.phantoms_m = [[float(x), float(y), 0.0] for x in range(10, 20) for y in range(0, 20, 2)]
     trace = simulate(scenario, "d")
-    sent = proposals_of(trace)[0]
-    known = len(beginnings.known_discs(trace, "ugv1", sent.issued_s, sent)[0])
+    known = max(
+        len(known) + len(told) for known, told in zip(*(trace.decisions[c] for c in ("known", "told")), strict=True)
+    )
     assert 64 <= known <= 64 + len(scenario.obstacles)
     assert not faults_of(trace)
 
