@@ -99,7 +99,7 @@ DEVIATIONS: tuple[PaperDeviation, ...] = (
         "As printed it is a function of the UGV's own position, so that the error is 0.", (19,),
     ),
     PaperDeviation(
-        "(13)", "intervention: its rate", ("nsbc.law:Intervention",), "changed",
+        "(13)", "intervention: its rate", ("nsbc.law:AcceptedMotion",), "changed",
         "The rate is the polyline's velocity. J_int is a constant selection of directions, the identity by default.",
         "As printed the rate is J v_int, which contains the velocity that (14) is to find.", (19,),
     ),
