@@ -24,6 +24,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any, Literal, NamedTuple
 
+import numpy as np
+
 from airground_drake.run.trace import Trace
 from airground_drake.verify.claim import TraceClaim
 from airground_drake.verify.engines.geometry import NormSignal
@@ -223,7 +225,9 @@ class Judge:
             if over is None or over >= stop:
                 break
             yield from self._missed(begun, over)
-            begun = self._reached(over, stop)
+            # from a knot below on: at the crossing itself e may equal the threshold, and no time would pass
+            low = int(np.searchsorted(self.e.t, over)) + int(np.argmax(self.e.x[self.e.t >= over] < self.release))
+            begun = self._reached(float(self.e.t[low]), stop)
         if watch.trigger is not None:
             yield self._trigger(watch.trigger, begun, watch.until)
         elif begun is not None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from itertools import islice
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,8 @@ from verify.judging import decided
 
 from airground_drake.run.trace import Trace
 from airground_drake.scenarios.schema import Decision, Preset, Threshold
+from airground_drake.verify.engines.geometry import NormSignal
+from airground_drake.verify.runs.thr_quality import Judge, Watch
 
 Run = Callable[..., Trace]
 
@@ -78,3 +81,14 @@ def test_random_motions_and_noise(trigger: str, seed: int) -> None:
     )  # fmt: skip
     assert held("THR-TRIG", trace)
     assert trace.events
+
+
+def test_a_bare_trigger_is_judged_in_a_bounded_number_of_steps() -> None:
+    """Release level and threshold are one: at a crossing the task error may equal both, and time must go on."""
+    rng = np.random.default_rng(3)
+    for _ in range(300):
+        t = np.cumsum(rng.uniform(0.05, 0.4, 12))
+        e = NormSignal.of(t, np.column_stack([rng.uniform(0.0, 6.0, 12), np.zeros((12, 3))]))
+        zeta = float(rng.uniform(1.0, 5.0))
+        found = Judge("ugv1", e, zeta, zeta, 0.0)._of_watch(Watch(float(t[0]), None, float(t[-1])))
+        assert sum(1 for _ in islice(found, 50)) < 12
