@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from html import escape
 from typing import TYPE_CHECKING
 
-if TYPE_CHECKING:  # imported by whoever has made what is shown
+if TYPE_CHECKING:  # a notebook that shows such an object has imported its module
     from pydrake.systems.framework import Diagram
 
     from airground_drake.run.trace import Trace

@@ -37,7 +37,7 @@ class Wanted(NamedTuple):
         formats: which of html, json and junit to write; traces and diagram are always written.
         command: how to make this report again.
         kept: folder of kept findings about the model, see `judge_model`; None: everything anew.
-        audit: makes the findings about the paper; None: there are none.
+        audit: makes the findings about the paper; None: the report has no findings.
         audited: whether these are all findings, so that each must be demonstrated.
         limits: what the scenario may ask for.
         seeds: with how many seeds, from 1 on, distances and arrivals are counted; 0: none.

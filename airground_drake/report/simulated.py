@@ -152,7 +152,7 @@ def _third_party(
     for key in {**recorded, **made}:
         theirs, ours = recorded.get(key), made.get(key)
         if theirs is not None and ours is not None:
-            theirs.pop("rerun", None)  # the command that judges it again is no part of a verdict
+            theirs.pop("rerun", None)  # the command that judges it again may differ
         yield _line(*key, _first(theirs, ours), f"{ours and ours['status']}, exactly", note)
 
 

@@ -215,7 +215,7 @@ def require_count(claim: Claim, finding: Finding) -> None:
 
 
 def other_plants(trace: Trace) -> str:
-    """Robots that had another plant than the scenario's, with its class, in words; empty if there are none."""
+    """Robots that had another plant than the scenario's, with its class, in words; empty if all are the scenario's."""
     kinds = trace.meta.get("plants", {})
     robots = trace.scenario.robots
     return ", ".join(f"{name}: {kind}" for name, kind in kinds.items() if kind != plant_of(robots[name]).kind)

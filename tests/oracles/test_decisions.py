@@ -18,7 +18,6 @@ from verify.runs.cases import (
     B_D,
     BINARY,
     BLOCKS,
-    EIGHT,
     LOCAL,
     RELAXED,
     SIXTH,
@@ -46,20 +45,6 @@ from oracles.decisions import GAP_TOLERANCE, OVERSTATED, UNDERSTATED, rule, wron
 Base = Callable[[str], Trace]
 COSTS = st.floats(0.1, 10.0)
 LAST = -1
-
-
-@pytest.fixture(scope="module")
-def base(run: Any) -> Base:
-    """`base(name)`: a shipped run, or one of method (c) with few stages, by route."""
-
-    def get(name: str) -> Trace:
-        if name == BLOCKS:
-            return run("soft_gate", "c", set=[*EIGHT, "gatekeeper.route=mixed_integer", "gatekeeper.blocks=4"])
-        if " " not in name:
-            return run("soft_gate", "c", set=[*EIGHT, f"gatekeeper.route={name}"])
-        return run(*name.split())
-
-    return get
 
 
 @pytest.mark.parametrize("name", [RELAXED, BINARY, LOCAL, BLOCKS, B_C, B_D, SWAP, "case_b c_literal", "case_a a"])
@@ -160,7 +145,7 @@ FAULTY: tuple[tuple[str, str, Edit, str], ...] = (
     ("budget spent", RELAXED, decision(budget_spent), ""),
     ("no normals", RELAXED, problem(normals=lambda _: []), "a bound without unit normals"),
 )  # fmt: skip
-"""What is edited, in which run, how, and a word of the fault; '': there is none."""
+"""What is edited, in which run, how, and a word of the fault; '': no fault."""
 
 
 @pytest.mark.parametrize(("name", "edit", "shown"), [row[1:] for row in FAULTY], ids=[row[0] for row in FAULTY])
