@@ -233,12 +233,19 @@ class Trace:
         return self._vectors(self.sampled, ugv, "ref_v", "m_s")
 
     def as_seen(self, by: str, of: str) -> Array:
-        """Where a robot saw a robot at the control samples, (S, 3), m: its true place, unless `seen` says otherwise."""
+        """Where a robot saw a robot at the control samples, (S, 3), m: its true place, unless `seen` says otherwise.
+
+        Raises:
+            TraceError: if a row of `seen` is not at the time of a control sample.
+        """
         places = self.position(of)[self.sample_rows]
         mine = self.seen[(self.seen["by"] == by) & (self.seen["of"] == of)]
         if len(mine):
             places = places.copy()
-            at = np.searchsorted(self.sampled("t_s"), mine["t_s"])
+            samples, times = self.sampled("t_s"), mine["t_s"].to_numpy(dtype=np.float64)
+            if not np.isin(times, samples).all():
+                raise TraceError(f"run {self.meta.get('run')}: {by} saw {of} at a time that is no control sample")
+            at = np.searchsorted(samples, times)
             places[at] = mine[["x_m", "y_m", "z_m"]].to_numpy(dtype=np.float64)
         return places
 

@@ -51,6 +51,10 @@ def _recorded_otherwise(trace: Trace) -> Iterator[Fault]:
     of = {kind: table[table["kind"] == kind] for kind in ("proposal", "withdrawal", "answer")}
     if sorted(of["answer"]["number"]) != sorted(trace.decisions["answer"]):
         yield Fault("answers are not those of the decisions")
+    period_s, read = trace.scenario.intervention.period_s, of["answer"].dropna(subset="read_s")
+    waited_s = (read["read_s"] - read["sent_s"]).to_numpy(dtype=np.float64)
+    if ((waited_s <= 0.0) | (waited_s > max(period_s, trace.scenario.gatekeeper.period_s) + TIME_TOLERANCE_S)).any():
+        yield Fault("answers are not read at the next planning instant")
     withdrawn = dict(zip(of["withdrawal"]["about"].tolist(), of["withdrawal"]["sent_s"].tolist(), strict=True))
     for sent in proposals_of(trace):
         if sent.number not in {*of["proposal"]["number"]}:

@@ -137,6 +137,7 @@ RECORDS: dict[str, tuple[tuple[str, str, Edit, str], ...]] = {
         ("part of a joint plan", DOORWAY, part_lost, "part of a joint plan not sent"),
         ("not withdrawn", B_D, messages(lambda table: table[table["kind"] != "withdrawal"]), "withdrawn at another"),
         ("withdrawn later", B_D, later("withdrawal", 0.05), "withdrawn at another time"),
+        ("read too late", B_D, messages(lambda table: table.assign(read_s=table["read_s"] + 1)), "answers are not"),
         ("an answer not sent", B_D, messages(lambda table: table.drop(index=1)), "answers are not those"),
         ("a proposal not sent", B_D, messages(lambda table: table.drop(index=0)), "a proposal is no message"),
     ),
