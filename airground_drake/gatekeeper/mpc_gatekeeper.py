@@ -20,11 +20,10 @@ from airground_drake.gatekeeper.problem import Horizon, Problem, predicted_probl
 from airground_drake.gatekeeper.rollout import View
 from airground_drake.gatekeeper.routes.route import Route
 from airground_drake.gatekeeper.solution import ConstantPlans, Solution, after_failure
+from airground_drake.geometry import convex
 from airground_drake.geometry.motion import Motion
-from airground_drake.intervention.messages import ACCEPT, REFUSE, SILENT, Disc, Proposals, Report, Reports, answer_to
+from airground_drake.intervention.messages import ACCEPT, REFUSE, SILENT, Proposals, Report, Reports, answer_to
 from airground_drake.intervention.policy import Proposal
-from airground_drake.nsbc.avoidance import Surroundings
-from airground_drake.nsbc.kernels import distances
 from airground_drake.nsbc.law import UgvLaw
 from airground_drake.world.world import World
 
@@ -39,7 +38,7 @@ class GatekeeperState:
         reports: what came with them.
         decisions: those of the last sample that was not idle.
         commitments: under method (d), each UGV's tries and rests.
-        sensed: under method (d), which obstacles each UGV has sensed so far, (n, m).
+        sensed: under method (d), which outlines at rest each UGV has sensed so far, (n, m).
         count: number of answers so far.
     """
 
@@ -95,7 +94,6 @@ class Gatekeepers(abc.ABC):
         self._presets = tuple(presets)
         self._world = world
         self._near = world.around(world.select("ugv"))
-        self._discs = np.column_stack([self._near.still, world.radius[len(world.moving) :]])
         self.times_s: list[float] = []
 
     @abc.abstractmethod
@@ -107,14 +105,15 @@ class Gatekeepers(abc.ABC):
         return not any(proposals) and not any(before.answers[::2])
 
     def _in_range(self, t: float, position: Array) -> npt.NDArray[np.bool_]:
-        """Which obstacles are there at time t, s, and within sensing range, (m,)."""
-        return distances(self._world.at(self._near, t).still, position) <= self.law.avoidance.sensing_range
+        """Which outlines at rest are there at time t, s, and within sensing range, (m,)."""
+        still, reach = self._world.at(self._near, t).still, self.law.avoidance.sensing_range
+        found: npt.NDArray[np.bool_] = convex.within(still, position[None], reach, True)[0]
+        return found
 
     def _report(self, position: Array, decision: GatekeeperDecision) -> Report:
         """The report with an answer: the obstacles within sensing range, and the reason."""
-        near = self._discs[self._in_range(decision.t, position)]
-        discs: tuple[Disc, ...] = tuple((x, y, z, radius) for x, y, z, radius in near.tolist())
-        return Report(decision.answer, discs, decision.reason, in_words(decision))
+        near = self._near.still[self._in_range(decision.t, position)]
+        return Report(decision.answer, tuple(map(convex.as_tuple, near)), decision.reason, in_words(decision))
 
     def _view(self, now: Inputs, i: int) -> View:
         """All obstacles and robots around a UGV, whether within sensing range or not."""
@@ -123,8 +122,10 @@ class Gatekeepers(abc.ABC):
             t=now.t,
             position=now.positions[i].copy(),
             preset=self._presets[i],
-            centres=Surroundings.of(near, now.positions).centre[i],
-            velocities=np.concatenate([np.zeros_like(near.still), now.velocities[near.others[i]]]),
+            still=near.still,
+            parts=near.parts[near.others[i]],
+            places=now.positions[near.carrier[near.others[i]]],
+            velocities=now.velocities[near.carrier[near.others[i]]],
             distances=near.distance[i],
             shares=near.share[i],
             max_speed=float(near.max_speed[i]),

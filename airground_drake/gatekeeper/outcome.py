@@ -22,6 +22,7 @@ from numba import njit
 
 from airground_drake.base.arrays import Array
 from airground_drake.gatekeeper.rollout import ACCEPTED, REFUSED, ClosedLoop, View, advance, closed_loop, workspace
+from airground_drake.geometry import convex
 from airground_drake.geometry.paths import NoPath, shortest_path
 from airground_drake.intervention.policy import Proposal
 from airground_drake.nsbc.law import UgvLaw
@@ -30,8 +31,8 @@ USELESS = 1e-6
 """Relative gain below which an intervention makes no difference."""
 STILL_SHARE = 0.1
 """Largest `Outlook.still` as a share of the way that the UGV can do in a second."""
-MOST_CIRCLES = 32
-"""Circles among which a shortest way is looked for: it takes 10 ms, and eight times as long for twice as many."""
+MOST_OUTLINES = 32
+"""Outlines among which a shortest way is looked for: it takes 10 ms, and eight times as long for twice as many."""
 
 
 @dataclass(frozen=True)
@@ -90,23 +91,21 @@ def outcomes(seen: View, law: UgvLaw, proposal: Proposal, look: Outlook) -> tupl
         proposal: in question.
         look: how far to look.
     """
-    h, t, m = law.avoidance.period, seen.t, len(seen.centres) - len(seen.asked)
+    h, t, m = law.avoidance.period, seen.t, len(seen.still)
     look = replace(look, still=min(look.still, STILL_SHARE * seen.max_speed))
-    discs, distances = seen.centres[:m], seen.distances[:m]
     until = min(proposal.motion.end, t + look.longest)
     ends = min(max(until, seen.preset.end), t + look.longest) + look.past
     after = h * np.arange(0.0, np.ceil((ends - t) / h) + 1.0)
-    fixed = np.broadcast_to(discs, (len(after), m, 3))
     goal = seen.preset.positions[-1]
     settled = max(until, seen.preset.end, t + look.coasting, *(asked[0].end for asked in seen.asked if asked))
     steps = int(np.ceil((settled - t) / h - 1e-9))
     found = []
     for together, accepted in ((False, 0), (True, max(0, int(np.ceil((until - t) / h - 1e-9))))):
-        places = [robot_at(seen, j, after, look.coasting, together=together)[:, None] for j in range(len(seen.asked))]
-        points = np.ascontiguousarray(np.concatenate([fixed, *places], axis=1))  # the layout that is compiled for
-        loop = closed_loop(seen, law, proposal, after, points)
+        places = [robot_at(seen, j, after, look.coasting, together=together) for j in range(len(seen.parts))]
+        moving = np.stack(places, axis=1) if places else np.empty((len(after), 0, 3))
+        loop = closed_loop(seen, law, proposal, after, moving)
         positions, cost = _rolled_out(loop, accepted, goal, steps, look.near, look.still)
-        found.append(_outcome(positions, cost, goal, seen.preset.max_speed, discs, distances, h, look))
+        found.append(_outcome(positions, cost, goal, seen, seen.distances[:m], h, look))
     return found[0], found[1]
 
 
@@ -118,47 +117,45 @@ def robot_at(seen: View, robot: int, after: Array, coasting: float, *, together:
     where this UGV accepts, too (`together`): otherwise each would refuse its part of a joint plan because the other
     parts free its way.
     """
-    k, asked = len(seen.centres) - len(seen.asked) + robot, seen.asked[robot]
+    place, asked = seen.places[robot], seen.asked[robot]
     if asked is None or not (together or asked[1]):
-        return seen.centres[k] + np.minimum(after, coasting)[:, None] * seen.velocities[k]
+        return place + np.minimum(after, coasting)[:, None] * seen.velocities[robot]
     motion, _ = asked
-    beside = seen.centres[k] - motion.at(seen.t)[0]
+    beside = place - motion.at(seen.t)[0]
     return motion.sample(seen.t + after) + np.exp(-after)[:, None] * beside
 
 
 def _outcome(
-    positions: Array, cost: float, goal: Array, speed: float, discs: Array, distances: Array, h: float, look: Outlook
+    positions: Array, cost: float, goal: Array, seen: View, distances: Array, h: float, look: Outlook
 ) -> Outcome:
     end = positions[-1]
     if np.linalg.norm(end - goal) <= look.near:
         return Outcome(positions, False, 0.0, cost)
     before = positions[max(0, len(positions) - 1 - max(1, round(1.0 / h)))]
     stalls = bool(np.linalg.norm(end - before) < look.still)
-    left = way_left(end, goal, discs, distances)
-    ahead = left**3 / (3.0 * max(speed, 1e-9))
+    left = way_left(end, goal, seen.still, distances)
+    ahead = left**3 / (3.0 * max(seen.preset.max_speed, 1e-9))
     return Outcome(positions, stalls, left, ahead if stalls else cost + ahead)
 
 
-def way_left(place: Array, goal: Array, discs: Array, distances: Array | float) -> float:
-    """Length of the shortest way to the goal among circles around discs (m, 3), m; straight if no way is free.
+def way_left(place: Array, goal: Array, rows: Array, distances: Array) -> float:
+    """Length of the shortest way to the goal that keeps distances (m,), m, from cores (m, W), m; straight without one.
 
-    Balls of radii `distances`, (m,) or one for all, m, meet the plane of the way in these circles. If there are more
-    than `MOST_CIRCLES`, those nearest to the straight way count, so that no map makes it take long.
+    If there are more than `MOST_OUTLINES` in the plane of the way, those nearest to the straight way count, so that no
+    map makes it take long.
     """
-    squared = np.square(distances) - np.square(discs[:, 2] - place[2])
-    near = squared > 0.0
-    centres, radii = discs[near, :2], np.sqrt(squared[near])
-    leg = goal[:2] - place[:2]
+    rows, distances = convex.sections(rows, distances, float(place[2]))
+    start, end = (np.append(each[:2], 0.0) for each in (place, goal))
+    leg = end - start
     length = float(np.sqrt(leg @ leg))
-    along = np.clip((centres - place[:2]) @ leg / max(length**2, 1e-300), 0.0, 1.0)
-    beside = np.linalg.norm(place[:2] + along[:, None] * leg - centres, axis=1) - radii
+    beside = convex.beside(rows, start, end) - distances
     if (beside >= 0.0).all():
         return length
-    if len(centres) > MOST_CIRCLES:
-        nearest = np.argsort(beside, kind="stable")[:MOST_CIRCLES]
-        centres, radii = centres[nearest], radii[nearest]
+    if len(rows) > MOST_OUTLINES:
+        nearest = np.argsort(beside, kind="stable")[:MOST_OUTLINES]
+        rows, distances = rows[nearest], distances[nearest]
     try:
-        return shortest_path(place[:2], goal[:2], centres, radii).length_m
+        return shortest_path(start[:2], end[:2], rows, distances).length_m
     except NoPath:
         return length
 

@@ -24,10 +24,11 @@ from airground_drake.gatekeeper.mpc_gatekeeper import Gatekeepers, GatekeeperSta
 from airground_drake.gatekeeper.outcome import Outcome, Outlook, outcomes
 from airground_drake.gatekeeper.patience import Commitment, Patience
 from airground_drake.gatekeeper.rollout import View
+from airground_drake.geometry import convex
+from airground_drake.geometry.convex import news_within, within
 from airground_drake.geometry.motion import Motion
 from airground_drake.intervention.messages import ACCEPT, DONE, REFUSE, SILENT, Proposals, Report, answer_to
 from airground_drake.intervention.policy import Proposal
-from airground_drake.nsbc.kernels import news_within, within
 from airground_drake.nsbc.law import UgvLaw
 from airground_drake.world.world import World
 
@@ -35,8 +36,6 @@ ACCEPTING: tuple[Reason, ...] = ("cheaper", "makes_way")
 """Reasons for which a proposal is accepted."""
 MOST_CLAIMED = 64
 """Obstacles of the UAV's map that a UGV takes into account."""
-SAME_M = 1e-9
-"""Obstacles closer to each other than this are one, m."""
 
 
 class OutcomeGatekeepers(Gatekeepers):
@@ -85,24 +84,23 @@ class OutcomeGatekeepers(Gatekeepers):
         )  # fmt: skip
 
     def _remembered(self, t: float, positions: Array, before: GatekeeperState) -> np.ndarray:
-        """Which obstacles each UGV has sensed up to time t, s, (n, m); the very same array if nothing is new."""
-        points, own = self._world.at(self._near, t).still, positions[self._near.members]
+        """Which outlines each UGV has sensed up to time t, s, (n, m); the very same array if nothing is new."""
+        still, own = self._world.at(self._near, t).still, positions[self._near.members]
         reach = self.law.avoidance.sensing_range
-        if before.sensed.shape != (len(own), len(points)):
-            return within(points, own, reach)
-        if news_within(points, own, reach, before.sensed):
-            return before.sensed | within(points, own, reach)
+        if before.sensed.shape != (len(own), len(still)):
+            return within(still, own, reach, True)
+        if news_within(still, own, reach, True, before.sensed):
+            return before.sensed | within(still, own, reach, True)
         return before.sensed
 
     def _discovered(
         self, sensed: npt.NDArray[np.bool_], before: GatekeeperState, i: int, proposal: Proposal
     ) -> tuple[int, ...]:
-        """Obstacles that a UGV senses for the first time and that are not on the proposal's map."""
+        """Outlines that a UGV senses for the first time and that are not on the proposal's map."""
         if sensed is before.sensed or before.sensed.shape != sensed.shape:
             return ()
         new = np.flatnonzero(sensed[i] & ~before.sensed[i])
-        apart = np.linalg.norm(self._near.still[new, None] - proposal.mapped, axis=2)
-        return tuple(new[~(apart <= SAME_M).any(axis=1)].tolist())
+        return tuple(new[~convex.same(self._near.still[new], proposal.mapped).any(axis=1)].tolist())
 
     def _decide(
         self,
@@ -146,10 +144,10 @@ class OutcomeGatekeepers(Gatekeepers):
         """A UGV's knowledge: obstacles sensed or told of, other robots and the motions asked of them."""
         around, m = self._view(now, i), len(self._near.still)
         told = self._believed(now.positions[i], known.sensed[i], proposal)
-        discs, distances = self._known(known.sensed[i], told, i, proposal)
+        still = convex.joined(self._near.still[known.sensed[i]], proposal.mapped[told])
         asked: list[tuple[Motion, bool] | None] = []
         numbers = list[tuple[int, bool]]()
-        for j in self._near.others[i].tolist():
+        for j in self._near.carrier[self._near.others[i]].tolist():
             other = now.proposals[j] if j < len(now.proposals) else None
             answer = answer_to(other, known.answers, j)
             if other and answer in (ACCEPT, SILENT):
@@ -162,10 +160,9 @@ class OutcomeGatekeepers(Gatekeepers):
         basis = Basis(tuple(sensed), tuple(remembered), (), tuple(told.tolist()), tuple(numbers))
         seen = replace(
             around,
-            centres=np.concatenate([discs, around.centres[m:]]),
-            velocities=np.concatenate([np.zeros_like(discs), around.velocities[m:]]),
-            distances=np.concatenate([distances, around.distances[m:]]),
-            shares=np.concatenate([np.ones(len(discs)), around.shares[m:]]),
+            still=still,
+            distances=np.concatenate([convex.keep(still, self._world.radius[i]), around.distances[m:]]),
+            shares=np.concatenate([np.ones(len(still)), around.shares[m:]]),
             asked=tuple(asked),
         )
         return seen, basis
@@ -173,25 +170,17 @@ class OutcomeGatekeepers(Gatekeepers):
     def _believed(self, position: Array, sensed: npt.NDArray[np.bool_], proposal: Proposal) -> npt.NDArray[np.intp]:
         """Rows of the UAV's map that are out of a UGV's sight and that it has not sensed itself.
 
-        Only the `MOST_CLAIMED` of these that are nearest count, so that no map makes a decision take long. Obstacles
-        whose radius is negative or not finite are left out.
+        Only the `MOST_CLAIMED` of these that are nearest count, so that no map makes a decision take long. Rows that
+        are no outlines are left out.
         """
-        own, claimed = self._near.still[sensed], proposal.mapped
-        radii = np.broadcast_to(proposal.mapped_radii, len(claimed))
-        hidden = np.linalg.norm(claimed - position, axis=1) > self.law.avoidance.sensing_range
-        apart = np.linalg.norm(claimed[:, None] - own, axis=2)
-        new = np.flatnonzero(hidden & (apart > SAME_M).all(axis=1) & np.isfinite(radii) & (radii >= 0.0))
-        nearest = np.argsort(np.linalg.norm(claimed[new] - position, axis=1), kind="stable")[:MOST_CLAIMED]
+        claimed = proposal.mapped
+        apart = np.full(len(claimed), -np.inf)
+        sound = convex.are_outlines(claimed)
+        apart[sound] = convex.distances(claimed[sound], position, True)
+        known = convex.same(claimed, self._near.still[sensed]).any(axis=1)
+        new = np.flatnonzero((apart > self.law.avoidance.sensing_range) & ~known)
+        nearest = np.argsort(apart[new], kind="stable")[:MOST_CLAIMED]
         return new[np.sort(nearest)]
-
-    def _known(
-        self, sensed: npt.NDArray[np.bool_], told: npt.NDArray[np.intp], i: int, proposal: Proposal
-    ) -> tuple[Array, Array]:
-        """Centres, (k, 3), and safe distances, (k,), m, of the obstacles that a UGV has sensed, and of those told."""
-        radii = np.broadcast_to(proposal.mapped_radii, len(proposal.mapped))[told]
-        away = self._world.apart("ugv", "obstacle") + (self._world.radius[self._near.members[i]] + radii)
-        distances = np.concatenate([self._near.distance[i, : len(sensed)][sensed], away])
-        return np.concatenate([self._near.still[sensed], proposal.mapped[told]]), distances
 
 
 def _answer(decision: GatekeeperDecision, standing: float) -> float:

@@ -10,6 +10,7 @@ import numpy as np
 from airground_drake.base.arrays import Array, read_only
 from airground_drake.gatekeeper.cost import Terms, half_plane_cost, plan_cost
 from airground_drake.gatekeeper.rollout import ACCEPTED, REFUSED, View, closed_loop, follow
+from airground_drake.geometry import convex
 from airground_drake.intervention.policy import Proposal
 from airground_drake.nsbc.law import UgvLaw
 
@@ -113,20 +114,28 @@ class Evaluation:
 
 
 def predicted_problem(seen: View, law: UgvLaw, proposal: Proposal, horizon: Horizon) -> Problem:
-    """(26) for one UGV: roll out both choices and keep the points that it senses and might come near."""
-    seen = seen.restrict(np.linalg.norm(seen.centres - seen.position, axis=1) <= law.avoidance.sensing_range)
+    """(26) for one UGV: roll out both choices and keep what it senses and might come near.
+
+    (26) knows points. Of an obstacle that is no point these are, at each stage, its core's nearest to the refused
+    roll-out; there is no guarantee that an accepted one keeps its distance from the others.
+    """
+    seen = seen.restrict(seen.apart() <= law.avoidance.sensing_range)
     dt, stages = horizon.substeps * law.avoidance.period, np.ones(horizon.stages, dtype=np.int64)
     samples = law.avoidance.period * np.arange(0.0, horizon.stages * horizon.substeps + 1.0)
-    points = seen.centres + samples[:, None, None] * seen.velocities
-    loop = closed_loop(seen, law, proposal, samples, points, horizon.substeps)
-    accept, refuse = (follow(loop, mode * stages)[1] for mode in (ACCEPTED, REFUSED))
+    places = seen.places + samples[:, None, None] * seen.velocities
+    loop = closed_loop(seen, law, proposal, samples, places, horizon.substeps)
+    (_, accept), (standing, refuse) = (follow(loop, mode * stages) for mode in (ACCEPTED, REFUSED))
     squared = np.maximum(np.square(accept).sum(axis=1), np.square(refuse).sum(axis=1))
     # a plan that switches may be faster than both constant ones, but for a retreat not above the speed limit
     reach = dt * np.cumsum(np.sqrt(np.maximum(squared, seen.max_speed**2)))
-    centres = points[horizon.substeps :: horizon.substeps]
-    gap = np.linalg.norm(centres - seen.position, axis=2) - seen.distances - reach[:, None]
-    height = np.abs(centres[:, :, 2] - seen.position[2]) - seen.distances
-    near = ~((gap >= 0.0) | (height >= 0.0)).all(axis=0)  # NaN counts as near, so that the problem is refused
+    moving = places[horizon.substeps :: horizon.substeps]
+    centres = np.concatenate([convex.nearest_points(seen.still, standing), moving], axis=1)
+    away, height = np.linalg.norm(moving - seen.position, axis=2), np.abs(moving[:, :, 2] - seen.position[2])
+    m, z = len(seen.still), seen.position[2]
+    above = np.maximum(np.maximum(seen.still[:, convex.BASE] - z, z - seen.still[:, convex.TOP]), 0.0)
+    away = np.column_stack([np.tile(seen.apart()[:m], (len(moving), 1)), away]) - seen.distances - reach[:, None]
+    height = np.column_stack([np.tile(above, (len(moving), 1)), height]) - seen.distances
+    near = ~((away >= 0.0) | (height >= 0.0)).all(axis=0)  # NaN counts as near, so that the problem is refused
     return Problem(
         dt=dt,
         initial=seen.position,

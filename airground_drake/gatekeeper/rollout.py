@@ -10,9 +10,10 @@ import numpy.typing as npt
 from numba import njit
 
 from airground_drake.base.arrays import Array
+from airground_drake.geometry import convex
 from airground_drake.geometry.motion import Motion
 from airground_drake.intervention.policy import Proposal
-from airground_drake.nsbc.kernels import Points, fill_half_spaces
+from airground_drake.nsbc.kernels import fill_half_spaces
 from airground_drake.nsbc.law import AcceptedMotion, Numbers, Tracking, UgvLaw, UgvState, command
 
 REFUSED, ACCEPTED = 0, 1
@@ -21,40 +22,48 @@ REFUSED, ACCEPTED = 0, 1
 
 @dataclass(frozen=True, eq=False)
 class View:
-    """A UGV's view when it decides: K points, obstacles first, then other robots.
+    """A UGV's view when it decides: m outlines at rest, then n parts of bodies that move, see `geometry.convex`.
 
     Attributes:
         t: time, s.
         position: own position, (3,), m.
         preset: own preset trajectory.
-        centres: obstacles and other robots, (K, 3), m.
-        velocities: their velocities, taken as constant, (K, 3), m/s.
-        distances: safe distances to them, (K,), m.
-        shares: share of each avoidance inequality, (K,).
+        still: outlines at rest, (m, W), world frame.
+        parts: outlines that move, about the origins of their bodies, (n, W).
+        places: positions of these bodies, (n, 3), m.
+        velocities: their velocities, taken as constant, (n, 3), m/s.
+        distances: safe distances from the cores, (m + n,), m.
+        shares: share of each avoidance inequality, (m + n,).
         max_speed: own speed limit, m/s.
-        asked: under method (d), per other robot, the motion that it is asked to make and whether it has accepted it,
-            or None.
+        asked: under method (d), per part that moves, the motion that its body is asked to make and whether it has
+            accepted it, or None.
     """
 
     t: float
     position: Array
     preset: Motion
-    centres: Array
+    still: Array
+    parts: Array
+    places: Array
     velocities: Array
     distances: Array
     shares: Array
     max_speed: float
     asked: tuple[tuple[Motion, bool] | None, ...] = ()
 
+    def apart(self) -> Array:
+        """Signed distances of the own position from the cores, (m + n,), m."""
+        fixed = convex.distances(self.still, self.position, True)
+        moving = [convex.distances(self.parts[j, None], self.position - at, True) for j, at in enumerate(self.places)]
+        return np.concatenate([fixed, *moving])
+
     def restrict(self, sensed: npt.NDArray[np.bool_]) -> View:
-        """The same with only the points (K,) that are marked as sensed."""
+        """The same with only what is marked as sensed, (m + n,)."""
+        fixed, moving = sensed[: len(self.still)], sensed[len(self.still) :]
         return replace(
-            self,
-            centres=self.centres[sensed],
-            velocities=self.velocities[sensed],
-            distances=self.distances[sensed],
-            shares=self.shares[sensed],
-        )
+            self, still=self.still[fixed], parts=self.parts[moving], places=self.places[moving],
+            velocities=self.velocities[moving], distances=self.distances[sensed], shares=self.shares[sensed],
+        )  # fmt: skip
 
 
 class ClosedLoop(NamedTuple):
@@ -68,9 +77,12 @@ class ClosedLoop(NamedTuple):
         preset: own preset trajectory at the control samples, (S + 1, 3), m.
         wanted: the proposed motion at the control samples, (S + 1, 3), m.
         chosen: J_int^+ J_int, projector onto the directions in which the UAV intervenes, (3, 3).
-        points: where the points to keep away from are at the control samples, (S + 1, K, 3), m.
-        distances: safe distances to them, (K,), m.
-        shares: share of each avoidance inequality, (K,).
+        still: outlines at rest, (m, W).
+        parts: outlines that move, (n, W).
+        every: 0 to n - 1, the indices of all of them.
+        places: where the bodies that move are at the control samples, (S + 1, n, 3), m.
+        distances: safe distances from the cores, (m + n,), m.
+        shares: share of each avoidance inequality, (m + n,).
         max_speed: own speed limit, m/s.
         substeps: control periods per stage.
     """
@@ -80,7 +92,10 @@ class ClosedLoop(NamedTuple):
     preset: Array
     wanted: Array
     chosen: Array
-    points: Array
+    still: Array
+    parts: Array
+    every: npt.NDArray[np.intp]
+    places: Array
     distances: Array
     shares: Array
     max_speed: float
@@ -88,12 +103,12 @@ class ClosedLoop(NamedTuple):
 
 
 def closed_loop(
-    seen: View, law: UgvLaw, proposal: Proposal, after: Array, points: Array, substeps: int = 1
+    seen: View, law: UgvLaw, proposal: Proposal, after: Array, places: Array, substeps: int = 1
 ) -> ClosedLoop:
-    """The UGV's closed loop among points that move in any way, with `substeps` control periods per stage.
+    """The UGV's closed loop among bodies that move in any way, with `substeps` control periods per stage.
 
-    `after` are control samples from now on, (S + 1,), s, and `points` the places of the points then, (S + 1, K, 3), m.
-    The `centres` and `velocities` of the view do not count.
+    `after` are control samples from now on, (S + 1,), s, and `places` where these bodies are then, (S + 1, n, 3), m.
+    The `places` and `velocities` of the view do not count.
     """
     t = seen.t + after
     return ClosedLoop(
@@ -102,7 +117,10 @@ def closed_loop(
         preset=seen.preset.sample(t),
         wanted=proposal.motion.sample(t),
         chosen=proposal.chosen,
-        points=points,
+        still=seen.still,
+        parts=seen.parts,
+        every=np.arange(len(seen.parts)),
+        places=np.ascontiguousarray(places),  # the layout that is compiled for
         distances=seen.distances,
         shares=seen.shares,
         max_speed=float(seen.max_speed),
@@ -151,14 +169,17 @@ def advance(loop: ClosedLoop, mode: int, k: int, position: Array, work: Workspac
 def _command(loop: ClosedLoop, mode: int, k: int, position: Array, work: Workspace) -> Array:
     """Velocity that the law commands in control period k, (3,), m/s; rates are of the sampled motions."""
     mobility, normal, bound, rate, asked = work
-    law, points = loop.law, Points(loop.points[k], loop.distances, loop.shares)
-    fill_half_spaces(position, mobility, points, law.layer, normal, bound)
+    law = loop.law
+    count = fill_half_spaces(
+        position, mobility, loop.still, loop.parts, loop.every, loop.every, loop.places[k], loop.distances, loop.shares,
+        law.layer, normal, bound,
+    )  # fmt: skip
     for a in range(3):
         rate[a] = (loop.preset[k + 1, a] - loop.preset[k, a]) / law.layer.period
         asked[a] = (loop.wanted[k + 1, a] - loop.wanted[k, a]) / law.layer.period
     ugv, track = UgvState(position, mobility, loop.max_speed), Tracking(loop.preset[k], rate)
     intervention = AcceptedMotion(loop.wanted[k], asked, loop.chosen)
-    return command(law, ugv, track, intervention, mode == ACCEPTED, normal, bound)
+    return command(law, ugv, track, intervention, mode == ACCEPTED, normal[:count], bound[:count])
 
 
 @njit(cache=True)

@@ -23,6 +23,7 @@ from scipy.sparse.csgraph import dijkstra
 from scipy.spatial import cKDTree
 
 from airground_drake.base.arrays import Array, read_only
+from airground_drake.geometry.convex import CORNERS
 
 Points = NDArray[np.complex128]
 
@@ -84,7 +85,7 @@ class Path:
         return position, np.array((cos2 * tx - sin2 * ty, cos2 * ty + sin2 * tx))
 
 
-def shortest_path(start: ArrayLike, goal: ArrayLike, centres: ArrayLike, radii: ArrayLike) -> Path:
+def shortest_path(start: ArrayLike, goal: ArrayLike, rows: Array, keep: ArrayLike) -> Path:
     """Shortest path of a point from start to goal outside all the discs.
 
     If the start is strictly inside a disc, the path first goes straight to the nearest point of the boundary
@@ -94,19 +95,19 @@ def shortest_path(start: ArrayLike, goal: ArrayLike, centres: ArrayLike, radii: 
     Args:
         start: first point, (2,), m.
         goal: last point, (2,), m.
-        centres: of the discs, (m, 2), m; m = 0 gives the straight line.
-        radii: of the discs, (m,), m.
+        rows: outlines of balls, (m, W), see `geometry.convex`; m = 0 gives the straight line.
+        keep: distances from their cores, (m,), m: the radii of the discs.
 
     Raises:
         NoPath: if the goal is strictly inside a disc, or if the start (or the point where it leaves the
             discs) and the goal are in different components of the free space.
         ValueError: if a number is not finite.
     """
-    given = start, goal, centres, radii
+    given = start, goal, rows, keep
     if not all(np.isfinite(numbers).all() for numbers in given):
         raise ValueError(f"a path needs finite numbers, got {given}")
     p, q = complex(*np.asarray(start)), complex(*np.asarray(goal))
-    c, r = np.reshape(centres, (-1, 2)) @ np.array((1.0, 1.0j)), np.asarray(radii, dtype=np.float64)
+    c, r = rows[:, CORNERS : CORNERS + 2] @ np.array((1.0, 1.0j)), np.asarray(keep, dtype=np.float64)
     c, r = _outermost(c, r)
     inside = abs(c - q) < r - TOL
     if inside.any():

@@ -10,6 +10,7 @@ from itertools import pairwise
 import numpy as np
 
 from airground_drake.base.arrays import Array
+from airground_drake.geometry import convex
 from airground_drake.geometry.motion import Motion
 from airground_drake.intervention.coordination.joint import Effort, Plan, plan
 from airground_drake.intervention.coordination.roadmap import RobotTask, Space
@@ -189,15 +190,13 @@ class Coordinate(Policy):
 
     def _space(self, seen: Observation, clearance: float, spacing: float) -> Space:
         """Obstacles and distances for a UGV without a body, in the plane of `seen.robot`."""
-        radii = seen.safe_distance + np.broadcast_to(seen.obstacle_radii, len(seen.obstacles))
-        above = seen.obstacles[:, 2] - float(seen.position[2])
-        return Space(seen.obstacles[:, :2], radii, clearance, seen.robot_distance, spacing, above)
+        keep, height = convex.keep(seen.obstacles, 0.0), float(seen.position[2])
+        return Space(seen.obstacles, keep, clearance, seen.robot_distance, spacing, height)
 
 
 def _has_the_map_of(before: Observation, seen: Observation) -> bool:
     """Whether the obstacles are those of an earlier observation."""
-    same = np.array_equal(before.obstacles, seen.obstacles)
-    return before.t <= seen.t and same and np.array_equal(before.obstacle_radii, seen.obstacle_radii)
+    return before.t <= seen.t and np.array_equal(before.obstacles, seen.obstacles)
 
 
 def _is_as_before(before: Observation, seen: Observation) -> bool:
@@ -282,7 +281,7 @@ def _motion(way: Way, start: float, follow: float, height: float) -> Motion:
 @cache
 def warm_up() -> None:
     """Load the compiled functions before the first proposal is needed."""
-    room = Space(np.array([[0.0, 1.0]]), np.array([0.1]), 0.1, 1.0, 0.1)
+    room = Space(convex.balls([0.0, 1.0, 0.0]), np.array([0.1]), 0.1, 1.0, 0.1)
     ends = [np.array([0.0, 0.0]), np.array([3.0, 0.0])]
     tasks = [RobotTask(a, np.array([[0.0, *b]])) for a, b in pairwise([*ends, ends[0]])]
     plan(room, tasks, [1.0, 1.0], effort=Effort(orders=2))

@@ -13,6 +13,7 @@ from typing import Any, Literal, Self, get_args
 import numpy as np
 
 from airground_drake.base.errors import PolicyError, described, traceback_of
+from airground_drake.geometry import convex
 from airground_drake.geometry.motion import Motion
 from airground_drake.intervention.guest.process import GuestPolicy
 from airground_drake.intervention.guest.time_limit import OutOfTime, time_limit
@@ -177,8 +178,7 @@ class BehaviourDatabase:
                 before = held if mate is None else Negotiation(refusals=mate.refusals)
                 cause = robot if mate is None or mate.triggered else seen.robot
                 proposal = Proposal(
-                    chosen.policy, seen.t, motion, cause=cause, mapped=seen.obstacles, mapped_radii=seen.obstacle_radii,
-                    party=party,
+                    chosen.policy, seen.t, motion, cause=cause, mapped=seen.obstacles, party=party
                 )  # fmt: skip
                 found[robot] = replace(before, proposal=proposal, turn=turn, in_vain=0, cause=cause)
         return found, asked
@@ -229,7 +229,8 @@ def predicted_cost(motions: Mapping[str, Motion], seen: Observation) -> float:
     positions = own.sample(t) if own is not None else np.tile(seen.position, (len(t), 1))
     cost = np.square(positions - seen.preset.sample(t)).sum()
     if len(seen.obstacles):
-        lacking = (seen.obstacle_distances - np.linalg.norm(positions[:, None] - seen.obstacles, axis=2)).max(axis=1)
+        apart = np.array([convex.distances(seen.obstacles, position, True) for position in positions])
+        lacking = (seen.obstacle_distances - apart).max(axis=1)
         cost += INTRUSION * np.square(np.maximum(0.0, lacking)).sum()
     for mate in seen.team:
         motion = motions.get(mate.name, mate.proposal.motion if mate.proposal and mate.answered == "accepted" else None)

@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from airground_drake.base.arrays import Array
+from airground_drake.geometry import convex
 from airground_drake.geometry.motion import Motion
 from airground_drake.geometry.paths import NoPath, Path, shortest_path
 from airground_drake.intervention.policy import Observation, Policy, Teammate
@@ -54,8 +55,8 @@ class Detour(Policy):
         trajectory before its end.
         """
         height = seen.position[2]
-        centres, radii = self._in_the_way(seen)
-        met = self._rendezvous(seen, centres, radii)
+        rows, reach = self._in_the_way(seen)
+        met = self._rendezvous(seen, rows, reach)
         if met is None:
             return None
         duration, path = met
@@ -65,7 +66,7 @@ class Detour(Policy):
         times = seen.start + np.linspace(0.0, max(duration, RENDEZVOUS_TOLERANCE_S), count + 1)
         return _then_follow(times, legs, seen.preset, self.follow, height)
 
-    def _rendezvous(self, seen: Observation, centres: Array, radii: Array) -> tuple[float, Path] | None:
+    def _rendezvous(self, seen: Observation, rows: Array, reach: Array) -> tuple[float, Path] | None:
         """Time to a rendezvous, s, and the path to it; None if the preset is blocked up to its end.
 
         The tried duration only grows: by a sample where the preset is blocked, otherwise to the travel time. So the
@@ -76,7 +77,7 @@ class Detour(Policy):
         duration = float(gap) / (self.speed + seen.preset.max_speed)  # no rendezvous can be earlier
         missed, strides = duration, 0
         while True:
-            needed, path = self._way(seen, duration, centres, radii)
+            needed, path = self._way(seen, duration, rows, reach)
             if path is not None and needed <= duration + RENDEZVOUS_TOLERANCE_S:
                 break
             missed = duration
@@ -90,35 +91,31 @@ class Detour(Policy):
                 strides += 1
         while strides > CHASED and duration - missed > RENDEZVOUS_TOLERANCE_S:
             middle = 0.5 * (missed + duration)
-            needed, between = self._way(seen, middle, centres, radii)
+            needed, between = self._way(seen, middle, rows, reach)
             if between is not None and needed <= middle + RENDEZVOUS_TOLERANCE_S:
                 duration, path = middle, between
             else:
                 missed = middle
         return duration, path
 
-    def _way(self, seen: Observation, duration: float, centres: Array, radii: Array) -> tuple[float, Path | None]:
+    def _way(self, seen: Observation, duration: float, rows: Array, reach: Array) -> tuple[float, Path | None]:
         """Travel time, s, and path to the preset's place after the duration, s; infinite and None without a path."""
         goal = seen.preset.at(seen.start + duration)[0][:2]
         try:
-            path = shortest_path(seen.position[:2], goal, centres, radii)
+            path = shortest_path(seen.position[:2], goal, rows, reach)
         except NoPath:
             return math.inf, None
         return path.length_m / self.speed, path
 
     def _in_the_way(self, seen: Observation) -> tuple[Array, Array]:
-        """Centres (m, 2), m, and radii (m,), m, of the discs that the path must keep out of."""
-        height = seen.position[2]
+        """Outlines (m, W) in the plane of the path, and the distances to keep from their cores, (m,), m."""
         robots = [mate for mate in seen.team if mate.name != seen.robot and mate.standing and not _will_move(mate)]
-        places = np.array([mate.position for mate in robots]).reshape(-1, 3)
+        around = convex.joined(seen.obstacles, convex.balls([mate.position for mate in robots]))
         least = np.concatenate([seen.obstacle_distances, [seen.distance_to(mate) for mate in robots]])
-        around = np.concatenate([seen.obstacles, places])
         # an obstacle may be as near to the target as the safe distance allows: then it gets no clearance
-        from_target = np.linalg.norm(around - seen.preset.positions[-1], axis=1)
+        from_target = convex.distances(around, seen.preset.positions[-1], True)
         reach = np.clip(from_target, least, least + self.clearance)
-        squared = reach**2 - (around[:, 2] - height) ** 2
-        near = squared > 0.0
-        return around[near, :2], np.sqrt(squared[near])
+        return convex.sections(around, reach, float(seen.position[2]))
 
 
 def _will_move(mate: Teammate) -> bool:

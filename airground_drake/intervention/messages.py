@@ -22,8 +22,8 @@ NOTHING = -1.0
 Point = tuple[float, float, float]
 """A place, m, world frame."""
 
-Disc = tuple[float, float, float, float]
-"""An obstacle: its centre, world frame, and its radius, m."""
+Outline = tuple[float, ...]
+"""A convex part of an obstacle, without padding: see `geometry.convex`."""
 
 
 class Report(NamedTuple):
@@ -37,7 +37,7 @@ class Report(NamedTuple):
     """
 
     number: int = -1
-    sensed: tuple[Disc, ...] = ()
+    sensed: tuple[Outline, ...] = ()
     reason: str = ""
     words: str = ""
 

@@ -13,9 +13,10 @@ from typing import Any, Self
 import numpy as np
 
 from airground_drake.base.arrays import Array
+from airground_drake.geometry import convex
 from airground_drake.geometry.motion import Motion
 from airground_drake.intervention.database import Asked, BehaviourDatabase, Negotiation
-from airground_drake.intervention.messages import ACCEPT, DONE, REFUSE, SILENT, Disc, Proposals, Reports, answer_to
+from airground_drake.intervention.messages import ACCEPT, DONE, REFUSE, SILENT, Outline, Proposals, Reports, answer_to
 from airground_drake.intervention.policy import Answered, Observation, Proposal, Teammate
 from airground_drake.world.motion import SAME_S
 
@@ -36,7 +37,7 @@ class PlannerState:
     """
 
     talks: tuple[Negotiation, ...]
-    learnt: tuple[Disc, ...] = ()
+    learnt: tuple[Outline, ...] = ()
     sent: tuple[tuple[int, Proposal], ...] = ()
     asked: tuple[Asked, ...] = ()
     read: tuple[tuple[int, float], ...] = ()
@@ -96,12 +97,10 @@ class Planner:
         period: planning period, s; a proposal can act one period after it is made.
         presets: preset trajectories of the UGVs.
         targets: targets of the UGVs, (n, 3), m.
-        mapped: centres of the obstacles on the UAV's map, (m, 3), m.
-        safe_distance: d to obstacles, m.
+        mapped: outlines of the obstacles on the UAV's map, (m, W), see `geometry.convex`.
         robot_distance: d between UGVs, m.
         max_speed: speed limits of the UGVs, (n,), m/s.
         radius: radii of the UGVs' bodies, (n,), m, or one for all.
-        mapped_radii: radii of `mapped`, (m,), m, or one for all.
         mapped_from: when each of `mapped` appears, (m,), s, or one time for all.
     """
 
@@ -111,11 +110,9 @@ class Planner:
     presets: tuple[Motion, ...]
     targets: Array
     mapped: Array
-    safe_distance: float
     robot_distance: float
     max_speed: Array
     radius: Array | float = 0.0
-    mapped_radii: Array | float = 0.0
     mapped_from: Array | float = 0.0
 
     @property
@@ -154,12 +151,15 @@ class Planner:
         """
         said = [answer_to(talk.proposal, answers, i) for i, talk in enumerate(memory.talks)]
         heard = [report for report, answer in zip(reports, said, strict=True) if answer != SILENT]
-        reported = {disc for report in heard for disc in report.sensed}
+        reported = {outline for report in heard for outline in report.sensed}
         there = np.broadcast_to(self.mapped_from, len(self.mapped)) <= t + SAME_S
-        mapped = np.column_stack([self.mapped, np.broadcast_to(self.mapped_radii, len(self.mapped))])[there]
-        fresh = tuple(sorted(reported - set(memory.learnt) - set(map(tuple, mapped.tolist()))))
+        mapped = self.mapped[there]
+        unknown = reported - set(memory.learnt)
+        if unknown:
+            unknown -= set(map(convex.as_tuple, mapped))
+        fresh = tuple(sorted(unknown, key=_place))
         learnt = memory.learnt + fresh
-        discs = np.concatenate([mapped, np.array(learnt).reshape(-1, 4)])
+        obstacles = convex.joined(mapped, convex.stacked(learnt)) if learnt else mapped
         talks = self._after_answers(memory.talks, t, intervening, said, learnt=bool(fresh))
         asked = list(memory.asked)
         newest = max((number for number, _ in memory.read[-len(self.ugvs) :]), default=-1)
@@ -174,16 +174,13 @@ class Planner:
                 position=positions[i],
                 target=self.targets[i],
                 preset=self.presets[i],
-                obstacles=np.ascontiguousarray(discs[:, :3]),
-                mapped=np.ascontiguousarray(mapped[:, :3]),
+                obstacles=obstacles,
+                mapped=mapped,
                 others=np.delete(positions, i, axis=0),
-                safe_distance=self.safe_distance,
                 refusals=talks[i].refusals,
                 team=self._team(t, positions, intervening, answers, talks, standing),
                 robot_distance=self.robot_distance,
                 radius=float(self.radii[i]),
-                obstacle_radii=discs[:, 3],
-                mapped_radii=mapped[:, 3],
             )
             changed, policies = self.database.plan(talks[i], seen)
             asked += policies
@@ -246,3 +243,9 @@ class Planner:
             )
             for i, name in enumerate(self.ugvs)
         )
+
+
+def _place(outline: Outline) -> Outline:
+    """Sorts outlines by place, then by radius."""
+    middle = outline[convex.MIDDLE : convex.EXTENT]
+    return (*middle, outline[convex.BASE], outline[convex.RADIUS], *outline)

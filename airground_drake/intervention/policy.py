@@ -11,6 +11,7 @@ from typing import Any, ClassVar, Literal, Self
 import numpy as np
 
 from airground_drake.base.arrays import LARGEST, Array, read_only
+from airground_drake.geometry import convex
 from airground_drake.geometry.motion import Motion
 from airground_drake.nsbc.task import pseudoinverse
 
@@ -62,16 +63,14 @@ class Observation:
         position: its position, (3,), m, world frame.
         target: its target, (3,), m.
         preset: its preset trajectory.
-        obstacles: centres of all obstacles that the UAV knows, from its own map and from answers, (m, 3), m.
-        mapped: centres of the obstacles on its own map, (k, 3), m.
+        obstacles: outlines of all obstacles that the UAV knows, from its own map and from answers, (m, W); see
+            `geometry.convex`.
+        mapped: outlines of the obstacles on its own map, (k, W).
         others: positions of the other robots, (n, 3), m.
-        safe_distance: distance d to keep from obstacles, between surfaces, m.
         refusals: number of proposals that the UGV has refused since the trigger.
         team: all UGVs in array order, this one among them.
         robot_distance: distance that two UGVs have to keep, between surfaces, m.
         radius: of the UGV's body, m.
-        obstacle_radii: radii of `obstacles`, (m,), m, or one for all.
-        mapped_radii: radii of `mapped`, (k,), m, or one for all.
     """
 
     t: float
@@ -83,18 +82,15 @@ class Observation:
     obstacles: Array
     mapped: Array
     others: Array
-    safe_distance: float
     refusals: int
     team: tuple[Teammate, ...] = ()
     robot_distance: float = 0.0
     radius: float = 0.0
-    obstacle_radii: Array | float = 0.0
-    mapped_radii: Array | float = 0.0
 
     @property
     def obstacle_distances(self) -> Array:
-        """Distances to keep between the centres of the UGV and of each obstacle, (m,), m."""
-        return self.safe_distance + (self.radius + np.broadcast_to(self.obstacle_radii, len(self.obstacles)))
+        """Distances to keep between the centre of the UGV and the core of each obstacle, (m,), m."""
+        return convex.keep(self.obstacles, self.radius)
 
     def distance_to(self, mate: Teammate) -> float:
         """Distance to keep between the centres of the UGV and of another one, m."""
@@ -114,10 +110,10 @@ class Proposal:
         issued: time of sending, s.
         motion: desired value of the task over time: where the UGV should be.
         selection: J_int, (m, 3), directions in which the UAV intervenes (default: all).
-        mapped: obstacles that the UAV knows, (k, 3), m. The UGV uses them only to judge how useful the proposal is.
+        mapped: outlines of obstacles that the UAV knows, (k, W). The UGV uses them only to judge how useful the
+            proposal is.
         cause: name of the UGV whose trigger led to the proposal. If it names another UGV, this one is asked to make
             way for it. Empty: this UGV.
-        mapped_radii: radii of `mapped`, (k,), m, or one for all.
         party: names of all UGVs in the same joint plan; empty: the proposal stands alone.
         number: identifies the proposal in the UGV's answer. `planner.sent_after` gives it; before that it is -1.
     """
@@ -126,9 +122,8 @@ class Proposal:
     issued: float
     motion: Motion
     selection: Array = field(default_factory=lambda: np.eye(3))
-    mapped: Array = field(default_factory=lambda: np.empty((0, 3)))
+    mapped: Array = field(default_factory=lambda: convex.stacked([]))
     cause: str = ""
-    mapped_radii: Array | float = 0.0
     party: tuple[str, ...] = ()
     number: int = -1
 

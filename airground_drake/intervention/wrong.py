@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from airground_drake.base.arrays import Array
+from airground_drake.geometry import convex
 from airground_drake.geometry.motion import Motion
 from airground_drake.intervention.detour import Detour
 from airground_drake.intervention.policy import SHORTEST_LEG_S, Observation, Policy
@@ -30,7 +31,7 @@ class StaleMap(Detour):
 
     def propose(self, seen: Observation) -> Motion | None:
         """The detour round the obstacles of its own map."""
-        return super().propose(replace(seen, obstacles=seen.mapped, obstacle_radii=seen.mapped_radii))
+        return super().propose(replace(seen, obstacles=seen.mapped))
 
 
 class Noisy(Detour):
@@ -64,11 +65,14 @@ class Hostile(Policy):
         self.speed = _positive("hostile", speed_m_s)
 
     def propose(self, seen: Observation) -> Motion | None:
-        """The straight way to the centre of the nearest obstacle or robot."""
-        around = np.concatenate([seen.obstacles, seen.others])
+        """The straight way to the middle of the nearest obstacle or robot."""
+        middles = seen.obstacles[:, [convex.MIDDLE, convex.MIDDLE + 1, convex.BASE]]
+        around = np.concatenate([middles, seen.others])
         if not len(around):
             return None
-        nearest = around[np.linalg.norm(around - seen.position, axis=1).argmin()]
+        fixed = convex.distances(seen.obstacles, seen.position, True)
+        apart = np.concatenate([fixed, np.linalg.norm(seen.others - seen.position, axis=1)])
+        nearest = around[apart.argmin()]
         return _straight(seen, np.append(nearest[:2], seen.position[2]), self.speed)
 
 

@@ -8,7 +8,8 @@ that point, the velocity v of one control period h must satisfy
 
 with share = 1 for an obstacle and 1/2 for each robot of a pair. As ||x + s v|| >= ||x|| + s (x.v)/||x||, the
 distance is then at least d during the whole period, whatever velocity the lower priorities ask for: v = 0
-satisfies all of them, so a safe choice always exists. D and d are distances of centres: `World` puts both radii into d.
+satisfies all of them, so a safe choice always exists. D and d are distances of the robot's centre from the *core* of
+what it avoids (`geometry.convex`): `World` puts both radii into d.
 """
 
 from __future__ import annotations
@@ -34,9 +35,9 @@ class HalfSpaces:
     """K velocity constraints for each of n robots: normal . v >= bound.
 
     Attributes:
-        normal: (n, K, 3); unit vectors away from what is avoided, with 0 in directions in which the robot
-            cannot move.
-        bound: (n, K), m/s; -inf where out of sensing range.
+        normal: (n, K, 3); unit vectors away from what is avoided and within sensing range, with 0 in directions in
+            which the robot cannot move; 0 in rows that are not needed.
+        bound: (n, K), m/s; -inf in rows that are not needed.
     """
 
     normal: Array
@@ -45,26 +46,6 @@ class HalfSpaces:
     def slack(self, velocity: Array) -> Array:
         """normal . v - bound for velocities (n, 3) m/s: (n, K) m/s, negative where violated."""
         return np.matmul(self.normal, velocity[..., None])[..., 0] - self.bound
-
-
-@dataclass(frozen=True)
-class Surroundings:
-    """The K points that each of n robots must keep away from.
-
-    Attributes:
-        centre: (n, K, 3), m, world frame.
-        distance: safe distances d, (n, K), m.
-        share: fraction of the constraint that this robot takes, (n, K): 1 (obstacle) or 1/2 (robot).
-    """
-
-    centre: Array
-    distance: Array
-    share: Array
-
-    @classmethod
-    def of(cls, near: Neighbours, positions: Array) -> Surroundings:
-        """The surroundings of the members when all bodies that move are at positions (M, 3) m."""
-        return cls(kernels.gather(positions, near.still, near.others), near.distance, near.share)
 
 
 @dataclass(frozen=True)
@@ -91,10 +72,16 @@ class Avoidance:
         """The numbers as the kernels take them."""
         return kernels.Layer(float(self.gain), float(self.period), float(self.sensing_range), _CODES[self.composition])
 
-    def half_spaces(self, position: Array, mobility: Array, around: Surroundings) -> HalfSpaces:
-        """Constraints at positions (n, 3) m; mobility (n, 3) is 1 where a robot can move, else 0."""
-        points = kernels.Points(around.centre, around.distance, around.share)
-        return HalfSpaces(*kernels.team_half_spaces(position, mobility, points, self.layer))
+    def half_spaces(self, positions: Array, near: Neighbours) -> HalfSpaces:
+        """Constraints of k robots when all bodies that move are at positions (M, 3) m."""
+        found = HalfSpaces(np.zeros((*near.distance.shape, 3)), np.full(near.distance.shape, -np.inf))
+        around = near.still, near.parts, near.carrier
+        for i, member in enumerate(near.members):
+            own = positions[member], near.mobility[i], *around, near.others[i], positions
+            given = near.distance[i], near.share[i], self.layer
+            count = kernels.fill_half_spaces(*own, *given, found.normal[i], found.bound[i])
+            found.normal[i, count:], found.bound[i, count:] = 0.0, -np.inf
+        return found
 
     def apply(self, lower: Array, spaces: HalfSpaces) -> Array:
         """Put the avoidance tasks above lower-priority velocities: (n, 3) m/s to (n, 3) m/s."""

@@ -13,6 +13,7 @@ import numpy.typing as npt
 from numba import njit
 
 from airground_drake.base.arrays import Array
+from airground_drake.geometry.convex import nearest
 
 MARGIN_M_S = 1e-12
 """Added to every bound in the projection, m/s. The bound of a robot in contact is 0. Without the margin rounding would
@@ -41,65 +42,56 @@ class Layer(NamedTuple):
     composition: int
 
 
-class Points(NamedTuple):
-    """The points that one robot must keep away from: centres, (K, 3), m, safe distances, (K,), m, shares, (K,)."""
-
-    centre: Array
-    distance: Array
-    share: Array
-
-
 @njit(cache=True)
 def fill_half_spaces(
-    position: Array, mobility: Array, points: Points, layer: Layer, normal: Array, bound: Array
-) -> None:
-    """Write the velocity constraints of one robot: normal (K, 3), bound (K,); see `Avoidance.half_spaces`."""
-    for k in range(len(bound)):
-        squared = 0.0
-        for a in range(3):
-            normal[k, a] = position[a] - points.centre[k, a]
-            squared += normal[k, a] ** 2
-        reach = np.sqrt(squared)
-        for a in range(3):
-            normal[k, a] = mobility[a] * normal[k, a] / reach if reach > 0.0 else 0.0
-        excess = reach - points.distance[k]
-        if reach > layer.sensing_range:
-            bound[k] = -np.inf
-        elif excess <= 0.0:
-            bound[k] = -points.share[k] * layer.gain * excess
+    position: Array,
+    mobility: Array,
+    still: Array,
+    parts: Array,
+    carrier: npt.NDArray[np.intp],
+    others: npt.NDArray[np.intp],
+    places: Array,
+    distance: Array,
+    share: Array,
+    layer: Layer,
+    normal: Array,
+    bound: Array,
+) -> int:
+    """Write the velocity constraints of one robot, those within sensing range, and return their number K.
+
+    Args:
+        position: of the robot, (3,), m.
+        mobility: of the robot, (3,), see `Neighbours`.
+        still: outlines at rest, (m, W).
+        parts: outlines that move, (P, W).
+        carrier: rows in `places` of the bodies of the parts, (P,).
+        others: the n of these parts that the robot keeps away from, (n,).
+        places: positions of the bodies that move, (M, 3), m.
+        distance: safe distances from the cores, (m + n,), m.
+        share: shares of the inequalities, (m + n,).
+        layer: the numbers of the layer.
+        normal: result, (m + n, 3); the first K rows.
+        bound: result, (m + n,), m/s.
+    """
+    gain, period, reach, planar = layer.gain, layer.period, layer.sensing_range, mobility[2] == 0.0
+    x, y, z = position[0], position[1], position[2]
+    count, m = 0, len(still)
+    for k in range(len(distance)):
+        if k < m:
+            apart = nearest(still[k], x, y, z, planar, normal[count], reach)
         else:
-            bound[k] = -points.share[k] * excess / layer.period
-
-
-@njit(cache=True)
-def distances(points: Array, position: Array) -> Array:
-    """Distances, (m,), m, of points (m, 3), m, from a position (3,), m."""
-    found = np.empty(len(points))
-    for k in range(len(points)):
-        x, y, z = points[k, 0] - position[0], points[k, 1] - position[1], points[k, 2] - position[2]
-        found[k] = np.sqrt(x * x + y * y + z * z)
-    return found
-
-
-@njit(cache=True)
-def within(points: Array, positions: Array, reach: float) -> npt.NDArray[np.bool_]:
-    """Which points (m, 3), m, are within `reach`, m, of each of n positions (n, 3), m: (n, m)."""
-    found = np.empty((len(positions), len(points)), dtype=np.bool_)
-    for i in range(len(positions)):
-        found[i] = distances(points, positions[i]) <= reach
-    return found
-
-
-@njit(cache=True)
-def news_within(points: Array, positions: Array, reach: float, known: npt.NDArray[np.bool_]) -> bool:
-    """Whether `within` would find a point that is not known yet; `known` is (n, m)."""
-    for i in range(len(positions)):
-        for k in range(len(points)):
-            if not known[i, k]:
-                x, y, z = points[k, 0] - positions[i, 0], points[k, 1] - positions[i, 1], points[k, 2] - positions[i, 2]
-                if np.sqrt(x * x + y * y + z * z) <= reach:
-                    return True
-    return False
+            part = others[k - m]
+            origin = carrier[part]
+            px, py, pz = places[origin, 0], places[origin, 1], places[origin, 2]
+            apart = nearest(parts[part], x - px, y - py, z - pz, planar, normal[count], reach)
+        if apart > reach:
+            continue
+        for a in range(3):
+            normal[count, a] *= mobility[a]
+        excess = apart - distance[k]
+        bound[count] = -share[k] * gain * excess if excess <= 0.0 else -share[k] * excess / period
+        count += 1
+    return count
 
 
 @njit(cache=True)
@@ -143,36 +135,14 @@ def _recursion(lower: Array, normal: Array, bound: Array, nearest_first: bool) -
 
 
 @njit(cache=True)
-def team_half_spaces(position: Array, mobility: Array, points: Points, layer: Layer) -> tuple[Array, Array]:
-    """Constraints of n robots, with a leading dimension n in `points`: normal (n, K, 3), bound (n, K)."""
-    normal, bound = np.empty(points.centre.shape), np.empty(points.distance.shape)
-    for i in range(len(position)):
-        around = Points(points.centre[i], points.distance[i], points.share[i])
-        fill_half_spaces(position[i], mobility[i], around, layer, normal[i], bound[i])
-    return normal, bound
-
-
-@njit(cache=True)
-def gather(positions: Array, obstacles: Array, others: npt.NDArray[np.intp]) -> Array:
-    """Points around k robots: (k, m + n, 3) from obstacles (m, 3) and positions of the others (k, n)."""
-    m = len(obstacles)
-    centre = np.empty((others.shape[0], m + others.shape[1], 3))
-    for i in range(others.shape[0]):
-        for a in range(3):
-            for k in range(m):
-                centre[i, k, a] = obstacles[k, a]
-            for k in range(others.shape[1]):
-                centre[i, m + k, a] = positions[others[i, k], a]
-    return centre
-
-
-@njit(cache=True)
 def commands(
     lower: Array,
     positions: Array,
     members: npt.NDArray[np.intp],
+    carrier: npt.NDArray[np.intp],
     others: npt.NDArray[np.intp],
     still: Array,
+    parts: Array,
     distance: Array,
     share: Array,
     mobility: Array,
@@ -184,13 +154,14 @@ def commands(
 ) -> Array:
     """Velocities of k robots, (k, 3), m/s; see `Avoidance.command`, with the fields of `Neighbours` and of `Layer`."""
     # one by one, because numba takes 1.5 us to unpack a named tuple that Python passes, and 0.04 us for an array
-    layer = Layer(gain, period, sensing_range, composition)
-    velocity, centre = limit_speed(lower, max_speed), gather(positions, still, others)
-    normal, bound = np.empty(centre.shape[1:]), np.empty(centre.shape[1])
+    layer, velocity = Layer(gain, period, sensing_range, composition), limit_speed(lower, max_speed)
+    normal, bound = np.empty((distance.shape[1], 3)), np.empty(distance.shape[1])
     for i in range(len(velocity)):
-        around = Points(centre[i], distance[i], share[i])
-        fill_half_spaces(positions[members[i]], mobility[i], around, layer, normal, bound)
-        velocity[i] = avoid_one(velocity[i], normal, bound, composition)
+        count = fill_half_spaces(
+            positions[members[i]], mobility[i], still, parts, carrier, others[i], positions, distance[i], share[i],
+            layer, normal, bound,
+        )  # fmt: skip
+        velocity[i] = avoid_one(velocity[i], normal[:count], bound[:count], composition)
     return velocity
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -17,7 +17,7 @@ from numba import njit
 
 from airground_drake.base.arrays import Array
 from airground_drake.nsbc.avoidance import Avoidance
-from airground_drake.nsbc.kernels import Layer, Points, avoid_one, fill_half_spaces, gather, limit_one
+from airground_drake.nsbc.kernels import Layer, avoid_one, fill_half_spaces, limit_one
 from airground_drake.world.world import Neighbours
 
 
@@ -108,8 +108,11 @@ class UgvLaw:
                 executing[i] = True
                 wanted[i], wanted_rate[i], chosen[i] = one
         own = self.numbers
-        numbers = (own.motion_gain, own.intervention_gain, own.intervention_on_top, *own.layer)
-        return _commands(*numbers, *near, wanted, wanted_rate, chosen, positions, target, rate, executing)
+        gains = own.motion_gain, own.intervention_gain, own.intervention_on_top
+        tasks = wanted, wanted_rate, chosen, positions, target, rate, executing
+        numbers: tuple[Any, ...] = (*gains, *own.layer, *near, *tasks)
+        velocity: Array = _commands(*numbers)
+        return velocity
 
 
 @njit(cache=True)
@@ -155,8 +158,10 @@ def _commands(
     sensing_range: float,
     composition: int,
     members: npt.NDArray[np.intp],
+    carrier: npt.NDArray[np.intp],
     others: npt.NDArray[np.intp],
     still: Array,
+    parts: Array,
     distance: Array,
     share: Array,
     mobility: Array,
@@ -173,11 +178,14 @@ def _commands(
     # one by one, because numba takes 1.5 us to unpack a named tuple that Python passes, and 0.04 us for an array
     layer = Layer(avoidance_gain, period, sensing_range, composition)
     law = Numbers(motion_gain, intervention_gain, intervention_on_top, layer)
-    velocity, centre = np.empty(target.shape), gather(positions, still, others)
-    normal, bound = np.empty(centre.shape[1:]), np.empty(centre.shape[1])
+    velocity = np.empty(target.shape)
+    normal, bound = np.empty((distance.shape[1], 3)), np.empty(distance.shape[1])
     for i in range(len(target)):
         ugv = UgvState(positions[members[i]], mobility[i], max_speed[i])
-        fill_half_spaces(ugv.position, ugv.mobility, Points(centre[i], distance[i], share[i]), layer, normal, bound)
-        asked = AcceptedMotion(wanted[i], wanted_rate[i], chosen[i])
-        velocity[i] = command(law, ugv, Tracking(target[i], rate[i]), asked, executing[i], normal, bound)
+        count = fill_half_spaces(
+            ugv.position, ugv.mobility, still, parts, carrier, others[i], positions, distance[i], share[i],
+            layer, normal, bound,
+        )  # fmt: skip
+        asked, track = AcceptedMotion(wanted[i], wanted_rate[i], chosen[i]), Tracking(target[i], rate[i])
+        velocity[i] = command(law, ugv, track, asked, executing[i], normal[:count], bound[:count])
     return velocity

@@ -8,11 +8,11 @@ import numpy as np
 import numpy.typing as npt
 
 from airground_drake.base.arrays import Array
+from airground_drake.geometry import convex
 from airground_drake.run.collisions import first_collisions
 from airground_drake.run.trace import Trace
 from airground_drake.scenarios.world import make_world
 from airground_drake.world.motion import PeriodMotion
-from airground_drake.world.shape import Shape
 from airground_drake.world.world import ROBOTS, Body
 
 
@@ -59,43 +59,50 @@ def _add_collisions(trace: Trace, add: Any) -> None:
     """Add each robot's visits within collision distance of obstacles and of robots later in the list."""
     world, collision_m = make_world(trace.scenario), trace.scenario.safe_distance.collision_m
     ways = [_way(trace, body) for body in world.bodies]
-    low, high = (np.array(corners) for corners in zip(*map(_box, ways), strict=True))
-    for i, own in enumerate(world.bodies[world.select(*ROBOTS)]):
-        within = collision_m + own.shape.radius_m
-        gap = np.maximum(np.maximum(low[i] - high[i + 1 :], low[i + 1 :] - high[i]), 0.0)
-        near = i + 1 + np.flatnonzero(np.linalg.norm(gap, axis=1) <= within + world.radius[i + 1 :])
+    low, high = (np.array(corners) for corners in zip(*map(_box, ways, world.bodies), strict=True))
+    for i, (own, radius) in enumerate(zip(world.bodies[world.select(*ROBOTS)], world.radius, strict=True)):
+        within = collision_m + float(radius)
+        gap = np.maximum(np.maximum(ways[i].box[0] - high[i + 1 :], low[i + 1 :] - ways[i].box[1]), 0.0)
+        near = i + 1 + np.flatnonzero(np.linalg.norm(gap, axis=1) <= within)
         for k in sorted(near.tolist(), key=lambda k: world.bodies[k].kind in ROBOTS):
             body = world.bodies[k]
             role = "other" if body.kind in ROBOTS else "obstacle"
             first, apart = trace.there_from(body.name), ways[i].seen_from(ways[k])
             apart = apart._replace(start=apart.start[first:], end=apart.end[first:])
-            for row in first + visits(apart, body.shape, within) if first < len(trace.t) else ():
+            planar = own.mobility[2] == 0.0
+            for row in first + visits(apart, body.shape, within, planar) if first < len(trace.t) else ():
                 add(trace.t[row], own.name, "collision", **{role: body.name})
 
 
 def _way(trace: Trace, body: Body) -> PeriodMotion:
-    """Motion of a body between the rows: (T - 1, 3), or (3,) if it never moves."""
+    """Motion of a body's origin between the rows: (T - 1, 3), or (3,) if it never moves."""
     if body.plant is None:
         return PeriodMotion(body.start_m, body.start_m)
     position = trace.position(body.name)
     return body.plant.motion(position[:-1], position[1:], np.diff(trace.t))
 
 
-def _box(way: PeriodMotion) -> tuple[Array, Array]:
-    """Two opposite corners, (3,), m, of a box around a motion."""
-    places = np.concatenate([way.start.reshape(-1, 3), way.end.reshape(-1, 3)])
-    return places.min(axis=0) - way.off_m, places.max(axis=0) + way.off_m
+def _box(way: PeriodMotion, body: Body) -> tuple[Array, Array]:
+    """Two opposite corners, (3,), m, of a box around a body that moves."""
+    (start, end), (low, high) = way.box, convex.box(body.shape)
+    return start + low, end + high
 
 
-def visits(apart: PeriodMotion, shape: Shape, within: float) -> npt.NDArray[np.intp]:
+def visits(apart: PeriodMotion, shape: Array, within: float, planar: bool) -> npt.NDArray[np.intp]:
     """Rows, (K,), at which a centre comes within a distance of a shape; between two rows, the first of them.
 
     Args:
-        apart: motion of the centre relative to the shape's, (T - 1, 3), m.
-        shape: the shape.
-        within: the distance, m.
+        apart: motion of the centre relative to the shape's origin, (T - 1, 3), m.
+        shape: outlines of the shape, (k, W), see `geometry.convex`.
+        within: the distance from its surface, m.
+        planar: whether the centre stays in its plane.
     """
-    near = shape.distance(np.concatenate([apart.start, apart.end[-1:]])) < within
-    passes = shape.least_distance(apart) < within
+    places = np.concatenate([apart.start, apart.end[-1:]])
+    near, passes = np.zeros(len(places), dtype=bool), np.zeros(len(apart.start), dtype=bool)
+    for row in shape:
+        reach = within + row[convex.RADIUS]
+        near |= convex.within(row[None], places, np.nextafter(reach, -np.inf), planar)[:, 0]
+        least = convex.approaches(row, apart.start, apart.end, planar)[0]
+        passes |= least < reach + apart.off_m
     enters = near & ~np.append(False, near[:-1])
     return np.flatnonzero(enters | np.append(passes & ~near[:-1] & ~near[1:], False))

@@ -20,10 +20,10 @@ from airground_drake.gatekeeper.outcome import Outlook, outcomes
 from airground_drake.gatekeeper.problem import Horizon, predicted_problem
 from airground_drake.gatekeeper.rollout import View
 from airground_drake.gatekeeper.routes.mixed_integer import MixedIntegerRoute
+from airground_drake.geometry import convex
 from airground_drake.geometry.motion import Motion
 from airground_drake.intervention.policy import Proposal
-from airground_drake.nsbc.avoidance import Avoidance, Composition, Surroundings
-from airground_drake.nsbc.kernels import distances, news_within, within
+from airground_drake.nsbc.avoidance import Avoidance, Composition
 from airground_drake.nsbc.law import UgvLaw
 from airground_drake.run import recording
 from airground_drake.run.events import extract
@@ -193,15 +193,14 @@ def read_back(model: Model, root: Context) -> dict[str, Any]:
 def warm_up() -> None:
     """Load the compiled kernels and the solver, once per process, so that no run's time includes loading."""
     one, motion = np.ones((1, 3)), Motion(np.array([0.0, 1.0]), np.zeros((2, 3)))
-    news_within(one, one, 1.0, within(one, one, 1.0))
-    distances(one, one[0])
+    rows = convex.balls(one)
+    convex.news_within(rows, one, 1.0, True, convex.within(rows, one, 1.0, True))
     avoidance = Avoidance(gain=1.0, period=0.1)
     plant = FirstOrder()
     world = World((Body("a", "ugv", one[0], plant=plant), Body("b", "uav", one[0], plant=plant)), {})
     near = world.around(slice(0, 1))
     avoidance.command(one, world.starts, near)
-    Surroundings.of(near, world.starts)
-    seen = View(0.0, one[0], motion, one, one, np.ones(1), np.ones(1), 1.0)
+    seen = View(0.0, one[0], motion, rows, rows, one, one, np.ones(2), np.ones(2), 1.0, (None,))
     law, horizon = UgvLaw(avoidance, 1.0, 1.0, False), Horizon(2, 1, 1.0, 1.0)
     law.velocity(world.starts, near, one, one, [None])
     MixedIntegerRoute().solve(predicted_problem(seen, law, Proposal("", 0.0, motion), horizon))

@@ -66,15 +66,14 @@ the route. Arrays are flattened in C order: initial (3), accept, refuse and refe
 does not give is empty. The normals are those of the half-planes of `route_bound`."""
 
 PROPOSAL_COLUMNS = (
-    "number", "robot", "policy", "issued_s", "times_s", "positions_m", "selection", "mapped_m", "mapped_radius_m",
-    "cause", "party",
+    "number", "robot", "policy", "issued_s", "times_s", "positions_m", "selection", "mapped", "cause", "party",
 )  # fmt: skip
 """Columns of `Trace.proposals`, one row per proposal sent; arrays are flattened in C order:
 - number: identifies the proposal; counts from 0 in the order of sending.
 - robot, policy, issued_s: its UGV, its policy, the time of sending.
 - times_s (M), positions_m (M x 3): vertices of the requested motion.
 - selection (m x 3): J_int of (12)-(14), the directions that the motion concerns.
-- mapped_m (k x 3), mapped_radius_m (k): centres and radii of the obstacles on the UAV's map.
+- mapped: outlines of the obstacles on the UAV's map, without padding, one after the other: see `geometry.convex`.
 - cause: the UGV whose trigger led to it: this UGV, or another UGV for which it makes way.
 - party: indices in `ugvs` of all UGVs in the same joint plan; empty if the proposal stands alone."""
 

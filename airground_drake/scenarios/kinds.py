@@ -21,7 +21,7 @@ from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 from airground_drake.base.arrays import LARGEST
 from airground_drake.base.statuses import COUNTS, EXPECTATIONS, NOTHING, alternatives, declared
 from airground_drake.registry import MODEL_CLAIMS, PLUGIN, PLUGIN_PATTERN, RUN_CLAIMS, Registry, is_plugin
-from airground_drake.scenarios.limits import MAX_NAME, MAX_SEED, MAX_TEXT
+from airground_drake.scenarios.limits import MAX_CORNERS, MAX_NAME, MAX_SEED, MAX_TEXT
 
 SMALLEST = 1e-9  # of a positive number
 NAME_PATTERN = "^[A-Za-z_][A-Za-z0-9_]*$"  # of a UGV, an obstacle, a run, a parameter
@@ -36,7 +36,7 @@ WANTED = "x-wanted"
 """Key for the words in which messages describe an allowed value, where its type and bounds do not say it."""
 
 # Unit by the suffix of a key, the longest suffix first.
-_UNITS = {"m_sqrt_s": "m/sqrt(s)", "1_m2_s": "1/(m^2 s)", "m_s": "m/s", "1_s": "1/s", "m": "m", "s": "s"}
+_UNITS = {"rad": "rad", "m_sqrt_s": "m/sqrt(s)", "1_m2_s": "1/(m^2 s)", "m_s": "m/s", "1_s": "1/s", "m": "m", "s": "s"}
 
 
 def unit_of(name: str, before: str = "") -> str:
@@ -80,6 +80,18 @@ def _all_or_none(point: list[float]) -> list[float]:
     return point
 
 
+def _place_or_none(point: list[float]) -> list[float]:
+    if len(point) not in (0, 2, 3):
+        raise refused(point, "2 or 3 numbers in m: [x, y] or [x, y, z]")
+    return [*point, 0.0] if len(point) == 2 else point
+
+
+def _two_or_none(value: list[Any]) -> list[Any]:
+    if len(value) not in (0, 2):
+        raise refused(value, "2 entries")
+    return value
+
+
 Words = Annotated[str, Field(strict=True, max_length=MAX_TEXT), AfterValidator(_visible)]
 Name = Annotated[str, Field(strict=True, max_length=MAX_NAME, pattern=NAME_PATTERN)]
 YesNo = Annotated[bool, Field(strict=True)]
@@ -121,6 +133,17 @@ class ValueRule:
 
 
 PointOrNone = Annotated[list[Real], Field(strict=True), ValueRule(_all_or_none, lambda: {"minItems": 0, "maxItems": 3})]
+PlaceOrNone = Annotated[
+    list[Real], Field(strict=True), ValueRule(_place_or_none, lambda: {"minItems": 0, "maxItems": 3})
+]
+Corner = Annotated[list[Real], Field(strict=True, min_length=2, max_length=2)]
+CornersOrNone = Annotated[list[Corner], Field(strict=True, max_length=MAX_CORNERS)]
+TwoCornersOrNone = Annotated[
+    list[Corner], Field(strict=True), ValueRule(_two_or_none, lambda: {"minItems": 0, "maxItems": 2})
+]
+SizeOrNone = Annotated[
+    list[Positive], Field(strict=True), ValueRule(_two_or_none, lambda: {"minItems": 0, "maxItems": 2})
+]
 
 
 def one_of(options: Iterable[str], place: str = "") -> ValueRule:

@@ -8,6 +8,7 @@ key without a default. Positions are in the world frame, z up, the ground at z =
 # No `from __future__ import annotations` here: pydantic needs the types themselves, not their names.
 import json
 from dataclasses import asdict, dataclass, field
+from itertools import pairwise
 from typing import Annotated, Any, ClassVar
 
 from pydantic import ConfigDict, Field
@@ -16,17 +17,21 @@ from airground_drake.base.files import sha256
 from airground_drake.registry import METHODS, MODEL_CLAIMS, POLICIES, ROUTES, RUN_CLAIMS, UAV_TASKS
 from airground_drake.scenarios.kinds import (
     CLAIMS,
+    CornersOrNone,
     Count,
     CountFromZero,
     GroundPoint,
     Name,
     NotNegative,
     OneValue,
+    PlaceOrNone,
     Point,
     PointOrNone,
     Positive,
     Real,
     Share,
+    SizeOrNone,
+    TwoCornersOrNone,
     Words,
     YesNo,
     expected_of,
@@ -37,6 +42,11 @@ from airground_drake.scenarios.kinds import (
 from airground_drake.scenarios.limits import MAX_STAGES, MAX_UGVS
 
 Vector = list[float]
+
+ARENA = "arena_"
+"""Begins the names of the arena's walls: arena_south, arena_east, arena_north and arena_west."""
+ENDLESS_M = 1e6
+"""Height of the arena's walls, m."""
 
 TRIGGERS: tuple[str, ...] = ("automaton", "bare")
 RULES: tuple[str, ...] = ("hysteresis", "first_stage")
@@ -99,14 +109,30 @@ class Uav:
 
 @dataclass(slots=True)
 class Obstacle:
-    """A ball from which robots keep the safe distance of (7)-(8); with the default radius a point."""
+    """An obstacle from which robots keep the safe distance of (7)-(8); by default a ball, or without a radius a point.
 
-    position_m: Point
-    """Where it is."""
+    At most one of `polygon_m`, `segment_m` and `size_m` gives it another shape. These are in the frame of the obstacle:
+    its origin is at `position_m`, and it is turned by `heading_rad`. By default that is the world frame.
+    """
+
+    position_m: PlaceOrNone = field(default_factory=list)
+    """Centre of a ball or box, else origin of its frame: [x, y] or [x, y, z]. Needed for a ball."""
     known_to_uav: YesNo = True
     """Whether it is on the UAV's map from the beginning."""
     radius_m: NotNegative = 0.0
-    """Radius of its body, added to the safe distances of its pairs; 0: a point."""
+    """Radius of a ball; of another shape, how far it extends round its corners and edges."""
+    polygon_m: CornersOrNone = field(default_factory=list)
+    """Corners [x, y] of a polygon, in order, at least three; edges must not cross."""
+    segment_m: CornersOrNone = field(default_factory=list)
+    """Corners [x, y] of a thin wall, at least two."""
+    size_m: SizeOrNone = field(default_factory=list)
+    """Length and width [x, y] of a box about `position_m`."""
+    heading_rad: Real = 0.0
+    """Turns a polygon, wall or box about `position_m`, counter-clockwise."""
+    height_m: NotNegative = 0.0
+    """It stands from the ground to this height; 0: flat, or a ball. For UGVs all walls are endless."""
+    distance_m: NotNegative = 0.0
+    """Distance to keep from it, in place of `safe_distance.obstacle_m`; 0: that one."""
     appears_s: NotNegative = 0.0
     """It is there from the first control sample at or after this time on; before that, it is nowhere."""
 
@@ -385,6 +411,8 @@ class Scenario:
     """The UAV."""
     obstacles: dict[Name, Obstacle] = field(default_factory=dict)
     """The obstacles, by name."""
+    arena_m: TwoCornersOrNone = field(default_factory=list)
+    """Opposite corners [x, y] of a rectangle whose endless walls keep all robots inside."""
     safe_distance: SafeDistance = field(default_factory=SafeDistance)
     """Distances to keep."""
     control: Control = field(default_factory=Control)
@@ -413,6 +441,18 @@ class Scenario:
         return sha256(text.encode())
 
     @property
+    def barriers(self) -> dict[str, Obstacle]:
+        """The obstacles and the walls of the arena, by name."""
+        if not self.arena_m:
+            return self.obstacles
+        (ax, bx), (ay, by) = (sorted(axis) for axis in zip(*self.arena_m, strict=True))
+        corners = [[ax, ay], [bx, ay], [bx, by], [ax, by], [ax, ay]]
+        walls = zip(("south", "east", "north", "west"), pairwise(corners), strict=True)
+        return self.obstacles | {
+            f"{ARENA}{side}": Obstacle(segment_m=list(wall), height_m=ENDLESS_M) for side, wall in walls
+        }
+
+    @property
     def robots(self) -> dict[str, Ugv | Uav]:
         """The UGVs and then the UAV, by name."""
         return {**self.ugvs, self.uav.name: self.uav}
@@ -420,7 +460,7 @@ class Scenario:
     @property
     def bodies(self) -> dict[str, Ugv | Uav | Obstacle]:
         """The robots and then the obstacles, by name."""
-        return {**self.robots, **self.obstacles}
+        return {**self.robots, **self.barriers}
 
     def __repr__(self) -> str:
         """One line with the numbers of robots and obstacles, and the runs."""

@@ -17,13 +17,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from airground_drake.base.errors import ScenarioError
+from airground_drake.base.errors import Fault, ScenarioError
 from airground_drake.base.exact import decimal
 from airground_drake.base.statuses import COUNTS, NOTHING, alternatives
 from airground_drake.decision.bayes import COMPUTED
+from airground_drake.geometry import convex
 from airground_drake.registry import MODEL_CLAIMS, ROUTES, RUN_CLAIMS
 from airground_drake.scenarios.rounding import TOLERANCE_M, Rounding
-from airground_drake.scenarios.schema import Scenario, Vector
+from airground_drake.scenarios.schema import ARENA, Scenario, Vector
+from airground_drake.scenarios.shapes import crossing, outlines_of
 
 GAINS = ("avoidance_gain_1_s", "motion_gain_1_s", "formation_gain_1_s", "intervention_gain_1_s")
 ARRIVES = "LIVE-GOAL"  # the claim that every UGV ends where it is to end
@@ -59,6 +61,46 @@ def _names(scenario: Scenario) -> Problems:
     keys += [(f"obstacles.{name}", name) for name in scenario.obstacles]
     count = Counter(name for _, name in keys)
     yield from ((key, name, "a name that no other UGV, obstacle or UAV has") for key, name in keys if count[name] > 1)
+
+
+def _reserved(scenario: Scenario) -> Problems:
+    for name in (*scenario.robots, *scenario.obstacles):
+        if name.startswith(ARENA):
+            key = f"ugvs.{name}" if name in scenario.ugvs else f"obstacles.{name}"
+            yield key, name, f"a name that does not begin with {ARENA}: these are the walls of arena_m"
+
+
+def _shapes(scenario: Scenario) -> Problems:
+    """Each obstacle has one shape, whose corners go round it once."""
+    for name, obstacle in scenario.obstacles.items():
+        key = f"obstacles.{name}"
+        given = [shape for shape in ("polygon_m", "segment_m", "size_m") if getattr(obstacle, shape)]
+        if len(given) > 1:
+            yield f"{key}.{given[1]}", getattr(obstacle, given[1]), f"one shape: {given[0]} is given, too"
+        if not obstacle.position_m and given in ([], ["size_m"]):
+            yield f"{key}.position_m", Fault("missing"), "wanted: [x, y] or [x, y, z] in m, or polygon_m or segment_m"
+        if obstacle.heading_rad and not given:
+            yield f"{key}.heading_rad", obstacle.heading_rad, "0: only polygon_m, segment_m and size_m have a heading"
+        if (given or obstacle.height_m) and obstacle.position_m and obstacle.position_m[2]:
+            yield f"{key}.position_m", obstacle.position_m, "z = 0: it stands on the ground"
+        yield from _corners(f"{key}.segment_m", obstacle.segment_m, 2, closed=False)
+        yield from _corners(f"{key}.polygon_m", obstacle.polygon_m, 3, closed=True)
+    if scenario.arena_m and any(one == other for one, other in zip(*scenario.arena_m, strict=True)):
+        yield "arena_m", scenario.arena_m, "two opposite corners of a rectangle"
+
+
+def _corners(key: str, corners: Sequence[Vector], least: int, *, closed: bool) -> Problems:
+    """The corners of a wall, or of a polygon whose edges must not touch each other."""
+    if 0 < len(corners) < least:
+        yield key, corners, f"at least {least} corners [x, y] in m"
+        return
+    edges = [(k - 1, k) for k in range(0 if closed else 1, len(corners))]
+    for i, j in edges:
+        if math.dist(corners[i], corners[j]) <= TOLERANCE:
+            yield f"{key}.{j}", corners[j], "a corner other than the one before it"
+    if closed and corners and (met := crossing([(x, y) for x, y in corners])):
+        one, other = (list(corners[k]) for k in met)
+        yield key, corners, f"edges that do not meet: those that end at {one} and at {other} do"
 
 
 def _blocks(scenario: Scenario) -> Problems:
@@ -206,17 +248,32 @@ class _Body(NamedTuple):
     name: str
 
 
-def _nearest_pairs(scenario: Scenario) -> list[tuple[str, _Body, _Body]]:
-    """For each kind of pairs the pair that needs the most room in a period, with the key of its safe distance."""
+Apart = tuple[str, float]
+"""A safe distance: its key, and its value, m."""
+
+
+def apart_of(scenario: Scenario, name: str) -> Apart:
+    """The distance to keep from an obstacle."""
+    own = scenario.barriers[name].distance_m
+    return (f"obstacles.{name}.distance_m", own) if own else _apart(scenario, "obstacle_m")
+
+
+def _apart(scenario: Scenario, kind: str) -> Apart:
+    return f"safe_distance.{kind}", getattr(scenario.safe_distance, kind)
+
+
+def _nearest_pairs(scenario: Scenario) -> list[tuple[Apart, _Body, _Body]]:
+    """For each kind of pairs the pair that needs the most room in a period, with its safe distance."""
     h = scenario.control.period_s
     *ugvs, uav = (
         _Body(each.radius_m + each.max_speed_m_s * h, each.max_speed_m_s, each.radius_m, name)
         for name, each in scenario.robots.items()
     )
     ugvs.sort(reverse=True)
-    fixed = [_Body(each.radius_m, 0.0, each.radius_m, name) for name, each in scenario.obstacles.items()]
-    pairs = [("air_ground_m", uav, ugvs[0]), *(("ugv_m", one, other) for one, other in pairwise(ugvs[:2]))]
-    return [*pairs, *(("obstacle_m", max(uav, ugvs[0]), each) for each in fixed)]
+    fixed = [_Body(each.radius_m, 0.0, each.radius_m, name) for name, each in scenario.barriers.items()]
+    pairs = [(_apart(scenario, "air_ground_m"), uav, ugvs[0])]
+    pairs += [(_apart(scenario, "ugv_m"), one, other) for one, other in pairwise(ugvs[:2])]
+    return [*pairs, *((apart_of(scenario, each.name), max(uav, ugvs[0]), each) for each in fixed)]
 
 
 def _shown(number: Fraction, rounding: str) -> str:
@@ -229,13 +286,13 @@ def _sensing(scenario: Scenario) -> Problems:
     """A body beyond the sensing range must not come within the safe distance in one control period."""
     period = scenario.control.period_s
 
-    def room(kind: str, one: _Body, other: _Body) -> Fraction:
+    def room(apart: Apart, one: _Body, other: _Body) -> Fraction:
         closing = (decimal(one.speed) + decimal(other.speed)) * decimal(period)
-        return decimal(getattr(scenario.safe_distance, kind) + (one.radius + other.radius)) + closing
+        return decimal(apart[1] + (one.radius + other.radius)) + closing
 
-    needed, kind, one, other = max((room(*pair), *pair) for pair in _nearest_pairs(scenario))
+    needed, (kind, least), one, other = max((room(*pair), *pair) for pair in _nearest_pairs(scenario))
     if decimal(scenario.control.sensing_range_m) < needed:
-        apart = f"safe_distance.{kind} {getattr(scenario.safe_distance, kind):.9g} m{_and(one.radius + other.radius)}"
+        apart = f"{kind} {least:.9g} m{_and(one.radius + other.radius)}"
         total = f"{apart} + closing {one.speed + other.speed:.9g} m/s * control.period_s {period:.9g} s"
         allowed = f"at least {_shown(needed, ROUND_CEILING)} m for {one.name} and {other.name}: {total}"
         yield "control.sensing_range_m", scenario.control.sensing_range_m, allowed
@@ -257,7 +314,11 @@ def _extent(scenario: Scenario) -> Problems:
         points += [(f"ugvs.{name}.start_m", ugv.start_m), (f"ugvs.{name}.target_m", ugv.target_m)]
         points += [(f"ugvs.{name}.preset.waypoints_m.{i}", each) for i, each in enumerate(ugv.preset.waypoints_m)]
     points.append(("uav.start_m", scenario.uav.start_m))
-    points += [(f"obstacles.{name}.position_m", each.position_m) for name, each in scenario.obstacles.items()]
+    for name, each in scenario.barriers.items():
+        shape = next((key for key in ("polygon_m", "segment_m", "size_m") if getattr(each, key)), "position_m")
+        places = [each.position_m] if each.position_m else []
+        places += [place for row in outlines_of(scenario, each) for place in convex.corners_of(row).tolist()]
+        points += [(f"obstacles.{name}.{shape}", place) for place in places]
     key, point = max(points, key=lambda entry: max(map(abs, entry[1])))
     farthest = max(map(abs, point))
     allowed = loss.largest_extent(duration) - speed * duration
@@ -279,7 +340,7 @@ def _extent(scenario: Scenario) -> Problems:
 
 
 class _Round(NamedTuple):
-    """A robot or obstacle: its key in the scenario, its name, its place, m, and its radius, m."""
+    """A robot: its key in the scenario, its name, its place, m, and its radius, m."""
 
     key: str
     name: str
@@ -289,25 +350,33 @@ class _Round(NamedTuple):
 
 def _clearances(scenario: Scenario) -> Problems:
     """No robot may start or end within the safe distance of an obstacle or of another robot."""
+    outlines = {name: outlines_of(scenario, each) for name, each in scenario.barriers.items()}
     for attribute, verb in (("start_m", "starts"), ("target_m", "would end")):
-        fixed = [
-            _Round("", name, each.position_m, each.radius_m)
-            for name, each in scenario.obstacles.items()
-            if not each.appears_s or attribute == "target_m"  # where robots are when it appears is judged in each run
-        ]
         ugvs = [
             _Round(f"ugvs.{name}", name, getattr(ugv, attribute), ugv.radius_m) for name, ugv in scenario.ugvs.items()
         ]
         uav = _Round("uav", scenario.uav.name, getattr(scenario.uav, attribute), scenario.uav.radius_m)
-        for robots, others, kind in (
-            ([*ugvs, uav], fixed, "obstacle_m"), (ugvs, ugvs, "ugv_m"), ([uav], ugvs, "air_ground_m"),
-        ):  # fmt: skip
+        for name, rows in outlines.items():
+            if scenario.barriers[name].appears_s and attribute == "start_m":
+                continue  # where robots are when it appears is judged in each run
+            kind, least = apart_of(scenario, name)
+            for robot in (*ugvs, uav):
+                apart = convex.distances(rows, np.array(robot.point), robot is not uav) - rows[:, convex.RADIUS]
+                gap = float(apart.min()) - robot.radius
+                if gap < least - TOLERANCE:
+                    yield _too_near(robot, attribute, f"{verb} {gap:.9g} m from {name}", kind, least)
+        for robots, others, kind in ((ugvs, ugvs, "ugv_m"), ([uav], ugvs, "air_ground_m")):
             least = getattr(scenario.safe_distance, kind)
             for robot, other in _within(robots, others, least - TOLERANCE):
-                allowed = f"at least safe_distance.{kind} = {least:.9g} m is needed"
                 gap = math.dist(robot.point, other.point) - (robot.radius + other.radius)
-                message = f"{robot.name} {verb} {gap:.9g} m from {other.name}, {allowed}"
-                yield f"{robot.key}.{attribute}", robot.point, message
+                what = f"{verb} {gap:.9g} m from {other.name}"
+                yield _too_near(robot, attribute, what, f"safe_distance.{kind}", least)
+
+
+def _too_near(robot: _Round, attribute: str, what: str, kind: str, least: float) -> tuple[str, object, str]:
+    message = f"{robot.name} {what}, at least {kind} = {least:.9g} m is needed"
+    message = f"{robot.name} {what}, at least {kind} = {least:.9g} m is needed"
+    return f"{robot.key}.{attribute}", robot.point, message
 
 
 def _within(these: Sequence[_Round], those: Sequence[_Round], distance: float) -> Iterator[tuple[_Round, _Round]]:
@@ -348,7 +417,7 @@ def _keys(value: object, above: str = "") -> Iterator[str]:
 
 
 CHECKS: tuple[Callable[[Scenario], Problems], ...] = (
-    _names, _blocks, _route, _runs, _presets, _ends, _gains, _periods, _release, _distances, _sensing, _extent,
-    _clearances, _reproduction, _choices,
+    _names, _reserved, _shapes, _blocks, _route, _runs, _presets, _ends, _gains, _periods, _release, _distances,
+    _sensing, _extent, _clearances, _reproduction, _choices,
 )  # fmt: skip
 """Every rule; later ones rely on earlier ones."""

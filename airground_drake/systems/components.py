@@ -23,6 +23,7 @@ from airground_drake.gatekeeper.outcome_gatekeeper import OutcomeGatekeepers
 from airground_drake.gatekeeper.patience import Patience
 from airground_drake.gatekeeper.problem import Horizon
 from airground_drake.gatekeeper.routes.route import Route
+from airground_drake.geometry import convex
 from airground_drake.geometry.motion import Motion
 from airground_drake.intervention.database import BehaviourDatabase, make_policy
 from airground_drake.intervention.planner import Planner
@@ -30,6 +31,7 @@ from airground_drake.nsbc.avoidance import Avoidance, Composition
 from airground_drake.nsbc.law import UgvLaw
 from airground_drake.registry import ROUTES, Method
 from airground_drake.scenarios.schema import Decision, Scenario
+from airground_drake.scenarios.shapes import outlines_of
 from airground_drake.scenarios.world import make_world
 
 SAME_TIME = 1e-12
@@ -54,7 +56,7 @@ def make_planner(scenario: Scenario, method: Method) -> Planner:
     Raises:
         UnknownNameError, PluginError: if the scenario names a policy that cannot be made.
     """
-    mapped, radii, appears = make_map(scenario)
+    mapped, appears = make_map(scenario)
     given = scenario.intervention
     policies = given.policies if method.intervenes else []
     database = BehaviourDatabase(
@@ -71,26 +73,24 @@ def make_planner(scenario: Scenario, method: Method) -> Planner:
         presets=tuple(make_presets(scenario)),
         targets=positions([ugv.target_m for ugv in scenario.ugvs.values()]),
         mapped=mapped,
-        mapped_radii=radii,
         mapped_from=appears,
-        safe_distance=scenario.safe_distance.obstacle_m,
         robot_distance=scenario.safe_distance.ugv_m,
         max_speed=np.array([ugv.max_speed_m_s for ugv in scenario.ugvs.values()]),
         radius=np.array([ugv.radius_m for ugv in scenario.ugvs.values()]),
     )
 
 
-def make_map(scenario: Scenario) -> tuple[Array, Array, Array]:
+def make_map(scenario: Scenario) -> tuple[Array, Array]:
     """The UAV's map: obstacles that it knows, and phantoms, which exist on the map only and have no radius.
 
     Returns:
-        Centres, (m, 3), m, radii, (m,), m, and when each appears, (m,), s.
+        Outlines, (m, W), see `geometry.convex`, and when each appears, (m,), s.
     """
-    known = [obstacle for obstacle in scenario.obstacles.values() if obstacle.known_to_uav]
-    nothing = [0.0] * len(scenario.uav.phantoms_m)
-    centres = [*(obstacle.position_m for obstacle in known), *scenario.uav.phantoms_m]
-    radii, appears = ([getattr(each, key) for each in known] + nothing for key in ("radius_m", "appears_s"))
-    return positions(centres), np.array(radii), np.array(appears)
+    known = [obstacle for obstacle in scenario.barriers.values() if obstacle.known_to_uav]
+    parts = [outlines_of(scenario, obstacle) for obstacle in known]
+    appears = [obstacle.appears_s for obstacle, rows in zip(known, parts, strict=True) for _ in rows]
+    phantoms = convex.balls(scenario.uav.phantoms_m, gap=scenario.safe_distance.obstacle_m)
+    return convex.joined(*parts, phantoms), np.array([*appears, *(0.0 for _ in phantoms)])
 
 
 def make_route(scenario: Scenario) -> Route:

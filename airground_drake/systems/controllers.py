@@ -26,6 +26,7 @@ from pydrake.systems.framework import (
 
 from airground_drake.base.arrays import Array, read_only
 from airground_drake.base.errors import PluginError, short
+from airground_drake.geometry import convex
 from airground_drake.intervention.messages import NOTHING, accepted_proposals
 from airground_drake.intervention.policy import Proposal
 from airground_drake.nsbc.avoidance import Avoidance
@@ -244,8 +245,9 @@ def read_back(system: LeafSystem, avoidance: Avoidance, near: Neighbours) -> dic
     """The parameters with which a controller's avoidance runs, in strict JSON, for the trace.
 
     Returns:
-        For its k robots: `members`, their indices in the order of the world; `obstacles_m`, centres (m, 3); `others`,
-        indices of the n robots that each avoids, (k, n); `safe_m` and `share` beside the obstacles, then beside the
+        For its k robots: `members`, their indices in the order of the world; `outlines` of the m convex parts at rest,
+        without padding, one after the other; `others`, indices of the bodies of the n parts that each avoids besides,
+        (k, n); `safe_m` and `share` beside the parts at rest, then beside the
         robots, (k, m + n); `mobility` (k, 3); `max_speed_m_s` (k,). For the layer: `sampling_s`, period and offset;
         `gain_1_s`, `period_s`, `sensing_range_m`. Arrays are flat, in C order; `safe_m` and `share` are lists of
         [value, number of repetitions].
@@ -253,8 +255,8 @@ def read_back(system: LeafSystem, avoidance: Avoidance, near: Neighbours) -> dic
     timing = system.GetUniquePeriodicDiscreteUpdateAttribute()
     return {
         "members": near.members.tolist(),
-        "obstacles_m": near.still.ravel().tolist(),
-        "others": near.others.ravel().tolist(),
+        "outlines": [number for row in near.still for number in convex.as_tuple(row)],
+        "others": near.carrier[near.others].ravel().tolist(),
         "safe_m": _in_runs(near.distance),
         "share": _in_runs(near.share),
         "mobility": near.mobility.ravel().tolist(),

@@ -14,7 +14,7 @@ from pydrake.systems.framework import BasicVector, Context, EventStatus, LeafSys
 from airground_drake.base.arrays import Array
 from airground_drake.intervention.messages import accepted_proposals
 from airground_drake.intervention.policy import Proposal
-from airground_drake.nsbc.avoidance import Avoidance, Surroundings
+from airground_drake.nsbc.avoidance import Avoidance
 from airground_drake.systems.lifetime import weakly
 from airground_drake.systems.signals import declare_bodies, no_proposals
 from airground_drake.world.world import ROBOTS, World
@@ -164,8 +164,7 @@ class Monitor(LeafSystem):
         """The largest violation by the commands that were chosen at `sample` and are held until now."""
         commands = self._command.Eval(context).reshape(-1, 3)
         near = self._world.at(self._near, sample.t)
-        own = sample.positions[near.members]
-        spaces = self._avoidance.half_spaces(own, near.mobility, Surroundings.of(near, sample.positions))
+        spaces = self._avoidance.half_spaces(sample.positions, near)
         speed = np.linalg.norm(commands, axis=1)
         missed: dict[Rule, Array] = {
             Rule.AVOIDANCE: -spaces.slack(commands).min(axis=1, initial=np.inf),

@@ -31,6 +31,12 @@ class PeriodMotion(NamedTuple):
         """The same motion relative to another centre that moves during the same periods."""
         return PeriodMotion(self.start - other.start, self.end - other.end, self.off_m + other.off_m)
 
+    @property
+    def box(self) -> tuple[Array, Array]:
+        """Two opposite corners, (3,), m, of a box around the motion of all periods."""
+        places = np.concatenate([self.start.reshape(-1, 3), self.end.reshape(-1, 3)])
+        return places.min(axis=0) - self.off_m, places.max(axis=0) + self.off_m
+
     def least_distance(self) -> tuple[Array, Array]:
         """The least distance from the origin.
 

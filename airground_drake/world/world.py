@@ -11,16 +11,14 @@ import numpy as np
 import numpy.typing as npt
 
 from airground_drake.base.arrays import Array
+from airground_drake.geometry import convex
 from airground_drake.world.motion import SAME_S
 from airground_drake.world.plant import Plant
-from airground_drake.world.shape import Ball, Shape
 
 Kind = Literal["ugv", "uav", "obstacle"]
 KINDS: tuple[Kind, ...] = get_args(Kind)
 ROBOTS: tuple[Kind, ...] = ("ugv", "uav")
 """Kinds of bodies that are commanded."""
-NOWHERE_M = 1e150
-"""Coordinates of a body that has not appeared yet: beyond any sensing range, and its square is still finite."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,8 +28,8 @@ class Body:
     Attributes:
         name: unique in its world.
         kind: UGVs stay in their plane.
-        start_m: position of its centre at the start, (3,), m, world frame.
-        shape: the room that it takes up around its centre.
+        start_m: position of its origin at the start, (3,), m, world frame.
+        shape: outlines of its convex parts about its origin, (k, W), see `geometry.convex`; of a robot, one ball.
         plant: how it moves; None: it never moves.
         max_speed_m_s: speed limit.
         appears_s: time from which on it is there, s; only for a body that never moves.
@@ -40,7 +38,7 @@ class Body:
     name: str
     kind: Kind
     start_m: Array
-    shape: Shape = field(default_factory=Ball)
+    shape: Array = field(default_factory=lambda: convex.balls(np.zeros(3)))
     plant: Plant | None = None
     max_speed_m_s: float = 0.0
     appears_s: float = 0.0
@@ -53,38 +51,26 @@ class Body:
         return np.array([1.0, 1.0, 0.0]) if self.kind == "ugv" else np.ones(3)
 
 
-class Pair(NamedTuple):
-    """Two bodies that keep apart.
-
-    Attributes:
-        first: name of a robot.
-        second: name of the other body.
-        distance_m: safe distance between their centres.
-        shares: part of the avoidance inequality that each of them takes.
-    """
-
-    first: str
-    second: str
-    distance_m: float
-    shares: tuple[float, float]
-
-
 class Neighbours(NamedTuple):
-    """The bodies that k robots keep away from, as arrays for compiled code: m at rest, then n that move.
+    """What k robots keep away from, as arrays for compiled code: m convex parts at rest, then n parts that move.
 
     Attributes:
         members: the robots, rows of the positions of moving bodies, (k,).
-        others: what moves around each, rows likewise, (k, n).
-        still: centres of the bodies at rest, (m, 3), m.
-        distance: safe distances between centres, (k, m + n), m.
+        carrier: the bodies of the P parts that move, rows of the positions of moving bodies, (P,).
+        others: the parts that move around each robot, rows of `parts`, (k, n).
+        still: outlines of the parts at rest, (m, W).
+        parts: outlines of all parts that move, about the origins of their bodies, (P, W).
+        distance: safe distances between the robot's centre and the cores, (k, m + n), m.
         share: part of the avoidance inequality that the robot takes, (k, m + n).
         mobility: of the robots, (k, 3), 1 where they can move, else 0.
         max_speed: of the robots, (k,), m/s.
     """
 
     members: npt.NDArray[np.intp]
+    carrier: npt.NDArray[np.intp]
     others: npt.NDArray[np.intp]
     still: Array
+    parts: Array
     distance: Array
     share: Array
     mobility: Array
@@ -100,8 +86,9 @@ class World:
 
     Attributes:
         bodies: in array order.
-        apart_m: safe distance between the surfaces of two bodies, m, by the set of their kinds; each of two robots
-            takes half of an inequality, a robot near an obstacle all of it.
+        apart_m: safe distance between the surfaces of two robots, m, by the set of their kinds. An obstacle's outlines
+            say what distance to keep from it. Each of two robots takes half of an inequality, a robot beside an
+            obstacle all of it.
     """
 
     bodies: tuple[Body, ...]
@@ -144,18 +131,34 @@ class World:
         return tuple(body for body in self.bodies if body.plant is not None)
 
     def at(self, near: Neighbours, t: float) -> Neighbours:
-        """The same neighbours at time t, s: bodies at rest that have not appeared yet are at NOWHERE_M.
+        """The same neighbours at time t, s: bodies at rest that have not appeared yet are nowhere.
 
         A controller that asks at its samples has a body from the first sample at or after `appears_s` on.
         """
         if t >= self._complete_s:
             return near
-        return near._replace(still=np.where((self._appears <= t + SAME_S)[:, None], near.still, NOWHERE_M))
+        return near._replace(still=convex.where(self._appears[self.owner] <= t + SAME_S, near.still))
+
+    @cached_property
+    def still(self) -> Array:
+        """Outlines of the convex parts of all bodies at rest, (m, W), world frame."""
+        resting = [convex.moved(body.shape, body.start_m) for body in self.resting]
+        return convex.joined(*resting) if resting else convex.stacked([])
+
+    @cached_property
+    def owner(self) -> npt.NDArray[np.intp]:
+        """The body of each row of `still`, (m,), as an index in `resting`."""
+        return np.repeat(np.arange(len(self.resting)), [len(body.shape) for body in self.resting])
+
+    @cached_property
+    def resting(self) -> tuple[Body, ...]:
+        """The bodies that never move."""
+        return tuple(body for body in self.bodies if body.plant is None)
 
     @cached_property
     def _appears(self) -> Array:
-        """When each body at rest appears, (m,), s."""
-        return np.array([body.appears_s for body in self.bodies if body.plant is None], dtype=np.float64)
+        """When each body at rest appears, s."""
+        return np.array([body.appears_s for body in self.resting], dtype=np.float64)
 
     @cached_property
     def _complete_s(self) -> float:
@@ -174,8 +177,8 @@ class World:
 
     @cached_property
     def radius(self) -> Array:
-        """Radii of all bodies, (B,), m."""
-        return np.array([body.shape.radius_m for body in self.bodies])
+        """Radii of the robots, in the order of the world, m."""
+        return np.array([float(body.shape[0, convex.RADIUS]) for body in self.bodies if body.kind in ROBOTS])
 
     def moves_straight(self, period_s: float) -> bool:
         """Whether all bodies move on straight lines while their commands are held for a period."""
@@ -185,42 +188,31 @@ class World:
         """Safe distance between the surfaces of bodies of two kinds, m; 0 if none is declared."""
         return self.apart_m.get(frozenset((first, second)), 0.0)
 
-    def pair(self, first: str, second: str) -> Pair:
-        """The distance and the shares of a robot and another body."""
-        i, j = self.index(first), self.index(second)
-        shares = float(self._share[i, j]), float(self._share[j, i]) if j < len(self._share) else 0.0
-        return Pair(first, second, float(self._distance[i, j]), shares)
-
-    @cached_property
-    def _distance(self) -> Array:
-        """Safe distances between the centres of moving bodies and all bodies, (M, B), m; the diagonal means nothing."""
-        by_kind = np.array([[self.apart(one, other) for other in KINDS] for one in KINDS])
-        code = [KINDS.index(body.kind) for body in self.bodies]
-        count = len(self.moving)
-        surfaces: Array = by_kind[np.ix_(code[:count], code)]
-        return surfaces + (self.radius[:count, None] + self.radius)
-
-    @cached_property
-    def _share(self) -> Array:
-        """Shares that moving bodies take beside all bodies, (M, B): an obstacle takes none."""
-        robot = np.array([body.kind in ROBOTS for body in self.bodies])
-        share: Array = np.where(robot, 0.5, 1.0) * robot[: len(self.moving), None]
-        return share
-
     def around(self, rows: slice) -> Neighbours:
         """The bodies that the robots in some rows keep away from."""
-        count = len(self.moving)
-        members = np.arange(count)[rows]
-        others = np.array([np.delete(np.arange(count), i) for i in members], dtype=np.intp).reshape(len(members), -1)
-        still = np.arange(count, len(self.bodies))
-        columns = np.concatenate([np.tile(still, (len(members), 1)), others], axis=1)
+        members = np.arange(len(self.moving))[rows]
+        parts = convex.joined(*(body.shape for body in self.moving))
+        carrier = np.repeat(np.arange(len(self.moving)), [len(body.shape) for body in self.moving])
+        others = np.array([np.flatnonzero(carrier != i) for i in members], dtype=np.intp).reshape(len(members), -1)
         robots = [self.bodies[i] for i in members]
+        distance = [
+            np.concatenate([convex.keep(self.still, radius), self._beside(robot, radius)[other]])
+            for robot, radius, other in zip(robots, self.radius[members], others, strict=True)
+        ]
+        share = np.where(np.array([body.kind in ROBOTS for body in self.moving]), 0.5, 1.0)[carrier]
         return Neighbours(
-            members, others, _rows([self.bodies[k].start_m for k in still]),
-            np.take_along_axis(self._distance[members], columns, axis=1),
-            np.take_along_axis(self._share[members], columns, axis=1),
+            members, carrier, others, self.still, parts, np.array(distance).reshape(len(members), -1),
+            np.array([np.append(np.ones(len(self.still)), share[other]) for other in others]).reshape(len(members), -1),
             _rows([robot.mobility for robot in robots]), np.array([robot.max_speed_m_s for robot in robots]),
         )  # fmt: skip
+
+    def _beside(self, robot: Body, radius: float) -> Array:
+        """Safe distances between the centre of a robot and the cores of the parts that move, (P,), m."""
+        return np.concatenate([
+            self.apart(robot.kind, body.kind) + (radius + body.shape[:, convex.RADIUS]) if body.kind in ROBOTS
+            else convex.keep(body.shape, radius)
+            for body in self.moving
+        ])  # fmt: skip
 
 
 def _rows(points: Sequence[Array]) -> Array:

@@ -1,4 +1,4 @@
-"""The graph on which robots move: a lattice between the discs, with the robots' starts, presets and shortest paths."""
+"""The graph on which robots move: a lattice between obstacles, with the robots' starts, presets and shortest paths."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from scipy.sparse.csgraph import dijkstra
 from scipy.spatial import cKDTree
 
 from airground_drake.base.arrays import Array
+from airground_drake.geometry import convex
 from airground_drake.geometry.paths import NoPath, shortest_path
 from airground_drake.intervention.coordination.intervals import Grid, Indices
-from airground_drake.intervention.coordination.timed import free_points, free_segments
 
 PITCH = 0.2
 """Spacing of the lattice as a share of the distance that robots keep."""
@@ -38,29 +38,28 @@ ROUNDING_M = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class Space:
-    """Discs and distances that a robot has to keep. `Space.of` makes the space of a robot with a body.
+    """Obstacles and distances that a robot has to keep. `Space.of` makes the space of a robot with a body.
 
     Attributes:
-        centres: of the obstacles, (m, 2), m.
-        radii: distances to keep from the centres, (m,), m.
+        rows: outlines of the obstacles, (m, W), see `geometry.convex`.
+        keep: distances to keep from their cores, (m,), m.
         clearance: extra distance from obstacles, m. Nodes of the lattice keep all of it, edges half of it.
         apart: distance between the robot's centre and the surfaces of other robots, m.
         spacing: extra distance from other robots where possible, m; not 0.
-        above: distances of the obstacles from the robot's plane, (m,), m; then `radii` are radii of balls.
+        height: of the robot's plane, m.
     """
 
-    centres: Array
-    radii: Array
+    rows: Array
+    keep: Array
     clearance: float
     apart: float
     spacing: float
-    above: Array | float = 0.0
+    height: float = 0.0
 
     def of(self, body: float) -> Space:
-        """This space for the centre of a robot whose body has this radius, m: balls are cut by the robot's plane."""
-        squared = np.square(self.radii + body) - np.square(self.above)
-        near = squared > 0.0
-        return Space(self.centres[near], np.sqrt(squared[near]), self.clearance, self.apart + body, self.spacing)
+        """This space for the centre of a robot whose body has this radius, m, with obstacles cut by its plane."""
+        rows, keep = convex.sections(self.rows, self.keep + body, self.height)
+        return Space(rows, keep, self.clearance, self.apart + body, self.spacing)
 
     def wide(self, longest: float, body: float = 0.0) -> float:
         """How far another robot must be from both ends of an edge to be `apart + spacing` from the whole edge, m.
@@ -75,24 +74,21 @@ class Space:
         return math.sqrt((self.apart + body + self.spacing) ** 2 + longest**2 / 4.0)
 
     @property
-    def discs(self) -> Array:
-        """Centres and distances to keep with the clearance of edges, (m, 3), m."""
-        return self._discs(CHORDS * self.clearance)
-
-    def _discs(self, clearance: float) -> Array:
-        """Centres and distances to keep with a clearance, m, as (m, 3), m."""
-        return np.column_stack([self.centres, self.radii + clearance])
+    def along(self) -> Array:
+        """Distances that edges keep from the cores, (m,), m."""
+        found: Array = self.keep + CHORDS * self.clearance
+        return found
 
     def segments_are_free(self, begin: Array, end: Array) -> npt.NDArray[np.bool_]:
-        """Which segments, from begin (K, 2), m, to end (K, 2), m, keep the distance from every disc.
+        """Which segments, from begin (K, 2), m, to end (K, 2), m, keep the distance from every obstacle.
 
-        A segment that begins or ends too near to a disc is free if it comes no nearer in between.
+        A segment that begins or ends too near to an obstacle is free if it comes no nearer in between.
         """
-        return free_segments(begin, end, self.discs, ROUNDING_M)
+        return convex.segments_are_free(begin, end, self.rows, self.along, ROUNDING_M)
 
     def points_are_free(self, points: Array, clearance: float) -> npt.NDArray[np.bool_]:
         """Which points (K, 2), m, keep every distance and this clearance, m."""
-        return free_points(points, self._discs(clearance - ROUNDING_M))
+        return convex.points_are_free(points, self.rows, self.keep + (clearance - ROUNDING_M))
 
 
 @dataclass(frozen=True, eq=False)
@@ -233,13 +229,14 @@ def _area(space: Space, tasks: Sequence[RobotTask], others: Sequence[Array]) -> 
         [*(task.start[None] for task in tasks), *(task.preset[:, 1:] for task in tasks),
          np.array(others).reshape(-1, 2)]
     )  # fmt: skip
-    widest = float(max(space.apart, *space.radii, 0.0)) if len(space.radii) else space.apart
+    widest = float(max(space.apart, *space.keep, 0.0)) if len(space.keep) else space.apart
     room = 3.0 * (widest + space.spacing)
     low, high = points.min(axis=0) - room, points.max(axis=0) + room
-    near = ((space.centres > low) & (space.centres < high)).all(axis=1)
-    beyond = (space.radii[near] + space.clearance + space.apart + space.spacing)[:, None]
-    low = np.concatenate([low[None], space.centres[near] - beyond]).min(axis=0)
-    high = np.concatenate([high[None], space.centres[near] + beyond]).max(axis=0)
+    middles, extent = space.rows[:, convex.MIDDLE : convex.EXTENT], space.rows[:, convex.EXTENT, None]
+    near = ((middles > low - extent) & (middles < high + extent)).all(axis=1)
+    beyond = (space.keep[near] + space.clearance + space.apart + space.spacing)[:, None] + extent[near]
+    low = np.concatenate([low[None], middles[near] - beyond]).min(axis=0)
+    high = np.concatenate([high[None], middles[near] + beyond]).max(axis=0)
     return low, high
 
 
@@ -262,11 +259,11 @@ def _spread(times: Array, pieces: Indices) -> Array:
 def _path_nodes(space: Space, start: Array, target: Array, pitch: float) -> Array:
     """Places along the shortest path to the target, (K, 2), m, among them the ends of its pieces; K = 0: no path."""
     try:
-        path = shortest_path(start, target, space.centres, space.radii + ARCS * space.clearance)
+        path = shortest_path(start, target, space.rows, space.keep + ARCS * space.clearance)
     except NoPath:
         return np.zeros((0, 2))
     sagitta = (ARCS - CHORDS) * space.clearance
-    flat = 0.9 * math.sqrt(8.0 * sagitta * float(space.radii.min(initial=1.0)))
+    flat = 0.9 * math.sqrt(8.0 * sagitta * float(space.keep.min(initial=1.0)))
     gap = max(min(pitch, flat), path.length_m / MOST_PATH_NODES)
     ends = np.concatenate([[0.0], np.cumsum(path.pieces[:, 5])])
     along = _spread(ends, np.maximum(1, np.ceil(np.diff(ends) / gap)).astype(np.int64))

@@ -43,5 +43,5 @@ def _straightened(space: Space, way: Way, others: Sequence[OtherRobot]) -> Way:
     stacked = np.concatenate([np.zeros((0, 3)), *(other.motion for other in others)])
     begins = np.concatenate([[0], np.cumsum([len(other.motion) for other in others])]).astype(np.int64)
     apart = np.array([space.apart + other.radius + space.spacing for other in others])
-    motion = straightened(way.motion, way.rows, space.discs, stacked, begins, apart)
+    motion = straightened(way.motion, way.rows, space.rows, space.along, stacked, begins, apart)
     return Way(motion, way.joined, way.rows - (len(way.motion) - len(motion)))

@@ -11,6 +11,7 @@ import numpy.typing as npt
 from numba import njit
 
 from airground_drake.base.arrays import Array
+from airground_drake.geometry.convex import passes
 
 
 def timed(times: Array, places: Array) -> Array:
@@ -103,51 +104,8 @@ def free_pieces(preset: Array, other: Array, apart: float) -> npt.NDArray[np.boo
 
 
 @njit(cache=True)
-def free_points(points: Array, discs: Array) -> npt.NDArray[np.bool_]:
-    """Which points (K, 2), m, are outside all discs (m, 3) of centre and radius, m."""
-    free = np.ones(len(points), np.bool_)
-    for k in range(len(points)):
-        for m in range(len(discs)):
-            x, y = points[k, 0] - discs[m, 0], points[k, 1] - discs[m, 1]
-            if np.sqrt(x * x + y * y) < discs[m, 2]:
-                free[k] = False
-                break
-    return free
-
-
-@njit(cache=True)
-def free_segments(begin: Array, end: Array, discs: Array, slack: float) -> npt.NDArray[np.bool_]:
-    """Which segments keep out of all discs. A segment with an end in a disc must come no nearer than that end.
-
-    Args:
-        begin: (K, 2), m.
-        end: (K, 2), m.
-        discs: (m, 3) of centre and radius, m.
-        slack: tolerance of the distances, m.
-    """
-    free = np.ones(len(begin), np.bool_)
-    for k in range(len(begin)):
-        sx, sy = end[k, 0] - begin[k, 0], end[k, 1] - begin[k, 1]
-        squared = max(sx * sx + sy * sy, 1e-300)
-        reach = 1.001 * np.sqrt(squared)
-        for m in range(len(discs)):
-            ax, ay = begin[k, 0] - discs[m, 0], begin[k, 1] - discs[m, 1]
-            to_begin = np.sqrt(ax * ax + ay * ay)
-            if to_begin > discs[m, 2] + reach:
-                continue
-            bx, by = end[k, 0] - discs[m, 0], end[k, 1] - discs[m, 1]
-            share = min(max(-(ax * sx + ay * sy) / squared, 0.0), 1.0)
-            x, y = ax + share * sx, ay + share * sy
-            allowed = min(discs[m, 2], to_begin, np.sqrt(bx * bx + by * by))
-            if np.sqrt(x * x + y * y) < allowed - slack:
-                free[k] = False
-                break
-    return free
-
-
-@njit(cache=True)
 def straight_is_free(
-    motion: Array, i: int, j: int, discs: Array, others: Array, begins: npt.NDArray[np.int64], apart: Array
+    motion: Array, i: int, j: int, rows: Array, keep: Array, others: Array, begins: npt.NDArray[np.int64], apart: Array
 ) -> bool:
     """Whether a timed motion may go straight from row i to row j.
 
@@ -157,17 +115,16 @@ def straight_is_free(
         motion: (M, 3).
         i: row at which the straight piece begins.
         j: row at which it ends.
-        discs: (m, 3) of centre and radius, m.
+        rows: outlines of obstacles, (m, W), see `geometry.convex`.
+        keep: distances from their cores, (m,), m.
         others: other timed motions, stacked, (R, 3).
         begins: first row of each of the others, and R, (B + 1,).
         apart: distances to keep from the others, (B,), m.
     """
     t, x, y = motion[i, 0], motion[i, 1], motion[i, 2]
     until, u, v = motion[j, 0], motion[j, 1], motion[j, 2]
-    for k in range(len(discs)):
-        ax, ay, bx, by = x - discs[k, 0], y - discs[k, 1], u - discs[k, 0], v - discs[k, 1]
-        least = min(discs[k, 2], np.hypot(ax, ay), np.hypot(bx, by))
-        if approach(ax, ay, bx - ax, by - ay, 1.0) < least - 1e-9:
+    for k in range(len(rows)):
+        if not passes(rows[k], keep[k], x, y, u, v, 1e-9):
             return False
     straight = np.empty((2, 3))
     straight[0, 0], straight[0, 1], straight[0, 2] = t, x, y
@@ -184,7 +141,7 @@ def straight_is_free(
 
 @njit(cache=True)
 def straightened(
-    motion: Array, upto: int, discs: Array, others: Array, begins: npt.NDArray[np.int64], apart: Array
+    motion: Array, upto: int, rows: Array, keep: Array, others: Array, begins: npt.NDArray[np.int64], apart: Array
 ) -> Array:
     """The timed motion without needless detours between its first `upto` rows.
 
@@ -196,7 +153,7 @@ def straightened(
     kept[0], count, i = 0, 1, 0
     while i + 1 < upto:
         j = upto - 1
-        while j > i + 1 and not straight_is_free(motion, i, j, discs, others, begins, apart):
+        while j > i + 1 and not straight_is_free(motion, i, j, rows, keep, others, begins, apart):
             j = i + max(1, (j - i) * 3 // 4)
         kept[count] = j
         count += 1

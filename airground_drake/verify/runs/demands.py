@@ -11,7 +11,9 @@ from typing import Any
 
 import numpy as np
 
+from airground_drake.geometry.convex import as_tuple
 from airground_drake.run.trace import Trace
+from airground_drake.scenarios.shapes import outlines_of
 from airground_drake.verify.runs.control_law import ON_TOP
 from airground_drake.verify.runs.pairs import declared_pairs
 
@@ -29,6 +31,7 @@ def demanded(trace: Trace) -> dict[str, dict[str, Any]]:
     """
     scenario, robots = trace.scenario, trace.robots
     control, obstacles = scenario.control, scenario.obstacles
+    outlines = [x for each in obstacles.values() for row in outlines_of(scenario, each) for x in as_tuple(row)]
     everybody, m = np.arange(len(robots)), len(obstacles)
     number = {name: k for k, name in enumerate([*obstacles, *robots])}
     safe, share = np.zeros((2, len(robots), len(number)))
@@ -43,7 +46,7 @@ def demanded(trace: Trace) -> dict[str, dict[str, Any]]:
         beside = np.array([np.delete(np.arange(len(number)), m + i) for i in team])
         found[name] = {
             "members": team,
-            "obstacles_m": np.array([each.position_m for each in obstacles.values()]).ravel(),
+            "outlines": np.array(outlines),
             "others": (beside[:, m:] - m).ravel(),
             "safe_m": np.take_along_axis(safe[team], beside, axis=1).ravel(),
             "share": np.take_along_axis(share[team], beside, axis=1).ravel(),

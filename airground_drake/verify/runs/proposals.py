@@ -10,6 +10,7 @@ import numpy as np
 
 from airground_drake.base.arrays import Array
 from airground_drake.base.errors import TraceError
+from airground_drake.geometry.convex import unpacked
 from airground_drake.run.trace import Trace
 
 
@@ -25,8 +26,7 @@ class ProposalRecord:
         times_s: times of the vertices of the motion that it asks for, (M,).
         positions_m: the vertices, (M, 3).
         selection: J_int of (12)-(14), (m, 3).
-        mapped_m: obstacles on the UAV's map, (k, 3).
-        mapped_radius_m: their radii, (k,).
+        mapped: outlines of the obstacles on the UAV's map, (k, W), see `geometry.convex`.
         cause: UGV whose trigger it was sent for: `ugv`, or another UGV that `ugv` is to make way for.
         party: UGVs with a part in the same joint plan; empty: it stands alone.
     """
@@ -38,8 +38,7 @@ class ProposalRecord:
     times_s: Array
     positions_m: Array
     selection: Array
-    mapped_m: Array
-    mapped_radius_m: Array
+    mapped: Array
     cause: str
     party: tuple[str, ...]
 
@@ -56,25 +55,28 @@ def proposals_of(trace: Trace) -> list[ProposalRecord]:
 
 def _sent(trace: Trace, row: Mapping[Any, Any]) -> ProposalRecord:
     """The proposal of a row of the table."""
-    times, places, selection, mapped, radii = (
-        np.asarray(row[name], dtype=np.float64).ravel()
-        for name in ("times_s", "positions_m", "selection", "mapped_m", "mapped_radius_m")
+    times, places, selection, mapped = (
+        np.asarray(row[name], dtype=np.float64).ravel() for name in ("times_s", "positions_m", "selection", "mapped")
     )
     label = f"proposal to {row['robot']} at t = {row['issued_s']} s"
-    numbers = np.concatenate([times, places, selection, mapped, radii, [row["issued_s"]]])
+    numbers = np.concatenate([times, places, selection, mapped, [row["issued_s"]]])
     if not np.isfinite(numbers).all() or not len(times) or not (np.diff(times) > 0.0).all():
         raise TraceError(f"{label}: numbers that are not finite, or times that do not increase")
     shaped = len(places) == 3 * len(times) and len(selection) and not len(selection) % 3
-    if not shaped or len(mapped) != 3 * len(radii) or row["robot"] not in trace.ugvs:
+    if not shaped or row["robot"] not in trace.ugvs:
         raise TraceError(f"{label}: no motion of a UGV of the trace")
     if row["cause"] not in trace.ugvs:
         raise TraceError(f"{label}: its cause {row['cause']!r} is no UGV of the trace")
+    try:
+        outlines = unpacked(mapped.tolist())
+    except ValueError as error:
+        raise TraceError(f"{label}: obstacles on its map: {error}") from None
     party = tuple(ugv for i, ugv in enumerate(trace.ugvs) if i in row["party"])
     if len(party) != len(row["party"]) or (party and row["robot"] not in party):
         raise TraceError(f"{label}: not in the joint plan of the UGVs {list(row['party'])}")
     return ProposalRecord(
         int(row["number"]), str(row["robot"]), str(row["policy"]), float(row["issued_s"]), times,
-        places.reshape(-1, 3), selection.reshape(-1, 3), mapped.reshape(-1, 3), radii, str(row["cause"]), party,
+        places.reshape(-1, 3), selection.reshape(-1, 3), outlines, str(row["cause"]), party,
     )  # fmt: skip
 
 

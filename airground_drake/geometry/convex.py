@@ -1,0 +1,486 @@
+"""Convex obstacles as rows of numbers, and their signed distances: pure maths, compiled.
+
+An *outline* is a row of floats. So m obstacles are an array (m, W), which masks, concatenates, compares and goes to
+compiled code as points (m, 3) do. Outlines of one array have the same length; what a row does not need of it is 0:
+
+    GAP                      distance that a robot's surface keeps from this obstacle's surface, m
+    RADIUS                   the obstacle is all that is within this distance of its *core*, m
+    SPEED                    speed at which the obstacle may move, m/s; 0 for one at rest
+    BASE, TOP                heights between which the core stands, m
+    COUNT                    number of corners of the core
+    MIDDLE (2), EXTENT       a circle round the corners, m, by which far obstacles are left out
+    CORNERS (2 each)         x, y of each corner, m, counter-clockwise
+
+The core is the convex hull of the corners, from BASE to TOP: a point (one corner), a wall (two), a polygon or a prism.
+A ball is a point with a radius. All geometry is about cores; `keep` says what distance from the core a robot keeps, and
+nobody else has to know radii.
+
+Distances are signed: inside a core they are minus the depth. The signed distance is a convex function of the point, and
+`nearest` gives a subgradient n of it, a unit vector: dist(x + s v) >= dist(x) + s n.v for all v and s >= 0. The theorem
+of set-based avoidance needs nothing else.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+import numpy.typing as npt
+from numba import njit
+from numpy.typing import ArrayLike
+
+from airground_drake.base.arrays import Array
+
+GAP, RADIUS, SPEED, BASE, TOP, COUNT, MIDDLE, EXTENT, CORNERS = 0, 1, 2, 3, 4, 5, 6, 8, 9
+SAME_M = 1e-9
+"""Outlines whose numbers differ by no more than this are one, m."""
+NOWHERE_M = 1e150
+"""Coordinates of an obstacle that is not there: beyond any range, and its square is still finite."""
+
+
+def ball(centre: ArrayLike, radius: float = 0.0, gap: float = 0.0) -> Array:
+    """The outline of a ball about a centre (3,), m; with the default radius a point."""
+    x, y, z = np.asarray(centre, dtype=np.float64).tolist()
+    return np.array([gap, radius, 0.0, z, z, 1.0, x, y, 0.0, x, y])
+
+
+def balls(centres: ArrayLike, radii: ArrayLike = 0.0, gap: float = 0.0) -> Array:
+    """The outlines of balls about centres (m, 3), m; radii (m,), m, or one for all."""
+    places = np.asarray(centres, dtype=np.float64).reshape(-1, 3)
+    return stacked(map(ball, places, np.broadcast_to(radii, len(places)), [gap] * len(places)))
+
+
+def prism(corners: ArrayLike, *, base: float = 0.0, top: float = 0.0, radius: float = 0.0, gap: float = 0.0) -> Array:
+    """The outline of the convex hull of corners (n, 2), m, from one height to another, m.
+
+    Args:
+        corners: of a convex polygon, in order and counter-clockwise; two for a wall, one for a post.
+        base: height at which it begins, m.
+        top: height at which it ends, m.
+        radius: of the rounding, m.
+        gap: distance to keep from it, m.
+    """
+    places = np.asarray(corners, dtype=np.float64).reshape(-1, 2)
+    middle = 0.5 * (places.min(axis=0) + places.max(axis=0))
+    extent = float(np.hypot(*(places - middle).T).max()) * (1.0 + 1e-15)
+    return np.array([gap, radius, 0.0, base, top, len(places), *middle.tolist(), extent, *places.ravel().tolist()])
+
+
+def stacked(rows: Iterable[ArrayLike]) -> Array:
+    """Outlines as one array (m, W), padded with zeros; m may be 0."""
+    given = [np.asarray(row, dtype=np.float64) for row in rows]
+    found = np.zeros((len(given), max((len(row) for row in given), default=CORNERS + 2)))
+    for row, outline in zip(found, given, strict=True):
+        row[: len(outline)] = outline
+    return found
+
+
+def joined(*parts: Array) -> Array:
+    """Arrays of outlines one after the other, padded to the same width."""
+    width = max(part.shape[1] for part in parts)
+    return np.concatenate([np.pad(part, ((0, 0), (0, width - part.shape[1]))) for part in parts])
+
+
+def as_tuple(row: Array) -> tuple[float, ...]:
+    """An outline without padding, to be compared or sent."""
+    return tuple(row[: CORNERS + 2 * int(row[COUNT])].tolist())
+
+
+def unpacked(numbers: Iterable[float]) -> Array:
+    """Outlines (m, W) from their numbers without padding, one after the other.
+
+    Raises:
+        ValueError: if the numbers are not those of outlines.
+    """
+    left, rows = list(numbers), []
+    while left:
+        count = left[COUNT] if len(left) > COUNT else 0.0
+        length = CORNERS + 2 * int(count) if 1.0 <= count <= len(left) else 0
+        if not CORNERS < length <= len(left):
+            raise ValueError(f"{len(left)} numbers at the end are no outline")
+        rows.append(left[:length])
+        left = left[length:]
+    return stacked(rows)
+
+
+def same(one: Array, other: Array) -> npt.NDArray[np.bool_]:
+    """Which outlines (m, W) have the cores of others (k, V), to within `SAME_M`: (m, k)."""
+    if not (len(one) and len(other)):
+        return np.zeros((len(one), len(other)), dtype=bool)
+    both = joined(one, other)[:, BASE:]
+    found: npt.NDArray[np.bool_] = np.all(np.abs(both[: len(one), None] - both[len(one) :]) <= SAME_M, axis=2)
+    return found
+
+
+def are_outlines(rows: Array) -> npt.NDArray[np.bool_]:
+    """Which rows (m, W) are outlines of convex cores, (m,); others may come from a stranger."""
+    if rows.ndim != 2 or rows.shape[1] < CORNERS + 2:
+        return np.zeros(len(rows), dtype=bool)
+    count = rows[:, COUNT]
+    found: npt.NDArray[np.bool_] = np.logical_and.reduce([
+        np.isfinite(rows).all(axis=1), (rows[:, [GAP, RADIUS, SPEED, EXTENT]] >= 0.0).all(axis=1),
+        rows[:, BASE] <= rows[:, TOP], count >= 1.0, count == np.floor(count), CORNERS + 2.0 * count <= rows.shape[1],
+    ])  # fmt: skip
+    for k in np.flatnonzero(found):
+        corners = corners_of(rows[k])
+        before, after = corners - np.roll(corners, 1, axis=0), np.roll(corners, -1, axis=0) - corners
+        turns = before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0]
+        reach = np.hypot(*(corners - rows[k, MIDDLE:EXTENT]).T).max()
+        round_once = len(corners) < 3 or abs(_turned(before, after) - 2.0 * np.pi) < 1.0
+        distinct = len(corners) == 1 or (np.hypot(*after.T) > 0.0).all()
+        found[k] = (turns >= 0.0).all() and round_once and distinct and reach <= rows[k, EXTENT]
+    return found
+
+
+def _turned(before: Array, after: Array) -> float:
+    """By how much a way along edges (n, 2) turns left in all, rad."""
+    turns = np.arctan2(before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0], (before * after).sum(axis=1))
+    return float(turns.sum())
+
+
+def corners_of(row: Array) -> Array:
+    """The corners of an outline, (count, 2), m."""
+    return row[CORNERS : CORNERS + 2 * int(row[COUNT])].reshape(-1, 2)
+
+
+def keep(rows: Array, radius: float) -> Array:
+    """Distances that the centre of a robot with a radius, m, keeps from the cores of outlines (m, W): (m,), m."""
+    found: Array = rows[:, GAP] + (radius + rows[:, RADIUS])
+    return found
+
+
+def box(rows: Array) -> tuple[Array, Array]:
+    """Two opposite corners, (3,), m, of a box round all that outlines (m, W) stand for."""
+    reach, middle = rows[:, EXTENT] + rows[:, RADIUS], rows[:, MIDDLE:EXTENT]
+    low = np.column_stack([middle - reach[:, None], rows[:, BASE] - rows[:, RADIUS]])
+    high = np.column_stack([middle + reach[:, None], rows[:, TOP] + rows[:, RADIUS]])
+    return low.min(axis=0), high.max(axis=0)
+
+
+def moved(rows: Array, by: Array) -> Array:
+    """Outlines (m, W), each moved by its vector, (m, 3) or one for all, m."""
+    found, shift = rows.copy(), np.broadcast_to(by, (len(rows), 3))
+    found[:, BASE] += shift[:, 2]
+    found[:, TOP] += shift[:, 2]
+    found[:, MIDDLE:EXTENT] += shift[:, :2]
+    for k in range(int(rows[:, COUNT].max(initial=0.0))):
+        there = rows[:, COUNT] > k
+        found[there, CORNERS + 2 * k : CORNERS + 2 * k + 2] += shift[there, :2]
+    return found
+
+
+def where(there: npt.NDArray[np.bool_], rows: Array) -> Array:
+    """Outlines (m, W) of which those that are not there, (m,), are points at NOWHERE_M."""
+    nowhere = np.zeros(rows.shape[1])
+    nowhere[: CORNERS + 2] = ball(np.full(3, NOWHERE_M))
+    return np.where(there[:, None], rows, nowhere)
+
+
+@njit(cache=True)
+def nearest(row: Array, x: float, y: float, z: float, planar: bool, away: Array, beyond: float) -> float:
+    """Signed distance of a point from a core, m; writes the unit vector away from the core into `away`, (3,).
+
+    Args:
+        row: an outline.
+        x: of the point, m.
+        y: of the point, m.
+        z: of the point, m.
+        planar: whether the point stays in its plane: then no way leads out of a core through its top.
+        away: the result; 0 in the only corner of a core, where no direction leads away.
+        beyond: if the distance exceeds this, m, a lower bound of it that exceeds it, too, may be returned, and `away`
+            means nothing.
+    """
+    count = int(row[COUNT])
+    dz = z - min(max(z, row[BASE]), row[TOP])
+    if count == 1:
+        return _from_corner(x - row[CORNERS], y - row[CORNERS + 1], dz, away)
+    mx, my = x - row[MIDDLE], y - row[MIDDLE + 1]
+    limit = beyond + row[EXTENT]
+    if mx * mx + my * my > limit * limit:
+        return np.sqrt(mx * mx + my * my) - row[EXTENT]
+    depth, best, ux, uy = -np.inf, np.inf, 0.0, 0.0
+    cx, cy, at_corner = 0.0, 0.0, False
+    for k in range(count if count > 2 else 1):
+        i, j = CORNERS + 2 * k, CORNERS + 2 * ((k + 1) % count)
+        ex, ey = row[j] - row[i], row[j + 1] - row[i + 1]
+        px, py = x - row[i], y - row[i + 1]
+        length = np.sqrt(ex * ex + ey * ey)
+        side = (px * ey - py * ex) / length  # how far outside of the line through the edge
+        nx, ny = ey / length, -ex / length
+        if count == 2 and side < 0.0:
+            side, nx, ny = -side, -nx, -ny
+        if side < 0.0 or (side == 0.0 and count > 2):
+            if best == np.inf and side > depth:
+                depth, ux, uy = side, nx, ny
+            continue
+        along = px * ex + py * ey
+        if along < 0.0 or along > length * length:
+            qx, qy = (px, py) if along < 0.0 else (x - row[j], y - row[j + 1])
+            squared = qx * qx + qy * qy
+            if squared < best:
+                best, cx, cy, at_corner = squared, qx, qy, True
+        elif side * side <= best:
+            best, depth, ux, uy, at_corner = side * side, side, nx, ny, False
+            break  # the nearest point of a convex set is unique
+    if best == np.inf:  # in the polygon, or over or under it
+        rise = max(z - row[TOP], row[BASE] - z)
+        if not planar and rise >= depth:
+            away[0], away[1], away[2] = 0.0, 0.0, 1.0 if z - row[TOP] >= row[BASE] - z else -1.0
+            return rise
+        away[0], away[1], away[2] = ux, uy, 0.0
+        return depth
+    if at_corner:
+        return _from_corner(cx, cy, dz, away)
+    if dz == 0.0:  # the normal of the edge, which does not depend on the point
+        away[0], away[1], away[2] = ux, uy, 0.0
+        return depth
+    return _from_corner(ux * depth, uy * depth, dz, away)
+
+
+@njit(cache=True)
+def _from_corner(dx: float, dy: float, dz: float, away: Array) -> float:
+    """Length of an offset, m, and its direction, in `away`."""
+    away[0], away[1], away[2] = dx, dy, dz
+    squared = 0.0
+    for a in range(3):
+        squared += away[a] ** 2
+    reach = np.sqrt(squared)
+    for a in range(3):
+        away[a] = away[a] / reach if reach > 0.0 else 0.0
+    return float(reach)
+
+
+@njit(cache=True)
+def distances(rows: Array, position: Array, planar: bool) -> Array:
+    """Signed distances of a position (3,), m, from the cores of outlines (m, W): (m,), m."""
+    found, away = np.empty(len(rows)), np.empty(3)
+    for k in range(len(rows)):
+        found[k] = nearest(rows[k], position[0], position[1], position[2], planar, away, np.inf)
+    return found
+
+
+@njit(cache=True)
+def nearest_points(rows: Array, positions: Array) -> Array:
+    """The points of cores (m, W) that are nearest to positions (N, 3) in the plane z = 0, m: (N, m, 3), m.
+
+    Inside a core it is the nearest point of its boundary.
+    """
+    found, away = np.empty((len(positions), len(rows), 3)), np.empty(3)
+    for k in range(len(rows)):
+        row = rows[k]
+        for i in range(len(positions)):
+            if row[COUNT] == 1.0:
+                z = min(max(positions[i, 2], row[BASE]), row[TOP])
+                found[i, k, 0], found[i, k, 1], found[i, k, 2] = row[CORNERS], row[CORNERS + 1], z
+                continue
+            apart = nearest(row, positions[i, 0], positions[i, 1], positions[i, 2], True, away, np.inf)
+            for a in range(3):
+                found[i, k, a] = positions[i, a] - apart * away[a]
+    return found
+
+
+@njit(cache=True)
+def beside(rows: Array, start: Array, end: Array) -> Array:
+    """Least distances of cores (m, W) from the segment between two places (3,), m, of one height: (m,), m."""
+    found = np.empty(len(rows))
+    for k in range(len(rows)):
+        found[k] = approach(rows[k], start, end, True)[0]
+    return found
+
+
+@njit(cache=True)
+def within(rows: Array, positions: Array, reach: float, planar: bool) -> npt.NDArray[np.bool_]:
+    """Which outlines (m, W) have a core within `reach`, m, of each of n positions (n, 3), m: (n, m)."""
+    found, away = np.empty((len(positions), len(rows)), dtype=np.bool_), np.empty(3)
+    for i in range(len(positions)):
+        x, y, z = positions[i, 0], positions[i, 1], positions[i, 2]
+        for k in range(len(rows)):
+            found[i, k] = nearest(rows[k], x, y, z, planar, away, reach) <= reach
+    return found
+
+
+@njit(cache=True)
+def news_within(rows: Array, positions: Array, reach: float, planar: bool, known: npt.NDArray[np.bool_]) -> bool:
+    """Whether `within` would find an outline that is not known yet; `known` is (n, m)."""
+    away = np.empty(3)
+    for i in range(len(positions)):
+        x, y, z = positions[i, 0], positions[i, 1], positions[i, 2]
+        for k in range(len(rows)):
+            if not known[i, k] and nearest(rows[k], x, y, z, planar, away, reach) <= reach:
+                return True
+    return False
+
+
+@njit(cache=True)
+def approach(row: Array, start: Array, end: Array, planar: bool) -> tuple[float, float]:
+    """Least signed distance of a point in straight motion from a core, m, and the share of the motion where that is.
+
+    Outside of the core the squared distance is a parabola between two of `_breaks`: three values give its least one.
+    Inside, the signed distance is convex, and the least one is found by thirds.
+
+    Args:
+        row: an outline.
+        start: first place of the point, (3,), m.
+        end: last place, (3,), m.
+        planar: as in `nearest`.
+    """
+    vx, vy, vz = end[0] - start[0], end[1] - start[1], end[2] - start[2]
+    shares = _breaks(row, start, vx, vy, vz)
+    least, at, before, first = np.inf, 0.0, 0.0, 0.0
+    away = np.empty(3)
+    for k in range(len(shares)):
+        here = shares[k]
+        last = nearest(row, start[0] + here * vx, start[1] + here * vy, start[2] + here * vz, planar, away, np.inf)
+        if last < least:
+            least, at = last, here
+        if k > 0 and here > before:
+            half = 0.5 * (before + here)
+            middle = nearest(
+                row, start[0] + half * vx, start[1] + half * vy, start[2] + half * vz, planar, away, np.inf
+            )
+            if middle < least:
+                least, at = middle, half
+            curve = first * first - 2.0 * middle * middle + last * last
+            if curve > 0.0:
+                s = half - (last * last - first * first) / (2.0 * curve) * (here - half)
+                if before < s < here:
+                    d = nearest(row, start[0] + s * vx, start[1] + s * vy, start[2] + s * vz, planar, away, np.inf)
+                    if d < least:
+                        least, at = d, s
+        first, before = last, here
+    if least >= 0.0:
+        return least, at
+    low, high = 0.0, 1.0
+    for _ in range(90):
+        one, two = (2.0 * low + high) / 3.0, (low + 2.0 * high) / 3.0
+        d1 = nearest(row, start[0] + one * vx, start[1] + one * vy, start[2] + one * vz, planar, away, np.inf)
+        d2 = nearest(row, start[0] + two * vx, start[1] + two * vy, start[2] + two * vz, planar, away, np.inf)
+        if min(d1, d2) < least:
+            least, at = (d1, one) if d1 < d2 else (d2, two)
+        low, high = (low, two) if d1 < d2 else (one, high)
+    return least, at
+
+
+@njit(cache=True)
+def _breaks(row: Array, start: Array, vx: float, vy: float, vz: float) -> Array:
+    """Shares of a straight motion between which the nearest point is on the same edge, corner or face: from 0 to 1."""
+    count = int(row[COUNT])
+    found, n = np.empty(3 * count + 4), 1
+    found[0] = 0.0
+    if vz != 0.0:
+        found[1], found[2] = (row[BASE] - start[2]) / vz, (row[TOP] - start[2]) / vz
+        n = 3
+    for k in range(count if count > 1 else 0):
+        i, j = CORNERS + 2 * k, CORNERS + 2 * ((k + 1) % count)
+        ex, ey = row[j] - row[i], row[j + 1] - row[i + 1]
+        px, py = row[i] - start[0], row[i + 1] - start[1]
+        along, across = vx * ex + vy * ey, vx * ey - vy * ex
+        if along != 0.0:  # where it passes the ends of the edge
+            found[n] = (px * ex + py * ey) / along
+            found[n + 1] = found[n] + (ex * ex + ey * ey) / along
+            n += 2
+        if across != 0.0:  # where it crosses the line of the edge
+            found[n] = (px * ey - py * ex) / across
+            n += 1
+    inner = found[:n][(found[:n] >= 0.0) & (found[:n] < 1.0)]
+    return np.append(np.sort(inner), 1.0)
+
+
+@njit(cache=True)
+def approaches(row: Array, starts: Array, ends: Array, planar: bool) -> tuple[Array, Array]:
+    """`approach` for straight motions from (T, 3) to (T, 3), m: distances, m, and shares, (T,)."""
+    found, shares = np.empty(len(starts)), np.empty(len(starts))
+    for k in range(len(found)):
+        found[k], shares[k] = approach(row, starts[k], ends[k], planar)
+    return found, shares
+
+
+@njit(cache=True)
+def points_are_free(points: Array, rows: Array, keep: Array) -> npt.NDArray[np.bool_]:
+    """Which points (K, 2), m, in the plane z = 0 are `keep` (m,), m, from all cores (m, W): (K,)."""
+    free, away = np.ones(len(points), np.bool_), np.empty(3)
+    for k in range(len(points)):
+        x, y = points[k, 0], points[k, 1]
+        for m in range(len(rows)):
+            far = keep[m] + rows[m, EXTENT]
+            if abs(x - rows[m, MIDDLE]) > far or abs(y - rows[m, MIDDLE + 1]) > far:
+                continue
+            if nearest(rows[m], x, y, 0.0, True, away, keep[m]) < keep[m]:
+                free[k] = False
+                break
+    return free
+
+
+@njit(cache=True)
+def segments_are_free(begin: Array, end: Array, rows: Array, keep: Array, slack: float) -> npt.NDArray[np.bool_]:
+    """Which segments in the plane z = 0 keep out. One with an end too near to a core must come no nearer than that end.
+
+    Args:
+        begin: (K, 2), m.
+        end: (K, 2), m.
+        rows: outlines, (m, W).
+        keep: distances from their cores, (m,), m.
+        slack: tolerance of the distances, m.
+    """
+    free = np.ones(len(begin), np.bool_)
+    for k in range(len(begin)):
+        for m in range(len(rows)):
+            if not passes(rows[m], keep[m], begin[k, 0], begin[k, 1], end[k, 0], end[k, 1], slack):
+                free[k] = False
+                break
+    return free
+
+
+@njit(cache=True)
+def passes(row: Array, keep: float, ax: float, ay: float, bx: float, by: float, slack: float) -> bool:
+    """`segments_are_free` for one segment, from (ax, ay) to (bx, by), m, and one outline."""
+    sx, sy = bx - ax, by - ay
+    squared = max(sx * sx + sy * sy, 1e-300)
+    length = 1.001 * np.sqrt(squared)
+    px, py = ax - row[MIDDLE], ay - row[MIDDLE + 1]
+    to_begin = np.sqrt(px * px + py * py)
+    if to_begin > keep + row[EXTENT] + length:
+        return True
+    if row[COUNT] == 1.0:
+        qx, qy = bx - row[MIDDLE], by - row[MIDDLE + 1]
+        share = min(max(-(px * sx + py * sy) / squared, 0.0), 1.0)
+        x, y = px + share * sx, py + share * sy
+        return bool(np.sqrt(x * x + y * y) >= min(keep, to_begin, np.sqrt(qx * qx + qy * qy)) - slack)
+    start, stop, away = np.zeros(3), np.zeros(3), np.empty(3)
+    start[0], start[1], stop[0], stop[1] = ax, ay, bx, by
+    first = nearest(row, ax, ay, 0.0, True, away, keep + length)
+    if first > keep + length:
+        return True
+    last = nearest(row, bx, by, 0.0, True, away, np.inf)
+    return bool(approach(row, start, stop, True)[0] >= min(keep, first, last) - slack)
+
+
+def sections(rows: Array, distance: Array | float, height: float) -> tuple[Array, Array]:
+    """Where a plane at a height, m, cuts the sets within a distance, (m,), m, of the cores of outlines (m, W).
+
+    Returns:
+        The outlines that it cuts, in the plane z = 0, (k, W), and the distances from their cores there, (k,), m.
+    """
+    above = np.maximum(np.maximum(rows[:, BASE] - height, height - rows[:, TOP]), 0.0)
+    reach = np.broadcast_to(distance, len(rows))
+    squared = np.square(reach) - np.square(above)
+    near = squared > 0.0
+    found = rows[near]
+    found[:, BASE] = found[:, TOP] = 0.0
+    return found, np.sqrt(squared[near])
+
+
+def rim(row: Array, distance: float, rays: int = 16) -> Array:
+    """The boundary of all that is within a distance, m, of a core in the plane, as a polygon (K, 2), m, to be drawn."""
+    corners = corners_of(row)
+    if len(corners) == 1:
+        turn = np.linspace(0.0, 2.0 * np.pi, 4 * rays, endpoint=False)
+        return np.asarray(corners[0] + distance * np.column_stack([np.cos(turn), np.sin(turn)]))
+    edges = np.roll(corners, -1, axis=0) - corners
+    heading = np.arctan2(-edges[:, 0], edges[:, 1])  # of the outward normals
+    found = []
+    for k, corner in enumerate(corners):
+        sweep = (heading[k] - heading[k - 1]) % (2.0 * np.pi)
+        turn = heading[k - 1] + sweep * np.linspace(0.0, 1.0, max(2, int(rays * sweep / np.pi)))
+        found.append(corner + distance * np.column_stack([np.cos(turn), np.sin(turn)]))
+    return np.concatenate(found)
