@@ -30,6 +30,7 @@ from airground_drake.gatekeeper.rollout import View
 from airground_drake.gatekeeper.routes.relaxed import RelaxedRoute
 from airground_drake.gatekeeper.routes.route import Route
 from airground_drake.gatekeeper.solution import ConstantPlans, Solution
+from airground_drake.geometry.convex import balls
 from airground_drake.geometry.motion import Motion
 from airground_drake.geometry.paths import NoPath, shortest_path
 from airground_drake.intervention.policy import Proposal
@@ -99,8 +100,10 @@ def among(rng: np.random.Generator, ugvs: int, discs: int, safe: float) -> list[
             t=0.0,
             position=starts[i],
             preset=preset,
-            centres=np.concatenate([centres, starts[others]]),
-            velocities=np.concatenate([np.zeros((discs, 3)), speeds[others]]),
+            still=balls(centres),
+            parts=balls(np.zeros((len(others), 3))),
+            places=starts[others],
+            velocities=speeds[others],
             distances=np.full(discs + ugvs - 1, safe),
             shares=np.concatenate([np.ones(discs), np.full(ugvs - 1, 0.5)]),
             max_speed=3.0,
@@ -113,7 +116,7 @@ def among(rng: np.random.Generator, ugvs: int, discs: int, safe: float) -> list[
 def way(start: np.ndarray, goal: np.ndarray, centres: np.ndarray, radius: float) -> np.ndarray:
     """Shortest way round the discs as points (k, 3), m; a straight line if no way exists."""
     try:
-        path = shortest_path(start[:2], goal[:2], centres[:, :2], np.full(len(centres), radius))
+        path = shortest_path(start[:2], goal[:2], balls(centres), np.full(len(centres), radius))
     except NoPath:
         return np.array([start, goal])
     count = max(2, int(path.length_m / 0.1))

@@ -33,6 +33,7 @@ from airground_drake.gatekeeper.outcome_gatekeeper import OutcomeGatekeepers
 from airground_drake.gatekeeper.problem import Horizon, predicted_problem
 from airground_drake.gatekeeper.rollout import View
 from airground_drake.gatekeeper.routes.relaxed import RelaxedRoute
+from airground_drake.geometry.convex import balls
 from airground_drake.geometry.motion import Motion
 from airground_drake.intervention.planner import Planner
 from airground_drake.intervention.policy import Proposal
@@ -80,14 +81,18 @@ def at_decision_level(seed: int, proposals: int) -> tuple[float, int, int]:
     for _ in range(proposals):
         centres = np.column_stack([random.uniform(-4.0, 4.0, (4, 2)), np.zeros(4)])
         start = safe_start(random, centres, d)
-        points = (Body(f"obstacle_{k}", "obstacle", centre) for k, centre in enumerate(centres))
+        points = (
+            Body(f"obstacle_{k}", "obstacle", centre, balls(np.zeros(3), gap=d)) for k, centre in enumerate(centres)
+        )
         world = replace(base, bodies=(*base.moving, *points))
         t = float(random.uniform(0.0, 20.0))
         proposal = Proposal("hostile", t, attack(random, start, centres, t))
         for on_top in (False, True):
             law = UgvLaw(avoidance, 2.0, 1.5, intervention_on_top=on_top)
             if on_top:
-                scene = View(t, start, presets[0], centres, np.zeros((4, 3)), np.full(4, d), np.ones(4), 3.0)
+                nobody, still = np.zeros((0, 3)), balls(centres)
+                around = still, still[:0], nobody, nobody
+                scene = View(t, start, presets[0], *around, np.full(4, d), np.ones(4), 3.0)
                 if not route.solve(predicted_problem(scene, law, proposal, horizon)).accept_first:
                     continue
                 accepted += 1

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from airground_drake.base.arrays import Array
+from airground_drake.geometry.convex import BASE, GAP, MIDDLE, RADIUS, balls
 from airground_drake.geometry.motion import Motion
 from airground_drake.intervention.database import Negotiation
 from airground_drake.intervention.messages import ACCEPT, DONE, REFUSE, Reports, answer_to
@@ -124,9 +125,10 @@ class LyingPlanner(Planner):
 
     def _proposal(self, i: int, t: float, forged: Proposal | None, positions: Array) -> Proposal:
         """What UGV i is told, under the number and the time of another proposal if one is to be forged."""
-        motion, mapped = self._motion(i, t, positions), self._map(i, positions)
+        motion, places = self._motion(i, t, positions), self._map(i, positions)
+        mapped = balls(places, self._radii(places), float(self.mapped[:, GAP].max(initial=1.0)))
         number, issued = (-1, t) if forged is None else (forged.number, forged.issued)
-        more = {"mapped": mapped, "mapped_radii": self._radii(mapped), "cause": self._cause(i)}
+        more = {"mapped": mapped, "cause": self._cause(i)}
         more["party"] = self.ugvs if self.tactic.party == "all" else ()
         return Proposal("lying", issued, motion, number=number, **more)
 
@@ -146,7 +148,7 @@ class LyingPlanner(Planner):
         """Radii that go with a map, (m,), m."""
         true = np.zeros(len(mapped))
         if self.tactic.mapped in ("true", "moved"):
-            true = true + self.mapped_radii
+            true = true + self.mapped[:, RADIUS]
         radii = {
             "true": true,
             "none": 0.0 * true,
@@ -182,9 +184,10 @@ class LyingPlanner(Planner):
         here, goal, flat = positions[i], self.targets[i], np.array([1.0, 1.0, 0.0])
         steps = np.linspace(-1.0, 1.0, 9)[:, None]
         across = 0.5 * (here + goal) + 8.0 * steps * np.array([1.0, 0.0, 0.0])
+        middles = self.mapped[:, [MIDDLE, MIDDLE + 1, BASE]]
         maps = {
-            "true": self.mapped,
-            "moved": self.mapped + self.random.normal(size=self.mapped.shape) * flat,
+            "true": middles,
+            "moved": middles + self.random.normal(size=middles.shape) * flat,
             "nothing": np.empty((0, 3)),
             "phantoms": self.random.uniform(-5.0, 15.0, (8, 3)) * flat,
             "on the robot": here + self.random.normal(scale=0.5, size=(4, 3)) * flat,

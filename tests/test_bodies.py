@@ -15,11 +15,13 @@ from builders.misbuilt import neighbours
 from oracles import faults_of
 from report.cases import built
 
-from airground_drake.base.arrays import Array
 from airground_drake.base.errors import TraceError
 from airground_drake.check import positions
 from airground_drake.export import tables
+from airground_drake.gatekeeper.answer import Basis
 from airground_drake.gatekeeper.outcome_gatekeeper import OutcomeGatekeepers
+from airground_drake.gatekeeper.rollout import View
+from airground_drake.geometry.convex import GAP, unpacked
 from airground_drake.proofs.export import recorded
 from airground_drake.proofs.too_near import too_near
 from airground_drake.report import attention, summary
@@ -127,12 +129,12 @@ def test_a_pair_has_one_distance_wherever_users_see_it(ends_at: float, gap_m: fl
     assert "2.00 m needed" not in drawn
 
 
-def points_in_mind(self: OutcomeGatekeepers, *args: Any) -> tuple[Array, Array]:
-    discs, distances = KNOWN(self, *args)
-    return discs, np.full_like(distances, self._world.apart("ugv", "obstacle"))
+def points_in_mind(self: OutcomeGatekeepers, *args: Any) -> tuple[View, Basis]:
+    seen, basis = VIEW(self, *args)
+    return replace(seen, distances=np.append(seen.still[:, GAP], seen.distances[len(seen.still) :])), basis
 
 
-KNOWN = OutcomeGatekeepers._known
+VIEW = OutcomeGatekeepers._view_of
 
 FORGETFUL: dict[str, tuple[Callable[[pytest.MonkeyPatch], None], set[str]]] = {
     "an obstacle's radius": (
@@ -144,7 +146,7 @@ FORGETFUL: dict[str, tuple[Callable[[pytest.MonkeyPatch], None], set[str]]] = {
         {"SAFE-TRACE", "SAFE-HYP", "commands"},
     ),
     "radii in the gatekeeper only": (
-        lambda patch: patch.setattr(OutcomeGatekeepers, "_known", points_in_mind),
+        lambda patch: patch.setattr(OutcomeGatekeepers, "_view_of", points_in_mind),
         {"predictions"},
     ),
 }
@@ -215,7 +217,7 @@ def test_the_uav_knows_it_from_then_on() -> None:
         )  # fmt: skip
         sent = simulate(sudden(appears_s, *changes), "d").proposals
         assert len(sent)
-        assert len(np.reshape(sent.iloc[0]["mapped_m"], (-1, 3))) == 2 + known
+        assert len(unpacked(sent.iloc[0]["mapped"])) == 2 + known
 
 
 def test_a_controller_that_knows_of_it_too_early_or_late_is_found(monkeypatch: pytest.MonkeyPatch) -> None:

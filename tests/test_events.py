@@ -16,12 +16,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 from properties import examples
 
+from airground_drake.geometry.convex import balls
 from airground_drake.run import events
 from airground_drake.run.trace import Trace
 from airground_drake.scenarios.schema import Obstacle
 from airground_drake.verify import judge
 from airground_drake.world.motion import PeriodMotion
-from airground_drake.world.shape import Ball
 
 PLACES = st.lists(st.tuples(*[st.integers(-4, 4)] * 2), min_size=2, max_size=12)
 
@@ -46,7 +46,7 @@ def test_every_visit_is_found_once(places: list[tuple[int, int]], within: float)
         expected.append(row if row * fine < ends else k // fine)
     grazing = abs(np.linalg.norm(dense, axis=1).min() - within) < 0.02
     if not grazing:
-        assert events.visits(PeriodMotion(apart[:-1], apart[1:]), Ball(), within).tolist() == expected
+        assert events.visits(PeriodMotion(apart[:-1], apart[1:]), balls(np.zeros(3)), within, True).tolist() == expected
 
 
 def test_what_is_passed_between_two_rows_is_hit() -> None:

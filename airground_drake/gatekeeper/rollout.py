@@ -131,11 +131,12 @@ def closed_loop(
 class Workspace(NamedTuple):
     """Arrays that one control period writes to, and the UGV's mobility.
 
-    The avoidance inequalities are `normal`, (K, 3), and `bound`, (K,), m/s; `rate` and `asked` are the velocities of
+    The avoidance inequalities are `which`, `normal` and `bound`, see `fill_half_spaces`; `rate` and `asked` are the velocities of
     the preset trajectory and of the proposed motion, (3,), m/s.
     """
 
     mobility: Array
+    which: npt.NDArray[np.intp]
     normal: Array
     bound: Array
     rate: Array
@@ -147,7 +148,7 @@ def workspace(loop: ClosedLoop) -> Workspace:
     """Uninitialised arrays for `advance`."""
     count = len(loop.distances)
     plane = np.array([1.0, 1.0, 0.0])
-    return Workspace(plane, np.empty((count, 3)), np.empty(count), np.empty(3), np.empty(3))
+    return Workspace(plane, np.empty(count, np.intp), np.empty((count, 3)), np.empty(count), np.empty(3), np.empty(3))
 
 
 @njit(cache=True)
@@ -168,11 +169,11 @@ def advance(loop: ClosedLoop, mode: int, k: int, position: Array, work: Workspac
 @njit(cache=True)
 def _command(loop: ClosedLoop, mode: int, k: int, position: Array, work: Workspace) -> Array:
     """Velocity that the law commands in control period k, (3,), m/s; rates are of the sampled motions."""
-    mobility, normal, bound, rate, asked = work
+    mobility, which, normal, bound, rate, asked = work
     law = loop.law
     count = fill_half_spaces(
         position, mobility, loop.still, loop.parts, loop.every, loop.every, loop.places[k], loop.distances, loop.shares,
-        law.layer, normal, bound,
+        law.layer, which, normal, bound,
     )  # fmt: skip
     for a in range(3):
         rate[a] = (loop.preset[k + 1, a] - loop.preset[k, a]) / law.layer.period

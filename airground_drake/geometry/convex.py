@@ -38,16 +38,14 @@ NOWHERE_M = 1e150
 """Coordinates of an obstacle that is not there: beyond any range, and its square is still finite."""
 
 
-def ball(centre: ArrayLike, radius: float = 0.0, gap: float = 0.0) -> Array:
-    """The outline of a ball about a centre (3,), m; with the default radius a point."""
-    x, y, z = np.asarray(centre, dtype=np.float64).tolist()
-    return np.array([gap, radius, 0.0, z, z, 1.0, x, y, 0.0, x, y])
-
-
 def balls(centres: ArrayLike, radii: ArrayLike = 0.0, gap: float = 0.0) -> Array:
-    """The outlines of balls about centres (m, 3), m; radii (m,), m, or one for all."""
+    """The outlines of balls about centres (m, 3), m; radii (m,), m, or one for all; with the default, points."""
     places = np.asarray(centres, dtype=np.float64).reshape(-1, 3)
-    return stacked(map(ball, places, np.broadcast_to(radii, len(places)), [gap] * len(places)))
+    found = np.zeros((len(places), CORNERS + 2))
+    found[:, GAP], found[:, RADIUS], found[:, COUNT] = gap, radii, 1.0
+    found[:, BASE] = found[:, TOP] = places[:, 2]
+    found[:, MIDDLE:EXTENT] = found[:, CORNERS:] = places[:, :2]
+    return found
 
 
 def prism(corners: ArrayLike, *, base: float = 0.0, top: float = 0.0, radius: float = 0.0, gap: float = 0.0) -> Array:
@@ -172,7 +170,7 @@ def moved(rows: Array, by: Array) -> Array:
 def where(there: npt.NDArray[np.bool_], rows: Array) -> Array:
     """Outlines (m, W) of which those that are not there, (m,), are points at NOWHERE_M."""
     nowhere = np.zeros(rows.shape[1])
-    nowhere[: CORNERS + 2] = ball(np.full(3, NOWHERE_M))
+    nowhere[: CORNERS + 2] = balls(np.full(3, NOWHERE_M))[0]
     return np.where(there[:, None], rows, nowhere)
 
 

@@ -35,9 +35,9 @@ class HalfSpaces:
     """K velocity constraints for each of n robots: normal . v >= bound.
 
     Attributes:
-        normal: (n, K, 3); unit vectors away from what is avoided and within sensing range, with 0 in directions in
-            which the robot cannot move; 0 in rows that are not needed.
-        bound: (n, K), m/s; -inf in rows that are not needed.
+        normal: (n, K, 3); unit vectors away from what is avoided, with 0 in directions in which the robot cannot move;
+            0 where out of sensing range.
+        bound: (n, K), m/s; -inf where out of sensing range.
     """
 
     normal: Array
@@ -74,13 +74,14 @@ class Avoidance:
 
     def half_spaces(self, positions: Array, near: Neighbours) -> HalfSpaces:
         """Constraints of k robots when all bodies that move are at positions (M, 3) m."""
-        found = HalfSpaces(np.zeros((*near.distance.shape, 3)), np.full(near.distance.shape, -np.inf))
+        count = near.distance.shape[1]
+        found = HalfSpaces(np.zeros((len(near.members), count, 3)), np.full((len(near.members), count), -np.inf))
+        which, normal, bound = np.empty(count, dtype=np.intp), np.empty((count, 3)), np.empty(count)
         around = near.still, near.parts, near.carrier
         for i, member in enumerate(near.members):
             own = positions[member], near.mobility[i], *around, near.others[i], positions
-            given = near.distance[i], near.share[i], self.layer
-            count = kernels.fill_half_spaces(*own, *given, found.normal[i], found.bound[i])
-            found.normal[i, count:], found.bound[i, count:] = 0.0, -np.inf
+            k = kernels.fill_half_spaces(*own, near.distance[i], near.share[i], self.layer, which, normal, bound)
+            found.normal[i, which[:k]], found.bound[i, which[:k]] = normal[:k], bound[:k]
         return found
 
     def apply(self, lower: Array, spaces: HalfSpaces) -> Array:

@@ -54,6 +54,7 @@ def fill_half_spaces(
     distance: Array,
     share: Array,
     layer: Layer,
+    which: npt.NDArray[np.intp],
     normal: Array,
     bound: Array,
 ) -> int:
@@ -70,8 +71,9 @@ def fill_half_spaces(
         distance: safe distances from the cores, (m + n,), m.
         share: shares of the inequalities, (m + n,).
         layer: the numbers of the layer.
+        which: result, (m + n,): the first K entries say what the constraints are about, counting what is at rest first.
         normal: result, (m + n, 3); the first K rows.
-        bound: result, (m + n,), m/s.
+        bound: result, (m + n,), m/s; the first K entries.
     """
     gain, period, reach, planar = layer.gain, layer.period, layer.sensing_range, mobility[2] == 0.0
     x, y, z = position[0], position[1], position[2]
@@ -88,7 +90,7 @@ def fill_half_spaces(
             continue
         for a in range(3):
             normal[count, a] *= mobility[a]
-        excess = apart - distance[k]
+        which[count], excess = k, apart - distance[k]
         bound[count] = -share[k] * gain * excess if excess <= 0.0 else -share[k] * excess / period
         count += 1
     return count
@@ -156,10 +158,11 @@ def commands(
     # one by one, because numba takes 1.5 us to unpack a named tuple that Python passes, and 0.04 us for an array
     layer, velocity = Layer(gain, period, sensing_range, composition), limit_speed(lower, max_speed)
     normal, bound = np.empty((distance.shape[1], 3)), np.empty(distance.shape[1])
+    which = np.empty(distance.shape[1], np.intp)
     for i in range(len(velocity)):
         count = fill_half_spaces(
             positions[members[i]], mobility[i], still, parts, carrier, others[i], positions, distance[i], share[i],
-            layer, normal, bound,
+            layer, which, normal, bound,
         )  # fmt: skip
         velocity[i] = avoid_one(velocity[i], normal[:count], bound[:count], composition)
     return velocity

@@ -180,11 +180,12 @@ def _commands(
     law = Numbers(motion_gain, intervention_gain, intervention_on_top, layer)
     velocity = np.empty(target.shape)
     normal, bound = np.empty((distance.shape[1], 3)), np.empty(distance.shape[1])
+    which = np.empty(distance.shape[1], np.intp)
     for i in range(len(target)):
         ugv = UgvState(positions[members[i]], mobility[i], max_speed[i])
         count = fill_half_spaces(
             ugv.position, ugv.mobility, still, parts, carrier, others[i], positions, distance[i], share[i],
-            layer, normal, bound,
+            layer, which, normal, bound,
         )  # fmt: skip
         asked, track = AcceptedMotion(wanted[i], wanted_rate[i], chosen[i]), Tracking(target[i], rate[i])
         velocity[i] = command(law, ugv, track, asked, executing[i], normal[:count], bound[:count])

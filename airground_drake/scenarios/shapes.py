@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from itertools import pairwise
 
 from airground_drake.base.arrays import Array
-from airground_drake.geometry.convex import ball, prism, stacked
+from airground_drake.geometry.convex import balls, prism, stacked
 from airground_drake.scenarios.schema import Obstacle, Scenario
 
 DIGITS = 12
@@ -22,7 +22,7 @@ def outlines_of(scenario: Scenario, obstacle: Obstacle) -> Array:
     gap = obstacle.distance_m or scenario.safe_distance.obstacle_m
     parts = convex_parts(obstacle)
     if parts is None:
-        return stacked([ball(obstacle.position_m, obstacle.radius_m, gap)])
+        return balls(obstacle.position_m, obstacle.radius_m, gap)
     return stacked(prism(part, top=obstacle.height_m, radius=obstacle.radius_m, gap=gap) for part in parts)
 
 

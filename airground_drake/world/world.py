@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Literal, NamedTuple, get_args
+from typing import Literal, NamedTuple, Self, get_args
 
 import numpy as np
 import numpy.typing as npt
@@ -75,6 +75,21 @@ class Neighbours(NamedTuple):
     share: Array
     mobility: Array
     max_speed: Array
+
+    @classmethod
+    def at_rest(cls, still: Array, max_speed: Array, radius: float = 0.0) -> Self:
+        """UGVs that keep away from outlines at rest only, (m, W), not from each other.
+
+        Args:
+            still: the outlines, see `geometry.convex`.
+            max_speed: speed limits of the k UGVs, (k,), m/s.
+            radius: of their bodies, m.
+        """
+        count, limits = len(max_speed), np.asarray(max_speed, dtype=np.float64)
+        nobody, own = np.zeros((count, 0), dtype=np.intp), np.arange(count)
+        distance = np.tile(convex.keep(still, radius), (count, 1))
+        plane = np.tile([1.0, 1.0, 0.0], (count, 1))
+        return cls(own, own[:0], nobody, still, convex.stacked([]), distance, np.ones_like(distance), plane, limits)
 
 
 @dataclass(frozen=True, eq=False)

@@ -23,7 +23,11 @@ WIRINGS = (
         'frozenset(("ugv", "uav")): 0.9 * safe.air_ground_m',
     ),
     Mutant(
-        "share 1 for robots", "world/world.py", "World._share", "np.where(robot, 0.5, 1.0)", "np.where(robot, 1.0, 1.0)"
+        "share 1 for robots",
+        "world/world.py",
+        "World.around",
+        "for body in self.moving]), 0.5, 1.0)",
+        "for body in self.moving]), 1.0, 1.0)",
     ),
     Mutant(
         "UGVs may leave the ground",
@@ -37,8 +41,8 @@ WIRINGS = (
         "robots avoid only what the UAV knows",
         "scenarios/world.py",
         "make_world",
-        "for name, each in scenario.obstacles.items()",
-        "for name, each in scenario.obstacles.items() if each.known_to_uav",
+        "for name, each in scenario.barriers.items()",
+        "for name, each in scenario.barriers.items() if each.known_to_uav",
     ),
     Mutant(
         "sensing range cut",
@@ -61,17 +65,17 @@ WIRINGS = (
 BODIES = (
     Mutant(
         "obstacles have no radius",
-        "scenarios/world.py",
-        "make_world",
-        "Ball(each.radius_m)",
-        "Ball(0.0 * each.radius_m)",
+        "scenarios/shapes.py",
+        "outlines_of",
+        "return balls(obstacle.position_m, obstacle.radius_m, gap)",
+        "return balls(obstacle.position_m, 0.0, gap)",
         runs=("bodies d", "bodies c"),
     ),
     Mutant(
         "collisions are of centres",
         "run/events.py",
         "_add_collisions",
-        "within = collision_m + own.shape.radius_m",
+        "within = collision_m + float(radius)",
         "within = collision_m",
         runs=("bodies b",),
     ),
@@ -270,8 +274,8 @@ GATEKEEPER = (
         "the prediction has no avoidance",
         "gatekeeper/rollout.py",
         "_command",
-        "mode == ACCEPTED, normal, bound)",
-        "mode == ACCEPTED, 0.0 * normal, 0.0 * bound)",
+        "mode == ACCEPTED, normal[:count], bound[:count])",
+        "mode == ACCEPTED, normal[:0], bound[:0])",
     ),
     Mutant(
         "a first stage that refuses is accepted",
@@ -284,8 +288,8 @@ GATEKEEPER = (
         "obstacles out of sight are forgotten",
         "gatekeeper/outcome_gatekeeper.py",
         "OutcomeGatekeepers._remembered",
-        "return before.sensed | within(points, own, reach)",
-        "return within(points, own, reach)",
+        "return before.sensed | within(still, own, reach, True)",
+        "return within(still, own, reach, True)",
         runs=("crowd d",),
         tests=("tests/gatekeeper/test_outcome_gatekeeper.py",),
     ),

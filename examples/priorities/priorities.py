@@ -23,10 +23,12 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Context, Diagram, DiagramBuilder, DiscreteValues, LeafSystem
 from pydrake.systems.primitives import LogVectorOutput
 
-from airground_drake.nsbc.avoidance import Avoidance, Surroundings, limit_speed
+from airground_drake.geometry.convex import balls
+from airground_drake.nsbc.avoidance import Avoidance, limit_speed
 from airground_drake.nsbc.task import Task
 from airground_drake.nsbc.tasks import PositionTask
 from airground_drake.systems.plant import first_order_plant
+from airground_drake.world.world import Neighbours
 
 Array = NDArray[np.float64]
 
@@ -86,11 +88,8 @@ def command(scene: Scene, position: Array, order: int) -> Array:
         along = turn * np.column_stack([away[:, 1], -away[:, 0], np.zeros(len(away))])
         first = Round(along[np.argmax((along @ away.T).min(axis=1))], SPEED_M_S)  # the one that leads out of a corner
         wanted = first.velocity(row) + wanted @ null_space(first.jacobian(row)[0])
-    around = Surroundings(
-        scene.obstacles[None], np.full((1, len(scene.obstacles)), DISTANCE_M), np.ones((1, len(scene.obstacles)))
-    )
-    spaces = AVOIDANCE.half_spaces(row, np.array([[1.0, 1.0, 0.0]]), around)
-    return AVOIDANCE.apply(limit_speed(wanted, limit), spaces)[0]
+    around = Neighbours.at_rest(balls(scene.obstacles, gap=DISTANCE_M), limit)
+    return AVOIDANCE.command(wanted, row, around)[0]
 
 
 def state(scene: Scene, position: Array, order: int) -> int:

@@ -36,6 +36,10 @@ def distances(factor: float, *kinds: Kind) -> Patch:
     return apply
 
 
+def to_obstacles(factor: float) -> Patch:
+    return neighbours(lambda given: given._replace(distance=np.where(given.share < 1.0, 1.0, factor) * given.distance))
+
+
 def shares(value: float) -> Patch:
     return neighbours(lambda given: given._replace(share=np.where(given.share < 1.0, value, given.share)))
 
@@ -87,7 +91,7 @@ def half_rate(patch: pytest.MonkeyPatch) -> None:
 MISBUILT: dict[str, tuple[Patch, str]] = {
     "distance UAV/UGV times 0.9999": (distances(0.9999, "ugv", "uav"), "safe_m"),
     "distance UGV/UGV times 1.000001": (distances(1.000001, "ugv"), "safe_m"),
-    "distance to obstacles times 0.9": (distances(0.9, "ugv", "obstacle"), "safe_m"),
+    "distance to obstacles times 0.9": (to_obstacles(0.9), "safe_m"),
     "share 0.51 for robots": (shares(0.51), "share"),
     "no gain": (layer(gain=0.0), "gain_1_s"),
     "range cut": (layer(sensing_range=2.1), "sensing_range_m"),

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from airground_drake.geometry.convex import balls
 from airground_drake.geometry.motion import Motion
 from airground_drake.intervention.policy import Observation, Teammate
 
@@ -24,11 +25,11 @@ def mate(name: str, position: Sequence[float], target: Sequence[float], **more: 
 
 def seen(team: Sequence[Teammate], obstacles: Sequence[Sequence[float]] = (), *, robot: int = 0) -> Observation:
     """What the UAV sees at t = 10 s when it plans for one of them; safe distances are 2 m."""
-    known = np.array([[*point, 0.0] for point in obstacles]).reshape(-1, 3)
+    known = balls([[*point, 0.0] for point in obstacles], gap=2.0)
     one = team[robot]
     others = np.array([other.position for other in team if other is not one]).reshape(-1, 3)
     return Observation(
         t=10.0, start=10.05, robot=one.name, position=one.position, target=one.target, preset=one.preset,
-        obstacles=known, mapped=known, others=others, safe_distance=2.0, refusals=0, team=tuple(team),
+        obstacles=known, mapped=known, others=others, refusals=0, team=tuple(team),
         robot_distance=2.0,
     )  # fmt: skip

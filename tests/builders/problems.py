@@ -6,13 +6,16 @@ from dataclasses import replace
 
 import numpy as np
 
+from airground_drake.base.arrays import Array
 from airground_drake.gatekeeper.problem import Horizon, Problem, predicted_problem
 from airground_drake.gatekeeper.rollout import View
+from airground_drake.geometry import convex
 from airground_drake.geometry.motion import Motion
 from airground_drake.intervention.policy import Proposal
 from airground_drake.nsbc.avoidance import Avoidance
 from airground_drake.nsbc.law import UgvLaw
 
+NOBODY = np.empty((0, 3))
 LAW = UgvLaw(Avoidance(3.0, 0.05, 4.0), 2.0, 1.5, intervention_on_top=False)
 
 
@@ -29,6 +32,27 @@ def random_problem(seed: int, stages: int = 24, points: int = 2) -> Problem:
     return Problem(0.05, np.zeros(3), accept, refuse, reference, centres, distances, 1.0, 200.0, 0.7 * (seed % 2))
 
 
+def view(
+    position: Array,
+    preset: Motion,
+    discs: Array,
+    safe: float,
+    max_speed: float,
+    *,
+    t: float = 0.0,
+    places: Array = NOBODY,
+    velocities: Array = NOBODY,
+    share: float = 0.5,
+) -> View:
+    """What a UGV sees of discs at rest, (m, 3), m, and of points that move, (n, 3), m, m/s; one safe distance, m."""
+    m, n = len(discs), len(places)
+    still, parts = convex.balls(discs), convex.balls(np.zeros((n, 3)))
+    shares = np.repeat([1.0, share], [m, n])
+    return View(
+        t, position, preset, still, parts, places, velocities, np.full(m + n, safe), shares, max_speed, (None,) * n
+    )
+
+
 def rolled_out(seed: int) -> Problem:
     """The closed loop of a UGV among discs, its straight way home against a proposed way round."""
     rng = np.random.default_rng(seed)
@@ -38,7 +62,7 @@ def rolled_out(seed: int) -> Problem:
     away = rng.uniform(-4.0, 4.0, (2, 3)) * [1, 1, 0]
     home = Motion.at_speed(np.array([np.zeros(3), away[0]]), 0.6, start=-rng.uniform(0.0, 3.0))
     round_about = Motion.at_speed(np.array([np.zeros(3), away[1], away[0]]), 2.8, start=0.0)
-    scene = View(0.0, np.zeros(3), home, centres, 0.0 * centres, np.full(points, 2.0), np.ones(points), 3.0)
+    scene = view(np.zeros(3), home, centres, 2.0, 3.0)
     return predicted_problem(scene, LAW, Proposal("way round", 0.0, round_about), Horizon(60, 1, 1.0, 1000.0))
 
 

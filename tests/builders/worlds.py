@@ -7,9 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from airground_drake.base.arrays import Array
+from airground_drake.geometry import convex
 from airground_drake.world.plant import FirstOrder
-from airground_drake.world.shape import Ball
-from airground_drake.world.world import Body, World
+from airground_drake.world.world import Body, Neighbours, World
 
 
 def world(
@@ -32,19 +32,32 @@ def world(
     limits, own = (np.broadcast_to(np.asarray(each, dtype=np.float64), len(names) + 1) for each in (max_speed, radius))
     fixed = np.broadcast_to(obstacle_radius, len(places))
     robots = [
-        Body(name, "uav" if name == "uav" else "ugv", np.zeros(3), Ball(float(size)), FirstOrder(), float(limit))
+        Body(
+            name,
+            "uav" if name == "uav" else "ugv",
+            np.zeros(3),
+            convex.balls(np.zeros(3), size),
+            FirstOrder(),
+            float(limit),
+        )
         for name, size, limit in zip([*names, "uav"], own, limits, strict=True)
     ]
     stones = [
-        Body(f"obstacle_{k}", "obstacle", place, Ball(float(size)))
+        Body(f"obstacle_{k}", "obstacle", place, convex.balls(np.zeros(3), size, obstacle_m))
         for k, (place, size) in enumerate(zip(places, fixed, strict=True))
     ]
-    return World(
-        (*robots, *stones),
-        {
-            frozenset(("ugv",)): ugv_m,
-            frozenset(("ugv", "uav")): air_ground_m,
-            frozenset(("ugv", "obstacle")): obstacle_m,
-            frozenset(("uav", "obstacle")): obstacle_m,
-        },
-    )
+    return World((*robots, *stones), {frozenset(("ugv",)): ugv_m, frozenset(("ugv", "uav")): air_ground_m})
+
+
+def among_points(robots: Array, points: Array, safe: Array, share: Array, mobility: Array) -> tuple[Array, Neighbours]:
+    """Robots at places (k, 3), m, each beside points of its own, (k, K, 3), m; `safe`, m, and `share` are (k, K).
+
+    Returns:
+        Positions of all bodies, (k + k K, 3), m, and what each robot keeps away from.
+    """
+    count, each = safe.shape
+    positions = np.concatenate([robots, points.reshape(-1, 3)])
+    bodies, others = np.arange(len(positions)), count + np.arange(count * each).reshape(count, each)
+    parts, nothing = convex.balls(np.zeros((len(positions), 3))), convex.stacked([])
+    limits = np.full(count, np.inf)
+    return positions, Neighbours(bodies[:count], bodies, others, nothing, parts, safe, share, mobility, limits)

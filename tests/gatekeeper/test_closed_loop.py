@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
-from builders.problems import LAW
+from builders.problems import LAW, view
 from builders.worlds import world
 from hypothesis import given
 from hypothesis import strategies as st
 from properties import examples
 
 from airground_drake.gatekeeper.problem import Horizon, predicted_problem
-from airground_drake.gatekeeper.rollout import View, closed_loop, follow
+from airground_drake.gatekeeper.rollout import closed_loop, follow
 from airground_drake.geometry.motion import Motion
 from airground_drake.intervention.policy import Proposal
 from airground_drake.nsbc.avoidance import Avoidance
@@ -48,8 +50,9 @@ def test_plans_are_those_of_the_running_controller(seed: int, on_top: bool, subs
     proposal = Proposal("way", 0.0, travel(4, 2.8), selection)
     team = world(("ugv1", "ugv2"), discs, 2.0, 1.0, 1.0, max_speed=[3.0, 3.0, 9.0])
     near, controller, plant = team.around(slice(0, 1)), UgvController(team, law), FirstOrder()
-    moving = np.vstack([0.0 * discs, drift, np.zeros(3)])
-    seen = View(0.0, np.zeros(3), preset, np.vstack([discs, other, FAR]), moving, near.distance[0], near.share[0], 3.0)
+    places, moving = np.vstack([other, FAR]), np.vstack([drift, np.zeros(3)])
+    seen = view(np.zeros(3), preset, discs, 2.0, 3.0, places=places, velocities=moving)
+    seen = replace(seen, distances=near.distance[0], shares=near.share[0])
     answers = rng.integers(0, 2, 12)
     position, ends = np.zeros(3), []
     for k in range(12 * substeps):
@@ -63,7 +66,7 @@ def test_plans_are_those_of_the_running_controller(seed: int, on_top: bool, subs
         if (k + 1) % substeps == 0:
             ends.append(position)
     after = H * np.arange(0.0, 12 * substeps + 1.0)
-    loop = closed_loop(seen, law, proposal, after, seen.centres + after[:, None, None] * moving, substeps)
+    loop = closed_loop(seen, law, proposal, after, places + after[:, None, None] * moving, substeps)
     np.testing.assert_allclose(follow(loop, answers)[0], ends, atol=1e-9)
     problem = predicted_problem(seen, law, proposal, Horizon(12, substeps, 1.0, 200.0))
     for mode in (0, 1):
@@ -74,10 +77,10 @@ def test_plans_are_those_of_the_running_controller(seed: int, on_top: bool, subs
 @pytest.mark.parametrize(("max_speed", "kept"), [(3.0, 1), (0.9, 0)])
 def test_points_are_kept_that_any_plan_might_reach(max_speed: float, kept: int) -> None:
     """A disc 1.5 m away, 1.5 s, and both constant plans at rest."""
-    one, rest = np.ones(1), Motion(np.zeros(1), np.zeros((1, 3)))
-    centres = np.array([[3.5, 0.0, 0.0]])
+    rest, centres, nobody = Motion(np.zeros(1), np.zeros((1, 3))), np.array([[3.5, 0.0, 0.0]]), np.empty((0, 3))
     for velocity in (0.0, np.nan):  # NaN is kept, so that the problem is refused
-        scene = View(0.0, np.zeros(3), rest, centres, np.full((1, 3), velocity), 2 * one, one, max_speed)
+        moving = {"places": centres, "velocities": np.full((1, 3), velocity), "share": 1.0}
+        scene = view(np.zeros(3), rest, nobody, 2.0, max_speed, **moving)
         problem = predicted_problem(scene, LAW, Proposal("stay", 0.0, rest), Horizon(30, 1, 1.0, 200.0))
         assert len(problem.distances) == (kept if velocity == 0.0 else 1)
         assert problem.is_finite() == (velocity == 0.0)
@@ -92,8 +95,7 @@ def test_the_terminal_cost_bounds_the_tail_of_25_under_the_own_task(error: float
     """1 / (2 B) up to the error at which the speed limit binds; beyond it more (docs/theory.md)."""
     preset = Motion.at_speed(np.array([[0.0, 0.0, 0.0], [100.0, 0.0, 0.0]]), SPEED, start=0.0)
     start = preset.at(1.0)[0] + error * np.array([np.cos(angle), np.sin(angle), 0.0])
-    none = np.empty((0, 3))
-    scene = View(1.0, start, preset, none, none, np.empty(0), np.empty(0), LIMIT)
+    scene = view(start, preset, np.empty((0, 3)), 2.0, LIMIT, t=1.0)
     problem = predicted_problem(scene, LAW, Proposal("none", 1.0, preset), Horizon(400, 1, 1.0, 1.0))
     gain, closing = LAW.motion_gain, LIMIT - SPEED
     weight = 1.0 / (2.0 * gain)

@@ -9,6 +9,7 @@ import pytest
 
 from airground_drake.gatekeeper.outcome import Outcome, Outlook, outcomes, robot_at, way_left
 from airground_drake.gatekeeper.rollout import View
+from airground_drake.geometry.convex import balls
 from airground_drake.geometry.motion import Motion
 from airground_drake.intervention.policy import Proposal
 from airground_drake.nsbc.avoidance import Avoidance
@@ -22,8 +23,8 @@ Points = tuple[tuple[float, float], ...]
 def situation(*discs: tuple[float, float], speed: float = 1.0, max_speed: float = 3.0) -> View:
     """A UGV at the origin that is to go to (8, 0), and discs of 2 m."""
     preset = Motion.at_speed(np.array([[0.0, 0.0, 0.0], [8.0, 0.0, 0.0]]), speed)
-    centres, one = np.array([[x, y, 0.0] for x, y in discs]).reshape(-1, 3), np.ones(len(discs))
-    return View(0.0, np.zeros(3), preset, centres, 0.0 * centres, 2.0 * one, one, max_speed)
+    still, one, nobody = balls([[x, y, 0.0] for x, y in discs]), np.ones(len(discs)), np.zeros((0, 3))
+    return View(0.0, np.zeros(3), preset, still, still[:0], nobody, nobody, 2.0 * one, one, max_speed)
 
 
 def along(*corners: tuple[float, float], speed: float = 2.0) -> Proposal:
@@ -37,7 +38,9 @@ AWAY = Motion.at_speed(np.array([[4.0, 0.0, 0.0], [4.0, 9.0, 0.0]]), 2.0)
 
 def beside(asked: tuple[Motion, bool] | None) -> View:
     """Another robot stands on the way of the UGV."""
-    return replace(situation((4.0, 0.0)), asked=(asked,), shares=np.array([0.5]))
+    place, point = np.array([[4.0, 0.0, 0.0]]), balls(np.zeros(3))
+    moving = {"parts": point, "places": place, "velocities": 0.0 * place, "asked": (asked,)}
+    return replace(situation(), **moving, distances=np.array([2.0]), shares=np.array([0.5]))
 
 
 @pytest.mark.parametrize(
@@ -86,7 +89,7 @@ def test_another_robot_is_predicted_on_the_motion_that_it_is_asked_for() -> None
     after = np.array([0.0, 1.0, 10.0])
     passing = replace(beside(None), velocities=np.array([[1.0, 0.0, 0.0]]))
     np.testing.assert_allclose(robot_at(passing, 0, after, 3.0, together=True)[:, 0], [4.0, 5.0, 7.0])
-    off = replace(beside((AWAY, True)), centres=np.array([[3.0, 0.0, 0.0]]))
+    off = replace(beside((AWAY, True)), places=np.array([[3.0, 0.0, 0.0]]))
     np.testing.assert_allclose(robot_at(off, 0, after, 3.0, together=False)[:, 0], 4.0 - np.exp(-after))
 
 
@@ -108,13 +111,14 @@ FAR = tuple((x, y) for x in range(-50, 50, 5) for y in (40.0, 50.0, 60.0))
     ],
 )
 def test_the_way_left(x: float, discs: Points, radius: float | tuple[float, ...], left: float) -> None:
-    centres = np.array([[*disc, 0.0] for disc in discs]).reshape(-1, 3)
-    found = way_left(np.array([x, 0.0, 0.0]), np.array([8.0, 0.0, 0.0]), centres, np.array(radius))
+    rows = balls([[*disc, 0.0] for disc in discs])
+    reach = np.broadcast_to(radius, len(rows))
+    found = way_left(np.array([x, 0.0, 0.0]), np.array([8.0, 0.0, 0.0]), rows, reach)
     assert found == pytest.approx(left)
 
 
 def test_a_ball_above_the_way_takes_up_the_circle_in_which_it_meets_the_plane() -> None:
-    left = way_left(np.zeros(3), np.array([8.0, 0.0, 0.0]), np.array([[4.0, 0.0, 1.5], [4.0, 0.0, 2.6]]), 2.5)
+    left = way_left(np.zeros(3), np.array([8.0, 0.0, 0.0]), balls([[4.0, 0.0, 1.5], [4.0, 0.0, 2.6]]), np.full(2, 2.5))
     assert left == pytest.approx(AROUND)
 
 

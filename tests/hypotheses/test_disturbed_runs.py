@@ -8,10 +8,11 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
+from builders.worlds import among_points
 from hypotheses.demands import Demands, limited, nearest, unit
 
 from airground_drake.base.arrays import Array
-from airground_drake.nsbc.avoidance import Avoidance, HalfSpaces, Surroundings
+from airground_drake.nsbc.avoidance import Avoidance, HalfSpaces
 from airground_drake.scenarios.load import load
 from airground_drake.verify.model.safe_dist import SafeDist
 
@@ -79,7 +80,7 @@ def run(
         inward = -x[robots, target] / np.maximum(reach[robots, target], 1e-9)[:, None]
         push = unit(rng, count) if how == "random" else inward
         wanted = (0.0 if how == "idle" else 100.0) * push * demands.mobility
-        spaces = edit(layer.half_spaces(positions, demands.mobility, Surroundings(things[other], safe, share)))
+        spaces = edit(layer.half_spaces(*among_points(positions, things[other], safe, share, demands.mobility)))
         velocity = layer.apply(limited(wanted, demands.max_speed), spaces)
         rate = np.einsum("ika,ia->ik", spaces.normal, velocity)
         short = np.where(np.isfinite(spaces.bound), spaces.bound - rate, -np.inf)
@@ -127,7 +128,7 @@ def test_a_weaker_layer_or_a_larger_disturbance_breaks_the_bound(
 @pytest.mark.parametrize("value", [np.nan, -np.inf, -1e300])
 def test_a_velocity_that_is_no_number_does_not_lead_inside(value: float) -> None:
     layer = Avoidance(3.0, 0.05, 5.0, "augmented")
-    around = Surroundings(np.zeros((1, 1, 3)), np.full((1, 1), 2.0), np.ones((1, 1)))
-    spaces = layer.half_spaces(np.array([[2.0, 0.0, 0.0]]), np.ones((1, 3)), around)
+    one, robot = np.ones((1, 1)), np.array([[2.0, 0.0, 0.0]])
+    spaces = layer.half_spaces(*among_points(robot, np.zeros((1, 1, 3)), 2.0 * one, one, np.ones((1, 3))))
     velocity = layer.apply(np.array([[value, 0.0, 0.0]]), spaces)
     assert not np.isfinite(velocity).all() or spaces.normal[0, 0] @ velocity[0] >= spaces.bound[0, 0]

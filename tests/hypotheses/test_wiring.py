@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from functools import partial
 from typing import Any
 
 import numpy as np
 import pytest
 from builders.misbuilt import MISBUILT, Patch
+from builders.worlds import among_points
 from hypotheses.wiring import differences
 from pydrake.systems.primitives import LinearSystem
 
 from airground_drake.base.arrays import Array
+from airground_drake.geometry.convex import BASE, MIDDLE
 from airground_drake.intervention.policy import Proposal
-from airground_drake.nsbc.avoidance import Avoidance, Surroundings, limit_speed
+from airground_drake.nsbc.avoidance import Avoidance, limit_speed
 from airground_drake.nsbc.law import UgvLaw
 from airground_drake.scenarios.load import load
 from airground_drake.systems import controllers, diagram
@@ -28,9 +29,10 @@ def uav_among(
     """The UAV's command by other inequalities: centres by `change`, bounds by `edit`."""
 
     def wrong(self: Avoidance, lower: Array, positions: Array, near: Neighbours) -> Array:
-        around = Surroundings.of(near, positions)
-        around = replace(around, centre=change(around.centre))
-        spaces = self.half_spaces(positions[near.members], near.mobility, around)
+        still = np.tile(near.still[:, [MIDDLE, MIDDLE + 1, BASE]], (len(near.members), 1, 1))
+        points = change(np.concatenate([still, positions[near.others]], axis=1))
+        given = near.distance, near.share, near.mobility
+        spaces = self.half_spaces(*among_points(positions[near.members], points, *given))
         edit(spaces.bound)
         return self.apply(limit_speed(lower, near.max_speed), spaces)
 

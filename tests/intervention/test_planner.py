@@ -13,6 +13,7 @@ from verify.judging import decided
 
 from airground_drake import load, simulate
 from airground_drake.base.arrays import Array
+from airground_drake.geometry.convex import as_tuple, balls, stacked
 from airground_drake.geometry.motion import Motion
 from airground_drake.intervention.database import BehaviourDatabase
 from airground_drake.intervention.messages import ACCEPT, DONE, REFUSE, SILENT, Report, accepted_proposals, answer_to
@@ -45,7 +46,7 @@ class Scripted(Policy):
 def planner(policy: Policy) -> Planner:
     presets = tuple(Motion(np.zeros(1), place[None]) for place in PLACES[:3])
     database = BehaviourDatabase([("scripted", policy)], retry=1.0, ranking="listed")
-    return Planner(UGVS, database, 0.1, presets, PLACES[:3], np.zeros((0, 3)), 1.0, 1.0, np.ones(3))
+    return Planner(UGVS, database, 0.1, presets, PLACES[:3], stacked([]), 1.0, np.ones(3))
 
 
 def step(
@@ -240,15 +241,15 @@ def test_radii_come_with_a_refusal_and_go_out_with_a_proposal() -> None:
     policy = Scripted({"one": wait(9.0)}, {"one": wait(9.0)})
     uav = replace(
         planner(policy),
-        mapped=np.array([[2.0, 9.0, 0.0]]),
-        mapped_radii=np.array([3.0]),
+        mapped=balls([2.0, 9.0, 0.0], 3.0, 1.0),
         radius=np.array([0.5, 0.1, 0.0]),
     )
     memory = step(uav, uav.start(), 1.0, "one")
-    sensed = Report(sensed=((2.0, 9.0, 0.0, 3.0), (5.0, 5.0, 0.0, 0.7)))
+    known, unknown = map(as_tuple, balls([[2.0, 9.0, 0.0], [5.0, 5.0, 0.0]], [3.0, 0.7], 1.0))
+    sensed = Report(sensed=(known, unknown))
     answers = np.array([REFUSE, 0.0, SILENT, -1.0, SILENT, -1.0])
     memory = uav.plan(memory, 1.1, PLACES, [True, False, False], answers, (sensed, *NOBODY[1:]))
-    assert memory.learnt == ((5.0, 5.0, 0.0, 0.7),)  # the other one is on the map
+    assert memory.learnt == (unknown,)  # the other one is on the map
     memory = step(uav, memory, 3.0, "one")
     first, second = policy.seen
     assert (first.radius, [each.radius for each in first.team]) == (0.5, [0.5, 0.1, 0.0])
@@ -257,7 +258,7 @@ def test_radii_come_with_a_refusal_and_go_out_with_a_proposal() -> None:
     assert second.distance_to(second.team[1]) == 1.0 + (0.5 + 0.1)
     sent = memory.proposals[0]
     assert sent is not None
-    assert np.array_equal(sent.mapped_radii, [3.0, 0.7])
+    assert list(map(as_tuple, sent.mapped)) == [known, unknown]
 
 
 def test_a_policy_sees_each_robot_as_it_is() -> None:

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from builders.worlds import world
+from builders.worlds import among_points, world
 from hypothesis import given
 from hypothesis import strategies as st
 from properties import examples
 
-from airground_drake.nsbc.avoidance import Avoidance, Composition, Surroundings
+from airground_drake.geometry.convex import BASE, MIDDLE
+from airground_drake.nsbc.avoidance import Avoidance, Composition
 from airground_drake.world.world import ROBOTS, Neighbours, World
 
 D = 2.0
@@ -49,9 +50,9 @@ def closest(position: np.ndarray, velocity: np.ndarray, centre: np.ndarray, othe
 
 
 def worst_margin(near: Neighbours, positions: np.ndarray, velocities: np.ndarray, h: float) -> float:
-    centres = np.vstack([near.still, positions])
-    moving = np.vstack([np.zeros_like(near.still), velocities])
     m = len(near.still)
+    centres = np.vstack([near.still[:, [MIDDLE, MIDDLE + 1, BASE]], positions])
+    moving = np.vstack([np.zeros((m, 3)), velocities])
     return min(
         closest(positions[i], velocities[i], centres[k], moving[k], h) - near.distance[i, column]
         for i in near.members
@@ -68,8 +69,9 @@ def attack(seed: int, steps: int, avoidance: Avoidance, *, share: float | None =
         near = near._replace(share=np.where(near.share < 1.0, share, 1.0))
     worst = np.inf
     for _ in range(steps):
-        around = Surroundings.of(near, positions)
-        nearest = around.centre[np.arange(len(positions)), rng.integers(around.centre.shape[1], size=len(positions))]
+        still = np.tile(near.still[:, [MIDDLE, MIDDLE + 1, BASE]], (len(positions), 1, 1))
+        points = np.concatenate([still, positions[near.others]], axis=1)
+        nearest = points[np.arange(len(positions)), rng.integers(points.shape[1], size=len(positions))]
         towards = nearest - positions if rng.random() < 0.7 else rng.normal(size=positions.shape)
         velocities = avoidance.command(100.0 * towards * near.mobility, positions, near)
         worst = min(worst, worst_margin(near, positions, velocities, avoidance.period))
@@ -101,7 +103,7 @@ def test_inequalities_hold_in_floating_point_from_any_safe_state(speed: float) -
     for seed in range(60):
         team, positions = scene(seed)
         near = team.around(team.select(*ROBOTS))
-        spaces = avoidance.half_spaces(positions, near.mobility, Surroundings.of(near, positions))
+        spaces = avoidance.half_spaces(positions, near)
         lower = np.random.default_rng(seed).normal(size=positions.shape) * speed * near.mobility
         for v, normal, bound in zip(avoidance.apply(lower, spaces), spaces.normal, spaces.bound, strict=True):
             for (x, y, z), least in zip(normal.tolist(), bound.tolist(), strict=True):
@@ -113,19 +115,20 @@ def test_inequalities_hold_in_floating_point_from_any_safe_state(speed: float) -
 )
 def test_inequalities(x: float, share: float, bound: float) -> None:
     """Out at A (d - D), eq (8); no further than the safe distance in a period; out of range, nothing."""
-    around = Surroundings(np.zeros((1, 1, 3)), np.full((1, 1), D), np.full((1, 1), share))
-    found = Avoidance(3.0, 0.05, 4.0).half_spaces(np.array([[x, 0.0, 0.0]]), np.ones((1, 3)), around)
+    robot, safe = np.array([[x, 0.0, 0.0]]), np.full((1, 1), D)
+    around = among_points(robot, np.zeros((1, 1, 3)), safe, np.full((1, 1), share), np.ones((1, 3)))
+    found = Avoidance(3.0, 0.05, 4.0).half_spaces(*around)
     assert found.bound[0, 0] == pytest.approx(bound)
-    assert found.normal[0, 0].tolist() == [1.0, 0.0, 0.0]
+    assert found.normal[0, 0].tolist() == [1.0 if x <= 4.0 else 0.0, 0.0, 0.0]
 
 
 def test_a_robot_between_two_obstacles_is_not_driven_into_either() -> None:
     """Inside both safe distances, with a hostile velocity: it is held where it violates both alike."""
     avoidance = Avoidance(3.0, 0.05)
     position, obstacles = np.array([[0.1, 0.0, 0.0]]), np.array([[[-1.5, 0.0, 0.0], [1.5, 0.0, 0.0]]])
-    around = Surroundings(obstacles, np.full((1, 2), 2.0), np.ones((1, 2)))
+    safe, share, plane = np.full((1, 2), 2.0), np.ones((1, 2)), np.array([[1.0, 1.0, 0.0]])
     for _ in range(200):
-        spaces = avoidance.half_spaces(position, np.array([[1.0, 1.0, 0.0]]), around)
+        spaces = avoidance.half_spaces(*among_points(position, obstacles, safe, share, plane))
         position = position + 0.05 * avoidance.apply(np.array([[10.0, 0.0, 0.0]]), spaces)
         assert np.linalg.norm(position - obstacles[0], axis=1).min() >= 1.4 - 1e-9
     assert abs(position[0, 0]) < 1e-3

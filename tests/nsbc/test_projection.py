@@ -15,7 +15,7 @@ from properties import examples
 
 from airground_drake.base.arrays import Array
 from airground_drake.nsbc import kernels
-from airground_drake.nsbc.avoidance import Avoidance, Surroundings
+from airground_drake.nsbc.avoidance import Avoidance
 from airground_drake.world.world import ROBOTS
 
 SEEDS = st.integers(0, 2**32 - 1)
@@ -90,7 +90,7 @@ def test_the_command_of_any_team_is_the_closest_allowed_velocity(seed: int) -> N
     positions[1, :2] = positions[0, :2] + rng.normal(size=2)  # inside each other's safe distance at times
     avoidance = Avoidance(3.0, 0.05)
     near = team.around(team.select(*ROBOTS))
-    spaces = avoidance.half_spaces(positions, near.mobility, Surroundings.of(near, positions))
+    spaces = avoidance.half_spaces(positions, near)
     lower = rng.normal(size=positions.shape) * 10.0 ** rng.uniform(-2.0, 1.0) * near.mobility
     velocity = avoidance.apply(lower, spaces)
     for v, wish, normal, bound in zip(velocity, lower, spaces.normal, spaces.bound, strict=True):

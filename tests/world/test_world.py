@@ -18,7 +18,6 @@ from airground_drake.scenarios.load import load
 from airground_drake.verify import judge
 from airground_drake.world.motion import PeriodMotion
 from airground_drake.world.plant import FirstOrder
-from airground_drake.world.shape import Ball
 from airground_drake.world.world import ROBOTS, World
 
 WORLD = world(
@@ -42,11 +41,13 @@ def test_distances_and_shares() -> None:
 @given(st.lists(st.floats(0.0, 5.0), min_size=5, max_size=5))
 def test_both_of_a_pair_keep_the_same_to_the_bit_and_their_shares_make_one(radii: list[float]) -> None:
     found = world(2, np.zeros((2, 3)), radius=np.array(radii[:3]), obstacle_radius=np.array(radii[3:]))
-    for one in found.robots:
-        for other in set(found.names()) - {one}:
-            pair = found.pair(one, other)
-            assert sum(pair.shares) == 1.0
-            assert other not in found.robots or pair.distance_m == found.pair(other, one).distance_m
+    near = found.around(found.select(*ROBOTS))
+    assert (near.share[:, :2] == 1.0).all()
+    for i, others in enumerate(near.others):
+        for column, j in enumerate(others, start=2):
+            back = 2 + int(np.flatnonzero(near.others[j] == i)[0])
+            assert near.distance[i, column] == near.distance[j, back]
+            assert near.share[i, column] + near.share[j, back] == 1.0
 
 
 @pytest.mark.parametrize(
@@ -83,7 +84,6 @@ def test_no_point_of_two_motions_is_nearer_than_the_least_distance(
         assert (np.maximum(np.linalg.norm(apart.start + s * change, axis=-1) - off, 0.0) >= least - 1e-9).all()
     nearest = np.linalg.norm(apart.start + share[:, None] * change, axis=-1)
     np.testing.assert_allclose(np.maximum(nearest - off, 0.0), least, atol=1e-12)
-    np.testing.assert_allclose(Ball(1.5).least_distance(apart), least - 1.5)
 
 
 def test_a_plant_that_leaves_the_straight_line_costs_what_it_may_be_off(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -10,10 +10,11 @@ from builders.edits import moved, with_scenario
 from builders.runs import beside_a_rock, passing_by, run_of
 from builders.scenarios import case_a
 from builders.simulation import simulate
+from builders.worlds import among_points
 from verify.judging import decided
 
 from airground_drake.base.arrays import Array
-from airground_drake.nsbc.avoidance import Avoidance, Surroundings
+from airground_drake.nsbc.avoidance import Avoidance
 
 
 @pytest.mark.parametrize(
@@ -66,9 +67,9 @@ def test_what_is_missed_is_what_the_controllers_inequalities_lack(seed: int) -> 
 
     def lack(robot: str, other: str, safe: float, share: float) -> Array:
         column = np.ones((len(ticks) - 1, 1))
-        around = Surroundings(place[other][:-1, None], safe * column, share * column)
         mobility = np.tile([1.0, 1.0, float(robot == "uav")], (len(ticks) - 1, 1))
-        spaces = avoidance.half_spaces(place[robot][:-1], mobility, around)
+        beside = place[robot][:-1], place[other][:-1, None]
+        spaces = avoidance.half_spaces(*among_points(*beside, safe * column, share * column, mobility))
         return np.maximum(-h * spaces.slack(step[robot] / h)[:, 0], 0.0)
 
     compared = 0

@@ -9,6 +9,7 @@ import pytest
 from builders.misbuilt import MISBUILT, Patch, distances, neighbours
 from verify.judging import decided
 
+from airground_drake.geometry.convex import moved
 from airground_drake.nsbc.avoidance import Avoidance
 from airground_drake.run import simulation
 from airground_drake.scenarios.load import load
@@ -36,7 +37,10 @@ def altered_later(patch: pytest.MonkeyPatch) -> None:
 
 
 PARAMETERS: dict[str, tuple[Patch, str]] = MISBUILT | {
-    "obstacles that are not there": (neighbours(lambda g: g._replace(still=g.still + 0.1)), "obstacles_m"),
+    "obstacles that are not there": (
+        neighbours(lambda g: g._replace(still=moved(g.still, np.full(3, 0.1)))),
+        "outlines",
+    ),
     "others in another order": (neighbours(lambda g: g._replace(others=g.others[:, ::-1].copy())), "others"),
     "composition": (recursive, "composition"),
     "altered later": (altered_later, "max_speed_m_s"),
