@@ -131,8 +131,8 @@ def closed_loop(
 class Workspace(NamedTuple):
     """Arrays that one control period writes to, and the UGV's mobility.
 
-    The avoidance inequalities are `which`, `normal` and `bound`, see `fill_half_spaces`; `rate` and `asked` are the velocities of
-    the preset trajectory and of the proposed motion, (3,), m/s.
+    The avoidance inequalities are `which`, `normal` and `bound`, see `fill_half_spaces`; `rate` and `asked` are the
+    velocities of the preset trajectory and of the proposed motion, (3,), m/s.
     """
 
     mobility: Array
@@ -170,9 +170,9 @@ def advance(loop: ClosedLoop, mode: int, k: int, position: Array, work: Workspac
 def _command(loop: ClosedLoop, mode: int, k: int, position: Array, work: Workspace) -> Array:
     """Velocity that the law commands in control period k, (3,), m/s; rates are of the sampled motions."""
     mobility, which, normal, bound, rate, asked = work
-    law = loop.law
+    law, every = loop.law, loop.every
     count = fill_half_spaces(
-        position, mobility, loop.still, loop.parts, loop.every, loop.every, loop.places[k], loop.distances, loop.shares,
+        position, mobility, loop.still, loop.parts, every, every, loop.places[k], loop.distances, loop.shares,
         law.layer, which, normal, bound,
     )  # fmt: skip
     for a in range(3):

@@ -234,7 +234,7 @@ def test_a_run_with_a_policy_in_another_process_is_the_same_to_the_bit() -> None
     one, other = traces
     assert (one.states.to_numpy() == other.states.to_numpy()).all()
     assert len(one.proposals) > 0
-    for column in ("issued_s", "times_s", "positions_m", "mapped_m"):
+    for column in ("issued_s", "times_s", "positions_m", "mapped"):
         for a, b in zip(one.proposals[column], other.proposals[column], strict=True):
             assert np.array_equal(a, b)
 

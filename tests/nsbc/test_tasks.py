@@ -7,6 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
+from airground_drake.geometry.convex import stacked
 from airground_drake.nsbc import law
 from airground_drake.nsbc.avoidance import Avoidance
 from airground_drake.nsbc.tasks import DistanceTask, FormationTask, PositionTask
@@ -46,11 +47,7 @@ def test_the_law_has_20_as_the_composition_of_tasks(position: np.ndarray, select
     wanted, wanted_rate, inverse = 2.0 * plane, 0.3 * plane, np.linalg.pinv(selection)
     intervention = (wanted_rate + 1.5 * (wanted - position)) @ selection.T @ inverse.T
     composed = intervention + (rate + 0.7 * (target - position)) @ (np.eye(3) - inverse @ selection).T
-    none = np.zeros((count, 0))
-    near = Neighbours(
-        np.arange(count), none.astype(np.intp), np.zeros((0, 3)), none, none, np.tile(plane, (count, 1)),
-        np.full(count, 1e9),
-    )  # fmt: skip
+    near = Neighbours.at_rest(stacked([]), np.full(count, 1e9))
     asked = [law.AcceptedMotion(wanted, wanted_rate, inverse @ selection)] * count
     commanded = law.UgvLaw(Avoidance(1.0, 0.1), 0.7, 1.5, True).velocity(position, near, target, rate, asked)
     np.testing.assert_allclose(commanded, composed, rtol=1e-9, atol=1e-9)

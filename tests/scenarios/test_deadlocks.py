@@ -8,8 +8,10 @@ from feasible import joint_plan, shortest_length
 from scenarios.cases import DEADLOCKS
 from timeline import kinds
 
+from airground_drake.geometry.convex import EXTENT, MIDDLE, as_tuple
 from airground_drake.run.simulation import simulate
 from airground_drake.scenarios.load import load
+from airground_drake.scenarios.shapes import outlines_of
 from airground_drake.systems.components import make_map, positions
 from airground_drake.verify import judge
 
@@ -21,7 +23,8 @@ def test_everybody_can_arrive_with_room_to_spare(name: str) -> None:
     scenario = load(name)
     safe, ugvs = scenario.safe_distance, scenario.ugvs.values()
     real = positions([each.position_m for each in scenario.obstacles.values()])
-    centres = np.concatenate([real, make_map(scenario)[0]])[:, :2]
+    on_map = make_map(scenario)[0][:, MIDDLE:EXTENT]
+    centres = np.concatenate([real[:, :2], on_map])
     starts, targets = (positions([getattr(each, at) for each in ugvs])[:, :2] for at in ("start_m", "target_m"))
     for start, target in zip(starts, targets, strict=True):
         assert np.isfinite(shortest_length(start, target, centres, safe.obstacle_m + 2.0 * ROOM_M))
@@ -52,8 +55,8 @@ def test_under_method_d_everybody_arrives_and_every_claim_holds(name: str) -> No
 
 def test_the_map_of_the_warehouse_is_wrong() -> None:
     scenario = load("warehouse")
-    real = {tuple(each.position_m) for each in scenario.obstacles.values()}
-    on_map = set(map(tuple, make_map(scenario)[0].tolist()))
+    real = {as_tuple(row) for each in scenario.obstacles.values() for row in outlines_of(scenario, each)}
+    on_map = set(map(as_tuple, make_map(scenario)[0]))
     assert (len(real - on_map), len(on_map - real)) == (1, 1)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+from dataclasses import asdict, replace
 
 import pytest
 import yaml
@@ -13,7 +13,7 @@ from airground_drake.base.errors import ScenarioError
 from airground_drake.scenarios import plugins
 from airground_drake.scenarios.document import text_of
 from airground_drake.scenarios.load import load, own, resolved, shipped, validated
-from airground_drake.scenarios.schema import Uav
+from airground_drake.scenarios.schema import Obstacle, Uav
 
 
 @pytest.mark.parametrize("name", shipped())
@@ -59,7 +59,7 @@ def test_yaml_is_read_by_version_1_2_with_anchors_merges_and_templates(write: Wr
         ("intervention.policies.0.name=my.module:Policy", "my.module:Policy"),
         ("obstacles.obstacle_3.known_to_uav=false", False),
         ("obstacles._box={position_m: [-9, -9, 0], known_to_uav: true, radius_m: 0}",
-         {"position_m": [-9.0, -9.0, 0.0], "known_to_uav": True, "radius_m": 0.0, "appears_s": 0.0}),
+         asdict(Obstacle([-9.0, -9.0, 0.0]))),
         ("title=a = b", "a = b"),
         ("runs.b.expected={SAFE-TRACE: refuted}", {"SAFE-TRACE": "refuted"}),
         ("runs.d.expected.LIVE-GOAL=refuted", "refuted"),

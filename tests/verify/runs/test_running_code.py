@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
 import pytest
 from builders.misbuilt import MISBUILT, Patch, distances, neighbours
 from verify.judging import decided
