@@ -22,7 +22,16 @@ from airground_drake.gatekeeper.routes.route import Route
 from airground_drake.gatekeeper.solution import ConstantPlans, Solution, after_failure
 from airground_drake.geometry import convex
 from airground_drake.geometry.motion import Motion
-from airground_drake.intervention.messages import ACCEPT, REFUSE, SILENT, Proposals, Report, Reports, answer_to
+from airground_drake.intervention.messages import (
+    ACCEPT,
+    REFUSE,
+    SILENT,
+    Proposals,
+    Report,
+    Reports,
+    answer_to,
+    sightings,
+)
 from airground_drake.intervention.policy import Proposal
 from airground_drake.nsbc.law import UgvLaw
 from airground_drake.world.world import World
@@ -110,24 +119,40 @@ class Gatekeepers(abc.ABC):
         found: npt.NDArray[np.bool_] = convex.within(still, position[None], reach, True)[0]
         return found
 
-    def _report(self, position: Array, decision: GatekeeperDecision) -> Report:
+    def _beside(self, now: Inputs, i: int) -> npt.NDArray[np.intp]:
+        """Parts that move around a UGV: of all robots, and of obstacles within sensing range; rows of `parts`."""
+        near, others = self._world.at(self._near, now.t), self._near.others[i]
+        if len(self._world.moving) == len(self._world.robots):
+            return others
+        own, reach = now.positions[i], self.law.avoidance.sensing_range
+        return np.array([
+            part for part in others
+            if near.carrier[part] < len(self._world.robots)
+            or convex.distances(near.parts[part, None], own - now.positions[near.carrier[part]], True)[0] <= reach
+        ], dtype=np.intp)  # fmt: skip
+
+    def _report(self, now: Inputs, decision: GatekeeperDecision) -> Report:
         """The report with an answer: the obstacles within sensing range, and the reason."""
-        near = self._near.still[self._in_range(decision.t, position)]
-        return Report(decision.answer, tuple(map(convex.as_tuple, near)), decision.reason, in_words(decision))
+        i = decision.robot
+        near = self._near.still[self._in_range(decision.t, now.positions[i])]
+        beside = {self._world.moving[body].name for body in self._near.carrier[self._beside(now, i)]}
+        seen = tuple(each for each in sightings(self._world, now.t, now.positions) if each.name in beside)
+        return Report(decision.answer, tuple(map(convex.as_tuple, near)), decision.reason, in_words(decision), seen)
 
     def _view(self, now: Inputs, i: int) -> View:
-        """All obstacles and robots around a UGV, whether within sensing range or not."""
-        near = self._world.at(self._near, now.t)
+        """All obstacles at rest and robots around a UGV, and the obstacles that move within sensing range."""
+        near, beside, m = self._world.at(self._near, now.t), self._beside(now, i), len(self._near.still)
+        shown = np.append(np.ones(m, dtype=bool), np.isin(near.others[i], beside))
         return View(
             t=now.t,
             position=now.positions[i].copy(),
             preset=self._presets[i],
             still=near.still,
-            parts=near.parts[near.others[i]],
-            places=now.positions[near.carrier[near.others[i]]],
-            velocities=now.velocities[near.carrier[near.others[i]]],
-            distances=near.distance[i],
-            shares=near.share[i],
+            parts=near.parts[beside],
+            places=now.positions[near.carrier[beside]],
+            velocities=now.velocities[near.carrier[beside]],
+            distances=near.distance[i][shown],
+            shares=near.share[i][shown],
             max_speed=float(near.max_speed[i]),
         )
 
@@ -161,7 +186,7 @@ class PaperGatekeepers(Gatekeepers):
             answer = ACCEPT if decision.accepted else REFUSE
             answers += [answer, proposal.number]
             since.append(before.since[i] if answer == answer_to(proposal, before.answers, i) else now.t)
-            reports.append(self._report(now.positions[i], decision))
+            reports.append(self._report(now, decision))
         return replace(
             before, answers=tuple(answers), since=tuple(since), reports=tuple(reports), decisions=tuple(decisions),
             count=before.count + len(decisions),

@@ -110,7 +110,7 @@ def outcomes(seen: View, law: UgvLaw, proposal: Proposal, look: Outlook) -> tupl
 
 
 def robot_at(seen: View, robot: int, after: Array, coasting: float, *, together: bool) -> Array:
-    """Where one of the other robots is predicted to be at times `after` from now, (S + 1,) s: (S + 1, 3), m.
+    """Where one of the other bodies is predicted to be at times `after` from now, (S + 1,) s: (S + 1, 3), m.
 
     A robot that is asked to make a motion tracks it: its distance from the motion decays with a time constant of 1 s.
     Any other robot keeps its velocity for `coasting`, s, then stands. A motion that it has not accepted yet counts only

@@ -30,6 +30,7 @@ from airground_drake.geometry.motion import Motion
 from airground_drake.intervention.messages import ACCEPT, DONE, REFUSE, SILENT, Proposals, Report, answer_to
 from airground_drake.intervention.policy import Proposal
 from airground_drake.nsbc.law import UgvLaw
+from airground_drake.world.plant import Scripted
 from airground_drake.world.world import World
 
 ACCEPTING: tuple[Reason, ...] = ("cheaper", "makes_way")
@@ -77,7 +78,7 @@ class OutcomeGatekeepers(Gatekeepers):
             decision = replace(decision, answer=before.count + len(decisions))
             decisions.append(decision)
             answers += [_answer(decision, standing), proposal.number]
-            reports.append(self._report(now.positions[i], decision))
+            reports.append(self._report(now, decision))
         return replace(
             known, answers=tuple(answers), reports=tuple(reports), decisions=tuple(decisions), commitments=tuple(held),
             count=before.count + len(decisions),
@@ -141,13 +142,17 @@ class OutcomeGatekeepers(Gatekeepers):
         return outcomes(seen, law, proposal, self._outlook)
 
     def _view_of(self, now: Inputs, known: GatekeeperState, i: int, proposal: Proposal) -> tuple[View, Basis]:
-        """A UGV's knowledge: obstacles sensed or told of, other robots and the motions asked of them."""
+        """A UGV's knowledge: obstacles sensed or told of, other bodies that move and the motions asked of them."""
         around, m = self._view(now, i), len(self._near.still)
         told = self._believed(now.positions[i], known.sensed[i], proposal)
         still = convex.joined(self._near.still[known.sensed[i]], proposal.mapped[told])
         asked: list[tuple[Motion, bool] | None] = []
         numbers = list[tuple[int, bool]]()
-        for j in self._near.carrier[self._near.others[i]].tolist():
+        for j in self._near.carrier[self._beside(now, i)].tolist():
+            plant = self._world.moving[j].plant
+            if isinstance(plant, Scripted):
+                asked.append((plant.script, True) if plant.announced else None)
+                continue
             other = now.proposals[j] if j < len(now.proposals) else None
             answer = answer_to(other, known.answers, j)
             if other and answer in (ACCEPT, SILENT):

@@ -131,14 +131,15 @@ def closed_loop(
 class Workspace(NamedTuple):
     """Arrays that one control period writes to, and the UGV's mobility.
 
-    The avoidance inequalities are `which`, `normal` and `bound`, see `fill_half_spaces`; `rate` and `asked` are the
-    velocities of the preset trajectory and of the proposed motion, (3,), m/s.
+    See `fill_half_spaces` for `which`, `normal`, `bound` and `retreat`; `rate` and `asked` are the velocities of the
+    preset trajectory and of the proposed motion, (3,), m/s.
     """
 
     mobility: Array
     which: npt.NDArray[np.intp]
     normal: Array
     bound: Array
+    retreat: Array
     rate: Array
     asked: Array
 
@@ -148,7 +149,15 @@ def workspace(loop: ClosedLoop) -> Workspace:
     """Uninitialised arrays for `advance`."""
     count = len(loop.distances)
     plane = np.array([1.0, 1.0, 0.0])
-    return Workspace(plane, np.empty(count, np.intp), np.empty((count, 3)), np.empty(count), np.empty(3), np.empty(3))
+    return Workspace(
+        plane,
+        np.empty(count, np.intp),
+        np.empty((count, 3)),
+        np.empty(count),
+        np.empty(count),
+        np.empty(3),
+        np.empty(3),
+    )
 
 
 @njit(cache=True)
@@ -169,18 +178,18 @@ def advance(loop: ClosedLoop, mode: int, k: int, position: Array, work: Workspac
 @njit(cache=True)
 def _command(loop: ClosedLoop, mode: int, k: int, position: Array, work: Workspace) -> Array:
     """Velocity that the law commands in control period k, (3,), m/s; rates are of the sampled motions."""
-    mobility, which, normal, bound, rate, asked = work
+    mobility, which, normal, bound, retreat, rate, asked = work
     law, every = loop.law, loop.every
     count = fill_half_spaces(
         position, mobility, loop.still, loop.parts, every, every, loop.places[k], loop.distances, loop.shares,
-        law.layer, which, normal, bound,
+        law.layer, which, normal, bound, retreat,
     )  # fmt: skip
     for a in range(3):
         rate[a] = (loop.preset[k + 1, a] - loop.preset[k, a]) / law.layer.period
         asked[a] = (loop.wanted[k + 1, a] - loop.wanted[k, a]) / law.layer.period
     ugv, track = UgvState(position, mobility, loop.max_speed), Tracking(loop.preset[k], rate)
     intervention = AcceptedMotion(loop.wanted[k], asked, loop.chosen)
-    return command(law, ugv, track, intervention, mode == ACCEPTED, normal[:count], bound[:count])
+    return command(law, ugv, track, intervention, mode == ACCEPTED, normal[:count], bound[:count], retreat[:count])
 
 
 @njit(cache=True)

@@ -16,7 +16,7 @@ from airground_drake.intervention.coordination.joint import Effort, Plan, plan
 from airground_drake.intervention.coordination.roadmap import RobotTask, Space
 from airground_drake.intervention.coordination.single import OtherRobot, Way
 from airground_drake.intervention.coordination.timed import at_rest, distance, speed, timed, without_repeats
-from airground_drake.intervention.policy import Observation, Policy, Teammate
+from airground_drake.intervention.policy import MovingObstacle, Observation, Policy, Teammate
 
 SHARE = 0.8
 """A plan uses this share of a UGV's speed limit; the rest is for catching up."""
@@ -147,6 +147,7 @@ class Coordinate(Policy):
     def _plan(self, seen: Observation, space: Space, group: Sequence[int]) -> Plan:
         team = seen.team
         fixed = [OtherRobot(predicted(mate, seen.start), mate.radius) for i, mate in enumerate(team) if i not in group]
+        fixed += [_as_robot(each, seen) for each in seen.moving]
         tasks = [task_of(team[i], seen.start) for i in group]
         speeds = [min(self.speed, SHARE * team[i].max_speed) for i in group]
         return plan(space, tasks, speeds, fixed, follow=self.follow, effort=Effort())
@@ -196,7 +197,9 @@ class Coordinate(Policy):
 
 def _has_the_map_of(before: Observation, seen: Observation) -> bool:
     """Whether the obstacles are those of an earlier observation."""
-    return before.t <= seen.t and np.array_equal(before.obstacles, seen.obstacles)
+    moved = any(each.velocity.any() for each in (*before.moving, *seen.moving))
+    same = [each.name for each in before.moving] == [each.name for each in seen.moving]
+    return before.t <= seen.t and same and not moved and np.array_equal(before.obstacles, seen.obstacles)
 
 
 def _is_as_before(before: Observation, seen: Observation) -> bool:
@@ -247,6 +250,16 @@ def predicted(mate: Teammate, start: float) -> Array:
     off = here - mate.preset.at(start)[0][:2]
     places = mate.preset.sample(times)[:, :2] + off * np.exp(-(times - start) / BLEND_S)[:, None]
     return without_repeats(timed(times - start, places))
+
+
+def _as_robot(obstacle: MovingObstacle, seen: Observation) -> OtherRobot:
+    """An obstacle that moves as a disc round it, of such a radius that robots keep its distance."""
+    rows = obstacle.outlines
+    reach = np.hypot(*rows[:, convex.MIDDLE : convex.EXTENT].T) + rows[:, convex.EXTENT]
+    radius = float((reach + obstacle.distances(0.0)).max()) - seen.robot_distance
+    times = obstacle.motion.times[obstacle.motion.times > seen.start + 1e-6]
+    places = obstacle.motion.sample(np.append(seen.start, times))[:, :2]
+    return OtherRobot(without_repeats(timed(np.append(0.0, times - seen.start), places)), radius)
 
 
 def _waits(mate: Teammate, t: float) -> bool:

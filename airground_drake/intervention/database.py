@@ -232,6 +232,11 @@ def predicted_cost(motions: Mapping[str, Motion], seen: Observation) -> float:
         apart = np.array([convex.distances(seen.obstacles, position, True) for position in positions])
         lacking = (seen.obstacle_distances - apart).max(axis=1)
         cost += INTRUSION * np.square(np.maximum(0.0, lacking)).sum()
+    for each in seen.moving:
+        offsets = positions - each.motion.sample(t)
+        apart = np.array([convex.distances(each.outlines, offset, True) for offset in offsets])
+        lacking = (each.distances(seen.radius) - apart).max(axis=1)
+        cost += INTRUSION * np.square(np.maximum(0.0, lacking)).sum()
     for mate in seen.team:
         motion = motions.get(mate.name, mate.proposal.motion if mate.proposal and mate.answered == "accepted" else None)
         if mate.name == seen.robot or (motion is None and not mate.standing):

@@ -1,4 +1,4 @@
-"""The detour policy: the shortest path back to the preset, round known obstacles and robots that stand."""
+"""The detour policy: the shortest path back to the preset, round known obstacles and bodies that stand."""
 
 from __future__ import annotations
 
@@ -51,8 +51,8 @@ class Detour(Policy):
     def propose(self, seen: Observation) -> Motion | None:
         """The shortest path to the earliest rendezvous with the preset trajectory, then the trajectory.
 
-        Robots that stand and have not accepted a motion count as obstacles. None if no free path leads to the preset
-        trajectory before its end.
+        Robots that stand and have not accepted a motion count as obstacles, and so do moving obstacles that stand.
+        None if no free path leads to the preset trajectory before its end.
         """
         height = seen.position[2]
         rows, reach = self._in_the_way(seen)
@@ -110,8 +110,11 @@ class Detour(Policy):
     def _in_the_way(self, seen: Observation) -> tuple[Array, Array]:
         """Outlines (m, W) in the plane of the path, and the distances to keep from their cores, (m,), m."""
         robots = [mate for mate in seen.team if mate.name != seen.robot and mate.standing and not _will_move(mate)]
-        around = convex.joined(seen.obstacles, convex.balls([mate.position for mate in robots]))
-        least = np.concatenate([seen.obstacle_distances, [seen.distance_to(mate) for mate in robots]])
+        waiting = [each for each in seen.moving if not each.velocity.any()]
+        stand = [convex.moved(each.outlines, each.position) for each in waiting]
+        around = convex.joined(seen.obstacles, convex.balls([mate.position for mate in robots]), *stand)
+        apart = [seen.distance_to(mate) for mate in robots]
+        least = np.concatenate([seen.obstacle_distances, apart, *(each.distances(seen.radius) for each in waiting)])
         # an obstacle may be as near to the target as the safe distance allows: then it gets no clearance
         from_target = convex.distances(around, seen.preset.positions[-1], True)
         reach = np.clip(from_target, least, least + self.clearance)

@@ -14,6 +14,8 @@ from typing import NamedTuple
 
 from airground_drake.base.arrays import Array
 from airground_drake.intervention.policy import Proposal
+from airground_drake.world.plant import Scripted
+from airground_drake.world.world import World
 
 ACCEPT, SILENT, REFUSE, DONE = 1.0, 0.0, -1.0, 2.0
 NOTHING = -1.0
@@ -26,20 +28,30 @@ Outline = tuple[float, ...]
 """A convex part of an obstacle, without padding: see `geometry.convex`."""
 
 
+class Sighting(NamedTuple):
+    """An obstacle that moves, as it was seen: its name, the place of its origin, m, and its velocity, m/s."""
+
+    name: str
+    place: Point
+    velocity: Point
+
+
 class Report(NamedTuple):
     """A UGV's report, sent with its answer.
 
     Attributes:
         number: of the answer, which counts the answers of all UGVs; -1: no answer.
-        sensed: obstacles that the UGV sensed when it decided.
+        sensed: obstacles at rest that the UGV sensed when it decided.
         reason: why it answers so, see `gatekeeper.answer.Reason`; empty before it has decided.
         words: the reason as a sentence.
+        seen: obstacles that move and that the UGV sensed when it decided.
     """
 
     number: int = -1
     sensed: tuple[Outline, ...] = ()
     reason: str = ""
     words: str = ""
+    seen: tuple[Sighting, ...] = ()
 
 
 Reports = tuple[Report, ...]
@@ -47,6 +59,16 @@ Reports = tuple[Report, ...]
 
 Proposals = tuple[Proposal | None, ...]
 """One entry per UGV."""
+
+
+def sightings(world: World, t: float, positions: Array) -> list[Sighting]:
+    """The obstacles that move and are there at time t, s, with all bodies that move at positions (M, 3), m."""
+    found = []
+    for body, place in zip(world.moving, positions, strict=True):
+        if isinstance(body.plant, Scripted) and world.there(t, [body])[0]:
+            velocity = body.plant.script.at(t)[1]
+            found.append(Sighting(body.name, (*place.tolist(),), (*velocity.tolist(),)))
+    return found
 
 
 def answer_to(proposal: Proposal | None, answers: Sequence[float] | Array, robot: int) -> float:

@@ -6,9 +6,9 @@ or no longer needed. Then it asks the behaviour database for a proposal to every
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Self
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 
@@ -16,11 +16,37 @@ from airground_drake.base.arrays import Array
 from airground_drake.geometry import convex
 from airground_drake.geometry.motion import Motion
 from airground_drake.intervention.database import Asked, BehaviourDatabase, Negotiation
-from airground_drake.intervention.messages import ACCEPT, DONE, REFUSE, SILENT, Outline, Proposals, Reports, answer_to
-from airground_drake.intervention.policy import Answered, Observation, Proposal, Teammate
+from airground_drake.intervention.messages import (
+    ACCEPT,
+    DONE,
+    REFUSE,
+    SILENT,
+    Outline,
+    Proposals,
+    Reports,
+    Sighting,
+    answer_to,
+)
+from airground_drake.intervention.policy import Answered, MovingObstacle, Observation, Proposal, Teammate
 from airground_drake.world.motion import SAME_S
 
 _WORDS: dict[float, Answered] = {ACCEPT: "accepted", REFUSE: "refused"}
+
+
+class Mover(NamedTuple):
+    """An obstacle that moves.
+
+    Attributes:
+        name: of the obstacle.
+        outlines: of its parts about its origin, (k, W), see `geometry.convex`.
+        known: whether the UAV sees it; else it knows what a UGV last reported.
+        script: its way, if predictions know it.
+    """
+
+    name: str
+    outlines: Array
+    known: bool
+    script: Motion | None
 
 
 @dataclass(frozen=True)
@@ -29,7 +55,8 @@ class PlannerState:
 
     Attributes:
         talks: negotiations, one per UGV.
-        learnt: obstacles from UGVs' reports that are not on the map.
+        learnt: obstacles at rest from UGVs' reports that are not on the map.
+        seen: obstacles that move, as UGVs last reported them, with the time of the report, s, by name.
         sent: all proposals with the index of their UGV, in order of sending.
         asked: policies that were asked, in order.
         read: answers that were read: their number, and when, s.
@@ -42,6 +69,7 @@ class PlannerState:
     asked: tuple[Asked, ...] = ()
     read: tuple[tuple[int, float], ...] = ()
     withdrawn: tuple[tuple[int, float], ...] = ()
+    seen: tuple[tuple[Sighting, float], ...] = ()
 
     def __deepcopy__(self, memo: dict[int, Any]) -> Self:
         """Immutable: the copy is the object itself."""
@@ -102,6 +130,9 @@ class Planner:
         max_speed: speed limits of the UGVs, (n,), m/s.
         radius: radii of the UGVs' bodies, (n,), m, or one for all.
         mapped_from: when each of `mapped` appears, (m,), s, or one time for all.
+        mapped_until: when each disappears, likewise.
+        movers: obstacles that move.
+        coasting: time for which an obstacle that moves is predicted to keep its velocity; then it stands, s.
     """
 
     ugvs: tuple[str, ...]
@@ -114,6 +145,9 @@ class Planner:
     max_speed: Array
     radius: Array | float = 0.0
     mapped_from: Array | float = 0.0
+    mapped_until: Array | float = np.inf
+    movers: tuple[Mover, ...] = ()
+    coasting: float = 3.0
 
     @property
     def radii(self) -> Array:
@@ -137,6 +171,7 @@ class Planner:
         answers: Array,
         reports: Reports,
         standing: Sequence[bool] = (),
+        sightings: Sequence[Sighting] = (),
     ) -> PlannerState:
         """The memory after one planning period.
 
@@ -148,12 +183,17 @@ class Planner:
             answers: of the UGVs, (2n,), see `messages`.
             reports: of the UGVs, see `messages`.
             standing: per UGV, whether it stands, see `halts`; default: no UGV stands.
+            sightings: the obstacles that move and are there.
         """
         said = [answer_to(talk.proposal, answers, i) for i, talk in enumerate(memory.talks)]
         heard = [report for report, answer in zip(reports, said, strict=True) if answer != SILENT]
         reported = {outline for report in heard for outline in report.sensed}
-        there = np.broadcast_to(self.mapped_from, len(self.mapped)) <= t + SAME_S
-        mapped = self.mapped[there]
+        there = (np.less_equal(self.mapped_from, t + SAME_S)) & np.less(t + SAME_S, self.mapped_until)
+        mapped = self.mapped[np.broadcast_to(there, len(self.mapped))]
+        latest = {each.name: (each, when) for each, when in memory.seen} | {
+            each.name: (each, t) for report in heard for each in report.seen
+        }
+        moving = self._moving(t, {each.name: each for each in sightings}, latest)
         unknown = reported - set(memory.learnt)
         if unknown:
             unknown -= set(map(convex.as_tuple, mapped))
@@ -181,11 +221,29 @@ class Planner:
                 team=self._team(t, positions, intervening, answers, talks, standing),
                 robot_distance=self.robot_distance,
                 radius=float(self.radii[i]),
+                moving=moving,
             )
             changed, policies = self.database.plan(talks[i], seen)
             asked += policies
             talks = [changed.get(name, talk) for name, talk in zip(self.ugvs, talks, strict=True)]
-        return replace(memory, talks=tuple(talks), learnt=learnt, asked=tuple(asked), read=(*memory.read, *read))
+        return replace(
+            memory, talks=tuple(talks), learnt=learnt, asked=tuple(asked), read=(*memory.read, *read),
+            seen=tuple(latest.values()),
+        )  # fmt: skip
+
+    def _moving(
+        self, t: float, now: Mapping[str, Sighting], latest: Mapping[str, tuple[Sighting, float]]
+    ) -> tuple[MovingObstacle, ...]:
+        """The obstacles that move, as the UAV sees them at time t, s, or as UGVs last reported them."""
+        found = []
+        for mover in self.movers:
+            sighting, when = (now.get(mover.name), t) if mover.known else latest.get(mover.name, (None, t))
+            if sighting is None:
+                continue
+            place, velocity = np.array(sighting.place), np.array(sighting.velocity)
+            coasts = Motion(np.array([when, when + self.coasting]), np.array([place, place + self.coasting * velocity]))
+            found.append(MovingObstacle(mover.name, mover.outlines, place, velocity, mover.script or coasts))
+        return tuple(found)
 
     def _after_answers(
         self,

@@ -52,6 +52,29 @@ class Teammate:
     radius: float = 0.0
 
 
+@dataclass(frozen=True, eq=False)
+class MovingObstacle:
+    """What the UAV knows of an obstacle that moves.
+
+    Attributes:
+        name: of the obstacle.
+        outlines: of its convex parts about its origin, (k, W), see `geometry.convex`.
+        position: of its origin, (3,), m, world frame: as it is now, or as a UGV last reported it.
+        velocity: of then, (3,), m/s.
+        motion: where its origin is predicted to be.
+    """
+
+    name: str
+    outlines: Array
+    position: Array
+    velocity: Array
+    motion: Motion
+
+    def distances(self, radius: float) -> Array:
+        """Distances to keep between the centre of a UGV with this radius, m, and the cores of its parts, (k,), m."""
+        return convex.keep(self.outlines, radius)
+
+
 @dataclass(frozen=True)
 class Observation:
     """What the UAV knows when it plans for one UGV.
@@ -63,7 +86,7 @@ class Observation:
         position: its position, (3,), m, world frame.
         target: its target, (3,), m.
         preset: its preset trajectory.
-        obstacles: outlines of all obstacles that the UAV knows, from its own map and from answers, (m, W); see
+        obstacles: outlines of all obstacles at rest that the UAV knows, from its own map and from answers, (m, W); see
             `geometry.convex`.
         mapped: outlines of the obstacles on its own map, (k, W).
         others: positions of the other robots, (n, 3), m.
@@ -71,6 +94,7 @@ class Observation:
         team: all UGVs in array order, this one among them.
         robot_distance: distance that two UGVs have to keep, between surfaces, m.
         radius: of the UGV's body, m.
+        moving: obstacles that move and that the UAV knows.
     """
 
     t: float
@@ -86,6 +110,7 @@ class Observation:
     team: tuple[Teammate, ...] = ()
     robot_distance: float = 0.0
     radius: float = 0.0
+    moving: tuple[MovingObstacle, ...] = ()
 
     @property
     def obstacle_distances(self) -> Array:

@@ -8,7 +8,15 @@ that point, the velocity v of one control period h must satisfy
 
 with share = 1 for an obstacle and 1/2 for each robot of a pair. As ||x + s v|| >= ||x|| + s (x.v)/||x||, the
 distance is then at least d during the whole period, whatever velocity the lower priorities ask for: v = 0
-satisfies all of them, so a safe choice always exists. D and d are distances of the robot's centre from the *core* of
+satisfies all of them, so a safe choice always exists.
+
+Beside an obstacle that may move at a speed V the robot does nothing that would bring it too near by itself:
+
+    n.v >= -(D - d - V h) / h  if D >= d + V h: whatever the obstacle does, d is kept in this period;
+    n.v >= 0                   otherwise: what is lost below min(D, d + V h), the obstacle has moved itself.
+
+Below these inequalities, and above all other tasks, it retreats: n.v >= V - (D - d) / h, as far as its speed limit
+allows. D and d are distances of the robot's centre from the *core* of
 what it avoids (`geometry.convex`): `World` puts both radii into d.
 """
 
@@ -76,11 +84,12 @@ class Avoidance:
         """Constraints of k robots when all bodies that move are at positions (M, 3) m."""
         count = near.distance.shape[1]
         found = HalfSpaces(np.zeros((len(near.members), count, 3)), np.full((len(near.members), count), -np.inf))
-        which, normal, bound = np.empty(count, dtype=np.intp), np.empty((count, 3)), np.empty(count)
+        which, normal, (bound, retreat) = np.empty(count, dtype=np.intp), np.empty((count, 3)), np.empty((2, count))
         around = near.still, near.parts, near.carrier
         for i, member in enumerate(near.members):
             own = positions[member], near.mobility[i], *around, near.others[i], positions
-            k = kernels.fill_half_spaces(*own, near.distance[i], near.share[i], self.layer, which, normal, bound)
+            given = near.distance[i], near.share[i], self.layer, which, normal, bound, retreat
+            k = kernels.fill_half_spaces(*own, *given)
             found.normal[i, which[:k]], found.bound[i, which[:k]] = normal[:k], bound[:k]
         return found
 

@@ -13,7 +13,7 @@ import numpy.typing as npt
 from numba import njit
 
 from airground_drake.base.arrays import Array
-from airground_drake.geometry.convex import nearest
+from airground_drake.geometry.convex import SPEED, nearest
 
 MARGIN_M_S = 1e-12
 """Added to every bound in the projection, m/s. The bound of a robot in contact is 0. Without the margin rounding would
@@ -57,6 +57,7 @@ def fill_half_spaces(
     which: npt.NDArray[np.intp],
     normal: Array,
     bound: Array,
+    retreat: Array,
 ) -> int:
     """Write the velocity constraints of one robot, those within sensing range, and return their number K.
 
@@ -74,6 +75,7 @@ def fill_half_spaces(
         which: result, (m + n,): the first K entries say what the constraints are about, counting what is at rest first.
         normal: result, (m + n, 3); the first K rows.
         bound: result, (m + n,), m/s; the first K entries.
+        retreat: result, (m + n,), m/s: speeds away that the robot should have, 0 where it need not retreat.
     """
     gain, period, reach, planar = layer.gain, layer.period, layer.sensing_range, mobility[2] == 0.0
     x, y, z = position[0], position[1], position[2]
@@ -90,8 +92,13 @@ def fill_half_spaces(
             continue
         for a in range(3):
             normal[count, a] *= mobility[a]
-        which[count], excess = k, apart - distance[k]
-        bound[count] = -share[k] * gain * excess if excess <= 0.0 else -share[k] * excess / period
+        which[count], retreat[count], excess = k, 0.0, apart - distance[k]
+        speed = still[k, SPEED] if k < m else parts[others[k - m], SPEED]
+        if speed > 0.0:
+            bound[count] = min(-(excess - speed * period) / period, 0.0)
+            retreat[count] = max(speed - excess / period, 0.0)
+        else:
+            bound[count] = -share[k] * gain * excess if excess <= 0.0 else -share[k] * excess / period
         count += 1
     return count
 
@@ -112,6 +119,19 @@ def avoid_one(lower: Array, normal: Array, bound: Array, composition: int) -> Ar
     if composition == AUGMENTED:
         return _scale_back(_closest_feasible(lower, normal, bound), normal, bound)
     return _recursion(lower, normal, bound, composition == RECURSION_NEAREST)
+
+
+@njit(cache=True)
+def yielding(task: Array, normal: Array, retreat: Array, max_speed: float) -> Array:
+    """The velocity, (3,), m/s, closest to `task` with which a robot retreats as it should, within its speed limit."""
+    for k in range(len(retreat)):
+        if retreat[k] > 0.0:
+            break
+    else:
+        return task
+    found = avoid_one(task, normal, np.where(retreat > 0.0, retreat, -np.inf), AUGMENTED)
+    limit_one(found, max_speed)
+    return found
 
 
 @njit(cache=True)
@@ -158,13 +178,14 @@ def commands(
     # one by one, because numba takes 1.5 us to unpack a named tuple that Python passes, and 0.04 us for an array
     layer, velocity = Layer(gain, period, sensing_range, composition), limit_speed(lower, max_speed)
     normal, bound = np.empty((distance.shape[1], 3)), np.empty(distance.shape[1])
-    which = np.empty(distance.shape[1], np.intp)
+    which, retreat = np.empty(distance.shape[1], np.intp), np.empty(distance.shape[1])
     for i in range(len(velocity)):
         count = fill_half_spaces(
             positions[members[i]], mobility[i], still, parts, carrier, others[i], positions, distance[i], share[i],
-            layer, which, normal, bound,
+            layer, which, normal, bound, retreat,
         )  # fmt: skip
-        velocity[i] = avoid_one(velocity[i], normal[:count], bound[:count], composition)
+        task = yielding(velocity[i], normal[:count], retreat[:count], max_speed[i])
+        velocity[i] = avoid_one(task, normal[:count], bound[:count], composition)
     return velocity
 
 

@@ -17,7 +17,7 @@ from numba import njit
 
 from airground_drake.base.arrays import Array
 from airground_drake.nsbc.avoidance import Avoidance
-from airground_drake.nsbc.kernels import Layer, avoid_one, fill_half_spaces, limit_one
+from airground_drake.nsbc.kernels import Layer, avoid_one, fill_half_spaces, limit_one, yielding
 from airground_drake.world.world import Neighbours
 
 
@@ -117,7 +117,14 @@ class UgvLaw:
 
 @njit(cache=True)
 def command(
-    law: Numbers, ugv: UgvState, track: Tracking, asked: AcceptedMotion, executing: bool, normal: Array, bound: Array
+    law: Numbers,
+    ugv: UgvState,
+    track: Tracking,
+    asked: AcceptedMotion,
+    executing: bool,
+    normal: Array,
+    bound: Array,
+    retreat: Array,
 ) -> Array:
     """Command of one UGV, (3,), m/s.
 
@@ -125,13 +132,16 @@ def command(
     composite, as (20) does; otherwise it is the task below avoidance, and tracking fills its null space, so that no
     intervention can break an avoidance inequality.
 
-    `asked` counts only if `executing`. The avoidance inequalities at this position are `normal`, (K, 3), and `bound`,
-    (K,), m/s.
+    A task below avoidance yields to obstacles that may move: see `kernels.yielding`. `asked` counts only if
+    `executing`. The avoidance inequalities at this position are `normal`, (K, 3), and `bound`, (K,), m/s; `retreat`,
+    (K,), m/s, as in `kernels.fill_half_spaces`.
     """
     own, composition = np.empty(3), law.layer.composition
     for a in range(3):
         own[a] = ugv.mobility[a] * (track.rate[a] + law.motion_gain * (track.target[a] - ugv.position[a]))
     limit_one(own, ugv.max_speed)
+    if not executing or law.intervention_on_top:
+        own = yielding(own, normal, retreat, ugv.max_speed)
     if not executing:
         return avoid_one(own, normal, bound, composition)
     below = avoid_one(own, normal, bound, composition) if law.intervention_on_top else own
@@ -145,7 +155,9 @@ def command(
     if not np.isfinite(task).all():  # the planner never sends such numbers
         task = below
     limit_one(task, ugv.max_speed)
-    return task if law.intervention_on_top else avoid_one(task, normal, bound, composition)
+    if law.intervention_on_top:
+        return task
+    return avoid_one(yielding(task, normal, retreat, ugv.max_speed), normal, bound, composition)
 
 
 @njit(cache=True)
@@ -180,13 +192,13 @@ def _commands(
     law = Numbers(motion_gain, intervention_gain, intervention_on_top, layer)
     velocity = np.empty(target.shape)
     normal, bound = np.empty((distance.shape[1], 3)), np.empty(distance.shape[1])
-    which = np.empty(distance.shape[1], np.intp)
+    which, retreat = np.empty(distance.shape[1], np.intp), np.empty(distance.shape[1])
     for i in range(len(target)):
         ugv = UgvState(positions[members[i]], mobility[i], max_speed[i])
         count = fill_half_spaces(
             ugv.position, ugv.mobility, still, parts, carrier, others[i], positions, distance[i], share[i],
-            layer, which, normal, bound,
+            layer, which, normal, bound, retreat,
         )  # fmt: skip
         asked, track = AcceptedMotion(wanted[i], wanted_rate[i], chosen[i]), Tracking(target[i], rate[i])
-        velocity[i] = command(law, ugv, track, asked, executing[i], normal[:count], bound[:count])
+        velocity[i] = command(law, ugv, track, asked, executing[i], normal[:count], bound[:count], retreat[:count])
     return velocity

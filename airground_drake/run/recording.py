@@ -46,11 +46,11 @@ def distinct(t: Array, command: Array) -> npt.NDArray[np.intp]:
     return np.unique(np.maximum.accumulate(np.where(led, np.arange(len(t)), 0))[np.append(np.diff(cluster) > 0, True)])
 
 
-def states(t: Array, logged: Mapping[str, Array], ugvs: Sequence[str], robots: Sequence[str]) -> pd.DataFrame:
-    """`Trace.states` of rows at times (T,), s; what was logged of n robots has the shape (3 n, T), of UGVs (n, T)."""
+def states(t: Array, logged: Mapping[str, Array], ugvs: Sequence[str], bodies: Sequence[str]) -> pd.DataFrame:
+    """`Trace.states` of rows at times (T,), s; what was logged of M bodies has the shape (3 M, T), of UGVs (n, T)."""
     columns: dict[str, Array] = {"t_s": t}
-    for i, robot in enumerate(robots):
-        columns |= {f"{robot}.{axis}_m": logged["bodies"][3 * i + a] for a, axis in enumerate("xyz")}
+    for i, body in enumerate(bodies):
+        columns |= {f"{body}.{axis}_m": logged["bodies"][3 * i + a] for a, axis in enumerate("xyz")}
     for i, ugv in enumerate(ugvs):
         columns[f"{ugv}.noise_m"] = logged["noise"][i]
         columns[f"{ugv}.decision_variable_m"] = logged["decision_variable"][i]

@@ -169,7 +169,7 @@ class Recorder:
         uav, t = model.world.names("uav")[0], t[keep]
         trace = Trace(
             meta,
-            states=recording.states(t, data, ugvs, robots),
+            states=recording.states(t, data, ugvs, [body.name for body in model.world.moving]),
             samples=recording.samples(t, self._scenario.control.period_s, data, ugvs, robots),
             decisions=recording.decisions(decided, ugvs, self._own.gatekeeper.route),
             timings=timings,

@@ -5,7 +5,7 @@ between. Its values are true values just before the row's time, so an event at t
 closer than 1e-9 s are merged. Between two rows every first-order robot moves on a straight line, and noise is linear.
 
     t_s
-    <robot>.x_m .y_m .z_m                     position, world frame
+    <body>.x_m .y_m .z_m                      position of a robot, or of an obstacle that moves, world frame
     <ugv>.noise_m                             integrated noise of (15)
     <ugv>.decision_variable_m                 x, input of the trigger: ||rho_rd - rho|| + noise, unless another
                                               block computes it
@@ -175,9 +175,9 @@ class Trace:
         names = [f"{robot}.{stem}{axis}_{unit}" for axis in "xyz"]
         return self.derived(("vectors", *names), lambda: read_only(np.column_stack([column(name) for name in names])))
 
-    def position(self, robot: str) -> Array:
-        """Positions, (T, 3), m, world frame."""
-        return self._vectors(self.column, robot, "", "m")
+    def position(self, body: str) -> Array:
+        """Positions of a robot, or of an obstacle that moves, (T, 3), m, world frame."""
+        return self._vectors(self.column, body, "", "m")
 
     def there_from(self, name: str) -> int:
         """Row from which on a body is there: the first control sample at or after an obstacle's `appears_s`, or row 0.
@@ -185,11 +185,20 @@ class Trace:
         The number of rows if there is no such sample before the end: then nothing of the run is about the body.
         """
         obstacle = self.scenario.obstacles.get(name)
-        if obstacle is None or obstacle.appears_s == 0.0:
-            return 0
-        period = self.scenario.control.period_s
-        row = int(np.searchsorted(self.t, period * ceil((obstacle.appears_s - SAME_S) / period) - SAME_S))
+        row = self._row_of(obstacle.appears_s) if obstacle else 0
         return row if row < len(self.t) - 1 else len(self.t)
+
+    def there_until(self, name: str) -> int:
+        """Row up to which a body is there: that of the first sample at or after its `disappears_s`, or the last row."""
+        obstacle = self.scenario.obstacles.get(name)
+        return min(self._row_of(obstacle.disappears_s or np.inf), len(self.t) - 1) if obstacle else len(self.t) - 1
+
+    def _row_of(self, t_s: float) -> int:
+        """Row of the first control sample at or after a time, s; the number of rows if there is none."""
+        period = self.scenario.control.period_s
+        if not np.isfinite(t_s):
+            return len(self.t)
+        return int(np.searchsorted(self.t, period * ceil((t_s - SAME_S) / period) - SAME_S)) if t_s else 0
 
     @property
     def sample_rows(self) -> npt.NDArray[np.intp]:

@@ -80,10 +80,14 @@ def _all_or_none(point: list[float]) -> list[float]:
     return point
 
 
-def _place_or_none(point: list[float]) -> list[float]:
-    if len(point) not in (0, 2, 3):
+def _place(point: list[float]) -> list[float]:
+    if len(point) not in (2, 3):
         raise refused(point, "2 or 3 numbers in m: [x, y] or [x, y, z]")
     return [*point, 0.0] if len(point) == 2 else point
+
+
+def _place_or_none(point: list[float]) -> list[float]:
+    return _place(point) if point else point
 
 
 def _two_or_none(value: list[Any]) -> list[Any]:
@@ -136,6 +140,7 @@ PointOrNone = Annotated[list[Real], Field(strict=True), ValueRule(_all_or_none, 
 PlaceOrNone = Annotated[
     list[Real], Field(strict=True), ValueRule(_place_or_none, lambda: {"minItems": 0, "maxItems": 3})
 ]
+Place = Annotated[list[Real], Field(strict=True), ValueRule(_place, lambda: {"minItems": 2, "maxItems": 3})]
 Corner = Annotated[list[Real], Field(strict=True, min_length=2, max_length=2)]
 CornersOrNone = Annotated[list[Corner], Field(strict=True, max_length=MAX_CORNERS)]
 TwoCornersOrNone = Annotated[

@@ -24,6 +24,7 @@ from airground_drake.scenarios.kinds import (
     Name,
     NotNegative,
     OneValue,
+    Place,
     PlaceOrNone,
     Point,
     PointOrNone,
@@ -39,7 +40,7 @@ from airground_drake.scenarios.kinds import (
     registered,
     settings_of,
 )
-from airground_drake.scenarios.limits import MAX_STAGES, MAX_UGVS
+from airground_drake.scenarios.limits import MAX_CORNERS, MAX_STAGES, MAX_UGVS
 
 Vector = list[float]
 
@@ -49,6 +50,7 @@ ENDLESS_M = 1e6
 """Height of the arena's walls, m."""
 
 TRIGGERS: tuple[str, ...] = ("automaton", "bare")
+AT_END: tuple[str, ...] = ("stop", "reverse", "loop")
 RULES: tuple[str, ...] = ("hysteresis", "first_stage")
 SETTABLE: tuple[str, ...] = ("decision", "gatekeeper", "intervention")
 """Sections in which a run may set its own values. All runs share bodies, distances and controllers: a report draws them
@@ -108,6 +110,23 @@ class Uav:
 
 
 @dataclass(slots=True)
+class Moves:
+    """The way of an obstacle that moves, without turning: of the origin of its frame, straight between waypoints.
+
+    Each leg takes a whole number of control periods, so the speed is rounded down. Walls and robots do not stop it.
+    """
+
+    waypoints_m: Annotated[list[Place], Field(min_length=2, max_length=MAX_CORNERS)]
+    """Corners of the way, [x, y] or [x, y, z], at least two."""
+    speed_m_s: Positive
+    """Speed along it."""
+    start_s: NotNegative = 0.0
+    """When it starts; until then it stands at the first waypoint."""
+    at_end: Annotated[Words, one_of(AT_END)] = "stop"
+    """At the last waypoint it stops, goes back the way it came, or goes straight to the first one and on."""
+
+
+@dataclass(slots=True)
 class Obstacle:
     """An obstacle from which robots keep the safe distance of (7)-(8); by default a ball, or without a radius a point.
 
@@ -132,9 +151,22 @@ class Obstacle:
     height_m: NotNegative = 0.0
     """It stands from the ground to this height; 0: flat, or a ball. For UGVs all walls are endless."""
     distance_m: NotNegative = 0.0
-    """Distance to keep from it, in place of `safe_distance.obstacle_m`; 0: that one."""
+    """Distance to keep from it, in place of `safe_distance.obstacle_m` or `moving_m`; 0: that one."""
+    moves: Moves | None = None
+    """How it moves; then its frame has no `position_m`."""
+    max_speed_m_s: NotNegative = 0.0
+    """Speed at which robots expect it to move at most; 0: that of `moves`, or none. Without `moves` it might move."""
+    known_motion: YesNo = False
+    """Whether predictions know its way, or its present velocity only. No distance rests on it."""
     appears_s: NotNegative = 0.0
     """It is there from the first control sample at or after this time on; before that, it is nowhere."""
+    disappears_s: NotNegative = 0.0
+    """It is nowhere from the first control sample at or after this time on; 0: it stays."""
+
+    @property
+    def expected_speed_m_s(self) -> float:
+        """Speed at which robots expect it to move at most, m/s."""
+        return self.max_speed_m_s or (self.moves.speed_m_s if self.moves else 0.0)
 
 
 @dataclass(slots=True)
@@ -147,6 +179,8 @@ class SafeDistance:
 
     obstacle_m: Positive = 2.0
     """Between a robot and an obstacle."""
+    moving_m: NotNegative = 0.0
+    """Between a robot and an obstacle that moves; 0: `obstacle_m`."""
     ugv_m: Positive = 2.0
     """Between two UGVs."""
     air_ground_m: Positive = 1.0

@@ -6,8 +6,10 @@ import math
 from collections.abc import Sequence
 from itertools import pairwise
 
+import numpy as np
+
 from airground_drake.base.arrays import Array
-from airground_drake.geometry.convex import balls, prism, stacked
+from airground_drake.geometry.convex import SPEED, balls, prism, stacked
 from airground_drake.scenarios.schema import Obstacle, Scenario
 
 DIGITS = 12
@@ -18,12 +20,23 @@ Corner = tuple[float, float]
 
 
 def outlines_of(scenario: Scenario, obstacle: Obstacle) -> Array:
-    """The outlines of an obstacle's convex parts, (k, W), in the world frame, with the distance that robots keep."""
-    gap = obstacle.distance_m or scenario.safe_distance.obstacle_m
-    parts = convex_parts(obstacle)
+    """The outlines of an obstacle's convex parts, (k, W), with the distance that robots keep, m, and its speed, m/s.
+
+    They are in the world frame; those of an obstacle that moves are about the origin of its frame.
+    """
+    gap, parts = gap_m(scenario, obstacle), convex_parts(obstacle)
     if parts is None:
-        return balls(obstacle.position_m, obstacle.radius_m, gap)
-    return stacked(prism(part, top=obstacle.height_m, radius=obstacle.radius_m, gap=gap) for part in parts)
+        found = balls(obstacle.position_m or np.zeros(3), obstacle.radius_m, gap)
+    else:
+        found = stacked(prism(part, top=obstacle.height_m, radius=obstacle.radius_m, gap=gap) for part in parts)
+    found[:, SPEED] = obstacle.expected_speed_m_s
+    return found
+
+
+def gap_m(scenario: Scenario, obstacle: Obstacle) -> float:
+    """The distance that robots keep from an obstacle's surface, m."""
+    safe = scenario.safe_distance
+    return obstacle.distance_m or (obstacle.expected_speed_m_s and safe.moving_m) or safe.obstacle_m
 
 
 def convex_parts(obstacle: Obstacle) -> list[list[Corner]] | None:
@@ -40,7 +53,8 @@ def convex_parts(obstacle: Obstacle) -> list[list[Corner]] | None:
         x, y = (0.5 * side for side in obstacle.size_m)
         return [_placed(obstacle, [[-x, -y], [x, -y], [x, y], [-x, y]])]
     if obstacle.height_m:
-        return [[(obstacle.position_m[0], obstacle.position_m[1])]]
+        x, y = obstacle.position_m[:2] or (0.0, 0.0)
+        return [[(x, y)]]
     return None
 
 

@@ -24,7 +24,7 @@ from airground_drake.decision.bayes import COMPUTED
 from airground_drake.geometry import convex
 from airground_drake.registry import MODEL_CLAIMS, ROUTES, RUN_CLAIMS
 from airground_drake.scenarios.rounding import TOLERANCE_M, Rounding
-from airground_drake.scenarios.schema import ARENA, Scenario, Vector
+from airground_drake.scenarios.schema import ARENA, Obstacle, Scenario, Vector
 from airground_drake.scenarios.shapes import crossing, outlines_of
 
 GAINS = ("avoidance_gain_1_s", "motion_gain_1_s", "formation_gain_1_s", "intervention_gain_1_s")
@@ -77,16 +77,43 @@ def _shapes(scenario: Scenario) -> Problems:
         given = [shape for shape in ("polygon_m", "segment_m", "size_m") if getattr(obstacle, shape)]
         if len(given) > 1:
             yield f"{key}.{given[1]}", getattr(obstacle, given[1]), f"one shape: {given[0]} is given, too"
-        if not obstacle.position_m and given in ([], ["size_m"]):
+        if not (obstacle.position_m or obstacle.moves) and given in ([], ["size_m"]):
             yield f"{key}.position_m", Fault("missing"), "wanted: [x, y] or [x, y, z] in m, or polygon_m or segment_m"
         if obstacle.heading_rad and not given:
             yield f"{key}.heading_rad", obstacle.heading_rad, "0: only polygon_m, segment_m and size_m have a heading"
         if (given or obstacle.height_m) and obstacle.position_m and obstacle.position_m[2]:
             yield f"{key}.position_m", obstacle.position_m, "z = 0: it stands on the ground"
+        if obstacle.disappears_s and obstacle.disappears_s <= obstacle.appears_s:
+            yield (
+                f"{key}.disappears_s",
+                obstacle.disappears_s,
+                f"later than appears_s = {obstacle.appears_s:.9g} s, or 0",
+            )
+        yield from _way(key, obstacle, flat=bool(given or obstacle.height_m))
         yield from _corners(f"{key}.segment_m", obstacle.segment_m, 2, closed=False)
         yield from _corners(f"{key}.polygon_m", obstacle.polygon_m, 3, closed=True)
     if scenario.arena_m and any(one == other for one, other in zip(*scenario.arena_m, strict=True)):
         yield "arena_m", scenario.arena_m, "two opposite corners of a rectangle"
+
+
+def _way(key: str, obstacle: Obstacle, *, flat: bool) -> Problems:
+    """The way of an obstacle that moves."""
+    moves = obstacle.moves
+    if moves is None:
+        if obstacle.known_motion:
+            yield f"{key}.known_motion", True, "false: it has no moves"
+        return
+    if obstacle.position_m:
+        yield f"{key}.position_m", obstacle.position_m, "no position_m: it moves along moves.waypoints_m"
+    yield from _corners(f"{key}.moves.waypoints_m", moves.waypoints_m, 2, closed=False)
+    if moves.at_end == "loop" and math.dist(moves.waypoints_m[0], moves.waypoints_m[-1]) <= TOLERANCE:
+        yield (
+            f"{key}.moves.waypoints_m",
+            moves.waypoints_m,
+            "without the first waypoint at the end: a loop leads back there",
+        )
+    if flat and any(point[2] for point in moves.waypoints_m):
+        yield f"{key}.moves.waypoints_m", moves.waypoints_m, "z = 0: it stands on the ground"
 
 
 def _corners(key: str, corners: Sequence[Vector], least: int, *, closed: bool) -> Problems:
@@ -224,7 +251,7 @@ def _release(scenario: Scenario) -> Problems:
 
 def _distances(scenario: Scenario) -> Problems:
     safe, altitude = scenario.safe_distance, scenario.uav.altitude_m
-    for name in ("obstacle_m", "ugv_m", "air_ground_m"):
+    for name in ("obstacle_m", "ugv_m", "air_ground_m", *(["moving_m"] if safe.moving_m else [])):
         if not safe.collision_m < getattr(safe, name):
             allowed = f"less than safe_distance.{name} = {getattr(safe, name):.9g} m"
             yield "safe_distance.collision_m", safe.collision_m, allowed
@@ -254,8 +281,11 @@ Apart = tuple[str, float]
 
 def apart_of(scenario: Scenario, name: str) -> Apart:
     """The distance to keep from an obstacle."""
-    own = scenario.barriers[name].distance_m
-    return (f"obstacles.{name}.distance_m", own) if own else _apart(scenario, "obstacle_m")
+    obstacle = scenario.barriers[name]
+    if obstacle.distance_m:
+        return f"obstacles.{name}.distance_m", obstacle.distance_m
+    moving = obstacle.expected_speed_m_s and scenario.safe_distance.moving_m
+    return _apart(scenario, "moving_m" if moving else "obstacle_m")
 
 
 def _apart(scenario: Scenario, kind: str) -> Apart:
@@ -270,7 +300,9 @@ def _nearest_pairs(scenario: Scenario) -> list[tuple[Apart, _Body, _Body]]:
         for name, each in scenario.robots.items()
     )
     ugvs.sort(reverse=True)
-    fixed = [_Body(each.radius_m, 0.0, each.radius_m, name) for name, each in scenario.barriers.items()]
+    fixed = [
+        _Body(each.radius_m, each.expected_speed_m_s, each.radius_m, name) for name, each in scenario.barriers.items()
+    ]
     pairs = [(_apart(scenario, "air_ground_m"), uav, ugvs[0])]
     pairs += [(_apart(scenario, "ugv_m"), one, other) for one, other in pairwise(ugvs[:2])]
     return [*pairs, *((apart_of(scenario, each.name), max(uav, ugvs[0]), each) for each in fixed)]
@@ -317,6 +349,8 @@ def _extent(scenario: Scenario) -> Problems:
     for name, each in scenario.barriers.items():
         shape = next((key for key in ("polygon_m", "segment_m", "size_m") if getattr(each, key)), "position_m")
         places = [each.position_m] if each.position_m else []
+        if each.moves:
+            shape, places = "moves.waypoints_m", list(each.moves.waypoints_m)
         places += [place for row in outlines_of(scenario, each) for place in convex.corners_of(row).tolist()]
         points += [(f"obstacles.{name}.{shape}", place) for place in places]
     key, point = max(points, key=lambda entry: max(map(abs, entry[1])))
@@ -357,8 +391,8 @@ def _clearances(scenario: Scenario) -> Problems:
         ]
         uav = _Round("uav", scenario.uav.name, getattr(scenario.uav, attribute), scenario.uav.radius_m)
         for name, rows in outlines.items():
-            if scenario.barriers[name].appears_s and attribute == "start_m":
-                continue  # where robots are when it appears is judged in each run
+            if scenario.barriers[name].moves or (scenario.barriers[name].appears_s and attribute == "start_m"):
+                continue  # where robots are when it comes or appears is judged in each run
             kind, least = apart_of(scenario, name)
             for robot in (*ugvs, uav):
                 apart = convex.distances(rows, np.array(robot.point), robot is not uav) - rows[:, convex.RADIUS]

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from airground_drake.geometry import convex
+from airground_drake.scenarios.courses import course
 from airground_drake.scenarios.plants import plant_of
-from airground_drake.scenarios.schema import Scenario, Uav, Ugv
+from airground_drake.scenarios.schema import Obstacle, Scenario, Uav, Ugv
 from airground_drake.scenarios.shapes import outlines_of
+from airground_drake.world.plant import Scripted
 from airground_drake.world.world import Body, Kind, World
 
 
@@ -16,15 +20,24 @@ def make_world(scenario: Scenario) -> World:
     safe = scenario.safe_distance
     robots = [_robot(name, "ugv", ugv) for name, ugv in scenario.ugvs.items()]
     robots += [_robot(scenario.uav.name, "uav", scenario.uav)]
-    obstacles = [
-        Body(name, "obstacle", np.zeros(3), outlines_of(scenario, each), appears_s=each.appears_s)
-        for name, each in scenario.barriers.items()
-    ]
+    obstacles = [_obstacle(scenario, name, each) for name, each in scenario.barriers.items()]
+    obstacles.sort(key=lambda body: body.plant is None)
     apart: dict[frozenset[Kind], float] = {
         frozenset(("ugv",)): safe.ugv_m,
         frozenset(("ugv", "uav")): safe.air_ground_m,
     }
     return World((*robots, *obstacles), apart)
+
+
+def _obstacle(scenario: Scenario, name: str, given: Obstacle) -> Body:
+    start, plant = np.zeros(3), None
+    if given.moves:
+        way = course(given.moves, scenario.control.period_s, scenario.duration_s)
+        start, plant = way.at(0.0)[0], Scripted(way, given.known_motion)
+    until = given.disappears_s or math.inf
+    return Body(
+        name, "obstacle", start, outlines_of(scenario, given), plant, given.expected_speed_m_s, given.appears_s, until
+    )  # fmt: skip
 
 
 def _robot(name: str, kind: Kind, given: Ugv | Uav) -> Body:

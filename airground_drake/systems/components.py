@@ -26,10 +26,11 @@ from airground_drake.gatekeeper.routes.route import Route
 from airground_drake.geometry import convex
 from airground_drake.geometry.motion import Motion
 from airground_drake.intervention.database import BehaviourDatabase, make_policy
-from airground_drake.intervention.planner import Planner
+from airground_drake.intervention.planner import Mover, Planner
 from airground_drake.nsbc.avoidance import Avoidance, Composition
 from airground_drake.nsbc.law import UgvLaw
 from airground_drake.registry import ROUTES, Method
+from airground_drake.scenarios.courses import course
 from airground_drake.scenarios.schema import Decision, Scenario
 from airground_drake.scenarios.shapes import outlines_of
 from airground_drake.scenarios.world import make_world
@@ -56,7 +57,7 @@ def make_planner(scenario: Scenario, method: Method) -> Planner:
     Raises:
         UnknownNameError, PluginError: if the scenario names a policy that cannot be made.
     """
-    mapped, appears = make_map(scenario)
+    mapped, appears, disappears = make_map(scenario)
     given = scenario.intervention
     policies = given.policies if method.intervenes else []
     database = BehaviourDatabase(
@@ -74,23 +75,41 @@ def make_planner(scenario: Scenario, method: Method) -> Planner:
         targets=positions([ugv.target_m for ugv in scenario.ugvs.values()]),
         mapped=mapped,
         mapped_from=appears,
+        mapped_until=disappears,
+        movers=make_movers(scenario),
+        coasting=scenario.gatekeeper.horizon_s,
         robot_distance=scenario.safe_distance.ugv_m,
         max_speed=np.array([ugv.max_speed_m_s for ugv in scenario.ugvs.values()]),
         radius=np.array([ugv.radius_m for ugv in scenario.ugvs.values()]),
     )
 
 
-def make_map(scenario: Scenario) -> tuple[Array, Array]:
-    """The UAV's map: obstacles that it knows, and phantoms, which exist on the map only and have no radius.
+def make_map(scenario: Scenario) -> tuple[Array, Array, Array]:
+    """The UAV's map: obstacles at rest that it knows, and phantoms, which exist on the map only and have no radius.
 
     Returns:
-        Outlines, (m, W), see `geometry.convex`, and when each appears, (m,), s.
+        Outlines, (m, W), see `geometry.convex`, and when each appears and disappears, (m,), s.
     """
-    known = [obstacle for obstacle in scenario.barriers.values() if obstacle.known_to_uav]
+    known = [each for each in scenario.barriers.values() if each.known_to_uav and not each.moves]
     parts = [outlines_of(scenario, obstacle) for obstacle in known]
-    appears = [obstacle.appears_s for obstacle, rows in zip(known, parts, strict=True) for _ in rows]
     phantoms = convex.balls(scenario.uav.phantoms_m, gap=scenario.safe_distance.obstacle_m)
-    return convex.joined(*parts, phantoms), np.array([*appears, *(0.0 for _ in phantoms)])
+    count = [*map(len, parts), len(phantoms)]
+    appears = np.repeat([*(each.appears_s for each in known), 0.0], count)
+    disappears = np.repeat([*(each.disappears_s or np.inf for each in known), np.inf], count)
+    return convex.joined(*parts, phantoms), appears, disappears
+
+
+def make_movers(scenario: Scenario) -> tuple[Mover, ...]:
+    """The obstacles that move."""
+    period, until = scenario.control.period_s, scenario.duration_s
+    return tuple(
+        Mover(
+            name, outlines_of(scenario, each), each.known_to_uav,
+            course(each.moves, period, until) if each.known_motion else None,
+        )
+        for name, each in scenario.barriers.items()
+        if each.moves
+    )  # fmt: skip
 
 
 def make_route(scenario: Scenario) -> Route:

@@ -230,12 +230,13 @@ def _vehicles(world: World, plants: Mapping[str, System], *, disturbed: bool) ->
         builder.Connect(commanded, disturbance.GetInputPort("command"))
         commanded = disturbance.GetOutputPort("velocity")
     velocities = builder.AddNamedSystem("team_velocity", Demultiplexer(sum(sizes), 3))
-    for robot, plant in plants.items():
-        builder.AddNamedSystem(f"{robot}_plant", plant)
+    for body, plant in plants.items():
+        builder.AddNamedSystem(f"{body}_plant", plant)
     bodies = builder.AddNamedSystem("bodies", Multiplexer([3] * len(plants)))
     for i, plant in enumerate(plants.values()):
         builder.Connect(plant.get_output_port(0), bodies.get_input_port(i))
-        builder.Connect(velocities.get_output_port(i), plant.get_input_port(0))
+        if i < len(world.robots):
+            builder.Connect(velocities.get_output_port(i), plant.get_input_port(0))
     builder.Connect(commanded, velocities.get_input_port())
     for i, kind in enumerate(ROBOTS):
         builder.ExportInput(team_command.get_input_port(i), f"{kind}_command")
@@ -328,12 +329,12 @@ def _uav_controller(scenario: Scenario, world: World) -> UavController:
 
 
 def _plant(body: Body, plants: PlantFactory | None, period_s: float) -> System:
-    """The Drake system of a moving body: the user's, or that of its plant.
+    """The Drake system of a moving body: the user's for a robot, or that of its plant.
 
     Raises:
         PluginError: if the user's system does not have the ports of a plant.
     """
-    if plants is None:
+    if plants is None or body.kind not in ROBOTS:
         assert body.plant is not None
         return PLANTS[body.plant.kind](body, period_s)
     robot, plant = body.name, plants(body.name, body.start_m)

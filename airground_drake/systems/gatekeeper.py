@@ -45,7 +45,7 @@ class Gatekeeper(LeafSystem):
         """Declare ports, state and the update every `period`, s; the controllers' period is `control`, s."""
         super().__init__()
         n = len(world.names("ugv"))
-        self._gatekeepers = gatekeepers
+        self._gatekeepers, self._world = gatekeepers, world
         self._bodies = declare_bodies(self, world)
         self._command = self.DeclareVectorInputPort("team_command", 3 * len(world.robots))
         self._gains = self.DeclareVectorInputPort("gains", len(UgvGains.get_fields()))
@@ -107,7 +107,7 @@ class Gatekeeper(LeafSystem):
         positions = self._bodies.Eval(context).reshape(-1, 3)
         if self._gatekeepers.idle(context.get_time(), proposals, positions, before):
             return EventStatus.DidNothing()
-        velocities = self._command.Eval(context).reshape(-1, 3)
+        velocities = self._world.velocities(context.get_time(), self._command.Eval(context).reshape(-1, 3))
         law = self._gatekeepers.law.with_gains(*self._gains.Eval(context).tolist())
         now = Inputs(context.get_time(), proposals, positions, velocities, law)
         state.get_mutable_abstract_state(self._state).set_value(self._gatekeepers.sample(now, before))

@@ -9,6 +9,7 @@ from pydrake.systems.framework import Context, DiscreteValues, EventStatus, Leaf
 from airground_drake.base.arrays import Array
 from airground_drake.decision.excursion import INTERVENING
 from airground_drake.intervention.halts import NOT_WATCHED, room, standing, watched
+from airground_drake.intervention.messages import sightings
 from airground_drake.intervention.planner import Planner, PlannerState, sent_after
 from airground_drake.systems.lifetime import weakly
 from airground_drake.systems.signals import FIELDS, components_of, declare_bodies, no_proposals, no_reports
@@ -32,7 +33,7 @@ class InterventionPlanner(LeafSystem):
     def __init__(self, planner: Planner, world: World, control_period: float) -> None:
         """Declare ports, state and the periodic update; the controllers' period is in s."""
         super().__init__()
-        self._planner = planner
+        self._planner, self._world = planner, world
         n = len(planner.ugvs)
         self._ugvs = components_of(world, "ugv")
         self._robots = world.select(*ROBOTS)
@@ -84,9 +85,10 @@ class InterventionPlanner(LeafSystem):
         intervening = [mode == INTERVENING for mode in self._status.Eval(context)[::FIELDS].tolist()]
         if self._planner.idle(before, intervening):
             return EventStatus.DidNothing()
-        positions = self._bodies.Eval(context).reshape(-1, 3)[self._robots]
+        bodies = self._bodies.Eval(context).reshape(-1, 3)
         answers, reports = self._answers.Eval(context), self._reports.Eval(context)
         stands = standing(self._halts(context), t).tolist()  # of this instant: the state is updated after this
-        memory = self._planner.plan(before, t, positions, intervening, answers, reports, stands)
+        moving = sightings(self._world, t, bodies)
+        memory = self._planner.plan(before, t, bodies[self._robots], intervening, answers, reports, stands, moving)
         state.get_mutable_abstract_state(self._memory).set_value(sent_after(before, memory, t))
         return EventStatus.Succeeded()

@@ -6,11 +6,12 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 from pydrake.systems.framework import BasicVector, Context, LeafSystem, System
-from pydrake.systems.primitives import LinearSystem
+from pydrake.systems.primitives import LinearSystem, TrajectorySource
+from pydrake.trajectories import PiecewisePolynomial
 
 from airground_drake.base.arrays import Array
 from airground_drake.systems.lifetime import weakly
-from airground_drake.world.plant import FirstOrder
+from airground_drake.world.plant import FirstOrder, Scripted
 from airground_drake.world.world import Body
 
 
@@ -22,8 +23,18 @@ def first_order_plant(robot: str, start: Array) -> LinearSystem:
     return plant
 
 
+def scripted_plant(body: Body) -> TrajectorySource:
+    """The position of a body with a script, (3,), m, world frame; it has no input."""
+    assert isinstance(body.plant, Scripted)
+    times, places = body.plant.script.times, body.plant.script.positions
+    if len(times) == 1:
+        times, places = np.append(times, times[0] + 1.0), np.repeat(places, 2, axis=0)
+    return TrajectorySource(PiecewisePolynomial.FirstOrderHold(times, places.T))
+
+
 PLANTS: dict[str, Callable[[Body, float], System]] = {
     FirstOrder.kind: lambda body, period_s: first_order_plant(body.name, body.start_m),
+    Scripted.kind: lambda body, period_s: scripted_plant(body),
 }
 """Makes the Drake system of a body, by the kind of its plant; the number is the control period, s."""
 

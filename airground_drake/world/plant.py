@@ -1,4 +1,7 @@
-"""How a robot moves under a velocity command that is held for a period. `systems.plant` makes its Drake system."""
+"""How a body moves: a robot under a velocity command that is held for a period, an obstacle by its script.
+
+`systems.plant` makes the Drake systems.
+"""
 
 from __future__ import annotations
 
@@ -8,6 +11,7 @@ from typing import ClassVar, Protocol
 import numpy as np
 
 from airground_drake.base.arrays import Array
+from airground_drake.geometry.motion import Motion
 from airground_drake.world.motion import PeriodMotion
 
 
@@ -28,6 +32,32 @@ class Plant(Protocol):
 
     def reach(self, speed_m_s: float, period_s: float) -> float:
         """Largest distance from the straight line of the commanded velocity in a period, m."""
+
+
+@dataclass(frozen=True, eq=False)
+class Scripted:
+    """A motion that is given: nobody commands it.
+
+    Attributes:
+        script: where it is, straight between its vertices, which are at control samples.
+        announced: whether the robots' predictions know that.
+    """
+
+    kind: ClassVar[str] = "scripted"
+    script: Motion
+    announced: bool = False
+
+    def step(self, position: Array, velocity: Array, period_s: Array | float) -> Array:
+        """As fast as it is told by its script."""
+        return position + np.asarray(period_s)[..., None] * velocity
+
+    def motion(self, start: Array, end: Array, period_s: Array | float) -> PeriodMotion:
+        """Exact."""
+        return PeriodMotion(start, end)
+
+    def reach(self, speed_m_s: float, period_s: float) -> float:
+        """0."""
+        return 0.0
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ import numpy.typing as npt
 from airground_drake.base.arrays import Array
 from airground_drake.geometry import convex
 from airground_drake.world.motion import SAME_S
-from airground_drake.world.plant import Plant
+from airground_drake.world.plant import Plant, Scripted
 
 Kind = Literal["ugv", "uav", "obstacle"]
 KINDS: tuple[Kind, ...] = get_args(Kind)
@@ -31,8 +31,9 @@ class Body:
         start_m: position of its origin at the start, (3,), m, world frame.
         shape: outlines of its convex parts about its origin, (k, W), see `geometry.convex`; of a robot, one ball.
         plant: how it moves; None: it never moves.
-        max_speed_m_s: speed limit.
-        appears_s: time from which on it is there, s; only for a body that never moves.
+        max_speed_m_s: speed limit, or the speed that robots expect of an obstacle at most.
+        appears_s: time from which on an obstacle is there, s.
+        disappears_s: time from which on it is not there any more, s.
     """
 
     name: str
@@ -42,6 +43,7 @@ class Body:
     plant: Plant | None = None
     max_speed_m_s: float = 0.0
     appears_s: float = 0.0
+    disappears_s: float = np.inf
 
     @property
     def mobility(self) -> Array:
@@ -146,13 +148,18 @@ class World:
         return tuple(body for body in self.bodies if body.plant is not None)
 
     def at(self, near: Neighbours, t: float) -> Neighbours:
-        """The same neighbours at time t, s: bodies at rest that have not appeared yet are nowhere.
+        """The same neighbours at time t, s: obstacles that are not there are nowhere.
 
-        A controller that asks at its samples has a body from the first sample at or after `appears_s` on.
+        A controller that asks at its samples has an obstacle from the first sample at or after `appears_s` on.
         """
-        if t >= self._complete_s:
+        if self._always:
             return near
-        return near._replace(still=convex.where(self._appears[self.owner] <= t + SAME_S, near.still))
+        still, moving = self.there(t, self.resting)[self.owner], self.there(t, self.moving)[near.carrier]
+        return near._replace(still=convex.where(still, near.still), parts=convex.where(moving, near.parts))
+
+    def there(self, t: float, bodies: Sequence[Body]) -> npt.NDArray[np.bool_]:
+        """Which bodies are there at time t, s."""
+        return np.array([body.appears_s <= t + SAME_S < body.disappears_s for body in bodies], dtype=np.bool_)
 
     @cached_property
     def still(self) -> Array:
@@ -171,14 +178,14 @@ class World:
         return tuple(body for body in self.bodies if body.plant is None)
 
     @cached_property
-    def _appears(self) -> Array:
-        """When each body at rest appears, s."""
-        return np.array([body.appears_s for body in self.resting], dtype=np.float64)
+    def _always(self) -> bool:
+        """Whether all bodies are always there."""
+        return all(body.appears_s == 0.0 and body.disappears_s == np.inf for body in self.bodies)
 
-    @cached_property
-    def _complete_s(self) -> float:
-        """Time from which on all bodies are there, s."""
-        return float(self._appears.max(initial=0.0)) - SAME_S
+    def velocities(self, t: float, commands: Array) -> Array:
+        """Velocities of bodies that move at time t, s, (M, 3), m/s: commands of the robots, (r, 3), and scripts."""
+        scripts = [body.plant.script.at(t)[1] for body in self.moving if isinstance(body.plant, Scripted)]
+        return np.concatenate([commands, scripts]) if scripts else commands
 
     @property
     def robots(self) -> tuple[str, ...]:

@@ -274,8 +274,8 @@ GATEKEEPER = (
         "the prediction has no avoidance",
         "gatekeeper/rollout.py",
         "_command",
-        "mode == ACCEPTED, normal[:count], bound[:count])",
-        "mode == ACCEPTED, normal[:0], bound[:0])",
+        "mode == ACCEPTED, normal[:count], bound[:count], retreat[:count])",
+        "mode == ACCEPTED, normal[:0], bound[:0], retreat[:0])",
     ),
     Mutant(
         "a first stage that refuses is accepted",

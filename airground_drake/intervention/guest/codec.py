@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 
 from airground_drake.geometry.motion import Motion
-from airground_drake.intervention.policy import Observation, Proposal, Teammate
+from airground_drake.intervention.policy import MovingObstacle, Observation, Proposal, Teammate
 
-KINDS: tuple[type, ...] = (Observation, Teammate, Proposal, Motion)
+KINDS: tuple[type, ...] = (Observation, Teammate, Proposal, MovingObstacle, Motion)
 """Classes whose objects a message may contain."""
 LONGEST = 4 * 2**20
 """Largest answer of a policy, bytes: some 90,000 vertices."""
