@@ -13,7 +13,7 @@ from airground_drake.registry import method_of
 from airground_drake.run.trace import Trace
 from airground_drake.verify.claim import TIME_TOLERANCE_S
 from airground_drake.verify.engines.geometry import interpolate
-from airground_drake.verify.runs.control_law import inequalities_of, spare
+from airground_drake.verify.runs.control_law import inequalities_of
 from airground_drake.verify.runs.gate_record import DecisionRecord, rows_of
 from airground_drake.verify.runs.instants import row_at
 from airground_drake.verify.runs.proposals import ProposalRecord, proposals_of
@@ -117,9 +117,9 @@ def avoidance(trace: Trace) -> dict[str, dict[str, int]]:
     """By UGV the numbers of control samples at which it executed a proposal, avoidance bound, and both."""
     found = {}
     for ugv in trace.ugvs:
-        executes = trace.sampled(f"{ugv}.executing") >= 0
-        left = spare(inequalities_of(trace, ugv), trace.chosen(ugv))
-        bound = (left <= BINDING_M_S).any(axis=1)
+        executes, given = trace.sampled(f"{ugv}.executing") >= 0, inequalities_of(trace, ugv)
+        bound = np.zeros(len(executes), dtype=np.bool_)
+        bound[given.sample[given.slack(trace.chosen(ugv)) <= BINDING_M_S]] = True
         counts = {"executing": executes, "binding": bound, "both": executes & bound}
         found[ugv] = {name: int(flags.sum()) for name, flags in counts.items()}
     return found

@@ -245,8 +245,8 @@ def radius_m(trace: Trace, name: str) -> float:
 
 
 def _obstacles(trace: Trace) -> list[str]:
-    """The obstacles that are there before the end."""
-    return [name for name in trace.scenario.obstacles if trace.there_from(name) < len(trace.t)]
+    """The barriers that are there before the end."""
+    return [name for name in trace.scenario.barriers if trace.there_from(name) < len(trace.t)]
 
 
 def _others(trace: Trace, robot: str) -> list[str]:

@@ -23,8 +23,7 @@ MERGE_S = 1e-9
 1e-17 s, and at 10 m/s a robot moves 1e-8 m meanwhile."""
 
 
-@dataclass(frozen=True)
-class Approach:
+class Approach(NamedTuple):
     """A minimum of the distance over continuous time.
 
     Attributes:
@@ -55,8 +54,14 @@ def closest_approach(t: Array, first: Array, second: Array, off_m: float = 0.0) 
         return Approach(float(np.linalg.norm(relative[0])), float(t[0]), 0)
     distance, fraction = PeriodMotion(relative[:-1], relative[1:], off_m).least_distance()
     k = int(np.argmin(distance))
-    instant = min(t[k] + fraction[k] * (t[k + 1] - t[k]), t[k + 1])
-    return Approach(float(distance[k]), float(instant), k + 1)
+    return Approach(float(distance[k]), instant_of(t, k + 1, float(fraction[k])), k + 1)
+
+
+def instant_of(t: Array, row: int, share: float) -> float:
+    """The time after a share of the segment that a row ends, s; of row 0, its time."""
+    if row == 0:
+        return float(t[0])
+    return float(min(t[row - 1] + share * (t[row] - t[row - 1]), t[row]))
 
 
 def interpolate(t: Array, values: Array, at: float | Array) -> Array:

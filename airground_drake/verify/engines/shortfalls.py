@@ -1,31 +1,39 @@
 """By how much recorded positions miss the inequalities of set-based avoidance, in exact rational arithmetic.
 
 The unit of time is the control period: the velocity of a body is the step to its next sample, and the gain is
-a = min(A h, 1). Let D be the distance of two bodies that keep d, and n the unit vector from the second to the first.
-The theorem `disturbed` (proofs/Safety.v) asks of each sample that either
+a = min(A h, 1). The second body is a point, or a core: a wall, a polygon or a prism (`outlines.Cores`). Let D be the
+signed distance of a first body from it that keeps d, and n the unit vector away from the nearest point; inside a polygon,
+of the nearest edge. The theorem `disturbed` (proofs/Safety.v) asks of each sample that either
 
     n.step_1 >= q_1 b - e_1 and -n.step_2 >= q_2 b - e_2,    b = a (d - D) where D <= d, else d - D,    q_1 + q_2 = 1,
 
 or the two are far: D >= d + ||step_1|| + ||step_2||. If e_1 + e_2 <= e at every sample, then D >= d - e / a at all
-times. Positions are doubles, which are rational numbers: only square roots are enclosed.
+times. Positions and corners are doubles, which are rational numbers, and so is the nearest point of a core: only square
+roots are enclosed.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from fractions import Fraction
 from math import inf, isqrt, nextafter
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from airground_drake.base.arrays import Array
+from airground_drake.verify.engines.outlines import Cores, away_from
 
 SCREEN_M = 1e-9
 """Floats decide pairs by more than this, m: for bodies within 1e5 m they err by less than 1e-10 m."""
 BITS = 160
 """Lengths are enclosed to 2^-160 units."""
+TIE_M = Fraction(1, 10**12)
+"""Inside a core any face counts that is the nearest to within this, m: floats may take another one for the nearest. What
+it is farther away counts as missed."""
+POINT = Cores(np.zeros((1, 2)), np.array(0.0), np.array(0.0))
+"""The core of a body whose place is its centre."""
 
 
 def demanded(lacking: Any, inside: Any, outside: Any) -> Any:
@@ -39,38 +47,54 @@ def demanded(lacking: Any, inside: Any, outside: Any) -> Any:
     return np.where(lacking >= 0, inside, outside) * lacking
 
 
-def shortfalls(first: Array, second: Array, d: float, share: Fraction, gain: Fraction, last: Fraction) -> Array:
+def shortfalls(
+    first: Array, second: Array, d: float, share: Fraction, gain: Fraction, last: Fraction,
+    core: Cores = POINT, *, planar: bool = False,
+) -> Array:  # fmt: skip
     """What a pair misses at each sample, e_1 + e_2, rounded up: (K,), m per control period.
 
     Args:
         first: positions of a robot at K samples and at the end of the run, (K + 1, 3), m.
-        second: those of another robot, (K + 1, 3), m, or the place of an obstacle, (3,), m.
-        d: safe distance of the centres, m.
+        second: those of another body, (K + 1, 3), m, or the place of one at rest, (3,), m.
+        d: safe distance of the first body's centre from the core, m.
         share: q_1; the second body takes the rest.
         gain: a.
         last: control periods from the last sample to the end of the run, at most 1.
+        core: of the second body, about its place.
+        planar: whether the first body stays in its plane: then no way leads out of a core through its top.
     """
     other = np.broadcast_to(second, first.shape)
     found = np.zeros(len(first) - 1)
-    for k in _doubtful(first, other, d, float(share), float(gain), float(last)).tolist():
+    pair = _Pair(core, planar, Fraction(d), share, gain)
+    for k in _doubtful(first, other, pair, float(last)).tolist():
         ends = np.concatenate([first[k : k + 2], other[k : k + 2]])
-        found[k] = rounded_up(_shortfall(ends, Fraction(d), share, gain, last if k == len(found) - 1 else Fraction(1)))
+        found[k] = rounded_up(_shortfall(ends, pair, last if k == len(found) - 1 else Fraction(1)))
     return found
 
 
-def shortage(one: Array, other: Array, d: float) -> Fraction:
-    """By how much two places (3,), m, are closer than d, m, from above; 0 if they are not."""
-    (here, there), unit = _in_units(np.stack([one, other]))
-    return max(Fraction(d) - _length(_minus(here, there), unit)[0], Fraction(0))
+def shortage(one: Array, other: Array, d: float, core: Cores = POINT, *, planar: bool = False) -> Fraction:
+    """By how much a place (3,), m, is closer than d, m, to a core about another place, from above; 0 if it is not."""
+    (here, there), shape, unit = _in_units(np.stack([one, other]), core)
+    return max(Fraction(d) - _apart(_ways_off(shape, _minus(here, there), planar, unit)), Fraction(0))
 
 
-def _doubtful(first: Array, other: Array, d: float, share: float, gain: float, last: float) -> npt.NDArray[np.intp]:
+class _Pair(NamedTuple):
+    """A core, whether the first body stays in its plane, d in m, q_1 and a."""
+
+    core: Cores
+    planar: bool
+    d: Fraction
+    share: Fraction
+    gain: Fraction
+
+
+def _doubtful(first: Array, other: Array, pair: _Pair, last: float) -> npt.NDArray[np.intp]:
     """Samples that floats find neither far nor met by more than `SCREEN_M`: their numbers."""
-    apart = (first - other)[:-1]
-    distance = np.linalg.norm(apart, axis=1)
-    normal = apart / np.where(distance > 0.0, distance, np.nan)[:, None]
-    bound = demanded(d - distance, gain, 1.0)
-    met, reach = np.ones(len(apart), dtype=np.bool_), np.zeros(len(apart))
+    distance, normal = away_from(pair.core, (first - other)[:-1], planar=pair.planar)
+    normal[~normal.any(axis=1)] = np.nan
+    d, share = float(pair.d), float(pair.share)
+    bound = demanded(d - distance, float(pair.gain), 1.0)
+    met, reach = np.ones(len(distance), dtype=np.bool_), np.zeros(len(distance))
     for body, sign, part in ((first, 1.0, share), (other, -1.0, 1.0 - share)):
         step = np.diff(body, axis=0)
         step[-1] /= last
@@ -80,43 +104,94 @@ def _doubtful(first: Array, other: Array, d: float, share: float, gain: float, l
     return np.flatnonzero((distance - d - reach <= SCREEN_M) & ~met)
 
 
-def _shortfall(ends: Array, d: Fraction, share: Fraction, gain: Fraction, lasts: Fraction) -> Fraction:
+def _shortfall(ends: Array, pair: _Pair, lasts: Fraction) -> Fraction:
     """e_1 + e_2 of one sample, from above.
 
     Args:
         ends: where the first body is and goes, and where the second is and goes, (4, 3), m.
-        d: safe distance, m.
-        share: of the first body.
-        gain: a.
+        pair: the bodies.
         lasts: control periods from here to there.
     """
-    (here, after, there, beyond), unit = _in_units(ends)
-    apart, steps = _minus(here, there), (_minus(after, here), _minus(beyond, there))
-    low, high = _length(apart, unit)
-    reach = sum((_length(step, unit)[1] for step in steps), Fraction(0)) / lasts
-    if low >= d + reach:
+    (here, after, there, beyond), shape, unit = _in_units(ends, pair.core)
+    steps = (_minus(after, here), _minus(beyond, there))
+    ways = _ways_off(shape, _minus(here, there), pair.planar, unit)
+    apart, reach = _apart(ways), sum((_length(step, unit)[1] for step in steps), Fraction(0)) / lasts
+    if apart >= pair.d + reach:
         return Fraction(0)
-    if low == 0:  # n is unknown: along any n a step is at least minus its length
-        return gain * d + reach
-    bound = demanded(d - low, gain, Fraction(1))  # it decreases with the distance
-    missed = Fraction(0)
-    for step, sign, part in zip(steps, (1, -1), (share, 1 - share), strict=True):
-        along = Fraction(sign * _dot(apart, step), unit * unit) / lasts
-        missed += max(part * bound - min(along / low, along / high), Fraction(0))
-    return missed
+    if not ways:  # n is unknown: along any n a step is at least minus its length
+        return pair.gain * pair.d + reach
+    bound = demanded(pair.d - apart, pair.gain, Fraction(1))  # it decreases with the distance
+    found = list[Fraction]()
+    for way in ways:
+        missed = apart - way.apart
+        for step, sign, part in zip(steps, (1, -1), (pair.share, 1 - pair.share), strict=True):
+            along = Fraction(sign * _dot(way.normal, step), unit) / lasts
+            missed += max(part * bound - min(along / length for length in _length(way.normal, 1)), Fraction(0))
+        found.append(missed)
+    return min(found)
 
 
-def _in_units(places: Array) -> tuple[list[list[int]], int]:
-    """Places (K, 3), m, as whole numbers of 1 / unit m: the denominators of doubles are powers of 2."""
-    ratios = [[x.as_integer_ratio() for x in place] for place in places.tolist()]
-    unit = max(bottom for place in ratios for _, bottom in place)
-    return [[top * (unit // bottom) for top, bottom in place] for place in ratios], unit
+class _Shape(NamedTuple):
+    """A core in units: its corners, each once, and the heights between which it stands."""
+
+    corners: list[list[int]]
+    base: int
+    top: int
+
+
+class _Way(NamedTuple):
+    """A direction in which the distance grows, not of length 1, and a lower bound of the distance, m, along it."""
+
+    normal: Sequence[int]
+    apart: Fraction
+
+
+def _ways_off(shape: _Shape, place: Sequence[int], planar: bool, unit: int) -> list[_Way]:
+    """The direction away from a core, or out of it: there the nearest faces to within `TIE_M`; none at distance 0."""
+    x, y, z = place
+    corners, count = shape.corners, len(shape.corners)
+    edges = [(a, _minus(b, a)) for a, b in zip(corners, corners[1:] + corners[:1], strict=True)]
+    edges = edges if count > 2 else edges[: count - 1]
+    faces = [([ey, -ex, 0], (x - ax) * ey - (y - ay) * ex) for (ax, ay), (ex, ey) in edges]
+    if count > 2 and all(side <= 0 for _, side in faces):
+        faces += [] if planar else [([0, 0, 1], z - shape.top), ([0, 0, -1], shape.base - z)]
+        ways = [_Way(normal, min(Fraction(side, unit) / each for each in _length(normal, 1))) for normal, side in faces]
+        return [way for way in ways if way.apart >= _apart(ways) - TIE_M]
+    rise = z - min(max(z, shape.base), shape.top)
+    vectors = [([x - ax, y - ay, rise], 1) for ax, ay in corners]
+    for ((ax, ay), (ex, ey)), (_, side) in zip(edges, faces, strict=True):
+        squared = ex * ex + ey * ey
+        if 0 < (x - ax) * ex + (y - ay) * ey < squared:
+            vectors.append(([ey * side, -ex * side, rise * squared], squared))
+    vector, scale = min(vectors, key=lambda each: Fraction(_dot(each[0], each[0]), each[1] ** 2))
+    return [_Way(vector, _length(vector, unit * scale)[0])] if any(vector) else []
+
+
+def _apart(ways: Sequence[_Way]) -> Fraction:
+    """A lower bound of the distance, m; without a way it is 0."""
+    return max((way.apart for way in ways), default=Fraction(0))
+
+
+def _in_units(places: Array, core: Cores) -> tuple[list[list[int]], _Shape, int]:
+    """Places (K, 3), m, and a core as whole numbers of 1 / unit m: the denominators of doubles are powers of 2."""
+    corners = list(dict.fromkeys(map(tuple, core.corners.tolist())))
+    numbers = [*places.ravel().tolist(), *(x for corner in corners for x in corner), float(core.base), float(core.top)]
+    ratios = [x.as_integer_ratio() for x in numbers]
+    unit = max(bottom for _, bottom in ratios)
+    whole = iter([top * (unit // bottom) for top, bottom in ratios])
+    found = [_next(whole, 3) for _ in places]
+    return found, _Shape([_next(whole, 2) for _ in corners], *_next(whole, 2)), unit
+
+
+def _next(numbers: Iterator[int], count: int) -> list[int]:
+    return [next(numbers) for _ in range(count)]
 
 
 def _length(vector: Sequence[int], unit: int) -> tuple[Fraction, Fraction]:
-    """Bounds of the length of a vector in units, m; the lower one is exact where the length is a whole number."""
-    found, scale = isqrt(_dot(vector, vector) << (2 * BITS)), unit << BITS
-    return Fraction(found, scale), Fraction(found + 1, scale)
+    """Bounds of the length of a vector in units, m; both are exact where the length is a whole number of units."""
+    squared, scale = _dot(vector, vector) << (2 * BITS), unit << BITS
+    found = isqrt(squared)
+    return Fraction(found, scale), Fraction(found + (found * found < squared), scale)
 
 
 def rounded_up(value: Fraction) -> float:

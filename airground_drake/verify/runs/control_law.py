@@ -1,4 +1,4 @@
-"""The avoidance inequalities (7)-(8), (11), written again in numpy for many samples at once: B of them.
+"""The avoidance inequalities (7)-(8), (11), written again in numpy for all samples of a run at once.
 
 Velocities in m/s, positions in m, world frame. Nothing of the running code is used.
 """
@@ -12,8 +12,9 @@ import numpy as np
 from airground_drake.base.arrays import Array
 from airground_drake.run.trace import Trace
 from airground_drake.scenarios.schema import Control
+from airground_drake.verify.engines.outlines import Indices, within
 from airground_drake.verify.engines.shortfalls import demanded
-from airground_drake.verify.runs.pairs import around, places_of
+from airground_drake.verify.runs.pairs import Pair, declared_pairs, is_planar, parts_of
 
 PLANE = np.array([1.0, 1.0, 0.0])
 """Directions in which a UGV can move."""
@@ -22,57 +23,82 @@ ON_TOP = ("b", "c")
 
 
 class Inequalities(NamedTuple):
-    """normal_k.v >= bound_k for K points: normals (B, K, 3), bounds (B, K), -inf beyond the sensing range."""
+    """Inequalities normal.v >= bound of a robot along its run, C of them, by control sample and column.
 
+    Attributes:
+        sample: number of the control sample, (C,).
+        column: what is avoided, (C,): the number of a part in `pairs.parts_of`, or that of a robot after all parts.
+        normal: (C, 3).
+        bound: (C,), m/s.
+    """
+
+    sample: Indices
+    column: Indices
     normal: Array
     bound: Array
 
+    def slack(self, velocity: Array) -> Array:
+        """Slack of the velocities at the control samples, (S, 3), in each inequality, (C,), m/s."""
+        return np.asarray(np.einsum("cd,cd->c", self.normal, velocity[self.sample]) - self.bound)
 
-def inequalities(
-    position: Array, centre: Array, safe: Array, share: Array, control: Control, *, planar: bool
-) -> Inequalities:
+
+def least_speeds(distance: Array, safe: Array, share: Array, control: Control) -> Array:
     """Set-based avoidance (7)-(8), (11): n.v >= share A (d - D) where D <= d, else n.v >= share (d - D) / h.
 
     Args:
-        position: (B, 3).
-        centre: points to keep away from, (B, K, 3).
-        safe: distances d, (K,) or (B, K).
-        share: of each inequality, (K,) or (B, K).
-        control: A, h and sensing range of the scenario.
-        planar: whether the robot cannot use the z component of n.
+        distance: D, (...), m.
+        safe: d, (...), m.
+        share: of each inequality, (...).
+        control: A, h and sensing range R of the scenario.
+
+    Returns:
+        The bounds, (...), m/s; -inf where D > R: nothing is asked there.
     """
-    offset = position[:, None] - centre
-    distance = np.sqrt(np.square(offset).sum(axis=2))
-    normal = offset / np.where(distance > 0.0, distance, 1.0)[..., None] * (PLANE if planar else 1.0)
     bound = share * demanded(safe - distance, control.avoidance_gain_1_s, 1.0 / control.period_s)
-    return Inequalities(normal, np.where(distance <= control.sensing_range_m, bound, -np.inf))
+    return np.where(distance <= control.sensing_range_m, bound, -np.inf)
 
 
 def inequalities_of(trace: Trace, robot: str, *, as_seen: bool = False) -> Inequalities:
-    """The inequalities of a robot at the control samples of its run, beside the bodies of `around` in their order.
+    """The inequalities of a robot at the control samples of its run, beside all that is within sensing range.
 
     They are those of the true positions, or of the positions that the robot saw.
     """
-    places, beside, samples = places_of(trace), around(trace, robot), trace.sample_rows
+    samples, parts, control = trace.sample_rows, parts_of(trace), trace.scenario.control
+    planar, pairs = is_planar(trace, robot), pairs_beside(trace, robot)
 
     def place(body: str) -> Array:
-        if as_seen and body in trace.robots:
-            return trace.as_seen(robot, body)
-        return np.broadcast_to(places[body], (len(trace.t), 3))[samples]
+        return trace.as_seen(robot, body) if as_seen else trace.position(body)[samples]
 
-    others = [place(other) for other, _ in beside]
-    found = inequalities(
-        place(robot),
-        np.stack(others, axis=1) if others else np.empty((len(samples), 0, 3)),
-        np.array([pair.safe_m for _, pair in beside]),
-        np.array([pair.share for _, pair in beside]),
-        trace.scenario.control,
-        planar=robot in trace.ugvs,
-    )
-    there = samples[:, None] >= np.array([pair.row for _, pair in beside])
-    return found._replace(bound=np.where(there, found.bound, -np.inf))
+    own, others = place(robot), [name for name in trace.robots if name != robot]
+    near = within(parts.cores, own, control.sensing_range_m, planar=planar)
+    row = np.array([pairs[name].row for name in parts.names], dtype=np.intp)[parts.owner]
+    there = samples[near.place] >= row[near.core]
+    offset = own[:, None] - np.stack([place(name) for name in others], axis=1)
+    apart = np.sqrt(np.square(offset).sum(axis=2))
+    sample, other = np.nonzero(apart <= control.sensing_range_m)
+    apart, offset = apart[sample, other], offset[sample, other]
+    beside = [*(pairs[name] for name in parts.names), *(pairs[name] for name in others)]
+    which = np.append(parts.owner[near.core[there]], len(parts.names) + other)
+    safe, share = (np.array([getattr(pair, name) for pair in beside])[which] for name in ("safe_m", "share"))
+    normal = np.concatenate([near.away.normal[there], offset / np.where(apart > 0.0, apart, 1.0)[:, None]])
+    bound = least_speeds(np.append(near.away.distance[there], apart), safe, share, control)
+    when = np.append(near.place[there], sample)
+    number = np.array([trace.robots.index(name) for name in others], dtype=np.intp)
+    column = np.append(near.core[there], len(parts.owner) + number[other])
+    order = np.lexsort([column, when])
+    normal = normal * (PLANE if planar else 1.0)
+    return Inequalities(when[order], column[order], normal[order], bound[order])
 
 
-def spare(given: Inequalities, velocity: Array) -> Array:
-    """Slack of velocities (B, 3) in each inequality, (B, K), m/s; inf beyond the sensing range."""
-    return np.asarray(np.einsum("bkd,bd->bk", given.normal, velocity) - given.bound)
+def pairs_beside(trace: Trace, robot: str) -> dict[str, Pair]:
+    """The pairs of a robot by the name of the other body, also those that do not appear before the end."""
+
+    def by_robot() -> dict[str, dict[str, Pair]]:
+        found = {name: dict[str, Pair]() for name in trace.robots}
+        for pair in declared_pairs(trace):
+            found[pair.first][pair.second] = pair
+            if pair.second in found:
+                found[pair.second][pair.first] = pair
+        return found
+
+    return trace.derived("beside", by_robot)[robot]

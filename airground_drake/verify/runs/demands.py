@@ -15,7 +15,7 @@ from airground_drake.geometry.convex import as_tuple
 from airground_drake.run.trace import Trace
 from airground_drake.scenarios.shapes import outlines_of
 from airground_drake.verify.runs.control_law import ON_TOP
-from airground_drake.verify.runs.pairs import declared_pairs
+from airground_drake.verify.runs.pairs import declared_pairs, parts_of
 
 CONTROLLERS = ("ugv_controller", "uav_controller")
 NO_INTERVENTION = "a"
@@ -27,23 +27,26 @@ PLANAR, SPATIAL = (1.0, 1.0, 0.0), (1.0, 1.0, 1.0)
 def demanded(trace: Trace) -> dict[str, dict[str, Any]]:
     """The parameters of both controllers by the scenario, as `systems.controllers.read_back` names them; flat arrays.
 
-    Every robot avoids all obstacles, then all other robots in team order.
+    Every robot avoids all convex parts of the barriers, then all other robots in team order.
     """
-    scenario, robots = trace.scenario, trace.robots
-    control, obstacles = scenario.control, scenario.obstacles
-    outlines = [x for each in obstacles.values() for row in outlines_of(scenario, each) for x in as_tuple(row)]
-    everybody, m = np.arange(len(robots)), len(obstacles)
-    number = {name: k for k, name in enumerate([*obstacles, *robots])}
+    scenario, robots, parts = trace.scenario, trace.robots, parts_of(trace)
+    control, barriers = scenario.control, scenario.barriers
+    outlines = [x for each in barriers.values() for row in outlines_of(scenario, each) for x in as_tuple(row)]
+    everybody, m = np.arange(len(robots)), len(parts.owner)
+    number = {name: k for k, name in enumerate([*barriers, *robots])}
     safe, share = np.zeros((2, len(robots), len(number)))
     for pair in declared_pairs(trace):
         first, second = number[pair.first], number[pair.second]
         for i, j in ((first, second), (second, first)):
-            if i >= m:  # an obstacle avoids nothing
-                safe[i - m, j], share[i - m, j] = pair.safe_m, pair.share
+            if i >= len(barriers):  # a barrier avoids nothing
+                i -= len(barriers)
+                safe[i, j], share[i, j] = pair.safe_m, pair.share
+    column = np.append(parts.owner, len(barriers) + everybody)
+    safe, share = safe[:, column], share[:, column]
     with_uav = np.array([name == scenario.uav.name for name in robots])
     found = {}
     for name, team in zip(CONTROLLERS, (everybody[~with_uav], everybody[with_uav]), strict=True):
-        beside = np.array([np.delete(np.arange(len(number)), m + i) for i in team])
+        beside = np.array([np.delete(np.arange(m + len(robots)), m + i) for i in team])
         found[name] = {
             "members": team,
             "outlines": np.array(outlines),
@@ -89,12 +92,13 @@ def differences(trace: Trace) -> Iterator[dict[str, Any]]:
 
 def _place(trace: Trace, wanted: dict[str, Any], parameter: str, k: int) -> dict[str, Any]:
     """Which robot, and beside what, the k-th number of a parameter is about."""
-    members, obstacles = wanted["members"], list(trace.scenario.obstacles)
+    members, parts = wanted["members"], parts_of(trace)
     each = len(wanted[parameter]) // len(members)
     if parameter in ("safe_m", "share"):
         robot, column = divmod(k, each)
         others = wanted["others"].reshape(len(members), -1)[robot]
-        beside = obstacles[column] if column < len(obstacles) else trace.robots[others[column - len(obstacles)]]
+        m = len(parts.owner)
+        beside = parts.names[parts.owner[column]] if column < m else trace.robots[others[column - m]]
         return {"robot": trace.robots[members[robot]], "other": beside}
     if parameter in ("mobility", "max_speed_m_s"):
         return {"robot": trace.robots[members[k // each]]}

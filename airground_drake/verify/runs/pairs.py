@@ -1,7 +1,11 @@
 """The pairs of bodies that must keep apart, by the scenario, and where they are during a run.
 
+A barrier is an obstacle or a wall of the arena, of one convex part or many: its distance is the least over its parts.
+Everything about places and distances is here: nobody else computes them.
+
 A distance that users see is the gap of a pair, beside the gap required: between surfaces, below 0 if the bodies
-overlap. `least_gap` and `gap_over_time` are its only sources. The law keeps distances of centres, `Pair.safe_m`.
+overlap. `least_gap` and `gap_over_time` are its only sources. The law keeps distances of a robot's centre from the core
+of a barrier (`engines.outlines`) or from the centre of another robot, `Pair.safe_m`.
 """
 
 from __future__ import annotations
@@ -15,18 +19,35 @@ import numpy as np
 from airground_drake.base.arrays import Array
 from airground_drake.run.trace import Trace
 from airground_drake.scenarios.plants import plant_of
-from airground_drake.verify.engines.geometry import MERGE_S, apart_at_least, boxes_of, closest_approach, interpolate
+from airground_drake.scenarios.shapes import outlines_of
+from airground_drake.verify.engines.geometry import (
+    MERGE_S,
+    apart_at_least,
+    boxes_of,
+    closest_approach,
+    instant_of,
+    interpolate,
+)
+from airground_drake.verify.engines.outlines import (
+    Cores,
+    Indices,
+    apart_by_blocks,
+    away_from,
+    closest,
+    nearest_point,
+    over_time,
+)
 
 
 class Pair(NamedTuple):
-    """A robot, and an obstacle or another robot that it must keep away from.
+    """A robot, and a barrier or another robot that it must keep away from.
 
     Attributes:
         first: the robot.
-        second: the obstacle or other robot.
-        required_m: gap to keep: the scenario's safe distance of the kind of pair.
+        second: the barrier or other robot.
+        required_m: gap to keep: the obstacle's own distance, or else the scenario's of the kind of pair.
         radii_m: sum of both radii.
-        share: part of the avoidance inequality that each robot takes: all beside an obstacle, half beside a robot.
+        share: part of the avoidance inequality that each robot takes: all beside a barrier, half beside a robot.
         reach_m: how far they can approach each other in one control period.
         row: from which on both are there.
     """
@@ -41,7 +62,7 @@ class Pair(NamedTuple):
 
     @property
     def safe_m(self) -> float:
-        """Distance of the centres that the law keeps, m."""
+        """Distance of the robot's centre from the other's core that the law keeps, m."""
         return self.required_m + self.radii_m
 
 
@@ -68,28 +89,69 @@ class Gap(NamedTuple):
 
 
 def pairs_of(trace: Trace) -> tuple[Pair, ...]:
-    """All robot/obstacle and robot/robot pairs of a run, with the safe distances of its scenario.
+    """All robot/barrier and robot/robot pairs of a run, with the safe distances of its scenario.
 
-    Obstacles that do not appear before the end are in none.
+    Barriers that do not appear before the end are in none.
 
-    Those of one robot come in the order in which its controller lists them: obstacles, then robots in array order.
+    Those of one robot come in the order in which its controller lists them: barriers, then robots in array order.
     """
     return trace.derived("pairs", lambda: tuple(pair for pair in declared_pairs(trace) if pair.row < len(trace.t)))
 
 
 def declared_pairs(trace: Trace) -> Iterator[Pair]:
-    """The same with obstacles that do not appear before the end."""
+    """The same with barriers that do not appear before the end."""
     safe, uav, period = trace.scenario.safe_distance, trace.scenario.uav.name, trace.scenario.control.period_s
-    radius = {name: body.radius_m for name, body in trace.scenario.bodies.items()}
+    radius = {name: robot.radius_m for name, robot in trace.scenario.robots.items()}
     limit = {name: robot.max_speed_m_s for name, robot in trace.scenario.robots.items()}
-    there = {name: trace.there_from(name) for name in trace.scenario.obstacles}
+    there = [(name, each, trace.there_from(name)) for name, each in trace.scenario.barriers.items()]
     for robot in trace.robots:
-        for obstacle, row in there.items():
-            radii = radius[robot] + radius[obstacle]
-            yield Pair(robot, obstacle, safe.obstacle_m, radii, 1.0, limit[robot] * period, row)
+        for name, each, row in there:
+            radii, apart = radius[robot] + each.radius_m, each.distance_m or safe.obstacle_m
+            yield Pair(robot, name, apart, radii, 1.0, limit[robot] * period, row)
     for robot, other in combinations(trace.robots, 2):
         apart = safe.air_ground_m if uav in (robot, other) else safe.ugv_m
         yield Pair(robot, other, apart, radius[robot] + radius[other], 0.5, (limit[robot] + limit[other]) * period)
+
+
+class Parts(NamedTuple):
+    """The convex parts of all barriers of a scenario, m of them in the order of the barriers and their parts.
+
+    Attributes:
+        cores: (m, ...), world frame.
+        owner: the barrier of each, by its number in the order of `names`, (m,).
+        first: number of the first part of each barrier.
+        names: of the barriers.
+    """
+
+    cores: Cores
+    owner: Indices
+    first: Indices
+    names: list[str]
+
+
+def parts_of(trace: Trace) -> Parts:
+    """The convex parts of the barriers, whether the UAV knows them or not."""
+
+    def found() -> Parts:
+        each = cores_of(trace)
+        counts = [len(cores.base) for cores in each.values()]
+        first = np.concatenate([[0], np.cumsum(counts)])[: len(counts)].astype(np.intp)
+        return Parts(Cores.joined([*each.values()]), np.repeat(np.arange(len(counts)), counts), first, [*each])
+
+    return trace.derived("parts", found)
+
+
+def cores_of(trace: Trace) -> dict[str, Cores]:
+    """The cores of the convex parts of each barrier, by its name."""
+    scenario = trace.scenario
+    return trace.derived(
+        "cores", lambda: {name: Cores.of(outlines_of(scenario, each)) for name, each in scenario.barriers.items()}
+    )
+
+
+def is_planar(trace: Trace, robot: str) -> bool:
+    """Whether a robot stays in its plane."""
+    return robot in trace.ugvs
 
 
 def pair_of(trace: Trace, one: str, other: str) -> Pair:
@@ -110,26 +172,41 @@ def least_gap(trace: Trace, pair: Pair) -> Gap:
     """The smallest gap of a pair over continuous time, exact if both move on straight lines, else a lower bound."""
 
     def found() -> Gap:
-        places, off_m = places_of(trace), off_m_of(trace, pair.first) + off_m_of(trace, pair.second)
-        both = places[pair.first], places[pair.second]
-        first, second = (place[pair.row :] if place.ndim == 2 else place for place in both)
-        nearest = closest_approach(trace.t[pair.row :], first, second, off_m)
-        gap, margin = nearest.distance_m - pair.radii_m, nearest.distance_m - pair.safe_m
-        return Gap(pair, gap, margin, nearest.t_s, nearest.row + pair.row)
+        t, off_m = trace.t[pair.row :], off_m_of(trace, pair.first) + off_m_of(trace, pair.second)
+        first, cores = trace.position(pair.first)[pair.row :], cores_of(trace).get(pair.second)
+        if cores is None:
+            distance, t_s, row = closest_approach(t, first, trace.position(pair.second), off_m)
+        else:
+            distance, row, share = closest(cores, first, planar=is_planar(trace, pair.first))
+            distance = max(distance - off_m, 0.0) if off_m and cores.are_points else distance - off_m
+            t_s = instant_of(t, row, share)
+        return Gap(pair, distance - pair.radii_m, distance - pair.safe_m, t_s, row + pair.row)
 
     return trace.derived(("least gap", pair.first, pair.second), found)
 
 
 def gap_over_time(trace: Trace, pair: Pair) -> Array:
     """The gap of a pair at the rows of a trace, (T,), m; NaN before an obstacle appears."""
-    places = places_of(trace)
-    apart: Array = np.linalg.norm(places[pair.first] - places[pair.second], axis=1)
+    first, cores = trace.position(pair.first), cores_of(trace).get(pair.second)
+    if cores is None:
+        return np.asarray(np.linalg.norm(first - trace.position(pair.second), axis=1)) - pair.radii_m
+    apart = over_time(cores, first, planar=is_planar(trace, pair.first))
     apart[: pair.row] = np.nan
     return apart - pair.radii_m
 
 
+def distances_when_there(trace: Trace, robot: str) -> dict[str, float]:
+    """Distances, m, of a robot from the cores of all barriers, by name, at the row from which on each is there."""
+    parts, last = parts_of(trace), len(trace.t) - 1
+    if not parts.names:
+        return {}
+    row = np.array([min(trace.there_from(name), last) for name in parts.names])[parts.owner]
+    apart = away_from(parts.cores, trace.position(robot)[row], planar=is_planar(trace, robot)).distance
+    return dict(zip(parts.names, np.minimum.reduceat(apart, parts.first).tolist(), strict=True))
+
+
 def apart_of(trace: Trace) -> Array:
-    """A lower bound of the distance of the centres of each pair over the run, (P,), m, in the order of `pairs_of`.
+    """A lower bound of the distance of each pair, as of `Pair.safe_m`, over the run: (P,), m, as in `pairs_of`.
 
     Obstacles count as there from the start on.
     """
@@ -137,12 +214,18 @@ def apart_of(trace: Trace) -> Array:
 
 
 def _apart_of(trace: Trace) -> Array:
-    places, pairs = places_of(trace), pairs_of(trace)
-    number = {name: k for k, name in enumerate(places)}
-    boxes = boxes_of(np.stack([np.broadcast_to(place, (len(trace.t), 3)) for place in places.values()]))
-    first, second = np.array([[number[pair.first], number[pair.second]] for pair in pairs], dtype=np.intp).T
-    off = np.array([off_m_of(trace, name) for name in places])
-    return apart_at_least(boxes, first, second) - (off[first] + off[second])
+    robots, parts = trace.robots, parts_of(trace)
+    off = {robot: off_m_of(trace, robot) for robot in robots}
+    found = dict[tuple[str, str], float]()
+    for robot in robots:
+        apart = apart_by_blocks(parts.cores, trace.position(robot)).min(axis=1) - off[robot]
+        least = np.minimum.reduceat(apart, parts.first) if len(apart) else apart
+        found |= {(robot, name): bound for name, bound in zip(parts.names, least.tolist(), strict=True)}
+    first, second = np.triu_indices(len(robots), 1)
+    between = apart_at_least(boxes_of(np.stack([trace.position(robot) for robot in robots])), first, second)
+    for bound, i, j in zip(between.tolist(), first.tolist(), second.tolist(), strict=True):
+        found[robots[i], robots[j]] = bound - (off[robots[i]] + off[robots[j]])
+    return np.array([found[pair.first, pair.second] for pair in pairs_of(trace)])
 
 
 def off_m_of(trace: Trace, name: str) -> float:
@@ -168,68 +251,34 @@ def least_of(bounds: Array, most: int, value: Callable[[int], float]) -> list[in
     return sorted(sorted(np.flatnonzero(bounds <= enough).tolist(), key=value)[:most])
 
 
-def near_pairs(trace: Trace) -> tuple[Pair, ...]:
-    """The pairs, in their order, that may come within sensing range: other pairs have no inequality."""
-
-    def chosen() -> tuple[Pair, ...]:
-        near = apart_of(trace) <= trace.scenario.control.sensing_range_m
-        return tuple(pair for pair, is_near in zip(pairs_of(trace), near.tolist(), strict=True) if is_near)
-
-    return trace.derived("near", chosen)
-
-
-def around(trace: Trace, robot: str) -> list[tuple[str, Pair]]:
-    """Bodies that may come within sensing range of a robot, by name, each with their pair."""
-
-    def by_robot() -> dict[str, list[tuple[str, Pair]]]:
-        found = {name: list[tuple[str, Pair]]() for name in trace.robots}
-        for pair in near_pairs(trace):
-            found[pair.first].append((pair.second, pair))
-            if pair.second in found:
-                found[pair.second].append((pair.first, pair))
-        return found
-
-    return trace.derived("around", by_robot)[robot]
-
-
 def preset_of(trace: Trace, ugv: str) -> tuple[Array, float]:
     """Corners of a UGV's preset trajectory, (m, 3), m, and its speed along them, m/s."""
     preset = trace.scenario.ugvs[ugv].preset
     return np.asarray(preset.waypoints_m, dtype=np.float64), preset.speed_m_s
 
 
-def places_of(trace: Trace) -> dict[str, Array]:
-    """Positions by name, m: (T, 3) of a robot, (3,) of an obstacle, whether the UAV knows it or not."""
-
-    def found() -> dict[str, Array]:
-        obstacles = trace.scenario.obstacles
-        at_rest = {name: np.asarray(o.position_m, dtype=np.float64) for name, o in obstacles.items()}
-        return at_rest | {robot: trace.position(robot) for robot in trace.robots}
-
-    return trace.derived("places", found)
-
-
-def centres_of(trace: Trace) -> Array:
-    """Centres of the obstacles, (m, 3), m."""
-    return np.array([o.position_m for o in trace.scenario.obstacles.values()], dtype=np.float64).reshape(-1, 3)
-
-
 def appears_of(trace: Trace) -> Array:
-    """When each obstacle appears, (m,), s; inf: not before the end."""
-    rows = [trace.there_from(name) for name in trace.scenario.obstacles]
-    return np.array([trace.t[row] if row < len(trace.t) else np.inf for row in rows], dtype=np.float64)
+    """When each convex part of the barriers appears, (m,), s; inf: not before the end."""
+    parts, t = parts_of(trace), np.append(trace.t, np.inf)
+    return np.asarray(t[[trace.there_from(name) for name in parts.names]][parts.owner])
 
 
 def snapshot(trace: Trace, names: Iterable[str], t_s: float) -> dict[str, Any]:
-    """Positions of the bodies among `names` at a time, and velocities of the robots among them just after it."""
-    t = trace.t
-    places = places_of(trace)
-    wanted = set(names)
+    """Positions of the robots among `names` at a time, and their velocities just after it.
+
+    Of a barrier it is the point of its core that is nearest to the first of these robots.
+    """
+    t, given = trace.t, list(names)
     row = min(int(np.searchsorted(t, t_s + MERGE_S)), len(t) - 1)
-    fixed = {name: place.tolist() for name, place in places.items() if name in wanted and place.ndim == 1}
-    moving = wanted.intersection(trace.robots)
+    moving = [name for name in given if name in trace.robots]
+    places = {name: interpolate(t, trace.position(name), t_s) for name in sorted(moving)}
+    fixed = {
+        name: nearest_point(cores, places[moving[0]], planar=is_planar(trace, moving[0])).tolist()
+        for name, cores in cores_of(trace).items()
+        if name in given and moving
+    }
     return {
-        "positions_m": fixed | {name: interpolate(t, places[name], t_s).tolist() for name in sorted(moving)},
+        "positions_m": fixed | {name: place.tolist() for name, place in places.items()},
         "velocities_m_s": {name: trace.command(name)[row].tolist() for name in sorted(moving)},
     }
 

@@ -21,17 +21,20 @@ from airground_drake.base.exact import decimal
 from airground_drake.run.trace import Trace
 from airground_drake.verify.claim import TIME_TOLERANCE_S, TraceClaim
 from airground_drake.verify.engines.geometry import interpolate
-from airground_drake.verify.engines.shortfalls import SCREEN_M, rounded_up, shortage, shortfalls
+from airground_drake.verify.engines.outlines import Cores, apart_by_blocks
+from airground_drake.verify.engines.shortfalls import POINT, SCREEN_M, rounded_up, shortage, shortfalls
 from airground_drake.verify.finding import Finding
-from airground_drake.verify.runs.control_law import inequalities_of, spare
+from airground_drake.verify.runs.control_law import inequalities_of
 from airground_drake.verify.runs.demands import differences
 from airground_drake.verify.runs.pairs import (
     DISTANCE_TOLERANCE_M,
     Pair,
     apart_of,
-    around,
+    cores_of,
+    distances_when_there,
+    is_planar,
     pairs_of,
-    places_of,
+    parts_of,
     snapshot,
 )
 
@@ -239,20 +242,39 @@ def _guarantees(trace: Trace) -> Iterator[Guarantee]:
     samples, period = np.append(trace.sample_rows, len(trace.t) - 1), trace.scenario.control.period_s
     lasting = float(trace.t[samples[-1]] - trace.t[samples[-2]])
     last = Fraction(1) if abs(lasting - period) <= TIME_TOLERANCE_S else Fraction(lasting) / Fraction(period)
-    places = {name: p if p.ndim == 1 else p[samples] for name, p in places_of(trace).items()}
-    longest = {name: 0.0 if p.ndim == 1 else _longest(p, float(last)) for name, p in places.items()}
+    places = {name: trace.position(name)[samples] for name in trace.robots}
+    longest = {name: _longest(each, float(last)) for name, each in places.items()}
     pairs, gain = pairs_of(trace), _gain(trace)
-    reach = np.array([pair.safe_m + longest[pair.first] + longest[pair.second] for pair in pairs])
+    reach = np.array([pair.safe_m + longest[pair.first] + longest.get(pair.second, 0.0) for pair in pairs])
     for k in np.flatnonzero(apart_of(trace) <= reach + SCREEN_M).tolist():
         pair = pairs[k]
         begin = int(np.searchsorted(samples, pair.row))
-        first, second = (p if p.ndim == 1 else p[begin:] for p in (places[pair.first], places[pair.second]))
-        missed = shortfalls(first, second, pair.safe_m, Fraction(pair.share), gain, last)
-        missed = np.concatenate([np.zeros(begin), missed])
-        e = Fraction(float(missed.max()))
-        short = shortage(first[0], second if second.ndim == 1 else second[0], pair.safe_m)
-        lost = max(e / gain, short) if gain else len(missed) * e + short
-        yield Guarantee(pair, missed, rounded_up(short), -rounded_up(lost - Fraction(pair.required_m)))
+        first, planar = places[pair.first][begin:], is_planar(trace, pair.first)
+        beside = _beside(trace, pair, first, places, float(reach[k]))
+        asked = Fraction(pair.share), gain, last
+        missed = [shortfalls(first, place, pair.safe_m, *asked, core, planar=planar) for place, core in beside]
+        begun = [shortage(first[0], place.reshape(-1, 3)[0], pair.safe_m, core, planar=planar) for place, core in beside]
+        most = np.max([np.zeros(len(first) - 1), *missed], axis=0)
+        e, short = Fraction(float(most.max())), max(begun, default=Fraction(0))
+        lost = max(e / gain, short) if gain else (len(samples) - 1) * e + short
+        missed_m = np.concatenate([np.zeros(begin), most])
+        yield Guarantee(pair, missed_m, rounded_up(short), -rounded_up(lost - Fraction(pair.required_m)))
+
+
+def _beside(
+    trace: Trace, pair: Pair, first: Array, places: dict[str, Array], reach: float
+) -> list[tuple[Array, Cores]]:
+    """What the first body of a pair keeps away from: places of the second and its core, or each part of a barrier.
+
+    Parts that stay beyond reach of the way `first` are left out. A point is given by its place.
+    """
+    if pair.second in places:
+        return [(places[pair.second], POINT)]
+    cores = cores_of(trace)[pair.second]
+    if cores.are_points:
+        return [(place, POINT) for place in cores.points]
+    near = np.flatnonzero((apart_by_blocks(cores, first) <= reach + SCREEN_M).any(axis=1)).tolist()
+    return [(np.zeros(3), cores.take(k)) for k in near]
 
 
 def _longest(places: Array, last: float) -> float:
@@ -275,19 +297,20 @@ def _binding(trace: Trace) -> tuple[int, dict[str, int]]:
     """How many avoidance inequalities were in range of a robot, and how many bound a command, by who avoided whom."""
     count = {"ugv beside obstacle": 0, "uav beside obstacle": 0}
     count |= {"ugv beside ugv": 0, "ugv beside uav": 0, "uav beside ugv": 0}
-    kind = dict.fromkeys(trace.ugvs, "ugv") | {trace.robots[-1]: "uav"}
+    beside = ["obstacle" for _ in parts_of(trace).owner] + ["ugv" for _ in trace.ugvs] + ["uav"]
     in_range = 0
     for robot in trace.robots:
-        slack = spare(inequalities_of(trace, robot), trace.chosen(robot))
-        in_range += int(np.isfinite(slack).sum())
-        for (other, _), binds in zip(around(trace, robot), (slack <= BINDING_M_S).sum(axis=0).tolist(), strict=True):
-            count[f"{kind[robot]} beside {kind.get(other, 'obstacle')}"] += binds
+        given = inequalities_of(trace, robot)
+        in_range += len(given.bound)
+        kind = "ugv" if robot in trace.ugvs else "uav"
+        for column in given.column[given.slack(trace.chosen(robot)) <= BINDING_M_S].tolist():
+            count[f"{kind} beside {beside[column]}"] += 1
     return in_range, count
 
 
 def _static(trace: Trace) -> Iterator[_Hypothesis]:
     """Hypotheses on the scenario and the start: gain, sensing range, distances at t = 0."""
-    control, places = trace.scenario.control, places_of(trace)
+    control = trace.scenario.control
     limit = {name: robot.max_speed_m_s for name, robot in trace.scenario.robots.items()}
     period, reach = decimal(control.period_s), decimal(control.sensing_range_m)
     stable = np.array([float(1 - decimal(control.avoidance_gain_1_s) * period)])
@@ -303,10 +326,11 @@ def _static(trace: Trace) -> Iterator[_Hypothesis]:
         beside = list(own)
         others = [pair.second for pair in beside]
         rows = [pair.row for pair in beside]
-        there = [places[other] if places[other].ndim == 1 else places[other][0] for other in others]
-        away = places[robot][rows] - np.array(there)
+        away = trace.position(robot)[0] - np.stack([trace.position(name)[0] for name in trace.robots])
+        apart = dict(zip(trace.robots, np.linalg.norm(away, axis=1).tolist(), strict=True))
+        apart |= distances_when_there(trace, robot)
         start, about = trace.t[rows], {"first": robot}
-        excess = np.linalg.norm(away, axis=1) - np.array([pair.safe_m for pair in beside])
+        excess = np.array([apart[pair.second] - pair.safe_m for pair in beside])
         yield _Hypothesis("safe start", "m", start, excess, DISTANCE_TOLERANCE_M, about, others)
         left = [room(pair.safe_m, limit[robot], limit.get(pair.second, 0.0)) for pair in beside]
         yield _Hypothesis("sensing range", "m", start, np.array(left), 0.0, about, others)
