@@ -1,4 +1,4 @@
-"""The convex parts of an obstacle, as outlines in the world frame; see `geometry.convex`."""
+"""The convex parts of an obstacle: their corners in the world frame."""
 
 from __future__ import annotations
 
@@ -6,37 +6,13 @@ import math
 from collections.abc import Sequence
 from itertools import pairwise
 
-import numpy as np
-
-from airground_drake.base.arrays import Array
-from airground_drake.geometry.convex import SPEED, balls, prism, stacked
-from airground_drake.scenarios.schema import Obstacle, Scenario
+from airground_drake.scenarios.schema import Obstacle
 
 DIGITS = 12
 """Corners that are turned or moved are rounded to this many digits after the point, m: they are then the same on every
 machine, and short as decimals."""
 
 Corner = tuple[float, float]
-
-
-def outlines_of(scenario: Scenario, obstacle: Obstacle) -> Array:
-    """The outlines of an obstacle's convex parts, (k, W), with the distance that robots keep, m, and its speed, m/s.
-
-    They are in the world frame; those of an obstacle that moves are about the origin of its frame.
-    """
-    gap, parts = gap_m(scenario, obstacle), convex_parts(obstacle)
-    if parts is None:
-        found = balls(obstacle.position_m or np.zeros(3), obstacle.radius_m, gap)
-    else:
-        found = stacked(prism(part, top=obstacle.height_m, radius=obstacle.radius_m, gap=gap) for part in parts)
-    found[:, SPEED] = obstacle.expected_speed_m_s
-    return found
-
-
-def gap_m(scenario: Scenario, obstacle: Obstacle) -> float:
-    """The distance that robots keep from an obstacle's surface, m."""
-    safe = scenario.safe_distance
-    return obstacle.distance_m or (obstacle.expected_speed_m_s and safe.moving_m) or safe.obstacle_m
 
 
 def convex_parts(obstacle: Obstacle) -> list[list[Corner]] | None:

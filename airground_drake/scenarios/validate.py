@@ -23,9 +23,10 @@ from airground_drake.base.statuses import COUNTS, NOTHING, alternatives
 from airground_drake.decision.bayes import COMPUTED
 from airground_drake.geometry import convex
 from airground_drake.registry import MODEL_CLAIMS, ROUTES, RUN_CLAIMS
+from airground_drake.scenarios.outlines import outlines_of
 from airground_drake.scenarios.rounding import TOLERANCE_M, Rounding
 from airground_drake.scenarios.schema import ARENA, Obstacle, Scenario, Vector
-from airground_drake.scenarios.shapes import crossing, outlines_of
+from airground_drake.scenarios.shapes import crossing
 
 GAINS = ("avoidance_gain_1_s", "motion_gain_1_s", "formation_gain_1_s", "intervention_gain_1_s")
 ARRIVES = "LIVE-GOAL"  # the claim that every UGV ends where it is to end

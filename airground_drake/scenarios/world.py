@@ -8,9 +8,9 @@ import numpy as np
 
 from airground_drake.geometry import convex
 from airground_drake.scenarios.courses import course
+from airground_drake.scenarios.outlines import outlines_of
 from airground_drake.scenarios.plants import plant_of
 from airground_drake.scenarios.schema import Obstacle, Scenario, Uav, Ugv
-from airground_drake.scenarios.shapes import outlines_of
 from airground_drake.world.plant import Scripted
 from airground_drake.world.world import Body, Kind, World
 

@@ -31,8 +31,8 @@ from airground_drake.nsbc.avoidance import Avoidance, Composition
 from airground_drake.nsbc.law import UgvLaw
 from airground_drake.registry import ROUTES, Method
 from airground_drake.scenarios.courses import course
+from airground_drake.scenarios.outlines import outlines_of
 from airground_drake.scenarios.schema import Decision, Scenario
-from airground_drake.scenarios.shapes import outlines_of
 from airground_drake.scenarios.world import make_world
 
 SAME_TIME = 1e-12

@@ -65,7 +65,7 @@ WIRINGS = (
 BODIES = (
     Mutant(
         "obstacles have no radius",
-        "scenarios/shapes.py",
+        "scenarios/outlines.py",
         "outlines_of",
         "return balls(obstacle.position_m, obstacle.radius_m, gap)",
         "return balls(obstacle.position_m, 0.0, gap)",

@@ -11,7 +11,7 @@ from timeline import kinds
 from airground_drake.geometry.convex import EXTENT, MIDDLE, as_tuple
 from airground_drake.run.simulation import simulate
 from airground_drake.scenarios.load import load
-from airground_drake.scenarios.shapes import outlines_of
+from airground_drake.scenarios.outlines import outlines_of
 from airground_drake.systems.components import make_map, positions
 from airground_drake.verify import judge
 

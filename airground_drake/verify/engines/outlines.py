@@ -19,13 +19,15 @@ import numpy as np
 import numpy.typing as npt
 
 from airground_drake.base.arrays import Array
-from airground_drake.geometry.convex import BASE, CORNERS, COUNT, TOP
 from airground_drake.verify.engines.geometry import ROUNDING_M, ROWS, boxes_of
 from airground_drake.world.motion import PeriodMotion
 
 Indices = npt.NDArray[np.intp]
 Flags = npt.NDArray[np.bool_]
 
+GAP, RADIUS, SPEED, BASE, TOP, COUNT, MIDDLE, EXTENT, CORNERS = 0, 1, 2, 3, 4, 5, 6, 8, 9
+"""What the numbers of an *outline* in a trace mean: distance to keep, radius of its rounding, speed, heights of its core,
+number of corners, a circle round them, and the corners; `geometry.convex` describes it."""
 AT_ONCE = 100_000
 """Places, or pairs of boxes, that are compared together, so that they fit into memory."""
 BATCH = 32
@@ -50,12 +52,24 @@ class Cores:
 
     @classmethod
     def of(cls, rows: Array) -> Cores:
-        """The cores of outlines (m, W); `geometry.convex` says what a row means."""
+        """The cores of outlines (m, W)."""
         count = rows[:, COUNT].astype(np.intp)
         k = np.arange(count.max(initial=1))
         column = CORNERS + 2 * np.where(k < count[:, None], k, 0)
         corners = np.stack([np.take_along_axis(rows, column + axis, axis=1) for axis in (0, 1)], axis=-1)
         return cls(corners, rows[:, BASE], rows[:, TOP])
+
+    @classmethod
+    def prisms(cls, parts: Sequence[Sequence[Sequence[float]]], top: float) -> Cores:
+        """Cores from the ground to one height, m; `parts` are their corners [x, y], m."""
+        most = max(map(len, parts))
+        corners = np.array([[*part, *(part[:1] * (most - len(part)))] for part in map(list, parts)], dtype=np.float64)
+        return cls(corners, np.zeros(len(parts)), np.full(len(parts), top))
+
+    @classmethod
+    def at(cls, places: Array) -> Cores:
+        """Points (m, 3), m."""
+        return cls(places[:, None, :2], places[:, 2], places[:, 2])
 
     @classmethod
     def joined(cls, some: Sequence[Cores]) -> Cores:
@@ -91,6 +105,26 @@ class Cores:
     def points(self) -> Array:
         """The first corner of each at its base, (..., 3), m."""
         return np.append(self.corners[..., 0, :], self.base[..., None], axis=-1)
+
+
+def unpacked(numbers: Sequence[float]) -> Array:
+    """Outlines (m, W), padded with zeros, from their numbers one after the other.
+
+    Raises:
+        ValueError: if the numbers are not those of outlines.
+    """
+    rows, begin = list[Sequence[float]](), 0
+    while begin < len(numbers):
+        count = numbers[begin + COUNT] if begin + COUNT < len(numbers) else 0.0
+        end = begin + CORNERS + 2 * int(count) if 1.0 <= count <= len(numbers) else begin
+        if count != int(count) or not begin < end <= len(numbers):
+            raise ValueError(f"the numbers from the {begin + 1}. on are no outline")
+        rows.append(numbers[begin:end])
+        begin = end
+    found = np.zeros((len(rows), max(map(len, rows), default=CORNERS + 2)))
+    for row, outline in zip(found, rows, strict=True):
+        row[: len(outline)] = outline
+    return found
 
 
 class Away(NamedTuple):

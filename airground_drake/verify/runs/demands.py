@@ -6,14 +6,20 @@ is taken from the code that builds them, so that a wrong distance there is a dif
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
 
-from airground_drake.geometry.convex import as_tuple
+from airground_drake.base.arrays import Array
 from airground_drake.run.trace import Trace
-from airground_drake.scenarios.shapes import outlines_of
+from airground_drake.verify.engines.outlines import (
+    CORNERS,
+    COUNT,
+    EXTENT,
+    MIDDLE,
+    unpacked,
+)
 from airground_drake.verify.runs.control_law import ON_TOP
 from airground_drake.verify.runs.pairs import declared_pairs, parts_of
 
@@ -27,11 +33,12 @@ PLANAR, SPATIAL = (1.0, 1.0, 0.0), (1.0, 1.0, 1.0)
 def demanded(trace: Trace) -> dict[str, dict[str, Any]]:
     """The parameters of both controllers by the scenario, as `systems.controllers.read_back` names them; flat arrays.
 
+    Outlines are without the circles round their corners.
+
     Every robot avoids all convex parts of the barriers, then all other robots in team order.
     """
     scenario, robots, parts = trace.scenario, trace.robots, parts_of(trace)
     control, barriers = scenario.control, scenario.barriers
-    outlines = [x for each in barriers.values() for row in outlines_of(scenario, each) for x in as_tuple(row)]
     everybody, m = np.arange(len(robots)), len(parts.owner)
     number = {name: k for k, name in enumerate([*barriers, *robots])}
     safe, share = np.zeros((2, len(robots), len(number)))
@@ -41,6 +48,7 @@ def demanded(trace: Trace) -> dict[str, dict[str, Any]]:
             if i >= len(barriers):  # a barrier avoids nothing
                 i -= len(barriers)
                 safe[i, j], share[i, j] = pair.safe_m, pair.share
+    outlines = np.concatenate([np.empty(0), *_outlines(trace)])
     column = np.append(parts.owner, len(barriers) + everybody)
     safe, share = safe[:, column], share[:, column]
     with_uav = np.array([name == scenario.uav.name for name in robots])
@@ -49,7 +57,7 @@ def demanded(trace: Trace) -> dict[str, dict[str, Any]]:
         beside = np.array([np.delete(np.arange(m + len(robots)), m + i) for i in team])
         found[name] = {
             "members": team,
-            "outlines": np.array(outlines),
+            "outlines": outlines,
             "others": (beside[:, m:] - m).ravel(),
             "safe_m": np.take_along_axis(safe[team], beside, axis=1).ravel(),
             "share": np.take_along_axis(share[team], beside, axis=1).ravel(),
@@ -67,6 +75,31 @@ def demanded(trace: Trace) -> dict[str, dict[str, Any]]:
     return found
 
 
+def _outlines(trace: Trace) -> Iterator[Array]:
+    """The numbers of each outline, but for the circle round its corners."""
+    parts, safe = parts_of(trace), trace.scenario.safe_distance
+    for k, number in enumerate(parts.owner.tolist()):
+        each, core = trace.scenario.barriers[parts.names[number]], parts.cores.take(k)
+        corners = list(dict.fromkeys(map(tuple, core.corners.tolist())))
+        heights = [float(core.base), float(core.top), float(len(corners))]
+        gap = each.distance_m or safe.obstacle_m
+        yield np.array([gap, each.radius_m, 0.0, *heights, *(x for corner in corners for x in corner)])
+
+
+def _without_circles(numbers: Sequence[float]) -> Array:
+    """The numbers of outlines, but for the circles round their corners; NaN in place of a circle that is too small."""
+    try:
+        rows = unpacked(numbers)
+    except ValueError:
+        return np.array(numbers)
+    found = [np.empty(0)]
+    for row in rows:
+        corners = row[CORNERS : CORNERS + 2 * int(row[COUNT])]
+        held = np.hypot(*(corners.reshape(-1, 2) - row[MIDDLE:EXTENT]).T).max() <= row[EXTENT]
+        found.append(np.where(held, np.append(row[:MIDDLE], corners), np.nan))
+    return np.concatenate(found)
+
+
 def differences(trace: Trace) -> Iterator[dict[str, Any]]:
     """Parameters of the controllers that are not what the scenario demands, each with the first place that differs."""
     built = trace.meta["controllers"]
@@ -81,7 +114,7 @@ def differences(trace: Trace) -> Iterator[dict[str, Any]]:
             if parameter in ("safe_m", "share"):
                 value, times = np.array(given, dtype=np.float64).reshape(-1, 2).T
                 given = np.repeat(value, times.astype(np.intp))
-            given = np.asarray(given, dtype=np.float64)
+            given = _without_circles(given or []) if parameter == "outlines" else np.asarray(given, dtype=np.float64)
             if given.shape != due.shape:
                 yield {**about, "built": f"{given.size} numbers", "scenario": f"{due.size} numbers"}
             elif (given != due).any():

@@ -19,7 +19,8 @@ import numpy as np
 from airground_drake.base.arrays import Array
 from airground_drake.run.trace import Trace
 from airground_drake.scenarios.plants import plant_of
-from airground_drake.scenarios.shapes import outlines_of
+from airground_drake.scenarios.schema import Obstacle
+from airground_drake.scenarios.shapes import convex_parts
 from airground_drake.verify.engines.geometry import (
     MERGE_S,
     apart_at_least,
@@ -143,10 +144,15 @@ def parts_of(trace: Trace) -> Parts:
 
 def cores_of(trace: Trace) -> dict[str, Cores]:
     """The cores of the convex parts of each barrier, by its name."""
-    scenario = trace.scenario
-    return trace.derived(
-        "cores", lambda: {name: Cores.of(outlines_of(scenario, each)) for name, each in scenario.barriers.items()}
-    )
+    barriers = trace.scenario.barriers
+    return trace.derived("cores", lambda: {name: _cores(each) for name, each in barriers.items()})
+
+
+def _cores(obstacle: Obstacle) -> Cores:
+    parts = convex_parts(obstacle)
+    if parts is None:
+        return Cores.at(np.array([obstacle.position_m], dtype=np.float64))
+    return Cores.prisms(parts, obstacle.height_m)
 
 
 def is_planar(trace: Trace, robot: str) -> bool:

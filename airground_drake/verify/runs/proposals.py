@@ -10,8 +10,8 @@ import numpy as np
 
 from airground_drake.base.arrays import Array
 from airground_drake.base.errors import TraceError
-from airground_drake.geometry.convex import unpacked
 from airground_drake.run.trace import Trace
+from airground_drake.verify.engines.outlines import unpacked
 
 
 @dataclass(frozen=True, eq=False)

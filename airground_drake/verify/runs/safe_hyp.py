@@ -253,7 +253,9 @@ def _guarantees(trace: Trace) -> Iterator[Guarantee]:
         beside = _beside(trace, pair, first, places, float(reach[k]))
         asked = Fraction(pair.share), gain, last
         missed = [shortfalls(first, place, pair.safe_m, *asked, core, planar=planar) for place, core in beside]
-        begun = [shortage(first[0], place.reshape(-1, 3)[0], pair.safe_m, core, planar=planar) for place, core in beside]
+        begun = [
+            shortage(first[0], place.reshape(-1, 3)[0], pair.safe_m, core, planar=planar) for place, core in beside
+        ]
         most = np.max([np.zeros(len(first) - 1), *missed], axis=0)
         e, short = Fraction(float(most.max())), max(begun, default=Fraction(0))
         lost = max(e / gain, short) if gain else (len(samples) - 1) * e + short
