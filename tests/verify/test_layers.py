@@ -17,7 +17,8 @@ ALLOWED: dict[str, set[str]] = {
     },
     "runs": {
         "base.arrays", "base.errors", "base.exact", "run.collisions", "run.tables", "run.trace", "scenarios.plants",
-        "scenarios.schema", "scenarios.shapes", "verify.engines", "verify.runs", "verify.claim", "verify.finding", "verify.model.theorem",
+        "scenarios.schema", "scenarios.shapes", "verify.engines", "verify.runs", "verify.claim", "verify.finding",
+        "verify.model.theorem",
     },
 }  # fmt: skip
 """By folder of verify/, what its modules may import of this package."""

@@ -1,9 +1,9 @@
 """By how much recorded positions miss the inequalities of set-based avoidance, in exact rational arithmetic.
 
 The unit of time is the control period: the velocity of a body is the step to its next sample, and the gain is
-a = min(A h, 1). The second body is a point or a core: a wall, a polygon or a prism (`outlines.Cores`). Let D be the signed
-distance of the first body from it, d the distance to keep, and n the unit vector away from the nearest point, or inside a
-polygon the normal of the nearest edge. The theorem `disturbed` (proofs/Safety.v) asks of each sample that either
+a = min(A h, 1). The second body is a point or a core: a wall, a polygon or a prism (`outlines.Cores`). Let D be the
+signed distance of the first body from it, d the distance to keep, and n the unit vector away from the nearest point; in
+a polygon, the normal of the nearest edge. The theorem `disturbed` (proofs/Safety.v) asks of each sample that either
 
     n.step_1 >= q_1 b - e_1 and -n.step_2 >= q_2 b - e_2,    b = a (d - D) where D <= d, else d - D,    q_1 + q_2 = 1,
 
@@ -30,8 +30,8 @@ SCREEN_M = 1e-9
 BITS = 160
 """Lengths are enclosed to 2^-160 units."""
 TIE_M = Fraction(1, 10**12)
-"""Inside a core any face counts that is the nearest to within this, m: floats may take another one for the nearest. By how
-much it is farther away counts as missed."""
+"""Inside a core any face counts that is the nearest to within this, m: floats may take another one for the nearest. By
+how much it is farther away counts as missed."""
 POINT = Cores(np.zeros((1, 2)), np.array(0.0), np.array(0.0))
 """The core of a body whose place is its centre."""
 

@@ -5,9 +5,9 @@ SAFE-HYP compares the built controllers with the scenario.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from fractions import Fraction
-from itertools import combinations, product
+from itertools import combinations
 from typing import Any, NamedTuple
 
 from airground_drake.base.exact import decimal
@@ -18,7 +18,7 @@ SHARES = {"obstacle": (Fraction(1), Fraction(0)), "uav_ugv": (Fraction(1, 2),) *
 
 
 class PairKind(NamedTuple):
-    """Pairs of one kind with the same safe distance of centres, m, and closing speed, m/s."""
+    """Pairs of one kind with the same safe distance, m, of a centre from the other's core, and closing speed, m/s."""
 
     kind: str
     safe_m: Fraction
@@ -33,7 +33,7 @@ def constants(scenario: Scenario) -> dict[str, Any]:
         "period_s": control.period_s,
         "sensing_range_m": control.sensing_range_m,
         "pairs": [
-            {"kind": each.kind, "distance_of_centres_m": float(each.safe_m), "closing_m_s": float(each.closing_m_s)}
+            {"kind": each.kind, "distance_m": float(each.safe_m), "closing_m_s": float(each.closing_m_s)}
             for each in _kinds(scenario)
         ],
     }
@@ -42,8 +42,7 @@ def constants(scenario: Scenario) -> dict[str, Any]:
 def kinds_of(inputs: dict[str, Any]) -> list[PairKind]:
     """The pairs among a claim's inputs, as the decimals that their numbers print as."""
     return [
-        PairKind(each["kind"], decimal(each["distance_of_centres_m"]), decimal(each["closing_m_s"]))
-        for each in inputs["pairs"]
+        PairKind(each["kind"], decimal(each["distance_m"]), decimal(each["closing_m_s"])) for each in inputs["pairs"]
     ]
 
 
@@ -53,21 +52,32 @@ def _kinds(scenario: Scenario) -> Iterator[PairKind]:
     Kept are pairs that no other pair exceeds in both distance and speed, and the nearest pair.
     """
     safe = scenario.safe_distance
-    ugvs = [(decimal(ugv.radius_m), decimal(ugv.max_speed_m_s)) for ugv in scenario.ugvs.values()]
-    uav = (decimal(scenario.uav.radius_m), decimal(scenario.uav.max_speed_m_s))
-    obstacles = {(decimal(obstacle.radius_m), Fraction(0)) for obstacle in scenario.obstacles.values()}
-    pairs: dict[str, tuple[float, Iterable[Any]]] = {
-        "obstacle": (safe.obstacle_m, product({*ugvs, uav}, obstacles)),
-        "uav_ugv": (safe.air_ground_m, product([uav], ugvs)),
-        "ugv_ugv": (safe.ugv_m, combinations(ugvs, 2)),
+    ugvs = [_Robot(decimal(ugv.radius_m), decimal(ugv.max_speed_m_s)) for ugv in scenario.ugvs.values()]
+    uav = _Robot(decimal(scenario.uav.radius_m), decimal(scenario.uav.max_speed_m_s))
+    barriers = {(decimal(each.distance_m or safe.obstacle_m), decimal(each.radius_m)) for each in
+                scenario.barriers.values()}  # fmt: skip
+    pairs: dict[str, set[tuple[Fraction, Fraction]]] = {
+        "obstacle": {(d + (own.radius_m + r), own.speed_m_s) for own in {*ugvs, uav} for d, r in barriers},
+        "uav_ugv": {uav.beside(ugv, safe.air_ground_m) for ugv in ugvs},
+        "ugv_ugv": {one.beside(other, safe.ugv_m) for one, other in combinations(ugvs, 2)},
     }
-    for kind, (surface_m, both) in pairs.items():
-        found = sorted({(decimal(surface_m) + r + s, v + w) for (r, v), (s, w) in both}, reverse=True)
+    for kind, both in pairs.items():
         kept: list[tuple[Fraction, Fraction]] = []
-        for each in found:
+        for each in sorted(both, reverse=True):
             if not kept or each[1] > kept[-1][1]:
                 kept.append(each)
-        if found:
-            nearest = min(found, key=lambda each: (each[0], -each[1]))
+        if both:
+            nearest = min(both, key=lambda each: (each[0], -each[1]))
             kept += [nearest] if nearest not in kept else []
         yield from (PairKind(kind, *each) for each in kept)
+
+
+class _Robot(NamedTuple):
+    """Its radius and speed limit."""
+
+    radius_m: Fraction
+    speed_m_s: Fraction
+
+    def beside(self, other: _Robot, apart_m: float) -> tuple[Fraction, Fraction]:
+        """Safe distance of the centres, m, and closing speed, m/s; `apart_m` is the one between surfaces."""
+        return decimal(apart_m) + self.radius_m + other.radius_m, self.speed_m_s + other.speed_m_s

@@ -20,9 +20,9 @@ from airground_drake.verify.model.theorem import Hypothesis, Proof, TheoremClaim
 
 @dataclass(frozen=True, kw_only=True)
 class LeastDistances(Proof):
-    """The least distances of centres, m, by kind of pair; none without a gain."""
+    """The least distances of a centre from the other's core, m, by kind of pair; none without a gain."""
 
-    least_distances_of_centres_m: dict[str, float] | None = None
+    least_distances_m: dict[str, float] | None = None
 
 
 class SafeDist(TheoremClaim):
@@ -49,7 +49,8 @@ class SafeDist(TheoremClaim):
     equations = "(7)-(8), (11) in the inequality form of the package (set-based avoidance)"
     assumptions = (
         "The disturbance may change at any time, but is bounded by w in every direction (for a UGV: in its plane).",
-        "Inside a safe distance v = 0 is not feasible, and the inequalities of several points can contradict each "
+        "An obstacle at rest is a convex set, or several, each a point of its own in what follows. Inside a safe distance "
+        "v = 0 is not feasible, and the inequalities of several points can contradict each "
         "other; the layer then takes the least violation. So: one violated inequality at a time, or a common direction "
         "g as in the statement. A UGV straight under the UAV has no such direction; there its disturbance does not "
         "count either, and the UAV's half suffices (`Gate.overhead`).",
@@ -67,7 +68,7 @@ class SafeDist(TheoremClaim):
     )
 
     theorems = ("Safety.disturbed", "Gate.deficit_closed_form", "Gate.common_direction", "Gate.overhead")
-    margin_of = "distance of centres that is left, d - W/A"
+    margin_of = "distance from centre to core that is left, d - W/A"
 
     def inputs(self, scenario: Scenario) -> dict[str, Any]:
         """The constants of SAFE-INV, and the bound on the disturbance, m/s."""
@@ -97,7 +98,7 @@ class SafeDist(TheoremClaim):
         least = dict[str, float]()
         for pair in kinds_of(inputs):
             least[pair.kind] = min(float(left_m(inputs, pair)), least.get(pair.kind, inf))
-        return LeastDistances(least_distances_of_centres_m=least, **proof)
+        return LeastDistances(least_distances_m=least, **proof)
 
 
 def left_m(inputs: dict[str, Any], pair: PairKind) -> Fraction:

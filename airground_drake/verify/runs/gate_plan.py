@@ -31,6 +31,7 @@ from airground_drake.verify.runs.gate_record import (
     cost_tolerance,
     reasons_of,
 )
+from airground_drake.verify.runs.pairs import are_too_near
 from airground_drake.verify.runs.sum_up_rounding import compare_rounding, integrated_error_s, is_rounded
 
 SPEED_TOLERANCE = 1e-4
@@ -220,7 +221,7 @@ def compare_plan(trace: Trace, row: DecisionRecord) -> Iterator[Deviation]:
     begins = row["initial_m"] - interpolate(trace.t, trace.position(row.robot), row.t_s)
     yield Deviation(row, "initial position, m", begins, POSITION_TOLERANCE_M)
     refusing, accepting = row.constant
-    clear_refusing, clear_accepting = _clear(row, refusing, period), _clear(row, accepting, period)
+    clear_refusing, clear_accepting = (_clear(trace, row, each, period) for each in (refusing, accepting))
     ways = [("refusing throughout", refusing, clear_refusing), ("accepting throughout", accepting, clear_accepting)]
     if row.planned:
         plan = row["plan"]
@@ -256,12 +257,16 @@ def compare_plan(trace: Trace, row: DecisionRecord) -> Iterator[Deviation]:
         yield Deviation(row, f"{name}: faster than the speed limit", np.maximum(0.0, over), SPEED_TOLERANCE)
 
 
-def _clear(row: DecisionRecord, positions: Array, period: float) -> npt.NDArray[np.bool_]:
-    """Stages (N,) in which no control sample (every `period`, s) is within a safe distance by more than rounding."""
+def _clear(trace: Trace, row: DecisionRecord, positions: Array, period: float) -> npt.NDArray[np.bool_]:
+    """Stages (N,) in which no control sample (every `period`, s) is within a safe distance by more than rounding.
+
+    Neither the points of the problem nor the barriers themselves may be so near: of a wall the problem has but points.
+    """
     centres = row["centres_m"]
     before = centres[0] - (centres[min(1, len(centres) - 1)] - centres[0])
     start = (np.linalg.norm(row["initial_m"] - before, axis=1) - row["distances_m"]).min(initial=np.inf)
     inside = np.concatenate([[start], row.clearance(positions)]) < -INSIDE_M
+    inside |= are_too_near(trace, row.robot, np.concatenate([row["initial_m"][None], positions]), row.t_s, INSIDE_M)
     several = row.dt > period + TIME_TOLERANCE_S  # samples within the stage: what they see is not recorded
     return ~(inside[:-1] | (inside[1:] & several))
 

@@ -15,6 +15,7 @@ from itertools import combinations
 from typing import Any, NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from airground_drake.base.arrays import Array
 from airground_drake.run.trace import Trace
@@ -37,6 +38,7 @@ from airground_drake.verify.engines.outlines import (
     closest,
     nearest_point,
     over_time,
+    within,
 )
 
 
@@ -209,6 +211,18 @@ def distances_when_there(trace: Trace, robot: str) -> dict[str, float]:
     row = np.array([min(trace.there_from(name), last) for name in parts.names])[parts.owner]
     apart = away_from(parts.cores, trace.position(robot)[row], planar=is_planar(trace, robot)).distance
     return dict(zip(parts.names, np.minimum.reduceat(apart, parts.first).tolist(), strict=True))
+
+
+def are_too_near(trace: Trace, robot: str, places: Array, t_s: float, by_m: float) -> npt.NDArray[np.bool_]:
+    """At which places (K, 3), m, a robot is too near to a barrier that is there at a time, by more than `by_m`, (K,)."""
+    parts, found = parts_of(trace), np.zeros(len(places), dtype=np.bool_)
+    barriers = [trace.scenario.barriers[name] for name in parts.names]
+    own, apart = trace.scenario.robots[robot].radius_m, trace.scenario.safe_distance.obstacle_m
+    keep = np.array([(each.distance_m or apart) + (own + each.radius_m) for each in barriers])[parts.owner]
+    keep = np.where(appears_of(trace) <= t_s + MERGE_S, keep - by_m, -np.inf)
+    near = within(parts.cores, places, float(keep.max(initial=0.0)), planar=is_planar(trace, robot))
+    found[near.place[near.away.distance < keep[near.core]]] = True
+    return found
 
 
 def apart_of(trace: Trace) -> Array:

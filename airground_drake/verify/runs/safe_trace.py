@@ -31,20 +31,24 @@ class SafeTrace(TraceClaim):
     summary = "No robot came closer to an obstacle or to another robot than the safe distance."
     statement = "During the whole run every robot kept the safe distance from every obstacle and every other robot."
     latex = (
-        r"\min_{t \in [0, T]} \lVert p_i(t) - q_j(t) \rVert - (r_i + r_j) \ge d_{ij} - 10^{-9} \text{ m} \quad "
+        r"\min_{t \in [0, T]} \mathrm{dist}(p_i(t), C_j) - (r_i + r_j) \ge d_{ij} - 10^{-9} \text{ m} \quad "
         r"\text{for every pair } (i, j)",
     )
     method = (
-        "Exact minimum of the distance on every segment between two rows (closest point of a relative straight motion "
-        "to the origin, closed form): nothing is sampled. Before that, each recorded step must equal command times "
+        "Exact minimum of the distance on every segment between two rows, in closed form: nothing is sampled. A straight "
+        "motion is nearest to a convex core at an end, where it passes a corner or an edge at right angles, or where it "
+        "crosses the line of an edge; in a polygon, it is deepest where two edges are equally near. A barrier is as near "
+        "as the nearest of its convex parts. Before that, each recorded step must equal command times "
         "duration to 1e-9 m, otherwise the verdict is `error`."
     )
     equations = "(7)-(8), (11)"
     assumptions = (
         "Between two rows every robot moves on a straight line at constant speed (integrator plant, zero-order hold).",
-        "Robots and obstacles are balls of the scenario's radii r (`radius_m`; by default points). A distance is the "
-        "gap between their surfaces; below 0 they overlap. d_ij is the safe distance of the kind of pair.",
-        "Obstacles stand still for the whole run, as the scenario lists them. One with `appears_s` is judged from the "
+        "Robots are balls of the scenario's radii r (`radius_m`; by default points), and C is the centre of the other "
+        "body. A barrier is all that is within its radius of its core C: a point, walls, a polygon, or a prism up to its "
+        "height. A distance is the gap between surfaces; below 0 they overlap. d_ij is the obstacle's own `distance_m`, "
+        "or the safe distance of the kind of pair.",
+        "For a UGV, walls have no end in height. Obstacles stand still for the whole run, as the scenario lists them. One with `appears_s` is judged from the "
         "first control sample at or after that time on, the instant itself included.",
     )
     does_not_establish = (

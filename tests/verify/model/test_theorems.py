@@ -51,7 +51,7 @@ def test_a_theory_that_coq_has_not_checked_proves_nothing(name: str, monkeypatch
 
 
 def pair(kind: str, safe_m: float, closing_m_s: float) -> list[dict[str, Any]]:
-    return [{"kind": kind, "distance_of_centres_m": safe_m, "closing_m_s": closing_m_s}]
+    return [{"kind": kind, "distance_m": safe_m, "closing_m_s": closing_m_s}]
 
 
 GAINED = (*LAYER, "SAFE-DIST")
@@ -127,7 +127,7 @@ def test_numbers_that_follow() -> None:
     found = {name: claim.judge(INPUTS[name]).evidence for name, claim in CLAIMS.items()}
     assert found["ZENO-PROOF"].most_triggers == 61
     assert found["LIVE-WAIT"].bound_s == 5 * (30.0 + 0.05)
-    assert found["SAFE-DIST"].least_distances_of_centres_m == {"obstacle": 1.75, "uav_ugv": 0.5, "ugv_ugv": 1.5}
+    assert found["SAFE-DIST"].least_distances_m == {"obstacle": 1.75, "uav_ugv": 0.5, "ugv_ugv": 1.5}
     scenario = load("case_a", ["uav.radius_m=0.25", "obstacles.obstacle_1.radius_m=0.1"])
-    safe = {(each["kind"], each["distance_of_centres_m"]) for each in CLAIMS["SAFE-INV"].inputs(scenario)["pairs"]}
+    safe = {(each["kind"], each["distance_m"]) for each in CLAIMS["SAFE-INV"].inputs(scenario)["pairs"]}
     assert {("obstacle", 2.35), ("obstacle", 2.0), ("uav_ugv", 1.25)} <= safe  # both radii: the farthest, the nearest
