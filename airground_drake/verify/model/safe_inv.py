@@ -1,7 +1,8 @@
 """SAFE-INV: a robot that starts at a safe distance and obeys the avoidance inequalities keeps it (proofs/Safety.v).
 
-Symbols: D is the distance of a pair, d its safe distance, n the unit vector away from the nearest point of the other body
-(inside a polygon, the normal of the nearest edge), p a position, v a velocity (relative between robots), A the gain, h the control period, q the share of an inequality, c the closing speed and R the sensing range.
+Symbols: D is the distance of a pair, d its safe distance, n the unit vector away from the nearest point of the other
+body (inside a polygon, the normal of the nearest edge), p a position, v a velocity, both relative between two robots, A
+the gain, h the control period, q the share of an inequality, c the closing speed and R the sensing range.
 """
 
 from __future__ import annotations
@@ -25,9 +26,9 @@ class SafeInv(TheoremClaim):
         "every sample each pair in sensing range meets its avoidance inequalities and velocities are held until the "
         "next. Inside a safe distance the deficit shrinks by the factor 1 - A h per period and never grows. Two robots "
         "take half of an inequality each; a UGV under a UAV has no vertical velocity. Pairs beyond the sensing range "
-        "need no inequality. An obstacle is a convex set, or several: a point, a wall, a polygon or a prism, each with an "
-        "inequality of its own. All this rests on a lemma: on a straight line the distance from a convex set is at least "
-        "its value at the start plus the time times its rate of change at the start."
+        "need no inequality. An obstacle is a convex set, or several: a point, a wall, a polygon or a prism, each with "
+        "an inequality of its own. All this rests on a lemma: on a straight line the distance from a convex set is at "
+        "least its value at the start plus the time times its rate of change at the start."
     )
     latex: tuple[str, ...] = (
         r"\mathrm{dist}(p + s v) \ge D + s \, n^\top v, \quad D = \mathrm{dist}(p), \quad s \ge 0",
@@ -47,8 +48,8 @@ class SafeInv(TheoremClaim):
     assumptions: tuple[str, ...] = (
         "Positions are integrals of the commands, which are held between samples; all robots are sampled at the same "
         "instants.",
-        "Obstacles stand still. Robots obey their speed limits: pairs out of range rely on that. D is the distance of a "
-        "robot's centre from the other's centre or, signed, from an obstacle's convex core. All radii are part of d.",
+        "Obstacles stand still. Robots obey their speed limits: pairs out of range rely on that. D is the distance of "
+        "a robot's centre from the other's centre or, signed, from an obstacle's convex core. All radii are part of d.",
         "A UGV's velocity has no z component.",
     )
     does_not_establish = (

@@ -214,7 +214,7 @@ def distances_when_there(trace: Trace, robot: str) -> dict[str, float]:
 
 
 def are_too_near(trace: Trace, robot: str, places: Array, t_s: float, by_m: float) -> npt.NDArray[np.bool_]:
-    """At which places (K, 3), m, a robot is too near to a barrier that is there at a time, by more than `by_m`, (K,)."""
+    """At which places (K, 3), m, a robot is by more than `by_m` too near to a barrier that is there at a time, (K,)."""
     parts, found = parts_of(trace), np.zeros(len(places), dtype=np.bool_)
     barriers = [trace.scenario.barriers[name] for name in parts.names]
     own, apart = trace.scenario.robots[robot].radius_m, trace.scenario.safe_distance.obstacle_m

@@ -140,10 +140,11 @@ class SafeHyp(TraceClaim):
         "Exact arithmetic on the recorded positions at the control samples and on the corners of obstacles, which are "
         "rational numbers; square roots are enclosed. Pairs and samples are left out if floats find them far apart, or "
         "an inequality met by more than 1e-9 m. D and d are distances of a robot's centre from another centre, or from "
-        "a convex core: a point, a wall, a polygon or a prism; n is the unit vector away from its nearest point, inside "
-        "a polygon the normal of its nearest edge. A barrier of several parts has an inequality for each of them, and "
-        "keeps what all of them keep. The distances promised are listed less the radii. The parameters of the controllers were read back from the diagram and are compared with the scenario. "
-        "Rows less than 1e-9 s apart count as one instant."
+        "a convex core: a point, a wall, a polygon or a prism; n is the unit vector away from its nearest point, "
+        "inside a polygon the normal of its nearest edge. A barrier of several parts has an inequality for each of "
+        "them, and keeps what all of them keep. The distances promised are listed less the radii. The parameters of "
+        "the controllers were read back from the diagram and are compared with the scenario. Rows less than 1e-9 s "
+        "apart count as one instant."
     )
     equations = "(7)-(8), (11) in the inequality form of the package (set-based avoidance)"
     assumptions = (

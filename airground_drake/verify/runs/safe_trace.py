@@ -35,21 +35,22 @@ class SafeTrace(TraceClaim):
         r"\text{for every pair } (i, j)",
     )
     method = (
-        "Exact minimum of the distance on every segment between two rows, in closed form: nothing is sampled. A straight "
-        "motion is nearest to a convex core at an end, where it passes a corner or an edge at right angles, or where it "
-        "crosses the line of an edge; in a polygon, it is deepest where two edges are equally near. A barrier is as near "
-        "as the nearest of its convex parts. Before that, each recorded step must equal command times "
-        "duration to 1e-9 m, otherwise the verdict is `error`."
+        "Exact minimum of the distance on every segment between two rows, in closed form: nothing is sampled. A "
+        "straight motion is nearest to a convex core at an end, where it passes a corner or an edge at right angles, "
+        "or where it crosses the line of an edge; in a polygon, it is deepest where two edges are equally near. A "
+        "barrier is as near as the nearest of its convex parts. Before that, each recorded step must equal command "
+        "times duration to 1e-9 m, otherwise the verdict is `error`."
     )
     equations = "(7)-(8), (11)"
     assumptions = (
         "Between two rows every robot moves on a straight line at constant speed (integrator plant, zero-order hold).",
         "Robots are balls of the scenario's radii r (`radius_m`; by default points), and C is the centre of the other "
-        "body. A barrier is all that is within its radius of its core C: a point, walls, a polygon, or a prism up to its "
-        "height. A distance is the gap between surfaces; below 0 they overlap. d_ij is the obstacle's own `distance_m`, "
-        "or the safe distance of the kind of pair.",
-        "For a UGV, walls have no end in height. Obstacles stand still for the whole run, as the scenario lists them. One with `appears_s` is judged from the "
-        "first control sample at or after that time on, the instant itself included.",
+        "body. A barrier is all that is within its radius of its core C: a point, walls, a polygon, or a prism up to "
+        "its height. A distance is the gap between surfaces; below 0 they overlap. d_ij is the obstacle's own "
+        "`distance_m`, or the safe distance of the kind of pair.",
+        "For a UGV, walls have no end in height. Obstacles stand still for the whole run, as the scenario lists them. "
+        "One with `appears_s` is judged from the first control sample at or after that time on, the instant itself "
+        "included.",
     )
     does_not_establish = (
         "Safety of any other run, start or seed, or of a plant that does not follow its velocity exactly (SAFE-DIST); "
