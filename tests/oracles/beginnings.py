@@ -10,7 +10,9 @@ import numpy as np
 from airground_drake.base.arrays import Array
 from airground_drake.run.trace import Trace
 from airground_drake.verify.engines.geometry import corner_times, interpolate, travelled
-from airground_drake.verify.runs.pairs import Pair, centres_of, pairs_of, preset_of
+from airground_drake.verify.engines.outlines import GAP, RADIUS, Cores
+from airground_drake.verify.runs.control_law import pairs_beside
+from airground_drake.verify.runs.pairs import Pair, pairs_of, parts_of, preset_of
 from airground_drake.verify.runs.proposals import ProposalRecord, proposal_of
 from oracles.closed_loops import Scene
 from oracles.control_law import place, selected
@@ -21,23 +23,20 @@ class Beginning(NamedTuple):
     """What the roll-outs of a decision by outcomes begin with; S is the number of periods.
 
     Attributes:
-        refused, accepted: the closed loops if the proposal is refused and if it is accepted. Obstacles come first
-            among their points.
+        refused, accepted: the closed loops if the proposal is refused and if it is accepted.
         settled: periods after which the prediction ends once nothing moves.
-        discs: number of obstacles.
         goal: (3,), m.
     """
 
     refused: Scene
     accepted: Scene
     settled: int
-    discs: int
     goal: Array
 
     @property
-    def known(self) -> tuple[Array, Array]:
-        """Centres of the obstacles, (discs, 3), and the distances that are kept from them, (discs,), m."""
-        return self.refused.points[0, : self.discs], self.refused.safe[: self.discs]
+    def known(self) -> tuple[Cores, Array]:
+        """The cores of what is at rest, (M,), and the distances that are kept from them, (M,), m."""
+        return self.refused.still, self.refused.safe[: len(self.refused.still.base)]
 
 
 def beginning(trace: Trace, t: float, number: int) -> Beginning:
@@ -57,26 +56,26 @@ def beginning(trace: Trace, t: float, number: int) -> Beginning:
     until = min(float(on.times_s[-1]), t + gate.longest_s)
     ends = min(max(until, arrives), t + gate.longest_s) + gate.settling_s
     after = h * np.arange(np.ceil((ends - t) / h) + 1.0)
-    discs, distances = known_discs(trace, row, on)
+    still, distances = known_cores(trace, row, on)
     pairs = [pair for pair in _among_robots(trace) if robot in (pair.first, pair.second)]
     others = [_other(trace, robot, t, after, pair, asked) for pair in pairs]
     settled = max(until, arrives, t + gate.horizon_s, *(end for _, _, _, end in others))
-    fixed = np.broadcast_to(discs, (len(after), *discs.shape))
     safe = np.array([*distances, *(each[1] for each in others)])
-    share = np.array([1.0] * len(discs) + [each[2] for each in others])
+    share = np.array([1.0] * len(distances) + [each[2] for each in others])
 
     def loop(choice: int, periods: int) -> Scene:
-        points = np.concatenate([fixed, *(each[0][choice][:, None] for each in others)], axis=1)
-        return scene(trace, on, t, after, periods, points, safe, share)
+        points = np.stack([each[0][choice] for each in others], axis=1) if others else np.empty((len(after), 0, 3))
+        return scene(trace, on, t, after, periods, still, points, safe, share)
 
     executed = max(0, int(np.ceil((until - t) / h - 1e-9)))
     settles = round(np.ceil((settled - t) / h - 1e-9))
-    return Beginning(loop(0, 0), loop(1, executed), settles, len(discs), corners[-1])
+    return Beginning(loop(0, 0), loop(1, executed), settles, corners[-1])
 
 
 def scene(
-    trace: Trace, on: ProposalRecord, t: float, after: Array, periods: int, points: Array, safe: Array, share: Array
-) -> Scene:
+    trace: Trace, on: ProposalRecord, t: float, after: Array, periods: int, still: Cores, points: Array, safe: Array,
+    share: Array,
+) -> Scene:  # fmt: skip
     """The closed loop of the UGV that a proposal is for.
 
     Args:
@@ -85,9 +84,10 @@ def scene(
         t: when it begins, s.
         after: the control samples, since then, (S + 1,), s.
         periods: for which the proposal is executed.
-        points: to keep away from, at the samples, (S + 1, K, 3), m.
-        safe: distances to keep, (K,), m.
-        share: of the inequalities, (K,).
+        still: cores to keep away from, (M,).
+        points: the same that move, at the samples, (S + 1, K, 3), m.
+        safe: distances to keep, (M + K,), m.
+        share: of the inequalities, (M + K,).
     """
     return Scene(
         here=interpolate(trace.t, trace.position(on.ugv), t),
@@ -96,6 +96,7 @@ def scene(
         executed=np.arange(len(after) - 1) < periods,
         chosen=selected(on),
         limit=np.array(trace.scenario.ugvs[on.ugv].max_speed_m_s),
+        still=still,
         points=points,
         safe=safe,
         share=share,
@@ -107,17 +108,18 @@ def _among_robots(trace: Trace) -> list[Pair]:
     return trace.derived("robots", lambda: [pair for pair in pairs_of(trace) if pair.second in robots])
 
 
-def known_discs(trace: Trace, row: dict[Any, Any], on: ProposalRecord) -> tuple[Array, Array]:
-    """Obstacles that a UGV had sensed when it decided, and those of the message that it believed, as recorded.
+def known_cores(trace: Trace, row: dict[Any, Any], on: ProposalRecord) -> tuple[Cores, Array]:
+    """Parts that a UGV had sensed when it decided, and those of the message that it believed, as recorded.
 
     Returns:
-        Centres, (k, 3), and the distances that the UGV keeps from them, (k,), m.
+        Their cores, (k,), and the distances that the UGV keeps from them, (k,), m.
     """
     known, told = (np.array(row[name], dtype=np.intp) for name in ("known", "told"))
-    radii = np.array([each.radius_m for each in trace.scenario.obstacles.values()])
-    apart = trace.scenario.safe_distance.obstacle_m + trace.scenario.ugvs[on.ugv].radius_m
-    radius = np.concatenate([radii[known], on.mapped_radius_m[told]])
-    return np.concatenate([centres_of(trace)[known], on.mapped_m[told]]), apart + radius
+    parts, pairs = parts_of(trace), pairs_beside(trace, on.ugv)
+    own = [pairs[parts.names[k]].safe_m for k in parts.owner[known]]
+    claimed = on.mapped[told]
+    theirs = claimed[:, GAP] + (trace.scenario.ugvs[on.ugv].radius_m + claimed[:, RADIUS])
+    return Cores.joined([parts.cores.take(known), Cores.of(claimed)]), np.append(own, theirs)
 
 
 def _other(

@@ -10,8 +10,9 @@ import numpy.typing as npt
 
 from airground_drake.base.arrays import Array
 from airground_drake.run.trace import Trace
-from airground_drake.verify.runs.control_law import inequalities
-from oracles.control_law import Asked, commanded, tracking
+from airground_drake.verify.engines.outlines import Cores, away_from
+from airground_drake.verify.runs.control_law import PLANE, least_speeds
+from oracles.control_law import Asked, Inequalities, commanded, tracking
 
 AT_ONCE = 5_000_000
 """Largest number of coordinates of points that are rolled out side by side, so that they fit into memory."""
@@ -27,7 +28,7 @@ T = TypeVar("T")
 
 
 class Scene(NamedTuple):
-    """The inputs of a closed loop of S control periods, among K points to keep away from.
+    """The inputs of a closed loop of S control periods, among M cores at rest and K points that move.
 
     The arrays of R stacked scenes have a first axis R.
 
@@ -38,9 +39,10 @@ class Scene(NamedTuple):
         executed: in which periods the proposal is executed, (S,).
         chosen: J_int^+ J_int, (3, 3).
         limit: speed limit, (), m/s.
+        still: cores at rest, (M,).
         points: at the control samples, (S + 1, K, 3), m.
-        safe: distances to keep, (K,), m.
-        share: of the inequalities, (K,).
+        safe: distances to keep from both, (M + K,), m.
+        share: of the inequalities, (M + K,).
     """
 
     here: Array
@@ -49,30 +51,44 @@ class Scene(NamedTuple):
     executed: npt.NDArray[np.bool_]
     chosen: Array
     limit: Array
+    still: Cores
     points: Array
     safe: Array
     share: Array
 
 
 def stacked(scenes: Sequence[Scene]) -> Scene:
-    """Scenes as one, padded to the longest and to the largest number of points.
+    """Scenes as one, padded to the longest and to the largest numbers of cores and points.
 
-    A padded motion stays at its end; padded points are far away.
+    A padded motion stays at its end; padded cores and points are far away.
     """
-    steps, most = max(len(one.executed) for one in scenes), max(len(one.safe) for one in scenes)
+    steps = max(len(one.executed) for one in scenes)
+    cores, points = max(len(one.still.base) for one in scenes), max(one.points.shape[1] for one in scenes)
+    far = Cores.at(np.full((cores, 3), FAR_M))
+    corners = max(one.still.corners.shape[1] for one in scenes)
+    wide = Cores(np.zeros((0, corners, 2)), np.empty(0), np.empty(0))
 
     def padded(one: Scene) -> Scene:
-        later, more = (0, steps - len(one.executed)), (0, most - len(one.safe))
+        m, k = len(one.still.base), one.points.shape[1]
+        later, more = (0, steps - len(one.executed)), (0, points - k)
+        safe, share = (
+            np.concatenate([part[:m], np.zeros(cores - m), part[m:], np.zeros(points - k)])
+            for part in (one.safe, one.share)
+        )
         return one._replace(
             preset=np.pad(one.preset, (later, (0, 0)), mode="edge"),
             wanted=np.pad(one.wanted, (later, (0, 0)), mode="edge"),
             executed=np.pad(one.executed, later),
+            still=Cores.joined([one.still, far.take(slice(cores - m)), wide]),
             points=np.pad(one.points, (later, more, (0, 0)), constant_values=FAR_M),
-            safe=np.pad(one.safe, more),
-            share=np.pad(one.share, more),
+            safe=safe,
+            share=share,
         )
 
-    return Scene(*(np.stack(part) for part in zip(*map(padded, scenes), strict=True)))
+    every = [padded(one) for one in scenes]
+    still = Cores(*(np.stack([getattr(one.still, part) for one in every]) for part in ("corners", "base", "top")))
+    parts = {name: np.stack([getattr(one, name) for one in every]) for name in Scene._fields if name != "still"}
+    return Scene(still=still, **parts)
 
 
 def roll_out(trace: Trace, scenes: Scene, nudge: Array | float = 0.0) -> Iterator[Array]:
@@ -83,7 +99,14 @@ def roll_out(trace: Trace, scenes: Scene, nudge: Array | float = 0.0) -> Iterato
     control, h, place = trace.scenario.control, trace.scenario.control.period_s, scenes.here
     rates, wishes = (np.diff(part, axis=1) / h for part in (scenes.preset, scenes.wanted))
     for k in range(scenes.executed.shape[1]):
-        given = inequalities(place, scenes.points[:, k], scenes.safe, scenes.share, control, planar=True)
+        offset = place[:, None] - scenes.points[:, k]
+        apart, (distance, normal) = (
+            np.sqrt(np.square(offset).sum(axis=2)),
+            away_from(scenes.still, place[:, None], planar=True),
+        )
+        normal = np.append(normal, offset / np.where(apart > 0.0, apart, 1.0)[..., None], axis=1)
+        bound = least_speeds(np.append(distance, apart, axis=1), scenes.safe, scenes.share, control)
+        given = Inequalities(normal * PLANE, bound)
         own = tracking(place, scenes.preset[:, k], rates[:, k], control.motion_gain_1_s, scenes.limit)
         rows = np.flatnonzero(scenes.executed[:, k])
         asked = Asked(scenes.wanted[rows, k], wishes[rows, k], scenes.chosen[rows])
@@ -108,7 +131,10 @@ def in_batches(items: Iterable[T], scenes_of: Callable[[T], Sequence[Scene]]) ->
     for item in items:
         scenes = scenes_of(item)
         batch.append(item)
-        count, largest = count + len(scenes), max(largest, *(one.points.size for one in scenes))
+        count, largest = (
+            count + len(scenes),
+            max(largest, *(one.points.size + 100 * len(one.still.base) for one in scenes)),
+        )
         if count * largest > AT_ONCE:
             yield batch
             batch, count, largest = [], 0, 0

@@ -12,9 +12,8 @@ from airground_drake.base.arrays import Array
 from airground_drake.run.trace import Trace
 from airground_drake.verify.claim import TIME_TOLERANCE_S
 from airground_drake.verify.engines.geometry import corner_times, travelled
-from airground_drake.verify.runs.control_law import inequalities_of
 from airground_drake.verify.runs.pairs import preset_of
-from oracles.control_law import Asked, avoiding, commanded, limited, place, rates, selected, tracking
+from oracles.control_law import Asked, as_seen, avoiding, commanded, limited, place, rates, selected, tracking
 from oracles.fault import Fault
 from oracles.protocol import executed_at
 
@@ -52,7 +51,7 @@ def _law_of_ugv(trace: Trace, ugv: str, samples: Rows) -> Law:
     """(6) with avoidance and the proposal that the UGV should execute, if any, by the priorities of the method."""
     scenario, t = trace.scenario, trace.t[samples]
     position, recorded = trace.as_seen(ugv, ugv), trace.chosen(ugv)
-    given = inequalities_of(trace, ugv, as_seen=True)
+    given = as_seen(trace, ugv)
     limit = np.full(len(samples), scenario.ugvs[ugv].max_speed_m_s)
     executed = executed_at(trace, ugv)
     rows = np.flatnonzero([sent is not None for sent in executed])
@@ -94,5 +93,5 @@ def _law_of_uav(trace: Trace, samples: Rows) -> Law:
     fed[trace.t[samples] <= TIME_TOLERANCE_S] = 0.0  # nothing was commanded before the first sample
     over = centroid + np.array([0.0, 0.0, uav.altitude_m])
     below = limited(fed + control.formation_gain_1_s * (over - position), uav.max_speed_m_s)
-    command = avoiding(below, inequalities_of(trace, uav.name, as_seen=True), "augmented", planar=False)
+    command = avoiding(below, as_seen(trace, uav.name), "augmented", planar=False)
     return Law(command, np.linalg.norm(recorded - command, axis=1))

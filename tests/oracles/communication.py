@@ -6,20 +6,22 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from airground_drake.base.arrays import Array
 from airground_drake.run.trace import Trace
-from airground_drake.scenarios.schema import Obstacle
 from airground_drake.verify.claim import TIME_TOLERANCE_S
-from airground_drake.verify.engines.geometry import interpolate
+from airground_drake.verify.engines.outlines import CORNERS, COUNT, MIDDLE
+from airground_drake.verify.runs.demands import outlines_of
 from airground_drake.verify.runs.instants import intervening
-from airground_drake.verify.runs.pairs import appears_of
+from airground_drake.verify.runs.pairs import appears_of, parts_of
 from airground_drake.verify.runs.proposals import proposals_of
 from oracles.fault import Fault
 from oracles.protocol import answers_to, withdrawn_s
+from oracles.sensing import beyond_range
 
 SENSED_M = 1e-9
 """Within this of the sensing range an obstacle may have been sensed or not, m."""
-Disc = tuple[float, ...]
-"""Centre and radius, m."""
+Part = tuple[float, ...]
+"""The numbers of an outline, but for the circle round its corners."""
 
 
 def wrong_messages(trace: Trace) -> list[Fault]:
@@ -48,33 +50,34 @@ def _wrong_maps(trace: Trace) -> Iterator[Fault]:
     The UAV knows an obstacle that came with an answer from the next planning instant on, if the proposal is in force
     until then.
     """
-    scenario = trace.scenario
-    appears = dict(zip(scenario.obstacles, appears_of(trace).tolist(), strict=True))
-    phantoms = [(*map(float, place), 0.0) for place in scenario.uav.phantoms_m]
-    surely, perhaps = _told(trace)
+    scenario, parts, every = (
+        trace.scenario,
+        parts_of(trace),
+        list(map(tuple, map(np.ndarray.tolist, outlines_of(trace)))),
+    )
+    told_before = np.array([scenario.barriers[parts.names[k]].known_to_uav for k in parts.owner], dtype=np.bool_)
+    appears, gap = appears_of(trace), scenario.safe_distance.obstacle_m
+    phantoms = [(gap, 0.0, 0.0, z, z, 1.0, x, y) for x, y, z in scenario.uav.phantoms_m]
+    surely, perhaps = _told(trace, every)
     for sent in proposals_of(trace):
-        listed = [tuple(row) for row in np.column_stack([sent.mapped_m, sent.mapped_radius_m]).tolist()]
-        t = sent.issued_s
-        there = [each for name, each in scenario.obstacles.items() if appears[name] <= t + TIME_TOLERANCE_S]
-        known = [*(_disc(each) for each in there if each.known_to_uav), *phantoms]
+        listed, t = list(map(_without_circle, sent.mapped)), sent.issued_s
+        there = told_before & (appears <= t + TIME_TOLERANCE_S)
+        known = [*(every[k] for k in np.flatnonzero(there)), *phantoms]
         learnt = listed[len(known) :]
-        least = {disc for disc, noticed in surely.items() if noticed <= t + TIME_TOLERANCE_S}
-        most = {disc for disc, answered in perhaps.items() if answered < t - TIME_TOLERANCE_S}
+        least = {part for part, noticed in surely.items() if noticed <= t + TIME_TOLERANCE_S}
+        most = {part for part, answered in perhaps.items() if answered < t - TIME_TOLERANCE_S}
         right = listed[: len(known)] == known and len({*learnt}) == len(learnt)
         right &= least - {*known} <= {*learnt} <= most - {*known}
         if not right and ":" not in sent.policy:
             yield Fault("map of a proposal", sent.ugv, t, {"learnt": learnt, "told": sorted(most)})
 
 
-def _told(trace: Trace) -> tuple[dict[Disc, float], dict[Disc, float]]:
-    """When the UAV surely knew each obstacle that came with an answer, and when it may have known it, s.
+def _told(trace: Trace, every: list[Part]) -> tuple[dict[Part, float], dict[Part, float]]:
+    """When the UAV surely knew each part of a barrier that came with an answer, and when it may have known it, s.
 
     At a planning instant the UAV reads the last answer before, if the proposal has been in force until then.
     """
-    reach, period = trace.scenario.control.sensing_range_m, trace.scenario.intervention.period_s
-    discs = [_disc(each) for each in trace.scenario.obstacles.values()]
-    centres = np.array(discs).reshape(-1, 4)[:, :3]
-    surely, perhaps = dict[Disc, float](), dict[Disc, float]()
+    period, surely, perhaps = trace.scenario.intervention.period_s, dict[Part, float](), dict[Part, float]()
     for sent in proposals_of(trace):
         end = min(withdrawn_s(trace, sent), float(trace.t[-1])) + TIME_TOLERANCE_S
         read = dict[float, float]()  # by time of the last answer before a planning instant
@@ -83,17 +86,15 @@ def _told(trace: Trace) -> tuple[dict[Disc, float], dict[Disc, float]]:
             if before:
                 read.setdefault(before[-1], k * period)
         for answer in answers_to(trace, sent):
-            here = interpolate(trace.t, trace.position(sent.ugv), answer.t_s)
-            away = np.linalg.norm(centres - here, axis=1) - reach
-            away = np.where(appears_of(trace) <= answer.t_s + TIME_TOLERANCE_S, away, np.inf)
-            for disc, far in zip(discs, away.tolist(), strict=True):
-                if far <= SENSED_M:
-                    perhaps[disc] = min(answer.t_s, perhaps.get(disc, np.inf))
-                if far <= -SENSED_M:
-                    surely[disc] = min(read.get(answer.t_s, np.inf), surely.get(disc, np.inf))
+            there = appears_of(trace) <= answer.t_s + TIME_TOLERANCE_S
+            away = np.where(there, beyond_range(trace, sent.ugv, answer.t_s), np.inf)
+            for k in np.flatnonzero(away <= SENSED_M).tolist():
+                part = every[k]
+                perhaps[part] = min(answer.t_s, perhaps.get(part, np.inf))
+                if away[k] <= -SENSED_M:
+                    surely[part] = min(read.get(answer.t_s, np.inf), surely.get(part, np.inf))
     return surely, perhaps
 
 
-def _disc(obstacle: Obstacle) -> Disc:
-    x, y, z = obstacle.position_m
-    return x, y, z, obstacle.radius_m
+def _without_circle(row: Array) -> Part:
+    return tuple(np.append(row[:MIDDLE], row[CORNERS : CORNERS + 2 * int(row[COUNT])]).tolist())

@@ -14,13 +14,34 @@ from airground_drake.base.arrays import Array
 from airground_drake.run.trace import Trace
 from airground_drake.verify.claim import TIME_TOLERANCE_S
 from airground_drake.verify.engines.geometry import interpolate
-from airground_drake.verify.runs.control_law import ON_TOP, PLANE, Inequalities, spare
+from airground_drake.verify.runs.control_law import ON_TOP, PLANE, inequalities_of
 from airground_drake.verify.runs.proposals import ProposalRecord
 from oracles.projection import closest, least_violation, shortened
 
 MARGIN_M_S = 1e-12
 """The law's closest velocity keeps its inequalities by this much, m/s. Without it the corner of two nearly parallel
 inequalities (a robot squeezed between an obstacle and another robot) is elsewhere by far more."""
+
+
+class Inequalities(NamedTuple):
+    """normal_k.v >= bound_k for K points or cores: normals (B, K, 3), bounds (B, K), -inf where nothing is asked."""
+
+    normal: Array
+    bound: Array
+
+    def slack(self, velocity: Array) -> Array:
+        """Slack of velocities (B, 3) in each inequality, (B, K), m/s; inf where nothing is asked."""
+        return np.asarray(np.einsum("bkd,bd->bk", self.normal, velocity) - self.bound)
+
+
+def as_seen(trace: Trace, robot: str) -> Inequalities:
+    """The inequalities of what a robot saw at the control samples, side by side in the order of its controller."""
+    given, count = inequalities_of(trace, robot, as_seen=True), len(trace.sample_rows)
+    k = np.arange(len(given.sample)) - np.searchsorted(given.sample, given.sample)
+    most = int(k.max(initial=-1)) + 1
+    found = Inequalities(np.zeros((count, most, 3)), np.full((count, most), -np.inf))
+    found.normal[given.sample, k], found.bound[given.sample, k] = given.normal, given.bound
+    return found
 
 
 class Asked(NamedTuple):
@@ -40,7 +61,7 @@ def limited(velocity: Array, limit: Array | float) -> Array:
 def avoiding(below: Array, given: Inequalities, composition: str, *, planar: bool) -> Array:
     """The avoidance tasks above velocities (B, 3): the closest ones, or (5) as printed for `recursion_*`."""
     velocity = below.copy()
-    missed = (spare(given, below) < 0.0).any(axis=1)
+    missed = (given.slack(below) < 0.0).any(axis=1)
     if not missed.any():
         return velocity
     normal, bound = given.normal[missed], given.bound[missed]

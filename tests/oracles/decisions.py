@@ -7,6 +7,7 @@ the rules, and what a route says of its own plan with bounds of the optimum.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -15,7 +16,8 @@ from airground_drake.run.trace import Trace
 from airground_drake.scenarios.schema import Gatekeeper
 from airground_drake.verify.claim import TIME_TOLERANCE_S
 from airground_drake.verify.engines.geometry import interpolate, travelled
-from airground_drake.verify.runs.control_law import ON_TOP
+from airground_drake.verify.engines.outlines import Cores, away_from
+from airground_drake.verify.runs.control_law import ON_TOP, pairs_beside
 from airground_drake.verify.runs.convex_bounds import Enclosure
 from airground_drake.verify.runs.gate_plan import BLOCKS, Bounded, bound, cheapest_of_blocks
 from airground_drake.verify.runs.gate_record import (
@@ -25,10 +27,11 @@ from airground_drake.verify.runs.gate_record import (
     cost_tolerance,
     rows_of,
 )
-from airground_drake.verify.runs.instants import GATED_METHODS, intervening, row_at
-from airground_drake.verify.runs.pairs import around, places_of, preset_of
+from airground_drake.verify.runs.instants import GATED_METHODS, intervening
+from airground_drake.verify.runs.pairs import parts_of, preset_of
 from airground_drake.verify.runs.proposals import proposals_of
 from oracles.fault import Fault
+from oracles.sensing import sensed
 
 NO_DIFFERENCE = 1e-6
 """Relative gain from which on a new proposal makes a difference."""
@@ -104,9 +107,9 @@ def compare_situation(trace: Trace, row: DecisionRecord) -> Iterator[Deviation]:
     yield Deviation(row, "initial position, m", row["initial_m"] - own, POSITION_TOLERANCE_M)
     reference = travelled(*preset_of(trace, robot), t + after)
     yield Deviation(row, "reference, m", row["reference_m"] - reference, POSITION_TOLERANCE_M)
-    left = list(_sensed(trace, robot, t, after))
+    left = list(_beside(trace, row, after))
     for j, distance in enumerate(row["distances_m"]):
-        differ = [max(np.abs(at - row["centres_m"][:, j]).max(), abs(safe - distance)) for _, at, safe in left]
+        differ = [max(np.abs(of.at - row["centres_m"][:, j]).max(), abs(of.safe - distance)) for of in left]
         nearest = int(np.argmin(differ)) if left else -1
         found = float(differ[nearest]) if left else np.inf
         yield Deviation(row, f"point {j}: nothing that the UGV senses, m", min(found, 1e9), POSITION_TOLERANCE_M)
@@ -114,26 +117,43 @@ def compare_situation(trace: Trace, row: DecisionRecord) -> Iterator[Deviation]:
             left.pop(nearest)
     fastest = np.linalg.norm(np.stack([row["accept_m_s"], row["refuse_m_s"]]), axis=2).max(axis=0)
     reach = row.dt * np.cumsum(fastest)
-    for name, at, safe in left:
-        lacking = np.minimum(
-            safe + reach - np.linalg.norm(at - own, axis=1),
-            safe - np.abs(at[:, 2] - own[2]),  # UGVs keep their height
-        ).max()
+    for of in left:
+        lacking = np.minimum(of.safe + reach - of.apart(own), of.safe - of.above(float(own[2]))).max()
         if row.planned:
-            lacking = max(lacking, (safe - np.linalg.norm(row["positions_m"] - at, axis=1)).max())
-        yield Deviation(row, f"{name} is left out though within reach, m", max(0.0, lacking), POSITION_TOLERANCE_M)
+            lacking = max(lacking, (of.safe - of.apart(row["positions_m"])).max())
+        yield Deviation(row, f"{of.name} is left out though within reach, m", max(0.0, lacking), POSITION_TOLERANCE_M)
 
 
-def _sensed(trace: Trace, robot: str, t: float, after: Array) -> Iterator[tuple[str, Array, float]]:
-    """What a UGV senses at a time: its name, its places (N, 3), m, if it moves on as it does, and its safe distance."""
-    here, now = interpolate(trace.t, trace.position(robot), t), row_at(trace, t)
-    for other, pair in around(trace, robot):
-        place, velocity = places_of(trace)[other], np.zeros(3)
-        if place.ndim == 2:
-            place, velocity = interpolate(trace.t, place, t), trace.command(other)[now]
-        near = np.linalg.norm(place - here) <= trace.scenario.control.sensing_range_m
-        if near and t >= trace.t[pair.row] - TIME_TOLERANCE_S:
-            yield other, place + after[:, None] * velocity, pair.safe_m
+class _Beside(NamedTuple):
+    """What a UGV senses: its name, its points in (26) (N, 3), m, its safe distance, m, and its cores, (1,) or (N,)."""
+
+    name: str
+    at: Array
+    safe: float
+    cores: Cores
+
+    def apart(self, place: Array) -> Array:
+        """Distances of a place, or of one for each stage, (1,) or (N,), m."""
+        return away_from(self.cores, place, planar=True).distance
+
+    def above(self, height: float) -> Array:
+        """How far a height is from those of the cores, (1,) or (N,), m: UGVs keep their height."""
+        return np.abs(height - np.clip(height, self.cores.base, self.cores.top))
+
+
+def _beside(trace: Trace, row: DecisionRecord, after: Array) -> Iterator[_Beside]:
+    """What a UGV senses at a decision. Of a core, (26) has the points nearest to the way without intervention."""
+    there, parts, pairs = sensed(trace, row.robot, row.t_s, after), parts_of(trace), pairs_beside(trace, row.robot)
+    refused = row.constant[0]
+    for k in there.parts.tolist():
+        core, name = parts.cores.take(slice(k, k + 1)), parts.names[parts.owner[k]]
+        away = away_from(core, refused, planar=True)
+        at = np.broadcast_to(core.points, refused.shape)
+        if not core.are_points:
+            at = refused - away.distance[:, None] * away.normal
+        yield _Beside(name, at, pairs[name].safe_m, core)
+    for pair, places in zip(there.robots, there.places, strict=True):
+        yield _Beside(pair.second if pair.first == row.robot else pair.first, places, pair.safe_m, Cores.at(places))
 
 
 def compare_answers(trace: Trace, rows: Sequence[DecisionRecord]) -> Iterator[Deviation]:

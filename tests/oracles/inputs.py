@@ -1,4 +1,4 @@
-"""What a decision rested on, as recorded: obstacles within range, known, new and told, and what others were asked."""
+"""What a decision rested on, as recorded: parts within range, known, new and told, and what others were asked."""
 
 from __future__ import annotations
 
@@ -11,17 +11,29 @@ from airground_drake.base.arrays import Array
 from airground_drake.run.trace import Trace
 from airground_drake.verify.claim import TIME_TOLERANCE_S
 from airground_drake.verify.engines.geometry import interpolate
+from airground_drake.verify.engines.outlines import (
+    BASE,
+    COUNT,
+    EXTENT,
+    GAP,
+    MIDDLE,
+    RADIUS,
+    SPEED,
+    TOP,
+    Cores,
+    away_from,
+)
 from airground_drake.verify.runs.acceptances import METHOD
-from airground_drake.verify.runs.pairs import appears_of, centres_of
+from airground_drake.verify.runs.pairs import appears_of, parts_of
 from airground_drake.verify.runs.proposals import ProposalRecord, proposal_of, proposals_of
 from oracles.fault import Fault
 from oracles.protocol import answers_to
-from oracles.sensing import SAME_M, first_sensed
+from oracles.sensing import are_same, beyond_range, first_sensed
 
 MOST_CLAIMED = 64
-"""Obstacles of a message that a UGV takes into account."""
+"""Outlines of a message that a UGV takes into account."""
 EDGE_M = 1e-9
-"""Within this of the sensing range an obstacle may have been sensed or not, m."""
+"""Within this of the sensing range a part may have been sensed or not, m."""
 
 
 def wrong_inputs(trace: Trace) -> list[Fault]:
@@ -41,7 +53,7 @@ def _compared(trace: Trace, row: dict[Any, Any]) -> Iterator[tuple[str, list[Any
     if trace.meta["method"] == METHOD and row["accept_stalls"] < 0.0:
         yield from ((name, [], found) for name, found in recorded.items())
         return
-    away, there = _away(trace, ugv, t)
+    away, there = beyond_range(trace, ugv, t), appears_of(trace) <= t + TIME_TOLERANCE_S
     surely = [k for k in recorded["sensed"] if abs(away[k]) <= EDGE_M]
     yield "sensed", sorted({*np.flatnonzero(there & (away < -EDGE_M)).tolist(), *surely}), recorded["sensed"]
     if trace.meta["method"] != METHOD:
@@ -49,30 +61,35 @@ def _compared(trace: Trace, row: dict[Any, Any]) -> Iterator[tuple[str, list[Any
     on, first = proposal_of(trace, int(row["number"])), first_sensed(trace, ugv)
     known = np.flatnonzero(first <= t + TIME_TOLERANCE_S)
     yield "known", known.tolist(), recorded["known"]
-    shown = (np.linalg.norm(centres_of(trace)[:, None] - on.mapped_m, axis=2) <= SAME_M).any(axis=1)
+    cores = parts_of(trace).cores
+    shown = are_same(cores, Cores.of(on.mapped)).any(axis=1)
     stood = bool(((trace.decisions["number"] == on.number) & (trace.decisions["t_s"] < t - TIME_TOLERANCE_S)).any())
     new = (first > t - period_s + TIME_TOLERANCE_S) & (first <= t + TIME_TOLERANCE_S) & ~shown
     if stood:  # at the first decision on a proposal what is new makes no difference
         yield "new", np.flatnonzero(new).tolist(), recorded["new"]
-    yield "told", _told(trace, ugv, t, on.mapped_m, on.mapped_radius_m, centres_of(trace)[known]), recorded["told"]
+    yield "told", _told(trace, ugv, t, on.mapped, cores.take(known)), recorded["told"]
     others = [asked_of(trace, other, t) for other in trace.ugvs if other != ugv]
     yield "asked", [one.number for one, _ in others if one], recorded["asked"]
     yield "asked, accepted", [int(accepted) for one, accepted in others if one], recorded["asked_accepted"]
 
 
-def _away(trace: Trace, ugv: str, t: float) -> tuple[Array, Any]:
-    """How far each obstacle is beyond the sensing range, (m,), m, and whether it is there."""
-    here = interpolate(trace.t, trace.position(ugv), t)
-    away = np.linalg.norm(centres_of(trace) - here, axis=1) - trace.scenario.control.sensing_range_m
-    return away, appears_of(trace) <= t + TIME_TOLERANCE_S
-
-
-def _told(trace: Trace, ugv: str, t: float, mapped_m: Array, radius_m: Array, known_m: Array) -> list[int]:
-    """Rows of a map that a UGV believes: out of sight, not sensed, no negative radius, and the nearest ones only."""
-    far = np.linalg.norm(mapped_m - interpolate(trace.t, trace.position(ugv), t), axis=1)
-    apart = (np.linalg.norm(mapped_m[:, None] - known_m, axis=2) > SAME_M).all(axis=1)
-    rows = np.flatnonzero((far > trace.scenario.control.sensing_range_m) & apart & (radius_m >= 0.0))
+def _told(trace: Trace, ugv: str, t: float, mapped: Array, known: Cores) -> list[int]:
+    """Rows of a map that a UGV believes: outlines out of sight that it has not sensed, and the nearest ones only."""
+    here, cores = interpolate(trace.t, trace.position(ugv), t), Cores.of(mapped)
+    far = away_from(cores, here, planar=True).distance
+    new = (far > trace.scenario.control.sensing_range_m) & ~are_same(cores, known).any(axis=1)
+    rows = np.flatnonzero(new & [_is_outline(*each) for each in zip(mapped, cores.corners, strict=True)])
     return sorted(rows[np.argsort(far[rows], kind="stable")[:MOST_CLAIMED]].tolist())
+
+
+def _is_outline(row: Array, corners: Array) -> bool:
+    """Whether numbers describe a convex core, within its circle, with distances that are not negative."""
+    there = corners[: int(row[COUNT])]
+    edges = np.roll(there, -1, axis=0) - there
+    turned = np.roll(edges, 1, axis=0)[:, 0] * edges[:, 1] - np.roll(edges, 1, axis=0)[:, 1] * edges[:, 0]
+    held = np.hypot(*(there - row[MIDDLE:EXTENT]).T).max() <= row[EXTENT]
+    lengths = row[[GAP, RADIUS, SPEED]].min() >= 0.0 and row[BASE] <= row[TOP]
+    return bool(held and lengths and (turned >= 0.0).all())
 
 
 def asked_of(trace: Trace, ugv: str, t: float) -> tuple[ProposalRecord | None, bool]:

@@ -8,8 +8,9 @@ import numpy as np
 
 from airground_drake.base.arrays import Array
 from airground_drake.run.trace import Trace
-from airground_drake.verify.runs.control_law import ON_TOP
+from airground_drake.verify.runs.control_law import ON_TOP, pairs_beside
 from airground_drake.verify.runs.gate_record import DecisionRecord, rows_of
+from airground_drake.verify.runs.pairs import parts_of
 from airground_drake.verify.runs.proposals import proposal_of
 from oracles.beginnings import scene
 from oracles.closed_loops import NUDGES_M, Scene, in_batches, move_apart, roll_out, stacked
@@ -109,9 +110,11 @@ def scene_of(trace: Trace, row: DecisionRecord, plan: Array) -> Scene:
     after = control_s * np.arange(each * row.stages + 1.0)
     on = proposal_of(trace, row.number)
     there = sensed(trace, on.ugv, row.t_s, after)
-    points = np.stack([one.places for one in there], axis=1) if there else np.empty((len(after), 0, 3))
-    safe, share = (np.array([getattr(one.pair, name) for one in there]) for name in ("safe_m", "share"))
-    loop = scene(trace, on, row.t_s, after, 0, points, safe, share)
+    points = np.stack(there.places, axis=1) if there.places else np.empty((len(after), 0, 3))
+    parts, pairs = parts_of(trace), pairs_beside(trace, on.ugv)
+    beside = [*(pairs[parts.names[k]] for k in parts.owner[there.parts]), *there.robots]
+    safe, share = (np.array([getattr(pair, name) for pair in beside]) for name in ("safe_m", "share"))
+    loop = scene(trace, on, row.t_s, after, 0, parts.cores.take(there.parts), points, safe, share)
     return loop._replace(executed=np.repeat(plan == 1.0, each))
 
 

@@ -72,7 +72,7 @@ def _judged(trace: Trace, row: DecisionRecord, last: DecisionRecord | None, pati
         patience.tries = 0 if certain or given["tries"] <= float(accepts) else patience.tries
     if standing == "accept":
         answer = ("refuse", "over") if patience.until is not None and t >= patience.until else ("accept", "kept")
-        if answer[0] == "accept" and news(trace, row.robot, on.mapped_m, t - gate.period_s, t):
+        if answer[0] == "accept" and len(news(trace, row.robot, on.mapped, t - gate.period_s, t)):
             answer = _by_outcome(row, on)
         if answer[0] == "refuse":
             patience.until, patience.since = None, t

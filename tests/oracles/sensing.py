@@ -1,74 +1,92 @@
-"""What a UGV senses in a run: bodies within range at a time, and obstacles that it had not sensed before."""
+"""What a UGV senses in a run: parts of barriers and robots within range, and parts that it had not sensed before."""
 
 from __future__ import annotations
 
-from itertools import compress
 from typing import NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from airground_drake.base.arrays import Array
 from airground_drake.run.trace import Trace
 from airground_drake.verify.claim import TIME_TOLERANCE_S
 from airground_drake.verify.engines.geometry import interpolate
+from airground_drake.verify.engines.outlines import Cores, away_from, within
+from airground_drake.verify.runs.control_law import pairs_beside
 from airground_drake.verify.runs.instants import row_at
-from airground_drake.verify.runs.pairs import Pair, appears_of, around, centres_of, places_of
+from airground_drake.verify.runs.pairs import Pair, appears_of, parts_of
 
 SAME_M = 1e-9
-"""Obstacles closer to each other than this are one, m."""
+"""Cores whose corners and heights differ by no more than this are one, m."""
+Indices = npt.NDArray[np.intp]
 
 
 class Sensed(NamedTuple):
-    """What a UGV senses when it decides: the other of a pair, and its places (S, 3), m, if it moves on as it does."""
+    """What a UGV senses when it decides: parts of barriers, by number, and robots, each with its pair.
 
-    name: str
-    pair: Pair
-    places: Array
+    `places` are those of each robot, (S, 3), m, if it moves on as it does.
+    """
+
+    parts: Indices
+    robots: list[Pair]
+    places: list[Array]
 
 
-def sensed(trace: Trace, robot: str, t: float, after: Array) -> list[Sensed]:
-    """Obstacles and other robots within sensing range of a robot at a time, with their places at times `after` that."""
-    here, found = interpolate(trace.t, trace.position(robot), t), []
-    for other, pair in around(trace, robot):
+def sensed(trace: Trace, robot: str, t: float, after: Array) -> Sensed:
+    """What is within sensing range of a UGV at a time, s, with the places of robots at times `after` that."""
+    here, reach = interpolate(trace.t, trace.position(robot), t), trace.scenario.control.sensing_range_m
+    pairs, places = list[Pair](), list[Array]()
+    for other in trace.robots:
         place, velocity = moves(trace, other, t)
-        if (
-            t >= trace.t[pair.row] - TIME_TOLERANCE_S
-            and np.linalg.norm(place - here) <= trace.scenario.control.sensing_range_m
-        ):
-            found.append(Sensed(other, pair, place + after[:, None] * velocity))
-    return found
+        if other != robot and np.linalg.norm(place - here) <= reach:
+            pairs.append(pairs_beside(trace, robot)[other])
+            places.append(place + after[:, None] * velocity)
+    there = appears_of(trace) <= t + TIME_TOLERANCE_S
+    return Sensed(np.flatnonzero(there & (beyond_range(trace, robot, t) <= 0.0)), pairs, places)
 
 
-def moves(trace: Trace, name: str, t: float) -> tuple[Array, Array]:
-    """Where an obstacle or a robot is at a time, (3,), m, and its velocity up to then, (3,), m/s."""
-    place = places_of(trace)[name]
-    if place.ndim == 1:
-        return place, np.zeros(3)
-    return interpolate(trace.t, place, t), trace.command(name)[row_at(trace, t)]
+def beyond_range(trace: Trace, ugv: str, t: float) -> Array:
+    """How far each part is beyond the sensing range of a UGV at a time, s, (m,), m."""
+    here = interpolate(trace.t, trace.position(ugv), t)
+    return away_from(parts_of(trace).cores, here, planar=True).distance - trace.scenario.control.sensing_range_m
 
 
-def news(trace: Trace, ugv: str, mapped_m: Array, begin_s: float, end_s: float) -> list[str]:
-    """Obstacles that a UGV senses for the first time within (begin_s, end_s], and that are not on a proposal's map.
+def moves(trace: Trace, robot: str, t: float) -> tuple[Array, Array]:
+    """Where a robot is at a time, (3,), m, and its velocity up to then, (3,), m/s."""
+    return interpolate(trace.t, trace.position(robot), t), trace.command(robot)[row_at(trace, t)]
+
+
+def news(trace: Trace, ugv: str, mapped: Array, begin_s: float, end_s: float) -> Indices:
+    """Parts that a UGV senses for the first time within (begin_s, end_s], and that are not on a proposal's map.
 
     Args:
         trace: the run.
         ugv: the UGV.
-        mapped_m: obstacles on the map, (k, 3), m.
+        mapped: outlines of the map, (k, W).
         begin_s: s.
         end_s: s.
     """
     first = trace.derived(("first sensed", ugv), lambda: first_sensed(trace, ugv))
     new = (first > begin_s + TIME_TOLERANCE_S) & (first <= end_s + TIME_TOLERANCE_S)
-    shown = (np.linalg.norm(centres_of(trace)[:, None] - mapped_m, axis=2) <= SAME_M).any(axis=1)
-    return list(compress(trace.scenario.obstacles, new & ~shown))
+    shown = are_same(parts_of(trace).cores, Cores.of(mapped)).any(axis=1)
+    return np.flatnonzero(new & ~shown)
+
+
+def are_same(one: Cores, other: Cores) -> npt.NDArray[np.bool_]:
+    """Which cores (m,) are which others (k,), up to `SAME_M`: (m, k)."""
+    both = Cores.joined([one, other])
+    numbers = np.column_stack([both.corners.reshape(len(both.base), -1), both.base, both.top])
+    m = len(one.base)
+    return np.asarray((np.abs(numbers[:m, None] - numbers[m:]) <= SAME_M).all(axis=2))
 
 
 def first_sensed(trace: Trace, ugv: str) -> Array:
-    """When a UGV senses each obstacle for the first time, at the gatekeeper's samples, (m,), s; inf if never."""
+    """When a UGV senses each part for the first time, at the gatekeeper's samples, (m,), s; inf if never."""
     period_s = trace.scenario.gatekeeper.period_s
     samples = period_s * np.arange(np.floor(trace.t[-1] / period_s + 1e-9) + 1.0)
     was = interpolate(trace.t, trace.position(ugv), np.minimum(samples, trace.t[-1]))
-    away = np.linalg.norm(was[:, None] - centres_of(trace), axis=2)
-    there = samples[:, None] >= appears_of(trace) - TIME_TOLERANCE_S
-    seen = there & (away <= trace.scenario.control.sensing_range_m)
-    return np.where(seen.any(axis=0), samples[seen.argmax(axis=0)], np.inf)
+    near = within(parts_of(trace).cores, was, trace.scenario.control.sensing_range_m, planar=True)
+    appears, found = appears_of(trace), np.full(len(parts_of(trace).owner), np.inf)
+    there = samples[near.place] >= appears[near.core] - TIME_TOLERANCE_S
+    np.minimum.at(found, near.core[there], samples[near.place[there]])
+    return found

@@ -48,7 +48,7 @@ def demanded(trace: Trace) -> dict[str, dict[str, Any]]:
             if i >= len(barriers):  # a barrier avoids nothing
                 i -= len(barriers)
                 safe[i, j], share[i, j] = pair.safe_m, pair.share
-    outlines = np.concatenate([np.empty(0), *_outlines(trace)])
+    outlines = np.concatenate([np.empty(0), *outlines_of(trace)])
     column = np.append(parts.owner, len(barriers) + everybody)
     safe, share = safe[:, column], share[:, column]
     with_uav = np.array([name == scenario.uav.name for name in robots])
@@ -75,8 +75,8 @@ def demanded(trace: Trace) -> dict[str, dict[str, Any]]:
     return found
 
 
-def _outlines(trace: Trace) -> Iterator[Array]:
-    """The numbers of each outline, but for the circle round its corners."""
+def outlines_of(trace: Trace) -> Iterator[Array]:
+    """The numbers of the outline of each convex part of the barriers, but for the circle round its corners."""
     parts, safe = parts_of(trace), trace.scenario.safe_distance
     for k, number in enumerate(parts.owner.tolist()):
         each, core = trace.scenario.barriers[parts.names[number]], parts.cores.take(k)
