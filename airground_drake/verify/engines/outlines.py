@@ -200,7 +200,8 @@ def least_distances(cores: Cores, start: Array, end: Array, *, planar: bool) -> 
     passes a corner or an edge at right angles; where it crosses the line of an edge or the plane of base or top. In a
     polygon it is also where two edges are equally near. Each is a closed form, and the distance is evaluated there.
     """
-    start, end = np.broadcast_arrays(start, end)
+    shape = np.broadcast_shapes(start.shape[:-1], end.shape[:-1], cores.base.shape)
+    start, end = (np.broadcast_to(place, (*shape, 3)) for place in (start, end))
     if cores.are_points:
         return PeriodMotion(start - cores.points, end - cores.points).least_distance()
     found, share = _least(cores, start, end, _turning_points(cores, start, end, planar), planar)
