@@ -13,7 +13,7 @@ import numpy.typing as npt
 from numba import njit
 
 from airground_drake.base.arrays import Array
-from airground_drake.geometry.convex import SPEED, nearest
+from airground_drake.geometry.convex import SPEED, may_be_within, nearest
 
 MARGIN_M_S = 1e-12
 """Added to every bound in the projection, m/s. The bound of a robot in contact is 0. Without the margin rounding would
@@ -82,6 +82,8 @@ def fill_half_spaces(
     count, m = 0, len(still)
     for k in range(len(distance)):
         if k < m:
+            if not may_be_within(still, k, x, y, reach):
+                continue
             apart = nearest(still[k], x, y, z, planar, normal[count], reach)
         else:
             part = others[k - m]
