@@ -28,25 +28,27 @@ Theorem can_be_met : forall t, 0 <= t -> 1 <= norm (sub (p true t) (p false t)).
 Proof.
   assert (P : forall k, 0 < excess k) by (intros k; apply pow_lt; lra).
   pose proof (safe_always 1 1 ltac:(lra) ltac:(lra) ltac:(lra) bool p v (fun _ => V 1 1 1) (fun _ => 0)
-    (fun i j => i = true /\ j = false) (fun _ _ => 1) (fun i _ => if i then 1 else 0) (fun _ _ => 0)
+    (fun _ _ => norm) (fun i j => i = true /\ j = false) (fun _ _ => 1) (fun i _ => if i then 1 else 0) (fun _ _ => 0)
     (fun _ => True)) as S.
-  unfold sample, distance, moved, missed in S; apply S; auto; clear S.
+  unfold sample, distance, difference, moved, missed in S; apply S; auto; clear S.
   - intros i k s _ H; unfold moved, sample; destruct i; [rewrite place by exact H |].
     + replace (INR k * 1) with (INR k * 1 + 0) at 1 by ring; rewrite place by lra; right.
       unfold norm; transitivity (sqrt 0); [f_equal; unfold v; vectors; field | rewrite sqrt_0; ring].
     + right; unfold norm; transitivity (sqrt 0); [f_equal; unfold v, p; vectors; ring | rewrite sqrt_0; ring].
   - intros i k; destruct i; unfold v; vectors; f_equal; ring.
+  - intros i j [-> ->]; split; [reflexivity | intros x; unfold norm; f_equal; vectors; ring].
+  - intros i j x _; apply away_exists.
   - intros i j [-> ->]; lra.
   - intros i j k _ [-> ->]; left; specialize (P k).
     assert (N : norm (sub (p true (INR k * 1)) (p false (INR k * 1))) = 1 + excess k).
     { replace (INR k * 1) with (INR k * 1 + 0) at 1 by ring; rewrite place by lra.
       unfold norm, p; vectors; apply Rsqr_inj; [apply sqrt_pos | lra |]; rewrite Rsqr_sqrt by nra; unfold Rsqr; field. }
-    exists (V 1 0 0); repeat split.
+    exists (V 1 0 0); split; [apply away_from_point |]; repeat split.
     + unfold norm; vectors; transitivity (sqrt 1); [f_equal; ring | apply sqrt_1].
     + rewrite N; replace (INR k * 1) with (INR k * 1 + 0) at 1 by ring; rewrite place by lra.
       unfold p; vectors; f_equal; field.
-    + unfold meets, distance, sample; rewrite N; unfold bound; destruct Rle_dec; [lra |]; unfold v; vectors; lra.
-    + unfold meets, distance; unfold v; vectors; lra.
+    + unfold meets, distance, difference, sample; rewrite N; unfold bound; destruct Rle_dec; [lra |]; unfold v; vectors; lra.
+    + unfold meets, v; vectors; lra.
   - lra.
   - pose proof (place 0 0 ltac:(lra)) as Z; replace (INR 0 * 1 + 0) with 0 in Z by (simpl; ring); rewrite Z.
     unfold p, norm, excess; vectors; rewrite <- sqrt_1 at 1; apply sqrt_le_1_alt; lra.

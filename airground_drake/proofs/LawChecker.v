@@ -192,18 +192,19 @@ Theorem obeying_keeps : forall t, begins r <= t <= ends r -> d - e / g <= norm (
 Proof.
   intros t Ht; destruct (distance_at r i j t W Ri Rj Ht) as [k [s [K [Hs ->]]]].
   pose proof W as U; apply well_formed_means in U; destruct U as [_ [U _]].
+  pose (gap := fun _ _ : bool => norm).
   assert (At : forall l q, sampled l -> 0 <= q <= 1 ->
-    distance bool seen true false (sample 1 l + q) = norm (add (offset r i j l) (scale q (change r i j l)))).
-  { intros l q Hl Hq; unfold distance; rewrite seen_at by assumption; f_equal; apply vec_eq; unfold seen, origin;
+    distance bool seen gap true false (sample 1 l + q) = norm (add (offset r i j l) (scale q (change r i j l)))).
+  { intros l q Hl Hq; unfold distance, difference, gap; rewrite seen_at by assumption; f_equal; apply vec_eq; unfold seen, origin;
       vectors; ring. }
-  assert (At0 : forall l, sampled l -> distance bool seen true false (sample 1 l) = norm (offset r i j l)).
+  assert (At0 : forall l, sampled l -> distance bool seen gap true false (sample 1 l) = norm (offset r i j l)).
   { intros l Hl; replace (sample 1 l) with (sample 1 l + 0) by ring; rewrite At by (assumption || lra).
     f_equal; apply vec_eq; vectors; ring. }
   replace (norm (apart_at (body_of r i) (body_of r j) k s) / IZR (unit r))
-    with (distance bool seen true false (sample 1 k + s)).
+    with (distance bool seen gap true false (sample 1 k + s)).
   2: { rewrite At, <- offset_between, norm_scale by (assumption || apply Rlt_le, Rinv_0_lt_compat, U).
        field; lra. }
-  apply (disturbed 1 g ltac:(lra) ltac:(lra) bool seen step (fun _ => V 1 1 1) (fun _ => 0)
+  apply (disturbed 1 g ltac:(lra) ltac:(lra) bool seen step (fun _ => V 1 1 1) (fun _ => 0) gap
     (fun a b => a = true /\ b = false) (fun _ _ => d) (fun a _ => if a then 1 else 0)
     (fun a _ => if a then e else 0) sampled); try lra; try (split; reflexivity); auto.
   - unfold sampled; lia.
@@ -212,6 +213,8 @@ Proof.
       apply vec_eq; unfold step, origin; vectors; ring.
     + apply vec_eq; unfold seen, step, origin; vectors; ring.
   - intros a l; apply vec_eq; vectors; ring.
+  - intros a b [-> ->]; split; [reflexivity | intros x; unfold gap, norm; f_equal; vectors; ring].
+  - intros a b x _; apply away_exists.
   - intros a b [-> ->]; ring.
   - intros a b l Hl [-> ->]; specialize (law l Hl); cbv zeta in law; destruct law as [F | [Pos M]].
     + right; unfold far; rewrite At0 by exact Hl; change (step false l) with origin; rewrite norm_origin.
@@ -221,7 +224,7 @@ Proof.
       { replace (sample 1 l) with (sample 1 l + 0) at 1 by ring; rewrite seen_at by (assumption || lra).
         apply vec_eq; unfold seen, origin; vectors; ring. }
       split; [| split].
-      * rewrite X; apply along_unit, Pos.
+      * apply away_from_point; unfold difference; rewrite X; apply along_unit, Pos.
       * unfold meets; rewrite At0 by exact Hl; eapply Rle_trans; [| eapply Rle_trans; [exact M |]]; [lra |].
         right; unfold step; vectors; field; lra.
       * apply obstacle; reflexivity.

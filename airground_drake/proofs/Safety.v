@@ -1,5 +1,8 @@
 (** Set-based avoidance keeps the safe distance: any bodies, any number of samples, all real times.
 
+    A distance is a convex function of the difference of two bodies' positions: for two points or balls the norm of it,
+    for a ball and a convex set, which may move without turning, the signed distance to that set (Convex.v).
+
     The law, (7)-(8) and (11) as inequalities: at every sample each body of a pair at distance [D] with safe distance
     [d] moves away from the other at least at its share of
         [A (d - D)]     inside the safe distance,
@@ -57,18 +60,38 @@ Proof.
   rewrite <- nn; lra.
 Qed.
 
+(** [n] leads away: a unit vector along which the convex function [gap] grows at the rate 1, a subgradient of it. *)
+Definition away (gap : vec -> R) x n := norm n = 1 /\ forall y, gap x + dot n (sub y x) <= gap y.
+
 (** ** The lemma: after [s] on a straight line the distance is at least what it was plus [s] times its rate of change *)
-Theorem lemma x v s : 0 < norm x -> norm x + s * (dot x v / norm x) <= norm (add x (scale s v)).
+Theorem lemma gap x n v s : away gap x n -> gap x + s * dot n v <= gap (add x (scale s v)).
 Proof.
-  intros pos; eapply Rle_trans; [| exact (grows _ x _ (along_unit x pos))].
-  right; vectors; field; lra.
+  intros [_ G]; specialize (G (add x (scale s v))).
+  replace (dot n (sub (add x (scale s v)) x)) with (s * dot n v) in G by (vectors; ring); exact G.
+Qed.
+
+(** Two points. *)
+Lemma away_from_point n x : along n x -> away norm x n.
+Proof. intros Ha; split; [apply Ha | intros y; apply grows, Ha]. Qed.
+
+Lemma away_exists x : exists n, away norm x n.
+Proof.
+  destruct (Rle_lt_or_eq_dec 0 (norm x) (norm_nonneg x)) as [pos | zero].
+  - eexists; apply away_from_point, along_unit, pos.
+  - exists (V 1 0 0); apply away_from_point; split.
+    + unfold norm; vectors; transitivity (sqrt 1); [f_equal; ring | apply sqrt_1].
+    + pose proof (norm_square x) as Q; rewrite <- zero in *; destruct x as [a b c]; vectors.
+      assert (a = 0 /\ b = 0 /\ c = 0) as [-> [-> ->]] by nra; f_equal; ring.
 Qed.
 
 Corollary lemma_in_the_plane x1 x2 v1 v2 s : let D := sqrt (x1 * x1 + x2 * x2) in
   0 < D -> D + s * ((x1 * v1 + x2 * v2) / D) <= sqrt ((x1 + s * v1) * (x1 + s * v1) + (x2 + s * v2) * (x2 + s * v2)).
 Proof.
-  intros D pos; pose proof (lemma (V x1 x2 0) (V v1 v2 0) s) as L; unfold norm in L; vectors.
-  rewrite !Rmult_0_r, !Rplus_0_r, Rmult_0_r, Rplus_0_r in L; apply L, pos.
+  intros D; set (x := V x1 x2 0); replace D with (norm x) by (unfold norm, D; f_equal; vectors; ring); intros pos.
+  pose proof (lemma norm x _ (V v1 v2 0) s (away_from_point _ x (along_unit x pos))) as L.
+  replace (sqrt _) with (norm (add x (scale s (V v1 v2 0)))) by (unfold norm; f_equal; unfold x; vectors; ring).
+  replace ((x1 * v1 + x2 * v2) / norm x) with (dot (scale (/ norm x) x) (V v1 v2 0)); [exact L |].
+  unfold Rdiv; generalize (/ norm x); intros r; unfold x; vectors; ring.
 Qed.
 
 (** * One period *)
@@ -110,6 +133,8 @@ Variable can_move : body -> vec.
 (** By how much its motion may differ from [v], m/s: 0 where velocities are held, the top speed of an obstacle that
     moves as it likes. *)
 Variable wander : body -> R.
+(** The distance of two bodies, by the difference of their positions. *)
+Variable gap : body -> body -> vec -> R.
 (** Which pairs are to be kept apart, by which distance; the part of the law that the first one of a pair takes; and by
     how much it may miss that part, m/s. *)
 Variables (apart : body -> body -> Prop) (d share slack : body -> body -> R).
@@ -118,7 +143,8 @@ Variable sampled : nat -> Prop.
 Hypothesis from_the_first : forall k, sampled (S k) -> sampled k.
 
 Definition sample k := INR k * h.
-Definition distance i j t := norm (sub (p i t) (p j t)).
+Definition difference i j t := sub (p i t) (p j t).
+Definition distance i j t := gap i j (difference i j t).
 Definition moved i k s := sub (p i (sample k + s)) (p i (sample k)).
 (** Body [i] meets its inequality against [j] at sample [k], up to [slack]; [n] points from [j] to [i]. *)
 Definition meets i j k n :=
@@ -132,19 +158,23 @@ Definition missed i j := slack i j + slack j i + wander i + wander j.
 Hypothesis held : forall i k s, sampled k -> 0 <= s <= h -> norm (sub (moved i k s) (scale s (v i k))) <= wander i * s.
 (** No body moves along an axis along which it cannot. *)
 Hypothesis moves_as_it_can : forall i k, mask (can_move i) (v i k) = v i k.
-Hypothesis symmetric : forall i j, apart i j -> d j i = d i j.
+Hypothesis symmetric : forall i j, apart i j -> d j i = d i j /\ forall x, gap j i (scale (-1) x) = gap i j x.
+(** Distances are convex, and change no faster than positions. *)
+Hypothesis convex : forall i j x, apart i j -> exists n, away (gap i j) x n.
 (** The two shares of a pair add up to 1. *)
 Hypothesis shared : forall i j, apart i j -> share i j + share j i = 1.
 (** At every sample both bodies of a pair meet their inequalities, or they are too far apart to matter. *)
 Hypothesis law : forall i j k, sampled k -> apart i j ->
-  (exists n, along n (sub (p i (sample k)) (p j (sample k))) /\ meets i j k n /\ meets j i k (scale (-1) n))
+  (exists n, away (gap i j) (difference i j (sample k)) n /\ meets i j k n /\ meets j i k (scale (-1) n))
   \/ far i j k.
 
 Lemma dot_mask m n u : mask m u = u -> dot (mask m n) u = dot n u.
 Proof. intros E; rewrite <- E at 2; vectors; ring. Qed.
 
-Lemma distance_sym i j t : distance i j t = distance j i t.
-Proof. unfold distance, norm; f_equal; vectors; ring. Qed.
+Lemma distance_sym i j t : apart i j -> distance j i t = distance i j t.
+Proof.
+  intros Hij; unfold distance; rewrite <- (proj2 (symmetric i j Hij)); f_equal; unfold difference; vectors; f_equal; ring.
+Qed.
 
 (** How far a body moves along [a] is what [v] says, up to [wander]. *)
 Lemma moved_along a i k s : sampled k -> 0 <= s <= h ->
@@ -161,35 +191,35 @@ Lemma between i j k s e f : sampled k -> apart i j -> 0 <= s <= h -> missed i j 
   d i j - f <= distance i j (sample k) -> d i j - missing e f s <= distance i j (sample k + s).
 Proof.
   intros Hk Hij Hs He He0 Hf HD; unfold missed in He; set (D := distance i j (sample k)) in *.
-  set (x := sub (p i (sample k)) (p j (sample k))) in *; set (y := sub (p i (sample k + s)) (p j (sample k + s))).
-  assert (Y : forall a, dot a (sub y x) = dot a (moved i k s) - dot a (moved j k s)).
-  { intros a; unfold x, y, moved; vectors; ring. }
-  change (d i j - missing e f s <= norm y); destruct (law i j k Hk Hij) as [[n [An [Mi Mj]]] | F].
-  - pose proof (grows n x y An) as G; pose proof (period (d i j) D e f s Hs Hf HD) as P; destruct An as [N _].
-    pose proof (moved_along n i k s Hk Hs) as Vi; pose proof (moved_along n j k s Hk Hs) as Vj.
-    unfold meets in Mi, Mj; rewrite (distance_sym j i), (symmetric i j Hij) in Mj; fold D in Mi, Mj.
+  set (x := difference i j (sample k)) in *; set (y := difference i j (sample k + s)).
+  change (d i j - missing e f s <= gap i j y).
+  assert (G : forall n, away (gap i j) x n ->
+    D + s * (dot n (v i k) - dot n (v j k) - wander i - wander j) <= gap i j y).
+  { intros n [N G]; specialize (G y); change (gap i j x) with D in G.
+    pose proof (moved_along n i k s Hk Hs) as Vi; pose proof (moved_along n j k s Hk Hs) as Vj; rewrite N in *.
+    replace (dot n (sub y x)) with (dot n (moved i k s) - dot n (moved j k s)) in G
+      by (unfold x, y, difference, moved; vectors; ring); lra. }
+  destruct (law i j k Hk Hij) as [[n [An [Mi Mj]]] | F].
+  - specialize (G n An); pose proof (period (d i j) D e f s Hs Hf HD) as P.
+    unfold meets in Mi, Mj; rewrite distance_sym, (proj1 (symmetric i j Hij)) in Mj by exact Hij; fold D in Mi, Mj.
     rewrite dot_mask in Mi, Mj by apply moves_as_it_can.
     replace (dot (scale (-1) n) (v j k)) with (- dot n (v j k)) in Mj by (vectors; ring).
-    rewrite Y in G; rewrite N in *; change (norm x) with D in G; set (B := bound (d i j) D) in *.
+    set (B := bound (d i j) D) in *.
     assert (E : B = share i j * B + share j i * B) by (rewrite <- Rmult_plus_distr_r, shared by exact Hij; ring).
     assert (s * (B - e) <= s * (dot n (v i k) - dot n (v j k) - wander i - wander j))
       by (apply Rmult_le_compat_l; lra).
     lra.
-  - unfold far in F; fold D in F; assert (0 <= missing e f s) by (apply missing_nonneg; lra).
+  - destruct (convex i j x Hij) as [n An]; specialize (G n An); destruct An as [N _].
+    pose proof (dot_le n (v i k)); pose proof (dot_le n (v j k)); rewrite N in *.
+    unfold far in F; fold D in F; assert (0 <= missing e f s) by (apply missing_nonneg; lra).
     assert (W : forall b, 0 <= wander b).
     { intros b; pose proof (held b k h Hk ltac:(lra)); pose proof (norm_nonneg (sub (moved b k h) (scale h (v b k)))).
       nra. }
-    set (c := norm (v i k) + wander i + norm (v j k) + wander j) in *; assert (0 <= c).
-    { unfold c; pose proof (W i); pose proof (W j); pose proof (norm_nonneg (v i k)).
-      pose proof (norm_nonneg (v j k)); lra. }
-    assert (0 <= D) by apply norm_nonneg; pose proof (norm_nonneg y); assert (0 <= s * c <= c * h) by nra.
-    assert (T : D * D <= D * (norm y + s * c)).
-    { pose proof (moved_along x i k s Hk Hs) as Vi; pose proof (moved_along x j k s Hk Hs) as Vj.
-      pose proof (dot_le x y); pose proof (Rmult_le_compat_l s _ _ (proj1 Hs) (proj1 (dot_le x (v i k)))).
-      pose proof (Rmult_le_compat_l s _ _ (proj1 Hs) (proj2 (dot_le x (v j k)))); change (norm x) with D in *.
-      assert (S : dot x (sub y x) = dot x y - D * D) by (change D with (norm x); rewrite norm_square; vectors; ring).
-      rewrite Y in S; unfold c; lra. }
-    destruct (Req_dec D 0) as [Z | Z]; [lra | apply Rmult_le_reg_l in T; lra].
+    pose proof (W i); pose proof (W j); pose proof (norm_nonneg (v i k)); pose proof (norm_nonneg (v j k)).
+    set (c := norm (v i k) + wander i + norm (v j k) + wander j) in *; assert (0 <= c) by (unfold c; lra).
+    assert (- (s * c) <= s * (dot n (v i k) - dot n (v j k) - wander i - wander j))
+      by (replace (- (s * c)) with (s * - c) by ring; apply Rmult_le_compat_l; unfold c; lra).
+    assert (s * c <= c * h) by nra; lra.
 Qed.
 
 (** What may be missing at sample [k], where [f] was missing at the start. *)
