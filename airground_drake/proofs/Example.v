@@ -47,7 +47,8 @@ Proof.
     + unfold norm; vectors; transitivity (sqrt 1); [f_equal; ring | apply sqrt_1].
     + rewrite N; replace (INR k * 1) with (INR k * 1 + 0) at 1 by ring; rewrite place by lra.
       unfold p; vectors; f_equal; field.
-    + unfold meets, distance, difference, sample; rewrite N; unfold bound; destruct Rle_dec; [lra |]; unfold v; vectors; lra.
+    + unfold meets, distance, difference, sample; rewrite N; unfold bound, v.
+      destruct Rle_dec; [lra | vectors; lra].
     + unfold meets, v; vectors; lra.
   - lra.
   - pose proof (place 0 0 ltac:(lra)) as Z; replace (INR 0 * 1 + 0) with 0 in Z by (simpl; ring); rewrite Z.

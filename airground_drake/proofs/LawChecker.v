@@ -195,8 +195,8 @@ Proof.
   pose (gap := fun _ _ : bool => norm).
   assert (At : forall l q, sampled l -> 0 <= q <= 1 ->
     distance bool seen gap true false (sample 1 l + q) = norm (add (offset r i j l) (scale q (change r i j l)))).
-  { intros l q Hl Hq; unfold distance, difference, gap; rewrite seen_at by assumption; f_equal; apply vec_eq; unfold seen, origin;
-      vectors; ring. }
+  { intros l q Hl Hq; unfold distance, difference, gap; rewrite seen_at by assumption; f_equal; apply vec_eq;
+      unfold seen, origin; vectors; ring. }
   assert (At0 : forall l, sampled l -> distance bool seen gap true false (sample 1 l) = norm (offset r i j l)).
   { intros l Hl; replace (sample 1 l) with (sample 1 l + 0) by ring; rewrite At by (assumption || lra).
     f_equal; apply vec_eq; vectors; ring. }

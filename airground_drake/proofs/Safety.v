@@ -173,7 +173,8 @@ Proof. intros E; rewrite <- E at 2; vectors; ring. Qed.
 
 Lemma distance_sym i j t : apart i j -> distance j i t = distance i j t.
 Proof.
-  intros Hij; unfold distance; rewrite <- (proj2 (symmetric i j Hij)); f_equal; unfold difference; vectors; f_equal; ring.
+  intros Hij; unfold distance; rewrite <- (proj2 (symmetric i j Hij)); f_equal; unfold difference; vectors.
+  f_equal; ring.
 Qed.
 
 (** How far a body moves along [a] is what [v] says, up to [wander]. *)
