@@ -1,6 +1,7 @@
 (** Whether a recorded run keeps a distance at all times: decided exactly, from positions alone. *)
 Require Import Reals Lra Psatz ZArith List Bool Lia.
-Require Import Safety Run.
+Require Import Safety Convex Run.
+Import ListNotations.
 Local Open Scope Z_scope.
 
 (** * What is computed *)
@@ -25,6 +26,45 @@ Definition keeps (r : run) (i j : nat) (a b : Z) :=
   let u := body_of r i in let v := body_of r j in
   if 0 <? b then if has_rows r i then if has_rows r j then
   all_steps (step_keeps (parts_up r a b) (stride u + stride v)) (places u) (places v)
+  else false else false else false.
+
+(** ** A body and the convex hull of corners that move with another body
+
+    A vector [n] separates them: the body is beyond the plane [n . x = least], [d] or more from every corner along [n].
+    A proof is a list of such vectors, each with the number of periods that it serves. *)
+Definition root (d : Z) (n : point) := Z.max 1 (Z.sqrt_up (d * d * product n n)).
+
+Definition furthest (n : point) (corners : list point) :=
+  fold_right (fun c most => Z.max (product n c) most) (product n (hd (P 0 0 0) corners)) corners.
+
+Definition beyond (n : point) (least : Z) (p q : point) := least <=? product n (minus p q).
+
+(** [n] serves [more] periods more, and then those of [vectors]. *)
+Fixpoint separate d corners (n : point) (least : Z) (more : nat) (vectors : list (nat * point)) (ps qs : list point) :=
+  match ps, qs with
+  | p :: ps', q :: qs' =>
+      if beyond n least p q then
+        match ps', more, vectors with
+        | [], _, _ => true
+        | _, S more', _ => separate d corners n least more' vectors ps' qs'
+        | _, O, (S more', n') :: vectors' =>
+            let least' := furthest n' corners + root d n' in
+            if beyond n' least' p q then separate d corners n' least' more' vectors' ps' qs' else false
+        | _, O, _ => false
+        end
+      else false
+  | _, _ => false
+  end.
+
+(** Body [i] keeps [a / b] metres from the hull of [corners], which moves with body [j]. *)
+Definition keeps_clear (r : run) (i j : nat) (corners : list point) (a b : Z) (vectors : list (nat * point)) :=
+  let d := parts_up r a b in
+  if 0 <? b then if has_rows r i then if has_rows r j then
+  match vectors with
+  | (S more, n) :: vectors' =>
+      separate d corners n (furthest n corners + root d n) more vectors' (places (body_of r i)) (places (body_of r j))
+  | _ => false
+  end
   else false else false else false.
 
 (** * What it means *)
@@ -94,12 +134,110 @@ Theorem sound r i j a b : well_formed r = true -> keeps r i j a b = true -> fora
   IZR a / IZR b <= norm (sub (position r i t) (position r j t)).
 Proof.
   intros W H t Ht; apply keeps_means in H; destruct H as [B [Ri [Rj H]]].
-  destruct (distance_at r i j t W Ri Rj Ht) as [k [s [K [Hs ->]]]].
+  destruct (difference_at r i j t W Ri Rj Ht) as [k [s [K [Hs ->]]]].
   pose proof (listed_ok r i W Ri) as Bi; pose proof (listed_ok r j W Rj) as Bj.
   unfold has_rows in *; apply Nat.eqb_eq in Ri, Rj.
   pose proof (step_sound _ _ _ k s Bi Bj ltac:(congruence) H ltac:(lia) Hs) as D.
   pose proof (parts_up_sound r a b B); apply well_formed_means in W; destruct W as [_ [U _]].
-  set (n := norm _) in *; apply Rmult_le_reg_r with (IZR b * IZR (unit r)); [nra |].
+  rewrite norm_scale by apply Rlt_le, Rinv_0_lt_compat, U; set (n := norm _) in *; apply Rmult_le_reg_r with (IZR b * IZR (unit r)); [nra |].
   replace (IZR a / IZR b * (IZR b * IZR (unit r))) with (IZR a * IZR (unit r)) by (field; lra).
-  replace (n / IZR (unit r) * (IZR b * IZR (unit r))) with (n * IZR b) by (field; lra); nra.
+  replace (/ IZR (unit r) * n * (IZR b * IZR (unit r))) with (n * IZR b) by (field; lra); nra.
+Qed.
+
+(** * A body and a convex set *)
+
+(** At the time [t] body [i] is [d] or more from every point of the hull of [corners], which moves with body [j]; m. *)
+Definition clear (r : run) (i j : nat) (corners : list point) (d t : R) :=
+  forall c, hull (map (place_in r) corners) c -> d <= norm (sub (position r i t) (add (position r j t) c)).
+
+Definition separates d corners n p q := (furthest n corners + root d n <= product n (minus p q))%Z.
+
+Lemma separate_first d corners o ps qs n more vectors :
+  separate d corners n (furthest n corners + root d n) more vectors ps qs = true ->
+  separates d corners n (nth 0 ps o) (nth 0 qs o).
+Proof.
+  destruct ps as [| p ps], qs as [| q qs]; intros H; try discriminate H; cbn [separate] in H; unfold beyond in H.
+  split_ifs; apply Z.leb_le; assumption.
+Qed.
+
+(** In every period there is a vector that separates the two at both of its ends. *)
+Lemma separate_means d corners k o : forall ps qs n more vectors,
+  separate d corners n (furthest n corners + root d n) more vectors ps qs = true -> (S k < length ps)%nat ->
+  exists n', separates d corners n' (nth k ps o) (nth k qs o) /\ separates d corners n' (nth (S k) ps o) (nth (S k) qs o).
+Proof.
+  induction k as [| k IH]; intros [| p ps] [| q qs] n more vectors H K; try (simpl in K; lia); try discriminate H.
+  all: pose proof (separate_first _ _ o _ _ _ _ _ H) as H0; cbn [separate] in H; split_ifs.
+  all: destruct ps as [| p' ps]; [simpl in K; lia |].
+  all: destruct more as [| more]; [destruct vectors as [| [[| more] n'] vectors] |]; try discriminate H; cbv match in H.
+  all: split_ifs.
+  - exists n'; split; [apply Z.leb_le; assumption | apply (separate_first _ _ o _ _ _ _ _ H)].
+  - exists n; split; [exact H0 | apply (separate_first _ _ o _ _ _ _ _ H)].
+  - apply (IH _ _ _ _ _ H); simpl in *; lia.
+  - apply (IH _ _ _ _ _ H); simpl in *; lia.
+Qed.
+
+Lemma furthest_is n corners c : In c corners -> (product n c <= furthest n corners)%Z.
+Proof.
+  unfold furthest; generalize (product n (hd (P 0 0 0) corners)); intros m; induction corners as [| e corners IH].
+  - intros [].
+  - intros [-> | In]; simpl; [| specialize (IH In)]; lia.
+Qed.
+
+Lemma root_sound d n : 1 <= IZR (root d n) /\ IZR d * norm (real n) <= IZR (root d n).
+Proof.
+  assert (R : (1 <= root d n)%Z) by (unfold root; lia); split; [apply IZR_le, R |].
+  assert (Q : (d * d * product n n <= root d n * root d n)%Z).
+  { unfold root; destruct (Z_le_gt_dec (d * d * product n n) 0) as [L | G]; [nia |].
+    pose proof (Z.sqrt_up_spec _ (Z.gt_lt _ _ G)); pose proof (Z.sqrt_up_nonneg (d * d * product n n)); nia. }
+  apply IZR_le in R, Q; rewrite !mult_IZR, real_product, <- norm_square in Q.
+  apply Rsqr_incr_0_var; [unfold Rsqr; nra | lra].
+Qed.
+
+Lemma separated d corners n b c k s e : 0 <= s <= 1 -> In e corners ->
+  separates d corners n (nth k (places b) (P 0 0 0)) (nth k (places c) (P 0 0 0)) ->
+  separates d corners n (nth (S k) (places b) (P 0 0 0)) (nth (S k) (places c) (P 0 0 0)) ->
+  dot (real n) (real e) + IZR (root d n) <= dot (real n) (apart_at b c k s).
+Proof.
+  intros Hs E S0 S1; apply (furthest_is n) in E; unfold separates in S0, S1; unfold apart_at, on_way; rewrite !nth_real.
+  assert (A : forall x, (furthest n corners + root d n <= product n x)%Z ->
+    dot (real n) (real e) + IZR (root d n) <= dot (real n) (real x)).
+  { intros x Hx; rewrite <- !real_product, <- plus_IZR; apply IZR_le; lia. }
+  apply A in S0, S1; rewrite real_minus in S0, S1; set (least := _ + _) in *.
+  set (w := real n) in *; set (p := real (nth k _ _)) in *; set (q := real (nth k (places c) _)) in *.
+  set (p' := real (nth (S k) (places b) _)) in *; set (q' := real (nth (S k) (places c) _)) in *.
+  replace (dot w _) with ((1 - s) * dot w (sub p q) + s * dot w (sub p' q')) by (vectors; ring); nra.
+Qed.
+
+(** ** Soundness: a body that the checker accepts keeps its distance from the whole set at all times of the run. *)
+Theorem sound_of_sets r i j corners a b vectors : well_formed r = true ->
+  keeps_clear r i j corners a b vectors = true -> forall t, begins r <= t <= ends r ->
+  clear r i j corners (IZR a / IZR b) t.
+Proof.
+  unfold keeps_clear; intros W H t Ht c Hc; split_ifs; destruct vectors as [| [[| more] m] vectors]; try discriminate H.
+  pose proof H as K; apply Z.ltb_lt, IZR_lt in Heqb0.
+  destruct (difference_at r i j t W Heqb1 Heqb2 Ht) as [k [s [Hk [Hs E]]]].
+  unfold has_rows in Heqb1; apply Nat.eqb_eq in Heqb1.
+  destruct (separate_means _ _ k (P 0 0 0) _ _ _ _ _ H ltac:(lia)) as [n [S0 S1]].
+  apply well_formed_means in W; destruct W as [_ [U _]]; set (u := IZR (unit r)) in *.
+  set (x := apart_at (body_of r i) (body_of r j) k s) in *; set (w := real n); set (d := parts_up r a b) in *.
+  assert (I : 0 < / u) by apply Rinv_0_lt_compat, U.
+  destruct (root_sound d n) as [R1 Rd]; fold w in Rd; set (rt := IZR (root d n)) in *.
+  assert (B : dot w c <= / u * (dot w x - rt)).
+  { apply (at_corners _ w _) with (2 := Hc); intros c' Hc'; apply in_map_iff in Hc'; destruct Hc' as [e [<- He]].
+    replace (dot w (place_in r e)) with (/ u * dot w (real e))
+      by (unfold place_in, metres, real, Rdiv; fold u; vectors; ring).
+    apply Rmult_le_compat_l; [lra |]; pose proof (separated d corners n _ _ k s e Hs He S0 S1).
+    fold w rt x in H0; lra. }
+  set (v := sub (position r i t) (add (position r j t) c)).
+  assert (V : / u * rt <= norm w * norm v).
+  { apply Rle_trans with (2 := proj2 (dot_le w v)).
+    replace v with (sub (scale (/ u) x) c) by (unfold v; rewrite <- E; vectors; f_equal; ring).
+    replace (dot w (sub (scale (/ u) x) c)) with (/ u * dot w x - dot w c) by (vectors; ring); lra. }
+  pose proof (norm_nonneg w); pose proof (norm_nonneg v).
+  assert (Q : IZR d <= u * norm v).
+  { assert (0 < norm w) by nra; apply Rmult_le_reg_l with (norm w); [assumption |].
+    apply (Rmult_le_compat_l u) in V; [| lra]; rewrite <- Rmult_assoc, Rinv_r, Rmult_1_l in V by lra; lra. }
+  pose proof (parts_up_sound r a b Heqb0) as A; fold d u in A.
+  apply Rmult_le_reg_r with (IZR b * u); [nra |]; replace (IZR a / IZR b * (IZR b * u)) with (IZR a * u) by (field; lra).
+  nra.
 Qed.

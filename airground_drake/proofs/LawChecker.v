@@ -190,7 +190,7 @@ Qed.
 
 Theorem obeying_keeps : forall t, begins r <= t <= ends r -> d - e / g <= norm (sub (position r i t) (position r j t)).
 Proof.
-  intros t Ht; destruct (distance_at r i j t W Ri Rj Ht) as [k [s [K [Hs ->]]]].
+  intros t Ht; destruct (difference_at r i j t W Ri Rj Ht) as [k [s [K [Hs ->]]]].
   pose proof W as U; apply well_formed_means in U; destruct U as [_ [U _]].
   pose (gap := fun _ _ : bool => norm).
   assert (At : forall l q, sampled l -> 0 <= q <= 1 ->
@@ -200,10 +200,7 @@ Proof.
   assert (At0 : forall l, sampled l -> distance bool seen gap true false (sample 1 l) = norm (offset r i j l)).
   { intros l Hl; replace (sample 1 l) with (sample 1 l + 0) by ring; rewrite At by (assumption || lra).
     f_equal; apply vec_eq; vectors; ring. }
-  replace (norm (apart_at (body_of r i) (body_of r j) k s) / IZR (unit r))
-    with (distance bool seen gap true false (sample 1 k + s)).
-  2: { rewrite At, <- offset_between, norm_scale by (assumption || apply Rlt_le, Rinv_0_lt_compat, U).
-       field; lra. }
+  rewrite offset_between, <- At by assumption.
   apply (disturbed 1 g ltac:(lra) ltac:(lra) bool seen step (fun _ => V 1 1 1) (fun _ => 0) gap
     (fun a b => a = true /\ b = false) (fun _ _ => d) (fun a _ => if a then 1 else 0)
     (fun a _ => if a then e else 0) sampled); try lra; try (split; reflexivity); auto.
