@@ -28,10 +28,10 @@ Definition keeps (r : run) (i j : nat) (a b : Z) :=
   all_steps (step_keeps (parts_up r a b) (stride u + stride v)) (places u) (places v)
   else false else false else false.
 
-(** ** A body and the convex hull of corners that move with another body
+(** ** A body and convex sets that move with another body: hulls of corners
 
-    A vector [n] separates them: the body is beyond the plane [n . x = least], [d] or more from every corner along [n].
-    A proof is a list of such vectors, each with the number of periods that it serves. *)
+    A vector [n] separates a body from a set: the body is beyond the plane [n . x = least], [d] or more from every
+    corner along [n]. A proof is a list of such vectors, each with the number of periods that it serves. *)
 Definition root (d : Z) (n : point) := Z.max 1 (Z.sqrt_up (d * d * product n n)).
 
 Definition furthest (n : point) (corners : list point) :=
@@ -56,15 +56,20 @@ Fixpoint separate d corners (n : point) (least : Z) (more : nat) (vectors : list
   | _, _ => false
   end.
 
-(** Body [i] keeps [a / b] metres from the hull of [corners], which moves with body [j]. *)
-Definition keeps_clear (r : run) (i j : nat) (corners : list point) (a b : Z) (vectors : list (nat * point)) :=
-  let d := parts_up r a b in
+(** [sets] are lists of corners, and [proofs] has one for each. *)
+Fixpoint separate_all d (sets : list (list point)) (proofs : list (list (nat * point))) ps qs :=
+  match sets, proofs with
+  | [], _ => true
+  | corners :: sets', ((more, n) :: vectors) :: proofs' =>
+      if separate d corners n (furthest n corners + root d n) more vectors ps qs
+      then separate_all d sets' proofs' ps qs else false
+  | _, _ => false
+  end.
+
+(** Body [i] keeps [a / b] metres from the hulls of [sets], which move with body [j]. *)
+Definition keeps_clear (r : run) (i j : nat) sets (a b : Z) proofs :=
   if 0 <? b then if has_rows r i then if has_rows r j then
-  match vectors with
-  | (S more, n) :: vectors' =>
-      separate d corners n (furthest n corners + root d n) more vectors' (places (body_of r i)) (places (body_of r j))
-  | _ => false
-  end
+  separate_all (parts_up r a b) sets proofs (places (body_of r i)) (places (body_of r j))
   else false else false else false.
 
 (** * What it means *)
@@ -139,16 +144,20 @@ Proof.
   unfold has_rows in *; apply Nat.eqb_eq in Ri, Rj.
   pose proof (step_sound _ _ _ k s Bi Bj ltac:(congruence) H ltac:(lia) Hs) as D.
   pose proof (parts_up_sound r a b B); apply well_formed_means in W; destruct W as [_ [U _]].
-  rewrite norm_scale by apply Rlt_le, Rinv_0_lt_compat, U; set (n := norm _) in *; apply Rmult_le_reg_r with (IZR b * IZR (unit r)); [nra |].
+  rewrite norm_scale by apply Rlt_le, Rinv_0_lt_compat, U; set (n := norm _) in *.
+  apply Rmult_le_reg_r with (IZR b * IZR (unit r)); [nra |].
   replace (IZR a / IZR b * (IZR b * IZR (unit r))) with (IZR a * IZR (unit r)) by (field; lra).
   replace (/ IZR (unit r) * n * (IZR b * IZR (unit r))) with (n * IZR b) by (field; lra); nra.
 Qed.
 
-(** * A body and a convex set *)
+(** * A body and convex sets *)
 
-(** At the time [t] body [i] is [d] or more from every point of the hull of [corners], which moves with body [j]; m. *)
-Definition clear (r : run) (i j : nat) (corners : list point) (d t : R) :=
-  forall c, hull (map (place_in r) corners) c -> d <= norm (sub (position r i t) (add (position r j t) c)).
+(** At the time [t] body [i] is [d] or more from every point of the hulls of [sets], which move with body [j]; m. *)
+Definition clear (r : run) (i j : nat) (sets : list (list point)) (d t : R) := forall corners c, In corners sets ->
+  hull (map (place_in r) corners) c -> d <= norm (sub (position r i t) (add (position r j t) c)).
+
+Lemma clear_less r i j sets d e t : e <= d -> clear r i j sets d t -> clear r i j sets e t.
+Proof. intros L H corners c I C; specialize (H corners c I C); lra. Qed.
 
 Definition separates d corners n p q := (furthest n corners + root d n <= product n (minus p q))%Z.
 
@@ -163,7 +172,8 @@ Qed.
 (** In every period there is a vector that separates the two at both of its ends. *)
 Lemma separate_means d corners k o : forall ps qs n more vectors,
   separate d corners n (furthest n corners + root d n) more vectors ps qs = true -> (S k < length ps)%nat ->
-  exists n', separates d corners n' (nth k ps o) (nth k qs o) /\ separates d corners n' (nth (S k) ps o) (nth (S k) qs o).
+  exists n', separates d corners n' (nth k ps o) (nth k qs o) /\
+    separates d corners n' (nth (S k) ps o) (nth (S k) qs o).
 Proof.
   induction k as [| k IH]; intros [| p ps] [| q qs] n more vectors H K; try (simpl in K; lia); try discriminate H.
   all: pose proof (separate_first _ _ o _ _ _ _ _ H) as H0; cbn [separate] in H; split_ifs.
@@ -208,19 +218,25 @@ Proof.
   replace (dot w _) with ((1 - s) * dot w (sub p q) + s * dot w (sub p' q')) by (vectors; ring); nra.
 Qed.
 
-(** ** Soundness: a body that the checker accepts keeps its distance from the whole set at all times of the run. *)
-Theorem sound_of_sets r i j corners a b vectors : well_formed r = true ->
-  keeps_clear r i j corners a b vectors = true -> forall t, begins r <= t <= ends r ->
-  clear r i j corners (IZR a / IZR b) t.
+Lemma separate_each d corners ps qs : forall sets proofs, separate_all d sets proofs ps qs = true -> In corners sets ->
+  exists n more vectors, separate d corners n (furthest n corners + root d n) more vectors ps qs = true.
 Proof.
-  unfold keeps_clear; intros W H t Ht c Hc; split_ifs; destruct vectors as [| [[| more] m] vectors]; try discriminate H.
-  pose proof H as K; apply Z.ltb_lt, IZR_lt in Heqb0.
+  induction sets as [| first sets IH]; intros [| [| [more n] vectors] proofs] H I; try discriminate H; destruct I.
+  all: cbn [separate_all] in H; split_ifs; subst; eauto.
+Qed.
+
+(** ** Soundness: a body that the checker accepts keeps its distance from all of the sets at all times of the run. *)
+Theorem sets_sound r i j sets a b proofs : well_formed r = true -> keeps_clear r i j sets a b proofs = true ->
+  forall t, begins r <= t <= ends r -> clear r i j sets (IZR a / IZR b) t.
+Proof.
+  unfold keeps_clear; intros W H t Ht corners c I Hc; split_ifs; apply Z.ltb_lt, IZR_lt in Heqb0.
   destruct (difference_at r i j t W Heqb1 Heqb2 Ht) as [k [s [Hk [Hs E]]]].
   unfold has_rows in Heqb1; apply Nat.eqb_eq in Heqb1.
-  destruct (separate_means _ _ k (P 0 0 0) _ _ _ _ _ H ltac:(lia)) as [n [S0 S1]].
+  destruct (separate_each _ _ _ _ _ _ H I) as [first [more [vectors K]]].
+  destruct (separate_means _ _ k (P 0 0 0) _ _ _ _ _ K ltac:(lia)) as [n [S0 S1]].
   apply well_formed_means in W; destruct W as [_ [U _]]; set (u := IZR (unit r)) in *.
   set (x := apart_at (body_of r i) (body_of r j) k s) in *; set (w := real n); set (d := parts_up r a b) in *.
-  assert (I : 0 < / u) by apply Rinv_0_lt_compat, U.
+  assert (Iu : 0 < / u) by apply Rinv_0_lt_compat, U.
   destruct (root_sound d n) as [R1 Rd]; fold w in Rd; set (rt := IZR (root d n)) in *.
   assert (B : dot w c <= / u * (dot w x - rt)).
   { apply (at_corners _ w _) with (2 := Hc); intros c' Hc'; apply in_map_iff in Hc'; destruct Hc' as [e [<- He]].
@@ -238,6 +254,6 @@ Proof.
   { assert (0 < norm w) by nra; apply Rmult_le_reg_l with (norm w); [assumption |].
     apply (Rmult_le_compat_l u) in V; [| lra]; rewrite <- Rmult_assoc, Rinv_r, Rmult_1_l in V by lra; lra. }
   pose proof (parts_up_sound r a b Heqb0) as A; fold d u in A.
-  apply Rmult_le_reg_r with (IZR b * u); [nra |]; replace (IZR a / IZR b * (IZR b * u)) with (IZR a * u) by (field; lra).
-  nra.
+  apply Rmult_le_reg_r with (IZR b * u); [nra |].
+  replace (IZR a / IZR b * (IZR b * u)) with (IZR a * u) by (field; lra); nra.
 Qed.

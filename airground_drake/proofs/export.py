@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from fractions import Fraction
-from functools import cache
-from itertools import combinations, groupby, pairwise
+from functools import cache, cached_property
+from itertools import chain, combinations, groupby, pairwise
 from math import isqrt, lcm
 from typing import NamedTuple
 
 from airground_drake.base.errors import TraceError
 from airground_drake.base.exact import decimal
 from airground_drake.proofs.record import FOLDER
+from airground_drake.proofs.separating import Prism, Vector, separating
 from airground_drake.run.trace import Trace
 from airground_drake.scenarios.schema import Scenario
 
@@ -21,6 +22,22 @@ PARTS = 2**60
 """Positions are rounded to 1/PARTS m: some coordinates are as small as 1e-100 m. At a metre binary64 is coarser."""
 
 Place = tuple[Fraction, Fraction, Fraction]
+
+
+class ConvexSet(NamedTuple):
+    """All that is over a convex outline, from the z of a body up to a height, m.
+
+    Attributes:
+        outline: corners from the body's position, counter-clockwise; two of a wall, one of a post.
+        height: 0 if the set is flat.
+    """
+
+    outline: tuple[tuple[Fraction, Fraction], ...]
+    height: Fraction = Fraction(0)
+
+    def in_parts(self, unit: int) -> Prism:
+        """The same in whole numbers of metres / unit."""
+        return Prism(tuple((int(x * unit), int(y * unit)) for x, y in self.outline), int(self.height * unit))
 
 
 class Demand(NamedTuple):
@@ -31,16 +48,18 @@ class Demand(NamedTuple):
         second: the other body.
         required_m: distance of their surfaces, m.
         radii_m: sum of their radii, m.
+        sets: name of the convex sets that are the second body without its radius; empty: it is a ball.
     """
 
     first: str
     second: str
     required_m: Fraction
     radii_m: Fraction
+    sets: str = ""
 
     @property
     def safe_m(self) -> Fraction:
-        """Distance of the centres, m, which the theorems are about."""
+        """Distance of the centres, or of a centre from convex sets, m, which the theorems are about."""
         return self.required_m + self.radii_m
 
     @property
@@ -59,6 +78,7 @@ class Recorded:
         places: of each body, m: one per row, or a single one of a body at rest. In the order of their numbers.
         demands: pairs and distances.
         gain: A h, the product of gain and control period, at most 1 (see `capped` in Safety.v).
+        sets: convex sets that bodies are, by the name that demands give them.
     """
 
     name: str
@@ -66,16 +86,37 @@ class Recorded:
     places: Mapping[str, tuple[Place, ...]]
     demands: tuple[Demand, ...]
     gain: Fraction
+    sets: Mapping[str, tuple[ConvexSet, ...]] = field(default_factory=dict)
 
-    @property
+    @cached_property
     def unit(self) -> int:
         """Common denominator of all numbers, in parts of a metre and of a second."""
         numbers: Iterable[Fraction] = (
             *self.times,
             *(demand.safe_m for demand in self.demands),
             *(axis for places in self.places.values() for place in places for axis in place),
+            *(axis for each in chain(*self.sets.values()) for axis in (each.height, *chain(*each.outline))),
         )
         return lcm(*(number.denominator for number in numbers))
+
+    @cached_property
+    def rows(self) -> Mapping[str, Sequence[Vector]]:
+        """Where each body is at each row, in whole numbers of metres / unit."""
+        unit, count = self.unit, len(self.times)
+        found = {
+            name: [(int(x * unit), int(y * unit), int(z * unit)) for x, y, z in places]
+            for name, places in self.places.items()
+        }
+        return {name: rows * count if len(rows) == 1 else rows for name, rows in found.items()}
+
+    def way(self, demand: Demand) -> list[Vector]:
+        """Where the first body of a pair is at each row as seen from the second one, in metres / unit."""
+        both = zip(self.rows[demand.first], self.rows[demand.second], strict=True)
+        return [(p[0] - q[0], p[1] - q[1], p[2] - q[2]) for p, q in both]
+
+    def prisms(self, demand: Demand) -> list[Prism]:
+        """The sets that are the second body of a pair, in metres / unit."""
+        return [each.in_parts(self.unit) for each in self.sets[demand.sets]]
 
 
 def recorded(trace: Trace) -> Recorded:
@@ -154,6 +195,11 @@ Ltac decide_distance a b :=
   intros t T; apply (Rle_trans _ (IZR a / IZR b)); [lra |];
   apply sound; [exact is_well_formed | vm_cast_no_check (eq_refl true) | exact (during t T)].
 
+(** The same for convex sets, with vectors that separate: each with the number of periods for which it does. *)
+Ltac decide_clear a b vectors :=
+  intros t T; apply (clear_less _ _ _ _ (IZR a / IZR b)); [lra |];
+  apply (sets_sound _ _ _ _ a b vectors); [exact is_well_formed | vm_cast_no_check (eq_refl true) | exact (during t T)].
+
 """
 _LAW = """\
 (** Coq computes [obeys_law], and [obeys_exactly] turns the answer into a statement about all rows. *)
@@ -166,21 +212,17 @@ Ltac decide_law num den a b :=
 def distances_file(run: Recorded) -> str:
     """The run, and the theorem that every pair keeps its distance at all times."""
     interval = f"{real(run.times[0])} <= t <= {real(run.times[-1])}"
-    claims = [
-        f"{real(demand.safe_m)} <= norm (sub (position {run.name} {demand.first} t) "
-        f"(position {run.name} {demand.second} t))"
-        for demand in run.demands
-    ]
+    claims = [_claim(run, demand) for demand in run.demands]
     lemmas = [
-        f"Lemma {demand.lemma} : forall t, {interval} ->\n  {claim}.\n"
-        f"Proof. decide_distance {ratio(demand.safe_m)}. Qed.\n\n"
+        f"Lemma {demand.lemma} : forall t, {interval} ->\n  {claim}.\nProof. {_tactic(run, demand)}. Qed.\n\n"
         for demand, claim in zip(run.demands, claims, strict=True)
     ]
     checks = _DISTANCES.format(
         run=run.name, interval=interval, start=ratio(run.times[0]), end=ratio(run.times[-1])
     )  # fmt: skip
-    together = _theorem(f"{run.name}_keeps_its_distances", f"forall t, {interval} ->", _grouped(run, claims))
-    proof = _all_of([_all_of(group) for group in _grouped(run, [f"({each.lemma} t T)" for each in run.demands])])
+    together = _theorem(f"{run.name}_keeps_its_distances", f"forall t, {interval} ->", _grouped(run.demands, claims))
+    proofs = _grouped(run.demands, [f"({each.lemma} t T)" for each in run.demands])
+    proof = _all_of([_all_of(group) for group in proofs])
     return (
         f"(** That {run.name} keeps its distances. Written by `airground prove`, from the positions in trace/. *)\n"
         "Require Import Reals Lra ZArith List.\nRequire Import Safety Run DistanceChecker.\nImport ListNotations.\n"
@@ -191,28 +233,50 @@ def distances_file(run: Recorded) -> str:
     )
 
 
+def _claim(run: Recorded, demand: Demand) -> str:
+    if demand.sets:
+        return f"clear {run.name} {demand.first} {demand.second} {demand.sets} {real(demand.safe_m)} t"
+    positions = (f"(position {run.name} {name} t)" for name in (demand.first, demand.second))
+    return f"{real(demand.safe_m)} <= norm (sub {' '.join(positions)})"
+
+
+def _tactic(run: Recorded, demand: Demand) -> str:
+    """Has Coq decide a claim."""
+    if not demand.sets:
+        return f"decide_distance {ratio(demand.safe_m)}"
+    way, safe = run.way(demand), int(demand.safe_m * run.unit)
+    proofs = (
+        "; ".join(f"({periods}%nat, {_point(vector)})" for periods, vector in separating(prism, way, safe))
+        for prism in run.prisms(demand)
+    )
+    listed = ";\n  ".join(f"[{vectors}]" for vectors in proofs)
+    return f"decide_clear {ratio(demand.safe_m)} ([\n  {listed}])%Z"
+
+
 def law_file(run: Recorded) -> str:
-    """The theorem that every pair of the run obeys the avoidance law, without error."""
+    """The theorem that every two balls of the run obey the avoidance law, without error."""
     g = real(run.gain)
-    claims = [f"obeys {run.name} {g} {demand.first} {demand.second} {real(demand.safe_m)} 0" for demand in run.demands]
+    balls = [demand for demand in run.demands if not demand.sets]
+    claims = [f"obeys {run.name} {g} {demand.first} {demand.second} {real(demand.safe_m)} 0" for demand in balls]
     lemmas = [
         f"Lemma {demand.lemma}_obey : {claim}.\nProof. decide_law {ratio(run.gain)} {ratio(demand.safe_m)}. Qed.\n\n"
-        for demand, claim in zip(run.demands, claims, strict=True)
+        for demand, claim in zip(balls, claims, strict=True)
     ]
-    proof = _all_of([_all_of(group) for group in _grouped(run, [f"{each.lemma}_obey" for each in run.demands])])
+    proof = _all_of([_all_of(group) for group in _grouped(balls, [f"{each.lemma}_obey" for each in balls])])
+    pairs = "All pairs" if len(balls) == len(run.demands) else "All pairs of balls, none with walls and polygons"
     return (
         f"(** That {run.name} obeys the avoidance law. Written by `airground prove`, from the positions in trace/. *)\n"
         f"Require Import Reals Lra ZArith.\nRequire Import Safety Run LawChecker {run.name}.\n"
         f"Local Open Scope R_scope.\n\n{_LAW}{''.join(lemmas)}"
-        f"(** All pairs: A h, bodies, distance of centres in m, error in m per step. *)\n"
-        f"{_theorem(f'{run.name}_obeys_the_law', '', _grouped(run, claims))}Proof. exact {proof}. Qed.\n\n"
+        f"(** {pairs}: A h, bodies, distance of centres in m, error in m per step. *)\n"
+        f"{_theorem(f'{run.name}_obeys_the_law', '', _grouped(balls, claims))}Proof. exact {proof}. Qed.\n\n"
         f"Print Assumptions {run.name}_obeys_the_law.\n"
     )
 
 
-def _grouped(run: Recorded, texts: Sequence[str]) -> list[list[str]]:
+def _grouped(demands: Sequence[Demand], texts: Sequence[str]) -> list[list[str]]:
     """One text per pair, by the first body: Coq takes a time quadratic in the length of each conjunction."""
-    pairs = groupby(zip(run.demands, texts, strict=True), key=lambda each: each[0].first)
+    pairs = groupby(zip(demands, texts, strict=True), key=lambda each: each[0].first)
     return [[text for _, text in group] for _, group in pairs]
 
 
@@ -227,35 +291,37 @@ def _all_of(proofs: Sequence[str]) -> str:
 
 
 def _data(run: Recorded) -> str:
-    """The integers: bodies, their numbers, times."""
+    """The integers: bodies, their numbers, convex sets, times."""
     unit = run.unit
-
-    def whole(number: Fraction) -> str:
-        parts = int(number * unit)
-        return f"-{-parts:#x}" if parts < 0 else f"{parts:#x}"
-
-    def point(place: Place) -> str:
-        return "P " + " ".join(f"({text})" if text.startswith("-") else text for text in map(whole, place))
-
     out = [f"(** Positions at the rows, in parts: {unit} parts are 1 m. *)\n"]
-    for name, places in run.places.items():
-        if len(places) == 1:
-            out.append(f"Definition {name}_places := at_rest {len(run.times)} ({point(places[0])}).\n")
+    for name, rows in run.rows.items():
+        if len(run.places[name]) == 1:
+            out.append(f"Definition {name}_places := at_rest {len(rows)} ({_point(rows[0])}).\n")
         else:
-            rows = ";\n".join(map(point, places))
-            out.append(f"Definition {name}_places := Body {_stride(places, unit):#x} [\n{rows}].\n")
+            listed = ";\n".join(map(_point, rows))
+            out.append(f"Definition {name}_places := Body {_stride(rows):#x} [\n{listed}].\n")
     out += [f"Definition {name} := {k}%nat.\n" for k, name in enumerate(run.places)]
-    times = ";\n".join(map(whole, run.times))
+    for name, sets in run.sets.items():
+        corners = ("; ".join(map(_point, each.in_parts(unit).corners)) for each in sets)
+        listed = ";\n".join(f"[{each}]" for each in corners)
+        out.append(f"(** Corners of convex sets, from where their body is. *)\nDefinition {name} := [\n{listed}].\n")
+    times = ";\n".join(_whole(int(time * unit)) for time in run.times)
     bodies = "; ".join(f"{name}_places" for name in run.places)
     out.append(f"Definition {run.name} := Run {unit:#x} [\n{times}] [\n{bodies}].\n\n")
     return "".join(out)
 
 
-def _stride(places: Sequence[Place], unit: int) -> int:
+def _whole(number: int) -> str:
+    return f"-{-number:#x}" if number < 0 else f"{number:#x}"
+
+
+def _point(place: Vector) -> str:
+    return "P " + " ".join(f"({text})" if text.startswith("-") else text for text in map(_whole, place))
+
+
+def _stride(rows: Sequence[Vector]) -> int:
     """The longest step, parts, rounded up."""
-    square = max(
-        sum((int(b * unit) - int(a * unit)) ** 2 for a, b in zip(p, q, strict=True)) for p, q in pairwise(places)
-    )
+    square = max(sum((b - a) ** 2 for a, b in zip(p, q, strict=True)) for p, q in pairwise(rows))
     root = isqrt(square)
     return root + (root * root < square)
 

@@ -1,0 +1,206 @@
+"""Vectors that separate a point on its way from a convex set, in whole numbers: what DistanceChecker.v takes as proof."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from fractions import Fraction
+from itertools import product
+from math import gcd, isqrt
+from typing import NamedTuple
+
+import numpy as np
+
+from airground_drake.base.arrays import Array
+
+Vector = tuple[int, int, int]
+Stretch = tuple[int, Vector]
+"""A number of periods, and the vector that separates during all of them."""
+
+FINE = 2**30
+"""Length of rounded vectors. Where the loss, about the distance over FINE squared, is too much, exact ones are taken."""
+TRIES = 8
+"""How often a longer stretch is looked for."""
+
+
+class Prism(NamedTuple):
+    """A convex set: what is over a convex outline, from z = 0 up to a height. All in parts of a metre.
+
+    Attributes:
+        outline: its corners, counter-clockwise; two of a wall, one of a post.
+        height: 0 if the set is flat.
+    """
+
+    outline: tuple[tuple[int, int], ...]
+    height: int = 0
+
+    @property
+    def levels(self) -> list[int]:
+        """The heights of its corners."""
+        return [*dict.fromkeys((0, self.height))]
+
+    @property
+    def corners(self) -> list[Vector]:
+        """The set is the convex hull of them."""
+        return [(x, y, z) for z in self.levels for x, y in self.outline]
+
+    @property
+    def edges(self) -> list[tuple[Vector, Vector]]:
+        """A corner and the vector along the edge to another one."""
+        sides = [*zip(self.outline, (*self.outline[1:], self.outline[0]), strict=True)]
+        flat = [((*a, z), (b[0] - a[0], b[1] - a[1], 0)) for z in self.levels for a, b in sides if a != b]
+        upright = [((*a, 0), (0, 0, self.height)) for a in self.outline if self.height]
+        return flat + upright
+
+    @property
+    def normals(self) -> list[Vector]:
+        """Of its faces, outwards, and of its outline."""
+        sides = [_reduced((y, -x, 0)) for _, (x, y, _) in self.edges if x or y]
+        return [*dict.fromkeys(sides), (0, 0, 1), (0, 0, -1)]
+
+    def nearest(self, points: Array) -> Array:
+        """The points of the set that are nearest to others, in floating point; both (k, 3)."""
+        outline = np.array(self.outline, dtype=np.float64)
+        found = points.copy()
+        best = np.full(len(points), np.inf)
+        outside = np.full(len(points), len(outline) < 3)
+        for begin, end in zip(outline, np.roll(outline, -1, axis=0), strict=True):
+            side, to = end - begin, points[:, :2] - begin
+            along = np.clip(to @ side / max(side @ side, np.finfo(float).tiny), 0.0, 1.0)
+            place = begin + along[:, None] * side
+            apart = np.linalg.norm(points[:, :2] - place, axis=1)
+            found[apart < best, :2] = place[apart < best]
+            best = np.minimum(best, apart)
+            outside |= side[0] * to[:, 1] - side[1] * to[:, 0] < 0.0
+        found[~outside, :2] = points[~outside, :2]
+        found[:, 2] = np.clip(points[:, 2], 0.0, self.height)
+        return found
+
+
+def separating(prism: Prism, way: Sequence[Vector], safe: int) -> list[Stretch]:
+    """Vectors that show that a point keeps a distance on its way, each for as many periods as one is found to serve.
+
+    Args:
+        prism: the set, at rest.
+        way: places of the point at the rows, two or more; straight in between. Parts.
+        safe: the distance, parts.
+
+    Returns:
+        Stretches that make up the way. If the distance is not kept, the last one serves the rest of it, and is wrong.
+    """
+    search = _Search(prism, way, safe)
+    found = list[Stretch]()
+    row, last = 0, len(way) - 1
+    while row < last:
+        end, vector = search.longest(row)
+        if end == row:
+            _, vector = apart(prism, way[row], way[row + 1])
+            end = search.end(vector, row)
+        if end == row:
+            return [*found, (last - row, vector)]
+        found.append((end - row, vector))
+        row = end
+    return found
+
+
+class _Search:
+    """The rows of a way that a vector serves."""
+
+    def __init__(self, prism: Prism, way: Sequence[Vector], safe: int) -> None:
+        self._corners, self._way, self._safe = prism.corners, way, safe
+        self._rows = np.array(way, dtype=np.float64)
+        offsets = self._rows - prism.nearest(self._rows)
+        self._apart = np.linalg.norm(offsets, axis=1)
+        self._away = offsets / np.maximum(self._apart, np.finfo(float).tiny)[:, None]
+        self._normals = prism.normals
+        self._doubt = 1e-12 * max(np.abs(self._rows).max(), np.abs(np.array(self._corners, dtype=float)).max(), safe)
+
+    def longest(self, row: int) -> tuple[int, Vector]:
+        """The last row of the longest stretch found that begins at a row, and its vector."""
+        nearest = row + int(np.argmin(self._apart[row:]))
+        tried = [*self._normals, self._rounded(self._away[row]), self._rounded(self._away[nearest])]
+        best = max(((self.end(vector, row), vector) for vector in tried), key=lambda each: each[0])
+        for _ in range(TRIES):
+            if (end := best[0]) == len(self._way) - 1:
+                break
+            worst = row + int(np.argmin(self._apart[row : end + 2]))
+            between = self._away[[row, end + 1, worst, (row + end) // 2]]
+            tried = [self._rounded(each) for each in (*between, between[0] + between[1], between[1] + between[2])]
+            best = max(best, *((self.end(vector, row), vector) for vector in tried), key=lambda each: each[0])
+            if best[0] == end:
+                break
+        return best
+
+    def end(self, vector: Vector, row: int) -> int:
+        """The last row up to which a vector serves, from a row on; that row itself if it serves no period."""
+        if not any(vector):
+            return row
+        along = max(_dot(vector, corner) for corner in self._corners)
+        least = along + max(1, _root_up(self._safe**2 * _dot(vector, vector)))
+        direction = np.array(vector, dtype=np.float64)
+        beyond = self._rows[row:] @ direction - float(least)
+        doubt = self._doubt * np.linalg.norm(direction)
+        for k in np.flatnonzero(beyond <= doubt).tolist():
+            if beyond[k] < -doubt or _dot(vector, self._way[row + k]) < least:
+                return row + max(k - 1, 0)
+        return len(self._way) - 1
+
+    def _rounded(self, direction: Array) -> Vector:
+        x, y, z = (round(axis * FINE) for axis in direction.tolist())
+        return _reduced((x, y, z))
+
+
+def apart(prism: Prism, begin: Vector, end: Vector) -> tuple[Fraction, Vector]:
+    """The least distance of a set from a point that moves straight from one place to another, squared, in parts.
+
+    Returns:
+        The square, 0 if they meet, and the vector that separates them: the direction of the distance.
+    """
+    best = (Fraction(0), (0, 0, 0))
+    corners = prism.corners
+    for vector in _directions(prism, begin, end):
+        reach = min(_dot(vector, begin), _dot(vector, end)) - max(_dot(vector, corner) for corner in corners)
+        if reach > 0:
+            best = max(best, (Fraction(reach * reach, _dot(vector, vector)), vector))
+    return best
+
+
+def _directions(prism: Prism, begin: Vector, end: Vector) -> Iterator[Vector]:
+    """The direction of the distance is among them: of a corner, edge or face from an end of the way or all of it."""
+    way = _minus(end, begin)
+    for corner in prism.corners:
+        to = _minus(begin, corner)
+        yield from (to, _minus(end, corner))
+        yield _minus(_times(_dot(way, way), to), _times(_dot(to, way), way))
+    for (corner, edge), place in product(prism.edges, (begin, end)):
+        to = _minus(place, corner)
+        yield _minus(_times(_dot(edge, edge), to), _times(_dot(to, edge), edge))
+        across = _cross(way, edge)
+        yield from (across, _times(-1, across))
+    yield from prism.normals
+
+
+def _minus(a: Vector, b: Vector) -> Vector:
+    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
+
+
+def _times(s: int, a: Vector) -> Vector:
+    return s * a[0], s * a[1], s * a[2]
+
+
+def _dot(a: Vector, b: Vector) -> int:
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+def _cross(a: Vector, b: Vector) -> Vector:
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+
+
+def _reduced(a: Vector) -> Vector:
+    common = gcd(*a) or 1
+    return a[0] // common, a[1] // common, a[2] // common
+
+
+def _root_up(square: int) -> int:
+    """The square root, rounded up."""
+    root = isqrt(square)
+    return root + (root * root < square)
