@@ -4,19 +4,22 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import MISSING, dataclass, field, fields
 from fractions import Fraction
 from functools import cache, cached_property
-from itertools import chain, combinations, groupby, pairwise
+from itertools import chain, combinations, groupby, pairwise, product
 from math import isqrt, lcm
 from typing import NamedTuple
 
+from airground_drake.base.arrays import Array
 from airground_drake.base.errors import TraceError
 from airground_drake.base.exact import decimal
+from airground_drake.geometry import convex
 from airground_drake.proofs.record import FOLDER
 from airground_drake.proofs.separating import Prism, Vector, separating
 from airground_drake.run.trace import Trace
 from airground_drake.scenarios.schema import Scenario
+from airground_drake.scenarios.shapes import outlines_of
 
 PARTS = 2**60
 """Positions are rounded to 1/PARTS m: some coordinates are as small as 1e-100 m. At a metre binary64 is coarser."""
@@ -25,19 +28,22 @@ Place = tuple[Fraction, Fraction, Fraction]
 
 
 class ConvexSet(NamedTuple):
-    """All that is over a convex outline, from the z of a body up to a height, m.
+    """All between two heights that is over a convex outline, m from where its body is.
 
     Attributes:
-        outline: corners from the body's position, counter-clockwise; two of a wall, one of a post.
-        height: 0 if the set is flat.
+        outline: corners, counter-clockwise; two of a wall, one of a post.
+        base: lowest z.
+        top: highest z; the base if the set is flat.
     """
 
     outline: tuple[tuple[Fraction, Fraction], ...]
-    height: Fraction = Fraction(0)
+    base: Fraction = Fraction(0)
+    top: Fraction = Fraction(0)
 
     def in_parts(self, unit: int) -> Prism:
         """The same in whole numbers of metres / unit."""
-        return Prism(tuple((int(x * unit), int(y * unit)) for x, y in self.outline), int(self.height * unit))
+        outline = tuple((int(x * unit), int(y * unit)) for x, y in self.outline)
+        return Prism(outline, int(self.base * unit), int(self.top * unit))
 
 
 class Demand(NamedTuple):
@@ -48,14 +54,15 @@ class Demand(NamedTuple):
         second: the other body.
         required_m: distance of their surfaces, m.
         radii_m: sum of their radii, m.
-        sets: name of the convex sets that are the second body without its radius; empty: it is a ball.
+        core: what the second body is without its radius: "" for a point, "ground" for flat convex sets, "solid" for
+            prisms.
     """
 
     first: str
     second: str
     required_m: Fraction
     radii_m: Fraction
-    sets: str = ""
+    core: str = ""
 
     @property
     def safe_m(self) -> Fraction:
@@ -66,6 +73,11 @@ class Demand(NamedTuple):
     def lemma(self) -> str:
         """Name of the lemma about it."""
         return f"{self.first}_and_{self.second}"
+
+    @property
+    def sets(self) -> str:
+        """Name of the convex sets that are the second body."""
+        return f"{self.second}_{self.core}"
 
 
 @dataclass(frozen=True)
@@ -78,7 +90,7 @@ class Recorded:
         places: of each body, m: one per row, or a single one of a body at rest. In the order of their numbers.
         demands: pairs and distances.
         gain: A h, the product of gain and control period, at most 1 (see `capped` in Safety.v).
-        sets: convex sets that bodies are, by the name that demands give them.
+        sets: the convex sets of demands, by name, from where their body is.
     """
 
     name: str
@@ -95,7 +107,7 @@ class Recorded:
             *self.times,
             *(demand.safe_m for demand in self.demands),
             *(axis for places in self.places.values() for place in places for axis in place),
-            *(axis for each in chain(*self.sets.values()) for axis in (each.height, *chain(*each.outline))),
+            *(axis for each in chain(*self.sets.values()) for axis in (each.base, each.top, *chain(*each.outline))),
         )
         return lcm(*(number.denominator for number in numbers))
 
@@ -115,54 +127,102 @@ class Recorded:
         return [(p[0] - q[0], p[1] - q[1], p[2] - q[2]) for p, q in both]
 
     def prisms(self, demand: Demand) -> list[Prism]:
-        """The sets that are the second body of a pair, in metres / unit."""
-        return [each.in_parts(self.unit) for each in self.sets[demand.sets]]
+        """The sets that are the second body of a pair, in metres / unit; for a ball its centre."""
+        return [each.in_parts(self.unit) for each in self.sets[demand.sets]] if demand.core else [Prism(((0, 0),))]
 
 
 def recorded(trace: Trace) -> Recorded:
     """A run with its positions rounded to 1/PARTS m; nothing else is rounded.
 
     Raises:
-        TraceError: if a column is missing or not finite, or an obstacle appears under way.
+        TraceError: if a column is missing or not finite, or no theorem is about a body of the scenario.
     """
-    control = trace.scenario.control
-    if late := [name for name, obstacle in trace.scenario.obstacles.items() if obstacle.appears_s]:
-        raise TraceError(
-            f"run {trace.run}: {late[0]} appears under way; theorems are about bodies that are always there"
-        )
-    places: dict[str, tuple[Place, ...]] = {
-        name: (_rounded(obstacle.position_m),) for name, obstacle in trace.scenario.obstacles.items()
-    }
+    refuse_unknown(trace)
+    scenario, control = trace.scenario, trace.scenario.control
+    outlines = {name: outlines_of(scenario, obstacle) for name, obstacle in scenario.barriers.items()}
+    places: dict[str, tuple[Place, ...]] = {name: (_centre(rows),) for name, rows in outlines.items()}
     places |= {robot: tuple(map(_rounded, trace.position(robot).tolist())) for robot in trace.robots}
     spelled = _spelled(list(places))
+    wanted = [each._replace(first=spelled[each.first], second=spelled[each.second]) for each in demands(scenario)]
+    names = dict(zip(spelled.values(), spelled, strict=True))
     return Recorded(
         name=f"run_{trace.run}",
         times=tuple(map(Fraction, trace.t.tolist())),
         places={spelled[name]: place for name, place in places.items()},
-        demands=tuple(
-            each._replace(first=spelled[each.first], second=spelled[each.second]) for each in demands(trace.scenario)
-        ),
+        demands=tuple(wanted),
         gain=min(decimal(control.avoidance_gain_1_s) * decimal(control.period_s), Fraction(1)),
+        sets={each.sets: _sets(outlines[names[each.second]], each.core) for each in wanted if each.core},
     )
+
+
+_COVERED = frozenset(
+    {"start_m", "target_m", "preset", "max_speed_m_s", "radius_m", "name", "altitude_m", "task", "phantoms_m"}
+    | {"position_m", "known_to_uav", "polygon_m", "segment_m", "size_m", "heading_rad", "height_m", "distance_m"}
+)
+"""Keys of bodies that theorems take into account, or need not."""
+
+
+def refuse_unknown(trace: Trace) -> None:
+    """Refuse a run with a body that no theorem is about.
+
+    Raises:
+        TraceError: with the first such body, and the key of the scenario that makes it so.
+    """
+    for name, body in trace.scenario.bodies.items():
+        for key in fields(body):
+            given, default = getattr(body, key.name), key.default
+            default = default if key.default_factory is MISSING else key.default_factory()
+            if key.name not in _COVERED and given != default:
+                raise TraceError(f"run {trace.run}: {name} has {key.name}; no theorem is about such a body")
+
+
+def _is_ball(rows: Array) -> bool:
+    return len(rows) == 1 and rows[0, convex.COUNT] == 1 and rows[0, convex.BASE] == rows[0, convex.TOP]
+
+
+def _centre(rows: Array) -> Place:
+    """The centre of a ball; convex sets are given in the frame of the world."""
+    [x, y], *_ = convex.corners_of(rows[0]).tolist()
+    return _rounded((x, y, float(rows[0, convex.BASE])) if _is_ball(rows) else (0.0, 0.0, 0.0))
+
+
+def _sets(rows: Array, core: str) -> tuple[ConvexSet, ...]:
+    """The cores of outlines: for UGVs all walls are endless, and they are as flat as the ground."""
+    outlines = [tuple((_round(x), _round(y)) for x, y in convex.corners_of(row).tolist()) for row in rows]
+    if core == "ground":
+        return tuple(map(ConvexSet, outlines))
+    heights = [(_round(base), _round(top)) for base, top in rows[:, [convex.BASE, convex.TOP]].tolist()]
+    return tuple(ConvexSet(outline, *between) for outline, between in zip(outlines, heights, strict=True))
 
 
 def demands(scenario: Scenario) -> list[Demand]:
     """Who is to keep which distance from whom: each robot from each obstacle, and each two robots."""
-    robots, safe, uav = scenario.robots, scenario.safe_distance, scenario.uav.name
-    radius = {name: decimal(body.radius_m) for name, body in scenario.bodies.items()}
-    found = [(robot, obstacle, safe.obstacle_m) for robot in robots for obstacle in scenario.obstacles]
-    found += [(*two, safe.air_ground_m if uav in two else safe.ugv_m) for two in combinations(robots, 2)]
-    return [Demand(one, other, decimal(apart), radius[one] + radius[other]) for one, other, apart in found]
+    safe, uav = scenario.safe_distance, scenario.uav.name
+    radius = {name: decimal(robot.radius_m) for name, robot in scenario.robots.items()}
+    outlines = {name: outlines_of(scenario, obstacle) for name, obstacle in scenario.barriers.items()}
+    found = []
+    for (robot, own), (name, rows) in product(radius.items(), outlines.items()):
+        core = "" if _is_ball(rows) else "solid" if robot == uav else "ground"
+        gap, rounding = map(decimal, rows[0, [convex.GAP, convex.RADIUS]])
+        found.append(Demand(robot, name, gap, own + rounding, core))
+    for one, other in combinations(radius, 2):
+        apart = decimal(safe.air_ground_m if uav in (one, other) else safe.ugv_m)
+        found.append(Demand(one, other, apart, radius[one] + radius[other]))
+    return found
 
 
 def _rounded(place: Sequence[float]) -> Place:
-    x, y, z = (Fraction(round(Fraction(axis) * PARTS), PARTS) for axis in place)
+    x, y, z = map(_round, place)
     return x, y, z
+
+
+def _round(axis: float) -> Fraction:
+    return Fraction(round(Fraction(axis) * PARTS), PARTS)
 
 
 def _spelled(names: list[str]) -> dict[str, str]:
     """Names for Coq: as they are if that is a free identifier, else by number."""
-    plain = re.compile(r"(?!run_|body_number_)(?!\w*(_and_|_places\b))[A-Za-z]\w*", re.ASCII)
+    plain = re.compile(r"(?!run_|body_number_)(?!\w*(_and_|_(places|ground|solid)\b))[A-Za-z]\w*", re.ASCII)
     return {
         name: name if plain.fullmatch(name) and name not in _taken() else f"body_number_{k}"
         for k, name in enumerate(names)
@@ -234,7 +294,7 @@ def distances_file(run: Recorded) -> str:
 
 
 def _claim(run: Recorded, demand: Demand) -> str:
-    if demand.sets:
+    if demand.core:
         return f"clear {run.name} {demand.first} {demand.second} {demand.sets} {real(demand.safe_m)} t"
     positions = (f"(position {run.name} {name} t)" for name in (demand.first, demand.second))
     return f"{real(demand.safe_m)} <= norm (sub {' '.join(positions)})"
@@ -242,7 +302,7 @@ def _claim(run: Recorded, demand: Demand) -> str:
 
 def _tactic(run: Recorded, demand: Demand) -> str:
     """Has Coq decide a claim."""
-    if not demand.sets:
+    if not demand.core:
         return f"decide_distance {ratio(demand.safe_m)}"
     way, safe = run.way(demand), int(demand.safe_m * run.unit)
     proofs = (
@@ -256,7 +316,7 @@ def _tactic(run: Recorded, demand: Demand) -> str:
 def law_file(run: Recorded) -> str:
     """The theorem that every two balls of the run obey the avoidance law, without error."""
     g = real(run.gain)
-    balls = [demand for demand in run.demands if not demand.sets]
+    balls = [demand for demand in run.demands if not demand.core]
     claims = [f"obeys {run.name} {g} {demand.first} {demand.second} {real(demand.safe_m)} 0" for demand in balls]
     lemmas = [
         f"Lemma {demand.lemma}_obey : {claim}.\nProof. decide_law {ratio(run.gain)} {ratio(demand.safe_m)}. Qed.\n\n"

@@ -1,7 +1,8 @@
 """Reads an exported Coq file back and compares it with the run.
 
 Coq cannot see whether the numbers in the file are the recorded ones. This module takes the file apart by its own
-patterns. From the exporter it uses only `demands`: who keeps which distance from whom.
+patterns. From the exporter it uses only `demands`: who keeps which distance from whom. Corners are compared with the
+shapes of the scenario.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from typing import NamedTuple
 from airground_drake.base.errors import AirgroundError
 from airground_drake.proofs.export import PARTS, demands
 from airground_drake.run.trace import Trace
+from airground_drake.scenarios.shapes import convex_parts
 
 
 class ReadbackError(AirgroundError):
@@ -39,7 +41,11 @@ def compare(text: str, trace: Trace) -> RereadError:
     unit, times, listed = _parts(rf"^Definition {run} := Run (\w+) \[\n(.*?)\] \[\n(.*?)\]\.$", text)
     if [Fraction(int(t, 0), int(unit, 0)) for t in times.split(";\n")] != [Fraction(t) for t in trace.t.tolist()]:
         raise ReadbackError(f"{run}: the times are not those of the trace")
-    recorded = {name: [obstacle.position_m] for name, obstacle in trace.scenario.obstacles.items()}
+    shapes = {name: convex_parts(obstacle) for name, obstacle in trace.scenario.barriers.items()}
+    recorded = {
+        name: [obstacle.position_m if shapes[name] is None else [0.0] * 3]
+        for name, obstacle in trace.scenario.barriers.items()
+    }
     recorded |= {robot: trace.position(robot).tolist() for robot in trace.robots}
     bodies = [name.removesuffix("_places") for name in listed.split("; ")]
     numbers = re.findall(r"^Definition (\w+) := (\d+)%nat\.$", text, re.MULTILINE)
@@ -49,10 +55,16 @@ def compare(text: str, trace: Trace) -> RereadError:
     for body, places in zip(bodies, recorded.values(), strict=True):
         said = _coordinates(body, text, len(trace.t), int(unit, 0), len(places))
         off += [abs(one - Fraction(axis)) for one, axis in zip(said, chain(*places), strict=True)]
+    spelled = dict(zip(recorded, bodies, strict=True))
+    asked = demands(trace.scenario)
+    for name, core in dict.fromkeys((each.second, each.core) for each in asked if each.core):
+        top = trace.scenario.barriers[name].height_m if core == "solid" else 0.0
+        parts = [[(*corner, z) for z in dict.fromkeys((0.0, top)) for corner in part] for part in shapes[name] or []]
+        off += _off_corners(f"{spelled[name]}_{core}", text, int(unit, 0), parts)
     if max(off) > Fraction(1, 2 * PARTS):
         raise ReadbackError(f"{run}: a position differs from the trace by {float(max(off)):.3g} m")
-    spelled = dict(zip(recorded, bodies, strict=True))
-    wanted = [(spelled[each.first], spelled[each.second], each.safe_m) for each in demands(trace.scenario)]
+    named = [each._replace(first=spelled[each.first], second=spelled[each.second]) for each in asked]
+    wanted = [(each.first, each.second, each.sets if each.core else "", each.safe_m) for each in named]
     _compare_statement(run, text, trace, wanted)
     return RereadError(sum(each > 0 for each in off), float(max(off)))
 
@@ -60,13 +72,29 @@ def compare(text: str, trace: Trace) -> RereadError:
 def _coordinates(body: str, text: str, rows: int, unit: int, places: int) -> list[Fraction]:
     """All coordinates of a body in the file, m."""
     [what] = _parts(rf"^Definition {body}_places := (.*?)\.$", text)
-    points = re.findall(r"\bP (\(?-?\w+\)?) (\(?-?\w+\)?) (\(?-?\w+\)?)", what)
+    points = _points(what, unit)
     if len(points) != places or not what.startswith("Body " if places > 1 else f"at_rest {rows} "):
         raise ReadbackError(f"{body}: {len(points)} places in the file, {places} in the trace")
-    return [Fraction(int(axis.strip("()"), 0), unit) for point in points for axis in point]
+    return [*chain(*points)]
 
 
-def _compare_statement(run: str, text: str, trace: Trace, wanted: Sequence[tuple[str, str, Fraction]]) -> None:
+def _off_corners(sets: str, text: str, unit: int, parts: Sequence[Sequence[Sequence[float]]]) -> list[Fraction]:
+    """By how much the corners of convex sets in the file differ from those of the scenario, m."""
+    [what] = _parts(rf"^Definition {sets} := \[\n(.*?)\]\.$", text)
+    said = [_points(each, unit) for each in what.split(";\n")]
+    if [len(each) for each in said] != [len(part) for part in parts]:
+        raise ReadbackError(f"{sets}: the sets in the file have other corners than the shape in the scenario")
+    pairs = zip(chain(*chain(*said)), chain(*chain(*parts)), strict=True)
+    return [abs(one - Fraction(axis)) for one, axis in pairs]
+
+
+def _points(text: str, unit: int) -> list[list[Fraction]]:
+    """All points in a part of the file, m."""
+    points = re.findall(r"\bP (\(?-?\w+\)?) (\(?-?\w+\)?) (\(?-?\w+\)?)", text)
+    return [[Fraction(int(axis.strip("()"), 0), unit) for axis in point] for point in points]
+
+
+def _compare_statement(run: str, text: str, trace: Trace, wanted: Sequence[tuple[str, str, str, Fraction]]) -> None:
     """The theorem at the end is about all of the run's time and every pair, with its full distance."""
     number = r"(\d+|\(\d+ / \d+\))"
     start, end, body = _parts(
@@ -74,8 +102,12 @@ def _compare_statement(run: str, text: str, trace: Trace, wanted: Sequence[tuple
     )
     if [_value(start), _value(end)] != [Fraction(trace.t[0]), Fraction(trace.t[-1])]:
         raise ReadbackError(f"{run}: the theorem is not about all of the run's time")
-    claim = re.compile(rf"{number} <= norm \(sub \(position {run} (\w+) t\) \(position {run} (\w+) t\)\)")
-    claims = [(first, second, _value(safe)) for safe, first, second in claim.findall(body)]
+    balls = rf"{number} <= norm \(sub \(position {run} (\w+) t\) \(position {run} (\w+) t\)\)"
+    claim = re.compile(rf"{balls}|clear {run} (\w+) (\w+) (\w+) {number} t")
+    claims = [
+        (one or first, other or second, sets, _value(apart or safe))
+        for apart, one, other, first, second, sets, safe in claim.findall(body)
+    ]
     between = claim.sub("", body)  # has to be conjunctions and their parentheses alone
     if claims != list(wanted) or re.sub(r"[\s()]", "", between) != "/\\" * (len(claims) - 1):
         raise ReadbackError(f"{run}: the theorem does not claim the scenario's distance of every pair")

@@ -14,7 +14,15 @@ from airground_drake.base import files
 from airground_drake.base.errors import FolderError, TraceError, UnknownNameError, one_line
 from airground_drake.base.statuses import NOTHING, declared
 from airground_drake.proofs import coq, readback
-from airground_drake.proofs.export import Demand, Recorded, demands, distances_file, law_file, recorded
+from airground_drake.proofs.export import (
+    Demand,
+    Recorded,
+    demands,
+    distances_file,
+    law_file,
+    recorded,
+    refuse_unknown,
+)
 from airground_drake.proofs.record import FOLDER, digest
 from airground_drake.proofs.too_near import TooNear, too_near
 from airground_drake.run import trace
@@ -169,7 +177,7 @@ def prove_report(report: Path, names: Sequence[str] = (), limit_s: float = coq.L
     Raises:
         FolderError: if its folder `proofs` is a link.
         UnknownNameError: if the report has no run with a name in `names`.
-        TraceError: if a trace cannot be read.
+        TraceError: if a trace cannot be read, or no theorem is about a body of its scenario.
         CoqError: if a theory is not accepted.
         NoCoqError: if Coq is not installed.
         OSError: if the folder cannot be written.
@@ -186,6 +194,7 @@ def prove_report(report: Path, names: Sequence[str] = (), limit_s: float = coq.L
     for name, run in runs.items():
         if run.run != name or not re.fullmatch(r"\w+", name, re.ASCII):
             raise TraceError(one_line(f"{report / 'trace' / name}: the trace is of run {run.run!r}"))
+        refuse_unknown(run)
     found: list[Proved] = []
     with workshop(limit_s) as place:
         for name, run in runs.items():

@@ -1,4 +1,4 @@
-"""Vectors that separate a point on its way from a convex set, in whole numbers: what DistanceChecker.v takes as proof."""
+"""Vectors that separate a point on its way from a convex set, in whole numbers: proofs for DistanceChecker.v."""
 
 from __future__ import annotations
 
@@ -17,26 +17,28 @@ Stretch = tuple[int, Vector]
 """A number of periods, and the vector that separates during all of them."""
 
 FINE = 2**30
-"""Length of rounded vectors. Where the loss, about the distance over FINE squared, is too much, exact ones are taken."""
+"""Length of rounded vectors. They lose about the distance / FINE^2; where that is too much, exact ones are taken."""
 TRIES = 8
 """How often a longer stretch is looked for."""
 
 
 class Prism(NamedTuple):
-    """A convex set: what is over a convex outline, from z = 0 up to a height. All in parts of a metre.
+    """A convex set: all between two heights that is over a convex outline. In parts of a metre.
 
     Attributes:
         outline: its corners, counter-clockwise; two of a wall, one of a post.
-        height: 0 if the set is flat.
+        base: lowest z.
+        top: highest z; the base if the set is flat.
     """
 
     outline: tuple[tuple[int, int], ...]
-    height: int = 0
+    base: int = 0
+    top: int = 0
 
     @property
     def levels(self) -> list[int]:
         """The heights of its corners."""
-        return [*dict.fromkeys((0, self.height))]
+        return [*dict.fromkeys((self.base, self.top))]
 
     @property
     def corners(self) -> list[Vector]:
@@ -48,7 +50,7 @@ class Prism(NamedTuple):
         """A corner and the vector along the edge to another one."""
         sides = [*zip(self.outline, (*self.outline[1:], self.outline[0]), strict=True)]
         flat = [((*a, z), (b[0] - a[0], b[1] - a[1], 0)) for z in self.levels for a, b in sides if a != b]
-        upright = [((*a, 0), (0, 0, self.height)) for a in self.outline if self.height]
+        upright = [((*a, self.base), (0, 0, self.top - self.base)) for a in self.outline if self.top > self.base]
         return flat + upright
 
     @property
@@ -72,7 +74,7 @@ class Prism(NamedTuple):
             best = np.minimum(best, apart)
             outside |= side[0] * to[:, 1] - side[1] * to[:, 0] < 0.0
         found[~outside, :2] = points[~outside, :2]
-        found[:, 2] = np.clip(points[:, 2], 0.0, self.height)
+        found[:, 2] = np.clip(points[:, 2], self.base, self.top)
         return found
 
 

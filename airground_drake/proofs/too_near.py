@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from math import sqrt
 
 import numpy as np
 
-from airground_drake.proofs.export import Demand, Place, Recorded
+from airground_drake.proofs.export import Demand, Recorded
+from airground_drake.proofs.separating import Prism, Vector, apart
 
 SCREEN_M = 1e-6
 """Largest error of floating-point distances, m; steps that come near by less are computed exactly."""
@@ -48,36 +49,26 @@ def too_near(run: Recorded) -> list[TooNear]:
 
 def _worst(run: Recorded, demand: Demand) -> TooNear | None:
     """The least distance of a pair, if it is too small."""
-    rows = len(run.times)
-    first, second = (_at_all_rows(run.places[name], rows) for name in (demand.first, demand.second))
-    nearest = min(_steps(first, second, float(demand.safe_m)), default=None)
-    if nearest is None or nearest[0] >= demand.safe_m**2:
+    unit, way = run.unit, run.way(demand)
+    steps = [step for prism in run.prisms(demand) for step in _steps(prism, way, float(demand.safe_m), unit)]
+    squared, row, prism = min(steps, default=(demand.safe_m**2, 0, None), key=lambda step: step[0])
+    if prism is None or squared >= demand.safe_m**2:
         return None
-    squared, row, fraction = nearest
     apart_m = sqrt(squared)
     short_m = float(demand.safe_m**2 - squared) / (float(demand.safe_m) + apart_m)  # d - D, without cancellation
-    t_s = run.times[row] + fraction * (run.times[row + 1] - run.times[row])
+    t_s = run.times[row] + _when(prism, way[row], way[row + 1]) * (run.times[row + 1] - run.times[row])
     return TooNear(demand, apart_m - float(demand.radii_m), short_m, float(t_s))
 
 
-def _at_all_rows(places: tuple[Place, ...], rows: int) -> tuple[Place, ...]:
-    return places * rows if len(places) == 1 else places
+def _steps(prism: Prism, way: Sequence[Vector], safe_m: float, unit: int) -> Iterator[tuple[Fraction, int, Prism]]:
+    """The steps that may come too near: least squared distance, m^2; row at which it begins; from what it is."""
+    rows = np.array(way, dtype=np.float64)
+    far = np.linalg.norm(rows - prism.nearest(rows), axis=1)[:-1] - np.linalg.norm(np.diff(rows, axis=0), axis=1)
+    for row in np.flatnonzero(far < (safe_m + SCREEN_M) * unit).tolist():
+        yield apart(prism, way[row], way[row + 1])[0] / unit**2, row, prism
 
 
-def _steps(
-    first: tuple[Place, ...], second: tuple[Place, ...], safe_m: float
-) -> Iterator[tuple[Fraction, int, Fraction]]:
-    """The steps that may come too near: least squared distance, m^2; row at which it begins; where in it, from 0 to 1.
-
-    On a step the relative position is r + s w; its square is least at s = -r.w / w.w, cut to [0, 1].
-    """
-    relative = np.array(first, dtype=np.float64) - np.array(second, dtype=np.float64)
-    begin, step = relative[:-1], np.diff(relative, axis=0)
-    near = np.linalg.norm(begin, axis=1) - np.linalg.norm(step, axis=1) < safe_m + SCREEN_M
-    for row in np.flatnonzero(near).tolist():
-        r, end = ([a - b for a, b in zip(first[k], second[k], strict=True)] for k in (row, row + 1))
-        w = [b - a for a, b in zip(r, end, strict=True)]
-        length = sum(c * c for c in w)
-        s = Fraction(-sum(a * b for a, b in zip(r, w, strict=True)), length) if length else Fraction(0)
-        s = min(max(s, Fraction(0)), Fraction(1))
-        yield sum(((a + s * b) ** 2 for a, b in zip(r, w, strict=True)), Fraction(0)), row, s
+def _when(prism: Prism, begin: Vector, end: Vector) -> Fraction:
+    """Where on the way from one place to another a set is nearest, from 0 to 1; to a hundredth."""
+    places = np.linspace(np.array(begin, dtype=np.float64), np.array(end, dtype=np.float64), 101)
+    return Fraction(int(np.argmin(np.linalg.norm(places - prism.nearest(places), axis=1))), 100)
