@@ -37,39 +37,56 @@ Definition root (d : Z) (n : point) := Z.max 1 (Z.sqrt_up (d * d * product n n))
 Definition furthest (n : point) (corners : list point) :=
   fold_right (fun c most => Z.max (product n c) most) (product n (hd (P 0 0 0) corners)) corners.
 
-Definition beyond (n : point) (least : Z) (p q : point) := least <=? product n (minus p q).
+Definition least_of d corners n := furthest n corners + root d n.
 
-(** [n] serves [more] periods more, and then those of [vectors]. *)
-Fixpoint separate d corners (n : point) (least : Z) (more : nat) (vectors : list (nat * point)) (ps qs : list point) :=
+(** By how much the body is beyond the plane. *)
+Definition excess (n : point) (least : Z) (p q : point) := product n (minus p q) - least.
+
+(** For how many rows an excess [e] lasts that shrinks by [cost] at most in each; 0 where it is not worth dividing. *)
+Definition lasts (e cost : Z) := if e <? 32 * cost then O else Z.to_nat (Z.min (e / cost) 4096).
+
+(** [n] serves [more] periods more, and then those of [vectors]. In a period both bodies move by [reach] at most in all,
+    so that the excess shrinks by [cost] at most: at the next [sure] rows it is not below 0, and need not be computed. *)
+Fixpoint separate d reach corners (n : point) (least cost : Z) (sure more : nat) (vectors : list (Z * point)) ps qs :=
   match ps, qs with
   | p :: ps', q :: qs' =>
-      if beyond n least p q then
-        match ps', more, vectors with
-        | [], _, _ => true
-        | _, S more', _ => separate d corners n least more' vectors ps' qs'
-        | _, O, (S more', n') :: vectors' =>
-            let least' := furthest n' corners + root d n' in
-            if beyond n' least' p q then separate d corners n' least' more' vectors' ps' qs' else false
-        | _, O, _ => false
-        end
-      else false
+      match sure, more with
+      | S sure', S more' => separate d reach corners n least cost sure' more' vectors ps' qs'
+      | _, _ =>
+        let e := excess n least p q in
+        if 0 <=? e then
+          match ps', more, vectors with
+          | [], _, _ => true
+          | _, S more', _ => separate d reach corners n least cost (lasts e cost) more' vectors ps' qs'
+          | _, O, (periods, n') :: vectors' =>
+              let least := least_of d corners n' in
+              let cost := root reach n' in
+              let e := excess n' least p q in
+              if 0 <=? e then
+                separate d reach corners n' least cost (lasts e cost) (pred (Z.to_nat periods)) vectors' ps' qs'
+              else false
+          | _, O, [] => false
+          end
+        else false
+      end
   | _, _ => false
   end.
 
 (** [sets] are lists of corners, and [proofs] has one for each. *)
-Fixpoint separate_all d (sets : list (list point)) (proofs : list (list (nat * point))) ps qs :=
+Fixpoint separate_all d reach (sets : list (list point)) (proofs : list (list (Z * point))) ps qs :=
   match sets, proofs with
   | [], _ => true
-  | corners :: sets', ((more, n) :: vectors) :: proofs' =>
-      if separate d corners n (furthest n corners + root d n) more vectors ps qs
-      then separate_all d sets' proofs' ps qs else false
+  | corners :: sets', ((periods, n) :: vectors) :: proofs' =>
+      if separate d reach corners n (least_of d corners n) (root reach n) O (Z.to_nat periods) vectors ps qs
+      then separate_all d reach sets' proofs' ps qs else false
   | _, _ => false
   end.
 
 (** Body [i] keeps [a / b] metres from the hulls of [sets], which move with body [j]. *)
 Definition keeps_clear (r : run) (i j : nat) sets (a b : Z) proofs :=
+  let u := body_of r i in let v := body_of r j in
   if 0 <? b then if has_rows r i then if has_rows r j then
-  separate_all (parts_up r a b) sets proofs (places (body_of r i)) (places (body_of r j))
+  separate_all (parts_up r a b) (stride u + stride v) sets proofs (places u) (places v)
   else false else false else false.
 
 (** * What it means *)
@@ -159,33 +176,6 @@ Definition clear (r : run) (i j : nat) (sets : list (list point)) (d t : R) := f
 Lemma clear_less r i j sets d e t : e <= d -> clear r i j sets d t -> clear r i j sets e t.
 Proof. intros L H corners c I C; specialize (H corners c I C); lra. Qed.
 
-Definition separates d corners n p q := (furthest n corners + root d n <= product n (minus p q))%Z.
-
-Lemma separate_first d corners o ps qs n more vectors :
-  separate d corners n (furthest n corners + root d n) more vectors ps qs = true ->
-  separates d corners n (nth 0 ps o) (nth 0 qs o).
-Proof.
-  destruct ps as [| p ps], qs as [| q qs]; intros H; try discriminate H; cbn [separate] in H; unfold beyond in H.
-  split_ifs; apply Z.leb_le; assumption.
-Qed.
-
-(** In every period there is a vector that separates the two at both of its ends. *)
-Lemma separate_means d corners k o : forall ps qs n more vectors,
-  separate d corners n (furthest n corners + root d n) more vectors ps qs = true -> (S k < length ps)%nat ->
-  exists n', separates d corners n' (nth k ps o) (nth k qs o) /\
-    separates d corners n' (nth (S k) ps o) (nth (S k) qs o).
-Proof.
-  induction k as [| k IH]; intros [| p ps] [| q qs] n more vectors H K; try (simpl in K; lia); try discriminate H.
-  all: pose proof (separate_first _ _ o _ _ _ _ _ H) as H0; cbn [separate] in H; split_ifs.
-  all: destruct ps as [| p' ps]; [simpl in K; lia |].
-  all: destruct more as [| more]; [destruct vectors as [| [[| more] n'] vectors] |]; try discriminate H; cbv match in H.
-  all: split_ifs.
-  - exists n'; split; [apply Z.leb_le; assumption | apply (separate_first _ _ o _ _ _ _ _ H)].
-  - exists n; split; [exact H0 | apply (separate_first _ _ o _ _ _ _ _ H)].
-  - apply (IH _ _ _ _ _ H); simpl in *; lia.
-  - apply (IH _ _ _ _ _ H); simpl in *; lia.
-Qed.
-
 Lemma furthest_is n corners c : In c corners -> (product n c <= furthest n corners)%Z.
 Proof.
   unfold furthest; generalize (product n (hd (P 0 0 0) corners)); intros m; induction corners as [| e corners IH].
@@ -203,13 +193,85 @@ Proof.
   apply Rsqr_incr_0_var; [unfold Rsqr; nra | lra].
 Qed.
 
+Definition separates d corners n p q := (0 <= excess n (least_of d corners n) p q)%Z.
+
+Lemma excess_after reach n least p q p' q' : norm (sub (real (minus p' q')) (real (minus p q))) <= IZR reach ->
+  (excess n least p q - root reach n <= excess n least p' q')%Z.
+Proof.
+  intros H; unfold excess; apply le_IZR; rewrite !minus_IZR, !real_product.
+  pose proof (dot_le (real n) (sub (real (minus p' q')) (real (minus p q)))) as C; destruct (root_sound reach n) as [_ R].
+  replace (dot (real n) (sub _ _)) with (dot (real n) (real (minus p' q')) - dot (real n) (real (minus p q))) in C
+    by (vectors; ring); pose proof (norm_nonneg (real n)); nra.
+Qed.
+
+(** What is known at a row where [sure] rows are left. *)
+Definition known cost sure e := match sure with O => True | S k => (Z.of_nat k * cost <= e)%Z end.
+
+Lemma lasts_known e e' cost : (0 < cost)%Z -> (0 <= e)%Z -> (e - cost <= e')%Z -> known cost (lasts e cost) e'.
+Proof.
+  intros C E L; unfold lasts; destruct (_ <? _)%Z; [exact I |]; pose proof (Z.mul_div_le e cost C).
+  set (m := Z.min _ _); unfold known; destruct (Z.to_nat m) as [| k] eqn:K; [exact I |].
+  assert (Z.of_nat k + 1 <= e / cost)%Z by lia; nia.
+Qed.
+
+(** In a period both bodies move by [reach] at most in all. *)
+Definition moves_by reach ps qs o := forall k, (S k < length ps)%nat ->
+  norm (sub (real (minus (nth (S k) ps o) (nth (S k) qs o))) (real (minus (nth k ps o) (nth k qs o)))) <= IZR reach.
+
+Lemma root_positive d n : (0 < root d n)%Z.
+Proof. unfold root; lia. Qed.
+
+Lemma separate_first d reach corners o ps qs n sure more vectors :
+  known (root reach n) sure (excess n (least_of d corners n) (nth 0 ps o) (nth 0 qs o)) ->
+  separate d reach corners n (least_of d corners n) (root reach n) sure more vectors ps qs = true ->
+  separates d corners n (nth 0 ps o) (nth 0 qs o).
+Proof.
+  destruct ps as [| p ps], qs as [| q qs]; intros N H; try discriminate H; cbn [separate] in H; cbn [nth] in *.
+  unfold separates; destruct sure as [| sure], more as [| more]; simpl known in N.
+  1, 2, 3: split_ifs; apply Z.leb_le; assumption.
+  pose proof (root_positive reach n); nia.
+Qed.
+
+(** In every period there is a vector that separates the two at both of its ends. *)
+Lemma separate_means d reach corners o k : forall ps qs n sure more vectors, moves_by reach ps qs o ->
+  known (root reach n) sure (excess n (least_of d corners n) (nth 0 ps o) (nth 0 qs o)) ->
+  separate d reach corners n (least_of d corners n) (root reach n) sure more vectors ps qs = true ->
+  (S k < length ps)%nat -> exists n',
+  separates d corners n' (nth k ps o) (nth k qs o) /\ separates d corners n' (nth (S k) ps o) (nth (S k) qs o).
+Proof.
+  induction k as [| k IH]; intros [| p ps] [| q qs] n sure more vectors T N H K; try (simpl in K; lia);
+    try discriminate H.
+  all: pose proof (separate_first _ _ _ o _ _ _ _ _ _ N H) as H0; cbn [separate] in H; cbn [nth] in N, H0.
+  all: destruct ps as [| p' ps]; [simpl in K; lia |].
+  all: assert (A : forall m, (excess m (least_of d corners m) p q - root reach m <=
+    excess m (least_of d corners m) (nth 0 (p' :: ps) o) (nth 0 qs o))%Z)
+    by (intros; apply excess_after, (T 0%nat); simpl; lia).
+  all: assert (T' : moves_by reach (p' :: ps) qs o) by (intros l Hl; apply (T (S l)); simpl in *; lia).
+  all: assert (M : exists n' sure' more' vectors', separates d corners n' p q /\
+    known (root reach n') sure' (excess n' (least_of d corners n') (nth 0 (p' :: ps) o) (nth 0 qs o)) /\
+    separate d reach corners n' (least_of d corners n') (root reach n') sure' more' vectors' (p' :: ps) qs = true).
+  1, 3: pose proof (root_positive reach n) as C; destruct sure as [| sure], more as [| more]; cbv match in H; split_ifs;
+    try (destruct vectors as [| [m n'] vectors]; try discriminate H; cbv match in H; split_ifs;
+      exists n', (lasts (excess n' (least_of d corners n') p q) (root reach n')), (pred (Z.to_nat m)), vectors;
+      repeat split; [| | exact H]; [apply Z.leb_le; assumption |];
+      apply lasts_known with (3 := A n'); [apply root_positive | apply Z.leb_le; assumption]).
+  1, 3: exists n, (lasts (excess n (least_of d corners n) p q) (root reach n)), more, vectors; repeat split;
+    [exact H0 | apply lasts_known with (3 := A n); assumption | exact H].
+  1, 2: exists n, sure, more, vectors; repeat split; [exact H0 | | exact H]; simpl known in N; specialize (A n);
+    destruct sure; [exact I | rewrite Nat2Z.inj_succ, Z.mul_succ_l in N; unfold known; lia].
+  all: destruct M as [n' [sure' [more' [vectors' [M0 [M1 M2]]]]]].
+  - exists n'; split; [exact M0 | exact (separate_first _ _ _ o (p' :: ps) qs _ _ _ _ M1 M2)].
+  - refine (IH (p' :: ps) qs _ _ _ _ T' M1 M2 _); simpl in *; lia.
+Qed.
+
 Lemma separated d corners n b c k s e : 0 <= s <= 1 -> In e corners ->
   separates d corners n (nth k (places b) (P 0 0 0)) (nth k (places c) (P 0 0 0)) ->
   separates d corners n (nth (S k) (places b) (P 0 0 0)) (nth (S k) (places c) (P 0 0 0)) ->
   dot (real n) (real e) + IZR (root d n) <= dot (real n) (apart_at b c k s).
 Proof.
-  intros Hs E S0 S1; apply (furthest_is n) in E; unfold separates in S0, S1; unfold apart_at, on_way; rewrite !nth_real.
-  assert (A : forall x, (furthest n corners + root d n <= product n x)%Z ->
+  intros Hs E S0 S1; apply (furthest_is n) in E; unfold separates, excess, least_of in S0, S1.
+  unfold apart_at, on_way; rewrite !nth_real.
+  assert (A : forall x, (0 <= product n x - (furthest n corners + root d n))%Z ->
     dot (real n) (real e) + IZR (root d n) <= dot (real n) (real x)).
   { intros x Hx; rewrite <- !real_product, <- plus_IZR; apply IZR_le; lia. }
   apply A in S0, S1; rewrite real_minus in S0, S1; set (least := _ + _) in *.
@@ -218,10 +280,11 @@ Proof.
   replace (dot w _) with ((1 - s) * dot w (sub p q) + s * dot w (sub p' q')) by (vectors; ring); nra.
 Qed.
 
-Lemma separate_each d corners ps qs : forall sets proofs, separate_all d sets proofs ps qs = true -> In corners sets ->
-  exists n more vectors, separate d corners n (furthest n corners + root d n) more vectors ps qs = true.
+Lemma separate_each d reach corners ps qs : forall sets proofs,
+  separate_all d reach sets proofs ps qs = true -> In corners sets -> exists n more vectors,
+  separate d reach corners n (least_of d corners n) (root reach n) O more vectors ps qs = true.
 Proof.
-  induction sets as [| first sets IH]; intros [| [| [more n] vectors] proofs] H I; try discriminate H; destruct I.
+  induction sets as [| first sets IH]; intros [| [| [m n] vectors] proofs] H I; try discriminate H; destruct I.
   all: cbn [separate_all] in H; split_ifs; subst; eauto.
 Qed.
 
@@ -231,9 +294,16 @@ Theorem sets_sound r i j sets a b proofs : well_formed r = true -> keeps_clear r
 Proof.
   unfold keeps_clear; intros W H t Ht corners c I Hc; split_ifs; apply Z.ltb_lt, IZR_lt in Heqb0.
   destruct (difference_at r i j t W Heqb1 Heqb2 Ht) as [k [s [Hk [Hs E]]]].
-  unfold has_rows in Heqb1; apply Nat.eqb_eq in Heqb1.
-  destruct (separate_each _ _ _ _ _ _ H I) as [first [more [vectors K]]].
-  destruct (separate_means _ _ k (P 0 0 0) _ _ _ _ _ K ltac:(lia)) as [n [S0 S1]].
+  pose proof (listed_ok r i W Heqb1) as Bi; pose proof (listed_ok r j W Heqb2) as Bj.
+  unfold has_rows in Heqb1, Heqb2; apply Nat.eqb_eq in Heqb1, Heqb2.
+  destruct (separate_each _ _ _ _ _ _ _ H I) as [first [more [vectors K]]].
+  assert (T : moves_by (stride (body_of r i) + stride (body_of r j)) (places (body_of r i)) (places (body_of r j)) (P 0 0 0)).
+  { intros l Hl; pose proof (moves_within _ l (P 0 0 0) Bi ltac:(lia)) as A.
+    pose proof (moves_within _ l (P 0 0 0) Bj ltac:(lia)) as B; rewrite plus_IZR, !real_minus.
+    eapply Rle_trans; [| apply Rplus_le_compat; [exact A | exact B]].
+    eapply Rle_trans; [| apply norm_difference]; right; f_equal; apply vec_eq; vectors; ring. }
+  destruct (separate_means _ _ _ _ k _ _ first O _ _ T Logic.I K ltac:(lia)) as [n [S0 S1]].
+  clear T.
   apply well_formed_means in W; destruct W as [_ [U _]]; set (u := IZR (unit r)) in *.
   set (x := apart_at (body_of r i) (body_of r j) k s) in *; set (w := real n); set (d := parts_up r a b) in *.
   assert (Iu : 0 < / u) by apply Rinv_0_lt_compat, U.

@@ -274,7 +274,8 @@ def distances_file(run: Recorded) -> str:
     interval = f"{real(run.times[0])} <= t <= {real(run.times[-1])}"
     claims = [_claim(run, demand) for demand in run.demands]
     lemmas = [
-        f"Lemma {demand.lemma} : forall t, {interval} ->\n  {claim}.\nProof. {_tactic(run, demand)}. Qed.\n\n"
+        f"{_vectors(run, demand) if demand.core else ''}"
+        f"Lemma {demand.lemma} : forall t, {interval} ->\n  {claim}.\nProof. {_tactic(demand)}. Qed.\n\n"
         for demand, claim in zip(run.demands, claims, strict=True)
     ]
     checks = _DISTANCES.format(
@@ -300,17 +301,21 @@ def _claim(run: Recorded, demand: Demand) -> str:
     return f"{real(demand.safe_m)} <= norm (sub {' '.join(positions)})"
 
 
-def _tactic(run: Recorded, demand: Demand) -> str:
+def _tactic(demand: Demand) -> str:
     """Has Coq decide a claim."""
     if not demand.core:
         return f"decide_distance {ratio(demand.safe_m)}"
+    return f"decide_clear {ratio(demand.safe_m)} {demand.lemma}_vectors"
+
+
+def _vectors(run: Recorded, demand: Demand) -> str:
+    """For each convex set of the second body, vectors that separate the first one from it, with their periods."""
     way, safe = run.way(demand), int(demand.safe_m * run.unit)
-    proofs = (
-        "; ".join(f"({periods}%nat, {_point(vector)})" for periods, vector in separating(prism, way, safe))
-        for prism in run.prisms(demand)
+    listed = ";\n".join(
+        f"[{'; '.join(f'({periods}, {_point(vector)})' for periods, vector in stretches)}]"
+        for stretches in separating(run.prisms(demand), way, safe)
     )
-    listed = ";\n  ".join(f"[{vectors}]" for vectors in proofs)
-    return f"decide_clear {ratio(demand.safe_m)} ([\n  {listed}])%Z"
+    return f"Definition {demand.lemma}_vectors := ([\n{listed}])%Z.\n"
 
 
 def law_file(run: Recorded) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from fractions import Fraction
-from itertools import product
+from itertools import chain, product
 from math import gcd, isqrt
 from typing import NamedTuple
 
@@ -16,8 +16,8 @@ Vector = tuple[int, int, int]
 Stretch = tuple[int, Vector]
 """A number of periods, and the vector that separates during all of them."""
 
-FINE = 2**30
-"""Length of rounded vectors. They lose about the distance / FINE^2; where that is too much, exact ones are taken."""
+SCALES = (2**4, 2**12, 2**30)
+"""Lengths of rounded vectors. They lose about the distance / length^2, and Coq multiplies short numbers faster."""
 TRIES = 8
 """How often a longer stretch is looked for."""
 
@@ -78,18 +78,23 @@ class Prism(NamedTuple):
         return found
 
 
-def separating(prism: Prism, way: Sequence[Vector], safe: int) -> list[Stretch]:
+def separating(prisms: Sequence[Prism], way: Sequence[Vector], safe: int) -> list[list[Stretch]]:
     """Vectors that show that a point keeps a distance on its way, each for as many periods as one is found to serve.
 
     Args:
-        prism: the set, at rest.
+        prisms: sets at rest.
         way: places of the point at the rows, two or more; straight in between. Parts.
         safe: the distance, parts.
 
     Returns:
-        Stretches that make up the way. If the distance is not kept, the last one serves the rest of it, and is wrong.
+        For each set stretches that make up the way. If the distance is not kept, the last one serves the rest of it,
+        and is wrong.
     """
-    search = _Search(prism, way, safe)
+    rows = np.array(way, dtype=np.float64)
+    return [_stretches(prism, way, _Search(prism, way, rows, safe)) for prism in prisms]
+
+
+def _stretches(prism: Prism, way: Sequence[Vector], search: _Search) -> list[Stretch]:
     found = list[Stretch]()
     row, last = 0, len(way) - 1
     while row < last:
@@ -107,9 +112,8 @@ def separating(prism: Prism, way: Sequence[Vector], safe: int) -> list[Stretch]:
 class _Search:
     """The rows of a way that a vector serves."""
 
-    def __init__(self, prism: Prism, way: Sequence[Vector], safe: int) -> None:
-        self._corners, self._way, self._safe = prism.corners, way, safe
-        self._rows = np.array(way, dtype=np.float64)
+    def __init__(self, prism: Prism, way: Sequence[Vector], rows: Array, safe: int) -> None:
+        self._corners, self._way, self._rows, self._safe = prism.corners, way, rows, safe
         offsets = self._rows - prism.nearest(self._rows)
         self._apart = np.linalg.norm(offsets, axis=1)
         self._away = offsets / np.maximum(self._apart, np.finfo(float).tiny)[:, None]
@@ -118,18 +122,19 @@ class _Search:
 
     def longest(self, row: int) -> tuple[int, Vector]:
         """The last row of the longest stretch found that begins at a row, and its vector."""
-        nearest = row + int(np.argmin(self._apart[row:]))
-        tried = [*self._normals, self._rounded(self._away[row]), self._rounded(self._away[nearest])]
-        best = max(((self.end(vector, row), vector) for vector in tried), key=lambda each: each[0])
+        last, nearest = len(self._way) - 1, row + int(np.argmin(self._apart[row:]))
+        best, before = (row, (0, 0, 0)), -1
+        tried: Iterator[Vector] = chain(self._normals, self._rounded(self._away[[nearest, row]]))
         for _ in range(TRIES):
-            if (end := best[0]) == len(self._way) - 1:
+            for vector in tried:
+                if best[0] < last and (end := self.end(vector, row)) > best[0]:
+                    best = end, vector
+            if best[0] in (before, last):
                 break
-            worst = row + int(np.argmin(self._apart[row : end + 2]))
-            between = self._away[[row, end + 1, worst, (row + end) // 2]]
-            tried = [self._rounded(each) for each in (*between, between[0] + between[1], between[1] + between[2])]
-            best = max(best, *((self.end(vector, row), vector) for vector in tried), key=lambda each: each[0])
-            if best[0] == end:
-                break
+            before = end = best[0]
+            nearest = row + int(np.argmin(self._apart[row : end + 2]))
+            first, middle, near, after = self._away[[row, (row + end) // 2, nearest, end + 1]]
+            tried = self._rounded(np.array([first, middle, near, after, first + after, near + after]))
         return best
 
     def end(self, vector: Vector, row: int) -> int:
@@ -146,9 +151,11 @@ class _Search:
                 return row + max(k - 1, 0)
         return len(self._way) - 1
 
-    def _rounded(self, direction: Array) -> Vector:
-        x, y, z = (round(axis * FINE) for axis in direction.tolist())
-        return _reduced((x, y, z))
+    def _rounded(self, directions: Array) -> Iterator[Vector]:
+        """Directions (k, 3) in whole numbers, short ones first."""
+        for length in SCALES:
+            for x, y, z in np.rint(directions * length).astype(int).tolist():
+                yield _reduced((x, y, z))
 
 
 def apart(prism: Prism, begin: Vector, end: Vector) -> tuple[Fraction, Vector]:

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from math import sqrt
 
 import numpy as np
 
+from airground_drake.base.arrays import Array
 from airground_drake.proofs.export import Demand, Recorded
 from airground_drake.proofs.separating import Prism, Vector, apart
 
@@ -50,7 +50,13 @@ def too_near(run: Recorded) -> list[TooNear]:
 def _worst(run: Recorded, demand: Demand) -> TooNear | None:
     """The least distance of a pair, if it is too small."""
     unit, way = run.unit, run.way(demand)
-    steps = [step for prism in run.prisms(demand) for step in _steps(prism, way, float(demand.safe_m), unit)]
+    rows = np.array(way, dtype=np.float64)
+    near = (float(demand.safe_m) + SCREEN_M) * unit
+    steps = [
+        (apart(prism, way[row], way[row + 1])[0] / unit**2, row, prism)
+        for prism in run.prisms(demand)
+        for row in _near(prism, rows, near)
+    ]
     squared, row, prism = min(steps, default=(demand.safe_m**2, 0, None), key=lambda step: step[0])
     if prism is None or squared >= demand.safe_m**2:
         return None
@@ -60,12 +66,12 @@ def _worst(run: Recorded, demand: Demand) -> TooNear | None:
     return TooNear(demand, apart_m - float(demand.radii_m), short_m, float(t_s))
 
 
-def _steps(prism: Prism, way: Sequence[Vector], safe_m: float, unit: int) -> Iterator[tuple[Fraction, int, Prism]]:
-    """The steps that may come too near: least squared distance, m^2; row at which it begins; from what it is."""
-    rows = np.array(way, dtype=np.float64)
-    far = np.linalg.norm(rows - prism.nearest(rows), axis=1)[:-1] - np.linalg.norm(np.diff(rows, axis=0), axis=1)
-    for row in np.flatnonzero(far < (safe_m + SCREEN_M) * unit).tolist():
-        yield apart(prism, way[row], way[row + 1])[0] / unit**2, row, prism
+def _near(prism: Prism, rows: Array, reach: float) -> list[int]:
+    """The rows, (k, 3), from which the next step may come nearer to a set than `reach`; all in parts."""
+    steps = np.linalg.norm(np.diff(rows, axis=0), axis=1)
+    apart = np.linalg.norm(rows - prism.nearest(rows), axis=1)[:-1]
+    found: list[int] = np.flatnonzero(apart - steps < reach).tolist()
+    return found
 
 
 def _when(prism: Prism, begin: Vector, end: Vector) -> Fraction:
