@@ -91,9 +91,10 @@ def _runs(options: argparse.Namespace) -> int:
 def _lines(found: Proved) -> list[str]:
     """The lines about a run."""
     lines = []
+    some = "" if found.lawful == found.pairs else f" by {found.lawful} pairs, of balls that do not move by themselves"
     for what, answer in (
         (f"all {found.pairs} distances kept at all times", found.distances),
-        ("avoidance law obeyed without error", found.law),
+        (f"avoidance law obeyed without error{some}", found.law),
     ):
         if answer.proved:
             lines.append(f"run {found.run}: {what}: proved in {answer.seconds:.1f} s ({answer.file})")

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from airground_drake.base import files
-from airground_drake.proofs.export import distances_file, law_file, recorded
+from airground_drake.proofs.export import distances_file, law_file, lawful, recorded
 from airground_drake.proofs.runs import FOUND, SCHEMA, expects_kept
 from airground_drake.proofs.too_near import too_near
 from airground_drake.run.trace import Trace
@@ -53,6 +53,7 @@ def _broken(folder: Path, found: Mapping[str, Any], traces: Mapping[str, Trace])
         kept = entry["distances"]["proved"]
         expected = {
             "meta_sha256": meta, "expected": expects_kept(trace), "rows": len(trace.t), "pairs": len(exact.demands),
+            "lawful_pairs": len(lawful(exact.demands)),
         }  # fmt: skip
         for key, value in expected.items():
             yield from _unless(f"{name}.{key}", value, entry[key])

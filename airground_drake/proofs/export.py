@@ -56,6 +56,7 @@ class Demand(NamedTuple):
         radii_m: sum of their radii, m.
         core: what the second body is without its radius: "" for a point, "ground" for flat convex sets, "solid" for
             prisms.
+        passive: whether the second body is an obstacle that may move, beside which robots follow the passive law.
     """
 
     first: str
@@ -63,6 +64,7 @@ class Demand(NamedTuple):
     required_m: Fraction
     radii_m: Fraction
     core: str = ""
+    passive: bool = False
 
     @property
     def safe_m(self) -> Fraction:
@@ -141,7 +143,8 @@ def recorded(trace: Trace) -> Recorded:
     scenario, control = trace.scenario, trace.scenario.control
     outlines = {name: outlines_of(scenario, obstacle) for name, obstacle in scenario.barriers.items()}
     places: dict[str, tuple[Place, ...]] = {name: (_centre(rows),) for name, rows in outlines.items()}
-    places |= {robot: tuple(map(_rounded, trace.position(robot).tolist())) for robot in trace.robots}
+    moving = [name for name, obstacle in scenario.barriers.items() if obstacle.moves]
+    places |= {name: tuple(map(_rounded, trace.position(name).tolist())) for name in (*moving, *trace.robots)}
     spelled = _spelled(list(places))
     wanted = [each._replace(first=spelled[each.first], second=spelled[each.second]) for each in demands(scenario)]
     names = dict(zip(spelled.values(), spelled, strict=True))
@@ -158,6 +161,7 @@ def recorded(trace: Trace) -> Recorded:
 _COVERED = frozenset(
     {"start_m", "target_m", "preset", "max_speed_m_s", "radius_m", "name", "altitude_m", "task", "phantoms_m"}
     | {"position_m", "known_to_uav", "polygon_m", "segment_m", "size_m", "heading_rad", "height_m", "distance_m"}
+    | {"moves", "known_motion"}
 )
 """Keys of bodies that theorems take into account, or need not."""
 
@@ -204,7 +208,7 @@ def demands(scenario: Scenario) -> list[Demand]:
     for (robot, own), (name, rows) in product(radius.items(), outlines.items()):
         core = "" if _is_ball(rows) else "solid" if robot == uav else "ground"
         gap, rounding = map(decimal, rows[0, [convex.GAP, convex.RADIUS]])
-        found.append(Demand(robot, name, gap, own + rounding, core))
+        found.append(Demand(robot, name, gap, own + rounding, core, rows[0, convex.SPEED] > 0.0))
     for one, other in combinations(radius, 2):
         apart = decimal(safe.air_ground_m if uav in (one, other) else safe.ugv_m)
         found.append(Demand(one, other, apart, radius[one] + radius[other]))
@@ -294,6 +298,11 @@ def distances_file(run: Recorded) -> str:
     )
 
 
+def lawful(demands: Iterable[Demand]) -> list[Demand]:
+    """The pairs that LawChecker.v can judge: two balls, neither of which is an obstacle that may move."""
+    return [demand for demand in demands if not demand.core and not demand.passive]
+
+
 def _claim(run: Recorded, demand: Demand) -> str:
     if demand.core:
         return f"clear {run.name} {demand.first} {demand.second} {demand.sets} {real(demand.safe_m)} t"
@@ -319,16 +328,15 @@ def _vectors(run: Recorded, demand: Demand) -> str:
 
 
 def law_file(run: Recorded) -> str:
-    """The theorem that every two balls of the run obey the avoidance law, without error."""
-    g = real(run.gain)
-    balls = [demand for demand in run.demands if not demand.core]
+    """The theorem that the pairs of `lawful` obey the avoidance law, without error."""
+    g, balls = real(run.gain), lawful(run.demands)
     claims = [f"obeys {run.name} {g} {demand.first} {demand.second} {real(demand.safe_m)} 0" for demand in balls]
     lemmas = [
         f"Lemma {demand.lemma}_obey : {claim}.\nProof. decide_law {ratio(run.gain)} {ratio(demand.safe_m)}. Qed.\n\n"
         for demand, claim in zip(balls, claims, strict=True)
     ]
     proof = _all_of([_all_of(group) for group in _grouped(balls, [f"{each.lemma}_obey" for each in balls])])
-    pairs = "All pairs" if len(balls) == len(run.demands) else "All pairs of balls, none with walls and polygons"
+    pairs = "All pairs" if len(balls) == len(run.demands) else "All pairs of balls, none with an obstacle that may move"
     return (
         f"(** That {run.name} obeys the avoidance law. Written by `airground prove`, from the positions in trace/. *)\n"
         f"Require Import Reals Lra ZArith.\nRequire Import Safety Run LawChecker {run.name}.\n"

@@ -46,7 +46,8 @@ def compare(text: str, trace: Trace) -> RereadError:
         name: [obstacle.position_m if shapes[name] is None else [0.0] * 3]
         for name, obstacle in trace.scenario.barriers.items()
     }
-    recorded |= {robot: trace.position(robot).tolist() for robot in trace.robots}
+    moving = [name for name, obstacle in trace.scenario.barriers.items() if obstacle.moves]
+    recorded |= {name: trace.position(name).tolist() for name in (*moving, *trace.robots)}
     bodies = [name.removesuffix("_places") for name in listed.split("; ")]
     numbers = re.findall(r"^Definition (\w+) := (\d+)%nat\.$", text, re.MULTILINE)
     if numbers != [(name, str(k)) for k, name in enumerate(bodies)] or len(bodies) != len(recorded):

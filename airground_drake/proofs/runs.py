@@ -20,6 +20,7 @@ from airground_drake.proofs.export import (
     demands,
     distances_file,
     law_file,
+    lawful,
     recorded,
     refuse_unknown,
 )
@@ -72,8 +73,9 @@ class Proved:
         expected: whether the scenario expects its distances to be kept.
         pairs: number of pairs.
         rows: of the trace.
+        lawful: number of pairs whose law is judged.
         distances: every pair keeps its full distance at all times.
-        law: every pair obeys the avoidance law, without error.
+        law: those pairs obey the avoidance law, without error.
         rounded: coordinates that were rounded, and by how much at most, m.
         meta_sha256: of the run's trace/<run>/meta.json.
     """
@@ -81,6 +83,7 @@ class Proved:
     run: str
     expected: bool
     pairs: int
+    lawful: int
     rows: int
     distances: CoqReply
     law: CoqReply
@@ -204,9 +207,9 @@ def prove_report(report: Path, names: Sequence[str] = (), limit_s: float = coq.L
                 if (place.folder / answer.file).exists():
                     files.write_bytes(report / PLACE / answer.file, (place.folder / answer.file).read_bytes())
             meta = files.sha256(files.read_bytes(report / "trace" / name / "meta.json"))
-            found.append(
-                Proved(name, expects_kept(run), len(demands(run.scenario)), len(run.t), distances, law, rounded, meta)
-            )
+            asked = demands(run.scenario)
+            counts = len(asked), len(lawful(asked)), len(run.t)
+            found.append(Proved(name, expects_kept(run), *counts, distances, law, rounded, meta))
             yield found[-1]
         files.write_json(report / PLACE / FOUND, document(place, found))
 
@@ -229,6 +232,7 @@ def document(place: Workshop, found: Sequence[Proved]) -> dict[str, Any]:
                 "meta_sha256": proved.meta_sha256,
                 "rows": proved.rows,
                 "pairs": proved.pairs,
+                "lawful_pairs": proved.lawful,
                 "rounded_coordinates": proved.rounded.coordinates,
                 "rounded_by_m": proved.rounded.most_m,
                 "distances": _entry(proved.distances),
