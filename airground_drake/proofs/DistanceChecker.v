@@ -46,7 +46,7 @@ Definition excess (n : point) (least : Z) (p q : point) := product n (minus p q)
 Definition lasts (e cost : Z) := if e <? 32 * cost then O else Z.to_nat (Z.min (e / cost) 4096).
 
 (** [n] serves [more] periods more, and then those of [vectors]. In a period both bodies move by [reach] at most in all,
-    so that the excess shrinks by [cost] at most: at the next [sure] rows it is not below 0, and need not be computed. *)
+    so that the excess shrinks by [cost] at most: at the next [sure] rows it is not below 0 and need not be known. *)
 Fixpoint separate d reach corners (n : point) (least cost : Z) (sure more : nat) (vectors : list (Z * point)) ps qs :=
   match ps, qs with
   | p :: ps', q :: qs' =>
@@ -199,7 +199,8 @@ Lemma excess_after reach n least p q p' q' : norm (sub (real (minus p' q')) (rea
   (excess n least p q - root reach n <= excess n least p' q')%Z.
 Proof.
   intros H; unfold excess; apply le_IZR; rewrite !minus_IZR, !real_product.
-  pose proof (dot_le (real n) (sub (real (minus p' q')) (real (minus p q)))) as C; destruct (root_sound reach n) as [_ R].
+  pose proof (dot_le (real n) (sub (real (minus p' q')) (real (minus p q)))) as C.
+  destruct (root_sound reach n) as [_ R].
   replace (dot (real n) (sub _ _)) with (dot (real n) (real (minus p' q')) - dot (real n) (real (minus p q))) in C
     by (vectors; ring); pose proof (norm_nonneg (real n)); nra.
 Qed.
@@ -297,7 +298,8 @@ Proof.
   pose proof (listed_ok r i W Heqb1) as Bi; pose proof (listed_ok r j W Heqb2) as Bj.
   unfold has_rows in Heqb1, Heqb2; apply Nat.eqb_eq in Heqb1, Heqb2.
   destruct (separate_each _ _ _ _ _ _ _ H I) as [first [more [vectors K]]].
-  assert (T : moves_by (stride (body_of r i) + stride (body_of r j)) (places (body_of r i)) (places (body_of r j)) (P 0 0 0)).
+  assert (T : moves_by (stride (body_of r i) + stride (body_of r j)) (places (body_of r i)) (places (body_of r j))
+    (P 0 0 0)).
   { intros l Hl; pose proof (moves_within _ l (P 0 0 0) Bi ltac:(lia)) as A.
     pose proof (moves_within _ l (P 0 0 0) Bj ltac:(lia)) as B; rewrite plus_IZR, !real_minus.
     eapply Rle_trans; [| apply Rplus_le_compat; [exact A | exact B]].

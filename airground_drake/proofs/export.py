@@ -158,7 +158,7 @@ def recorded(trace: Trace) -> Recorded:
     )
 
 
-_COVERED = frozenset(
+COVERED = frozenset(
     {"start_m", "target_m", "preset", "max_speed_m_s", "radius_m", "name", "altitude_m", "task", "phantoms_m"}
     | {"position_m", "known_to_uav", "polygon_m", "segment_m", "size_m", "heading_rad", "height_m", "distance_m"}
     | {"moves", "known_motion"}
@@ -176,7 +176,7 @@ def refuse_unknown(trace: Trace) -> None:
         for key in fields(body):
             given, default = getattr(body, key.name), key.default
             default = default if key.default_factory is MISSING else key.default_factory()
-            if key.name not in _COVERED and given != default:
+            if key.name not in COVERED and given != default:
                 raise TraceError(f"run {trace.run}: {name} has {key.name}; no theorem is about such a body")
 
 

@@ -124,7 +124,8 @@ class _Search:
         """The last row of the longest stretch found that begins at a row, and its vector."""
         last, nearest = len(self._way) - 1, row + int(np.argmin(self._apart[row:]))
         best, before = (row, (0, 0, 0)), -1
-        tried: Iterator[Vector] = chain(self._normals, self._rounded(self._away[[nearest, row]]))
+        short = [normal for normal in self._normals if max(map(abs, normal)) <= SCALES[0]]
+        tried: Iterator[Vector] = chain(short, self._rounded(self._away[[nearest, row]]), self._normals)
         for _ in range(TRIES):
             for vector in tried:
                 if best[0] < last and (end := self.end(vector, row)) > best[0]:

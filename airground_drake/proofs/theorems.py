@@ -34,19 +34,26 @@ _SHARES = "The shares that the two robots of a pair take add up to 1."
 _HELD = "Between two samples every body moves on a straight line at its velocity, up to `wander`."
 _PLANAR = "A body that cannot leave the plane has no velocity out of it."
 _LAW = "At every sample each pair meets its two inequalities, or is too far apart to matter."
-_LAYER = (_STABLE, _SHARES, _HELD, _PLANAR, _LAW)
+_CONVEX = "Distances are signed distances to convex sets that do not turn, such as points, balls and polygons (Convex)."
+_LAYER = (_STABLE, _SHARES, _HELD, _PLANAR, _LAW, _CONVEX)
+_AROUND = ("The signed distance is that from a nearest point, or inside minus the depth (Convex.signed_distance).",)
+_PERIOD = (
+    "In the period the robot moves away from the set at min(r, (L - D)/h) or faster; r is the speed of its retreat.",
+    "r is not negative.",
+    _CONVEX,
+)
 _RUN_AND_SCENARIO = ("SAFE-HYP", "SAFE-INV")
 _COSTS = ("drift, noise, c1 and c2 are positive.",)
 
 _ALL = (
     Theorem(
         "Safety.lemma", "ours", ("SAFE-INV",),
-        "After a time s on a straight line the distance is at least what it was plus s times its rate of change.",
-        ("The two bodies are not at the same point.",),
+        "After a time s on a straight line a distance is at least what it was plus s times its rate of change.",
+        ("The distance is a convex function of the relative position, and n a unit subgradient of it.",),
     ),
     Theorem(
         "Safety.lemma_in_the_plane", "ours", ("SAFE-INV",),
-        "The lemma for two coordinates.",
+        "The lemma for the distance of two points in the plane.",
         ("The two bodies are not at the same point.",),
     ),
     Theorem(
@@ -83,6 +90,51 @@ _ALL = (
         "Safety.capped", "ours", _RUN_AND_SCENARIO,
         "A gain with A h > 1 asks for more than min(A, 1/h), so that the theorems cover it with min(A h, 1).",
         ("h is positive.",),
+    ),
+    Theorem(
+        "Convex.leads_away", "ours", ("SAFE-INV",),
+        "The signed distance to a convex set is convex, and the unit vector away from the set is a subgradient of it.",
+        _AROUND,
+    ),
+    Theorem(
+        "Convex.ball", "ours", ("SAFE-INV",),
+        "The distance from a ball or point is convex, and the unit vector away from its centre is a subgradient of it.",
+        ("The vector points away from the centre.",),
+    ),
+    Theorem(
+        "Convex.nearest_point", "ours", ("SAFE-INV",),
+        "Outside a convex set that is the direction from its nearest point.",
+        ("The set is convex.", "No point of it is nearer, and the point is not in it."),
+    ),
+    Theorem(
+        "Convex.nearest_edge", "ours", ("SAFE-INV",),
+        "Inside a polygon it is the normal of the nearest edge, whose line is as far as the set is deep.",
+        ("The set is an intersection of half-planes or half-spaces.", "The point is in it."),
+    ),
+    Theorem(
+        "Passive.own_doing", "ours", ("SAFE-HYP",),
+        "Had the set stood still since the sample, the robot would be at min(D, L) or farther, less its errors w s.",
+        _PERIOD,
+    ),
+    Theorem(
+        "Passive.kept", "ours", ("SAFE-HYP",),
+        "A period that starts at L or farther keeps d, whatever the set does at Vo or slower.",
+        (*_PERIOD, "L is at least d + (w + Vo) h, w the largest velocity error of the robot."),
+    ),
+    Theorem(
+        "Passive.since", "ours", ("SAFE-HYP",),
+        "Since any sample the distance has fallen below L by no more than the set's way and the robot's errors.",
+        _PERIOD,
+    ),
+    Theorem(
+        "Passive.restored", "ours", ("SAFE-HYP",),
+        "A retreat that is as fast as what comes nearer in a period loses nothing in it.",
+        (*_PERIOD, "The distance starts at L or nearer, by what one period can take away."),
+    ),
+    Theorem(
+        "Passive.loss_is_real", "ours", ("SAFE-DIST",),
+        "Without a retreat errors add up: a robot told to stand that drifts towards a point loses all of its drift.",
+        ("The drift is not negative.",),
     ),
     Theorem(
         "Gate.scaled_back", "(20)", ("SAFE-GATE",),
@@ -195,6 +247,12 @@ _ALL = (
         "Two bodies of a recorded run that the checker accepts keep their distance at all times of the run.",
         ("The integers in the file are the recorded positions, rounded to 2^-60 m.",
          "Between two rows bodies move on straight lines."),
+    ),
+    Theorem(
+        "DistanceChecker.sets_sound", "(7)-(8), (11)", ("airground prove DIR", "SAFE-TRACE"),
+        "A body that the checker accepts keeps its distance from convex sets that move without turning, at all times.",
+        ("The hypotheses of DistanceChecker.sound.",
+         "The corners in the file are those of the scenario, rounded to 2^-60 m; the sets do not turn."),
     ),
     Theorem(
         "LawChecker.sound", "(7)-(8), (11)", ("airground prove DIR", "SAFE-HYP"),

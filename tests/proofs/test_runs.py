@@ -8,14 +8,16 @@ import shutil
 from collections.abc import Callable, Iterable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from builders.edits import with_scenario
 
 from airground_drake.base.arrays import Array
+from airground_drake.base.errors import TraceError
 from airground_drake.commands import main
-from airground_drake.proofs import coq
+from airground_drake.proofs import coq, export
 from airground_drake.proofs.export import demands, distances_file, recorded
 from airground_drake.proofs.readback import ReadbackError, compare
 from airground_drake.proofs.record import closure
@@ -107,6 +109,88 @@ def short(of: Trace, rows: int = 5) -> Trace:
     return replace(of, states=of.states.iloc[:rows].reset_index(drop=True))
 
 
+WALLS: dict[str, dict[str, Any]] = {
+    "room": {"segment_m": [[-6.0, -2.0], [6.0, -2.0], [6.0, 6.0], [-6.0, 6.0]], "height_m": 3.0},
+    "ell": {"polygon_m": [[4, 2], [5, 2], [5, 4], [4.5, 4], [4.5, 3], [4, 3]], "heading_rad": 0.1, "height_m": 1.0},
+    "post": {"position_m": [-4.0, 3.0, 0.0], "radius_m": 0.25, "height_m": 4.0, "distance_m": 0.5},
+    "cart": {"size_m": [0.6, 0.4], "moves": {"waypoints_m": [[-3.5, -1.0], [-3.5, 2.0]], "speed_m_s": 1.0}},
+    "person": {"radius_m": 0.25, "moves": {"waypoints_m": [[3.0, -1.0], [3.0, 2.0]], "speed_m_s": 1.0}},
+}
+
+
+def among_walls(of: Trace, **others: dict[str, Any]) -> Trace:
+    """Its positions, in a world of walls, a prism and bodies that move; robots keep 0.9 m."""
+    way = np.linspace(-1.0, -0.8, len(of.t))
+    table = of.states.assign(**{
+        f"{name}.{axis}_m": places
+        for name, x in (("cart", -3.5), ("person", 3.0))
+        for axis, places in zip("xyz", (x, way, 0.0), strict=True)
+    })  # fmt: skip
+    changed = with_scenario(of, obstacles=WALLS | others, safe_distance__obstacle_m=0.9)
+    return replace(changed, states=table)
+
+
+@pytest.mark.slow
+def test_distances_from_walls_prisms_and_bodies_that_move_are_proved(run: Simulations, workshop: Workshop) -> None:
+    few = among_walls(short(run("case_a", "d")))
+    distances, law, rounded = prove(workshop, few)
+    assert (distances.proved, distances.why) == (True, "")
+    assert (law.proved, law.why) == (True, "")
+    assert rounded.most_m <= 2.0**-61
+    said = (workshop.folder / "run_d.v").read_text(encoding="utf-8")
+    assert "clear run_d ugv1 room room_ground (9 / 10) t /\\" in said
+    assert "clear run_d uav cart cart_ground (9 / 10) t" in said
+    assert "clear run_d uav post post_solid (3 / 4) t" in said
+    assert len(re.findall(r"^Lemma .*_obey :", (workshop.folder / law.file).read_text(encoding="utf-8"), re.M)) == 3
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("short_m", "kept"), [(5e-14, False), (-5e-14, True)])
+def test_some_rounding_errors_short_of_a_wall_is_too_short(
+    short_m: float, kept: bool, run: Simulations, workshop: Workshop
+) -> None:
+    few = short(run("case_a", "d"))
+    row = int(np.argmax(few.position(UGV)[:, 1]))
+    x, y, _ = few.position(UGV)[row]
+    wall = {"segment_m": [[x - 1.0, y + 0.9 - short_m], [x + 1.0, y + 0.9 - short_m]]}
+    distances, _, _ = prove(workshop, among_walls(few, wall_1=wall))
+    assert distances.proved is kept
+    assert [(one.demand.lemma, one.t_s) for one in distances.too_near] == (
+        [] if kept else [(f"{UGV}_and_wall_1", few.t[row])]
+    )
+    if not kept:
+        assert distances.too_near[0].short_m == pytest.approx(short_m, abs=2e-15)
+        assert distances.why.startswith(
+            f"Coq refuses {UGV} and wall_1, 0.9 m. In exact arithmetic {UGV} and wall_1 are"
+        )
+
+
+def test_a_wall_that_a_robot_steps_through_is_too_near(run: Simulations) -> None:
+    few = short(run("case_a", "d"))
+    x, y, z = few.position(UGV)[2]
+    through = among_walls(
+        moved(few, 3, np.array([x, y + 3.0, z])), beside={"segment_m": [[0.0, y + 1.5], [2.0, y + 1.5]]}
+    )
+    [found] = too_near(recorded(through))
+    assert (found.demand.lemma, found.least_m, found.short_m) == (f"{UGV}_and_wall_1", 0.0, 0.9)
+    assert few.t[2] < found.t_s < few.t[3]
+
+
+@pytest.mark.parametrize(("key", "value"), [("appears_s", 2.0), ("disappears_s", 1.0)])
+def test_a_body_that_no_theorem_is_about_is_refused_by_name(key: str, value: float, run: Simulations) -> None:
+    late = among_walls(short(run("case_a", "d")), late={"position_m": [9.0, 9.0, 0.0], key: value})
+    with pytest.raises(TraceError, match=rf"^run d: late has {key}; no theorem is about such a body$"):
+        recorded(late)
+
+
+def test_a_key_that_nobody_has_thought_of_is_refused(run: Simulations, monkeypatch: pytest.MonkeyPatch) -> None:
+    few = among_walls(short(run("case_a", "d")))
+    recorded(few)
+    monkeypatch.setattr(export, "COVERED", export.COVERED - {"heading_rad"})
+    with pytest.raises(TraceError, match="ell has heading_rad"):
+        recorded(few)
+
+
 @pytest.mark.slow
 def test_tiny_coordinates_are_rounded_and_it_is_said_by_how_much(run: Simulations, workshop: Workshop) -> None:
     few = short(run("case_a", "d"))
@@ -144,6 +228,30 @@ def test_every_pair_is_to_keep_its_kind_of_distance_and_both_radii() -> None:
         ("one", "rock", 2.9), ("two", "rock", 3.0), ("above", "rock", 3.2),
         ("one", "two", 3.3), ("one", "above", 1.5), ("two", "above", 1.6),
     ]  # fmt: skip
+
+
+EDITS_OF_WALLS: list[tuple[Callable[[str], str], str]] = [
+    (lambda text: re.sub(r"(room_ground := \[\n\[P \(-0x)", r"\g<1>1", text), "a position differs"),
+    (
+        lambda text: re.sub(r"(room_solid := \[\n)\[.*?\];\n", r"\1", text),
+        "room_solid: the sets in the file have other corners",
+    ),
+    (lambda text: text.replace("clear run_d uav room room_solid", "clear run_d uav room room_ground"), "of every pair"),
+    (lambda text: text.replace("room_ground (9 / 10) t /\\", "room_ground (8 / 10) t /\\"), "of every pair"),
+    (lambda text: text.replace("cart_places := Body", "cart_places := at_rest 5"), "cart"),
+]
+
+
+@pytest.mark.parametrize(("edit", "why"), EDITS_OF_WALLS)
+def test_a_file_that_says_something_else_of_walls_than_the_scenario_is_refused(
+    edit: Callable[[str], str], why: str, run: Simulations
+) -> None:
+    few = among_walls(short(run("case_a", "d")))
+    text = distances_file(recorded(few))
+    compare(text, few)
+    assert edit(text) != text
+    with pytest.raises(ReadbackError, match=why):
+        compare(edit(text), few)
 
 
 EDITS: list[tuple[Callable[[str], str], str]] = [
