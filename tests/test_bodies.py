@@ -231,7 +231,7 @@ def test_a_controller_that_knows_of_it_too_early_or_late_is_found(monkeypatch: p
 
 
 def test_coq_is_not_asked_about_it() -> None:
-    with pytest.raises(TraceError, match=r"rock appears under way; .* bodies that are always there"):
+    with pytest.raises(TraceError, match=r"rock has appears_s; no theorem is about such a body"):
         recorded(simulate(sudden(2.0), "d"))
 
 

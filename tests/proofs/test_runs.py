@@ -139,7 +139,7 @@ def test_distances_from_walls_prisms_and_bodies_that_move_are_proved(run: Simula
     assert rounded.most_m <= 2.0**-61
     said = (workshop.folder / "run_d.v").read_text(encoding="utf-8")
     assert "clear run_d ugv1 room room_ground (9 / 10) t /\\" in said
-    assert "clear run_d uav cart cart_ground (9 / 10) t" in said
+    assert "clear run_d uav cart cart_solid (9 / 10) t" in said
     assert "clear run_d uav post post_solid (3 / 4) t" in said
     assert len(re.findall(r"^Lemma .*_obey :", (workshop.folder / law.file).read_text(encoding="utf-8"), re.M)) == 3
 
@@ -169,7 +169,7 @@ def test_a_wall_that_a_robot_steps_through_is_too_near(run: Simulations) -> None
     few = short(run("case_a", "d"))
     x, y, z = few.position(UGV)[2]
     through = among_walls(
-        moved(few, 3, np.array([x, y + 3.0, z])), beside={"segment_m": [[0.0, y + 1.5], [2.0, y + 1.5]]}
+        moved(few, 3, np.array([x, y + 3.0, z])), wall_1={"segment_m": [[0.0, y + 1.5], [2.0, y + 1.5]]}
     )
     [found] = too_near(recorded(through))
     assert (found.demand.lemma, found.least_m, found.short_m) == (f"{UGV}_and_wall_1", 0.0, 0.9)
