@@ -178,13 +178,14 @@ def painted_over(folder: Path) -> None:
 
 def crash_called_proved(folder: Path) -> None:
     """What `airground prove` would write of run b, as if Coq had accepted it."""
-    from airground_drake.proofs.export import distances_file, recorded
+    from airground_drake.proofs.export import distances_file, lawful, recorded
 
     exact = recorded(load(trace(folder, "b")))
     entry = {
         "expected": False,
         "meta_sha256": hashlib.sha256((trace(folder, "b") / "meta.json").read_bytes()).hexdigest(),
         "rows": len(read_table(folder, run="b")), "pairs": len(exact.demands),
+        "lawful_pairs": len(lawful(exact.demands)),
         "distances": {"proved": True, "theorem": f"{exact.name}_keeps_its_distances", "file": f"{exact.name}.v"},
         "law": {"proved": False, "file": f"{exact.name}_law.v", "why": "it took longer than 1 s"},
     }  # fmt: skip
