@@ -11,15 +11,13 @@ from itertools import chain, combinations, groupby, pairwise, product
 from math import isqrt, lcm
 from typing import NamedTuple
 
-from airground_drake.base.arrays import Array
 from airground_drake.base.errors import TraceError
 from airground_drake.base.exact import decimal
-from airground_drake.geometry import convex
 from airground_drake.proofs.record import FOLDER
 from airground_drake.proofs.separating import Prism, Vector, separating
 from airground_drake.run.trace import Trace
-from airground_drake.scenarios.schema import Scenario
-from airground_drake.scenarios.shapes import outlines_of
+from airground_drake.scenarios.schema import Obstacle, Scenario
+from airground_drake.scenarios.shapes import convex_parts
 
 PARTS = 2**60
 """Positions are rounded to 1/PARTS m: some coordinates are as small as 1e-100 m. At a metre binary64 is coarser."""
@@ -141,9 +139,9 @@ def recorded(trace: Trace) -> Recorded:
     """
     refuse_unknown(trace)
     scenario, control = trace.scenario, trace.scenario.control
-    outlines = {name: outlines_of(scenario, obstacle) for name, obstacle in scenario.barriers.items()}
-    places: dict[str, tuple[Place, ...]] = {name: (_centre(rows),) for name, rows in outlines.items()}
-    moving = [name for name, obstacle in scenario.barriers.items() if obstacle.moves]
+    barriers = scenario.barriers
+    places: dict[str, tuple[Place, ...]] = {name: (_centre(obstacle),) for name, obstacle in barriers.items()}
+    moving = [name for name, obstacle in barriers.items() if obstacle.moves]
     places |= {name: tuple(map(_rounded, trace.position(name).tolist())) for name in (*moving, *trace.robots)}
     spelled = _spelled(list(places))
     wanted = [each._replace(first=spelled[each.first], second=spelled[each.second]) for each in demands(scenario)]
@@ -154,7 +152,7 @@ def recorded(trace: Trace) -> Recorded:
         places={spelled[name]: place for name, place in places.items()},
         demands=tuple(wanted),
         gain=min(decimal(control.avoidance_gain_1_s) * decimal(control.period_s), Fraction(1)),
-        sets={each.sets: _sets(outlines[names[each.second]], each.core) for each in wanted if each.core},
+        sets={each.sets: _sets(barriers[names[each.second]], each.core) for each in wanted if each.core},
     )
 
 
@@ -180,35 +178,29 @@ def refuse_unknown(trace: Trace) -> None:
                 raise TraceError(f"run {trace.run}: {name} has {key.name}; no theorem is about such a body")
 
 
-def _is_ball(rows: Array) -> bool:
-    return len(rows) == 1 and rows[0, convex.COUNT] == 1 and rows[0, convex.BASE] == rows[0, convex.TOP]
+def _centre(obstacle: Obstacle) -> Place:
+    """The centre of a ball; corners of other shapes are given in the frame of the world, or that of what moves."""
+    return _rounded(obstacle.position_m if convex_parts(obstacle) is None and obstacle.position_m else (0.0, 0.0, 0.0))
 
 
-def _centre(rows: Array) -> Place:
-    """The centre of a ball; convex sets are given in the frame of the world."""
-    [x, y], *_ = convex.corners_of(rows[0]).tolist()
-    return _rounded((x, y, float(rows[0, convex.BASE])) if _is_ball(rows) else (0.0, 0.0, 0.0))
-
-
-def _sets(rows: Array, core: str) -> tuple[ConvexSet, ...]:
-    """The cores of outlines: for UGVs all walls are endless, and they are as flat as the ground."""
-    outlines = [tuple((_round(x), _round(y)) for x, y in convex.corners_of(row).tolist()) for row in rows]
-    if core == "ground":
-        return tuple(map(ConvexSet, outlines))
-    heights = [(_round(base), _round(top)) for base, top in rows[:, [convex.BASE, convex.TOP]].tolist()]
-    return tuple(ConvexSet(outline, *between) for outline, between in zip(outlines, heights, strict=True))
+def _sets(obstacle: Obstacle, core: str) -> tuple[ConvexSet, ...]:
+    """The convex parts of an obstacle: for UGVs all walls are endless, so their outlines on the ground are enough."""
+    top = _round(obstacle.height_m if core == "solid" else 0.0)
+    parts = convex_parts(obstacle) or []
+    return tuple(ConvexSet(tuple((_round(x), _round(y)) for x, y in part), top=top) for part in parts)
 
 
 def demands(scenario: Scenario) -> list[Demand]:
     """Who is to keep which distance from whom: each robot from each obstacle, and each two robots."""
     safe, uav = scenario.safe_distance, scenario.uav.name
     radius = {name: decimal(robot.radius_m) for name, robot in scenario.robots.items()}
-    outlines = {name: outlines_of(scenario, obstacle) for name, obstacle in scenario.barriers.items()}
+    balls = {name for name, obstacle in scenario.barriers.items() if convex_parts(obstacle) is None}
     found = []
-    for (robot, own), (name, rows) in product(radius.items(), outlines.items()):
-        core = "" if _is_ball(rows) else "solid" if robot == uav else "ground"
-        gap, rounding = map(decimal, rows[0, [convex.GAP, convex.RADIUS]])
-        found.append(Demand(robot, name, gap, own + rounding, core, rows[0, convex.SPEED] > 0.0))
+    for (robot, own), (name, obstacle) in product(radius.items(), scenario.barriers.items()):
+        moves = obstacle.expected_speed_m_s > 0.0
+        gap = decimal(obstacle.distance_m or (moves and safe.moving_m) or safe.obstacle_m)
+        core = "" if name in balls else "solid" if robot == uav else "ground"
+        found.append(Demand(robot, name, gap, own + decimal(obstacle.radius_m), core, moves))
     for one, other in combinations(radius, 2):
         apart = decimal(safe.air_ground_m if uav in (one, other) else safe.ugv_m)
         found.append(Demand(one, other, apart, radius[one] + radius[other]))
@@ -273,12 +265,12 @@ Ltac decide_law num den a b :=
 """
 
 
-def distances_file(run: Recorded) -> str:
-    """The run, and the theorem that every pair keeps its distance at all times."""
+def distances_file(run: Recorded, *, vectors: bool = True) -> str:
+    """The run, and the theorem that every pair keeps its distance at all times; Coq needs the `vectors`."""
     interval = f"{real(run.times[0])} <= t <= {real(run.times[-1])}"
     claims = [_claim(run, demand) for demand in run.demands]
     lemmas = [
-        f"{_vectors(run, demand) if demand.core else ''}"
+        f"{_vectors(run, demand) if vectors and demand.core else ''}"
         f"Lemma {demand.lemma} : forall t, {interval} ->\n  {claim}.\nProof. {_tactic(demand)}. Qed.\n\n"
         for demand, claim in zip(run.demands, claims, strict=True)
     ]
@@ -345,6 +337,11 @@ def law_file(run: Recorded) -> str:
         f"{_theorem(f'{run.name}_obeys_the_law', '', _grouped(balls, claims))}Proof. exact {proof}. Qed.\n\n"
         f"Print Assumptions {run.name}_obeys_the_law.\n"
     )
+
+
+def without_vectors(text: str) -> str:
+    """An exported file without its separating vectors: others, found on another machine, may prove the same."""
+    return re.sub(r"^Definition \w+_vectors := \(\[[][\s();,P\da-fx-]*\]\)%Z\.\n", "", text, flags=re.MULTILINE)
 
 
 def _grouped(demands: Sequence[Demand], texts: Sequence[str]) -> list[list[str]]:
