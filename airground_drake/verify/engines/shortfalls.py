@@ -147,7 +147,10 @@ class _Way(NamedTuple):
 
 
 def _ways_off(shape: _Shape, place: Sequence[int], planar: bool, unit: int) -> list[_Way]:
-    """The direction away from a core, or out of it: there the nearest faces to within `TIE_M`; none at distance 0."""
+    """The direction away from a core, or out of it: there the nearest faces to within `TIE_M`; none on a point.
+
+    On a wall both sides will do.
+    """
     x, y, z = place
     corners, count = shape.corners, len(shape.corners)
     edges = [(a, _minus(b, a)) for a, b in zip(corners, corners[1:] + corners[:1], strict=True)]
@@ -164,7 +167,9 @@ def _ways_off(shape: _Shape, place: Sequence[int], planar: bool, unit: int) -> l
         if 0 < (x - ax) * ex + (y - ay) * ey < squared:
             vectors.append(([ey * side, -ex * side, rise * squared], squared))
     vector, scale = min(vectors, key=lambda each: Fraction(_dot(each[0], each[0]), each[1] ** 2))
-    return [_Way(vector, _length(vector, unit * scale)[0])] if any(vector) else []
+    if any(vector):
+        return [_Way(vector, _length(vector, unit * scale)[0])]
+    return [_Way([sign * part for part in faces[0][0]], Fraction(0)) for sign in (1, -1)] if count == 2 else []
 
 
 def _apart(ways: Sequence[_Way]) -> Fraction:
