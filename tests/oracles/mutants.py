@@ -13,6 +13,7 @@ from builders.misbuilt import Patch
 from airground_drake.base.arrays import Array
 from airground_drake.gatekeeper.patience import Commitment, Patience
 from airground_drake.gatekeeper.rollout import ClosedLoop
+from airground_drake.geometry.convex import moved
 from airground_drake.intervention import database
 from airground_drake.intervention.messages import accepted_proposals
 from airground_drake.intervention.planner import Planner
@@ -147,7 +148,7 @@ def sent_with(change: Callable[[dict[str, Any]], None]) -> Patch:
 
 
 def moved_map(given: dict[str, Any]) -> None:
-    given["mapped"] = given["mapped"] + 1e-3
+    given["mapped"] = moved(given["mapped"], np.array([1e-3, 0.0, 0.0]))
 
 
 def with_law(name: str, value: Callable[[Any], Any]) -> Callable[[ClosedLoop], ClosedLoop]:

@@ -12,6 +12,7 @@ from verify.judging import decided
 from airground_drake.gatekeeper import outcome, problem
 from airground_drake.gatekeeper.patience import Patience
 from airground_drake.gatekeeper.rollout import ACCEPTED, REFUSED, ClosedLoop, closed_loop
+from airground_drake.geometry.convex import moved
 from airground_drake.run.simulation import simulate
 from airground_drake.scenarios.load import load
 from airground_drake.systems import components
@@ -92,7 +93,7 @@ PREDICTIONS: dict[str, Callable[[ClosedLoop], ClosedLoop]] = {
     "priorities": with_law("intervention_on_top", lambda v: not v),
     "speed limit": lambda loop: loop._replace(max_speed=0.5 * loop.max_speed),
     "no neighbours": lambda loop: loop._replace(shares=0.0 * loop.shares, distances=0.0 * loop.distances),
-    "wrong neighbours": lambda loop: loop._replace(points=loop.points + 0.1),
+    "wrong neighbours": lambda loop: loop._replace(still=moved(loop.still, np.full(3, 0.1)), places=loop.places + 0.1),
     "late": lambda loop: loop._replace(wanted=np.concatenate([loop.wanted[:1], loop.wanted[:-1]])),
 }
 

@@ -11,8 +11,7 @@ from hypothesis import strategies as st
 
 from airground_drake.base.arrays import Array
 from airground_drake.nsbc import kernels
-from airground_drake.verify.runs.control_law import Inequalities
-from oracles.control_law import avoiding
+from oracles.control_law import Inequalities, avoiding
 from oracles.projection import closest, least_violation
 
 SEEDS = st.integers(0, 2**32 - 1)

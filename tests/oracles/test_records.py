@@ -13,7 +13,9 @@ from builders.edits import bumped, moved, with_events, with_meta, with_scenario
 from verify.judging import decided
 from verify.runs.cases import A_D, B_C, B_D, DOORWAY, Edit, at, first, problem, proposals, scenario
 
+from airground_drake.base.arrays import Array
 from airground_drake.base.errors import TraceError
+from airground_drake.geometry import convex
 from airground_drake.registry import method_of
 from airground_drake.run.simulation import simulate
 from airground_drake.run.tables import SEEN_COLUMNS, typed
@@ -22,6 +24,7 @@ from airground_drake.scenarios.schema import Obstacle, Scenario
 from airground_drake.scenarios.world import make_world
 from airground_drake.systems import UgvController
 from airground_drake.systems.components import make_law
+from airground_drake.verify.engines.outlines import RADIUS, unpacked
 from airground_drake.verify.runs.proposals import proposals_of
 from oracles import ORACLES, commands, predictions
 from oracles.communication import SENSED_M
@@ -38,15 +41,20 @@ def each_value(**changes: Callable[[Any], Any]) -> Edit:
     )
 
 
-def told(row: int, points: slice = slice(None), by: float = 0.0, wider: float = 0.0) -> Edit:
+def packed(outlines: Array) -> list[float]:
+    """Outlines as they stand in a table."""
+    return [number for row in outlines for number in convex.as_tuple(row)]
+
+
+def told(row: int, some: slice = slice(None), by: float = 0.0, wider: float = 0.0) -> Edit:
     """The map of the last proposal, or a part of it, in another proposal."""
 
     def edit(table: pd.DataFrame) -> pd.DataFrame:
-        columns = {name: table[name].tolist() for name in ("mapped_m", "mapped_radius_m")}
-        places, sizes = (np.array(columns[name][-1]) for name in columns)
-        columns["mapped_m"][row] = (places.reshape(-1, 3)[points] + [by, 0.0, 0.0]).ravel()
-        columns["mapped_radius_m"][row] = sizes[points] + wider
-        return table.assign(**columns)
+        column = table["mapped"].tolist()
+        outlines = convex.moved(unpacked(column[-1])[some], np.array([by, 0.0, 0.0]))
+        outlines[:, RADIUS] += wider
+        column[row] = packed(outlines)
+        return table.assign(mapped=column)
 
     return proposals(edit)
 
@@ -118,8 +126,8 @@ def later(kind: str, by_s: float) -> Edit:
 
 def other_map(trace: Trace) -> Trace:
     """What a UGV believes is a part of the map in the message."""
-    walls = np.ravel([[3.3, 9.5, 0.0], [5.0, 9.0, 0.0], [6.5, 7.5, 0.0]])
-    return each_value(mapped_m=lambda _: walls, mapped_radius_m=lambda _: np.zeros(3))(trace)
+    rocks = packed(convex.balls([[3.3, 9.5, 0.0], [5.0, 9.0, 0.0], [6.5, 7.5, 0.0]], gap=2.0))
+    return each_value(mapped=lambda _: rocks)(trace)
 
 
 RECORDS: dict[str, tuple[tuple[str, str, Edit, str], ...]] = {
@@ -273,9 +281,7 @@ def test_an_accepted_intervention_is_reconsidered_when_an_obstacle_is_new(
     assert not ORACLES["progress"](trace)
     assert not ORACLES["predictions"](trace)
     assert decided("LIVE-HYP", trace).status == "holds"
-    told_before = each_value(
-        mapped_m=lambda v: np.append(v, [*hidden, 0.0]), mapped_radius_m=lambda v: np.append(v, 0.0)
-    )
+    told_before = each_value(mapped=lambda v: [*v, *packed(convex.balls([*hidden, 0.0], gap=2.0))])
     assert ORACLES["inputs"](told_before(trace))  # then it was no news
     nothing_new = trace.decisions.assign(new=[[]] * len(trace.decisions))
     found = decided("LIVE-HYP", replace(trace, decisions=nothing_new))

@@ -8,14 +8,19 @@ from typing import Any
 import numpy as np
 import pytest
 from builders.edits import with_scenario
+from builders.rooms import room
 from random_scenarios import draw
 
+from airground_drake.base.arrays import Array
 from airground_drake.gatekeeper import outcome_gatekeeper
+from airground_drake.geometry import convex
 from airground_drake.run.simulation import simulate
 from airground_drake.run.trace import Trace
+from airground_drake.scenarios import world
 from airground_drake.scenarios.load import from_data, load, resolved
 from airground_drake.scenarios.schema import Obstacle, Policy, Scenario
 from airground_drake.scenarios.shipped import shipped
+from airground_drake.verify.engines.outlines import Cores
 from oracles import ORACLES, faults_of, inputs, predictions
 from oracles.mutants import PATIENCE, one_direction
 from oracles.protocol import executed_at
@@ -171,8 +176,55 @@ def test_a_prediction_that_depends_on_rounding_is_not_compared(
     assert ORACLES["predictions"](trace)
 
 
-def test_the_way_left_is_bounded_from_both_sides() -> None:
-    least, most = bounds_of_way_left(np.zeros(3), np.array([8.0, 0.0, 0.0]), np.array([[4.0, 0.0, 0.0]]), 2.0)
-    true = 2.0 * np.sqrt(12.0) + 2.0 * np.pi / 3.0
+ROUND_A_DISC = 2.0 * 12.0**0.5 + 2.0 * np.pi / 3.0
+"""From 4 m before a disc of 2 m to 4 m behind it."""
+ROUND_A_WALL = 2.0 * (15.0**0.5 + np.arcsin(0.25))
+"""Likewise round the end of a wall across the way, 1 m away from it."""
+ROUND_A_BLOCK = 2.0 * (17.99**0.5 + 0.1 * (np.pi / 4.0 + np.arcsin(0.1 / 18.0**0.5))) + 2.0
+"""Likewise over a block 2 m long, 0.1 m away from its corners."""
+
+
+@pytest.mark.parametrize(
+    ("row", "distance", "true"),
+    [
+        (convex.balls([4.0, 0.0, 0.0])[0], 2.0, ROUND_A_DISC),
+        (convex.prism([[4.0, -9.0], [4.0, 0.0]]), 1.0, ROUND_A_WALL),
+        (convex.prism([[3.0, -9.0], [5.0, -9.0], [5.0, 3.0], [3.0, 3.0]]), 0.1, ROUND_A_BLOCK),
+    ],
+)
+def test_the_way_left_is_bounded_from_both_sides(row: Array, distance: float, true: float) -> None:
+    goal = np.array([8.0, 0.0, 0.0])
+    least, most = bounds_of_way_left(np.zeros(3), goal, Cores.of(row[None]), np.array([distance]))
     assert least == 8.0
-    assert true <= most <= 1.01 * true
+    assert true - 1e-6 <= most <= 1.01 * true
+
+
+@pytest.mark.parametrize("name", "abcd")
+def test_a_run_among_walls_has_no_fault(name: str) -> None:
+    assert not faults_of(simulate(room(), name))
+
+
+def test_a_plan_among_walls_that_is_accepted_has_no_fault() -> None:
+    scenario = room(20.0)
+    scenario.intervention.policies = [Policy("coordinate")]
+    trace = simulate(scenario, "d")
+    assert (trace.decisions["decision"] == "accept").any()
+    assert not faults_of(trace)
+
+
+WRONG_LAW: dict[str, Callable[[Array], Array]] = {
+    "one part is not seen": lambda rows: rows[: max(1, len(rows) - 2)],
+    "middles in place of nearest points": lambda rows: np.array([
+        [gap, 0.0, 0.0, 0.0, 0.0, 1.0, x, y, 0.0, x, y] for gap, x, y in rows[:, [0, 6, 7]]
+    ]),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", WRONG_LAW)
+def test_a_law_that_measures_other_distances_is_noticed(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    honest = world.outlines_of
+    change = WRONG_LAW[name]
+    monkeypatch.setattr(
+        world, "outlines_of", lambda of, each: change(honest(of, each)) if each.segment_m else honest(of, each)
+    )
+    assert faults_of(simulate(room(), "a"))["commands"]

@@ -19,7 +19,7 @@ from airground_drake.geometry import convex
 from airground_drake.run.simulation import simulate as simulated
 from airground_drake.run.trace import Trace
 from airground_drake.scenarios import world
-from airground_drake.scenarios.schema import Obstacle, SafeDistance
+from airground_drake.scenarios.schema import Obstacle, Policy, SafeDistance
 from airground_drake.verify.model.pair_kinds import constants
 from airground_drake.verify.runs.gate_plan import INSIDE_M
 from airground_drake.verify.runs.pairs import are_too_near, gap_over_time, pair_of
@@ -94,9 +94,7 @@ def test_the_arena_is_judged_by_its_walls() -> None:
 @pytest.mark.parametrize(
     ("height_m", "z", "gap_m"), [(0.0, 1.0, 1.0), (3.0, 4.0, 1.0), (3.0, 2.5, -0.5), (8.0, 2.5, -1.0), (3.0, 3.0, 0.0)]
 )
-def test_a_uav_keeps_away_from_the_top_and_a_ugv_from_the_sides(
-    height_m: float, z: float, gap_m: float
-) -> None:
+def test_a_uav_keeps_away_from_the_top_and_a_ugv_from_the_sides(height_m: float, z: float, gap_m: float) -> None:
     scenario = lone(
         [2.0, 0.0, 0.0], [2.0, 0.0, 0.0], STILL, 1.0, safe_distance=SafeDistance(0.3, ugv_m=0.3, air_ground_m=0.2),
         obstacles={"o": Obstacle(polygon_m=SQUARE, height_m=height_m)},
@@ -182,8 +180,13 @@ def test_robots_that_know_other_shapes_are_refuted(name: str, monkeypatch: pytes
     assert {one["parameter"] for one in finding.evidence["different_parameters"]} >= {parameter}
 
 
-def test_a_room_is_safe_whatever_a_hostile_uav_asks_for() -> None:
-    trace = simulated(room(), "d")
+def test_a_room_is_safe_under_d_and_not_under_b() -> None:
+    trace = simulated(room(), "b")  # under (b) it is obeyed
+    assert decided("SAFE-TRACE", trace).where["second"] == "u"
+    assert decided("SAFE-TRACE", trace).margin < -0.3
+    scenario = room(20.0)
+    scenario.intervention.policies = [Policy("coordinate")]
+    trace = simulated(scenario, "d")
     assert (trace.decisions["decision"] == "accept").any()
     for claim in ("SAFE-TRACE", "SAFE-HYP", "LIVE-HYP"):
         finding = decided(claim, trace)
