@@ -59,7 +59,7 @@ def distances_while_stalled(trace: Trace, robot: str) -> list[float]:
     """Final distances in m of a stalled robot to its two nearest obstacles, in the order of their names."""
     if not stall_position(trace, robot):
         return []
-    distance = {name: float(gap_m(trace, robot, name)[-1]) for name in trace.scenario.obstacles}
+    distance = {name: float(gap_m(trace, robot, name)[-1]) for name in trace.scenario.barriers}
     return [distance[name] for name in sorted(sorted(distance, key=distance.__getitem__)[:2])]
 
 

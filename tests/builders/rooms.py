@@ -11,7 +11,7 @@ NOTCHED = [[-3.0, -3.0], [3.0, -3.0], [3.0, 3.0], [0.5, 3.0], [0.5, -1.0], [-0.5
 
 
 def room(duration_s: float = 12.0) -> Scenario:
-    """A UGV on its way into a U of walls, past other shapes; one is hidden from the UAV, one appears.
+    """A UGV on its way into a U of walls, past other shapes; one is hidden from the UAV, one appears behind it.
 
     The policy of the UAV leads it into the middle wall.
     """
@@ -25,7 +25,7 @@ def room(duration_s: float = 12.0) -> Scenario:
             "u": Obstacle(segment_m=[[0.0, 2.0], [3.0, 2.0], [3.0, -2.0], [0.0, -2.0]], radius_m=0.05),
             "notched": Obstacle(polygon_m=NOTCHED, position_m=[-3.0, 6.0, 0.0], heading_rad=0.3, height_m=5.0),
             "hidden": Obstacle(size_m=[0.4, 0.4], position_m=[1.0, -1.0, 0.0], distance_m=0.2, known_to_uav=False),
-            "late": Obstacle(segment_m=[[-2.0, -4.0], [4.0, -5.0]], appears_s=3.0),
+            "late": Obstacle(segment_m=[[-2.0, -1.0], [-2.0, 1.0]], appears_s=5.0),
             "rock": Obstacle([1.0, 1.2, 0.0], radius_m=0.1),
         },
         arena_m=[[-9.0, -9.0], [9.0, 12.0]],
