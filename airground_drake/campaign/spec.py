@@ -30,9 +30,10 @@ from airground_drake.campaign.rows import TIMES
 from airground_drake.registry import RUN_CLAIMS
 from airground_drake.scenarios import plugins
 from airground_drake.scenarios.document import UNKNOWN_KEY, Document, read, suggestion
+from airground_drake.scenarios.filled import filled
 from airground_drake.scenarios.kinds import WANTED, Real, Words, refused
 from airground_drake.scenarios.limits import MAX_NAME
-from airground_drake.scenarios.load import filled, from_data, load, shipped
+from airground_drake.scenarios.load import from_data, load, shipped
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.verify.finding import PLAIN_NAME
 

@@ -17,7 +17,8 @@ from airground_drake.base.errors import ScenarioError
 from airground_drake.registry import METHODS, POLICIES
 from airground_drake.scenarios import json_schema, schema
 from airground_drake.scenarios.document import of_data
-from airground_drake.scenarios.load import filled, load, shipped
+from airground_drake.scenarios.filled import filled
+from airground_drake.scenarios.load import load, shipped
 from airground_drake.scenarios.shipped import json_schema_file
 
 SCHEMA = json_schema.scenario_schema(installed=False)
