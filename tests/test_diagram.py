@@ -24,7 +24,7 @@ PACKAGE = Path(airground_drake.__file__).parent
 LAYERS = (
     ("base", "check"),
     ("registry",),
-    ("geometry",),
+    ("geometry", "maps"),
     ("world",),
     ("nsbc",),
     ("decision", "intervention"),

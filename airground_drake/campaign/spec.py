@@ -20,7 +20,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Annotated, Any, ClassVar
 
-from pydantic import BeforeValidator, ConfigDict, Field, PlainValidator, WithJsonSchema
+from pydantic import BeforeValidator, ConfigDict, PlainValidator, WithJsonSchema
 
 from airground_drake.base import files
 from airground_drake.base.errors import Fault, ScenarioError
@@ -31,7 +31,7 @@ from airground_drake.registry import RUN_CLAIMS
 from airground_drake.scenarios import plugins
 from airground_drake.scenarios.document import UNKNOWN_KEY, Document, read, suggestion
 from airground_drake.scenarios.filled import filled
-from airground_drake.scenarios.kinds import WANTED, Real, Words, refused
+from airground_drake.scenarios.kinds import Real, Words, refused, wanted
 from airground_drake.scenarios.limits import MAX_NAME
 from airground_drake.scenarios.load import from_data, load, shipped
 from airground_drake.scenarios.schema import Scenario
@@ -41,11 +41,6 @@ COURSE = "course"
 """Name of the random numbers that maps and teams are drawn from."""
 NOT_JUDGED: dict[str, Any] = {"reproduction": [], "choices": []}
 """Keys about the paper's numbers, which say nothing about a drawn scenario."""
-
-
-def _wanted(words: str, **bounds: Any) -> Any:
-    """The bounds of a key's value, and what messages say is wanted."""
-    return Field(json_schema_extra={WANTED: words}, **bounds)
 
 
 def _key(given: object) -> Key:
@@ -62,7 +57,7 @@ def _key(given: object) -> Key:
 
 _DOTTED = "a mapping with dotted keys of the scenario"
 _Key = Annotated[Key, PlainValidator(_key), WithJsonSchema({})]
-_Names = Annotated[tuple[Words, ...], _wanted("a list of names")]
+_Names = Annotated[tuple[Words, ...], wanted("a list of names")]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -85,14 +80,14 @@ class File:
 
     name: Annotated[
         str,
-        _wanted("a name of at most 100 letters, digits, _, . and -", pattern=f"^{PLAIN_NAME.pattern}$", strict=True),
+        wanted("a name of at most 100 letters, digits, _, . and -", pattern=f"^{PLAIN_NAME.pattern}$", strict=True),
     ]
     title: Words = ""
-    scenario: Annotated[Words, _wanted("a shipped scenario, or the path of a YAML file", min_length=1)]
+    scenario: Annotated[Words, wanted("a shipped scenario, or the path of a YAML file", min_length=1)]
     runs: _Names = ()
-    seed: Annotated[int, _wanted("a whole number from 0 on", strict=True, ge=0)] = 0
-    fixed: Annotated[dict[str, Any], _wanted(_DOTTED, alias="set")] = field(default_factory=dict)
-    drawn: Annotated[dict[str, _Key], _wanted(_DOTTED, alias="draw")] = field(default_factory=dict)
+    seed: Annotated[int, wanted("a whole number from 0 on", strict=True, ge=0)] = 0
+    fixed: Annotated[dict[str, Any], wanted(_DOTTED, alias="set")] = field(default_factory=dict)
+    drawn: Annotated[dict[str, _Key], wanted(_DOTTED, alias="draw")] = field(default_factory=dict)
     course: Annotated[Course | None, BeforeValidator(lambda given: {} if given is None else given)] = None
     claims: _Names = ()
     marks: dict[str, Real] = field(default_factory=dict)

@@ -45,6 +45,7 @@ COMMANDS: dict[str, Command] = {
     "figures": Command("airground_drake.commands.figures", "write the figures of a report as PDF, with LaTeX tables"),
     "diagram": Command("airground_drake.commands.diagram", "draw the diagram of a scenario"),
     "list": Command("airground_drake.commands.listing", "list scenarios, methods, policies, routes, tasks and claims"),
+    "import": Command("airground_drake.commands.importing", "make a scenario of a BARN world, a ROS map, or MovingAI"),
     "init": Command("airground_drake.commands.init", "write a small scenario to start from"),
 }
 

@@ -49,6 +49,11 @@ def refused(value: object, allowed: str, *at: str) -> PydanticCustomError:
     return PydanticCustomError("rule", "{allowed}", {"value": value, "allowed": allowed, "at": at})
 
 
+def wanted(words: str, **bounds: Any) -> Any:
+    """The bounds of a key's value, and what messages say is wanted."""
+    return Field(json_schema_extra={WANTED: words}, **bounds)
+
+
 def as_float(value: object) -> object:
     """A whole number as a floating-point number; infinite if it is too large."""
     if type(value) is not int:

@@ -1,0 +1,115 @@
+"""`airground import FORMAT FILE`: make a scenario of a BARN world, a ROS map, or a benchmark of MovingAI."""
+
+from __future__ import annotations
+
+import argparse
+import math
+import re
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from airground_drake.base import files
+from airground_drake.base.usage import Parser, between, output_file, positive, refuse, whole
+from airground_drake.scenarios.limits import MAX_NAME, MAX_UGVS
+from airground_drake.scenarios.shipped import argument
+
+if TYPE_CHECKING:
+    from airground_drake.scenarios.imported import Imported
+
+FORMATS = {
+    "barn": ("radius_m", "distance_m", "ugv"),
+    "ros-map": ("radius_m", "distance_m", "ugv", "ugvs"),
+    "mapf": ("agents", "map", "cell_m"),
+}
+"""What can be imported, and the options for it."""
+RADII_M = {"barn": 0.215, "ros-map": 0.15}
+"""Default radius of a UGV: half the width of BARN's Jackal; a TurtleBot."""
+DISTANCE_M, UGVS, AGENTS, CELL_M = 0.1, 3, 4, 1.0
+
+
+def parser() -> argparse.ArgumentParser:
+    """Make the parser."""
+    parser = Parser(
+        prog="airground import",
+        description="Make a scenario of a Gazebo world of cylinders and boxes such as BARN's, of a ROS map, or of a "
+        "benchmark of MovingAI with its map.",
+    )
+    parser.add_argument("format", choices=tuple(FORMATS), help="what FILE is")
+    parser.add_argument(
+        "file", type=Path, metavar="FILE", help="barn: NAME.world; ros-map: the map's YAML file; mapf: NAME.scen"
+    )
+    parser.add_argument(
+        "-o", "--output", type=output_file, default=Path("scenario.yaml"), metavar="YAML", help="default: %(default)s"
+    )
+    parser.add_argument(
+        "--ugv", type=_ugv, action="append", metavar="NAME:X,Y:X,Y",
+        help="barn, ros-map: a UGV with its start and target in m; may be repeated (default for barn: the challenge's)",
+    )  # fmt: skip
+    parser.add_argument(
+        "--ugvs", type=whole(1, MAX_UGVS), metavar="N", help=f"ros-map: UGVs to find room for (default: {UGVS})"
+    )
+    parser.add_argument(
+        "--radius-m", type=positive, metavar="R",
+        help="barn, ros-map: radius of UGVs (default: " + ", ".join(f"{k} {v:g}" for k, v in RADII_M.items()) + ")",
+    )  # fmt: skip
+    parser.add_argument(
+        "--distance-m", type=positive, metavar="D",
+        help=f"barn, ros-map: what UGVs keep from obstacles and from one another (default: {DISTANCE_M:g})",
+    )  # fmt: skip
+    parser.add_argument(
+        "--agents", type=whole(1, MAX_UGVS), metavar="N", help=f"mapf: the first N agents (default: {AGENTS})"
+    )
+    parser.add_argument("--map", type=Path, metavar="FILE", help="mapf: the map (default: as FILE says, beside it)")
+    parser.add_argument(
+        "--cell-m", type=between(0.1, 100.0), metavar="M", help=f"mapf: side of a cell (default: {CELL_M:g})"
+    )
+    return parser
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Write the scenario, with a map's files where it needs some; existing files are left alone."""
+    options = parser().parse_args(arguments)
+    for option in ("ugv", "ugvs", "radius_m", "distance_m", "agents", "map", "cell_m"):
+        if getattr(options, option) is not None and option not in FORMATS[options.format]:
+            fitting = " and ".join(each for each, theirs in FORMATS.items() if option in theirs)
+            return refuse(f"--{option.replace('_', '-')} is for {fitting}")
+    if options.ugv and options.ugvs:
+        return refuse("--ugvs finds room for UGVs, --ugv names them: use one of the two")
+    files.try_to_create(options.output)
+    made = _imported(options)
+    for path in made.beside:
+        files.try_to_create(path)
+    for path, content in {**made.beside, options.output: made.text.encode()}.items():
+        files.write_bytes(path, content)
+    print("\n".join([*made.says, *map(str, made.beside), str(options.output)]))
+    print(f"next: airground report {argument(options.output)}")
+    return 0
+
+
+def _imported(options: argparse.Namespace) -> Imported:
+    from airground_drake.scenarios import imported
+
+    path, folder = options.file, options.output.parent
+    name = imported.scenario_name(options.output.stem, options.format.replace("-", "_"))
+    if options.format == "mapf":
+        return imported.mapf(path, options.map, name, folder, options.agents or AGENTS, options.cell_m or CELL_M)
+    sizes = imported.Sizes(options.radius_m or RADII_M[options.format], options.distance_m or DISTANCE_M)
+    robots = [imported.Robot(*each) for each in options.ugv or ()]
+    if options.format == "barn":
+        return imported.barn(path, name, robots, sizes)
+    return imported.ros_map(path, name, folder, robots, options.ugvs or UGVS, sizes)
+
+
+def _ugv(text: str) -> tuple[str, tuple[float, float], tuple[float, float]]:
+    """Parse a UGV: its name, start and target."""
+    name, _, rest = text.partition(":")
+    try:
+        (x, y), (to_x, to_y) = (map(float, point.split(",")) for point in rest.split(":"))
+        good = math.isfinite(math.fsum(map(abs, (x, y, to_x, to_y))))
+    except ValueError:
+        good = False
+    if not (good and re.fullmatch(r"[A-Za-z_]\w*", name, re.ASCII) and len(name) <= MAX_NAME):
+        wanted = "wanted: NAME:X,Y:X,Y with start and target in m, such as ugv1:0,0:4.5,2"
+        raise argparse.ArgumentTypeError(f"{text!r} is not allowed; {wanted}")
+    return name, (x, y), (to_x, to_y)

@@ -1,0 +1,190 @@
+"""The obstacles of a Gazebo world: upright cylinders, balls and boxes of its models."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import NamedTuple
+from xml.etree import ElementTree
+from xml.parsers import expat
+
+from airground_drake.base.errors import Fault, ScenarioError, short
+
+LINE = "line"
+"""Attribute in which each element has its line in the file."""
+MOST_ELEMENTS = 1_000_000
+TILTED = 1e-6
+"""Roll or pitch above which something does not stand upright, rad."""
+SHAPES = ("box", "cylinder", "sphere")
+FLAT = ("plane", "heightmap", "empty")
+"""Geometries that stand in nobody's way."""
+
+
+class Pose(NamedTuple):
+    """Position, m, and heading, rad, of something upright."""
+
+    x: float = 0.0
+    y: float = 0.0
+    z: float = 0.0
+    heading: float = 0.0
+
+    def __matmul__(self, inner: Pose) -> Pose:
+        """The pose, in the outer frame, of what has the pose `inner` in this one."""
+        cos, sin = math.cos(self.heading), math.sin(self.heading)
+        x, y = self.x + cos * inner.x - sin * inner.y, self.y + sin * inner.x + cos * inner.y
+        return Pose(x, y, self.z + inner.z, self.heading + inner.heading)
+
+
+class Solid(NamedTuple):
+    """Something in the way of robots.
+
+    Attributes:
+        name: of its model.
+        pose: of its middle.
+        size: length and width of a box, m; the radius alone, m, for cylinders and balls.
+        top: its height over the ground, m.
+    """
+
+    name: str
+    pose: Pose
+    size: tuple[float, ...]
+    top: float
+
+
+class Gazebo(NamedTuple):
+    """The solids of a world, and in words what is not among them."""
+
+    solids: list[Solid]
+    left_out: list[str]
+
+
+def world(text: str, source: str) -> Gazebo:
+    """The obstacles in a world file that may be hostile.
+
+    A model is where `<state>` says, if it is in there; else where the model says. Left out are models that a plug-in
+    moves, models within models, included models, and meshes.
+
+    Args:
+        text: of the file.
+        source: its path, for messages.
+
+    Raises:
+        ScenarioError: if it is no such world, or has shapes that do not stand upright.
+    """
+    root = _parsed(text, source)
+    found = root.find("world") if root.tag == "sdf" else root if root.tag == "world" else None
+    if found is None:
+        raise ScenarioError(f"{source}:{root.get(LINE)}", root.tag, Fault("no world"), "wanted: <sdf> with a <world>")
+    states = {each.get("name"): each for each in found.iterfind("state/model")}
+    solids, left_out = list[Solid](), [f"<include> of {_text(each, 'uri')}" for each in found.iterfind("include")]
+    for model in found.iterfind("model"):
+        name = model.get("name") or "model"
+        if model.find("plugin") is not None and _text(model, "static") not in ("1", "true"):
+            left_out.append(f"{name}, which a plug-in moves")
+            continue
+        state = states.get(model.get("name"))
+        reader = _Reader(source, name, _scale(state, source))
+        pose = reader.pose(model if state is None or state.find("pose") is None else state)
+        for link in model.iterfind("link"):
+            for collision in link.iterfind("collision"):
+                solids += reader.solids(collision, pose @ reader.pose(link) @ reader.pose(collision))
+        left_out += [*reader.left_out, *(f"{each.get('name')} within {name}" for each in model.iterfind("model"))]
+    return Gazebo(solids, left_out)
+
+
+class _Reader:
+    """Reads the shapes of one model."""
+
+    def __init__(self, source: str, name: str, scale: tuple[float, ...]) -> None:
+        self.source, self.name, self.scale = source, name, scale
+        self.left_out: list[str] = []
+
+    def pose(self, of: ElementTree.Element) -> Pose:
+        """The pose that an element gives, or that of its frame."""
+        given = of.find("pose")
+        if given is None or not (given.text or "").strip():
+            return Pose()
+        if frame := given.get("relative_to") or given.get("frame"):
+            raise self._wrong(given, frame, "wanted: a pose in the frame of the element around it")
+        x, y, z, roll, pitch, yaw = _numbers(given, 6, self.source)
+        if max(abs(math.remainder(angle, math.tau)) for angle in (roll, pitch)) > TILTED:
+            raise self._wrong(given, f"{roll:g} {pitch:g}", "roll and pitch must be 0: shapes stand upright")
+        return Pose(x, y, z, yaw)
+
+    def solids(self, collision: ElementTree.Element, pose: Pose) -> Iterator[Solid]:
+        """The solid of a `<collision>`, if it is in the way of robots."""
+        for shape in collision.iterfind("geometry/*"):
+            if shape.tag in FLAT:
+                continue
+            if shape.tag not in SHAPES:
+                self.left_out.append(f"a {shape.tag} of {self.name}")
+            elif shape.tag == "box":
+                length, width, height = self._sizes(shape, "size", 3, self.scale)
+                yield Solid(self.name, pose, (length, width), pose.z + 0.5 * height)
+            else:
+                across, along, up = self.scale
+                if across != along or (shape.tag == "sphere" and across != up):
+                    raise self._wrong(shape, " ".join(map(str, self.scale)), "round shapes keep their proportions")
+                (radius,) = self._sizes(shape, "radius", 1, (across,))
+                (height,) = self._sizes(shape, "length", 1, (up,)) if shape.tag == "cylinder" else (2.0 * radius,)
+                yield Solid(self.name, pose, (radius,), pose.z + 0.5 * height)
+
+    def _sizes(self, shape: ElementTree.Element, key: str, count: int, scale: tuple[float, ...]) -> tuple[float, ...]:
+        """Sizes above 0, m."""
+        given = shape.find(key)
+        if given is None:
+            raise self._wrong(shape, Fault("missing"), f"wanted: <{key}>")
+        sizes = tuple(size * factor for size, factor in zip(_numbers(given, count, self.source), scale, strict=True))
+        if min(sizes) <= 0.0:
+            raise self._wrong(given, given.text, "wanted: numbers above 0, in m")
+        return sizes
+
+    def _wrong(self, at: ElementTree.Element, value: object, allowed: str) -> ScenarioError:
+        return ScenarioError(f"{self.source}:{at.get(LINE)}", f"{self.name}: <{at.tag}>", value, allowed)
+
+
+def _scale(state: ElementTree.Element | None, source: str) -> tuple[float, ...]:
+    scale = None if state is None else state.find("scale")
+    return (1.0, 1.0, 1.0) if scale is None else _numbers(scale, 3, source)
+
+
+def _numbers(of: ElementTree.Element, count: int, source: str) -> tuple[float, ...]:
+    """The finite numbers in an element."""
+    try:
+        numbers = tuple(map(float, (of.text or "").split()))
+    except ValueError:
+        numbers = ()
+    if len(numbers) != count or not all(abs(number) < 1e9 for number in numbers):
+        allowed = f"wanted: {count} number{'s' * (count > 1)} below 1e9 in size"
+        raise ScenarioError(f"{source}:{of.get(LINE)}", f"<{of.tag}>", short((of.text or "").strip()), allowed)
+    return numbers
+
+
+def _text(of: ElementTree.Element, key: str) -> str:
+    return (of.findtext(key) or "").strip()
+
+
+def _parsed(text: str, source: str) -> ElementTree.Element:
+    """The elements of an XML text; each has its line as an attribute. A DTD, which may hold bombs, is refused."""
+    builder, parser, count = ElementTree.TreeBuilder(), expat.ParserCreate(), 0
+
+    def refuse(fault: str, allowed: str) -> ScenarioError:
+        return ScenarioError(f"{source}:{parser.CurrentLineNumber}", "", Fault(fault), allowed)
+
+    def start(tag: str, attributes: dict[str, str]) -> None:
+        nonlocal count
+        count += 1
+        if count > MOST_ELEMENTS:
+            raise refuse("too many elements", f"at most {MOST_ELEMENTS} are allowed")
+        builder.start(tag, {**attributes, LINE: str(parser.CurrentLineNumber)})
+
+    def doctype(*_: object) -> None:
+        raise refuse("a DTD is given", "wanted: the SDF of a Gazebo world, which needs none")
+
+    parser.StartElementHandler, parser.EndElementHandler = start, builder.end
+    parser.CharacterDataHandler, parser.StartDoctypeDeclHandler = builder.data, doctype
+    try:
+        parser.Parse(text, True)
+    except expat.ExpatError as error:
+        raise refuse(f"not XML: {expat.errors.messages[error.code]}", "wanted: the SDF of a Gazebo world") from None
+    return builder.close()

@@ -1,0 +1,116 @@
+"""Maps in the files of ROS's `map_server`: a YAML file and the image that it names."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, ClassVar, NamedTuple
+
+from pydantic import BeforeValidator, ConfigDict
+
+from airground_drake.base import files
+from airground_drake.base.errors import Fault, ScenarioError
+from airground_drake.maps.grid import Grid
+from airground_drake.maps.images import Occupancy, occupancy
+from airground_drake.scenarios.document import MAX_BYTES, parsed
+from airground_drake.scenarios.filled import filled
+from airground_drake.scenarios.kinds import Real, Words, as_float, wanted
+
+MOST_BYTES = 64_000_000
+"""Most bytes of an image."""
+
+
+_Share = Annotated[float, wanted("a number from 0 to 1", strict=True, ge=0.0, le=1.0), BeforeValidator(as_float)]
+
+
+@dataclass(frozen=True, kw_only=True)
+class MapServer:
+    """The keys of a map_server's file. Others are left to others.
+
+    Attributes:
+        image: path of the image, from the file's folder.
+        resolution: side of a cell, m.
+        origin: outer corner of the cell at the lower left, x and y in m; heading of the image, rad.
+        occupied_thresh: probability above which a cell is occupied.
+        free_thresh: probability below which it is free.
+        negate: 1 if white is occupied, not black.
+        mode: how the image is read.
+    """
+
+    __pydantic_config__: ClassVar = ConfigDict(extra="ignore")
+
+    image: Annotated[Words, wanted("the path of a PGM, PPM, PNG or BMP file", min_length=1)]
+    resolution: Annotated[
+        float, wanted("the side of a cell, 0.001 to 1000 m", strict=True, ge=1e-3, le=1e3), BeforeValidator(as_float)
+    ]
+    origin: Annotated[list[Real], wanted("3 numbers: [x, y, yaw], m and rad", min_length=3, max_length=3)]
+    occupied_thresh: _Share
+    free_thresh: _Share
+    negate: Annotated[int, wanted("0 or 1", ge=0, le=1)]
+    mode: Annotated[str, BeforeValidator(lambda given: str(given).lower()), wanted("trinary", pattern="^trinary$")] = (
+        "trinary"
+    )
+
+
+class MapFile(NamedTuple):
+    """A map_server's map.
+
+    Attributes:
+        cells: which are occupied, which unknown, (rows, columns), the lowest row first.
+        cell_m: side of a cell, m.
+        origin: outer corner of the cell at the lower left, x and y in m; heading of the rows, rad.
+        contents: content of the YAML file and of its image, by path.
+    """
+
+    cells: Occupancy
+    cell_m: float
+    origin: tuple[float, float, float]
+    contents: dict[Path, bytes]
+
+    def grid(self, *, unknown: bool = True) -> Grid:
+        """The map with the unknown cells occupied, or free if `unknown` is false."""
+        occupied = self.cells.occupied | self.cells.unknown if unknown else self.cells.occupied
+        return Grid(occupied, self.cell_m, self.origin)
+
+
+def read(path: Path, where: str = "") -> MapFile:
+    """The map of a map_server's YAML file.
+
+    Args:
+        path: of the YAML file.
+        where: file, line and key that name the map, for the message if there is no such file.
+
+    Raises:
+        ScenarioError: if one of the two files cannot be read or used.
+    """
+    data = _content(path, MAX_BYTES, where or str(path), "", "the YAML file of a map")
+    try:
+        document = parsed(data.decode("utf-8-sig"), str(path))
+    except UnicodeDecodeError:
+        raise ScenarioError(str(path), "", Fault("not UTF-8 text"), "wanted: the YAML file of a map") from None
+    about: MapServer = filled(MapServer, document)
+    if about.free_thresh > about.occupied_thresh:
+        allowed = f"at most occupied_thresh = {about.occupied_thresh:g}"
+        raise ScenarioError(document.where("free_thresh"), "free_thresh", about.free_thresh, allowed)
+    image = path.parent / about.image
+    content = _content(image, MOST_BYTES, document.where("image"), "image", "a PGM, PPM, PNG or BMP file")
+    try:
+        cells = occupancy(
+            content,
+            occupied_above=about.occupied_thresh,
+            free_below=about.free_thresh,
+            negate=bool(about.negate),
+        )
+    except ValueError as error:
+        fault = Fault(f"{about.image} is {error}")
+        raise ScenarioError(document.where("image"), "image", fault, "wanted: the image of a map") from None
+    x, y, heading = about.origin
+    return MapFile(cells, about.resolution, (x, y, heading), {path: data, image: content})
+
+
+def _content(path: Path, most: int, source: str, key: str, what: str) -> bytes:
+    try:
+        return files.read_bytes(path, most, links=True)
+    except (OSError, ValueError) as error:  # ValueError: a null character
+        why = getattr(error, "strerror", None) or str(error)
+        raise ScenarioError(source, key, Fault(f"{path} cannot be read ({why})"), f"wanted: {what}") from None
