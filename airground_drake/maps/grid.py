@@ -13,22 +13,23 @@ from scipy import ndimage
 from airground_drake.base.arrays import Array
 from airground_drake.maps.rectangles import Cells, Rectangles
 
+DIGITS = 12
+"""Corners are rounded to this many digits after the point, m: they are then the same on every machine."""
 
-class Grid(NamedTuple):
-    """Square cells. Row 0 has the lowest y in the map's frame, column 0 the lowest x.
+
+class Frame(NamedTuple):
+    """Where a map's cells are in the world. Places are given in cells, (column, row), from the corner of cell (0, 0).
 
     Attributes:
-        occupied: which cells are occupied, (rows, columns).
         cell_m: side of a cell, m.
-        origin: outer corner of the cell (0, 0) in the world, x and y in m; heading of the map's frame, rad.
+        origin: outer corner of the cell (0, 0) in the world, x and y in m; heading of the rows, rad.
     """
 
-    occupied: Cells
     cell_m: float
     origin: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
     def points(self, places: Array) -> Array:
-        """Points of the world, (..., 2), m, at places given in cells, (column, row), (..., 2)."""
+        """Points of the world, (..., 2), m, at places (..., 2)."""
         x, y, heading = self.origin
         cos, sin = math.cos(heading), math.sin(heading)
         across, up = np.moveaxis(np.asarray(places) * self.cell_m, -1, 0)
@@ -44,11 +45,24 @@ class Grid(NamedTuple):
     def corners(self, rectangles: Rectangles) -> Array:
         """Corners of rectangles of cells in the world, counter-clockwise, (n, 4, 2), m."""
         bottom, top, left, right = rectangles.T
-        return self.points(np.stack([left, bottom, right, bottom, right, top, left, top], axis=-1).reshape(-1, 4, 2))
+        places = np.stack([left, bottom, right, bottom, right, top, left, top], axis=-1).reshape(-1, 4, 2)
+        return np.round(self.points(places), DIGITS)
+
+
+class Grid(NamedTuple):
+    """Square cells. Row 0 has the lowest y in the map's frame, column 0 the lowest x.
+
+    Attributes:
+        occupied: which cells are occupied, (rows, columns).
+        frame: where they are.
+    """
+
+    occupied: Cells
+    frame: Frame
 
     def cells(self, points: Array) -> NDArray[np.int64]:
         """Row and column of the cell at each point, (n, 2) for (n, 2), m. They may be outside of the map."""
-        return np.floor(self.places(points))[:, ::-1].astype(np.int64)
+        return np.floor(self.frame.places(points))[:, ::-1].astype(np.int64)
 
     def filled(self, robots: Sequence[Sequence[float]]) -> Grid:
         """The map with all free cells occupied that no robot can reach.
@@ -74,4 +88,4 @@ class Grid(NamedTuple):
         """
         if not self.occupied.any():
             return np.full(self.occupied.shape, math.inf)
-        return (ndimage.distance_transform_edt(~self.occupied) - math.sqrt(0.5)) * self.cell_m
+        return (ndimage.distance_transform_edt(~self.occupied) - math.sqrt(0.5)) * self.frame.cell_m

@@ -37,11 +37,11 @@ def ways(grid: Grid, clearance_m: float, count: int) -> tuple[Array, float]:
     regions, number = ndimage.label(open_)
     if number:
         open_ = regions == np.bincount(regions[open_]).argmax()
-    side = max(1, round(AROUND_M / grid.cell_m))
+    side = max(1, round(AROUND_M / grid.frame.cell_m))
     peaks = open_ & (clear == ndimage.maximum_filter(np.where(open_, clear, 0.0), side))
     far = np.where(peaks, np.iinfo(np.int32).max, -1).astype(np.int32)  # steps from the sites so far
     sites = list[tuple[int, int]]()
-    apart = math.ceil(2.0 * clearance_m / grid.cell_m)
+    apart = math.ceil(2.0 * clearance_m / grid.frame.cell_m)
     while len(sites) < 2 * count:
         site = np.unravel_index(np.argmax(far if sites else np.where(peaks, clear, -1.0)), far.shape)
         if far[site] < apart:
@@ -59,7 +59,7 @@ def ways(grid: Grid, clearance_m: float, count: int) -> tuple[Array, float]:
         pairs.append((start, target))
         longest = max(longest, int(steps[target]))
     places = np.array(pairs, np.float64)[..., ::-1] + 0.5
-    return grid.points(places), longest * grid.cell_m
+    return grid.frame.points(places), longest * grid.frame.cell_m
 
 
 def _steps(open_: Cells, start: tuple[int, int]) -> NDArray[np.int32]:

@@ -113,12 +113,12 @@ def ros_map(path: Path, name: str, folder: Path, robots: Sequence[Robot], count:
     grid = found.grid()
     rows, columns = grid.occupied.shape
     says = [
-        f"{columns} x {rows} cells of {grid.cell_m:g} m: {found.cells.occupied.sum()} occupied, "
+        f"{columns} x {rows} cells of {grid.frame.cell_m:g} m: {found.cells.occupied.sum()} occupied, "
         f"{found.cells.unknown.sum()} unknown"
     ]
     longest = 2.0 * max((math.dist(each.start, each.target) for each in robots), default=0.0)
     if not robots:
-        needed = sizes.radius_m + sizes.distance_m + grid.cell_m
+        needed = sizes.radius_m + sizes.distance_m + grid.frame.cell_m
         try:
             pairs, longest = sites.ways(grid, needed, count)
         except ValueError as error:

@@ -10,7 +10,7 @@ from pydantic import BeforeValidator, ConfigDict
 
 from airground_drake.base import files
 from airground_drake.base.errors import Fault, ScenarioError
-from airground_drake.maps.grid import Grid
+from airground_drake.maps.grid import Frame, Grid
 from airground_drake.maps.images import Occupancy, occupancy
 from airground_drake.scenarios.document import MAX_BYTES, parsed
 from airground_drake.scenarios.filled import filled
@@ -57,20 +57,18 @@ class MapFile(NamedTuple):
 
     Attributes:
         cells: which are occupied, which unknown, (rows, columns), the lowest row first.
-        cell_m: side of a cell, m.
-        origin: outer corner of the cell at the lower left, x and y in m; heading of the rows, rad.
+        frame: where they are.
         contents: content of the YAML file and of its image, by path.
     """
 
     cells: Occupancy
-    cell_m: float
-    origin: tuple[float, float, float]
+    frame: Frame
     contents: dict[Path, bytes]
 
     def grid(self, *, unknown: bool = True) -> Grid:
         """The map with the unknown cells occupied, or free if `unknown` is false."""
         occupied = self.cells.occupied | self.cells.unknown if unknown else self.cells.occupied
-        return Grid(occupied, self.cell_m, self.origin)
+        return Grid(occupied, self.frame)
 
 
 def read(path: Path, where: str = "") -> MapFile:
@@ -105,7 +103,7 @@ def read(path: Path, where: str = "") -> MapFile:
         fault = Fault(f"{about.image} is {error}")
         raise ScenarioError(document.where("image"), "image", fault, "wanted: the image of a map") from None
     x, y, heading = about.origin
-    return MapFile(cells, about.resolution, (x, y, heading), {path: data, image: content})
+    return MapFile(cells, Frame(about.resolution, (x, y, heading)), {path: data, image: content})
 
 
 def _content(path: Path, most: int, source: str, key: str, what: str) -> bytes:

@@ -10,27 +10,26 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from airground_drake.maps.grid import Grid
+from airground_drake.maps.grid import Frame, Grid
 from airground_drake.maps.rectangles import Cells, covering
 
 SMALL = st.floats(-50.0, 50.0)
 GRIDS = st.builds(
     Grid,
     arrays(bool, st.tuples(st.integers(1, 7), st.integers(1, 7))),
-    st.floats(0.01, 5.0),
-    st.tuples(SMALL, SMALL, st.floats(-7.0, 7.0)),
+    st.builds(Frame, st.floats(0.01, 5.0), st.tuples(SMALL, SMALL, st.floats(-7.0, 7.0))),
 )
 
 
 def middle(grid: Grid, row: float, column: float) -> complex:
     """The middle of a cell in the world."""
-    x, y, heading = grid.origin
-    return complex(x, y) + grid.cell_m * complex(column + 0.5, row + 0.5) * cmath.exp(1j * heading)
+    x, y, heading = grid.frame.origin
+    return complex(x, y) + grid.frame.cell_m * complex(column + 0.5, row + 0.5) * cmath.exp(1j * heading)
 
 
 @given(grid=GRIDS)
 def test_a_cells_middle_is_inside_rectangles_exactly_if_it_is_occupied(grid: Grid) -> None:
-    corners = grid.corners(covering(grid.occupied)) @ (1.0, 1j)
+    corners = grid.frame.corners(covering(grid.occupied)) @ (1.0, 1j)
     for (row, column), occupied in np.ndenumerate(grid.occupied):
         point = middle(grid, row, column)
         assert grid.cells(np.array([[point.real, point.imag]])).tolist() == [[row, column]]
@@ -42,10 +41,10 @@ def test_a_cells_middle_is_inside_rectangles_exactly_if_it_is_occupied(grid: Gri
         assert any(min(each) > 0.0 for each in sides) == occupied
 
 
-def test_without_a_heading_coordinates_are_exact() -> None:
-    grid = Grid(np.ones((3, 4), bool), 0.05, (-10.0, 2.0, 0.0))
-    expected = [[-10.0 + 0.05, 2.0], [-10.0 + 0.05 * 4, 2.0], [-10.0 + 0.05 * 4, 2.0 + 0.05 * 3], [-10.0 + 0.05, 2.15]]
-    assert grid.corners(np.array([[0, 3, 1, 4]])).tolist() == [expected]
+def test_without_a_heading_coordinates_are_short_decimals() -> None:
+    grid = Grid(np.ones((3, 4), bool), Frame(0.05, (-10.0, 2.0, 0.0)))
+    expected = [[-9.95, 2.0], [-9.8, 2.0], [-9.8, 2.15], [-9.95, 2.15]]
+    assert grid.frame.corners(np.array([[0, 3, 1, 4]])).tolist() == [expected]
 
 
 def reached(free: Cells, robots: list[tuple[int, int]]) -> Cells:
@@ -85,10 +84,10 @@ def test_clearance_is_at_most_the_distance_from_the_nearest_occupied_cell(grid: 
     found = grid.clearance()
     for row, column in itertools.product(*map(range, grid.occupied.shape)):
         gaps = [
-            grid.cell_m * np.hypot(max(abs(row - i) - 0.5, 0.0), max(abs(column - j) - 0.5, 0.0))
+            grid.frame.cell_m * np.hypot(max(abs(row - i) - 0.5, 0.0), max(abs(column - j) - 0.5, 0.0))
             for i, j in np.argwhere(grid.occupied)
         ]
         if not grid.occupied[row, column]:
             least = min(gaps, default=np.inf)
             assert found[row, column] <= least + 1e-9
-            assert found[row, column] >= least - (np.sqrt(0.5) - 0.5) * grid.cell_m - 1e-9
+            assert found[row, column] >= least - (np.sqrt(0.5) - 0.5) * grid.frame.cell_m - 1e-9

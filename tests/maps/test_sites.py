@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from airground_drake.maps.grid import Grid
+from airground_drake.maps.grid import Frame, Grid
 from airground_drake.maps.sites import ways
 from airground_drake.scenarios import map_file
 
@@ -37,11 +37,11 @@ def test_sites_are_clear_of_obstacles_and_apart_with_a_way_that_is_not_longer_th
     pairs, longest = ways(grid, clearance, 3)
     open_ = (grid.clearance() > clearance) & ~grid.occupied
     cells = [[tuple(cell) for cell in grid.cells(pair).tolist()] for pair in pairs]
-    found = [shortest(open_, start, target) * grid.cell_m for start, target in cells]
+    found = [shortest(open_, start, target) * grid.frame.cell_m for start, target in cells]
     assert longest == pytest.approx(max(found))
-    occupied = grid.points(np.argwhere(grid.occupied)[:, ::-1] + 0.5)
+    occupied = grid.frame.points(np.argwhere(grid.occupied)[:, ::-1] + 0.5)
     for point in pairs.reshape(-1, 2):
-        nearest = np.abs(occupied - point).max(axis=1).min() - 0.5 * grid.cell_m
+        nearest = np.abs(occupied - point).max(axis=1).min() - 0.5 * grid.frame.cell_m
         assert nearest > clearance / math.sqrt(2.0)
     sites = pairs.reshape(-1, 2).tolist()
     assert min(math.dist(one, other) for one, other in itertools.combinations(sites, 2)) > 2.0 * clearance
@@ -51,11 +51,11 @@ def test_without_room_the_number_that_fits_is_said() -> None:
     cells = np.ones((3, 30), bool)
     cells[1, 1:-1] = False
     with pytest.raises(ValueError, match="room for 14, with"):
-        ways(Grid(cells, 1.0), 0.2, 15)  # 28 cells
+        ways(Grid(cells, Frame(1.0)), 0.2, 15)  # 28 cells
     with pytest.raises(ValueError, match="room for 0, with"):
-        ways(Grid(cells, 1.0), 5.0, 1)
+        ways(Grid(cells, Frame(1.0)), 5.0, 1)
 
 
 def test_an_empty_map_has_room() -> None:
-    pairs, longest = ways(Grid(np.zeros((40, 60), bool), 0.5), 1.0, 2)
+    pairs, longest = ways(Grid(np.zeros((40, 60), bool), Frame(0.5)), 1.0, 2)
     assert longest >= np.abs(pairs[:, 0] - pairs[:, 1]).sum(axis=1).max() - 1e-9
