@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from airground_drake.base import files
+from airground_drake.base.errors import ScenarioError
 from airground_drake.base.usage import Parser, between, output_file, positive, refuse, whole
 from airground_drake.scenarios.limits import MAX_NAME, MAX_UGVS
 from airground_drake.scenarios.shipped import argument
@@ -77,11 +78,20 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if options.ugv and options.ugvs:
         return refuse("--ugvs finds room for UGVs, --ugv names them: use one of the two")
     files.try_to_create(options.output)
+    from airground_drake.scenarios.load import load
+
     made = _imported(options)
     for path in made.beside:
         files.try_to_create(path)
-    for path, content in {**made.beside, options.output: made.text.encode()}.items():
+    written = {**made.beside, options.output: made.text.encode()}
+    for path, content in written.items():
         files.write_bytes(path, content)
+    try:
+        load(options.output)
+    except ScenarioError:  # where the robots were put by hand, there may be no room
+        for path in written:
+            path.unlink()
+        raise
     print("\n".join([*made.says, *map(str, made.beside), str(options.output)]))
     print(f"next: airground report {argument(options.output)}")
     return 0

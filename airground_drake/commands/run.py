@@ -55,6 +55,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         files.make_folder(options.output, "the trace")
     if announced := estimate(replace(scenario, runs={name: scenario.runs[name]})).announcement:
         print(announced, file=sys.stderr)
+    if scenario.map is not None:
+        print(scenario.map.cells, file=sys.stderr)
     from airground_drake.run import trace as traces
     from airground_drake.run.simulation import simulate
 

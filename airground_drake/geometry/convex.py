@@ -60,10 +60,22 @@ def prism(corners: ArrayLike, *, base: float = 0.0, top: float = 0.0, radius: fl
         radius: of the rounding, m.
         gap: distance to keep from it, m.
     """
-    places = np.asarray(corners, dtype=np.float64).reshape(-1, 2)
-    middle = 0.5 * (places.min(axis=0) + places.max(axis=0))
-    extent = float(np.hypot(*(places - middle).T).max()) * (1.0 + 1e-15)
-    return np.array([gap, radius, 0.0, base, top, len(places), *middle.tolist(), extent, *places.ravel().tolist()])
+    places = np.asarray(corners, dtype=np.float64).reshape(1, -1, 2)
+    found: Array = prisms(places, base=base, top=top, radius=radius, gap=gap)[0]
+    return found
+
+
+def prisms(corners: Array, *, base: float = 0.0, top: float = 0.0, radius: float = 0.0, gap: float = 0.0) -> Array:
+    """The outlines, (m, W), of the convex hulls of corners (m, n, 2), m; see `prism`."""
+    number, count, _ = corners.shape
+    found = np.empty((number, CORNERS + 2 * count))
+    found[:, :MIDDLE] = gap, radius, 0.0, base, top, count
+    middle = 0.5 * (corners.min(axis=1) + corners.max(axis=1))
+    found[:, MIDDLE:EXTENT] = middle
+    apart = corners - middle[:, None]
+    found[:, EXTENT] = np.hypot(apart[..., 0], apart[..., 1]).max(axis=1) * (1.0 + 1e-15)
+    found[:, CORNERS:] = corners.reshape(number, -1)
+    return found
 
 
 def stacked(rows: Iterable[ArrayLike]) -> Array:

@@ -11,10 +11,9 @@ from numpy.typing import NDArray
 from PIL import Image, UnidentifiedImageError
 
 from airground_drake.base.errors import short
-from airground_drake.maps.rectangles import Cells
+from airground_drake.maps.rectangles import MOST_CELLS, Cells
 
 FORMATS = ("PPM", "PNG", "BMP")  # Pillow counts PGM to PPM
-MOST_CELLS = 16_000_000
 WHITE = 3 * 255
 UNKNOWN = 3 * 205
 """Brightness of cells that `map_saver` leaves unknown. With its own free_thresh of 0.25 they would count as free."""

@@ -7,8 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from airground_drake.base.errors import Fault, ScenarioError
-from airground_drake.maps.images import MOST_CELLS
-from airground_drake.maps.rectangles import Cells
+from airground_drake.maps.rectangles import MOST_CELLS, Cells
 
 TERRAIN = {**dict.fromkeys(".GS", False), **dict.fromkeys("@OTW", True)}
 """Whether a cell with this character is in the way: out of bounds, trees and water are."""

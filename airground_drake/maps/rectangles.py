@@ -5,6 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+MOST_CELLS = 16_000_000
+"""Most cells of a map."""
+
 Cells = NDArray[np.bool_]
 """A value for each cell, (rows, columns)."""
 Rectangles = NDArray[np.int64]

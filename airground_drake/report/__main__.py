@@ -98,6 +98,8 @@ def _reported(options: argparse.Namespace, command: str) -> int:
     limits = Limits(options.limit_steps, options.limit_memory * GIB)
     if not options.quiet and (announced := estimate(scenario).announcement):
         print(announced, file=sys.stderr)
+    if not options.quiet and scenario.map is not None:
+        print(scenario.map.cells, file=sys.stderr)
     with (
         plugins.admitted(scenario, options.scenario, allow=options.allow_plugins),
         plugins.shown(options.show_policy_output),

@@ -21,8 +21,8 @@ from airground_drake.report.page import page
 from airground_drake.run import trace
 from airground_drake.run.runs import simulate_seeds
 from airground_drake.run.trace import Trace
-from airground_drake.scenarios import plugins
-from airground_drake.scenarios.schema import Scenario
+from airground_drake.scenarios import map_file, plugins
+from airground_drake.scenarios.schema import MapCells, Scenario
 from airground_drake.systems import graphviz
 from airground_drake.systems.diagram import build_diagram, method_drawn
 from airground_drake.verify import Verdict, judge_all
@@ -117,10 +117,21 @@ def write(
         written += [f"trace/{name}/{file}" for file in trace.save(of_run, output / "trace" / name)]
     for name, text in pages.items():
         files.write_text(output / name, text)
+    if scenario.map is not None and scenario.map.cells is not None:
+        written += _map_files(scenario.map.cells, output)
     report = document.sealed(report, output, written)
     if "json" in formats:
         files.write_json(output / PAGES["json"], report)
     return report
+
+
+def _map_files(cells: MapCells, output: Path) -> list[str]:
+    """Copy the files of a map into a report, if this process has read them; returns their names there."""
+    copied = {folder.of_map(name): map_file.content(sha256) for name, sha256 in cells.sha256.items()}
+    for name, content in copied.items():
+        if content is not None:
+            files.write_bytes(output / name, content)
+    return [name for name, content in copied.items() if content is not None]
 
 
 def provenance(scenario: Scenario, started: datetime, command: str) -> dict[str, Any]:

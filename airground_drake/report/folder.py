@@ -22,8 +22,9 @@ RULE = "allowed: a folder that is new or empty, has a report.json of ours, or no
 _FILES = re.compile(
     r"report\.html|report\.json|junit\.xml|diagram\.dot|diagram\.svg"
     r"|trace/\w+/(\w+\.parquet|timings\.json|meta\.json)|proofs/(proofs\.json|run_\w+\.v)"
+    r"|map/[^/]+\.(ya?ml|p[bgp]m|png|bmp)"
 )
-_FOLDERS = re.compile(r"trace(/\w+)?|proofs")
+_FOLDERS = re.compile(r"trace(/\w+)?|proofs|map")
 _OURS = re.compile(rb'\s*\{\s*"schema":\s*"airground_drake\.report/')
 
 
@@ -81,6 +82,12 @@ def clear(folder: Path) -> None:
     for path in reversed(_parts(folder)):
         if not any(path.iterdir()):
             path.rmdir()
+
+
+def of_map(name: str) -> str:
+    """The path in a report of a file of a map, from its name; a name with another ending gets `.pgm`."""
+    path = f"map/{name}"
+    return path if _FILES.fullmatch(path) else f"{path}.pgm"
 
 
 def is_report(folder: Path) -> bool:

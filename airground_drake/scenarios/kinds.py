@@ -20,6 +20,7 @@ from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
 from airground_drake.base.arrays import LARGEST
 from airground_drake.base.statuses import COUNTS, EXPECTATIONS, NOTHING, alternatives, declared
+from airground_drake.maps.rectangles import MOST_CELLS
 from airground_drake.registry import MODEL_CLAIMS, PLUGIN, PLUGIN_PATTERN, RUN_CLAIMS, Registry, is_plugin
 from airground_drake.scenarios.limits import MAX_CORNERS, MAX_NAME, MAX_SEED, MAX_TEXT
 
@@ -148,6 +149,8 @@ PlaceOrNone = Annotated[
 Place = Annotated[list[Real], Field(strict=True), ValueRule(_place, lambda: {"minItems": 2, "maxItems": 3})]
 Corner = Annotated[list[Real], Field(strict=True, min_length=2, max_length=2)]
 CornersOrNone = Annotated[list[Corner], Field(strict=True, max_length=MAX_CORNERS)]
+Cell = Annotated[int, Field(strict=True, ge=0, le=MOST_CELLS)]
+CellRectangle = Annotated[list[Cell], Field(strict=True, min_length=4, max_length=4)]
 TwoCornersOrNone = Annotated[
     list[Corner], Field(strict=True), ValueRule(_two_or_none, lambda: {"minItems": 0, "maxItems": 2})
 ]

@@ -16,7 +16,7 @@ from typing import Any
 
 from airground_drake.base.errors import Fault, ScenarioError
 from airground_drake.base.exact import decimal
-from airground_drake.scenarios import validate
+from airground_drake.scenarios import map_file, validate
 from airground_drake.scenarios.document import Document, of_data, put, read, replace, simple
 from airground_drake.scenarios.filled import filled
 from airground_drake.scenarios.schema import Scenario, Vector
@@ -129,6 +129,7 @@ def _checked(document: Document) -> Scenario:
     """The scenario of a document, without the values that its runs set."""
     scenario: Scenario = filled(Scenario, document)
     _complete(scenario)
+    _read_map(scenario, document)
     try:
         validate.check(scenario, document.source)
     except ScenarioError as error:
@@ -144,6 +145,20 @@ def _complete(scenario: Scenario) -> None:
     control = scenario.control
     for name in validate.GAINS:
         setattr(control, name, _rounded_down(getattr(control, name), control.period_s))
+
+
+def _read_map(scenario: Scenario, document: Document) -> None:
+    """Fill in the cells of the map, unless they are there, in the document, too: its runs then need no file.
+
+    Raises:
+        ScenarioError: if its files cannot be used.
+    """
+    given = scenario.map
+    if given is None or (given.cells and (given.cells.file, given.cells.unknown) == (given.file, given.unknown)):
+        return
+    robots = [robot.start_m for robot in scenario.robots.values()]
+    given.cells = map_file.cells(given, Path(document.source).parent, robots, document.where("map", "file"))
+    document.data["map"]["cells"] = dataclasses.asdict(given.cells)
 
 
 def _rounded_down(gain: float, period: float) -> float:

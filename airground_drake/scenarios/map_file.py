@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, ClassVar, NamedTuple
@@ -12,9 +13,12 @@ from airground_drake.base import files
 from airground_drake.base.errors import Fault, ScenarioError
 from airground_drake.maps.grid import Frame, Grid
 from airground_drake.maps.images import Occupancy, occupancy
+from airground_drake.maps.rectangles import covering
 from airground_drake.scenarios.document import MAX_BYTES, parsed
 from airground_drake.scenarios.filled import filled
 from airground_drake.scenarios.kinds import Real, Words, as_float, wanted
+from airground_drake.scenarios.limits import MAX_RECTANGLES
+from airground_drake.scenarios.schema import Map, MapCells
 
 MOST_BYTES = 64_000_000
 """Most bytes of an image."""
@@ -52,6 +56,10 @@ class MapServer:
     )
 
 
+_contents: dict[str, bytes] = {}
+"""Contents of the files of maps, by SHA-256: reports copy them."""
+
+
 class MapFile(NamedTuple):
     """A map_server's map.
 
@@ -76,12 +84,12 @@ def read(path: Path, where: str = "") -> MapFile:
 
     Args:
         path: of the YAML file.
-        where: file, line and key that name the map, for the message if there is no such file.
+        where: file and line of the scenario that names the map, if any: for the message if there is no such file.
 
     Raises:
         ScenarioError: if one of the two files cannot be read or used.
     """
-    data = _content(path, MAX_BYTES, where or str(path), "", "the YAML file of a map")
+    data = _content(path, MAX_BYTES, where or str(path), "map.file" if where else "", "the YAML file of a map")
     try:
         document = parsed(data.decode("utf-8-sig"), str(path))
     except UnicodeDecodeError:
@@ -104,6 +112,42 @@ def read(path: Path, where: str = "") -> MapFile:
         raise ScenarioError(document.where("image"), "image", fault, "wanted: the image of a map") from None
     x, y, heading = about.origin
     return MapFile(cells, Frame(about.resolution, (x, y, heading)), {path: data, image: content})
+
+
+def cells(given: Map, folder: Path, robots: Sequence[Sequence[float]], where: str) -> MapCells:
+    """What the files of a scenario's map say.
+
+    Args:
+        given: the map.
+        folder: of the scenario.
+        robots: starts of all robots, [x, y, ...], m; what none of them can reach is filled.
+        where: file and line of the scenario that name the map, for messages.
+
+    Raises:
+        ScenarioError: if the files cannot be used, or need too many rectangles.
+    """
+    found = read(folder / given.file, where)
+    grid = found.grid(unknown=given.unknown == "occupied")
+    filled = grid.filled([each[:2] for each in robots])
+    rectangles = covering(filled.occupied)
+    if len(rectangles) > MAX_RECTANGLES:
+        fault = Fault(f"{given.file} needs {len(rectangles)} rectangles")
+        raise ScenarioError(where, "map.file", fault, f"at most {MAX_RECTANGLES} are allowed: remove noise, or crop it")
+    digests = {path.name: files.sha256(content) for path, content in found.contents.items()}
+    _contents.update(zip(digests.values(), found.contents.values(), strict=True))
+    rows, columns = grid.occupied.shape
+    return MapCells(
+        file=given.file, unknown=given.unknown, sha256=digests, cell_m=grid.frame.cell_m, origin=[*grid.frame.origin],
+        rows=rows, columns=columns,
+        occupied=int(found.cells.occupied.sum()), unsure=int(found.cells.unknown.sum()),
+        unreached=int((filled.occupied & ~grid.occupied).sum()),
+        rectangles=rectangles.tolist(),
+    )  # fmt: skip
+
+
+def content(sha256: str) -> bytes | None:
+    """The content of a file of a map that this process has read, by its SHA-256."""
+    return _contents.get(sha256)
 
 
 def _content(path: Path, most: int, source: str, key: str, what: str) -> bytes:

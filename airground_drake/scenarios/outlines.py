@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from airground_drake.base.arrays import Array
-from airground_drake.geometry.convex import SPEED, balls, prism, stacked
-from airground_drake.scenarios.schema import Obstacle, Scenario
-from airground_drake.scenarios.shapes import convex_parts
+from airground_drake.geometry.convex import SPEED, balls, prism, prisms, stacked
+from airground_drake.scenarios.schema import MapObstacle, Obstacle, Scenario
+from airground_drake.scenarios.shapes import convex_parts, corners_of_map
 
 
 def outlines_of(scenario: Scenario, obstacle: Obstacle) -> Array:
@@ -15,7 +15,10 @@ def outlines_of(scenario: Scenario, obstacle: Obstacle) -> Array:
 
     They are in the world frame; those of an obstacle that moves are about the origin of its frame.
     """
-    gap, parts = gap_m(scenario, obstacle), convex_parts(obstacle)
+    gap = gap_m(scenario, obstacle)
+    if isinstance(obstacle, MapObstacle):
+        return prisms(corners_of_map(obstacle.cells), top=obstacle.height_m, gap=gap)
+    parts = convex_parts(obstacle)
     if parts is None:
         found = balls(obstacle.position_m or np.zeros(3), obstacle.radius_m, gap)
     else:

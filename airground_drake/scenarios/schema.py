@@ -17,6 +17,7 @@ from airground_drake.base.files import sha256
 from airground_drake.registry import METHODS, MODEL_CLAIMS, POLICIES, ROUTES, RUN_CLAIMS, UAV_TASKS
 from airground_drake.scenarios.kinds import (
     CLAIMS,
+    CellRectangle,
     CornersOrNone,
     Count,
     CountFromZero,
@@ -40,7 +41,7 @@ from airground_drake.scenarios.kinds import (
     registered,
     settings_of,
 )
-from airground_drake.scenarios.limits import MAX_CORNERS, MAX_STAGES, MAX_UGVS
+from airground_drake.scenarios.limits import MAX_CORNERS, MAX_RECTANGLES, MAX_STAGES, MAX_UGVS
 
 Vector = list[float]
 
@@ -48,6 +49,8 @@ ARENA = "arena_"
 """Begins the names of the arena's walls: arena_south, arena_east, arena_north and arena_west."""
 ENDLESS_M = 1e6
 """Height of the arena's walls, m."""
+MAP = "map"
+"""Name of the obstacle that the map is."""
 
 TRIGGERS: tuple[str, ...] = ("automaton", "bare")
 AT_END: tuple[str, ...] = ("stop", "reverse", "loop")
@@ -167,6 +170,71 @@ class Obstacle:
     def expected_speed_m_s(self) -> float:
         """Speed at which robots expect it to move at most, m/s."""
         return self.max_speed_m_s or (self.moves.speed_m_s if self.moves else 0.0)
+
+
+@dataclass(slots=True)
+class MapCells:
+    """What was read from the files of a map: filled in when a scenario is loaded.
+
+    So whoever has the scenario of a report needs no other file. A free cell that no robot can reach from its start
+    counts as occupied.
+    """
+
+    file: Words
+    """The map's `file`."""
+    unknown: Words
+    """The map's `unknown`."""
+    sha256: dict[Words, Words]
+    """SHA-256 of the YAML file and of its image, by name."""
+    cell_m: Positive
+    """Side of a cell."""
+    origin: Annotated[list[Real], Field(min_length=3, max_length=3)]
+    """Outer corner of the first cell of the lowest row, x and y in m; heading of the rows in rad."""
+    rows: CountFromZero
+    """Number of rows."""
+    columns: CountFromZero
+    """Number of columns."""
+    occupied: CountFromZero
+    """Number of occupied cells."""
+    unsure: CountFromZero
+    """Number of unknown cells."""
+    unreached: CountFromZero
+    """Number of free cells that no robot can reach."""
+    rectangles: Annotated[list[CellRectangle], Field(max_length=MAX_RECTANGLES)]
+    """Rectangles of cells whose union is in the way: first row, row after the last, first column, column after the
+    last. They may overlap."""
+
+    def __str__(self) -> str:
+        """One line for people."""
+        cells = f"{self.columns} x {self.rows} cells of {self.cell_m:g} m"
+        counts = f"{self.occupied} occupied, {self.unsure} unknown ({self.unknown}), {self.unreached} out of reach"
+        return f"map {self.file}: {cells}, {counts}; {len(self.rectangles)} rectangles"
+
+
+@dataclass(slots=True)
+class Map:
+    """A map in the files of ROS's map_server (YAML and image): all its cells that are in the way are one obstacle."""
+
+    file: Annotated[Words, Field(min_length=1)]
+    """Path of the YAML file, from the folder of the scenario."""
+    height_m: NotNegative = 0.0
+    """What is in the way stands from the ground to this height; 0: the UAV flies over it. For UGVs it is endless."""
+    distance_m: NotNegative = 0.0
+    """Distance to keep from it, in place of `safe_distance.obstacle_m`; 0: that one."""
+    known_to_uav: YesNo = True
+    """Whether the UAV has the map from the beginning."""
+    unknown: Annotated[Words, one_of(("occupied", "free"))] = "occupied"
+    """What cells count as that are unknown: grey 205, transparent, or between the thresholds."""
+    cells: MapCells | None = None
+    """What was read from the files; filled in."""
+
+
+@dataclass(slots=True)
+class MapObstacle(Obstacle):
+    """The obstacle that a map is; its parts are those of `cells`."""
+
+    cells: MapCells = field(kw_only=True)
+    """The map's cells."""
 
 
 @dataclass(slots=True)
@@ -447,6 +515,8 @@ class Scenario:
     """The obstacles, by name."""
     arena_m: TwoCornersOrNone = field(default_factory=list)
     """Opposite corners [x, y] of a rectangle whose endless walls keep all robots inside."""
+    map: Map | None = None
+    """A map of ROS."""
     safe_distance: SafeDistance = field(default_factory=SafeDistance)
     """Distances to keep."""
     control: Control = field(default_factory=Control)
@@ -476,15 +546,18 @@ class Scenario:
 
     @property
     def barriers(self) -> dict[str, Obstacle]:
-        """The obstacles and the walls of the arena, by name."""
-        if not self.arena_m:
-            return self.obstacles
-        (ax, bx), (ay, by) = (sorted(axis) for axis in zip(*self.arena_m, strict=True))
-        corners = [[ax, ay], [bx, ay], [bx, by], [ax, by], [ax, ay]]
-        walls = zip(("south", "east", "north", "west"), pairwise(corners), strict=True)
-        return self.obstacles | {
-            f"{ARENA}{side}": Obstacle(segment_m=list(wall), height_m=ENDLESS_M) for side, wall in walls
-        }
+        """The obstacles, the map and the walls of the arena, by name."""
+        found = dict(self.obstacles)
+        if (given := self.map) is not None and given.cells is not None and given.cells.rectangles:
+            found[MAP] = MapObstacle(
+                known_to_uav=given.known_to_uav, height_m=given.height_m, distance_m=given.distance_m, cells=given.cells
+            )
+        if self.arena_m:
+            (ax, bx), (ay, by) = (sorted(axis) for axis in zip(*self.arena_m, strict=True))
+            corners = [[ax, ay], [bx, ay], [bx, by], [ax, by], [ax, ay]]
+            walls = zip(("south", "east", "north", "west"), pairwise(corners), strict=True)
+            found |= {f"{ARENA}{side}": Obstacle(segment_m=list(wall), height_m=ENDLESS_M) for side, wall in walls}
+        return found
 
     @property
     def robots(self) -> dict[str, Ugv | Uav]:

@@ -6,7 +6,11 @@ import math
 from collections.abc import Sequence
 from itertools import pairwise
 
-from airground_drake.scenarios.schema import Obstacle
+import numpy as np
+
+from airground_drake.base.arrays import Array
+from airground_drake.maps.grid import Frame
+from airground_drake.scenarios.schema import MapCells, MapObstacle, Obstacle
 
 DIGITS = 12
 """Corners that are turned or moved are rounded to this many digits after the point, m: they are then the same on every
@@ -18,8 +22,11 @@ Corner = tuple[float, float]
 def convex_parts(obstacle: Obstacle) -> list[list[Corner]] | None:
     """Corners of the convex parts of an obstacle's core in the world frame, m; None: it is a ball.
 
-    A wall has a part per segment, and a post one corner. A polygon that is not convex is split.
+    A wall has a part per segment, a map one per rectangle. A post has one corner. A polygon that is not convex is
+    split.
     """
+    if isinstance(obstacle, MapObstacle):
+        return [[(x, y) for x, y in corners] for corners in corners_of_map(obstacle.cells).tolist()]
     if obstacle.segment_m:
         corners = _placed(obstacle, obstacle.segment_m)
         return [[a, b] for a, b in pairwise(corners)]
@@ -32,6 +39,12 @@ def convex_parts(obstacle: Obstacle) -> list[list[Corner]] | None:
         x, y = obstacle.position_m[:2] or (0.0, 0.0)
         return [[(x, y)]]
     return None
+
+
+def corners_of_map(cells: MapCells) -> Array:
+    """Corners of the rectangles of a map in the world frame, (n, 4, 2), m."""
+    x, y, heading = cells.origin
+    return Frame(cells.cell_m, (x, y, heading)).corners(np.array(cells.rectangles))
 
 
 def _placed(obstacle: Obstacle, corners: Sequence[Sequence[float]]) -> list[Corner]:

@@ -25,7 +25,7 @@ from airground_drake.geometry import convex
 from airground_drake.registry import MODEL_CLAIMS, ROUTES, RUN_CLAIMS
 from airground_drake.scenarios.outlines import outlines_of
 from airground_drake.scenarios.rounding import TOLERANCE_M, Rounding
-from airground_drake.scenarios.schema import ARENA, Obstacle, Scenario, Vector
+from airground_drake.scenarios.schema import ARENA, MAP, Obstacle, Scenario, Vector
 from airground_drake.scenarios.shapes import crossing
 
 GAINS = ("avoidance_gain_1_s", "motion_gain_1_s", "formation_gain_1_s", "intervention_gain_1_s")
@@ -66,9 +66,22 @@ def _names(scenario: Scenario) -> Problems:
 
 def _reserved(scenario: Scenario) -> Problems:
     for name in (*scenario.robots, *scenario.obstacles):
+        key = f"ugvs.{name}" if name in scenario.ugvs else f"obstacles.{name}" if name in scenario.obstacles else "uav"
         if name.startswith(ARENA):
-            key = f"ugvs.{name}" if name in scenario.ugvs else f"obstacles.{name}"
             yield key, name, f"a name that does not begin with {ARENA}: these are the walls of arena_m"
+        if name == MAP or name.startswith(f"{MAP}_"):
+            yield key, name, f"a name other than {MAP}, and one that does not begin with {MAP}_: these are of the map"
+
+
+def _map(scenario: Scenario) -> Problems:
+    """The rectangles of a map are in it."""
+    if scenario.map is None or scenario.map.cells is None:
+        return
+    cells = scenario.map.cells
+    for index, (bottom, top, left, right) in enumerate(cells.rectangles):
+        if not (bottom < top <= cells.rows and left < right <= cells.columns):
+            allowed = f"a rectangle of the {cells.rows} rows and {cells.columns} columns"
+            yield f"map.cells.rectangles.{index}", [bottom, top, left, right], allowed
 
 
 def _shapes(scenario: Scenario) -> Problems:
@@ -284,9 +297,14 @@ def apart_of(scenario: Scenario, name: str) -> Apart:
     """The distance to keep from an obstacle."""
     obstacle = scenario.barriers[name]
     if obstacle.distance_m:
-        return f"obstacles.{name}.distance_m", obstacle.distance_m
+        return f"{_key_of(name)}.distance_m", obstacle.distance_m
     moving = obstacle.expected_speed_m_s and scenario.safe_distance.moving_m
     return _apart(scenario, "moving_m" if moving else "obstacle_m")
+
+
+def _key_of(barrier: str) -> str:
+    """The key of an obstacle or of the map; walls of the arena count as obstacles."""
+    return MAP if barrier == MAP else f"obstacles.{barrier}"
 
 
 def _apart(scenario: Scenario, kind: str) -> Apart:
@@ -353,7 +371,7 @@ def _extent(scenario: Scenario) -> Problems:
         if each.moves:
             shape, places = "moves.waypoints_m", list(each.moves.waypoints_m)
         places += [place for row in outlines_of(scenario, each) for place in convex.corners_of(row).tolist()]
-        points += [(f"obstacles.{name}.{shape}", place) for place in places]
+        points += [(f"{_key_of(name)}.{'file' if name == MAP else shape}", place) for place in places]
     key, point = max(points, key=lambda entry: max(map(abs, entry[1])))
     farthest = max(map(abs, point))
     allowed = loss.largest_extent(duration) - speed * duration
@@ -452,7 +470,7 @@ def _keys(value: object, above: str = "") -> Iterator[str]:
 
 
 CHECKS: tuple[Callable[[Scenario], Problems], ...] = (
-    _names, _reserved, _shapes, _blocks, _route, _runs, _presets, _ends, _gains, _periods, _release, _distances,
+    _names, _reserved, _shapes, _map, _blocks, _route, _runs, _presets, _ends, _gains, _periods, _release, _distances,
     _sensing, _extent, _clearances, _reproduction, _choices,
 )  # fmt: skip
 """Every rule; later ones rely on earlier ones."""

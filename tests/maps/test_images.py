@@ -11,7 +11,8 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from PIL import Image
 
-from airground_drake.maps.images import MOST_CELLS, occupancy
+from airground_drake.maps.images import occupancy
+from airground_drake.maps.rectangles import MOST_CELLS
 
 SHAPES = st.tuples(st.integers(1, 6), st.integers(1, 6))
 SHARES = st.floats(0.0, 1.0)
