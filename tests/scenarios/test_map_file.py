@@ -98,21 +98,21 @@ def test_cells_in_the_way_and_out_of_reach_are_one_obstacle(folder: Path) -> Non
         reached += free
     cells = scenario.map.cells if scenario.map else None
     assert cells is not None
-    assert (cells.rows, cells.columns, cells.occupied, cells.unsure) == (8, 10, 29, 1)
-    assert cells.unreached == 80 - 29 - 1 - reached
+    assert (cells.rows, cells.columns, cells.occupied, cells.unsure) == (8, 10, 31, 1)
+    assert cells.unreached == 80 - 31 - 1 - reached
     names = [body.name for body in make_world(scenario).resting]
     assert names == ["map"]
-    assert str(cells).startswith("map maps/room.yaml: 10 x 8 cells of 0.5 m, 29 occupied, 1 unknown (occupied), ")
+    assert str(cells).startswith("map maps/room.yaml: 10 x 8 cells of 0.5 m, 31 occupied, 1 unknown (occupied), ")
 
 
 def test_free_unknown_cells_and_the_keys_of_the_obstacle(folder: Path) -> None:
-    given = {"file": "maps/room.yaml", "unknown": "free", "height_m": 1.5, "distance_m": 0.3, "known_to_uav": False}
+    given = {"file": "maps/room.yaml", "unknown": "free", "height_m": 1.5, "distance_m": 0.1, "known_to_uav": False}
     scenario = load(write(folder, map=given))
     assert not in_the_way(scenario, 0.75, 4.25)  # the unknown cell
     barrier = scenario.barriers["map"]
     assert not barrier.known_to_uav
     rows = outlines_of(scenario, barrier)
-    assert {(row[convex.BASE], row[convex.TOP], row[convex.GAP]) for row in rows} == {(0.0, 1.5, 0.3)}
+    assert {(row[convex.BASE], row[convex.TOP], row[convex.GAP]) for row in rows} == {(0.0, 1.5, 0.1)}
 
 
 def test_a_heading_turns_the_map_about_its_origin(folder: Path) -> None:
@@ -179,7 +179,7 @@ MISTAKES: list[tuple[Callable[[Path], object], str]] = [
     (lambda folder: write(folder, map={"file": "maps/room.pgm"}), "room.pgm: not UTF-8 text"),
     (lambda folder: write(folder, map={"file": ""}), "map.file: '' is not allowed"),
     (lambda folder: write(folder, map={}), "map.file: missing"),
-    (lambda folder: write(folder, map={"file": "maps/room.yaml", "unknown": "wall"}), "allowed: occupied, free"),
+    (lambda folder: write(folder, map={"file": "maps/room.yaml", "unknown": "wall"}), "one of occupied, free"),
     (lambda folder: write(folder, map={"file": "maps/room.yaml", "hight_m": 1}), "did you mean height_m?"),
     (lambda folder: write(folder, obstacles={"map": {"position_m": [50, 50, 0]}}), "obstacles.map: 'map' is not"),
     (lambda folder: write(folder, obstacles={"map_1": {"position_m": [50, 50, 0]}}), "does not begin with map_"),
@@ -189,9 +189,9 @@ MISTAKES: list[tuple[Callable[[Path], object], str]] = [
     ),
     (changing(image=None), "room.yaml:1: image: missing; wanted: the path of a PGM, PPM, PNG or BMP file"),
     (changing(image="no.pgm"), "room.yaml:2: image: "),
-    (changing(image="a\0b"), "image: 'a\\x00b' is not allowed"),
+    (changing(image="a\0b"), "image: '\\x00' is not allowed"),
     (changing(image="room.yaml"), "image: room.yaml is not a PGM, PPM, PNG or BMP image; wanted: the image of a map"),
-    (changing(resolution=0.0), "room.yaml:8: resolution: 0.0 is not allowed; wanted: the side of a cell, 0.001 to"),
+    (changing(resolution=0.0), "room.yaml:9: resolution: 0.0 is not allowed; wanted: the side of a cell, 0.001 to"),
     (changing(resolution=math.nan), "resolution: nan is not allowed"),
     (changing(resolution="5 cm"), "resolution: '5 cm' is not allowed"),
     (changing(origin=[0.0, 0.0]), "origin: [0.0, 0.0] is not allowed; wanted: 3 numbers: [x, y, yaw], m and rad"),
@@ -200,7 +200,7 @@ MISTAKES: list[tuple[Callable[[Path], object], str]] = [
     (changing(free_thresh=0.7), "free_thresh: 0.7 is not allowed; at most occupied_thresh = 0.65"),
     (changing(negate=2), "negate: 2 is not allowed; wanted: 0 or 1"),
     (changing(mode="scale"), "mode: 'scale' is not allowed; wanted: trinary"),
-    (changing(mode=3), "mode: 3 is not allowed; wanted: trinary"),
+    (changing(mode=3), "mode: '3' is not allowed; wanted: trinary"),
     (with_image(b"P5\n10 8\n255\n" + bytes(79)), "image: room.pgm is a broken image (image file is truncated"),
     (with_image(b"P6\n100000 100000\n255\n"), "image: room.pgm is an image of more than 16000000 cells"),
     (lambda folder: os.truncate(folder / "maps/room.pgm", 1 << 40), "image: "),
