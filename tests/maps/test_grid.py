@@ -79,6 +79,26 @@ def test_free_cells_that_no_robot_reaches_are_filled(grid: Grid, robots: list[tu
     assert filled[1:] == grid[1:]
 
 
+def distance(cells: Cells, x: float, y: float) -> float:
+    """Distance of a point from the nearest of some cells, in cells."""
+    gaps = [
+        np.hypot(max(abs(x - column - 0.5) - 0.5, 0.0), max(abs(y - row - 0.5) - 0.5, 0.0))
+        for row, column in np.argwhere(cells)
+    ]
+    return float(min(gaps, default=np.inf))
+
+
+@given(grid=GRIDS, robot=st.tuples(st.integers(-1, 7), st.integers(-1, 7)), within=st.tuples(*2 * [st.floats(0, 1)]))
+def test_filling_changes_no_distance_of_whoever_can_be_there(
+    grid: Grid, robot: tuple[int, int], within: tuple[float, float]
+) -> None:
+    home = middle(grid, *robot)
+    filled = grid.filled([(home.real, home.imag)])
+    for row, column in np.argwhere(~filled.occupied):
+        x, y = column + within[0], row + within[1]
+        assert distance(filled.occupied, x, y) == distance(grid.occupied, x, y)
+
+
 @given(grid=GRIDS)
 def test_clearance_is_at_most_the_distance_from_the_nearest_occupied_cell(grid: Grid) -> None:
     found = grid.clearance()
