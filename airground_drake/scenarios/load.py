@@ -158,7 +158,8 @@ def _read_map(scenario: Scenario, document: Document) -> None:
         return
     robots = [robot.start_m for robot in scenario.robots.values()]
     given.cells = map_file.cells(given, Path(document.source).parent, robots, document.where("map", "file"))
-    document.data["map"]["cells"] = dataclasses.asdict(given.cells)
+    cells = dataclasses.fields(given.cells)
+    document.data["map"]["cells"] = {each.name: getattr(given.cells, each.name) for each in cells}
 
 
 def _rounded_down(gain: float, period: float) -> float:

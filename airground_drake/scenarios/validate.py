@@ -367,10 +367,10 @@ def _extent(scenario: Scenario) -> Problems:
     points.append(("uav.start_m", scenario.uav.start_m))
     for name, each in scenario.barriers.items():
         shape = next((key for key in ("polygon_m", "segment_m", "size_m") if getattr(each, key)), "position_m")
-        places = [each.position_m] if each.position_m else []
+        corners = outlines_of(scenario, each)[:, convex.CORNERS :].reshape(-1, 2)  # and zeros
+        places = [corners[np.abs(corners).max(axis=1).argmax()].tolist()] + [each.position_m] * bool(each.position_m)
         if each.moves:
-            shape, places = "moves.waypoints_m", list(each.moves.waypoints_m)
-        places += [place for row in outlines_of(scenario, each) for place in convex.corners_of(row).tolist()]
+            shape, places = "moves.waypoints_m", [*places, *each.moves.waypoints_m]
         points += [(f"{_key_of(name)}.{'file' if name == MAP else shape}", place) for place in places]
     key, point = max(points, key=lambda entry: max(map(abs, entry[1])))
     farthest = max(map(abs, point))
@@ -455,7 +455,7 @@ def _reproduction(scenario: Scenario) -> Problems:
 
 
 def _choices(scenario: Scenario) -> Problems:
-    keys = set(_keys(asdict(scenario)))
+    keys = set(_keys(asdict(scenario))) if scenario.choices else set()
     for index, choice in enumerate(scenario.choices):
         if choice.key not in keys:
             yield f"choices.{index}.key", choice.key, "a key of this scenario, such as control.period_s"
