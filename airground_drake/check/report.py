@@ -35,9 +35,11 @@ SHAPE: Mapping[str, type] = {
 """Type of each part of report.json that is read; lists have objects."""
 OF_A_REPORT = re.compile(
     r"report\.json|report\.html|junit\.xml|diagram\.(dot|svg)|proofs/(proofs\.json|run_\w+\.v)"
-    r"|trace/([^/]+)/((meta|timings)\.json|\w+\.parquet)"
+    r"|trace/([^/]+)/((meta|timings)\.json|\w+\.parquet)|map/[^/]+\.(ya?ml|p[bgp]m|png|bmp)"
 )
 """Files that a report may have; the third group is a run."""
+OF_THE_MAP = "map/"
+"""Folder of the files of the map."""
 ADDED_LATER = "proofs/"
 """Folder of the files that `airground prove` adds to a report."""
 
@@ -132,6 +134,11 @@ def check_files(folder: Path, there: Sequence[str], report: Json) -> str:
     for name in sorted({*recorded} | found):
         same("a file is named if it is there", name in recorded, name in found, about=name)
         same("SHA-256 of a file", recorded[name], sha256(read_bytes(folder / name)), about=name)
+        if name.startswith(OF_THE_MAP):
+            read = report["scenario"]["resolved"]["map"]["cells"]["sha256"].values()
+            holds(
+                "the map was read from this file", recorded[name] in read, recorded[name], ", ".join(read), about=name
+            )
     return f"{len(found)} files"
 
 

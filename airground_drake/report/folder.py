@@ -86,7 +86,7 @@ def clear(folder: Path) -> None:
 
 def of_map(name: str) -> str:
     """The path in a report of a file of a map, from its name; a name with another ending gets `.pgm`."""
-    path = f"map/{name}"
+    path = f"map/{Path(name).name}"  # the name may come from a stranger
     return path if _FILES.fullmatch(path) else f"{path}.pgm"
 
 

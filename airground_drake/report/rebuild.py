@@ -11,7 +11,7 @@ import re
 import sys
 import xml.etree.ElementTree as ET
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import asdict, replace
 from functools import partial
 from importlib.metadata import version
 from itertools import zip_longest
@@ -58,6 +58,7 @@ def lines(folder: Path, judge: Judge | None = None) -> Iterator[Line]:
     yield from parts
     if any(line["outcome"] == DISAGREES for line in parts):
         return  # pages that show a wrong report.json need no comparison
+    yield from _map(folder, scenario)
     try:
         for line in _pages(folder, report, scenario, traces):
             yield _with_note(line, other_code)
@@ -162,6 +163,25 @@ def _taken(line: Line, why: str, applies: bool) -> Line:
     if not applies or line["outcome"] != AGREES:
         return line
     return line | {"outcome": RECORDED, "text": why}
+
+
+def _map(folder: Path, scenario: Any) -> Iterator[Line]:
+    """The cells of a map, made again from the copies of its files."""
+    from airground_drake.report.folder import of_map
+    from airground_drake.scenarios import map_file
+
+    if scenario.map is None:
+        return
+    recorded = scenario.map.cells
+    about = next(iter(recorded.sha256), "")
+    if not (folder / of_map(about)).exists():
+        yield line_of("map", "", OPEN, "the report has no copy of its files")
+        return
+    made = map_file.cells(replace(scenario.map, file=of_map(about)), folder, recorded.starts_m, str(folder))
+    found = list(differences(asdict(recorded), asdict(replace(made, file=recorded.file))))
+    yield from (different("map", "", place, theirs, ours) for place, theirs, ours in found[:1])
+    if not found:
+        yield line_of("map", "", AGREES, f"{len(recorded.rectangles)} rectangles follow from its files")
 
 
 def _pages(folder: Path, report: Mapping[str, Any], scenario: Any, traces: Mapping[str, Any]) -> Iterator[Line]:

@@ -156,8 +156,8 @@ def _read_map(scenario: Scenario, document: Document) -> None:
     given = scenario.map
     if given is None or (given.cells and (given.cells.file, given.cells.unknown) == (given.file, given.unknown)):
         return
-    robots = [robot.start_m for robot in scenario.robots.values()]
-    given.cells = map_file.cells(given, Path(document.source).parent, robots, document.where("map", "file"))
+    starts = [robot.start_m for robot in scenario.robots.values()]
+    given.cells = map_file.cells(given, Path(document.source).parent, starts, document.where("map", "file"))
     cells = dataclasses.fields(given.cells)
     document.data["map"]["cells"] = {each.name: getattr(given.cells, each.name) for each in cells}
 

@@ -114,13 +114,13 @@ def read(path: Path, where: str = "") -> MapFile:
     return MapFile(cells, Frame(about.resolution, (x, y, heading)), {path: data, image: content})
 
 
-def cells(given: Map, folder: Path, robots: Sequence[Sequence[float]], where: str) -> MapCells:
+def cells(given: Map, folder: Path, starts: Sequence[Sequence[float]], where: str) -> MapCells:
     """What the files of a scenario's map say.
 
     Args:
         given: the map.
         folder: of the scenario.
-        robots: starts of all robots, [x, y, ...], m; what none of them can reach is filled.
+        starts: of all robots, [x, y, ...], m; what none of them can reach is filled.
         where: file and line of the scenario that name the map, for messages.
 
     Raises:
@@ -128,7 +128,8 @@ def cells(given: Map, folder: Path, robots: Sequence[Sequence[float]], where: st
     """
     found = read(folder / given.file, where)
     grid = found.grid(unknown=given.unknown == "occupied")
-    filled = grid.filled([each[:2] for each in robots])
+    starts_m = [[*each[:2]] for each in starts]
+    filled = grid.filled(starts_m)
     rectangles = covering(filled.occupied)
     if len(rectangles) > MAX_RECTANGLES:
         fault = Fault(f"{given.file} needs {len(rectangles)} rectangles")
@@ -137,7 +138,8 @@ def cells(given: Map, folder: Path, robots: Sequence[Sequence[float]], where: st
     _contents.update(zip(digests.values(), found.contents.values(), strict=True))
     rows, columns = grid.occupied.shape
     return MapCells(
-        file=given.file, unknown=given.unknown, sha256=digests, cell_m=grid.frame.cell_m, origin=[*grid.frame.origin],
+        file=given.file, unknown=given.unknown, sha256=digests, starts_m=starts_m,
+        cell_m=grid.frame.cell_m, origin=[*grid.frame.origin],
         rows=rows, columns=columns,
         occupied=int(found.cells.occupied.sum()), unsure=int(found.cells.unknown.sum()),
         unreached=int((filled.occupied & ~grid.occupied).sum()),

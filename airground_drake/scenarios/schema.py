@@ -18,6 +18,7 @@ from airground_drake.registry import METHODS, MODEL_CLAIMS, POLICIES, ROUTES, RU
 from airground_drake.scenarios.kinds import (
     CLAIMS,
     CellRectangle,
+    Corner,
     CornersOrNone,
     Count,
     CountFromZero,
@@ -186,6 +187,8 @@ class MapCells:
     """The map's `unknown`."""
     sha256: dict[Words, Words]
     """SHA-256 of the YAML file and of its image, by name."""
+    starts_m: list[Corner]
+    """Where the robots started."""
     cell_m: Positive
     """Side of a cell."""
     origin: Annotated[list[Real], Field(min_length=3, max_length=3)]
@@ -199,7 +202,7 @@ class MapCells:
     unsure: CountFromZero
     """Number of unknown cells."""
     unreached: CountFromZero
-    """Number of free cells that no robot can reach."""
+    """Number of free cells that no robot can reach from these starts."""
     rectangles: Annotated[list[CellRectangle], Field(max_length=MAX_RECTANGLES)]
     """Rectangles of cells whose union is in the way: first row, row after the last, first column, column after the
     last. They may overlap."""
