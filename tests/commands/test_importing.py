@@ -12,8 +12,8 @@ from commands.conftest import Airground
 
 from airground_drake.geometry import convex
 from airground_drake.scenarios.load import load
-from airground_drake.scenarios.schema import Scenario
 from airground_drake.scenarios.outlines import outlines_of
+from airground_drake.scenarios.schema import Scenario
 
 MAPS = Path(__file__).parents[1] / "maps" / "data"
 PILLAR = (

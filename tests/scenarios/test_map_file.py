@@ -20,8 +20,8 @@ from airground_drake.base.files import sha256
 from airground_drake.geometry import convex
 from airground_drake.scenarios import map_file
 from airground_drake.scenarios.load import from_data, load, resolved, validated
-from airground_drake.scenarios.schema import Scenario
 from airground_drake.scenarios.outlines import outlines_of
+from airground_drake.scenarios.schema import Scenario
 from airground_drake.scenarios.world import make_world
 
 ROOM = """
