@@ -478,6 +478,63 @@ def passes(row: Array, keep: float, ax: float, ay: float, bx: float, by: float, 
     return bool(approach(row, start, stop, True)[0] >= min(keep, first, last) - slack)
 
 
+@njit(cache=True)
+def clears(row: Array, reach: float, ax: float, ay: float, bx: float, by: float) -> bool:
+    """Whether a segment from (ax, ay) to (bx, by), m, in the plane z = 0 is everywhere `reach`, m, from a core.
+
+    Of a segment and a core that do not meet, either an end of the segment or a corner of the core is nearest.
+    """
+    sx, sy, count = bx - ax, by - ay, int(row[COUNT])
+    far = reach + row[EXTENT]
+    mx, my = row[MIDDLE], row[MIDDLE + 1]
+    if min(ax, bx) > mx + far or max(ax, bx) < mx - far or min(ay, by) > my + far or max(ay, by) < my - far:
+        return True
+    length = np.sqrt(sx * sx + sy * sy)
+    if abs((mx - ax) * sy - (my - ay) * sx) > far * length:
+        return True
+    squared = max(sx * sx + sy * sy, 1e-300)
+    for k in range(count):
+        i, j = CORNERS + 2 * k, CORNERS + 2 * ((k + 1) % count)
+        cx, cy = row[i] - ax, row[i + 1] - ay
+        share = min(max((cx * sx + cy * sy) / squared, 0.0), 1.0)
+        x, y = cx - share * sx, cy - share * sy
+        if x * x + y * y < reach * reach:
+            return False
+        here, there = cx * sy - cy * sx, (row[j] - ax) * sy - (row[j + 1] - ay) * sx
+        if here * there < 0.0:  # the edge crosses the line of the segment, and perhaps the segment
+            ex, ey = row[j] - row[i], row[j + 1] - row[i + 1]
+            if (cx * ey - cy * ex) * ((row[i] - bx) * ey - (row[i + 1] - by) * ex) <= 0.0:
+                return False
+    away = np.empty(3)
+    return bool(
+        nearest(row, ax, ay, 0.0, True, away, reach) >= reach and nearest(row, bx, by, 0.0, True, away, reach) >= reach
+    )
+
+
+@njit(cache=True)
+def ways_are_clear(begin: Array, end: Array, rows: Array, reach: Array) -> npt.NDArray[np.bool_]:
+    """Which segments, from (K, 2) to (K, 2), m, in the plane z = 0 are `reach` (m,), m, from all cores (m, W): (K,)."""
+    found = np.ones(len(begin), np.bool_)
+    for k in range(len(begin)):
+        for m in range(len(rows)):
+            if not clears(rows[m], reach[m], begin[k, 0], begin[k, 1], end[k, 0], end[k, 1]):
+                found[k] = False
+                break
+    return found
+
+
+@njit(cache=True)
+def in_the_way(begin: Array, end: Array, more: Array, rows: Array, reach: Array) -> npt.NDArray[np.bool_]:
+    """Which cores (m, W) are nearer than `reach` (m,), m, and `more` (K,), m, to one of K segments: (m,)."""
+    found = np.zeros(len(rows), np.bool_)
+    for m in range(len(rows)):
+        for k in range(len(begin)):
+            if not clears(rows[m], reach[m] + more[k], begin[k, 0], begin[k, 1], end[k, 0], end[k, 1]):
+                found[m] = True
+                break
+    return found
+
+
 def sections(rows: Array, distance: Array | float, height: float) -> tuple[Array, Array]:
     """Where a plane at a height, m, cuts the sets within a distance, (m,), m, of the cores of outlines (m, W).
 

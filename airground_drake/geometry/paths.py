@@ -1,9 +1,11 @@
-"""Shortest planar path of a point robot among discs that may overlap.
+"""Shortest planar path of a point robot among convex obstacles that may overlap.
 
-The discs are open sets: running along a circle is allowed, crossing its inside is not. A shortest path is made of
-straight segments tangent to circles and of arcs of those circles, so it is found exactly: the common tangents that no
-disc blocks and the uncovered arcs between their ends form a graph, searched with Dijkstra. Start and goal are circles
-of radius zero in it.
+The robot keeps a distance from the core of each obstacle (`convex`). The set that it keeps out of is a disc for a ball
+and a rounded polygon for a wall or a polygon. These are open sets: running along a boundary is allowed, crossing the
+inside is not. The boundary of a rounded polygon is made of circles round its corners and of their common outer
+tangents. So a shortest path is made of straight segments tangent to circles and of arcs of those circles, and is found
+exactly: the common tangents that no obstacle blocks and the free arcs between their ends form a graph, searched with
+Dijkstra. Start and goal are circles of radius zero in it.
 
 All points are in one planar frame, in m; angles are in rad. The private functions write a point (x, y) as the complex
 number x + iy.
@@ -13,8 +15,10 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_right
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 from itertools import accumulate
+from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -23,22 +27,27 @@ from scipy.sparse.csgraph import dijkstra
 from scipy.spatial import cKDTree
 
 from airground_drake.base.arrays import Array, read_only
-from airground_drake.geometry.convex import CORNERS
+from airground_drake.geometry import convex
+from airground_drake.geometry.convex import BASE, CORNERS, COUNT, TOP
 
 Points = NDArray[np.complex128]
 
 TOL = 1e-9
-"""Tolerance, m. A start or goal up to TOL inside a circle counts as on it; a disc of radius up to TOL is ignored. It is
-meant for coordinates and radii up to 1e4 m, where rounding (2e-12 m) stays well below."""
+"""Tolerance, m. A start or goal up to TOL inside an obstacle counts as on its boundary; a disc of radius up to TOL is
+ignored, and from walls and polygons at least twice as much is kept. It is meant for coordinates and radii up to 1e4 m,
+where rounding (2e-12 m) stays well below."""
 _EPS = TOL / 10
-"""Room for rounding, m: legs may dip so far into a disc, a disc that sticks out of another by less is dropped, shorter
-pieces are left out of the path."""
+"""Room for rounding, m: legs may dip so far into an obstacle, a disc that sticks out of another by less is dropped,
+shorter pieces are left out of the path."""
 
 FEW = 64
-"""Up to this number all discs enter the graph; beyond it only the discs that a path runs into."""
+"""Up to this number of circles all obstacles enter the graph; beyond it only those that a path runs into."""
 
 AT_ONCE = 1_000_000
 """Largest number of pairs of a segment and a disc that are tested together, to limit memory."""
+
+CHORD = 0.1
+"""Largest angle of the chords that stand for an arc where obstacles are looked for that a path runs into, rad."""
 
 
 class NoPath(ValueError):  # noqa: N818
@@ -86,44 +95,178 @@ class Path:
 
 
 def shortest_path(start: ArrayLike, goal: ArrayLike, rows: Array, keep: ArrayLike) -> Path:
-    """Shortest path of a point from start to goal outside all the discs.
+    """Shortest path of a point from start to goal that keeps its distance from all obstacles.
 
-    If the start is strictly inside a disc, the path first goes straight to the nearest point of the boundary
-    of the union of the discs (the only leg that crosses discs) and is the shortest from there on. The result
-    depends on the arguments only, also where two paths are equally short.
+    If the start is too near to an obstacle, the path first goes straight to the nearest point of the boundary of the
+    union of all that it has to keep out of (the only leg that crosses obstacles) and is the shortest from there on. The
+    result depends on the arguments only, also where two paths are equally short.
 
     Args:
         start: first point, (2,), m.
         goal: last point, (2,), m.
-        rows: outlines of balls, (m, W), see `geometry.convex`; m = 0 gives the straight line.
-        keep: distances from their cores, (m,), m: the radii of the discs.
+        rows: outlines of obstacles, (m, W), see `geometry.convex`; m = 0 gives the straight line. Heights do not count.
+        keep: distances from their cores, (m,), m.
 
     Raises:
-        NoPath: if the goal is strictly inside a disc, or if the start (or the point where it leaves the
-            discs) and the goal are in different components of the free space.
+        NoPath: if the goal is too near to an obstacle, or if the start (or the point where it leaves the obstacles) and
+            the goal are in different components of the free space.
         ValueError: if a number is not finite.
     """
     given = start, goal, rows, keep
     if not all(np.isfinite(numbers).all() for numbers in given):
         raise ValueError(f"a path needs finite numbers, got {given}")
     p, q = complex(*np.asarray(start)), complex(*np.asarray(goal))
-    c, r = rows[:, CORNERS : CORNERS + 2] @ np.array((1.0, 1.0j)), np.asarray(keep, dtype=np.float64)
-    c, r = _outermost(c, r)
-    inside = abs(c - q) < r - TOL
-    if inside.any():
-        raise NoPath(f"goal {_show(q)} is inside the disc at {_show(c[inside][0])}, radius {r[inside][0]}")
-    free = _escape(p, c, r) if (abs(c - p) < r - TOL).any() else p
-    for point in (free, q):  # up to TOL inside a circle: shrink the disc to put the point on the circle
-        r = np.minimum(r, abs(c - point))
-    route = _route_among(free, q, c, r)
+    around = _Obstacles.of(rows, np.asarray(keep, dtype=np.float64))
+    if (lacking := around.lack(q)) is not None:
+        raise NoPath(f"goal {_show(q)} is inside {lacking}")
+    free = p if around.lack(p) is None else _escape(p, around)
+    for point in (free, q):
+        around = around.shrunk(point)
+    route = _route_among(free, q, around)
     if route is None:
+        c, r, _ = around.circles
         beyond = p + 1.0 + np.max(abs(c - p) + r)
-        shut = [n for n, z in (("start", free), ("goal", q)) if _route_among(z, beyond, c, r) is None]
-        raise NoPath(f"no way from start {_show(p)} to goal {_show(q)}: discs enclose {' and '.join(shut)}")
+        shut = [n for n, z in (("start", free), ("goal", q)) if _route_among(z, beyond, around) is None]
+        raise NoPath(f"no way from start {_show(p)} to goal {_show(q)}: obstacles enclose {' and '.join(shut)}")
     leg = np.array([free - p])
     pieces = np.concatenate((_rows(np.array([p]), leg, np.zeros(1), abs(leg)), route))
     kept = pieces[:, 5] > _EPS
     return Path(pieces[kept] if kept.any() else np.array([[p.real, p.imag, 0.0, 0.0, 0.0, 0.0]]))
+
+
+@dataclass(frozen=True, eq=False)
+class _Obstacles:
+    """What a path keeps out of.
+
+    Attributes:
+        c: centres of discs, (m,).
+        r: their radii, (m,), m.
+        rows: outlines of walls and polygons, (k, W), at height 0.
+        keep: distances from their cores, (k,), m.
+    """
+
+    c: Points
+    r: Array
+    rows: Array
+    keep: Array
+
+    @classmethod
+    def of(cls, rows: Array, keep: Array) -> Self:
+        """Of outlines (m, W), and distances from their cores, (m,), m."""
+        round_ones = rows[:, COUNT] == 1.0
+        c, r = _outermost(rows[round_ones, CORNERS : CORNERS + 2] @ np.array((1.0, 1.0j)), keep[round_ones])
+        others = rows[~round_ones]
+        others[:, BASE] = others[:, TOP] = 0.0
+        return cls(c, r, others, np.maximum(keep[~round_ones], 2.0 * TOL))
+
+    @property
+    def corners(self) -> tuple[Points, Points, Points]:
+        """All corners, (n,), polygon by polygon, and the corners before and after each."""
+        count, width = self.rows[:, COUNT, None].astype(np.intp), int(self.rows[:, COUNT].max(initial=0.0))
+        places = self.rows[:, CORNERS : CORNERS + 2 * width].reshape(len(self.rows), width, 2) @ np.array((1.0, 1.0j))
+        at = np.arange(width)
+        there = at < count
+        before, after = (np.take_along_axis(places, (at + turn) % count, axis=1) for turn in (-1, 1))
+        return places[there], before[there], after[there]
+
+    @property
+    def edges(self) -> tuple[Points, Points]:
+        """First and last points of the straight parts of the boundaries, (n,)."""
+        if not len(self.rows):
+            return np.empty(0, dtype=complex), np.empty(0, dtype=complex)
+        here, _, after = self.corners
+        out = -1j * (after - here) / abs(after - here) * self.of_corners(self.keep)
+        return here + out, after + out
+
+    def of_corners(self, values: Array) -> Array:
+        """Values of polygons, (k,), for each of their corners, (n,)."""
+        return np.repeat(values, self.rows[:, COUNT].astype(np.intp))
+
+    @cached_property
+    def circles(self) -> tuple[Points, Array, Points]:
+        """Centres and radii of discs and of the circles round corners, (n,), and the ways to the next corners, (2, n).
+
+        Of equal circles round corners there is one.
+        """
+        discs = np.zeros((2, len(self.c)), dtype=complex)
+        if not len(self.rows):
+            return self.c, self.r, discs
+        here, before, after = self.corners
+        r = self.of_corners(self.keep)
+        kept = _are_outermost(here, r)
+        ways = np.stack((before - here, after - here))[:, kept]
+        return (
+            np.concatenate((self.c, here[kept])),
+            np.concatenate((self.r, r[kept])),
+            np.concatenate((discs, ways), axis=1),
+        )
+
+    def lack(self, point: complex) -> str | None:
+        """Words for an obstacle that a point is too near to by more than TOL; None if there is none."""
+        inside = abs(self.c - point) < self.r - TOL
+        if inside.any():
+            return f"the disc at {_show(self.c[inside][0])}, radius {self.r[inside][0]}"
+        near = self.distances(point) < self.keep - TOL
+        if near.any():
+            middle = complex(*self.rows[near][0, convex.MIDDLE : convex.EXTENT])
+            return f"the obstacle about {_show(middle)}, with {self.keep[near][0]} m round it"
+        return None
+
+    def distances(self, point: complex) -> Array:
+        """Signed distances of a point from the cores of walls and polygons, (k,), m."""
+        return convex.distances(self.rows, np.array((point.real, point.imag, 0.0)), True)
+
+    def shrunk(self, point: complex) -> Self:
+        """The same with a point that is up to TOL inside on the boundary."""
+        r, keep = np.minimum(self.r, abs(self.c - point)), np.minimum(self.keep, self.distances(point))
+        return replace(self, r=r, keep=keep)
+
+    def some(self, which: NDArray[np.bool_]) -> Self:
+        """Some of discs and polygons, (m + k,)."""
+        discs, others = np.split(which, [len(self.r)])
+        return replace(self, c=self.c[discs], r=self.r[discs], rows=self.rows[others], keep=self.keep[others])
+
+    def clear(self, points: Points) -> NDArray[np.bool_]:
+        """Which points, (n,), are outside everything; (n,)."""
+        free = _clear(points[:, None], self.c, self.r)
+        if len(self.rows):
+            free &= convex.points_are_free(_places(points), self.rows, self.keep - _EPS)
+        return free
+
+    def passable(self, a: Points, b: Points) -> NDArray[np.bool_]:
+        """Which segments, from (n,) to (n,), nothing blocks; (n,)."""
+        free = _passable(a, b, self.c, self.r)
+        if len(self.rows):
+            left = np.flatnonzero(free)
+            free[left] = convex.ways_are_clear(_places(a[left]), _places(b[left]), self.rows, self.keep - _EPS)
+        return free
+
+    def entered(self, pieces: Array) -> NDArray[np.bool_]:
+        """Which discs and polygons pieces of a path (see ``Path``) run into, or nearly; (m + k,)."""
+        discs = _entered(pieces, self.c, self.r)
+        if not len(self.rows):
+            return discs
+        begin, end, sagitta = _chords(pieces)
+        others = convex.in_the_way(_places(begin), _places(end), sagitta, self.rows, self.keep - _EPS)
+        return np.concatenate((discs, others))
+
+
+def _places(points: Points) -> Array:
+    return np.column_stack([points.real, points.imag])
+
+
+def _chords(pieces: Array) -> tuple[Points, Points, Array]:
+    """Chords of pieces of a path (see ``Path``): both ends, and how far the path is from them at most, m, each (n,)."""
+    count = np.maximum(1, np.ceil(abs(pieces[:, 4]) * pieces[:, 5] / CHORD)).astype(np.intp)
+    x, y, tx, ty, curvature, length = np.repeat(pieces, count, axis=0).T
+    step = length / np.repeat(count, count)
+    along = step * (np.arange(len(step)) - np.repeat(np.cumsum(count) - count, count))
+    half = 0.5 * curvature * step
+    turn = np.exp(1j * curvature * along)
+    chord = along * np.sinc(0.5 * curvature * along / np.pi) * np.exp(0.5j * curvature * along)
+    begin = x + 1j * y + chord * (tx + 1j * ty)
+    end = begin + step * np.sinc(half / np.pi) * np.exp(1j * half) * turn * (tx + 1j * ty)
+    return begin, end, abs(0.25 * half * step)
 
 
 def _show(z: complex) -> str:
@@ -131,17 +274,23 @@ def _show(z: complex) -> str:
 
 
 def _outermost(c: Points, r: Array) -> tuple[Points, Array]:
-    """Drop the discs that are inside another one; of equal discs keep the first."""
+    """Drop points, and the discs that are inside another one; of equal discs keep the first."""
     c, r = c[r > TOL], r[r > TOL]
+    keep = _are_outermost(c, r)
+    return c[keep], r[keep]
+
+
+def _are_outermost(c: Points, r: Array) -> NDArray[np.bool_]:
+    """Which discs are not inside another one, of equal discs the first; (m,)."""
     if not len(r):
-        return c, r
+        return np.ones(0, dtype=bool)
     near = cKDTree(np.column_stack([c.real, c.imag])).query_pairs(np.ptp(r) + TOL, output_type="ndarray")
     i, j = np.concatenate([near, near[:, ::-1]]).T
     apart = abs(c[i] - c[j])
     within, around = apart + r[i] <= r[j] + _EPS, apart + r[j] <= r[i] + _EPS
     keep = np.ones(len(r), dtype=bool)
     keep[i[within & (~around | (j < i))]] = False
-    return c[keep], r[keep]
+    return keep
 
 
 def _clear(points: Points, c: Points, r: Array) -> NDArray[np.bool_]:
@@ -171,35 +320,78 @@ def _crossings(c: Points, r: Array) -> tuple[Points, NDArray[np.intp]]:
     return np.concatenate((c[i] + (a + 1j * h) * u, c[i] + (a - 1j * h) * u)), np.tile((i, j), 2)
 
 
-def _escape(p: complex, c: Points, r: Array) -> complex:
-    """The nearest point to p, which is inside a disc, of the boundary of the union of the discs."""
-    reach = 2.0 * float(r.max())
-    while True:  # as far as it reaches, the discs that do, too, are the union
-        near = abs(c - p) - r <= reach
-        found = _exit(p, c[near], r[near])
+def _on_edges(c: Points, r: Array, begin: Points, end: Points) -> tuple[Points, NDArray[np.intp]]:
+    """Where circles meet or touch segments from (k,) to (k,): the points and the indices of the circles, (n,)."""
+    points, circles = [np.empty(0, dtype=complex)], [np.empty(0, dtype=np.intp)]
+    if not len(begin):
+        return points[0], circles[0]
+    u, length = (end - begin) / abs(end - begin), abs(end - begin)
+    for some in np.array_split(np.arange(len(begin)), len(begin) * len(r) // AT_ONCE + 1):
+        z = (c[:, None] - begin[some]) * u[some].conj()  # along and beside each segment
+        half = np.sqrt(np.maximum((r[:, None] - z.imag) * (r[:, None] + z.imag), 0.0))
+        for side in (-1.0, 1.0):
+            along = z.real + side * half
+            met = (abs(z.imag) <= r[:, None] + _EPS) & (along >= -_EPS) & (along <= length[some] + _EPS)
+            i, j = np.nonzero(met)
+            points.append(begin[some][j] + along[i, j] * u[some][j])
+            circles.append(i)
+    return np.concatenate(points), np.concatenate(circles)
+
+
+def _escape(p: complex, around: _Obstacles) -> complex:
+    """The nearest point to p, which is inside, of the boundary of the union of all obstacles."""
+    depth = np.concatenate((abs(around.c - p) - around.r, around.distances(p) - around.keep))
+    reach = 2.0 * float(max(around.r.max(initial=0.0), around.keep.max(initial=0.0)))
+    while True:  # as far as it reaches, the obstacles that do, too, are the union
+        near = depth <= reach
+        found = _exit(p, around.some(near))
         if abs(found - p) <= reach or near.all():
             return found
         reach *= 2.0
 
 
-def _exit(p: complex, c: Points, r: Array) -> complex:
-    """As `_escape`, with all crossings of the circles."""
+def _exit(p: complex, around: _Obstacles) -> complex:
+    """As `_escape`, with all places where boundaries cross."""
+    c, r, _ = around.circles
+    begin, end = around.edges
     e = np.where(abs(p - c) > _EPS, p - c, 1.0)  # along +x from a centre
-    candidates = np.concatenate(((c + r / abs(e) * e)[abs(p - c) < r], _crossings(c, r)[0]))
-    return complex(min(candidates[_clear(candidates[:, None], c, r)], key=lambda z: float(abs(z - p))))
+    u, length = (end - begin) / abs(end - begin), abs(end - begin)
+    feet = begin + np.clip(((p - begin) * u.conj()).real, 0.0, length) * u
+    i, j = np.triu_indices(len(begin), 1)
+    with np.errstate(divide="ignore", invalid="ignore"):  # of parallel edges
+        share = ((begin[j] - begin[i]) * u[j].conj()).imag / (u[i] * u[j].conj()).imag
+    met = (share >= 0.0) & (share <= length[i])
+    candidates = np.concatenate((
+        (c + r / abs(e) * e)[abs(p - c) < r], _crossings(c, r)[0],
+        feet, _on_edges(c, r, begin, end)[0], begin[i[met]] + share[met] * u[i[met]],
+    ))  # fmt: skip
+    return complex(min(candidates[around.clear(candidates)], key=lambda z: float(abs(z - p))))
 
 
-def _tangents(c: Points, r: Array) -> tuple[Points, Points, NDArray[np.intp]]:
-    """Both ends of all common tangents, (n,), and the circles they touch, (2, n); 0, 1 are points."""
-    i, j = np.tile(np.triu_indices(len(r), 1), 4)
-    side, turn = np.repeat([[1.0, 1.0, -1.0, -1.0], [1.0, -1.0, 1.0, -1.0]], len(i) // 4, axis=1)
-    d, k = abs(c[j] - c[i]), r[i] - side * r[j]  # side: 1 outer tangent, -1 inner
-    real = (d >= abs(k) - _EPS) & ((i > 1) | (side > 0.0))  # a point has two tangents to a circle, not four
-    i, j, side, turn, d, k = (v[real] for v in (i, j, side, turn, d, k))
-    u = (c[j] - c[i]) / d
-    d = np.where(d - abs(k) <= _EPS, abs(k), d)  # touching
-    normal = (k + 1j * turn * np.sqrt((d - k) * (d + k))) / d * u
-    return c[i] + r[i] * normal, c[j] + side * r[j] * normal, np.array((i, j))
+def _tangents(c: Points, r: Array, ways: Points) -> tuple[Points, Points, NDArray[np.intp]]:
+    """Both ends of all common tangents, (n,), and the circles they touch, (2, n); 0, 1 are points.
+
+    A tangent that cuts the polygon about whose corner the circle is, is left out: the ways to the next corners, (2, m),
+    lead to its other side.
+    """
+    i, j = np.triu_indices(len(r), 1)
+    apart = abs(c[j] - c[i])
+    found = []
+    for side, turn in ((1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0)):  # side: 1 outer tangent, -1 inner
+        k = r[i] - side * r[j]
+        real = (apart >= abs(k) - _EPS) & (apart > 0.0)
+        if side < 0.0:
+            real &= i > 1  # a point has two tangents to a circle, not four
+        f, g, d, k = i[real], j[real], apart[real], k[real]
+        u = (c[g] - c[f]) / d
+        d = np.where(d - abs(k) <= _EPS, abs(k), d)  # touching
+        normal = (k + 1j * turn * np.sqrt((d - k) * (d + k))) / d * u
+        inside = (normal * ways[:, f].conj()).real > _EPS, (side * normal * ways[:, g].conj()).real > _EPS
+        out = ~(inside[0] | inside[1]).any(axis=0)
+        f, g, normal = f[out], g[out], normal[out]
+        found.append((c[f] + r[f] * normal, c[g] + side * r[g] * normal, np.array((f, g))))
+    a, b, on = zip(*found, strict=True)
+    return np.concatenate(a), np.concatenate(b), np.concatenate(on, axis=1)
 
 
 def _rows(begin: Points, heading: Points, curvature: Array, length: Array) -> Array:
@@ -208,14 +400,14 @@ def _rows(begin: Points, heading: Points, curvature: Array, length: Array) -> Ar
     return np.stack((begin.real, begin.imag, unit.real, unit.imag, curvature, length), axis=1)
 
 
-def _route_among(p: complex, q: complex, c: Points, r: Array) -> Array | None:
-    """As `_route`, also among many discs: a shortest path among some that runs into none of the others is shortest."""
-    if len(r) <= FEW:
-        return _route(p, q, c, r)
-    some = _entered(_rows(np.array([p]), np.array([q - p]), np.zeros(1), np.array([abs(q - p)])), c, r)
+def _route_among(p: complex, q: complex, around: _Obstacles) -> Array | None:
+    """As `_route`, also among many: a shortest path among some that runs into none of the others is shortest."""
+    if len(around.circles[1]) <= FEW:
+        return _route(p, q, around)
+    some = around.entered(_rows(np.array([p]), np.array([q - p]), np.zeros(1), np.array([abs(q - p)])))
     while True:
-        route = _route(p, q, c[some], r[some])
-        more = some if route is None else some | _entered(route, c, r)
+        route = _route(p, q, around.some(some))
+        more = some if route is None else some | around.entered(route)
         if (more == some).all():
             return route
         some = more
@@ -236,21 +428,27 @@ def _entered(pieces: Array, c: Points, r: Array) -> NDArray[np.bool_]:
     return np.asarray((abs(nearest - c) < r - _EPS).any(axis=0))
 
 
-def _route(p: complex, q: complex, c: Points, r: Array) -> Array | None:
+def _route(p: complex, q: complex, around: _Obstacles) -> Array | None:
     """The pieces (see ``Path``) of the shortest path between free points; None if no path exists."""
     if abs(q - p) <= _EPS:
         return np.empty((0, 6))
-    a, b, on = _tangents(np.concatenate(([p, q], c)), np.concatenate(([0.0, 0.0], r)))
-    free = _passable(a, b, c, r)
+    c, r, ways = around.circles
+    a, b, on = _tangents(
+        np.concatenate(([p, q], c)), np.concatenate(([0.0, 0.0], r)), np.concatenate((np.zeros((2, 2)), ways), axis=1)
+    )
+    free = around.passable(a, b)
     a, b, on = a[free], b[free], on[:, free] - 2  # on -2, -1: start and goal, which are the nodes 0 and 1
     cross, pair = _crossings(c, r)
-    at = np.concatenate(([p, q], a, b, cross))
+    met, by = _on_edges(c, r, *around.edges)
+    at = np.concatenate(([p, q], a, b, cross, met))
     n, k = len(at), len(a)
     ends = np.where(on < 0, on + 2, 2 + np.arange(2 * k).reshape(2, k))
+    crossed = np.arange(2 + 2 * k, n - len(met))
 
-    # Arcs between neighbouring nodes of a circle: free or blocked as a whole, as the crossings are nodes too.
-    node = np.concatenate((ends.ravel(), np.tile(np.arange(2 + 2 * k, n), 2)))
-    disc = np.concatenate((on.ravel(), pair.ravel()))
+    # Arcs between neighbouring nodes of a circle: free or blocked as a whole, as its crossings with all other
+    # boundaries are nodes too.
+    node = np.concatenate((ends.ravel(), crossed, crossed, np.arange(n - len(met), n)))
+    disc = np.concatenate((on.ravel(), pair.ravel(), by))
     node, disc = node[disc >= 0], disc[disc >= 0]
     angle = np.angle(at[node] - c[disc])
     order = np.lexsort((angle, disc))
@@ -258,7 +456,7 @@ def _route(p: complex, q: complex, c: Points, r: Array) -> Array | None:
     last = np.arange(1, len(node) + 1) == np.searchsorted(disc, disc, side="right")
     after = np.where(last, np.searchsorted(disc, disc), np.arange(1, len(node) + 1))
     sweep = angle[after] - angle + np.where(last, 2.0 * np.pi, 0.0)
-    free = _clear((c[disc] + r[disc] * np.exp(1j * (angle + 0.5 * sweep)))[:, None], c, r)
+    free = around.clear(c[disc] + r[disc] * np.exp(1j * (angle + 0.5 * sweep)))
     node, after, disc, sweep = node[free], node[after][free], disc[free], sweep[free]
 
     # Every edge in both directions; of parallel edges the shortest, as a sparse matrix would add them up.
