@@ -29,6 +29,7 @@ from scipy.spatial import cKDTree
 from airground_drake.base.arrays import Array, read_only
 from airground_drake.geometry import convex
 from airground_drake.geometry.convex import BASE, CORNERS, COUNT, TOP
+from airground_drake.geometry.separation import are_separated
 
 Points = NDArray[np.complex128]
 
@@ -51,7 +52,7 @@ CHORD = 0.1
 
 
 class NoPath(ValueError):  # noqa: N818
-    """No free path exists; the message says which point is at fault and why."""
+    """No free path exists; the message says why."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,18 +117,19 @@ def shortest_path(start: ArrayLike, goal: ArrayLike, rows: Array, keep: ArrayLik
     if not all(np.isfinite(numbers).all() for numbers in given):
         raise ValueError(f"a path needs finite numbers, got {given}")
     p, q = complex(*np.asarray(start)), complex(*np.asarray(goal))
-    around = _Obstacles.of(rows, np.asarray(keep, dtype=np.float64))
+    rows, reach = _flat(rows), np.asarray(keep, dtype=np.float64)
+    around = _Obstacles.of(rows, reach)
     if (lacking := around.lack(q)) is not None:
         raise NoPath(f"goal {_show(q)} is inside {lacking}")
     free = p if around.lack(p) is None else _escape(p, around)
     for point in (free, q):
         around = around.shrunk(point)
-    route = _route_among(free, q, around)
+    begin, end = _places(np.array([free, q]))
+    many = len(around.circles[1]) > FEW  # without a way the search would take long to come to an end
+    apart = many and are_separated(begin, end, rows, reach - _EPS)
+    route = None if apart else _route_among(free, q, around)
     if route is None:
-        c, r, _ = around.circles
-        beyond = p + 1.0 + np.max(abs(c - p) + r)
-        shut = [n for n, z in (("start", free), ("goal", q)) if _route_among(z, beyond, around) is None]
-        raise NoPath(f"no way from start {_show(p)} to goal {_show(q)}: obstacles enclose {' and '.join(shut)}")
+        raise NoPath(f"no way from start {_show(p)} to goal {_show(q)}: obstacles enclose one of them")
     leg = np.array([free - p])
     pieces = np.concatenate((_rows(np.array([p]), leg, np.zeros(1), abs(leg)), route))
     kept = pieces[:, 5] > _EPS
@@ -152,12 +154,10 @@ class _Obstacles:
 
     @classmethod
     def of(cls, rows: Array, keep: Array) -> Self:
-        """Of outlines (m, W), and distances from their cores, (m,), m."""
+        """Of outlines (m, W) at height 0, and distances from their cores, (m,), m."""
         round_ones = rows[:, COUNT] == 1.0
         c, r = _outermost(rows[round_ones, CORNERS : CORNERS + 2] @ np.array((1.0, 1.0j)), keep[round_ones])
-        others = rows[~round_ones]
-        others[:, BASE] = others[:, TOP] = 0.0
-        return cls(c, r, others, np.maximum(keep[~round_ones], 2.0 * TOL))
+        return cls(c, r, rows[~round_ones], np.maximum(keep[~round_ones], 2.0 * TOL))
 
     @property
     def corners(self) -> tuple[Points, Points, Points]:
@@ -249,6 +249,13 @@ class _Obstacles:
         begin, end, sagitta = _chords(pieces)
         others = convex.in_the_way(_places(begin), _places(end), sagitta, self.rows, self.keep - _EPS)
         return np.concatenate((discs, others))
+
+
+def _flat(rows: Array) -> Array:
+    """Outlines (m, W) at height 0."""
+    found = rows.copy()
+    found[:, BASE] = found[:, TOP] = 0.0
+    return found
 
 
 def _places(points: Points) -> Array:
