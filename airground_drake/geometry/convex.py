@@ -23,6 +23,7 @@ of set-based avoidance needs nothing else.
 from __future__ import annotations
 
 from collections.abc import Iterable
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -36,6 +37,8 @@ SAME_M = 1e-9
 """Outlines whose numbers differ by no more than this are one, m."""
 FAR = 1.0 + 1e-12
 """Squares of distances that exceed a limit by this factor do so whatever the rounding."""
+PER_CELL = 4.0
+"""Points to a cell, on average, where points near an outline are looked for."""
 NOWHERE_M = 1e150
 """Coordinates of an obstacle that is not there: beyond any range, and its square is still finite."""
 
@@ -422,15 +425,17 @@ def approaches(row: Array, starts: Array, ends: Array, planar: bool) -> tuple[Ar
 def points_are_free(points: Array, rows: Array, keep: Array) -> npt.NDArray[np.bool_]:
     """Which points (K, 2), m, in the plane z = 0 are `keep` (m,), m, from all cores (m, W): (K,)."""
     free, away = np.ones(len(points), np.bool_), np.empty(3)
-    for k in range(len(points)):
-        x, y = points[k, 0], points[k, 1]
-        for m in range(len(rows)):
-            far = keep[m] + rows[m, EXTENT]
-            if abs(x - rows[m, MIDDLE]) > far or abs(y - rows[m, MIDDLE + 1]) > far:
-                continue
-            if nearest(rows[m], x, y, 0.0, True, away, keep[m]) < keep[m]:
-                free[k] = False
-                break
+    cells = _cells_of(points)
+    for m in range(len(rows)):
+        low_x, high_x, low_y, high_y = _reached(rows[m], keep[m])
+        first, last, bottom, top = _cells_between(cells, low_x, high_x, low_y, high_y)
+        for column in range(first, last):
+            for i in range(cells.first[column, bottom], cells.first[column, top]):
+                k = cells.members[i]
+                x, y = points[k, 0], points[k, 1]
+                if not free[k] or x < low_x or x > high_x or y < low_y or y > high_y:
+                    continue
+                free[k] = nearest(rows[m], x, y, 0.0, True, away, keep[m]) >= keep[m]
     return free
 
 
@@ -446,12 +451,86 @@ def segments_are_free(begin: Array, end: Array, rows: Array, keep: Array, slack:
         slack: tolerance of the distances, m.
     """
     free = np.ones(len(begin), np.bool_)
+    cells, half = _cells_of(0.5 * (begin + end)), 0.0
     for k in range(len(begin)):
-        for m in range(len(rows)):
-            if not passes(rows[m], keep[m], begin[k, 0], begin[k, 1], end[k, 0], end[k, 1], slack):
-                free[k] = False
-                break
+        half = max(half, 0.5 * abs(end[k, 0] - begin[k, 0]), 0.5 * abs(end[k, 1] - begin[k, 1]))
+    for m in range(len(rows)):
+        low_x, high_x, low_y, high_y = _reached(rows[m], keep[m])
+        first, last, bottom, top = _cells_between(cells, low_x - half, high_x + half, low_y - half, high_y + half)
+        for column in range(first, last):
+            for i in range(cells.first[column, bottom], cells.first[column, top]):
+                k = cells.members[i]
+                ax, ay, bx, by = begin[k, 0], begin[k, 1], end[k, 0], end[k, 1]
+                if not free[k] or max(ax, bx) < low_x or min(ax, bx) > high_x or max(ay, by) < low_y:
+                    continue
+                if min(ay, by) <= high_y:
+                    free[k] = passes(rows[m], keep[m], ax, ay, bx, by, slack)
     return free
+
+
+class _Cells(NamedTuple):
+    """Points in square cells, to find those near an outline.
+
+    Attributes:
+        first: index of the first member of each cell of each column, and the index after the last, (columns, rows + 1).
+        members: numbers of the points, sorted by cell, (K,).
+        corner: lowest corner, (2,), m.
+        size: of a cell, m.
+    """
+
+    first: npt.NDArray[np.int64]
+    members: npt.NDArray[np.int64]
+    corner: Array
+    size: float
+
+
+@njit(cache=True)
+def _cells_of(points: Array) -> _Cells:
+    """Points (K, 2), m, in cells of about `PER_CELL`."""
+    low, high = np.zeros(2), np.zeros(2)
+    for a in range(2):
+        if len(points) > 0:
+            low[a], high[a] = points[:, a].min(), points[:, a].max()
+    wide, tall = high[0] - low[0], high[1] - low[1]
+    size = max(np.sqrt(wide * tall * PER_CELL / max(len(points), 1)), max(wide, tall) / 1000.0, 1e-9)
+    columns, rows = int(wide / size) + 1, int(tall / size) + 1
+    number, count = np.empty(len(points), np.int64), np.zeros(columns * rows + 1, np.int64)
+    for k in range(len(points)):
+        column = min(int((points[k, 0] - low[0]) / size), columns - 1)
+        number[k] = column * rows + min(int((points[k, 1] - low[1]) / size), rows - 1)
+        count[number[k] + 1] += 1
+    count = np.cumsum(count)
+    first, members = np.empty((columns, rows + 1), np.int64), np.empty(len(points), np.int64)
+    for column in range(columns):
+        first[column] = count[column * rows : (column + 1) * rows + 1]
+    for k in range(len(points)):
+        members[count[number[k]]] = k
+        count[number[k]] += 1
+    return _Cells(first, members, low, size)
+
+
+@njit(cache=True)
+def _reached(row: Array, keep: float) -> tuple[float, float, float, float]:
+    """Least and greatest x, then y, within a distance, m, of a core, with a hair of room."""
+    low_x, high_x, low_y, high_y = np.inf, -np.inf, np.inf, -np.inf
+    for k in range(int(row[COUNT])):
+        x, y = row[CORNERS + 2 * k], row[CORNERS + 2 * k + 1]
+        low_x, high_x, low_y, high_y = min(low_x, x), max(high_x, x), min(low_y, y), max(high_y, y)
+    far = keep + 1e-6 * (1.0 + abs(keep))
+    return low_x - far, high_x + far, low_y - far, high_y + far
+
+
+@njit(cache=True)
+def _cells_between(
+    cells: _Cells, low_x: float, high_x: float, low_y: float, high_y: float
+) -> tuple[int, int, int, int]:
+    """First column and the one after the last, then row, of the cells that a box meets."""
+    columns, rows = cells.first.shape[0], cells.first.shape[1] - 1
+    first = min(max(np.floor((low_x - cells.corner[0]) / cells.size), 0.0), columns)
+    last = max(min(np.floor((high_x - cells.corner[0]) / cells.size) + 1.0, columns), first)
+    bottom = min(max(np.floor((low_y - cells.corner[1]) / cells.size), 0.0), rows)
+    top = max(min(np.floor((high_y - cells.corner[1]) / cells.size) + 1.0, rows), bottom)
+    return int(first), int(last), int(bottom), int(top)
 
 
 @njit(cache=True)
@@ -469,13 +548,15 @@ def passes(row: Array, keep: float, ax: float, ay: float, bx: float, by: float, 
         share = min(max(-(px * sx + py * sy) / squared, 0.0), 1.0)
         x, y = px + share * sx, py + share * sy
         return bool(np.sqrt(x * x + y * y) >= min(keep, to_begin, np.sqrt(qx * qx + qy * qy)) - slack)
-    start, stop, away = np.zeros(3), np.zeros(3), np.empty(3)
-    start[0], start[1], stop[0], stop[1] = ax, ay, bx, by
-    first = nearest(row, ax, ay, 0.0, True, away, keep + length)
-    if first > keep + length:
+    if clears(row, keep - slack, ax, ay, bx, by):
         return True
+    away = np.empty(3)
+    first = nearest(row, ax, ay, 0.0, True, away, np.inf)
     last = nearest(row, bx, by, 0.0, True, away, np.inf)
-    return bool(approach(row, start, stop, True)[0] >= min(keep, first, last) - slack)
+    if min(first, last) >= keep:
+        return False
+    start, stop = np.array((ax, ay, 0.0)), np.array((bx, by, 0.0))
+    return bool(approach(row, start, stop, True)[0] >= min(first, last) - slack)
 
 
 @njit(cache=True)
