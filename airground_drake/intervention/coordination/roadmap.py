@@ -14,7 +14,7 @@ from scipy.spatial import cKDTree
 
 from airground_drake.base.arrays import Array
 from airground_drake.geometry import convex
-from airground_drake.geometry.paths import NoPath, shortest_path
+from airground_drake.geometry.paths import NoPath, Path, shortest_path
 from airground_drake.intervention.coordination.intervals import Grid, Indices
 
 PITCH = 0.2
@@ -176,14 +176,15 @@ def build_roadmap(spaces: Sequence[Space], tasks: Sequence[RobotTask], others: S
     """
     by_size = sorted(spaces, key=lambda each: each.apart)
     space = by_size[0]
-    low, high = _area(by_size[-1], tasks, others)
+    paths = [_shortest(own, task) for own, task in zip(spaces, tasks, strict=True)]
+    low, high = _area(by_size[-1], tasks, others, paths)
     pitch = max(PITCH * space.apart, math.sqrt(float(np.prod(high - low)) / MOST_NODES))
     reach = REACH * pitch
     far = FAR * math.sqrt(space.wide(reach) ** 2 - space.apart**2)
     lattice, pairs = _lattice(space, low, high, pitch)
     nodes, robots = [lattice], []
-    for own, task in zip(spaces, tasks, strict=True):
-        found, robot = _robot_nodes(own, task, sum(map(len, nodes)), pitch, far)
+    for own, task, path in zip(spaces, tasks, paths, strict=True):
+        found, robot = _robot_nodes(own, task, path, sum(map(len, nodes)), pitch, far)
         nodes.append(found)
         robots.append(robot)
     points = np.concatenate(nodes)
@@ -206,25 +207,42 @@ def _lattice(space: Space, low: Array, high: Array, pitch: float) -> tuple[Array
     return points[free], _lattice_edges(np.where(free, np.cumsum(free) - 1, -1).reshape(columns, rows))
 
 
-def _robot_nodes(space: Space, task: RobotTask, first: int, pitch: float, far: float) -> tuple[Array, RobotNodes]:
+def _robot_nodes(
+    space: Space, task: RobotTask, path: Path | None, first: int, pitch: float, far: float
+) -> tuple[Array, RobotNodes]:
     """Places and numbers of a robot's nodes: start, preset, shortest path to the target, and a fan round the start.
 
     Args:
         space: of the robot.
         task: of the robot.
+        path: its shortest path.
         first: number of its first node.
         pitch: gap between nodes, m.
         far: radius of the fan, m.
     """
     preset, times = _preset_nodes(task.preset, pitch)
-    path = _path_nodes(space, task.start, preset[-1], pitch)
-    points = np.concatenate([task.start[None], preset, path, _fan(space, task.start, far)])
+    along_path = np.zeros((0, 2)) if path is None else _path_nodes(space, path, pitch)
+    points = np.concatenate([task.start[None], preset, along_path, _fan(space, task.start, far)])
     along = np.arange(first + 1, first + 1 + len(preset))
     return points, RobotNodes(first, int(along[-1]), along, times, space.points_are_free(preset, 0.0))
 
 
-def _area(space: Space, tasks: Sequence[RobotTask], others: Sequence[Array]) -> tuple[Array, Array]:
-    """Corners of a box round all robots, presets and nearby discs, with room to go round these."""
+def _shortest(space: Space, task: RobotTask) -> Path | None:
+    """The shortest path of a robot to its target; None without one."""
+    try:
+        return shortest_path(task.start, task.preset[-1, 1:], space.rows, space.keep + ARCS * space.clearance)
+    except NoPath:
+        return None
+
+
+def _area(
+    space: Space, tasks: Sequence[RobotTask], others: Sequence[Array], paths: Sequence[Path | None]
+) -> tuple[Array, Array]:
+    """Corners of a box round all robots, presets and nearby discs, with room to go round these.
+
+    Walls may be long. So among walls it is shortest paths that say how far the box reaches, and a wall or polygon makes
+    it larger by `room` at most.
+    """
     points = np.concatenate(
         [*(task.start[None] for task in tasks), *(task.preset[:, 1:] for task in tasks),
          np.array(others).reshape(-1, 2)]
@@ -233,11 +251,21 @@ def _area(space: Space, tasks: Sequence[RobotTask], others: Sequence[Array]) -> 
     room = 3.0 * (widest + space.spacing)
     low, high = points.min(axis=0) - room, points.max(axis=0) + room
     middles, extent = space.rows[:, convex.MIDDLE : convex.EXTENT], space.rows[:, convex.EXTENT, None]
-    near = ((middles > low - extent) & (middles < high + extent)).all(axis=1)
+    walls = space.rows[:, convex.COUNT] > 1.0
+    if walls.any():
+        ends = [path.pieces[:, :2] for path in paths if path is not None]
+        low = np.concatenate([low[None], *(each - room for each in ends)]).min(axis=0)
+        high = np.concatenate([high[None], *(each + room for each in ends)]).max(axis=0)
+    near = ~walls & ((middles > low - extent) & (middles < high + extent)).all(axis=1)
     beyond = (space.keep[near] + space.clearance + space.apart + space.spacing)[:, None] + extent[near]
-    low = np.concatenate([low[None], middles[near] - beyond]).min(axis=0)
-    high = np.concatenate([high[None], middles[near] + beyond]).max(axis=0)
-    return low, high
+    boxes = [(low, high), *((middle - far, middle + far) for middle, far in zip(middles[near], beyond, strict=True))]
+    for row, keep in zip(space.rows[walls], space.keep[walls].tolist(), strict=True):
+        corners, far = convex.corners_of(row), keep + space.clearance + space.apart + space.spacing
+        lowest, highest = corners.min(axis=0), corners.max(axis=0)
+        if (lowest < high).all() and (highest > low).all():
+            boxes.append((np.maximum(lowest - far, low - room), np.minimum(highest + far, high + room)))
+    lows, highs = zip(*boxes, strict=True)
+    return np.min(lows, axis=0), np.max(highs, axis=0)
 
 
 def _preset_nodes(preset: Array, pitch: float) -> tuple[Array, Array]:
@@ -256,12 +284,8 @@ def _spread(times: Array, pieces: Indices) -> Array:
     return np.concatenate([*parts, times[-1:]])
 
 
-def _path_nodes(space: Space, start: Array, target: Array, pitch: float) -> Array:
-    """Places along the shortest path to the target, (K, 2), m, among them the ends of its pieces; K = 0: no path."""
-    try:
-        path = shortest_path(start, target, space.rows, space.keep + ARCS * space.clearance)
-    except NoPath:
-        return np.zeros((0, 2))
+def _path_nodes(space: Space, path: Path, pitch: float) -> Array:
+    """Places along a robot's shortest path, (K, 2), m, among them the ends of its pieces."""
     sagitta = (ARCS - CHORDS) * space.clearance
     flat = 0.9 * math.sqrt(8.0 * sagitta * float(space.keep.min(initial=1.0)))
     gap = max(min(pitch, flat), path.length_m / MOST_PATH_NODES)
