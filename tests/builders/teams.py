@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
+from airground_drake.geometry.convex import balls
 from airground_drake.intervention.coordination.joint import Plan
 from airground_drake.intervention.coordination.roadmap import RobotTask, Space
 from airground_drake.intervention.coordination.timed import at_rest
@@ -19,8 +20,8 @@ APART = 2.0
 
 def space(obstacles: Sequence[Sequence[float]] | Array = ()) -> Space:
     """Discs of 2 m, robots 2 m apart, with 0.1 m and 0.2 m to spare."""
-    centres = np.array(obstacles, dtype=np.float64).reshape(-1, 2)
-    return Space(centres, np.full(len(centres), APART), 0.1, APART, 0.2)
+    rows = balls([[*centre, 0.0] for centre in obstacles])
+    return Space(rows, np.full(len(rows), APART), 0.1, APART, 0.2)
 
 
 def task(start: Sequence[float] | Array, target: Sequence[float] | Array) -> RobotTask:

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from builders.observations import mate, seen
 
+from airground_drake.geometry.convex import balls
 from airground_drake.geometry.motion import Motion
 from airground_drake.geometry.paths import Path, shortest_path
 from airground_drake.intervention import detour
@@ -19,6 +20,7 @@ from airground_drake.intervention.policy import Observation, Proposal
 from airground_drake.intervention.wrong import StaleMap
 
 DETOUR = Detour(speed_m_s=1.0)
+CENTRES = [[2.5, 0.0, 0.0], [0.0, 9.0, 0.0]]
 
 
 def least_distance(what: Observation, other: int) -> float:
@@ -65,7 +67,7 @@ def test_bodies_are_gone_round_by_both_radii() -> None:
     parked = mate("ugv2", [6.0, 0.1], [6.0, 0.1], triggered=False, radius=0.5)
     what = replace(seen([stuck, parked]), radius=0.25)
     assert least_distance(what, 1) >= 2.05 + 0.75 - 1e-3
-    shelf = replace(seen([stuck], [(6.0, 0.5)]), radius=0.25, obstacle_radii=np.array([1.5]))
+    shelf = replace(seen([stuck]), radius=0.25, obstacles=balls([6.0, 0.5, 0.0], 1.5, gap=2.0))
     motion = DETOUR.propose(shelf)
     assert motion is not None
     least = np.linalg.norm(motion.positions - [6.0, 0.5, 0.0], axis=1).min()
@@ -74,10 +76,9 @@ def test_bodies_are_gone_round_by_both_radii() -> None:
 
 def test_a_map_of_the_beginning_has_the_radii_of_the_beginning() -> None:
     stuck = mate("ugv1", [0.0, 0.0], [12.0, 0.0])
-    learnt = seen([stuck], [(6.0, 0.5), (6.0, 3.0)])
-    stale = replace(learnt, mapped=learnt.mapped[:1], mapped_radii=np.array([1.5]), obstacle_radii=np.array([1.5, 0.0]))
-    motion, known = StaleMap(speed_m_s=1.0).propose(stale), replace(seen([stuck], [(6.0, 0.5)]), obstacle_radii=1.5)
-    found = DETOUR.propose(known)
+    learnt = balls([[6.0, 0.5, 0.0], [6.0, 3.0, 0.0]], [1.5, 0.0], gap=2.0)
+    motion = StaleMap(speed_m_s=1.0).propose(replace(seen([stuck]), obstacles=learnt, mapped=learnt[:1]))
+    found = DETOUR.propose(replace(seen([stuck]), obstacles=learnt[:1]))
     assert motion is not None
     assert found is not None
     assert np.array_equal(motion.positions, found.positions)
@@ -87,8 +88,8 @@ def test_the_predicted_cost_counts_intrusion_into_obstacles_and_every_teammate()
     stuck = mate("ugv1", [0.0, 0.0], [12.0, 0.0])
     motions = {"ugv1": Motion(np.array([0.0]), np.array([[0.0, 0.0, 0.0]]))}
     costs = [
-        predicted_cost(motions, replace(seen([stuck], [(2.5, 0.0), (0.0, 9.0)]), radius=own, obstacle_radii=each))
-        for own, each in ((0.0, 0.0), (0.0, np.array([0.5, 5.0])), (0.25, np.array([0.25, 0.0])), (0.5, 0.5))
+        predicted_cost(motions, replace(seen([stuck]), radius=own, obstacles=balls(CENTRES, each, gap=2.0)))
+        for own, each in ((0.0, 0.0), (0.0, (0.5, 5.0)), (0.25, (0.25, 0.0)), (0.5, 0.5))
     ]
     assert costs[0] == costs[1] == costs[2]
     assert costs[3] > costs[0]

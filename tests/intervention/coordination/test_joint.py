@@ -8,11 +8,13 @@ from itertools import combinations
 
 import numpy as np
 import pytest
+from builders.shapes import from_core
 from builders.teams import Array, motions, random_team, space, task
 from hypothesis import given
 from hypothesis import strategies as st
 from properties import examples
 
+from airground_drake.geometry import convex
 from airground_drake.intervention.coordination.joint import Effort, Plan, plan
 from airground_drake.intervention.coordination.roadmap import RobotTask, Space
 from airground_drake.intervention.coordination.single import OtherRobot, _wished
@@ -46,9 +48,10 @@ def assert_keeps_distances(
         assert (np.diff(way[:, 0]) > 0.0).all()
         legs = np.diff(way, axis=0)
         assert (np.hypot(legs[:, 1], legs[:, 2]) <= speed * legs[:, 0] * (1.0 + 1e-9) + 1e-9).all()
-        for centre, radius in zip(room.centres, room.radii, strict=True):
-            least = min(radius + one.body, float(np.hypot(*(one.start - centre))))
-            assert distances(way, np.array([[0.0, *centre]])).min() >= least - 2e-9
+        for row, keep in zip(room.rows, room.keep.tolist(), strict=True):
+            core = convex.corners_of(row)
+            least = min(keep + one.body, float(from_core(one.start[None], one.start[None], core)[0]))
+            assert from_core(way[:-1, 1:], way[1:, 1:], core).min(initial=np.inf) >= least - 2e-9
     bodies = [OtherRobot(way, one.body) for way, one in zip(ways, tasks, strict=True)]
     moved = [body for body, way in zip(bodies, found.ways, strict=True) if way is not None]  # others may be run into
     for one, other in [*combinations(bodies, 2), *((body, each) for body in moved for each in fixed)]:
@@ -67,7 +70,7 @@ def test_every_distance_is_kept_at_all_times(
 ) -> None:
     room, tasks = random_team(seed, min(count, 1 + int(extent / 4.0)), min(obstacles, int(extent / 3.0)), extent)
     tasks = [replace(one, body=bodies[k % len(bodies)]) for k, one in enumerate(tasks)]
-    room = replace(room, radii=room.radii + np.arange(len(room.radii)) % 2 * bodies[-1])
+    room = replace(room, keep=room.keep + np.arange(len(room.keep)) % 2 * bodies[-1])
     fixed = [OtherRobot(np.array([[0.0, -30.0, extent / 2.0], [30.0, 2.0 * extent, extent / 2.0]]), bodies[-1])]
     found = plan(room, tasks, [1.0] * len(tasks), fixed, effort=Effort(orders=6))
     assert_keeps_distances(room, tasks, found, 1.0, fixed)
@@ -138,9 +141,9 @@ def test_a_small_robot_goes_where_a_large_one_cannot() -> None:
 
 
 def test_a_ball_above_the_ground_is_as_wide_as_it_is_there() -> None:
-    room = replace(space([(0.0, 0.0)]), above=np.array([2.1]))
-    assert len(room.of(0.0).radii) == 0
-    assert room.of(0.5).radii == pytest.approx(np.sqrt(2.5**2 - 2.1**2))
+    room = replace(space([(0.0, 0.0)]), height=2.1)
+    assert len(room.of(0.0).rows) == 0
+    assert room.of(0.5).keep == pytest.approx(np.sqrt(2.5**2 - 2.1**2))
 
 
 @pytest.mark.parametrize(("radius", "beside", "free"), [(0.0, 0.5, True), (1.0, 0.5, False), (1.0, 1.1, True)])
