@@ -7,6 +7,7 @@ traces.
 
     files, limits         strict reading; sizes and times beyond which a report is refused
     rules, scenario       how a broken rule is told; what a scenario declares
+    shapes                convex parts of obstacles, and distances from them
     run                   a trace that belongs to its run and obeys its law of motion
     safety                SAFE-TRACE: distances in continuous time; SAFE-HYP: the avoidance inequalities, exactly
     triggers              ZENO-TRACE, THR-TRIG, THR-QUALITY

@@ -10,7 +10,6 @@ import numpy as np
 
 from .rules import SMALL, Disagreement, close
 from .run import Run
-from .safety import distances_m
 
 
 class Event(NamedTuple):
@@ -75,11 +74,9 @@ def _collisions(run: Run) -> Iterator[Event]:
         within = float(run.scenario["safe_distance"]["collision_m"]) + pair.radii_m
         if run.apart_m[pair.robot, pair.other] >= within:
             continue
-        first = run.there_from(pair.other)
-        away = (run.position_m[pair.robot] - run.position_m[pair.other])[first:]
-        near = np.linalg.norm(away, axis=1) < within
+        near, passes = run.shapes[pair.other].within(run.apart(pair), pair.planar, within)
         enters = near & ~np.append(False, near[:-1])
-        passes = np.append((distances_m(away) < within) & ~near[:-1] & ~near[1:], False)
+        passes = np.append(passes & ~near[:-1] & ~near[1:], False)
         hit = {"other" if pair.other in run.robots else "obstacle": pair.other}
-        for when in run.t_s[first:][enters | passes]:
+        for when in run.t_s[run.there_from(pair.other) :][enters | passes]:
             yield Event(float(when), pair.robot, "collision", **hit)

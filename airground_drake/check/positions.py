@@ -14,8 +14,8 @@ import pandas as pd
 from .files import Json
 from .limits import LARGEST
 from .rules import SMALL, Array
-from .safety import distances_m, gain_of, lost_m, shortfall_m
-from .scenario import pairs_of, robots_of
+from .safety import gain_of, lost_m, shortfall_m
+from .scenario import barriers_of, pairs_of, places_of, robots_of, shapes_of
 
 COLUMNS = ("t_s", "body", "x_m", "y_m", "z_m")
 MOST_ROWS = 10_000_000
@@ -89,15 +89,15 @@ def judge(table: pd.DataFrame, scenario: Json) -> tuple[list[JudgedPair], Covera
     period: float | None = None
     if np.ptp(spacing) <= (within := _resolution_s(t_s)):
         period = control_s if abs(spacing[0] - control_s) <= within else float(spacing.mean())
-    found = []
+    found, shapes = [], shapes_of(scenario)
     for pair in pairs_of(scenario):
-        own, other = places[pair.robot], places[pair.other]
-        least_m = float(distances_m(own - other).min()) - pair.radii_m
+        own, other, shape = places[pair.robot], places[pair.other], shapes[pair.other]
+        least_m = shape.least_m(own - other, pair.planar) - pair.radii_m
         missed = guarantee = None
         if period is not None:
             gain = gain_of(scenario, period)
-            e = shortfall_m(own, other, pair, gain)
-            short = max(0.0, pair.safe_m - float(np.linalg.norm(own[0] - other[0])))
+            e = shortfall_m(own, other, pair, shape, gain)
+            short = max(0.0, pair.safe_m - float(shape.signed_m(own[:1] - other[:1], pair.planar)[0]))
             promised = pair.gap_m - max(lost_m(e, gain, len(spacing)), short)
             missed, guarantee = float(e), promised if promised > 0.0 else None
         found.append(JudgedPair(pair.robot, pair.other, pair.gap_m, least_m, missed, guarantee))
@@ -116,7 +116,7 @@ def _sampled(table: pd.DataFrame, scenario: Json) -> tuple[Array, Mapping[str, A
         raise UnusableError(f"its columns are {', '.join(map(str, table.columns))}; wanted: {', '.join(COLUMNS)}")
     if len(table) > MOST_ROWS:
         raise UnusableError(f"it has {len(table)} rows; allowed: {MOST_ROWS}")
-    robots, obstacles = robots_of(scenario), scenario["obstacles"]
+    robots = robots_of(scenario)
     names = table["body"].astype(str)
     if strange := sorted({*names} - {*robots}):
         raise UnusableError(f"body {strange[0]!r} is not a robot of the scenario; its robots are {', '.join(robots)}")
@@ -135,11 +135,10 @@ def _sampled(table: pd.DataFrame, scenario: Json) -> tuple[Array, Mapping[str, A
     for robot, own in times.items():
         if len(own) != len(times[first]) or not np.allclose(own, times[first], rtol=0.0, atol=_resolution_s(own)):
             raise UnusableError(f"{robot} and {first} are not sampled at the same times; wanted: equal t_s")
-    for name, body in obstacles.items():
-        if body.get("appears_s"):
+    for name, body in barriers_of(scenario).items():
+        if body["appears_s"]:
             raise UnusableError(f"{name} appears under way (appears_s); wanted: obstacles that are always there")
-        found[name] = np.tile(np.array(body["position_m"], dtype=np.float64), (len(times[first]), 1))
-    return times[first], found
+    return times[first], found | places_of(scenario, times[first])
 
 
 def _numbers(rows: pd.DataFrame, robot: str) -> Any:

@@ -13,7 +13,8 @@ import pandas as pd
 
 from .files import Json, parse_table, read_bytes, read_json, sha256
 from .rules import SMALL, Array, NotEstablished, close, holds, same
-from .scenario import Levels, Pair, Preset, as_run, levels_of, pairs_of, preset_of, robots_of
+from .scenario import Levels, Pair, Preset, as_run, levels_of, pairs_of, places_of, preset_of, robots_of, shapes_of
+from .shapes import Shape, boxes_of
 
 Rows = npt.NDArray[np.intp]
 SCHEMA = "airground_drake.trace/8"
@@ -21,10 +22,6 @@ TABLES = ("states.parquet", "samples.parquet")
 """The tables that are read: positions, noise and triggers; commands and references at the control samples."""
 SHARED = ("method", "composition", "seed", "zeta_m", "events", "faults")
 """Keys that meta.json and the run's entry in report.json share."""
-ROWS = 50
-"""Rows of a slice of a run."""
-ROUNDING_M = 1e-6
-"""Bounds are lowered by this, because of rounding."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,10 +64,13 @@ class Run:
 
     @cached_property
     def apart_m(self) -> dict[tuple[str, str], float]:
-        """Lower bound of the distance of each pair, by both names in either order, m."""
-        least = least_apart_m(self.position_m, self.pairs).tolist()
-        found = {(pair.robot, pair.other): apart for pair, apart in zip(self.pairs, least, strict=True)}
-        return found | {(other, robot): apart for (robot, other), apart in found.items()}
+        """Lower bound of the distance of each pair, m, so that only near pairs are looked at closely."""
+        return least_apart_m(self.position_m, self.shapes, self.pairs)
+
+    @cached_property
+    def shapes(self) -> dict[str, Shape]:
+        """Shapes of obstacles and robots, relative to their places."""
+        return shapes_of(self.scenario)
 
     @cached_property
     def presets(self) -> dict[str, Preset]:
@@ -89,11 +89,13 @@ class Run:
 
     @cached_property
     def position_m(self) -> dict[str, Array]:
-        """Places of robots and obstacles, (T, 3) each."""
+        """Places of robots and obstacles, (T, 3) each; those of obstacles at rest are 0."""
         places = {robot: np.stack([self.column(f"{robot}.{a}_m") for a in "xyz"], axis=1) for robot in self.robots}
-        for name, obstacle in self.scenario["obstacles"].items():
-            places[name] = np.tile(np.array(obstacle["position_m"], dtype=np.float64), (len(self.t_s), 1))
-        return places
+        return places | places_of(self.scenario, self.t_s)
+
+    def apart(self, pair: Pair) -> Array:
+        """Places of a pair's robot relative to the other's from when both are there, (K, 3), m."""
+        return (self.position_m[pair.robot] - self.position_m[pair.other])[self.there_from(pair.other) :]
 
     def there_from(self, name: str) -> int:
         """Row from which on a body is there, the number of rows if not before the end.
@@ -206,20 +208,14 @@ def _moves_as_commanded(run: Run, robot: str) -> None:
     close("law of motion", place[1:], led, within=SMALL, about=robot, t_s=run.t_s[1:])
 
 
-def least_apart_m(position_m: dict[str, Array], pairs: list[Pair]) -> Array:
-    """Lower bounds of the distances of pairs over a whole run, (P,), so that only near pairs are looked at closely.
-
-    On a slice of the run each body stays in a ball around its positions. Two bodies are at least as far apart as their
-    balls.
-    """
-    number = {name: k for k, name in enumerate(position_m)}
-    one = np.array([number[pair.robot] for pair in pairs], dtype=np.intp)
-    other = np.array([number[pair.other] for pair in pairs], dtype=np.intp)
-    found, places = np.full(len(pairs), np.inf), list(position_m.values())
-    for begin in range(0, max(len(places[0]) - 1, 1), ROWS):
-        parts = [place[begin : begin + ROWS + 1] for place in places]
-        middle = np.array([0.5 * (part.min(axis=0) + part.max(axis=0)) for part in parts])
-        reach = np.array([np.linalg.norm(part - at, axis=1).max() for part, at in zip(parts, middle, strict=True)])
-        apart = np.linalg.norm(middle[one] - middle[other], axis=1) - reach[one] - reach[other]
-        found = np.minimum(found, apart)
-    return found - ROUNDING_M
+def least_apart_m(
+    position_m: dict[str, Array], shapes: dict[str, Shape], pairs: list[Pair]
+) -> dict[tuple[str, str], float]:
+    """Lower bound of the distance of each pair over a whole run, m: of boxes round slices of the run."""
+    box = {name: boxes_of(place) for name, place in position_m.items()}
+    found = {}
+    for pair in pairs:
+        (low, high), (other_low, other_high) = box[pair.robot], box[pair.other]
+        bounds = shapes[pair.other].bounds_m(low - other_high, high - other_low)
+        found[pair.robot, pair.other] = float(bounds.min())
+    return found

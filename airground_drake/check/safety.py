@@ -11,34 +11,24 @@ from .files import Json
 from .rules import SMALL, Array, Disagreement, Found, close, holds
 from .run import Run
 from .scenario import Pair, written
+from .shapes import Normal, Shape
 
 FAR_M = 1e-6
 """Largest error of a distance in floating point, m; pairs that are farther apart need no exact arithmetic."""
 
 
-def distances_m(relative_m: Array) -> Array:
-    """Least distance of two bodies between any two rows, (T - 1,), m, from relative positions (T, 3), m.
-
-    Both move straight: the relative position is r + s w, 0 <= s <= 1, and |r + s w|^2 is least at s = -r.w / w.w.
-    """
-    r, w = relative_m[:-1], np.diff(relative_m, axis=0)
-    ww = (w * w).sum(axis=1)
-    s = np.clip(-(r * w).sum(axis=1) / np.where(ww > 0.0, ww, 1.0), 0.0, 1.0)
-    return np.asarray(np.linalg.norm(r + s[:, None] * w, axis=1))
-
-
 def safe_trace(run: Run) -> Found:
-    """SAFE-TRACE: ||p_i(t) - q_j(t)|| >= d_ij at every time, for every pair.
+    """SAFE-TRACE: the distance of each pair is at least the safe one at every time; of several parts, the least.
 
     A pair tests the claim if it comes so near that one period at the speed limits could break it.
     """
     margin, least, most = np.inf, 0, 0
     for pair in run.pairs:
         closing = pair.closing_m_s * run.scenario["control"]["period_s"]
-        if run.apart_m[pair.robot, pair.other] - pair.safe_m > max(margin, closing + SMALL):
+        enough = pair.safe_m + max(margin, closing + 2.0 * SMALL)
+        if run.apart_m[pair.robot, pair.other] >= enough:
             continue  # neither the nearest pair nor near enough to count
-        apart = (run.position_m[pair.robot] - run.position_m[pair.other])[run.there_from(pair.other) :]
-        of_pair = float(distances_m(apart).min()) - pair.safe_m
+        of_pair = run.shapes[pair.other].least_m(run.apart(pair), pair.planar, enough) - pair.safe_m
         margin = min(margin, of_pair)
         least += of_pair - closing < -SMALL
         most += of_pair - closing <= SMALL
@@ -52,21 +42,22 @@ def _root(square: Fraction) -> tuple[Fraction, Fraction]:
     return Fraction(numerator, denominator), Fraction(numerator + 1, denominator)
 
 
-def _missed_m(x: list[Fraction], step: list[Fraction], safe: Fraction, share: Fraction, gain: Fraction) -> Fraction:
-    """Upper bound of what a step along x / |x| lacks of its share of the avoidance inequality, m; at least 0.
+def _missed_m(away: Normal, step: list[Fraction], safe: Fraction, share: Fraction, gain: Fraction) -> Fraction:
+    """Upper bound of what a step lacks of its share of the avoidance inequality, m; at least 0.
 
     Args:
-        x: from what is avoided to the robot, m.
+        away: from what is avoided to the robot.
         step: of the robot to the next sample, m.
         safe: distance to be kept, m.
         share: of the inequality.
         gain: A h, at most 1.
     """
-    least, most = _root(sum((c * c for c in x), Fraction()))
+    least, most = _root(sum((c * c for c in away.vector), Fraction()))
     if not least:  # both are at one place: the law may take any unit vector
         return max(Fraction(), share * gain * safe)
-    along = sum((c * s for c, s in zip(x, step, strict=True)), Fraction())
-    bounds = [share * (gain * (safe - d) if d <= safe else safe - d) for d in (least, most)]
+    along = sum((c * s for c, s in zip(away.vector, step, strict=True)), Fraction())
+    distances = (away.beyond / least, away.beyond / most)
+    bounds = [share * (gain * (safe - d) if d <= safe else safe - d) for d in distances]
     return max(Fraction(), max(bounds) - min(along / least, along / most))
 
 
@@ -75,33 +66,41 @@ def gain_of(scenario: Json, period_s: float) -> Fraction:
     return min(written(scenario["control"]["avoidance_gain_1_s"]) * written(period_s), Fraction(1))
 
 
-def shortfall_m(own_m: Array, other_m: Array, pair: Pair, gain: Fraction, last: Fraction = Fraction(1)) -> Fraction:
+def shortfall_m(
+    own_m: Array, other_m: Array, pair: Pair, shape: Shape, gain: Fraction, last: Fraction = Fraction(1)
+) -> Fraction:
     """The largest sum of what a pair's inequalities lack at one sample, m per period, in exact arithmetic.
 
-    Samples at which the two cannot meet within a period, whatever their direction, need no inequality.
+    There is an inequality for each convex part of what is avoided. Samples at which the two cannot meet within a
+    period, whatever their direction, need none.
 
     Args:
         own_m: places of the robot at the control samples and at the end, (K + 1, 3).
         other_m: places of what it avoids, (K + 1, 3).
         pair: safe distance and share.
+        shape: of what it avoids.
         gain: A h.
         last: length of the last period, in periods; its step is extended to a whole one.
     """
     reach = np.linalg.norm(np.diff(own_m, axis=0), axis=1) + np.linalg.norm(np.diff(other_m, axis=0), axis=1)
     reach[-1] /= float(last)
-    near = ~(np.linalg.norm(own_m - other_m, axis=1)[:-1] - reach >= pair.safe_m + FAR_M)  # also if it is not a number
     safe, share, worst = Fraction(pair.safe_m), Fraction(pair.share), Fraction()
-    for k in np.flatnonzero(near):
-        here, there, after, beyond = (
-            [Fraction(c) for c in place] for place in (own_m[k], other_m[k], own_m[k + 1], other_m[k + 1])
-        )
-        lasts = last if k == len(near) - 1 else Fraction(1)
-        x = [a - b for a, b in zip(here, there, strict=True)]
-        missed = _missed_m(x, [(a - b) / lasts for a, b in zip(after, here, strict=True)], safe, share, gain)
-        if pair.share < 1.0:
-            step = [(a - b) / lasts for a, b in zip(beyond, there, strict=True)]
-            missed += _missed_m([-c for c in x], step, safe, share, gain)
-        worst = max(worst, missed)
+    apart = own_m[:-1] - other_m[:-1]
+    for bound, part, rows in shape.near(apart):
+        if bound - reach.max() >= pair.safe_m + FAR_M:
+            break
+        far = part.signed_m(apart[rows], pair.planar) - reach[rows] >= pair.safe_m + FAR_M
+        for k in (rows.start + np.flatnonzero(~far)).tolist():  # also where it is not a number
+            here, there, after, beyond = (
+                [Fraction(c) for c in place] for place in (own_m[k], other_m[k], own_m[k + 1], other_m[k + 1])
+            )
+            lasts = last if k == len(apart) - 1 else Fraction(1)
+            away = part.away([a - b for a, b in zip(here, there, strict=True)], pair.planar)
+            missed = _missed_m(away, [(a - b) / lasts for a, b in zip(after, here, strict=True)], safe, share, gain)
+            if pair.share < 1.0:
+                step = [(a - b) / lasts for a, b in zip(beyond, there, strict=True)]
+                missed += _missed_m(Normal([-c for c in away.vector], away.beyond), step, safe, share, gain)
+            worst = max(worst, missed)
     return worst
 
 
@@ -126,7 +125,8 @@ def safe_hyp(run: Run) -> Found:
             continue
         there = rows[rows >= run.there_from(pair.other)]
         own, other = run.position_m[pair.robot][there], run.position_m[pair.other][there]
-        lost = max(lost, lost_m(shortfall_m(own, other, pair, gain, last), gain, len(run.sample_row)))
+        missed = shortfall_m(own, other, pair, run.shapes[pair.other], gain, last)
+        lost = max(lost, lost_m(missed, gain, len(run.sample_row)))
     return Found("holds" if lost <= SMALL else "refuted", -lost if lost <= SMALL else None)
 
 
@@ -140,8 +140,7 @@ def _constants(run: Run) -> None:
         about, speed = f"{pair.robot}, {pair.other}", written(limit[pair.robot]) + written(limit.get(pair.other, 0.0))
         least = written(pair.safe_m) + speed * period
         holds("sensing range", reach >= least, float(reach), f"{float(least)} at least", about=about)
-        row = run.there_from(pair.other)
-        start = float(np.linalg.norm(run.position_m[pair.robot][row] - run.position_m[pair.other][row]))
+        start = float(run.shapes[pair.other].signed_m(run.apart(pair)[:1], pair.planar)[0])
         holds("safe start", start >= pair.safe_m - SMALL, start, f"{pair.safe_m} at least", about=about)
 
 

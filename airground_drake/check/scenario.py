@@ -6,13 +6,14 @@ import math
 from copy import deepcopy
 from dataclasses import dataclass
 from fractions import Fraction
-from itertools import combinations
+from itertools import combinations, pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from .files import Json
 from .rules import Array
+from .shapes import ENDLESS_M, POINT, Shape, shape_of
 
 
 class Pair(NamedTuple):
@@ -25,6 +26,7 @@ class Pair(NamedTuple):
         radii_m: sum of both radii.
         closing_m_s: largest speed at which they can approach each other.
         share: part of the inequality that each robot takes: 1 beside an obstacle, 1/2 beside a robot.
+        planar: whether the robot is a UGV: for it, walls are endless.
     """
 
     robot: str
@@ -33,10 +35,11 @@ class Pair(NamedTuple):
     radii_m: float
     closing_m_s: float
     share: float
+    planar: bool = True
 
     @property
     def safe_m(self) -> float:
-        """Safe distance of the centres, m."""
+        """Safe distance of the robot's centre from the parts of the other's shape, m."""
         return self.gap_m + self.radii_m
 
 
@@ -90,16 +93,43 @@ def robots_of(scenario: Json) -> dict[str, Json]:
     return {**scenario["ugvs"], scenario["uav"]["name"]: scenario["uav"]}
 
 
+def barriers_of(scenario: Json) -> dict[str, Json]:
+    """The obstacles, and the walls of the arena as entries like theirs, by name."""
+    if not scenario["arena_m"]:
+        return dict(scenario["obstacles"])
+    (west, east), (south, north) = (sorted(axis) for axis in zip(*scenario["arena_m"], strict=True))
+    around = [[west, south], [east, south], [east, north], [west, north], [west, south]]
+    numbers = dict.fromkeys(("heading_rad", "radius_m", "distance_m", "appears_s"), 0.0) | {"height_m": ENDLESS_M}
+    walls = zip(("south", "east", "north", "west"), pairwise(around), strict=True)
+    return scenario["obstacles"] | {
+        f"arena_{side}": numbers | {"position_m": [], "segment_m": [*corners]} for side, corners in walls
+    }
+
+
+def shapes_of(scenario: Json) -> dict[str, Shape]:
+    """The shape of each obstacle and of each robot, which is a point, by name."""
+    shapes = {name: shape_of(body) for name, body in barriers_of(scenario).items()}
+    return shapes | dict.fromkeys(robots_of(scenario), POINT)
+
+
+def places_of(scenario: Json, t_s: Array) -> dict[str, Array]:
+    """How far obstacles have moved by times (K,), from where their shapes are: (K, 3), m, by name. All are at rest."""
+    return {name: np.zeros((len(t_s), 3)) for name in barriers_of(scenario)}
+
+
 def pairs_of(scenario: Json) -> list[Pair]:
     """Every robot with every obstacle, and every two robots once."""
     uav, robots = scenario["uav"]["name"], robots_of(scenario)
     limit = {name: float(robot["max_speed_m_s"]) for name, robot in robots.items()}
     safe = {kind: float(distance) for kind, distance in scenario["safe_distance"].items()}
     beside_obstacles = [
-        Pair(robot, obstacle, safe["obstacle_m"], radii_m(robots[robot], body), limit[robot], 1.0)
+        Pair(
+            robot, name, float(body["distance_m"] or safe["obstacle_m"]), radii_m(robots[robot], body), limit[robot],
+            1.0, robot != uav,
+        )
         for robot in robots
-        for obstacle, body in scenario["obstacles"].items()
-    ]
+        for name, body in barriers_of(scenario).items()
+    ]  # fmt: skip
     beside_robots = []
     for one, other in combinations(robots, 2):
         gap_m = safe["air_ground_m" if other == uav else "ugv_m"]
