@@ -74,7 +74,7 @@ def _collisions(run: Run) -> Iterator[Event]:
         within = float(run.scenario["safe_distance"]["collision_m"]) + pair.radii_m
         if run.apart_m[pair.robot, pair.other] >= within:
             continue
-        near, passes = run.shapes[pair.other].within(run.apart(pair), pair.planar, within)
+        near, passes = pair.shape.within(run.apart(pair), within)
         enters = near & ~np.append(False, near[:-1])
         passes = np.append(passes & ~near[:-1] & ~near[1:], False)
         hit = {"other" if pair.other in run.robots else "obstacle": pair.other}

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import signal
 import threading
+from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager
 from types import FrameType
@@ -19,6 +20,7 @@ MOST = {
     "samples": 10_000_000,
     "stages": 10_000,
     "robots and obstacles": 2_000,
+    "numbers of a shape": 2_000,
 }
 """Counts that follow from a scenario."""
 
@@ -39,10 +41,12 @@ def is_of_a_size(scenario: Json) -> None:
     time_s = numbers.get(("duration_s",), 0.0) + sum(looked_ahead)
     periods_s = [value for path, value in numbers.items() if path[1:] == ("period_s",)]
     bodies = [scenario.get(key) for key in ("ugvs", "obstacles")]
+    shapes = Counter(path[:3] for path in numbers if path[0] == "obstacles")
     counts = {
         "samples": max((time_s / period_s if period_s > 0.0 else math.inf for period_s in periods_s), default=0.0),
         "stages": numbers.get(("gatekeeper", "stages"), 0.0),
         "robots and obstacles": sum(len(each) for each in bodies if isinstance(each, dict)),
+        "numbers of a shape": max(shapes.values(), default=0),
     }
     for name, count in counts.items():
         if not count <= MOST[name]:

@@ -15,7 +15,7 @@ from .files import Json
 from .limits import LARGEST
 from .rules import SMALL, Array
 from .safety import gain_of, lost_m, shortfall_m
-from .scenario import barriers_of, pairs_of, places_of, robots_of, shapes_of
+from .scenario import barriers_of, pairs_of, places_of, robots_of
 
 COLUMNS = ("t_s", "body", "x_m", "y_m", "z_m")
 MOST_ROWS = 10_000_000
@@ -89,15 +89,15 @@ def judge(table: pd.DataFrame, scenario: Json) -> tuple[list[JudgedPair], Covera
     period: float | None = None
     if np.ptp(spacing) <= (within := _resolution_s(t_s)):
         period = control_s if abs(spacing[0] - control_s) <= within else float(spacing.mean())
-    found, shapes = [], shapes_of(scenario)
+    found = []
     for pair in pairs_of(scenario):
-        own, other, shape = places[pair.robot], places[pair.other], shapes[pair.other]
-        least_m = shape.least_m(own - other, pair.planar) - pair.radii_m
+        own, other = places[pair.robot], places[pair.other]
+        least_m = pair.shape.least_m(own - other) - pair.radii_m
         missed = guarantee = None
         if period is not None:
             gain = gain_of(scenario, period)
-            e = shortfall_m(own, other, pair, shape, gain)
-            short = max(0.0, pair.safe_m - float(shape.signed_m(own[:1] - other[:1], pair.planar)[0]))
+            e = shortfall_m(own, other, pair, gain)
+            short = max(0.0, pair.safe_m - float(pair.shape.signed_m(own[:1] - other[:1])[0]))
             promised = pair.gap_m - max(lost_m(e, gain, len(spacing)), short)
             missed, guarantee = float(e), promised if promised > 0.0 else None
         found.append(JudgedPair(pair.robot, pair.other, pair.gap_m, least_m, missed, guarantee))

@@ -13,8 +13,8 @@ import pandas as pd
 
 from .files import Json, parse_table, read_bytes, read_json, sha256
 from .rules import SMALL, Array, NotEstablished, close, holds, same
-from .scenario import Levels, Pair, Preset, as_run, levels_of, pairs_of, places_of, preset_of, robots_of, shapes_of
-from .shapes import Shape, boxes_of
+from .scenario import Levels, Pair, Preset, as_run, levels_of, pairs_of, places_of, preset_of, robots_of
+from .shapes import boxes_of
 
 Rows = npt.NDArray[np.intp]
 SCHEMA = "airground_drake.trace/8"
@@ -65,12 +65,11 @@ class Run:
     @cached_property
     def apart_m(self) -> dict[tuple[str, str], float]:
         """Lower bound of the distance of each pair, m, so that only near pairs are looked at closely."""
-        return least_apart_m(self.position_m, self.shapes, self.pairs)
-
-    @cached_property
-    def shapes(self) -> dict[str, Shape]:
-        """Shapes of obstacles and robots, relative to their places."""
-        return shapes_of(self.scenario)
+        box, found = {name: boxes_of(place) for name, place in self.position_m.items()}, {}
+        for pair in self.pairs:
+            (low, high), (other_low, other_high) = box[pair.robot], box[pair.other]
+            found[pair.robot, pair.other] = float(pair.shape.bounds_m(low - other_high, high - other_low).min())
+        return found
 
     @cached_property
     def presets(self) -> dict[str, Preset]:
@@ -206,16 +205,3 @@ def _moves_as_commanded(run: Run, robot: str) -> None:
     close("start of a robot", place[0], run.robots[robot]["start_m"], within=SMALL, about=robot)
     led = place[:-1] + np.diff(run.t_s)[:, None] * command
     close("law of motion", place[1:], led, within=SMALL, about=robot, t_s=run.t_s[1:])
-
-
-def least_apart_m(
-    position_m: dict[str, Array], shapes: dict[str, Shape], pairs: list[Pair]
-) -> dict[tuple[str, str], float]:
-    """Lower bound of the distance of each pair over a whole run, m: of boxes round slices of the run."""
-    box = {name: boxes_of(place) for name, place in position_m.items()}
-    found = {}
-    for pair in pairs:
-        (low, high), (other_low, other_high) = box[pair.robot], box[pair.other]
-        bounds = shapes[pair.other].bounds_m(low - other_high, high - other_low)
-        found[pair.robot, pair.other] = float(bounds.min())
-    return found

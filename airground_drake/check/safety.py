@@ -11,7 +11,7 @@ from .files import Json
 from .rules import SMALL, Array, Disagreement, Found, close, holds
 from .run import Run
 from .scenario import Pair, written
-from .shapes import Normal, Shape
+from .shapes import Away
 
 FAR_M = 1e-6
 """Largest error of a distance in floating point, m; pairs that are farther apart need no exact arithmetic."""
@@ -28,7 +28,7 @@ def safe_trace(run: Run) -> Found:
         enough = pair.safe_m + max(margin, closing + 2.0 * SMALL)
         if run.apart_m[pair.robot, pair.other] >= enough:
             continue  # neither the nearest pair nor near enough to count
-        of_pair = run.shapes[pair.other].least_m(run.apart(pair), pair.planar, enough) - pair.safe_m
+        of_pair = pair.shape.least_m(run.apart(pair), enough) - pair.safe_m
         margin = min(margin, of_pair)
         least += of_pair - closing < -SMALL
         most += of_pair - closing <= SMALL
@@ -42,7 +42,7 @@ def _root(square: Fraction) -> tuple[Fraction, Fraction]:
     return Fraction(numerator, denominator), Fraction(numerator + 1, denominator)
 
 
-def _missed_m(away: Normal, step: list[Fraction], safe: Fraction, share: Fraction, gain: Fraction) -> Fraction:
+def _missed_m(away: Away, step: list[Fraction], safe: Fraction, share: Fraction, gain: Fraction) -> Fraction:
     """Upper bound of what a step lacks of its share of the avoidance inequality, m; at least 0.
 
     Args:
@@ -66,9 +66,7 @@ def gain_of(scenario: Json, period_s: float) -> Fraction:
     return min(written(scenario["control"]["avoidance_gain_1_s"]) * written(period_s), Fraction(1))
 
 
-def shortfall_m(
-    own_m: Array, other_m: Array, pair: Pair, shape: Shape, gain: Fraction, last: Fraction = Fraction(1)
-) -> Fraction:
+def shortfall_m(own_m: Array, other_m: Array, pair: Pair, gain: Fraction, last: Fraction = Fraction(1)) -> Fraction:
     """The largest sum of what a pair's inequalities lack at one sample, m per period, in exact arithmetic.
 
     There is an inequality for each convex part of what is avoided. Samples at which the two cannot meet within a
@@ -77,8 +75,7 @@ def shortfall_m(
     Args:
         own_m: places of the robot at the control samples and at the end, (K + 1, 3).
         other_m: places of what it avoids, (K + 1, 3).
-        pair: safe distance and share.
-        shape: of what it avoids.
+        pair: safe distance, share, and shape of what it avoids.
         gain: A h.
         last: length of the last period, in periods; its step is extended to a whole one.
     """
@@ -86,20 +83,20 @@ def shortfall_m(
     reach[-1] /= float(last)
     safe, share, worst = Fraction(pair.safe_m), Fraction(pair.share), Fraction()
     apart = own_m[:-1] - other_m[:-1]
-    for bound, part, rows in shape.near(apart):
+    for bound, part, rows in pair.shape.near(apart):
         if bound - reach.max() >= pair.safe_m + FAR_M:
             break
-        far = part.signed_m(apart[rows], pair.planar) - reach[rows] >= pair.safe_m + FAR_M
+        far = part.signed_m(apart[rows]) - reach[rows] >= pair.safe_m + FAR_M
         for k in (rows.start + np.flatnonzero(~far)).tolist():  # also where it is not a number
             here, there, after, beyond = (
                 [Fraction(c) for c in place] for place in (own_m[k], other_m[k], own_m[k + 1], other_m[k + 1])
             )
             lasts = last if k == len(apart) - 1 else Fraction(1)
-            away = part.away([a - b for a, b in zip(here, there, strict=True)], pair.planar)
+            away = part.away([a - b for a, b in zip(here, there, strict=True)])
             missed = _missed_m(away, [(a - b) / lasts for a, b in zip(after, here, strict=True)], safe, share, gain)
             if pair.share < 1.0:
                 step = [(a - b) / lasts for a, b in zip(beyond, there, strict=True)]
-                missed += _missed_m(Normal([-c for c in away.vector], away.beyond), step, safe, share, gain)
+                missed += _missed_m(Away([-c for c in away.vector], away.beyond), step, safe, share, gain)
             worst = max(worst, missed)
     return worst
 
@@ -125,8 +122,7 @@ def safe_hyp(run: Run) -> Found:
             continue
         there = rows[rows >= run.there_from(pair.other)]
         own, other = run.position_m[pair.robot][there], run.position_m[pair.other][there]
-        missed = shortfall_m(own, other, pair, run.shapes[pair.other], gain, last)
-        lost = max(lost, lost_m(missed, gain, len(run.sample_row)))
+        lost = max(lost, lost_m(shortfall_m(own, other, pair, gain, last), gain, len(run.sample_row)))
     return Found("holds" if lost <= SMALL else "refuted", -lost if lost <= SMALL else None)
 
 
@@ -140,7 +136,7 @@ def _constants(run: Run) -> None:
         about, speed = f"{pair.robot}, {pair.other}", written(limit[pair.robot]) + written(limit.get(pair.other, 0.0))
         least = written(pair.safe_m) + speed * period
         holds("sensing range", reach >= least, float(reach), f"{float(least)} at least", about=about)
-        start = float(run.shapes[pair.other].signed_m(run.apart(pair)[:1], pair.planar)[0])
+        start = float(pair.shape.signed_m(run.apart(pair)[:1])[0])
         holds("safe start", start >= pair.safe_m - SMALL, start, f"{pair.safe_m} at least", about=about)
 
 

@@ -13,7 +13,10 @@ import numpy as np
 
 from .files import Json
 from .rules import Array
-from .shapes import ENDLESS_M, POINT, Shape, shape_of
+from .shapes import POINT, Shape, shape_of
+
+ENDLESS_M = 1e6
+"""Height of the walls of an arena, m."""
 
 
 class Pair(NamedTuple):
@@ -26,7 +29,7 @@ class Pair(NamedTuple):
         radii_m: sum of both radii.
         closing_m_s: largest speed at which they can approach each other.
         share: part of the inequality that each robot takes: 1 beside an obstacle, 1/2 beside a robot.
-        planar: whether the robot is a UGV: for it, walls are endless.
+        shape: of the other; for a UGV walls are endless in height.
     """
 
     robot: str
@@ -35,7 +38,7 @@ class Pair(NamedTuple):
     radii_m: float
     closing_m_s: float
     share: float
-    planar: bool = True
+    shape: Shape = POINT
 
     @property
     def safe_m(self) -> float:
@@ -106,12 +109,6 @@ def barriers_of(scenario: Json) -> dict[str, Json]:
     }
 
 
-def shapes_of(scenario: Json) -> dict[str, Shape]:
-    """The shape of each obstacle and of each robot, which is a point, by name."""
-    shapes = {name: shape_of(body) for name, body in barriers_of(scenario).items()}
-    return shapes | dict.fromkeys(robots_of(scenario), POINT)
-
-
 def places_of(scenario: Json, t_s: Array) -> dict[str, Array]:
     """How far obstacles have moved by times (K,), from where their shapes are: (K, 3), m, by name. All are at rest."""
     return {name: np.zeros((len(t_s), 3)) for name in barriers_of(scenario)}
@@ -125,10 +122,11 @@ def pairs_of(scenario: Json) -> list[Pair]:
     beside_obstacles = [
         Pair(
             robot, name, float(body["distance_m"] or safe["obstacle_m"]), radii_m(robots[robot], body), limit[robot],
-            1.0, robot != uav,
+            1.0, shape,
         )
-        for robot in robots
         for name, body in barriers_of(scenario).items()
+        for of, shape in ((scenario["ugvs"], shape_of(body, endless=True)), ([uav], shape_of(body, endless=False)))
+        for robot in of
     ]  # fmt: skip
     beside_robots = []
     for one, other in combinations(robots, 2):

@@ -1,8 +1,8 @@
 """Shapes of obstacles: convex parts, their signed distances, and the least of these along straight motion.
 
-A part is a prism: the convex hull of corners in the plane, from one height to another. One corner of one height is a
-point: the centre of a ball, or a robot. Distances are from parts; radii are in the distance to be kept. Inside a part
-the distance is minus the depth. From several parts it is the least.
+A part is the convex hull of corners in the plane, from one height to another. One corner of one height is a point: the
+centre of a ball, or a robot. Distances are from parts; radii are in the distance to be kept. Inside a part the distance
+is minus the depth. From several parts it is the least.
 
 The signed distance is a convex function of the place, and changes by no more than the place moves.
 """
@@ -12,68 +12,60 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from fractions import Fraction
-from functools import cached_property
 from itertools import combinations, pairwise
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 
 from .files import Json
 from .rules import Array, Flags, NotEstablished
 
+T = TypeVar("T")
 Corner = tuple[float, float]
 DIGITS = 12
 """Corners that are turned or moved are rounded to so many digits after the point, m."""
-ENDLESS_M = 1e6
-"""Height of the walls of an arena, m."""
 ROWS = 50
 """Steps of a slice of a run; a slice is left out as a whole if it is far away."""
 ROUNDING_M = 1e-6
 """Bounds of distances are lowered by this, because of rounding."""
 THIRDS = 64
-"""How often a step is shortened by a third: what is left is 5e-12 of it."""
+"""How often a third of a step is left out in the search for the least distance: 5e-12 of it is left."""
 
 
-class Normal(NamedTuple):
-    """A vector away from a part, of any length; the signed distance is `beyond` / |`vector`|."""
+class Away(NamedTuple):
+    """A vector away from the nearest point or face of a part; the signed distance is `beyond` / |`vector`|."""
 
     vector: list[Fraction]
     beyond: Fraction
 
 
 class Part:
-    """A convex part of a shape: corners counter-clockwise, from `base_m` to `top_m`.
+    """A convex part of a shape. Its methods take places (K, 3), m."""
 
-    In the methods places are (K, 3), m; `planar`: they stay at their height, so that no way out leads over the top.
-    """
-
-    def __init__(self, corners: Sequence[Corner], base_m: float = 0.0, top_m: float = 0.0) -> None:
-        """Make a part from its corners and heights."""
+    def __init__(self, corners: Sequence[Corner], base_m: float, top_m: float) -> None:
+        """Make a part from its corners, counter-clockwise, and the heights from which to which it stands."""
         self.corners, self.base_m, self.top_m = corners, base_m, top_m
         self.begin = np.array(corners, dtype=np.float64)
         self.edge = np.roll(self.begin, -1, axis=0) - self.begin
         self.square = np.where((square := (self.edge**2).sum(axis=1)) > 0.0, square, 1.0)
         self.outward = np.column_stack([self.edge[:, 1], -self.edge[:, 0]]) / np.sqrt(self.square)[:, None]
 
-    def signed_m(self, places: Array, planar: bool) -> Array:
+    def signed_m(self, places: Array) -> Array:
         """Signed distances, (K,), m."""
         rise = np.maximum(places[:, 2] - self.top_m, self.base_m - places[:, 2])
         to = places[:, None, :2] - self.begin
         share = np.clip((to * self.edge).sum(axis=2) / self.square, 0.0, 1.0)
         flat = np.linalg.norm(to - share[..., None] * self.edge, axis=2).min(axis=1)
-        found = np.hypot(flat, np.maximum(rise, 0.0))
-        if len(self.corners) > 2:
-            side = (to * self.outward).sum(axis=2).max(axis=1)
-            found = np.where(side <= 0.0, side if planar else np.maximum(side, rise), found)
-        return np.asarray(found)
+        side = (to * self.outward).sum(axis=2).max(axis=1)
+        inside = (side <= 0.0) & (len(self.corners) > 2)
+        return np.where(inside, np.maximum(side, rise), np.hypot(flat, np.maximum(rise, 0.0)))
 
-    def between_m(self, places: Array, at_m: Array, planar: bool, reach_m: float) -> Array:
+    def between_m(self, places: Array, at_m: Array, reach_m: float) -> Array:
         """Least signed distances on the straight steps from place to place, (K - 1,), m, where below `reach_m`.
 
         Args:
             places: as above.
             at_m: their signed distances, (K,), m.
-            planar: as above.
             reach_m: of a step that stays beyond it, the result may be too large.
         """
         start, step = places[:-1], np.diff(places, axis=0)
@@ -83,38 +75,32 @@ class Part:
         low, high = np.zeros(len(k)), np.ones(len(k))
         for _ in range(THIRDS if len(k) else 0):  # a convex function has its least value beside the lower of two
             one, two = (2.0 * low + high) / 3.0, (low + 2.0 * high) / 3.0
-            first, second = (self.signed_m(start[k] + s[:, None] * step[k], planar) for s in (one, two))
+            first, second = (self.signed_m(start[k] + s[:, None] * step[k]) for s in (one, two))
             found[k] = np.minimum(found[k], np.minimum(first, second))
             low, high = np.where(first < second, low, one), np.where(first < second, two, high)
         return found
 
-    @cached_property
-    def edges(self) -> list[tuple[list[Fraction], list[Fraction]]]:
-        """First corner of each edge, and the vector to the next one, exactly."""
-        exact = [[Fraction(x), Fraction(y)] for x, y in self.corners]
-        return [(a, [b[0] - a[0], b[1] - a[1]]) for a, b in zip(exact, exact[1:] + exact[:1], strict=True)]
-
-    def away(self, place: Sequence[Fraction], planar: bool) -> Normal:
-        """Exact direction and distance from the nearest point; from the nearest face inside."""
+    def away(self, place: Sequence[Fraction]) -> Away:
+        """Exactly, from the nearest point outside, and from the nearest face inside."""
         x, y, z = place
-        base, top = Fraction(self.base_m), Fraction(self.top_m)
-        height, sides, offsets = z - min(max(z, base), top), [], []
-        for (ax, ay), (ex, ey) in self.edges:
-            px, py, square = x - ax, y - ay, ex * ex + ey * ey
-            share = min(max((px * ex + py * ey) / square, Fraction()), Fraction(1)) if square else 0
+        height, offsets, faces = Fraction(), [], []
+        if math.isfinite(self.top_m):
+            over, under = z - Fraction(self.top_m), Fraction(self.base_m) - z
+            height = max(over, Fraction()) - max(under, Fraction())
+            faces = [Away([Fraction(), Fraction(), Fraction(up)], h) for up, h in ((1, over), (-1, under))]
+        for (ax, ay), (bx, by) in edges_of([(Fraction(a), Fraction(b)) for a, b in self.corners]):
+            px, py, ex, ey = x - ax, y - ay, bx - ax, by - ay
+            share = min(max((px * ex + py * ey) / (ex * ex + ey * ey), Fraction()), Fraction(1)) if (ex or ey) else 0
             offset = [px - share * ex, py - share * ey, height]
-            offsets.append(Normal(offset, sum((c * c for c in offset), Fraction())))
-            sides.append(Normal([ey, -ex, Fraction()], px * ey - py * ex))
-        if len(sides) < 3 or any(side.beyond > 0 for side in sides):
+            offsets.append(Away(offset, sum((c * c for c in offset), Fraction())))
+            faces.append(Away([ey, -ex, Fraction()], px * ey - py * ex))
+        if len(offsets) < 3 or any(face.beyond > 0 for face in faces[-len(offsets) :]):
             return min(offsets, key=lambda each: each.beyond)
-        if not planar:
-            up = [Fraction(), Fraction(), Fraction(1)]
-            sides += [Normal(up, z - top), Normal([-c for c in up], base - z)]
-        return max(sides, key=lambda each: float(each.beyond) / math.hypot(*map(float, each.vector)))
+        return max(faces, key=lambda each: float(each.beyond) / math.hypot(*map(float, each.vector)))
 
 
 class Shape:
-    """One or more convex parts; places and `planar` as in `Part`.
+    """One or more convex parts; places as in `Part`.
 
     Attributes:
         parts: m of them.
@@ -139,10 +125,6 @@ class Shape:
         apart = np.linalg.norm(np.maximum(gap, 0.0), axis=2) - ROUNDING_M
         return np.where(apart > 0.0, apart, -np.inf)
 
-    def signed_m(self, places: Array, planar: bool) -> Array:
-        """Signed distances, (K,), m."""
-        return np.min([part.signed_m(places, planar) for part in self.parts], axis=0)
-
     def near(self, places: Array) -> Iterator[tuple[float, Part, slice]]:
         """Each part with each slice of places, the nearest first, and a lower bound of its distance, m."""
         bounds = self.bounds_m(*boxes_of(places))
@@ -150,29 +132,33 @@ class Shape:
             begin, part = divmod(int(k), len(self.parts))
             yield float(bounds.flat[k]), self.parts[part], slice(ROWS * begin, ROWS * (begin + 1) + 1)
 
-    def least_m(self, places: Array, planar: bool, reach_m: float = np.inf) -> float:
+    def signed_m(self, places: Array) -> Array:
+        """Signed distances, (K,), m."""
+        return np.min([part.signed_m(places) for part in self.parts], axis=0)
+
+    def least_m(self, places: Array, reach_m: float = np.inf) -> float:
         """Least signed distance along the straight steps from place to place, m, at most `reach_m`."""
         for bound, part, rows in self.near(places):
             if bound >= reach_m:
                 break
-            at_m = part.signed_m(places[rows], planar)
+            at_m = part.signed_m(places[rows])
             reach_m = min(reach_m, float(at_m.min()))
-            reach_m = min(reach_m, float(part.between_m(places[rows], at_m, planar, reach_m).min(initial=np.inf)))
+            reach_m = min(reach_m, float(part.between_m(places[rows], at_m, reach_m).min(initial=np.inf)))
         return reach_m
 
-    def within(self, places: Array, planar: bool, reach_m: float) -> tuple[Flags, Flags]:
+    def within(self, places: Array, reach_m: float) -> tuple[Flags, Flags]:
         """Which places, (K,), and which straight steps between them, (K - 1,), come nearer than `reach_m`."""
         there, passes = np.zeros(len(places), dtype=bool), np.zeros(len(places) - 1, dtype=bool)
         for bound, part, rows in self.near(places):
             if bound >= reach_m:
                 break
-            at_m = part.signed_m(places[rows], planar)
+            at_m = part.signed_m(places[rows])
             there[rows] |= at_m < reach_m
-            passes[rows.start : rows.stop - 1] |= part.between_m(places[rows], at_m, planar, reach_m) < reach_m
+            passes[rows.start : rows.stop - 1] |= part.between_m(places[rows], at_m, reach_m) < reach_m
         return there, passes
 
 
-POINT = Shape([Part([(0.0, 0.0)])])
+POINT = Shape([Part([(0.0, 0.0)], 0.0, 0.0)])
 
 
 def boxes_of(places: Array) -> tuple[Array, Array]:
@@ -183,8 +169,12 @@ def boxes_of(places: Array) -> tuple[Array, Array]:
     return low, high
 
 
-def shape_of(body: Json) -> Shape:
+def shape_of(body: Json, *, endless: bool) -> Shape:
     """The shape of an obstacle, by its entry in a scenario.
+
+    Args:
+        body: the entry.
+        endless: in height, as walls are for UGVs; balls are not.
 
     Raises:
         NotEstablished: if it is a polygon that cannot be split into convex parts.
@@ -199,8 +189,11 @@ def shape_of(body: Json) -> Shape:
         parts = [_placed(body, [(-x, -y), (x, -y), (x, y), (-x, y)])]
     else:
         x, y, z = body["position_m"]
-        return Shape([Part([(x, y)], *((0.0, body["height_m"]) if body["height_m"] else (z, z)))])
-    return Shape([Part(each, 0.0, body["height_m"]) for each in parts])
+        if not body["height_m"]:
+            return Shape([Part([(x, y)], z, z)])
+        parts = [[(x, y)]]
+    heights = (-math.inf, math.inf) if endless else (0.0, float(body["height_m"]))
+    return Shape([Part(corners, *heights) for corners in parts])
 
 
 def _placed(body: Json, corners: Sequence[Sequence[float]]) -> list[Corner]:
@@ -215,30 +208,26 @@ def _placed(body: Json, corners: Sequence[Sequence[float]]) -> list[Corner]:
 def split(corners: Sequence[Corner]) -> list[list[Corner]]:
     """Convex parts of a polygon: ears are cut off, the first one each time, and parts joined while they stay convex.
 
-    The law has an inequality for each part, so the parts must be those of the controllers. Their edges must be those of
-    the polygon and pairs in opposite directions: then they cover it, because their winding numbers add up to its own.
+    The law has an inequality for each part, so the parts must be those of the controllers. They cover the polygon: all
+    ears are counter-clockwise, and their edges are those of the polygon and pairs of opposite ones, so their winding
+    numbers add up to its own.
 
     Raises:
-        NotEstablished: if they are not.
+        NotEstablished: if there is no ear.
     """
-    around = [*corners] if sum(a[0] * b[1] - a[1] * b[0] for a, b in _edges(corners)) > 0.0 else [*corners][::-1]
-    parts = [around] if _is_convex(around) else _triangles(around)
+    around = [*corners] if sum(a[0] * b[1] - a[1] * b[0] for a, b in edges_of(corners)) > 0.0 else [*corners][::-1]
+    parts = [around] if _is_convex(around) else _ears(around)
     while True:
         pairs = combinations(range(len(parts)), 2)
         both = next(((i, j, union) for i, j in pairs if (union := _union(parts[i], parts[j]))), None)
         if both is None:
-            break
+            return [[corner for corner, turn in zip(part, _turns(part), strict=True) if turn > 0.0] for part in parts]
         parts[both[0]] = both[2]
         del parts[both[1]]
-    edges = [edge for part in parts for edge in _edges(part)]
-    if len({*edges}) < len(edges) or {*edges} - {(b, a) for a, b in edges} != {*_edges(around)}:
-        raise NotEstablished("convex parts make up a polygon", f"{len(parts)} parts do not", f"{corners}")
-    return [
-        [b for (a, b), (_, c) in pairwise([*_edges(part), _edges(part)[0]]) if _turn(a, b, c) > 0.0] for part in parts
-    ]
 
 
-def _edges(corners: Sequence[Corner]) -> list[tuple[Corner, Corner]]:
+def edges_of(corners: Sequence[T]) -> list[tuple[T, T]]:
+    """The edges of a polygon; the first one leads to the first corner."""
     return list(zip([corners[-1], *corners[:-1]], corners, strict=True))
 
 
@@ -247,30 +236,37 @@ def _turn(a: Corner, b: Corner, c: Corner) -> float:
     return (b[0] - a[0]) * (c[1] - b[1]) - (b[1] - a[1]) * (c[0] - b[0])
 
 
+def _turns(corners: Sequence[Corner]) -> list[float]:
+    """At each corner."""
+    return [_turn(a, b, c) for (a, b), c in zip(edges_of(corners), [*corners[1:], corners[0]], strict=True)]
+
+
 def _is_convex(corners: Sequence[Corner]) -> bool:
-    return all(_turn(corners[k - 2], corners[k - 1], corners[k]) >= 0.0 for k in range(len(corners)))
+    return min(_turns(corners)) >= 0.0
 
 
-def _triangles(corners: Sequence[Corner]) -> list[list[Corner]]:
-    """An ear turns left, and no other corner is in it."""
+def _ears(corners: Sequence[Corner]) -> list[list[Corner]]:
+    """Triangles that turn left, with no other corner in them."""
     left, found = [*corners], []
-    while len(left) > 3:
+    while len(left) > 2:
         for k in range(len(left)):
             a, b, c = ear = [left[k - 2], left[k - 1], left[k]]
-            sides = ((p, _turn(a, b, p), _turn(b, c, p), _turn(c, a, p)) for p in left if p not in ear)
-            if _turn(a, b, c) > 0.0 and not any(min(turns) >= 0.0 for _, *turns in sides):
+            others = (p for p in left if p not in ear)
+            if _turn(a, b, c) > 0.0 and not any(
+                min(_turn(a, b, p), _turn(b, c, p), _turn(c, a, p)) >= 0.0 for p in others
+            ):
                 break
         else:
-            raise NotEstablished("convex parts make up a polygon", f"{left} has no ear", f"{corners}")
+            raise NotEstablished("a polygon has convex parts", f"{left} has no ear", f"{corners}")
         found.append(ear)
         del left[k - 1]
-    return [*found, left]
+    return found
 
 
 def _union(one: list[Corner], other: list[Corner]) -> list[Corner] | None:
     """The union of two parts that share an edge, if it is convex."""
-    for a, b in _edges(one):
-        if (b, a) in _edges(other):
+    for a, b in edges_of(one):
+        if (b, a) in edges_of(other):
             k, m = one.index(b), other.index(a)
             both = [*one[k:], *one[:k], *[*other[m:], *other[:m]][1:-1]]
             return both if _is_convex(both) else None

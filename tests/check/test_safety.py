@@ -12,7 +12,6 @@ import pytest
 from airground_drake.check import safety
 from airground_drake.check.run import Run
 from airground_drake.check.scenario import Pair
-from airground_drake.check.shapes import POINT
 
 PERIOD_S, GAIN_1_S, SAFE_M = 0.25, 2.0, 2.0
 """Binary fractions, so that A h = 1/2 and the positions below are exact."""
@@ -25,7 +24,7 @@ def run(way_m: list[float], **more: Any) -> Run:
     pair = Pair("ugv1", "rock", SAFE_M, 0.0, 1.0, 1.0)
     found = SimpleNamespace(
         t_s=t, sample_row=np.arange(len(t) - 1), pairs=[pair], apart_m={("ugv1", "rock"): 0.0},
-        position_m={"ugv1": own, "rock": np.zeros((len(t), 3))}, shapes={"rock": POINT}, apart=lambda _: own,
+        position_m={"ugv1": own, "rock": np.zeros((len(t), 3))}, apart=lambda _: own,
         there_from=lambda _: 0, scenario={"control": {"period_s": PERIOD_S, "avoidance_gain_1_s": GAIN_1_S}},
     )  # fmt: skip
     return cast("Run", cast("Any", found))
@@ -53,7 +52,7 @@ def test_a_distance_that_is_short_refutes(short_m: float, status: str) -> None:
 )
 def test_the_shortfall_is_what_the_inequality_lacks(way_m: list[float], missed_m: float) -> None:
     approach = run(way_m)
-    found = safety.shortfall_m(*approach.position_m.values(), approach.pairs[0], POINT, Fraction(1, 2))
+    found = safety.shortfall_m(*approach.position_m.values(), approach.pairs[0], Fraction(1, 2))
     assert abs(found - Fraction(missed_m)) < Fraction(1, 2**100)
 
 
