@@ -1,0 +1,140 @@
+"""Runs among walls, polygons and boxes: the checker holds what was kept, and refuses forged walls and places."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from check.forgeries import all_of, cells, everywhere
+from check.forging import Edit, edited_table, forged, mend, trace
+from sharing import once
+
+from airground_drake.check.command import LIMIT_S, checked
+from airground_drake.check.line import AGREES, CheckLine
+from airground_drake.check.report import DECIDED, SCHEMA, SHAPE
+from airground_drake.check.run import SHARED, read_run
+from airground_drake.run.simulation import simulate
+from airground_drake.run.trace import save
+from airground_drake.scenarios.load import from_data, resolved
+
+U = [[0.0, 1.0], [2.0, 1.0], [2.0, -1.0], [0.0, -1.0], [0.0, -0.9], [1.8, -0.9], [1.8, 0.9], [0.0, 0.9]]
+BARRIERS: dict[str, dict[str, Any]] = {
+    "wall": {"segment_m": [[1.0, -2.0], [1.0, 0.5], [2.0, 2.0]], "radius_m": 0.05},
+    "room": {"polygon_m": U, "position_m": [1.0, 0.0], "heading_rad": 0.2, "distance_m": 0.25},
+    "block": {"size_m": [1.0, 3.0], "position_m": [2.0, 0.5], "heading_rad": -0.3},
+    "tower": {"size_m": [0.6, 0.6], "position_m": [0.0, 0.0], "heading_rad": 0.5, "height_m": 1.3},
+    "gate": {"polygon_m": [[1.5, -3.0], [1.5, 3.0], [2.0, 0.0]], "appears_s": 0.5},
+}
+"""What ugv1 runs into; the UAV climbs over the tower, which the two UGVs pass on either side."""
+
+
+def scene(name: str) -> dict[str, Any]:
+    """A run in which the barrier of that name, or the arena, decides the least margin."""
+    aside = 1.5 if name == "tower" else 0.1
+    ways = {"ugv1": [[-2.0, aside, 0.0], [5.0, aside, 0.0]], "ugv2": [[-2.0, -1.5, 0.0], [5.0, -1.5, 0.0]]}
+    ways = ways if name == "tower" else {"ugv1": ways["ugv1"]}
+    if name == "arena":  # beyond it and back
+        ways["ugv1"].append([1.0, aside, 0.0])
+    return {
+        "name": name, "duration_s": 5.0, "uav": {"start_m": [-2.0, 0.0, 1.4], "altitude_m": 1.4},
+        "safe_distance": {"obstacle_m": 0.3, "ugv_m": 0.3, "air_ground_m": 0.5}, "runs": {"d": {"method": "a"}},
+        "control": {"period_s": 0.05, "sensing_range_m": 3.0}, "decision": {"noise_period_s": 0.05},
+        "ugvs": {
+            ugv: {"start_m": way[0], "target_m": way[-1], "preset": {"waypoints_m": way}, "radius_m": 0.2}
+            for ugv, way in ways.items()
+        },
+        **({"arena_m": [[2.0, -2.0], [-3.0, 2.0]]} if name == "arena" else {"obstacles": {name: BARRIERS[name]}}),
+    }  # fmt: skip
+
+
+@pytest.fixture(scope="module", name="report_of")
+def reports(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
+    """A report of each scene with the checker's own verdicts; nobody writes into it."""
+    above = tmp_path_factory.mktemp("walls")
+
+    def make(name: str, folder: Path) -> None:
+        scenario = from_data(scene(name), name)
+        save(simulate(scenario, "d"), trace(folder))
+        about = json.loads((trace(folder) / "meta.json").read_bytes())
+        document: dict[str, Any] = {key: kind() for key, kind in SHAPE.items()} | {"schema": SCHEMA}
+        document |= {"scenario": {"resolved": resolved(scenario)}, "runs": {"d": {key: about[key] for key in SHARED}}}
+        run = read_run(trace(folder), "d", json.loads(json.dumps(document)))
+        for claim, decide in DECIDED.items():
+            found = decide(run)
+            count = found.exercised[0] if found.exercised else 0
+            entry = {"id": claim, "run": "d", "status": found.status, "margin": found.margin, "exercised": count}
+            document["claims"].append(entry | {"unit": ""})
+        (folder / "report.json").write_text(json.dumps(document))
+        everywhere("name", value=name)(folder)  # its digest
+        mend(folder)
+
+    return lambda name: once(above / name, lambda folder: make(name, folder))
+
+
+def refusals(report: Path, edit: Edit) -> list[CheckLine]:
+    """What the checker says against a forged copy."""
+    return [line for line in checked(forged(report, edit), LIMIT_S) if line.outcome != AGREES]
+
+
+@pytest.mark.parametrize("name", [*BARRIERS, "arena"])
+def test_honest_runs_stop_at_the_distance_and_keep_it(report_of: Callable[[str], Path], name: str) -> None:
+    folder = report_of(name)
+    claims = {claim["id"]: claim for claim in json.loads((folder / "report.json").read_bytes())["claims"]}
+    assert refusals(folder, all_of()) == []
+    assert claims["SAFE-TRACE"]["status"] == claims["SAFE-HYP"]["status"] == "holds"
+    assert 0.0 <= claims["SAFE-TRACE"]["margin"] < 1e-3
+    assert claims["SAFE-TRACE"]["exercised"] >= 1
+
+
+def into_the_wall(folder: Path) -> None:
+    """Beyond the wall at one row, with commands that lead there and back."""
+    with edited_table(folder) as frame, edited_table(folder, "samples") as samples:
+        row, sample = len(frame) - 11, len(samples) - 10
+        assert frame["t_s"][row] == samples["t_s"][sample]
+        frame.loc[row, "ugv1.x_m"] += 0.6
+        samples.loc[sample - 1, "ugv1.vx_m_s"] += 0.6 / 0.05
+        samples.loc[sample, "ugv1.vx_m_s"] -= 0.6 / 0.05
+
+
+def moved(by_m: float) -> Callable[[Any], Any]:
+    return lambda corners: [[x + by_m, y] for x, y in corners]
+
+
+FORGERIES: dict[str, tuple[str, str, Edit]] = {
+    "wall moved": ("wall", "SAFE-TRACE", everywhere("obstacles", "wall", "segment_m", value=moved(-1e-3))),
+    "wall moved away": ("wall", "SAFE-TRACE", everywhere("obstacles", "wall", "segment_m", value=moved(1e-3))),
+    "wall thinner": ("wall", "SAFE-TRACE", everywhere("obstacles", "wall", "radius_m", value=0.049)),
+    "wall with a distance of its own": ("wall", "SAFE-TRACE", everywhere("obstacles", "wall", "distance_m", value=0.2)),
+    "wall left out": ("wall", "SAFE-TRACE", everywhere("obstacles", value={})),
+    "smaller distance": ("room", "SAFE-TRACE", everywhere("obstacles", "room", "distance_m", value=0.249)),
+    "room turned": ("room", "SAFE-TRACE", everywhere("obstacles", "room", "heading_rad", value=0.201)),
+    "room moved": ("room", "SAFE-TRACE", everywhere("obstacles", "room", "position_m", value=[1.001, 0.0, 0.0])),
+    "room filled": ("room", "SAFE-TRACE", everywhere("obstacles", "room", "polygon_m", value=U[:4])),
+    "block turned": ("block", "SAFE-TRACE", everywhere("obstacles", "block", "heading_rad", value=-0.301)),
+    "block smaller": ("block", "SAFE-TRACE", everywhere("obstacles", "block", "size_m", value=[0.999, 3.0])),
+    "tower lower": ("tower", "SAFE-TRACE", everywhere("obstacles", "tower", "height_m", value=1.299)),
+    "gate appears later": ("gate", "SAFE-TRACE", everywhere("obstacles", "gate", "appears_s", value=6.0)),
+    "arena larger": ("arena", "SAFE-TRACE", everywhere("arena_m", value=[[2.001, -2.0], [-3.0, 2.0]])),
+    "arena left out": ("arena", "SAFE-TRACE", everywhere("arena_m", value=[])),
+    "into the wall": ("wall", "SAFE-TRACE", into_the_wall),
+    "into the wall between samples": ("wall", "trace", cells("ugv1.x_m", lambda old: old + 0.6, 90)),
+    "edges that cross": (
+        "room", "events", everywhere("obstacles", "room", "polygon_m", value=[[0, 0], [9, 9], [9, 0], [0, 9]]),
+    ),
+}  # fmt: skip
+"""The scene, the check that refuses the forgery, and the forgery."""
+
+
+@pytest.mark.parametrize("name", FORGERIES)
+def test_forged_walls_and_places_are_refused(report_of: Callable[[str], Path], name: str) -> None:
+    barrier, claim, edit = FORGERIES[name]
+    assert claim in {line.claim for line in refusals(report_of(barrier), edit)}
+
+
+@pytest.mark.parametrize("name", ["room", "gate"])
+def test_corners_may_be_listed_in_either_order(report_of: Callable[[str], Path], name: str) -> None:
+    reversed_corners = everywhere("obstacles", name, "polygon_m", value=lambda corners: corners[::-1])
+    assert refusals(report_of(name), reversed_corners) == []
