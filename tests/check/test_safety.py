@@ -12,9 +12,11 @@ import pytest
 from airground_drake.check import safety
 from airground_drake.check.run import Run
 from airground_drake.check.scenario import Pair
+from airground_drake.check.shapes import Shape, shape_of
 
 PERIOD_S, GAIN_1_S, SAFE_M = 0.25, 2.0, 2.0
 """Binary fractions, so that A h = 1/2 and the positions below are exact."""
+BODY = {"position_m": [0.0, 0.0, 0.0], "heading_rad": 0.0, "height_m": 0.0, "segment_m": [], "polygon_m": []}
 
 
 def run(way_m: list[float], **more: Any) -> Run:
@@ -54,6 +56,29 @@ def test_the_shortfall_is_what_the_inequality_lacks(way_m: list[float], missed_m
     approach = run(way_m)
     found = safety.shortfall_m(*approach.position_m.values(), approach.pairs[0], Fraction(1, 2))
     assert abs(found - Fraction(missed_m)) < Fraction(1, 2**100)
+
+
+WALL = shape_of(BODY | {"segment_m": [[-9.0, 0.0], [1.0, 0.0], [1.0, 9.0]]}, endless=True)
+BLOCK = shape_of(BODY | {"size_m": [2.0, 2.0], "height_m": 8.0}, endless=False)
+
+
+@pytest.mark.parametrize(
+    ("shape", "here", "there", "missed_m"),
+    [
+        (WALL, [-8.0, -2.0, 0.0], [-7.0, -2.0, 0.0], 0.0),  # along it, at the safe distance
+        (WALL, [-8.0, -2.0, 0.0], [-7.0, -1.75, 0.0], 0.25),
+        (WALL, [-12.0, -4.0, 0.0], [-9.6, -0.8, 0.0], 1.0),  # 4 m towards an end that is 5 m away
+        (WALL, [-1.5, 3.0, 7.0], [-0.5, 2.25, 7.0], 0.5),  # of its two parts the second one misses more
+        (BLOCK, [0.5, 0.25, 4.0], [0.75, 0.0, 4.0], 1.0),  # inside, 0.5 m from the face on the right
+        (BLOCK, [0.0, 0.0, 7.875], [0.0, 0.0, 8.0], 0.9375),  # inside, below the top
+        (BLOCK, [0.5, 0.0, 10.5], [0.0, 0.0, 9.5], 0.5),  # above it
+        (BLOCK, [3.25, 0.0, 11.0], [1.75, 0.0, 9.0], 0.75),  # 2.5 m straight towards the edge at the top, 3.75 m away
+    ],
+)
+def test_the_shortfall_beside_a_wall(shape: Shape, here: list[float], there: list[float], missed_m: float) -> None:
+    own = np.array([here, there])
+    pair = Pair("uav", "wall", SAFE_M, 0.0, 1.0, 1.0, shape)
+    assert float(safety.shortfall_m(own, 0.0 * own, pair, Fraction(1, 2))) == pytest.approx(missed_m, abs=1e-12)
 
 
 @pytest.mark.parametrize(("step_m", "status"), [(2.0**-32, "holds"), (0.53e-9, "refuted")])

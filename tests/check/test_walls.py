@@ -89,14 +89,18 @@ def test_honest_runs_stop_at_the_distance_and_keep_it(report_of: Callable[[str],
     assert claims["SAFE-TRACE"]["exercised"] >= 1
 
 
-def into_the_wall(folder: Path) -> None:
-    """Beyond the wall at one row, with commands that lead there and back."""
-    with edited_table(folder) as frame, edited_table(folder, "samples") as samples:
-        row, sample = len(frame) - 11, len(samples) - 10
-        assert frame["t_s"][row] == samples["t_s"][sample]
-        frame.loc[row, "ugv1.x_m"] += 0.6
-        samples.loc[sample - 1, "ugv1.vx_m_s"] += 0.6 / 0.05
-        samples.loc[sample, "ugv1.vx_m_s"] -= 0.6 / 0.05
+def ahead(by_m: float) -> Edit:
+    """Ahead at one row, with commands that lead there and back."""
+
+    def edit(folder: Path) -> None:
+        with edited_table(folder) as frame, edited_table(folder, "samples") as samples:
+            row, sample = len(frame) - 11, len(samples) - 10
+            assert frame["t_s"][row] == samples["t_s"][sample]
+            frame.loc[row, "ugv1.x_m"] += by_m
+            samples.loc[sample - 1, "ugv1.vx_m_s"] += by_m / 0.05
+            samples.loc[sample, "ugv1.vx_m_s"] -= by_m / 0.05
+
+    return edit
 
 
 def moved(by_m: float) -> Callable[[Any], Any]:
@@ -119,8 +123,9 @@ FORGERIES: dict[str, tuple[str, str, Edit]] = {
     "gate appears later": ("gate", "SAFE-TRACE", everywhere("obstacles", "gate", "appears_s", value=6.0)),
     "arena larger": ("arena", "SAFE-TRACE", everywhere("arena_m", value=[[2.001, -2.0], [-3.0, 2.0]])),
     "arena left out": ("arena", "SAFE-TRACE", everywhere("arena_m", value=[])),
-    "into the wall": ("wall", "SAFE-TRACE", into_the_wall),
-    "into the wall between samples": ("wall", "trace", cells("ugv1.x_m", lambda old: old + 0.6, 90)),
+    "onto the wall": ("wall", "SAFE-TRACE", ahead(0.6)),
+    "through the wall and back between rows that are clear of it": ("wall", "SAFE-TRACE", ahead(1.3)),
+    "onto the wall without a command": ("wall", "trace", cells("ugv1.x_m", lambda old: old + 0.6, 90)),
     "edges that cross": (
         "room", "events", everywhere("obstacles", "room", "polygon_m", value=[[0, 0], [9, 9], [9, 0], [0, 9]]),
     ),
