@@ -20,7 +20,7 @@ MOST = {
     "samples": 10_000_000,
     "stages": 10_000,
     "robots and obstacles": 2_000,
-    "numbers of a shape": 2_000,
+    "numbers of a shape": 5_000,
 }
 """Counts that follow from a scenario."""
 

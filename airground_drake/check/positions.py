@@ -97,7 +97,7 @@ def judge(table: pd.DataFrame, scenario: Json) -> tuple[list[JudgedPair], Covera
         if period is not None:
             gain = gain_of(scenario, period)
             e = shortfall_m(own, other, pair, gain)
-            short = max(0.0, pair.safe_m - float(pair.shape.signed_m(own[:1] - other[:1])[0]))
+            short = max(0.0, pair.safe_m - pair.shape.least_m(own[:1] - other[:1]))
             promised = pair.gap_m - max(lost_m(e, gain, len(spacing)), short)
             missed, guarantee = float(e), promised if promised > 0.0 else None
         found.append(JudgedPair(pair.robot, pair.other, pair.gap_m, least_m, missed, guarantee))

@@ -136,7 +136,7 @@ def _constants(run: Run) -> None:
         about, speed = f"{pair.robot}, {pair.other}", written(limit[pair.robot]) + written(limit.get(pair.other, 0.0))
         least = written(pair.safe_m) + speed * period
         holds("sensing range", reach >= least, float(reach), f"{float(least)} at least", about=about)
-        start = float(pair.shape.signed_m(run.apart(pair)[:1])[0])
+        start = pair.shape.least_m(run.apart(pair)[:1])
         holds("safe start", start >= pair.safe_m - SMALL, start, f"{pair.safe_m} at least", about=about)
 
 

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from .files import Json
-from .rules import Array
+from .rules import Array, NotEstablished
 from .shapes import POINT, Shape, shape_of
 
 ENDLESS_M = 1e6
@@ -110,7 +110,14 @@ def barriers_of(scenario: Json) -> dict[str, Json]:
 
 
 def places_of(scenario: Json, t_s: Array) -> dict[str, Array]:
-    """How far obstacles have moved by times (K,), from where their shapes are: (K, 3), m, by name. All are at rest."""
+    """How far obstacles have moved by times (K,), from where their shapes are: (K, 3), m, by name.
+
+    Raises:
+        NotEstablished: if one moves, might move, or disappears.
+    """
+    for name, body in scenario["obstacles"].items():
+        if body["moves"] or body["max_speed_m_s"] or body["disappears_s"]:
+            raise NotEstablished("obstacles rest and stay", "it moves, might move, or disappears", name)
     return {name: np.zeros((len(t_s), 3)) for name in barriers_of(scenario)}
 
 

@@ -132,10 +132,6 @@ class Shape:
             begin, part = divmod(int(k), len(self.parts))
             yield float(bounds.flat[k]), self.parts[part], slice(ROWS * begin, ROWS * (begin + 1) + 1)
 
-    def signed_m(self, places: Array) -> Array:
-        """Signed distances, (K,), m."""
-        return np.min([part.signed_m(places) for part in self.parts], axis=0)
-
     def least_m(self, places: Array, reach_m: float = np.inf) -> float:
         """Least signed distance along the straight steps from place to place, m, at most `reach_m`."""
         for bound, part, rows in self.near(places):

@@ -349,6 +349,9 @@ HOSTILE: dict[str, tuple[str, Edit]] = {
     "obstacles without end": (
         "the scenario is of a size", everywhere("obstacles", value={f"o{k}": STONE for k in range(3000)}),
     ),
+    "corners without end": (
+        "the scenario is of a size", everywhere("obstacles", value={"o": STONE | {"polygon_m": [[0.0, 0.0]] * 3000}}),
+    ),
     "duration of many digits": ("the rows cover the run", everywhere("duration_s", value="1e1000000000")),
     **{
         f"{'.'.join(path)} = {value:g}": ("the scenario is of a size", everywhere(*path, value=value))

@@ -20,9 +20,8 @@ from airground_drake.check.scenario import pairs_of
 from airground_drake.check.shapes import POINT, ROWS, Shape, boxes_of, shape_of, split
 from airground_drake.geometry import convex
 from airground_drake.scenarios.load import load, resolved
+from airground_drake.scenarios.outlines import outlines_of
 from airground_drake.scenarios.schema import Obstacle
-from airground_drake.scenarios.shapes import outlines_of
-from airground_drake.verify.engines.geometry import closest_approach
 
 Corners = list[list[float]]
 Array = NDArray[np.float64]
@@ -56,6 +55,11 @@ def prism(corners: Corners, height_m: float, *, endless: bool) -> Shape:
     return shape_of(AT_ORIGIN | {"polygon_m": corners, "height_m": height_m}, endless=endless)
 
 
+def signed_m(shape: Shape, places: Array) -> Array:
+    """The least signed distances over all parts, (K,), m."""
+    return np.asarray(np.min([part.signed_m(places) for part in shape.parts], axis=0))
+
+
 PLACES = st.lists(st.tuples(*[st.floats(-4.0, 4.0)] * 2, st.floats(0.0, 4.0)), min_size=2, max_size=6)
 HEIGHTS = st.sampled_from([0.0, 0.5, 2.0])
 
@@ -75,7 +79,7 @@ def boundary_m(corners: Corners, place: Any) -> tuple[float, bool]:
 def test_outside_the_distance_is_that_of_the_whole_polygon(corners: Corners, places: Any, height_m: float) -> None:
     for endless in (True, False):
         shape = prism(corners, height_m, endless=endless)
-        for place, found in zip(places, shape.signed_m(np.array(places)), strict=True):
+        for place, found in zip(places, signed_m(shape, np.array(places)), strict=True):
             flat, inside = boundary_m(corners, place)
             over = 0.0 if endless else max(place[2] - height_m, 0.0)
             if min(flat, abs(place[2] - height_m)) < 1e-9:
@@ -95,11 +99,11 @@ def test_the_least_distance_of_a_way_is_that_of_dense_samples(
     shape, way = prism(corners, height_m, endless=endless), np.array(places)
     least = shape.least_m(way)
     share = np.linspace(0.0, 1.0, 401)[:, None]
-    dense = [shape.signed_m(a + share * (b - a)).min() for a, b in pairwise(way)]
+    dense = [signed_m(shape, a + share * (b - a)).min() for a, b in pairwise(way)]
     longest = float(np.linalg.norm(np.diff(way, axis=0), axis=1).max())
     assert min(dense) - longest / 800.0 <= least <= min(dense) + 1e-12
     there, passes = shape.within(way, 0.7)
-    assert there.tolist() == (shape.signed_m(way) < 0.7).tolist()
+    assert there.tolist() == (signed_m(shape, way) < 0.7).tolist()
     for near, of_step in zip(passes.tolist(), dense, strict=True):
         assert near or of_step >= 0.7
         assert not near or of_step < 0.7 + longest / 800.0
@@ -180,5 +184,7 @@ def test_bounds_are_below_all_distances(seed: int, rows: int, step: float, corne
 def test_the_least_distance_of_points_has_a_closed_form(seed: int, rows: int, step: float) -> None:
     rng = np.random.default_rng(seed)
     way = rng.normal(size=3) + np.cumsum(step * rng.normal(size=(rows, 3)), axis=0)
-    exact = closest_approach(np.arange(float(rows)), way, np.zeros(3)).distance_m
+    start, step = way[:-1], np.diff(way, axis=0)
+    share = np.clip(-(start * step).sum(axis=1) / (step**2).sum(axis=1), 0.0, 1.0)
+    exact = np.linalg.norm(start + share[:, None] * step, axis=1).min()
     assert POINT.least_m(way) == pytest.approx(exact, abs=1e-10)

@@ -7,13 +7,15 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import pandas as pd
 import pytest
 from check.forgeries import all_of, cells, everywhere
-from check.forging import Edit, edited_table, forged, mend, trace
+from check.forging import Edit, edited_table, forged, mend, read_table, trace
 from sharing import once
 
 from airground_drake.check.command import LIMIT_S, checked
 from airground_drake.check.line import AGREES, CheckLine
+from airground_drake.check.positions import judge
 from airground_drake.check.report import DECIDED, SCHEMA, SHAPE
 from airground_drake.check.run import SHARED, read_run
 from airground_drake.run.simulation import simulate
@@ -89,6 +91,23 @@ def test_honest_runs_stop_at_the_distance_and_keep_it(report_of: Callable[[str],
     assert claims["SAFE-TRACE"]["exercised"] >= 1
 
 
+@pytest.mark.parametrize(("name", "by_m"), [("wall", 0.0), ("room", 0.0), ("block", 0.01), ("tower", 0.01)])
+def test_positions_among_walls_are_judged(report_of: Callable[[str], Path], name: str, by_m: float) -> None:
+    """As they are, and beside an obstacle that is kept farther away from."""
+    folder = report_of(name)
+    frame, scenario = read_table(folder), json.loads((folder / "report.json").read_bytes())["scenario"]["resolved"]
+    columns = ["x_m", "y_m", "z_m"]
+    tables = [
+        pd.DataFrame(frame[[f"{robot}.{column}" for column in columns]].to_numpy(), columns=columns)
+        .assign(t_s=frame["t_s"], body=robot)
+        for robot in (*scenario["ugvs"], "uav")
+    ]  # fmt: skip
+    scenario["obstacles"][name]["distance_m"] = (scenario["obstacles"][name]["distance_m"] or 0.3) + by_m
+    pairs, _ = judge(pd.concat(tables, ignore_index=True), scenario)
+    assert [pair.second for pair in pairs if not pair.kept] == ([name] if by_m else [])
+    assert max(pair.missed_m or 0.0 for pair in pairs) == pytest.approx(by_m, abs=1e-9)
+
+
 def ahead(by_m: float) -> Edit:
     """Ahead at one row, with commands that lead there and back."""
 
@@ -126,6 +145,7 @@ FORGERIES: dict[str, tuple[str, str, Edit]] = {
     "onto the wall": ("wall", "SAFE-TRACE", ahead(0.6)),
     "through the wall and back between rows that are clear of it": ("wall", "SAFE-TRACE", ahead(1.3)),
     "onto the wall without a command": ("wall", "trace", cells("ugv1.x_m", lambda old: old + 0.6, 90)),
+    "wall that might move": ("wall", "trace", everywhere("obstacles", "wall", "max_speed_m_s", value=1.0)),
     "edges that cross": (
         "room", "events", everywhere("obstacles", "room", "polygon_m", value=[[0, 0], [9, 9], [9, 0], [0, 9]]),
     ),
