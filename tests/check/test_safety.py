@@ -59,6 +59,7 @@ def test_the_shortfall_is_what_the_inequality_lacks(way_m: list[float], missed_m
 
 
 WALL = shape_of(BODY | {"segment_m": [[-9.0, 0.0], [1.0, 0.0], [1.0, 9.0]]}, endless=True)
+BALL = shape_of(BODY | {"position_m": [0.0, 0.0, 3.0], "size_m": []}, endless=True)
 BLOCK = shape_of(BODY | {"size_m": [2.0, 2.0], "height_m": 8.0}, endless=False)
 
 
@@ -73,6 +74,7 @@ BLOCK = shape_of(BODY | {"size_m": [2.0, 2.0], "height_m": 8.0}, endless=False)
         (BLOCK, [0.0, 0.0, 7.875], [0.0, 0.0, 8.0], 0.9375),  # inside, below the top
         (BLOCK, [0.5, 0.0, 10.5], [0.0, 0.0, 9.5], 0.5),  # above it
         (BLOCK, [3.25, 0.0, 11.0], [1.75, 0.0, 9.0], 0.75),  # 2.5 m straight towards the edge at the top, 3.75 m away
+        (BALL, [4.0, 0.0, 0.0], [0.0, 0.0, 0.0], 0.2),  # 3.2 m towards a centre that is 5 m away, higher up
     ],
 )
 def test_the_shortfall_beside_a_wall(shape: Shape, here: list[float], there: list[float], missed_m: float) -> None:

@@ -179,6 +179,14 @@ def test_bounds_are_below_all_distances(seed: int, rows: int, step: float, corne
                 assert bound <= Shape([part]).least_m(places)
 
 
+def test_the_step_between_two_slices_belongs_to_one() -> None:
+    """A place is passed at 1 m between the last row of a slice and the first one of the next."""
+    way = np.column_stack([2.0 * np.arange(2 * ROWS) - (2 * ROWS - 1), np.ones((2 * ROWS, 1)), np.zeros((2 * ROWS, 1))])
+    assert POINT.least_m(way) == pytest.approx(1.0, abs=1e-10)
+    assert POINT.within(way, 1.1)[1].nonzero()[0].tolist() == [ROWS - 1]
+    assert POINT.bounds_m(*boxes_of(way)).min() <= 1.0
+
+
 @examples(20)
 @given(seed=st.integers(0, 2**32 - 1), rows=st.integers(2, 3 * ROWS), step=st.floats(0.01, 3.0))
 def test_the_least_distance_of_points_has_a_closed_form(seed: int, rows: int, step: float) -> None:
