@@ -7,10 +7,12 @@ import json
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from airground_drake.base.arrays import Array
 from airground_drake.base.errors import ExportError
 from airground_drake.run.trace import Trace
 from airground_drake.scenarios.schema import Scenario
-from airground_drake.view.looks import SAFE_COLOR, STATE_COLORS, UAV_COLOR, UNSEEN_COLOR, rgb
+from airground_drake.view.geometry import Mesh, prisms
+from airground_drake.view.looks import OBSTACLE_COLOR, SAFE_COLOR, STATE_COLORS, UAV_COLOR, UNSEEN_COLOR, rgb
 from airground_drake.view.stage import Robot, Stage, stage_of, states
 
 if TYPE_CHECKING:
@@ -31,18 +33,24 @@ def _array(items: Mapping[str, Any]) -> dict[str, Any]:
     return {"type": "array", "items": items}
 
 
-_TIME = _object(sec={"type": "integer"}, nsec={"type": "integer"})
+_WHOLE = {"type": "integer"}
+_TIME = _object(sec=_WHOLE, nsec=_WHOLE)
 _VECTOR = _object(x=_NUMBER, y=_NUMBER, z=_NUMBER)
 _POSE = _object(position=_VECTOR, orientation=_object(x=_NUMBER, y=_NUMBER, z=_NUMBER, w=_NUMBER))
 _COLOR = _object(r=_NUMBER, g=_NUMBER, b=_NUMBER, a=_NUMBER)
 _CYLINDER = _object(pose=_POSE, size=_VECTOR, bottom_scale=_NUMBER, top_scale=_NUMBER, color=_COLOR)
 _SPHERE = _object(pose=_POSE, size=_VECTOR, color=_COLOR)
+_LINE = _object(
+    type=_WHOLE, pose=_POSE, thickness=_NUMBER, scale_invariant={"type": "boolean"}, points=_array(_VECTOR),
+    color=_COLOR, colors=_array(_COLOR), indices=_array(_WHOLE),
+)  # fmt: skip
+_TRIANGLES = _object(pose=_POSE, points=_array(_VECTOR), color=_COLOR, colors=_array(_COLOR), indices=_array(_WHOLE))
 _ENTITY = _object(
     timestamp=_TIME, frame_id=_TEXT, id=_TEXT, lifetime=_TIME, frame_locked={"type": "boolean"},
-    cylinders=_array(_CYLINDER), spheres=_array(_SPHERE),
+    cylinders=_array(_CYLINDER), spheres=_array(_SPHERE), lines=_array(_LINE), triangles=_array(_TRIANGLES),
 )  # fmt: skip
 _SCENE = _object(deletions=_array(_object()), entities=_array(_ENTITY))
-_LOG = _object(timestamp=_TIME, level={"type": "integer"}, message=_TEXT, name=_TEXT)
+_LOG = _object(timestamp=_TIME, level=_WHOLE, message=_TEXT, name=_TEXT)
 _SIGNALS = _object(
     position_m=_VECTOR, command_m_s=_VECTOR, decision_variable_m=_NUMBER, noise_m=_NUMBER, mode=_NUMBER,
     executing=_NUMBER,
@@ -99,7 +107,7 @@ def _write(writer: Writer, messages: list[Message]) -> None:
 def _messages(trace: Trace, scenario: Scenario) -> Iterator[Message]:
     """All messages of a run."""
     standing = stage_of(trace, scenario)
-    yield Message(0.0, "/scene", "foxglove.SceneUpdate", {"deletions": [], "entities": list(_obstacles(standing))})
+    yield Message(0.0, "/scene", "foxglove.SceneUpdate", {"deletions": [], "entities": list(_barriers(standing))})
     looks = {robot: states(trace, robot, trace.t) for robot in trace.ugvs}
     for k, t in enumerate(trace.t.tolist()):
         entities = []
@@ -127,14 +135,23 @@ def _signals(trace: Trace, robot: str, k: int) -> dict[str, Any]:
     return found
 
 
-def _obstacles(standing: Stage) -> Iterator[dict[str, Any]]:
-    """Each obstacle as a cylinder inside its transparent safe cylinder; phantoms as cylinders."""
-    low = standing.mark_m
-    for obstacle in standing.obstacles:
-        centre = obstacle.centre_m.tolist()
-        cylinders = [_cylinder(centre, obstacle.radius_m, 2.0 * low, obstacle.color)]
-        cylinders.append(_cylinder(centre, obstacle.safe_m, low, SAFE_COLOR, 0.2))
-        yield _entity(f"obstacle {obstacle.name}", 0.0, cylinders=cylinders)
+def _barriers(standing: Stage) -> Iterator[dict[str, Any]]:
+    """Each ball, post or wall inside its transparent safe zone; the arena's frames; phantoms as cylinders."""
+    low, highest = standing.mark_m, float(standing.high_m[2])
+    for barrier in standing.barriers:
+        name, color, foot = f"obstacle {barrier.name}", barrier.color, barrier.place_m.tolist()
+        tall = max(2.0 * low, min(barrier.top_m, highest) - foot[2])
+        if barrier.is_round:
+            body = _cylinder(foot, float(barrier.radius_m[0]), tall, color)
+            zone = _cylinder(foot, float(barrier.safe_m[0]), low, SAFE_COLOR, 0.2)
+            yield _entity(name, 0.0, cylinders=[body, zone])
+        else:
+            body = _triangles(prisms(barrier.body, tall), color)
+            zone = _triangles(prisms(barrier.safe, low), SAFE_COLOR, 0.2)
+            yield _entity(name, 0.0, triangles=[body, zone])
+    if standing.arena:
+        colors = (OBSTACLE_COLOR, SAFE_COLOR)
+        yield _entity("arena", 0.0, lines=[_loop(*each) for each in zip(standing.arena, colors, strict=True)])
     for k, phantom in enumerate(standing.phantoms_m.tolist()):
         yield _entity(f"phantom {k + 1}", 0.0, cylinders=[_cylinder(phantom, low, low, UNSEEN_COLOR, 0.5)])
 
@@ -159,6 +176,18 @@ def _cylinder(foot: list[float], radius: float, height: float, color: str, alpha
     size = {"x": 2.0 * radius, "y": 2.0 * radius, "z": height}
     pose = _pose([x, y, z + height / 2.0])
     return {"pose": pose, "size": size, "bottom_scale": 1.0, "top_scale": 1.0, "color": _rgba(color, alpha)}
+
+
+def _triangles(mesh: Mesh, color: str, alpha: float = 1.0) -> dict[str, Any]:
+    points, indices = [_vector(each) for each in mesh.vertices.T.tolist()], mesh.faces.T.ravel().tolist()
+    return {"pose": _pose([0.0] * 3), "points": points, "color": _rgba(color, alpha), "colors": [], "indices": indices}
+
+
+def _loop(corners: Array, color: str) -> dict[str, Any]:
+    """A closed line on the ground through corners (K, 2), m, two pixels wide."""
+    points = [_vector([*each, 0.0]) for each in corners.tolist()]
+    line = {"type": 1, "pose": _pose([0.0] * 3), "thickness": 2.0, "scale_invariant": True, "points": points}
+    return line | {"color": _rgba(color), "colors": [], "indices": []}
 
 
 def _pose(position: list[float]) -> dict[str, Any]:

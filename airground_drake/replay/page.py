@@ -10,10 +10,10 @@ from jinja2 import Template
 
 from airground_drake.base.errors import ReplayError
 from airground_drake.replay.recording import recorded
-from airground_drake.replay.scene import FRAMES_PER_S, MAX_NAMED_OBSTACLES, Scene
+from airground_drake.replay.scene import FRAMES_PER_S, MAX_NAMED_BARRIERS, Scene
 from airground_drake.report.html import digest
 from airground_drake.report.templating import environment_of
-from airground_drake.view.draw import obstacle_path, robot_path
+from airground_drake.view.draw import barrier_path, robot_path
 from airground_drake.view.looks import (
     OBSTACLE_COLOR,
     OUTCOME_COLORS,
@@ -71,9 +71,9 @@ def _data(scene: Scene) -> dict[str, Any]:
             {"name": body.name, "path": robot_path(k).split("/")[1:], "ugv": body.kind == "UGV"}
             for k, body in enumerate(scene.robots)
         ],
-        "obstacles": [
-            {"name": obstacle.name, "path": [*obstacle_path(k).split("/")[1:], "body"]}
-            for k, obstacle in enumerate(scene.obstacles if len(scene.obstacles) <= MAX_NAMED_OBSTACLES else ())
+        "barriers": [
+            {"name": barrier.name, "path": [*barrier_path(k).split("/")[1:], "body"]}
+            for k, barrier in enumerate(scene.barriers if len(scene.barriers) <= MAX_NAMED_BARRIERS else ())
         ],
     }
 

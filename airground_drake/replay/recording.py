@@ -10,7 +10,7 @@ from pydrake.math import RigidTransform
 from airground_drake.base.arrays import Array
 from airground_drake.replay.proposals import Sent
 from airground_drake.replay.scene import FRAMES_PER_S, Scene
-from airground_drake.view.draw import draw, obstacle_path, rgba, robot_path, served, shadow_path, state_path
+from airground_drake.view.draw import draw, barrier_path, rgba, robot_path, served, shadow_path, state_path
 from airground_drake.view.geometry import ribbon
 from airground_drake.view.looks import OUTCOME_COLORS, PATH_COLOR
 from airground_drake.view.stage import STATES
@@ -36,9 +36,9 @@ def recorded(scene: Scene) -> Meshcat:
             continue
         for state in range(len(STATES)):
             _show(meshcat, animation, state_path(k, state), body.states == state)
-    for k, obstacle in enumerate(scene.obstacles):
-        if obstacle.appears_s:
-            _show(meshcat, animation, obstacle_path(k), scene.times_s >= obstacle.appears_s)
+    for k, barrier in enumerate(scene.barriers):
+        if barrier.appears_s:
+            _show(meshcat, animation, barrier_path(k), scene.times_s >= barrier.appears_s)
     for k, proposal in enumerate(scene.proposals):
         _proposal(meshcat, animation, scene, proposal, k)
     meshcat.SetAnimation(animation)

@@ -19,8 +19,8 @@ from airground_drake.view.stage import Robot, Stage, stage_of, states
 FRAMES_PER_S = 30
 """Frames in a second of simulated time."""
 
-MAX_NAMED_OBSTACLES = 8
-"""With more obstacles, names are not shown."""
+MAX_NAMED_BARRIERS = 8
+"""With more barriers, their names are not shown."""
 
 
 @dataclass(frozen=True)

@@ -20,7 +20,7 @@ from airground_drake.scenarios.schema import Scenario
 from airground_drake.view import canvas
 from airground_drake.view.labels import place
 from airground_drake.view.looks import OUTCOME_COLORS, PATH_COLOR, STATE_COLORS, STATE_MARKS, UAV_COLOR
-from airground_drake.view.plane import draw_obstacles, draw_robot
+from airground_drake.view.plane import draw_barriers, draw_robot
 
 PICTURES_PER_S = 15
 """Pictures in a second of the video."""
@@ -83,7 +83,8 @@ def _picture(scene: Scene) -> tuple[Figure, Update]:
     axes = figure.add_axes((0.0, 0.0, 1.0, 1.0 - 50.0 / size[1]))
     axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal")
     axes.set_axis_off()
-    place(axes, draw_obstacles(axes, scene.scenario), [body.positions for body in scene.robots])
+    labels, edges = draw_barriers(axes, scene.scenario)
+    place(axes, labels, [*(body.positions for body in scene.robots), *edges])
     updates = [_proposal(axes, scene, proposal) for proposal in scene.proposals]
     updates += [_robot(axes, scene.scenario, body) for body in scene.robots]
     figure.text(8.0 / size[0], 1.0 - 10.0 / size[1], f"{scene.scenario.name}, run {scene.run}: {scene.says}", va="top")

@@ -10,11 +10,21 @@ from pydrake.math import RigidTransform, RollPitchYaw
 
 from airground_drake.base.arrays import Array
 from airground_drake.base.errors import ReplayError
-from airground_drake.view.geometry import camera, grid
-from airground_drake.view.looks import PATH_COLOR, SAFE_COLOR, STATE_COLORS, UAV_COLOR, UNSEEN_COLOR, rgb
-from airground_drake.view.stage import STATES, TRIGGERED, Pillar, Robot, Stage
+from airground_drake.view.geometry import camera, grid, prisms
+from airground_drake.view.looks import (
+    OBSTACLE_COLOR,
+    PATH_COLOR,
+    SAFE_COLOR,
+    STATE_COLORS,
+    UAV_COLOR,
+    UNSEEN_COLOR,
+    rgb,
+)
+from airground_drake.view.stage import FINE, STATES, TRIGGERED, Barrier, Robot, Stage
 
 ELEVATION = np.radians(58.0)
+LOWER = 0.05
+"""Tops of safe zones that overlap differ by up to this share of their height: the higher one hides the lower one."""
 OPENING_DEG, MARGIN_DEG = 46.0, 7.0
 """Opening angle of the camera, and the part of it that the panels of the page may cover."""
 
@@ -35,8 +45,11 @@ def served() -> Meshcat:
 def draw(meshcat: Meshcat, stage: Stage) -> None:
     """Draw a scenario; robots are drawn at the origin, each UGV once in every state."""
     _ground(meshcat, stage)
-    for k, obstacle in enumerate(stage.obstacles):
-        _pillar(meshcat, obstacle_path(k), obstacle, stage.mark_m * (1.0 + k / len(stage.obstacles)))
+    for k, barrier in enumerate(stage.barriers):
+        height = stage.mark_m * (1.0 + k / len(stage.barriers))  # different heights show safe zones that overlap
+        (_pillar if barrier.is_round else _wall)(meshcat, barrier_path(k), barrier, height, stage.high_m[2])
+    if stage.arena:
+        _arena(meshcat, stage)
     for k, phantom in enumerate(stage.phantoms_m):
         _cylinder(meshcat, f"/phantoms/{k}", stage.mark_m, stage.mark_m, phantom, UNSEEN_COLOR, 0.5)
     for k, robot in enumerate(stage.robots):
@@ -61,8 +74,8 @@ def shadow_path(k: int) -> str:
     return f"/shadows/{k}"
 
 
-def obstacle_path(k: int) -> str:
-    """Place of obstacle k."""
+def barrier_path(k: int) -> str:
+    """Place of barrier k; its child `body` is at a point of it."""
     return f"/obstacles/{k}"
 
 
@@ -96,13 +109,39 @@ def _ground(meshcat: Meshcat, stage: Stage) -> None:
     meshcat.SetCameraPose(place, target)
 
 
-def _pillar(meshcat: Meshcat, path: str, obstacle: Pillar, height: float) -> None:
-    """An obstacle in its safe cylinder; different heights show each cylinder where two overlap."""
-    _cylinder(meshcat, f"{path}/body", obstacle.radius_m, 2.0 * height, obstacle.centre_m, obstacle.color)
-    _cylinder(meshcat, f"{path}/safe", obstacle.safe_m, height, obstacle.centre_m, SAFE_COLOR, 0.2)
+def _pillar(meshcat: Meshcat, path: str, pillar: Barrier, height: float, highest: float) -> None:
+    """A ball or a post in its safe cylinder."""
+    foot, safe = pillar.place_m, float(pillar.safe_m[0])
+    tall = max(2.0 * height, min(pillar.top_m, highest) - foot[2])
+    _cylinder(meshcat, f"{path}/body", float(pillar.radius_m[0]), tall, foot, pillar.color)
+    _cylinder(meshcat, f"{path}/safe", safe, height, foot, SAFE_COLOR, 0.2)
     angle = np.linspace(0.0, 2.0 * np.pi, 73)
-    rim = np.array([obstacle.safe_m * np.cos(angle), obstacle.safe_m * np.sin(angle), np.full_like(angle, height)])
-    meshcat.SetLine(f"{path}/rim", rim + obstacle.centre_m[:, None], 1.0, rgba(SAFE_COLOR))
+    rim = np.array([safe * np.cos(angle), safe * np.sin(angle), np.full_like(angle, height)])
+    meshcat.SetLine(f"{path}/rim", rim + foot[:, None], 1.0, rgba(SAFE_COLOR))
+
+
+def _wall(meshcat: Meshcat, path: str, wall: Barrier, height: float, highest: float) -> None:
+    """Polygons and walls, as high as they are, in the zone that the surfaces of robots keep out of."""
+    foot = wall.place_m
+    body = prisms([part - foot[:2] for part in wall.body], max(2.0 * height, min(wall.top_m, highest)))
+    meshcat.SetTriangleMesh(f"{path}/body", body.vertices, body.faces, rgba(wall.color))
+    meshcat.SetTransform(f"{path}/body", RigidTransform(foot))
+    zone = prisms(wall.safe, height, lower=LOWER * height / len(wall.parts))
+    meshcat.SetTriangleMesh(f"{path}/safe", zone.vertices, zone.faces, rgba(SAFE_COLOR, 0.2))
+    if wall.rays == FINE:
+        start, end = (np.column_stack([each, np.full(len(each), height)]).T for each in wall.rim)
+        meshcat.SetLineSegments(f"{path}/rim", start, end, 1.0, rgba(SAFE_COLOR))
+
+
+def _arena(meshcat: Meshcat, stage: Stage) -> None:
+    """Low transparent walls, and the frame that the surfaces of robots keep to."""
+    frame, inner = (np.column_stack([ring, np.zeros(4)]) for ring in stage.arena)
+    after, up = np.roll(frame, -1, axis=0), np.array([0.0, 0.0, 4.0 * stage.mark_m])
+    corners = np.stack([frame, after, after + up, frame + up], axis=1).reshape(-1, 3)
+    faces = np.concatenate([np.array([[0, 1, 2], [0, 2, 3]]) + 4 * k for k in range(4)])
+    meshcat.SetTriangleMesh("/arena/walls", corners.T, faces.T.astype(np.int32), rgba(OBSTACLE_COLOR, 0.3))
+    for name, ring, color in (("frame", frame, OBSTACLE_COLOR), ("safe", inner, SAFE_COLOR)):
+        meshcat.SetLine(f"/arena/{name}", np.concatenate([ring, ring[:1]]).T, 2.0, rgba(color))
 
 
 def _robot(meshcat: Meshcat, k: int, robot: Robot) -> None:

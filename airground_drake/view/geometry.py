@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable, Sequence
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -45,6 +48,42 @@ def ribbon(path: Array, width_m: float, dash_m: float | None = None) -> Mesh:
     corner = np.array([[0, 1, 2], [0, 2, 3]])[:, :, None] + 4 * np.arange(len(start))
     faces = np.concatenate(corner, axis=1)
     return Mesh(vertices.reshape(-1, 3).T, faces.astype(np.int32))
+
+
+def prisms(outlines: Sequence[Array], height: float, *, lower: float = 0.0) -> Mesh:
+    """Prisms of a height, m, over convex polygons (K, 2), m, counter-clockwise; without their bottoms.
+
+    Their tops come first, each lower than the one before it by `lower`, m. So what is transparent is drawn once where
+    several overlap, seen from above.
+    """
+    vertices, tops, walls, first = list[Array](), list[Array](), list[Array](), 0
+    for k, outline in enumerate(outlines):
+        n = len(outline)
+        vertices += [np.column_stack([outline, np.full(n, z)]) for z in (height - k * lower, 0.0)]
+        here, after = first + np.arange(n), first + np.roll(np.arange(n), -1)
+        tops.append(np.stack([np.full(n - 2, first), here[1:-1], here[2:]]))
+        walls += [np.stack([here, here + n, after]), np.stack([after, here + n, after + n])]
+        first += 2 * n
+    return Mesh(np.concatenate(vertices).T, np.concatenate([*tops, *walls], axis=1).astype(np.int32))
+
+
+def outer_edges(outlines: Sequence[Array], inside: Callable[[Array], npt.NDArray[np.bool_]], piece: float) -> Array:
+    """The edges of polygons (K, 2), m, that are not inside of another one: ends of short segments, (2, S, 2), m.
+
+    Args:
+        outlines: the polygons.
+        inside: whether points (S, 2), m, are inside of one of them, not at its edge.
+        piece: greatest length of a segment, m.
+    """
+    found = list[Array]()
+    for outline in outlines:
+        closed = np.concatenate([outline, outline[:1]])
+        for begin, end in pairwise(closed):
+            count = max(1, math.ceil(float(np.linalg.norm(end - begin)) / piece))
+            points = begin + np.linspace(0.0, 1.0, count + 1)[:, None] * (end - begin)
+            found.append(np.stack([points[:-1], points[1:]]))
+    every = np.concatenate(found, axis=1)
+    return np.asarray(every[:, ~inside(every.mean(axis=0))])
 
 
 def grid(low: Array, high: Array) -> tuple[Array, Array]:

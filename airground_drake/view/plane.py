@@ -10,9 +10,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.collections import PatchCollection
+from matplotlib.collections import PatchCollection, PolyCollection
 from matplotlib.figure import Figure
-from matplotlib.patches import Circle
+from matplotlib.patches import Circle, PathPatch
+from matplotlib.path import Path
 
 from airground_drake.base.arrays import Array
 from airground_drake.run.trace import Trace
@@ -20,9 +21,9 @@ from airground_drake.scenarios.schema import Scenario
 from airground_drake.view import canvas, svg
 from airground_drake.view.canvas import INK, MUTED, UAV_LOOK, Look, look, rule, short, thin
 from airground_drake.view.labels import Label, place
-from airground_drake.view.stage import safe_m
+from airground_drake.view.stage import MANY, Barrier, arena_of, barriers_of
 
-MAX_NAMED_OBSTACLES = 12
+MAX_NAMED_BARRIERS = 12
 THUMBNAIL_IN = (2.5, 1.9)
 """Width and height of a small picture, inches."""
 MAX_THUMBNAIL_UGVS, MAX_THUMBNAIL_POINTS = 20, 200
@@ -49,14 +50,13 @@ class Frame(NamedTuple):
 
 
 def frame_of(scenario: Scenario, ways: Iterable[tuple[str, Array]]) -> Frame:
-    """The rectangle around the ways (T, 3), m, of robots, by name, their targets and all safe circles."""
+    """The rectangle around the ways (T, 3), m, of robots, by name, their targets, the arena, and safe outlines."""
     points = list[Array]()
     for name, way in ways:
         points += [way[:, :2] + side * scenario.robots[name].radius_m for side in (-1.0, 1.0)]
         points += [np.array([scenario.ugvs[name].target_m[:2]])] if name in scenario.ugvs else []
-    for obstacle in scenario.obstacles.values():
-        points.append(np.array(obstacle.position_m[:2]) + np.outer([-1.0, 1.0], [safe_m(scenario, obstacle)] * 2))
-    every = np.concatenate(points)
+    points += [np.array(barrier.corners) for barrier in barriers_of(scenario)]
+    every = np.concatenate([*points, *arena_of(scenario)])
     (left, bottom), (right, top) = every.min(axis=0) - 0.4, every.max(axis=0) + 0.4
     return Frame(left, right, bottom - 0.6, top + 0.8)
 
@@ -74,30 +74,92 @@ def axes_over(frame: Frame, width_in: float) -> tuple[Figure, Axes]:
     return figure, axes
 
 
-def draw_obstacles(axes: Axes, scenario: Scenario) -> list[Label]:
-    """Draw obstacles as hexagons in their safe circles, hollow ones if the UAV does not know them, and phantoms.
+def draw_barriers(axes: Axes, scenario: Scenario) -> tuple[list[Label], list[Array]]:
+    """Draw all that stands about within the outlines that robots' surfaces keep to, the arena, and phantoms.
+
+    What the UAV does not know is hollow. Points and balls have a hexagon in the middle.
 
     Returns:
-        Labels: the names of the obstacles, unless they are many, and of phantoms.
+        Labels, the names of the barriers, unless they are many, and of phantoms; and lines (K, 2), m, that labels
+        should avoid: the edges of walls, unless they are many.
     """
-    obstacles = scenario.obstacles.values()
-    circles = [Circle((each.position_m[0], each.position_m[1]), safe_m(scenario, each)) for each in obstacles]
+    _draw_arena(axes, arena_of(scenario))
+    every = barriers_of(scenario)
+    walls, balls = ([each for each in every if each.is_round == of_balls] for of_balls in (False, True))
+    _fill(axes, [part for each in walls for part in each.safe], _SAFE, 0.9)
+    for known, appearance in ((True, _KNOWN), (False, _UNKNOWN)):
+        _fill(axes, [part for each in walls if each.known_to_uav == known for part in each.body], appearance, 1.5)
+    circles = [Circle((each.place_m[0], each.place_m[1]), each.safe_m[0]) for each in balls]
     axes.add_collection(
         PatchCollection(circles, facecolor="#f3f3f3", edgecolor=MUTED, linestyle=(0, (2, 2)), linewidth=1.0, zorder=1.0)
     )
     hexagon: dict[str, Any] = {"linestyle": "none", "marker": "h", "markersize": 6, "color": INK, "zorder": 3}
-    labels = list[Label]()
-    for name, each in scenario.obstacles.items():
-        _disc(axes, each.position_m, each.radius_m, INK)
-        axes.plot(*each.position_m[:2], **hexagon, markerfacecolor=INK if each.known_to_uav else "white")
-        since = f", from {each.appears_s:g} s" if each.appears_s else ""
-        hint = "" if each.known_to_uav else "\n(unseen by the UAV)"
-        labels.append(Label(np.array(each.position_m), f"{short(name, 12)}{since}{hint}", size_pt=7.5))
-    labels = labels if len(labels) <= MAX_NAMED_OBSTACLES else []
+    for each in balls:
+        _disc(axes, each.place_m, each.radius_m[0], INK)
+        axes.plot(*each.place_m[:2], **hexagon, markerfacecolor=INK if each.known_to_uav else "white")
+    labels = [_name_of(each) for each in every] if len(every) <= MAX_NAMED_BARRIERS else []
     for at in scenario.uav.phantoms_m:
         axes.plot(*at[:2], marker="x", markersize=6, color=MUTED, zorder=3)
         labels.append(Label(np.array(at), "(only on the UAV's map)", size_pt=7.5))
-    return labels
+    edges = [np.concatenate([part, part[:1]]) for each in walls for part in each.body]
+    return labels, edges if len(edges) <= MANY else []
+
+
+class _Look(NamedTuple):
+    """How polygons are drawn as one.
+
+    Attributes:
+        fill: colour of what fills them.
+        edge: colour of their edges.
+        width: of the edges that are seen, points.
+        core: width of a line in the colour of the filling, points; it hides seams, and makes thin walls hollow.
+        many: colours of filling and edges if the polygons are many.
+        dash: of the edges.
+    """
+
+    fill: str
+    edge: str
+    width: float
+    core: float
+    many: tuple[str, str]
+    dash: Any = "-"
+
+
+_SAFE = _Look("#f3f3f3", MUTED, 1.0, 0.0, ("#dddddd", "none"), (0, (1, 1)))
+_KNOWN, _UNKNOWN = _Look(MUTED, INK, 1.2, 0.5, (MUTED, MUTED)), _Look("white", INK, 1.5, 1.2, ("white", INK))
+"""Of walls that the UAV knows, and of others."""
+
+
+def _fill(axes: Axes, parts: Sequence[Array], appearance: _Look, zorder: float) -> None:
+    """Draw polygons (K, 2): what fills them covers the inner half of their edges, and edges in other polygons.
+
+    Many polygons are drawn once, without their outline: they would take most of the bytes of a page.
+    """
+    fill, edge, width, core, many, dash = appearance
+    if len(parts) > MANY:
+        axes.add_collection(PolyCollection(parts, facecolor=many[0], edgecolor=many[1], linewidth=0.5, zorder=zorder))
+    elif parts:
+        below: dict[str, Any] = {"edgecolor": edge, "linewidth": 2.0 * width, "linestyle": dash, "zorder": zorder}
+        axes.add_collection(PolyCollection(parts, facecolor="none", **below))
+        above = PolyCollection(parts, facecolor=fill, edgecolor=fill, linewidth=core, zorder=zorder + 0.05)
+        axes.add_collection(above)
+
+
+def _draw_arena(axes: Axes, rings: Sequence[Array]) -> None:
+    """Draw the frame of an arena, (4, 2), and the one that robots' surfaces keep to, if there is an arena."""
+    if rings:
+        frame, inner = ([*ring, ring[0]] for ring in rings)
+        band = Path.make_compound_path(Path(frame, closed=True), Path(inner[::-1], closed=True))
+        axes.add_patch(PathPatch(band, facecolor="#f3f3f3", edgecolor="none", zorder=0.9))
+        axes.plot(*np.transpose(inner), color=MUTED, linestyle=(0, (2, 2)), linewidth=1.0, zorder=1.0)
+        axes.plot(*np.transpose(frame), color=INK, linewidth=1.6, zorder=1.5)
+
+
+def _name_of(barrier: Barrier) -> Label:
+    """The name; of a ball, whose mark is small, also whether the UAV knows it."""
+    since = f", from {barrier.appears_s:g} s" if barrier.appears_s else ""
+    hint = "" if barrier.known_to_uav or not barrier.is_round else "\n(unseen by the UAV)"
+    return Label(barrier.place_m, f"{short(barrier.name, 12)}{since}{hint}", size_pt=7.5)
 
 
 def draw_robot(
@@ -157,11 +219,11 @@ def plot(trace: Trace, axes: Axes | None = None) -> Axes:
     scenario = trace.scenario
     ways = {robot: trace.position(robot) for robot in trace.robots}
     frame_of(scenario, ways.items()).show(axes)
-    labels = draw_obstacles(axes, scenario)
+    labels, edges = draw_barriers(axes, scenario)
     for robot, appearance in looks_of(scenario, trace.ugvs).items():
         rows = trace.counting_rows(robot)
         labels += draw_robot(axes, scenario, robot, ways[robot], appearance, rows, label=robot)
-    place(axes, labels, list(ways.values()))
+    place(axes, labels, [*ways.values(), *edges])
     axes.set(xlabel="x, m", ylabel="y, m", title=f"{scenario.name}, run {trace.run}")
     return axes
 
@@ -181,7 +243,7 @@ def thumbnail(scenario: Scenario, ways: Mapping[str, Array] | None = None) -> st
         axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
         axes.set_axis_off()
         frame_of(scenario, drawn).show(axes)
-        draw_obstacles(axes, scenario)
+        draw_barriers(axes, scenario)
         for k, (name, way) in enumerate(drawn):
             draw_robot(axes, scenario, name, way[thin(way, MAX_THUMBNAIL_POINTS)], look(k), linewidth=1.4)
         return canvas.svg(figure)

@@ -9,8 +9,11 @@ import numpy.typing as npt
 
 from airground_drake.base.arrays import Array
 from airground_drake.decision.trigger import Mode
+from airground_drake.geometry import convex
 from airground_drake.run.trace import Trace
-from airground_drake.scenarios.schema import Obstacle, Scenario, Uav, Ugv
+from airground_drake.scenarios.schema import ARENA, Scenario, Uav, Ugv
+from airground_drake.scenarios.shapes import outlines_of
+from airground_drake.view.geometry import outer_edges
 from airground_drake.view.looks import OBSTACLE_COLOR, UNSEEN_COLOR
 
 STATES = ("own task", "triggered", "intervened")
@@ -21,6 +24,14 @@ SMALLEST, LARGEST = 0.006, 0.018
 """Smallest and largest radius with which a point is drawn, as shares of the larger side of the scene."""
 OF_SAFE_DISTANCE = 0.4
 """Radius of a point as a share of the least safe distance on the ground: points that keep it are drawn apart."""
+OF_MARK = 0.3
+"""Half of the thickness of a thin wall as a share of the radius of a point."""
+MANY, FINE, COARSE = 100, 16, 4
+"""Up to so many parts of barriers have outlines and fine rims: numbers of corners for half a circle, fine and coarse."""
+INWARD = 0.97
+"""What is this share of a distance away from a core is inside of the polygon about it, also between two corners."""
+HIGHEST = 2.0
+"""Walls are drawn up to this multiple of the largest height of a robot: others may be endless."""
 
 
 @dataclass(frozen=True)
@@ -34,20 +45,91 @@ class Robot:
 
 
 @dataclass(frozen=True)
-class Pillar:
-    """An obstacle: `radius_m` as drawn; the surfaces of UGVs have to stay `safe_m` away from its centre."""
+class Barrier:
+    """An obstacle, or anything else that stands about, except the walls of the arena.
+
+    Attributes:
+        name: of the scenario.
+        parts: outlines of its convex parts, (k, W), world frame; see `geometry.convex`.
+        known_to_uav: whether it is on the UAV's map.
+        appears_s: time from which on it is there, s.
+        mark_m: least radius with which points and thin walls are drawn, m.
+        rays: number of corners for half a circle.
+    """
 
     name: str
-    centre_m: Array
-    radius_m: float
-    safe_m: float
+    parts: Array
     known_to_uav: bool
     appears_s: float = 0.0
+    mark_m: float = 0.0
+    rays: int = FINE
 
     @property
     def color(self) -> str:
         """#rrggbb."""
         return OBSTACLE_COLOR if self.known_to_uav else UNSEEN_COLOR
+
+    @property
+    def is_round(self) -> bool:
+        """Whether it is a ball or a post."""
+        return bool(len(self.parts) == 1 and self.parts[0, convex.COUNT] == 1.0)
+
+    @property
+    def place_m(self) -> Array:
+        """A point of it, (3,), m, on the ground below it or its centre: the middle of its largest part."""
+        largest = self.parts[np.argmax(self.parts[:, convex.EXTENT])]
+        return np.append(convex.corners_of(largest).mean(axis=0), largest[convex.BASE])
+
+    @property
+    def top_m(self) -> float:
+        """Its height, m."""
+        return float(self.parts[:, convex.TOP].max())
+
+    @property
+    def radius_m(self) -> Array:
+        """By how much its parts are rounded as they are drawn, (k,), m; of a ball or a post, its radius."""
+        least = np.select([self.parts[:, convex.COUNT] == 1.0, self.parts[:, convex.COUNT] == 2.0], [1.0, OF_MARK])
+        return np.maximum(least * self.mark_m, self.parts[:, convex.RADIUS])
+
+    @property
+    def safe_m(self) -> Array:
+        """How far the surfaces of UGVs stay away from the cores of its parts, (k,), m."""
+        return convex.keep(self.parts, 0.0)
+
+    @property
+    def body(self) -> list[Array]:
+        """Its parts as they are drawn, seen from above: polygons (K, 2), m."""
+        return self._rims(self.radius_m)
+
+    @property
+    def safe(self) -> list[Array]:
+        """Where the surfaces of UGVs must not be because of each of its parts: polygons (K, 2), m."""
+        return self._rims(self.safe_m)
+
+    @property
+    def rim(self) -> Array:
+        """The edge of all of `safe` together: ends of short segments, (2, S, 2), m. For fine rims only."""
+        reach = self.safe_m
+
+        def inside(points: Array) -> npt.NDArray[np.bool_]:
+            return ~convex.points_are_free(points, self.parts, INWARD * reach)
+
+        return outer_edges(self.safe, inside, float(reach.max()))
+
+    def _rims(self, reach: Array) -> list[Array]:
+        """Outlines of all that is within distances (k,), m, of the cores of its parts."""
+        return [
+            convex.rim(part, each, self.rays) if each else convex.corners_of(part)
+            for part, each in zip(self.parts, reach.tolist(), strict=True)
+        ]
+
+    @property
+    def corners(self) -> tuple[Array, Array]:
+        """Corners (2,), m, of the least rectangle, along the axes, that contains `safe`."""
+        places = [convex.corners_of(part) for part in self.parts]
+        low = np.min([each.min(axis=0) - reach for each, reach in zip(places, self.safe_m, strict=True)], axis=0)
+        high = np.max([each.max(axis=0) + reach for each, reach in zip(places, self.safe_m, strict=True)], axis=0)
+        return low, high
 
 
 @dataclass(frozen=True)
@@ -55,11 +137,12 @@ class Stage:
     """A scenario before anything moves.
 
     `low_m` and `high_m` (3,) bound what is shown. `mark_m` is the radius with which a point is drawn. `phantoms_m`
-    (P, 3) are the obstacles that only the UAV's map has.
+    (P, 3) are the obstacles that only the UAV's map has. `arena` is as `arena_of` gives it.
     """
 
     robots: tuple[Robot, ...]
-    obstacles: tuple[Pillar, ...]
+    barriers: tuple[Barrier, ...]
+    arena: tuple[Array, ...]
     phantoms_m: Array
     low_m: Array
     high_m: Array
@@ -79,14 +162,8 @@ def stage(scenario: Scenario, visited_m: Array | None = None) -> Stage:
         Robot(name, "UGV" if name in scenario.ugvs else "UAV", max(mark, spec.radius_m), np.array(spec.target_m))
         for name, spec in specs.items()
     )
-    obstacles = tuple(
-        Pillar(
-            name, np.array(spec.position_m), max(mark, spec.radius_m), safe_m(scenario, spec), spec.known_to_uav,
-            spec.appears_s,
-        )
-        for name, spec in scenario.obstacles.items()
-    )  # fmt: skip
-    return Stage(robots, obstacles, np.reshape(scenario.uav.phantoms_m, (-1, 3)), low, high, mark)
+    phantoms = np.reshape(scenario.uav.phantoms_m, (-1, 3))
+    return Stage(robots, barriers_of(scenario, mark), arena_of(scenario), phantoms, low, high, mark)
 
 
 def stage_of(trace: Trace, scenario: Scenario) -> Stage:
@@ -94,9 +171,24 @@ def stage_of(trace: Trace, scenario: Scenario) -> Stage:
     return stage(scenario, np.concatenate([trace.position(robot) for robot in trace.robots]))
 
 
-def safe_m(scenario: Scenario, obstacle: Obstacle) -> float:
-    """Distance that the surfaces of UGVs must keep from the centre of an obstacle, m: d and its radius."""
-    return scenario.safe_distance.obstacle_m + obstacle.radius_m
+def barriers_of(scenario: Scenario, mark: float = 0.0) -> tuple[Barrier, ...]:
+    """All that stands about but the walls of the arena; points and thin walls are drawn with at least a mark, m."""
+    found = {name: each for name, each in scenario.barriers.items() if not name.startswith(ARENA)}
+    parts = {name: outlines_of(scenario, each) for name, each in found.items()}
+    rays = FINE if sum(map(len, parts.values())) <= MANY else COARSE
+    return tuple(
+        Barrier(name, parts[name], each.known_to_uav, each.appears_s, mark, rays) for name, each in found.items()
+    )
+
+
+def arena_of(scenario: Scenario) -> tuple[Array, ...]:
+    """The frame of the arena, and the one that robots' surfaces keep to: corners (4, 2) each, m; none without arena."""
+    if not scenario.arena_m:
+        return ()
+    low, high = np.min(scenario.arena_m, axis=0), np.max(scenario.arena_m, axis=0)
+    side = np.array([[0, 0], [1, 0], [1, 1], [0, 1]])
+    gap = scenario.safe_distance.obstacle_m
+    return tuple(low + inset + side * (high - low - 2.0 * inset) for inset in (0.0, gap))
 
 
 def states(trace: Trace, ugv: str, times: Array) -> npt.NDArray[np.intp]:
@@ -111,10 +203,12 @@ def states_of(executing: Array, mode: Array) -> npt.NDArray[np.intp]:
 
 
 def _bounds(scenario: Scenario, visited_m: Array) -> tuple[Array, Array]:
-    """Corners (3,), m, of a box around positions (M, 3), m, the targets and the obstacles' safe cylinders."""
+    """Corners (3,), m, of a box around positions (M, 3), m, targets, arena, and barriers with their safe zones."""
     points = [visited_m, np.array([spec.target_m for spec in scenario.ugvs.values()])]
-    for spec in scenario.obstacles.values():
-        reach = np.array([1.0, 1.0, 0.0]) * safe_m(scenario, spec)
-        points.append(np.array([spec.position_m]) + np.outer([-1.0, 1.0], reach))
+    highest = HIGHEST * visited_m[:, 2].max()
+    for each in barriers_of(scenario):
+        heights = each.parts[:, convex.BASE].min(), max(min(each.top_m, highest), each.place_m[2])
+        points.append(np.column_stack([each.corners, heights]))
+    points += [np.column_stack([ring, np.zeros(4)]) for ring in arena_of(scenario)]
     every = np.concatenate([*points, visited_m[:1] * [1.0, 1.0, 0.0]])
     return every.min(axis=0), np.maximum(every.max(axis=0), every.min(axis=0) + 1.0)

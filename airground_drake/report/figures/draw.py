@@ -24,6 +24,7 @@ from airground_drake.run.trace import Trace
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.view import canvas
 from airground_drake.view.plane import frame_of
+from airground_drake.view.stage import barriers_of
 
 MAX_RUNS, MAX_UGVS, MAX_TEAM = 6, 4, 6
 """Maximum numbers of runs, of UGVs in the figure of distances, and of UGVs by name. Larger teams get histograms."""
@@ -142,16 +143,23 @@ def _trajectories(chosen: _Selection) -> Figure:
     frame = frame_of(
         first.scenario, ((robot, trace.position(robot)) for trace in chosen.runs.values() for robot in first.robots)
     )
-    roomy = len(first.ugvs) > 2
+    barriers = barriers_of(first.scenario)
+    has_walls = not all(each.is_round for each in barriers)
+    roomy = len(first.ugvs) > 2 or has_walls
     width_in = frame.width_in(canvas.WIDE_IN if roomy else canvas.MAP_IN, canvas.TALLEST_IN)
-    circles = "safe circle dashed"
-    if any(radius_m(first, name) > 0.0 for name in (*first.robots, *first.scenario.obstacles)):
-        circles = "dark disc as large as it is, safe circle dashed"
+    true_size = any(radius_m(first, name) > 0.0 for name in first.robots) or any(
+        each.is_round and each.radius_m[0] > 0.0 for each in barriers
+    )
+    kinds = ["Hexagon: obstacle"] if any(each.is_round for each in barriers) or not has_walls else []
+    kinds += ["Dark: walls"] if has_walls else []
+    circles = "dark disc as large as it is, " if true_size else ""
+    circles += "light grey: too near" if has_walls else "safe circle dashed"
     hidden = len(first.ugvs) - len(chosen.team)
     thin = f" Thin grey lines, which end in dots: {hidden} more UGVs." if hidden else ""
+    frame_is = " Frame: the arena." if first.scenario.arena_m else ""
     caption = (
-        f"{_ends(chosen)}○ start, \N{MULTIPLICATION SIGN} target, ▲ trigger, □ stands still, ✖ collision. Hexagon: "
-        f"obstacle (hollow: not on the UAV's map), {circles}. Thin dashed line: the UAV.{thin}"
+        f"{_ends(chosen)}○ start, \N{MULTIPLICATION SIGN} target, ▲ trigger, □ stands still, ✖ collision. "
+        f"{'. '.join(kinds)} (hollow: not on the UAV's map), {circles}.{frame_is} Thin dashed line: the UAV.{thin}"
     )
     robots = [*chosen.team, *first.uavs]
     panels = []
@@ -171,7 +179,7 @@ def _distances(chosen: _Selection) -> Figure | None:
     if not required:
         return None
     top = FARTHEST * max(required)
-    world = [*chosen.first.scenario.obstacles, *chosen.first.robots]
+    world = [*chosen.first.scenario.barriers, *chosen.first.robots]
     met = {ugv: {at.other for (_, each), those in near.items() if each == ugv for at in those} for ugv in chosen.ugvs}
     looks = {ugv: {other: k for k, other in enumerate(filter(met[ugv].__contains__, world))} for ugv in chosen.ugvs}
     half = (len(chosen.ugvs) + 1) // 2  # a single run takes both columns of the page

@@ -15,16 +15,16 @@ from airground_drake.report.reproduction import MEASURES
 from airground_drake.run.trace import Trace
 from airground_drake.view.canvas import ALARM, INK, MUTED
 from airground_drake.view.labels import Label, place
-from airground_drake.view.plane import Frame, axes_over, draw_obstacles, draw_robot, looks_of
+from airground_drake.view.plane import Frame, axes_over, draw_barriers, draw_robot, looks_of
 
 
 def plane(trace: Trace, ugvs: Sequence[str], frame: Frame, width_in: float) -> Figure:
-    """The ways of a run in the plane: starts o, targets x, obstacles with safe circles, the UAV dashed.
+    """The ways of a run in the plane: starts o, targets x, barriers with safe outlines, the UAV dashed.
 
     UGVs other than `ugvs` are thin lines that end in a dot.
     """
     figure, axes = axes_over(frame, width_in)
-    of_obstacles, labels = draw_obstacles(axes, trace.scenario), list[Label]()
+    (of_barriers, edges), labels = draw_barriers(axes, trace.scenario), list[Label]()
     for robot in trace.ugvs:
         if robot not in ugvs:
             axes.plot(*trace.position(robot)[:, :2].T, color=MUTED, linewidth=0.7, zorder=1)
@@ -35,7 +35,7 @@ def plane(trace: Trace, ugvs: Sequence[str], frame: Frame, width_in: float) -> F
         labels += draw_robot(axes, trace.scenario, robot, way, appearance, rows)
     for ugv in ugvs:
         labels += _happenings(axes, trace, ugv)
-    place(axes, [*labels, *of_obstacles], [trace.position(robot) for robot in robots])
+    place(axes, [*labels, *of_barriers], [*(trace.position(robot) for robot in robots), *edges])
     return figure
 
 

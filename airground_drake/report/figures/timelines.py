@@ -161,7 +161,8 @@ def histogram(quantity: str, of_runs: Mapping[str, Sequence[float]]) -> Figure:
 def compared_distances(runs: Mapping[str, Trace], robot: str) -> Figure:
     """Distance from one robot to its nearest obstacle over time in several runs, with the minima."""
     first = next(iter(runs.values()))
-    d = float(first.scenario.safe_distance.obstacle_m)
+    minima = {name: closest_obstacle(trace, robot) for name, trace in runs.items()}
+    d = max((minimum.required_m for minimum in minima.values() if minimum), default=0.0)
     figure, (axes,) = _time_axes(1, 3.0 + 0.22 * len(runs), first, right_in=0.65, above_in=0.22 * len(runs))
     gaps = {name: nearest_distance(trace, robot) for name, trace in runs.items()}
     low = min(d, *(float(gap.min()) for gap in gaps.values()))
@@ -172,8 +173,7 @@ def compared_distances(runs: Mapping[str, Trace], robot: str) -> Figure:
     rule(axes, "time, s", "distance to the nearest obstacle, m")
     label_right(axes, [(d, f"d = {d:g}", INK)])
     for position, (name, trace) in enumerate(runs.items()):
-        appearance = look(position)
-        minimum = closest_obstacle(trace, robot)
+        appearance, minimum = look(position), minima[name]
         if minimum is None:
             continue
         text = f"run {short(name, 24)}: minimum {minimum.value:.3f} m"
@@ -185,7 +185,7 @@ def compared_distances(runs: Mapping[str, Trace], robot: str) -> Figure:
 
 def nearest_distance(trace: Trace, robot: str) -> Array:
     """Distance between surfaces to the nearest obstacle, (T,), m."""
-    nearest: Array = np.fmin.reduce([gap_m(trace, robot, name) for name in trace.scenario.obstacles])
+    nearest: Array = np.fmin.reduce([gap_m(trace, robot, name) for name in trace.scenario.barriers])
     return nearest
 
 
