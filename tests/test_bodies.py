@@ -244,4 +244,4 @@ def test_the_page_says_that_it_appeared_there() -> None:
     assert intrusion(course) == "rock appears 0.800 m from ugv1 (nobody's doing)"
     gap = gap_m(trace, "ugv1", "rock")
     np.testing.assert_array_equal(np.isnan(gap), np.arange(len(gap)) < trace.there_from("rock"))
-    assert stage(trace.scenario).obstacles[0].appears_s == 4.2
+    assert stage(trace.scenario).barriers[0].appears_s == 4.2

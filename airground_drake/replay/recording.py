@@ -10,7 +10,7 @@ from pydrake.math import RigidTransform
 from airground_drake.base.arrays import Array
 from airground_drake.replay.proposals import Sent
 from airground_drake.replay.scene import FRAMES_PER_S, Scene
-from airground_drake.view.draw import draw, barrier_path, rgba, robot_path, served, shadow_path, state_path
+from airground_drake.view.draw import barrier_path, draw, rgba, robot_path, served, shadow_path, state_path
 from airground_drake.view.geometry import ribbon
 from airground_drake.view.looks import OUTCOME_COLORS, PATH_COLOR
 from airground_drake.view.stage import STATES

@@ -126,7 +126,7 @@ class _Look(NamedTuple):
 
 
 _SAFE = _Look("#f3f3f3", MUTED, 1.0, 0.0, ("#dddddd", "none"), (0, (1, 1)))
-_KNOWN, _UNKNOWN = _Look(MUTED, INK, 1.2, 0.5, (MUTED, MUTED)), _Look("white", INK, 1.5, 1.2, ("white", INK))
+_KNOWN, _UNKNOWN = _Look(MUTED, INK, 1.6, 1.0, (MUTED, MUTED)), _Look("white", INK, 1.5, 1.2, ("white", INK))
 """Of walls that the UAV knows, and of others."""
 
 

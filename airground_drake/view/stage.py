@@ -27,8 +27,8 @@ OF_SAFE_DISTANCE = 0.4
 OF_MARK = 0.3
 """Half of the thickness of a thin wall as a share of the radius of a point."""
 MANY, FINE, COARSE = 100, 16, 4
-"""Up to so many parts of barriers have outlines and fine rims: numbers of corners for half a circle, fine and coarse."""
-INWARD = 0.97
+"""Up to so many parts of barriers have fine rims: numbers of corners for half a circle, fine and coarse."""
+INWARD = 0.99
 """What is this share of a distance away from a core is inside of the polygon about it, also between two corners."""
 HIGHEST = 2.0
 """Walls are drawn up to this multiple of the largest height of a robot: others may be endless."""
@@ -114,7 +114,7 @@ class Barrier:
         def inside(points: Array) -> npt.NDArray[np.bool_]:
             return ~convex.points_are_free(points, self.parts, INWARD * reach)
 
-        return outer_edges(self.safe, inside, float(reach.max()))
+        return outer_edges(self.safe, inside, 0.25 * float(reach.min()))
 
     def _rims(self, reach: Array) -> list[Array]:
         """Outlines of all that is within distances (k,), m, of the cores of its parts."""

@@ -14,6 +14,7 @@ from report.cases import GOING_ROUND, SUCCESS, make_scenario, make_trace
 
 from airground_drake.base.errors import ExportError
 from airground_drake.export import recording
+from airground_drake.scenarios.schema import Obstacle
 
 
 def test_it_has_what_the_trace_has_as_its_schemas_say() -> None:
@@ -37,6 +38,25 @@ def test_it_has_what_the_trace_has_as_its_schemas_say() -> None:
     assert [(t, data["message"]) for t, data in messages["/events"]] == [
         (pytest.approx(event["t_s"], abs=1e-9), f"{event['robot']}: {event['kind']}") for event in trace.events
     ]
+
+
+def test_walls_are_triangles_as_high_as_they_are_in_their_zones_and_the_arena_two_loops() -> None:
+    scenario = make_scenario()
+    trace = make_trace(scenario, "c", GOING_ROUND, SUCCESS)
+    scenario.obstacles = {
+        "box": Obstacle([9.0, 8.0, 0.0], size_m=[2.0, 1.0], height_m=2.5),
+        "post": Obstacle([9, 3, 0]),
+    }
+    scenario.arena_m = [[-30.0, -9.0], [30.0, 19.0]]
+    reader = make_reader(io.BytesIO(recording.recorded(trace, scenario)))
+    box, post, arena = json.loads(next(reader.iter_messages(["/scene"]))[2].data)["entities"]
+    body, zone = box["triangles"]
+    points = [[at[axis] for axis in "xyz"] for at in body["points"]]
+    assert sorted(points) == [[x, y, z] for x in (8.0, 10.0) for y in (7.5, 8.5) for z in (0.0, 2.5)]
+    assert {*body["indices"]} == {*range(8)}
+    assert max(at["x"] for at in zone["points"]) == pytest.approx(10.0 + scenario.safe_distance.obstacle_m)
+    assert (len(post["cylinders"]), "triangles" in post) == (2, False)
+    assert [[line["type"], len(line["points"])] for line in arena["lines"]] == [[1, 4], [1, 4]]
 
 
 def test_without_the_package_one_line_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -48,9 +48,9 @@ def page(browser: Browser) -> Iterator[Page]:
 def file(scene: Scene, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The page of a scene whose robots and obstacles have the names of what every JavaScript object has."""
     robots = tuple(replace(body, name=name) for body, name in zip(scene.robots, NAMES, strict=True))
-    obstacles = tuple(replace(each, name=name) for each, name in zip(scene.obstacles, OBSTACLES, strict=True))
+    obstacles = tuple(replace(each, name=name) for each, name in zip(scene.barriers, OBSTACLES, strict=True))
     path = tmp_path_factory.mktemp("replay") / "replay.html"
-    path.write_text(pages.page(replace(scene, robots=robots, obstacles=obstacles)), "utf-8")
+    path.write_text(pages.page(replace(scene, robots=robots, barriers=obstacles)), "utf-8")
     return path
 
 
