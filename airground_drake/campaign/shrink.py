@@ -1,4 +1,4 @@
-"""Make a counterexample small: fewer robots and obstacles, a later start, an earlier end, rounder numbers.
+"""Make a counterexample small: fewer robots and obstacles, plainer shapes, less time, rounder numbers.
 
 Greedy: each change is kept if the scenario is still valid and still fails, until no change is left.
 """
@@ -22,7 +22,7 @@ SPARE_S = (0.25, 0.5, 1.0, 2.0, 5.0)
 """Time that is kept before the first trigger, or after the last event, s."""
 SEEDS = (1, 2, 3, 4)
 """Seeds of the noise to try after a change that draws other noise."""
-ROUNDED = ("ugvs", "obstacles", "uav", "control", "decision", "duration_s")
+ROUNDED = ("ugvs", "obstacles", "arena_m", "uav", "control", "decision", "duration_s")
 """Keys with numbers that are rounded."""
 
 Json = dict[str, Any]
@@ -48,6 +48,7 @@ def shrink(data: Json, fails: Fails, traced: Traced, tests: int) -> tuple[Json, 
         _without_policies,
         _without_robots,
         _without_obstacles,
+        _plainer,
         partial(_later, traced),
         partial(_shorter, traced),
         _rounder,
@@ -93,6 +94,21 @@ def _with_seeds(candidates: Iterator[Json]) -> Iterator[Json]:
 def _without_obstacles(data: Json) -> Iterator[Json]:
     yield from _without_items(data, "uav", "phantoms_m")
     yield from _without_entries(data, "obstacles")
+    if data["arena_m"]:
+        yield copy.deepcopy(data) | {"arena_m": []}
+
+
+def _plainer(data: Json) -> Iterator[Json]:
+    """Leave out a corner of a wall or polygon, or its heading, radius, height or own distance."""
+    for name, obstacle in data["obstacles"].items():
+        changes = [{key: 0.0} for key in ("heading_rad", "radius_m", "height_m", "distance_m") if obstacle[key]]
+        for key in ("polygon_m", "segment_m"):
+            corners = obstacle[key]
+            changes += [{key: corners[:k] + corners[k + 1 :]} for k in range(len(corners))]
+        for change in changes:
+            smaller = copy.deepcopy(data)
+            smaller["obstacles"][name] |= change
+            yield smaller
 
 
 def _without_entries(data: Json, key: str) -> Iterator[Json]:

@@ -91,6 +91,27 @@ def test_what_does_not_matter_goes() -> None:
     assert round(small["obstacles"][matters]["position_m"][0], 1) == small["obstacles"][matters]["position_m"][0]
 
 
+def test_shapes_become_plain_and_the_arena_goes() -> None:
+    data = resolved(load("minimal"))
+    ell = [[0.0, 0.0], [3.0, 0.0], [3.0, 1.0], [1.0, 1.0], [1.0, 3.0], [0.0, 3.0]]
+    wall = {"polygon_m": ell, "position_m": [40.0, 0.0, 0.0], "heading_rad": 0.3, "height_m": 2.0, "radius_m": 0.2}
+    bent = {"segment_m": [[50.0, 0.0], [52.0, 0.0], [52.0, 2.0]]}
+    data |= {"obstacles": {"wall": wall, "bent": bent}, "arena_m": [[-90.0, -90.0], [90.0, 90.0]]}
+    data = resolved(from_data(data, "given"))
+
+    def fails(candidate: dict[str, Any]) -> bool:
+        try:
+            there = from_data(copy.deepcopy(candidate), "candidate").obstacles
+        except ScenarioError:
+            return False
+        return {"wall", "bent"} <= there.keys() and there["wall"].height_m > 0.0
+
+    small, _ = shrink(data, fails, lambda data: None, 300)
+    wall, bent = small["obstacles"]["wall"], small["obstacles"]["bent"]
+    assert (len(wall["polygon_m"]), len(bent["segment_m"]), small["arena_m"]) == (3, 2, [])
+    assert (wall["heading_rad"], wall["radius_m"], wall["height_m"]) == (0.0, 0.0, 2.0)
+
+
 def test_a_run_gets_no_shorter_than_a_control_period() -> None:
     data = resolved(load("minimal"))
     period = data["control"]["period_s"]

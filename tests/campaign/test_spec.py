@@ -54,13 +54,34 @@ def test_random_courses_are_valid_and_have_the_counts_that_are_asked_for(tmp_pat
             assert getattr(each.uav, end) == pytest.approx([*centroid[:2], each.uav.altitude_m], abs=1e-6)
 
 
+def test_a_course_has_walls_and_boxes_if_they_are_asked_for_and_all_else_stays_as_it_was(tmp_path: Path) -> None:
+    plain = "scenario: minimal\nseed: 5\ncourse: {ugvs: 2, obstacles: 3, hidden: 0.5"
+    many = spec_of(tmp_path, plain + ", walls: [2, 4], boxes: 3, size_m: [1, 2]}\n")
+    before = spec_of(tmp_path, plain + "}\n")
+    counts, known = set[int](), set[bool]()
+    for k in range(8):
+        drawn, plainly = many.draw(k), before.draw(k)
+        walls, boxes = (
+            [each for each in drawn.obstacles.values() if getattr(each, key)] for key in ("segment_m", "size_m")
+        )
+        assert {name: drawn.obstacles[name] for name in plainly.obstacles} == plainly.obstacles
+        assert (drawn.ugvs, drawn.uav) == (plainly.ugvs, plainly.uav)
+        sizes = [size for each in boxes for size in each.size_m] + [2.0 * each.segment_m[1][0] for each in walls]
+        assert 1.0 <= min(sizes) <= max(sizes) <= 2.0
+        assert len(boxes) == 3
+        counts.add(len(walls))
+        known |= {each.known_to_uav for each in walls + boxes}
+    assert (counts, known) == ({2, 3, 4}, {True, False})
+
+
 def test_obstacles_of_a_course_are_clear_of_a_low_uav_and_one_without_room_cannot_be_drawn(tmp_path: Path) -> None:
-    low = "set: {uav.altitude_m: 1.2}\ncourse: {ugvs: 2, obstacles: 9, length_m: 12, width_m: 9}\n"
+    low = "set: {uav.altitude_m: 1.2}\ncourse: {ugvs: 2, obstacles: 9, walls: 3, boxes: 3, length_m: 12, width_m: 9}\n"
     spec = spec_of(tmp_path, f"scenario: minimal\n{low}")
     assert len([spec.draw(i) for i in range(12)]) == 12  # all are valid
-    spec = spec_of(tmp_path, "scenario: minimal\ncourse: {ugvs: 9, width_m: 3}\n")
-    with pytest.raises(ScenarioError, match="have no room"):
-        spec.draw(0)
+    for full in ("ugvs: 9, width_m: 3", "boxes: 2, size_m: [90, 90], width_m: 20"):
+        spec = spec_of(tmp_path, f"scenario: minimal\ncourse: {{{full}}}\n")
+        with pytest.raises(ScenarioError, match="have no room"):
+            spec.draw(0)
 
 
 @pytest.mark.parametrize(
@@ -82,6 +103,12 @@ def test_obstacles_of_a_course_are_clear_of_a_low_uav_and_one_without_room_canno
         ("scenario: minimal\ndraw: {seed: {unifrom: [0, 1]}}", ":2: draw.seed: 'unifrom' is not allowed; did you mean"),
         ("scenario: minimal\ndraw: {seed: {uniform: [1, 0]}}", "draw.seed.uniform: [1, 0] is not allowed; wanted"),
         ("scenario: minimal\ncourse: {ugvs: 0}", ":2: course.ugvs: 0 is not allowed; wanted: a whole number from 1"),
+        (
+            "scenario: minimal\ncourse: {size_m: [2, 1]}",
+            "course.size_m: [2, 1] is not allowed; wanted: [least, most] in m",
+        ),
+        ("scenario: minimal\ncourse: {size_m: 2}", "course.size_m: 2 is not allowed; wanted: [least, most] in m"),
+        ("scenario: minimal\ncourse: {walls: [2, 1]}", "course.walls: [2, 1] is not allowed; wanted: a whole number"),
         ("scenario: minimal\ncourse: []", ":2: course: a list is given; wanted: a mapping with the keys ugvs"),
         (f"scenario: minimal\ncourse: {{length_m: 1{'0' * 400}}}", "wanted: a number in m from 1e-09 to 1e+09"),
         (f"scenario: minimal\ndraw: {{seed: {{integer: [0, 1{'0' * 400}]}}}}", "whole numbers up to 2147483647"),
