@@ -2,7 +2,7 @@
 
 Nothing is filtered. Places are cells of a grid whose pitch keeps every safe distance; periods are multiples of the
 control period; gains, release level and sensing range are fractions or multiples of their bounds. Draws shrink to fewer
-robots and obstacles, shorter runs, and the defaults of the schema.
+robots and obstacles, plainer shapes, shorter runs, and the defaults of the schema.
 
     from hypothesis import given, settings, strategies as st
     from airground_drake import simulate
@@ -58,6 +58,16 @@ PERIODS = (0.025, 0.05, 0.1)
 """Control periods, s."""
 JITTER = (0.0, 0.25, -0.25, 0.5, -0.5)
 """Offsets of a place from the middle of its cell, along an axis, m."""
+KINDS = ("ball", "box", "wall", "polygon", "post")
+"""Shapes of obstacles."""
+SIZES = (1.0, 2.0)
+"""How far shapes extend from their places at most, before they are rounded, m."""
+OWN_DISTANCES = (0.0, 0.5, 3.0)
+"""Distances that an obstacle may have instead of the scenario's, m; 0: none."""
+HEADINGS = (0.0, 0.5, 1.5707963, -2.0)
+HEIGHTS = (0.0, 1.0, 50.0)
+APPEARANCES = (0.0, 1.5, 30.0)
+"""Headings, rad, heights, m, and times of appearance, s, of obstacles."""
 BAYES = (Threshold("bayes"), Threshold("bayes", drift_m_s=0.5, noise_m_sqrt_s=1.0))
 """Thresholds by the Bayes risk."""
 
@@ -108,6 +118,7 @@ def scenarios(
     routes: SearchStrategy[str] | None = None,
     durations: SearchStrategy[float] | None = None,
     compositions: SearchStrategy[str] | None = None,
+    shapes: SearchStrategy[str] | None = None,
 ) -> Scenario:
     """A valid scenario with one run, named by its method.
 
@@ -122,6 +133,8 @@ def scenarios(
         durations: of the run, s; default: 1 to 20. Runs of minutes may be invalid, because rounding errors of
             distances grow with the way.
         compositions: of the avoidance; default: `augmented`, the only one that guarantees distances.
+        shapes: of the obstacles, names of `KINDS`; default: any of them in half of the scenarios, which may also have
+            an arena, and balls in the others.
     """
     count = draw(st.integers(1, 4) if ugvs is None else ugvs)
     method = draw(first_of(*sorted(METHODS, reverse=True)) if methods is None else methods)
@@ -129,7 +142,10 @@ def scenarios(
     safe = SafeDistance(draw(first_of(*DISTANCES)), draw(first_of(*DISTANCES)), draw(first_of(1.0, 0.5)))
     largest = draw(first_of(*RADII))
     others = draw(st.integers(0, 6) if obstacles is None else obstacles)
-    team, uav, points = draw(_maps(count, others, safe, largest))
+    if shapes is None:
+        shapes = draw(first_of(first_of("ball"), first_of(*KINDS)))
+    own = draw(first_of(*OWN_DISTANCES))
+    team, uav, rocks, arena = draw(_maps(count, others, safe, largest, own, shapes))
     speed = max(uav.max_speed_m_s, *(ugv.max_speed_m_s for ugv in team.values()))
     database = draw(DATABASES if policies is None else policies)
     return Scenario(
@@ -138,9 +154,10 @@ def scenarios(
         duration_s=draw(st.integers(1, 20).map(float) if durations is None else durations),
         ugvs=team,
         uav=uav,
-        obstacles=points,
+        obstacles=rocks,
+        arena_m=arena,
         safe_distance=safe,
-        control=draw(_controls(period, _reach(safe, largest, speed, period))),
+        control=draw(_controls(period, _reach(safe, own, largest, speed, period))),
         decision=draw(_decisions(period, triggers)),
         intervention=draw(_interventions(period, database)),
         gatekeeper=draw(_gatekeepers(period, routes)),
@@ -148,9 +165,14 @@ def scenarios(
     )
 
 
-def _reach(safe: SafeDistance, radius: float, speed: float, period: float) -> float:
+def _reach(safe: SafeDistance, own: float, radius: float, speed: float, period: float) -> float:
     """A sensing range, m, that covers safe distances, radii and the way of two robots at this speed in one period."""
-    return max(safe.obstacle_m, safe.ugv_m, safe.air_ground_m) + 2.0 * (radius + speed * period)
+    return _farthest(safe, own) + 2.0 * (radius + speed * period)
+
+
+def _farthest(safe: SafeDistance, own: float) -> float:
+    """The largest distance that any two bodies keep, m, if an obstacle may have its own."""
+    return max(safe.obstacle_m, safe.ugv_m, safe.air_ground_m, own)
 
 
 Cell = tuple[int, int]
@@ -159,9 +181,17 @@ Cell = tuple[int, int]
 
 @st.composite
 def _maps(
-    draw: DrawFn, count: int, others: int, safe: SafeDistance, largest: float
-) -> tuple[dict[str, Ugv], Uav, dict[str, Obstacle]]:
-    """UGVs, UAV and obstacles on a grid; each start has its own cell, and so has each target and each obstacle.
+    draw: DrawFn,
+    count: int,
+    others: int,
+    safe: SafeDistance,
+    largest: float,
+    own: float,
+    shapes: SearchStrategy[str],
+) -> tuple[dict[str, Ugv], Uav, dict[str, Obstacle], list[Vector]]:
+    """UGVs, UAV and obstacles on a grid, in an arena or without one.
+
+    Each start has its own cell, and so has each target and each obstacle.
 
     Args:
         draw: given by Hypothesis.
@@ -169,20 +199,54 @@ def _maps(
         others: number of obstacles.
         safe: distances that starts and targets keep.
         largest: the largest radius, m.
+        own: distance that some obstacles have instead of the scenario's, m; 0: none.
+        shapes: of the obstacles.
     """
-    pitch = max(safe.obstacle_m, safe.ugv_m, safe.air_ground_m) + 2.0 * (max(JITTER) + largest)
+    kinds = [draw(shapes) for _ in range(others)]
+    size = draw(first_of(*SIZES)) if {*kinds} - {"ball", "post"} else 0.0
+    pitch = _farthest(safe, own) + 2.0 * (max(JITTER) + largest) + size
     radii = first_of(0.0, largest)
     width = math.isqrt(count + others + 2) + draw(st.integers(1, 3))
     cells = [(x, y) for y in range(width) for x in range(width)]
     free = list(cells)
     points = {
-        f"obstacle_{k + 1}": Obstacle(draw(_places(free, pitch)), draw(first_of(True, False)), draw(radii))
-        for k in range(others)
+        f"obstacle_{k + 1}": draw(_obstacles(kind, draw(_places(free, pitch)), size, radii, own))
+        for k, kind in enumerate(kinds)
     }
+    arena = [[-pitch, -pitch], [width * pitch, width * pitch]] if size and draw(first_of(False, True)) else []
     starts, targets = list(free), list(free)
     team = {f"ugv{k + 1}": draw(_ugvs(cells, starts, targets, pitch, radii)) for k in range(count)}
     altitude = safe.air_ground_m + 2.0 * largest + 1.0
-    return team, draw(_uavs(cells, starts, targets, pitch, altitude, radii)), points
+    return team, draw(_uavs(cells, starts, targets, pitch, altitude, radii)), points, arena
+
+
+@st.composite
+def _obstacles(
+    draw: DrawFn, kind: str, place: Vector, size: float, radii: SearchStrategy[float], own: float
+) -> Obstacle:
+    """An obstacle of a kind whose core extends at most `size`, m, from its place."""
+    found = Obstacle(place, draw(first_of(True, False)), draw(radii))
+    if kind == "ball":
+        return found
+    found.height_m = 1.0 if kind == "post" else draw(first_of(*HEIGHTS))
+    found.distance_m, found.appears_s = draw(first_of(0.0, own)), draw(first_of(*APPEARANCES))
+    if kind == "post":
+        return found
+    found.heading_rad = draw(first_of(*HEADINGS))
+    if kind == "box":
+        found.size_m = [size, size * draw(first_of(0.5, 1.5))]
+        return found
+    corners = draw(st.integers(3, 7))  # at equal angles, so that edges do not cross
+    rays = [size * draw(first_of(1.0, 0.3, 0.6)) for _ in range(corners)]
+    around = [
+        [round(ray * math.cos(math.tau * k / corners), 6), round(ray * math.sin(math.tau * k / corners), 6)]
+        for k, ray in enumerate(rays)
+    ]
+    if kind == "wall":
+        found.segment_m = around[: draw(st.integers(2, corners))]
+    else:
+        found.polygon_m = around
+    return found
 
 
 @st.composite

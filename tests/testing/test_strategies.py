@@ -13,6 +13,7 @@ from airground_drake.registry import METHODS, POLICIES
 from airground_drake.run.simulation import simulate
 from airground_drake.scenarios.load import from_data, resolved
 from airground_drake.scenarios.schema import Control, Decision, Gatekeeper, Scenario
+from airground_drake.scenarios.shapes import convex_parts
 from airground_drake.testing import assert_holds
 from airground_drake.testing.strategies import PARAMETERS, policies, scenarios
 
@@ -26,11 +27,13 @@ from airground_drake.testing.strategies import PARAMETERS, policies, scenarios
         routes=st.just("nonlinear"),
         compositions=st.just("recursion_nearest"),
         policies=policies(["mine:Mine"]),
+        shapes=st.sampled_from(["wall", "box"]),
     )
 )
 def test_given_strategies_are_used(scenario: Scenario) -> None:
     assert 5 <= len(scenario.ugvs) <= 12
     assert len(scenario.obstacles) == 30
+    assert all(each.segment_m or each.size_m for each in scenario.obstacles.values())
     assert (scenario.decision.trigger, scenario.gatekeeper.route) == ("bare", "nonlinear")
     assert {run.composition for run in scenario.runs.values()} == {"recursion_nearest"}
     assert [policy.parameters for policy in scenario.intervention.policies] in ([], [{}])
@@ -51,11 +54,22 @@ def test_draws_are_valid_and_of_many_kinds() -> None:
         seen.update(f"composition {run.composition}" for run in scenario.runs.values())
         seen.update(f"radius {ugv.radius_m}" for ugv in scenario.ugvs.values())
         seen.update(f"waypoints {len(ugv.preset.waypoints_m)}" for ugv in scenario.ugvs.values())
+        seen.update(["arena"] if scenario.arena_m else [])
+        for each in scenario.obstacles.values():
+            kinds = [key for key in ("polygon_m", "segment_m", "size_m") if getattr(each, key)] or ["place"]
+            more = [
+                key for key in ("radius_m", "height_m", "heading_rad", "distance_m", "appears_s") if getattr(each, key)
+            ]
+            seen.update([*kinds, *(f"{kinds[0]} {key}" for key in more)])
+            seen.update(["concave"] if each.polygon_m and len(convex_parts(each) or ()) > 1 else [])
 
     draw()
     assert {f"method {name}" for name in METHODS} <= set(seen)
     assert {f"policy {name}" for name in POLICIES.own} <= set(seen)
     assert {name for name in seen if name.startswith("composition")} == {"composition augmented"}
+    keys = ("radius_m", "height_m", "heading_rad", "distance_m", "appears_s")
+    assert {f"{kind} {key}" for kind in ("polygon_m", "segment_m", "size_m") for key in keys} <= set(seen)
+    assert {"arena", "concave", "place", "place height_m"} <= set(seen)
     assert {"threshold fixed", "threshold bayes", "known True", "known False", "waypoints 4", "radius 0.5"} <= set(seen)
 
 
@@ -70,7 +84,7 @@ def test_a_failure_shrinks_to_the_simplest_scenario() -> None:
     least = find(drawn, lambda scenario: len(scenario.ugvs) >= 2, settings=two)
     assert list(least.runs) == ["d"]
     assert least.duration_s == 1.0
-    assert least.obstacles == {}
+    assert (least.obstacles, least.arena_m) == ({}, [])
     assert least.intervention.policies == []
     assert len(least.ugvs) == 2
     assert [least.ugvs["ugv1"].start_m, least.ugvs["ugv1"].target_m] == [[0.0, 0.0, 0.0], [3.0, 0.0, 0.0]]
