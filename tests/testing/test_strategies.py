@@ -18,6 +18,11 @@ from airground_drake.testing import assert_holds
 from airground_drake.testing.strategies import PARAMETERS, policies, scenarios
 
 
+OF_OBSTACLES = (
+    "polygon_m", "segment_m", "size_m", "radius_m", "height_m", "heading_rad", "distance_m", "appears_s",
+)  # fmt: skip
+
+
 @examples(15)
 @given(
     scenarios(
@@ -56,20 +61,15 @@ def test_draws_are_valid_and_of_many_kinds() -> None:
         seen.update(f"waypoints {len(ugv.preset.waypoints_m)}" for ugv in scenario.ugvs.values())
         seen.update(["arena"] if scenario.arena_m else [])
         for each in scenario.obstacles.values():
-            kinds = [key for key in ("polygon_m", "segment_m", "size_m") if getattr(each, key)] or ["place"]
-            more = [
-                key for key in ("radius_m", "height_m", "heading_rad", "distance_m", "appears_s") if getattr(each, key)
-            ]
-            seen.update([*kinds, *(f"{kinds[0]} {key}" for key in more)])
+            seen.update(["post"] if each.height_m and not (each.polygon_m or each.segment_m or each.size_m) else [])
+            seen.update(key for key in OF_OBSTACLES if getattr(each, key))
             seen.update(["concave"] if each.polygon_m and len(convex_parts(each) or ()) > 1 else [])
 
     draw()
     assert {f"method {name}" for name in METHODS} <= set(seen)
     assert {f"policy {name}" for name in POLICIES.own} <= set(seen)
     assert {name for name in seen if name.startswith("composition")} == {"composition augmented"}
-    keys = ("radius_m", "height_m", "heading_rad", "distance_m", "appears_s")
-    assert {f"{kind} {key}" for kind in ("polygon_m", "segment_m", "size_m") for key in keys} <= set(seen)
-    assert {"arena", "concave", "place", "place height_m"} <= set(seen)
+    assert {"arena", "concave", "post", *OF_OBSTACLES} <= set(seen)
     assert {"threshold fixed", "threshold bayes", "known True", "known False", "waypoints 4", "radius 0.5"} <= set(seen)
 
 
