@@ -17,7 +17,6 @@ from airground_drake.scenarios.shapes import convex_parts
 from airground_drake.testing import assert_holds
 from airground_drake.testing.strategies import PARAMETERS, policies, scenarios
 
-
 OF_OBSTACLES = (
     "polygon_m", "segment_m", "size_m", "radius_m", "height_m", "heading_rad", "distance_m", "appears_s",
 )  # fmt: skip
@@ -49,7 +48,7 @@ def test_given_strategies_are_used(scenario: Scenario) -> None:
 def test_draws_are_valid_and_of_many_kinds() -> None:
     seen: Counter[str] = Counter()
 
-    @examples(100)
+    @examples(150)
     @given(scenarios())
     def draw(scenario: Scenario) -> None:
         assert from_data(resolved(scenario), "drawn") == scenario
