@@ -11,8 +11,8 @@ from airground_drake.base.arrays import Array
 from airground_drake.decision.trigger import Mode
 from airground_drake.geometry import convex
 from airground_drake.run.trace import Trace
+from airground_drake.scenarios.outlines import outlines_of
 from airground_drake.scenarios.schema import ARENA, Scenario, Uav, Ugv
-from airground_drake.scenarios.shapes import outlines_of
 from airground_drake.view.geometry import outer_edges
 from airground_drake.view.looks import OBSTACLE_COLOR, UNSEEN_COLOR
 

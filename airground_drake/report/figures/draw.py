@@ -151,9 +151,9 @@ def _trajectories(chosen: _Selection) -> Figure:
         each.is_round and each.radius_m[0] > 0.0 for each in barriers
     )
     kinds = ["Hexagon: obstacle"] if any(each.is_round for each in barriers) or not has_walls else []
-    kinds += ["Dark: walls"] if has_walls else []
+    kinds += ["Filled: walls"] if has_walls else []
     circles = "dark disc as large as it is, " if true_size else ""
-    circles += "light grey: too near" if has_walls else "safe circle dashed"
+    circles += "band around them: too near" if has_walls else "safe circle dashed"
     hidden = len(first.ugvs) - len(chosen.team)
     thin = f" Thin grey lines, which end in dots: {hidden} more UGVs." if hidden else ""
     frame_is = " Frame: the arena." if first.scenario.arena_m else ""
