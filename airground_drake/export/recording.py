@@ -13,7 +13,7 @@ from airground_drake.run.trace import Trace
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.view.geometry import Mesh, prisms
 from airground_drake.view.looks import OBSTACLE_COLOR, SAFE_COLOR, STATE_COLORS, UAV_COLOR, UNSEEN_COLOR, rgb
-from airground_drake.view.stage import Robot, Stage, stage_of, states
+from airground_drake.view.stage import Barrier, Robot, Stage, stage_of, states
 
 if TYPE_CHECKING:
     from mcap.writer import Writer
@@ -107,10 +107,11 @@ def _write(writer: Writer, messages: list[Message]) -> None:
 def _messages(trace: Trace, scenario: Scenario) -> Iterator[Message]:
     """All messages of a run."""
     standing = stage_of(trace, scenario)
-    yield Message(0.0, "/scene", "foxglove.SceneUpdate", {"deletions": [], "entities": list(_barriers(standing))})
+    yield Message(0.0, "/scene", "foxglove.SceneUpdate", {"deletions": [], "entities": list(_standing(standing))})
     looks = {robot: states(trace, robot, trace.t) for robot in trace.ugvs}
+    moved = [(each, trace.position(each.name) - each.way_m[0]) for each in standing.barriers if len(each.way_m)]
     for k, t in enumerate(trace.t.tolist()):
-        entities = []
+        entities = [_barrier(standing, barrier, t, by[k].tolist()) for barrier, by in moved]
         for robot in standing.robots:
             color = STATE_COLORS[looks[robot.name][k]] if robot.name in looks else UAV_COLOR
             entities.append(_robot(robot, t, trace.position(robot.name)[k].tolist(), color))
@@ -135,25 +136,27 @@ def _signals(trace: Trace, robot: str, k: int) -> dict[str, Any]:
     return found
 
 
-def _barriers(standing: Stage) -> Iterator[dict[str, Any]]:
-    """Each ball, post or wall inside its transparent safe zone; the arena's frames; phantoms as cylinders."""
-    low, highest = standing.mark_m, float(standing.high_m[2])
-    for barrier in standing.barriers:
-        name, color, foot = f"obstacle {barrier.name}", barrier.color, barrier.place_m.tolist()
-        tall = max(2.0 * low, min(barrier.top_m, highest) - foot[2])
-        if barrier.is_round:
-            body = _cylinder(foot, float(barrier.radius_m[0]), tall, color)
-            zone = _cylinder(foot, float(barrier.safe_m[0]), low, SAFE_COLOR, 0.2)
-            yield _entity(name, 0.0, cylinders=[body, zone])
-        else:
-            body = _triangles(prisms(barrier.body, tall), color)
-            zone = _triangles(prisms(barrier.safe, low), SAFE_COLOR, 0.2)
-            yield _entity(name, 0.0, triangles=[body, zone])
-    if standing.arena:
+def _standing(stage: Stage) -> Iterator[dict[str, Any]]:
+    """All barriers where they are at the start, the arena's frames, and phantoms as cylinders."""
+    low = stage.mark_m
+    yield from (_barrier(stage, barrier, 0.0, [0.0] * 3) for barrier in stage.barriers)
+    if stage.arena:
         colors = (OBSTACLE_COLOR, SAFE_COLOR)
-        yield _entity("arena", 0.0, lines=[_loop(*each) for each in zip(standing.arena, colors, strict=True)])
-    for k, phantom in enumerate(standing.phantoms_m.tolist()):
+        yield _entity("arena", 0.0, lines=[_loop(*each) for each in zip(stage.arena, colors, strict=True)])
+    for k, phantom in enumerate(stage.phantoms_m.tolist()):
         yield _entity(f"phantom {k + 1}", 0.0, cylinders=[_cylinder(phantom, low, low, UNSEEN_COLOR, 0.5)])
+
+
+def _barrier(stage: Stage, barrier: Barrier, t: float, moved: list[float]) -> dict[str, Any]:
+    """A ball, post or wall inside its transparent safe zone, moved from where it starts."""
+    name, color, low = f"obstacle {barrier.name}", barrier.color, stage.mark_m
+    foot = (barrier.place_m + moved).tolist()
+    tall = max(2.0 * low, min(barrier.top_m, float(stage.high_m[2])) - float(barrier.place_m[2]))
+    if barrier.is_round:
+        body = _cylinder(foot, float(barrier.radius_m[0]), tall, color)
+        return _entity(name, t, cylinders=[body, _cylinder(foot, float(barrier.safe_m[0]), low, SAFE_COLOR, 0.2)])
+    body = _triangles(prisms(barrier.body, tall), moved, color)
+    return _entity(name, t, triangles=[body, _triangles(prisms(barrier.safe, low), moved, SAFE_COLOR, 0.2)])
 
 
 def _robot(robot: Robot, t: float, position: list[float], color: str) -> dict[str, Any]:
@@ -178,9 +181,9 @@ def _cylinder(foot: list[float], radius: float, height: float, color: str, alpha
     return {"pose": pose, "size": size, "bottom_scale": 1.0, "top_scale": 1.0, "color": _rgba(color, alpha)}
 
 
-def _triangles(mesh: Mesh, color: str, alpha: float = 1.0) -> dict[str, Any]:
+def _triangles(mesh: Mesh, place: list[float], color: str, alpha: float = 1.0) -> dict[str, Any]:
     points, indices = [_vector(each) for each in mesh.vertices.T.tolist()], mesh.faces.T.ravel().tolist()
-    return {"pose": _pose([0.0] * 3), "points": points, "color": _rgba(color, alpha), "colors": [], "indices": indices}
+    return {"pose": _pose(place), "points": points, "color": _rgba(color, alpha), "colors": [], "indices": indices}
 
 
 def _loop(corners: Array, color: str) -> dict[str, Any]:

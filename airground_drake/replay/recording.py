@@ -37,8 +37,11 @@ def recorded(scene: Scene) -> Meshcat:
         for state in range(len(STATES)):
             _show(meshcat, animation, state_path(k, state), body.states == state)
     for k, barrier in enumerate(scene.barriers):
-        if barrier.appears_s:
-            _show(meshcat, animation, barrier_path(k), scene.times_s >= barrier.appears_s)
+        if k in scene.moved_m:
+            _move(meshcat, animation, barrier_path(k), scene.moved_m[k])
+        if barrier.appears_s or np.isfinite(barrier.disappears_s):
+            there = (scene.times_s >= barrier.appears_s) & (scene.times_s < barrier.disappears_s)
+            _show(meshcat, animation, barrier_path(k), there)
     for k, proposal in enumerate(scene.proposals):
         _proposal(meshcat, animation, scene, proposal, k)
     meshcat.SetAnimation(animation)

@@ -33,13 +33,17 @@ class DrawnBody(Robot):
 
 @dataclass(frozen=True)
 class Scene(Stage):
-    """A run. `times_s` (F,) are those of the frames, the last one the end."""
+    """A run. `times_s` (F,) are those of the frames, the last one the end.
+
+    `moved_m` is by how much each barrier that moves has moved at each frame, (F, 3), m, by its number.
+    """
 
     robots: tuple[DrawnBody, ...]
     scenario: Scenario
     run: str
     says: str
     times_s: Array
+    moved_m: Mapping[int, Array]
     proposals: tuple[Sent, ...]
     events: tuple[Mapping[str, Any], ...]
 
@@ -57,10 +61,14 @@ def scene(trace: Trace, scenario: Scenario) -> Scene:
     """
     times = frame_times(trace.t)
     still = stage_of(trace, scenario)
+
+    def positions(name: str) -> Array:
+        return np.column_stack([np.interp(times, trace.t, axis) for axis in trace.position(name).T])
+
     bodies = tuple(
         DrawnBody(
             **vars(robot),
-            positions=np.column_stack([np.interp(times, trace.t, axis) for axis in trace.position(robot.name).T]),
+            positions=positions(robot.name),
             states=states(trace, robot.name, times) if robot.kind == "UGV" else np.zeros(len(times), dtype=np.intp),
         )
         for robot in still.robots
@@ -72,6 +80,7 @@ def scene(trace: Trace, scenario: Scenario) -> Scene:
         run=trace.run,
         says=f"method ({method}), {method_of(method).says}",
         times_s=times,
+        moved_m={k: positions(each.name) - each.way_m[0] for k, each in enumerate(still.barriers) if len(each.way_m)},
         proposals=sent(trace),
         events=tuple(trace.events),
     )

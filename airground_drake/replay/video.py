@@ -9,10 +9,12 @@ from subprocess import CalledProcessError
 import numpy as np
 from matplotlib.animation import AbstractMovieWriter, FFMpegWriter, PillowWriter
 from matplotlib.axes import Axes
+from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 
 from airground_drake.base import files
+from airground_drake.base.arrays import Array
 from airground_drake.base.errors import ReplayError
 from airground_drake.replay.proposals import Sent
 from airground_drake.replay.scene import DrawnBody, Scene
@@ -21,6 +23,7 @@ from airground_drake.view import canvas
 from airground_drake.view.labels import place
 from airground_drake.view.looks import OUTCOME_COLORS, PATH_COLOR, STATE_COLORS, STATE_MARKS, UAV_COLOR
 from airground_drake.view.plane import draw_barriers, draw_robot
+from airground_drake.view.stage import Barrier
 
 PICTURES_PER_S = 15
 """Pictures in a second of the video."""
@@ -83,9 +86,10 @@ def _picture(scene: Scene) -> tuple[Figure, Update]:
     axes = figure.add_axes((0.0, 0.0, 1.0, 1.0 - 50.0 / size[1]))
     axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal")
     axes.set_axis_off()
-    labels, edges = draw_barriers(axes, scene.scenario)
+    labels, edges = draw_barriers(axes, scene.scenario, moving=False)
     place(axes, labels, [*(body.positions for body in scene.robots), *edges])
     updates = [_proposal(axes, scene, proposal) for proposal in scene.proposals]
+    updates += [_barrier(axes, scene.barriers[k], moved) for k, moved in scene.moved_m.items()]
     updates += [_robot(axes, scene.scenario, body) for body in scene.robots]
     figure.text(8.0 / size[0], 1.0 - 10.0 / size[1], f"{scene.scenario.name}, run {scene.run}: {scene.says}", va="top")
     clock = figure.text(8.0 / size[0], 1.0 - 30.0 / size[1], "", va="top", fontweight="bold")
@@ -113,6 +117,21 @@ def _robot(axes: Axes, scenario: Scenario, body: DrawnBody) -> Update:
         shape.set(facecolor=color, edgecolor=color)
         name.xy = (float(at[0]), float(at[1]) + body.radius_m)
         name.set_text(f"{body.name} {STATE_MARKS[state]}".rstrip())
+
+    return update
+
+
+def _barrier(axes: Axes, barrier: Barrier, moved: Array) -> Update:
+    """A barrier that moves, by (F, 3), m."""
+    parts = PolyCollection(barrier.body, facecolor=barrier.color, edgecolor=canvas.INK, zorder=3)
+    axes.add_collection(parts)
+    name = axes.annotate(barrier.name, (0.0, 0.0), (0, 4), textcoords="offset points", ha="center", zorder=5, bbox=_BOX)
+
+    def update(frame: int) -> None:
+        by = moved[frame, :2]
+        parts.set_verts([part + by for part in barrier.body])
+        x, y = barrier.place_m[:2] + by
+        name.xy = (float(x), float(y))
 
     return update
 

@@ -12,13 +12,13 @@ from airground_drake.scenarios.schema import Scenario
 from airground_drake.scenarios.world import make_world
 from airground_drake.systems.lifetime import weakly
 from airground_drake.systems.signals import FIELDS, declare_bodies
-from airground_drake.view.draw import draw, robot_path, shadow_path, state_path
+from airground_drake.view.draw import barrier_path, draw, robot_path, shadow_path, state_path
 from airground_drake.view.stage import STATES, stage, states_of
 from airground_drake.world.world import ROBOTS
 
 
 class LiveView(LeafSystem):
-    """Draws a scenario in a Meshcat, and moves its robots there as the simulation goes on.
+    """Draws a scenario in a Meshcat, and moves its bodies there as the simulation goes on.
 
     Input ports (n UGVs, M moving bodies), named like the output ports that they belong to: `bodies` (3M), m;
     `status` (4n), of the event trigger; `executing` (n), see `UgvController`.
@@ -43,7 +43,12 @@ class LiveView(LeafSystem):
         self.DeclareInitializationPublishEvent(weakly(self._begin))
         self.DeclarePerStepPublishEvent(weakly(self._publish))
         meshcat.Delete("/robots")
-        draw(meshcat, stage(scenario))
+        scene = stage(scenario)
+        draw(meshcat, scene)
+        rows = {body.name: row for row, body in enumerate(world.moving)}
+        self._barriers = [
+            (k, rows[each.name], each.way_m[0]) for k, each in enumerate(scene.barriers) if len(each.way_m)
+        ]
 
     def _begin(self, context: Context) -> None:
         self._shown_s = -math.inf
@@ -60,6 +65,8 @@ class LiveView(LeafSystem):
             self._meshcat.SetTransform(robot_path(k), RigidTransform(position), t)
         for k, above in enumerate(positions[self._uavs], start=self._uavs.start):
             self._meshcat.SetTransform(shadow_path(k), RigidTransform(above * [1.0, 1.0, 0.0]), t)
+        for k, row, start in self._barriers:
+            self._meshcat.SetTransform(barrier_path(k), RigidTransform(positions[row] - start), t)
         for k, state in enumerate(states_of(executing, modes)):
             for each in range(len(STATES)):
                 self._meshcat.SetProperty(state_path(k, each), "visible", bool(each == state), t)

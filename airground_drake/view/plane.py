@@ -29,7 +29,7 @@ THUMBNAIL_IN = (2.5, 1.9)
 MAX_THUMBNAIL_UGVS, MAX_THUMBNAIL_POINTS = 20, 200
 _LEFT_IN, _BESIDE_IN, _BELOW_IN, _ABOVE_IN = 0.5, 0.65, 0.42, 0.1
 """Margin left of a map, both side margins together, margins below and above it, inches."""
-_VOID_DASH = (0, (1.5, 2.5))
+_VOID_DASH, _WAY_DOTS = (0, (1.5, 2.5)), (0, (1.0, 1.5))
 
 
 class Frame(NamedTuple):
@@ -74,17 +74,21 @@ def axes_over(frame: Frame, width_in: float) -> tuple[Figure, Axes]:
     return figure, axes
 
 
-def draw_barriers(axes: Axes, scenario: Scenario) -> tuple[list[Label], list[Array]]:
+def draw_barriers(axes: Axes, scenario: Scenario, *, moving: bool = True) -> tuple[list[Label], list[Array]]:
     """Draw all that stands about within the outlines that robots' surfaces keep to, the arena, and phantoms.
 
-    What the UAV does not know is hollow. Points and balls have a hexagon in the middle.
+    What the UAV does not know is hollow. Points and balls have a hexagon in the middle. What moves is drawn where it
+    starts, with its way in dots, unless `moving` is False.
 
     Returns:
         Labels, the names of the barriers, unless they are many, and of phantoms; and lines (K, 2), m, that labels
         should avoid: the edges of walls, unless they are many.
     """
     _draw_arena(axes, arena_of(scenario))
-    every = barriers_of(scenario)
+    every = [each for each in barriers_of(scenario) if moving or not len(each.way_m)]
+    for each in every:
+        if len(each.way_m):
+            axes.plot(*each.way_m[:, :2].T, color=INK, linestyle=_WAY_DOTS, linewidth=1.8, zorder=1.4)
     walls, balls = ([each for each in every if each.is_round == of_balls] for of_balls in (False, True))
     _fill(axes, [part for each in walls for part in each.safe], _SAFE, 0.9)
     for known, appearance in ((True, _KNOWN), (False, _UNKNOWN)):
@@ -158,6 +162,8 @@ def _draw_arena(axes: Axes, rings: Sequence[Array]) -> None:
 def _name_of(barrier: Barrier) -> Label:
     """The name; of a ball, whose mark is small, also whether the UAV knows it."""
     since = f", from {barrier.appears_s:g} s" if barrier.appears_s else ""
+    since += f", until {barrier.disappears_s:g} s" if np.isfinite(barrier.disappears_s) else ""
+    since += ", moves" if len(barrier.way_m) else ""
     hint = "" if barrier.known_to_uav or not barrier.is_round else "\n(unseen by the UAV)"
     return Label(barrier.place_m, f"{short(barrier.name, 12)}{since}{hint}", size_pt=7.5)
 

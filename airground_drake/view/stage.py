@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 import numpy.typing as npt
@@ -50,9 +50,11 @@ class Barrier:
 
     Attributes:
         name: of the scenario.
-        parts: outlines of its convex parts, (k, W), world frame; see `geometry.convex`.
+        parts: outlines of its convex parts at the start, (k, W), world frame; see `geometry.convex`.
         known_to_uav: whether it is on the UAV's map.
         appears_s: time from which on it is there, s.
+        disappears_s: time from which on it is gone, s; infinite if it stays.
+        way_m: corners of the way of its frame's origin, (n, 3), m; n is 0 if it does not move.
         mark_m: least radius with which points and thin walls are drawn, m.
         rays: number of corners for half a circle.
     """
@@ -61,6 +63,8 @@ class Barrier:
     parts: Array
     known_to_uav: bool
     appears_s: float = 0.0
+    disappears_s: float = np.inf
+    way_m: Array = field(default_factory=lambda: np.empty((0, 3)))
     mark_m: float = 0.0
     rays: int = FINE
 
@@ -125,11 +129,12 @@ class Barrier:
 
     @property
     def corners(self) -> tuple[Array, Array]:
-        """Corners (2,), m, of the least rectangle, along the axes, that contains `safe`."""
+        """Corners (2,), m, of the least rectangle, along the axes, that contains `safe` wherever the barrier goes."""
         places = [convex.corners_of(part) for part in self.parts]
         low = np.min([each.min(axis=0) - reach for each, reach in zip(places, self.safe_m, strict=True)], axis=0)
         high = np.max([each.max(axis=0) + reach for each, reach in zip(places, self.safe_m, strict=True)], axis=0)
-        return low, high
+        goes = self.way_m[:, :2] - self.way_m[:1, :2] if len(self.way_m) else np.zeros((1, 2))
+        return low + goes.min(axis=0), high + goes.max(axis=0)
 
 
 @dataclass(frozen=True)
@@ -175,10 +180,13 @@ def barriers_of(scenario: Scenario, mark: float = 0.0) -> tuple[Barrier, ...]:
     """All that stands about but the walls of the arena; points and thin walls are drawn with at least a mark, m."""
     found = {name: each for name, each in scenario.barriers.items() if not name.startswith(ARENA)}
     parts = {name: outlines_of(scenario, each) for name, each in found.items()}
-    rays = FINE if sum(map(len, parts.values())) <= MANY else COARSE
-    return tuple(
-        Barrier(name, parts[name], each.known_to_uav, each.appears_s, mark, rays) for name, each in found.items()
-    )
+    rays, barriers = FINE if sum(map(len, parts.values())) <= MANY else COARSE, list[Barrier]()
+    for name, each in found.items():
+        way = np.array([[*place, 0.0][:3] for place in each.moves.waypoints_m]) if each.moves else np.empty((0, 3))
+        rows = convex.moved(parts[name], way[0]) if len(way) else parts[name]
+        until = each.disappears_s or np.inf
+        barriers.append(Barrier(name, rows, each.known_to_uav, each.appears_s, until, way, mark, rays))
+    return tuple(barriers)
 
 
 def arena_of(scenario: Scenario) -> tuple[Array, ...]:

@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 from report.cases import make_scenario
 
 from airground_drake.base.arrays import Array
-from airground_drake.scenarios.schema import Obstacle, Scenario
+from airground_drake.scenarios.schema import Moves, Obstacle, Scenario
 from airground_drake.view.canvas import MUTED
 from airground_drake.view.plane import MAX_NAMED_BARRIERS, draw_barriers, frame_of
 
@@ -132,6 +132,16 @@ def test_a_wall_of_many_parts_has_its_name_once_inside_of_it() -> None:
     assert beyond(ell.at[:2], np.array(ELL), closed=True) < -0.5
     assert beyond(bent.at[:2], np.array(BENT), closed=False) < 1e-9
     assert len(edges) >= 4
+
+
+def test_what_moves_is_drawn_with_its_way_and_a_word_or_left_to_others() -> None:
+    scenario = walls(1)
+    scenario.obstacles["cart"] = Obstacle(size_m=[1.0, 1.0], moves=Moves([[1.0, 2.0, 0.0], [5.0, 2.0, 0.0]], 1.0))
+    axes = Figure().subplots()
+    labels, _ = draw_barriers(axes, scenario)
+    assert [label.text for label in labels] == ["wall_0", "cart, moves"]
+    assert [line.get_xydata().tolist() for line in axes.lines] == [[[1.0, 2.0], [5.0, 2.0]]]
+    assert [label.text for label in draw_barriers(axes, scenario, moving=False)[0]] == ["wall_0"]
 
 
 def test_a_thousand_walls_are_a_few_collections_without_names() -> None:

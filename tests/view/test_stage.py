@@ -12,7 +12,7 @@ from pydrake.math import RigidTransform
 from report.cases import make_scenario
 
 from airground_drake.base.arrays import Array
-from airground_drake.scenarios.schema import Obstacle, Scenario
+from airground_drake.scenarios.schema import Moves, Obstacle, Scenario
 from airground_drake.view.draw import barrier_path, draw, served
 from airground_drake.view.stage import HIGHEST, Barrier, arena_of, barriers_of, stage
 
@@ -67,6 +67,14 @@ def test_a_stage_holds_walls_to_their_tops_if_these_are_no_higher_than_twice_a_r
     assert low.low_m[1] == pytest.approx(-20.0 - away)
     high = stage(scenario_with(box=Obstacle([50.0, 0.0, 0.0], size_m=[2.0, 40.0], height_m=1e5)))
     assert high.high_m[2] == HIGHEST * make_scenario().uav.start_m[2]
+
+
+def test_what_moves_stands_where_it_starts_within_bounds_that_hold_its_way() -> None:
+    way = Moves([[10.0, 0.0, 0.0], [10.0, 30.0, 0.0], [-40.0, 30.0, 0.0]], 1.0)
+    (cart,) = barriers_of(scenario_with(cart=Obstacle(size_m=[2.0, 1.0], moves=way, distance_m=0.5, disappears_s=9.0)))
+    assert (cart.place_m.tolist(), cart.disappears_s) == ([10.0, 0.0, 0.0], 9.0)
+    assert np.concatenate(cart.corners) == pytest.approx([-41.5, -1.0, 11.5, 31.0])
+    assert np.mean(cart.body[0], axis=0).tolist() == [10.0, 0.0]
 
 
 def test_an_arena_is_a_frame_and_the_one_that_surfaces_keep_to_and_no_barrier() -> None:

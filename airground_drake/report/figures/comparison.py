@@ -20,11 +20,13 @@ def draw(scenario: Scenario, traces: Mapping[str, Trace]) -> Figure | None:
     printed = [name for name in traces if scenario.runs[name].composition.startswith("recursion")]
     methods = {scenario.runs[name].method for name in printed}
     augmented = [name for name in traces if name not in printed and scenario.runs[name].method in methods]
-    if not printed or not augmented or not scenario.barriers:
+    if not printed or not augmented:
         return None
     runs = {name: traces[name] for name in [*augmented, *printed][:MAX_RUNS]}
     first = runs[augmented[0]]
     minima = {(name, ugv): closest_obstacle(trace, ugv) for name, trace in runs.items() for ugv in first.ugvs}
+    if None in minima.values():  # no obstacle was there
+        return None
     (_, robot), _ = min(minima.items(), key=lambda item: item[1].value if item[1] else np.inf)
     worst = {name: minima[name, robot] for name in runs}
     required = " or ".join(f"{d:g} m" for d in sorted({at.required_m for at in worst.values() if at}))

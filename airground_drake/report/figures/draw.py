@@ -157,6 +157,7 @@ def _trajectories(chosen: _Selection) -> Figure:
     hidden = len(first.ugvs) - len(chosen.team)
     thin = f" Thin grey lines, which end in dots: {hidden} more UGVs." if hidden else ""
     frame_is = " Frame: the arena." if first.scenario.arena_m else ""
+    frame_is += " Dots: ways of obstacles, drawn where they start." if any(len(each.way_m) for each in barriers) else ""
     caption = (
         f"{_ends(chosen)}○ start, \N{MULTIPLICATION SIGN} target, ▲ trigger, □ stands still, ✖ collision. "
         f"{'. '.join(kinds)} (hollow: not on the UAV's map), {circles}.{frame_is} Thin dashed line: the UAV.{thin}"

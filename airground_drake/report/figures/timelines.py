@@ -184,8 +184,9 @@ def compared_distances(runs: Mapping[str, Trace], robot: str) -> Figure:
 
 
 def nearest_distance(trace: Trace, robot: str) -> Array:
-    """Distance between surfaces to the nearest obstacle, (T,), m."""
-    nearest: Array = np.fmin.reduce([gap_m(trace, robot, name) for name in trace.scenario.barriers])
+    """Distance between surfaces to the nearest obstacle that is there, (T,), m."""
+    there = [name for name in trace.scenario.barriers if trace.there_from(name) < len(trace.t)]
+    nearest: Array = np.fmin.reduce([gap_m(trace, robot, name) for name in there])
     return nearest
 
 
