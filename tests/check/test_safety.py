@@ -41,6 +41,12 @@ def test_a_distance_that_is_short_refutes(short_m: float, status: str) -> None:
     assert found.margin == pytest.approx(-short_m, abs=1e-15)
 
 
+def test_a_pair_that_stays_far_has_its_margin() -> None:
+    far = run([10.0, 9.0])
+    far.apart_m["ugv1", "rock"] = 8.9
+    assert safety.safe_trace(far).margin == 9.0 - SAFE_M
+
+
 @pytest.mark.parametrize(
     ("way_m", "missed_m"),
     [

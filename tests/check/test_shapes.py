@@ -6,7 +6,8 @@ import cmath
 import math
 from fractions import Fraction
 from itertools import pairwise
-from typing import Any
+from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -16,7 +17,8 @@ from numpy.typing import NDArray
 from properties import examples
 
 from airground_drake.check.rules import NotEstablished
-from airground_drake.check.scenario import pairs_of
+from airground_drake.check.run import Run
+from airground_drake.check.scenario import Pair, pairs_of
 from airground_drake.check.shapes import POINT, ROWS, Shape, boxes_of, shape_of, split
 from airground_drake.geometry import convex
 from airground_drake.scenarios.load import load, resolved
@@ -177,6 +179,17 @@ def test_bounds_are_below_all_distances(seed: int, rows: int, step: float, corne
             places = way[ROWS * k : ROWS * (k + 1) + 1]
             for bound, part in zip(of_slice, shape.parts, strict=True):
                 assert bound <= Shape([part]).least_m(places)
+
+
+@examples(30)
+@given(seed=st.integers(0, 2**32 - 1), rows=st.integers(2, 3 * ROWS), step=st.floats(0.01, 10.0))
+def test_no_pair_of_robots_comes_nearer_than_its_bound(seed: int, rows: int, step: float) -> None:
+    rng = np.random.default_rng(seed)
+    ways = {name: 5.0 * rng.normal(size=3) + np.cumsum(step * rng.normal(size=(rows, 3)), axis=0) for name in "abc"}
+    pairs = [Pair(one, other, 1.0, 0.0, 1.0, 0.5) for one, other in ("ab", "ac", "bc")]
+    bounds = Run.apart_m.func(cast("Any", SimpleNamespace(position_m=ways, pairs=pairs)))
+    for pair in pairs:
+        assert bounds[pair.robot, pair.other] <= POINT.least_m(ways[pair.robot] - ways[pair.other])
 
 
 def test_the_step_between_two_slices_belongs_to_one() -> None:

@@ -23,12 +23,14 @@ from airground_drake.run.trace import save
 from airground_drake.scenarios.load import from_data, resolved
 
 U = [[0.0, 1.0], [2.0, 1.0], [2.0, -1.0], [0.0, -1.0], [0.0, -0.9], [1.8, -0.9], [1.8, 0.9], [0.0, 0.9]]
+TRAP = [[-3, -3], [2, -3], [2, 3], [1.5, 3], [1.5, -2.5], [-1.2, -2.5], [-1.2, 3], [-3, 3]]
+"""Round a place that ugv1 reaches in 1.5 s, and where it started."""
 BARRIERS: dict[str, dict[str, Any]] = {
     "wall": {"segment_m": [[1.0, -2.0], [1.0, 0.5], [2.0, 2.0]], "radius_m": 0.05},
     "room": {"polygon_m": U, "position_m": [1.0, 0.0], "heading_rad": 0.2, "distance_m": 0.25},
     "block": {"size_m": [1.0, 3.0], "position_m": [2.0, 0.5], "heading_rad": -0.3},
     "tower": {"size_m": [0.6, 0.6], "position_m": [0.0, 0.0], "heading_rad": 0.5, "height_m": 1.3},
-    "gate": {"polygon_m": [[1.5, -3.0], [1.5, 3.0], [2.0, 0.0]], "appears_s": 0.5},
+    "trap": {"polygon_m": TRAP, "appears_s": 1.5},
 }
 """What ugv1 runs into; the UAV climbs over the tower, which the two UGVs pass on either side."""
 
@@ -139,11 +141,12 @@ FORGERIES: dict[str, tuple[str, str, Edit]] = {
     "block turned": ("block", "SAFE-TRACE", everywhere("obstacles", "block", "heading_rad", value=-0.301)),
     "block smaller": ("block", "SAFE-TRACE", everywhere("obstacles", "block", "size_m", value=[0.999, 3.0])),
     "tower lower": ("tower", "SAFE-TRACE", everywhere("obstacles", "tower", "height_m", value=1.299)),
-    "gate appears later": ("gate", "SAFE-TRACE", everywhere("obstacles", "gate", "appears_s", value=6.0)),
+    "trap appears later": ("trap", "SAFE-TRACE", everywhere("obstacles", "trap", "appears_s", value=6.0)),
     "arena larger": ("arena", "SAFE-TRACE", everywhere("arena_m", value=[[2.001, -2.0], [-3.0, 2.0]])),
     "arena left out": ("arena", "SAFE-TRACE", everywhere("arena_m", value=[])),
     "onto the wall": ("wall", "SAFE-TRACE", ahead(0.6)),
     "through the wall and back between rows that are clear of it": ("wall", "SAFE-TRACE", ahead(1.3)),
+    "through the wall and back without a collision": ("wall", "events", ahead(1.3)),
     "onto the wall without a command": ("wall", "trace", cells("ugv1.x_m", lambda old: old + 0.6, 90)),
     "wall that might move": ("wall", "trace", everywhere("obstacles", "wall", "max_speed_m_s", value=1.0)),
     "edges that cross": (
@@ -159,7 +162,7 @@ def test_forged_walls_and_places_are_refused(report_of: Callable[[str], Path], n
     assert claim in {line.claim for line in refusals(report_of(barrier), edit)}
 
 
-@pytest.mark.parametrize("name", ["room", "gate"])
+@pytest.mark.parametrize("name", ["room", "trap"])
 def test_corners_may_be_listed_in_either_order(report_of: Callable[[str], Path], name: str) -> None:
     reversed_corners = everywhere("obstacles", name, "polygon_m", value=lambda corners: corners[::-1])
     assert refusals(report_of(name), reversed_corners) == []
