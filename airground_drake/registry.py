@@ -299,6 +299,7 @@ RUN_CLAIMS = Registry(
     "run_claims",
     {
         "SAFE-TRACE": "airground_drake.verify.runs.safe_trace:SafeTrace",
+        "SAFE-OWN": "airground_drake.verify.runs.safe_own:SafeOwn",
         "SAFE-HYP": "airground_drake.verify.runs.safe_hyp:SafeHyp",
         "ZENO-TRACE": "airground_drake.verify.runs.zeno_trace:ZenoTrace",
         "THR-TRIG": "airground_drake.verify.runs.thr_trig:ThrTrig",

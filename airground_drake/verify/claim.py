@@ -218,7 +218,8 @@ def other_plants(trace: Trace) -> str:
     """Robots that had another plant than the scenario's, with its class, in words; empty if all are the scenario's."""
     kinds = trace.meta.get("plants", {})
     robots = trace.scenario.robots
-    return ", ".join(f"{name}: {kind}" for name, kind in kinds.items() if kind != plant_of(robots[name]).kind)
+    others = {name: kind for name, kind in kinds.items() if name in robots and kind != plant_of(robots[name]).kind}
+    return ", ".join(f"{name}: {kind}" for name, kind in others.items())
 
 
 def require_motion(trace: Trace) -> None:

@@ -49,9 +49,13 @@ def demanded(lacking: Any, inside: Any, outside: Any) -> Any:
 
 def shortfalls(
     first: Array, second: Array, d: float, share: Fraction, gain: Fraction, last: Fraction,
-    core: Cores = POINT, *, planar: bool = False,
+    core: Cores = POINT, *, planar: bool = False, held: bool = False,
 ) -> Array:  # fmt: skip
     """What a pair misses at each sample, e_1 + e_2, rounded up: (K,), m per control period.
+
+    With a body that may move with V, the first one alone keeps the passive law: share 1, gain 0, d + V h in place of d,
+    and the second held where it is at each sample. Then e is what the first one may lack of min(D, d + V h) by its own
+    doing.
 
     Args:
         first: positions of a robot at K samples and at the end of the run, (K + 1, 3), m.
@@ -62,12 +66,13 @@ def shortfalls(
         last: control periods from the last sample to the end of the run, at most 1.
         core: of the second body, about its place.
         planar: whether the first body stays in its plane: then no way leads out of a core through its top.
+        held: whether the second body counts as at rest from each sample to the next.
     """
     other = np.broadcast_to(second, first.shape)
     found = np.zeros(len(first) - 1)
-    pair = _Pair(core, planar, Fraction(d), share, gain)
+    pair = _Pair(core, planar, Fraction(d), share, gain, held)
     for k in _doubtful(first, other, pair, float(last)).tolist():
-        ends = np.concatenate([first[k : k + 2], other[k : k + 2]])
+        ends = np.stack([first[k], first[k + 1], other[k], other[k] if held else other[k + 1]])
         found[k] = rounded_up(_shortfall(ends, pair, last if k == len(found) - 1 else Fraction(1)))
     return found
 
@@ -79,13 +84,14 @@ def shortage(one: Array, other: Array, d: float, core: Cores = POINT, *, planar:
 
 
 class _Pair(NamedTuple):
-    """A core, whether the first body stays in its plane, d in m, q_1 and a."""
+    """A core, whether the first body stays in its plane, d in m, q_1, a, and whether the second body is held."""
 
     core: Cores
     planar: bool
     d: Fraction
     share: Fraction
     gain: Fraction
+    held: bool
 
 
 def _doubtful(first: Array, other: Array, pair: _Pair, last: float) -> npt.NDArray[np.intp]:
@@ -96,7 +102,7 @@ def _doubtful(first: Array, other: Array, pair: _Pair, last: float) -> npt.NDArr
     bound = demanded(d - distance, float(pair.gain), 1.0)
     met, reach = np.ones(len(distance), dtype=np.bool_), np.zeros(len(distance))
     for body, sign, part in ((first, 1.0, share), (other, -1.0, 1.0 - share)):
-        step = np.diff(body, axis=0)
+        step = np.zeros_like(body[1:]) if pair.held and sign < 0.0 else np.diff(body, axis=0)
         step[-1] /= last
         reach += np.linalg.norm(step, axis=1)
         if part > 0.0:  # nothing is asked of an obstacle

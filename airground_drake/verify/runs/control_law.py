@@ -12,9 +12,9 @@ import numpy as np
 from airground_drake.base.arrays import Array
 from airground_drake.run.trace import Trace
 from airground_drake.scenarios.schema import Control
-from airground_drake.verify.engines.outlines import Indices, within
+from airground_drake.verify.engines.outlines import Indices
 from airground_drake.verify.engines.shortfalls import demanded
-from airground_drake.verify.runs.pairs import Pair, declared_pairs, is_planar, parts_of
+from airground_drake.verify.runs.pairs import contacts, is_planar, pairs_beside, parts_of
 
 PLANE = np.array([1.0, 1.0, 0.0])
 """Directions in which a UGV can move."""
@@ -30,32 +30,44 @@ class Inequalities(NamedTuple):
         column: what is avoided, (C,): the number of a part in `pairs.parts_of`, or that of a robot after all parts.
         normal: (C, 3).
         bound: (C,), m/s.
+        retreat: n.v at which the robot should retreat, (C,), m/s, a task below all inequalities; 0: it need not.
     """
 
     sample: Indices
     column: Indices
     normal: Array
     bound: Array
+    retreat: Array
 
     def slack(self, velocity: Array) -> Array:
         """Slack of the velocities at the control samples, (S, 3), in each inequality, (C,), m/s."""
         return np.asarray(np.einsum("cd,cd->c", self.normal, velocity[self.sample]) - self.bound)
 
 
-def least_speeds(distance: Array, safe: Array, share: Array, control: Control) -> Array:
+def least_speeds(distance: Array, safe: Array, share: Array, control: Control, speed: Array | float = 0.0) -> Array:
     """Set-based avoidance (7)-(8), (11): n.v >= share A (d - D) where D <= d, else n.v >= share (d - D) / h.
+
+    Beside a body that may move with V > 0 it is n.v >= -(D - d - V h) / h, and never more than n.v >= 0.
 
     Args:
         distance: D, (...), m.
         safe: d, (...), m.
         share: of each inequality, (...).
         control: A, h and sensing range R of the scenario.
+        speed: V, (...), m/s.
 
     Returns:
         The bounds, (...), m/s; -inf where D > R: nothing is asked there.
     """
-    bound = share * demanded(safe - distance, control.avoidance_gain_1_s, 1.0 / control.period_s)
-    return np.where(distance <= control.sensing_range_m, bound, -np.inf)
+    period = control.period_s
+    bound = share * demanded(safe - distance, control.avoidance_gain_1_s, 1.0 / period)
+    passive = np.minimum(-(distance - safe - speed * period) / period, 0.0)
+    return np.where(distance <= control.sensing_range_m, np.where(np.asarray(speed) > 0.0, passive, bound), -np.inf)
+
+
+def retreats(distance: Array, safe: Array, speed: Array, period_s: float) -> Array:
+    """Speeds n.v, (...), m/s, at which a robot should retreat from bodies that may move with V: V - (D - d) / h or 0."""
+    return np.where(speed > 0.0, np.maximum(speed - (distance - safe) / period_s, 0.0), 0.0)
 
 
 def inequalities_of(trace: Trace, robot: str, *, as_seen: bool = False) -> Inequalities:
@@ -70,35 +82,22 @@ def inequalities_of(trace: Trace, robot: str, *, as_seen: bool = False) -> Inequ
         return trace.as_seen(robot, body) if as_seen else trace.position(body)[samples]
 
     own, others = place(robot), [name for name in trace.robots if name != robot]
-    near = within(parts.cores, own, control.sensing_range_m, planar=planar)
-    row = np.array([pairs[name].row for name in parts.names], dtype=np.intp)[parts.owner]
-    there = samples[near.place] >= row[near.core]
+    near = contacts(trace, own, samples, control.sensing_range_m, planar=planar)
     offset = own[:, None] - np.stack([place(name) for name in others], axis=1)
     apart = np.sqrt(np.square(offset).sum(axis=2))
     sample, other = np.nonzero(apart <= control.sensing_range_m)
     apart, offset = apart[sample, other], offset[sample, other]
     beside = [*(pairs[name] for name in parts.names), *(pairs[name] for name in others)]
-    which = np.append(parts.owner[near.core[there]], len(parts.names) + other)
-    safe, share = (np.array([getattr(pair, name) for pair in beside])[which] for name in ("safe_m", "share"))
-    normal = np.concatenate([near.away.normal[there], offset / np.where(apart > 0.0, apart, 1.0)[:, None]])
-    bound = least_speeds(np.append(near.away.distance[there], apart), safe, share, control)
-    when = np.append(near.place[there], sample)
+    which = np.append(parts.owner[near.core], len(parts.names) + other)
+    safe, share, speed = (
+        np.array([getattr(pair, name) for pair in beside])[which] for name in ("safe_m", "share", "speed_m_s")
+    )
+    normal = np.concatenate([near.away.normal, offset / np.where(apart > 0.0, apart, 1.0)[:, None]])
+    distance = np.append(near.away.distance, apart)
+    bound, retreat = least_speeds(distance, safe, share, control, speed), retreats(distance, safe, speed, control.period_s)
+    when = np.append(near.place, sample)
     number = np.array([trace.robots.index(name) for name in others], dtype=np.intp)
-    column = np.append(near.core[there], len(parts.owner) + number[other])
+    column = np.append(near.core, len(parts.owner) + number[other])
     order = np.lexsort([column, when])
     normal = normal * (PLANE if planar else 1.0)
-    return Inequalities(when[order], column[order], normal[order], bound[order])
-
-
-def pairs_beside(trace: Trace, robot: str) -> dict[str, Pair]:
-    """The pairs of a robot by the name of the other body, also those that do not appear before the end."""
-
-    def by_robot() -> dict[str, dict[str, Pair]]:
-        found = {name: dict[str, Pair]() for name in trace.robots}
-        for pair in declared_pairs(trace):
-            found[pair.first][pair.second] = pair
-            if pair.second in found:
-                found[pair.second][pair.first] = pair
-        return found
-
-    return trace.derived("beside", by_robot)[robot]
+    return Inequalities(when[order], column[order], normal[order], bound[order], retreat[order])

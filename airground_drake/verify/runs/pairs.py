@@ -1,6 +1,7 @@
 """The pairs of bodies that must keep apart, by the scenario, and where they are during a run.
 
 A barrier is an obstacle or a wall of the arena, of one convex part or many: its distance is the least over its parts.
+If it moves, its parts are about the origin of its frame, and distances are those of the robot's place from there.
 Everything about places and distances is here: nobody else computes them.
 
 A distance that users see is the gap of a pair, beside the gap required: between surfaces, below 0 if the bodies
@@ -31,6 +32,8 @@ from airground_drake.verify.engines.geometry import (
     interpolate,
 )
 from airground_drake.verify.engines.outlines import (
+    Away,
+    Contacts,
     Cores,
     Indices,
     apart_by_blocks,
@@ -53,6 +56,8 @@ class Pair(NamedTuple):
         share: part of the avoidance inequality that each robot takes: all beside a barrier, half beside a robot.
         reach_m: how far they can approach each other in one control period.
         row: from which on both are there.
+        last: row up to which both are there.
+        speed_m_s: at which robots expect the barrier to move at most; above 0 the robot's law is the passive one.
     """
 
     first: str
@@ -62,11 +67,22 @@ class Pair(NamedTuple):
     share: float
     reach_m: float
     row: int = 0
+    last: int | None = None
+    speed_m_s: float = 0.0
+
+    @property
+    def rows(self) -> slice:
+        """The rows in which both are there."""
+        return slice(self.row, None if self.last is None else self.last + 1)
 
     @property
     def safe_m(self) -> float:
         """Distance of the robot's centre from the other's core that the law keeps, m."""
         return self.required_m + self.radii_m
+
+    def keeps_m(self, period_s: float) -> float:
+        """The same and V h: what a robot keeps at a sample, so that d is kept for a period whatever the barrier does."""
+        return self.safe_m + self.speed_m_s * period_s
 
 
 class Gap(NamedTuple):
@@ -106,11 +122,13 @@ def declared_pairs(trace: Trace) -> Iterator[Pair]:
     safe, uav, period = trace.scenario.safe_distance, trace.scenario.uav.name, trace.scenario.control.period_s
     radius = {name: robot.radius_m for name, robot in trace.scenario.robots.items()}
     limit = {name: robot.max_speed_m_s for name, robot in trace.scenario.robots.items()}
-    there = [(name, each, trace.there_from(name)) for name, each in trace.scenario.barriers.items()]
+    there = [(name, each, trace.there_from(name), trace.there_until(name)) for name, each in
+             trace.scenario.barriers.items()]  # fmt: skip
     for robot in trace.robots:
-        for name, each, row in there:
-            radii, apart = radius[robot] + each.radius_m, each.distance_m or safe.obstacle_m
-            yield Pair(robot, name, apart, radii, 1.0, limit[robot] * period, row)
+        for name, each, row, last in there:
+            radii, speed = radius[robot] + each.radius_m, each.expected_speed_m_s
+            apart = each.distance_m or (safe.moving_m if speed else 0.0) or safe.obstacle_m
+            yield Pair(robot, name, apart, radii, 1.0, (limit[robot] + speed) * period, row, last, speed)
     for robot, other in combinations(trace.robots, 2):
         apart = safe.air_ground_m if uav in (robot, other) else safe.ugv_m
         yield Pair(robot, other, apart, radius[robot] + radius[other], 0.5, (limit[robot] + limit[other]) * period)
@@ -120,7 +138,7 @@ class Parts(NamedTuple):
     """The convex parts of all barriers of a scenario, m of them in the order of the barriers and their parts.
 
     Attributes:
-        cores: (m, ...), world frame.
+        cores: (m, ...), world frame; those of a barrier that moves are about its origin.
         owner: the barrier of each, by its number in the order of `names`, (m,).
         first: number of the first part of each barrier.
         names: of the barriers.
@@ -153,8 +171,63 @@ def cores_of(trace: Trace) -> dict[str, Cores]:
 def _cores(obstacle: Obstacle) -> Cores:
     parts = convex_parts(obstacle)
     if parts is None:
-        return Cores.at(np.array([obstacle.position_m], dtype=np.float64))
+        return Cores.at(np.array([obstacle.position_m or [0.0, 0.0, 0.0]], dtype=np.float64))
     return Cores.prisms(parts, obstacle.height_m)
+
+
+def origin_of(trace: Trace, barrier: str) -> Array | None:
+    """Where the origin of a barrier's parts is at the rows, (T, 3), m; None if it does not move."""
+    return trace.position(barrier) if trace.scenario.barriers[barrier].moves else None
+
+
+def seen_from(trace: Trace, robot: str, barrier: str) -> Array:
+    """Places of a robot at the rows as seen from the origin of a barrier's parts, (T, 3), m."""
+    origin, place = origin_of(trace, barrier), trace.position(robot)
+    return place if origin is None else place - origin
+
+
+def carried(trace: Trace) -> list[tuple[Indices, Array | None]]:
+    """Numbers of the parts that are at rest, and of those of each barrier that moves, with the places of its origin."""
+
+    def found() -> list[tuple[Indices, Array | None]]:
+        parts = parts_of(trace)
+        origins = [origin_of(trace, name) for name in parts.names]
+        still = np.array([origin is None for origin in origins], dtype=np.bool_)
+        moving = [(np.flatnonzero(parts.owner == k), each) for k, each in enumerate(origins) if each is not None]
+        return [(np.flatnonzero(still[parts.owner]), None), *moving]
+
+    return trace.derived("carried", found)
+
+
+def contacts(trace: Trace, places: Array, rows: Indices, reach: float, *, planar: bool) -> Contacts:
+    """Which places (K, 3), m, in the order of a way, are within a distance, m, of which parts of the barriers.
+
+    Barriers that move are where they are at K rows; those that are not there are nowhere.
+    """
+    parts = parts_of(trace)
+    found = list[Contacts]()
+    for some, origin in carried(trace):
+        seen = places if origin is None else places - origin[rows]
+        near = within(parts.cores.take(some), seen, reach, planar=planar)
+        found.append(near._replace(core=some[near.core]))
+    place, core = (np.concatenate([each[k] for each in found]) for k in (0, 1))
+    distance, normal = (np.concatenate([each.away[k] for each in found]) for k in (0, 1))
+    first, last = lifetimes(trace)
+    there = np.flatnonzero((first[core] <= rows[place]) & (rows[place] < last[core]))
+    there = there[np.lexsort([core[there], place[there]])]
+    return Contacts(place[there], core[there], Away(distance[there], normal[there]))
+
+
+def lifetimes(trace: Trace) -> tuple[Indices, Indices]:
+    """The row from which on each convex part is there, and that from which on it is not, (m,)."""
+
+    def found() -> tuple[Indices, Indices]:
+        parts, end = parts_of(trace), len(trace.t) - 1
+        first = np.array([trace.there_from(name) for name in parts.names], dtype=np.intp)
+        last = np.array([trace.there_until(name) for name in parts.names], dtype=np.intp)
+        return first[parts.owner], np.where(last == end, end + 1, last)[parts.owner]
+
+    return trace.derived("lifetimes", found)
 
 
 def is_planar(trace: Trace, robot: str) -> bool:
@@ -180,11 +253,13 @@ def least_gap(trace: Trace, pair: Pair) -> Gap:
     """The smallest gap of a pair over continuous time, exact if both move on straight lines, else a lower bound."""
 
     def found() -> Gap:
-        t, off_m = trace.t[pair.row :], off_m_of(trace, pair.first) + off_m_of(trace, pair.second)
-        first, cores = trace.position(pair.first)[pair.row :], cores_of(trace).get(pair.second)
+        t, off_m = trace.t[pair.rows], off_m_of(trace, pair.first) + off_m_of(trace, pair.second)
+        cores = cores_of(trace).get(pair.second)
         if cores is None:
-            distance, t_s, row = closest_approach(t, first, trace.position(pair.second), off_m)
+            first, second = trace.position(pair.first), trace.position(pair.second)
+            distance, t_s, row = closest_approach(t, first[pair.rows], second[pair.rows], off_m)
         else:
+            first = seen_from(trace, pair.first, pair.second)[pair.rows]
             distance, row, share = closest(cores, first, planar=is_planar(trace, pair.first))
             distance = max(distance - off_m, 0.0) if off_m and cores.are_points else distance - off_m
             t_s = instant_of(t, row, share)
@@ -194,13 +269,15 @@ def least_gap(trace: Trace, pair: Pair) -> Gap:
 
 
 def gap_over_time(trace: Trace, pair: Pair) -> Array:
-    """The gap of a pair at the rows of a trace, (T,), m; NaN before an obstacle appears."""
-    first, cores = trace.position(pair.first), cores_of(trace).get(pair.second)
+    """The gap of a pair at the rows of a trace, (T,), m; NaN where an obstacle is not there."""
+    cores = cores_of(trace).get(pair.second)
     if cores is None:
-        return np.asarray(np.linalg.norm(first - trace.position(pair.second), axis=1)) - pair.radii_m
-    apart = over_time(cores, first, planar=is_planar(trace, pair.first))
-    apart[: pair.row] = np.nan
-    return apart - pair.radii_m
+        apart = np.linalg.norm(trace.position(pair.first) - trace.position(pair.second), axis=1)
+        return np.asarray(apart) - pair.radii_m
+    found, rows = np.full(len(trace.t), np.nan), pair.rows
+    way = seen_from(trace, pair.first, pair.second)[rows]
+    found[rows] = over_time(cores, way, planar=is_planar(trace, pair.first)) - pair.radii_m
+    return found
 
 
 def distances_when_there(trace: Trace, robot: str) -> dict[str, float]:
@@ -208,27 +285,44 @@ def distances_when_there(trace: Trace, robot: str) -> dict[str, float]:
     parts, last = parts_of(trace), len(trace.t) - 1
     if not parts.names:
         return {}
-    row = np.array([min(trace.there_from(name), last) for name in parts.names])[parts.owner]
-    apart = away_from(parts.cores, trace.position(robot)[row], planar=is_planar(trace, robot)).distance
+    row = np.minimum(lifetimes(trace)[0], last)
+    place = trace.position(robot)[row]
+    for some, origin in carried(trace):
+        if origin is not None:
+            place[some] -= origin[row[some]]
+    apart = away_from(parts.cores, place, planar=is_planar(trace, robot)).distance
     return dict(zip(parts.names, np.minimum.reduceat(apart, parts.first).tolist(), strict=True))
 
 
 def are_too_near(trace: Trace, robot: str, places: Array, t_s: float, by_m: float) -> npt.NDArray[np.bool_]:
     """At which places (K, 3), m, a robot is by more than `by_m` too near to a barrier that is there at a time, (K,)."""
-    parts, found = parts_of(trace), np.zeros(len(places), dtype=np.bool_)
-    barriers = [trace.scenario.barriers[name] for name in parts.names]
-    own, apart = trace.scenario.robots[robot].radius_m, trace.scenario.safe_distance.obstacle_m
-    keep = np.array([(each.distance_m or apart) + (own + each.radius_m) for each in barriers])[parts.owner]
-    keep = np.where(appears_of(trace) <= t_s + MERGE_S, keep - by_m, -np.inf)
-    near = within(parts.cores, places, float(keep.max(initial=0.0)), planar=is_planar(trace, robot))
+    found, pairs = np.zeros(len(places), dtype=np.bool_), pairs_beside(trace, robot)
+    parts, row = parts_of(trace), max(int(np.searchsorted(trace.t, t_s + MERGE_S)) - 1, 0)
+    keep = np.array([pairs[name].safe_m for name in parts.names])[parts.owner] - by_m
+    rows, most = np.full(len(places), row), float(keep.max(initial=0.0))
+    near = contacts(trace, places, rows, most, planar=is_planar(trace, robot))
     found[near.place[near.away.distance < keep[near.core]]] = True
     return found
+
+
+def pairs_beside(trace: Trace, robot: str) -> dict[str, Pair]:
+    """The pairs of a robot by the name of the other body, also those that do not appear before the end."""
+
+    def by_robot() -> dict[str, dict[str, Pair]]:
+        found = {name: dict[str, Pair]() for name in trace.robots}
+        for pair in declared_pairs(trace):
+            found[pair.first][pair.second] = pair
+            if pair.second in found:
+                found[pair.second][pair.first] = pair
+        return found
+
+    return trace.derived("beside", by_robot)[robot]
 
 
 def apart_of(trace: Trace) -> Array:
     """A lower bound of the distance of each pair, as of `Pair.safe_m`, over the run: (P,), m, as in `pairs_of`.
 
-    Obstacles count as there from the start on.
+    Obstacles count as there all the time.
     """
     return trace.derived("apart", lambda: _apart_of(trace))
 
@@ -238,7 +332,10 @@ def _apart_of(trace: Trace) -> Array:
     off = {robot: off_m_of(trace, robot) for robot in robots}
     found = dict[tuple[str, str], float]()
     for robot in robots:
-        apart = apart_by_blocks(parts.cores, trace.position(robot)).min(axis=1) - off[robot]
+        apart, place = np.empty(len(parts.owner)), trace.position(robot)
+        for some, origin in carried(trace):
+            way = place if origin is None else place - origin
+            apart[some] = apart_by_blocks(parts.cores.take(some), way).min(axis=1) - off[robot]
         least = np.minimum.reduceat(apart, parts.first) if len(apart) else apart
         found |= {(robot, name): bound for name, bound in zip(parts.names, least.tolist(), strict=True)}
     first, second = np.triu_indices(len(robots), 1)
@@ -279,8 +376,7 @@ def preset_of(trace: Trace, ugv: str) -> tuple[Array, float]:
 
 def appears_of(trace: Trace) -> Array:
     """When each convex part of the barriers appears, (m,), s; inf: not before the end."""
-    parts, t = parts_of(trace), np.append(trace.t, np.inf)
-    return np.asarray(t[[trace.there_from(name) for name in parts.names]][parts.owner])
+    return np.append(trace.t, np.inf)[lifetimes(trace)[0]]
 
 
 def snapshot(trace: Trace, names: Iterable[str], t_s: float) -> dict[str, Any]:
@@ -292,11 +388,13 @@ def snapshot(trace: Trace, names: Iterable[str], t_s: float) -> dict[str, Any]:
     row = min(int(np.searchsorted(t, t_s + MERGE_S)), len(t) - 1)
     moving = [name for name in given if name in trace.robots]
     places = {name: interpolate(t, trace.position(name), t_s) for name in sorted(moving)}
-    fixed = {
-        name: nearest_point(cores, places[moving[0]], planar=is_planar(trace, moving[0])).tolist()
-        for name, cores in cores_of(trace).items()
-        if name in given and moving
-    }
+    fixed = dict[str, list[float]]()
+    for name, cores in cores_of(trace).items():
+        if name in given and moving:
+            way = origin_of(trace, name)
+            origin = np.zeros(3) if way is None else interpolate(t, way, t_s)
+            there = nearest_point(cores, places[moving[0]] - origin, planar=is_planar(trace, moving[0]))
+            fixed[name] = (origin + there).tolist()
     return {
         "positions_m": fixed | {name: place.tolist() for name, place in places.items()},
         "velocities_m_s": {name: trace.command(name)[row].tolist() for name in sorted(moving)},

@@ -37,6 +37,7 @@ from airground_drake.verify.runs.pairs import (
     parts_of,
     snapshot,
 )
+from airground_drake.verify.runs.passive import Periods, last_period, passive_pairs, period_ends, periods_of
 
 VELOCITY_TOLERANCE_M_S = 1e-9
 """A speed may be above its limit by this much, m/s: a command that is shortened to its limit errs by 1e-15 m/s, and in
@@ -47,6 +48,10 @@ MOST_LISTED = 300
 """Pairs that the evidence lists at most: those with the least guarantee."""
 AVOIDANCE = "avoidance"
 """The hypothesis that the steps met the inequalities."""
+PASSIVE = "avoidance beside an obstacle that may move"
+"""The hypothesis that the steps met the passive law."""
+DECLARED = "declared speed"
+"""The hypothesis that an obstacle moved no faster than it was expected to."""
 BUILT = "controller parameters"
 """The hypothesis that the controllers were built with what the scenario demands."""
 
@@ -124,7 +129,9 @@ class SafeHyp(TraceClaim):
     summary = "Every step of the run met the conditions under which the safety theorem (SAFE-INV) holds."
     statement = (
         "At every control sample of the run the hypotheses of the safety theorem held, up to e per pair of bodies: so "
-        "each pair kept d - e / (A h) at all times of the run. The controllers were built with what the scenario says."
+        "each pair of robots and bodies at rest kept d - e / (A h) at all times of the run. Beside an obstacle that "
+        "may move the passive law held, and it moved no faster than declared: so d was kept in every period that "
+        "began at d + V h or more. The controllers were built with what the scenario says."
     )
     latex = (
         r"n^\top (p_i^{k+1} - p_i^k) \ge q\, b - e_i, \quad b = \begin{cases} A h (d - D) & D \le d \\ d - D & D > d "
@@ -133,6 +140,8 @@ class SafeHyp(TraceClaim):
         r"\text{ (obstacle)}, \; q = 1/2 \text{ (robot)}",
         r"e = \max_k (e_i + e_j) \quad \Rightarrow \quad D \ge d - \frac{e}{A h}, \quad \frac{e}{A h} \le 10^{-9} "
         r"\text{ m}",
+        r"n^\top (p_i^{k+1} - p_i^k) \ge \min(0, \, d + V h - D) - e_i, \quad \lVert \dot{o}_j \rVert \le V \quad "
+        r"\text{(obstacle that may move)}",
         r"D(0) \ge d, \quad A h \le 1, \quad \lVert v \rVert \le v_{\max}, \quad v_z = 0 \text{ (UGV)}, \quad "
         r"R \ge d + c h",
     )
@@ -152,11 +161,13 @@ class SafeHyp(TraceClaim):
         "Robots move straight from row to row.",
         "Beside an obstacle with `appears_s` the hypotheses are those from the first control sample at or after that "
         "time on, and the safe start is that D >= d at that sample: where it appears nearer, nothing is promised.",
+        "No safe start is asked beside an obstacle that may move: where it is near, the robot is passive.",
     )
     does_not_establish = (
         "The theorem (SAFE-INV) and the outcome (SAFE-TRACE). Broken hypotheses do not mean that the distance was "
         "violated, only that no more than d - e / (A h) is promised: inside several safe distances at once the "
-        "inequalities can contradict each other. Nothing is said about other runs."
+        "inequalities can contradict each other. Nothing is said about other runs, and nothing of the periods in which a "
+        "robot was passive but that it did not bring itself nearer (SAFE-OWN)."
     )
 
     exercised_by = "avoidance inequalities that bound a command at a control sample"
@@ -164,7 +175,7 @@ class SafeHyp(TraceClaim):
     def check(self, trace: Trace) -> Finding:
         """Evaluate all hypotheses; the first violation in time is the counterexample."""
         kept = sorted(guarantees(trace), key=lambda one: one.margin_m)
-        others = [*_static(trace), *_sampled(trace)]
+        others, moving = [*_static(trace), *_sampled(trace), *_beside_moving(trace)], beside_moving(trace)
         different = list(differences(trace))
         broken = [h.at(int(k)) for h in [*others, *_avoidance(trace, kept)] for k in h.broken()[:1]]
         broken += [{"hypothesis": BUILT, "t_s": float(trace.t[0]), **each} for each in different[:1]]
@@ -179,7 +190,7 @@ class SafeHyp(TraceClaim):
             unit=shown.get("unit", ""),
             quantity="distance promised less the safe one" if name == AVOIDANCE else f"least slack of {name!r}",
             where={key: shown[key] for key in shown if key not in ("margin", "unit")},
-            counterexample=first | snapshot(trace, map(str, first.values()), first["t_s"]) if first else None,
+            counterexample=_against(trace, first) if first else None,
             evidence=asdict(
                 Hypotheses(
                     float(max((one.missed_m.max() for one in kept), default=0.0)),
@@ -191,9 +202,20 @@ class SafeHyp(TraceClaim):
                     in_range,
                     binding,
                 )
-            ),
+            )
+            | ({"beside_moving": [asdict(each) for each in moving]} if moving else {}),
             exercised=sum(binding.values()),
         )
+
+
+def _against(trace: Trace, first: dict[str, Any]) -> dict[str, Any]:
+    """The hypothesis broken first, with what is needed to redo it by hand."""
+    found = first | snapshot(trace, map(str, first.values()), first["t_s"])
+    if first["hypothesis"] != DECLARED:
+        return found
+    declared = trace.scenario.barriers[first["other"]].expected_speed_m_s
+    told = f"{first['other']} moved at {declared - first['margin']:.2f} m/s at {first['t_s']:.2f} s"
+    return found | {"why": f"{told}, declared {declared:.2f}"}
 
 
 def _worst(hypotheses: Sequence[_Hypothesis]) -> list[dict[str, Any]]:
@@ -242,19 +264,20 @@ def guarantees(trace: Trace) -> list[Guarantee]:
 
 
 def _guarantees(trace: Trace) -> Iterator[Guarantee]:
-    samples, period = np.append(trace.sample_rows, len(trace.t) - 1), trace.scenario.control.period_s
-    lasting = float(trace.t[samples[-1]] - trace.t[samples[-2]])
-    last = Fraction(1) if abs(lasting - period) <= TIME_TOLERANCE_S else Fraction(lasting) / Fraction(period)
+    samples, last = period_ends(trace), last_period(trace)
     places = {name: trace.position(name)[samples] for name in trace.robots}
     longest = {name: _longest(each, float(last)) for name, each in places.items()}
     pairs, gain = pairs_of(trace), _gain(trace)
     reach = np.array([pair.safe_m + longest[pair.first] + longest.get(pair.second, 0.0) for pair in pairs])
     for k in np.flatnonzero(apart_of(trace) <= reach + SCREEN_M).tolist():
         pair = pairs[k]
+        if pair.speed_m_s > 0.0:  # see `passive`
+            continue
         begin = int(np.searchsorted(samples, pair.row))
-        first, planar = places[pair.first][begin:], is_planar(trace, pair.first)
-        beside = _beside(trace, pair, first, places, float(reach[k]))
-        asked = Fraction(pair.share), gain, last
+        end = len(samples) if pair.last is None else int(np.searchsorted(samples, pair.last)) + 1
+        there, planar = slice(begin, end), is_planar(trace, pair.first)
+        first, beside = places[pair.first][there], _beside(trace, pair, places, there, float(reach[k]))
+        asked = Fraction(pair.share), gain, last if end == len(samples) else Fraction(1)
         missed = [shortfalls(first, place, pair.safe_m, *asked, core, planar=planar) for place, core in beside]
         begun = [
             shortage(first[0], place.reshape(-1, 3)[0], pair.safe_m, core, planar=planar) for place, core in beside
@@ -262,23 +285,24 @@ def _guarantees(trace: Trace) -> Iterator[Guarantee]:
         most = np.max([np.zeros(len(first) - 1), *missed], axis=0)
         e, short = Fraction(float(most.max())), max(begun, default=Fraction(0))
         lost = max(e / gain, short) if gain else (len(samples) - 1) * e + short
-        missed_m = np.concatenate([np.zeros(begin), most])
+        missed_m = np.concatenate([np.zeros(begin), most, np.zeros(len(samples) - end)])
         yield Guarantee(pair, missed_m, rounded_up(short), -rounded_up(lost - Fraction(pair.required_m)))
 
 
 def _beside(
-    trace: Trace, pair: Pair, first: Array, places: dict[str, Array], reach: float
+    trace: Trace, pair: Pair, places: dict[str, Array], there: slice, reach: float
 ) -> list[tuple[Array, Cores]]:
     """What the first body of a pair keeps away from: places of the second and its core, or each part of a barrier.
 
-    Parts that stay beyond reach of the way `first` are left out. A point is given by its place.
+    Parts that stay beyond reach of the way of the first are left out. A point is given by its place.
     """
     if pair.second in places:
-        return [(places[pair.second], POINT)]
+        return [(places[pair.second][there], POINT)]
     cores = cores_of(trace)[pair.second]
     if cores.are_points:
         return [(place, POINT) for place in cores.points]
-    near = np.flatnonzero((apart_by_blocks(cores, first) <= reach + SCREEN_M).any(axis=1)).tolist()
+    bounds = apart_by_blocks(cores, places[pair.first][there])
+    near = np.flatnonzero((bounds <= reach + SCREEN_M).any(axis=1)).tolist()
     return [(np.zeros(3), cores.take(k)) for k in near]
 
 
@@ -296,6 +320,76 @@ def _avoidance(trace: Trace, kept: Sequence[Guarantee]) -> Iterator[_Hypothesis]
         lost = one.missed_m / gain if gain else one.missed_m * len(t)
         about = {"first": one.pair.first, "second": one.pair.second}
         yield _Hypothesis(AVOIDANCE, "m", t, 0.0 - lost, DISTANCE_TOLERANCE_M, about)
+
+
+def _beside_moving(trace: Trace) -> Iterator[_Hypothesis]:
+    """Beside obstacles that may move: the passive law, and that they move no faster than declared."""
+    period_s, ends = trace.scenario.control.period_s, period_ends(trace)
+    for one in _passive(trace):
+        about = {"first": one.pair.first, "second": one.pair.second}
+        yield _Hypothesis(PASSIVE, "m", trace.t[one.row], 0.0 - one.missed_m, DISTANCE_TOLERANCE_M, about)
+    for name, speed in speeds(trace).items():
+        spare = trace.scenario.barriers[name].expected_speed_m_s - speed
+        yield _Hypothesis(DECLARED, "m/s", trace.t[ends[:-1]], spare, DISTANCE_TOLERANCE_M / period_s, {"other": name})
+        off = np.linalg.norm(trace.position(name) - interpolate(trace.t[ends], trace.position(name)[ends], trace.t), axis=1)
+        yield _Hypothesis("straight motion", "m", trace.t, 0.0 - off, DISTANCE_TOLERANCE_M, {"other": name})
+
+
+def speeds(trace: Trace) -> dict[str, Array]:
+    """Mean speeds of the obstacles that move during the control periods, (K,), m/s, by name; 0 while not there."""
+    ends, found = period_ends(trace), dict[str, Array]()
+    for name, each in trace.scenario.barriers.items():
+        if each.moves:
+            speed = np.linalg.norm(np.diff(trace.position(name)[ends], axis=0), axis=1) / np.diff(trace.t[ends])
+            there = (ends[:-1] >= trace.there_from(name)) & (ends[:-1] < trace.there_until(name))
+            found[name] = np.where(there, speed, 0.0)
+    return found
+
+
+def _passive(trace: Trace) -> list[Periods]:
+    return [periods_of(trace, pair) for pair in passive_pairs(trace)]
+
+
+@dataclass(frozen=True)
+class BesideMoving:
+    """A robot beside an obstacle that may move, in numbers of control periods.
+
+    `kept_periods`: all hypotheses were met, so that the distance is proved whatever the obstacle does within its
+    declared speed. In the `passive_periods` it was too near for that, and the robot did not bring itself nearer; in
+    `standing_periods` of these it stood. In `retreating_periods` it retreated so fast that it would have kept the
+    distance, and all that it lost is the obstacle's motion above its declared speed.
+    """
+
+    first: str
+    second: str
+    safe_distance_m: float
+    declared_m_s: float
+    fastest_m_s: float
+    too_fast_s: float | None
+    periods: int
+    kept_periods: int
+    passive_periods: int
+    retreating_periods: int
+    standing_periods: int
+    e_m: float
+
+
+def beside_moving(trace: Trace) -> list[BesideMoving]:
+    """Each robot beside each obstacle that may move."""
+    return trace.derived("beside moving", lambda: list(_beside_each(trace)))
+
+
+def _beside_each(trace: Trace) -> Iterator[BesideMoving]:
+    fast, slop = speeds(trace), DISTANCE_TOLERANCE_M / trace.scenario.control.period_s
+    for one in _passive(trace):
+        pair, of_body = one.pair, fast.get(one.pair.second, np.zeros(1))
+        over = np.flatnonzero(of_body > pair.speed_m_s + slop)
+        yield BesideMoving(
+            pair.first, pair.second, pair.required_m, pair.speed_m_s, float(of_body.max()),
+            float(trace.t[period_ends(trace)[over[0]]]) if len(over) else None,
+            len(one.row), int(one.kept.sum()), int(one.passive.sum()), int(one.retreated.sum()), int(one.stood.sum()),
+            float(one.missed_m.max(initial=0.0)),
+        )  # fmt: skip
 
 
 def _binding(trace: Trace) -> tuple[int, dict[str, int]]:
@@ -335,9 +429,10 @@ def _static(trace: Trace) -> Iterator[_Hypothesis]:
         apart = dict(zip(trace.robots, np.linalg.norm(away, axis=1).tolist(), strict=True))
         apart |= distances_when_there(trace, robot)
         start, about = trace.t[rows], {"first": robot}
-        excess = np.array([apart[pair.second] - pair.safe_m for pair in beside])
-        yield _Hypothesis("safe start", "m", start, excess, DISTANCE_TOLERANCE_M, about, others)
-        left = [room(pair.safe_m, limit[robot], limit.get(pair.second, 0.0)) for pair in beside]
+        excess = np.array([np.inf if pair.speed_m_s else apart[pair.second] - pair.safe_m for pair in beside])
+        if np.isfinite(excess).any():
+            yield _Hypothesis("safe start", "m", start, excess, DISTANCE_TOLERANCE_M, about, others)
+        left = [room(pair.safe_m, limit[robot], limit.get(pair.second, pair.speed_m_s)) for pair in beside]
         yield _Hypothesis("sensing range", "m", start, np.array(left), 0.0, about, others)
 
 

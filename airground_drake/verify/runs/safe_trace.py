@@ -19,6 +19,7 @@ from airground_drake.verify.runs.pairs import (
     pairs_of,
     snapshot,
 )
+from airground_drake.verify.runs.passive import encounters
 
 MOST_LISTED = 300
 """Pairs that the evidence lists at most: those of least margin."""
@@ -48,13 +49,15 @@ class SafeTrace(TraceClaim):
         "body. A barrier is all that is within its radius of its core C: a point, walls, a polygon, or a prism up to "
         "its height. A distance is the gap between surfaces; below 0 they overlap. d_ij is the obstacle's own "
         "`distance_m`, or the safe distance of the kind of pair.",
-        "For a UGV, walls have no end in height. Obstacles stand still for the whole run, as the scenario lists them. "
-        "One with `appears_s` is judged from the first control sample at or after that time on, the instant itself "
+        "For a UGV, walls have no end in height. Obstacles stand still for the whole run, as the scenario lists them, "
+        "or move without turning as the trace says, straight between two rows. One with `appears_s` or `disappears_s` "
+        "is judged from the first control sample at or after the one up to that at or after the other, both instants "
         "included.",
     )
     does_not_establish = (
         "Safety of any other run, start or seed, or of a plant that does not follow its velocity exactly (SAFE-DIST); "
-        "nor that positions in the trace are those of a real robot. It says nothing about why the distance was kept."
+        "nor that positions in the trace are those of a real robot. It says nothing about why the distance was kept. "
+        "Beside obstacles that move a refutation does not mean that a robot did anything wrong (SAFE-OWN)."
     )
 
     exercised_by = "pairs that came so close that one control period at full speed would have broken the distance"
@@ -113,7 +116,10 @@ def _entry(trace: Trace, k: int) -> Distance:
 
 
 def _why(trace: Trace, worst: Distance) -> dict[str, str]:
-    """That a pair was nearest when its obstacle appeared, if so: no robot's doing."""
-    if not least_gap(trace, pair_of(trace, worst.first, worst.second)).at_appearance(trace.t):
+    """Whose doing it was: of an obstacle that moves, or nobody's if the pair was nearest when its obstacle appeared."""
+    pair = pair_of(trace, worst.first, worst.second)
+    if pair.speed_m_s > 0.0:
+        return {"why": next(each.told() for each in encounters(trace) if each[:2] == (pair.first, pair.second))}
+    if not least_gap(trace, pair).at_appearance(trace.t):
         return {}
     return {"why": f"{worst.second} appeared at {worst.t_s:.9g} s this near to {worst.first}: nobody's doing"}
