@@ -103,7 +103,7 @@ class UgvController(_Controller):
     def parameters(self, context: Context) -> dict[str, Any]:
         """What it runs with, see `read_back`, and whether it puts interventions on top of avoidance."""
         law: UgvLaw = self._in_force(context)
-        found = read_back(self, law.avoidance, self._near)
+        found = read_back(self, law.avoidance, self._near, len(self._world.robots))
         return {**found, "composition": law.avoidance.composition, "intervention_on_top": law.intervention_on_top}
 
     def _with_gains(self, *gains: float) -> UgvLaw:
@@ -196,7 +196,7 @@ class UavController(_Controller):
     def parameters(self, context: Context) -> dict[str, Any]:
         """What it runs with, see `read_back`."""
         avoidance, _ = self._in_force(context)
-        return read_back(self, avoidance, self._near)
+        return read_back(self, avoidance, self._near, len(self._world.robots))
 
     def _with_gains(self, *gains: float) -> tuple[Avoidance, float]:
         return replace(self.avoidance, gain=gains[0]), gains[1]
@@ -241,19 +241,21 @@ class UavController(_Controller):
         return _velocity_of(task, read_only(own))
 
 
-def read_back(system: LeafSystem, avoidance: Avoidance, near: Neighbours) -> dict[str, Any]:
-    """The parameters with which a controller's avoidance runs, in strict JSON, for the trace.
+def read_back(system: LeafSystem, avoidance: Avoidance, near: Neighbours, robots: int) -> dict[str, Any]:
+    """The parameters with which a controller's avoidance runs, in strict JSON, for the trace; `robots`: how many move.
 
     Returns:
         For its k robots: `members`, their indices in the order of the world; `outlines` of the m convex parts at rest,
-        without padding, one after the other; `others`, indices of the bodies of the n parts that each avoids besides,
-        (k, n); `safe_m` and `share` beside the parts at rest, then beside the
-        robots, (k, m + n); `mobility` (k, 3); `max_speed_m_s` (k,). For the layer: `sampling_s`, period and offset;
+        without padding, one after the other; `moving_outlines`, those of obstacles that move, about their origins, if
+        there are any; `others`, indices of the bodies of the n parts that each avoids besides what is at rest, (k, n);
+        `safe_m` and `share` beside the parts at rest, then beside the others, (k, m + n); `mobility` (k, 3);
+        `max_speed_m_s` (k,). For the layer: `sampling_s`, period and offset;
         `gain_1_s`, `period_s`, `sensing_range_m`. Arrays are flat, in C order; `safe_m` and `share` are lists of
         [value, number of repetitions].
     """
     timing = system.GetUniquePeriodicDiscreteUpdateAttribute()
-    return {
+    moving = [number for row in near.parts[robots:] for number in convex.as_tuple(row)]
+    return ({"moving_outlines": moving} if moving else {}) | {
         "members": near.members.tolist(),
         "outlines": [number for row in near.still for number in convex.as_tuple(row)],
         "others": near.carrier[near.others].ravel().tolist(),

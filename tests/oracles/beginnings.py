@@ -11,8 +11,7 @@ from airground_drake.base.arrays import Array
 from airground_drake.run.trace import Trace
 from airground_drake.verify.engines.geometry import corner_times, interpolate, travelled
 from airground_drake.verify.engines.outlines import GAP, RADIUS, Cores
-from airground_drake.verify.runs.control_law import pairs_beside
-from airground_drake.verify.runs.pairs import Pair, pairs_of, parts_of, preset_of
+from airground_drake.verify.runs.pairs import Pair, pairs_beside, pairs_of, parts_of, preset_of
 from airground_drake.verify.runs.proposals import ProposalRecord, proposal_of
 from oracles.closed_loops import Scene
 from oracles.control_law import place, selected

@@ -17,7 +17,7 @@ from airground_drake.scenarios.schema import Gatekeeper
 from airground_drake.verify.claim import TIME_TOLERANCE_S
 from airground_drake.verify.engines.geometry import interpolate, travelled
 from airground_drake.verify.engines.outlines import Cores, away_from
-from airground_drake.verify.runs.control_law import ON_TOP, pairs_beside
+from airground_drake.verify.runs.control_law import ON_TOP
 from airground_drake.verify.runs.convex_bounds import Enclosure
 from airground_drake.verify.runs.gate_plan import BLOCKS, Bounded, bound, cheapest_of_blocks
 from airground_drake.verify.runs.gate_record import (
@@ -28,7 +28,7 @@ from airground_drake.verify.runs.gate_record import (
     rows_of,
 )
 from airground_drake.verify.runs.instants import GATED_METHODS, intervening
-from airground_drake.verify.runs.pairs import parts_of, preset_of
+from airground_drake.verify.runs.pairs import pairs_beside, parts_of, preset_of
 from airground_drake.verify.runs.proposals import proposals_of
 from oracles.fault import Fault
 from oracles.sensing import sensed

@@ -8,9 +8,9 @@ import numpy as np
 
 from airground_drake.base.arrays import Array
 from airground_drake.run.trace import Trace
-from airground_drake.verify.runs.control_law import ON_TOP, pairs_beside
+from airground_drake.verify.runs.control_law import ON_TOP
 from airground_drake.verify.runs.gate_record import DecisionRecord, rows_of
-from airground_drake.verify.runs.pairs import parts_of
+from airground_drake.verify.runs.pairs import pairs_beside, parts_of
 from airground_drake.verify.runs.proposals import proposal_of
 from oracles.beginnings import scene
 from oracles.closed_loops import NUDGES_M, Scene, in_batches, move_apart, roll_out, stacked

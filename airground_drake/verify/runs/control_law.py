@@ -66,7 +66,7 @@ def least_speeds(distance: Array, safe: Array, share: Array, control: Control, s
 
 
 def retreats(distance: Array, safe: Array, speed: Array, period_s: float) -> Array:
-    """Speeds n.v, (...), m/s, at which a robot should retreat from bodies that may move with V: V - (D - d) / h or 0."""
+    """Speeds n.v, (...), m/s, at which a robot should retreat from bodies that may move: V - (D - d) / h, at least 0."""
     return np.where(speed > 0.0, np.maximum(speed - (distance - safe) / period_s, 0.0), 0.0)
 
 
@@ -94,7 +94,8 @@ def inequalities_of(trace: Trace, robot: str, *, as_seen: bool = False) -> Inequ
     )
     normal = np.concatenate([near.away.normal, offset / np.where(apart > 0.0, apart, 1.0)[:, None]])
     distance = np.append(near.away.distance, apart)
-    bound, retreat = least_speeds(distance, safe, share, control, speed), retreats(distance, safe, speed, control.period_s)
+    bound = least_speeds(distance, safe, share, control, speed)
+    retreat = retreats(distance, safe, speed, control.period_s)
     when = np.append(near.place, sample)
     number = np.array([trace.robots.index(name) for name in others], dtype=np.intp)
     column = np.append(near.core, len(parts.owner) + number[other])

@@ -18,14 +18,17 @@ from airground_drake.verify.engines.outlines import (
     COUNT,
     EXTENT,
     MIDDLE,
+    Indices,
     unpacked,
 )
 from airground_drake.verify.runs.control_law import ON_TOP
-from airground_drake.verify.runs.pairs import declared_pairs, parts_of
+from airground_drake.verify.runs.pairs import carried, declared_pairs, pairs_beside, parts_of
 
 CONTROLLERS = ("ugv_controller", "uav_controller")
 NO_INTERVENTION = "a"
 """Method without interventions."""
+OUTLINES = ("outlines", "moving_outlines")
+"""Parameters that are outlines: of what is at rest, and of what moves, about its origin."""
 PLANAR, SPATIAL = (1.0, 1.0, 0.0), (1.0, 1.0, 1.0)
 """Directions in which UGVs and UAVs move."""
 
@@ -35,11 +38,13 @@ def demanded(trace: Trace) -> dict[str, dict[str, Any]]:
 
     Outlines are without the circles round their corners.
 
-    Every robot avoids all convex parts of the barriers, then all other robots in team order.
+    Every robot avoids all convex parts of the barriers at rest, then all other robots in team order, then the parts of
+    the barriers that move.
     """
     scenario, robots, parts = trace.scenario, trace.robots, parts_of(trace)
-    control, barriers = scenario.control, scenario.barriers
-    everybody, m = np.arange(len(robots)), len(parts.owner)
+    control, barriers, everybody = scenario.control, scenario.barriers, np.arange(len(robots))
+    still, moving = _numbers(trace)
+    m = len(still)
     number = {name: k for k, name in enumerate([*barriers, *robots])}
     safe, share = np.zeros((2, len(robots), len(number)))
     for pair in declared_pairs(trace):
@@ -48,17 +53,20 @@ def demanded(trace: Trace) -> dict[str, dict[str, Any]]:
             if i >= len(barriers):  # a barrier avoids nothing
                 i -= len(barriers)
                 safe[i, j], share[i, j] = pair.safe_m, pair.share
-    outlines = np.concatenate([np.empty(0), *outlines_of(trace)])
-    column = np.append(parts.owner, len(barriers) + everybody)
+    outlines = [*outlines_of(trace)]
+    at_rest, that_move = (np.concatenate([np.empty(0), *(outlines[k] for k in some)]) for some in (still, moving))
+    column = np.concatenate([parts.owner[still], len(barriers) + everybody, parts.owner[moving]])
     safe, share = safe[:, column], share[:, column]
+    bodies = np.unique(parts.owner[moving], return_inverse=True)[1]
+    carrier = np.concatenate([everybody, len(robots) + bodies])
     with_uav = np.array([name == scenario.uav.name for name in robots])
     found = {}
     for name, team in zip(CONTROLLERS, (everybody[~with_uav], everybody[with_uav]), strict=True):
-        beside = np.array([np.delete(np.arange(m + len(robots)), m + i) for i in team])
+        beside = np.array([np.delete(np.arange(len(column)), m + i) for i in team])
         found[name] = {
             "members": team,
-            "outlines": outlines,
-            "others": (beside[:, m:] - m).ravel(),
+            "outlines": at_rest,
+            "others": carrier[beside[:, m:] - m].ravel(),
             "safe_m": np.take_along_axis(safe[team], beside, axis=1).ravel(),
             "share": np.take_along_axis(share[team], beside, axis=1).ravel(),
             "mobility": np.array([SPATIAL if with_uav[i] else PLANAR for i in team]).ravel(),
@@ -68,6 +76,8 @@ def demanded(trace: Trace) -> dict[str, dict[str, Any]]:
             "period_s": control.period_s,
             "sensing_range_m": control.sensing_range_m,
         }
+        if len(moving):
+            found[name]["moving_outlines"] = that_move
     of_run = scenario.runs[trace.run]
     found["ugv_controller"]["composition"] = of_run.composition
     if of_run.method != NO_INTERVENTION:
@@ -75,15 +85,21 @@ def demanded(trace: Trace) -> dict[str, dict[str, Any]]:
     return found
 
 
+def _numbers(trace: Trace) -> tuple[Indices, Indices]:
+    """Numbers of the parts of barriers at rest, and of those that move."""
+    still, *moving = (numbers for numbers, _ in carried(trace))
+    return still, np.concatenate([np.empty(0, dtype=np.intp), *moving])
+
+
 def outlines_of(trace: Trace) -> Iterator[Array]:
     """The numbers of the outline of each convex part of the barriers, but for the circle round its corners."""
-    parts, safe = parts_of(trace), trace.scenario.safe_distance
+    parts, pairs = parts_of(trace), pairs_beside(trace, trace.robots[0])
     for k, number in enumerate(parts.owner.tolist()):
         each, core = trace.scenario.barriers[parts.names[number]], parts.cores.take(k)
         corners = list(dict.fromkeys(map(tuple, core.corners.tolist())))
         heights = [float(core.base), float(core.top), float(len(corners))]
-        gap = each.distance_m or safe.obstacle_m
-        yield np.array([gap, each.radius_m, 0.0, *heights, *(x for corner in corners for x in corner)])
+        gap, speed = pairs[parts.names[number]].required_m, each.expected_speed_m_s
+        yield np.array([gap, each.radius_m, speed, *heights, *(x for corner in corners for x in corner)])
 
 
 def _without_circles(numbers: Sequence[float]) -> Array:
@@ -114,7 +130,7 @@ def differences(trace: Trace) -> Iterator[dict[str, Any]]:
             if parameter in ("safe_m", "share"):
                 value, times = np.array(given, dtype=np.float64).reshape(-1, 2).T
                 given = np.repeat(value, times.astype(np.intp))
-            given = _without_circles(given or []) if parameter == "outlines" else np.asarray(given, dtype=np.float64)
+            given = _without_circles(given or []) if parameter in OUTLINES else np.asarray(given, dtype=np.float64)
             if given.shape != due.shape:
                 yield {**about, "built": f"{given.size} numbers", "scenario": f"{due.size} numbers"}
             elif (given != due).any():
@@ -130,8 +146,9 @@ def _place(trace: Trace, wanted: dict[str, Any], parameter: str, k: int) -> dict
     if parameter in ("safe_m", "share"):
         robot, column = divmod(k, each)
         others = wanted["others"].reshape(len(members), -1)[robot]
-        m = len(parts.owner)
-        beside = parts.names[parts.owner[column]] if column < m else trace.robots[others[column - m]]
+        still, _ = _numbers(trace)
+        m, moving = len(still), [name for name, barrier in trace.scenario.barriers.items() if barrier.moves]
+        beside = parts.names[parts.owner[still[column]]] if column < m else [*trace.robots, *moving][others[column - m]]
         return {"robot": trace.robots[members[robot]], "other": beside}
     if parameter in ("mobility", "max_speed_m_s"):
         return {"robot": trace.robots[members[k // each]]}

@@ -81,7 +81,7 @@ class Pair(NamedTuple):
         return self.required_m + self.radii_m
 
     def keeps_m(self, period_s: float) -> float:
-        """The same and V h: what a robot keeps at a sample, so that d is kept for a period whatever the barrier does."""
+        """The same and V h: who keeps it at a sample keeps d for a period, whatever the barrier does."""
         return self.safe_m + self.speed_m_s * period_s
 
 

@@ -6,6 +6,8 @@ of min(D, d + V h), the obstacle has moved itself.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from dataclasses import dataclass
 from fractions import Fraction
 from typing import NamedTuple
 
@@ -137,6 +139,64 @@ def _periods(trace: Trace, pair: Pair) -> Periods:
     )  # fmt: skip
 
 
+def beside(trace: Trace) -> list[Periods]:
+    """The control periods of every robot beside every obstacle that may move."""
+    return [periods_of(trace, pair) for pair in passive_pairs(trace)]
+
+
+def speeds(trace: Trace) -> dict[str, Array]:
+    """Mean speeds of the obstacles that move during the control periods, (K,), m/s, by name; 0 while not there."""
+    ends, found = period_ends(trace), dict[str, Array]()
+    for name, each in trace.scenario.barriers.items():
+        if each.moves:
+            speed = np.linalg.norm(np.diff(trace.position(name)[ends], axis=0), axis=1) / np.diff(trace.t[ends])
+            there = (ends[:-1] >= trace.there_from(name)) & (ends[:-1] < trace.there_until(name))
+            found[name] = np.where(there, speed, 0.0)
+    return found
+
+
+@dataclass(frozen=True)
+class BesideMoving:
+    """A robot beside an obstacle that may move, in numbers of control periods.
+
+    `kept_periods`: all hypotheses were met, so that the distance is proved whatever the obstacle does within its
+    declared speed. In the `passive_periods` it was too near for that, and the robot did not bring itself nearer; in
+    `standing_periods` of these it stood. In `retreating_periods` it retreated so fast that it would have kept the
+    distance, and all that it lost is the obstacle's motion above its declared speed.
+    """
+
+    first: str
+    second: str
+    safe_distance_m: float
+    declared_m_s: float
+    fastest_m_s: float
+    too_fast_s: float | None
+    periods: int
+    kept_periods: int
+    passive_periods: int
+    retreating_periods: int
+    standing_periods: int
+    e_m: float
+
+
+def beside_moving(trace: Trace) -> list[BesideMoving]:
+    """Each robot beside each obstacle that may move."""
+    return trace.derived("beside moving", lambda: list(_beside_each(trace)))
+
+
+def _beside_each(trace: Trace) -> Iterator[BesideMoving]:
+    fast, slop = speeds(trace), DISTANCE_TOLERANCE_M / trace.scenario.control.period_s
+    for one in beside(trace):
+        pair, of_body = one.pair, fast.get(one.pair.second, np.zeros(1))
+        over = np.flatnonzero(of_body > pair.speed_m_s + slop)
+        yield BesideMoving(
+            pair.first, pair.second, pair.required_m, pair.speed_m_s, float(of_body.max()),
+            float(trace.t[period_ends(trace)[over[0]]]) if len(over) else None,
+            len(one.row), int(one.kept.sum()), int(one.passive.sum()), int(one.retreated.sum()), int(one.stood.sum()),
+            float(one.missed_m.max(initial=0.0)),
+        )  # fmt: skip
+
+
 def own_margins(trace: Trace, pair: Pair, robot: str) -> Array:
     """What a robot left of min(D, d + V h) by its own doing, for the T - 1 segments between rows, (T - 1,), m.
 
@@ -152,13 +212,14 @@ def own_margins(trace: Trace, pair: Pair, robot: str) -> Array:
     origin = np.zeros_like(place) if origin is None else origin
     keeps, off_m = pair.keeps_m(trace.scenario.control.period_s), off_m_of(trace, robot)
     last = len(trace.t) - 1 if pair.last is None else pair.last
-    parts = cores.take(np.flatnonzero(apart_by_blocks(cores, place - origin).min(axis=1) <= keeps + pair.reach_m + off_m))
+    reach = keeps + pair.reach_m + off_m
+    parts = cores.take(np.flatnonzero(apart_by_blocks(cores, place - origin).min(axis=1) <= reach))
     found = np.full(len(rows), np.inf)
     if not len(parts.base):
         return found
     each = parts.take((slice(None), None))
     at_sample = away_from(each, place[sample] - origin[sample], planar=planar).distance.min(axis=0)
-    near = (at_sample <= keeps + pair.reach_m + off_m) & (sample >= pair.row) & (rows < last)
+    near = (at_sample <= reach) & (sample >= pair.row) & (rows < last)
     start, end = (place[rows[near] + k] - origin[sample[near]] for k in (0, 1))
     least = least_distances(each, start, end, planar=planar)[0].min(axis=0) - off_m
     found[near] = least - np.minimum(at_sample[near], keeps)

@@ -37,7 +37,7 @@ from airground_drake.verify.runs.pairs import (
     parts_of,
     snapshot,
 )
-from airground_drake.verify.runs.passive import Periods, last_period, passive_pairs, period_ends, periods_of
+from airground_drake.verify.runs.passive import beside, beside_moving, last_period, period_ends, speeds
 
 VELOCITY_TOLERANCE_M_S = 1e-9
 """A speed may be above its limit by this much, m/s: a command that is shortened to its limit errs by 1e-15 m/s, and in
@@ -166,8 +166,8 @@ class SafeHyp(TraceClaim):
     does_not_establish = (
         "The theorem (SAFE-INV) and the outcome (SAFE-TRACE). Broken hypotheses do not mean that the distance was "
         "violated, only that no more than d - e / (A h) is promised: inside several safe distances at once the "
-        "inequalities can contradict each other. Nothing is said about other runs, and nothing of the periods in which a "
-        "robot was passive but that it did not bring itself nearer (SAFE-OWN)."
+        "inequalities can contradict each other. Nothing is said about other runs, and of the periods in which a robot "
+        "was passive only that it did not bring itself nearer (SAFE-OWN)."
     )
 
     exercised_by = "avoidance inequalities that bound a command at a control sample"
@@ -325,71 +325,15 @@ def _avoidance(trace: Trace, kept: Sequence[Guarantee]) -> Iterator[_Hypothesis]
 def _beside_moving(trace: Trace) -> Iterator[_Hypothesis]:
     """Beside obstacles that may move: the passive law, and that they move no faster than declared."""
     period_s, ends = trace.scenario.control.period_s, period_ends(trace)
-    for one in _passive(trace):
+    for one in beside(trace):
         about = {"first": one.pair.first, "second": one.pair.second}
         yield _Hypothesis(PASSIVE, "m", trace.t[one.row], 0.0 - one.missed_m, DISTANCE_TOLERANCE_M, about)
     for name, speed in speeds(trace).items():
         spare = trace.scenario.barriers[name].expected_speed_m_s - speed
         yield _Hypothesis(DECLARED, "m/s", trace.t[ends[:-1]], spare, DISTANCE_TOLERANCE_M / period_s, {"other": name})
-        off = np.linalg.norm(trace.position(name) - interpolate(trace.t[ends], trace.position(name)[ends], trace.t), axis=1)
+        place = trace.position(name)
+        off = np.linalg.norm(place - interpolate(trace.t[ends], place[ends], trace.t), axis=1)
         yield _Hypothesis("straight motion", "m", trace.t, 0.0 - off, DISTANCE_TOLERANCE_M, {"other": name})
-
-
-def speeds(trace: Trace) -> dict[str, Array]:
-    """Mean speeds of the obstacles that move during the control periods, (K,), m/s, by name; 0 while not there."""
-    ends, found = period_ends(trace), dict[str, Array]()
-    for name, each in trace.scenario.barriers.items():
-        if each.moves:
-            speed = np.linalg.norm(np.diff(trace.position(name)[ends], axis=0), axis=1) / np.diff(trace.t[ends])
-            there = (ends[:-1] >= trace.there_from(name)) & (ends[:-1] < trace.there_until(name))
-            found[name] = np.where(there, speed, 0.0)
-    return found
-
-
-def _passive(trace: Trace) -> list[Periods]:
-    return [periods_of(trace, pair) for pair in passive_pairs(trace)]
-
-
-@dataclass(frozen=True)
-class BesideMoving:
-    """A robot beside an obstacle that may move, in numbers of control periods.
-
-    `kept_periods`: all hypotheses were met, so that the distance is proved whatever the obstacle does within its
-    declared speed. In the `passive_periods` it was too near for that, and the robot did not bring itself nearer; in
-    `standing_periods` of these it stood. In `retreating_periods` it retreated so fast that it would have kept the
-    distance, and all that it lost is the obstacle's motion above its declared speed.
-    """
-
-    first: str
-    second: str
-    safe_distance_m: float
-    declared_m_s: float
-    fastest_m_s: float
-    too_fast_s: float | None
-    periods: int
-    kept_periods: int
-    passive_periods: int
-    retreating_periods: int
-    standing_periods: int
-    e_m: float
-
-
-def beside_moving(trace: Trace) -> list[BesideMoving]:
-    """Each robot beside each obstacle that may move."""
-    return trace.derived("beside moving", lambda: list(_beside_each(trace)))
-
-
-def _beside_each(trace: Trace) -> Iterator[BesideMoving]:
-    fast, slop = speeds(trace), DISTANCE_TOLERANCE_M / trace.scenario.control.period_s
-    for one in _passive(trace):
-        pair, of_body = one.pair, fast.get(one.pair.second, np.zeros(1))
-        over = np.flatnonzero(of_body > pair.speed_m_s + slop)
-        yield BesideMoving(
-            pair.first, pair.second, pair.required_m, pair.speed_m_s, float(of_body.max()),
-            float(trace.t[period_ends(trace)[over[0]]]) if len(over) else None,
-            len(one.row), int(one.kept.sum()), int(one.passive.sum()), int(one.retreated.sum()), int(one.stood.sum()),
-            float(one.missed_m.max(initial=0.0)),
-        )  # fmt: skip
 
 
 def _binding(trace: Trace) -> tuple[int, dict[str, int]]:

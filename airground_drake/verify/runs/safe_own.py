@@ -10,8 +10,8 @@ import numpy as np
 from airground_drake.run.trace import Trace
 from airground_drake.verify.claim import TraceClaim
 from airground_drake.verify.finding import Finding
-from airground_drake.verify.runs.pairs import DISTANCE_TOLERANCE_M, Pair, apart_of, pairs_of, snapshot
-from airground_drake.verify.runs.passive import encounters, own_margins, passive_pairs, periods_of
+from airground_drake.verify.runs.pairs import DISTANCE_TOLERANCE_M, apart_of, pairs_of, snapshot
+from airground_drake.verify.runs.passive import beside, encounters, own_margins
 
 MOST_LISTED = 300
 """Pairs that the evidence lists at most: those of least margin."""
@@ -104,9 +104,4 @@ def _against(trace: Trace, worst: OwnMargin) -> dict[str, Any]:
 
 def _within_reach(trace: Trace) -> int:
     """Periods in which one at full speed would have led nearer than d + V h to an obstacle that may move."""
-
-    def near(pair: Pair) -> int:
-        periods = periods_of(trace, pair)
-        return int((periods.apart_m < periods.keeps_m + pair.reach_m).sum())
-
-    return sum(near(pair) for pair in passive_pairs(trace))
+    return sum(int((each.apart_m < each.keeps_m + each.pair.reach_m).sum()) for each in beside(trace))
