@@ -8,18 +8,31 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
 
 from airground_drake.run.trace import Trace
 from airground_drake.verify.finding import Finding
 from airground_drake.verify.model import thr_choice
+from airground_drake.verify.model.safe_dist import LeastDistances, SafeDist
 from airground_drake.verify.model.theorem import Proof
-from airground_drake.verify.runs.acceptances import acceptances
+from airground_drake.verify.runs.acceptances import Acceptance, acceptances
+from airground_drake.verify.runs.passive import beside
 from airground_drake.verify.runs.safe_hyp import guarantees
 from airground_drake.verify.runs.thr_quality import drift_of
 from airground_drake.verify.runs.triggers import task_error
 
 Count = tuple[int, int]
 """How often a premise was met, and how many times it could have been."""
+
+
+class Retreats(NamedTuple):
+    """Periods in which a robot was too near to an obstacle that may move; of them, retreating at w, and at w + V."""
+
+    passive: int = 0
+    w_h_once: int = 0
+    kept: int = 0
 
 
 def safe_pairs(trace: Trace) -> Count:
@@ -35,9 +48,37 @@ def below_avoidance(trace: Trace) -> Count:
 
 
 def without_news(trace: Trace) -> Count:
-    """Count the acceptances under method (d), and those of them during which no obstacle was new."""
-    found = [one for of_ugv in acceptances(trace).values() for one in of_ugv]
-    return sum(not one.news_s for one in found), len(found)
+    """Count the acceptances under method (d), and those during which no obstacle was new and none in range may move."""
+    found = [(ugv, one) for ugv, of_ugv in acceptances(trace).items() for one in of_ugv]
+    return sum(not one.news_s and not _beside_a_mover(trace, ugv, one) for ugv, one in found), len(found)
+
+
+def _beside_a_mover(trace: Trace, ugv: str, one: Acceptance) -> bool:
+    """Whether an obstacle that may move is within sensing range of a UGV while it executes a proposal."""
+    reach = trace.scenario.control.sensing_range_m
+    periods = [each for each in beside(trace) if each.pair.first == ugv]
+    return any(
+        bool((near := each.apart_m <= reach).any())
+        and bool(((trace.t[each.row[near]] >= one.t_s) & (trace.t[each.row[near]] <= one.end_s)).any())
+        for each in periods
+    )
+
+
+def retreats(trace: Trace) -> Retreats:
+    """How fast robots retreated from obstacles that may move while they were too near; none where records are wrong."""
+    try:
+        return _retreats(trace)
+    except (Exception, SystemExit):  # as in `judge`
+        return Retreats()
+
+
+def _retreats(trace: Trace) -> Retreats:
+    found = [each for each in beside(trace) if each.passive.any()]
+    away = [np.einsum("ka,ka->k", each.normal, each.velocity)[each.passive] for each in found]
+    w = SafeDist().inputs(trace.scenario)["disturbance_m_s"]
+    counted = [(len(v), int((v >= w).sum()), int((v >= w + each.pair.speed_m_s).sum()))
+               for each, v in zip(found, away, strict=True)]  # fmt: skip
+    return Retreats(*(sum(column) for column in zip(*counted, strict=True))) if counted else Retreats()
 
 
 COUNTED: dict[str, Callable[[Trace], Count]] = {
@@ -93,3 +134,14 @@ def with_runs(finding: Finding, of_runs: Iterable[dict[str, thr_choice.Measured]
         return finding
     runs = {name: row for each in of_runs for name, row in each.items()}
     return replace(finding, evidence=replace(finding.evidence, runs=runs))
+
+
+def with_retreats(finding: Finding, of_runs: Iterable[Retreats]) -> Finding:
+    """The finding on SAFE-DIST with the periods in which robots were too near to obstacles that may move; if any."""
+    passive, once, kept = (sum(column) for column in zip(*of_runs, Retreats(), strict=True))
+    if not passive or not isinstance(finding.evidence, LeastDistances):
+        return finding
+    evidence = replace(
+        finding.evidence, passive_periods=passive, passive_periods_w_h_once=once, passive_periods_kept=kept
+    )
+    return replace(finding, evidence=evidence)

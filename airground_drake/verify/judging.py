@@ -15,7 +15,16 @@ from airground_drake.base.progress import SILENT, Progress
 from airground_drake.run.trace import Trace
 from airground_drake.scenarios.load import own
 from airground_drake.scenarios.schema import Scenario
-from airground_drake.verify.applications import Count, counts, measured, with_counts, with_runs
+from airground_drake.verify.applications import (
+    Count,
+    Retreats,
+    counts,
+    measured,
+    retreats,
+    with_counts,
+    with_retreats,
+    with_runs,
+)
 from airground_drake.verify.cache import cached_finding
 from airground_drake.verify.claim import ModelClaim, TraceClaim, Verdict
 from airground_drake.verify.finding import Finding
@@ -137,7 +146,8 @@ def judge_all(
             if each.run == (trace.run if (each.claim.id, trace.run) in apart else "")
         ]
         counted = with_counts(each.claim.id, finding, [about.counts for about in concerned])
-        verdicts.append(each.verdict(scenario, with_runs(counted, [about.measured for about in concerned])))
+        found = with_retreats(counted, [about.retreats for about in concerned])
+        verdicts.append(each.verdict(scenario, with_runs(found, [about.measured for about in concerned])))
     return verdicts
 
 
@@ -172,12 +182,13 @@ def _asked(scenario: Scenario, claims: Collection[str] | None = None) -> list[_A
 
 
 class _Judged(NamedTuple):
-    """What the claims found about a run, how often it met the premises of theorems, and what it measured."""
+    """What the claims found about a run, how often it met the premises of theorems, what it measured, and retreats."""
 
     findings: list[Finding]
     counts: dict[str, Count]
     measured: dict[str, Any]
+    retreats: Retreats
 
     @classmethod
     def of(cls, trace: Trace, claims: Sequence[TraceClaim]) -> _Judged:
-        return cls([claim.judge(trace) for claim in claims], counts(trace), measured(trace))
+        return cls([claim.judge(trace) for claim in claims], counts(trace), measured(trace), retreats(trace))

@@ -33,11 +33,12 @@ class LiveGate(LiveWait):
     method = (
         "Theorems in Coq about the transitions of a commitment. Tests compare those of the running `Patience` with the "
         "theorem's, and disturb the running gatekeeper and control law. LIVE-HYP checks the hypotheses on every run "
-        "under (d). The report counts the acceptances during which no obstacle was new."
+        "under (d). The report counts the acceptances during which no obstacle was new and none in range may move."
     )
     equations = "(20)"
     assumptions = (
-        "No obstacle is sensed that the UGV did not know at its acceptance.",
+        "No obstacle is sensed that the UGV did not know at its acceptance. Obstacles in range stand still: an "
+        "intervention beside one that may move is not counted.",
         "The UAV does not withdraw the proposal. It withdraws all parts of a joint plan when one UGV refuses its part; "
         "a part is executed only while the others are accepted or done.",
         "The gatekeeper is sampled every period. Rounding of times is not counted.",

@@ -15,6 +15,22 @@ from airground_drake.scenarios.schema import Scenario
 
 SHARES = {"obstacle": (Fraction(1), Fraction(0)), "uav_ugv": (Fraction(1, 2),) * 2, "ugv_ugv": (Fraction(1, 2),) * 2}
 """By kind of pair, the parts of an inequality that its two bodies take; an obstacle stands still and takes none."""
+THEOREMS = {
+    "obstacle": ("Safety.safe_always", "Safety.obstacle"),
+    "uav_ugv": ("Safety.safe_always",),
+    "ugv_ugv": ("Safety.safe_always",),
+}
+"""By kind of pair, the theorems that prove its distance. A kind that is not here is never called proved."""
+MOVING = "moving"
+"""The kind of a robot beside an obstacle that may move: no theorem keeps its distance."""
+
+
+def kind_of(scenario: Scenario, first: str, second: str) -> str:
+    """The kind of a pair of bodies, named in either order."""
+    for name in (first, second):
+        if name in scenario.barriers:
+            return MOVING if scenario.barriers[name].expected_speed_m_s > 0.0 else "obstacle"
+    return "uav_ugv" if scenario.uav.name in (first, second) else "ugv_ugv"
 
 
 class PairKind(NamedTuple):
@@ -47,7 +63,7 @@ def kinds_of(inputs: dict[str, Any]) -> list[PairKind]:
 
 
 def _kinds(scenario: Scenario) -> Iterator[PairKind]:
-    """The extreme pairs of each kind: the hypotheses hold for all pairs if they hold for these.
+    """The extreme pairs of each kind in `THEOREMS`: the hypotheses hold for all pairs if they hold for these.
 
     Kept are pairs that no other pair exceeds in both distance and speed, and the nearest pair.
     """
@@ -55,7 +71,7 @@ def _kinds(scenario: Scenario) -> Iterator[PairKind]:
     ugvs = [_Robot(decimal(ugv.radius_m), decimal(ugv.max_speed_m_s)) for ugv in scenario.ugvs.values()]
     uav = _Robot(decimal(scenario.uav.radius_m), decimal(scenario.uav.max_speed_m_s))
     barriers = {(decimal(each.distance_m or safe.obstacle_m), decimal(each.radius_m)) for each in
-                scenario.barriers.values()}  # fmt: skip
+                scenario.barriers.values() if not each.expected_speed_m_s}  # fmt: skip
     pairs: dict[str, set[tuple[Fraction, Fraction]]] = {
         "obstacle": {(d + (own.radius_m + r), own.speed_m_s) for own in {*ugvs, uav} for d, r in barriers},
         "uav_ugv": {uav.beside(ugv, safe.air_ground_m) for ugv in ugvs},

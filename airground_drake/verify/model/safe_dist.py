@@ -20,9 +20,16 @@ from airground_drake.verify.model.theorem import Hypothesis, Proof, TheoremClaim
 
 @dataclass(frozen=True, kw_only=True)
 class LeastDistances(Proof):
-    """The least distances of a centre from the other's core, m, by kind of pair; none without a gain."""
+    """The least distances of a centre from the other's core, m, by kind of pair; none without a gain.
+
+    Of all runs of a report the periods in which a robot was too near to an obstacle that may move: with `w_h_once` it
+    retreats at w or more, and with `kept` at w + V or more.
+    """
 
     least_distances_m: dict[str, float] | None = None
+    passive_periods: int | None = None
+    passive_periods_w_h_once: int | None = None
+    passive_periods_kept: int | None = None
 
 
 class SafeDist(TheoremClaim):
@@ -35,7 +42,10 @@ class SafeDist(TheoremClaim):
         "d - 2 w/A (two disturbed robots), as long as its own inequality is met at every sample. After N periods "
         "inside in a row the distance is at least d - (1 - (1 - A h)^N) W/A if it was d before, W = w or 2 w. "
         "With several points, each with D >= d - W/A, all inequalities can be met at once if there is a unit vector g "
-        "with n.g >= m > 0 for every point with D < d + h W/m; then all these bounds are kept together."
+        "with n.g >= m > 0 for every point with D < d + h W/m; then all these bounds are kept together. All this is "
+        "about robots and bodies at rest. Beside an obstacle that may move with V the passive inequality restores "
+        "nothing: w costs w h in each period. With a retreat n.v >= w it costs w h once, and with n.v >= w + V nothing "
+        "is lost."
     )
     latex = (
         r"A h \le 1, \; \lVert e \rVert \le w, \; D(0) \ge d - \frac{W}{A} \; \Rightarrow \; D(t) \ge d - "
@@ -61,10 +71,11 @@ class SafeDist(TheoremClaim):
         "on top. The layer itself may ask for more within a safe distance of something else.",
     )
     does_not_establish = (
-        "That the disturbance of a real robot stays below w; nor anything where inequalities contradict each other: a "
-        "disturbed robot can press another, whose half of the pair's inequality has no room, into an obstacle, as far "
-        "as contact. It does not bound how long a robot stays inside the safe distance, nor how fast it recovers: the "
-        "layer's velocities there are not limited."
+        "That the disturbance of a real robot stays below w; nor any distance from an obstacle that may move: the "
+        "report counts the periods in which a robot that was too near to one retreated fast enough; nor anything where "
+        "inequalities contradict each other: a disturbed robot can press another, whose half of the pair's inequality "
+        "has no room, into an obstacle, as far as contact. It does not bound how long a robot stays inside the safe "
+        "distance, nor how fast it recovers: the layer's velocities there are not limited."
     )
 
     theorems = ("Safety.disturbed", "Gate.deficit_closed_form", "Gate.common_direction", "Gate.overhead")

@@ -15,12 +15,13 @@ class SafeGate(SafeInv):
     """SAFE-GATE; its hypotheses are those of SAFE-INV and one more."""
 
     id = "SAFE-GATE"
-    summary = "Under method (d) nothing that the UAV asks for can bring a robot closer than the safe distance."
+    summary = "Under method (d) nothing that the UAV asks for makes a robot bring itself closer than the safe distance."
     statement = (
         "Under method (d) no intervention, accepted or not, leaves the safe set. The avoidance layer comes last, and "
         "from a safe state any command, scaled back far enough, meets every inequality; SAFE-INV does the rest. "
         "Neither the optimiser nor its horizon, nor the UAV as an adviser is trusted; as a robot the UAV must keep its "
-        "own share of each inequality."
+        "own share of each inequality. This is about robots and bodies at rest. Beside an obstacle that may move, "
+        "nothing that the UAV asks for makes a robot bring itself too near: v = 0 meets the passive inequality, too."
     )
     latex = (
         r"b_k \le 0, \; 0 \le c \le \frac{b_k}{n_k^\top u} \text{ wherever } n_k^\top u < b_k \; \Rightarrow \; "
@@ -38,9 +39,9 @@ class SafeGate(SafeInv):
         "The UAV flies by its own avoidance layer: it takes half of each inequality, straight above a UGV all of it.",
     )
     does_not_establish = (
-        "That an intervention is useful, or that the robots get anywhere. Nothing is said of methods (b) and (c), "
-        "which put interventions on top. That the built controllers have these priorities and limits is for SAFE-HYP "
-        "to compare, run by run."
+        "That an intervention is useful, or that the robots get anywhere, or that an obstacle that moves stays away. "
+        "Nothing is said of methods (b) and (c), which put interventions on top. That the built controllers have these "
+        "priorities and limits is for SAFE-HYP to compare, run by run."
     )
 
     theorems = ("Gate.scaled_back", "Safety.standing", "Safety.safe_always")

@@ -22,8 +22,8 @@ class SafeInv(TheoremClaim):
     id = "SAFE-INV"
     summary = "A robot that obeys the avoidance inequalities and starts at a safe distance keeps it."
     statement = (
-        "Any number of robots and obstacles whose pairs start at their safe distances keep them at all times, if at "
-        "every sample each pair in sensing range meets its avoidance inequalities and velocities are held until the "
+        "Any number of robots and obstacles at rest whose pairs start at their safe distances keep them at all times, "
+        "if at every sample each pair in sensing range meets its avoidance inequalities and velocities are held until the "
         "next. Inside a safe distance the deficit shrinks by the factor 1 - A h per period and never grows. Two robots "
         "take half of an inequality each; a UGV under a UAV has no vertical velocity. Pairs beyond the sensing range "
         "need no inequality. An obstacle is a convex set, or several: a point, a wall, a polygon or a prism, each with "
@@ -48,7 +48,8 @@ class SafeInv(TheoremClaim):
     assumptions: tuple[str, ...] = (
         "Positions are integrals of the commands, which are held between samples; all robots are sampled at the same "
         "instants.",
-        "Obstacles stand still. Robots obey their speed limits: pairs out of range rely on that. D is the distance of "
+        "Obstacles stand still: a pair with one that may move is not covered (SAFE-OWN says what a robot keeps there). "
+        "Robots obey their speed limits: pairs out of range rely on that. D is the distance of "
         "a robot's centre from the other's centre or, signed, from an obstacle's convex core. All radii are part of d.",
         "A UGV's velocity has no z component.",
     )

@@ -66,7 +66,7 @@ def least_speeds(distance: Array, safe: Array, share: Array, control: Control, s
 
 
 def retreats(distance: Array, safe: Array, speed: Array, period_s: float) -> Array:
-    """Speeds n.v, (...), m/s, at which a robot should retreat from bodies that may move: V - (D - d) / h, at least 0."""
+    """Speeds n.v, (...), m/s, at which a robot should retreat from bodies that may move: V - (D - d) / h, or 0."""
     return np.where(speed > 0.0, np.maximum(speed - (distance - safe) / period_s, 0.0), 0.0)
 
 

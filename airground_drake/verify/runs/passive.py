@@ -233,8 +233,9 @@ class Encounter(NamedTuple):
         first: the robot.
         second: the obstacle.
         required_m: gap to keep.
-        gap_m: the least gap; 0 where they touched: what comes after is no motion of bodies.
-        t_s: when it was least, or when they first touched.
+        gap_m: the least gap; 0 where they overlap.
+        t_s: when they collided, or else when the gap was least.
+        collided: whether they did; the model lets both go on.
         own_doing: whether the robot brought itself too near at any time.
         appeared: whether the obstacle appeared there.
         reaction: what the robot did then: `retreated at its limit`, `retreated`, `stood` or `moved aside`.
@@ -248,6 +249,7 @@ class Encounter(NamedTuple):
     required_m: float
     gap_m: float
     t_s: float
+    collided: bool
     own_doing: bool
     appeared: bool
     reaction: str
@@ -286,15 +288,16 @@ def _near(trace: Trace, pairs: list[Pair]) -> list[Pair]:
 
 def _encounter(trace: Trace, pair: Pair) -> Encounter:
     least, gaps, periods = least_gap(trace, pair), gap_over_time(trace, pair), periods_of(trace, pair)
-    touching = np.flatnonzero(gaps <= 0.0)
-    t_s = float(trace.t[touching[0]]) if len(touching) else least.t_s
+    hits = np.flatnonzero(gaps <= trace.scenario.safe_distance.collision_m)
+    t_s = float(trace.t[hits[0]]) if len(hits) else least.t_s
     own = bool(own_margins(trace, pair, pair.first).min(initial=np.inf) < -DISTANCE_TOLERANCE_M)
     before = np.flatnonzero((trace.t[periods.row] < t_s) | (periods.row == pair.row))
     k = int(before[-1])
     given, samples = inequalities_of(trace, pair.first), trace.sample_rows
     number = np.searchsorted(samples, periods.row)
     blocked = [_blocked_by(trace, pair, periods, int(each), given, int(number[each])) for each in before]
-    held = [bool(each) and gaps[row] < pair.required_m for each, row in zip(blocked, periods.row[before], strict=True)]
+    short = pair.required_m - DISTANCE_TOLERANCE_M
+    held = [bool(each) and gaps[row] < short for each, row in zip(blocked, periods.row[before], strict=True)]
     end = max((each for each in range(len(held)) if held[each]), default=-1)
     begin = end
     while begin > 0 and held[begin - 1]:
@@ -306,7 +309,7 @@ def _encounter(trace: Trace, pair: Pair) -> Encounter:
     away = float(periods.normal[k] @ velocity)
     names = dict.fromkeys(name for each in blocked[begin : end + 1] for name in each) if end >= 0 else {}
     return Encounter(
-        pair.first, pair.second, pair.required_m, max(least.gap_m, 0.0), t_s, own, least.at_appearance(trace.t),
+        pair.first, pair.second, pair.required_m, max(least.gap_m, 0.0), t_s, bool(len(hits)), own, least.at_appearance(trace.t),
         _reaction(speed, away, limit), speed, [*names], caught,
     )  # fmt: skip
 

@@ -190,7 +190,7 @@ class SafeHyp(TraceClaim):
             unit=shown.get("unit", ""),
             quantity="distance promised less the safe one" if name == AVOIDANCE else f"least slack of {name!r}",
             where={key: shown[key] for key in shown if key not in ("margin", "unit")},
-            counterexample=_against(trace, first) if first else None,
+            counterexample=_against(trace, first, broken) if first else None,
             evidence=asdict(
                 Hypotheses(
                     float(max((one.missed_m.max() for one in kept), default=0.0)),
@@ -208,14 +208,15 @@ class SafeHyp(TraceClaim):
         )
 
 
-def _against(trace: Trace, first: dict[str, Any]) -> dict[str, Any]:
+def _against(trace: Trace, first: dict[str, Any], broken: Sequence[dict[str, Any]]) -> dict[str, Any]:
     """The hypothesis broken first, with what is needed to redo it by hand."""
     found = first | snapshot(trace, map(str, first.values()), first["t_s"])
     if first["hypothesis"] != DECLARED:
         return found
     declared = trace.scenario.barriers[first["other"]].expected_speed_m_s
     told = f"{first['other']} moved at {declared - first['margin']:.2f} m/s at {first['t_s']:.2f} s"
-    return found | {"why": f"{told}, declared {declared:.2f}"}
+    more = sorted({str(each["hypothesis"]) for each in broken} - {DECLARED})
+    return found | {"why": f"{told}, declared {declared:.2f}", "also_broken": more}
 
 
 def _worst(hypotheses: Sequence[_Hypothesis]) -> list[dict[str, Any]]:
