@@ -14,6 +14,7 @@ from airground_drake.report.phrases import (
     Line,
     collision,
     counted,
+    encounter,
     ending,
     found_no_way,
     gatekeeper,
@@ -61,7 +62,13 @@ def answers(document: Document, every: Sequence[RunOutcome], *, tabulated: bool)
 
 
 def _safe(document: Document, every: Sequence[RunOutcome]) -> Iterator[Line]:
-    bad = [course for course in every if course.safe is False]
+    for course in every:
+        if course.blameless:
+            told = "; ".join(encounter(course, one) for one in course.encounters[:MAX_NAMES])
+            more = len(course.encounters) - MAX_NAMES
+            told += f"; {counted(more, 'more encounter')}" if more > 0 else ""
+            yield Line("partly", f"{course.name}: {told}{' (expected)' * course.declared_unsafe}.")
+    bad = [course for course in every if course.safe is False and not course.blameless]
     printed = [course for course in bad if not course.plain and not course.hits]
     for course in bad:
         if course not in printed:
@@ -102,7 +109,7 @@ def _proof(every: Sequence[RunOutcome]) -> Iterator[Line]:
     for (lacking, refuted, status), alike in told.items():
         runs, who = joined([course.name for course in alike]), joined([*chain(*labels(alike, of_d))])
         yield {
-            "tested": Line("yes", f"Proved for {who}, whatever the UAV asks for."),
+            "tested": Line("yes", f"Proved for {who}, whatever the UAV asks for{_covered(alike)}."),
             "idle": Line(
                 "none", f"Proved for {who}, but nothing came near: its conditions hold with nothing to check."
             ),
@@ -110,6 +117,13 @@ def _proof(every: Sequence[RunOutcome]) -> Iterator[Line]:
             "undecided": Line("open", f"Not known whether the proof applies to {runs} ({lacking})."),
             "unproved": Line("no" if refuted else "open", f"Not proved for {who} ({lacking})."),
         }[status]
+
+
+def _covered(those: Sequence[RunOutcome]) -> str:
+    """For which pairs, if something may move."""
+    if not any(course.movers for course in those):
+        return ""
+    return ": distances from bodies at rest and between robots; beside what moves, that no robot brings itself too near"
 
 
 def _lacking(proof: ProofOutcome) -> tuple[str, bool]:

@@ -14,6 +14,7 @@ from airground_drake.report.interventions import avoidance, farthest_from_predic
 from airground_drake.run.collisions import first_collisions
 from airground_drake.run.trace import Trace
 from airground_drake.verify.engines.geometry import interpolate
+from airground_drake.verify.model.pair_kinds import THEOREMS, kind_of
 from airground_drake.verify.runs.gate_record import without_decisions
 from airground_drake.verify.runs.instants import without_proposals
 from airground_drake.verify.runs.live_goal import AT_REST_M, AT_REST_S, moved_at_the_end
@@ -27,7 +28,9 @@ from airground_drake.verify.runs.pairs import (
     numbers_of,
     pair_of,
     pairs_of,
+    to_barrier,
 )
+from airground_drake.verify.runs.passive import passive_pairs
 
 MOST_OBSTACLES = 20
 """Maximum number of obstacles listed per robot."""
@@ -88,7 +91,8 @@ def on_the_way(trace: Trace) -> dict[str, dict[str, Any]]:
 
     Returns:
         By UGV `stands` (it did not move in the last second), `left_m` (the way to its target along its preset) and
-        `left_s` (how long that takes if it comes nearer as fast as in the last second; None if it does not).
+        `left_s` (how long that takes if it comes nearer as fast as in the last second; None if it does not). Where it
+        stands because an obstacle that moves is at its target: `kept_away`, see `_kept_away`.
     """
     done = {event["robot"] for event in trace.events if event["kind"] == "arrival"} | {*first_collisions(trace.events)}
     return {ugv: _on_the_way(trace, ugv) for ugv in trace.ugvs if ugv not in done}
@@ -102,7 +106,31 @@ def _on_the_way(trace: Trace, ugv: str) -> dict[str, Any]:
         "stands": stands,
         "left_m": left_m,
         "left_s": left_m / speed_m_s if speed_m_s > 0.0 and not stands else None,
+        **({"kept_away": found} if stands and (found := _kept_away(trace, ugv)) else {}),
     }
+
+
+def _kept_away(trace: Trace, ugv: str) -> dict[str, Any]:
+    """The obstacle that moves and at the end keeps a UGV away from its target; {} without one.
+
+    Returns:
+        `by` (its name), `on` (whether it covers the target, or is only near it), `since_s` (from when on the UGV has
+        stood) and `off_m` (how far from its target).
+    """
+    own = trace.scenario.ugvs[ugv]
+    for pair in passive_pairs(trace):
+        if pair.first == ugv and pair.last in (None, len(trace.t) - 1):
+            apart = to_barrier(trace, pair, np.array(own.target_m))
+            if apart < pair.safe_m:
+                place = trace.position(ugv)
+                moving = np.flatnonzero(np.linalg.norm(place - place[-1], axis=1) > AT_REST_M)
+                return {
+                    "by": pair.second,
+                    "on": apart <= pair.radii_m,
+                    "since_s": float(trace.t[moving[-1] + 1 if len(moving) else 0]),
+                    "off_m": float(np.linalg.norm(place[-1] - own.target_m)),
+                }
+    return {}
 
 
 def _way_left_m(trace: Trace, ugv: str, time_s: float) -> float:
@@ -268,11 +296,16 @@ def _least(trace: Trace, robot: str, among: Sequence[str], most: int) -> dict[st
 
 
 def _listed(trace: Trace, found: dict[str, Gap]) -> dict[str, dict[str, Any]]:
-    """The same for report.json; `appeared`: the gap was smallest at the instant at which the obstacle appeared."""
+    """The same for report.json.
+
+    `appeared`: the gap was smallest at the instant at which the obstacle appeared. `moves`: the obstacle may move, so
+    that no theorem keeps its distance.
+    """
     return {
         other: {
             "value": least.gap_m, "t_s": least.t_s, "safe_distance_m": least.pair.required_m,
             **({"appeared": True} if least.at_appearance(trace.t) else {}),
+            **({} if kind_of(trace.scenario, least.pair.first, other) in THEOREMS else {"moves": True}),
         }
         for other, least in found.items()
     }  # fmt: skip

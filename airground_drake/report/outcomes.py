@@ -16,6 +16,8 @@ SLACK_M = 1e-9
 
 THEOREMS, CONDITIONS = ("SAFE-INV", "SAFE-GATE"), "SAFE-HYP"
 """The claims that prove the safety of method (d), and the one that a run met their conditions."""
+DECLARED = "declared speed"
+"""The hypothesis of SAFE-HYP that is about obstacles that move alone."""
 
 
 Document = Mapping[str, Any]
@@ -24,7 +26,8 @@ Document = Mapping[str, Any]
 class Near(NamedTuple):
     """The smallest distance of a pair: the gap between the surfaces, below 0 if they overlap.
 
-    `appeared`: at the instant at which the other one appeared.
+    `appeared`: at the instant at which the other one appeared. `moves`: the other one may move, and no theorem keeps
+    its distance.
     """
 
     margin_m: float
@@ -34,6 +37,7 @@ class Near(NamedTuple):
     required_m: float
     t_s: float
     appeared: bool = False
+    moves: bool = False
 
     @property
     def is_short(self) -> bool:
@@ -88,6 +92,12 @@ class RunOutcome:
         on_the_way: UGVs among them that did not collide, and how far they had come (`metrics.on_the_way`).
         no_way: UGVs that the UAV was called for and found no way for.
         there: how many UGVs arrived.
+        encounters: obstacles that move and came too near to a robot, those of SAFE-OWN, by time.
+        own_doing: whether a robot brought a distance below the required one itself; None: not known, or nothing moves.
+        faster: obstacles that moved faster than declared, by name: their entries in SAFE-HYP.
+        else_met: whether all other hypotheses of SAFE-HYP held, so that all other distances are proved.
+        movers: obstacles that may move.
+        walls: obstacles that are walls.
     """
 
     name: str
@@ -106,6 +116,20 @@ class RunOutcome:
     on_the_way: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     no_way: list[str] = field(default_factory=list)
     there: int = 0
+    encounters: list[Mapping[str, Any]] = field(default_factory=list)
+    own_doing: bool | None = None
+    faster: dict[str, Mapping[str, Any]] = field(default_factory=dict)
+    else_met: bool = False
+    movers: list[str] = field(default_factory=list)
+    walls: list[str] = field(default_factory=list)
+
+    @property
+    def blameless(self) -> bool:
+        """Whether obstacles that move came too near by their own motion, and everything else was kept."""
+        if self.safe is not False or self.own_doing is not False or not self.encounters:
+            return False
+        hits = {hit.get("other") or hit["obstacle"] for hit in self.hits.values()}
+        return hits <= {*self.movers} and all(near.moves for near in self.near if near.is_short)
 
     @property
     def helped(self) -> bool:
@@ -125,8 +149,9 @@ def courses(document: Document) -> list[RunOutcome]:
         course = RunOutcome(name, str(spec["method"]), spec["composition"] == "augmented")
         if name in document["runs"]:
             _judge(course, document)
+            _beside_movers(course, document)
             _locate(course, document)
-        course.proof = _proof(document, name) if course.method == "d" else None
+        course.proof = _proof(document, course) if course.method == "d" else None
         found.append(course)
     return found
 
@@ -150,6 +175,24 @@ def _judge(course: RunOutcome, document: Document) -> None:
         course.safe, course.why = True, ""
     else:
         course.why = f"SAFE-TRACE: {status.replace('_', ' ')}" if status else "SAFE-TRACE was not checked"
+
+
+def _beside_movers(course: RunOutcome, document: Document) -> None:
+    """What came of the run beside obstacles that may move."""
+    proved = any(claim["status"] == "proved" for claim in claims(document, THEOREMS[0]))
+    barriers = document["scenario"]["resolved"]["obstacles"]
+    course.movers = [name for name, each in barriers.items() if each.get("moves") or each.get("max_speed_m_s")]
+    course.walls = [name for name, each in barriers.items() if each.get("segment_m")]
+    for claim in claims(document, "SAFE-OWN", run=course.name):
+        if claim["status"] in (*PASSING, "refuted"):
+            course.own_doing = claim["status"] == "refuted"
+            course.encounters = claim["evidence"].get("came_too_near_themselves", [])
+    for claim in claims(document, CONDITIONS, run=course.name):
+        rows = claim["evidence"].get("beside_moving", [])
+        course.faster = {each["second"]: each for each in rows if each["too_fast_s"] is not None}
+        against = claim["counterexample"] or {}
+        only_speed = against.get("hypothesis") == DECLARED and not against.get("also_broken")
+        course.else_met = proved and (claim["status"] in PASSING or only_speed)
 
 
 def _locate(course: RunOutcome, document: Document) -> None:
@@ -176,8 +219,12 @@ def no_way(run: Mapping[str, Any]) -> list[str]:
     return [ugv for ugv in run["metrics"]["without_proposals"] if ugv not in failed]
 
 
-def _proof(document: Document, run: str) -> ProofOutcome:
-    """Whether a run of method (d) was proved safe; theorems may have been judged for this run alone."""
+def _proof(document: Document, course: RunOutcome) -> ProofOutcome:
+    """Whether a run of method (d) was proved safe; theorems may have been judged for this run alone.
+
+    That an obstacle moved faster than declared leaves the proofs for all other pairs as they are.
+    """
+    run = course.name
 
     def judged(name: str) -> Mapping[str, Any] | None:
         return next(iter([*claims(document, name, run=run), *claims(document, name, run="")]), None)
@@ -186,7 +233,7 @@ def _proof(document: Document, run: str) -> ProofOutcome:
     if unproved := {name: claim for name, claim in theorems.items() if claim is None or claim["status"] != "proved"}:
         return ProofOutcome("unproved", unproved)
     conditions = judged(CONDITIONS)
-    if conditions is None or conditions["status"] not in PASSING:
+    if conditions is None or not (conditions["status"] in PASSING or (course.faster and course.else_met)):
         refuted = conditions is not None and conditions["status"] == "refuted"
         return ProofOutcome("refuted" if refuted else "undecided", {CONDITIONS: conditions})
     return ProofOutcome("tested" if conditions["exercised"] else "idle")
@@ -199,7 +246,8 @@ def pairs(run: Mapping[str, Any]) -> Iterator[Near]:
             for other, found in others.items():
                 value, required = found["value"], found["safe_distance_m"]
                 appeared = bool(found.get("appeared"))
-                yield Near(value - required, robot, other, value, required, found["t_s"], appeared)
+                moves = bool(found.get("moves"))
+                yield Near(value - required, robot, other, value, required, found["t_s"], appeared, moves)
 
 
 def claims(document: Document, *names: str, run: str | None = None) -> list[Mapping[str, Any]]:

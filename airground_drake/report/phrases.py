@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from functools import partial
 from typing import Any, NamedTuple, TypeVar
 
 from airground_drake.base.statuses import PASSING
@@ -117,7 +118,39 @@ def trouble(course: RunOutcome) -> str:
     """What went wrong in a run: who came too near, and who did not arrive."""
     away = [robot for robot in course.away or () if robot not in course.hits]
     told = [] if course.safe is not False else [colliding(course) if course.hits else intrusion(course)]
+    told = [*map(partial(encounter, course), course.encounters[:1])] if course.blameless else told
     return ", and ".join([*told, *([_absent(course, away)] if away else [])])
+
+
+def encounter(course: RunOutcome, one: Mapping[str, Any]) -> str:
+    """How an obstacle that moves came too near to a robot by its own motion, and what the robot did."""
+    robot, mover, apart = one["first"], one["second"], f"{one['gap_m']:.2f} m"
+    if one["appeared"]:
+        return f"{mover} appeared {apart} from {robot}: nobody's doing"
+    if one["caught_s"] and one["blocked_by"]:
+        begin, end = (f"{time_s:.2f}" for time_s in one["caught_s"])
+        between = joined([f"{'wall ' * (name in course.walls)}{name}" for name in one["blocked_by"][:MAX_NAMES]])
+        kept = {f"{near.required_m:.2f} m from {near.other} was kept" for near in course.near
+                if robot == near.robot and near.other in one["blocked_by"] and not near.is_short}  # fmt: skip
+        told = f"{robot} was caught between {mover} and {between}, {begin} to {end} s"
+        told += f": {'; '.join([f'{mover} came to {apart} by its own motion', *sorted(kept)])}"
+        return f"{told}. It had nowhere to retreat, and stood" if one["reaction"] == "stood" else told
+    how = f"; {robot} {one['reaction']}"
+    how += f", {one['speed_m_s']:.2f} m/s" if one["reaction"].startswith("retreated") else ""
+    at = f"at {one['t_s']:.2f} s ({apart}, required {one['required_m']:.2f} m)"
+    return f"{mover} {'ran into' if one['collided'] else 'came too near to'} {robot} {at}{how}"
+
+
+def too_fast(course: RunOutcome) -> str:
+    """Which obstacles moved faster than declared, and what is proved all the same."""
+    told = []
+    for mover, each in course.faster.items():
+        speeds = f"at {each['fastest_m_s']:.2f} m/s at {each['too_fast_s']:.2f} s, declared {each['declared_m_s']:.2f}"
+        lost = f"{each['safe_distance_m']:.2f} m from {mover} is not promised from then on"
+        told.append(f"{mover} moved {speeds}: {lost}")
+    still = ["no robot brought itself too near"] if course.own_doing is False else []
+    still += ["distances from walls and robots"] if course.else_met else []
+    return "; ".join(told) + (f". Still proved: {'; '.join(still)}" if still else "")
 
 
 def intrusion(course: RunOutcome) -> str:
@@ -164,8 +197,25 @@ def rounded(value: float) -> str:
     return f"{float(f'{value:.2g}'):.15g}"
 
 
+def kept_away(course: RunOutcome, robot: str) -> str:
+    """Since when a robot has stood because an obstacle that moves is at its target; '' if it has not."""
+    found = course.on_the_way.get(robot, {}).get("kept_away")
+    if not found:
+        return ""
+    least = min(
+        (near.value_m for near in course.near if {near.robot, near.other} == {robot, found["by"]}), default=None
+    )
+    never = f" (never nearer than {least:.2f} m)" if least is not None else ""
+    where = f"{found['off_m']:.2f} m from its target, {'on' if found['on'] else 'near'} which {found['by']} stands"
+    return f"from {found['since_s']:.1f} s it stood {where}{never}"
+
+
 def _absent(course: RunOutcome, names: Sequence[str]) -> str:
     """How those ended that did not arrive, and for whom the UAV found no way."""
+    apart = [f"{robot} does not arrive: {why}" for robot in names if (why := kept_away(course, robot))]
+    if apart:
+        rest = [robot for robot in names if not kept_away(course, robot)]
+        return "; ".join([*apart, *([_absent(course, rest)] if rest else [])])
     told = grouped((ending(course, robot), robot) for robot in names)
     clauses = [f"{_robots(alike)} {'is' if len(alike) == 1 else 'are'} {how}" for how, alike in told.items()]
     lost = [robot for robot in names if robot in course.no_way]

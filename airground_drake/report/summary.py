@@ -18,15 +18,19 @@ from airground_drake.report.answers import answers as answers_of
 from airground_drake.report.outcomes import Document, RunOutcome, courses, tolerance, triggers
 from airground_drake.report.phrases import (
     MARKS,
+    MAX_NAMES,
     MEANINGS,
     Line,
     colliding,
     counted,
     grouped,
+    joined,
+    kept_away,
     more_pairs,
     of_run,
     refusal,
     subject,
+    too_fast,
     trouble,
     under,
 )
@@ -103,6 +107,8 @@ def _outcome(every: Sequence[RunOutcome]) -> Line:
     helped, alone = ([course for course in main if course.helped is way] for way in (True, False))
     if not main:
         return Line("open", "Nothing was run.")
+    if movers := _beside_movers(main, unsafe):
+        return movers
     could_not = f"un{'s' * (len(unknown) > 1)} {', '.join(unknown)} could not be judged."
     if unknown and not unsafe:
         return Line("open", f"Not decided: r{could_not}")
@@ -121,7 +127,36 @@ def _outcome(every: Sequence[RunOutcome]) -> Line:
     if unsafe:
         told = "No method brings everyone home safely" if len(main) > 1 and not unjudged else "Not safe"
         return Line("no", f"{told}{_failures(unsafe, main)}{unjudged}")
+    waits = {trouble(course) for course in short}
+    if len(waits) == 1 and len(short) == len(main) and any(kept_away(short[0], robot) for robot in short[0].away or ()):
+        return Line("no", f"Safe, but {waits.pop()}.")
     return Line("no", f"Safe, but not all arrive{_failures(short, main, ': ')}")
+
+
+def _beside_movers(main: Sequence[RunOutcome], unsafe: Sequence[RunOutcome]) -> Line | None:
+    """What obstacles did that move: that they came too near themselves, or faster than declared; None: neither."""
+    blamed = [course for course in unsafe if not course.blameless]
+    faster = [course for course in main if course.faster]
+    if blamed or not (unsafe or faster):
+        return None
+    told = grouped((trouble(course), course) for course in unsafe)
+    said = [_where(what, alike, main) for what, alike in told.items()]
+    parts = [*said, "No robot brought a distance below the required one itself"] if said else []
+    speeds = grouped((too_fast(course), course) for course in faster)
+    parts += [_where(what, alike, main) for what, alike in speeds.items()]
+    missing = grouped((trouble(course), course) for course in main if course.away and course not in unsafe)
+    parts += [_where(what, alike, main) for what, alike in missing.items()]
+    if unknown := [course.name for course in main if course.safe is None or course.away is None]:
+        parts.append(f"Run{'s' * (len(unknown) > 1)} {', '.join(unknown)} could not be judged")
+    return Line("no" if faster else "partly", " ".join(f"{part}." for part in parts))
+
+
+def _where(what: str, those: Sequence[RunOutcome], among: Sequence[RunOutcome]) -> str:
+    """What happened in those runs, and in which if not in all."""
+    if len(those) == len(among):
+        return what
+    runs = under(those, among)
+    return f"{runs[0].upper()}{runs[1:]}, {what}"
 
 
 def _failures(those: Iterable[RunOutcome], among: Sequence[RunOutcome], same: str = "") -> str:
@@ -159,11 +194,15 @@ def _safe(course: RunOutcome) -> Line:
     near = course.near[0] if course.near else None
     if course.safe is None:
         return Line("open", f"not known, {course.why}")
+    if course.blameless:
+        return Line("partly", f"{near.told()}: not its own doing" if near else "not the robots' own doing")
     if not course.safe:
         return Line("no", f"{near.told()}{more_pairs(course)}" if near else course.why)
     if not near:
         return Line("none", "nothing near")
-    told = f"{near}, {'proved' if course.proof and course.proof.holds else 'not proved'}"
+    proved = bool(course.proof and course.proof.holds)
+    told = f"{near}, {'proved' if proved and not near.moves else 'not proved'}"
+    told += f" beside {near.other}; all else proved" if proved and near.moves else ""
     return Line("yes", told) if course.tested else Line("none", f"{told}; not tested")
 
 
@@ -192,6 +231,9 @@ def _beware(document: Document, every: Sequence[RunOutcome]) -> list[str]:
     main = [course for course in every if course.plain] or every
     if seen := [course for course in main if course.safe and not (course.proof and course.proof.holds)]:
         said.append(f"{subject(seen, main)} also safe elsewhere: that was only seen in these runs")
+    if movers := list(dict.fromkeys(name for course in main for name in course.movers)):
+        who = joined(movers) if len(movers) <= MAX_NAMES else counted(len(movers), "obstacle that may move")
+        said.append(f"a robot can keep its distance from {who}: what moves can come as near as it likes")
     home = [course.away == {} for course in every]
     if any(home):
         who = "all" if all(home) else "those that arrive here"

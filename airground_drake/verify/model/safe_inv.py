@@ -23,12 +23,12 @@ class SafeInv(TheoremClaim):
     summary = "A robot that obeys the avoidance inequalities and starts at a safe distance keeps it."
     statement = (
         "Any number of robots and obstacles at rest whose pairs start at their safe distances keep them at all times, "
-        "if at every sample each pair in sensing range meets its avoidance inequalities and velocities are held until the "
-        "next. Inside a safe distance the deficit shrinks by the factor 1 - A h per period and never grows. Two robots "
-        "take half of an inequality each; a UGV under a UAV has no vertical velocity. Pairs beyond the sensing range "
-        "need no inequality. An obstacle is a convex set, or several: a point, a wall, a polygon or a prism, each with "
-        "an inequality of its own. All this rests on a lemma: on a straight line the distance from a convex set is at "
-        "least its value at the start plus the time times its rate of change at the start."
+        "if at every sample each pair in sensing range meets its avoidance inequalities and velocities are held until "
+        "the next. Inside a safe distance the deficit shrinks by the factor 1 - A h per period and never grows. Two "
+        "robots take half of an inequality each; a UGV under a UAV has no vertical velocity. Pairs beyond the sensing "
+        "range need no inequality. An obstacle is a convex set, or several: a point, a wall, a polygon or a prism, "
+        "each with an inequality of its own. All this rests on a lemma: on a straight line the distance from a convex "
+        "set is at least its value at the start plus the time times its rate of change at the start."
     )
     latex: tuple[str, ...] = (
         r"\mathrm{dist}(p + s v) \ge D + s \, n^\top v, \quad D = \mathrm{dist}(p), \quad s \ge 0",

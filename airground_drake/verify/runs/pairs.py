@@ -268,6 +268,13 @@ def least_gap(trace: Trace, pair: Pair) -> Gap:
     return trace.derived(("least gap", pair.first, pair.second), found)
 
 
+def to_barrier(trace: Trace, pair: Pair, place: Array) -> float:
+    """Distance of a place (3,), m, from the core of the barrier of a pair as it is at the end of the run, m."""
+    way = origin_of(trace, pair.second)
+    here = place if way is None else place - way[-1]
+    return float(away_from(cores_of(trace)[pair.second], here, planar=is_planar(trace, pair.first)).distance.min())
+
+
 def gap_over_time(trace: Trace, pair: Pair) -> Array:
     """The gap of a pair at the rows of a trace, (T,), m; NaN where an obstacle is not there."""
     cores = cores_of(trace).get(pair.second)

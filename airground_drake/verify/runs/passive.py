@@ -309,8 +309,8 @@ def _encounter(trace: Trace, pair: Pair) -> Encounter:
     away = float(periods.normal[k] @ velocity)
     names = dict.fromkeys(name for each in blocked[begin : end + 1] for name in each) if end >= 0 else {}
     return Encounter(
-        pair.first, pair.second, pair.required_m, max(least.gap_m, 0.0), t_s, bool(len(hits)), own, least.at_appearance(trace.t),
-        _reaction(speed, away, limit), speed, [*names], caught,
+        pair.first, pair.second, pair.required_m, max(least.gap_m, 0.0), t_s, bool(len(hits)), own,
+        least.at_appearance(trace.t), _reaction(speed, away, limit), speed, [*names], caught,
     )  # fmt: skip
 
 
