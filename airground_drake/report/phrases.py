@@ -145,7 +145,7 @@ def too_fast(course: RunOutcome) -> str:
     """Which obstacles moved faster than declared, and what is proved all the same."""
     told = []
     for mover, each in course.faster.items():
-        speeds = f"at {each['fastest_m_s']:.2f} m/s at {each['too_fast_s']:.2f} s, declared {each['declared_m_s']:.2f}"
+        speeds = f"at {each['too_fast_m_s']:.2f} m/s at {each['too_fast_s']:.2f} s, declared {each['declared_m_s']:.2f}"
         lost = f"{each['safe_distance_m']:.2f} m from {mover} is not promised from then on"
         told.append(f"{mover} moved {speeds}: {lost}")
     still = ["no robot brought itself too near"] if course.own_doing is False else []

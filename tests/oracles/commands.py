@@ -13,7 +13,18 @@ from airground_drake.run.trace import Trace
 from airground_drake.verify.claim import TIME_TOLERANCE_S
 from airground_drake.verify.engines.geometry import corner_times, travelled
 from airground_drake.verify.runs.pairs import preset_of
-from oracles.control_law import Asked, as_seen, avoiding, commanded, limited, place, rates, selected, tracking
+from oracles.control_law import (
+    Asked,
+    as_seen,
+    avoiding,
+    commanded,
+    limited,
+    place,
+    rates,
+    retreating,
+    selected,
+    tracking,
+)
 from oracles.fault import Fault
 from oracles.protocol import executed_at
 
@@ -93,5 +104,6 @@ def _law_of_uav(trace: Trace, samples: Rows) -> Law:
     fed[trace.t[samples] <= TIME_TOLERANCE_S] = 0.0  # nothing was commanded before the first sample
     over = centroid + np.array([0.0, 0.0, uav.altitude_m])
     below = limited(fed + control.formation_gain_1_s * (over - position), uav.max_speed_m_s)
-    command = avoiding(below, as_seen(trace, uav.name), "augmented", planar=False)
+    given, limit = as_seen(trace, uav.name), uav.max_speed_m_s
+    command = avoiding(retreating(below, given, limit, planar=False), given, "augmented", planar=False)
     return Law(command, np.linalg.norm(recorded - command, axis=1))

@@ -24,10 +24,14 @@ inequalities (a robot squeezed between an obstacle and another robot) is elsewhe
 
 
 class Inequalities(NamedTuple):
-    """normal_k.v >= bound_k for K points or cores: normals (B, K, 3), bounds (B, K), -inf where nothing is asked."""
+    """normal_k.v >= bound_k for K points or cores: normals (B, K, 3), bounds (B, K), -inf where nothing is asked.
+
+    `retreat`: normal_k.v that a task below them asks for, (B, K), 0 where it asks for nothing; None: nowhere.
+    """
 
     normal: Array
     bound: Array
+    retreat: Array | None = None
 
     def slack(self, velocity: Array) -> Array:
         """Slack of velocities (B, 3) in each inequality, (B, K), m/s; inf where nothing is asked."""
@@ -39,8 +43,20 @@ def as_seen(trace: Trace, robot: str) -> Inequalities:
     given, count = inequalities_of(trace, robot, as_seen=True), len(trace.sample_rows)
     k = np.arange(len(given.sample)) - np.searchsorted(given.sample, given.sample)
     most = int(k.max(initial=-1)) + 1
-    found = Inequalities(np.zeros((count, most, 3)), np.full((count, most), -np.inf))
-    found.normal[given.sample, k], found.bound[given.sample, k] = given.normal, given.bound
+    normal, bound, retreat = np.zeros((count, most, 3)), np.full((count, most), -np.inf), np.zeros((count, most))
+    normal[given.sample, k], bound[given.sample, k], retreat[given.sample, k] = given.normal, given.bound, given.retreat
+    return Inequalities(normal, bound, retreat if retreat.any() else None)
+
+
+def retreating(below: Array, given: Inequalities, limit: Array | float, *, planar: bool) -> Array:
+    """Velocities (B, 3) that retreat from what may move: the closest ones that do, within a speed limit."""
+    if given.retreat is None:
+        return below
+    some = (given.retreat > 0.0).any(axis=1)
+    asked = Inequalities(given.normal[some], np.where(given.retreat[some] > 0.0, given.retreat[some], -np.inf))
+    found = below.copy()
+    limits = np.broadcast_to(limit, len(below))[some]
+    found[some] = limited(avoiding(below[some], asked, "augmented", planar=planar), limits)
     return found
 
 
@@ -126,12 +142,12 @@ def commanded(
     """
     composition, gain = trace.meta["composition"], trace.scenario.control.intervention_gain_1_s
     if trace.meta["method"] in ON_TOP:
-        velocity = avoiding(own, given, composition, planar=True)
+        velocity = avoiding(retreating(own, given, limit, planar=True), given, composition, planar=True)
         velocity[rows] = intervened(position[rows], velocity[rows], asked, gain, limit[rows])
         return velocity
     task = own.copy()
     task[rows] = intervened(position[rows], own[rows], asked, gain, limit[rows])
-    return avoiding(task, given, composition, planar=True)
+    return avoiding(retreating(task, given, limit, planar=True), given, composition, planar=True)
 
 
 def selected(sent: ProposalRecord) -> Array:

@@ -171,6 +171,7 @@ class BesideMoving:
     declared_m_s: float
     fastest_m_s: float
     too_fast_s: float | None
+    too_fast_m_s: float | None
     periods: int
     kept_periods: int
     passive_periods: int
@@ -192,6 +193,7 @@ def _beside_each(trace: Trace) -> Iterator[BesideMoving]:
         yield BesideMoving(
             pair.first, pair.second, pair.required_m, pair.speed_m_s, float(of_body.max()),
             float(trace.t[period_ends(trace)[over[0]]]) if len(over) else None,
+            float(of_body[over[0]]) if len(over) else None,
             len(one.row), int(one.kept.sum()), int(one.passive.sum()), int(one.retreated.sum()), int(one.stood.sum()),
             float(one.missed_m.max(initial=0.0)),
         )  # fmt: skip
