@@ -67,10 +67,11 @@ def _add_collisions(trace: Trace, add: Any) -> None:
         for k in sorted(near.tolist(), key=lambda k: world.bodies[k].kind in ROBOTS):
             body = world.bodies[k]
             role = "other" if body.kind in ROBOTS else "obstacle"
-            first, apart = trace.there_from(body.name), ways[i].seen_from(ways[k])
-            apart = apart._replace(start=apart.start[first:], end=apart.end[first:])
+            first, last = trace.there_from(body.name), trace.there_until(body.name)
+            apart = ways[i].seen_from(ways[k])
+            apart = apart._replace(start=apart.start[first:last], end=apart.end[first:last])
             planar = own.mobility[2] == 0.0
-            for row in first + visits(apart, body.shape, within, planar) if first < len(trace.t) else ():
+            for row in first + visits(apart, body.shape, within, planar) if first < last else ():
                 add(trace.t[row], own.name, "collision", **{role: body.name})
 
 
