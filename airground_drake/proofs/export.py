@@ -328,7 +328,7 @@ def law_file(run: Recorded) -> str:
         for demand, claim in zip(balls, claims, strict=True)
     ]
     proof = _all_of([_all_of(group) for group in _grouped(balls, [f"{each.lemma}_obey" for each in balls])])
-    pairs = "All pairs" if len(balls) == len(run.demands) else "All pairs of balls, none with an obstacle that may move"
+    pairs = "All pairs" if len(balls) == len(run.demands) else "The pairs of robots, and those with balls at rest"
     return (
         f"(** That {run.name} obeys the avoidance law. Written by `airground prove`, from the positions in trace/. *)\n"
         f"Require Import Reals Lra ZArith.\nRequire Import Safety Run LawChecker {run.name}.\n"
