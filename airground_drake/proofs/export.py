@@ -159,7 +159,7 @@ def recorded(trace: Trace) -> Recorded:
 COVERED = frozenset(
     {"start_m", "target_m", "preset", "max_speed_m_s", "radius_m", "name", "altitude_m", "task", "phantoms_m"}
     | {"position_m", "known_to_uav", "polygon_m", "segment_m", "size_m", "heading_rad", "height_m", "distance_m"}
-    | {"moves", "known_motion"}
+    | {"moves", "known_motion", "cells"}
 )
 """Keys of bodies that theorems take into account, or need not."""
 

@@ -75,10 +75,8 @@ WRONG = [
     pytest.param("Safety.v", "else - (D - d) / h.", "else - (D - d).", "period", id="bound without 1/h"),
     pytest.param("Safety.v", "norm n = 1 /\\ forall y", "forall y", "lemma", id="vectors of any length"),
     pytest.param("Convex.v", "norm e <= - gap x ->", "norm e <= - gap x / 2 ->", "leads_away", id="half the depth"),
-    pytest.param("Passive.v", "Rmin r ((L - gap x) / h)", "Rmin r (L - gap x)", "after", id="limit without 1/h"),
-    pytest.param(
-        "DistanceChecker.v", "Z.max 1 (Z.sqrt_up", "Z.max 0 (Z.sqrt_up", "root_sound", id="vector 0 separates"
-    ),
+    pytest.param("Passive.v", "d + (w + Vo) * h <= L ->", "d + w * h <= L ->", "kept", id="no Vo"),
+    pytest.param("DistanceChecker.v", "Z.max 1 (Z.sqrt_up", "Z.max 0 (Z.sqrt_up", "root_sound", id="vector 0"),
     pytest.param("DistanceChecker.v", "Z.min (e / cost)", "Z.min (2 * e / cost)", "lasts_known", id="lasts too long"),
     pytest.param("Trigger.v", "if Rle_dec (dwell_end s) t then", "if Rle_dec 0 0 then", "invariant", id="no dwell"),
 ]
