@@ -19,7 +19,7 @@ CASE_A = Path(schema.__file__).with_name("case_a.yaml")
 DATA: dict[str, Any] = yaml.safe_load(CASE_A.read_text(encoding="utf-8"))
 DELETE = object()
 
-DEADLOCKS = ("pocket", "swap", "doorway", "intersection", "crossing", "warehouse")
+DEADLOCKS = ("pocket", "swap", "doorway", "intersection", "crossing", "warehouse", "lab")
 """Shipped scenarios in which somebody is stuck without the UAV."""
 
 
