@@ -20,7 +20,7 @@ from airground_drake.geometry import convex
 
 MOST_NODES = 60_000
 """Number of nodes of a lattice; a larger area gets a wider spacing."""
-FINEST = 0.25
+FINEST = 0.1
 """Least spacing as a share of the least distance to keep."""
 MOST_SQUARES = 6
 """Number of squares in which a way is looked for, so that no obstacle far away makes it take long."""
@@ -86,7 +86,7 @@ class DistanceField:
     def length(self, place: Array) -> float:
         """Length of the way from a place (2,), m; infinite without a way.
 
-        A place too near to an obstacle is left towards the nearest node.
+        A place too near to an obstacle may be left by any straight way that comes no nearer.
         """
         apart = np.hypot(*(self.nodes - place).T)
         nearest = int(np.argmin(apart))

@@ -39,7 +39,7 @@ def _cross(u: Array, v: Array) -> Array:
     return found
 
 
-def shortest_around(start: Array, goal: Array, rows: Array, keep: Array, sides: int = 20) -> float:
+def shortest_around(start: Array, goal: Array, rows: Array, keep: Array, sides: int = 14) -> float:
     """Length of the shortest way that turns at points around corners only, m; infinite without one.
 
     The points are on circles a little wider than what is to be kept, so the way is a little longer than need be.

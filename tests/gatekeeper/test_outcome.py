@@ -9,8 +9,9 @@ import pytest
 
 from airground_drake.gatekeeper.outcome import Outcome, Outlook, outcomes, robot_at, way_left
 from airground_drake.gatekeeper.rollout import View
-from airground_drake.geometry.convex import balls
+from airground_drake.geometry.convex import balls, prism, stacked
 from airground_drake.geometry.motion import Motion
+from airground_drake.geometry.paths import shortest_path
 from airground_drake.intervention.policy import Proposal
 from airground_drake.nsbc.avoidance import Avoidance
 from airground_drake.nsbc.law import UgvLaw
@@ -107,7 +108,7 @@ FAR = tuple((x, y) for x in range(-50, 50, 5) for y in (40.0, 50.0, 60.0))
         (0.0, ((4.0, 0.0),), 2.0, AROUND),
         (0.0, ((4.0, 0.0),), 3.0, 2.0 * np.sqrt(7.0) + 6.0 * (np.pi / 2.0 - np.arccos(0.75))),
         (0.0, ((4.0, 0.0), (4.0, 9.0)), (2.0, 5.0), AROUND),
-        (0.0, (*FAR, (4.0, 0.0)), 2.0, AROUND),  # of very many, those beside the way count
+        (0.0, (*FAR, (4.0, 0.0)), 2.0, AROUND),
     ],
 )
 def test_the_way_left(x: float, discs: Points, radius: float | tuple[float, ...], left: float) -> None:
@@ -115,6 +116,18 @@ def test_the_way_left(x: float, discs: Points, radius: float | tuple[float, ...]
     reach = np.broadcast_to(radius, len(rows))
     found = way_left(np.array([x, 0.0, 0.0]), np.array([8.0, 0.0, 0.0]), rows, reach)
     assert found == pytest.approx(left)
+
+
+@pytest.mark.parametrize("place", [(0.0, 0.0), (-1.0, 1.0), (3.6, -1.5), (2.0, 2.0)])
+def test_among_very_many_walls_the_one_that_matters_counts(place: tuple[float, float]) -> None:
+    """Sixty far walls come first, sixty short ones lie nearer to the straight way than the last wall, across it."""
+    far = [prism([[x, y], [x + 1.0, y]]) for x in range(-20, 20, 2) for y in (30.0, 32.0, -30.0)]
+    beside = [prism([[x, y], [x + 0.05, y]]) for x in np.arange(0.5, 8.0, 0.25) for y in (0.8, -0.8)]
+    rows = stacked([*far, *beside, prism([[4.0, -3.0], [4.0, 5.0]])])
+    keep, here, goal = np.full(len(rows), 0.3), np.array([*place, 0.0]), np.array([8.0, 0.0, 0.0])
+    exact = shortest_path(here[:2], goal[:2], rows, keep).length_m
+    assert way_left(here, goal, rows, keep) == pytest.approx(exact, rel=0.03)
+    assert way_left(here, goal, rows[:-1], keep[:-1]) < exact - 0.5
 
 
 def test_a_ball_above_the_way_takes_up_the_circle_in_which_it_meets_the_plane() -> None:

@@ -8,15 +8,17 @@ from typing import Any
 import numpy as np
 import pytest
 from builders.observations import mate, seen
+from builders.shapes import from_core, rectangle
 
-from airground_drake.geometry.convex import balls
+from airground_drake.geometry.convex import balls, corners_of, prism, stacked
 from airground_drake.geometry.motion import Motion
 from airground_drake.geometry.paths import Path, shortest_path
 from airground_drake.intervention import detour
+from airground_drake.intervention.coordinate import Coordinate
 from airground_drake.intervention.database import predicted_cost
 from airground_drake.intervention.detour import Detour
 from airground_drake.intervention.halts import NOT_WATCHED, STANDS_S, room, standing, watched
-from airground_drake.intervention.policy import Observation, Proposal
+from airground_drake.intervention.policy import Observation, Policy, Proposal
 from airground_drake.intervention.wrong import StaleMap
 
 DETOUR = Detour(speed_m_s=1.0)
@@ -72,6 +74,22 @@ def test_bodies_are_gone_round_by_both_radii() -> None:
     assert motion is not None
     least = np.linalg.norm(motion.positions - [6.0, 0.5, 0.0], axis=1).min()
     assert least == pytest.approx(2.05 + 1.75, abs=1e-3)
+
+
+@pytest.mark.parametrize("policy", [DETOUR, Coordinate()])
+def test_the_way_out_of_a_room_keeps_its_distance_from_the_walls(policy: Policy) -> None:
+    """A room open to the left: walls of different distances, one of them thick, a box in front of the door."""
+    rows = stacked([
+        prism([[3.0, -2.0], [3.0, 2.0]], gap=0.3), prism([[0.0, 2.0], [3.0, 2.0]], gap=0.3, radius=0.05),
+        prism([[0.0, -2.0], [3.0, -2.0]], gap=0.2), rectangle(-1.5, 0.5, 0.6, 1.0),
+    ])  # fmt: skip
+    what = replace(seen([mate("ugv1", [2.4, 0.0], [6.0, 0.0], radius=0.2)]), radius=0.2, obstacles=rows)
+    found = policy.propose(what)
+    motion = found if isinstance(found, Motion) else (found or {})["ugv1"]
+    assert motion.positions[-1].tolist() == [6.0, 0.0, 0.0]
+    places = motion.positions[:, :2]
+    for row, least in zip(rows, (0.5, 0.55, 0.4, 0.2), strict=True):
+        assert from_core(places[:-1], places[1:], corners_of(row)).min() >= least - 1e-9
 
 
 def test_a_map_of_the_beginning_has_the_radii_of_the_beginning() -> None:

@@ -8,7 +8,7 @@ from itertools import combinations
 
 import numpy as np
 import pytest
-from builders.shapes import from_core
+from builders.shapes import fields, from_core, wall
 from builders.teams import Array, motions, random_team, space, task
 from hypothesis import given
 from hypothesis import strategies as st
@@ -16,7 +16,7 @@ from properties import examples
 
 from airground_drake.geometry import convex
 from airground_drake.intervention.coordination.joint import Effort, Plan, plan
-from airground_drake.intervention.coordination.roadmap import RobotTask, Space
+from airground_drake.intervention.coordination.roadmap import RobotTask, Space, build_roadmap
 from airground_drake.intervention.coordination.single import OtherRobot, _wished
 from airground_drake.intervention.coordination.timed import free_pieces
 
@@ -76,6 +76,35 @@ def test_every_distance_is_kept_at_all_times(
     assert_keeps_distances(room, tasks, found, 1.0, fixed)
     for way, one in zip(found.ways, tasks, strict=True):
         assert way is None or way.motion[-1, 1:].tolist() == one.preset[-1, 1:].tolist()
+
+
+@given(seed=st.integers(0, 10**6), count=st.integers(1, 3), field=fields(6), body=st.sampled_from([0.0, 0.2]))
+@examples(15, fuzz=1000)
+def test_every_distance_is_kept_among_walls(seed: int, count: int, field: tuple[Array, Array], body: float) -> None:
+    """Robots begin and end anywhere, too near to walls and polygons now and then."""
+    rng, (rows, keep) = np.random.default_rng(seed), field
+    places = rng.permutation(np.array([(x, y) for x in (0.3, 2.6, 5.2, 7.4, 9.7) for y in (0.4, 3.1, 6.6, 9.3)]))
+    tasks = [replace(task(places[2 * k], places[2 * k + 1]), body=body) for k in range(count)]
+    room = Space(rows, keep, 0.1, 0.5, 0.1)
+    found = plan(room, tasks, [1.0] * count, effort=Effort(orders=4))
+    assert_keeps_distances(room, tasks, found, 1.0, [])
+
+
+def test_walls_do_not_make_the_lattice_larger_than_ways_need() -> None:
+    """Arena walls of 40 m, and a wall through the middle: the way past it leads far, and so does the lattice then."""
+    corners = [(-20.0, -20.0), (20.0, -20.0), (20.0, 20.0), (-20.0, 20.0)]
+    arena = [wall(a, b) for a, b in zip(corners, [*corners[1:], corners[0]], strict=True)]
+    one = task((-15.0, -15.0), (-12.0, -15.0))
+    sizes = []
+    for more in ([], [wall((-13.5, -19.0), (-13.5, 10.0))]):
+        room = Space(convex.stacked([*arena, *more]), np.full(4 + len(more), 0.5), 0.1, 0.5, 0.1)
+        nodes = build_roadmap([room.of(0.0)], [one]).nodes
+        sizes.append(np.ptp(nodes, axis=0))
+        found = plan(room, [one], [1.0])
+        assert found.complete
+        assert_keeps_distances(room, [one], found, 1.0, [])
+    assert (sizes[0] < 12.0).all()
+    assert 5.0 < sizes[1][0] < 12.0
 
 
 @pytest.mark.parametrize(
