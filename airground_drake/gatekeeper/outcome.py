@@ -7,7 +7,7 @@ Each is worth the cost (25) along the roll-out plus a heuristic cost-to-go,
 
     V(p) = L(p)^3 / (3 v),
 
-with L the length of the shortest way to the goal among the known safe circles and v the reference speed: the integral
+with L the length of the shortest way to the goal round known obstacles and v the reference speed: the integral
 of L^2 for a UGV that takes this way at that speed. It does not bound the cost to come, because the own task does not
 take the shortest way. A roll-out that comes to rest short of the goal will never get there: its cost-to-go counts as
 infinite. Of two such roll-outs the one with less way left is better.

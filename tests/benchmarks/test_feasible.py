@@ -13,6 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from properties import examples
 
+from airground_drake.geometry.convex import balls
 from airground_drake.geometry.paths import NoPath, shortest_path
 
 NOTHING = np.empty((0, 2))
@@ -42,7 +43,8 @@ def test_lengths_are_those_of_the_packages_shortest_paths(seed: int, count: int)
     centres = np.random.default_rng(seed).uniform([2.0, -5.0], [18.0, 5.0], (count, 2))
     ours = shortest_length(START, TARGET, centres, 1.5)
     try:
-        theirs = shortest_path(START, TARGET, centres, np.full(count, 1.5)).length_m
+        discs = balls(np.column_stack([centres, np.zeros(count)]))
+        theirs = shortest_path(START, TARGET, discs, np.full(count, 1.5)).length_m
     except NoPath:
         theirs = np.inf
     assert ours == pytest.approx(theirs, abs=1e-6)
