@@ -120,11 +120,7 @@ def test_a_wall_that_appears_is_judged_from_then_on() -> None:
 def test_a_step_into_a_wall_costs_what_the_theorem_says(step_m: float) -> None:
     """A h = 0.075. The part that is stepped into is the second one of the wall."""
     scenario = lone(
-        [-2.0, 1.0, 0.0],
-        [-2.0, 1.0, 0.0],
-        STILL,
-        3.0,
-        obstacles={"o": Obstacle(segment_m=[[-4, 3.01], [0, 3.01], [0, -4]])},
+        [-2.0, 1.0, 0.0], [-2.0, 1.0, 0.0], STILL, 3.0, obstacles={"o": Obstacle(segment_m=[[-4, 3.01], [0, 3.01], [0, -4]])}
     )
     trace = simulate(scenario, drive=lambda t: [[step_m / 0.025 * (round(t / 0.025) == 7), 0.0, 0.0], [0.0] * 3])
     finding = decided("SAFE-HYP", trace)
