@@ -56,9 +56,11 @@ def over_a_square(half: float, keep: float) -> float:
     return 2.0 * (math.sqrt(apart**2 - keep**2) + keep * turn + 1.0)
 
 
-def over_an_end(half: float, keep: float) -> float:
-    """From (-half, 0) to (half, 0) round the end of a wall at the origin."""
-    return 2.0 * (math.sqrt(half**2 - keep**2) + keep * math.asin(keep / half))
+def over_an_end(half: float, keep: float, above: float = 0.0) -> float:
+    """From (-half, above) to (half, above) over the end of a wall, or a disc, at the origin; below 0: under it."""
+    apart = math.hypot(half, above)
+    turn = math.pi - 2.0 * math.acos(keep / apart) - 2.0 * math.atan2(above, half)
+    return 2.0 * math.sqrt(apart**2 - keep**2) + keep * turn
 
 
 @pytest.mark.parametrize(
@@ -69,18 +71,28 @@ def over_an_end(half: float, keep: float) -> float:
         ((-2.0, -2.0), (2.0, 2.0), SQUARE, 0.0, 2.0 * math.sqrt(10.0)),
         ((-3.0, 1.5), (3.0, 1.5), SQUARE, 0.5, 6.0),  # along an edge
         ((0.0, 0.8), (0.0, 4.0), SQUARE, 0.5, 3.2),  # from inside, straight out
-        ((0.9, 0.0), (4.0, 0.0), convex.stacked([*SQUARE, rectangle(1.8, 0.0, 1.0, 1.0)]), 0.5,
-         math.hypot(0.6, 1.0) + 0.8 + 0.5 * (math.atan2(0.5, 1.7) + math.asin(0.5 / math.hypot(1.7, 0.5))) + 1.7),
+        ((0.9, 0.0), (4.0, 0.0), convex.stacked([*SQUARE, rectangle(1.8, 0.0, 1.0, 0.8)]), 0.5,
+         math.hypot(0.6, 0.9) + 0.8 + math.sqrt(1.7**2 + 0.4**2 - 0.5**2)
+         + 0.5 * (math.atan2(0.4, 1.7) + math.asin(0.5 / math.hypot(1.7, 0.4)))),
         # out of two by the place where their edges cross
         ((-2.0, 0.0), (2.0, 0.0), convex.stacked([wall((0.0, -9.0), (0.0, 0.0))]), 0.5, over_an_end(2.0, 0.5)),
+        ((-2.0, 0.48), (2.0, 0.48), convex.stacked([wall((0.0, -9.0), (0.0, 0.0))]), 0.5, over_an_end(2.0, 0.5, 0.48)),
+        ((-2.0, 0.2), (2.0, 0.2), convex.stacked([wall((0.05, 0.5), (0.25, 4.0)), convex.balls([0.0, 0.0, 0.0])[0]]),
+         [0.05, 1.0], over_an_end(2.0, 1.0, -0.2)),  # a wall that stands on a disc: under it
         ((-2.0, 0.0), (2.0, 0.0), convex.stacked([wall((0.0, -9.0), (0.0, -4.0)), wall((0.0, -4.0), (0.0, 0.0))]), 0.5,
          over_an_end(2.0, 0.5)),  # walls that share a corner
         ((-2.0, 0.0), (2.0, 0.0), convex.stacked([wall((0.0, -9.0), (0.0, -0.5)), wall((0.0, 0.5), (0.0, 9.0))]), 0.5,
          4.0),  # two ends whose circles touch leave a passage
     ],
 )  # fmt: skip
-def test_known_lengths(start: Point, goal: Point, rows: Array, keep: float, length: float) -> None:
-    assert length_or_inf(start, goal, rows, np.full(len(rows), keep)) == pytest.approx(length, abs=1e-7)
+@pytest.mark.parametrize("few", [0, 64])
+def test_known_lengths(
+    start: Point, goal: Point, rows: Array, keep: float | list[float], length: float, few: int,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:  # fmt: skip
+    """All obstacles at once, or only those that a path runs into."""
+    monkeypatch.setattr(paths, "FEW", few)
+    assert length_or_inf(start, goal, rows, np.broadcast_to(keep, len(rows))) == pytest.approx(length, abs=1e-7)
 
 
 def test_the_way_out_of_a_room_is_as_long_as_among_discs_along_its_walls() -> None:
