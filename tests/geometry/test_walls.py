@@ -212,7 +212,7 @@ def test_a_distance_field_knows_no_way_through_closed_walls_and_bears_walls_far_
     corners = [(-2.0, -2.0), (2.0, -2.0), (2.0, 2.0), (-2.0, 2.0)]
     closed = convex.stacked([wall(a, b) for a, b in zip(corners, [*corners[1:], corners[0]], strict=True)])
     there, goal = np.zeros(2), np.array([5.0, 0.0])
-    assert math.isinf(length_among(there, goal, closed, np.full(4, 0.01)))
+    assert math.isinf(length_among(there, goal, closed, np.full(4, 0.003)))
     far = convex.joined(SQUARE, convex.stacked([wall((1e9, 0.0), (1e9, 1.0)), wall((-1e9, 9.0), (1e9, 9.0))]))
     found = length_among(np.array([-3.0, 0.0]), np.array([3.0, 0.0]), far, np.full(3, 0.5))
     assert found == pytest.approx(over_a_square(3.0, 0.5), rel=0.01)
