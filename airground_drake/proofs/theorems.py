@@ -112,7 +112,7 @@ _ALL = (
         ("The set is an intersection of half-planes or half-spaces.", "The point is in it."),
     ),
     Theorem(
-        "Passive.own_doing", "ours", ("SAFE-HYP",),
+        "Passive.own_doing", "ours", ("SAFE-HYP", "SAFE-OWN"),
         "Had the set stood still since the sample, the robot would be at min(D, L) or farther, less its errors w s.",
         _PERIOD,
     ),
@@ -122,7 +122,7 @@ _ALL = (
         (*_PERIOD, "L is at least d + (w + Vo) h, w the largest velocity error of the robot."),
     ),
     Theorem(
-        "Passive.since", "ours", ("SAFE-HYP",),
+        "Passive.since", "ours", ("SAFE-HYP", "SAFE-OWN"),
         "Since any sample the distance has fallen below L by no more than the set's way and the robot's errors.",
         _PERIOD,
     ),

@@ -62,6 +62,10 @@ class SafeInv(TheoremClaim):
     theorems: tuple[str, ...] = (
         "Safety.lemma",
         "Safety.lemma_in_the_plane",
+        "Convex.leads_away",
+        "Convex.ball",
+        "Convex.nearest_point",
+        "Convex.nearest_edge",
         "Safety.safe_always",
         "Safety.recovers",
         "Safety.obstacle",
