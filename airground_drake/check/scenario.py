@@ -97,16 +97,18 @@ def robots_of(scenario: Json) -> dict[str, Json]:
 
 
 def barriers_of(scenario: Json) -> dict[str, Json]:
-    """The obstacles, and the walls of the arena as entries like theirs, by name."""
+    """The obstacles, and the map and the walls of the arena as entries like theirs, by name."""
+    found: dict[str, Json] = dict(scenario["obstacles"])
+    numbers = dict.fromkeys(("heading_rad", "radius_m", "distance_m", "appears_s"), 0.0)
+    if scenario["map"] and scenario["map"]["cells"]["rectangles"]:
+        found["map"] = numbers | scenario["map"]
     if not scenario["arena_m"]:
-        return dict(scenario["obstacles"])
+        return found
     (west, east), (south, north) = (sorted(axis) for axis in zip(*scenario["arena_m"], strict=True))
     around = [[west, south], [east, south], [east, north], [west, north], [west, south]]
-    numbers = dict.fromkeys(("heading_rad", "radius_m", "distance_m", "appears_s"), 0.0) | {"height_m": ENDLESS_M}
     walls = zip(("south", "east", "north", "west"), pairwise(around), strict=True)
-    return scenario["obstacles"] | {
-        f"arena_{side}": numbers | {"position_m": [], "segment_m": [*corners]} for side, corners in walls
-    }
+    wall = numbers | {"height_m": ENDLESS_M, "position_m": []}
+    return found | {f"arena_{side}": wall | {"segment_m": [*corners]} for side, corners in walls}
 
 
 def places_of(scenario: Json, t_s: Array) -> dict[str, Array]:

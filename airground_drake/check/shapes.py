@@ -176,7 +176,9 @@ def shape_of(body: Json, *, endless: bool) -> Shape:
         NotEstablished: if it is a polygon that cannot be split into convex parts.
     """
     parts: Sequence[Sequence[Corner]]
-    if body["segment_m"]:
+    if "cells" in body:
+        parts = _of_map(body["cells"])
+    elif body["segment_m"]:
         parts = list(pairwise(_placed(body, body["segment_m"])))
     elif body["polygon_m"]:
         parts = split(_placed(body, body["polygon_m"]))
@@ -190,6 +192,13 @@ def shape_of(body: Json, *, endless: bool) -> Shape:
         parts = [[(x, y)]]
     heights = (-math.inf, math.inf) if endless else (0.0, float(body["height_m"]))
     return Shape([Part(corners, *heights) for corners in parts])
+
+
+def _of_map(cells: Json) -> list[list[Corner]]:
+    """The rectangles of a map: first row, row after the last, first column, column after the last."""
+    frame = {"position_m": cells["origin"][:2], "heading_rad": cells["origin"][2]}
+    scaled = (np.array(cells["rectangles"]) * cells["cell_m"]).tolist()
+    return [_placed(frame, [(x, y), (far_x, y), (far_x, far_y), (x, far_y)]) for y, far_y, x, far_x in scaled]
 
 
 def _placed(body: Json, corners: Sequence[Sequence[float]]) -> list[Corner]:

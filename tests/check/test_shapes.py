@@ -21,7 +21,7 @@ from airground_drake.check.run import Run
 from airground_drake.check.scenario import Pair, pairs_of
 from airground_drake.check.shapes import POINT, ROWS, Shape, boxes_of, shape_of, split
 from airground_drake.geometry import convex
-from airground_drake.scenarios.load import load, resolved
+from airground_drake.scenarios.load import from_data, load, resolved
 from airground_drake.scenarios.outlines import outlines_of
 from airground_drake.scenarios.schema import Obstacle
 
@@ -160,6 +160,24 @@ def test_every_kind_of_obstacle_has_the_shape_and_the_distance_of_the_package() 
         for robot, body in scenario.robots.items():
             assert {pairs[robot, name].safe_m} == {*convex.keep(rows, body.radius_m).tolist()}
             assert math.isinf(pairs[robot, name].shape.parts[0].top_m) == (robot in scenario.ugvs and name != "ball")
+
+
+@pytest.mark.parametrize("origin", [[7.0, -30.0, 0.0], [7.0, -30.0, 0.4]])
+def test_a_map_is_one_obstacle_of_all_its_rectangles(origin: list[float]) -> None:
+    data = resolved(load("minimal"))
+    cells = {
+        "file": "lab.yaml", "unknown": "occupied", "sha256": {}, "cell_m": 0.05, "origin": origin, "rows": 40,
+        "columns": 30, "occupied": 9, "unsure": 0, "unreached": 0, "rectangles": [[0, 3, 1, 4], [2, 40, 5, 30]],
+        "starts_m": [body["start_m"][:2] for body in (*data["ugvs"].values(), data["uav"])],
+    }  # fmt: skip
+    data["map"] = {"file": "lab.yaml", "height_m": 1.5, "distance_m": 0.4, "cells": cells}
+    scenario = from_data(data, "a report")
+    rows = outlines_of(scenario, scenario.barriers["map"])
+    for pair in (pair for pair in pairs_of(resolved(scenario)) if pair.other == "map"):
+        assert pair.safe_m == 0.4
+        for part, row in zip(pair.shape.parts, rows, strict=True):
+            assert np.allclose(part.begin, convex.corners_of(row), rtol=0.0, atol=2e-12)
+            assert part.top_m == (math.inf if pair.robot in scenario.ugvs else 1.5)
 
 
 def test_a_polygon_that_crosses_itself_has_no_parts() -> None:

@@ -50,8 +50,19 @@ def scene(name: str) -> dict[str, Any]:
             ugv: {"start_m": way[0], "target_m": way[-1], "preset": {"waypoints_m": way}, "radius_m": 0.2}
             for ugv, way in ways.items()
         },
-        **({"arena_m": [[2.0, -2.0], [-3.0, 2.0]]} if name == "arena" else {"obstacles": {name: BARRIERS[name]}}),
+        "obstacles": {name: BARRIERS[name]} if name in BARRIERS else {},
+        "arena_m": [[2.0, -2.0], [-3.0, 2.0]] if name == "arena" else [],
     }  # fmt: skip
+
+
+def with_map(data: dict[str, Any]) -> dict[str, Any]:
+    """With a map of two rectangles in the way, as a report has it; its files are needed by nobody."""
+    cells = {
+        "file": "lab.yaml", "unknown": "occupied", "sha256": {}, "cell_m": 0.5, "origin": [1.0, -2.0, 0.1], "rows": 9,
+        "columns": 9, "occupied": 6, "unsure": 0, "unreached": 0, "rectangles": [[0, 3, 0, 1], [3, 9, 1, 2]],
+        "starts_m": [body["start_m"][:2] for body in (*data["ugvs"].values(), data["uav"])],
+    }  # fmt: skip
+    return data | {"map": {"file": "lab.yaml", "cells": cells}}
 
 
 @pytest.fixture(scope="module", name="report_of")
@@ -60,7 +71,8 @@ def reports(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
     above = tmp_path_factory.mktemp("walls")
 
     def make(name: str, folder: Path) -> None:
-        scenario = from_data(scene(name), name)
+        data = scene(name)
+        scenario = from_data(with_map(data) if name == "map" else data, name)
         save(simulate(scenario, "d"), trace(folder))
         about = json.loads((trace(folder) / "meta.json").read_bytes())
         document: dict[str, Any] = {key: kind() for key, kind in SHAPE.items()} | {"schema": SCHEMA}
@@ -83,7 +95,7 @@ def refusals(report: Path, edit: Edit) -> list[CheckLine]:
     return [line for line in checked(forged(report, edit), LIMIT_S) if line.outcome != AGREES]
 
 
-@pytest.mark.parametrize("name", [*BARRIERS, "arena"])
+@pytest.mark.parametrize("name", [*BARRIERS, "arena", "map"])
 def test_honest_runs_stop_at_the_distance_and_keep_it(report_of: Callable[[str], Path], name: str) -> None:
     folder = report_of(name)
     claims = {claim["id"]: claim for claim in json.loads((folder / "report.json").read_bytes())["claims"]}
@@ -144,6 +156,9 @@ FORGERIES: dict[str, tuple[str, str, Edit]] = {
     "trap appears later": ("trap", "SAFE-TRACE", everywhere("obstacles", "trap", "appears_s", value=6.0)),
     "arena larger": ("arena", "SAFE-TRACE", everywhere("arena_m", value=[[2.001, -2.0], [-3.0, 2.0]])),
     "arena left out": ("arena", "SAFE-TRACE", everywhere("arena_m", value=[])),
+    "map of other cells": ("map", "SAFE-TRACE", everywhere("map", "cells", "rectangles", 1, 2, value=0)),
+    "map moved": ("map", "SAFE-TRACE", everywhere("map", "cells", "origin", 0, value=1.001)),
+    "map without cells": ("map", "SAFE-TRACE", everywhere("map", "cells", "rectangles", value=[])),
     "onto the wall": ("wall", "SAFE-TRACE", ahead(0.6)),
     "through the wall and back between rows that are clear of it": ("wall", "SAFE-TRACE", ahead(1.3)),
     "through the wall and back without a collision": ("wall", "events", ahead(1.3)),
