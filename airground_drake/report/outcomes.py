@@ -180,7 +180,7 @@ def _judge(course: RunOutcome, document: Document) -> None:
 def _beside_movers(course: RunOutcome, document: Document) -> None:
     """What came of the run beside obstacles that may move."""
     proved = any(claim["status"] == "proved" for claim in claims(document, THEOREMS[0]))
-    barriers = document["scenario"]["resolved"]["obstacles"]
+    barriers = document["scenario"]["resolved"].get("obstacles", {})
     course.movers = [name for name, each in barriers.items() if each.get("moves") or each.get("max_speed_m_s")]
     course.walls = [name for name, each in barriers.items() if each.get("segment_m")]
     for claim in claims(document, "SAFE-OWN", run=course.name):

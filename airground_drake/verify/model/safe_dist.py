@@ -78,7 +78,14 @@ class SafeDist(TheoremClaim):
         "distance, nor how fast it recovers: the layer's velocities there are not limited."
     )
 
-    theorems = ("Safety.disturbed", "Gate.deficit_closed_form", "Gate.common_direction", "Gate.overhead")
+    theorems = (
+        "Safety.disturbed",
+        "Gate.deficit_closed_form",
+        "Gate.common_direction",
+        "Gate.overhead",
+        "Passive.restored",
+        "Passive.loss_is_real",
+    )
     margin_of = "distance from centre to core that is left, d - W/A"
 
     def inputs(self, scenario: Scenario) -> dict[str, Any]:

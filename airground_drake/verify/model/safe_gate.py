@@ -44,7 +44,7 @@ class SafeGate(SafeInv):
         "priorities and limits is for SAFE-HYP to compare, run by run."
     )
 
-    theorems = ("Gate.scaled_back", "Safety.standing", "Safety.safe_always")
+    theorems = ("Gate.scaled_back", "Safety.standing", "Safety.safe_always", "Passive.own_doing")
 
     def inputs(self, scenario: Scenario) -> dict[str, Any]:
         """Those of SAFE-INV, and whether method (d) puts an intervention above avoidance."""
