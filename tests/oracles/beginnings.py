@@ -9,13 +9,15 @@ import numpy as np
 
 from airground_drake.base.arrays import Array
 from airground_drake.run.trace import Trace
+from airground_drake.scenarios.courses import course
+from airground_drake.verify.claim import TIME_TOLERANCE_S
 from airground_drake.verify.engines.geometry import corner_times, interpolate, travelled
-from airground_drake.verify.engines.outlines import GAP, RADIUS, Cores
-from airground_drake.verify.runs.pairs import Pair, pairs_beside, pairs_of, parts_of, preset_of
+from airground_drake.verify.engines.outlines import GAP, RADIUS, SPEED, Cores, away_from
+from airground_drake.verify.runs.pairs import Pair, cores_of, pairs_beside, pairs_of, preset_of
 from airground_drake.verify.runs.proposals import ProposalRecord, proposal_of
 from oracles.closed_loops import Scene
 from oracles.control_law import place, selected
-from oracles.sensing import moves
+from oracles.sensing import moves, still_parts
 
 
 class Beginning(NamedTuple):
@@ -55,16 +57,15 @@ def beginning(trace: Trace, t: float, number: int) -> Beginning:
     until = min(float(on.times_s[-1]), t + gate.longest_s)
     ends = min(max(until, arrives), t + gate.longest_s) + gate.settling_s
     after = h * np.arange(np.ceil((ends - t) / h) + 1.0)
-    still, distances = known_cores(trace, row, on)
+    still, law = known_cores(trace, row, on)
     pairs = [pair for pair in _among_robots(trace) if robot in (pair.first, pair.second)]
     others = [_other(trace, robot, t, after, pair, asked) for pair in pairs]
     settled = max(until, arrives, t + gate.horizon_s, *(end for _, _, _, end in others))
-    safe = np.array([*distances, *(each[1] for each in others)])
-    share = np.array([1.0] * len(distances) + [each[2] for each in others])
+    law = np.concatenate([law, np.array([(each[1], each[2], 0.0) for each in others]).reshape(-1, 3).T], axis=1)
 
     def loop(choice: int, periods: int) -> Scene:
         points = np.stack([each[0][choice] for each in others], axis=1) if others else np.empty((len(after), 0, 3))
-        return scene(trace, on, t, after, periods, still, points, safe, share)
+        return scene(trace, on, t, after, periods, still, points, law)
 
     executed = max(0, int(np.ceil((until - t) / h - 1e-9)))
     settles = round(np.ceil((settled - t) / h - 1e-9))
@@ -72,10 +73,9 @@ def beginning(trace: Trace, t: float, number: int) -> Beginning:
 
 
 def scene(
-    trace: Trace, on: ProposalRecord, t: float, after: Array, periods: int, still: Cores, points: Array, safe: Array,
-    share: Array,
-) -> Scene:  # fmt: skip
-    """The closed loop of the UGV that a proposal is for.
+    trace: Trace, on: ProposalRecord, t: float, after: Array, periods: int, still: Cores, points: Array, law: Array
+) -> Scene:
+    """The closed loop of the UGV that a proposal is for, with the obstacles that move and are within its range.
 
     Args:
         trace: the run.
@@ -85,9 +85,10 @@ def scene(
         periods: for which the proposal is executed.
         still: cores to keep away from, (M,).
         points: the same that move, at the samples, (S + 1, K, 3), m.
-        safe: distances to keep, (M + K,), m.
-        share: of the inequalities, (M + K,).
+        law: distances to keep, m, shares of the inequalities, and expected speeds, m/s, (3, M + K).
     """
+    movers, origins, of_movers = _movers(trace, on.ugv, t, after)
+    safe, share, speed = np.concatenate([law, of_movers], axis=1)
     return Scene(
         here=interpolate(trace.t, trace.position(on.ugv), t),
         preset=travelled(*preset_of(trace, on.ugv), t + after),
@@ -97,9 +98,41 @@ def scene(
         limit=np.array(trace.scenario.ugvs[on.ugv].max_speed_m_s),
         still=still,
         points=points,
+        movers=movers,
+        origins=origins,
         safe=safe,
         share=share,
+        speed=speed,
     )
+
+
+def _movers(trace: Trace, ugv: str, t: float, after: Array) -> tuple[Cores, Array, Array]:
+    """The parts of obstacles that move, are there, and are within sensing range of a UGV at a time.
+
+    Returns:
+        Their cores, (L,), where their origins are predicted to be, (S + 1, L, 3), m, and the law as of `scene`. With a
+        known motion they go their way, else on as they go for the horizon; then they stand.
+    """
+    gate, reach, here = trace.scenario.gatekeeper, trace.scenario.control.sensing_range_m, trace.position(ugv)
+    row = int(np.searchsorted(trace.t, t + TIME_TOLERANCE_S)) - 1
+    cores, origins, laws = list[Cores](), list[Array](), list[tuple[float, float, float]]()
+    for name, barrier in trace.scenario.barriers.items():
+        there = trace.there_from(name) <= row and not (barrier.disappears_s and trace.there_until(name) <= row)
+        if not (barrier.moves and there):
+            continue
+        way, own = trace.position(name), cores_of(trace)[name]
+        velocity = (way[row + 1] - way[row]) / (trace.t[row + 1] - trace.t[row])
+        places = way[row] + np.minimum(after, gate.horizon_s)[:, None] * velocity
+        if barrier.known_motion:
+            script = course(barrier.moves, trace.scenario.control.period_s, trace.scenario.duration_s)
+            places = interpolate(script.times, script.positions, t + after)
+        near = np.flatnonzero(away_from(own, here[row] - way[row], planar=True).distance <= reach)
+        pair = pairs_beside(trace, ugv)[name]
+        cores.append(own.take(near))
+        origins += [places] * len(near)
+        laws += [(pair.safe_m, pair.share, pair.speed_m_s)] * len(near)
+    stack = np.stack(origins, axis=1) if origins else np.empty((len(after), 0, 3))
+    return Cores.joined(cores), stack, np.array(laws).reshape(-1, 3).T
 
 
 def _among_robots(trace: Trace) -> list[Pair]:
@@ -111,14 +144,16 @@ def known_cores(trace: Trace, row: dict[Any, Any], on: ProposalRecord) -> tuple[
     """Parts that a UGV had sensed when it decided, and those of the message that it believed, as recorded.
 
     Returns:
-        Their cores, (k,), and the distances that the UGV keeps from them, (k,), m.
+        Their cores, (k,); and distances that the UGV keeps from them, m, shares, and expected speeds, m/s, (3, k).
     """
     known, told = (np.array(row[name], dtype=np.intp) for name in ("known", "told"))
-    parts, pairs = parts_of(trace), pairs_beside(trace, on.ugv)
-    own = [pairs[parts.names[k]].safe_m for k in parts.owner[known]]
+    parts, pairs = still_parts(trace), pairs_beside(trace, on.ugv)
+    beside = [pairs[parts.names[k]] for k in parts.owner[known]]
     claimed = on.mapped[told]
     theirs = claimed[:, GAP] + (trace.scenario.ugvs[on.ugv].radius_m + claimed[:, RADIUS])
-    return Cores.joined([parts.cores.take(known), Cores.of(claimed)]), np.append(own, theirs)
+    safe, speed = [pair.safe_m for pair in beside], [pair.speed_m_s for pair in beside]
+    law = np.array([np.append(safe, theirs), np.ones(len(known) + len(told)), np.append(speed, claimed[:, SPEED])])
+    return Cores.joined([parts.cores.take(known), Cores.of(claimed)]), law
 
 
 def _other(

@@ -11,7 +11,7 @@ import numpy.typing as npt
 from airground_drake.base.arrays import Array
 from airground_drake.run.trace import Trace
 from airground_drake.verify.engines.outlines import Cores, away_from
-from airground_drake.verify.runs.control_law import PLANE, least_speeds
+from airground_drake.verify.runs.control_law import PLANE, least_speeds, retreats
 from oracles.control_law import Asked, Inequalities, commanded, tracking
 
 AT_ONCE = 5_000_000
@@ -28,7 +28,7 @@ T = TypeVar("T")
 
 
 class Scene(NamedTuple):
-    """The inputs of a closed loop of S control periods, among M cores at rest and K points that move.
+    """The inputs of a closed loop of S control periods, among M cores at rest, K robots, and L parts that move.
 
     The arrays of R stacked scenes have a first axis R.
 
@@ -41,8 +41,11 @@ class Scene(NamedTuple):
         limit: speed limit, (), m/s.
         still: cores at rest, (M,).
         points: at the control samples, (S + 1, K, 3), m.
-        safe: distances to keep from both, (M + K,), m.
-        share: of the inequalities, (M + K,).
+        movers: cores of L parts of obstacles that move, about their origins, (L,).
+        origins: at the control samples, (S + 1, L, 3), m.
+        safe: distances to keep from all of these, (M + K + L,), m.
+        share: of the inequalities, (M + K + L,).
+        speed: expected of them at most, (M + K + L,), m/s; 0: the passive law does not apply.
     """
 
     here: Array
@@ -53,8 +56,11 @@ class Scene(NamedTuple):
     limit: Array
     still: Cores
     points: Array
+    movers: Cores
+    origins: Array
     safe: Array
     share: Array
+    speed: Array
 
 
 def stacked(scenes: Sequence[Scene]) -> Scene:
@@ -64,31 +70,44 @@ def stacked(scenes: Sequence[Scene]) -> Scene:
     """
     steps = max(len(one.executed) for one in scenes)
     cores, points = max(len(one.still.base) for one in scenes), max(one.points.shape[1] for one in scenes)
-    far = Cores.at(np.full((cores, 3), FAR_M))
-    corners = max(one.still.corners.shape[1] for one in scenes)
-    wide = Cores(np.zeros((0, corners, 2)), np.empty(0), np.empty(0))
+    movers = max(len(one.movers.base) for one in scenes)
+    far = Cores.at(np.full((max(cores, movers), 3), FAR_M))
+    wide, wider = (
+        Cores(np.zeros((0, max(part.corners.shape[1] for part in parts), 2)), np.empty(0), np.empty(0))
+        for parts in ([one.still for one in scenes], [one.movers for one in scenes])
+    )
 
     def padded(one: Scene) -> Scene:
-        m, k = len(one.still.base), one.points.shape[1]
+        m, k, n = len(one.still.base), one.points.shape[1], len(one.movers.base)
         later, more = (0, steps - len(one.executed)), (0, points - k)
-        safe, share = (
-            np.concatenate([part[:m], np.zeros(cores - m), part[m:], np.zeros(points - k)])
-            for part in (one.safe, one.share)
-        )
+        safe, share, speed = (
+            np.concatenate([
+                part[:m], np.zeros(cores - m), part[m : m + k], np.zeros(points - k), part[m + k :],
+                np.zeros(movers - n),
+            ])
+            for part in (one.safe, one.share, one.speed)
+        )  # fmt: skip
         return one._replace(
             preset=np.pad(one.preset, (later, (0, 0)), mode="edge"),
             wanted=np.pad(one.wanted, (later, (0, 0)), mode="edge"),
             executed=np.pad(one.executed, later),
             still=Cores.joined([one.still, far.take(slice(cores - m)), wide]),
             points=np.pad(one.points, (later, more, (0, 0)), constant_values=FAR_M),
+            movers=Cores.joined([one.movers, far.take(slice(movers - n)), wider]),
+            origins=np.pad(one.origins, (later, (0, movers - n), (0, 0)), mode="constant"),
             safe=safe,
             share=share,
+            speed=speed,
         )
 
     every = [padded(one) for one in scenes]
-    still = Cores(*(np.stack([getattr(one.still, part) for one in every]) for part in ("corners", "base", "top")))
-    parts = {name: np.stack([getattr(one, name) for one in every]) for name in Scene._fields if name != "still"}
-    return Scene(still=still, **parts)
+    still, carried = (
+        Cores(*(np.stack([getattr(getattr(one, name), part) for one in every]) for part in ("corners", "base", "top")))
+        for name in ("still", "movers")
+    )
+    parts = {name: np.stack([getattr(one, name) for one in every]) for name in Scene._fields
+             if name not in ("still", "movers")}  # fmt: skip
+    return Scene(**(parts | {"still": still, "movers": carried}))
 
 
 def roll_out(trace: Trace, scenes: Scene, nudge: Array | float = 0.0) -> Iterator[Array]:
@@ -104,9 +123,13 @@ def roll_out(trace: Trace, scenes: Scene, nudge: Array | float = 0.0) -> Iterato
             np.sqrt(np.square(offset).sum(axis=2)),
             away_from(scenes.still, place[:, None], planar=True),
         )
-        normal = np.append(normal, offset / np.where(apart > 0.0, apart, 1.0)[..., None], axis=1)
-        bound = least_speeds(np.append(distance, apart, axis=1), scenes.safe, scenes.share, control)
-        given = Inequalities(normal * PLANE, bound)
+        moving = away_from(scenes.movers, place[:, None] - scenes.origins[:, k], planar=True)
+        robots = offset / np.where(apart > 0.0, apart, 1.0)[..., None]
+        normal = np.concatenate([normal, robots, moving.normal], axis=1)
+        distance = np.concatenate([distance, apart, moving.distance], axis=1)
+        bound = least_speeds(distance, scenes.safe, scenes.share, control, scenes.speed)
+        retreat = retreats(distance, scenes.safe, scenes.speed, h)
+        given = Inequalities(normal * PLANE, bound, retreat if retreat.any() else None)
         own = tracking(place, scenes.preset[:, k], rates[:, k], control.motion_gain_1_s, scenes.limit)
         rows = np.flatnonzero(scenes.executed[:, k])
         asked = Asked(scenes.wanted[rows, k], wishes[rows, k], scenes.chosen[rows])

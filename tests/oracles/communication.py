@@ -12,11 +12,11 @@ from airground_drake.verify.claim import TIME_TOLERANCE_S
 from airground_drake.verify.engines.outlines import CORNERS, COUNT, MIDDLE
 from airground_drake.verify.runs.demands import outlines_of
 from airground_drake.verify.runs.instants import intervening
-from airground_drake.verify.runs.pairs import appears_of, parts_of
+from airground_drake.verify.runs.pairs import carried
 from airground_drake.verify.runs.proposals import proposals_of
 from oracles.fault import Fault
 from oracles.protocol import answers_to, withdrawn_s
-from oracles.sensing import beyond_range
+from oracles.sensing import are_there, beyond_range, still_parts
 
 SENSED_M = 1e-9
 """Within this of the sensing range an obstacle may have been sensed or not, m."""
@@ -50,18 +50,16 @@ def _wrong_maps(trace: Trace) -> Iterator[Fault]:
     The UAV knows an obstacle that came with an answer from the next planning instant on, if the proposal is in force
     until then.
     """
-    scenario, parts, every = (
-        trace.scenario,
-        parts_of(trace),
-        list(map(tuple, map(np.ndarray.tolist, outlines_of(trace)))),
-    )
+    scenario, parts, numbers = trace.scenario, still_parts(trace), carried(trace)[0][0].tolist()
+    outlines = list(map(tuple, map(np.ndarray.tolist, outlines_of(trace))))
+    every = [outlines[k] for k in numbers]
     told_before = np.array([scenario.barriers[parts.names[k]].known_to_uav for k in parts.owner], dtype=np.bool_)
-    appears, gap = appears_of(trace), scenario.safe_distance.obstacle_m
+    gap = scenario.safe_distance.obstacle_m
     phantoms = [(gap, 0.0, 0.0, z, z, 1.0, x, y) for x, y, z in scenario.uav.phantoms_m]
     surely, perhaps = _told(trace, every)
     for sent in proposals_of(trace):
         listed, t = list(map(_without_circle, sent.mapped)), sent.issued_s
-        there = told_before & (appears <= t + TIME_TOLERANCE_S)
+        there = told_before & are_there(trace, t)
         known = [*(every[k] for k in np.flatnonzero(there)), *phantoms]
         learnt = listed[len(known) :]
         least = {part for part, noticed in surely.items() if noticed <= t + TIME_TOLERANCE_S}
@@ -86,7 +84,7 @@ def _told(trace: Trace, every: list[Part]) -> tuple[dict[Part, float], dict[Part
             if before:
                 read.setdefault(before[-1], k * period)
         for answer in answers_to(trace, sent):
-            there = appears_of(trace) <= answer.t_s + TIME_TOLERANCE_S
+            there = are_there(trace, answer.t_s)
             away = np.where(there, beyond_range(trace, sent.ugv, answer.t_s), np.inf)
             for k in np.flatnonzero(away <= SENSED_M).tolist():
                 part = every[k]

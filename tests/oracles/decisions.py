@@ -28,10 +28,10 @@ from airground_drake.verify.runs.gate_record import (
     rows_of,
 )
 from airground_drake.verify.runs.instants import GATED_METHODS, intervening
-from airground_drake.verify.runs.pairs import pairs_beside, parts_of, preset_of
+from airground_drake.verify.runs.pairs import pairs_beside, preset_of
 from airground_drake.verify.runs.proposals import proposals_of
 from oracles.fault import Fault
-from oracles.sensing import sensed
+from oracles.sensing import sensed, still_parts
 
 NO_DIFFERENCE = 1e-6
 """Relative gain from which on a new proposal makes a difference."""
@@ -143,7 +143,7 @@ class _Beside(NamedTuple):
 
 def _beside(trace: Trace, row: DecisionRecord, after: Array) -> Iterator[_Beside]:
     """What a UGV senses at a decision. Of a core, (26) has the points nearest to the way without intervention."""
-    there, parts, pairs = sensed(trace, row.robot, row.t_s, after), parts_of(trace), pairs_beside(trace, row.robot)
+    there, parts, pairs = sensed(trace, row.robot, row.t_s, after), still_parts(trace), pairs_beside(trace, row.robot)
     refused = row.constant[0]
     for k in there.parts.tolist():
         core, name = parts.cores.take(slice(k, k + 1)), parts.names[parts.owner[k]]

@@ -24,11 +24,10 @@ from airground_drake.verify.engines.outlines import (
     away_from,
 )
 from airground_drake.verify.runs.acceptances import METHOD
-from airground_drake.verify.runs.pairs import appears_of, parts_of
 from airground_drake.verify.runs.proposals import ProposalRecord, proposal_of, proposals_of
 from oracles.fault import Fault
 from oracles.protocol import answers_to
-from oracles.sensing import are_same, beyond_range, first_sensed
+from oracles.sensing import are_same, are_there, beyond_range, first_sensed, still_parts
 
 MOST_CLAIMED = 64
 """Outlines of a message that a UGV takes into account."""
@@ -53,7 +52,7 @@ def _compared(trace: Trace, row: dict[Any, Any]) -> Iterator[tuple[str, list[Any
     if trace.meta["method"] == METHOD and row["accept_stalls"] < 0.0:
         yield from ((name, [], found) for name, found in recorded.items())
         return
-    away, there = beyond_range(trace, ugv, t), appears_of(trace) <= t + TIME_TOLERANCE_S
+    away, there = beyond_range(trace, ugv, t), are_there(trace, t)
     surely = [k for k in recorded["sensed"] if abs(away[k]) <= EDGE_M]
     yield "sensed", sorted({*np.flatnonzero(there & (away < -EDGE_M)).tolist(), *surely}), recorded["sensed"]
     if trace.meta["method"] != METHOD:
@@ -61,7 +60,7 @@ def _compared(trace: Trace, row: dict[Any, Any]) -> Iterator[tuple[str, list[Any
     on, first = proposal_of(trace, int(row["number"])), first_sensed(trace, ugv)
     known = np.flatnonzero(first <= t + TIME_TOLERANCE_S)
     yield "known", known.tolist(), recorded["known"]
-    cores = parts_of(trace).cores
+    cores = still_parts(trace).cores
     shown = are_same(cores, Cores.of(on.mapped)).any(axis=1)
     stood = bool(((trace.decisions["number"] == on.number) & (trace.decisions["t_s"] < t - TIME_TOLERANCE_S)).any())
     new = (first > t - period_s + TIME_TOLERANCE_S) & (first <= t + TIME_TOLERANCE_S) & ~shown

@@ -10,13 +10,13 @@ from airground_drake.base.arrays import Array
 from airground_drake.run.trace import Trace
 from airground_drake.verify.runs.control_law import ON_TOP
 from airground_drake.verify.runs.gate_record import DecisionRecord, rows_of
-from airground_drake.verify.runs.pairs import pairs_beside, parts_of
+from airground_drake.verify.runs.pairs import pairs_beside
 from airground_drake.verify.runs.proposals import proposal_of
 from oracles.beginnings import scene
 from oracles.closed_loops import NUDGES_M, Scene, in_batches, move_apart, roll_out, stacked
 from oracles.fault import Fault
 from oracles.outcome_rolls import Foreseen, foreseen, nudged
-from oracles.sensing import sensed
+from oracles.sensing import sensed, still_parts
 
 VELOCITY_TOLERANCE_M_S = 1e-6
 """Recorded and recomputed mode velocities may differ by this, m/s: rounding of two algorithms, which the closed loop
@@ -111,10 +111,10 @@ def scene_of(trace: Trace, row: DecisionRecord, plan: Array) -> Scene:
     on = proposal_of(trace, row.number)
     there = sensed(trace, on.ugv, row.t_s, after)
     points = np.stack(there.places, axis=1) if there.places else np.empty((len(after), 0, 3))
-    parts, pairs = parts_of(trace), pairs_beside(trace, on.ugv)
+    parts, pairs = still_parts(trace), pairs_beside(trace, on.ugv)
     beside = [*(pairs[parts.names[k]] for k in parts.owner[there.parts]), *there.robots]
-    safe, share = (np.array([getattr(pair, name) for pair in beside]) for name in ("safe_m", "share"))
-    loop = scene(trace, on, row.t_s, after, 0, parts.cores.take(there.parts), points, safe, share)
+    law = np.array([(pair.safe_m, pair.share, pair.speed_m_s) for pair in beside]).reshape(-1, 3).T
+    loop = scene(trace, on, row.t_s, after, 0, parts.cores.take(there.parts), points, law)
     return loop._replace(executed=np.repeat(plan == 1.0, each))
 
 

@@ -13,11 +13,29 @@ from airground_drake.verify.claim import TIME_TOLERANCE_S
 from airground_drake.verify.engines.geometry import interpolate
 from airground_drake.verify.engines.outlines import Cores, away_from, within
 from airground_drake.verify.runs.instants import row_at
-from airground_drake.verify.runs.pairs import Pair, appears_of, pairs_beside, parts_of
+from airground_drake.verify.runs.pairs import Pair, Parts, carried, lifetimes, pairs_beside, parts_of
 
 SAME_M = 1e-9
 """Cores whose corners and heights differ by no more than this are one, m."""
 Indices = npt.NDArray[np.intp]
+
+
+def still_parts(trace: Trace) -> Parts:
+    """The convex parts of the barriers at rest: records number them in their order."""
+
+    def found() -> Parts:
+        parts, still = parts_of(trace), carried(trace)[0][0]
+        owner = parts.owner[still]
+        return Parts(parts.cores.take(still), owner, np.unique(owner, return_index=True)[1], parts.names)
+
+    return trace.derived("still parts", found)
+
+
+def are_there(trace: Trace, t: float | Array) -> npt.NDArray[np.bool_]:
+    """Which of these parts are there at a time, (m,), or at (m,) times, s."""
+    still, times = carried(trace)[0][0], np.append(trace.t, np.inf)
+    first, last = (times[rows[still]] for rows in lifetimes(trace))
+    return np.asarray((first <= t + TIME_TOLERANCE_S) & (t < last - TIME_TOLERANCE_S))
 
 
 class Sensed(NamedTuple):
@@ -40,14 +58,13 @@ def sensed(trace: Trace, robot: str, t: float, after: Array) -> Sensed:
         if other != robot and np.linalg.norm(place - here) <= reach:
             pairs.append(pairs_beside(trace, robot)[other])
             places.append(place + after[:, None] * velocity)
-    there = appears_of(trace) <= t + TIME_TOLERANCE_S
-    return Sensed(np.flatnonzero(there & (beyond_range(trace, robot, t) <= 0.0)), pairs, places)
+    return Sensed(np.flatnonzero(are_there(trace, t) & (beyond_range(trace, robot, t) <= 0.0)), pairs, places)
 
 
 def beyond_range(trace: Trace, ugv: str, t: float) -> Array:
     """How far each part is beyond the sensing range of a UGV at a time, s, (m,), m."""
     here = interpolate(trace.t, trace.position(ugv), t)
-    return away_from(parts_of(trace).cores, here, planar=True).distance - trace.scenario.control.sensing_range_m
+    return away_from(still_parts(trace).cores, here, planar=True).distance - trace.scenario.control.sensing_range_m
 
 
 def moves(trace: Trace, robot: str, t: float) -> tuple[Array, Array]:
@@ -67,7 +84,7 @@ def news(trace: Trace, ugv: str, mapped: Array, begin_s: float, end_s: float) ->
     """
     first = trace.derived(("first sensed", ugv), lambda: first_sensed(trace, ugv))
     new = (first > begin_s + TIME_TOLERANCE_S) & (first <= end_s + TIME_TOLERANCE_S)
-    shown = are_same(parts_of(trace).cores, Cores.of(mapped)).any(axis=1)
+    shown = are_same(still_parts(trace).cores, Cores.of(mapped)).any(axis=1)
     return np.flatnonzero(new & ~shown)
 
 
@@ -84,8 +101,9 @@ def first_sensed(trace: Trace, ugv: str) -> Array:
     period_s = trace.scenario.gatekeeper.period_s
     samples = period_s * np.arange(np.floor(trace.t[-1] / period_s + 1e-9) + 1.0)
     was = interpolate(trace.t, trace.position(ugv), np.minimum(samples, trace.t[-1]))
-    near = within(parts_of(trace).cores, was, trace.scenario.control.sensing_range_m, planar=True)
-    appears, found = appears_of(trace), np.full(len(parts_of(trace).owner), np.inf)
-    there = samples[near.place] >= appears[near.core] - TIME_TOLERANCE_S
+    parts = still_parts(trace)
+    near = within(parts.cores, was, trace.scenario.control.sensing_range_m, planar=True)
+    found = np.full(len(parts.owner), np.inf)
+    there = np.array([are_there(trace, t) for t in samples]).reshape(len(samples), -1)[near.place, near.core]
     np.minimum.at(found, near.core[there], samples[near.place[there]])
     return found
