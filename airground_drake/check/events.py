@@ -72,11 +72,12 @@ def _collisions(run: Run) -> Iterator[Event]:
     """
     for pair in run.pairs:
         within = float(run.scenario["safe_distance"]["collision_m"]) + pair.radii_m
-        if run.apart_m[pair.robot, pair.other] >= within:
+        apart = run.apart(pair)
+        if run.apart_m[pair.robot, pair.other] >= within or len(apart) < 2:
             continue
-        near, passes = pair.shape.within(run.apart(pair), within)
+        near, passes = pair.shape.within(apart, within)
         enters = near & ~np.append(False, near[:-1])
         passes = np.append(passes & ~near[:-1] & ~near[1:], False)
         hit = {"other" if pair.other in run.robots else "obstacle": pair.other}
-        for when in run.t_s[run.there_from(pair.other) :][enters | passes]:
+        for when in run.t_s[run.there(pair.other)][enters | passes]:
             yield Event(float(when), pair.robot, "collision", **hit)

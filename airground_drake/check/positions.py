@@ -6,6 +6,7 @@ It needs a table of sampled positions and a scenario, nothing from the simulator
 from __future__ import annotations
 
 from collections.abc import Mapping
+from fractions import Fraction
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -15,13 +16,13 @@ from .files import Json
 from .limits import LARGEST
 from .rules import SMALL, Array
 from .safety import gain_of, lost_m, shortfall_m
-from .scenario import barriers_of, pairs_of, places_of, robots_of
+from .scenario import barriers_of, moving_of, pairs_of, places_of, robots_of
 
 COLUMNS = ("t_s", "body", "x_m", "y_m", "z_m")
 MOST_ROWS = 10_000_000
 NOT_JUDGED = (
     "how bodies moved between samples: motion is taken as straight",
-    "where obstacles were: they are taken as where the scenario has them",
+    "where obstacles at rest were: they are taken as where the scenario has them",
     "triggers, proposals, decisions, commands and arrivals",
 )
 
@@ -40,7 +41,8 @@ class JudgedPair(NamedTuple):
         least_m: distance that was kept at all times, with straight motion between samples.
         missed_m: e, by how much the samples miss the avoidance inequalities, m per sampling period; None if the law
             says nothing, since samples are not equally spaced.
-        guarantee_m: distance that follows from the law with that e; None as above, or if it is not above 0.
+        guarantee_m: distance that follows from the law with that e; None as above, if it is not above 0, or beside an
+            obstacle that may move: there e is by how much the robot itself came too near in a period.
     """
 
     first: str
@@ -74,8 +76,8 @@ def judge(table: pd.DataFrame, scenario: Json) -> tuple[list[JudgedPair], Covera
     """Judge the positions of a table.
 
     Args:
-        table: columns `COLUMNS`; a row is where a body is at a time, s and m, world frame. All robots of the scenario
-            at the same times.
+        table: columns `COLUMNS`; a row is where a body is at a time, s and m, world frame. All robots of the scenario,
+            and the origins of all obstacles that move, at the same times.
         scenario: as resolved; says which distances are to be kept, and the gain of the law.
 
     Returns:
@@ -95,11 +97,11 @@ def judge(table: pd.DataFrame, scenario: Json) -> tuple[list[JudgedPair], Covera
         least_m = pair.shape.least_m(own - other) - pair.radii_m
         missed = guarantee = None
         if period is not None:
-            gain = gain_of(scenario, period)
-            e = shortfall_m(own, other, pair, gain)
+            gain = Fraction() if pair.moves_m_s else gain_of(scenario, period)
+            e = shortfall_m(own, other, pair.passive(period), gain)
             short = max(0.0, pair.safe_m - pair.shape.least_m(own[:1] - other[:1]))
             promised = pair.gap_m - max(lost_m(e, gain, len(spacing)), short)
-            missed, guarantee = float(e), promised if promised > 0.0 else None
+            missed, guarantee = float(e), promised if promised > 0.0 and not pair.moves_m_s else None
         found.append(JudgedPair(pair.robot, pair.other, pair.gap_m, least_m, missed, guarantee))
     covered = Coverage(float(t_s[0]), float(t_s[-1] - t_s[0]), float(scenario["duration_s"]))
     return sorted(found, key=lambda one: one.least_m - one.safe_m), covered
@@ -116,40 +118,44 @@ def _sampled(table: pd.DataFrame, scenario: Json) -> tuple[Array, Mapping[str, A
         raise UnusableError(f"its columns are {', '.join(map(str, table.columns))}; wanted: {', '.join(COLUMNS)}")
     if len(table) > MOST_ROWS:
         raise UnusableError(f"it has {len(table)} rows; allowed: {MOST_ROWS}")
-    robots = robots_of(scenario)
+    bodies = [*robots_of(scenario), *moving_of(scenario)]
     names = table["body"].astype(str)
-    if strange := sorted({*names} - {*robots}):
-        raise UnusableError(f"body {strange[0]!r} is not a robot of the scenario; its robots are {', '.join(robots)}")
+    if strange := sorted({*names} - {*bodies}):
+        raise UnusableError(f"body {strange[0]!r} is none that moves in the scenario; these are {', '.join(bodies)}")
     found: dict[str, Array] = {}
     times: dict[str, Array] = {}
-    for robot in robots:
-        rows = table[names == robot]
+    for name in bodies:
+        rows = table[names == name]
         if len(rows) < 2:
-            raise UnusableError(f"{robot} has {len(rows)} rows; wanted: 2 at least")
-        numbers = _numbers(rows, robot)
-        times[robot], found[robot] = numbers[:, 0], numbers[:, 1:]
-        if (np.diff(times[robot]) <= 0.0).any():
-            k = int(np.argmax(np.diff(times[robot]) <= 0.0)) + 1
-            raise UnusableError(f"{robot}: t_s = {times[robot][k]:g} does not come after the row before")
-    first = next(iter(robots))
-    for robot, own in times.items():
+            raise UnusableError(f"{name} has {len(rows)} rows; wanted: 2 at least")
+        numbers = _numbers(rows, name)
+        times[name], found[name] = numbers[:, 0], numbers[:, 1:]
+        if (np.diff(times[name]) <= 0.0).any():
+            k = int(np.argmax(np.diff(times[name]) <= 0.0)) + 1
+            raise UnusableError(f"{name}: t_s = {times[name][k]:g} does not come after the row before")
+    first = bodies[0]
+    for name, own in times.items():
         if len(own) != len(times[first]) or not np.allclose(own, times[first], rtol=0.0, atol=_resolution_s(own)):
-            raise UnusableError(f"{robot} and {first} are not sampled at the same times; wanted: equal t_s")
+            raise UnusableError(f"{name} and {first} are not sampled at the same times; wanted: equal t_s")
     for name, body in barriers_of(scenario).items():
-        if body["appears_s"]:
-            raise UnusableError(f"{name} appears under way (appears_s); wanted: obstacles that are always there")
-    return times[first], found | places_of(scenario, times[first])
+        for key in ("appears_s", "disappears_s"):
+            if body[key]:
+                does = key.removesuffix("_s")
+                raise UnusableError(f"{name} {does} under way ({key}); wanted: obstacles that are always there")
+    return times[first], places_of(scenario, times[first]) | found
 
 
-def _numbers(rows: pd.DataFrame, robot: str) -> Any:
+def _numbers(rows: pd.DataFrame, name: str) -> Any:
     values = [
-        pd.to_numeric(rows[name], errors="coerce").to_numpy(dtype=np.float64) for name in COLUMNS if name != "body"
+        pd.to_numeric(rows[column], errors="coerce").to_numpy(dtype=np.float64)
+        for column in COLUMNS
+        if column != "body"
     ]
     numbers = np.column_stack(values)
     if not np.isfinite(numbers).all():
         k = int(np.argmax(~np.isfinite(numbers).all(axis=1)))
-        raise UnusableError(f"{robot}: row {rows.index[k]} has a value that is not a finite number")
+        raise UnusableError(f"{name}: row {rows.index[k]} has a value that is not a finite number")
     if not (within := (np.abs(numbers) <= LARGEST).all(axis=1)).all():
         k = int(np.argmin(within))
-        raise UnusableError(f"{robot}: row {rows.index[k]} has a value beyond {LARGEST:g}; wanted: seconds and metres")
+        raise UnusableError(f"{name}: row {rows.index[k]} has a value beyond {LARGEST:g}; wanted: seconds and metres")
     return numbers

@@ -15,11 +15,12 @@ from .limits import at_most_s, is_of_a_size
 from .line import AGREES, DISAGREES, OPEN, CheckLine
 from .rules import SMALL, Disagreement, Found, NotEstablished, close, holds, same
 from .run import Run, read_run
-from .safety import safe_hyp, safe_trace
+from .safety import safe_hyp, safe_own, safe_trace
 from .triggers import thr_quality, thr_trig, zeno_trace
 
-DECIDED: Mapping[str, Callable[[Run], Found]] = {
+DECIDED: Mapping[str, Callable[[Run], Found | None]] = {
     "SAFE-TRACE": safe_trace,
+    "SAFE-OWN": safe_own,
     "SAFE-HYP": safe_hyp,
     "ZENO-TRACE": zeno_trace,
     "THR-TRIG": thr_trig,
@@ -101,8 +102,9 @@ def _lines(folder: Path, there: Sequence[str], report: Json, limit_s: float) -> 
 
     def judge(claim: str, name: str) -> str:
         entries = [each for each in report["claims"] if (each["id"], each["run"]) == (claim, name)]
-        same("claims that there are", len(entries), 1, about=claim)
-        return _judged(entries[0], DECIDED[claim](runs[name]))
+        found = DECIDED[claim](runs[name])
+        same("claims that there are", len(entries), int(found is not None), about=claim)
+        return _judged(entries[0], found) if found else "nothing may move"
 
     for name in report["scenario"]["resolved"]["runs"]:
         yield attempt("trace", name, partial(load, name))

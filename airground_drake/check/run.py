@@ -13,7 +13,7 @@ import pandas as pd
 
 from .files import Json, parse_table, read_bytes, read_json, sha256
 from .rules import SMALL, Array, NotEstablished, close, holds, same
-from .scenario import Levels, Pair, Preset, as_run, levels_of, pairs_of, places_of, preset_of, robots_of
+from .scenario import Levels, Pair, Preset, as_run, levels_of, moving_of, pairs_of, places_of, preset_of, robots_of
 from .shapes import boxes_of
 
 Rows = npt.NDArray[np.intp]
@@ -22,6 +22,8 @@ TABLES = ("states.parquet", "samples.parquet")
 """The tables that are read: positions, noise and triggers; commands and references at the control samples."""
 SHARED = ("method", "composition", "seed", "zeta_m", "events", "faults")
 """Keys that meta.json and the run's entry in report.json share."""
+LIFETIME = (("appears_s", 0.0), ("disappears_s", math.inf))
+"""Keys of an obstacle that say while it is there, and what 0 means."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +62,7 @@ class Run:
     @cached_property
     def pairs(self) -> list[Pair]:
         """Pairs of bodies that are there before the end, and the distances that they must keep."""
-        return [pair for pair in pairs_of(self.scenario) if self.there_from(pair.other) < len(self.t_s)]
+        return [pair for pair in pairs_of(self.scenario) if self.there(pair.other).start < len(self.t_s)]
 
     @cached_property
     def apart_m(self) -> dict[tuple[str, str], float]:
@@ -88,23 +90,40 @@ class Run:
 
     @cached_property
     def position_m(self) -> dict[str, Array]:
-        """Places of robots and obstacles, (T, 3) each; those of obstacles at rest are 0."""
-        places = {robot: np.stack([self.column(f"{robot}.{a}_m") for a in "xyz"], axis=1) for robot in self.robots}
-        return places | places_of(self.scenario, self.t_s)
+        """Places of robots, and of the origins of obstacles' shapes, (T, 3) each; those at rest are at 0."""
+        recorded = [*self.robots, *self.moving]
+        places = {body: np.stack([self.column(f"{body}.{a}_m") for a in "xyz"], axis=1) for body in recorded}
+        return places_of(self.scenario, self.t_s) | places
+
+    @cached_property
+    def moving(self) -> list[str]:
+        """Obstacles that move."""
+        return moving_of(self.scenario)
 
     def apart(self, pair: Pair) -> Array:
-        """Places of a pair's robot relative to the other's from when both are there, (K, 3), m."""
-        return (self.position_m[pair.robot] - self.position_m[pair.other])[self.there_from(pair.other) :]
+        """Places of a pair's robot relative to the other's while both are there, (K, 3), m; K >= 1."""
+        return (self.position_m[pair.robot] - self.position_m[pair.other])[self.there(pair.other)]
 
-    def there_from(self, name: str) -> int:
-        """Row from which on a body is there, the number of rows if not before the end.
+    def there(self, name: str) -> slice:
+        """Rows in which a body is there; they start at the number of rows if it is not before the end.
 
-        An obstacle with `appears_s` is there from the first control sample at or after that time on.
+        It is there from the first control sample at or after its `appears_s` to that at or after its `disappears_s`.
         """
-        appears = float(self.scenario["obstacles"].get(name, {}).get("appears_s", 0.0))
-        if appears == 0.0:
-            return 0
-        later = self.sample_row[self.sample_s >= appears - SMALL]
+        body = self.scenario["obstacles"].get(name, {})
+        first, last = (self._row_at(float(body.get(key) or never)) for key, never in LIFETIME)
+        return slice(first, last + 1)
+
+    def period_rows(self, name: str) -> Rows:
+        """Rows of the control samples at which a body is there, and the last row if it still is: periods between them.
+
+        Two rows at least.
+        """
+        rows, there = np.append(self.sample_row, len(self.t_s) - 1), self.there(name)
+        return rows[(rows >= there.start) & (rows < there.stop)]
+
+    def _row_at(self, time_s: float) -> int:
+        """Row of the first control sample at or after a time, s; the number of rows if there is none."""
+        later = self.sample_row[self.sample_s >= time_s - SMALL]
         return int(later[0]) if len(later) else len(self.t_s)
 
     @cached_property
@@ -169,6 +188,10 @@ def read_run(folder: Path, name: str, report: Json) -> Run:
     _rows_cover_the_run(run)
     for robot in run.robots:
         _moves_as_commanded(run, robot)
+    declared = places_of(run.scenario, run.t_s)
+    for name in run.moving:
+        place = run.position_m[name]
+        close("way of an obstacle", place, declared[name], within=SMALL, about=name, t_s=run.t_s)
     for ugv, preset in run.presets.items():
         recorded = run.sampled(ugv, "ref_", "m")
         close("preset trajectory", recorded, preset.position_m(run.sample_s), within=SMALL, about=ugv, t_s=run.sample_s)

@@ -1,4 +1,8 @@
-"""SAFE-TRACE and SAFE-HYP: the distances of a run, and the hypotheses of the safety theorem."""
+"""SAFE-TRACE, SAFE-OWN and SAFE-HYP: distances of a run, whose doing they were, and hypotheses of the safety theorem.
+
+Beside an obstacle that is expected to move at most at V the passive law is in force: n.v >= -(D - d - V h) / h where
+D >= d + V h, else n.v >= 0. It is the other inequality with d + V h in place of d, and without a gain.
+"""
 
 from __future__ import annotations
 
@@ -10,7 +14,7 @@ import numpy as np
 from .files import Json
 from .rules import SMALL, Array, Disagreement, Found, close, holds
 from .run import Run
-from .scenario import Pair, written
+from .scenario import Pair, expected_m_s, written
 from .shapes import Away
 
 FAR_M = 1e-6
@@ -35,6 +39,32 @@ def safe_trace(run: Run) -> Found:
     return Found("holds" if margin >= -SMALL else "refuted", float(margin), (least, most))
 
 
+def safe_own(run: Run) -> Found | None:
+    """SAFE-OWN: in each period no robot comes nearer than min(D, d + V h) to the other body, held as at the sample.
+
+    It is asked where one period at the speed limits could lead nearer than d + V h. A period beside an obstacle that
+    may move tests the claim if it is asked then. None: nothing may move, and SAFE-TRACE says the same.
+    """
+    if not any(map(expected_m_s, run.scenario["obstacles"].values())):
+        return None
+    period, margin, least, most = run.scenario["control"]["period_s"], np.inf, 0, 0
+    for pair in run.pairs:
+        keeps, closing = pair.passive(period).safe_m, pair.closing_m_s * period
+        if run.apart_m[pair.robot, pair.other] > keeps + closing:
+            continue
+        rows = run.period_rows(pair.other)
+        own, other = run.position_m[pair.robot][rows], run.position_m[pair.other][rows]
+        for one, held in ((own, other), (other, own))[: 2 if pair.other in run.robots else 1]:
+            at_m, least_m = pair.shape.held_m(one[:-1] - held[:-1], one[1:] - held[:-1], keeps + closing)
+            asked = at_m <= keeps + closing
+            margin = min(margin, float((least_m - np.minimum(at_m, keeps))[asked].min(initial=np.inf)))
+        if pair.moves_m_s:
+            least += int((at_m - keeps - closing < -SMALL).sum())
+            most += int((at_m - keeps - closing <= SMALL).sum())
+    status = "holds" if margin >= -SMALL else "refuted"
+    return Found(status, None if margin == np.inf else margin, (least, most))
+
+
 def _root(square: Fraction) -> tuple[Fraction, Fraction]:
     """Lower and upper bound of a square root, 2^-160 relative to the denominator apart."""
     numerator = isqrt(square.numerator * square.denominator << 320)
@@ -54,7 +84,7 @@ def _missed_m(away: Away, step: list[Fraction], safe: Fraction, share: Fraction,
     """
     least, most = _root(sum((c * c for c in away.vector), Fraction()))
     if not least:  # both are at one place: the law may take any unit vector
-        return max(Fraction(), share * gain * safe)
+        return share * gain * safe + _root(sum((c * c for c in step), Fraction()))[1]
     along = sum((c * s for c, s in zip(away.vector, step, strict=True)), Fraction())
     distances = (away.beyond / least, away.beyond / most)
     bounds = [share * (gain * (safe - d) if d <= safe else safe - d) for d in distances]
@@ -108,40 +138,46 @@ def lost_m(missed: Fraction, gain: Fraction, samples: int) -> float:
 
 def safe_hyp(run: Run) -> Found:
     """SAFE-HYP: the hypotheses of the safety theorem, up to e per pair; its margin is the least -e / (A h)."""
+    period = run.scenario["control"]["period_s"]
+    gain, lost = gain_of(run.scenario, period), 0.0
     try:
         _constants(run)
         _motion(run)
+        for pair in run.pairs:
+            if run.apart_m[pair.robot, pair.other] > pair.safe_m + pair.closing_m_s * period + FAR_M:
+                continue
+            rows = run.period_rows(pair.other)
+            own, other = run.position_m[pair.robot][rows], run.position_m[pair.other][rows]
+            lasting = float(np.diff(run.t_s[rows[-2:]])[-1])
+            last = Fraction(1) if abs(lasting - period) <= SMALL else Fraction(lasting) / Fraction(period)
+            if pair.moves_m_s:
+                missed = float(shortfall_m(own, other, pair.passive(period), Fraction(), last))
+                about = f"{pair.robot}, {pair.other}"
+                holds("passive law", missed <= SMALL, missed, "missed by nothing", about=about)
+            else:
+                lost = max(lost, lost_m(shortfall_m(own, other, pair, gain, last), gain, len(run.sample_row)))
     except Disagreement as broken:
         return Found("refuted", because=broken)
-    period = run.scenario["control"]["period_s"]
-    rows, gain, lost = np.append(run.sample_row, len(run.t_s) - 1), gain_of(run.scenario, period), 0.0
-    lasting = float(np.diff(run.t_s[rows])[-1])
-    last = Fraction(1) if abs(lasting - period) <= SMALL else Fraction(lasting) / Fraction(period)
-    for pair in run.pairs:
-        if run.apart_m[pair.robot, pair.other] > pair.safe_m + pair.closing_m_s * period + FAR_M:
-            continue
-        there = rows[rows >= run.there_from(pair.other)]
-        own, other = run.position_m[pair.robot][there], run.position_m[pair.other][there]
-        lost = max(lost, lost_m(shortfall_m(own, other, pair, gain, last), gain, len(run.sample_row)))
     return Found("holds" if lost <= SMALL else "refuted", -lost if lost <= SMALL else None)
 
 
 def _constants(run: Run) -> None:
-    """A h <= 1, each pair starts apart, and the sensing range covers d + (closing speed) h."""
+    """A h <= 1, each pair without the passive law starts apart, and the sensing range covers d + (closing speed) h."""
     control, limit = run.scenario["control"], {name: each["max_speed_m_s"] for name, each in run.robots.items()}
     period, reach = written(control["period_s"]), written(control["sensing_range_m"])
     gain = written(control["avoidance_gain_1_s"]) * period
     holds("gain: A h <= 1", gain <= 1, float(gain), "1 at most")
     for pair in run.pairs:
-        about, speed = f"{pair.robot}, {pair.other}", written(limit[pair.robot]) + written(limit.get(pair.other, 0.0))
+        about = f"{pair.robot}, {pair.other}"
+        speed = written(limit[pair.robot]) + written(limit.get(pair.other, pair.moves_m_s))
         least = written(pair.safe_m) + speed * period
         holds("sensing range", reach >= least, float(reach), f"{float(least)} at least", about=about)
-        start = pair.shape.least_m(run.apart(pair)[:1])
+        start = np.inf if pair.moves_m_s else pair.shape.least_m(run.apart(pair)[:1])
         holds("safe start", start >= pair.safe_m - SMALL, start, f"{pair.safe_m} at least", about=about)
 
 
 def _motion(run: Run) -> None:
-    """Robots keep their speed limits, and UGVs stay at their height; that they move straight is the law of motion."""
+    """Robots and obstacles keep their speed limits, and UGVs their height; straight motion is the law of motion."""
     for robot, spec in run.robots.items():
         place = run.position_m[robot]
         speed = np.linalg.norm(run.sampled(robot, "v", "m_s"), axis=1)
@@ -149,3 +185,8 @@ def _motion(run: Run) -> None:
         holds("speed limit", slow, speed, most, about=robot, t_s=run.sample_s)
         if robot != run.uav:
             close("planar motion", place[:, 2], np.full(len(place), place[0, 2]), within=0.0, about=robot, t_s=run.t_s)
+    for name in run.moving:
+        rows, expected = run.period_rows(name), expected_m_s(run.scenario["obstacles"][name])
+        speed = np.linalg.norm(np.diff(run.position_m[name][rows], axis=0), axis=1) / np.diff(run.t_s[rows])
+        slow = speed <= expected + SMALL / run.scenario["control"]["period_s"]
+        holds("declared speed", slow, speed, f"{expected} at most", about=name, t_s=run.t_s[rows[:-1]])

@@ -12,11 +12,13 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from .files import Json
-from .rules import Array, NotEstablished
+from .rules import Array
 from .shapes import POINT, Shape, shape_of
 
 ENDLESS_M = 1e6
 """Height of the walls of an arena, m."""
+PERIODS = 1e-9
+"""Share of a time in control periods that counts as rounding."""
 
 
 class Pair(NamedTuple):
@@ -27,8 +29,9 @@ class Pair(NamedTuple):
         other: name.
         gap_m: distance of the surfaces to be kept: d of the kind of pair.
         radii_m: sum of both radii.
-        closing_m_s: largest speed at which they can approach each other.
+        closing_m_s: largest speed at which they are expected to approach each other.
         share: part of the inequality that each robot takes: 1 beside an obstacle, 1/2 beside a robot.
+        moves_m_s: V, the speed at which an obstacle is expected to move at most; above 0 the passive law is in force.
         shape: of the other; for a UGV walls are endless in height.
     """
 
@@ -38,12 +41,17 @@ class Pair(NamedTuple):
     radii_m: float
     closing_m_s: float
     share: float
+    moves_m_s: float = 0.0
     shape: Shape = POINT
 
     @property
     def safe_m(self) -> float:
         """Safe distance of the robot's centre from the parts of the other's shape, m."""
         return self.gap_m + self.radii_m
+
+    def passive(self, period_s: float) -> Pair:
+        """The same with d + V h in place of d."""
+        return self._replace(gap_m=self.gap_m + self.moves_m_s * period_s)
 
 
 class Levels(NamedTuple):
@@ -99,7 +107,8 @@ def robots_of(scenario: Json) -> dict[str, Json]:
 def barriers_of(scenario: Json) -> dict[str, Json]:
     """The obstacles, and the map and the walls of the arena as entries like theirs, by name."""
     found: dict[str, Json] = dict(scenario["obstacles"])
-    numbers = dict.fromkeys(("heading_rad", "radius_m", "distance_m", "appears_s"), 0.0)
+    keys = ("heading_rad", "radius_m", "distance_m", "appears_s", "disappears_s", "max_speed_m_s")
+    numbers = dict.fromkeys(keys, 0.0) | {"moves": None}
     if scenario["map"] and scenario["map"]["cells"]["rectangles"]:
         found["map"] = numbers | scenario["map"]
     if not scenario["arena_m"]:
@@ -111,16 +120,40 @@ def barriers_of(scenario: Json) -> dict[str, Json]:
     return found | {f"arena_{side}": wall | {"segment_m": [*corners]} for side, corners in walls}
 
 
-def places_of(scenario: Json, t_s: Array) -> dict[str, Array]:
-    """How far obstacles have moved by times (K,), from where their shapes are: (K, 3), m, by name.
+def moving_of(scenario: Json) -> list[str]:
+    """Names of the obstacles that move."""
+    return [name for name, body in scenario["obstacles"].items() if body["moves"]]
 
-    Raises:
-        NotEstablished: if one moves, might move, or disappears.
-    """
-    for name, body in scenario["obstacles"].items():
-        if body["moves"] or body["max_speed_m_s"] or body["disappears_s"]:
-            raise NotEstablished("obstacles rest and stay", "it moves, might move, or disappears", name)
-    return {name: np.zeros((len(t_s), 3)) for name in barriers_of(scenario)}
+
+def places_of(scenario: Json, t_s: Array) -> dict[str, Array]:
+    """Where the origins of the shapes of barriers are at times (K,), (K, 3), m, by name; those at rest are at 0."""
+    period_s = float(scenario["control"]["period_s"])
+    return {
+        name: way_m(body["moves"], period_s, t_s) if body["moves"] else np.zeros((len(t_s), 3))
+        for name, body in barriers_of(scenario).items()
+    }
+
+
+def way_m(moves: Json, period_s: float, t_s: Array) -> Array:
+    """Places on the way of an obstacle that moves, (K, 3), m; every leg takes a whole number of control periods."""
+    there = np.array(moves["waypoints_m"], dtype=np.float64)
+    back = {"stop": there[:0], "reverse": there[-2::-1], "loop": there[:1]}[moves["at_end"]]
+    corners = np.concatenate([there, back])
+    legs_s = np.linalg.norm(np.diff(corners, axis=0), axis=1) / moves["speed_m_s"]
+    reached = np.append(0.0, np.cumsum(np.maximum(_whole(legs_s / period_s), 1.0)))
+    since = np.maximum(t_s / period_s - _whole(moves["start_s"] / period_s), 0.0)
+    since = since % reached[-1] if len(back) else since
+    return np.stack([np.interp(since, reached, axis) for axis in corners.T], axis=-1)
+
+
+def _whole(periods: Any) -> Any:
+    """Rounded up."""
+    return np.ceil(periods * (1.0 - PERIODS))
+
+
+def expected_m_s(body: Json) -> float:
+    """The speed at which an obstacle is expected to move at most, m/s."""
+    return float(body["max_speed_m_s"] or (body["moves"]["speed_m_s"] if body["moves"] else 0.0))
 
 
 def pairs_of(scenario: Json) -> list[Pair]:
@@ -128,15 +161,16 @@ def pairs_of(scenario: Json) -> list[Pair]:
     uav, robots = scenario["uav"]["name"], robots_of(scenario)
     limit = {name: float(robot["max_speed_m_s"]) for name, robot in robots.items()}
     safe = {kind: float(distance) for kind, distance in scenario["safe_distance"].items()}
-    beside_obstacles = [
-        Pair(
-            robot, name, float(body["distance_m"] or safe["obstacle_m"]), radii_m(robots[robot], body), limit[robot],
-            1.0, shape,
-        )
-        for name, body in barriers_of(scenario).items()
-        for of, shape in ((scenario["ugvs"], shape_of(body, endless=True)), ([uav], shape_of(body, endless=False)))
-        for robot in of
-    ]  # fmt: skip
+    beside_obstacles = []
+    for name, body in barriers_of(scenario).items():
+        speed = expected_m_s(body)
+        gap_m = float(body["distance_m"] or (speed and safe["moving_m"]) or safe["obstacle_m"])
+        for of, endless in ((scenario["ugvs"], True), ([uav], False)):
+            shape = shape_of(body, endless=endless)
+            beside_obstacles += [
+                Pair(robot, name, gap_m, radii_m(robots[robot], body), limit[robot] + speed, 1.0, speed, shape)
+                for robot in of
+            ]
     beside_robots = []
     for one, other in combinations(robots, 2):
         gap_m = safe["air_ground_m" if other == uav else "ugv_m"]

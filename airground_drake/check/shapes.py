@@ -60,17 +60,17 @@ class Part:
         inside = (side <= 0.0) & (len(self.corners) > 2)
         return np.where(inside, np.maximum(side, rise), np.hypot(flat, np.maximum(rise, 0.0)))
 
-    def between_m(self, places: Array, at_m: Array, reach_m: float) -> Array:
-        """Least signed distances on the straight steps from place to place, (K - 1,), m, where below `reach_m`.
+    def between_m(self, start: Array, end: Array, at_m: tuple[Array, Array], reach_m: float) -> Array:
+        """Least signed distances on straight steps from `start` to `end`, (K, 3), where below `reach_m`: (K,), m.
 
         Args:
-            places: as above.
-            at_m: their signed distances, (K,), m.
+            start: as above.
+            end: likewise.
+            at_m: signed distances of both, (K,), m.
             reach_m: of a step that stays beyond it, the result may be too large.
         """
-        start, step = places[:-1], np.diff(places, axis=0)
-        found = np.minimum(at_m[:-1], at_m[1:])
-        bound = 0.5 * (at_m[:-1] + at_m[1:] - np.linalg.norm(step, axis=1)) - ROUNDING_M
+        step, found = end - start, np.minimum(*at_m)
+        bound = 0.5 * (at_m[0] + at_m[1] - np.linalg.norm(step, axis=1)) - ROUNDING_M
         k = np.flatnonzero(~(bound >= reach_m))
         low, high = np.zeros(len(k)), np.ones(len(k))
         for _ in range(THIRDS if len(k) else 0):  # a convex function has its least value beside the lower of two
@@ -79,6 +79,10 @@ class Part:
             found[k] = np.minimum(found[k], np.minimum(first, second))
             low, high = np.where(first < second, low, one), np.where(first < second, two, high)
         return found
+
+    def along_m(self, places: Array, at_m: Array, reach_m: float) -> Array:
+        """The same on the steps from place to place, (K - 1,); `at_m` has the distances of all, (K,)."""
+        return self.between_m(places[:-1], places[1:], (at_m[:-1], at_m[1:]), reach_m)
 
     def away(self, place: Sequence[Fraction]) -> Away:
         """Exactly, from the nearest point outside, and from the nearest face inside."""
@@ -139,8 +143,24 @@ class Shape:
                 break
             at_m = part.signed_m(places[rows])
             reach_m = min(reach_m, float(at_m.min()))
-            reach_m = min(reach_m, float(part.between_m(places[rows], at_m, reach_m).min(initial=np.inf)))
+            reach_m = min(reach_m, float(part.along_m(places[rows], at_m, reach_m).min(initial=np.inf)))
         return reach_m
+
+    def held_m(self, start: Array, end: Array, reach_m: float) -> tuple[Array, Array]:
+        """Signed distances of `start`, and the least on straight steps from there to `end`, (K, 3): (K,) each, m.
+
+        They are inf or too large where `start` is beyond `reach_m`.
+        """
+        at_m, least_m = np.full((2, len(start)), np.inf)
+        longest = float(np.linalg.norm(end - start, axis=1).max(initial=0.0))
+        for bound, part, rows in self.near(start):
+            if bound > reach_m + longest:
+                break
+            here, there = part.signed_m(start[rows]), part.signed_m(end[rows])
+            at_m[rows] = np.minimum(at_m[rows], here)
+            least = part.between_m(start[rows], end[rows], (here, there), reach_m)
+            least_m[rows] = np.minimum(least_m[rows], least)
+        return at_m, least_m
 
     def within(self, places: Array, reach_m: float) -> tuple[Flags, Flags]:
         """Which places, (K,), and which straight steps between them, (K - 1,), come nearer than `reach_m`."""
@@ -150,7 +170,7 @@ class Shape:
                 break
             at_m = part.signed_m(places[rows])
             there[rows] |= at_m < reach_m
-            passes[rows.start : rows.stop - 1] |= part.between_m(places[rows], at_m, reach_m) < reach_m
+            passes[rows.start : rows.stop - 1] |= part.along_m(places[rows], at_m, reach_m) < reach_m
         return there, passes
 
 
@@ -186,7 +206,7 @@ def shape_of(body: Json, *, endless: bool) -> Shape:
         x, y = (0.5 * side for side in body["size_m"])
         parts = [_placed(body, [(-x, -y), (x, -y), (x, y), (-x, y)])]
     else:
-        x, y, z = body["position_m"]
+        x, y, z = body["position_m"] or (0.0, 0.0, 0.0)
         if not body["height_m"]:
             return Shape([Part([(x, y)], z, z)])
         parts = [[(x, y)]]
