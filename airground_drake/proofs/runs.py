@@ -129,11 +129,9 @@ def prove(place: Workshop, run: Trace, limit_s: float = coq.LIMIT_S) -> tuple[Co
         ReadbackError: if the exported file differs from the trace.
         TraceError: if the trace lacks something.
     """
-    try:
+    with _usable(run):
         exact = recorded(run)
         text = distances_file(exact)
-    except (KeyError, TypeError, ValueError, AttributeError) as error:
-        raise TraceError(one_line(f"run {run.run}: the scenario in meta.json cannot be used: {error!r}")) from None
     rounded = readback.compare(text, run)
     distances = decide(place, exact, f"{exact.name}.v", text, f"{exact.name}_keeps_its_distances", limit_s)
     if distances.refused and (found := too_near(exact)):
@@ -143,6 +141,19 @@ def prove(place: Workshop, run: Trace, limit_s: float = coq.LIMIT_S) -> tuple[Co
     if distances.proved:
         law = decide(place, exact, law.file, law_file(exact), law.theorem, limit_s)
     return distances, law, rounded
+
+
+@contextmanager
+def _usable(run: Trace) -> Iterator[None]:
+    """Refuse a scenario that was damaged in meta.json.
+
+    Raises:
+        TraceError: in place of what Python says.
+    """
+    try:
+        yield
+    except (KeyError, TypeError, ValueError, AttributeError) as error:
+        raise TraceError(one_line(f"run {run.run}: the scenario in meta.json cannot be used: {error!r}")) from None
 
 
 def decide(place: Workshop, run: Recorded, name: str, text: str, theorem: str, limit_s: float) -> CoqReply:
@@ -197,7 +208,8 @@ def prove_report(report: Path, names: Sequence[str] = (), limit_s: float = coq.L
     for name, run in runs.items():
         if run.run != name or not re.fullmatch(r"\w+", name, re.ASCII):
             raise TraceError(one_line(f"{report / 'trace' / name}: the trace is of run {run.run!r}"))
-        refuse_unknown(run)
+        with _usable(run):
+            refuse_unknown(run)
     found: list[Proved] = []
     with workshop(limit_s) as place:
         for name, run in runs.items():
