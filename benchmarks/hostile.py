@@ -33,8 +33,8 @@ from airground_drake.gatekeeper.outcome_gatekeeper import OutcomeGatekeepers
 from airground_drake.gatekeeper.problem import Horizon, predicted_problem
 from airground_drake.gatekeeper.rollout import View
 from airground_drake.gatekeeper.routes.relaxed import RelaxedRoute
-from airground_drake.geometry.convex import balls
 from airground_drake.geometry.motion import Motion
+from airground_drake.geometry.outline import balls
 from airground_drake.intervention.planner import Planner
 from airground_drake.intervention.policy import Proposal
 from airground_drake.nsbc.avoidance import Avoidance

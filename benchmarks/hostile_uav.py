@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 
 from airground_drake.base.arrays import Array
-from airground_drake.geometry.convex import BASE, GAP, MIDDLE, RADIUS, balls
 from airground_drake.geometry.motion import Motion
+from airground_drake.geometry.outline import BASE, GAP, MIDDLE, RADIUS, balls
 from airground_drake.intervention.database import Negotiation
 from airground_drake.intervention.messages import ACCEPT, DONE, REFUSE, Reports, answer_to
 from airground_drake.intervention.planner import Planner, PlannerState

@@ -15,7 +15,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from airground_drake.geometry import convex
+from airground_drake.geometry import convex, outline
 from airground_drake.nsbc.avoidance import Avoidance
 from airground_drake.nsbc.law import UgvLaw
 from airground_drake.run.simulation import Recorder
@@ -97,7 +97,7 @@ def main() -> None:
     for parts in (1, 60, 200):
         recorder = Recorder(wall(parts), "a")
         trace, cost = recorder.simulate(), fastest(recorder.simulate, 3)
-        line, way = convex.prism([[-5.0, 0.0], [5.0, 0.0]])[None], trace.position("ugv0")
+        line, way = outline.prism([[-5.0, 0.0], [5.0, 0.0]])[None], trace.position("ugv0")
         least = min(float(convex.distances(line, place, True)[0]) for place in way)
         print(f"a wall of {parts:3} bodies: {1e3 * cost:6.1f} ms a run, {least:.6f} m from its line, 0.3 m required")
 

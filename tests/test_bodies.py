@@ -21,7 +21,7 @@ from airground_drake.export import tables
 from airground_drake.gatekeeper.answer import Basis
 from airground_drake.gatekeeper.outcome_gatekeeper import OutcomeGatekeepers
 from airground_drake.gatekeeper.rollout import View
-from airground_drake.geometry.convex import GAP, unpacked
+from airground_drake.geometry.outline import GAP, unpacked
 from airground_drake.proofs.export import recorded
 from airground_drake.proofs.too_near import too_near
 from airground_drake.report import attention, summary

@@ -16,7 +16,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from properties import examples
 
-from airground_drake.geometry.convex import balls
+from airground_drake.geometry.outline import balls
 from airground_drake.run import events
 from airground_drake.run.trace import Trace
 from airground_drake.scenarios.schema import Obstacle

@@ -10,7 +10,7 @@ import numpy as np
 from pydantic import BeforeValidator, ConfigDict, Field, PlainValidator, WithJsonSchema
 
 from airground_drake.base.arrays import Array
-from airground_drake.geometry import convex
+from airground_drake.geometry import convex, outline
 from airground_drake.scenarios.kinds import Number, Positive, as_float, refused
 from airground_drake.scenarios.limits import MAX_UGVS
 from airground_drake.scenarios.schema import Obstacle
@@ -167,8 +167,8 @@ class Course:
                 shape.segment_m = [[-length / 2.0, 0.0], [length / 2.0, 0.0]]
             else:
                 shape.size_m = [length, width]
-            outline = convex.stacked(convex.prism(part) for part in convex_parts(shape) or ())
-            apart = [convex.distances(outline, np.append(end, 0.0), True)[0] for end in ends]
+            rows = outline.stacked(outline.prism(part) for part in convex_parts(shape) or ())
+            apart = [convex.distances(rows, np.append(end, 0.0), True)[0] for end in ends]
             if (np.array(apart) >= least).all():
                 found[f"{kind}{len(found) + 1}"] = asdict(shape)
         if len(found) < count:

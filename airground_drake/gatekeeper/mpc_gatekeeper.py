@@ -20,7 +20,7 @@ from airground_drake.gatekeeper.problem import Horizon, Problem, predicted_probl
 from airground_drake.gatekeeper.rollout import View
 from airground_drake.gatekeeper.routes.route import Route
 from airground_drake.gatekeeper.solution import ConstantPlans, Solution, after_failure
-from airground_drake.geometry import convex
+from airground_drake.geometry import convex, outline
 from airground_drake.geometry.motion import Motion
 from airground_drake.intervention.messages import (
     ACCEPT,
@@ -137,7 +137,7 @@ class Gatekeepers(abc.ABC):
         near = self._near.still[self._in_range(decision.t, now.positions[i])]
         beside = {self._world.moving[body].name for body in self._near.carrier[self._beside(now, i)]}
         seen = tuple(each for each in sightings(self._world, now.t, now.positions) if each.name in beside)
-        return Report(decision.answer, tuple(map(convex.as_tuple, near)), decision.reason, in_words(decision), seen)
+        return Report(decision.answer, tuple(map(outline.as_tuple, near)), decision.reason, in_words(decision), seen)
 
     def _view(self, now: Inputs, i: int) -> View:
         """All obstacles at rest and robots around a UGV, and the obstacles that move within sensing range."""

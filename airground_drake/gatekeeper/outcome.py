@@ -22,7 +22,7 @@ from numba import njit
 
 from airground_drake.base.arrays import Array
 from airground_drake.gatekeeper.rollout import ACCEPTED, REFUSED, ClosedLoop, View, advance, closed_loop, workspace
-from airground_drake.geometry import convex
+from airground_drake.geometry import convex, outline
 from airground_drake.geometry.distance_field import length_among
 from airground_drake.geometry.paths import NoPath, shortest_path
 from airground_drake.intervention.policy import Proposal
@@ -145,14 +145,14 @@ def way_left(place: Array, goal: Array, rows: Array, distances: Array) -> float:
     Among cores with more than `MOST_CORNERS` the length is that of a way on a lattice (`distance_field`), a little
     longer: no map makes it take long.
     """
-    rows, distances = convex.sections(rows, distances, float(place[2]))
+    rows, distances = outline.sections(rows, distances, float(place[2]))
     start, end = (np.append(each[:2], 0.0) for each in (place, goal))
     leg = end - start
     length = float(np.sqrt(leg @ leg))
     beside = convex.beside(rows, start, end) - distances
     if (beside >= 0.0).all():
         return length
-    if rows[:, convex.COUNT].sum() > MOST_CORNERS:
+    if rows[:, outline.COUNT].sum() > MOST_CORNERS:
         left = length_among(start[:2], end[:2], rows, distances)
         return left if np.isfinite(left) else length
     try:

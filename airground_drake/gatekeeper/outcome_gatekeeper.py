@@ -24,7 +24,7 @@ from airground_drake.gatekeeper.mpc_gatekeeper import Gatekeepers, GatekeeperSta
 from airground_drake.gatekeeper.outcome import Outcome, Outlook, outcomes
 from airground_drake.gatekeeper.patience import Commitment, Patience
 from airground_drake.gatekeeper.rollout import View
-from airground_drake.geometry import convex
+from airground_drake.geometry import convex, outline
 from airground_drake.geometry.convex import news_within, within
 from airground_drake.geometry.motion import Motion
 from airground_drake.intervention.messages import ACCEPT, DONE, REFUSE, SILENT, Proposals, Report, answer_to
@@ -101,7 +101,7 @@ class OutcomeGatekeepers(Gatekeepers):
         if sensed is before.sensed or before.sensed.shape != sensed.shape:
             return ()
         new = np.flatnonzero(sensed[i] & ~before.sensed[i])
-        return tuple(new[~convex.same(self._near.still[new], proposal.mapped).any(axis=1)].tolist())
+        return tuple(new[~outline.same(self._near.still[new], proposal.mapped).any(axis=1)].tolist())
 
     def _decide(
         self,
@@ -145,7 +145,7 @@ class OutcomeGatekeepers(Gatekeepers):
         """A UGV's knowledge: obstacles sensed or told of, other bodies that move and the motions asked of them."""
         around, m = self._view(now, i), len(self._near.still)
         told = self._believed(now.positions[i], known.sensed[i], proposal)
-        still = convex.joined(self._near.still[known.sensed[i]], proposal.mapped[told])
+        still = outline.joined(self._near.still[known.sensed[i]], proposal.mapped[told])
         asked: list[tuple[Motion, bool] | None] = []
         numbers = list[tuple[int, bool]]()
         for j in self._near.carrier[self._beside(now, i)].tolist():
@@ -166,7 +166,7 @@ class OutcomeGatekeepers(Gatekeepers):
         seen = replace(
             around,
             still=still,
-            distances=np.concatenate([convex.keep(still, self._world.radius[i]), around.distances[m:]]),
+            distances=np.concatenate([outline.keep(still, self._world.radius[i]), around.distances[m:]]),
             shares=np.concatenate([np.ones(len(still)), around.shares[m:]]),
             asked=tuple(asked),
         )
@@ -180,9 +180,9 @@ class OutcomeGatekeepers(Gatekeepers):
         """
         claimed = proposal.mapped
         apart = np.full(len(claimed), -np.inf)
-        sound = convex.are_outlines(claimed)
+        sound = outline.are_outlines(claimed)
         apart[sound] = convex.distances(claimed[sound], position, True)
-        known = convex.same(claimed, self._near.still[sensed]).any(axis=1)
+        known = outline.same(claimed, self._near.still[sensed]).any(axis=1)
         new = np.flatnonzero((apart > self.law.avoidance.sensing_range) & ~known)
         nearest = np.argsort(apart[new], kind="stable")[:MOST_CLAIMED]
         return new[np.sort(nearest)]

@@ -10,7 +10,7 @@ import numpy as np
 from airground_drake.base.arrays import Array, read_only
 from airground_drake.gatekeeper.cost import Terms, half_plane_cost, plan_cost
 from airground_drake.gatekeeper.rollout import ACCEPTED, REFUSED, View, closed_loop, follow
-from airground_drake.geometry import convex
+from airground_drake.geometry import convex, outline
 from airground_drake.intervention.policy import Proposal
 from airground_drake.nsbc.law import UgvLaw
 
@@ -132,7 +132,7 @@ def predicted_problem(seen: View, law: UgvLaw, proposal: Proposal, horizon: Hori
     centres = np.concatenate([convex.nearest_points(seen.still, standing), moving], axis=1)
     away, height = np.linalg.norm(moving - seen.position, axis=2), np.abs(moving[:, :, 2] - seen.position[2])
     m, z = len(seen.still), seen.position[2]
-    above = np.maximum(np.maximum(seen.still[:, convex.BASE] - z, z - seen.still[:, convex.TOP]), 0.0)
+    above = np.maximum(np.maximum(seen.still[:, outline.BASE] - z, z - seen.still[:, outline.TOP]), 0.0)
     away = np.column_stack([np.tile(seen.apart()[:m], (len(moving), 1)), away]) - seen.distances - reach[:, None]
     height = np.column_stack([np.tile(above, (len(moving), 1)), height]) - seen.distances
     near = ~((away >= 0.0) | (height >= 0.0)).all(axis=0)  # NaN counts as near, so that the problem is refused

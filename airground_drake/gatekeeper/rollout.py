@@ -22,7 +22,7 @@ REFUSED, ACCEPTED = 0, 1
 
 @dataclass(frozen=True, eq=False)
 class View:
-    """A UGV's view when it decides: m outlines at rest, then n parts of bodies that move, see `geometry.convex`.
+    """A UGV's view when it decides: m outlines at rest, then n parts of bodies that move, see `geometry.outline`.
 
     Attributes:
         t: time, s.

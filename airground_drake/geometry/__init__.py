@@ -1,1 +1,1 @@
-"""Motions along polylines and shortest paths round discs: pure maths, without Drake."""
+"""Motions along polylines, convex obstacles, and shortest paths round them: pure maths, without Drake."""

@@ -1,194 +1,23 @@
-"""Convex obstacles as rows of numbers, and their signed distances: pure maths, compiled.
+"""Signed distances from convex obstacles, and what keeps clear of them: pure maths, compiled by numba.
 
-An *outline* is a row of floats. So m obstacles are an array (m, W), which masks, concatenates, compares and goes to
-compiled code as points (m, 3) do. Outlines of one array have the same length; what a row does not need of it is 0:
-
-    GAP                      distance that a robot's surface keeps from this obstacle's surface, m
-    RADIUS                   the obstacle is all that is within this distance of its *core*, m
-    SPEED                    speed at which the obstacle may move, m/s; 0 for one at rest
-    BASE, TOP                heights between which the core stands, m
-    COUNT                    number of corners of the core
-    MIDDLE (2), EXTENT       a circle round the corners, m, by which far obstacles are left out
-    CORNERS (2 each)         x, y of each corner, m, counter-clockwise
-
-The core is the convex hull of the corners, from BASE to TOP: a point (one corner), a wall (two), a polygon or a prism.
-A ball is a point with a radius. All geometry is about cores; `keep` says what distance from the core a robot keeps, and
-nobody else has to know radii.
-
-Distances are signed: inside a core they are minus the depth. The signed distance is a convex function of the point, and
-`nearest` gives a subgradient n of it, a unit vector: dist(x + s v) >= dist(x) + s n.v for all v and s >= 0. The theorem
-of set-based avoidance needs nothing else.
+Obstacles are rows of numbers, see `geometry.outline`. Results are those of IEEE arithmetic in the order written.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 from numba import njit
-from numpy.typing import ArrayLike
 
 from airground_drake.base.arrays import Array
+from airground_drake.geometry.outline import BASE, CORNERS, COUNT, EXTENT, MIDDLE, TOP
 
-GAP, RADIUS, SPEED, BASE, TOP, COUNT, MIDDLE, EXTENT, CORNERS = 0, 1, 2, 3, 4, 5, 6, 8, 9
-SAME_M = 1e-9
-"""Outlines whose numbers differ by no more than this are one, m."""
 FAR = 1.0 + 1e-12
 """Squares of distances that exceed a limit by this factor do so whatever the rounding."""
 PER_CELL = 4.0
 """Points to a cell, on average, where points near an outline are looked for."""
-NOWHERE_M = 1e150
-"""Coordinates of an obstacle that is not there: beyond any range, and its square is still finite."""
-
-
-def balls(centres: ArrayLike, radii: ArrayLike = 0.0, gap: float = 0.0) -> Array:
-    """The outlines of balls about centres (m, 3), m; radii (m,), m, or one for all; with the default, points."""
-    places = np.asarray(centres, dtype=np.float64).reshape(-1, 3)
-    found = np.zeros((len(places), CORNERS + 2))
-    found[:, GAP], found[:, RADIUS], found[:, COUNT] = gap, radii, 1.0
-    found[:, BASE] = found[:, TOP] = places[:, 2]
-    found[:, MIDDLE:EXTENT] = found[:, CORNERS:] = places[:, :2]
-    return found
-
-
-def prism(corners: ArrayLike, *, base: float = 0.0, top: float = 0.0, radius: float = 0.0, gap: float = 0.0) -> Array:
-    """The outline of the convex hull of corners (n, 2), m, from one height to another, m.
-
-    Args:
-        corners: of a convex polygon, in order and counter-clockwise; two for a wall, one for a post.
-        base: height at which it begins, m.
-        top: height at which it ends, m.
-        radius: of the rounding, m.
-        gap: distance to keep from it, m.
-    """
-    places = np.asarray(corners, dtype=np.float64).reshape(1, -1, 2)
-    found: Array = prisms(places, base=base, top=top, radius=radius, gap=gap)[0]
-    return found
-
-
-def prisms(corners: Array, *, base: float = 0.0, top: float = 0.0, radius: float = 0.0, gap: float = 0.0) -> Array:
-    """The outlines, (m, W), of the convex hulls of corners (m, n, 2), m; see `prism`."""
-    number, count, _ = corners.shape
-    found = np.empty((number, CORNERS + 2 * count))
-    found[:, :MIDDLE] = gap, radius, 0.0, base, top, count
-    middle = 0.5 * (corners.min(axis=1) + corners.max(axis=1))
-    found[:, MIDDLE:EXTENT] = middle
-    apart = corners - middle[:, None]
-    found[:, EXTENT] = np.hypot(apart[..., 0], apart[..., 1]).max(axis=1) * (1.0 + 1e-15)
-    found[:, CORNERS:] = corners.reshape(number, -1)
-    return found
-
-
-def stacked(rows: Iterable[ArrayLike]) -> Array:
-    """Outlines as one array (m, W), padded with zeros; m may be 0."""
-    given = [np.asarray(row, dtype=np.float64) for row in rows]
-    found = np.zeros((len(given), max((len(row) for row in given), default=CORNERS + 2)))
-    for row, outline in zip(found, given, strict=True):
-        row[: len(outline)] = outline
-    return found
-
-
-def joined(*parts: Array) -> Array:
-    """Arrays of outlines one after the other, padded to the same width."""
-    width = max(part.shape[1] for part in parts)
-    return np.concatenate([np.pad(part, ((0, 0), (0, width - part.shape[1]))) for part in parts])
-
-
-def as_tuple(row: Array) -> tuple[float, ...]:
-    """An outline without padding, to be compared or sent."""
-    return tuple(row[: CORNERS + 2 * int(row[COUNT])].tolist())
-
-
-def unpacked(numbers: Iterable[float]) -> Array:
-    """Outlines (m, W) from their numbers without padding, one after the other.
-
-    Raises:
-        ValueError: if the numbers are not those of outlines.
-    """
-    left, rows = list(numbers), []
-    while left:
-        count = left[COUNT] if len(left) > COUNT else 0.0
-        length = CORNERS + 2 * int(count) if 1.0 <= count <= len(left) else 0
-        if not CORNERS < length <= len(left):
-            raise ValueError(f"{len(left)} numbers at the end are no outline")
-        rows.append(left[:length])
-        left = left[length:]
-    return stacked(rows)
-
-
-def same(one: Array, other: Array) -> npt.NDArray[np.bool_]:
-    """Which outlines (m, W) have the cores of others (k, V), to within `SAME_M`: (m, k)."""
-    if not (len(one) and len(other)):
-        return np.zeros((len(one), len(other)), dtype=bool)
-    both = joined(one, other)[:, BASE:]
-    found: npt.NDArray[np.bool_] = np.all(np.abs(both[: len(one), None] - both[len(one) :]) <= SAME_M, axis=2)
-    return found
-
-
-def are_outlines(rows: Array) -> npt.NDArray[np.bool_]:
-    """Which rows (m, W) are outlines of convex cores, (m,); others may come from a stranger."""
-    if rows.ndim != 2 or rows.shape[1] < CORNERS + 2:
-        return np.zeros(len(rows), dtype=bool)
-    count = rows[:, COUNT]
-    found: npt.NDArray[np.bool_] = np.logical_and.reduce([
-        np.isfinite(rows).all(axis=1), (rows[:, [GAP, RADIUS, SPEED, EXTENT]] >= 0.0).all(axis=1),
-        rows[:, BASE] <= rows[:, TOP], count >= 1.0, count == np.floor(count), CORNERS + 2.0 * count <= rows.shape[1],
-    ])  # fmt: skip
-    for k in np.flatnonzero(found):
-        corners = corners_of(rows[k])
-        before, after = corners - np.roll(corners, 1, axis=0), np.roll(corners, -1, axis=0) - corners
-        turns = before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0]
-        reach = np.hypot(*(corners - rows[k, MIDDLE:EXTENT]).T).max()
-        round_once = len(corners) < 3 or abs(_turned(before, after) - 2.0 * np.pi) < 1.0
-        distinct = len(corners) == 1 or (np.hypot(*after.T) > 0.0).all()
-        found[k] = (turns >= 0.0).all() and round_once and distinct and reach <= rows[k, EXTENT]
-    return found
-
-
-def _turned(before: Array, after: Array) -> float:
-    """By how much a way along edges (n, 2) turns left in all, rad."""
-    turns = np.arctan2(before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0], (before * after).sum(axis=1))
-    return float(turns.sum())
-
-
-def corners_of(row: Array) -> Array:
-    """The corners of an outline, (count, 2), m."""
-    return row[CORNERS : CORNERS + 2 * int(row[COUNT])].reshape(-1, 2)
-
-
-def keep(rows: Array, radius: float) -> Array:
-    """Distances that the centre of a robot with a radius, m, keeps from the cores of outlines (m, W): (m,), m."""
-    found: Array = rows[:, GAP] + (radius + rows[:, RADIUS])
-    return found
-
-
-def box(rows: Array) -> tuple[Array, Array]:
-    """Two opposite corners, (3,), m, of a box round all that outlines (m, W) stand for."""
-    reach, middle = rows[:, EXTENT] + rows[:, RADIUS], rows[:, MIDDLE:EXTENT]
-    low = np.column_stack([middle - reach[:, None], rows[:, BASE] - rows[:, RADIUS]])
-    high = np.column_stack([middle + reach[:, None], rows[:, TOP] + rows[:, RADIUS]])
-    return low.min(axis=0), high.max(axis=0)
-
-
-def moved(rows: Array, by: Array) -> Array:
-    """Outlines (m, W), each moved by its vector, (m, 3) or one for all, m."""
-    found, shift = rows.copy(), np.broadcast_to(by, (len(rows), 3))
-    found[:, BASE] += shift[:, 2]
-    found[:, TOP] += shift[:, 2]
-    found[:, MIDDLE:EXTENT] += shift[:, :2]
-    for k in range(int(rows[:, COUNT].max(initial=0.0))):
-        there = rows[:, COUNT] > k
-        found[there, CORNERS + 2 * k : CORNERS + 2 * k + 2] += shift[there, :2]
-    return found
-
-
-def where(there: npt.NDArray[np.bool_], rows: Array) -> Array:
-    """Outlines (m, W) of which those that are not there, (m,), are points at NOWHERE_M."""
-    nowhere = np.zeros(rows.shape[1])
-    nowhere[: CORNERS + 2] = balls(np.full(3, NOWHERE_M))[0]
-    return np.where(there[:, None], rows, nowhere)
 
 
 @njit(cache=True)
@@ -614,34 +443,3 @@ def in_the_way(begin: Array, end: Array, more: Array, rows: Array, reach: Array)
                 found[m] = True
                 break
     return found
-
-
-def sections(rows: Array, distance: Array | float, height: float) -> tuple[Array, Array]:
-    """Where a plane at a height, m, cuts the sets within a distance, (m,), m, of the cores of outlines (m, W).
-
-    Returns:
-        The outlines that it cuts, in the plane z = 0, (k, W), and the distances from their cores there, (k,), m.
-    """
-    above = np.maximum(np.maximum(rows[:, BASE] - height, height - rows[:, TOP]), 0.0)
-    reach = np.broadcast_to(distance, len(rows))
-    squared = np.square(reach) - np.square(above)
-    near = squared > 0.0
-    found = rows[near]
-    found[:, BASE] = found[:, TOP] = 0.0
-    return found, np.sqrt(squared[near])
-
-
-def rim(row: Array, distance: float, rays: int = 16) -> Array:
-    """The boundary of all that is within a distance, m, of a core in the plane, as a polygon (K, 2), m, to be drawn."""
-    corners = corners_of(row)
-    if len(corners) == 1:
-        turn = np.linspace(0.0, 2.0 * np.pi, 4 * rays, endpoint=False)
-        return np.asarray(corners[0] + distance * np.column_stack([np.cos(turn), np.sin(turn)]))
-    edges = np.roll(corners, -1, axis=0) - corners
-    heading = np.arctan2(-edges[:, 0], edges[:, 1])  # of the outward normals
-    found = []
-    for k, corner in enumerate(corners):
-        sweep = (heading[k] - heading[k - 1]) % (2.0 * np.pi)
-        turn = heading[k - 1] + sweep * np.linspace(0.0, 1.0, max(2, int(rays * sweep / np.pi)))
-        found.append(corner + distance * np.column_stack([np.cos(turn), np.sin(turn)]))
-    return np.concatenate(found)

@@ -20,7 +20,7 @@ import numpy.typing as npt
 from numba import njit
 
 from airground_drake.base.arrays import Array
-from airground_drake.geometry import convex
+from airground_drake.geometry import convex, outline
 
 MOST_NODES = 60_000
 """Number of nodes of a lattice; a larger area gets a wider spacing."""
@@ -68,7 +68,7 @@ class DistanceField:
             keep: distances from their cores, (m,), m.
             half: half the side of the square, m. No node is outside; nor is one far from all obstacles.
         """
-        low, high = convex.box(rows)
+        low, high = outline.box(rows)
         room = float(keep.max())
         low = np.maximum(np.minimum(low[:2], goal) - room, goal - half)
         high = np.minimum(np.maximum(high[:2], goal) + room, goal + half)
@@ -123,7 +123,7 @@ def length_among(place: Array, goal: Array, rows: Array, keep: Array) -> float:
     straight = float(np.hypot(*(place - goal)))
     half = 2.0 ** (1.0 + np.ceil(np.log2(max(straight, float(keep.max()), ROUNDING_M))))
     best = float("inf")
-    aside, around = np.abs(rows[:, convex.MIDDLE : convex.EXTENT] - goal).max(axis=1), rows[:, convex.EXTENT] + keep
+    aside, around = np.abs(rows[:, outline.MIDDLE : outline.EXTENT] - goal).max(axis=1), rows[:, outline.EXTENT] + keep
     for _ in range(MOST_SQUARES):
         near = aside - around < half
         if not near.any():

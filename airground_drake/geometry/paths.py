@@ -27,8 +27,8 @@ from scipy.sparse.csgraph import dijkstra
 from scipy.spatial import cKDTree
 
 from airground_drake.base.arrays import Array, read_only
-from airground_drake.geometry import convex
-from airground_drake.geometry.convex import BASE, CORNERS, COUNT, TOP
+from airground_drake.geometry import convex, outline
+from airground_drake.geometry.outline import BASE, CORNERS, COUNT, TOP
 from airground_drake.geometry.separation import are_separated
 
 Points = NDArray[np.complex128]
@@ -109,7 +109,8 @@ def shortest_path(start: ArrayLike, goal: ArrayLike, rows: Array, keep: ArrayLik
     Args:
         start: first point, (2,), m.
         goal: last point, (2,), m.
-        rows: outlines of obstacles, (m, W), see `geometry.convex`; m = 0 gives the straight line. Heights do not count.
+        rows: outlines of obstacles, (m, W), see `geometry.outline`; m = 0 gives the straight line. Heights do not
+            count.
         keep: distances from their cores, (m,), m.
 
     Raises:
@@ -212,7 +213,7 @@ class _Obstacles:
             return f"the disc at {_show(self.c[inside][0])}, radius {self.r[inside][0]}"
         near = self.distances(point) < self.keep - TOL
         if near.any():
-            middle = complex(*self.rows[near][0, convex.MIDDLE : convex.EXTENT])
+            middle = complex(*self.rows[near][0, outline.MIDDLE : outline.EXTENT])
             return f"the obstacle about {_show(middle)}, with {self.keep[near][0]} m round it"
         return None
 

@@ -13,7 +13,8 @@ import numpy.typing as npt
 from numba import njit
 
 from airground_drake.base.arrays import Array
-from airground_drake.geometry.convex import CORNERS, COUNT, EXTENT, MIDDLE, nearest
+from airground_drake.geometry.convex import nearest
+from airground_drake.geometry.outline import CORNERS, COUNT, EXTENT, MIDDLE
 
 
 @njit(cache=True)
@@ -23,7 +24,7 @@ def are_separated(p: Array, q: Array, rows: Array, keep: Array) -> bool:
     Args:
         p: a place that is far enough from all cores, (2,), m.
         q: another one, (2,), m.
-        rows: outlines, (m, W), see `geometry.convex`.
+        rows: outlines, (m, W), see `geometry.outline`.
         keep: distances from their cores, (m,), m.
     """
     parent, odd = np.arange(len(rows)), np.zeros(len(rows), np.bool_)

@@ -10,7 +10,7 @@ from itertools import pairwise
 import numpy as np
 
 from airground_drake.base.arrays import Array
-from airground_drake.geometry import convex
+from airground_drake.geometry import outline
 from airground_drake.geometry.motion import Motion
 from airground_drake.intervention.coordination.joint import Effort, Plan, plan
 from airground_drake.intervention.coordination.roadmap import RobotTask, Space
@@ -191,7 +191,7 @@ class Coordinate(Policy):
 
     def _space(self, seen: Observation, clearance: float, spacing: float) -> Space:
         """Obstacles and distances for a UGV without a body, in the plane of `seen.robot`."""
-        keep, height = convex.keep(seen.obstacles, 0.0), float(seen.position[2])
+        keep, height = outline.keep(seen.obstacles, 0.0), float(seen.position[2])
         return Space(seen.obstacles, keep, clearance, seen.robot_distance, spacing, height)
 
 
@@ -255,7 +255,7 @@ def predicted(mate: Teammate, start: float) -> Array:
 def _as_robot(obstacle: MovingObstacle, seen: Observation) -> OtherRobot:
     """An obstacle that moves as a disc round it, of such a radius that robots keep its distance."""
     rows = obstacle.outlines
-    reach = np.hypot(*rows[:, convex.MIDDLE : convex.EXTENT].T) + rows[:, convex.EXTENT]
+    reach = np.hypot(*rows[:, outline.MIDDLE : outline.EXTENT].T) + rows[:, outline.EXTENT]
     radius = float((reach + obstacle.distances(0.0)).max()) - seen.robot_distance
     times = obstacle.motion.times[obstacle.motion.times > seen.start + 1e-6]
     places = obstacle.motion.sample(np.append(seen.start, times))[:, :2]
@@ -294,7 +294,7 @@ def _motion(way: Way, start: float, follow: float, height: float) -> Motion:
 @cache
 def warm_up() -> None:
     """Load the compiled functions before the first proposal is needed."""
-    room = Space(convex.balls([0.0, 1.0, 0.0]), np.array([0.1]), 0.1, 1.0, 0.1)
+    room = Space(outline.balls([0.0, 1.0, 0.0]), np.array([0.1]), 0.1, 1.0, 0.1)
     ends = [np.array([0.0, 0.0]), np.array([3.0, 0.0])]
     tasks = [RobotTask(a, np.array([[0.0, *b]])) for a, b in pairwise([*ends, ends[0]])]
     plan(room, tasks, [1.0, 1.0], effort=Effort(orders=2))

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from airground_drake.base.arrays import Array
-from airground_drake.geometry import convex
+from airground_drake.geometry import convex, outline
 from airground_drake.geometry.motion import Motion
 from airground_drake.geometry.paths import NoPath, Path, shortest_path
 from airground_drake.intervention.policy import Observation, Policy, Teammate
@@ -111,14 +111,14 @@ class Detour(Policy):
         """Outlines (m, W) in the plane of the path, and the distances to keep from their cores, (m,), m."""
         robots = [mate for mate in seen.team if mate.name != seen.robot and mate.standing and not _will_move(mate)]
         waiting = [each for each in seen.moving if not each.velocity.any()]
-        stand = [convex.moved(each.outlines, each.position) for each in waiting]
-        around = convex.joined(seen.obstacles, convex.balls([mate.position for mate in robots]), *stand)
+        stand = [outline.moved(each.outlines, each.position) for each in waiting]
+        around = outline.joined(seen.obstacles, outline.balls([mate.position for mate in robots]), *stand)
         apart = [seen.distance_to(mate) for mate in robots]
         least = np.concatenate([seen.obstacle_distances, apart, *(each.distances(seen.radius) for each in waiting)])
         # an obstacle may be as near to the target as the safe distance allows: then it gets no clearance
         from_target = convex.distances(around, seen.preset.positions[-1], True)
         reach = np.clip(from_target, least, least + self.clearance)
-        return convex.sections(around, reach, float(seen.position[2]))
+        return outline.sections(around, reach, float(seen.position[2]))
 
 
 def _will_move(mate: Teammate) -> bool:

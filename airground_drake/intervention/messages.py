@@ -25,7 +25,7 @@ Point = tuple[float, float, float]
 """A place, m, world frame."""
 
 Outline = tuple[float, ...]
-"""A convex part of an obstacle, without padding: see `geometry.convex`."""
+"""A convex part of an obstacle, without padding: see `geometry.outline`."""
 
 
 class Sighting(NamedTuple):

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 
 from airground_drake.base.arrays import Array
-from airground_drake.geometry import convex
+from airground_drake.geometry import outline
 from airground_drake.geometry.motion import Motion
 from airground_drake.intervention.database import Asked, BehaviourDatabase, Negotiation
 from airground_drake.intervention.messages import (
@@ -38,7 +38,7 @@ class Mover(NamedTuple):
 
     Attributes:
         name: of the obstacle.
-        outlines: of its parts about its origin, (k, W), see `geometry.convex`.
+        outlines: of its parts about its origin, (k, W), see `geometry.outline`.
         known: whether the UAV sees it; else it knows what a UGV last reported.
         script: its way, if predictions know it.
     """
@@ -125,7 +125,7 @@ class Planner:
         period: planning period, s; a proposal can act one period after it is made.
         presets: preset trajectories of the UGVs.
         targets: targets of the UGVs, (n, 3), m.
-        mapped: outlines of the obstacles on the UAV's map, (m, W), see `geometry.convex`.
+        mapped: outlines of the obstacles on the UAV's map, (m, W), see `geometry.outline`.
         robot_distance: d between UGVs, m.
         max_speed: speed limits of the UGVs, (n,), m/s.
         radius: radii of the UGVs' bodies, (n,), m, or one for all.
@@ -196,10 +196,10 @@ class Planner:
         moving = self._moving(t, {each.name: each for each in sightings}, latest)
         unknown = reported - set(memory.learnt)
         if unknown:
-            unknown -= set(map(convex.as_tuple, mapped))
+            unknown -= set(map(outline.as_tuple, mapped))
         fresh = tuple(sorted(unknown, key=_place))
         learnt = memory.learnt + fresh
-        obstacles = convex.joined(mapped, convex.stacked(learnt)) if learnt else mapped
+        obstacles = outline.joined(mapped, outline.stacked(learnt)) if learnt else mapped
         talks = self._after_answers(memory.talks, t, intervening, said, learnt=bool(fresh))
         asked = list(memory.asked)
         newest = max((number for number, _ in memory.read[-len(self.ugvs) :]), default=-1)
@@ -303,7 +303,7 @@ class Planner:
         )
 
 
-def _place(outline: Outline) -> Outline:
+def _place(given: Outline) -> Outline:
     """Sorts outlines by place, then by radius."""
-    middle = outline[convex.MIDDLE : convex.EXTENT]
-    return (*middle, outline[convex.BASE], outline[convex.RADIUS], *outline)
+    middle = given[outline.MIDDLE : outline.EXTENT]
+    return (*middle, given[outline.BASE], given[outline.RADIUS], *given)

@@ -11,7 +11,7 @@ from typing import Any, ClassVar, Literal, Self
 import numpy as np
 
 from airground_drake.base.arrays import LARGEST, Array, read_only
-from airground_drake.geometry import convex
+from airground_drake.geometry import outline
 from airground_drake.geometry.motion import Motion
 from airground_drake.nsbc.task import pseudoinverse
 
@@ -58,7 +58,7 @@ class MovingObstacle:
 
     Attributes:
         name: of the obstacle.
-        outlines: of its convex parts about its origin, (k, W), see `geometry.convex`.
+        outlines: of its convex parts about its origin, (k, W), see `geometry.outline`.
         position: of its origin, (3,), m, world frame: as it is now, or as a UGV last reported it.
         velocity: of then, (3,), m/s.
         motion: where its origin is predicted to be.
@@ -72,7 +72,7 @@ class MovingObstacle:
 
     def distances(self, radius: float) -> Array:
         """Distances to keep between the centre of a UGV with this radius, m, and the cores of its parts, (k,), m."""
-        return convex.keep(self.outlines, radius)
+        return outline.keep(self.outlines, radius)
 
 
 @dataclass(frozen=True)
@@ -87,7 +87,7 @@ class Observation:
         target: its target, (3,), m.
         preset: its preset trajectory.
         obstacles: outlines of all obstacles at rest that the UAV knows, from its own map and from answers, (m, W); see
-            `geometry.convex`.
+            `geometry.outline`.
         mapped: outlines of the obstacles on its own map, (k, W).
         others: positions of the other robots, (n, 3), m.
         refusals: number of proposals that the UGV has refused since the trigger.
@@ -115,7 +115,7 @@ class Observation:
     @property
     def obstacle_distances(self) -> Array:
         """Distances to keep between the centre of the UGV and the core of each obstacle, (m,), m."""
-        return convex.keep(self.obstacles, self.radius)
+        return outline.keep(self.obstacles, self.radius)
 
     def distance_to(self, mate: Teammate) -> float:
         """Distance to keep between the centres of the UGV and of another one, m."""
@@ -147,7 +147,7 @@ class Proposal:
     issued: float
     motion: Motion
     selection: Array = field(default_factory=lambda: np.eye(3))
-    mapped: Array = field(default_factory=lambda: convex.stacked([]))
+    mapped: Array = field(default_factory=lambda: outline.stacked([]))
     cause: str = ""
     party: tuple[str, ...] = ()
     number: int = -1

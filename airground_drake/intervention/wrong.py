@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from airground_drake.base.arrays import Array
-from airground_drake.geometry import convex
+from airground_drake.geometry import convex, outline
 from airground_drake.geometry.motion import Motion
 from airground_drake.intervention.detour import Detour
 from airground_drake.intervention.policy import SHORTEST_LEG_S, Observation, Policy
@@ -66,7 +66,7 @@ class Hostile(Policy):
 
     def propose(self, seen: Observation) -> Motion | None:
         """The straight way to the middle of the nearest obstacle or robot."""
-        middles = seen.obstacles[:, [convex.MIDDLE, convex.MIDDLE + 1, convex.BASE]]
+        middles = seen.obstacles[:, [outline.MIDDLE, outline.MIDDLE + 1, outline.BASE]]
         around = np.concatenate([middles, seen.others])
         if not len(around):
             return None

@@ -17,7 +17,7 @@ Beside an obstacle that may move at a speed V the robot does nothing that would 
 
 Below these inequalities, and above all other tasks, it retreats: n.v >= V - (D - d) / h, as far as its speed limit
 allows. D and d are distances of the robot's centre from the *core* of
-what it avoids (`geometry.convex`): `World` puts both radii into d.
+what it avoids (`geometry.outline`): `World` puts both radii into d.
 """
 
 from __future__ import annotations

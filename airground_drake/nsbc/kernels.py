@@ -13,7 +13,8 @@ import numpy.typing as npt
 from numba import njit
 
 from airground_drake.base.arrays import Array
-from airground_drake.geometry.convex import SPEED, may_be_within, nearest
+from airground_drake.geometry.convex import may_be_within, nearest
+from airground_drake.geometry.outline import SPEED
 
 MARGIN_M_S = 1e-12
 """Added to every bound in the projection, m/s. The bound of a robot in contact is 0. Without the margin rounding would

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from airground_drake.base.arrays import Array
-from airground_drake.geometry import convex
+from airground_drake.geometry import convex, outline
 from airground_drake.run.collisions import first_collisions
 from airground_drake.run.trace import Trace
 from airground_drake.scenarios.world import make_world
@@ -85,7 +85,7 @@ def _way(trace: Trace, body: Body) -> PeriodMotion:
 
 def _box(way: PeriodMotion, body: Body) -> tuple[Array, Array]:
     """Two opposite corners, (3,), m, of a box around a body that moves."""
-    (start, end), (low, high) = way.box, convex.box(body.shape)
+    (start, end), (low, high) = way.box, outline.box(body.shape)
     return start + low, end + high
 
 
@@ -94,14 +94,14 @@ def visits(apart: PeriodMotion, shape: Array, within: float, planar: bool) -> np
 
     Args:
         apart: motion of the centre relative to the shape's origin, (T - 1, 3), m.
-        shape: outlines of the shape, (k, W), see `geometry.convex`.
+        shape: outlines of the shape, (k, W), see `geometry.outline`.
         within: the distance from its surface, m.
         planar: whether the centre stays in its plane.
     """
     places = np.concatenate([apart.start, apart.end[-1:]])
     near, passes = np.zeros(len(places), dtype=bool), np.zeros(len(apart.start), dtype=bool)
     for row in shape:
-        reach = within + row[convex.RADIUS]
+        reach = within + row[outline.RADIUS]
         near |= convex.within(row[None], places, np.nextafter(reach, -np.inf), planar)[:, 0]
         least = convex.approaches(row, apart.start, apart.end, planar)[0]
         passes |= least < reach + apart.off_m

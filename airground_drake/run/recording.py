@@ -11,7 +11,7 @@ import pandas as pd
 
 from airground_drake.base.arrays import Array
 from airground_drake.gatekeeper.answer import GatekeeperDecision
-from airground_drake.geometry import convex
+from airground_drake.geometry import outline
 from airground_drake.intervention.database import Asked
 from airground_drake.intervention.planner import PlannerState
 from airground_drake.intervention.policy import Proposal
@@ -162,7 +162,7 @@ def proposals(ugvs: Sequence[str], sent: Sequence[tuple[int, Proposal]]) -> pd.D
             proposal.number, ugvs[i], proposal.policy, float(proposal.issued), proposal.motion.times.tolist(),
             proposal.motion.positions.ravel().tolist(),
             np.asarray(proposal.selection, dtype=np.float64).ravel().tolist(),
-            [number for row in proposal.mapped for number in convex.as_tuple(row)], proposal.cause or ugvs[i],
+            [number for row in proposal.mapped for number in outline.as_tuple(row)], proposal.cause or ugvs[i],
             [float(ugvs.index(name)) for name in proposal.party],
         )
         for i, proposal in sent

@@ -20,7 +20,7 @@ from airground_drake.gatekeeper.outcome import Outlook, outcomes
 from airground_drake.gatekeeper.problem import Horizon, predicted_problem
 from airground_drake.gatekeeper.rollout import View
 from airground_drake.gatekeeper.routes.mixed_integer import MixedIntegerRoute
-from airground_drake.geometry import convex
+from airground_drake.geometry import convex, outline
 from airground_drake.geometry.motion import Motion
 from airground_drake.intervention.policy import Proposal
 from airground_drake.nsbc.avoidance import Avoidance, Composition
@@ -193,7 +193,7 @@ def read_back(model: Model, root: Context) -> dict[str, Any]:
 def warm_up() -> None:
     """Load the compiled kernels and the solver, once per process, so that no run's time includes loading."""
     one, motion = np.ones((1, 3)), Motion(np.array([0.0, 1.0]), np.zeros((2, 3)))
-    rows = convex.balls(one)
+    rows = outline.balls(one)
     convex.news_within(rows, one, 1.0, True, convex.within(rows, one, 1.0, True))
     avoidance = Avoidance(gain=1.0, period=0.1)
     plant = FirstOrder()

@@ -73,7 +73,7 @@ PROPOSAL_COLUMNS = (
 - robot, policy, issued_s: its UGV, its policy, the time of sending.
 - times_s (M), positions_m (M x 3): vertices of the requested motion.
 - selection (m x 3): J_int of (12)-(14), the directions that the motion concerns.
-- mapped: outlines of the obstacles on the UAV's map, without padding, one after the other: see `geometry.convex`.
+- mapped: outlines of the obstacles on the UAV's map, without padding, one after the other: see `geometry.outline`.
 - cause: the UGV whose trigger led to it: this UGV, or another UGV for which it makes way.
 - party: indices in `ugvs` of all UGVs in the same joint plan; empty if the proposal stands alone."""
 

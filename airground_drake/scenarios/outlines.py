@@ -1,11 +1,11 @@
-"""The convex parts of an obstacle as outlines: see `geometry.convex`."""
+"""The convex parts of an obstacle as outlines: see `geometry.outline`."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from airground_drake.base.arrays import Array
-from airground_drake.geometry.convex import SPEED, balls, prism, prisms, stacked
+from airground_drake.geometry.outline import SPEED, balls, prism, prisms, stacked
 from airground_drake.scenarios.schema import MapObstacle, Obstacle, Scenario
 from airground_drake.scenarios.shapes import convex_parts, corners_of_map
 

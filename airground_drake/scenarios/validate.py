@@ -21,7 +21,7 @@ from airground_drake.base.errors import Fault, ScenarioError
 from airground_drake.base.exact import decimal
 from airground_drake.base.statuses import COUNTS, NOTHING, alternatives
 from airground_drake.decision.bayes import COMPUTED
-from airground_drake.geometry import convex
+from airground_drake.geometry import convex, outline
 from airground_drake.registry import MODEL_CLAIMS, ROUTES, RUN_CLAIMS
 from airground_drake.scenarios.outlines import outlines_of
 from airground_drake.scenarios.rounding import TOLERANCE_M, Rounding
@@ -367,7 +367,7 @@ def _extent(scenario: Scenario) -> Problems:
     points.append(("uav.start_m", scenario.uav.start_m))
     for name, each in scenario.barriers.items():
         shape = next((key for key in ("polygon_m", "segment_m", "size_m") if getattr(each, key)), "position_m")
-        corners = outlines_of(scenario, each)[:, convex.CORNERS :].reshape(-1, 2)  # and zeros
+        corners = outlines_of(scenario, each)[:, outline.CORNERS :].reshape(-1, 2)  # and zeros
         places = [corners[np.abs(corners).max(axis=1).argmax()].tolist()] + [each.position_m] * bool(each.position_m)
         if each.moves:
             shape, places = "moves.waypoints_m", [*places, *each.moves.waypoints_m]
@@ -414,7 +414,7 @@ def _clearances(scenario: Scenario) -> Problems:
                 continue  # where robots are when it comes or appears is judged in each run
             kind, least = apart_of(scenario, name)
             for robot in (*ugvs, uav):
-                apart = convex.distances(rows, np.array(robot.point), robot is not uav) - rows[:, convex.RADIUS]
+                apart = convex.distances(rows, np.array(robot.point), robot is not uav) - rows[:, outline.RADIUS]
                 gap = float(apart.min()) - robot.radius
                 if gap < least - TOLERANCE:
                     yield _too_near(robot, attribute, f"{verb} {gap:.9g} m from {name}", kind, least)

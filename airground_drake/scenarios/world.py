@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from airground_drake.geometry import convex
+from airground_drake.geometry import outline
 from airground_drake.scenarios.courses import course
 from airground_drake.scenarios.outlines import outlines_of
 from airground_drake.scenarios.plants import plant_of
@@ -42,4 +42,4 @@ def _obstacle(scenario: Scenario, name: str, given: Obstacle) -> Body:
 
 def _robot(name: str, kind: Kind, given: Ugv | Uav) -> Body:
     start = np.array(given.start_m, dtype=np.float64)
-    return Body(name, kind, start, convex.balls(np.zeros(3), given.radius_m), plant_of(given), given.max_speed_m_s)
+    return Body(name, kind, start, outline.balls(np.zeros(3), given.radius_m), plant_of(given), given.max_speed_m_s)

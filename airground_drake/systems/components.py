@@ -23,7 +23,7 @@ from airground_drake.gatekeeper.outcome_gatekeeper import OutcomeGatekeepers
 from airground_drake.gatekeeper.patience import Patience
 from airground_drake.gatekeeper.problem import Horizon
 from airground_drake.gatekeeper.routes.route import Route
-from airground_drake.geometry import convex
+from airground_drake.geometry import outline
 from airground_drake.geometry.motion import Motion
 from airground_drake.intervention.database import BehaviourDatabase, make_policy
 from airground_drake.intervention.planner import Mover, Planner
@@ -88,15 +88,15 @@ def make_map(scenario: Scenario) -> tuple[Array, Array, Array]:
     """The UAV's map: obstacles at rest that it knows, and phantoms, which exist on the map only and have no radius.
 
     Returns:
-        Outlines, (m, W), see `geometry.convex`, and when each appears and disappears, (m,), s.
+        Outlines, (m, W), see `geometry.outline`, and when each appears and disappears, (m,), s.
     """
     known = [each for each in scenario.barriers.values() if each.known_to_uav and not each.moves]
     parts = [outlines_of(scenario, obstacle) for obstacle in known]
-    phantoms = convex.balls(scenario.uav.phantoms_m, gap=scenario.safe_distance.obstacle_m)
+    phantoms = outline.balls(scenario.uav.phantoms_m, gap=scenario.safe_distance.obstacle_m)
     count = [*map(len, parts), len(phantoms)]
     appears = np.repeat([*(each.appears_s for each in known), 0.0], count)
     disappears = np.repeat([*(each.disappears_s or np.inf for each in known), np.inf], count)
-    return convex.joined(*parts, phantoms), appears, disappears
+    return outline.joined(*parts, phantoms), appears, disappears
 
 
 def make_movers(scenario: Scenario) -> tuple[Mover, ...]:

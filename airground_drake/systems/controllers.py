@@ -26,7 +26,7 @@ from pydrake.systems.framework import (
 
 from airground_drake.base.arrays import Array, read_only
 from airground_drake.base.errors import PluginError, short
-from airground_drake.geometry import convex
+from airground_drake.geometry import outline
 from airground_drake.intervention.messages import NOTHING, accepted_proposals
 from airground_drake.intervention.policy import Proposal
 from airground_drake.nsbc.avoidance import Avoidance
@@ -254,10 +254,10 @@ def read_back(system: LeafSystem, avoidance: Avoidance, near: Neighbours, robots
         [value, number of repetitions].
     """
     timing = system.GetUniquePeriodicDiscreteUpdateAttribute()
-    moving = [number for row in near.parts[robots:] for number in convex.as_tuple(row)]
+    moving = [number for row in near.parts[robots:] for number in outline.as_tuple(row)]
     return ({"moving_outlines": moving} if moving else {}) | {
         "members": near.members.tolist(),
-        "outlines": [number for row in near.still for number in convex.as_tuple(row)],
+        "outlines": [number for row in near.still for number in outline.as_tuple(row)],
         "others": near.carrier[near.others].ravel().tolist(),
         "safe_m": _in_runs(near.distance),
         "share": _in_runs(near.share),

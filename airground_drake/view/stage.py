@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from airground_drake.base.arrays import Array
 from airground_drake.decision.trigger import Mode
-from airground_drake.geometry import convex
+from airground_drake.geometry import convex, outline
 from airground_drake.run.trace import Trace
 from airground_drake.scenarios.outlines import outlines_of
 from airground_drake.scenarios.schema import ARENA, Scenario, Uav, Ugv
@@ -50,7 +50,7 @@ class Barrier:
 
     Attributes:
         name: of the scenario.
-        parts: outlines of its convex parts at the start, (k, W), world frame; see `geometry.convex`.
+        parts: outlines of its convex parts at the start, (k, W), world frame; see `geometry.outline`.
         known_to_uav: whether it is on the UAV's map.
         appears_s: time from which on it is there, s.
         disappears_s: time from which on it is gone, s; infinite if it stays.
@@ -76,29 +76,29 @@ class Barrier:
     @property
     def is_round(self) -> bool:
         """Whether it is a ball or a post."""
-        return bool(len(self.parts) == 1 and self.parts[0, convex.COUNT] == 1.0)
+        return bool(len(self.parts) == 1 and self.parts[0, outline.COUNT] == 1.0)
 
     @property
     def place_m(self) -> Array:
         """A point of it, (3,), m, on the ground below it or its centre: the middle of its largest part."""
-        largest = self.parts[np.argmax(self.parts[:, convex.EXTENT])]
-        return np.append(convex.corners_of(largest).mean(axis=0), largest[convex.BASE])
+        largest = self.parts[np.argmax(self.parts[:, outline.EXTENT])]
+        return np.append(outline.corners_of(largest).mean(axis=0), largest[outline.BASE])
 
     @property
     def top_m(self) -> float:
         """Its height, m."""
-        return float(self.parts[:, convex.TOP].max())
+        return float(self.parts[:, outline.TOP].max())
 
     @property
     def radius_m(self) -> Array:
         """By how much its parts are rounded as they are drawn, (k,), m; of a ball or a post, its radius."""
-        least = np.select([self.parts[:, convex.COUNT] == 1.0, self.parts[:, convex.COUNT] == 2.0], [1.0, OF_MARK])
-        return np.maximum(least * self.mark_m, self.parts[:, convex.RADIUS])
+        least = np.select([self.parts[:, outline.COUNT] == 1.0, self.parts[:, outline.COUNT] == 2.0], [1.0, OF_MARK])
+        return np.maximum(least * self.mark_m, self.parts[:, outline.RADIUS])
 
     @property
     def safe_m(self) -> Array:
         """How far the surfaces of UGVs stay away from the cores of its parts, (k,), m."""
-        return convex.keep(self.parts, 0.0)
+        return outline.keep(self.parts, 0.0)
 
     @property
     def body(self) -> list[Array]:
@@ -123,14 +123,14 @@ class Barrier:
     def _rims(self, reach: Array) -> list[Array]:
         """Outlines of all that is within distances (k,), m, of the cores of its parts."""
         return [
-            convex.rim(part, each, self.rays) if each else convex.corners_of(part)
+            outline.rim(part, each, self.rays) if each else outline.corners_of(part)
             for part, each in zip(self.parts, reach.tolist(), strict=True)
         ]
 
     @property
     def corners(self) -> tuple[Array, Array]:
         """Corners (2,), m, of the least rectangle, along the axes, that contains `safe` wherever the barrier goes."""
-        places = [convex.corners_of(part) for part in self.parts]
+        places = [outline.corners_of(part) for part in self.parts]
         low = np.min([each.min(axis=0) - reach for each, reach in zip(places, self.safe_m, strict=True)], axis=0)
         high = np.max([each.max(axis=0) + reach for each, reach in zip(places, self.safe_m, strict=True)], axis=0)
         goes = self.way_m[:, :2] - self.way_m[:1, :2] if len(self.way_m) else np.zeros((1, 2))
@@ -183,7 +183,7 @@ def barriers_of(scenario: Scenario, mark: float = 0.0) -> tuple[Barrier, ...]:
     rays, barriers = FINE if sum(map(len, parts.values())) <= MANY else COARSE, list[Barrier]()
     for name, each in found.items():
         way = np.array([[*place, 0.0][:3] for place in each.moves.waypoints_m]) if each.moves else np.empty((0, 3))
-        rows = convex.moved(parts[name], way[0]) if len(way) else parts[name]
+        rows = outline.moved(parts[name], way[0]) if len(way) else parts[name]
         until = each.disappears_s or np.inf
         barriers.append(Barrier(name, rows, each.known_to_uav, each.appears_s, until, way, mark, rays))
     return tuple(barriers)
@@ -215,7 +215,7 @@ def _bounds(scenario: Scenario, visited_m: Array) -> tuple[Array, Array]:
     points = [visited_m, np.array([spec.target_m for spec in scenario.ugvs.values()])]
     highest = HIGHEST * visited_m[:, 2].max()
     for each in barriers_of(scenario):
-        heights = each.parts[:, convex.BASE].min(), max(min(each.top_m, highest), each.place_m[2])
+        heights = each.parts[:, outline.BASE].min(), max(min(each.top_m, highest), each.place_m[2])
         points.append(np.column_stack([each.corners, heights]))
     points += [np.column_stack([ring, np.zeros(4)]) for ring in arena_of(scenario)]
     every = np.concatenate([*points, visited_m[:1] * [1.0, 1.0, 0.0]])

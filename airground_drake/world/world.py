@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from airground_drake.base.arrays import Array
-from airground_drake.geometry import convex
+from airground_drake.geometry import outline
 from airground_drake.world.motion import SAME_S
 from airground_drake.world.plant import Plant, Scripted
 
@@ -29,7 +29,7 @@ class Body:
         name: unique in its world.
         kind: UGVs stay in their plane.
         start_m: position of its origin at the start, (3,), m, world frame.
-        shape: outlines of its convex parts about its origin, (k, W), see `geometry.convex`; of a robot, one ball.
+        shape: outlines of its convex parts about its origin, (k, W), see `geometry.outline`; of a robot, one ball.
         plant: how it moves; None: it never moves.
         max_speed_m_s: speed limit, or the speed that robots expect of an obstacle at most.
         appears_s: time from which on an obstacle is there, s.
@@ -39,7 +39,7 @@ class Body:
     name: str
     kind: Kind
     start_m: Array
-    shape: Array = field(default_factory=lambda: convex.balls(np.zeros(3)))
+    shape: Array = field(default_factory=lambda: outline.balls(np.zeros(3)))
     plant: Plant | None = None
     max_speed_m_s: float = 0.0
     appears_s: float = 0.0
@@ -83,15 +83,15 @@ class Neighbours(NamedTuple):
         """UGVs that keep away from outlines at rest only, (m, W), not from each other.
 
         Args:
-            still: the outlines, see `geometry.convex`.
+            still: the outlines, see `geometry.outline`.
             max_speed: speed limits of the k UGVs, (k,), m/s.
             radius: of their bodies, m.
         """
         count, limits = len(max_speed), np.asarray(max_speed, dtype=np.float64)
         nobody, own = np.zeros((count, 0), dtype=np.intp), np.arange(count)
-        distance = np.tile(convex.keep(still, radius), (count, 1))
+        distance = np.tile(outline.keep(still, radius), (count, 1))
         plane = np.tile([1.0, 1.0, 0.0], (count, 1))
-        return cls(own, own[:0], nobody, still, convex.stacked([]), distance, np.ones_like(distance), plane, limits)
+        return cls(own, own[:0], nobody, still, outline.stacked([]), distance, np.ones_like(distance), plane, limits)
 
 
 @dataclass(frozen=True, eq=False)
@@ -155,7 +155,7 @@ class World:
         if self._always:
             return near
         still, moving = self.there(t, self.resting)[self.owner], self.there(t, self.moving)[near.carrier]
-        return near._replace(still=convex.where(still, near.still), parts=convex.where(moving, near.parts))
+        return near._replace(still=outline.where(still, near.still), parts=outline.where(moving, near.parts))
 
     def there(self, t: float, bodies: Sequence[Body]) -> npt.NDArray[np.bool_]:
         """Which bodies are there at time t, s."""
@@ -164,8 +164,8 @@ class World:
     @cached_property
     def still(self) -> Array:
         """Outlines of the convex parts of all bodies at rest, (m, W), world frame."""
-        resting = [convex.moved(body.shape, body.start_m) for body in self.resting]
-        return convex.joined(*resting) if resting else convex.stacked([])
+        resting = [outline.moved(body.shape, body.start_m) for body in self.resting]
+        return outline.joined(*resting) if resting else outline.stacked([])
 
     @cached_property
     def owner(self) -> npt.NDArray[np.intp]:
@@ -200,7 +200,7 @@ class World:
     @cached_property
     def radius(self) -> Array:
         """Radii of the robots, in the order of the world, m."""
-        return np.array([float(body.shape[0, convex.RADIUS]) for body in self.bodies if body.kind in ROBOTS])
+        return np.array([float(body.shape[0, outline.RADIUS]) for body in self.bodies if body.kind in ROBOTS])
 
     def moves_straight(self, period_s: float) -> bool:
         """Whether all bodies move on straight lines while their commands are held for a period."""
@@ -213,12 +213,12 @@ class World:
     def around(self, rows: slice) -> Neighbours:
         """The bodies that the robots in some rows keep away from."""
         members = np.arange(len(self.moving))[rows]
-        parts = convex.joined(*(body.shape for body in self.moving))
+        parts = outline.joined(*(body.shape for body in self.moving))
         carrier = np.repeat(np.arange(len(self.moving)), [len(body.shape) for body in self.moving])
         others = np.array([np.flatnonzero(carrier != i) for i in members], dtype=np.intp).reshape(len(members), -1)
         robots = [self.bodies[i] for i in members]
         distance = [
-            np.concatenate([convex.keep(self.still, radius), self._beside(robot, radius)[other]])
+            np.concatenate([outline.keep(self.still, radius), self._beside(robot, radius)[other]])
             for robot, radius, other in zip(robots, self.radius[members], others, strict=True)
         ]
         share = np.where(np.array([body.kind in ROBOTS for body in self.moving]), 0.5, 1.0)[carrier]
@@ -231,8 +231,8 @@ class World:
     def _beside(self, robot: Body, radius: float) -> Array:
         """Safe distances between the centre of a robot and the cores of the parts that move, (P,), m."""
         return np.concatenate([
-            self.apart(robot.kind, body.kind) + (radius + body.shape[:, convex.RADIUS]) if body.kind in ROBOTS
-            else convex.keep(body.shape, radius)
+            self.apart(robot.kind, body.kind) + (radius + body.shape[:, outline.RADIUS]) if body.kind in ROBOTS
+            else outline.keep(body.shape, radius)
             for body in self.moving
         ])  # fmt: skip
 

@@ -23,7 +23,7 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Context, Diagram, DiagramBuilder, DiscreteValues, LeafSystem
 from pydrake.systems.primitives import LogVectorOutput
 
-from airground_drake.geometry.convex import balls
+from airground_drake.geometry.outline import balls
 from airground_drake.nsbc.avoidance import Avoidance, limit_speed
 from airground_drake.nsbc.task import Task
 from airground_drake.nsbc.tasks import PositionTask

@@ -13,7 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from properties import examples
 
-from airground_drake.geometry.convex import balls
+from airground_drake.geometry.outline import balls
 from airground_drake.geometry.paths import NoPath, shortest_path
 
 NOTHING = np.empty((0, 2))

@@ -7,24 +7,24 @@ from typing import Any
 import numpy as np
 
 from airground_drake.base.arrays import Array
-from airground_drake.geometry import convex
+from airground_drake.geometry import outline
 
 Draw = np.random.Generator
 
 
-def outline(rng: Draw, **more: Any) -> Array:
-    """A point, a post, a wall, a polygon or a prism within 3 m or so of the origin; `more` as for `convex.prism`."""
+def drawn(rng: Draw, **more: Any) -> Array:
+    """A point, a post, a wall, a polygon or a prism within 3 m or so of the origin; `more` as for `outline.prism`."""
     kind, middle = rng.integers(6), rng.uniform(-3.0, 3.0, 2)
     top = float(rng.choice([0.0, rng.uniform(0.5, 3.0)]))
     if kind == 0:
-        return convex.balls([*middle, rng.choice([0.0, rng.uniform(0.0, 2.0)])], **more)[0]
+        return outline.balls([*middle, rng.choice([0.0, rng.uniform(0.0, 2.0)])], **more)[0]
     if kind == 1:
-        return convex.prism([middle], top=top + 0.5, **more)
+        return outline.prism([middle], top=top + 0.5, **more)
     if kind == 2:
-        return convex.prism([middle, middle + rng.normal(size=2)], top=top, **more)
+        return outline.prism([middle, middle + rng.normal(size=2)], top=top, **more)
     angle = np.cumsum(rng.dirichlet(np.full(rng.integers(3, 8), 3.0)))
     round_it = np.column_stack([np.cos(2.0 * np.pi * angle), np.sin(2.0 * np.pi * angle)])
-    return convex.prism(middle + rng.uniform(0.3, 2.0) * round_it * [1.0, rng.uniform(0.2, 1.0)], top=top, **more)
+    return outline.prism(middle + rng.uniform(0.3, 2.0) * round_it * [1.0, rng.uniform(0.2, 1.0)], top=top, **more)
 
 
 def places(rng: Draw, count: int, *, planar: bool) -> Array:

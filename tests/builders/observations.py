@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from airground_drake.geometry.convex import balls
 from airground_drake.geometry.motion import Motion
+from airground_drake.geometry.outline import balls
 from airground_drake.intervention.policy import Observation, Teammate
 
 Array = npt.NDArray[np.float64]

@@ -9,7 +9,7 @@ import numpy as np
 from airground_drake.base.arrays import Array
 from airground_drake.gatekeeper.problem import Horizon, Problem, predicted_problem
 from airground_drake.gatekeeper.rollout import View
-from airground_drake.geometry import convex
+from airground_drake.geometry import outline
 from airground_drake.geometry.motion import Motion
 from airground_drake.intervention.policy import Proposal
 from airground_drake.nsbc.avoidance import Avoidance
@@ -46,7 +46,7 @@ def view(
 ) -> View:
     """What a UGV sees of discs at rest, (m, 3), m, and of points that move, (n, 3), m, m/s; one safe distance, m."""
     m, n = len(discs), len(places)
-    still, parts = convex.balls(discs), convex.balls(np.zeros((n, 3)))
+    still, parts = outline.balls(discs), outline.balls(np.zeros((n, 3)))
     shares = np.repeat([1.0, share], [m, n])
     return View(
         t, position, preset, still, parts, places, velocities, np.full(m + n, safe), shares, max_speed, (None,) * n

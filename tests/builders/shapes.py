@@ -7,7 +7,7 @@ import numpy.typing as npt
 from hypothesis import strategies as st
 from scipy.sparse.csgraph import dijkstra
 
-from airground_drake.geometry import convex
+from airground_drake.geometry import outline
 
 Array = npt.NDArray[np.float64]
 
@@ -46,7 +46,7 @@ def shortest_around(start: Array, goal: Array, rows: Array, keep: Array, sides: 
     """
     angle = 2.0 * np.pi * np.arange(sides) / sides
     ring = np.column_stack([np.cos(angle), np.sin(angle)]) / np.cos(np.pi / sides) * (1.0 + 1e-9)
-    cores = [convex.corners_of(row) for row in rows]
+    cores = [outline.corners_of(row) for row in rows]
     rings = [corner + far * ring for core, far in zip(cores, keep.tolist(), strict=True) for corner in core]
     nodes = np.concatenate([[start, goal], *rings])
     free = np.ones(len(nodes), dtype=bool)
@@ -67,23 +67,23 @@ def rectangle(x: float, y: float, length: float, width: float, heading: float = 
     """The outline of a rectangle about (x, y), m, turned by `heading`, rad."""
     corners = 0.5 * np.array([[-length, -width], [length, -width], [length, width], [-length, width]])
     cos, sin = np.cos(heading), np.sin(heading)
-    return convex.prism(corners @ np.array([[cos, sin], [-sin, cos]]) + [x, y])
+    return outline.prism(corners @ np.array([[cos, sin], [-sin, cos]]) + [x, y])
 
 
 def wall(a: tuple[float, float], b: tuple[float, float]) -> Array:
     """The outline of a wall between two places, m."""
-    return convex.prism([a, b])
+    return outline.prism([a, b])
 
 
 _PLACES = st.integers(0, 40).map(lambda n: n / 4.0)
 _SIZES = st.integers(1, 12).map(lambda n: n / 4.0)
+TRIANGLE = np.array([[1.0, 0.0], [-0.5, 0.8], [-0.5, -0.8]])
 _POINTS = st.tuples(_PLACES, _PLACES)
 OUTLINES = st.one_of(
-    st.builds(lambda at: convex.balls([*at, 0.0])[0], _POINTS),
+    st.builds(lambda at: outline.balls([*at, 0.0])[0], _POINTS),
     st.builds(rectangle, _PLACES, _PLACES, _SIZES, _SIZES, st.sampled_from([0.0, 0.3, 1.0])),
     st.tuples(_POINTS, _POINTS).filter(lambda ends: ends[0] != ends[1]).map(lambda ends: wall(*ends)),
-    st.builds(lambda at, r: convex.prism(np.array(at) + r * np.array([[1.0, 0.0], [-0.5, 0.8], [-0.5, -0.8]])), _POINTS,
-              _SIZES),
+    st.builds(lambda at, r: outline.prism(np.array(at) + r * TRIANGLE), _POINTS, _SIZES),
 )  # fmt: skip
 """Balls, rectangles, walls and triangles in a square of 10 m; corners coincide and edges touch now and then."""
 
@@ -92,5 +92,5 @@ def fields(most: int) -> st.SearchStrategy[tuple[Array, Array]]:
     """Outlines, up to so many, and the distances to keep from them, m."""
     one = st.tuples(OUTLINES, st.sampled_from([0.2, 0.25, 0.5]))
     return st.lists(one, min_size=1, max_size=most).map(
-        lambda drawn: (convex.stacked([row for row, _ in drawn]), np.array([far for _, far in drawn]))
+        lambda drawn: (outline.stacked([row for row, _ in drawn]), np.array([far for _, far in drawn]))
     )

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from airground_drake.geometry.convex import balls
+from airground_drake.geometry.outline import balls
 from airground_drake.intervention.coordination.joint import Plan
 from airground_drake.intervention.coordination.roadmap import RobotTask, Space
 from airground_drake.intervention.coordination.timed import at_rest

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from airground_drake.base.arrays import Array
-from airground_drake.geometry import convex
+from airground_drake.geometry import outline
 from airground_drake.world.plant import FirstOrder
 from airground_drake.world.world import Body, Neighbours, World
 
@@ -36,14 +36,14 @@ def world(
             name,
             "uav" if name == "uav" else "ugv",
             np.zeros(3),
-            convex.balls(np.zeros(3), size),
+            outline.balls(np.zeros(3), size),
             FirstOrder(),
             float(limit),
         )
         for name, size, limit in zip([*names, "uav"], own, limits, strict=True)
     ]
     stones = [
-        Body(f"obstacle_{k}", "obstacle", place, convex.balls(np.zeros(3), size, obstacle_m))
+        Body(f"obstacle_{k}", "obstacle", place, outline.balls(np.zeros(3), size, obstacle_m))
         for k, (place, size) in enumerate(zip(places, fixed, strict=True))
     ]
     return World((*robots, *stones), {frozenset(("ugv",)): ugv_m, frozenset(("ugv", "uav")): air_ground_m})
@@ -58,6 +58,6 @@ def among_points(robots: Array, points: Array, safe: Array, share: Array, mobili
     count, each = safe.shape
     positions = np.concatenate([robots, points.reshape(-1, 3)])
     bodies, others = np.arange(len(positions)), count + np.arange(count * each).reshape(count, each)
-    parts, nothing = convex.balls(np.zeros((len(positions), 3))), convex.stacked([])
+    parts, nothing = outline.balls(np.zeros((len(positions), 3))), outline.stacked([])
     limits = np.full(count, np.inf)
     return positions, Neighbours(bodies[:count], bodies, others, nothing, parts, safe, share, mobility, limits)

@@ -20,7 +20,7 @@ from airground_drake.check.rules import NotEstablished
 from airground_drake.check.run import Run
 from airground_drake.check.scenario import Pair, pairs_of
 from airground_drake.check.shapes import POINT, ROWS, Shape, boxes_of, shape_of, split
-from airground_drake.geometry import convex
+from airground_drake.geometry import outline
 from airground_drake.scenarios.load import from_data, load, resolved
 from airground_drake.scenarios.outlines import outlines_of
 from airground_drake.scenarios.schema import Obstacle
@@ -143,8 +143,8 @@ def as_sets(shape: Shape) -> list[Any]:
 
 def as_sets_of(rows: Array) -> list[Any]:
     """The same of outlines."""
-    corners = [sorted(map(tuple, convex.corners_of(row).tolist())) for row in rows]
-    return sorted(zip(corners, rows[:, convex.BASE].tolist(), rows[:, convex.TOP].tolist(), strict=True))
+    corners = [sorted(map(tuple, outline.corners_of(row).tolist())) for row in rows]
+    return sorted(zip(corners, rows[:, outline.BASE].tolist(), rows[:, outline.TOP].tolist(), strict=True))
 
 
 def test_every_kind_of_obstacle_has_the_shape_and_the_distance_of_the_package() -> None:
@@ -158,7 +158,7 @@ def test_every_kind_of_obstacle_has_the_shape_and_the_distance_of_the_package() 
         rows = outlines_of(scenario, barrier)
         assert as_sets(pairs[scenario.uav.name, name].shape) == as_sets_of(rows), name
         for robot, body in scenario.robots.items():
-            assert {pairs[robot, name].safe_m} == {*convex.keep(rows, body.radius_m).tolist()}
+            assert {pairs[robot, name].safe_m} == {*outline.keep(rows, body.radius_m).tolist()}
             assert math.isinf(pairs[robot, name].shape.parts[0].top_m) == (robot in scenario.ugvs and name != "ball")
 
 
@@ -176,7 +176,7 @@ def test_a_map_is_one_obstacle_of_all_its_rectangles(origin: list[float]) -> Non
     for pair in (pair for pair in pairs_of(resolved(scenario)) if pair.other == "map"):
         assert pair.safe_m == 0.4
         for part, row in zip(pair.shape.parts, rows, strict=True):
-            assert np.allclose(part.begin, convex.corners_of(row), rtol=0.0, atol=2e-12)
+            assert np.allclose(part.begin, outline.corners_of(row), rtol=0.0, atol=2e-12)
             assert part.top_m == (math.inf if pair.robot in scenario.ugvs else 1.5)
 
 

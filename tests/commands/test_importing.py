@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from commands.conftest import Airground
 
-from airground_drake.geometry import convex
+from airground_drake.geometry import convex, outline
 from airground_drake.scenarios.load import load
 from airground_drake.scenarios.outlines import outlines_of
 from airground_drake.scenarios.schema import Scenario
@@ -44,8 +44,8 @@ def world(tmp_path: Path) -> Path:
 
 def least_distance(scenario: Scenario, place: list[float]) -> float:
     """Distance of a UGV at a place from all that is in the way, m."""
-    rows = convex.joined(*(outlines_of(scenario, each) for each in scenario.barriers.values()))
-    return float((convex.distances(rows, np.array(place), True) - rows[:, convex.RADIUS]).min())
+    rows = outline.joined(*(outlines_of(scenario, each) for each in scenario.barriers.values()))
+    return float((convex.distances(rows, np.array(place), True) - rows[:, outline.RADIUS]).min())
 
 
 def test_a_world_of_barn_is_its_cylinders_and_boxes_with_the_challenges_start_and_goal(

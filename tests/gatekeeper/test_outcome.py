@@ -9,8 +9,8 @@ import pytest
 
 from airground_drake.gatekeeper.outcome import Outcome, Outlook, outcomes, robot_at, way_left
 from airground_drake.gatekeeper.rollout import View
-from airground_drake.geometry.convex import balls, prism, stacked
 from airground_drake.geometry.motion import Motion
+from airground_drake.geometry.outline import balls, prism, stacked
 from airground_drake.geometry.paths import shortest_path
 from airground_drake.intervention.policy import Proposal
 from airground_drake.nsbc.avoidance import Avoidance

@@ -11,8 +11,8 @@ from airground_drake.gatekeeper.mpc_gatekeeper import GatekeeperState, Inputs
 from airground_drake.gatekeeper.outcome import Outcome, Outlook
 from airground_drake.gatekeeper.outcome_gatekeeper import OutcomeGatekeepers, reason_of
 from airground_drake.gatekeeper.patience import Commitment, Patience
-from airground_drake.geometry.convex import balls
 from airground_drake.geometry.motion import Motion
+from airground_drake.geometry.outline import balls
 from airground_drake.intervention.messages import ACCEPT, DONE, REFUSE, SILENT
 from airground_drake.intervention.policy import Proposal
 

@@ -13,7 +13,7 @@ from scipy.sparse.csgraph import dijkstra
 
 from airground_drake.base.arrays import Array
 from airground_drake.geometry import paths
-from airground_drake.geometry.convex import balls
+from airground_drake.geometry.outline import balls
 from airground_drake.geometry.paths import TOL, NoPath, Path, shortest_path
 
 Point = tuple[float, float]

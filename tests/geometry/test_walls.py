@@ -11,14 +11,14 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from properties import examples
 
-from airground_drake.geometry import convex, paths
+from airground_drake.geometry import convex, outline, paths
 from airground_drake.geometry.distance_field import DistanceField, length_among
 from airground_drake.geometry.paths import TOL, NoPath, shortest_path
 from airground_drake.geometry.separation import are_separated
 
 Point = tuple[float, float]
-ROOM = convex.stacked([wall((3.0, -2.0), (3.0, 2.0)), rectangle(1.5, 2.1, 3.0, 0.2), wall((0.0, -2.0), (3.0, -2.0))])
-SQUARE = convex.stacked([rectangle(0.0, 0.0, 2.0, 2.0)])
+ROOM = outline.stacked([wall((3.0, -2.0), (3.0, 2.0)), rectangle(1.5, 2.1, 3.0, 0.2), wall((0.0, -2.0), (3.0, -2.0))])
+SQUARE = outline.stacked([rectangle(0.0, 0.0, 2.0, 2.0)])
 coordinate = st.integers(-4, 44).map(lambda n: n / 4.0 + 0.1)
 point = st.tuples(coordinate, coordinate)
 
@@ -26,7 +26,7 @@ point = st.tuples(coordinate, coordinate)
 def lacking(place: Point | Array, rows: Array, keep: Array) -> Array:
     """By how much a place is too near to each core, m; inside a polygon all of the distance."""
     here = np.array([place], dtype=np.float64)
-    return keep - np.array([from_core(here, here, convex.corners_of(row))[0] for row in rows])
+    return keep - np.array([from_core(here, here, outline.corners_of(row))[0] for row in rows])
 
 
 def length_or_inf(start: Point, goal: Point, rows: Array, keep: Array) -> float:
@@ -40,13 +40,13 @@ def discs_along(rows: Array, keep: Array, gap: float) -> tuple[Array, Array]:
     """Balls along the edges of all cores instead: they take up less, and hardly."""
     places, radii = [], []
     for row, far in zip(rows, keep.tolist(), strict=True):
-        corners = convex.corners_of(row)
+        corners = outline.corners_of(row)
         for a, b in zip(corners, np.roll(corners, -1, axis=0), strict=True):
             count = max(1, math.ceil(float(np.hypot(*(b - a))) / gap))
             places.append(a + (b - a) * np.arange(count)[:, None] / count)
             radii.append(np.full(count, far))
     flat = np.concatenate(places)
-    return convex.balls(np.column_stack([flat, np.zeros(len(flat))])), np.concatenate(radii)
+    return outline.balls(np.column_stack([flat, np.zeros(len(flat))])), np.concatenate(radii)
 
 
 def over_a_square(half: float, keep: float) -> float:
@@ -71,17 +71,17 @@ def over_an_end(half: float, keep: float, above: float = 0.0) -> float:
         ((-2.0, -2.0), (2.0, 2.0), SQUARE, 0.0, 2.0 * math.sqrt(10.0)),
         ((-3.0, 1.5), (3.0, 1.5), SQUARE, 0.5, 6.0),  # along an edge
         ((0.0, 0.8), (0.0, 4.0), SQUARE, 0.5, 3.2),  # from inside, straight out
-        ((0.9, 0.0), (4.0, 0.0), convex.stacked([*SQUARE, rectangle(1.8, 0.0, 1.0, 0.8)]), 0.5,
+        ((0.9, 0.0), (4.0, 0.0), outline.stacked([*SQUARE, rectangle(1.8, 0.0, 1.0, 0.8)]), 0.5,
          math.hypot(0.6, 0.9) + 0.8 + math.sqrt(1.7**2 + 0.4**2 - 0.5**2)
          + 0.5 * (math.atan2(0.4, 1.7) + math.asin(0.5 / math.hypot(1.7, 0.4)))),
         # out of two by the place where their edges cross
-        ((-2.0, 0.0), (2.0, 0.0), convex.stacked([wall((0.0, -9.0), (0.0, 0.0))]), 0.5, over_an_end(2.0, 0.5)),
-        ((-2.0, 0.48), (2.0, 0.48), convex.stacked([wall((0.0, -9.0), (0.0, 0.0))]), 0.5, over_an_end(2.0, 0.5, 0.48)),
-        ((-2.0, 0.2), (2.0, 0.2), convex.stacked([wall((0.05, 0.5), (0.25, 4.0)), convex.balls([0.0, 0.0, 0.0])[0]]),
+        ((-2.0, 0.0), (2.0, 0.0), outline.stacked([wall((0.0, -9.0), (0.0, 0.0))]), 0.5, over_an_end(2.0, 0.5)),
+        ((-2.0, 0.48), (2.0, 0.48), outline.stacked([wall((0.0, -9.0), (0.0, 0.0))]), 0.5, over_an_end(2.0, 0.5, 0.48)),
+        ((-2.0, 0.2), (2.0, 0.2), outline.stacked([wall((0.05, 0.5), (0.25, 4.0)), outline.balls([0.0, 0.0, 0.0])[0]]),
          [0.05, 1.0], over_an_end(2.0, 1.0, -0.2)),  # a wall that stands on a disc: under it
-        ((-2.0, 0.0), (2.0, 0.0), convex.stacked([wall((0.0, -9.0), (0.0, -4.0)), wall((0.0, -4.0), (0.0, 0.0))]), 0.5,
+        ((-2.0, 0.0), (2.0, 0.0), outline.stacked([wall((0.0, -9.0), (0.0, -4.0)), wall((0.0, -4.0), (0.0, 0.0))]), 0.5,
          over_an_end(2.0, 0.5)),  # walls that share a corner
-        ((-2.0, 0.0), (2.0, 0.0), convex.stacked([wall((0.0, -9.0), (0.0, -0.5)), wall((0.0, 0.5), (0.0, 9.0))]), 0.5,
+        ((-2.0, 0.0), (2.0, 0.0), outline.stacked([wall((0.0, -9.0), (0.0, -0.5)), wall((0.0, 0.5), (0.0, 9.0))]), 0.5,
          4.0),  # two ends whose circles touch leave a passage
     ],
 )  # fmt: skip
@@ -105,7 +105,7 @@ def test_the_way_out_of_a_room_is_as_long_as_among_discs_along_its_walls() -> No
 @pytest.mark.parametrize("start", [(0.2, 0.3), (0.2, -0.9), (1.4, 0.0)])
 def test_the_start_leaves_by_the_nearest_place_of_the_boundary(start: Point) -> None:
     """Out of a square that a wall crosses: the nearest place of its own boundary is beside the wall."""
-    rows, keep = convex.stacked([*SQUARE, wall((0.5, 0.0), (4.0, 0.0))]), np.array([0.25, 0.5])
+    rows, keep = outline.stacked([*SQUARE, wall((0.5, 0.0), (4.0, 0.0))]), np.array([0.25, 0.5])
     path = shortest_path(start, (-3.0, 3.0), rows, keep)
     out, turn = float(path.pieces[0, 5]), np.linspace(0.0, 2.0 * math.pi, 2000)
     left = path.at(out)[0]
@@ -148,15 +148,15 @@ def test_a_path_is_shortest_and_keeps_its_distances(start: Point, goal: Point, f
 )  # fmt: skip
 def test_what_separates_two_places(rows: list[Array], apart: bool) -> None:
     start, goal, keep = np.array([-0.2, 0.0]), np.array([20.0, 1.0]), np.full(len(rows), 0.2)
-    assert are_separated(start, goal, convex.stacked(rows), keep) is apart
-    assert are_separated(goal, start, convex.stacked(rows), keep) is apart
+    assert are_separated(start, goal, outline.stacked(rows), keep) is apart
+    assert are_separated(goal, start, outline.stacked(rows), keep) is apart
 
 
 @examples(60)
 @given(st.lists(OUTLINES, max_size=12), st.integers(1, 30), st.integers(0, 99))
 def test_looking_up_outlines_changes_nothing(drawn: list[Array], count: int, seed: int) -> None:
     """Points and segments all at once, in cells, are judged as one at a time."""
-    rows = convex.stacked(drawn)
+    rows = outline.stacked(drawn)
     rng, keep = np.random.default_rng(seed), np.resize([0.25, 0.5, 1.0], len(rows))
     begin = np.round(4.0 * rng.uniform(-2.0, 12.0, (count, 2))) / 4.0
     end = begin + rng.normal(size=(count, 2)) * rng.choice([0.0, 0.3, 4.0], (count, 1))
@@ -171,7 +171,7 @@ def test_looking_up_outlines_changes_nothing(drawn: list[Array], count: int, see
         ]
         assert segments[k] == all(alone)
         for row, far, free in zip(rows, keep.tolist(), alone, strict=True):
-            nearest = from_core(begin[k : k + 1], end[k : k + 1], convex.corners_of(row))[0]
+            nearest = from_core(begin[k : k + 1], end[k : k + 1], outline.corners_of(row))[0]
             ends = far - max(
                 lacking(begin[k], row[None], np.array([far]))[0], lacking(end[k], row[None], np.array([far]))[0]
             )
@@ -210,10 +210,10 @@ def test_a_distance_field_between_places_too_near(start: Point, goal: Point) -> 
 
 def test_a_distance_field_knows_no_way_through_closed_walls_and_bears_walls_far_away() -> None:
     corners = [(-2.0, -2.0), (2.0, -2.0), (2.0, 2.0), (-2.0, 2.0)]
-    closed = convex.stacked([wall(a, b) for a, b in zip(corners, [*corners[1:], corners[0]], strict=True)])
+    closed = outline.stacked([wall(a, b) for a, b in zip(corners, [*corners[1:], corners[0]], strict=True)])
     there, goal = np.zeros(2), np.array([5.0, 0.0])
     assert math.isinf(length_among(there, goal, closed, np.full(4, 0.003)))
-    far = convex.joined(SQUARE, convex.stacked([wall((1e9, 0.0), (1e9, 1.0)), wall((-1e9, 9.0), (1e9, 9.0))]))
+    far = outline.joined(SQUARE, outline.stacked([wall((1e9, 0.0), (1e9, 1.0)), wall((-1e9, 9.0), (1e9, 9.0))]))
     found = length_among(np.array([-3.0, 0.0]), np.array([3.0, 0.0]), far, np.full(3, 0.5))
     assert found == pytest.approx(over_a_square(3.0, 0.5), rel=0.01)
     assert len(DistanceField.to(goal, closed, np.full(4, 0.01), 9.0).nodes) <= 65_000

@@ -14,7 +14,7 @@ from hypotheses.wiring import differences
 from pydrake.systems.primitives import LinearSystem
 
 from airground_drake.base.arrays import Array
-from airground_drake.geometry.convex import BASE, MIDDLE
+from airground_drake.geometry.outline import BASE, MIDDLE
 from airground_drake.intervention.policy import Proposal
 from airground_drake.nsbc.avoidance import Avoidance, limit_speed
 from airground_drake.nsbc.law import UgvLaw

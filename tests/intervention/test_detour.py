@@ -10,8 +10,8 @@ import pytest
 from builders.observations import mate, seen
 from builders.shapes import from_core, rectangle
 
-from airground_drake.geometry.convex import balls, corners_of, prism, stacked
 from airground_drake.geometry.motion import Motion
+from airground_drake.geometry.outline import balls, corners_of, prism, stacked
 from airground_drake.geometry.paths import Path, shortest_path
 from airground_drake.intervention import detour
 from airground_drake.intervention.coordinate import Coordinate

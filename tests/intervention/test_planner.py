@@ -13,8 +13,8 @@ from verify.judging import decided
 
 from airground_drake import load, simulate
 from airground_drake.base.arrays import Array
-from airground_drake.geometry.convex import as_tuple, balls, stacked
 from airground_drake.geometry.motion import Motion
+from airground_drake.geometry.outline import as_tuple, balls, stacked
 from airground_drake.intervention.database import BehaviourDatabase
 from airground_drake.intervention.messages import ACCEPT, DONE, REFUSE, SILENT, Report, accepted_proposals, answer_to
 from airground_drake.intervention.planner import Planner, PlannerState, sent_after

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from properties import examples
 
-from airground_drake.geometry.convex import BASE, MIDDLE
+from airground_drake.geometry.outline import BASE, MIDDLE
 from airground_drake.nsbc.avoidance import Avoidance, Composition
 from airground_drake.world.world import ROBOTS, Neighbours, World
 

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from properties import examples
 
 from airground_drake.base.arrays import Array
-from airground_drake.geometry import convex
+from airground_drake.geometry import convex, outline
 from airground_drake.geometry.motion import Motion
 from airground_drake.nsbc.avoidance import Avoidance
 from airground_drake.world.plant import Scripted
@@ -19,16 +19,16 @@ from airground_drake.world.world import Body, World
 
 H, GAP, SPEED, LIMIT = 0.05, 0.3, 1.2, 1.5
 SHAPES = {
-    "person": convex.balls(np.zeros(3), 0.25, GAP),
-    "forklift": convex.stacked([convex.prism([[-0.4, -1.0], [0.4, -1.0], [0.4, 1.0], [-0.4, 1.0]], gap=GAP)]),
-    "board": convex.stacked([convex.prism([[-0.7, 0.0], [0.7, 0.0]], radius=0.05, gap=GAP)]),
+    "person": outline.balls(np.zeros(3), 0.25, GAP),
+    "forklift": outline.stacked([outline.prism([[-0.4, -1.0], [0.4, -1.0], [0.4, 1.0], [-0.4, 1.0]], gap=GAP)]),
+    "board": outline.stacked([outline.prism([[-0.7, 0.0], [0.7, 0.0]], radius=0.05, gap=GAP)]),
 }
 
 
 def beside(shape: Array, speed: float, count: int = 2, walls: Array | None = None) -> World:
     """UGVs without a body, an idle UAV, and an obstacle that may move at this speed, m/s."""
     team, rows = world(count, ugv_m=0.2, max_speed=LIMIT), shape.copy()
-    rows[:, convex.SPEED] = speed
+    rows[:, outline.SPEED] = speed
     script = Scripted(Motion(np.zeros(1), np.zeros((1, 3))))
     fixed = () if walls is None else (Body("walls", "obstacle", np.zeros(3), walls),)
     return replace(team, bodies=(*team.bodies, Body("mover", "obstacle", np.zeros(3), rows, script, speed), *fixed))
@@ -36,7 +36,7 @@ def beside(shape: Array, speed: float, count: int = 2, walls: Array | None = Non
 
 def apart(shape: Array, place: Array, origin: Array) -> float:
     """Gap less the distance to keep of a point, by many points of the motion's corners: see tests of `convex`."""
-    return float((convex.distances(shape, place - origin, True) - convex.keep(shape, 0.0)).min())
+    return float((convex.distances(shape, place - origin, True) - outline.keep(shape, 0.0)).min())
 
 
 @examples(80, fuzz=2000)
@@ -70,7 +70,7 @@ def test_no_robot_brings_itself_too_near_and_what_was_far_enough_is_kept(shape: 
 def test_a_robot_retreats_within_its_speed_limit_and_slides_along_a_wall() -> None:
     """A person walks at a robot that stands, in the open and before a wall."""
     rows, avoidance = SHAPES["person"], Avoidance(3.0, H, 4.0)
-    wall = convex.stacked([convex.prism([[-9.0, 1.0], [9.0, 1.0]], gap=GAP)])
+    wall = outline.stacked([outline.prism([[-9.0, 1.0], [9.0, 1.0]], gap=GAP)])
     for walls, way in ((None, [0.0, 1.0, 0.0]), (wall, [0.3, 1.0, 0.0])):
         team = beside(rows, SPEED, 1, walls)
         near, drift = team.around(team.select("ugv")), SPEED * np.array(way) / np.linalg.norm(way)

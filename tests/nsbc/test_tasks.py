@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from airground_drake.geometry.convex import stacked
+from airground_drake.geometry.outline import stacked
 from airground_drake.nsbc import law
 from airground_drake.nsbc.avoidance import Avoidance
 from airground_drake.nsbc.tasks import DistanceTask, FormationTask, PositionTask

@@ -13,7 +13,7 @@ from builders.misbuilt import Patch
 from airground_drake.base.arrays import Array
 from airground_drake.gatekeeper.patience import Commitment, Patience
 from airground_drake.gatekeeper.rollout import ClosedLoop
-from airground_drake.geometry.convex import moved
+from airground_drake.geometry.outline import moved
 from airground_drake.intervention import database
 from airground_drake.intervention.messages import accepted_proposals
 from airground_drake.intervention.planner import Planner

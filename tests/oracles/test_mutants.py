@@ -12,7 +12,7 @@ from verify.judging import decided
 from airground_drake.gatekeeper import outcome, problem
 from airground_drake.gatekeeper.patience import Patience
 from airground_drake.gatekeeper.rollout import ACCEPTED, REFUSED, ClosedLoop, closed_loop
-from airground_drake.geometry.convex import moved
+from airground_drake.geometry.outline import moved
 from airground_drake.run.simulation import simulate
 from airground_drake.scenarios.load import load
 from airground_drake.systems import components

@@ -15,7 +15,7 @@ from verify.runs.cases import A_D, B_C, B_D, DOORWAY, Edit, at, first, problem, 
 
 from airground_drake.base.arrays import Array
 from airground_drake.base.errors import TraceError
-from airground_drake.geometry import convex
+from airground_drake.geometry import outline
 from airground_drake.registry import method_of
 from airground_drake.run.simulation import simulate
 from airground_drake.run.tables import SEEN_COLUMNS, typed
@@ -43,7 +43,7 @@ def each_value(**changes: Callable[[Any], Any]) -> Edit:
 
 def packed(outlines: Array) -> list[float]:
     """Outlines as they stand in a table."""
-    return [number for row in outlines for number in convex.as_tuple(row)]
+    return [number for row in outlines for number in outline.as_tuple(row)]
 
 
 def told(row: int, some: slice = slice(None), by: float = 0.0, wider: float = 0.0) -> Edit:
@@ -51,7 +51,7 @@ def told(row: int, some: slice = slice(None), by: float = 0.0, wider: float = 0.
 
     def edit(table: pd.DataFrame) -> pd.DataFrame:
         column = table["mapped"].tolist()
-        outlines = convex.moved(unpacked(column[-1])[some], np.array([by, 0.0, 0.0]))
+        outlines = outline.moved(unpacked(column[-1])[some], np.array([by, 0.0, 0.0]))
         outlines[:, RADIUS] += wider
         column[row] = packed(outlines)
         return table.assign(mapped=column)
@@ -126,7 +126,7 @@ def later(kind: str, by_s: float) -> Edit:
 
 def other_map(trace: Trace) -> Trace:
     """What a UGV believes is a part of the map in the message."""
-    rocks = packed(convex.balls([[3.3, 9.5, 0.0], [5.0, 9.0, 0.0], [6.5, 7.5, 0.0]], gap=2.0))
+    rocks = packed(outline.balls([[3.3, 9.5, 0.0], [5.0, 9.0, 0.0], [6.5, 7.5, 0.0]], gap=2.0))
     return each_value(mapped=lambda _: rocks)(trace)
 
 
@@ -281,7 +281,7 @@ def test_an_accepted_intervention_is_reconsidered_when_an_obstacle_is_new(
     assert not ORACLES["progress"](trace)
     assert not ORACLES["predictions"](trace)
     assert decided("LIVE-HYP", trace).status == "holds"
-    told_before = each_value(mapped=lambda v: [*v, *packed(convex.balls([*hidden, 0.0], gap=2.0))])
+    told_before = each_value(mapped=lambda v: [*v, *packed(outline.balls([*hidden, 0.0], gap=2.0))])
     assert ORACLES["inputs"](told_before(trace))  # then it was no news
     nothing_new = trace.decisions.assign(new=[[]] * len(trace.decisions))
     found = decided("LIVE-HYP", replace(trace, decisions=nothing_new))

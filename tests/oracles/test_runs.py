@@ -13,7 +13,7 @@ from random_scenarios import draw
 
 from airground_drake.base.arrays import Array
 from airground_drake.gatekeeper import outcome_gatekeeper
-from airground_drake.geometry import convex
+from airground_drake.geometry import outline
 from airground_drake.run.simulation import simulate
 from airground_drake.run.trace import Trace
 from airground_drake.scenarios import world
@@ -187,9 +187,9 @@ ROUND_A_BLOCK = 2.0 * (17.99**0.5 + 0.1 * (np.pi / 4.0 + np.arcsin(0.1 / 18.0**0
 @pytest.mark.parametrize(
     ("row", "distance", "true"),
     [
-        (convex.balls([4.0, 0.0, 0.0])[0], 2.0, ROUND_A_DISC),
-        (convex.prism([[4.0, -9.0], [4.0, 0.0]]), 1.0, ROUND_A_WALL),
-        (convex.prism([[3.0, -9.0], [5.0, -9.0], [5.0, 3.0], [3.0, 3.0]]), 0.1, ROUND_A_BLOCK),
+        (outline.balls([4.0, 0.0, 0.0])[0], 2.0, ROUND_A_DISC),
+        (outline.prism([[4.0, -9.0], [4.0, 0.0]]), 1.0, ROUND_A_WALL),
+        (outline.prism([[3.0, -9.0], [5.0, -9.0], [5.0, 3.0], [3.0, 3.0]]), 0.1, ROUND_A_BLOCK),
     ],
 )
 def test_the_way_left_is_bounded_from_both_sides(row: Array, distance: float, true: float) -> None:

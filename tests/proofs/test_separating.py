@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from airground_drake.geometry import convex
+from airground_drake.geometry import convex, outline
 from airground_drake.proofs.separating import Prism, Vector, apart, separating
 
 M = 2**20
@@ -42,7 +42,7 @@ def test_the_exact_distance_of_a_straight_way_is_that_of_the_law_and_its_vector_
     prism: Prism, begin: Vector, end: Vector
 ) -> None:
     square, vector = apart(prism, begin, end)
-    row = convex.prism(np.array(prism.outline) / M, top=prism.top / M)
+    row = outline.prism(np.array(prism.outline) / M, top=prism.top / M)
     places = np.linspace(np.array(begin, dtype=float), np.array(end, dtype=float), 400) / M
     sampled = min(convex.nearest(row, *place, False, np.empty(3), np.inf) for place in places)
     known = convex.approach(row, places[0], places[-1], False)[0]

@@ -9,7 +9,7 @@ from scenarios.cases import DEADLOCKS
 from timeline import kinds
 
 from airground_drake.base.arrays import Array
-from airground_drake.geometry.convex import as_tuple
+from airground_drake.geometry.outline import as_tuple
 from airground_drake.run.simulation import simulate
 from airground_drake.scenarios.load import load
 from airground_drake.scenarios.outlines import outlines_of

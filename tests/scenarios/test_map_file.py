@@ -17,7 +17,7 @@ from PIL import Image
 
 from airground_drake.base.errors import ScenarioError
 from airground_drake.base.files import sha256
-from airground_drake.geometry import convex
+from airground_drake.geometry import convex, outline
 from airground_drake.scenarios import map_file
 from airground_drake.scenarios.load import from_data, load, resolved, validated
 from airground_drake.scenarios.outlines import outlines_of
@@ -112,7 +112,7 @@ def test_free_unknown_cells_and_the_keys_of_the_obstacle(folder: Path) -> None:
     barrier = scenario.barriers["map"]
     assert not barrier.known_to_uav
     rows = outlines_of(scenario, barrier)
-    assert {(row[convex.BASE], row[convex.TOP], row[convex.GAP]) for row in rows} == {(0.0, 1.5, 0.1)}
+    assert {(row[outline.BASE], row[outline.TOP], row[outline.GAP]) for row in rows} == {(0.0, 1.5, 0.1)}
 
 
 def test_a_heading_turns_the_map_about_its_origin(folder: Path) -> None:

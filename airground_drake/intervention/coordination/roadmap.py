@@ -13,7 +13,7 @@ from scipy.sparse.csgraph import dijkstra
 from scipy.spatial import cKDTree
 
 from airground_drake.base.arrays import Array
-from airground_drake.geometry import convex
+from airground_drake.geometry import convex, outline
 from airground_drake.geometry.paths import NoPath, Path, shortest_path
 from airground_drake.intervention.coordination.intervals import Grid, Indices
 
@@ -41,7 +41,7 @@ class Space:
     """Obstacles and distances that a robot has to keep. `Space.of` makes the space of a robot with a body.
 
     Attributes:
-        rows: outlines of the obstacles, (m, W), see `geometry.convex`.
+        rows: outlines of the obstacles, (m, W), see `geometry.outline`.
         keep: distances to keep from their cores, (m,), m.
         clearance: extra distance from obstacles, m. Nodes of the lattice keep all of it, edges half of it.
         apart: distance between the robot's centre and the surfaces of other robots, m.
@@ -58,7 +58,7 @@ class Space:
 
     def of(self, body: float) -> Space:
         """This space for the centre of a robot whose body has this radius, m, with obstacles cut by its plane."""
-        rows, keep = convex.sections(self.rows, self.keep + body, self.height)
+        rows, keep = outline.sections(self.rows, self.keep + body, self.height)
         return Space(rows, keep, self.clearance, self.apart + body, self.spacing)
 
     def wide(self, longest: float, body: float = 0.0) -> float:
@@ -250,8 +250,8 @@ def _area(
     widest = float(max(space.apart, *space.keep, 0.0)) if len(space.keep) else space.apart
     room = 3.0 * (widest + space.spacing)
     low, high = points.min(axis=0) - room, points.max(axis=0) + room
-    middles, extent = space.rows[:, convex.MIDDLE : convex.EXTENT], space.rows[:, convex.EXTENT, None]
-    walls = space.rows[:, convex.COUNT] > 1.0
+    middles, extent = space.rows[:, outline.MIDDLE : outline.EXTENT], space.rows[:, outline.EXTENT, None]
+    walls = space.rows[:, outline.COUNT] > 1.0
     if walls.any():
         ends = [path.pieces[:, :2] for path in paths if path is not None]
         low = np.concatenate([low[None], *(each - room for each in ends)]).min(axis=0)
@@ -260,7 +260,7 @@ def _area(
     beyond = (space.keep[near] + space.clearance + space.apart + space.spacing)[:, None] + extent[near]
     boxes = [(low, high), *((middle - far, middle + far) for middle, far in zip(middles[near], beyond, strict=True))]
     for row, keep in zip(space.rows[walls], space.keep[walls].tolist(), strict=True):
-        corners, far = convex.corners_of(row), keep + space.clearance + space.apart + space.spacing
+        corners, far = outline.corners_of(row), keep + space.clearance + space.apart + space.spacing
         lowest, highest = corners.min(axis=0), corners.max(axis=0)
         if (lowest < high).all() and (highest > low).all():
             boxes.append((np.maximum(lowest - far, low - room), np.minimum(highest + far, high + room)))

@@ -115,7 +115,7 @@ def straight_is_free(
         motion: (M, 3).
         i: row at which the straight piece begins.
         j: row at which it ends.
-        rows: outlines of obstacles, (m, W), see `geometry.convex`.
+        rows: outlines of obstacles, (m, W), see `geometry.outline`.
         keep: distances from their cores, (m,), m.
         others: other timed motions, stacked, (R, 3).
         begins: first row of each of the others, and R, (B + 1,).

@@ -14,7 +14,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from properties import examples
 
-from airground_drake.geometry import convex
+from airground_drake.geometry import outline
 from airground_drake.intervention.coordination.joint import Effort, Plan, plan
 from airground_drake.intervention.coordination.roadmap import RobotTask, Space, build_roadmap
 from airground_drake.intervention.coordination.single import OtherRobot, _wished
@@ -49,7 +49,7 @@ def assert_keeps_distances(
         legs = np.diff(way, axis=0)
         assert (np.hypot(legs[:, 1], legs[:, 2]) <= speed * legs[:, 0] * (1.0 + 1e-9) + 1e-9).all()
         for row, keep in zip(room.rows, room.keep.tolist(), strict=True):
-            core = convex.corners_of(row)
+            core = outline.corners_of(row)
             least = min(keep + one.body, float(from_core(one.start[None], one.start[None], core)[0]))
             assert from_core(way[:-1, 1:], way[1:, 1:], core).min(initial=np.inf) >= least - 2e-9
     bodies = [OtherRobot(way, one.body) for way, one in zip(ways, tasks, strict=True)]
@@ -97,7 +97,7 @@ def test_walls_do_not_make_the_lattice_larger_than_ways_need() -> None:
     one = task((-15.0, -15.0), (-12.0, -15.0))
     sizes = []
     for more in ([], [wall((-13.5, -19.0), (-13.5, 10.0))]):
-        room = Space(convex.stacked([*arena, *more]), np.full(4 + len(more), 0.5), 0.1, 0.5, 0.1)
+        room = Space(outline.stacked([*arena, *more]), np.full(4 + len(more), 0.5), 0.1, 0.5, 0.1)
         nodes = build_roadmap([room.of(0.0)], [one]).nodes
         sizes.append(np.ptp(nodes, axis=0))
         found = plan(room, [one], [1.0])

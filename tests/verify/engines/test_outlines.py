@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from builders.cores import outline, places
+from builders.cores import drawn, places
 from hypothesis import given
 from hypothesis import strategies as st
 from properties import examples
 
 from airground_drake.base.arrays import Array
-from airground_drake.geometry import convex
+from airground_drake.geometry import convex, outline
 from airground_drake.verify.engines import outlines
 from airground_drake.verify.engines.geometry import ROWS
 from airground_drake.verify.engines.outlines import (
@@ -42,7 +42,7 @@ def corners_of(row: Array) -> Array:
 def test_a_distance_is_that_of_the_nearest_point(seed: int, planar: bool) -> None:
     """The nearest point is in the core, and no corner lies beyond the plane through it: that is a proof."""
     rng = np.random.default_rng(seed)
-    row = outline(rng)
+    row = drawn(rng)
     corners, core = corners_of(row), core_of(row)
     for place in places(rng, 10, planar=planar and row[3] == 0.0):
         distance, normal = away_from(core, place, planar=planar)
@@ -63,7 +63,7 @@ def test_a_distance_is_that_of_the_nearest_point(seed: int, planar: bool) -> Non
 def test_the_unit_vector_is_a_subgradient(seed: int, planar: bool) -> None:
     """dist(x + v) >= dist(x) + n.v, from inside, too."""
     rng = np.random.default_rng(seed)
-    row = outline(rng)
+    row = drawn(rng)
     start, end = places(rng, 20, planar=planar and row[3] == 0.0).reshape(2, 10, 3)
     here, there = (away_from(core_of(row), each, planar=planar) for each in (start, end))
     rate = ((end - start) * here.normal).sum(axis=1)
@@ -74,7 +74,7 @@ def test_the_unit_vector_is_a_subgradient(seed: int, planar: bool) -> None:
 @given(SEEDS, st.booleans())
 def test_the_running_code_measures_the_same(seed: int, planar: bool) -> None:
     rng = np.random.default_rng(seed)
-    row = outline(rng)
+    row = drawn(rng)
     some = places(rng, 10, planar=planar and row[3] == 0.0)
     found, away = away_from(core_of(row), some, planar=planar), np.empty(3)
     for place, distance, normal in zip(some, *found, strict=True):
@@ -88,7 +88,7 @@ def test_the_running_code_measures_the_same(seed: int, planar: bool) -> None:
 @given(SEEDS, st.booleans())
 def test_the_least_distance_along_a_motion_against_sampling(seed: int, planar: bool) -> None:
     rng = np.random.default_rng(seed)
-    row, fine = outline(rng), np.linspace(0.0, 1.0, 401)
+    row, fine = drawn(rng), np.linspace(0.0, 1.0, 401)
     start, end = places(rng, 2, planar=planar and row[3] == 0.0)
     core, length = core_of(row), float(np.linalg.norm(end - start))
     (least,), (share,) = least_distances(core, start[None], end[None], planar=planar)
@@ -110,19 +110,19 @@ def test_the_least_distance_along_a_motion_against_sampling(seed: int, planar: b
 def test_motions_past_a_square(
     begin: tuple[float, float], end: tuple[float, float], least: float, share: float
 ) -> None:
-    square = core_of(convex.prism([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]], top=1.0))
+    square = core_of(outline.prism([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]], top=1.0))
     found = least_distances(square, np.array([[*begin, 0.0]]), np.array([[*end, 0.0]]), planar=True)
     assert (found[0][0], found[1][0]) == (pytest.approx(least, abs=1e-15), pytest.approx(share))
 
 
 def test_the_way_out_through_the_top_is_for_those_who_fly() -> None:
-    block = core_of(convex.prism([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]], top=3.0))
+    block = core_of(outline.prism([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]], top=3.0))
     inside, above = np.array([0.5, 0.0, 2.9]), np.array([0.0, 0.0, 4.0])
     assert away_from(block, inside, planar=False).distance == pytest.approx(-0.1)
     assert away_from(block, inside, planar=False).normal.tolist() == [0.0, 0.0, 1.0]
     assert away_from(block, inside, planar=True).distance == pytest.approx(-0.5)
     assert away_from(block, above, planar=False) == (1.0, pytest.approx([0.0, 0.0, 1.0]))
-    slab = core_of(convex.prism([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]]))  # flat
+    slab = core_of(outline.prism([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]]))  # flat
     assert away_from(slab, above, planar=False).distance == 4.0
     assert away_from(slab, np.array([0.5, 0.0, 0.0]), planar=True).distance == -0.5
 
@@ -132,9 +132,9 @@ def test_the_way_out_through_the_top_is_for_those_who_fly() -> None:
 def test_many_cores_along_a_way_are_those_of_each_core_at_each_row(seed: int, rows: int, planar: bool) -> None:
     """Boxes leave nothing out."""
     rng = np.random.default_rng(seed)
-    shapes = [row for row in (outline(rng) for _ in range(12)) if row[3] == 0.0 or not planar]
-    many = convex.moved(
-        convex.stacked(shapes), np.append(rng.uniform(-9.0, 9.0, (len(shapes), 2)), np.zeros((len(shapes), 1)), 1)
+    shapes = [row for row in (drawn(rng) for _ in range(12)) if row[3] == 0.0 or not planar]
+    many = outline.moved(
+        outline.stacked(shapes), np.append(rng.uniform(-9.0, 9.0, (len(shapes), 2)), np.zeros((len(shapes), 1)), 1)
     )
     way = np.cumsum(rng.normal(0.0, 0.4, (rows, 3)), axis=0) * [1.0, 1.0, not planar]
     cores = Cores.of(many)
@@ -161,8 +161,8 @@ def test_many_cores_along_a_way_are_those_of_each_core_at_each_row(seed: int, ro
 def test_outlines_of_a_trace_are_those_of_the_running_code() -> None:
     layout = ("GAP", "RADIUS", "SPEED", "BASE", "TOP", "COUNT", "MIDDLE", "EXTENT", "CORNERS")
     assert {name: getattr(outlines, name) for name in layout} == {name: getattr(convex, name) for name in layout}
-    rows = convex.stacked([outline(np.random.default_rng(k)) for k in range(8)])
-    numbers = [number for row in rows for number in convex.as_tuple(row)]
+    rows = outline.stacked([drawn(np.random.default_rng(k)) for k in range(8)])
+    numbers = [number for row in rows for number in outline.as_tuple(row)]
     np.testing.assert_array_equal(unpacked(numbers), rows)
     for wrong in (numbers[:-1], [*numbers, 0.0], numbers[1:], [*numbers[:5], 0.5, *numbers[6:]]):
         with pytest.raises(ValueError, match="no outline"):

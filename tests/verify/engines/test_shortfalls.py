@@ -6,13 +6,13 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from builders.cores import outline
+from builders.cores import drawn
 from builders.worlds import world
 from hypothesis import given
 from hypothesis import strategies as st
 
 from airground_drake.base.arrays import Array
-from airground_drake.geometry import convex
+from airground_drake.geometry import outline
 from airground_drake.nsbc.avoidance import Avoidance
 from airground_drake.verify.engines import shortfalls as module
 from airground_drake.verify.engines.outlines import Cores
@@ -75,23 +75,23 @@ SQUARE = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]]
     ("row", "planar", "begin", "end", "missed"),
     [
         # a wall from (0, -4) to (0, 4), d = 2
-        (convex.prism([[0.0, -4.0], [0.0, 4.0]]), True, (2.0, 1.0, 0.0), (1.75, 1.5, 0.0), 0.25),
-        (convex.prism([[0.0, -4.0], [0.0, 4.0]]), True, (2.0, 1.0, 0.0), (2.0, 9.0, 0.0), 0.0),  # along it
-        (convex.prism([[0.0, -4.0], [0.0, 4.0]]), True, (-1.0, 3.0, 0.0), (-1.0, 3.0, 0.0), 0.075),
-        (convex.prism([[0.0, -4.0], [0.0, 4.0]]), True, (0.0, 6.0, 0.0), (0.0, 5.75, 0.0), 0.25),  # beside its end
-        (convex.prism([[0.0, -4.0], [0.0, 4.0]]), True, (0.0, 1.0, 0.0), (0.0625, 1.0, 0.0), 0.0875),  # off it
+        (outline.prism([[0.0, -4.0], [0.0, 4.0]]), True, (2.0, 1.0, 0.0), (1.75, 1.5, 0.0), 0.25),
+        (outline.prism([[0.0, -4.0], [0.0, 4.0]]), True, (2.0, 1.0, 0.0), (2.0, 9.0, 0.0), 0.0),  # along it
+        (outline.prism([[0.0, -4.0], [0.0, 4.0]]), True, (-1.0, 3.0, 0.0), (-1.0, 3.0, 0.0), 0.075),
+        (outline.prism([[0.0, -4.0], [0.0, 4.0]]), True, (0.0, 6.0, 0.0), (0.0, 5.75, 0.0), 0.25),  # beside its end
+        (outline.prism([[0.0, -4.0], [0.0, 4.0]]), True, (0.0, 1.0, 0.0), (0.0625, 1.0, 0.0), 0.0875),  # off it
         # a square
-        (convex.prism(SQUARE), True, (3.0, 0.5, 0.0), (2.75, 0.5, 0.0), 0.25),
-        (convex.prism(SQUARE), True, (4.0, 5.0, 0.0), (1.0, 1.0, 0.0), 5.0 - (5.0 - 2.0)),  # 5 m from its corner
-        (convex.prism(SQUARE), True, (0.75, 0.0, 0.0), (0.75, 0.0, 0.0), 0.075 * 2.25),  # inside, 0.25 m deep
-        (convex.prism(SQUARE), True, (0.75, 0.0, 0.0), (1.0, 0.0, 0.0), 0.0),
-        (convex.prism(SQUARE), True, (0.75, 0.0, 0.0), (0.5, 0.0, 0.0), 0.075 * 2.25 + 0.25),  # farther in
-        (convex.prism(SQUARE), True, (0.75, 0.75, 0.0), (0.75, 1.0, 0.0), 0.0),  # either of two edges will do
+        (outline.prism(SQUARE), True, (3.0, 0.5, 0.0), (2.75, 0.5, 0.0), 0.25),
+        (outline.prism(SQUARE), True, (4.0, 5.0, 0.0), (1.0, 1.0, 0.0), 5.0 - (5.0 - 2.0)),  # 5 m from its corner
+        (outline.prism(SQUARE), True, (0.75, 0.0, 0.0), (0.75, 0.0, 0.0), 0.075 * 2.25),  # inside, 0.25 m deep
+        (outline.prism(SQUARE), True, (0.75, 0.0, 0.0), (1.0, 0.0, 0.0), 0.0),
+        (outline.prism(SQUARE), True, (0.75, 0.0, 0.0), (0.5, 0.0, 0.0), 0.075 * 2.25 + 0.25),  # farther in
+        (outline.prism(SQUARE), True, (0.75, 0.75, 0.0), (0.75, 1.0, 0.0), 0.0),  # either of two edges will do
         # a block 3 m high, from above
-        (convex.prism(SQUARE, top=3.0), False, (0.0, 0.0, 5.0), (0.0, 0.0, 4.75), 0.25),
-        (convex.prism(SQUARE, top=3.0), False, (0.0, 0.0, 2.75), (0.0, 0.0, 2.75), 0.075 * 2.25),
-        (convex.prism(SQUARE, top=3.0), False, (4.0, 0.0, 7.0), (4.0, 0.0, 7.0), 0.0),
-        (convex.prism(SQUARE), False, (0.0, 0.0, 5.0), (0.0, 0.0, 2.0), 0.0),  # flat: 5 m below
+        (outline.prism(SQUARE, top=3.0), False, (0.0, 0.0, 5.0), (0.0, 0.0, 4.75), 0.25),
+        (outline.prism(SQUARE, top=3.0), False, (0.0, 0.0, 2.75), (0.0, 0.0, 2.75), 0.075 * 2.25),
+        (outline.prism(SQUARE, top=3.0), False, (4.0, 0.0, 7.0), (4.0, 0.0, 7.0), 0.0),
+        (outline.prism(SQUARE), False, (0.0, 0.0, 5.0), (0.0, 0.0, 2.0), 0.0),  # flat: 5 m below
     ],
 )  # fmt: skip
 def test_what_a_step_beside_a_core_misses(
@@ -107,9 +107,9 @@ def test_what_a_step_beside_a_core_misses(
 
 
 def test_a_distance_too_short_from_a_core_is_found_exactly() -> None:
-    wall = Cores.of(convex.prism([[0.0, -4.0], [0.0, 4.0]])[None]).take(0)
+    wall = Cores.of(outline.prism([[0.0, -4.0], [0.0, 4.0]])[None]).take(0)
     assert shortage(np.array([2.0 - 2.0**-52, 1.0, 0.0]), np.zeros(3), D, wall, planar=True) == Fraction(2) ** -52
-    square = Cores.of(convex.prism(SQUARE, top=3.0)[None]).take(0)
+    square = Cores.of(outline.prism(SQUARE, top=3.0)[None]).take(0)
     assert shortage(np.array([0.75, 0.0, 2.5]), np.zeros(3), D, square, planar=True) == Fraction(9, 4)
     assert shortage(np.array([0.0, 0.0, 2.75]), np.zeros(3), D, square, planar=False) == Fraction(9, 4)
 
@@ -117,7 +117,7 @@ def test_a_distance_too_short_from_a_core_is_found_exactly() -> None:
 @given(seed=st.integers(0, 2**32 - 1), planar=st.booleans())
 def test_the_screen_hides_nothing_beside_a_core(seed: int, planar: bool) -> None:
     rng = np.random.default_rng(seed)
-    core = Cores.of(outline(rng)[None]).take(0)
+    core = Cores.of(drawn(rng)[None]).take(0)
     way = np.cumsum(rng.normal(0.0, 1.0, (40, 3)) * 10.0 ** rng.uniform(-13.0, 0.5, (40, 1)), axis=0)
     way = (way + np.append(core.corners[0], 0.0) + rng.normal(0.0, 1.0, 3)) * [1.0, 1.0, not planar]
     screened = shortfalls(way, np.zeros(3), D, ONE, GAIN, ONE, core, planar=planar)
@@ -169,7 +169,7 @@ def test_teams_under_the_running_law_miss_no_more_than_rounding(seed: int, ugvs:
 def test_the_running_law_beside_a_core_misses_no_more_than_rounding(seed: int, planar: bool) -> None:
     """From outside and from inside, whatever is asked of it."""
     rng, h = np.random.default_rng(seed), 0.05
-    row = outline(rng, gap=0.5)
+    row = drawn(rng, gap=0.5)
     core, avoidance = Cores.of(row[None]).take(0), Avoidance(gain=4.0, period=h, sensing_range=50.0)
     team = world(1, max_speed=2.0)
     near = team.around(slice(0, 1) if planar else slice(1, 2))

@@ -15,7 +15,7 @@ from builders.simulation import simulate
 from verify.judging import decided
 
 from airground_drake.base.arrays import Array
-from airground_drake.geometry import convex
+from airground_drake.geometry import outline
 from airground_drake.run.simulation import simulate as simulated
 from airground_drake.run.trace import Trace
 from airground_drake.scenarios import world
@@ -120,7 +120,11 @@ def test_a_wall_that_appears_is_judged_from_then_on() -> None:
 def test_a_step_into_a_wall_costs_what_the_theorem_says(step_m: float) -> None:
     """A h = 0.075. The part that is stepped into is the second one of the wall."""
     scenario = lone(
-        [-2.0, 1.0, 0.0], [-2.0, 1.0, 0.0], STILL, 3.0, obstacles={"o": Obstacle(segment_m=[[-4, 3.01], [0, 3.01], [0, -4]])}
+        [-2.0, 1.0, 0.0],
+        [-2.0, 1.0, 0.0],
+        STILL,
+        3.0,
+        obstacles={"o": Obstacle(segment_m=[[-4, 3.01], [0, 3.01], [0, -4]])},
     )
     trace = simulate(scenario, drive=lambda t: [[step_m / 0.025 * (round(t / 0.025) == 7), 0.0, 0.0], [0.0] * 3])
     finding = decided("SAFE-HYP", trace)
@@ -153,11 +157,11 @@ def altered(**changes: Any) -> Patch:
 
 
 def without_rounding(patch: pytest.MonkeyPatch) -> None:
-    patch.setattr(convex, "keep", lambda rows, radius: rows[:, convex.GAP] + radius)
+    patch.setattr(outline, "keep", lambda rows, radius: rows[:, outline.GAP] + radius)
 
 
 def middles(obstacle: Obstacle, found: Array) -> Array:
-    return convex.balls(np.column_stack([found[:, convex.MIDDLE : convex.EXTENT], 0.0 * found[:, 0]]), 0.0, 0.3)
+    return outline.balls(np.column_stack([found[:, outline.MIDDLE : outline.EXTENT], 0.0 * found[:, 0]]), 0.0, 0.3)
 
 
 WRONG: dict[str, Patch] = {

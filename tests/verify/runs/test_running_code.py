@@ -10,7 +10,7 @@ import pytest
 from builders.misbuilt import MISBUILT, Patch, distances, neighbours
 from verify.judging import decided
 
-from airground_drake.geometry.convex import moved
+from airground_drake.geometry.outline import moved
 from airground_drake.nsbc.avoidance import Avoidance
 from airground_drake.run import simulation
 from airground_drake.scenarios.load import load
