@@ -17,7 +17,7 @@ from matplotlib.path import Path
 
 from airground_drake.base.arrays import Array
 from airground_drake.run.trace import Trace
-from airground_drake.scenarios.schema import Scenario
+from airground_drake.scenarios.schema import MAP, Scenario
 from airground_drake.view import canvas, svg
 from airground_drake.view.canvas import INK, MUTED, UAV_LOOK, Look, look, rule, short, thin
 from airground_drake.view.labels import Label, place
@@ -50,12 +50,21 @@ class Frame(NamedTuple):
 
 
 def frame_of(scenario: Scenario, ways: Iterable[tuple[str, Array]]) -> Frame:
-    """The rectangle around the ways (T, 3), m, of robots, by name, their targets, the arena, and safe outlines."""
+    """The rectangle around the ways (T, 3), m, of robots, by name, their targets, the arena, and safe outlines.
+
+    Of a map, it holds as much on each side of ways and targets as these extend.
+    """
     points = list[Array]()
     for name, way in ways:
         points += [way[:, :2] + side * scenario.robots[name].radius_m for side in (-1.0, 1.0)]
         points += [np.array([scenario.ugvs[name].target_m[:2]])] if name in scenario.ugvs else []
-    points += [np.array(barrier.corners) for barrier in barriers_of(scenario)]
+    travelled = np.concatenate(points)
+    low, high = travelled.min(axis=0), travelled.max(axis=0)
+    around = float((high - low).max())  # a map may reach far beyond what robots can
+    points += [
+        np.clip(each.corners, low - around, high + around) if each.name == MAP else np.array(each.corners)
+        for each in barriers_of(scenario)
+    ]
     every = np.concatenate([*points, *arena_of(scenario)])
     (left, bottom), (right, top) = every.min(axis=0) - 0.4, every.max(axis=0) + 0.4
     return Frame(left, right, bottom - 0.6, top + 0.8)
