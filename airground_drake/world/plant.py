@@ -6,13 +6,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar, Protocol
+from typing import TYPE_CHECKING, ClassVar, Protocol
 
 import numpy as np
 
 from airground_drake.base.arrays import Array
-from airground_drake.geometry.motion import Motion
 from airground_drake.world.motion import PeriodMotion
+
+if TYPE_CHECKING:
+    from airground_drake.geometry.motion import Motion
 
 
 class Plant(Protocol):
