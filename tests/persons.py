@@ -68,6 +68,14 @@ def scenario(name: str) -> Scenario:
         return lone(name, -2.0, 2.0, obstacles={"person": person})
     if name == "fork":
         return lone(name, -2.0, 3.0, obstacles={"fork": FORK})
+    if name.startswith("round a wall"):  # which does not stop a person, whose way is known or not
+        person = walking([6.2, 0.0], [-3.0, 0.0], speed=0.8, max_speed_m_s=0.9, known_motion=name.endswith("known"))
+        person["moves"]["at_end"] = "reverse"
+        wall = {"segment_m": [[0, -1.0], [1, -1.0], [1, 1.0], [0, 1.0]]}
+        threshold = {"threshold": {"rule": "fixed", "zeta_m": 0.5}, "release_m": 0.3}
+        runs = {method: {"method": method} for method in "bcd"}
+        obstacles = {"person": person, "u_wall": wall}
+        return lone("round", -2.0, 3.0, duration=14.0, obstacles=obstacles, decision=threshold, runs=runs)
     assert name == "two kinds"
     obstacles = {"person": walking([2.0, -3.0], [2.0, 0.0]), "post": {"position_m": [0.0, 0.55, 0.0]}}
     return lone("two_kinds", -2.0, 2.0, obstacles=obstacles, runs={"d": {"method": "d"}})

@@ -13,6 +13,7 @@ from airground_drake.scenarios.courses import course
 from airground_drake.verify.claim import TIME_TOLERANCE_S
 from airground_drake.verify.engines.geometry import corner_times, interpolate, travelled
 from airground_drake.verify.engines.outlines import GAP, RADIUS, SPEED, Cores, away_from
+from airground_drake.verify.runs.control_law import ON_TOP
 from airground_drake.verify.runs.pairs import Pair, cores_of, pairs_beside, pairs_of, preset_of
 from airground_drake.verify.runs.proposals import ProposalRecord, proposal_of
 from oracles.closed_loops import Scene
@@ -87,7 +88,9 @@ def scene(
         points: the same that move, at the samples, (S + 1, K, 3), m.
         law: distances to keep, m, shares of the inequalities, and expected speeds, m/s, (3, M + K).
     """
-    movers, origins, of_movers = _movers(trace, on.ugv, t, after)
+    around = movers(trace, on.ugv, t, after)
+    origins = np.stack([each.places for each in around], axis=1) if around else np.empty((len(after), 0, 3))
+    of_movers = np.array([(pair.safe_m, pair.share, pair.speed_m_s) for pair, *_ in around]).reshape(-1, 3).T
     safe, share, speed = np.concatenate([law, of_movers], axis=1)
     return Scene(
         here=interpolate(trace.t, trace.position(on.ugv), t),
@@ -98,7 +101,7 @@ def scene(
         limit=np.array(trace.scenario.ugvs[on.ugv].max_speed_m_s),
         still=still,
         points=points,
-        movers=movers,
+        movers=Cores.joined([each.core for each in around]),
         origins=origins,
         safe=safe,
         share=share,
@@ -106,33 +109,35 @@ def scene(
     )
 
 
-def _movers(trace: Trace, ugv: str, t: float, after: Array) -> tuple[Cores, Array, Array]:
-    """The parts of obstacles that move, are there, and are within sensing range of a UGV at a time.
+class Mover(NamedTuple):
+    """A part of what moves: its pair, its core about the origin, (1,), and the places of the origin, (S + 1, 3), m."""
 
-    Returns:
-        Their cores, (L,), where their origins are predicted to be, (S + 1, L, 3), m, and the law as of `scene`. With a
-        known motion they go their way, else on as they go for the horizon; then they stand.
+    pair: Pair
+    core: Cores
+    places: Array
+
+
+def movers(trace: Trace, ugv: str, t: float, after: Array) -> list[Mover]:
+    """What moves, is there, and is within sensing range of a UGV at a time, s, at times `after` that, (S + 1,), s.
+
+    It is predicted to go on as it goes for the horizon and then to stand; under method (d) a known motion goes its way.
     """
     gate, reach, here = trace.scenario.gatekeeper, trace.scenario.control.sensing_range_m, trace.position(ugv)
-    row = int(np.searchsorted(trace.t, t + TIME_TOLERANCE_S)) - 1
-    cores, origins, laws = list[Cores](), list[Array](), list[tuple[float, float, float]]()
+    row, found = int(np.searchsorted(trace.t, t + TIME_TOLERANCE_S)) - 1, list[Mover]()
     for name, barrier in trace.scenario.barriers.items():
-        there = trace.there_from(name) <= row and not (barrier.disappears_s and trace.there_until(name) <= row)
-        if not (barrier.moves and there):
+        gone = barrier.disappears_s and trace.there_until(name) <= row
+        if not barrier.moves or gone or trace.there_from(name) > row:
             continue
         way, own = trace.position(name), cores_of(trace)[name]
         velocity = (way[row + 1] - way[row]) / (trace.t[row + 1] - trace.t[row])
         places = way[row] + np.minimum(after, gate.horizon_s)[:, None] * velocity
-        if barrier.known_motion:
+        if barrier.known_motion and trace.meta["method"] not in ON_TOP:
             script = course(barrier.moves, trace.scenario.control.period_s, trace.scenario.duration_s)
             places = interpolate(script.times, script.positions, t + after)
         near = np.flatnonzero(away_from(own, here[row] - way[row], planar=True).distance <= reach)
         pair = pairs_beside(trace, ugv)[name]
-        cores.append(own.take(near))
-        origins += [places] * len(near)
-        laws += [(pair.safe_m, pair.share, pair.speed_m_s)] * len(near)
-    stack = np.stack(origins, axis=1) if origins else np.empty((len(after), 0, 3))
-    return Cores.joined(cores), stack, np.array(laws).reshape(-1, 3).T
+        found += [Mover(pair, own.take(slice(k, k + 1)), places) for k in near.tolist()]
+    return found
 
 
 def _among_robots(trace: Trace) -> list[Pair]:

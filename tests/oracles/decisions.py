@@ -30,6 +30,7 @@ from airground_drake.verify.runs.gate_record import (
 from airground_drake.verify.runs.instants import GATED_METHODS, intervening
 from airground_drake.verify.runs.pairs import pairs_beside, preset_of
 from airground_drake.verify.runs.proposals import proposals_of
+from oracles.beginnings import movers
 from oracles.fault import Fault
 from oracles.sensing import sensed, still_parts
 
@@ -154,6 +155,8 @@ def _beside(trace: Trace, row: DecisionRecord, after: Array) -> Iterator[_Beside
         yield _Beside(name, at, pairs[name].safe_m, core)
     for pair, places in zip(there.robots, there.places, strict=True):
         yield _Beside(pair.second if pair.first == row.robot else pair.first, places, pair.safe_m, Cores.at(places))
+    for pair, _, places in movers(trace, row.robot, row.t_s, after):
+        yield _Beside(pair.second, places, pair.safe_m, Cores.at(places))
 
 
 def compare_answers(trace: Trace, rows: Sequence[DecisionRecord]) -> Iterator[Deviation]:

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
+import persons
 import pytest
 from builders.edits import with_scenario
 from builders.rooms import room
@@ -21,7 +23,7 @@ from airground_drake.scenarios.load import from_data, load, resolved
 from airground_drake.scenarios.schema import Obstacle, Policy, Scenario
 from airground_drake.scenarios.shipped import shipped
 from airground_drake.verify.engines.outlines import Cores
-from oracles import ORACLES, faults_of, inputs, predictions
+from oracles import ORACLES, beginnings, control_law, faults_of, inputs, predictions
 from oracles.mutants import PATIENCE, one_direction
 from oracles.protocol import executed_at
 from oracles.way_left import bounds_of_way_left
@@ -70,6 +72,25 @@ def test_a_drawn_run_with_many_ugvs_has_no_fault(number: int) -> None:
     trace = of_draw(number, most_ugvs=30)
     assert len(trace.proposals)
     assert not faults_of(trace)
+
+
+@pytest.mark.parametrize(("scenario", "name"), [
+    ("standing", "a"), ("squeezed", "a"), ("round a wall", "b"), ("round a wall", "c"), ("round a wall", "d"),
+    ("round a wall, known", "d"),
+])  # fmt: skip
+def test_a_run_beside_a_person_has_no_fault(scenario: str, name: str) -> None:
+    trace = persons.run(scenario, name)
+    assert len(trace.proposals) or name == "a"
+    assert not faults_of(trace)
+
+
+def test_oracles_that_forget_the_retreat_or_the_person_find_faults(monkeypatch: pytest.MonkeyPatch) -> None:
+    """So the runs above put both to the test."""
+    monkeypatch.setattr(control_law, "retreating", lambda below, *_, **__: below)
+    assert "commands" in faults_of(replace(persons.run("squeezed")))
+    monkeypatch.undo()
+    monkeypatch.setattr(beginnings, "movers", lambda *_: [])
+    assert "predictions" in faults_of(replace(persons.run("round a wall", "c")))
 
 
 @pytest.mark.parametrize("name", "bcd")
