@@ -121,7 +121,7 @@ def _sampled(table: pd.DataFrame, scenario: Json) -> tuple[Array, Mapping[str, A
     bodies = [*robots_of(scenario), *moving_of(scenario)]
     names = table["body"].astype(str)
     if strange := sorted({*names} - {*bodies}):
-        raise UnusableError(f"body {strange[0]!r} is none that moves in the scenario; these are {', '.join(bodies)}")
+        raise UnusableError(f"body {strange[0]!r} is not a robot or moving obstacle; wanted: {', '.join(bodies)}")
     found: dict[str, Array] = {}
     times: dict[str, Array] = {}
     for name in bodies:

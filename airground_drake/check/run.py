@@ -114,10 +114,7 @@ class Run:
         return slice(first, last + 1)
 
     def period_rows(self, name: str) -> Rows:
-        """Rows of the control samples at which a body is there, and the last row if it still is: periods between them.
-
-        Two rows at least.
-        """
+        """Ends of the control periods in which a body is there: rows of control samples, and the last row."""
         rows, there = np.append(self.sample_row, len(self.t_s) - 1), self.there(name)
         return rows[(rows >= there.start) & (rows < there.stop)]
 

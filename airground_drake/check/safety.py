@@ -6,6 +6,7 @@ D >= d + V h, else n.v >= 0. It is the other inequality with d + V h in place of
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from fractions import Fraction
 from math import isqrt
 
@@ -13,7 +14,7 @@ import numpy as np
 
 from .files import Json
 from .rules import SMALL, Array, Disagreement, Found, close, holds
-from .run import Run
+from .run import Rows, Run
 from .scenario import Pair, expected_m_s, written
 from .shapes import Away
 
@@ -48,11 +49,8 @@ def safe_own(run: Run) -> Found | None:
     if not any(map(expected_m_s, run.scenario["obstacles"].values())):
         return None
     period, margin, least, most = run.scenario["control"]["period_s"], np.inf, 0, 0
-    for pair in run.pairs:
+    for pair, rows in _near(run):
         keeps, closing = pair.passive(period).safe_m, pair.closing_m_s * period
-        if run.apart_m[pair.robot, pair.other] > keeps + closing:
-            continue
-        rows = run.period_rows(pair.other)
         own, other = run.position_m[pair.robot][rows], run.position_m[pair.other][rows]
         for one, held in ((own, other), (other, own))[: 2 if pair.other in run.robots else 1]:
             at_m, least_m = pair.shape.held_m(one[:-1] - held[:-1], one[1:] - held[:-1], keeps + closing)
@@ -63,6 +61,16 @@ def safe_own(run: Run) -> Found | None:
             most += int((at_m - keeps - closing <= SMALL).sum())
     status = "holds" if margin >= -SMALL else "refuted"
     return Found(status, None if margin == np.inf else margin, (least, most))
+
+
+def _near(run: Run) -> Iterator[tuple[Pair, Rows]]:
+    """The pairs that one period at the speed limits could bring nearer than d + V h, with the ends of their periods."""
+    period = run.scenario["control"]["period_s"]
+    for pair in run.pairs:
+        if run.apart_m[pair.robot, pair.other] <= pair.passive(period).safe_m + pair.closing_m_s * period + FAR_M:
+            rows = run.period_rows(pair.other)
+            if len(rows) > 1:
+                yield pair, rows
 
 
 def _root(square: Fraction) -> tuple[Fraction, Fraction]:
@@ -143,12 +151,9 @@ def safe_hyp(run: Run) -> Found:
     try:
         _constants(run)
         _motion(run)
-        for pair in run.pairs:
-            if run.apart_m[pair.robot, pair.other] > pair.safe_m + pair.closing_m_s * period + FAR_M:
-                continue
-            rows = run.period_rows(pair.other)
+        for pair, rows in _near(run):
             own, other = run.position_m[pair.robot][rows], run.position_m[pair.other][rows]
-            lasting = float(np.diff(run.t_s[rows[-2:]])[-1])
+            lasting = float(run.t_s[rows[-1]] - run.t_s[rows[-2]])
             last = Fraction(1) if abs(lasting - period) <= SMALL else Fraction(lasting) / Fraction(period)
             if pair.moves_m_s:
                 missed = float(shortfall_m(own, other, pair.passive(period), Fraction(), last))

@@ -31,8 +31,8 @@ class Pair(NamedTuple):
         radii_m: sum of both radii.
         closing_m_s: largest speed at which they are expected to approach each other.
         share: part of the inequality that each robot takes: 1 beside an obstacle, 1/2 beside a robot.
-        moves_m_s: V, the speed at which an obstacle is expected to move at most; above 0 the passive law is in force.
         shape: of the other; for a UGV walls are endless in height.
+        moves_m_s: V, the speed at which an obstacle is expected to move at most; above 0 the passive law is in force.
     """
 
     robot: str
@@ -41,8 +41,8 @@ class Pair(NamedTuple):
     radii_m: float
     closing_m_s: float
     share: float
-    moves_m_s: float = 0.0
     shape: Shape = POINT
+    moves_m_s: float = 0.0
 
     @property
     def safe_m(self) -> float:
@@ -168,7 +168,7 @@ def pairs_of(scenario: Json) -> list[Pair]:
         for of, endless in ((scenario["ugvs"], True), ([uav], False)):
             shape = shape_of(body, endless=endless)
             beside_obstacles += [
-                Pair(robot, name, gap_m, radii_m(robots[robot], body), limit[robot] + speed, 1.0, speed, shape)
+                Pair(robot, name, gap_m, radii_m(robots[robot], body), limit[robot] + speed, 1.0, shape, speed)
                 for robot in of
             ]
     beside_robots = []

@@ -27,7 +27,8 @@ def run(way_m: list[float], **more: Any) -> Run:
     found = SimpleNamespace(
         t_s=t, sample_row=np.arange(len(t) - 1), pairs=[pair], apart_m={("ugv1", "rock"): 0.0},
         position_m={"ugv1": own, "rock": np.zeros((len(t), 3))}, apart=lambda _: own,
-        there_from=lambda _: 0, scenario={"control": {"period_s": PERIOD_S, "avoidance_gain_1_s": GAIN_1_S}},
+        period_rows=lambda _: np.arange(len(t)),
+        scenario={"control": {"period_s": PERIOD_S, "avoidance_gain_1_s": GAIN_1_S}},
     )  # fmt: skip
     return cast("Run", cast("Any", found))
 

@@ -79,7 +79,8 @@ def reports(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
         document |= {"scenario": {"resolved": resolved(scenario)}, "runs": {"d": {key: about[key] for key in SHARED}}}
         run = read_run(trace(folder), "d", json.loads(json.dumps(document)))
         for claim, decide in DECIDED.items():
-            found = decide(run)
+            if (found := decide(run)) is None:
+                continue
             count = found.exercised[0] if found.exercised else 0
             entry = {"id": claim, "run": "d", "status": found.status, "margin": found.margin, "exercised": count}
             document["claims"].append(entry | {"unit": ""})
@@ -163,7 +164,7 @@ FORGERIES: dict[str, tuple[str, str, Edit]] = {
     "through the wall and back between rows that are clear of it": ("wall", "SAFE-TRACE", ahead(1.3)),
     "through the wall and back without a collision": ("wall", "events", ahead(1.3)),
     "onto the wall without a command": ("wall", "trace", cells("ugv1.x_m", lambda old: old + 0.6, 90)),
-    "wall that might move": ("wall", "trace", everywhere("obstacles", "wall", "max_speed_m_s", value=1.0)),
+    "wall that might move": ("wall", "SAFE-OWN", everywhere("obstacles", "wall", "max_speed_m_s", value=1.0)),
     "edges that cross": (
         "room", "events", everywhere("obstacles", "room", "polygon_m", value=[[0, 0], [9, 9], [9, 0], [0, 9]]),
     ),
