@@ -14,7 +14,7 @@ from builders.rooms import room
 from random_scenarios import draw
 
 from airground_drake.base.arrays import Array
-from airground_drake.gatekeeper import outcome_gatekeeper
+from airground_drake.gatekeeper import outcome, outcome_gatekeeper
 from airground_drake.geometry import outline
 from airground_drake.run.simulation import simulate
 from airground_drake.run.trace import Trace
@@ -23,7 +23,7 @@ from airground_drake.scenarios.load import from_data, load, resolved
 from airground_drake.scenarios.schema import Obstacle, Policy, Scenario
 from airground_drake.scenarios.shipped import shipped
 from airground_drake.verify.engines.outlines import Cores
-from oracles import ORACLES, beginnings, control_law, faults_of, inputs, predictions
+from oracles import ORACLES, beginnings, control_law, faults_of, inputs, predictions, way_left
 from oracles.mutants import PATIENCE, one_direction
 from oracles.protocol import executed_at
 from oracles.way_left import bounds_of_way_left
@@ -160,6 +160,7 @@ def test_a_queue_along_an_axis_is_squeezed() -> None:
 
 def test_the_nearest_obstacles_of_an_endless_map_count() -> None:
     assert outcome_gatekeeper.MOST_CLAIMED == inputs.MOST_CLAIMED == 64
+    assert outcome.MOST_CORNERS == way_left.MOST_CORNERS == 64
     scenario = load("case_a", ["duration_s=15.5", "reproduction=[]", "choices=[]"])
     scenario.intervention.policies = [Policy("towards", {"x_m": 6.0, "y_m": 5.0, "speed_m_s": 2.0})]
     scenario.uav.phantoms_m = [[float(x), float(y), 0.0] for x in range(10, 20) for y in range(0, 20, 2)]

@@ -15,6 +15,9 @@ from airground_drake.verify.engines.outlines import Cores, away_from, least_dist
 
 AROUND = 48
 """Points around each corner."""
+MOST_CORNERS = 64
+"""Among more corners than these the gatekeeper takes a way on a lattice, which may be longer by the share `LONGER`."""
+LONGER = 0.1
 Flags = npt.NDArray[np.bool_]
 
 
@@ -36,7 +39,9 @@ def bounds_of_way_left(place: Array, goal: Array, cores: Cores, distances: Array
             return direct, np.inf
         more = some | _crossed(legs, flat, radii)
         if (more == some).all():
-            return direct, float(np.linalg.norm(np.diff(legs, axis=0), axis=1).sum())
+            longest = float(np.linalg.norm(np.diff(legs, axis=0), axis=1).sum())
+            corners = sum(len({*map(tuple, each)}) for each in flat.corners.tolist())
+            return direct, longest * (1.0 + LONGER * (corners > MOST_CORNERS))
         some = more
 
 

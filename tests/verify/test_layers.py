@@ -27,6 +27,8 @@ JUDGED = {
     "scenarios.world",
 }  # fmt: skip
 """Also the pair table of the World: claims read distances and shares from the scenario."""
+DATA = {"geometry.motion"}
+"""Types of the data of a scenario, which compute nothing that is judged: the way of an obstacle that moves."""
 
 
 def imported(path: Path) -> Iterator[str]:
@@ -57,7 +59,7 @@ def test_what_runs_may_import_loads_nothing_that_is_judged() -> None:
         path = todo.pop()
         seen.add(path)
         for name in imported(path):
-            assert not within(name, JUDGED), f"{path} imports {name}"
+            assert not within(name, JUDGED) or within(name, DATA), f"{path} imports {name}"
             module = PACKAGE.joinpath(*name.split("."))
             files = module.with_suffix(".py"), module.parent.with_suffix(".py")
             todo += [file for file in files if file.is_file() and file not in seen]
