@@ -196,6 +196,13 @@ def unnamed(name: str) -> Edit:
     return edit
 
 
+def another_map(folder: Path) -> None:
+    """A file of a map that the scenario did not read."""
+    (folder / "map").mkdir()
+    write(folder / "map" / "lab.yaml", b"image: lab.pgm")
+    everywhere("map", value={"cells": {"sha256": {}, "rectangles": []}})(folder)
+
+
 ALL = slice(None)
 UNMENDED = {"page with other bytes", "file outside named"}
 """Forgeries after which the list of files is left as it is."""
@@ -214,6 +221,7 @@ RULES: dict[str, tuple[str, Edit]] = {
     "notes in a trace": ("a report has such a file", file("trace/d/notes.txt", b"measured")),
     "trace added": ("a report has such a file", lambda folder: shutil.copytree(trace(folder), trace(folder, "e"))),
     "file named like the folder of proofs": ("a report has such a file", file("proofs.html", b"<p>All is proved.")),
+    "another map": ("the map was read from this file", another_map),
     "file outside named": ("a file is named if it is there", unnamed("outside")),
     # a trace and its run
     "table with other bytes": ("SHA-256 of a table", meta("files", "states.parquet", value="0" * 64)),
