@@ -60,7 +60,7 @@ def test_a_robot_that_has_nowhere_to_retreat_stands_and_the_wall_is_named() -> N
     assert true.counterexample is not None
     assert true.counterexample["why"].endswith("ugv1 stood, blocked by back")
     (came,) = own.evidence["came_too_near_themselves"]
-    assert own.status == "holds"
+    assert own.status == decided("SAFE-HYP", trace).status == "holds"
     assert came["blocked_by"] == ["back"]
     begin, end = came["caught_s"]
     gap = of_person(trace)

@@ -7,6 +7,7 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+import persons
 import pytest
 from builders.edits import bumped, moved, with_decision, with_events, with_scenario, with_states
 from builders.layout import rebuilt
@@ -63,6 +64,12 @@ def driven_at(_: Trace, over: float) -> Trace:
     scenario = lone([5.0, 0.0, 0.0], [5.0, 0.0, 0.0], STILL, 1.0)
     trace = simulate(scenario, drive=lambda t: [[2.0 + over, 0.0, 0.0], [0.0] * 3])
     return rebuilt(with_scenario(trace, ugvs__ugv1__max_speed_m_s=2.0))
+
+
+def stepped_towards_a_person(_: Trace, by: float) -> Trace:
+    """The robot stands before the person at d + V h, and at the end comes nearer."""
+    trace = persons.run("on the goal")
+    return moved(trace, "ugv1", len(trace.t) - 1, [by, 0.0, 0.0])
 
 
 def at_the_trigger(trace: Trace) -> int:
@@ -152,6 +159,7 @@ CASES: tuple[tuple[str, str, str, float, Edit, str], ...] = (
     ("SAFE-TRACE", "least distance", A, DISTANCE_TOLERANCE_M, nearer_than_allowed, "margin_m"),
     ("SAFE-TRACE", "place after a step", A, MOTION_TOLERANCE_M,
      lambda t, by: bumped("uav.x_m", by, len(t.t) - 1)(t), "error"),
+    ("SAFE-OWN", "step towards a person", A, DISTANCE_TOLERANCE_M, stepped_towards_a_person, "person"),
     ("SAFE-HYP", "inequality", "at a rock", DISTANCE_TOLERANCE_M * 0.075, lambda _, by: beside_a_rock(by), "avoidance"),
     ("SAFE-HYP", "start", "at a rock", DISTANCE_TOLERANCE_M, lambda _, by: beside_a_rock(0.0, by - 2.0), "safe start"),
     ("SAFE-HYP", "way", "synthetic a", DISTANCE_TOLERANCE_M,
