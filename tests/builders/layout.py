@@ -15,7 +15,8 @@ from airground_drake.base.arrays import Array
 from airground_drake.run.recording import sample_rows
 from airground_drake.run.tables import DECISION_COLUMNS, DECISION_LISTS, MESSAGE_COLUMNS, SCHEMA, typed
 from airground_drake.run.trace import Trace
-from airground_drake.verify.runs.demands import demanded
+from airground_drake.verify.engines.outlines import COUNT, MIDDLE
+from airground_drake.verify.runs.demands import OUTLINES, demanded
 
 HELD = ("noise_m", "decision_variable_m", "mode", "triggers", "triggered_at_s", "released_at_s")
 """Columns of a UGV after its position."""
@@ -79,7 +80,21 @@ def rebuilt(trace: Trace) -> Trace:
 def as_read_back(parameters: dict[str, Any]) -> dict[str, Any]:
     """Parameters of a controller as `systems.controllers.read_back` writes them."""
     found = {key: value.tolist() if isinstance(value, np.ndarray) else value for key, value in parameters.items()}
+    found |= {key: _with_circles(found[key]) for key in OUTLINES if key in found}
     return found | {key: [[value, 1] for value in found[key]] for key in ("safe_m", "share")}
+
+
+def _with_circles(numbers: list[float]) -> list[float]:
+    """Outlines, one after the other, with circles round their corners."""
+    found, begin = list[float](), 0
+    while begin < len(numbers):
+        head = numbers[begin : begin + MIDDLE]
+        begin += MIDDLE + 2 * int(head[COUNT])
+        corners = np.array(numbers[begin - 2 * int(head[COUNT]) : begin]).reshape(-1, 2)
+        middle = corners.mean(axis=0)
+        extent = float(np.hypot(*(corners - middle).T).max())
+        found += [*head, *middle.tolist(), extent, *corners.ravel().tolist()]
+    return found
 
 
 def decision_table(decisions: Sequence[dict[str, Any]]) -> pd.DataFrame:

@@ -199,6 +199,23 @@ def _beside_each(trace: Trace) -> Iterator[BesideMoving]:
         )  # fmt: skip
 
 
+def samples_before(trace: Trace) -> Indices:
+    """The row of the last control sample at or before the beginning of each segment between rows, (T - 1,)."""
+    samples = trace.sample_rows
+    return samples[np.searchsorted(samples, np.arange(len(trace.t) - 1), side="right") - 1]
+
+
+def steps_of(trace: Trace, robot: str) -> Array:
+    """How far from its place at the control sample a robot gets in each segment between rows, (T - 1,), m."""
+
+    def found() -> Array:
+        place, sample = trace.position(robot), trace.position(robot)[samples_before(trace)]
+        ends = [np.linalg.norm(each - sample, axis=1) for each in (place[:-1], place[1:])]
+        return np.asarray(np.max(ends, axis=0) + off_m_of(trace, robot))
+
+    return trace.derived(("steps", robot), found)
+
+
 def own_margins(trace: Trace, pair: Pair, robot: str) -> Array:
     """What a robot left of min(D, d + V h) by its own doing, for the T - 1 segments between rows, (T - 1,), m.
 
@@ -206,24 +223,23 @@ def own_margins(trace: Trace, pair: Pair, robot: str) -> Array:
     apart for one period to matter, or not both there.
     """
     other, rows = pair.second if robot == pair.first else pair.first, np.arange(len(trace.t) - 1)
-    samples = trace.sample_rows
-    sample = samples[np.searchsorted(samples, rows, side="right") - 1]
+    sample = samples_before(trace)
     cores = cores_of(trace).get(other, Cores.at(np.zeros((1, 3))))
     origin = trace.position(other) if other in trace.robots else origin_of(trace, other)
     place, planar = trace.position(robot), is_planar(trace, robot)
     origin = np.zeros_like(place) if origin is None else origin
     keeps, off_m = pair.keeps_m(trace.scenario.control.period_s), off_m_of(trace, robot)
     last = len(trace.t) - 1 if pair.last is None else pair.last
-    reach = keeps + pair.reach_m + off_m
-    parts = cores.take(np.flatnonzero(apart_by_blocks(cores, place - origin).min(axis=1) <= reach))
+    step = steps_of(trace, robot)
+    bounds = apart_by_blocks(cores, place - origin).min(axis=1)
+    each = cores.take(np.flatnonzero(bounds <= keeps + step.max())).take((slice(None), None))
     found = np.full(len(rows), np.inf)
-    if not len(parts.base):
+    if not len(each.base):
         return found
-    each = parts.take((slice(None), None))
     at_sample = away_from(each, place[sample] - origin[sample], planar=planar).distance.min(axis=0)
-    near = (at_sample <= reach) & (sample >= pair.row) & (rows < last)
+    near = (at_sample <= keeps + step) & (sample >= pair.row) & (rows < last)
     start, end = (place[rows[near] + k] - origin[sample[near]] for k in (0, 1))
-    least = least_distances(each, start, end, planar=planar)[0].min(axis=0) - off_m
+    least = least_distances(each, start, end, planar=planar)[0].min(axis=0, initial=np.inf) - off_m
     found[near] = least - np.minimum(at_sample[near], keeps)
     return found
 

@@ -11,7 +11,7 @@ from airground_drake.run.trace import Trace
 from airground_drake.verify.claim import TraceClaim
 from airground_drake.verify.finding import Finding
 from airground_drake.verify.runs.pairs import DISTANCE_TOLERANCE_M, apart_of, pairs_of, snapshot
-from airground_drake.verify.runs.passive import beside, encounters, own_margins
+from airground_drake.verify.runs.passive import beside, encounters, own_margins, steps_of
 
 MOST_LISTED = 300
 """Pairs that the evidence lists at most: those of least margin."""
@@ -37,7 +37,7 @@ class SafeOwn(TraceClaim):
     method = (
         "Exact minimum of the distance on every segment between two rows, in closed form as in SAFE-TRACE, from the "
         "other body as it was at the control sample before. It is asked of every robot of every pair that comes so "
-        "near that one period at full speed could matter."
+        "near that its longest step could matter."
     )
     equations = "(7)-(8), (11); n.v >= 0 beside obstacles that may move"
     assumptions = (
@@ -87,10 +87,11 @@ class OwnMargin(NamedTuple):
 
 def _margins(trace: Trace) -> Iterator[OwnMargin]:
     period, apart = trace.scenario.control.period_s, apart_of(trace)
+    longest = {name: float(steps_of(trace, name).max()) for name in trace.robots}
     for pair, least in zip(pairs_of(trace), apart.tolist(), strict=True):
-        if least > pair.keeps_m(period) + pair.reach_m:
-            continue
         for robot in (name for name in (pair.first, pair.second) if name in trace.robots):
+            if least > pair.keeps_m(period) + longest[robot]:
+                continue
             other = pair.second if robot == pair.first else pair.first
             margins = own_margins(trace, pair, robot)
             k = int(np.argmin(margins)) if not np.isnan(margins).any() else int(np.argmax(np.isnan(margins)))

@@ -121,6 +121,7 @@ R, E, N, H, I = "refuted", "error", "not_run", "holds", "inconclusive"  # noqa: 
 REST = [0.0] * 3
 BREAKAGES: dict[str, tuple[tuple[str, str, Edit, str, str], ...]] = {
     "SAFE-TRACE": (("ends at an obstacle", A, late(1, "ugv2", 4.8, -8.75, 0.0), R, "ugv2"),),
+    "SAFE-OWN": (("ends at an obstacle", A, late(1, "ugv2", 4.8, -8.75, 0.0), R, "ugv2"),),
     "SAFE-HYP": (
         ("sensing range of another scenario", A, scenario(control__sensing_range_m=4.001), R, "controller parameters"),
         ("gain", A, scenario(control__avoidance_gain_1_s=40.1), R, "gain: A h <= 1"),
