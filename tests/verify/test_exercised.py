@@ -9,6 +9,7 @@ from html import unescape
 from pathlib import Path
 from typing import Any
 
+import persons
 import pytest
 from builders.edits import with_meta, with_samples
 from verify.judging import CLAIMS, decided
@@ -23,13 +24,13 @@ from airground_drake.verify.claim import Verdict, require_count
 
 IDLE = [
     "duration_s=0.5",
-    "obstacles={}",
+    "obstacles={post: {position_m: [90, 90, 0], max_speed_m_s: 1.0}}",
     "ugvs.ugv1.target_m=[0, 0, 0]",
     "ugvs.ugv1.preset={waypoints_m: [[0, 0, 0], [0.01, 0, 0]], speed_m_s: 0.01}",
     "uav.target_m=[0, 0, 2]",
     "runs={c: {method: c}, d: {method: d}}",
 ]
-"""Nothing to avoid, nothing to trigger, nowhere to go."""
+"""Nothing near to avoid, nothing to trigger, nowhere to go."""
 
 
 @pytest.fixture(scope="module")
@@ -53,7 +54,8 @@ def test_a_run_with_several_triggers_and_proposals_exercises_every_claim(
     claim: str, run: Callable[[str, str], Trace]
 ) -> None:
     of = {"LIVE-HYP": ("contact", "d")}
-    (verdict,) = judge(run(*of.get(claim, ("dwell", "d"))), [claim])
+    trace = persons.run("standing") if claim == "SAFE-OWN" else run(*of.get(claim, ("dwell", "d")))
+    (verdict,) = judge(trace, [claim])
     count = verdict.exercised
     assert count
     assert verdict.as_expected
