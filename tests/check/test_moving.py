@@ -8,10 +8,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import persons
 import pytest
 from builders.edits import moved, with_meta, with_scenario
-from check.forgeries import all_of, cells, claim, everywhere
+from check.forgeries import all_of, cells, claim, everywhere, rows
 from check.forging import Edit, edited_report, edited_table, forged, mend
 from hypothesis import given
 from hypothesis import strategies as st
@@ -21,6 +22,8 @@ from sharing import once
 from airground_drake.base import files
 from airground_drake.check.command import LIMIT_S, checked
 from airground_drake.check.line import AGREES
+from airground_drake.check.positions import UnusableError
+from airground_drake.check.positions import judge as judge_positions
 from airground_drake.check.rules import SMALL
 from airground_drake.check.scenario import Pair, pairs_of, way_m
 from airground_drake.report import document
@@ -115,12 +118,6 @@ def test_verdicts_margins_and_counts_are_those_of_the_claims(report_of: Callable
     assert {each for each, status in safe.items() if status != "holds"} == REFUTED.get(name, set())
 
 
-def nobody_walks(folder: Path) -> None:
-    """The column of a person is left out."""
-    with edited_table(folder, run="a") as frame:
-        frame.drop(columns="person.x_m", inplace=True)
-
-
 def stepped(by_m: float, sample: int) -> Edit:
     """The robot goes ahead by a step in one control period, and back in the next."""
 
@@ -142,7 +139,7 @@ WAY, OWN, TRUE, MET = "trace", "SAFE-OWN", "SAFE-TRACE", "SAFE-HYP"
 FORGERIES: dict[str, tuple[str, set[str], Edit]] = {
     "shifted at a row": ("on the goal", {WAY}, cells("person.x_m", lambda old: old + 2e-9, 90, run="a")),
     "shifted throughout": ("on the goal", {WAY}, cells("person.y_m", lambda old: old - 0.01, slice(None), run="a")),
-    "not recorded": ("on the goal", {WAY}, nobody_walks),
+    "not recorded": ("on the goal", {WAY}, rows(lambda frame: frame.drop(columns="person.x_m"), run="a")),
     "another speed": ("on the goal", {WAY}, person("moves", "speed_m_s", value=1.1)),
     "a later start": ("on the goal", {WAY}, person("moves", "start_s", value=0.06)),
     "another waypoint": ("on the goal", {WAY}, person("moves", "waypoints_m", 1, 0, value=2.001)),
@@ -221,3 +218,36 @@ def test_the_required_gap_and_the_closing_speed_of_what_may_move(
     pair = gap(**more)
     assert (pair.gap_m, pair.moves_m_s, pair.closing_m_s) == (gap_m, moves_m_s, 1.0 + moves_m_s)
     assert pair.passive(persons.H).safe_m == pytest.approx(gap_m + 0.3 + moves_m_s * persons.H)
+
+
+def sampled(trace: Trace, *bodies: str) -> pd.DataFrame:
+    """Where bodies were at the control samples and at the end."""
+    ends = np.append(trace.sample_rows, len(trace.t) - 1)
+    return pd.concat([
+        pd.DataFrame(trace.position(body)[ends], columns=["x_m", "y_m", "z_m"]).assign(t_s=trace.t[ends], body=body)
+        for body in bodies
+    ], ignore_index=True)  # fmt: skip
+
+
+@pytest.mark.parametrize("by_m", [0.0, 0.01])
+def test_positions_of_persons_are_judged_too(by_m: float) -> None:
+    """Of a robot it is told by how much it came too near itself, and no distance is promised."""
+    trace = nearer(by_m)
+    pairs, _ = judge_positions(sampled(trace, "ugv1", "uav", "person"), resolved(trace.scenario))
+    one = next(pair for pair in pairs if (pair.first, pair.second) == ("ugv1", "person"))
+    assert one.missed_m == pytest.approx(by_m, abs=1e-9)
+    assert (one.safe_m, one.kept, one.guarantee_m) == (0.3, True, None)
+    assert one.least_m == pytest.approx(0.3 + 1.2 * persons.H - by_m, abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("name", "bodies", "says"),
+    [
+        ("on the goal", ("ugv1", "uav"), "person has 0 rows"),
+        ("leaving", ("ugv1", "uav", "person"), "person disappears under way"),
+    ],
+)
+def test_positions_without_a_person_are_not_judged(name: str, bodies: tuple[str, ...], says: str) -> None:
+    trace = persons.run(name)
+    with pytest.raises(UnusableError, match=says):
+        judge_positions(sampled(trace, *bodies), resolved(trace.scenario))

@@ -19,16 +19,19 @@ PERIOD_S, GAIN_1_S, SAFE_M = 0.25, 2.0, 2.0
 BODY = {"position_m": [0.0, 0.0, 0.0], "heading_rad": 0.0, "height_m": 0.0, "segment_m": [], "polygon_m": []}
 
 
-def run(way_m: list[float], **more: Any) -> Run:
-    """A robot that moves along x towards a rock at the origin, one place per control sample."""
+def run(way_m: list[float], speed_m_s: float = 0.0) -> Run:
+    """A robot that moves along x towards a rock at the origin, one place per control sample; the rock may move."""
     t = PERIOD_S * np.arange(len(way_m))
     own = np.column_stack([way_m, np.zeros(len(t)), np.zeros(len(t))])
-    pair = Pair("ugv1", "rock", SAFE_M, 0.0, 1.0, 1.0)
+    pair = Pair("ugv1", "rock", SAFE_M, 0.0, 1.0 + speed_m_s, 1.0, moves_m_s=speed_m_s)
     found = SimpleNamespace(
         t_s=t, sample_row=np.arange(len(t) - 1), pairs=[pair], apart_m={("ugv1", "rock"): 0.0},
         position_m={"ugv1": own, "rock": np.zeros((len(t), 3))}, apart=lambda _: own,
-        period_rows=lambda _: np.arange(len(t)),
-        scenario={"control": {"period_s": PERIOD_S, "avoidance_gain_1_s": GAIN_1_S}},
+        period_rows=lambda _: np.arange(len(t)), robots={"ugv1": {}},
+        scenario={
+            "control": {"period_s": PERIOD_S, "avoidance_gain_1_s": GAIN_1_S},
+            "obstacles": {"rock": {"moves": None, "max_speed_m_s": speed_m_s}},
+        },
     )  # fmt: skip
     return cast("Run", cast("Any", found))
 
@@ -63,6 +66,55 @@ def test_the_shortfall_is_what_the_inequality_lacks(way_m: list[float], missed_m
     approach = run(way_m)
     found = safety.shortfall_m(*approach.position_m.values(), approach.pairs[0], Fraction(1, 2))
     assert abs(found - Fraction(missed_m)) < Fraction(1, 2**100)
+
+
+PASSIVE = [
+    ([3.0, 2.25], 0.0),  # d + V h is reached
+    ([3.0, 2.0], 0.25),
+    ([2.0, 2.0], 0.0),  # nearer, it need not retreat
+    ([2.0, 1.75], 0.25),
+    ([1.0, 1.5], 0.0),
+    ([1.0, -3.0], 4.0),  # through it
+    ([0.0, 0.5], 0.5),  # from its place no direction is away
+    ([4.0, 3.0], 0.0),
+]
+"""Beside a rock that may move at 1 m/s: d + V h is 2.25 m."""
+
+
+@pytest.mark.parametrize(("way_m", "missed_m"), PASSIVE)
+def test_beside_what_may_move_a_robot_lacks_what_it_comes_nearer(way_m: list[float], missed_m: float) -> None:
+    """Wherever that went meanwhile."""
+    beside = run(way_m, 1.0)
+    own, gone = beside.position_m["ugv1"], np.array([[0.0, 0.0, 0.0], [0.0, 5.0, 0.0]])
+    found = safety.shortfall_m(own, gone, beside.pairs[0].passive(PERIOD_S), Fraction())
+    assert abs(found - Fraction(missed_m)) < Fraction(1, 2**100)
+
+
+@pytest.mark.parametrize(
+    ("way_m", "margin_m", "tests"),
+    [
+        ([3.0, 2.25], None, 0),  # too far for a period to matter: 1 m/s and V are 0.5 m
+        ([2.625, 2.25], 0.0, 1),
+        ([2.625, 2.0], -0.25, 1),
+        ([2.0, 2.0], 0.0, 1),
+        ([2.0, 1.75, 1.5], -0.25, 2),
+        ([1.0, -3.0], -1.0, 1),
+        ([1.0, 1.5, 2.5, 2.625, 3.0], 0.0, 4),
+        ([2.5, 2.625, 3.0], 0.25, 2),
+    ],
+)
+def test_own_doing_is_what_is_lost_of_the_distance_at_the_sample(
+    way_m: list[float], margin_m: float | None, tests: int
+) -> None:
+    found = safety.safe_own(run(way_m, 1.0))
+    assert found is not None
+    assert found.exercised == (tests, tests)
+    assert found.status == ("holds" if margin_m is None or margin_m >= 0.0 else "refuted")
+    assert found.margin == (margin_m if margin_m is None else pytest.approx(margin_m, abs=1e-12))
+
+
+def test_own_doing_is_not_asked_where_nothing_may_move() -> None:
+    assert safety.safe_own(run([3.0, 1.0])) is None
 
 
 WALL = shape_of(BODY | {"segment_m": [[-9.0, 0.0], [1.0, 0.0], [1.0, 9.0]]}, endless=True)
