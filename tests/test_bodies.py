@@ -139,7 +139,7 @@ VIEW = OutcomeGatekeepers._view_of
 FORGETFUL: dict[str, tuple[Callable[[pytest.MonkeyPatch], None], set[str]]] = {
     "an obstacle's radius": (
         neighbours(lambda near: near._replace(distance=near.distance - ROCK * (near.share == 1.0))),
-        {"SAFE-TRACE", "SAFE-HYP", "commands", "predictions"},
+        {"SAFE-TRACE", "SAFE-HYP", "commands"},
     ),
     "the other robot's radius": (
         neighbours(lambda near: near._replace(distance=near.distance - FLIER * (near.share == 0.5))),

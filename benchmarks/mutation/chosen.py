@@ -67,8 +67,8 @@ BODIES = (
         "obstacles have no radius",
         "scenarios/outlines.py",
         "outlines_of",
-        "return balls(obstacle.position_m, obstacle.radius_m, gap)",
-        "return balls(obstacle.position_m, 0.0, gap)",
+        "found = balls(obstacle.position_m or np.zeros(3), obstacle.radius_m, gap)",
+        "found = balls(obstacle.position_m or np.zeros(3), 0.0, gap)",
         runs=("bodies d", "bodies c"),
     ),
     Mutant(
@@ -114,8 +114,8 @@ LAW = (
         "interventions not filtered under (d)",
         "nsbc/law.py",
         "command",
-        "return task if law.intervention_on_top else avoid_one(task,",
-        "return task if not law.intervention_on_top else avoid_one(task,",
+        "    if law.intervention_on_top:\n        return task\n",
+        "    if not law.intervention_on_top:\n        return task\n",
     ),
     Mutant(
         "own task not filtered",

@@ -21,7 +21,7 @@ from airground_drake.scenarios.load import load, shipped
 from airground_drake.verify import judge, judge_model
 from airground_drake.verify.claim import Verdict
 
-SHORT = (("dwell", "a"), ("dwell", "d"), ("contact", "d"))
+SHORT = (("dwell", "a"), ("dwell", "d"), ("contact", "d"), ("forklift", "d"))
 """Runs that are there to put claims to the test."""
 
 

@@ -23,7 +23,7 @@ def test_every_claim_holds_on_a_valid_run(method: str) -> None:
     assert found == {name: UNRECORDED.get(method, {}).get(name, "holds") for name in found}
     ungated = {"LIVE-HYP", *GATE}
     left_out = {"a": ungated, "b": ungated, "c": {"LIVE-HYP"}, "d": set[str]()}[method]
-    assert set(verdicts) == set(CLAIMS) - left_out
+    assert set(verdicts) == set(CLAIMS) - left_out - {"SAFE-OWN"}  # nothing moves by itself
     assert all(json.dumps(verdict.to_json(), allow_nan=False) for verdict in verdicts.values())
 
 

@@ -160,7 +160,7 @@ def test_many_cores_along_a_way_are_those_of_each_core_at_each_row(seed: int, ro
 
 def test_outlines_of_a_trace_are_those_of_the_running_code() -> None:
     layout = ("GAP", "RADIUS", "SPEED", "BASE", "TOP", "COUNT", "MIDDLE", "EXTENT", "CORNERS")
-    assert {name: getattr(outlines, name) for name in layout} == {name: getattr(convex, name) for name in layout}
+    assert {name: getattr(outlines, name) for name in layout} == {name: getattr(outline, name) for name in layout}
     rows = outline.stacked([drawn(np.random.default_rng(k)) for k in range(8)])
     numbers = [number for row in rows for number in outline.as_tuple(row)]
     np.testing.assert_array_equal(unpacked(numbers), rows)
