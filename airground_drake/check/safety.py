@@ -6,7 +6,6 @@ D >= d + V h, else n.v >= 0. It is the other inequality with d + V h in place of
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from fractions import Fraction
 from math import isqrt
 
@@ -14,7 +13,7 @@ import numpy as np
 
 from .files import Json
 from .rules import SMALL, Array, Disagreement, Found, close, holds
-from .run import Rows, Run
+from .run import Run
 from .scenario import Pair, expected_m_s, written
 from .shapes import Away
 
@@ -43,34 +42,40 @@ def safe_trace(run: Run) -> Found:
 def safe_own(run: Run) -> Found | None:
     """SAFE-OWN: in each period no robot comes nearer than min(D, d + V h) to the other body, held as at the sample.
 
-    It is asked where one period at the speed limits could lead nearer than d + V h. A period beside an obstacle that
-    may move tests the claim if it is asked then. None: nothing may move, and SAFE-TRACE says the same.
+    It is asked from row to row, where the robot's way from the sample could lead nearer than d + V h. A period beside
+    an obstacle that may move tests the claim if one at the speed limits could. None: nothing may move, and SAFE-TRACE
+    says the same.
     """
     if not any(map(expected_m_s, run.scenario["obstacles"].values())):
         return None
     period, margin, least, most = run.scenario["control"]["period_s"], np.inf, 0, 0
-    for pair, rows in _near(run):
-        keeps, closing = pair.passive(period).safe_m, pair.closing_m_s * period
-        own, other = run.position_m[pair.robot][rows], run.position_m[pair.other][rows]
-        for one, held in ((own, other), (other, own))[: 2 if pair.other in run.robots else 1]:
-            at_m, least_m = pair.shape.held_m(one[:-1] - held[:-1], one[1:] - held[:-1], keeps + closing)
-            asked = at_m <= keeps + closing
-            margin = min(margin, float((least_m - np.minimum(at_m, keeps))[asked].min(initial=np.inf)))
+    rows = np.arange(len(run.t_s) - 1)
+    sample = run.sample_row[np.searchsorted(run.sample_row, rows, side="right") - 1]
+    ways = {robot: run.position_m[robot] for robot in run.robots}
+    step_m = {robot: np.maximum(*(_lengths(way[ends] - way[sample]) for ends in (rows, rows + 1)))
+              for robot, way in ways.items()}  # fmt: skip
+    longest = max(float(step.max()) for step in step_m.values())
+    for pair in run.pairs:
+        keeps, closing, there = pair.passive(period).safe_m, pair.closing_m_s * period, run.there(pair.other)
+        both, reach = rows[there.start : there.stop - 1], keeps + closing + 2.0 * longest
+        if run.apart_m[pair.robot, pair.other] > reach or not len(both):
+            continue
+        for robot, other in ((pair.robot, pair.other), (pair.other, pair.robot)):
+            if robot in ways:
+                held = run.position_m[other][sample[both]]
+                at, start, end = (ways[robot][k] - held for k in (sample[both], both, both + 1))
+                at_m, least_m = pair.shape.held_m(at, start, end, reach)
+                asked = at_m <= keeps + step_m[robot][both]
+                margin = min(margin, float((least_m - np.minimum(at_m, keeps))[asked].min(initial=np.inf)))
         if pair.moves_m_s:
-            least += int((at_m - keeps - closing < -SMALL).sum())
-            most += int((at_m - keeps - closing <= SMALL).sum())
+            spare = (at_m - keeps - closing)[sample[both] == both]
+            least, most = least + int((spare < -SMALL).sum()), most + int((spare <= SMALL).sum())
     status = "holds" if margin >= -SMALL else "refuted"
     return Found(status, None if margin == np.inf else margin, (least, most))
 
 
-def _near(run: Run) -> Iterator[tuple[Pair, Rows]]:
-    """The pairs that one period at the speed limits could bring nearer than d + V h, with the ends of their periods."""
-    period = run.scenario["control"]["period_s"]
-    for pair in run.pairs:
-        if run.apart_m[pair.robot, pair.other] <= pair.passive(period).safe_m + pair.closing_m_s * period + FAR_M:
-            rows = run.period_rows(pair.other)
-            if len(rows) > 1:
-                yield pair, rows
+def _lengths(vectors: Array) -> Array:
+    return np.asarray(np.linalg.norm(vectors, axis=1))
 
 
 def _root(square: Fraction) -> tuple[Fraction, Fraction]:
@@ -151,7 +156,10 @@ def safe_hyp(run: Run) -> Found:
     try:
         _constants(run)
         _motion(run)
-        for pair, rows in _near(run):
+        for pair in run.pairs:
+            rows = run.period_rows(pair.other)
+            if run.apart_m[pair.robot, pair.other] > pair.safe_m + pair.closing_m_s * period + FAR_M or len(rows) < 2:
+                continue
             own, other = run.position_m[pair.robot][rows], run.position_m[pair.other][rows]
             lasting = float(run.t_s[rows[-1]] - run.t_s[rows[-2]])
             last = Fraction(1) if abs(lasting - period) <= SMALL else Fraction(lasting) / Fraction(period)

@@ -146,10 +146,10 @@ class Shape:
             reach_m = min(reach_m, float(part.along_m(places[rows], at_m, reach_m).min(initial=np.inf)))
         return reach_m
 
-    def held_m(self, start: Array, end: Array, reach_m: float) -> tuple[Array, Array]:
-        """Signed distances of `start`, and the least on straight steps from there to `end`, (K, 3): (K,) each, m.
+    def held_m(self, places: Array, start: Array, end: Array, reach_m: float) -> tuple[Array, Array]:
+        """Signed distances of places, and the least on straight steps from `start` to `end`, (K, 3): (K,) each, m.
 
-        They are inf or too large where `start` is beyond `reach_m`.
+        Of parts that a step stays more than `reach_m` away from nothing is said.
         """
         at_m, least_m = np.full((2, len(start)), np.inf)
         longest = float(np.linalg.norm(end - start, axis=1).max(initial=0.0))
@@ -157,7 +157,7 @@ class Shape:
             if bound > reach_m + longest:
                 break
             here, there = part.signed_m(start[rows]), part.signed_m(end[rows])
-            at_m[rows] = np.minimum(at_m[rows], here)
+            at_m[rows] = np.minimum(at_m[rows], part.signed_m(places[rows]))
             least = part.between_m(start[rows], end[rows], (here, there), reach_m)
             least_m[rows] = np.minimum(least_m[rows], least)
         return at_m, least_m

@@ -57,6 +57,12 @@ def crowd() -> Trace:
     return simulate(lone("crowd", -2.0, 3.0, duration=10.0, **CROWD), "a")
 
 
+def near_from_the_start() -> Trace:
+    """A person stands up and leaves, faster than the robot that retreats."""
+    person = walking([-1.0, 0.5], [-1.0, 3.0])
+    return simulate(lone("near", -1.0, 0.5, duration=3.0, obstacles={"person": person}), "a")
+
+
 def of_one_run(trace: Trace) -> Trace:
     """The trace of a scenario that has no other run, with the events of what is in its tables."""
     runs = trace.meta["scenario"]["runs"]
@@ -74,7 +80,9 @@ RUNS: dict[str, Callable[[], Trace]] = {
     **{name: partial(persons.run, name) for name in ("standing", "squeezed", "on the goal", "leaving", "fork")},
     "too fast": lambda: persons.run("too fast", "d"),
     "crowd": crowd,
+    "near from the start": near_from_the_start,
     "a step nearer": lambda: nearer(0.01),
+    "sensed too late": lambda: with_scenario(persons.run("on the goal"), control__sensing_range_m=0.82),
     "a faster person was to be expected": lambda: with_scenario(
         persons.run("on the goal"), obstacles__person__max_speed_m_s=2.4
     ),
@@ -82,7 +90,8 @@ RUNS: dict[str, Callable[[], Trace]] = {
 }
 """Runs, and some that were changed: with claims of this package that are about the change."""
 REFUTED = {
-    **{each: {"SAFE-TRACE"} for each in ("standing", "squeezed", "fork", "crowd")}, "too fast": {"SAFE-HYP"},
+    **{each: {"SAFE-TRACE"} for each in ("standing", "squeezed", "fork", "crowd", "near from the start")},
+    **{each: {"SAFE-HYP"} for each in ("too fast", "sensed too late")},
     "a step nearer": {"SAFE-OWN", "SAFE-HYP"}, "a faster person was to be expected": {"SAFE-OWN", "SAFE-HYP"},
     "the person leaves later": {"SAFE-TRACE", "SAFE-OWN", "SAFE-HYP"},
 }  # fmt: skip
@@ -145,18 +154,18 @@ FORGERIES: dict[str, tuple[str, set[str], Edit]] = {
     "another waypoint": ("on the goal", {WAY}, person("moves", "waypoints_m", 1, 0, value=2.001)),
     "another end": ("on the goal", {WAY}, person("moves", "at_end", value="reverse")),
     "a faster person was to be expected": ("on the goal", {OWN, MET}, person("max_speed_m_s", value=1.3)),
-    "a slower person was to be expected": ("on the goal", {MET, OWN}, person("max_speed_m_s", value=1.1)),
+    "a slower person was to be expected": ("on the goal", {MET}, person("max_speed_m_s", value=1.1)),
     "a step towards the person": ("on the goal", {OWN, MET}, stepped(0.001, 200)),
     "gone before the end": ("on the goal", {OWN}, person("disappears_s", value=11.0)),
     "gone before it came near": ("standing", {TRUE, OWN, "events"}, person("disappears_s", value=3.0)),
     "it stayed": ("leaving", {TRUE, OWN, MET, "events"}, person("disappears_s", value=0.0)),
     "gone a little later": ("leaving", {OWN}, person("disappears_s", value=6.05)),
     "appeared later": ("standing", {OWN, "events"}, person("appears_s", value=7.0)),
-    "smaller distance": ("on the goal", {TRUE, OWN}, person("distance_m", value=0.29)),
+    "smaller distance": ("on the goal", {TRUE}, person("distance_m", value=0.29)),
     "smaller distance from what moves": (
-        "on the goal", {TRUE, OWN}, everywhere("safe_distance", "moving_m", value=0.29),
+        "on the goal", {TRUE}, everywhere("safe_distance", "moving_m", value=0.29),
     ),
-    "thinner person": ("on the goal", {TRUE, OWN}, person("radius_m", value=0.24)),
+    "thinner person": ("on the goal", {TRUE}, person("radius_m", value=0.24)),
     "the robot's doing": ("standing", {OWN}, claim("SAFE-OWN", "a", status="refuted")),
     "nobody's doing": ("a step nearer", {OWN}, claim("SAFE-OWN", "a", status="holds")),
     "another margin": ("a step nearer", {OWN}, claim("SAFE-OWN", "a", margin=-0.009)),
@@ -251,3 +260,10 @@ def test_positions_without_a_person_are_not_judged(name: str, bodies: tuple[str,
     trace = persons.run(name)
     with pytest.raises(UnusableError, match=says):
         judge_positions(sampled(trace, *bodies), resolved(trace.scenario))
+
+
+def test_one_who_is_there_for_no_period_is_judged_at_that_instant(report_of: Callable[[str], Path]) -> None:
+    """The robot is in its place, and no hypothesis is about it."""
+    edit = all_of(person("appears_s", value=11.02), person("disappears_s", value=11.04))
+    edit = all_of(edit, person("distance_m", value=1.0))
+    assert {*refusals(report_of("on the goal"), edit)} == {TRUE, OWN}

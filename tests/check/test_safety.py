@@ -27,7 +27,7 @@ def run(way_m: list[float], speed_m_s: float = 0.0) -> Run:
     found = SimpleNamespace(
         t_s=t, sample_row=np.arange(len(t) - 1), pairs=[pair], apart_m={("ugv1", "rock"): 0.0},
         position_m={"ugv1": own, "rock": np.zeros((len(t), 3))}, apart=lambda _: own,
-        period_rows=lambda _: np.arange(len(t)), robots={"ugv1": {}},
+        period_rows=lambda _: np.arange(len(t)), there=lambda _: slice(0, len(t)), robots={"ugv1": {}},
         scenario={
             "control": {"period_s": PERIOD_S, "avoidance_gain_1_s": GAIN_1_S},
             "obstacles": {"rock": {"moves": None, "max_speed_m_s": speed_m_s}},
@@ -93,14 +93,15 @@ def test_beside_what_may_move_a_robot_lacks_what_it_comes_nearer(way_m: list[flo
 @pytest.mark.parametrize(
     ("way_m", "margin_m", "tests"),
     [
-        ([3.0, 2.25], None, 0),  # too far for a period to matter: 1 m/s and V are 0.5 m
+        ([3.0, 2.5], None, 0),  # too far for a period to matter: 1 m/s and V are 0.5 m
+        ([3.0, 2.25], 0.0, 0),  # but its step does
         ([2.625, 2.25], 0.0, 1),
         ([2.625, 2.0], -0.25, 1),
         ([2.0, 2.0], 0.0, 1),
         ([2.0, 1.75, 1.5], -0.25, 2),
         ([1.0, -3.0], -1.0, 1),
         ([1.0, 1.5, 2.5, 2.625, 3.0], 0.0, 4),
-        ([2.5, 2.625, 3.0], 0.25, 2),
+        ([2.5, 2.625, 3.0], 0.375, 2),  # the second step is long enough
     ],
 )
 def test_own_doing_is_what_is_lost_of_the_distance_at_the_sample(
@@ -111,6 +112,16 @@ def test_own_doing_is_what_is_lost_of_the_distance_at_the_sample(
     assert found.exercised == (tests, tests)
     assert found.status == ("holds" if margin_m is None or margin_m >= 0.0 else "refuted")
     assert found.margin == (margin_m if margin_m is None else pytest.approx(margin_m, abs=1e-12))
+
+
+def test_of_two_robots_each_is_asked() -> None:
+    """The other one comes nearer while the first one stands."""
+    beside = run([3.0, 3.0], 1.0)
+    beside.robots["rock"] = {}
+    beside.position_m["rock"][1, 0] = 1.5
+    found = safety.safe_own(beside)
+    assert found is not None
+    assert found.margin == pytest.approx(1.5 - 2.25, abs=1e-12)
 
 
 def test_own_doing_is_not_asked_where_nothing_may_move() -> None:
