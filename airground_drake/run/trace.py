@@ -182,11 +182,12 @@ class Trace:
     def there_from(self, name: str) -> int:
         """Row from which on a body is there: the first control sample at or after an obstacle's `appears_s`, or row 0.
 
-        The number of rows if there is no such sample before the end: then nothing of the run is about the body.
+        The number of rows if there is no such sample before it disappears or before the end: then nothing of the run is
+        about the body.
         """
         obstacle = self.scenario.obstacles.get(name)
         row = self._row_of(obstacle.appears_s) if obstacle else 0
-        return row if row < len(self.t) - 1 else len(self.t)
+        return row if row < self.there_until(name) else len(self.t)
 
     def there_until(self, name: str) -> int:
         """Row up to which a body is there: that of the first sample at or after its `disappears_s`, or the last row."""

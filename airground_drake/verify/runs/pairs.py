@@ -104,7 +104,7 @@ class Gap(NamedTuple):
 
     def at_appearance(self, t: Array) -> bool:
         """Whether it was smallest when the obstacle appeared; t: times of the rows, (T,), s."""
-        return self.pair.row > 0 and self.t_s <= t[self.pair.row]
+        return self.pair.row > 0 and bool(self.t_s <= t[self.pair.row])
 
 
 def pairs_of(trace: Trace) -> tuple[Pair, ...]:
