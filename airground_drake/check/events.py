@@ -72,10 +72,9 @@ def _collisions(run: Run) -> Iterator[Event]:
     """
     for pair in run.pairs:
         within = float(run.scenario["safe_distance"]["collision_m"]) + pair.radii_m
-        apart = run.apart(pair)
-        if run.apart_m[pair.robot, pair.other] >= within or len(apart) < 2:
+        if run.apart_m[pair.robot, pair.other] >= within:
             continue
-        near, passes = pair.shape.within(apart, within)
+        near, passes = pair.shape.within(run.apart(pair), within)
         enters = near & ~np.append(False, near[:-1])
         passes = np.append(passes & ~near[:-1] & ~near[1:], False)
         hit = {"other" if pair.other in run.robots else "obstacle": pair.other}

@@ -61,7 +61,7 @@ class Run:
 
     @cached_property
     def pairs(self) -> list[Pair]:
-        """Pairs of bodies that are there before the end, and the distances that they must keep."""
+        """Pairs of bodies that are there for a control period, and the distances that they must keep."""
         return [pair for pair in pairs_of(self.scenario) if self.there(pair.other).start < len(self.t_s)]
 
     @cached_property
@@ -101,17 +101,17 @@ class Run:
         return moving_of(self.scenario)
 
     def apart(self, pair: Pair) -> Array:
-        """Places of a pair's robot relative to the other's while both are there, (K, 3), m; K >= 1."""
+        """Places of a pair's robot relative to the other's while both are there, (K, 3), m."""
         return (self.position_m[pair.robot] - self.position_m[pair.other])[self.there(pair.other)]
 
     def there(self, name: str) -> slice:
-        """Rows in which a body is there; they start at the number of rows if it is not before the end.
+        """Rows in which a body is there; they start at the number of rows if it is not there for a control period.
 
         It is there from the first control sample at or after its `appears_s` to that at or after its `disappears_s`.
         """
         body = self.scenario["obstacles"].get(name, {})
         first, last = (self._row_at(float(body.get(key) or never)) for key, never in LIFETIME)
-        return slice(first, last + 1)
+        return slice(first if first < last else len(self.t_s), last + 1)
 
     def period_rows(self, name: str) -> Rows:
         """Ends of the control periods in which a body is there: rows of control samples, and the last row."""

@@ -58,7 +58,7 @@ def safe_own(run: Run) -> Found | None:
     for pair in run.pairs:
         keeps, closing, there = pair.passive(period).safe_m, pair.closing_m_s * period, run.there(pair.other)
         both, reach = rows[there.start : there.stop - 1], keeps + closing + 2.0 * longest
-        if run.apart_m[pair.robot, pair.other] > reach or not len(both):
+        if run.apart_m[pair.robot, pair.other] > reach:
             continue
         for robot, other in ((pair.robot, pair.other), (pair.other, pair.robot)):
             if robot in ways:
@@ -85,7 +85,9 @@ def _root(square: Fraction) -> tuple[Fraction, Fraction]:
     return Fraction(numerator, denominator), Fraction(numerator + 1, denominator)
 
 
-def _missed_m(away: Away, step: list[Fraction], safe: Fraction, share: Fraction, gain: Fraction) -> Fraction:
+def _missed_m(
+    away: Away, step: list[Fraction], safe: Fraction, share: Fraction, gain: Fraction, point: bool
+) -> Fraction:
     """Upper bound of what a step lacks of its share of the avoidance inequality, m; at least 0.
 
     Args:
@@ -94,10 +96,11 @@ def _missed_m(away: Away, step: list[Fraction], safe: Fraction, share: Fraction,
         safe: distance to be kept, m.
         share: of the inequality.
         gain: A h, at most 1.
+        point: whether what is avoided is a point.
     """
     least, most = _root(sum((c * c for c in away.vector), Fraction()))
-    if not least:  # both are at one place: the law may take any unit vector
-        return share * gain * safe + _root(sum((c * c for c in step), Fraction()))[1]
+    if not least:  # the law may take either side of a wall, and beside a point any unit vector
+        return share * gain * safe + (_root(sum((c * c for c in step), Fraction()))[1] if point else 0)
     along = sum((c * s for c, s in zip(away.vector, step, strict=True)), Fraction())
     distances = (away.beyond / least, away.beyond / most)
     bounds = [share * (gain * (safe - d) if d <= safe else safe - d) for d in distances]
@@ -136,10 +139,11 @@ def shortfall_m(own_m: Array, other_m: Array, pair: Pair, gain: Fraction, last: 
             )
             lasts = last if k == len(apart) - 1 else Fraction(1)
             away = part.away([a - b for a, b in zip(here, there, strict=True)])
-            missed = _missed_m(away, [(a - b) / lasts for a, b in zip(after, here, strict=True)], safe, share, gain)
+            given, step = (safe, share, gain, len(part.corners) == 1), [a - b for a, b in zip(after, here, strict=True)]
+            missed = _missed_m(away, [each / lasts for each in step], *given)
             if pair.share < 1.0:
                 step = [(a - b) / lasts for a, b in zip(beyond, there, strict=True)]
-                missed += _missed_m(Away([-c for c in away.vector], away.beyond), step, safe, share, gain)
+                missed += _missed_m(Away([-c for c in away.vector], away.beyond), step, *given)
             worst = max(worst, missed)
     return worst
 
@@ -157,9 +161,9 @@ def safe_hyp(run: Run) -> Found:
         _constants(run)
         _motion(run)
         for pair in run.pairs:
-            rows = run.period_rows(pair.other)
-            if run.apart_m[pair.robot, pair.other] > pair.safe_m + pair.closing_m_s * period + FAR_M or len(rows) < 2:
+            if run.apart_m[pair.robot, pair.other] > pair.safe_m + pair.closing_m_s * period + FAR_M:
                 continue
+            rows = run.period_rows(pair.other)
             own, other = run.position_m[pair.robot][rows], run.position_m[pair.other][rows]
             lasting = float(run.t_s[rows[-1]] - run.t_s[rows[-2]])
             last = Fraction(1) if abs(lasting - period) <= SMALL else Fraction(lasting) / Fraction(period)
