@@ -138,12 +138,12 @@ def shortfall_m(own_m: Array, other_m: Array, pair: Pair, gain: Fraction, last: 
                 [Fraction(c) for c in place] for place in (own_m[k], other_m[k], own_m[k + 1], other_m[k + 1])
             )
             lasts = last if k == len(apart) - 1 else Fraction(1)
-            away = part.away([a - b for a, b in zip(here, there, strict=True)])
+            ways = part.away([a - b for a, b in zip(here, there, strict=True)])
             given, step = (safe, share, gain, len(part.corners) == 1), [a - b for a, b in zip(after, here, strict=True)]
-            missed = _missed_m(away, [each / lasts for each in step], *given)
-            if pair.share < 1.0:
+            missed = min(_missed_m(away, [each / lasts for each in step], *given) for away in ways)
+            if pair.share < 1.0:  # a robot is a point: there is one way
                 step = [(a - b) / lasts for a, b in zip(beyond, there, strict=True)]
-                missed += _missed_m(Away([-c for c in away.vector], away.beyond), step, *given)
+                missed += _missed_m(Away([-c for c in ways[0].vector], ways[0].beyond), step, *given)
             worst = max(worst, missed)
     return worst
 

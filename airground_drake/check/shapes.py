@@ -32,6 +32,10 @@ THIRDS = 64
 """How often a third of a step is left out in the search for the least distance: 5e-12 of it is left."""
 
 
+TIE_M = 1e-12
+"""Faces of which one is the nearest within this are equally near: rounding decides which one a robot takes."""
+
+
 class Away(NamedTuple):
     """A vector away from the nearest point or face of a part; the signed distance is `beyond` / |`vector`|."""
 
@@ -84,8 +88,8 @@ class Part:
         """The same on the steps from place to place, (K - 1,); `at_m` has the distances of all, (K,)."""
         return self.between_m(places[:-1], places[1:], (at_m[:-1], at_m[1:]), reach_m)
 
-    def away(self, place: Sequence[Fraction]) -> Away:
-        """Exactly, from the nearest point outside, and from the nearest face inside."""
+    def away(self, place: Sequence[Fraction]) -> list[Away]:
+        """Exactly, from the nearest point outside, and from the nearest faces inside; equally near ones all do."""
         x, y, z = place
         height, offsets, faces = Fraction(), [], []
         if math.isfinite(self.top_m):
@@ -99,8 +103,9 @@ class Part:
             offsets.append(Away(offset, sum((c * c for c in offset), Fraction())))
             faces.append(Away([ey, -ex, Fraction()], px * ey - py * ex))
         if len(offsets) < 3 or any(face.beyond > 0 for face in faces[-len(offsets) :]):
-            return min(offsets, key=lambda each: each.beyond)
-        return max(faces, key=lambda each: float(each.beyond) / math.hypot(*map(float, each.vector)))
+            return [min(offsets, key=lambda each: each.beyond)]
+        depths = [float(each.beyond) / math.hypot(*map(float, each.vector)) for each in faces]
+        return [face for face, depth in zip(faces, depths, strict=True) if depth >= max(depths) - TIE_M]
 
 
 class Shape:

@@ -141,6 +141,7 @@ BLOCK = shape_of(BODY | {"size_m": [2.0, 2.0], "height_m": 8.0}, endless=False)
         (WALL, [-12.0, -4.0, 0.0], [-9.6, -0.8, 0.0], 1.0),  # 4 m towards an end that is 5 m away
         (WALL, [-1.5, 3.0, 7.0], [-0.5, 2.25, 7.0], 0.5),  # of its two parts the second one misses more
         (BLOCK, [0.5, 0.25, 4.0], [0.75, 0.0, 4.0], 1.0),  # inside, 0.5 m from the face on the right
+        (BLOCK, [0.0, 0.0, 4.0], [0.5, 0.0, 4.0], 1.0),  # 1 m from each of the four faces: 1.5 m in its direction
         (BLOCK, [0.0, 0.0, 7.875], [0.0, 0.0, 8.0], 0.9375),  # inside, below the top
         (BLOCK, [0.5, 0.0, 10.5], [0.0, 0.0, 9.5], 0.5),  # above it
         (BLOCK, [3.25, 0.0, 11.0], [1.75, 0.0, 9.0], 0.75),  # 2.5 m straight towards the edge at the top, 3.75 m away

@@ -120,13 +120,13 @@ def test_the_normal_bounds_the_distance_after_any_step(
     steps = np.random.default_rng(seed).normal(size=(50, 3))
     for part in prism(corners, height_m, endless=endless).parts:
         for place in places:
-            away = part.away([Fraction(c) for c in place])
-            n = np.array([float(c) for c in away.vector])
-            here = float(part.signed_m(np.array([place]))[0])
-            assert here * np.linalg.norm(n) == pytest.approx(float(away.beyond), abs=1e-9)
-            if np.linalg.norm(n) > 1e-6:
-                after = part.signed_m(np.array(place) + steps)
-                assert (after >= here + steps @ n / np.linalg.norm(n) - 1e-9).all()
+            for away in part.away([Fraction(c) for c in place]):
+                n = np.array([float(c) for c in away.vector])
+                here = float(part.signed_m(np.array([place]))[0])
+                assert here * np.linalg.norm(n) == pytest.approx(float(away.beyond), abs=1e-9)
+                if np.linalg.norm(n) > 1e-6:
+                    after = part.signed_m(np.array(place) + steps)
+                    assert (after >= here + steps @ n / np.linalg.norm(n) - 1e-9).all()
 
 
 @given(corners=polygons(), at=st.sampled_from([[], [0.0, 0.0, 0.0], [1.5, -0.7, 0.0]]), turn=st.floats(-4.0, 4.0))
