@@ -83,7 +83,10 @@ RUNS: dict[str, Callable[[], Trace]] = {
     "near from the start": near_from_the_start,
     "a step nearer": lambda: nearer(0.01),
     "sensed too late": lambda: with_scenario(
-        persons.run("on the goal"), control__sensing_range_m=0.82, safe_distance__air_ground_m=0.3
+        persons.run("on the goal"),
+        control__sensing_range_m=0.82,
+        safe_distance__air_ground_m=0.3,
+        uav__max_speed_m_s=1.0,
     ),
     "a faster person was to be expected": lambda: with_scenario(
         persons.run("on the goal"), obstacles__person__max_speed_m_s=2.4
