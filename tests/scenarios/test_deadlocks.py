@@ -28,9 +28,9 @@ POST_M = 0.25
 
 
 def points_of(scenario: Scenario) -> Array:
-    """Points, (m, 2), m, along the edges of all obstacles and walls."""
+    """Points, (m, 2), m, along the edges of all walls and obstacles at rest."""
     found = list[Array]()
-    for barrier in scenario.barriers.values():
+    for barrier in (each for each in scenario.barriers.values() if not each.moves):
         for part in convex_parts(barrier) or [[(barrier.position_m[0], barrier.position_m[1])]]:
             corners = np.array(part)
             for begin, end in zip(corners, np.roll(corners, -1, axis=0), strict=True):
