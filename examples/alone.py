@@ -5,6 +5,7 @@ from airground_drake import Motion, Proposal
 from airground_drake.gatekeeper.outcome import Outlook
 from airground_drake.gatekeeper.outcome_gatekeeper import OutcomeGatekeepers
 from airground_drake.gatekeeper.patience import Patience
+from airground_drake.geometry.outline import balls
 from airground_drake.nsbc.avoidance import Avoidance
 from airground_drake.nsbc.law import UgvLaw
 from airground_drake.systems import Gatekeeper, UgvController
@@ -12,8 +13,8 @@ from airground_drake.world.plant import FirstOrder
 from airground_drake.world.world import Body, World
 
 robot = Body("robot", "ugv", np.zeros(3), plant=FirstOrder(), max_speed_m_s=2.0)
-rock = Body("rock", "obstacle", np.array([5.0, 0.0, 0.0]))
-world = World((robot, rock), {frozenset(("ugv", "obstacle")): 2.0})
+rock = Body("rock", "obstacle", np.array([5.0, 0.0, 0.0]), balls(np.zeros(3), gap=2.0))  # 2 m are kept from it
+world = World((robot, rock), {})
 law = UgvLaw(Avoidance(5.0, 0.05, sensing_range=4.0), motion_gain=1.0, intervention_gain=1.5, intervention_on_top=False)
 
 controller = UgvController(world, law)

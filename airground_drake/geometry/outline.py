@@ -71,7 +71,7 @@ def prisms(corners: Array, *, base: float = 0.0, top: float = 0.0, radius: float
     found[:, MIDDLE:EXTENT] = middle
     apart = corners - middle[:, None]
     found[:, EXTENT] = np.hypot(apart[..., 0], apart[..., 1]).max(axis=1) * (1.0 + 1e-15)
-    found[:, CORNERS:] = corners.reshape(number, -1)
+    found[:, CORNERS:] = corners.reshape(number, 2 * corners.shape[1])
     return found
 
 

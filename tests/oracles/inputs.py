@@ -77,7 +77,8 @@ def _told(trace: Trace, ugv: str, t: float, mapped: Array, known: Cores) -> list
     here, cores = interpolate(trace.t, trace.position(ugv), t), Cores.of(mapped)
     far = away_from(cores, here, planar=True).distance
     new = (far > trace.scenario.control.sensing_range_m) & ~are_same(cores, known).any(axis=1)
-    rows = np.flatnonzero(new & [_is_outline(*each) for each in zip(mapped, cores.corners, strict=True)])
+    sound = np.array([_is_outline(*each) for each in zip(mapped, cores.corners, strict=True)], dtype=np.bool_)
+    rows = np.flatnonzero(new & sound)
     return sorted(rows[np.argsort(far[rows], kind="stable")[:MOST_CLAIMED]].tolist())
 
 

@@ -91,7 +91,7 @@ def news(trace: Trace, ugv: str, mapped: Array, begin_s: float, end_s: float) ->
 def are_same(one: Cores, other: Cores) -> npt.NDArray[np.bool_]:
     """Which cores (m,) are which others (k,), up to `SAME_M`: (m, k)."""
     both = Cores.joined([one, other])
-    numbers = np.column_stack([both.corners.reshape(len(both.base), -1), both.base, both.top])
+    numbers = np.column_stack([both.corners.reshape(len(both.base), 2 * both.corners.shape[1]), both.base, both.top])
     m = len(one.base)
     return np.asarray((np.abs(numbers[:m, None] - numbers[m:]) <= SAME_M).all(axis=2))
 
@@ -104,6 +104,7 @@ def first_sensed(trace: Trace, ugv: str) -> Array:
     parts = still_parts(trace)
     near = within(parts.cores, was, trace.scenario.control.sensing_range_m, planar=True)
     found = np.full(len(parts.owner), np.inf)
-    there = np.array([are_there(trace, t) for t in samples]).reshape(len(samples), -1)[near.place, near.core]
+    then = np.array([are_there(trace, t) for t in samples]).reshape(len(samples), len(found))
+    there = then[near.place, near.core]
     np.minimum.at(found, near.core[there], samples[near.place[there]])
     return found
