@@ -119,7 +119,7 @@ class Run:
         return rows[(rows >= there.start) & (rows < there.stop)]
 
     def _row_at(self, time_s: float) -> int:
-        """Row of the first control sample at or after a time, s; the number of rows if there is none."""
+        """Row of the first control sample at or after a time, s; after the last sample, the number of rows."""
         later = self.sample_row[self.sample_s >= time_s - SMALL]
         return int(later[0]) if len(later) else len(self.t_s)
 

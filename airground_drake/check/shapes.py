@@ -33,7 +33,7 @@ THIRDS = 64
 
 
 TIE_M = 1e-12
-"""Faces of which one is the nearest within this are equally near: rounding decides which one a robot takes."""
+"""Faces whose distances differ by less than this count as equally near: a robot takes one of them by rounding."""
 
 
 class Away(NamedTuple):

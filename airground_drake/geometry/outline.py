@@ -113,7 +113,7 @@ def unpacked(numbers: Iterable[float]) -> Array:
 
 
 def same(one: Array, other: Array) -> npt.NDArray[np.bool_]:
-    """Which outlines (m, W) have the cores of others (k, V), to within `SAME_M`: (m, k)."""
+    """Whether each outline of one array, (m, W), has the same core as each of another, (k, V): (m, k)."""
     if not (len(one) and len(other)):
         return np.zeros((len(one), len(other)), dtype=bool)
     both = joined(one, other)[:, BASE:]
@@ -179,7 +179,7 @@ def moved(rows: Array, by: Array) -> Array:
 
 
 def where(there: npt.NDArray[np.bool_], rows: Array) -> Array:
-    """Outlines (m, W) of which those that are not there, (m,), are points at NOWHERE_M."""
+    """Outlines (m, W), with a point at NOWHERE_M in place of each that is not there; `there` is (m,)."""
     nowhere = np.zeros(rows.shape[1])
     nowhere[: CORNERS + 2] = balls(np.full(3, NOWHERE_M))[0]
     return np.where(there[:, None], rows, nowhere)

@@ -207,7 +207,7 @@ class _Obstacles:
         )
 
     def lack(self, point: complex) -> str | None:
-        """Words for an obstacle that a point is too near to by more than TOL; None if there is none."""
+        """Words for the first obstacle that a point is nearer to than allowed, by more than TOL; or None."""
         inside = abs(self.c - point) < self.r - TOL
         if inside.any():
             return f"the disc at {_show(self.c[inside][0])}, radius {self.r[inside][0]}"

@@ -1,1 +1,1 @@
-"""Maps of others: images of cells, Gazebo worlds, grids of MovingAI; occupied cells as few rectangles. No Drake."""
+"""Reads ROS maps, Gazebo worlds and MovingAI's maps, and covers occupied cells with few rectangles. No Drake."""

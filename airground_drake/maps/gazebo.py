@@ -52,7 +52,7 @@ class Solid(NamedTuple):
 
 
 class Gazebo(NamedTuple):
-    """The solids of a world, and in words what is not among them."""
+    """The solids of a world, and a sentence for each thing in it that was left out."""
 
     solids: list[Solid]
     left_out: list[str]

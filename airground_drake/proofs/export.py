@@ -291,7 +291,7 @@ def distances_file(run: Recorded, *, vectors: bool = True) -> str:
 
 
 def lawful(demands: Iterable[Demand]) -> list[Demand]:
-    """The pairs that LawChecker.v can judge: two balls, neither of which is an obstacle that may move."""
+    """The pairs that LawChecker.v can judge: two balls that do not move by themselves."""
     return [demand for demand in demands if not demand.core and not demand.passive]
 
 

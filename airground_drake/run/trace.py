@@ -195,7 +195,7 @@ class Trace:
         return min(self._row_of(obstacle.disappears_s or np.inf), len(self.t) - 1) if obstacle else len(self.t) - 1
 
     def _row_of(self, t_s: float) -> int:
-        """Row of the first control sample at or after a time, s; the number of rows if there is none."""
+        """Row of the first control sample at or after a time, s; after the last sample, the number of rows."""
         period = self.scenario.control.period_s
         if not np.isfinite(t_s):
             return len(self.t)

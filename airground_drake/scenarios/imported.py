@@ -1,4 +1,4 @@
-"""Scenarios made of the files of others: BARN's Gazebo worlds, maps of ROS, benchmarks of MovingAI."""
+"""Scenarios made from BARN's Gazebo worlds, ROS maps and MovingAI's benchmarks."""
 
 from __future__ import annotations
 

@@ -36,21 +36,11 @@ class Plant(Protocol):
         """Largest distance from the straight line of the commanded velocity in a period, m."""
 
 
-@dataclass(frozen=True, eq=False)
-class Scripted:
-    """A motion that is given: nobody commands it.
-
-    Attributes:
-        script: where it is, straight between its vertices, which are at control samples.
-        announced: whether the robots' predictions know that.
-    """
-
-    kind: ClassVar[str] = "scripted"
-    script: Motion
-    announced: bool = False
+class _Straight:
+    """A body that moves on a straight line in each period."""
 
     def step(self, position: Array, velocity: Array, period_s: Array | float) -> Array:
-        """As fast as it is told by its script."""
+        """Exact."""
         return position + np.asarray(period_s)[..., None] * velocity
 
     def motion(self, start: Array, end: Array, period_s: Array | float) -> PeriodMotion:
@@ -63,19 +53,21 @@ class Scripted:
 
 
 @dataclass(frozen=True)
-class FirstOrder:
-    """p_dot = v: it moves as it is told, on a straight line."""
+class FirstOrder(_Straight):
+    """p_dot = v: it moves as it is told."""
 
     kind: ClassVar[str] = "first_order"
 
-    def step(self, position: Array, velocity: Array, period_s: Array | float) -> Array:
-        """Exact."""
-        return position + np.asarray(period_s)[..., None] * velocity
 
-    def motion(self, start: Array, end: Array, period_s: Array | float) -> PeriodMotion:
-        """Exact."""
-        return PeriodMotion(start, end)
+@dataclass(frozen=True, eq=False)
+class Scripted(_Straight):
+    """A motion that is given: nobody commands it.
 
-    def reach(self, speed_m_s: float, period_s: float) -> float:
-        """0."""
-        return 0.0
+    Attributes:
+        script: where it is, straight between its vertices, which are at control samples.
+        announced: whether the robots' predictions know that.
+    """
+
+    kind: ClassVar[str] = "scripted"
+    script: Motion
+    announced: bool = False

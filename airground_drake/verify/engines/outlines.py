@@ -223,7 +223,7 @@ def _least(cores: Cores, start: Array, end: Array, shares: Array, planar: bool) 
     many = Cores(cores.corners[..., None, :, :], cores.base[..., None], cores.top[..., None])
     distance = away_from(many, place, planar=planar).distance
     k = distance.argmin(axis=-1)[..., None]
-    return tuple(np.take_along_axis(each, k, axis=-1)[..., 0] for each in (distance, shares))  # type: ignore[return-value]
+    return np.take_along_axis(distance, k, axis=-1)[..., 0], np.take_along_axis(shares, k, axis=-1)[..., 0]
 
 
 @np.errstate(divide="ignore", invalid="ignore")
