@@ -116,8 +116,8 @@ class Evaluation:
 def predicted_problem(seen: View, law: UgvLaw, proposal: Proposal, horizon: Horizon) -> Problem:
     """(26) for one UGV: roll out both choices and keep what it senses and might come near.
 
-    (26) knows points. Of an obstacle that is no point these are, at each stage, its core's nearest to the refused
-    roll-out; there is no guarantee that an accepted one keeps its distance from the others.
+    (26) knows points. Of a core that is no point these are, at each stage, its nearest to the refused roll-out; there
+    is no guarantee that an accepted one keeps its distance from the others.
     """
     seen = seen.restrict(seen.apart() <= law.avoidance.sensing_range)
     dt, stages = horizon.substeps * law.avoidance.period, np.ones(horizon.stages, dtype=np.int64)
@@ -129,12 +129,17 @@ def predicted_problem(seen: View, law: UgvLaw, proposal: Proposal, horizon: Hori
     # a plan that switches may be faster than both constant ones, but for a retreat not above the speed limit
     reach = dt * np.cumsum(np.sqrt(np.maximum(squared, seen.max_speed**2)))
     moving = places[horizon.substeps :: horizon.substeps]
-    centres = np.concatenate([convex.nearest_points(seen.still, standing), moving], axis=1)
-    away, height = np.linalg.norm(moving - seen.position, axis=2), np.abs(moving[:, :, 2] - seen.position[2])
-    m, z = len(seen.still), seen.position[2]
-    above = np.maximum(np.maximum(seen.still[:, outline.BASE] - z, z - seen.still[:, outline.TOP]), 0.0)
-    away = np.column_stack([np.tile(seen.apart()[:m], (len(moving), 1)), away]) - seen.distances - reach[:, None]
-    height = np.column_stack([np.tile(above, (len(moving), 1)), height]) - seen.distances
+    own = standing[:, None] - moving
+    offsets = [convex.nearest_points(row[None], own[:, j]) for j, row in enumerate(seen.parts)]
+    points = moving + np.concatenate(offsets, axis=1) if offsets else moving
+    centres = np.concatenate([convex.nearest_points(seen.still, standing), points], axis=1)
+    extent = np.hypot(*seen.parts[:, outline.MIDDLE : outline.EXTENT].T) + seen.parts[:, outline.EXTENT]
+    away = np.linalg.norm(moving - seen.position, axis=2) - extent
+    fixed = np.tile(seen.apart()[: len(seen.still)], (len(moving), 1))
+    away = np.column_stack([fixed, away]) - seen.distances - reach[:, None]
+    rise = np.column_stack([np.zeros((len(moving), len(seen.still))), moving[:, :, 2]]) - seen.position[2]
+    base, top = (np.append(seen.still[:, k], seen.parts[:, k]) for k in (outline.BASE, outline.TOP))
+    height = np.maximum(np.maximum(rise + base, -rise - top), 0.0) - seen.distances
     near = ~((away >= 0.0) | (height >= 0.0)).all(axis=0)  # NaN counts as near, so that the problem is refused
     return Problem(
         dt=dt,

@@ -148,15 +148,20 @@ def _beside(trace: Trace, row: DecisionRecord, after: Array) -> Iterator[_Beside
     refused = row.constant[0]
     for k in there.parts.tolist():
         core, name = parts.cores.take(slice(k, k + 1)), parts.names[parts.owner[k]]
-        away = away_from(core, refused, planar=True)
-        at = np.broadcast_to(core.points, refused.shape)
-        if not core.are_points:
-            at = refused - away.distance[:, None] * away.normal
-        yield _Beside(name, at, pairs[name].safe_m, core)
+        yield _Beside(name, _nearest(core, refused), pairs[name].safe_m, core)
     for pair, places in zip(there.robots, there.places, strict=True):
         yield _Beside(pair.second if pair.first == row.robot else pair.first, places, pair.safe_m, Cores.at(places))
-    for pair, _, places in movers(trace, row.robot, row.t_s, after):
-        yield _Beside(pair.second, places, pair.safe_m, Cores.at(places))
+    for pair, core, places in movers(trace, row.robot, row.t_s, after):
+        moved = Cores(core.corners + places[:, None, :2], core.base + places[:, 2], core.top + places[:, 2])
+        yield _Beside(pair.second, _nearest(moved, refused), pair.safe_m, moved)
+
+
+def _nearest(cores: Cores, way: Array) -> Array:
+    """The point of a core, or of one core for each place, that is nearest to each place of a way (N, 3), m: (N, 3)."""
+    if cores.are_points:
+        return np.broadcast_to(cores.points, way.shape)
+    away = away_from(cores, way, planar=True)
+    return way - away.distance[:, None] * away.normal
 
 
 def compare_answers(trace: Trace, rows: Sequence[DecisionRecord]) -> Iterator[Deviation]:
