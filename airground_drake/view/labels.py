@@ -10,10 +10,14 @@ import textalloc
 from matplotlib.axes import Axes
 
 from airground_drake.base.arrays import Array
-from airground_drake.view.canvas import INK, MUTED, thin
+from airground_drake.view.canvas import INK, MUTED, size_in, thin
 
 MAX_LINE_POINTS = 80
 """Number of points of a line that labels avoid."""
+CANDIDATES, FARTHEST = 1200, 0.3
+"""Places that are tried for a label, and their greatest distance from its point, as a share of the axes."""
+MARK_PT = 4.0
+"""Half the size of the marks that labels leave free, points."""
 _BOX = {"facecolor": "white", "edgecolor": "none", "alpha": 0.7, "pad": 0.5}
 
 
@@ -40,11 +44,14 @@ def place(axes: Axes, labels: Sequence[Label], lines: Sequence[Array]) -> None:
     if not labels:
         return
     at = np.array([label.at[:2] for label in labels])
+    figure, (width_in, _) = axes.get_figure(root=True), size_in(axes)
+    mark = MARK_PT * (figure.dpi if figure else 72.0) / 72.0
     kept = [line[thin(line, MAX_LINE_POINTS), :2] for line in lines]
     textalloc.allocate(
         axes, at[:, 0], at[:, 1], [label.text for label in labels], x_scatter=at[:, 0], y_scatter=at[:, 1],
         x_lines=[line[:, 0] for line in kept], y_lines=[line[:, 1] for line in kept],
+        scatter_sizes=[np.array(mark)] * len(at),
+        min_distance=1.5 * MARK_PT / (72.0 * width_in), max_distance=FARTHEST, nbr_candidates=CANDIDATES,
         textsize=[label.size_pt for label in labels], textcolor=[label.color for label in labels],
-        fontweight=[label.weight for label in labels], linecolor=MUTED, linewidth=0.6, max_distance=0.15,
-        zorder=5, bbox=_BOX,
+        fontweight=[label.weight for label in labels], linecolor=MUTED, linewidth=0.6, zorder=5, bbox=_BOX,
     )  # fmt: skip

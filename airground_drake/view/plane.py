@@ -91,7 +91,7 @@ def draw_barriers(axes: Axes, scenario: Scenario, *, moving: bool = True) -> tup
 
     Returns:
         Labels, the names of the barriers, unless they are many, and of phantoms; and lines (K, 2), m, that labels
-        should avoid: the edges of walls, unless they are many.
+        should avoid: the arena, and the edges of walls, unless they are many.
     """
     _draw_arena(axes, arena_of(scenario))
     every = [each for each in barriers_of(scenario) if moving or not len(each.way_m)]
@@ -114,8 +114,9 @@ def draw_barriers(axes: Axes, scenario: Scenario, *, moving: bool = True) -> tup
     for at in scenario.uav.phantoms_m:
         axes.plot(*at[:2], marker="x", markersize=6, color=MUTED, zorder=3)
         labels.append(Label(np.array(at), "(only on the UAV's map)", size_pt=7.5))
-    edges = [np.concatenate([part, part[:1]]) for each in walls for part in each.body]
-    return labels, edges if len(edges) <= MANY else []
+    edges = [part for each in walls for part in each.body]
+    rings = [*arena_of(scenario), *(edges if len(edges) <= MANY else [])]
+    return labels, [np.concatenate([ring, ring[:1]]) for ring in rings]
 
 
 class _Look(NamedTuple):
@@ -169,12 +170,10 @@ def _draw_arena(axes: Axes, rings: Sequence[Array]) -> None:
 
 
 def _name_of(barrier: Barrier) -> Label:
-    """The name; of a ball, whose mark is small, also whether the UAV knows it."""
+    """Its name, and when it is there."""
     since = f", from {barrier.appears_s:g} s" if barrier.appears_s else ""
     since += f", until {barrier.disappears_s:g} s" if np.isfinite(barrier.disappears_s) else ""
-    since += ", moves" if len(barrier.way_m) else ""
-    hint = "" if barrier.known_to_uav or not barrier.is_round else "\n(unseen by the UAV)"
-    return Label(barrier.place_m, f"{short(barrier.name, 12)}{since}{hint}", size_pt=7.5)
+    return Label(barrier.place_m, f"{short(barrier.name, 12)}{since}", size_pt=7.5)
 
 
 def draw_robot(

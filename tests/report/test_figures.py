@@ -140,7 +140,7 @@ def test_a_shortfall_says_from_whom(scenario: Scenario, traces: dict[str, Trace]
     one = {"printed": replace(traces["a_printed"], meta={**traces["a_printed"].meta, "run": "printed"})}
     _, distances, *_ = draw.draw(replace(scenario, runs={"printed": Run("a")}), one)
     assert distances.caption.startswith("Too close: ugv1 is 1.")
-    assert "required 2 m" in distances.panels[0].svg
+    assert "not 2 m" in distances.panels[0].svg
     assert canvas.ALARM in distances.panels[0].svg
 
 

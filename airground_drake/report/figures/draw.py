@@ -30,8 +30,8 @@ MAX_RUNS, MAX_UGVS, MAX_TEAM = 6, 4, 6
 """Maximum numbers of runs, of UGVs in the figure of distances, and of UGVs by name. Larger teams get histograms."""
 ALIKE_M = 1e-9
 """Paths that differ by no more than this are identical but for rounding."""
-FARTHEST = 5.0
-"""Distances are drawn up to this multiple of the largest required one."""
+FARTHEST, NEAR = 5.0, 3.0
+"""Distances are drawn up to this multiple of the largest required one, of bodies that came nearer than that one."""
 LISTED = 3
 """Number of events that a caption lists for each run."""
 
@@ -104,11 +104,12 @@ def _select(scenario: Scenario, traces: Mapping[str, Trace]) -> _Selection:
         groups.append([name]) if known is None else known.append(name)
     first = next(iter(runs.values()))
 
-    def rank(ugv: str) -> tuple[bool, bool, int]:
+    def rank(ugv: str) -> tuple[bool, bool, bool, int]:
         near = [close_by(trace, ugv)[:1] for trace in runs.values()]
         kept = all(found.value >= found.required_m - SLACK_M for each in near for found in each)
+        arrived = all(MEASURES["arrives"](trace, ugv)[0] for trace in runs.values())
         called = any(events_of(trace, ugv, "trigger") for trace in runs.values())
-        return kept, not called, first.ugvs.index(ugv)
+        return kept, arrived, not called, first.ugvs.index(ugv)
 
     ranked = sorted(first.ugvs, key=rank)
     few = MAX_TEAM if len(ranked) <= MAX_TEAM else MAX_UGVS
@@ -176,10 +177,11 @@ def _trajectories(chosen: _Selection) -> Figure:
 
 def _distances(chosen: _Selection) -> Figure | None:
     near = {(heading, ugv): close_by(trace, ugv) for heading, trace in chosen.shown.items() for ugv in chosen.ugvs}
-    required = [found.required_m for each in near.values() for found in each]
-    if not required:
+    most = max((found.required_m for each in near.values() for found in each), default=None)
+    if most is None:
         return None
-    top = FARTHEST * max(required)
+    near = {key: [at for at in each if at is each[0] or at.value < NEAR * most] for key, each in near.items()}
+    top = FARTHEST * most
     world = [*chosen.first.scenario.barriers, *chosen.first.robots]
     met = {ugv: {at.other for (_, each), those in near.items() if each == ugv for at in those} for ugv in chosen.ugvs}
     looks = {ugv: {other: k for k, other in enumerate(filter(met[ugv].__contains__, world))} for ugv in chosen.ugvs}
@@ -295,15 +297,15 @@ def _ends(chosen: _Selection) -> str:
     """The end of each run: collisions, UGVs that stand still, arrivals."""
     told: dict[str, list[str]] = {}
     for heading, trace in chosen.shown.items():
-        hits = first_collisions(trace.events)
+        hits, named_first = first_collisions(trace.events), sorted(trace.ugvs, key=lambda ugv: ugv not in chosen.team)
         words = [
             f"{ugv} collides at {hits[ugv]['t_s']:.2f} s (dashed from there: it does not count)"
-            for ugv in trace.ugvs
+            for ugv in named_first
             if ugv in hits
         ]
         words += [
             f"{ugv} stands still at ({at[0]:.2f}, {at[1]:.2f}) m"
-            for ugv in trace.ugvs
+            for ugv in named_first
             if (at := MEASURES["stall_position"](trace, ugv))
         ]
         if len(words) > LISTED:

@@ -94,8 +94,8 @@ def distances(
             color=ALARM if below else INK, zorder=5, clip_on=False,
         )  # fmt: skip
         value = metres(least.value, least.required_m)
-        note = f"{short(ugv)}: minimum {value} to {short(least.other, 14)}, {least.t_s:.2f} s"
-        note += f", required {least.required_m:g} m" if below else ""
+        value = f"{value}, not {least.required_m:g} m," if below else value
+        note = f"{short(ugv, 14)}: {value} from {short(least.other, 14)} at {least.t_s:.2f} s"
         axes.set_title(note, color=ALARM if below else INK)
     return figure
 
