@@ -24,10 +24,10 @@ from airground_drake.gatekeeper.rollout import View
 from airground_drake.geometry.outline import GAP, unpacked
 from airground_drake.proofs.export import recorded
 from airground_drake.proofs.too_near import too_near
-from airground_drake.report import attention, summary
+from airground_drake.report import attention, document, summary
 from airground_drake.report.figures.draw import draw
 from airground_drake.report.metrics import closest_obstacle, gap_m, of_run
-from airground_drake.report.outcomes import Near, RunOutcome
+from airground_drake.report.outcomes import courses
 from airground_drake.report.page import page
 from airground_drake.report.phrases import intrusion
 from airground_drake.run.simulation import simulate
@@ -240,7 +240,8 @@ def test_the_page_says_that_it_appeared_there() -> None:
     trace = simulate(sudden(4.2), "d")
     metrics = of_run(trace)["min_distance_m"]["ugv1"]["rock"]
     assert metrics["appeared"] is True
-    course = RunOutcome("d", "d", plain=True, near=[Near(-1.2, "ugv1", "rock", 0.8, 2.0, 4.2, appeared=True)])
+    built = document.build(trace.scenario, {"d": trace}, judge(trace), {"package": "", "seed": 1, "started": ""})
+    (course,) = (course for course in courses(built) if course.name == "d")
     assert intrusion(course) == "rock appears 0.800 m from ugv1 (nobody's doing)"
     gap = gap_m(trace, "ugv1", "rock")
     np.testing.assert_array_equal(np.isnan(gap), np.arange(len(gap)) < trace.there_from("rock"))

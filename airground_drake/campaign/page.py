@@ -14,8 +14,8 @@ from matplotlib.figure import Figure
 
 from airground_drake.base.arrays import Array
 from airground_drake.campaign.rows import JUDGED
-from airground_drake.report.html import LOOKS, number
-from airground_drake.report.phrases import MARKS, MEANINGS, Line
+from airground_drake.report.html import number
+from airground_drake.report.sentences import MARKS, Line
 from airground_drake.report.templating import environment_of
 from airground_drake.view import canvas, svg
 
@@ -155,5 +155,5 @@ def _histogram(values: Array, title: str, label: str, mark: float | None) -> tup
 def _environment() -> Environment:
     environment = environment_of("airground_drake.campaign", "airground_drake.report")
     environment.filters["num"] = number
-    environment.globals.update(marks=MARKS, kinds=LOOKS, names=MEANINGS, most_told=MOST_TOLD)
+    environment.globals.update(marks=MARKS, most_told=MOST_TOLD)
     return environment

@@ -12,7 +12,7 @@ from airground_drake.base import files
 from airground_drake.base.errors import FolderError, ReportError, TraceError
 from airground_drake.base.usage import Parser
 from airground_drake.report import compare, folder, summary
-from airground_drake.report.phrases import Line
+from airground_drake.report.sentences import Line
 
 PAGE = "index.html"
 MARK = "airground_drake index"

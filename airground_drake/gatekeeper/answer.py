@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 from airground_drake.gatekeeper.budget import Budget
 from airground_drake.gatekeeper.outcome import USELESS, Outcome
 from airground_drake.gatekeeper.problem import Problem
+from airground_drake.gatekeeper.reasons import WORDS, Reason
 from airground_drake.gatekeeper.solution import Solution
 from airground_drake.intervention.messages import ACCEPT, SILENT
 from airground_drake.intervention.policy import Proposal
@@ -42,31 +43,6 @@ class Rules:
             yield replace(self.budget, deadline_s=begin + self.allowance_s * (i + 1) / count)
 
 
-Reason = Literal[
-    "cheaper", "not_cheaper", "waits", "no_difference", "kept", "dwell", "reversed", "no_plan",
-    "first_stage",
-    "stalls", "makes_way", "exhausted", "over",
-]  # fmt: skip
-"""Reasons of answers: see `settle` for method (c), `outcome_gatekeeper` for method (d)."""
-
-WORDS: dict[Reason, str] = {
-    "cheaper": "the proposal leads to a better outcome than the UGV's own task",
-    "not_cheaper": "the UGV's own task leads to as good an outcome or a better one",
-    "waits": "the best plan refuses now and accepts later",
-    "no_difference": "the proposal would change nothing",
-    "kept": "as answered before",
-    "dwell": "as answered before: it is too early for another answer",
-    "reversed": "the best plan begins with the other answer, and is cheaper than this one throughout",
-    "first_stage": "the plan begins with this answer",
-    "no_plan": "no outcome could be computed",
-    "stalls": "with the proposal the UGV would come to rest short of its goal, no nearer than without",
-    "makes_way": "the UGV makes way for another one and still reaches its goal",
-    "exhausted": "the UGV has used all of its tries and has not rested since",
-    "over": "the time for which the proposal was accepted is over",
-}
-"""The reasons in words."""
-
-
 class Basis(NamedTuple):
     """What a prediction rested on; empty where nothing was predicted. Obstacles are indices in the order of the world.
 
@@ -96,7 +72,7 @@ class GatekeeperDecision:
         robot: index of the UGV.
         proposal: the proposal.
         accepted: the answer.
-        reason: see `WORDS`.
+        reason: see `reasons.WORDS`.
         problem: (26) as predicted.
         solution: the route's.
         throughout: costs (25) of accepting and of refusing throughout; -1 without a plan.
@@ -124,7 +100,7 @@ class GatekeeperDecision:
 
 def in_words(decision: GatekeeperDecision) -> str:
     """The reason as a sentence for the UAV."""
-    words = WORDS[decision.reason]
+    words = WORDS[decision.reason].sentence
     if decision.reason == "waits" and decision.solution is not None:
         accept, refuse = decision.throughout
         words += f": cost {decision.solution.objective:.4g}, {accept:.4g} to accept throughout, {refuse:.4g} to refuse"

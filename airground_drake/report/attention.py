@@ -7,17 +7,10 @@ from typing import Any, NamedTuple
 
 from airground_drake.base.errors import one_line
 from airground_drake.base.statuses import UNDECIDED, outcome
+from airground_drake.gatekeeper.reasons import refusal
 from airground_drake.report.outcomes import no_way
-from airground_drake.report.phrases import (
-    MAX_NAMES,
-    bodies_of,
-    counted,
-    found_no_way,
-    grouped,
-    in_words,
-    place_of,
-    refusal,
-)
+from airground_drake.report.phrases import bodies_of, found_no_way, in_words, place_of
+from airground_drake.report.sentences import MAX_NAMES, counted, grouped
 from airground_drake.scenarios.validate import preset_s
 
 MAX_FAULT_CHARS = 300
@@ -132,6 +125,7 @@ def _of_faults(runs: Mapping[str, Mapping[str, Any]]) -> Iterator[Item]:
 
 def faults_together(faults: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
     """The faults of a run, equal ones once: policy, what it said (cut), how often, robots, first and last time."""
+    kinds = grouped(((str(fault["policy"]), str(fault["what"])), fault) for fault in faults)
     return [
         {
             "policy": one_line(policy),
@@ -141,7 +135,5 @@ def faults_together(faults: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]
             "first_s": alike[0]["t_s"],
             "last_s": alike[-1]["t_s"],
         }
-        for (policy, what), alike in grouped(
-            ((str(fault["policy"]), str(fault["what"])), fault) for fault in faults
-        ).items()
+        for (policy, what), alike in kinds.items()
     ]

@@ -16,7 +16,7 @@ from airground_drake.base.files import sha256
 from airground_drake.base.statuses import COUNTS, NOT_EXERCISED, STATUSES, UNDECIDED, outcome
 from airground_drake.registry import method_of
 from airground_drake.report import metrics, reproduction
-from airground_drake.report.phrases import counted
+from airground_drake.report.sentences import counted
 from airground_drake.run.trace import Trace
 from airground_drake.scenarios.plugins import OPTION
 from airground_drake.scenarios.schema import Scenario

@@ -18,14 +18,14 @@ from jinja2 import Environment
 from markupsafe import Markup
 
 from airground_drake.base.statuses import PASSING, outcome
-from airground_drake.gatekeeper.answer import WORDS
-from airground_drake.report import attention, evidence, phrases, summary
+from airground_drake.gatekeeper.reasons import WORDS
+from airground_drake.report import attention, evidence, summary
 from airground_drake.report.figures.panels import Figure, Table
 from airground_drake.report.mathml import mathml
 from airground_drake.report.outcomes import pairs
-from airground_drake.report.phrases import grouped
 from airground_drake.report.proved import place
 from airground_drake.report.reproduction import YES_NO
+from airground_drake.report.sentences import MARKS, grouped
 from airground_drake.report.templating import environment_of
 from airground_drake.view import svg
 from airground_drake.view.canvas import DARK
@@ -59,8 +59,6 @@ SECTIONS = {
 """Sections of the page, in order, by their identifiers; an empty section is left out."""
 PLACES = {"distances": "safe", **dict.fromkeys(("decision", "events", "threshold-choice"), "intervened")}
 """Sections of the figures; the others are maps of what happened."""
-LOOKS = {"yes": "good", "partly": "tuned", "no": "bad", "open": "open", "none": "idle"}
-"""Class of each mark of the first screen, which sets its colour: never by colour alone."""
 
 CHIPS = {
     "as_expected": ("✓", "as declared", "good"),
@@ -142,9 +140,8 @@ def environment() -> Environment:
         evidence=evidence_tables, proof=place, records=partial(evidence.tables, number=number), brief=brief,
     )  # fmt: skip
     environment.globals.update(
-        chips=CHIPS, shown=_shown, reasons=WORDS, max_faults=MAX_FAULTS,
-        max_interventions=MAX_INTERVENTIONS,
-        marks=phrases.MARKS, kinds=LOOKS, names=phrases.MEANINGS,
+        chips=CHIPS, shown=_shown, reasons=WORDS, max_faults=MAX_FAULTS, max_interventions=MAX_INTERVENTIONS,
+        marks=MARKS,
         policy=Markup(security_policy(style, script)), style=Markup(style), script=Markup(script),
     )  # fmt: skip
     return environment

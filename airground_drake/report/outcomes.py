@@ -1,9 +1,9 @@
-"""What came of the runs of a report, from report.json alone: facts, which `answers` and `summary` put into words."""
+"""What came of the runs of a report, from report.json alone: facts, which the first screen puts into words."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import fields
 from math import dist
 from typing import Any, Literal, NamedTuple
 
@@ -19,6 +19,15 @@ THEOREMS, CONDITIONS = ("SAFE-INV", "SAFE-GATE"), "SAFE-HYP"
 DECLARED = "declared speed"
 """The hypothesis of SAFE-HYP that is about obstacles that move alone."""
 
+UNJUDGED: Mapping[str, Any] = {
+    "status": "", "exercised": 0, "as_expected": None, "evidence": {}, "counterexample": None,
+}  # fmt: skip
+"""What is known of a claim that was not judged."""
+NOT_RUN: Mapping[str, Any] = {
+    "events": [], "faults": [],
+    "metrics": {"min_distance_m": {}, "min_robot_distance_m": {}, "on_the_way": {}, "without_proposals": []},
+}  # fmt: skip
+"""What is known of a run that was not run."""
 
 Document = Mapping[str, Any]
 
@@ -48,7 +57,8 @@ class Near(NamedTuple):
         """The distance, without the pair."""
         return distance(self.value_m, self.required_m)
 
-    def told(self) -> str:
+    @property
+    def pair(self) -> str:
         """The distance, of whom, and whether it was there from the start."""
         return f"{self} ({self.robot} to {self.other}{', at the start' * (self.t_s == 0.0)})"
 
@@ -71,57 +81,100 @@ class ProofOutcome(NamedTuple):
         return self.status in ("tested", "idle")
 
 
-@dataclass
 class RunOutcome:
-    """What came of a run.
+    """What came of a run that the scenario names.
 
     Attributes:
         name: of the run.
         method: its identifier.
         plain: whether priorities are composed as the package does it; False: by a recursion that is only compared.
+        movers: obstacles that may move.
+        walls: obstacles that are walls.
         near: pairs, those of least margin first.
         safe: whether every pair kept its distance; None: not known.
         why: why that is not known, or what SAFE-TRACE says if the distances alone do not decide.
         declared_unsafe: whether the scenario declares that the run is not safe, and it is not.
         tested: whether any pair came near enough to be kept apart.
-        proof: of its safety under method (d); None under other methods.
-        hits: robots that collided, and the event of the first collision of each. What they do later does not count.
-        arrived_s: robots that arrived, and when, s.
-        away: robots that did not arrive, and where they ended; None: not known.
-        stuck: robots among them that stand where the scenario declares a stall.
-        on_the_way: UGVs among them that did not collide, and how far they had come (`metrics.on_the_way`).
-        no_way: UGVs that the UAV was called for and found no way for.
-        there: how many UGVs arrived.
         encounters: obstacles that move and came too near to a robot, those of SAFE-OWN, by time.
         own_doing: whether a robot brought a distance below the required one itself; None: not known, or nothing moves.
         faster: obstacles that moved faster than declared, by name: their entries in SAFE-HYP.
         else_met: whether all other hypotheses of SAFE-HYP held, so that all other distances are proved.
-        movers: obstacles that may move.
-        walls: obstacles that are walls.
+        hits: robots that collided, and the event of the first collision of each. What they do later does not count.
+        arrived_s: robots that arrived, and when, s.
+        away: robots that did not arrive, and where they ended; None: not known.
+        there: how many UGVs arrived.
+        stuck: robots among those away that stand where the scenario declares a stall.
+        on_the_way: UGVs among them that did not collide, and how far they had come (`metrics.on_the_way`).
+        no_way: UGVs that the UAV was called for and found no way for.
+        proof: of its safety under method (d); None under other methods.
     """
 
-    name: str
-    method: str
-    plain: bool
-    near: list[Near] = field(default_factory=list)
-    safe: bool | None = None
-    why: str = "it was not run"
-    declared_unsafe: bool = False
-    tested: bool = False
-    proof: ProofOutcome | None = None
-    hits: dict[str, Mapping[str, Any]] = field(default_factory=dict)
-    arrived_s: dict[str, float] = field(default_factory=dict)
-    away: dict[str, Sequence[float]] | None = None
-    stuck: set[str] = field(default_factory=set)
-    on_the_way: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
-    no_way: list[str] = field(default_factory=list)
-    there: int = 0
-    encounters: list[Mapping[str, Any]] = field(default_factory=list)
-    own_doing: bool | None = None
-    faster: dict[str, Mapping[str, Any]] = field(default_factory=dict)
-    else_met: bool = False
-    movers: list[str] = field(default_factory=list)
-    walls: list[str] = field(default_factory=list)
+    def __init__(self, document: Document, name: str) -> None:
+        """The outcome of the run with this name."""
+        resolved, run = document["scenario"]["resolved"], document["runs"].get(name, NOT_RUN)
+        spec, obstacles = resolved["runs"][name], resolved.get("obstacles", {})
+        judged = [*claims(document, run=""), *([] if run is NOT_RUN else claims(document, run=name))]
+        found = {each["id"]: each for each in judged}
+        self.name, self.method, self.plain = name, str(spec["method"]), spec["composition"] == "augmented"
+        self.movers = [each for each, of in obstacles.items() if of.get("moves") or of.get("max_speed_m_s")]
+        self.walls = [each for each, of in obstacles.items() if of.get("segment_m")]
+
+        unique = {frozenset((pair.robot, pair.other)): pair for pair in reversed([*pairs(run)])}
+        self.near = sorted(unique.values())
+        self.hits = first_collisions(run["events"])
+        kept = found.get("SAFE-TRACE", UNJUDGED)
+        is_short = bool(self.hits) or any(near.is_short for near in self.near)
+        self.safe = False if is_short or kept["status"] == "refuted" else True if kept["status"] in PASSING else None
+        self.why = "" if is_short or self.safe else _why(kept["status"], is_run=run is not NOT_RUN)
+        self.declared_unsafe = kept["status"] == "refuted" and kept["as_expected"] is True
+        self.tested = kept["exercised"] != 0
+
+        own, conditions = found.get("SAFE-OWN", UNJUDGED), found.get(CONDITIONS, UNJUDGED)
+        is_judged = own["status"] in (*PASSING, "refuted")
+        self.own_doing = own["status"] == "refuted" if is_judged else None
+        self.encounters: list[Mapping[str, Any]] = []
+        if is_judged:
+            self.encounters = own["evidence"].get("came_too_near_themselves", [])
+        rows = conditions["evidence"].get("beside_moving", [])
+        self.faster = {each["second"]: each for each in rows if each["too_fast_s"] is not None}
+        against = conditions["counterexample"] or {}
+        only_speed = against.get("hypothesis") == DECLARED and not against.get("also_broken")
+        proved = any(claim["status"] == "proved" for claim in claims(document, THEOREMS[0]))
+        self.else_met = proved and (conditions["status"] in PASSING or only_speed)
+        self.proof = self._proof(found) if self.method == "d" else None
+
+        self.arrived_s = {event["robot"]: event["t_s"] for event in run["events"] if event["kind"] == "arrival"}
+        self.away = None if run is NOT_RUN else self._away(resolved, run["metrics"]["final_position_m"])
+        self.there = len(resolved["ugvs"].keys() - self.away.keys()) if self.away is not None else 0
+        ends = found.get("LIVE-GOAL", UNJUDGED)["evidence"].get("conditions", [])
+        stands = (each for each in ends if each.get("condition") == "stands" and each["margin_m"] >= 0.0)
+        self.stuck = {each["robot"] for each in stands} & (self.away or {}).keys()
+        self.on_the_way: Mapping[str, Mapping[str, Any]] = run["metrics"]["on_the_way"]
+        self.no_way = no_way(run)
+
+    def _proof(self, found: Mapping[str, Mapping[str, Any]]) -> ProofOutcome:
+        """Whether the run was proved safe; theorems may have been judged for this run alone.
+
+        That an obstacle moved faster than declared leaves the proofs for all other pairs as they are.
+        """
+        unproved = {name: found.get(name) for name in THEOREMS if found.get(name, UNJUDGED)["status"] != "proved"}
+        if unproved:
+            return ProofOutcome("unproved", unproved)
+        conditions = found.get(CONDITIONS, UNJUDGED)
+        if conditions["status"] in PASSING or (self.faster and self.else_met):
+            return ProofOutcome("tested" if conditions["exercised"] else "idle")
+        status: Literal["refuted", "undecided"] = "refuted" if conditions["status"] == "refuted" else "undecided"
+        return ProofOutcome(status, {CONDITIONS: found.get(CONDITIONS)})
+
+    def _away(self, resolved: Mapping[str, Any], ends: Mapping[str, Sequence[float]]) -> dict[str, Sequence[float]]:
+        uav = resolved["uav"]
+        targets = {name: ugv["target_m"] for name, ugv in resolved["ugvs"].items()} | {uav["name"]: uav["target_m"]}
+        home = {robot for robot, at in targets.items() if dist(ends[robot], at) <= resolved["arrival_tolerance_m"]}
+        home = (home - self.hits.keys()) | (self.arrived_s.keys() & self.hits.keys())
+        away = {robot: ends[robot] for robot in targets if robot not in home}
+        if len(away) > 1 and uav["name"] not in self.hits:
+            away.pop(uav["name"], None)  # it follows the UGVs: it is not home before they are
+        return away
 
     @property
     def blameless(self) -> bool:
@@ -142,75 +195,17 @@ class RunOutcome:
         return self.safe is True and self.away == {}
 
 
+def _why(status: str, *, is_run: bool) -> str:
+    """Why it is not known whether a run was safe, or why it was not."""
+    if status == "refuted":
+        return "SAFE-TRACE is refuted"
+    told = f"SAFE-TRACE: {status.replace('_', ' ')}" if status else "SAFE-TRACE was not checked"
+    return told if is_run else "it was not run"
+
+
 def courses(document: Document) -> list[RunOutcome]:
     """What came of every run that the scenario names, in its order."""
-    found = []
-    for name, spec in document["scenario"]["resolved"]["runs"].items():
-        course = RunOutcome(name, str(spec["method"]), spec["composition"] == "augmented")
-        if name in document["runs"]:
-            _judge(course, document)
-            _beside_movers(course, document)
-            _locate(course, document)
-        course.proof = _proof(document, course) if course.method == "d" else None
-        found.append(course)
-    return found
-
-
-def _judge(course: RunOutcome, document: Document) -> None:
-    """Whether the run was safe, by its distances and by SAFE-TRACE."""
-    run = document["runs"][course.name]
-    unique = {frozenset((pair.robot, pair.other)): pair for pair in reversed([*pairs(run)])}
-    course.near = sorted(unique.values())
-    course.hits = first_collisions(run["events"])
-    unchecked: Mapping[str, Any] = {"status": "", "exercised": 0, "as_expected": False}
-    claim = next(iter(claims(document, "SAFE-TRACE", run=course.name)), unchecked)
-    status = claim["status"]
-    course.tested = claim["exercised"] != 0
-    course.declared_unsafe = status == "refuted" and claim["as_expected"] is True
-    if course.hits or (course.near and course.near[0].is_short):
-        course.safe, course.why = False, ""
-    elif status == "refuted":
-        course.safe, course.why = False, "SAFE-TRACE is refuted"
-    elif status in PASSING:
-        course.safe, course.why = True, ""
-    else:
-        course.why = f"SAFE-TRACE: {status.replace('_', ' ')}" if status else "SAFE-TRACE was not checked"
-
-
-def _beside_movers(course: RunOutcome, document: Document) -> None:
-    """What came of the run beside obstacles that may move."""
-    proved = any(claim["status"] == "proved" for claim in claims(document, THEOREMS[0]))
-    barriers = document["scenario"]["resolved"].get("obstacles", {})
-    course.movers = [name for name, each in barriers.items() if each.get("moves") or each.get("max_speed_m_s")]
-    course.walls = [name for name, each in barriers.items() if each.get("segment_m")]
-    for claim in claims(document, "SAFE-OWN", run=course.name):
-        if claim["status"] in (*PASSING, "refuted"):
-            course.own_doing = claim["status"] == "refuted"
-            course.encounters = claim["evidence"].get("came_too_near_themselves", [])
-    for claim in claims(document, CONDITIONS, run=course.name):
-        rows = claim["evidence"].get("beside_moving", [])
-        course.faster = {each["second"]: each for each in rows if each["too_fast_s"] is not None}
-        against = claim["counterexample"] or {}
-        only_speed = against.get("hypothesis") == DECLARED and not against.get("also_broken")
-        course.else_met = proved and (claim["status"] in PASSING or only_speed)
-
-
-def _locate(course: RunOutcome, document: Document) -> None:
-    """Who arrived in the run, and where the others are."""
-    resolved, run = document["scenario"]["resolved"], document["runs"][course.name]
-    uav, ends = resolved["uav"], run["metrics"]["final_position_m"]
-    targets = {name: ugv["target_m"] for name, ugv in resolved["ugvs"].items()} | {uav["name"]: uav["target_m"]}
-    course.arrived_s = {event["robot"]: event["t_s"] for event in run["events"] if event["kind"] == "arrival"}
-    home = {robot for robot, at in targets.items() if dist(ends[robot], at) <= resolved["arrival_tolerance_m"]}
-    home = (home - course.hits.keys()) | (course.arrived_s.keys() & course.hits.keys())
-    course.away = {robot: ends[robot] for robot in targets if robot not in home}
-    if len(course.away) > 1 and uav["name"] not in course.hits:
-        course.away.pop(uav["name"], None)  # it follows the UGVs: it is not home before they are
-    for goal in claims(document, "LIVE-GOAL", run=course.name):
-        stands = (each for each in goal["evidence"].get("conditions", []) if each.get("condition") == "stands")
-        course.stuck = {each["robot"] for each in stands if each["margin_m"] >= 0.0} & course.away.keys()
-    course.there = len(resolved["ugvs"].keys() - course.away.keys())
-    course.on_the_way, course.no_way = run["metrics"]["on_the_way"], no_way(run)
+    return [RunOutcome(document, name) for name in document["scenario"]["resolved"]["runs"]]
 
 
 def no_way(run: Mapping[str, Any]) -> list[str]:
@@ -219,40 +214,19 @@ def no_way(run: Mapping[str, Any]) -> list[str]:
     return [ugv for ugv in run["metrics"]["without_proposals"] if ugv not in failed]
 
 
-def _proof(document: Document, course: RunOutcome) -> ProofOutcome:
-    """Whether a run of method (d) was proved safe; theorems may have been judged for this run alone.
-
-    That an obstacle moved faster than declared leaves the proofs for all other pairs as they are.
-    """
-    run = course.name
-
-    def judged(name: str) -> Mapping[str, Any] | None:
-        return next(iter([*claims(document, name, run=run), *claims(document, name, run="")]), None)
-
-    theorems = {name: judged(name) for name in THEOREMS}
-    if unproved := {name: claim for name, claim in theorems.items() if claim is None or claim["status"] != "proved"}:
-        return ProofOutcome("unproved", unproved)
-    conditions = judged(CONDITIONS)
-    if conditions is None or not (conditions["status"] in PASSING or (course.faster and course.else_met)):
-        refuted = conditions is not None and conditions["status"] == "refuted"
-        return ProofOutcome("refuted" if refuted else "undecided", {CONDITIONS: conditions})
-    return ProofOutcome("tested" if conditions["exercised"] else "idle")
-
-
 def pairs(run: Mapping[str, Any]) -> Iterator[Near]:
     """The smallest distances of a run, an entry of report.json; two robots may be there twice."""
     for kind in ("min_distance_m", "min_robot_distance_m"):
         for robot, others in run["metrics"][kind].items():
             for other, found in others.items():
                 value, required = found["value"], found["safe_distance_m"]
-                appeared = bool(found.get("appeared"))
-                moves = bool(found.get("moves"))
-                yield Near(value - required, robot, other, value, required, found["t_s"], appeared, moves)
+                flags = bool(found.get("appeared")), bool(found.get("moves"))
+                yield Near(value - required, robot, other, value, required, found["t_s"], *flags)
 
 
 def claims(document: Document, *names: str, run: str | None = None) -> list[Mapping[str, Any]]:
-    """The claims with these names; `run`: only those about this run, '' for the model."""
-    return [claim for claim in document["claims"] if claim["id"] in names and run in (None, claim["run"])]
+    """The claims with these names, all if none is given; `run`: only those about this run, '' for the model."""
+    return [each for each in document["claims"] if each["id"] in (names or [each["id"]]) and run in (None, each["run"])]
 
 
 def tolerance(document: Document) -> str:

@@ -1,34 +1,15 @@
-"""Phrases about runs and robots that the first screen and the list of what needs attention share."""
+"""Clauses about runs, robots and claims that the first screen and the list of what needs attention share."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
-from functools import partial
-from typing import Any, NamedTuple, TypeVar
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 from airground_drake.base.statuses import PASSING
 from airground_drake.registry import METHODS
 from airground_drake.report.outcomes import RunOutcome, distance
+from airground_drake.report.sentences import MAX_NAMES, clause, counted, grouped, joined
 
-K = TypeVar("K")
-V = TypeVar("V")
-
-MARKS = {"yes": "✓", "partly": "≈", "no": "✗", "open": "?", "none": "\N{EN DASH}", "": " "}
-"""Marks of a line and their icons; '' continues the line before."""
-MEANINGS = {"yes": "yes", "partly": "in part", "no": "no", "open": "not known", "none": "neither good nor bad"}
-"""What the marks mean, for their legend and for screen readers."""
-MAX_NAMES = 3
-"""Maximum number of robots that a line names."""
-REFUSALS = {
-    "waits": "waiting looked cheaper",
-    "first_stage": "waiting looked cheaper",
-    "not_cheaper": "the UGV's own task looked as good",
-    "no_difference": "it would have changed nothing",
-    "no_plan": "no outcome could be computed",
-    "stalls": "it would have stalled on the way",
-    "exhausted": "it had used all of its tries",
-}
-"""Why a proposal was refused, in a few words."""
 SETTINGS = {
     ("gatekeeper.route", "mixed_integer"): "half-plane problems of (26) solved to optimality, best plan by (26) kept",
     ("gatekeeper.route", "relaxed"): "(27) with half-planes, sum-up rounding (28)-(29)",
@@ -37,17 +18,8 @@ SETTINGS = {
     ("gatekeeper.rule", "first_stage"): "first stage applied",
 }
 """What keys of the gatekeeper of method (c) mean, in a few words."""
-
-
 ROLES = ("first", "second", "robot", "other")
 """Keys that hold the name of a body in the place of a claim."""
-
-
-class Line(NamedTuple):
-    """A sentence and its mark, a key of `MARKS`."""
-
-    mark: str
-    text: str
 
 
 def of_run(resolved: Mapping[str, Any], course: RunOutcome) -> str:
@@ -64,29 +36,6 @@ def gatekeeper(resolved: Mapping[str, Any]) -> str:
     """How the gatekeeper of method (c) solves and answers, unless a run sets it differently."""
     pairs = ((f"gatekeeper.{key}", resolved["gatekeeper"][key]) for key in ("route", "rule"))
     return ", ".join(SETTINGS.get(pair, " ".join(pair)) for pair in pairs)
-
-
-def refusal(reason: str) -> str:
-    """The reason of a refusal in words."""
-    return REFUSALS.get(reason, reason.replace("_", " "))
-
-
-def grouped(pairs: Iterable[tuple[K, V]]) -> dict[K, list[V]]:
-    """The values of each key, in the order in which the keys first appear."""
-    found: dict[K, list[V]] = {}
-    for key, value in pairs:
-        found.setdefault(key, []).append(value)
-    return found
-
-
-def counted(count: int, noun: str) -> str:
-    """A number and its noun: "1 check", "2 checks"."""
-    return f"{count} {noun}{'s' * (count != 1)}"
-
-
-def joined(words: Sequence[str]) -> str:
-    """Words as a list: "a", "a and b", "a, b and c"."""
-    return " and ".join(filter(None, (", ".join(words[:-1]), words[-1])))
 
 
 def labels(those: Sequence[RunOutcome], among: Sequence[RunOutcome]) -> tuple[list[str], list[str]]:
@@ -116,50 +65,42 @@ def _plural(noun: str, names: Sequence[str]) -> str:
 
 def trouble(course: RunOutcome) -> str:
     """What went wrong in a run: who came too near, and who did not arrive."""
+    told = []
+    if course.blameless:
+        told = [encounter(course, course.encounters[0])]
+    elif course.safe is False:
+        told = [colliding(course) if course.hits else intrusion(course)]
     away = [robot for robot in course.away or () if robot not in course.hits]
-    told = [] if course.safe is not False else [colliding(course) if course.hits else intrusion(course)]
-    told = [*map(partial(encounter, course), course.encounters[:1])] if course.blameless else told
     return ", and ".join([*told, *([_absent(course, away)] if away else [])])
 
 
 def encounter(course: RunOutcome, one: Mapping[str, Any]) -> str:
     """How an obstacle that moves came too near to a robot by its own motion, and what the robot did."""
-    robot, mover, apart = one["first"], one["second"], f"{one['gap_m']:.2f} m"
     if one["appeared"]:
-        return f"{mover} appeared {apart} from {robot}: nobody's doing"
-    if one["caught_s"] and one["blocked_by"]:
-        begin, end = (f"{time_s:.2f}" for time_s in one["caught_s"])
-        between = joined([f"{'wall ' * (name in course.walls)}{name}" for name in one["blocked_by"][:MAX_NAMES]])
-        kept = {f"{near.required_m:.2f} m from {near.other} was kept" for near in course.near
-                if robot == near.robot and near.other in one["blocked_by"] and not near.is_short}  # fmt: skip
-        told = f"{robot} was caught between {mover} and {between}, {begin} to {end} s"
-        told += f": {'; '.join([f'{mover} came to {apart} by its own motion', *sorted(kept)])}"
-        return f"{told}. It had nowhere to retreat, and stood" if one["reaction"] == "stood" else told
-    how = f"; {robot} {one['reaction']}"
-    how += f", {one['speed_m_s']:.2f} m/s" if one["reaction"].startswith("retreated") else ""
-    at = f"at {one['t_s']:.2f} s ({apart}, required {one['required_m']:.2f} m)"
-    return f"{mover} {'ran into' if one['collided'] else 'came too near to'} {robot} {at}{how}"
+        return clause("appeared", one)
+    if one["caught_s"] and (around := one["blocked_by"]):
+        between = joined([f"{'wall ' * (name in course.walls)}{name}" for name in around[:MAX_NAMES]])
+        kept = {clause("beside", near=near) for near in course.near
+                if near.robot == one["first"] and near.other in around and not near.is_short}  # fmt: skip
+        stood = ". It had nowhere to retreat, and stood" * (one["reaction"] == "stood")
+        return clause("caught", one, between=between, kept="".join(sorted(kept))) + stood
+    speed = f", {one['speed_m_s']:.2f} m/s" if one["reaction"].startswith("retreated") else ""
+    met = "ran into" if one["collided"] else "came too near to"
+    return clause("met", one, met=met, reacted=f"{one['reaction']}{speed}")
 
 
 def too_fast(course: RunOutcome) -> str:
     """Which obstacles moved faster than declared, and what is proved all the same."""
-    told = []
-    for mover, each in course.faster.items():
-        speeds = f"at {each['too_fast_m_s']:.2f} m/s at {each['too_fast_s']:.2f} s, declared {each['declared_m_s']:.2f}"
-        lost = f"{each['safe_distance_m']:.2f} m from {mover} is not promised from then on"
-        told.append(f"{mover} moved {speeds}: {lost}")
-    still = ["no robot brought itself too near"] if course.own_doing is False else []
-    still += ["distances from walls and robots"] if course.else_met else []
-    return "; ".join(told) + (f". Still proved: {'; '.join(still)}" if still else "")
+    still = ["no robot brought itself too near"] * (course.own_doing is False)
+    still += ["distances from walls and robots"] * course.else_met
+    told = "; ".join(clause("too_fast", each) for each in course.faster.values())
+    return told + (f". Still proved: {'; '.join(still)}" if still else "")
 
 
 def intrusion(course: RunOutcome) -> str:
     """Who came how near to what in a run that was not safe."""
     if course.near and course.near[0].is_short:
-        least = course.near[0]
-        if least.appeared:
-            return f"{least.other} appears {least} from {least.robot} (nobody's doing)"
-        return f"{least.robot} comes within {least} of {least.other}"
+        return clause("appears" if course.near[0].appeared else "comes_within", near=course.near[0])
     return course.why
 
 
@@ -171,13 +112,12 @@ def more_pairs(course: RunOutcome, named: int = 1) -> str:
 
 def colliding(course: RunOutcome) -> str:
     """Who collides in a run."""
-    names = list(course.hits)
-    return f"{_robots(names)} collide{'s' * (len(names) == 1)}"
+    return f"{_robots([*course.hits])} collide{'s' * (len(course.hits) == 1)}"
 
 
 def collision(hit: Mapping[str, Any]) -> str:
     """Who collided with what and when, by the event."""
-    return f"{hit['robot']} collides with {hit.get('other') or hit['obstacle']} at {hit['t_s']:.2f} s"
+    return clause("collides", hit, what=hit.get("other") or hit["obstacle"])
 
 
 def ending(course: RunOutcome, robot: str) -> str:
@@ -185,16 +125,13 @@ def ending(course: RunOutcome, robot: str) -> str:
     known = course.on_the_way.get(robot)
     if robot in course.stuck:
         return "stuck"
-    if known and known["stands"]:
+    if not known:
+        return "short of its target"
+    if known["stands"]:
         return "standing still"
-    if known and known["left_s"] is not None:
-        return f"still moving at the end (about {rounded(known['left_s'])} s more)"
-    return "still moving at the end" if known else "short of its target"
-
-
-def rounded(value: float) -> str:
-    """Two digits of a number, without an exponent."""
-    return f"{float(f'{value:.2g}'):.15g}"
+    left_s = known["left_s"]
+    rounded = f" (about {float(f'{left_s:.2g}'):.15g} s more)" if left_s is not None else ""  # without an exponent
+    return f"still moving at the end{rounded}"
 
 
 def kept_away(course: RunOutcome, robot: str) -> str:
@@ -202,29 +139,27 @@ def kept_away(course: RunOutcome, robot: str) -> str:
     found = course.on_the_way.get(robot, {}).get("kept_away")
     if not found:
         return ""
-    least = min(
-        (near.value_m for near in course.near if {near.robot, near.other} == {robot, found["by"]}), default=None
-    )
-    never = f" (never nearer than {least:.2f} m)" if least is not None else ""
-    where = f"{found['off_m']:.2f} m from its target, {'on' if found['on'] else 'near'} which {found['by']} stands"
-    return f"from {found['since_s']:.1f} s it stood {where}{never}"
+    between = [near.value_m for near in course.near if {near.robot, near.other} == {robot, found["by"]}]
+    never = f" (never nearer than {min(between):.2f} m)" if between else ""
+    return clause("kept_away", found, where="on" if found["on"] else "near", never=never)
 
 
 def _absent(course: RunOutcome, names: Sequence[str]) -> str:
     """How those ended that did not arrive, and for whom the UAV found no way."""
-    apart = [f"{robot} does not arrive: {why}" for robot in names if (why := kept_away(course, robot))]
+    apart = {robot: why for robot in names if (why := kept_away(course, robot))}
     if apart:
-        rest = [robot for robot in names if not kept_away(course, robot)]
-        return "; ".join([*apart, *([_absent(course, rest)] if rest else [])])
-    told = grouped((ending(course, robot), robot) for robot in names)
-    clauses = [f"{_robots(alike)} {'is' if len(alike) == 1 else 'are'} {how}" for how, alike in told.items()]
+        told = [f"{robot} does not arrive: {why}" for robot, why in apart.items()]
+        rest = [robot for robot in names if robot not in apart]
+        return "; ".join([*told, *([_absent(course, rest)] if rest else [])])
+    ends = grouped((ending(course, robot), robot) for robot in names)
+    clauses = [f"{_robots(alike)} {'is' if len(alike) == 1 else 'are'} {how}" for how, alike in ends.items()]
     lost = [robot for robot in names if robot in course.no_way]
     return joined(clauses) + (f": {found_no_way(lost)}" if lost else "")
 
 
 def found_no_way(names: Sequence[str]) -> str:
     """For whom the UAV found no way."""
-    return f"the UAV found no way for {_robots(names)}"
+    return clause("no_way", who=_robots(names))
 
 
 def _robots(names: Sequence[str]) -> str:

@@ -12,28 +12,12 @@ from typing import NamedTuple
 
 from airground_drake.base.errors import one_line
 from airground_drake.base.statuses import NOT_EXERCISED, UNDECIDED, outcome
+from airground_drake.gatekeeper.reasons import refusal
 from airground_drake.registry import METHODS
-from airground_drake.report.answers import Answer
-from airground_drake.report.answers import answers as answers_of
+from airground_drake.report.answers import Answer, answers
 from airground_drake.report.outcomes import Document, RunOutcome, courses, tolerance, triggers
-from airground_drake.report.phrases import (
-    MARKS,
-    MAX_NAMES,
-    MEANINGS,
-    Line,
-    colliding,
-    counted,
-    grouped,
-    joined,
-    kept_away,
-    more_pairs,
-    of_run,
-    refusal,
-    subject,
-    too_fast,
-    trouble,
-    under,
-)
+from airground_drake.report.phrases import colliding, kept_away, more_pairs, of_run, subject, too_fast, trouble, under
+from airground_drake.report.sentences import MARKS, MAX_NAMES, Line, clause, counted, grouped, joined, say, upper
 
 WIDTH = 110
 """Characters of a line on a terminal, about."""
@@ -68,7 +52,7 @@ class FirstScreen(NamedTuple):
         """The marks on this screen with their meanings."""
         lines = [self.headline, self.declared, *(line for answer in self.answers for line in answer.lines)]
         used = {line.mark for line in [*lines, *(line for row in self.rows for line in (row.safe, row.arrived))]}
-        return ", ".join(f"{MARKS[mark]} {meaning}" for mark, meaning in MEANINGS.items() if mark in used)
+        return ", ".join(f"{mark.icon} {mark.meaning}" for name, mark in MARKS.items() if name in used - {""})
 
 
 def first_screen(document: Document) -> FirstScreen:
@@ -81,7 +65,7 @@ def first_screen(document: Document) -> FirstScreen:
         [_row(document, course) for course in every] if tabulated else [],
         f"{' to '.join(f'{each:g}' for each in dict.fromkeys(required[:1] + required[-1:]))} m" if required else "",
         tolerance(document),
-        answers_of(document, every, tabulated=tabulated),
+        answers(document, every, tabulated=tabulated),
         _beware(document, every),
         as_declared(document),
     )
@@ -94,69 +78,67 @@ def headline(document: Document) -> Line:
     differs += sum(not each["as_expected"] for each in document["overall"]["numbers"])
     if not differs:
         return Line(mark, told)
-    checks = f"{counted(differs, 'check')} {'is' if differs == 1 else 'are'}"
-    return Line("partly" if mark == "yes" else mark, f"{told} {checks} not as declared.")
+    checks, are = counted(differs, "check"), "is" if differs == 1 else "are"
+    return Line("partly" if mark == "yes" else mark, clause("undeclared", told=told, checks=checks, are=are))
 
 
 def _outcome(every: Sequence[RunOutcome]) -> Line:
     """What came of the runs, in a sentence."""
     main = [course for course in every if course.plain] or every
-    unknown = [course.name for course in main if course.safe is None or course.away is None]
     unsafe = [course for course in main if course.safe is False]
     fine = [course for course in main if course.fine]
-    helped, alone = ([course for course in main if course.helped is way] for way in (True, False))
-    if not main:
-        return Line("open", "Nothing was run.")
-    if movers := _beside_movers(main, unsafe):
-        return movers
-    could_not = f"un{'s' * (len(unknown) > 1)} {', '.join(unknown)} could not be judged."
-    if unknown and not unsafe:
-        return Line("open", f"Not decided: r{could_not}")
-    unjudged = f" R{could_not}" if unknown else ""
-    if len(fine) == len(main):
-        told = "With and without help, all arrive safely." if helped and alone else "All arrive safely."
-        return _unless_one_crashed(every, told)
-    if helped and all(course.fine for course in helped):
-        told = f"With help, all arrive safely{_failures(alone, alone, '. Without it, ')}"
-        return _unless_one_crashed(every, told + unjudged)
     short = [course for course in main if course.away and course not in unsafe]
+    helped, alone = ([course for course in main if course.helped is way] for way in (True, False))
+    could_not = _could_not(main)
+    if not main:
+        return say("nothing_run")
+    if all(course.blameless for course in unsafe) and (unsafe or any(course.faster for course in main)):
+        return _beside_movers(main, unsafe, short)
+    if could_not and not unsafe:
+        return say("nothing_judged", which=could_not)
+    unjudged = f" {upper(could_not)}." if could_not else ""
+    if len(fine) == len(main):
+        return _unless_one_crashed(every, clause("either_way" if helped and alone else "alone"))
+    if helped and all(course.fine for course in helped):
+        failures = _failures(alone, alone, ". Without it, ")
+        return _unless_one_crashed(every, clause("helped", failures=failures) + unjudged)
     if fine:
-        who = subject(fine, main) if unjudged else f"only {subject(fine, main)}"
-        told = f"{who} safe and {'brings' if who.endswith('is') else 'bring'} everyone home"
-        return Line("partly", f"{told[0].upper()}{told[1:]}{_failures([*unsafe, *short], main)}{unjudged}")
+        who, failures = subject(fine, main), _failures([*unsafe, *short], main)
+        only = who if unjudged else f"only {who}"
+        bring = "brings" if who.endswith("is") else "bring"
+        return say("some_arrive", who=upper(only), bring=bring, failures=failures + unjudged)
     if unsafe:
-        told = "No method brings everyone home safely" if len(main) > 1 and not unjudged else "Not safe"
-        return Line("no", f"{told}{_failures(unsafe, main)}{unjudged}")
+        name = "none_arrive" if len(main) > 1 and not unjudged else "unsafe"
+        return say(name, failures=_failures(unsafe, main) + unjudged)
     waits = {trouble(course) for course in short}
     if len(waits) == 1 and len(short) == len(main) and any(kept_away(short[0], robot) for robot in short[0].away or ()):
-        return Line("no", f"Safe, but {waits.pop()}.")
-    return Line("no", f"Safe, but not all arrive{_failures(short, main, ': ')}")
+        return say("safe_but", what=waits.pop())
+    return say("safe_but_away", failures=_failures(short, main, ": "))
 
 
-def _beside_movers(main: Sequence[RunOutcome], unsafe: Sequence[RunOutcome]) -> Line | None:
-    """What obstacles did that move: that they came too near themselves, or faster than declared; None: neither."""
-    blamed = [course for course in unsafe if not course.blameless]
+def _could_not(main: Sequence[RunOutcome]) -> str:
+    """Which runs could not be judged, as a clause; '' if all could."""
+    unknown = [course.name for course in main if course.safe is None or course.away is None]
+    return clause("could_not", s="s" * (len(unknown) > 1), runs=", ".join(unknown)) if unknown else ""
+
+
+def _beside_movers(main: Sequence[RunOutcome], unsafe: Sequence[RunOutcome], short: Sequence[RunOutcome]) -> Line:
+    """What obstacles did that move: that they came too near themselves, or faster than declared."""
     faster = [course for course in main if course.faster]
-    if blamed or not (unsafe or faster):
-        return None
-    told = grouped((trouble(course), course) for course in unsafe)
-    said = [_where(what, alike, main) for what, alike in told.items()]
-    parts = [*said, "No robot brought a distance below the required one itself"] if said else []
-    speeds = grouped((too_fast(course), course) for course in faster)
-    parts += [_where(what, alike, main) for what, alike in speeds.items()]
-    missing = grouped((trouble(course), course) for course in main if course.away and course not in unsafe)
-    parts += [_where(what, alike, main) for what, alike in missing.items()]
-    if unknown := [course.name for course in main if course.safe is None or course.away is None]:
-        parts.append(f"Run{'s' * (len(unknown) > 1)} {', '.join(unknown)} could not be judged")
+    parts = [
+        *_told(((trouble(course), course) for course in unsafe), main),
+        *[clause("blameless")] * bool(unsafe),
+        *_told(((too_fast(course), course) for course in faster), main),
+        *_told(((trouble(course), course) for course in short), main),
+        *[upper(each) for each in [_could_not(main)] if each],
+    ]
     return Line("no" if faster else "partly", " ".join(f"{part}." for part in parts))
 
 
-def _where(what: str, those: Sequence[RunOutcome], among: Sequence[RunOutcome]) -> str:
-    """What happened in those runs, and in which if not in all."""
-    if len(those) == len(among):
-        return what
-    runs = under(those, among)
-    return f"{runs[0].upper()}{runs[1:]}, {what}"
+def _told(what: Iterable[tuple[str, RunOutcome]], among: Sequence[RunOutcome]) -> list[str]:
+    """What happened, each once, and in which runs if not in all. A name at the beginning is left as it is."""
+    return [told if len(alike) == len(among) else f"{upper(under(alike, among))}, {told}"
+            for told, alike in grouped(what).items()]  # fmt: skip
 
 
 def _failures(those: Iterable[RunOutcome], among: Sequence[RunOutcome], same: str = "") -> str:
@@ -175,8 +157,7 @@ def _unless_one_crashed(every: Iterable[RunOutcome], told: str) -> Line:
 
 
 def _sentence(clauses: Iterable[str]) -> str:
-    says = "; ".join(clauses)
-    return f"{says[0].upper()}{says[1:]}."
+    return f"{upper('; '.join(clauses))}."
 
 
 def _row(document: Document, course: RunOutcome) -> Row:
@@ -185,7 +166,7 @@ def _row(document: Document, course: RunOutcome) -> Row:
     if course.away is None:
         return Row(course.name, says, _safe(course), Line("open", "not known"), "not run")
     count = len(resolved["ugvs"])
-    uav = "; not the UAV" if course.away and course.there == count else ""
+    uav = "; not the UAV" * (bool(course.away) and course.there == count)
     arrived = Line("no" if course.away else "yes", f"{course.there} of {count}{uav}")
     return Row(course.name, says, _safe(course), arrived, _interventions(document, course))
 
@@ -195,14 +176,14 @@ def _safe(course: RunOutcome) -> Line:
     if course.safe is None:
         return Line("open", f"not known, {course.why}")
     if course.blameless:
-        return Line("partly", f"{near.told()}: not its own doing" if near else "not the robots' own doing")
+        return Line("partly", f"{near.pair}: not its own doing" if near else "not the robots' own doing")
     if not course.safe:
-        return Line("no", f"{near.told()}{more_pairs(course)}" if near else course.why)
+        return Line("no", f"{near.pair}{more_pairs(course)}" if near else course.why)
     if not near:
         return Line("none", "nothing near")
     proved = bool(course.proof and course.proof.holds)
     told = f"{near}, {'proved' if proved and not near.moves else 'not proved'}"
-    told += f" beside {near.other}; all else proved" if proved and near.moves else ""
+    told += f" beside {near.other}; all else proved" * (proved and near.moves)
     return Line("yes", told) if course.tested else Line("none", f"{told}; not tested")
 
 
@@ -216,33 +197,32 @@ def _interventions(document: Document, course: RunOutcome) -> str:
     failed = f"; {failed}" if failed else ""
     if course.method in METHODS and not METHODS[course.method].gated:
         return f"{kinds['proposal']} obeyed{failed}"
-    answers = {"accepted": kinds["accept"], "refused": kinds["refuse"]}
-    answered = [f"{count} {answer}" for answer, count in answers.items() if count]
+    answered = {"accepted": kinds["accept"], "refused": kinds["refuse"]}
+    told = ", ".join(f"{count} {answer}" for answer, count in answered.items() if count)
     reasons = Counter[str]()
     for found in (run["metrics"]["gatekeeper"] or {}).get("refusals", {}).values():
         for reason, count in found.items():
             reasons[refusal(reason)] += count
     why = f": {reasons.most_common(1)[0][0]}" if kinds["refuse"] and reasons else ""
-    return f"{', '.join(answered) or 'no answer'}{why}{failed}"
+    return f"{told or 'no answer'}{why}{failed}"
 
 
 def _beware(document: Document, every: Sequence[RunOutcome]) -> list[str]:
-    said = ["real vehicles are safe: the model is first-order, its sensing perfect"]
     main = [course for course in every if course.plain] or every
+    told = [clause("real")]
     if seen := [course for course in main if course.safe and not (course.proof and course.proof.holds)]:
-        said.append(f"{subject(seen, main)} also safe elsewhere: that was only seen in these runs")
+        told.append(clause("elsewhere", who=subject(seen, main)))
     if movers := list(dict.fromkeys(name for course in main for name in course.movers)):
         who = joined(movers) if len(movers) <= MAX_NAMES else counted(len(movers), "obstacle that may move")
-        said.append(f"a robot can keep its distance from {who}: what moves can come as near as it likes")
+        told.append(clause("beside_movers", who=who))
     home = [course.away == {} for course in every]
     if any(home):
-        who = "all" if all(home) else "those that arrive here"
-        said.append(f"{who} also arrive from other starts or with other seeds: arrival is seen, not proved")
+        told.append(clause("other_starts", who="all" if all(home) else "those that arrive here"))
     if document["runs"] and not triggers(document):
-        said.append("the UAV helps: it was never called")
+        told.append(clause("never_called"))
     if any(course.safe is None for course in every):
-        said.append("what could not be judged is fine")
-    return said
+        told.append(clause("open_is_fine"))
+    return told
 
 
 def as_declared(document: Document) -> Line:
@@ -254,13 +234,13 @@ def as_declared(document: Document) -> Line:
     undecided, unpromised = sum(claim["status"] in UNDECIDED for claim in claims), overall["unpromised"]
     idle = sum(outcome(claim["status"], claim["exercised"]) == NOT_EXERCISED for claim in claims)
     parts = [
-        counted(failed, "deliberate failure") if failed else "",
-        f"{undecided} undecided" if undecided else "",
-        f"{idle} not tested" if idle else "",
+        counted(failed, "deliberate failure") * bool(failed),
+        f"{undecided} undecided" * bool(undecided),
+        f"{idle} not tested" * bool(idle),
     ]
     told = ", ".join(filter(None, parts))
-    more = f" For {counted(len(unpromised), 'more claim')} nothing is promised." if unpromised else ""
-    return Line("yes", f"{overall['checks']} checks as declared{': ' if told else ''}{told}.{more}")
+    more = f" For {counted(len(unpromised), 'more claim')} nothing is promised." * bool(unpromised)
+    return say("declared", checks=overall["checks"], told=f": {told}" * bool(told), more=more)
 
 
 def text(document: Document) -> str:
@@ -272,12 +252,12 @@ def text(document: Document) -> str:
             asked = "" if k else question
             said = f"{asked:<11} {_marked(line)}" if line.mark else f"{asked:<15} {line.text}"
             lines += wrap(one_line(said), WIDTH, subsequent_indent=16 * " ")
-    beware = [one_line(f"  - {clause}") for clause in screen.beware]
+    beware = [one_line(f"  - {each}") for each in screen.beware]
     return "\n".join([*lines, "Do not conclude that", *beware, f"Marks: {screen.legend}."])
 
 
 def _marked(line: Line) -> str:
-    return f"[{MARKS[line.mark]}] {line.text}"
+    return f"[{MARKS[line.mark].icon}] {line.text}"
 
 
 def _table(screen: FirstScreen) -> list[str]:

@@ -6,11 +6,14 @@ be true of the world; it knows nothing of the code that writes them. A sentence 
 
 from __future__ import annotations
 
+import ast
 import re
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from math import inf
-from typing import Any, NamedTuple
+from pathlib import Path
+from string import Formatter
+from typing import Any, NamedTuple, get_args, get_type_hints
 
 import pytest
 from hypothesis import given, settings
@@ -19,7 +22,8 @@ from hypothesis import strategies as st
 from airground_drake.base.statuses import PASSING, STATUSES, UNDECIDED
 from airground_drake.registry import METHODS
 from airground_drake.report import summary
-from airground_drake.report.phrases import Line
+from airground_drake.report.outcomes import ProofOutcome
+from airground_drake.report.sentences import SENTENCES, Line
 
 Document = dict[str, Any]
 TARGETS = {"ugv1": [0.0, 9.0, 0.0], "ugv2": [5.0, 9.0, 0.0], "uav": [0.0, 9.0, 2.0]}
@@ -991,3 +995,19 @@ def test_what_is_not_promised_is_neither_a_failure_nor_as_declared() -> None:
     assert "(expected)" not in lines(found, "Safe?")[0].text
     assert "not as declared" not in summary.headline(found).text
     assert summary.as_declared(found).text == "0 checks as declared. For 1 more claim nothing is promised."
+
+
+def test_every_sentence_of_the_table_is_said_and_gets_the_values_that_it_names() -> None:
+    """Also those of branches that no drawn report reaches: by the calls in the code."""
+    said = set[str]()
+    for path in Path(summary.__file__).parent.glob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.Call) and getattr(node.func, "id", "") in ("say", "clause"):
+                named = {each.value for each in ast.walk(node.args[0]) if isinstance(each, ast.Constant)} & {*SENTENCES}
+                given = {keyword.arg for keyword in node.keywords}
+                for name in named if len(node.args) == 1 else ():  # else a claim gives the other values
+                    fields = [field for _, field, *_ in Formatter().parse(SENTENCES[name]) if field]
+                    assert {re.split(r"\W", field)[0] for field in fields} <= given, name
+            elif isinstance(node, ast.Constant) and path.name != "sentences.py":
+                said.add(str(node.value))
+    assert {*SENTENCES} <= said | {*get_args(get_type_hints(ProofOutcome)["status"])}
