@@ -1,11 +1,11 @@
 """Random scenarios: `python benchmarks/random_scenarios.py -n 500 [--only 17] [--rows FILE]`.
 
-Draws scenarios (1 to 6 UGVs, 0 to 12 obstacles, all methods, compositions, periods, triggers, thresholds, routes and
-policies), simulates the valid ones, and judges each run by its claims, by the oracles of the tests and by the
-independent checker, which gets a report folder of the run. The simulator must not stop, no claim may be an `error`, no
-oracle may find a fault, the checker must agree with every verdict about the run, and claims that hold for every
-scenario of a method must hold. Prints each scenario that breaks
-this, by its number, which draws it again, and how much was exercised. Exit code 1 if there is such a scenario.
+Draws scenarios (1 to 12 UGVs, 0 to 12 obstacles of all shapes that stand, move, appear or disappear, all methods,
+compositions, periods, triggers, thresholds, routes and policies), simulates the valid ones, and judges each run by its
+claims, by the oracles of the tests and by the independent checker, which gets a report folder of the run. The simulator
+must not stop, no claim may be an `error`, no oracle may find a fault, the checker must agree with every verdict about
+the run, and claims must hold that theorems promise for the run. Prints each scenario that breaks this, by its number,
+which draws it again, and how much was exercised. Exit code 1 if there is such a scenario.
 
 Claims about the model are left out: they take longer than all the rest.
 """
@@ -19,7 +19,7 @@ import sys
 import tempfile
 import time
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from itertools import combinations
 from pathlib import Path
@@ -41,18 +41,21 @@ from airground_drake.run.simulation import simulate
 from airground_drake.run.trace import Trace
 from airground_drake.scenarios.load import from_data, resolved
 from airground_drake.scenarios.schema import Scenario
+from airground_drake.scenarios.shapes import convex_parts
 from airground_drake.verify import Verdict, judge
+from airground_drake.verify.runs.pairs import DISTANCE_TOLERANCE_M
 
 sys.path.append(str(Path(__file__).parents[1] / "tests"))
 
 from oracles import faults_of
 
 ALWAYS = ("ZENO-TRACE", "THR-TRIG")
-CERTIFIED = ("SAFE-TRACE", "SAFE-HYP")
-"""Claims that must hold in every run (ZENO-TRACE: with a dwell), and in every run of method (d)."""
+"""Claims that must hold in every run (ZENO-TRACE: with a dwell)."""
 NEVER_REFUTED = ("GATE-PLAN", "LIVE-HYP")
 """Claims that may be undecided without a proposal, but not refuted."""
 
+FASTEST_M_S = 2.0
+"""Speed of the fastest obstacles, m/s."""
 RUNS_PER_PROCESS = 20
 """Runs after which a process is replaced, to free its memory."""
 
@@ -68,6 +71,7 @@ class Row:
         wrong: faults, in words.
         seconds: wall-clock time.
         ugvs, obstacles: how many.
+        shaped, moving, appearing: how many of the obstacles are no balls, move, and appear under way.
         trigger, route: as in the scenario.
         triggers, releases, decisions, accepted: how many.
         margin_m: of SAFE-TRACE.
@@ -81,6 +85,9 @@ class Row:
     seconds: float = 0.0
     ugvs: int = 0
     obstacles: int = 0
+    shaped: int = 0
+    moving: int = 0
+    appearing: int = 0
     trigger: str = ""
     route: str = ""
     triggers: int = 0
@@ -91,58 +98,64 @@ class Row:
     statuses: dict[str, str] = field(default_factory=dict)
 
 
-def draw(number: int, most_ugvs: int = 6) -> dict[str, Any]:
+def draw(number: int, most_ugvs: int = 12) -> dict[str, Any]:
     """Draw a scenario; many are valid."""
-    rng = np.random.default_rng([20261121, number])
+    rng = np.random.default_rng([20261126, number])
     n, m = int(rng.integers(1, most_ugvs + 1)), int(rng.integers(0, 13))
     h = float(rng.choice([0.01, 0.025, 0.05, 0.1, 0.3]))
     speed = float(rng.choice([0.5, 1.0, 3.0]))
-    d, between = float(rng.choice([0.5, 1.0, 2.0])), float(rng.choice([0.5, 1.0, 2.0]))
-    radii = _radii(number, n + m + 1)
-    both = sum(sorted(radii)[-2:])
-    apart = max(d, between) + both
-    extent = 4.0 + 2.0 * (n + m) ** 0.5 * apart
-    points = _apart(rng, n + m, extent, apart)
+    d, between, beside = (float(rng.choice([0.5, 1.0, 2.0])) for _ in range(3))
+    radii, size = _radii(number, n + m + 1), float(rng.choice([0.0, 0.5, 2.0]))
+    both, own = sum(sorted(radii)[-2:]), float(rng.choice([0.0, 0.3, 3.0]))
+    apart = max(d, between, own) + both
+    extent = 4.0 + 1.5 * (n + m) ** 0.5 * (apart + size)
+    starts = _apart(rng, n, extent, apart)
     method = str(rng.choice(list(METHODS)))
     decision = _decision(rng, h)
+    duration = float(rng.choice([10, 30])) * (1.0 if h >= 0.05 else 0.25)
     ugvs = {}
     for i in range(n):
-        way = [points[i], *rng.uniform(-extent, extent, (int(rng.integers(1, 4)), 2)).tolist()]
+        way = [starts[i], *rng.uniform(-extent, extent, (int(rng.integers(1, 4)), 2)).tolist()]
         ugvs[f"u{i}"] = {
-            "start_m": [*points[i], 0.0],
+            "start_m": [*starts[i], 0.0],
             "target_m": [*(np.array([i * 3.0 * (between + both), 3.0 * extent])).tolist(), 0.0],
             "preset": {"waypoints_m": [[*p, 0.0] for p in way], "speed_m_s": speed * float(rng.choice([0.3, 1.0]))},
             "max_speed_m_s": speed,
             "radius_m": radii[i],
         }
-    kinds = ["detour", "towards", "hostile", "noisy", "stale_map"]
     parameters: dict[str, dict[str, float]] = {
         "detour": {"speed_m_s": speed}, "stale_map": {"speed_m_s": speed}, "hostile": {"speed_m_s": speed},
         "noisy": {"speed_m_s": speed, "noise_m": 0.5}, "towards": {"speed_m_s": speed, "x_m": 0.0, "y_m": 0.0},
+        "coordinate": {"speed_m_s": speed},
     }  # fmt: skip
-    chosen = rng.choice(kinds, size=int(rng.integers(1, 3)), replace=False).tolist()
+    chosen = rng.choice(list(parameters), size=int(rng.integers(1, 3)), replace=False).tolist()
     air_ground = float(rng.choice([0.4, 1.0]))
     stages, stage = int(rng.choice([2, 6, 20])), h * int(rng.choice([1, 2]))
     low = bool(rng.random() < 0.5)  # over the middle of the team, so that it comes near the UGVs
     height = (1.5 * air_ground if low else 3.0) + both
     start = [0.0, 0.0, height] if low else [-3.0 * extent, 0.0, height]
-    reach = max(d, between, air_ground) + both + 4.0 * speed * h
+    reach = max(d, between, beside, own, air_ground) + both + (4.0 * speed + FASTEST_M_S) * h
+    obstacles = {
+        f"o{k}": _obstacle(rng, starts, extent, radii[n + k], size, own, apart, height, duration) for k in range(m)
+    }
+    room = max(d, air_ground) + both + 0.01
+    east = max(3.0 * extent, (n - 1) * 3.0 * (between + both)) + room
+    arena = [[-3.0 * extent - room, -1.2 * extent - room], [east, 3.0 * extent + room]]
     return {
         "name": f"random_{number}",
         "seed": number,
-        "duration_s": float(rng.choice([20, 60])) * (1.0 if h >= 0.05 else 0.25),
+        "duration_s": duration,
         "ugvs": ugvs,
         "uav": {
             "start_m": start, "target_m": [0.0, 3.0 * extent, 3.0 + both], "altitude_m": height,
             "max_speed_m_s": 2.0 * speed, "radius_m": radii[-1],
         },
-        "obstacles": {
-            f"o{k}": {
-                "position_m": [*points[n + k], 0.0], "known_to_uav": bool(rng.random() < 0.7), "radius_m": radii[n + k],
-            }
-            for k in range(m)
+        "obstacles": obstacles,
+        "arena_m": arena if rng.random() < 0.25 else [],
+        "safe_distance": {
+            "obstacle_m": d, "ugv_m": between, "air_ground_m": air_ground,
+            "moving_m": beside * float(rng.choice([0.0, 1.0])),
         },
-        "safe_distance": {"obstacle_m": d, "ugv_m": between, "air_ground_m": air_ground},
         "control": {
             "period_s": h, "avoidance_gain_1_s": float(rng.choice([0.5, 0.9])) / h * float(rng.choice([0.1, 1.0])),
             "motion_gain_1_s": min(2.0, 0.9 / h), "formation_gain_1_s": min(5.0, 0.9 / h),
@@ -166,6 +179,64 @@ def draw(number: int, most_ugvs: int = 6) -> dict[str, Any]:
             },
         },
     }  # fmt: skip
+
+
+def _obstacle(
+    rng: np.random.Generator, starts: Sequence[Sequence[float]], extent: float, radius: float, size: float, own: float,
+    apart: float, height: float, duration: float,
+) -> dict[str, Any]:  # fmt: skip
+    """An obstacle: of any shape within `size`, m, of its place; some move, might move, appear or disappear."""
+    found: dict[str, Any] = {
+        "radius_m": radius,
+        "known_to_uav": bool(rng.random() < 0.7),
+        "distance_m": own * (rng.random() < 0.5),
+    }
+    found |= _shape(rng, size, height)
+    ball = not (found.keys() & {"polygon_m", "segment_m", "size_m", "height_m"})
+    if rng.random() < 0.25:
+        found["appears_s"] = round(float(rng.uniform(0.0, 0.8)) * duration, 3)
+    if rng.random() < 0.2:
+        found["disappears_s"] = round(float(rng.uniform(0.8, 1.1)) * duration, 3)
+    if rng.random() < 0.35:
+        speed = float(rng.choice([0.3, 1.2, FASTEST_M_S]))
+        corners = rng.uniform(-extent, extent, (int(rng.integers(2, 5)), 2)).round(3).tolist()
+        z = float(rng.choice([0.0, height])) if ball else 0.0
+        found["moves"] = {
+            "waypoints_m": [[*corner, z] for corner in corners], "speed_m_s": speed,
+            "start_s": float(rng.choice([0.0, 2.0])), "at_end": str(rng.choice(["stop", "reverse", "loop"])),
+        }  # fmt: skip
+        found["max_speed_m_s"] = speed * float(rng.choice([0.0, 0.4, 0.999, 1.0]))  # 0: what is true
+        found["known_motion"] = bool(rng.random() < 0.5)
+        return found
+    if rng.random() < 0.1:
+        found["max_speed_m_s"] = float(rng.choice([0.2, 1.0]))
+    while True:  # those that are there from the beginning keep their distance from every start
+        place = rng.uniform(-extent, extent, 2)
+        near = min(float(np.linalg.norm(place - np.array(start))) for start in starts)
+        if "appears_s" in found or near > 1.01 * (apart + size):
+            break
+    on_the_ground = float(rng.choice([0.0, 0.0, height])) if ball else 0.0
+    return found | {"position_m": [*place.tolist(), on_the_ground]}
+
+
+def _shape(rng: np.random.Generator, size: float, height: float) -> dict[str, Any]:
+    """The keys of a shape; of a ball there are none."""
+    kind = str(rng.choice(["ball", "post", "box", "wall", "polygon"])) if size else "ball"
+    if kind == "ball":
+        return {}
+    top = {"height_m": float(rng.choice([0.0, 0.7 * height, 50.0]))}
+    if kind == "post":
+        return {"height_m": top["height_m"] or 1.0}
+    top["heading_rad"] = float(rng.choice([0.0, 0.5, 0.5 * np.pi, -2.0]))
+    if kind == "box":
+        return top | {"size_m": (np.sqrt(2.0) * size * rng.choice([1.0, 0.7, 0.1], 2)).tolist()}
+    corners = int(rng.integers(3, 8))
+    rays = size * rng.choice([1.0, 0.3, 0.6], corners)
+    angles = 2.0 * np.pi * np.arange(corners) / corners
+    around = (rays[:, None] * np.column_stack([np.cos(angles), np.sin(angles)])).round(6).tolist()
+    if kind == "wall":
+        return top | {"segment_m": around[: int(rng.integers(2, corners + 1))]}
+    return top | {"polygon_m": around[:: int(rng.choice([1, -1]))]}
 
 
 def _radii(number: int, count: int) -> list[float]:
@@ -222,6 +293,12 @@ def judged(number: int) -> Row:
         return row
     (row.method,) = scenario.runs
     row.ugvs, row.obstacles = len(scenario.ugvs), len(scenario.obstacles)
+    given = scenario.obstacles.values()
+    row.shaped = sum(convex_parts(each) is not None for each in given)
+    row.moving, row.appearing = (
+        sum(each.moves is not None for each in given),
+        sum(each.appears_s > 0.0 for each in given),
+    )
     row.trigger, row.route = scenario.decision.trigger, scenario.gatekeeper.route
     try:
         of_run, verdicts, row.wrong = tried(scenario)
@@ -242,23 +319,43 @@ def tried(scenario: Scenario) -> tuple[Trace, list[Verdict], list[str]]:
     (name,) = scenario.runs
     of_run = simulate(scenario, name)
     verdicts = judge(of_run)
-    method = scenario.runs[name].method
     found = [f"oracle of {name}: {faults[0]}"[:300] for name, faults in faults_of(of_run).items()]
-    return of_run, verdicts, [*_claims(scenario, method, verdicts), *found, *_checker(scenario, of_run, verdicts)]
+    return of_run, verdicts, [*_claims(of_run, verdicts), *found, *_checker(scenario, of_run, verdicts)]
 
 
-def _claims(scenario: Scenario, method: str, verdicts: Sequence[Verdict]) -> list[str]:
+def _claims(of_run: Trace, verdicts: Sequence[Verdict]) -> list[str]:
     """Verdicts that are an error, and those that must hold and do not."""
     wrong = []
-    dwells = scenario.decision.trigger == "automaton" and scenario.decision.min_inter_event_s > 0.0
+    must = _must_hold(of_run, {verdict.claim.id: verdict for verdict in verdicts})
     for verdict in verdicts:
         status, name = verdict.status, verdict.claim.id
-        must = name in ALWAYS or (name in CERTIFIED and method == "d")
-        must = must and not (name == "ZENO-TRACE" and not dwells)
         wrongly = status == "refuted" and name in NEVER_REFUTED
-        if status == "error" or wrongly or (must and status != "holds"):
+        if status == "error" or wrongly or (name in must and status != "holds"):
             wrong.append(f"{name} {status}: {verdict.counterexample or verdict.evidence}"[:300])
     return wrong
+
+
+def _must_hold(of_run: Trace, found: Mapping[str, Verdict]) -> set[str]:
+    """Claims that theorems promise for a run.
+
+    Beside an obstacle that may move no distance is promised, only that robots do not bring themselves too near. Where
+    an obstacle moves faster than declared, the hypotheses are broken. Where one appears on a robot, inequalities may
+    contradict each other from then on.
+    """
+    scenario, given = of_run.scenario, of_run.scenario.runs[of_run.run]
+    must = set(ALWAYS)
+    if scenario.decision.trigger != "automaton" or scenario.decision.min_inter_event_s == 0.0:
+        must.discard("ZENO-TRACE")
+    worst = Counter[str]()  # margins, 0 where there is none
+    for entry in found["SAFE-HYP"].evidence["worst"]:
+        worst[entry["hypothesis"]] = min(worst[entry["hypothesis"]], entry["margin"])
+    if given.method in "ad" and given.composition == "augmented" and worst["safe start"] >= -DISTANCE_TOLERANCE_M:
+        must |= {"SAFE-OWN"} & found.keys()
+        if all(each.expected_speed_m_s == 0.0 for each in scenario.barriers.values()):
+            must |= {"SAFE-TRACE"}
+        if worst["declared speed"] >= -DISTANCE_TOLERANCE_M:
+            must |= {"SAFE-HYP"}
+    return must
 
 
 def _checker(scenario: Scenario, of_run: Trace, verdicts: Sequence[Verdict]) -> list[str]:
@@ -330,7 +427,7 @@ def summary(rows: Sequence[Row]) -> str:
     for name in ("method", "ugvs", "obstacles", "trigger", "route"):
         found = Counter(getattr(row, name) for row in valid)
         lines += [f"{name}: {dict(sorted(found.items()))}"]
-    for name in ("triggers", "releases", "decisions", "accepted"):
+    for name in ("shaped", "moving", "appearing", "triggers", "releases", "decisions", "accepted"):
         counts = [getattr(row, name) for row in valid]
         lines += [f"{name}: {sum(counts)} in {sum(count > 0 for count in counts)} runs"]
     if margins:

@@ -53,9 +53,9 @@ def test_the_checker_agrees_with_a_run_of_one_period() -> None:
 
 
 def test_points_are_listed_as_the_controllers_list_them() -> None:
-    """Recursion (5) depends on what comes first: here an obstacle and a robot, both in the way of the last UGV."""
-    data = draw(326) | {"duration_s": 3.3}
-    assert data["runs"]["c"]["composition"] == "recursion_listed"
+    """Recursion (5) depends on what comes first: here an obstacle and a robot, both in the way of a UGV."""
+    data = draw(366) | {"runs": {"a": {"method": "a", "composition": "recursion_listed"}}}
+    data["duration_s"] = 60 * data["control"]["period_s"]
     assert tried(from_data(data, "a crowd"))[2] == []
 
 

@@ -23,7 +23,9 @@ ON_TOP = ("b", "c")
 
 
 class Inequalities(NamedTuple):
-    """Inequalities normal.v >= bound of a robot along its run, C of them, by control sample and column.
+    """Inequalities normal.v >= bound of a robot along its run, C of them.
+
+    They are by control sample; at each, in the order of the controller: barriers at rest, robots, barriers that move.
 
     Attributes:
         sample: number of the control sample, (C,).
@@ -99,6 +101,8 @@ def inequalities_of(trace: Trace, robot: str, *, as_seen: bool = False) -> Inequ
     when = np.append(near.place, sample)
     number = np.array([trace.robots.index(name) for name in others], dtype=np.intp)
     column = np.append(near.core, len(parts.owner) + number[other])
-    order = np.lexsort([column, when])
+    moves = np.array([trace.scenario.barriers[name].moves is not None for name in parts.names], dtype=np.bool_)
+    rank = np.concatenate([np.where(moves[parts.owner], 2, 0), np.ones(len(trace.robots), dtype=np.intp)])
+    order = np.lexsort([column, rank[column], when])
     normal = normal * (PLANE if planar else 1.0)
     return Inequalities(when[order], column[order], normal[order], bound[order], retreat[order])
