@@ -2,14 +2,17 @@
 
     python benchmarks/hostile.py --proposals 10000 --runs 300 --lies 300
 
-Decision level: UGVs at random safe places among obstacles, many exactly at the safe distance, get proposals of random
-position, speed, direction and course; a third of them lead to the nearest obstacle. Under method (d) each proposal is
-executed, accepted or not; under (c) only if its gatekeeper accepts.
+Decision level: UGVs at random safe places among points, walls, boxes and triangles, many exactly at the safe distance,
+get proposals of random position, speed, direction and course; a third of them lead to the nearest obstacle. A person
+walks straight at the UGV all the time. Under method (d) each proposal is executed, accepted or not; under (c) only if
+its gatekeeper accepts.
 
-Whole runs: case A with the policies `hostile`, `towards` and `noisy` of random parameters, obstacles that the UAV does
-not know, and a gatekeeper that accepts nearly everything (under method (d) one that finds every prediction useful, as a
-lying map could make it). Distances are exact in continuous time. The time that a UAV steals is measured, too: the
-longest time for which a UGV executed interventions between two rests, against the bound of LIVE-WAIT.
+Whole runs: case A with walls and boxes in the place of some obstacles, and two persons who walk at random; the policies
+`hostile`, `towards` and `noisy` of random parameters, obstacles that the UAV does not know, and a gatekeeper that
+accepts nearly everything (under method (d) one that finds every prediction useful, as a lying map could make it).
+Distances are exact in continuous time. Beside persons the margin is that of SAFE-OWN: how near a robot brought itself.
+The time that a UAV steals is measured, too: the longest time for which a UGV executed interventions between two rests,
+against the bound of LIVE-WAIT.
 
 Lies: runs of case A under (d) with a UAV that lies in every part of its messages (`hostile_uav`), half of them with
 gatekeepers that believe every prediction, and with random patience. A small evolutionary search looks for the tactics
@@ -25,7 +28,7 @@ from functools import partial
 from unittest import mock
 
 import numpy as np
-from hostile_uav import CHOICES, LyingPlanner, Tactic, drawn, mutated
+from hostile_uav import CHOICES, LyingPlanner, Tactic, drawn, mutated, shape_at
 
 from airground_drake.audit.companions import Believing
 from airground_drake.base.arrays import Array
@@ -33,8 +36,8 @@ from airground_drake.gatekeeper.outcome_gatekeeper import OutcomeGatekeepers
 from airground_drake.gatekeeper.problem import Horizon, predicted_problem
 from airground_drake.gatekeeper.rollout import View
 from airground_drake.gatekeeper.routes.relaxed import RelaxedRoute
+from airground_drake.geometry import convex, outline
 from airground_drake.geometry.motion import Motion
-from airground_drake.geometry.outline import balls
 from airground_drake.intervention.planner import Planner
 from airground_drake.intervention.policy import Proposal
 from airground_drake.nsbc.avoidance import Avoidance
@@ -42,96 +45,167 @@ from airground_drake.nsbc.law import UgvLaw
 from airground_drake.registry import Method
 from airground_drake.run.simulation import Recorder
 from airground_drake.run.trace import Trace
-from airground_drake.scenarios.load import load
-from airground_drake.scenarios.schema import Policy, Run, Scenario
+from airground_drake.scenarios.load import load, validated
+from airground_drake.scenarios.schema import Moves, Obstacle, Policy, Run, Scenario
 from airground_drake.scenarios.world import make_world
 from airground_drake.systems import components
 from airground_drake.systems.components import make_planner, make_presets
 from airground_drake.systems.controllers import UgvController
+from airground_drake.verify.engines.outlines import Cores, closest
+from airground_drake.verify.runs.safe_own import SafeOwn
 from airground_drake.verify.runs.safe_trace import SafeTrace
+from airground_drake.world.plant import Scripted
 from airground_drake.world.world import Body
 
 STEPS = 30
 """Control periods for which a proposal is executed at decision level."""
+FAR_AWAY = ([-90.0, 0.0, 0.0], [-90.0, 0.0, 2.0])
+"""Where the other robots are at decision level, m."""
 GENERATION, BEST = 20, 5
 """Lies of a generation, and the best lies so far, whose tactics are mutated for the next one."""
 
 
-def attack(random: np.random.Generator, start: Array, centres: Array, t: float) -> Motion:
+def attack(random: np.random.Generator, start: Array, middles: Array, t: float) -> Motion:
     """A hostile motion: some corners, held or jumping, a third of them at the nearest obstacle."""
     count = int(random.integers(1, 6))
     corners = start + random.normal(scale=random.choice([0.5, 3.0, 30.0]), size=(count, 3)) * [1, 1, 0]
     if random.random() < 1 / 3:
-        nearest = centres[np.linalg.norm(centres - start, axis=1).argmin()]
+        nearest = middles[np.linalg.norm(middles - start, axis=1).argmin()]
         corners[-1] = start + (nearest - start) * random.choice([0.5, 1.0, 1.5]) * [1, 1, 0]
     times = t + np.cumsum(random.choice([1e-3, 0.05, 0.5]) * random.uniform(0.1, 1.0, count + 1))
     return Motion(times, np.vstack([start, corners]))
 
 
-def at_decision_level(seed: int, proposals: int) -> tuple[float, int, int]:
-    """Worst margin under (d), m; number of proposals that (c) accepted; number of these with a distance below d."""
+def at_decision_level(seed: int, proposals: int) -> tuple[float, float, int, int]:
+    """The worst margins under (d), m, to obstacles at rest, and by own doing to the person.
+
+    Also the number of proposals that (c) accepted, and of these with a distance below d from an obstacle at rest.
+    """
     random = np.random.default_rng(seed)
     scenario = load("case_a")
     base, presets = make_world(scenario), make_presets(scenario)
     gate = scenario.gatekeeper
     horizon = Horizon(gate.stages, 1, gate.error_weight_1_m2_s, gate.slack_weight_1_m2_s)
     avoidance = Avoidance(scenario.control.avoidance_gain_1_s, scenario.control.period_s, 4.0)
-    route, h, d = RelaxedRoute(), avoidance.period, scenario.safe_distance.obstacle_m
-    worst, accepted, below = np.inf, 0, 0
+    route, d = RelaxedRoute(), scenario.safe_distance.obstacle_m
+    worst, own, accepted, below = np.inf, np.inf, 0, 0
     for _ in range(proposals):
-        centres = np.column_stack([random.uniform(-4.0, 4.0, (4, 2)), np.zeros(4)])
-        start = safe_start(random, centres, d)
-        points = (
-            Body(f"obstacle_{k}", "obstacle", centre, balls(np.zeros(3), gap=d)) for k, centre in enumerate(centres)
-        )
-        world = replace(base, bodies=(*base.moving, *points))
+        still = outline.stacked(shape_at(place, d, random) for place in random.uniform(-4.0, 4.0, (4, 2)))
+        start = safe_start(random, still, d)
+        person = Person.drawn(random)
+        bodies = (Body(f"o{k}", "obstacle", np.zeros(3), row[None]) for k, row in enumerate(still))
+        world = replace(base, bodies=(*base.moving, person.body, *bodies))
         t = float(random.uniform(0.0, 20.0))
-        proposal = Proposal("hostile", t, attack(random, start, centres, t))
+        middles = np.column_stack([still[:, outline.MIDDLE : outline.EXTENT], np.zeros(len(still))])
+        proposal = Proposal("hostile", t, attack(random, start, middles, t))
         for on_top in (False, True):
             law = UgvLaw(avoidance, 2.0, 1.5, intervention_on_top=on_top)
             if on_top:
-                nobody, still = np.zeros((0, 3)), balls(centres)
-                around = still, still[:0], nobody, nobody
-                scene = View(t, start, presets[0], *around, np.full(4, d), np.ones(4), 3.0)
+                place, rows = person.start[None], person.body.shape
+                keep = np.append(outline.keep(still, 0.0), outline.keep(rows, 0.0))
+                scene = View(t, start, presets[0], still, rows, place, 0.0 * place, keep, np.ones(len(keep)), 3.0)
                 if not route.solve(predicted_problem(scene, law, proposal, horizon)).accept_first:
                     continue
                 accepted += 1
-            controller = UgvController(world, law)
-            margin = execute(controller, presets[0], proposal, start, t, h, centres) - d
+            way, walked = executed(UgvController(world, law), presets[0], proposal, start, t, person)
+            margin = closest(Cores.of(still), way, planar=True)[0] - d
             if on_top:
                 below += margin < -1e-9
             else:
-                worst = min(worst, margin)
-    return worst, accepted, below
+                worst, own = min(worst, margin), min(own, own_margin(way, walked, person, avoidance.period))
+    return worst, own, accepted, below
 
 
-def safe_start(random: np.random.Generator, centres: Array, d: float) -> Array:
-    """A place at least d from all centres; half of the time exactly d from one."""
+@dataclass(frozen=True)
+class Person:
+    """A person who walks straight at a UGV.
+
+    Attributes:
+        start: place at the beginning, (3,), m.
+        keeps_m: distance that the UGV has to keep from the middle of the person, m.
+        speed_m_s: of the person, as declared.
+    """
+
+    start: Array
+    keeps_m: float
+    speed_m_s: float
+
+    @classmethod
+    def drawn(cls, random: np.random.Generator) -> Person:
+        """Anywhere, also on the UGV."""
+        start = np.append(random.uniform(-5.0, 5.0, 2), 0.0)
+        return cls(start, float(random.choice([0.3, 1.0])), float(random.choice([0.3, 1.2, 4.0])))
+
+    @property
+    def body(self) -> Body:
+        """The person as an obstacle that moves."""
+        shape = outline.balls(np.zeros(3), gap=self.keeps_m)
+        shape[:, outline.SPEED] = self.speed_m_s
+        script = Motion(np.zeros(1), self.start[None])
+        return Body("person", "obstacle", self.start, shape, Scripted(script), self.speed_m_s)
+
+
+def safe_start(random: np.random.Generator, still: Array, d: float) -> Array:
+    """A place at least d from all outlines; half of the time exactly d from one."""
     while True:
         start = np.append(random.uniform(-5.0, 5.0, 2), 0.0)
         if random.random() < 0.5:
-            angle = random.uniform(0.0, 2.0 * np.pi)
-            start = centres[random.integers(len(centres))] + d * np.array([np.cos(angle), np.sin(angle), 0.0])
-        if (np.linalg.norm(centres - start, axis=1) >= d).all():
+            away, k = np.empty(3), int(random.integers(len(still)))
+            apart = convex.nearest(still[k], *start, True, away, np.inf)
+            start = start + (d - apart) * away
+        if (convex.distances(still, start, True) >= d).all():
             return start
 
 
-def execute(
-    controller: UgvController, preset: Motion, proposal: Proposal, start: Array, t: float, h: float, centres: Array
-) -> float:
-    """Exact minimum distance of the UGV to the centres while it executes the proposal, m."""
-    positions = np.array([start, [-90.0, 0.0, 0.0], [-90.0, 0.0, 2.0]])
-    least = np.inf
+def executed(
+    controller: UgvController, preset: Motion, proposal: Proposal, start: Array, t: float, person: Person
+) -> tuple[Array, Array]:
+    """Where the UGV and the person are at the samples while the UGV executes the proposal, (STEPS + 1, 3), m."""
+    h, positions = controller.law.avoidance.period, np.array([start, *FAR_AWAY, person.start])
+    ways = [positions.copy()]
     for k in range(STEPS):
         now = t + k * h
         reference, rate = (np.array([value, np.zeros(3)]) for value in preset.at(now))
         velocity = controller.velocity(now, positions, reference, rate, [proposal, None])
-        offset, step = positions[0] - centres, h * velocity[0]
-        length = step @ step
-        share = np.clip(-(offset @ step) / length, 0.0, 1.0) if length > 0.0 else np.zeros(len(centres))
-        least = min(least, float(np.linalg.norm(offset + share[:, None] * step, axis=1).min()))
+        towards = positions[0] - positions[3]
+        positions[3] += h * person.speed_m_s * towards / max(float(np.linalg.norm(towards)), 1e-9)
         positions[:2] += h * velocity
-    return least
+        ways.append(positions.copy())
+    return np.array(ways)[:, 0], np.array(ways)[:, 3]
+
+
+def own_margin(way: Array, walked: Array, person: Person, period: float) -> float:
+    """How near the UGV came to where the person was at each sample, less min(D, d + V h), m."""
+    start, step = (way - walked)[:-1], np.diff(way, axis=0)
+    squared = np.maximum((step * step).sum(axis=1), 1e-300)
+    share = np.clip(-(start * step).sum(axis=1) / squared, 0.0, 1.0)
+    least = np.linalg.norm(start + share[:, None] * step, axis=1)
+    keeps = person.keeps_m + person.speed_m_s * period
+    return float((least - np.minimum(np.linalg.norm(start, axis=1), keeps)).min())
+
+
+def with_walls_and_persons(scenario: Scenario, random: np.random.Generator) -> None:
+    """Turn some obstacles of case A into walls and boxes, and let two persons walk among the robots."""
+    for obstacle in scenario.obstacles.values():
+        kind = int(random.integers(3))
+        if kind:
+            obstacle.heading_rad = float(random.uniform(-3.0, 3.0))
+            obstacle.distance_m, obstacle.radius_m = 1.4, 0.1
+            setattr(obstacle, *[("segment_m", [[-0.5, 0.0], [0.5, 0.0]]), ("size_m", [0.8, 0.6])][kind - 1])
+    for k in range(2):
+        ways = random.uniform([-4.0, 0.0], [8.0, 14.0], (3, 2)).round(3).tolist()
+        moves = Moves([[*corner, 0.0] for corner in ways], float(random.uniform(0.3, 1.5)), at_end="reverse")
+        scenario.obstacles[f"person{k}"] = Obstacle(
+            radius_m=0.25, moves=moves, max_speed_m_s=1.2, distance_m=0.3, known_to_uav=bool(random.integers(2))
+        )
+    validated(scenario)
+
+
+def margin_of(trace: Trace) -> float:
+    """How much nearer than it may a robot brought itself to anything, m; above 0 it did not."""
+    claim = SafeOwn() if SafeOwn().applies(trace) else SafeTrace()
+    margin = claim.check(trace).margin
+    return np.nan if margin is None else float(margin)
 
 
 def whole_run(seed: int) -> tuple[float, int, float, float, float]:
@@ -150,13 +224,13 @@ def whole_run(seed: int) -> tuple[float, int, float, float, float]:
     scenario.gatekeeper.error_weight_1_m2_s = float(random.choice([1.0, 30.0, 1000.0]))
     scenario.obstacles["obstacle_2"].known_to_uav = bool(random.integers(2))
     scenario.choices = []  # some are about runs that are not made here
+    with_walls_and_persons(scenario, random)
     margins, executed, stolen = {}, 0, 0.0
     for method in ("d", "c"):
         scenario.runs, scenario.reproduction = {method: Run(method=method)}, []
         with mock.patch.object(OutcomeGatekeepers, "foresee", Believing.foresee):
             trace = Recorder(scenario, method).simulate()
-        margin = SafeTrace().check(trace).margin
-        margins[method] = np.nan if margin is None else margin
+        margins[method] = margin_of(trace)
         if method == "d":
             executed = sum(event["kind"] == "accept" for event in trace.events)
             stolen = max(stolen_s(trace, ugv) for ugv in trace.ugvs)
@@ -199,10 +273,13 @@ def told(lie: Lie) -> Told:
     scenario.intervention.period_s = float(random.choice([0.05, 0.1]))
     scenario.duration_s = max(20.0, 2.5 * (gate.tries * gate.longest_s + gate.rest_s))
     scenario.obstacles["obstacle_2"].known_to_uav = bool(random.integers(2))
+    scenario.choices, scenario.reproduction = [], []
     body = float(random.choice([0.0, 1.0]))  # radius of an obstacle, a part of the 2 m to its centre
     scenario.safe_distance.obstacle_m -= body
     for obstacle in scenario.obstacles.values():
         obstacle.radius_m = body
+    if random.random() < 0.5:
+        with_walls_and_persons(scenario, random)
     scenario.choices, scenario.runs, scenario.reproduction = [], {"d": Run(method="d")}, []
 
     def lying(given: Scenario, method: Method) -> Planner:
@@ -216,10 +293,9 @@ def told(lie: Lie) -> Told:
         mock.patch.object(OutcomeGatekeepers, "foresee", foresee),
     ):
         trace = Recorder(scenario, "d").simulate()
-    margin = SafeTrace().check(trace).margin
     return Told(
         lie,
-        np.nan if margin is None else float(margin),
+        margin_of(trace),
         max(stolen_s(trace, ugv) for ugv in trace.ugvs),
         gate.tries * (gate.longest_s + gate.period_s),
         max(trace.timings["decision_times_s"], default=0.0),
@@ -295,9 +371,9 @@ def main() -> None:
         if options.proposals:
             share = options.proposals // 20
             parts = list(pool.map(partial(at_decision_level, proposals=share), range(20)))
-            worst, accepted, below = min(p[0] for p in parts), sum(p[1] for p in parts), sum(p[2] for p in parts)
+            (worst, own), (accepted, below) = np.min(parts, axis=0)[:2], np.sum(parts, axis=0)[2:].astype(int)
             print(f"{20 * share} hostile proposals, each executed for {STEPS} control periods:")
-            print(f"  (d) worst margin to d: {worst:.3g} m")
+            print(f"  (d) worst margin to d: {worst:.3g} m; own doing beside the person: {own:.3g} m")
             print(f"  (c) accepted {accepted}, and {below} of these then came below d")
         if options.runs:
             runs = np.array(list(pool.map(whole_run, range(options.runs), chunksize=5)))

@@ -13,15 +13,16 @@ from typing import Any
 import numpy as np
 
 from airground_drake.base.arrays import Array
+from airground_drake.geometry import outline
 from airground_drake.geometry.motion import Motion
-from airground_drake.geometry.outline import BASE, GAP, MIDDLE, RADIUS, balls
+from airground_drake.geometry.outline import BASE, COUNT, EXTENT, GAP, MIDDLE, RADIUS
 from airground_drake.intervention.database import Negotiation
 from airground_drake.intervention.messages import ACCEPT, DONE, REFUSE, Reports, answer_to
-from airground_drake.intervention.planner import Planner, PlannerState
+from airground_drake.intervention.planner import Planner, PlannerState, Sighting
 from airground_drake.intervention.policy import Proposal
 
 CHOICES: dict[str, tuple[Any, ...]] = {
-    "mapped": ("true", "moved", "nothing", "phantoms", "on the robot", "ahead", "huge"),
+    "mapped": ("true", "moved", "nothing", "phantoms", "on the robot", "ahead", "room", "huge", "no shape"),
     "radii": ("true", "none", "half", "large", "enormous", "no length"),
     "motion": ("hold", "stall", "back and forth", "away", "collide", "shadow", "creep"),
     "party": ("alone", "all"),
@@ -44,7 +45,8 @@ class Tactic:
 
     Attributes:
         mapped: the map that it sends: the true map, every obstacle moved by about a metre, an empty map, random
-            phantoms, phantoms on top of the UGV, a wall across its way out of its sight, or very many phantoms.
+            phantoms of all shapes, phantoms on top of the UGV, a wall across its way out of its sight, walls all round
+            it, very many phantoms, or rows of numbers that are no shape.
         radii: radii on the map: true (0 for phantoms), zero, half, 3 m more, very much more, or not a length.
         motion: the motion that is proposed: stay; go towards the goal and stop short of it; to and fro; far away; into
             the nearest obstacle or robot; always the current position; towards the goal at a crawl.
@@ -103,6 +105,7 @@ class LyingPlanner(Planner):
         answers: Array,
         reports: Reports,
         standing: Sequence[bool] = (),
+        sightings: Sequence[Sighting] = (),
     ) -> PlannerState:
         """Speak, whatever the answers and reports."""
         return self._speak(memory, t, positions, answers)
@@ -125,8 +128,8 @@ class LyingPlanner(Planner):
 
     def _proposal(self, i: int, t: float, forged: Proposal | None, positions: Array) -> Proposal:
         """What UGV i is told, under the number and the time of another proposal if one is to be forged."""
-        motion, places = self._motion(i, t, positions), self._map(i, positions)
-        mapped = balls(places, self._radii(places), float(self.mapped[:, GAP].max(initial=1.0)))
+        motion, mapped = self._motion(i, t, positions), self._map(i, positions).copy()
+        mapped[:, RADIUS] = self._radii(mapped[:, RADIUS])
         number, issued = (-1, t) if forged is None else (forged.number, forged.issued)
         more = {"mapped": mapped, "cause": self._cause(i)}
         more["party"] = self.ugvs if self.tactic.party == "all" else ()
@@ -144,18 +147,15 @@ class LyingPlanner(Planner):
         }
         return causes[self.tactic.cause]
 
-    def _radii(self, mapped: Array) -> Array:
-        """Radii that go with a map, (m,), m."""
-        true = np.zeros(len(mapped))
-        if self.tactic.mapped in ("true", "moved"):
-            true = true + self.mapped[:, RADIUS]
+    def _radii(self, true: Array) -> Array:
+        """Radii that go with a map whose radii are (m,), m: (m,), m."""
         radii = {
             "true": true,
             "none": 0.0 * true,
             "half": 0.5 * true,
             "large": true + 3.0,
             "enormous": true + 1e6,
-            "no length": self.random.choice([np.nan, np.inf, -1.0], len(mapped)),
+            "no length": self.random.choice([np.nan, np.inf, -1.0], len(true)),
         }
         return np.asarray(radii[self.tactic.radii], dtype=np.float64)
 
@@ -165,7 +165,8 @@ class LyingPlanner(Planner):
         way = goal - here
         ahead = way / max(float(np.linalg.norm(way)), 1e-9)
         aside = np.array([-ahead[1], ahead[0], 0.0])
-        around = np.concatenate([self.mapped, np.delete(positions[:-1], i, axis=0)])
+        middles = self.mapped[:, [MIDDLE, MIDDLE + 1, BASE]]
+        around = np.concatenate([middles, np.delete(positions[: len(self.ugvs)], i, axis=0)])
         nearest = around[np.linalg.norm(around - here, axis=1).argmin()] if len(around) else goal
         corners = {
             "hold": [here, here],
@@ -180,18 +181,47 @@ class LyingPlanner(Planner):
         return Motion(t + lasts * np.linspace(0.0, 1.0, len(places)), places)
 
     def _map(self, i: int, positions: Array) -> Array:
-        """The map that goes with a proposal to UGV i, (m, 3), m."""
-        here, goal, flat = positions[i], self.targets[i], np.array([1.0, 1.0, 0.0])
-        steps = np.linspace(-1.0, 1.0, 9)[:, None]
-        across = 0.5 * (here + goal) + 8.0 * steps * np.array([1.0, 0.0, 0.0])
-        middles = self.mapped[:, [MIDDLE, MIDDLE + 1, BASE]]
+        """The map that goes with a proposal to UGV i: outlines, (m, W)."""
+        here, goal = positions[i, :2], self.targets[i, :2]
+        gap = float(self.mapped[:, GAP].max(initial=1.0))
+        middle, right = 0.5 * (here + goal), np.array([8.0, 0.0])
+        corners = here + 6.0 * np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
+
+        def walls(*ends: tuple[Array, Array]) -> Array:
+            return outline.stacked(outline.prism(each, gap=gap) for each in ends)
+
+        def phantoms(count: int, middle: Array, extent: float) -> Array:
+            places = middle + self.random.uniform(-extent, extent, (count, 2))
+            return outline.stacked(shape_at(place, gap, self.random) for place in places)
+
+        by = self.random.normal(size=(len(self.mapped), 3)) * [1.0, 1.0, 0.0]
         maps = {
-            "true": middles,
-            "moved": middles + self.random.normal(size=middles.shape) * flat,
-            "nothing": np.empty((0, 3)),
-            "phantoms": self.random.uniform(-5.0, 15.0, (8, 3)) * flat,
-            "on the robot": here + self.random.normal(scale=0.5, size=(4, 3)) * flat,
-            "ahead": across * flat,
-            "huge": self.random.uniform(-100.0, 100.0, (HUGE, 3)) * flat,
+            "true": lambda: self.mapped,
+            "moved": lambda: outline.moved(self.mapped, by),
+            "nothing": lambda: self.mapped[:0],
+            "phantoms": lambda: phantoms(8, np.full(2, 5.0), 10.0),
+            "on the robot": lambda: phantoms(4, here, 0.5),
+            "ahead": lambda: walls((middle - right, middle + right)),
+            "room": lambda: walls(*zip(corners, np.roll(corners, 1, axis=0), strict=True)),
+            "huge": lambda: outline.balls(self.random.uniform(-100.0, 100.0, (HUGE, 3)) * [1, 1, 0], gap=gap),
+            "no shape": lambda: self._spoilt(phantoms(6, here + 7.0, 3.0)),
         }
-        return np.asarray(maps[self.tactic.mapped], dtype=np.float64)
+        return np.asarray(maps[self.tactic.mapped](), dtype=np.float64)
+
+    def _spoilt(self, rows: Array) -> Array:
+        """Rows that are no outlines: a number is not finite, the circle is too small, or corners are missing."""
+        for row in rows:
+            column, value = [(EXTENT + 1, np.nan), (EXTENT, -1.0), (COUNT, 0.0), (COUNT, len(row))][
+                self.random.integers(4)
+            ]
+            row[column] = value
+        return rows
+
+
+def shape_at(place: Array, gap: float, random: np.random.Generator, size: float = 0.5) -> Array:
+    """The outline of a point, wall, box or triangle that extends `size`, m, from its place (2,), m, at most."""
+    count = int(random.integers(1, 5))
+    if count == 1:
+        return np.asarray(outline.balls([*place, 0.0], gap=gap)[0])
+    turns = random.uniform(0.0, 2.0 * np.pi) + 2.0 * np.pi * np.arange(count) / count
+    return outline.prism(place + size * np.column_stack([np.cos(turns), np.sin(turns)]), gap=gap)
