@@ -244,6 +244,8 @@ def _off_m(
     """How far the error was from the threshold: at each trigger, and in each excursion that is missed."""
     begin_s, end_s = float(error.t_s[0]), float(error.t_s[-1])
     for trigger in [*triggers, None]:
+        if trigger is None and begin_s >= end_s:  # the dwell outlasts the run
+            return
         until = end_s if trigger is None else trigger
         found = list(_excursions(error, levels, min(begin_s, until), until))
         serves = trigger is not None and bool(found) and found[-1][1] == until
