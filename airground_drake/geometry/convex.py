@@ -18,6 +18,10 @@ FAR = 1.0 + 1e-12
 """Squares of distances that exceed a limit by this factor do so whatever the rounding."""
 PER_CELL = 4.0
 """Points to a cell, on average, where points near an outline are looked for."""
+WIDEST_PIECE = 1.0
+"""Widest piece of an arc that may be covered at once, rad."""
+FINER = 6
+"""Such pieces are halved at most so often."""
 
 
 @njit(cache=True)
@@ -424,11 +428,15 @@ def clears(row: Array, reach: float, ax: float, ay: float, bx: float, by: float)
 @njit(cache=True)
 def ways_are_clear(begin: Array, end: Array, rows: Array, reach: Array) -> npt.NDArray[np.bool_]:
     """Which segments, from (K, 2) to (K, 2), m, in the plane z = 0 are `reach` (m,), m, from all cores (m, W): (K,)."""
-    found = np.ones(len(begin), np.bool_)
+    found, last = np.ones(len(begin), np.bool_), 0
     for k in range(len(begin)):
+        ax, ay, bx, by = begin[k, 0], begin[k, 1], end[k, 0], end[k, 1]
+        if len(rows) > 0 and not clears(rows[last], reach[last], ax, ay, bx, by):  # what blocked the one before
+            found[k] = False
+            continue
         for m in range(len(rows)):
-            if not clears(rows[m], reach[m], begin[k, 0], begin[k, 1], end[k, 0], end[k, 1]):
-                found[k] = False
+            if not clears(rows[m], reach[m], ax, ay, bx, by):
+                found[k], last = False, m
                 break
     return found
 
@@ -443,3 +451,85 @@ def in_the_way(begin: Array, end: Array, more: Array, rows: Array, reach: Array)
                 found[m] = True
                 break
     return found
+
+
+@njit(cache=True)
+def arcs_are_covered(
+    centres: Array, radii: Array, begin: Array, sweep: Array, rows: Array, reach: Array
+) -> npt.NDArray[np.bool_]:
+    """Which arcs have every point nearer than `reach` (m,), m, to one of the cores (m, W): (K,).
+
+    An arc is divided into pieces. A piece is covered if its ends and the point where the tangents at its ends meet are
+    near to the same core: all that is near to a core is convex. So an arc may be covered and not found to be.
+
+    Args:
+        centres: of the circles, (K, 2), m.
+        radii: of the circles, (K,), m.
+        begin: heading of the first point of each arc from its centre, (K,), rad.
+        sweep: angle of each arc, counter-clockwise, (K,), rad.
+        rows: outlines, (m, W).
+        reach: distances from their cores, (m,), m.
+    """
+    count, widest = np.zeros(len(centres) + 1, np.int64), 0.0
+    for k in range(len(radii)):
+        widest = max(widest, radii[k])
+    cells = _cells_of(centres)
+    near = np.empty(0, np.int64)
+    for fill in (False, True):  # the outlines near each circle: first their number, then the outlines
+        for m in range(len(rows)):
+            low_x, high_x, low_y, high_y = _reached(rows[m], reach[m] + widest)
+            first, last, bottom, top = _cells_between(cells, low_x, high_x, low_y, high_y)
+            for column in range(first, last):
+                for i in range(cells.first[column, bottom], cells.first[column, top]):
+                    k = cells.members[i]
+                    if may_be_within(rows, m, centres[k, 0], centres[k, 1], reach[m] + radii[k]):
+                        if fill:
+                            near[count[k]] = m
+                            count[k] += 1
+                        else:
+                            count[k + 1] += 1
+        if not fill:
+            count = np.cumsum(count)
+            near = np.empty(count[-1], np.int64)
+    found = np.empty(len(centres), np.bool_)
+    for k in range(len(centres)):  # by now, `count` has the index after the last outline near each circle
+        some = near[count[k - 1] if k > 0 else 0 : count[k]]
+        found[k] = _is_covered(centres[k], radii[k], begin[k], sweep[k], rows, reach, some)
+    return found
+
+
+@njit(cache=True)
+def _is_covered(
+    centre: Array, radius: float, begin: float, sweep: float, rows: Array, reach: Array, near: npt.NDArray[np.int64]
+) -> bool:
+    """`arcs_are_covered` for one arc, and the outlines near its circle, (n,)."""
+    pieces = max(int(np.ceil(sweep / WIDEST_PIECE)), 1)
+    angles, widths = np.empty(pieces + FINER), np.empty(pieces + FINER)
+    for piece in range(pieces):
+        angles[piece], widths[piece] = begin + piece * sweep / pieces, sweep / pieces
+    left, least, away = pieces, 1.01 * sweep / pieces / 2**FINER, np.empty(3)
+    while left > 0:
+        left -= 1
+        angle, width = angles[left], widths[left]
+        at, out = angle + 0.5 * width, radius / np.cos(0.5 * width)
+        ends = (
+            (centre[0] + radius * np.cos(angle), centre[1] + radius * np.sin(angle)),
+            (centre[0] + radius * np.cos(angle + width), centre[1] + radius * np.sin(angle + width)),
+            (centre[0] + out * np.cos(at), centre[1] + out * np.sin(at)),
+        )
+        x, y = centre[0] + radius * np.cos(at), centre[1] + radius * np.sin(at)
+        meets, covers = False, False
+        for m in near:
+            if nearest(rows[m], x, y, 0.0, True, away, reach[m]) < reach[m]:
+                meets = covers = True
+                for px, py in ends:
+                    covers = covers and nearest(rows[m], px, py, 0.0, True, away, reach[m]) < reach[m]
+                if covers:
+                    break
+        if not meets or (not covers and width < least):
+            return False
+        if not covers:
+            angles[left], angles[left + 1] = angle, at
+            widths[left] = widths[left + 1] = 0.5 * width
+            left += 2
+    return True

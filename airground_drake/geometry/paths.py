@@ -47,6 +47,9 @@ FEW = 64
 AT_ONCE = 1_000_000
 """Largest number of pairs of a segment and a disc that are tested together, to limit memory."""
 
+SLACK = 1e-3
+"""By so much more than the arc round a corner has to be covered at both ends, rad."""
+
 CHORD = 0.1
 """Largest angle of the chords that stand for an arc where obstacles are looked for that a path runs into, rad."""
 
@@ -205,6 +208,22 @@ class _Obstacles:
             np.concatenate((self.r, r[kept])),
             np.concatenate((discs, ways), axis=1),
         )
+
+    @cached_property
+    def touchable(self) -> NDArray[np.bool_]:
+        """Which circles have a point that no obstacle covers, (n,); no free path touches another one.
+
+        On a map that is one in eight: obstacles overlap. Of a corner's circle, only the arc between its two edges is on
+        the boundary of its own polygon. Of that arc a little more is looked at, for rounding.
+        """
+        c, r, (before, after) = self.circles
+        of_corner = before != 0.0
+        begin = np.where(of_corner, np.angle(1j * before) - SLACK, 0.0)
+        sweep = np.where(of_corner, np.angle(-after / np.where(of_corner, before, 1.0)) % (2.0 * np.pi), 2.0 * np.pi)
+        sweep = np.minimum(sweep + 2.0 * SLACK, 2.0 * np.pi)
+        discs = outline.balls(np.column_stack([_places(self.c), np.zeros(len(self.c))]))
+        rows, reach = outline.joined(discs, self.rows), np.concatenate((self.r, self.keep)) - 2.0 * TOL
+        return ~convex.arcs_are_covered(_places(c), r, begin, sweep, rows, reach)
 
     def lack(self, point: complex) -> str | None:
         """Words for the first obstacle that a point is nearer to than allowed, by more than TOL; or None."""
@@ -444,7 +463,7 @@ def _route(p: complex, q: complex, around: _Obstacles) -> Array | None:
     """The pieces (see ``Path``) of the shortest path between free points; None if no path exists."""
     if abs(q - p) <= _EPS:
         return np.empty((0, 6))
-    c, r, ways = around.circles
+    c, r, ways = (each[..., around.touchable] for each in around.circles)
     a, b, on = _tangents(
         np.concatenate(([p, q], c)), np.concatenate(([0.0, 0.0], r)), np.concatenate((np.zeros((2, 2)), ways), axis=1)
     )
