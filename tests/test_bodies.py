@@ -11,12 +11,12 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
+from builders import logs
 from builders.misbuilt import neighbours
 from oracles import faults_of
 from report.cases import built
 
 from airground_drake.base.errors import TraceError
-from airground_drake.check import positions
 from airground_drake.export import tables
 from airground_drake.gatekeeper.answer import Basis
 from airground_drake.gatekeeper.outcome_gatekeeper import OutcomeGatekeepers
@@ -99,8 +99,9 @@ def test_a_pair_has_one_distance_wherever_users_see_it(ends_at: float, gap_m: fl
     evidence = {verdict.claim.id: asdict(verdict)["evidence"] for verdict in found}
     places = [pd.DataFrame(trace.position(name), columns=["x_m", "y_m", "z_m"]) for name in trace.robots]
     table = pd.concat([each.assign(t_s=trace.t, body=name) for each, name in zip(places, trace.robots, strict=True)])
-    all_judged, _ = positions.judge(table, asdict(given))
-    judged = next(one for one in all_judged if (one.first, one.second) == ("ugv1", "rock"))
+    judged = next(
+        one for one in logs.judged(table, asdict(given), tmp_path).pairs if (one.first, one.second) == ("ugv1", "rock")
+    )
     listed = next(each for each in evidence["SAFE-TRACE"]["pairs"] if pair.items() <= each.items())
     metric = report["runs"]["b"]["metrics"]["min_distance_m"]["ugv1"]["rock"]
     exported = pd.read_csv([*tables.write(trace, tmp_path)][-1]).query("first == 'ugv1' and second == 'rock'").iloc[0]

@@ -97,6 +97,10 @@ class ExportError(AirgroundError):
     """A run cannot be written as a file of the kind that was asked for."""
 
 
+class LogError(AirgroundError):
+    """A recorded log cannot be read, or cannot be judged for its scenario: one line says why, and what was wanted."""
+
+
 class ReplayError(AirgroundError):
     """A replay cannot be made on this machine: no port for Meshcat, no encoder for a video."""
 

@@ -13,7 +13,6 @@ traces.
     triggers              ZENO-TRACE, THR-TRIG, THR-QUALITY
     events                arrivals and collisions
     report, line, command all checks, one line each; the command line
-    positions             positions that come from elsewhere: `airground judge`
 """
 
 from .command import main

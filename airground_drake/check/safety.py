@@ -6,8 +6,10 @@ D >= d + V h, else n.v >= 0. It is the other inequality with d + V h in place of
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from fractions import Fraction
 from math import isqrt
+from typing import NamedTuple
 
 import numpy as np
 
@@ -112,11 +114,20 @@ def gain_of(scenario: Json, period_s: float) -> Fraction:
     return min(written(scenario["control"]["avoidance_gain_1_s"]) * written(period_s), Fraction(1))
 
 
+class Shortfall(NamedTuple):
+    """What the inequalities of a pair lack in one period, m: the robot's own share, and that of the other robot."""
+
+    own: Fraction
+    other: Fraction
+
+    @property
+    def both(self) -> Fraction:
+        """The sum."""
+        return self.own + self.other
+
+
 def shortfall_m(own_m: Array, other_m: Array, pair: Pair, gain: Fraction, last: Fraction = Fraction(1)) -> Fraction:
     """The largest sum of what a pair's inequalities lack at one sample, m per period, in exact arithmetic.
-
-    There is an inequality for each convex part of what is avoided. Samples at which the two cannot meet within a
-    period, whatever their direction, need none.
 
     Args:
         own_m: places of the robot at the control samples and at the end, (K + 1, 3).
@@ -125,27 +136,55 @@ def shortfall_m(own_m: Array, other_m: Array, pair: Pair, gain: Fraction, last: 
         gain: A h.
         last: length of the last period, in periods; its step is extended to a whole one.
     """
+    periods = len(own_m) - 1
+    lasts = [Fraction(1)] * (periods - 1) + [last]
+    found = shortfalls_m(own_m, other_m, pair, [pair.safe_m] * periods, [gain] * periods, lasts)
+    return max((each.both for each in found.values()), default=Fraction())
+
+
+def shortfalls_m(
+    own_m: Array, other_m: Array, pair: Pair, safe_m: Sequence[float], gain: Sequence[Fraction],
+    lasts: Sequence[Fraction] = (),
+) -> dict[int, Shortfall]:  # fmt: skip
+    """What a pair's inequalities lack in each of K periods, by the period's number, where they lack something.
+
+    There is an inequality for each convex part of what is avoided; the largest shortfall counts. Samples at which the
+    two cannot meet within a period, whatever their direction, need none.
+
+    Args:
+        own_m: places of the robot at the samples, (K + 1, 3).
+        other_m: places of what it avoids, (K + 1, 3).
+        pair: share, and shape of what it avoids.
+        safe_m: distance to be kept in each period, (K,).
+        gain: A h of each period, (K,).
+        lasts: by what the steps of each period are divided, (K,); by default by 1.
+    """
     reach = np.linalg.norm(np.diff(own_m, axis=0), axis=1) + np.linalg.norm(np.diff(other_m, axis=0), axis=1)
-    reach[-1] /= float(last)
-    safe, share, worst = Fraction(pair.safe_m), Fraction(pair.share), Fraction()
+    lasts = lasts or [Fraction(1)] * len(reach)
+    reach /= np.array([float(each) for each in lasts])
+    enough = reach + np.asarray(safe_m) + FAR_M
+    share, found = Fraction(pair.share), dict[int, Shortfall]()
     apart = own_m[:-1] - other_m[:-1]
     for bound, part, rows in pair.shape.near(apart):
-        if bound - reach.max() >= pair.safe_m + FAR_M:
+        if bound >= enough.max():
             break
-        far = part.signed_m(apart[rows]) - reach[rows] >= pair.safe_m + FAR_M
+        far = part.signed_m(apart[rows]) >= enough[rows]
         for k in (rows.start + np.flatnonzero(~far)).tolist():  # also where it is not a number
             here, there, after, beyond = (
                 [Fraction(c) for c in place] for place in (own_m[k], other_m[k], own_m[k + 1], other_m[k + 1])
             )
-            lasts = last if k == len(apart) - 1 else Fraction(1)
             ways = part.away([a - b for a, b in zip(here, there, strict=True)])
-            given, step = (safe, share, gain, len(part.corners) == 1), [a - b for a, b in zip(after, here, strict=True)]
-            missed = min(_missed_m(away, [each / lasts for each in step], *given) for away in ways)
+            given, step = (
+                (Fraction(safe_m[k]), share, gain[k], len(part.corners) == 1),
+                [a - b for a, b in zip(after, here, strict=True)],
+            )
+            own, other = min(_missed_m(away, [each / lasts[k] for each in step], *given) for away in ways), Fraction()
             if pair.share < 1.0:  # a robot is a point: there is one way
-                step = [(a - b) / lasts for a, b in zip(beyond, there, strict=True)]
-                missed += _missed_m(Away([-c for c in ways[0].vector], ways[0].beyond), step, *given)
-            worst = max(worst, missed)
-    return worst
+                step = [(a - b) / lasts[k] for a, b in zip(beyond, there, strict=True)]
+                other = _missed_m(Away([-c for c in ways[0].vector], ways[0].beyond), step, *given)
+            if own + other > (found[k].both if k in found else 0):
+                found[k] = Shortfall(own, other)
+    return found
 
 
 def lost_m(missed: Fraction, gain: Fraction, samples: int) -> float:

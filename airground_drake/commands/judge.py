@@ -1,78 +1,159 @@
-"""`airground judge POSITIONS --scenario NAME`: judge recorded positions, such as those of a laboratory."""
+"""`airground judge LOG... --scenario NAME`: judge the log of an experiment, or of another simulator."""
 
 from __future__ import annotations
 
 import argparse
-import io
 import json
+import math
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
-from airground_drake.base import files
-from airground_drake.base.errors import FAULT_WIDTH, one_line
-from airground_drake.base.usage import Parser, overridable, refuse
+from airground_drake.base.errors import one_line
+from airground_drake.base.usage import Parser, between, output_folder, overridable
 
-if TYPE_CHECKING:
-    import pandas as pd
+MOST_GAP_S, MOST_ERROR_M = 1e6, 1e6
+EPILOG = """\
+what a LOG can be, found by its content:
+  CSV, TSV     a row per body and time (t_s, body, x_m, y_m, z_m), or columns for each body (tb1_x, /tb1/odom/.../x),
+               or a file per body (tb1.csv); header lines, decimal commas, epoch stamps, ns, ms and mm are noticed
+  TUM, Parquet
+  MCAP         Foxglove (JSON, protobuf), ROS 2, ROS 1            pip install 'airground_drake[logs]'
+  ROS bags     ROS 1 (.bag), ROS 2 (folder, .db3, .mcap)          pip install 'airground_drake[logs]'
+  a folder     of any of these
+`airground export` writes logs that can be judged, too.
 
-MOST_LISTED = 20
-"""Most pairs that are printed; those of least margin come first."""
+the scenario says who the robots are, how large they are, where obstacles stand, and which distances are to be kept.
+Only ugvs (start_m, target_m, radius_m, max_speed_m_s), obstacles and safe_distance matter here. `airground init`
+writes one to start from.
+
+examples:
+  airground judge run3.csv --scenario lab.yaml
+  airground judge tb1.csv tb2.csv uav.csv --scenario lab.yaml -o judged
+  airground judge rosbag2_2026_05_04 --scenario lab.yaml --rename /tb3_1/odom=ugv1 --frame map
+  airground judge log.csv --scenario lab.yaml --map-columns t=clock,body=who,x_mm=east,y_mm=north
+
+exit codes: 0 no distance is broken where the log covers it (the first line says if it does not cover all), 1 one is
+broken, or the position error decides, 2 usage, or a log that cannot be used
+"""
 
 
 def parser() -> argparse.ArgumentParser:
     """Make the parser."""
     parser = Parser(
         prog="airground judge",
-        description="Judge sampled positions of robots from any source: which distances were kept, and by how much "
-        "the samples miss the avoidance law.",
-        epilog="exit codes: 0 every distance is kept, 1 one is not, 2 usage, or a file that cannot be used",
+        description="Judge the log of an experiment: which distances were kept, by which margin, whose doing an "
+        "approach was, and which hypotheses of the safety theorem held.",
+        epilog=EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument(
-        "positions", type=Path, metavar="FILE", help="CSV or Parquet with the columns t_s, body, x_m, y_m, z_m"
-    )
+    parser.add_argument("logs", type=Path, nargs="+", metavar="LOG", help="a file or folder; several are one log")
     parser.add_argument(
         "--scenario", required=True, metavar="NAME", help="name of a shipped scenario, or path to a YAML file"
     )
     overridable(parser)
-    parser.add_argument("--json", action="store_true", help="print every pair as JSON")
+    parser.add_argument(
+        "--rename", type=_named, action="append", default=[], metavar="NAME=BODY",
+        help="a topic, frame, column or value in the log, and the body of the scenario that it is about",
+    )  # fmt: skip
+    parser.add_argument(
+        "--map-columns", type=_mapped, default={}, metavar="t=NAME,...",
+        help="names of the columns t, body, frame, x, y, z of a table, with a unit where needed (x_mm=NAME); "
+        "{body} in a NAME stands for a body's name",
+    )  # fmt: skip
+    parser.add_argument(
+        "--frame", action="append", default=[], metavar="FRAME",
+        help="use positions in this frame only; several FRAMEs are taken as one",
+    )  # fmt: skip
+    parser.add_argument("--time-unit", choices=("s", "ms", "us", "ns"), default="", help="of times without a unit")
+    parser.add_argument("--length-unit", choices=("m", "cm", "mm"), default="", help="of lengths without a unit")
+    parser.add_argument(
+        "--gap", type=between(0.0, MOST_GAP_S), default=0.0, metavar="S",
+        help="nothing is claimed between two positions of a body that are farther apart than this (default: 2.5 times "
+        "the body's usual time between two); closer ones are joined by a straight line",
+    )  # fmt: skip
+    parser.add_argument(
+        "--position-error", type=_error, action="append", default=[], metavar="[BODY=]M",
+        help="by how much recorded positions may be wrong",
+    )  # fmt: skip
+    parser.add_argument("--uav", action="append", default=[], metavar="NAME", help="one more UAV, like the scenario's")
+    parser.add_argument(
+        "--without", action="append", default=[], metavar="BODY", help="a body of the scenario that is not to be judged"
+    )
+    parser.add_argument(
+        "-o", "--output", type=output_folder, metavar="DIR",
+        help="also write a page with maps, judged.html, and a replay, replay.html",
+    )  # fmt: skip
+    parser.add_argument("--json", action="store_true", help="print all of it as JSON")
     return parser
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Judge, and print every pair; the exit codes are in the help."""
+    """Judge, and print the verdict; the exit codes are in the help."""
     options = parser().parse_args(arguments)
-    from airground_drake.check import positions
+    from airground_drake.logs import judging, opening, tables, tracks, words
     from airground_drake.scenarios.load import load, resolved
 
-    scenario = resolved(load(options.scenario, options.set))
-    try:
-        found, covered = positions.judge(_table(options.positions), scenario)
-    except (positions.UnusableError, ValueError) as error:
-        return refuse(f"{options.positions}: {str(error)[:FAULT_WIDTH]}")
-    broken = [one for one in found if not one.kept]
+    scenario = load(options.scenario, options.set)
+    document = resolved(scenario)
+    rename = dict(options.rename)
+    choice = tracks.Choice(
+        rename, [each.strip("/") for each in options.frame], options.without, options.uav, options.gap,
+        options.time_unit, options.length_unit,
+    )  # fmt: skip
+    bodies = tracks.bodies_of(document, options.uav)
+    tracks.known(document, choice, [name for name, _ in options.position_error if name])
+    log = opening.opened(options.logs, tables.Wanted(bodies, rename, options.map_columns))
+    found = tracks.joined(log, document, choice)
+    errors = _errors(options.position_error, bodies)
+    judged = judging.judge(found, document, errors)
+    if options.output is not None:
+        from airground_drake.logs import page
+
+        logs = [str(path) for path in options.logs]
+        written = page.write(options.output, judged, found, scenario, errors, logs)
     if options.json:
-        pairs = [{**one._asdict(), "kept": one.kept} for one in found]
-        document = {"kept": not broken, "covered": covered._asdict(), "pairs": pairs}
-        print(json.dumps(document | {"not_judged": positions.NOT_JUDGED}, indent=1))
-        return int(bool(broken))
-    print(f"The samples cover {covered.lasting_s:g} s, from t = {covered.first_s:.10g} s; "
-          f"the scenario lasts {covered.duration_s:g} s.")  # fmt: skip
-    print(f"{len(found) - len(broken)} of {len(found)} distances were kept. Least margins first:")
-    for one in found[:MOST_LISTED]:
-        law = "the law is not judged: samples are not equally spaced"
-        if one.missed_m is not None:
-            promised = f"{one.guarantee_m:.6g} m" if one.guarantee_m else "no distance"
-            law = f"misses the law by e = {one.missed_m:.6g} m per period, which promises {promised}"
-        verdict = "kept" if one.kept else "NOT KEPT"
-        print(one_line(f"{one.first}, {one.second}: {verdict}, {one.least_m:.6g} of {one.safe_m:.6g} m; {law}"))
-    print("".join(f"Not judged: {each}.\n" for each in positions.NOT_JUDGED), end="")
-    return int(bool(broken))
+        print(json.dumps(judging.as_json(judged, found), indent=1, allow_nan=False))
+    else:
+        for line in words.lines(judged, found):
+            print(one_line(line))
+        if options.output is not None:
+            print("".join(f"{one_line(str(path))}\n" for path in written), end="")
+    return int(judged.status != judging.KEPT)
 
 
-def _table(path: Path) -> pd.DataFrame:
-    """Read a table; ValueError if the file does not contain one."""
-    import pandas as pd
+def _named(text: str) -> tuple[str, str]:
+    name, is_there, body = text.rpartition("=")
+    if not (is_there and name and body):
+        raise argparse.ArgumentTypeError(f"{text!r} is not allowed; wanted: NAME=BODY, such as /tb3_1/odom=ugv1")
+    return name, body
 
-    content = files.read_bytes(path, links=True)
-    return files.read_table(content) if content[:4] == b"PAR1" else pd.read_csv(io.BytesIO(content))
+
+def _mapped(text: str) -> dict[str, str]:
+    from airground_drake.logs.columns import TARGETS, split_unit
+
+    found = {}
+    for part in text.split(","):
+        target, _, name = part.partition("=")
+        if split_unit(target)[0] not in TARGETS or not name:
+            wanted = f"wanted: t=NAME,body=NAME,x=NAME,... of {', '.join(TARGETS)}, with a unit where needed: x_mm=NAME"
+            raise argparse.ArgumentTypeError(f"{part!r} is not allowed; {wanted}")
+        found[target] = name
+    return found
+
+
+def _error(text: str) -> tuple[str, float]:
+    name, _, number = text.rpartition("=")
+    try:
+        value = float(number)
+    except ValueError:
+        value = math.nan
+    if not 0.0 <= value <= MOST_ERROR_M:
+        wanted = f"wanted: metres from 0 to {MOST_ERROR_M:g}, or BODY=metres"
+        raise argparse.ArgumentTypeError(f"{text!r} is not allowed; {wanted}")
+    return name, value
+
+
+def _errors(given: Sequence[tuple[str, float]], bodies: Sequence[str]) -> dict[str, float]:
+    """Position errors by body; one without a name is of all others."""
+    named = dict(given)
+    return {name: named.get(name, named.get("", 0.0)) for name in bodies}

@@ -11,6 +11,7 @@ import numpy as np
 import pandas as pd
 import persons
 import pytest
+from builders import logs
 from builders.edits import moved, with_meta, with_scenario
 from check.forgeries import all_of, cells, claim, everywhere, rows
 from check.forging import Edit, edited_report, edited_table, forged, mend
@@ -20,12 +21,13 @@ from persons import FORK, lone, walking
 from sharing import once
 
 from airground_drake.base import files
+from airground_drake.base.errors import LogError
 from airground_drake.check.command import LIMIT_S, checked
 from airground_drake.check.line import AGREES
-from airground_drake.check.positions import UnusableError
-from airground_drake.check.positions import judge as judge_positions
 from airground_drake.check.rules import SMALL
 from airground_drake.check.scenario import Pair, pairs_of, way_m
+from airground_drake.logs.judging import KEPT
+from airground_drake.logs.judging import judge as judge_log
 from airground_drake.report import document
 from airground_drake.run.events import extract
 from airground_drake.run.simulation import simulate
@@ -253,24 +255,36 @@ def sampled(trace: Trace, *bodies: str) -> pd.DataFrame:
 
 
 @pytest.mark.parametrize("by_m", [0.0, 0.01])
-def test_positions_of_persons_are_judged_too(by_m: float) -> None:
+def test_positions_of_persons_are_judged_too(by_m: float, tmp_path: Path) -> None:
     """Of a robot it is told by how much it came too near itself, and no distance is promised."""
     trace = nearer(by_m)
-    pairs, _ = judge_positions(sampled(trace, "ugv1", "uav", "person"), resolved(trace.scenario))
+    pairs = logs.judged(sampled(trace, "ugv1", "uav", "person"), resolved(trace.scenario), tmp_path).pairs
     one = next(pair for pair in pairs if (pair.first, pair.second) == ("ugv1", "person"))
     assert one.missed_m == pytest.approx(by_m, abs=1e-9)
-    assert (one.safe_m, one.kept, one.guarantee_m) == (0.3, True, None)
+    assert (one.safe_m, one.status, one.promised_m) == (0.3, KEPT, None)
     assert one.least_m == pytest.approx(0.3 + 1.2 * persons.H - by_m, abs=1e-9)
 
 
-@pytest.mark.parametrize(
-    ("name", "bodies", "says"),
-    [
-        ("on the goal", ("ugv1", "uav"), "person has 0 rows"),
-        ("leaving", ("ugv1", "uav", "person"), "person disappears under way"),
-    ],
-)
-def test_positions_without_a_person_are_not_judged(name: str, bodies: tuple[str, ...], says: str) -> None:
-    trace = persons.run(name)
-    with pytest.raises(UnusableError, match=says):
-        judge_positions(sampled(trace, *bodies), resolved(trace.scenario))
+def test_a_log_without_a_person_is_judged_only_if_that_is_said(tmp_path: Path) -> None:
+    trace = persons.run("on the goal")
+    table, document = sampled(trace, "ugv1", "uav"), resolved(trace.scenario)
+    with pytest.raises(LogError, match="person is not in the log"):
+        logs.judged(table, document, tmp_path)
+    found = judge_log(logs.read(tmp_path / "table.csv", document, without=["person"]), document)
+    assert "person" not in {pair.second for pair in found.pairs}
+
+
+def test_a_person_counts_only_while_it_is_there(tmp_path: Path) -> None:
+    """A recording of this package goes on after a person has disappeared."""
+    trace = persons.run("leaving")
+    table, document = sampled(trace, "ugv1", "uav", "person"), resolved(trace.scenario)
+    gone = document["obstacles"]["person"]["disappears_s"]
+    one = next(pair for pair in logs.judged(table, document, tmp_path).pairs if pair.second == "person")
+    assert one.covered_s == pytest.approx(gone, abs=2.0 * persons.H)
+    at_robot = table[table["body"] == "ugv1"].set_index("t_s")
+    later = (table["body"] == "person") & (table["t_s"] > gone + persons.H)
+    for axis in ("x_m", "y_m"):
+        table.loc[later, axis] = at_robot[axis].reindex(table.loc[later, "t_s"]).to_numpy()
+    again = next(pair for pair in logs.judged(table, document, tmp_path).pairs if pair.second == "person")
+    assert later.any()
+    assert again == one

@@ -9,15 +9,16 @@ from typing import Any
 
 import pandas as pd
 import pytest
+from builders import logs
 from check.forgeries import all_of, cells, everywhere
 from check.forging import Edit, edited_table, forged, mend, read_table, trace
 from sharing import once
 
 from airground_drake.check.command import LIMIT_S, checked
 from airground_drake.check.line import AGREES, CheckLine
-from airground_drake.check.positions import judge
 from airground_drake.check.report import DECIDED, SCHEMA, SHAPE
 from airground_drake.check.run import SHARED, read_run
+from airground_drake.logs.judging import KEPT
 from airground_drake.run.simulation import simulate
 from airground_drake.run.trace import save
 from airground_drake.scenarios.load import from_data, resolved
@@ -107,7 +108,9 @@ def test_honest_runs_stop_at_the_distance_and_keep_it(report_of: Callable[[str],
 
 
 @pytest.mark.parametrize(("name", "by_m"), [("wall", 0.0), ("room", 0.0), ("block", 0.01), ("tower", 0.01)])
-def test_positions_among_walls_are_judged(report_of: Callable[[str], Path], name: str, by_m: float) -> None:
+def test_positions_among_walls_are_judged(
+    report_of: Callable[[str], Path], name: str, by_m: float, tmp_path: Path
+) -> None:
     """As they are, and beside an obstacle that is kept farther away from."""
     folder = report_of(name)
     frame, scenario = read_table(folder), json.loads((folder / "report.json").read_bytes())["scenario"]["resolved"]
@@ -118,9 +121,9 @@ def test_positions_among_walls_are_judged(report_of: Callable[[str], Path], name
         for robot in (*scenario["ugvs"], "uav")
     ]  # fmt: skip
     scenario["obstacles"][name]["distance_m"] = (scenario["obstacles"][name]["distance_m"] or 0.3) + by_m
-    pairs, _ = judge(pd.concat(tables, ignore_index=True), scenario)
-    assert [pair.second for pair in pairs if not pair.kept] == ([name] if by_m else [])
-    assert max(pair.missed_m or 0.0 for pair in pairs) == pytest.approx(by_m, abs=1e-9)
+    pairs = logs.judged(pd.concat(tables, ignore_index=True), scenario, tmp_path).pairs
+    assert [pair.second for pair in pairs if pair.status != KEPT] == ([name] if by_m else [])
+    assert max(pair.missed_m for pair in pairs) == pytest.approx(by_m, abs=1e-9)
 
 
 def ahead(by_m: float) -> Edit:

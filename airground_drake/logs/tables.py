@@ -1,0 +1,225 @@
+"""Tables as streams: long ones with a column that names the body, wide ones, one file per robot, TUM, Parquet."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Collection, Iterator, Mapping
+from pathlib import Path
+from typing import Any, NamedTuple, cast
+
+import numpy as np
+import numpy.typing as npt
+import pandas as pd
+
+from airground_drake.base import files
+from airground_drake.base.arrays import Array
+from airground_drake.base.errors import LogError
+from airground_drake.logs import text
+from airground_drake.logs.columns import WORDS, Columns, Place, Time, columns, listed
+from airground_drake.logs.names import body_of, renamed
+from airground_drake.logs.stream import PER_M, Log, Stream, Whole
+
+TUM = ["timestamp", "tx", "ty", "tz", "qx", "qy", "qz", "qw"]
+"""Columns of a file in TUM's format, which has no header."""
+MOST_BODIES = 2_000
+"""Different values in a column that names bodies."""
+_UNITS = re.compile(r"length\W*units?\W+(\w+)", re.IGNORECASE)
+_DECIMAL = re.compile(r"([+-]?)(\d{1,19})(?:\.(\d*))?")
+
+
+class Wanted(NamedTuple):
+    """What the scenario and the command line say about names.
+
+    Attributes:
+        bodies: names of the scenario.
+        rename: bodies by names in the log.
+        columns: names of columns by what they are.
+    """
+
+    bodies: Collection[str]
+    rename: Mapping[str, str]
+    columns: Mapping[str, str]
+
+    def body(self, name: str, *, is_file: bool = False) -> str:
+        """The body that a name in the log stands for, or ''."""
+        return renamed([name], self.rename) or body_of(name, self.bodies, is_file=is_file)
+
+
+def read(path: Path, content: bytes, wanted: Wanted) -> Log:
+    """The streams of a table: a text, or Parquet.
+
+    Raises:
+        LogError: if it is no table, or lacks a column.
+    """
+    table = _parquet(content) if content[:4] == b"PAR1" else text.read(content)
+    labels = table.labels
+    if not table.has_header and len(labels) == len(TUM) and not wanted.columns:
+        table = table._replace(labels=(labels := TUM))
+    has = columns(labels, wanted.columns, wanted.bodies)
+    if not has.times or not has.places:
+        lacks = " and ".join(["a column of times"] * (not has.times) + ["columns x and y"] * (not has.places))
+        raise LogError(
+            f"it lacks {lacks}: its columns are {listed(labels)}; wanted: such as t_s, body, x_m, y_m, z_m, or "
+            "--map-columns t=NAME,body=NAME,x=NAME,y=NAME,z=NAME"
+        )
+    has = _of_bodies(has, table, wanted)
+    log = Log(list(_streams(path, table, has, wanted)))
+    used = {k for place in has.places for k in (place.x, place.y, place.z)} | {has.body, has.frame}
+    used |= {k for each in log.streams for k in _columns_of(each, labels)}
+    if others := [label or f"column {k + 1}" for k, label in enumerate(labels) if k not in used]:
+        log.ignored.append(f"{path.name}: columns {listed(others)}")
+    if table.odd:
+        where = f"first line {table.odd[0]}"
+        log.ignored.append(f"{path.name}: lines with another number of fields: {len(table.odd)}, {where}")
+    return log
+
+
+def _columns_of(stream: Stream, labels: list[str]) -> Iterator[int]:
+    for name in stream.clock.split(" and "):
+        if name in labels:
+            yield labels.index(name)
+
+
+def _parquet(content: bytes) -> text.Table:
+    """A table of numbers and texts; ValueError as `files.read_table`."""
+    try:
+        table = files.read_table(content)
+    except ValueError as error:
+        raise LogError(str(error)) from None
+    cells = pd.DataFrame(
+        {k: [_written(v) for v in table.iloc[:, k].tolist()] for k in range(table.shape[1])}, dtype=str
+    )
+    return text.Table([*map(str, table.columns)], cells, range(1, len(table) + 1), [], True, [])
+
+
+def _written(value: Any) -> str:
+    return "" if value is None else repr(value) if isinstance(value, float) else str(value)
+
+
+def _of_bodies(has: Columns, table: text.Table, wanted: Wanted) -> Columns:
+    """Choose between a long table, with a column of bodies and one place, and a wide one."""
+    wide = [place for place in has.places if place.name and wanted.body(place.name)]
+    if wide:
+        return has._replace(body=None, places=wide)
+    text_columns: list[int] = [has.body] if has.body is not None else []
+    text_columns += [k for k in range(len(table.labels)) if k not in text_columns and k not in _numbers_of(has)]
+    for k in text_columns:
+        values = table.cells[k].unique()
+        if len(values) <= MOST_BODIES and any(wanted.body(value) for value in values):
+            return has._replace(body=k, places=_one_place(has.places))
+    if has.body is not None and table.cells[has.body].nunique() > max(1, len(table.cells) // 4):
+        has = has._replace(body=None)  # it counts rows
+    if has.body is not None:
+        return has._replace(places=_one_place(has.places))
+    return has
+
+
+def _numbers_of(has: Columns) -> set[int | None]:
+    places = {k for place in has.places for k in (place.x, place.y, place.z)}
+    return places | {k for time in has.times for k in (time.whole, time.rest)} | {has.frame}
+
+
+def _one_place(places: list[Place]) -> list[Place]:
+    """The only place, or the one whose columns have the shortest names."""
+    shortest = min(places, key=lambda place: len(place.name))
+    if sum(len(place.name) == len(shortest.name) for place in places) > 1:
+        raise LogError(
+            f"it has several places in a row: {listed([p.name for p in places])}; wanted: --map-columns x=..."
+        )
+    return [shortest]
+
+
+def _streams(path: Path, table: text.Table, has: Columns, wanted: Wanted) -> Iterator[Stream]:
+    """The streams of a table; of a long one, those of each body and frame."""
+    stated = next((found[1].lower() for line in table.above if (found := _UNITS.search(line))), "")
+    length = WORDS.get(stated, stated) if WORDS.get(stated, stated) in PER_M else ""
+    whole = {time: _stamps(table, time) for time in has.times}
+    frames = table.cells[has.frame] if has.frame is not None else None
+    if frames is not None and all(text._is_number(each) for each in frames.unique()[:100]):
+        frames = None  # numbers of frames of a camera
+    for place in has.places:
+        time = next(each for each in (*has.times, has.times[0]) if place.name.startswith(each.owner) or not each.owner)
+        numbers, why = _places(table, place)
+        stamps, nano, stamped = whole[time]
+        why[~stamped & (why == "")] = "no time"
+        if not (numbers[:, :2] == numbers[:, :2]).any():
+            continue
+        alone = len(has.places) == 1
+        keys = pd.DataFrame({
+            "body": table.cells[has.body] if has.body is not None else place.name or path.stem,
+            "frame": frames if frames is not None else "",
+        }, index=table.cells.index)  # fmt: skip
+        for key, rows in keys.groupby(["body", "frame"], sort=False).groups.items():
+            name, frame = cast("tuple[str, str]", key)
+            at = np.asarray(rows)
+            is_file = has.body is None and alone and not wanted.body(place.name)
+            yield _stream(
+                Stream(
+                    str(path), path.stem if is_file else str(name), stamps[at], nano[at], numbers[at],
+                    "ns" if time.unit == "ns" else time.unit, place.unit or length, str(frame).strip("/"),
+                    clock=_clock(table, time), is_file=is_file,
+                ),
+                why[at], [table.lines[k] for k in at],
+                is_sparse=has.body is None and len(has.places) > 1 and bool((why == "empty").mean() > 0.5),
+            )  # fmt: skip
+
+
+def _clock(table: text.Table, time: Time) -> str:
+    both = [table.labels[k] for k in (time.whole, time.rest) if k is not None]
+    return " and ".join(both)
+
+
+def _stream(raw: Stream, why: npt.NDArray[np.object_], lines: list[int], *, is_sparse: bool) -> Stream:
+    """A stream without the rows that cannot be used; it counts them, but not the empty ones between other bodies'."""
+    good = why == ""
+    for k in np.flatnonzero(~good).tolist():
+        if is_sparse and why[k] == "empty":
+            continue
+        raw.skipped[why[k]] += 1
+        raw.first_skipped.setdefault(why[k], f"line {lines[k]}")
+    raw.whole, raw.nano, raw.places = raw.whole[good], raw.nano[good], raw.places[good]
+    return raw
+
+
+def _places(table: text.Table, place: Place) -> tuple[Array, npt.NDArray[np.object_]]:
+    """Coordinates (n, 3), and why a row has none: '' if it has."""
+    taken = [place.x, place.y, *([] if place.z is None else [place.z])]
+    texts = [table.cells[k] for k in taken]
+    numbers = np.full((len(table.cells), 3), np.nan)
+    why = np.full(len(table.cells), "", dtype=object)
+    for axis, cells in enumerate(texts):
+        numbers[:, axis] = pd.to_numeric(cells, errors="coerce").to_numpy(dtype=np.float64)
+        bad = ~np.isfinite(numbers[:, axis]) & (why == "")
+        low = cells.str.lower().to_numpy()
+        reasons = np.select([low == "", np.isin(low, ["nan", "null", "none", "na", "n/a", "inf", "-inf"])],
+                            ["empty", "not finite"], "no number")  # fmt: skip
+        why[bad] = reasons[bad]
+    return numbers, why
+
+
+def _stamps(table: text.Table, time: Time) -> tuple[Whole, Whole, npt.NDArray[np.bool_]]:
+    """Whole units, billionths, and whether a row has a stamp."""
+    whole, nano, good = _exactly(table.cells[time.whole].tolist())
+    if time.rest is not None:
+        rest, _, has_rest = _exactly(table.cells[time.rest].tolist())
+        nano, good = rest, good & has_rest
+    return whole, nano, good
+
+
+def _exactly(cells: list[str]) -> tuple[Whole, Whole, npt.NDArray[np.bool_]]:
+    """Decimal numbers as whole parts and billionths, exactly; other numbers as near as floating point has them."""
+    whole, nano = np.zeros(len(cells), dtype=np.int64), np.zeros(len(cells), dtype=np.int64)
+    good = np.zeros(len(cells), dtype=bool)
+    for k, cell in enumerate(cells):
+        if (found := _DECIMAL.fullmatch(cell)) and int(found[2]) < 2**63:
+            sign = -1 if found[1] == "-" else 1
+            whole[k], nano[k], good[k] = sign * int(found[2]), sign * int(f"{found[3] or ''}000000000"[:9]), True
+            continue
+        try:
+            value = float(cell)
+        except ValueError:
+            continue
+        if abs(value) < 2**62:
+            whole[k] = np.floor(value)
+            nano[k], good[k] = round((value - np.floor(value)) * 1e9), True
+    return whole, nano, good

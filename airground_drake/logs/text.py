@@ -1,0 +1,166 @@
+"""Text tables as loggers write them: the delimiter, the header and the sign of decimals are found from the data lines.
+
+Guessing from the first lines goes wrong where a header of several lines, or comments, stand above the data.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import re
+from collections import Counter
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import pandas as pd
+
+from airground_drake.base.errors import LogError
+
+DELIMITERS = (";", "\t", ",")
+"""In this order: a table with decimal commas has as many commas in each line, too. Blanks come last."""
+SAMPLE = 200
+"""Lines in the middle of a file from which its form is found."""
+ALIKE = 0.6
+"""Least share of these lines that have the usual number of fields."""
+FEWEST, MOST = 3, 20_000
+"""Columns of a table."""
+MOST_ROWS = 10_000_000
+_NUMBER = re.compile(r"[+-]?(\d+([.,]\d*)?|[.,]\d+)([eE][+-]?\d+)?|[+-]?(nan|inf|infinity)|", re.IGNORECASE)
+_COMMA = re.compile(r"[+-]?\d*,\d+([eE][+-]?\d+)?")
+_POINT = re.compile(r"[+-]?\d*\.\d+([eE][+-]?\d+)?")
+
+
+class Table(NamedTuple):
+    """A table of texts.
+
+    Attributes:
+        labels: names of the columns; of several header lines, the parts joined by "/"; numbers from 1 without header.
+        cells: the columns, by number, each a text per row; decimals have a point.
+        lines: number of each row's line in the file.
+        above: lines above the header, and comments.
+        has_header: whether there was one.
+        odd: numbers of the lines that have another number of fields, and are left out.
+    """
+
+    labels: list[str]
+    cells: pd.DataFrame
+    lines: Sequence[int]
+    above: list[str]
+    has_header: bool
+    odd: list[int]
+
+
+def read(content: bytes) -> Table:
+    """The table in a text file.
+
+    Raises:
+        LogError: if it is no text, or no table.
+    """
+    lines = _decoded(content).split("\n")
+    lines = [line.rstrip("\r") for line in lines]
+    full = [k for k, line in enumerate(lines) if line.strip() and not line.lstrip().startswith("#")]
+    if not full:
+        raise LogError("it has no lines with data")
+    middle = full[max(0, len(full) // 2 - SAMPLE // 2) :][:SAMPLE]
+    delimiter, count = _form([lines[k] for k in middle])
+    rows = [_fields(lines[k], delimiter) for k in middle]
+    rows = [row for row in rows if len(row) == count]
+    comma = delimiter != "," and _decimal_comma(rows)
+    numeric = [2 * sum(_is_number(row[c]) for row in rows) > len(rows) for c in range(count)]
+    first = next((k for k in full if _is_data(_fields(lines[k], delimiter), numeric)), None)
+    if first is None:
+        raise LogError("no line of it has numbers in the columns that have numbers elsewhere")
+    labels, header = _header(lines[:first], delimiter, count)
+    data = [k for k in full if k >= first]
+    if len(data) > MOST_ROWS:
+        raise LogError(f"it has {len(data)} rows; allowed: {MOST_ROWS}")
+    good = [k for k in data if _count(lines[k], delimiter) == count]
+    chosen = set(good)
+    cells = pd.read_csv(
+        io.StringIO("\n".join(lines[k] for k in good)), sep=delimiter if delimiter != " " else r"\s+", header=None,
+        names=list(range(count)), index_col=False, dtype=str, keep_default_na=False, na_filter=False,
+        skip_blank_lines=False,
+    )  # fmt: skip
+    cells = cells.apply(lambda column: column.str.strip())
+    if comma:
+        for c in (c for c in range(count) if numeric[c]):
+            cells[c] = cells[c].str.replace(",", ".", regex=False)
+    above = [line for k, line in enumerate(lines[:first]) if k not in header]
+    odd = [k + 1 for k in data if k not in chosen]
+    named = labels or [str(c + 1) for c in range(count)]
+    return Table(named, cells, [k + 1 for k in good], above, bool(labels), odd)
+
+
+def _decoded(content: bytes) -> str:
+    """The text; without a mark of its encoding it is UTF-8, or else Windows-1252."""
+    if content[:2] in (b"\xff\xfe", b"\xfe\xff"):
+        return content.decode("utf-16", errors="replace")
+    if b"\0" in content:
+        raise LogError("it is neither text nor a file of a kind that is known here")
+    try:
+        return content.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        text = content.decode("cp1252", errors="replace")
+    if sum(not (c.isprintable() or c in "\r\n\t") for c in text[:4096]) > 40:
+        raise LogError("it is neither text nor a file of a kind that is known here")
+    return text
+
+
+def _form(lines: Sequence[str]) -> tuple[str, int]:
+    """Delimiter, and number of fields."""
+    for delimiter in (*DELIMITERS, " "):
+        count, times = Counter(_count(line, delimiter) for line in lines).most_common(1)[0]
+        if count >= FEWEST and times >= ALIKE * len(lines):
+            if count > MOST:
+                raise LogError(f"it has {count} columns; allowed: {MOST}")
+            return delimiter, count
+    raise LogError("it is no table: its lines have no common number of fields, by semicolons, tabs, commas or blanks")
+
+
+def _fields(line: str, delimiter: str) -> list[str]:
+    if delimiter == " ":
+        return line.split()
+    if '"' not in line:
+        return [each.strip() for each in line.split(delimiter)]
+    try:
+        return [each.strip() for each in next(csv.reader([line], delimiter=delimiter), [])]
+    except csv.Error:
+        return []
+
+
+def _count(line: str, delimiter: str) -> int:
+    return line.count(delimiter) + 1 if delimiter != " " and '"' not in line else len(_fields(line, delimiter))
+
+
+def _is_number(cell: str) -> bool:
+    return _NUMBER.fullmatch(cell) is not None
+
+
+def _decimal_comma(rows: Sequence[Sequence[str]]) -> bool:
+    every = [cell for row in rows for cell in row]
+    return any(map(_COMMA.fullmatch, every)) and not any(map(_POINT.fullmatch, every))
+
+
+def _is_data(row: Sequence[str], numeric: Sequence[bool]) -> bool:
+    """Whether a line has numbers, or nothing, where most lines have numbers."""
+    cells = [cell for cell, is_one in zip(row, numeric, strict=False) if is_one]
+    return len(row) == len(numeric) and all(map(_is_number, cells)) and any(cells)
+
+
+def _header(lines: Sequence[str], delimiter: str, count: int) -> tuple[list[str], set[int]]:
+    """Names of the columns, and the numbers of the lines that they are from; a comment may be the header."""
+    found: list[int] = []
+    rows: list[list[str]] = []
+    for k in range(len(lines) - 1, -1, -1):
+        is_comment = lines[k].lstrip().startswith("#")
+        row = _fields(lines[k].lstrip().lstrip("#"), delimiter)
+        if not lines[k].strip() or (is_comment and rows):
+            break
+        if len(row) != count or not any(row):
+            break
+        rows.insert(0, row)
+        found.append(k)
+        if is_comment:
+            break
+    parts = [[row[c] for row in rows if row[c]] for c in range(count)]
+    return ["/".join(dict.fromkeys(each)) for each in parts] if rows else [], {*found}

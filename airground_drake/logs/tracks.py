@@ -1,0 +1,307 @@
+"""Streams joined to one track per body: in one frame, in the order of time, split where a body was not recorded."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+
+from airground_drake.base.arrays import Array
+from airground_drake.base.errors import LogError, one_line
+from airground_drake.check.files import Json
+from airground_drake.check.limits import LARGEST
+from airground_drake.check.scenario import expected_m_s, robots_of
+from airground_drake.logs import names, units
+from airground_drake.logs.stream import PER_M, Log, Stream, Whole
+
+GAP = 2.5
+"""A body was not recorded where two of its samples are farther apart than this multiple of the usual time between."""
+SINCE_1970_NS = 10**17
+"""From here on, stamps are since 1970; times are then from the first sample."""
+SAME_M = 1e-9
+"""Positions of one body at one time that differ by less are one."""
+ORIGIN_M = 1e-3
+"""Robots that start so close to (0, 0) start there."""
+
+
+class Span(NamedTuple):
+    """A stretch of time, s."""
+
+    begin: float
+    end: float
+
+
+@dataclass(eq=False)
+class Track:
+    """Where one body was; n samples, strictly increasing in time.
+
+    Attributes:
+        t_s: times, (n,).
+        places_m: (n, 3); z is nan if the log has none.
+        gap_s: motion between two samples that are farther apart is unknown.
+        told: where it is from: stream, frame and clock.
+    """
+
+    t_s: Array
+    places_m: Array
+    gap_s: float
+    told: dict[str, str] = field(default_factory=dict)
+
+    @property
+    def spans(self) -> list[Span]:
+        """Stretches without a gap; one sample alone is a stretch of length 0."""
+        cut = np.flatnonzero(np.diff(self.t_s) > self.gap_s * (1.0 + 1e-9))
+        begins, ends = self.t_s[np.append(0, cut + 1)], self.t_s[np.append(cut, len(self.t_s) - 1)]
+        return [Span(*both) for both in zip(begins.tolist(), ends.tolist(), strict=True)]
+
+    def at(self, t_s: Array) -> Array:
+        """Places at times (m,), with straight motion between samples: (m, 3), m."""
+        return np.column_stack([np.interp(t_s, self.t_s, axis) for axis in self.places_m.T])
+
+
+@dataclass(eq=False)
+class Tracks:
+    """The bodies of a log.
+
+    Attributes:
+        bodies: tracks by name.
+        said: what a reader must know of how they were read.
+        ignored: what was not used.
+        origin: what time 0 is: '' if the log's own clock.
+    """
+
+    bodies: dict[str, Track]
+    said: list[str]
+    ignored: list[str]
+    origin: str = ""
+
+
+class Choice(NamedTuple):
+    """What the command line chooses.
+
+    Attributes:
+        rename: bodies by names in the log.
+        frames: positions in other frames are not used, and these count as one; none: all that are there.
+        without: bodies of the scenario that are not judged.
+        uavs: further UAVs.
+        gap_s: see `Track`; 0 for `GAP` times the usual time between two samples.
+        time_unit: of stamps without one; '' to find out.
+        length_unit: likewise.
+    """
+
+    rename: Mapping[str, str] = {}
+    frames: Collection[str] = ()
+    without: Collection[str] = ()
+    uavs: Sequence[str] = ()
+    gap_s: float = 0.0
+    time_unit: str = ""
+    length_unit: str = ""
+
+
+def bodies_of(scenario: Json, uavs: Sequence[str] = ()) -> list[str]:
+    """Names of the bodies that a log may have: robots, further UAVs, and obstacles that move or might."""
+    return [*robots_of(scenario), *uavs, *(name for name, each in scenario["obstacles"].items() if expected_m_s(each))]
+
+
+def known(scenario: Json, choice: Choice, others: Sequence[str] = ()) -> None:
+    """Refuse names that the scenario does not have, and further UAVs that it has; LogError names them."""
+    there = bodies_of(scenario, choice.uavs)
+    for name in (*choice.without, *others):
+        if name not in there:
+            raise LogError(one_line(f"the scenario has no {name}; it has {', '.join(there)}"))
+    if taken := [name for name in choice.uavs if name in bodies_of(scenario) or name in scenario["obstacles"]]:
+        raise LogError(one_line(f"--uav {taken[0]}: the scenario has it already"))
+
+
+def joined(log: Log, scenario: Json, choice: Choice) -> Tracks:
+    """The tracks of the bodies of a scenario.
+
+    Args:
+        log: its streams.
+        scenario: as resolved.
+        choice: see there.
+
+    Raises:
+        LogError: if a UGV or an obstacle that moves is missing, a body is in several streams, or in several frames.
+    """
+    bodies = [name for name in bodies_of(scenario, choice.uavs) if name not in choice.without]
+    found, ignored = _assigned(log, bodies, choice)
+    _in_one_frame({name: each.frame for name, each in found.items()}, choice.frames)
+    said = units.settle(found, scenario, choice.time_unit, choice.length_unit)
+    for name in (*scenario["ugvs"], *choice.uavs, *(n for n, each in scenario["obstacles"].items() if each["moves"])):
+        if name not in found and name not in choice.without:
+            there = ", ".join(dict.fromkeys(each.label for each in log.streams)) or "none"
+            wanted = f"--rename NAME={name}, or --without {name}"
+            raise LogError(one_line(f"{name} is not in the log; names there: {there[:300]}; wanted: {wanted}"))
+    stamps = {name: each.ns(each.time_unit) for name, each in found.items()}
+    first = min(int(each.min()) for each in stamps.values())
+    zero = first if first >= SINCE_1970_NS else 0
+    tracks = {}
+    for name, stream in ((body, found[body]) for body in bodies if body in found):
+        if np.isnan(stream.places[:, 2]).any() and name not in scenario["ugvs"] and name not in scenario["obstacles"]:
+            said.append(f"{name} has no height in the log: its distances are not judged")
+            continue
+        tracks[name] = _track(name, stream, stamps[name] - zero, choice.gap_s, said)
+    uav = scenario["uav"]["name"]
+    if uav not in found and uav not in choice.without:
+        said.append(f"{uav} is not in the log: its distances are not judged")
+    _apart_at_the_start(tracks, scenario)
+    _heights(tracks, scenario, said)
+    return Tracks(tracks, said, [*log.ignored, *ignored], f"{first / 1e9:.6f} s since 1970" if zero else "")
+
+
+def _assigned(log: Log, bodies: Collection[str], choice: Choice) -> tuple[dict[str, Stream], list[str]]:
+    """The stream of each body, and what is said of the others."""
+    _exist(choice.rename, log, bodies)
+    candidates: dict[str, dict[int, list[Stream]]] = {}
+    ignored = list[str]()
+    for stream in log.streams:
+        body, rank = _body_of(stream, bodies, choice.rename)
+        if not len(stream.whole):
+            ignored.append(f"{stream.label}: no usable rows")
+        elif not body:
+            ignored.append(f"{stream.label}: names no body of the scenario")
+        elif choice.frames and stream.frame and stream.frame not in choice.frames:
+            ignored.append(f"{stream.label}: in frame {stream.frame}")
+        else:
+            candidates.setdefault(body, {}).setdefault(rank, []).append(stream)
+    found = {}
+    for body, by_rank in candidates.items():
+        best = _links(by_rank.pop(min(by_rank)))
+        ignored += [f"{each.label}: {body} has a nearer name" for others in by_rank.values() for each in others]
+        of_one = {(each.name, each.child, each.frame): each for each in best}
+        if len(of_one) > 1:
+            several = ", ".join(f"{each.label}{f' in frame {each.frame}' * bool(each.frame)}" for each in best)
+            wanted = f"--rename {best[0].child or best[0].name}={body}" + " or --frame" * (
+                len({*map(_frame, best)}) > 1
+            )
+            raise LogError(one_line(f"{body} is in the log more than once: {several[:400]}; wanted: {wanted}"))
+        found[body] = _merged(best)
+    return found, list(dict.fromkeys(ignored))
+
+
+def _frame(stream: Stream) -> str:
+    return stream.frame
+
+
+def _exist(rename: Mapping[str, str], log: Log, bodies: Collection[str]) -> None:
+    known = {name.strip("/") for each in log.streams for name in (each.name, each.child, each.label) if name}
+    for name, body in rename.items():
+        if body not in bodies:
+            raise LogError(one_line(f"--rename {name}={body}: the scenario has no {body}; it has {', '.join(bodies)}"))
+        if name.strip("/") not in known:
+            there = ", ".join(sorted(known))[:300]
+            raise LogError(one_line(f"--rename {name}={body}: the log has no {name}; it has {there}"))
+
+
+def _body_of(stream: Stream, bodies: Collection[str], rename: Mapping[str, str]) -> tuple[str, int]:
+    """The body of a stream, or '', and how near its name is: 0 renamed, 1 equal, 2 part of it."""
+    if body := names.renamed((stream.name, stream.child, stream.label), rename):
+        return body, 0
+    for name in filter(None, (stream.name, stream.child)):
+        if name.strip("/") in bodies:
+            return name.strip("/"), 1
+        if names.is_elsewhere(name, bodies):
+            return "", 2
+        if body := names.body_of(name, bodies, is_file=stream.is_file):
+            return body, 2
+    return "", 2
+
+
+def _links(streams: list[Stream]) -> list[Stream]:
+    """Streams without those of a robot's own parts: their frame is one that the robot carries."""
+    carried = {each.child for each in streams if each.child}
+    return [each for each in streams if each.frame not in carried or each.frame == each.child] or streams
+
+
+def _merged(streams: list[Stream]) -> Stream:
+    """One stream of several files."""
+    first = streams[0]
+    for other in streams[1:]:
+        if (other.time_unit, other.length_unit, other.clock) != (first.time_unit, first.length_unit, first.clock):
+            raise LogError(
+                one_line(f"{first.label} has other units or clocks in {first.source} than in {other.source}")
+            )
+        first.whole, first.nano = np.append(first.whole, other.whole), np.append(first.nano, other.nano)
+        first.places = np.concatenate([first.places, other.places])
+        first.skipped += other.skipped
+        first.first_skipped = {**other.first_skipped, **first.first_skipped}
+    return first
+
+
+def _in_one_frame(frames: Mapping[str, str], allowed: Collection[str]) -> None:
+    """Refuse positions in different frames, and frames of odometry, which begin where each robot stood."""
+    stated = {name: frame for name, frame in frames.items() if frame}
+    several = ", ".join(f"{name} in {frame}" for name, frame in stated.items())
+    if allowed:
+        return
+    if len({*stated.values()}) > 1:
+        wanted = "wanted: positions in one frame, such as map or world; or --frame for each name of that one frame"
+        raise LogError(one_line(f"positions are in different frames: {several}; {wanted}"))
+    if len(stated) > 1 and names.segments(next(iter(stated.values())))[-1] == "odom":
+        wanted = "wanted: positions in one frame, such as map or world; or --frame odom if this is one for all"
+        raise LogError(one_line(f"odometry is in a frame of each robot's own, though both may be called odom: "
+                                f"{several}; {wanted}"))  # fmt: skip
+
+
+def _track(name: str, stream: Stream, ns: Whole, gap_s: float, said: list[str]) -> Track:
+    """The track of a stream, whose stamps are ns after time 0: sorted, each time once."""
+    places = stream.places / PER_M[stream.length_unit]
+    if not (np.abs(np.nan_to_num(places)) <= LARGEST).all() or np.abs(ns).max() / 1e9 > LARGEST:
+        raise LogError(one_line(f"{name} has a value beyond {LARGEST:g}; wanted: seconds and metres"))
+    for reason, count in stream.skipped.items():
+        where = f", first in {at}" if (at := stream.first_skipped.get(reason)) else ""
+        said.append(f"{name}: {count} rows skipped, {reason}{where}")
+    if disorder := int((np.diff(ns) < 0).sum()):
+        said.append(f"{name}: rows are not in the order of time in {disorder} places; they were sorted")
+    order = np.argsort(ns, kind="stable")
+    ns, places = ns[order], places[order]
+    new = np.append(True, np.diff(ns) > 0)
+    first = np.flatnonzero(new)[np.cumsum(new) - 1]
+    apart = np.linalg.norm(np.nan_to_num(places - places[first]), axis=1)
+    same, other = (~new) & (apart <= SAME_M), (~new) & (apart > SAME_M)
+    if same.any():
+        said.append(f"{name}: {int(same.sum())} rows come twice; each counts once")
+    if other.any():
+        k = int(np.argmax(np.where(other, apart, -1.0)))
+        said.append(
+            f"{name}: {int(other.sum())} rows contradict an earlier one of the same time, at {ns[k] / 1e9:.6g} s by "
+            f"{apart[k]:.3g} m; the earlier one counts"
+        )
+    t_s = ns[new] / 1e9
+    usual = float(np.median(np.diff(t_s))) if len(t_s) > 1 else 0.0
+    told = {"stream": stream.label, "frame": stream.frame, "clock": stream.clock, "source": stream.source}
+    return Track(t_s, places[new], gap_s or GAP * usual, told)
+
+
+def _apart_at_the_start(tracks: Mapping[str, Track], scenario: Json) -> None:
+    """Refuse robots that all start at (0, 0), where the scenario has them start apart."""
+    ugvs = scenario["ugvs"]
+    there = [name for name in ugvs if name in tracks and np.abs(tracks[name].places_m[0, :2]).max() <= ORIGIN_M]
+    starts = {tuple(ugvs[name]["start_m"][:2]) for name in there}
+    if len(there) > 1 and len(starts) > 1:
+        raise LogError(
+            one_line(f"{', '.join(there)} all start at (0, 0): each is in a frame of its own, as odometry is; "
+                     "wanted: positions in one frame, such as map or world")
+        )  # fmt: skip
+
+
+def _heights(tracks: Mapping[str, Track], scenario: Json, said: list[str]) -> None:
+    """Give UGVs and obstacles without a height that of the scenario."""
+    flat = []
+    for name, track in tracks.items():
+        if np.isnan(track.places_m[:, 2]).any():
+            track.places_m[:, 2] = height_m(scenario, name)
+            flat.append(name)
+    if flat:
+        said.append(f"no height in the log: {', '.join(flat)}; taken from the scenario")
+
+
+def height_m(scenario: Json, name: str) -> float:
+    """Height of a UGV, or of the origin of an obstacle's frame, by the scenario, m."""
+    if name in scenario["ugvs"]:
+        return float(scenario["ugvs"][name]["start_m"][2])
+    moves = scenario["obstacles"][name]["moves"]
+    return float([*moves["waypoints_m"][0], 0.0, 0.0][2]) if moves else 0.0
