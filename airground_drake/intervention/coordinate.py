@@ -297,4 +297,4 @@ def warm_up() -> None:
     room = Space(outline.balls([0.0, 1.0, 0.0]), np.array([0.1]), 0.1, 1.0, 0.1)
     ends = [np.array([0.0, 0.0]), np.array([3.0, 0.0])]
     tasks = [RobotTask(a, np.array([[0.0, *b]])) for a, b in pairwise([*ends, ends[0]])]
-    plan(room, tasks, [1.0, 1.0], effort=Effort(orders=2))
+    plan(room, tasks, [1.0, 1.0], effort=Effort(candidates=20_000))

@@ -1,26 +1,27 @@
-"""Joint plans by prioritised planning: one robot after the other, in many orders, within a budget."""
+"""Joint plans: prioritised planning where that succeeds, a search over joint steps where it does not."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
+from airground_drake.geometry.paths import NoPath, shortest_path
+from airground_drake.intervention.coordination.first_plan import first_plan
+from airground_drake.intervention.coordination.neighbourhoods import Refinement
 from airground_drake.intervention.coordination.roadmap import RobotTask, Space, build_roadmap
 from airground_drake.intervention.coordination.single import Mover, OtherRobot, Way, find
 from airground_drake.intervention.coordination.smoothing import smooth
 from airground_drake.intervention.coordination.timed import at_rest
 
-MOST_ORDERS = 30
-"""Largest number of orders of the robots."""
-MOST_SEARCHES = 240
-"""Largest number of searches for single robots: a large team gets fewer orders."""
 LEAVING = 2.0
 """A robot leaves its place within the time in which it travels this many times the distance that robots keep."""
-LATER_ORDERS = 3
-"""Orders that are tried for a better plan after the first complete one."""
+
+Outcome = Literal["complete", "no plan exists", "exhausted", "effort spent"]
+"""A plan for all; none exists; none on the roadmaps, all searched to the end; none within the effort."""
 
 
 @dataclass(frozen=True)
@@ -28,14 +29,14 @@ class Effort:
     """Limits of the work on a plan, in counts, so that the plan is the same on every machine.
 
     Attributes:
-        orders: orders of the robots.
-        searches: searches for single robots, in all orders together.
-        expansions: expanded intervals, in all searches together; a quarter is reserved for a partial plan.
+        expansions: expanded intervals in all searches for single robots; a quarter is reserved for a partial plan.
+        candidates: moves that the search over joint steps considers; 0: no such search.
+        searches: searches for single robots that improve a complete plan, times the number of robots.
     """
 
-    orders: int = MOST_ORDERS
-    searches: int = MOST_SEARCHES
     expansions: int = 400_000
+    candidates: int = 10_000_000
+    searches: int = 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,13 +45,17 @@ class Plan:
 
     Attributes:
         ways: one per robot; None: it stays where it is.
-        orders: number of orders that were tried.
+        outcome: whether every robot has a way; if not, why.
+        separated: robots whose starts and targets lie in different components of their free space.
         expansions: number of expanded intervals.
+        candidates: moves that the search over joint steps considered.
     """
 
     ways: tuple[Way | None, ...]
-    orders: int
-    expansions: int
+    outcome: Outcome
+    separated: tuple[int, ...] = ()
+    expansions: int = 0
+    candidates: int = 0
 
     @property
     def complete(self) -> bool:
@@ -69,11 +74,12 @@ def plan(
 ) -> Plan:
     """Plan ways for some robots, which keep their distances from discs, from each other and from fixed motions.
 
-    The robots of an order are planned for in turn, each among the ways of those before it. If a robot finds no way:
-    1. The order is tried again, and every robot keeps clear of the starts of later robots until these can have left.
-    2. If that fails too, the robot without a way comes first in the next order.
-    3. If that order has been tried before, the next order is drawn from a fixed sequence.
-    If no order gives every robot a way, robots without a way stay where they are, and the others go round them.
+    1. The robots are planned for in turn, the longest way first, each among the ways of those before it. If a robot
+       finds no way, every robot keeps clear of the starts of later robots until these can have left.
+    2. If that fails, robots without a way even alone are left where they are, and the others are planned for again.
+    3. If that fails too, joint steps of these robots are searched on coarse roadmaps (`first_plan`).
+    4. A plan for all of them is improved (`neighbourhoods`).
+    5. Without one, robots that find no way stay where they are, and the others go round them.
 
     Args:
         space: discs and distances for a robot without a body.
@@ -92,10 +98,30 @@ def plan(
         for each, task, speed, own in zip(spaces, tasks, speeds, roadmap.robots, strict=True)
     ]
     search = _Search(movers, tuple(fixed), follow, effort)
-    ways = search.in_orders()
+    ways = search.complete()
     if ways is None:
         ways = search.partly()
-    return Plan(tuple(smooth(spaces, ways, [_resting(task) for task in tasks], fixed)), search.orders, search.spent)
+    outcome = search.outcome
+    separated = () if outcome == "complete" else _separated(spaces, tasks, ways)
+    return Plan(
+        tuple(smooth(spaces, ways, [_resting(task) for task in tasks], fixed)),
+        "no plan exists" if separated else outcome,
+        separated,
+        search.spent,
+        search.candidates,
+    )
+
+
+def _separated(spaces: Sequence[Space], tasks: Sequence[RobotTask], ways: Sequence[Way | None]) -> tuple[int, ...]:
+    """Robots that no way can lead to their targets, whatever the roadmap. Clearances do not count here."""
+    found = []
+    for i, (space, task, way) in enumerate(zip(spaces, tasks, ways, strict=True)):
+        if way is None:
+            try:
+                shortest_path(task.start, task.preset[-1, 1:], space.rows, space.keep)
+            except NoPath:
+                found.append(i)
+    return tuple(found)
 
 
 def _resting(task: RobotTask) -> OtherRobot:
@@ -108,52 +134,67 @@ class _Search:
 
     def __init__(self, movers: list[Mover], fixed: tuple[OtherRobot, ...], follow: float, effort: Effort) -> None:
         self._movers, self._fixed, self._follow, self._effort = movers, fixed, follow, effort
-        self.orders, self.searches, self.spent = 0, 0, 0
-        self._limit = effort.expansions
-        self._without_way: list[int] = []
+        self.spent, self.candidates = 0, 0
+        self.outcome: Outcome = "effort spent"
+        self._limit = effort.expansions * 3 // 4
+        self._without_way = [i for i, mover in enumerate(movers) if math.isinf(mover.to_go[mover.own.start])]
 
-    def in_orders(self) -> list[Way | None] | None:
-        """The best complete plan, or None."""
-        if any(math.isinf(mover.to_go[mover.own.start]) for mover in self._movers):
+    def complete(self) -> list[Way | None] | None:
+        """A plan for all robots that have a way alone, or None."""
+        ways, failed = self._in_either_way()
+        if failed is not None:
+            before = len(self._without_way)
+            self._without_way = [i for i, way in enumerate(self._alone()) if way is None]
+            if len(self._without_way) > before:
+                ways, failed = self._in_either_way()
+        able = self._able()
+        if failed is not None and len(able) > 1:
+            ways, failed = self._joint_steps(able)
+        if failed is not None:
             return None
-        best: list[Way | None] | None = None
-        least, left = math.inf, self._effort.orders
-        tried = set()
-        self._limit = self._effort.expansions * 3 // 4
-        drawn = self._drawn()
-        order = next(drawn)
-        while left > 0 and self.spent < self._limit and self.searches < self._effort.searches:
-            tried.add(order)
-            self.orders += 1
-            left -= 1
-            ways, failed = self._in_order(order)
-            if failed == order[0]:  # it has no way even without the other robots of the plan
-                self._without_way.append(failed)
-                return None
-            if failed is not None:
-                ways, failed = self._in_order(order, considerate=True)
-            if failed is None:
-                cost = sum(way.joined for way in ways if way is not None)
-                if cost < least - 1e-9:
-                    best, least = ways, cost
-                left = min(left, LATER_ORDERS)
-            first = (failed, *(i for i in order if i != failed)) if failed is not None else order
-            order = first if first not in tried else next((other for other in drawn if other not in tried), order)
-            if order in tried:
-                break
-        return best
+        if len(able) > 1:
+            self._refine(ways, able)
+        if self._without_way:
+            self.outcome = "exhausted"
+        else:
+            self.outcome = "complete"
+        return ways
 
-    def _drawn(self) -> Iterator[tuple[int, ...]]:
-        """Orders of the robots: the longest way first, then random ones from a fixed seed."""
-        count = len(self._movers)
-        by_length = sorted(range(count), key=lambda i: (-self._movers[i].to_go[self._movers[i].own.start], i))
-        yield tuple(by_length)
-        random = np.random.default_rng(0)
-        for _ in range(20 * self._effort.orders):
-            yield tuple(random.permutation(count).tolist())
+    def _able(self) -> list[int]:
+        """The robots that are not known to be without a way even alone."""
+        return [i for i in range(len(self._movers)) if i not in self._without_way]
+
+    def _alone(self) -> list[Way | None]:
+        """The ways that the robots would have without each other; not of those that are known to have none."""
+        found: list[Way | None] = []
+        for i, mover in enumerate(self._movers):
+            way, spent = (None, 0) if i in self._without_way else find(mover, self._taken(), self._follow, self._left())
+            self.spent += spent
+            found.append(way)
+        return found
+
+    def _left(self) -> int:
+        return max(0, self._limit - self.spent)
+
+    def _taken(self) -> list[OtherRobot]:
+        """The robots that are not asked, and those without a way."""
+        return [*self._fixed, *(_resting(self._movers[i].task) for i in self._without_way)]
+
+    def _in_either_way(self) -> tuple[list[Way | None], int | None]:
+        """Plan in one order, plainly and then considerately: ways, and the first robot without a way, or None."""
+        order = self._by_length(self._without_way)
+        ways, failed = self._in_order(order, self._without_way)
+        if failed is not None and failed != order[0]:
+            ways, failed = self._in_order(order, self._without_way, considerate=True)
+        return ways, failed
+
+    def _by_length(self, but: Sequence[int]) -> list[int]:
+        """The robots, the longest way first, without some."""
+        order = [i for i in range(len(self._movers)) if i not in but]
+        return sorted(order, key=lambda i: (-self._movers[i].to_go[self._movers[i].own.start], i))
 
     def _in_order(
-        self, order: Sequence[int], staying: Sequence[int] = (), *, considerate: bool = False
+        self, order: Sequence[int], staying: Sequence[int], *, considerate: bool = False
     ) -> tuple[list[Way | None], int | None]:
         """Ways of the robots in this order, and the first robot without a way, or None.
 
@@ -166,9 +207,7 @@ class _Search:
         taken = [*self._fixed, *(_resting(self._movers[i].task) for i in staying)]
         for k, i in enumerate(order):
             brief = [self._leaving(j) for j in order[k + 1 :]] if considerate else []
-            budget = self._limit - self.spent
-            way, spent = find(self._movers[i], taken, self._follow, budget, brief)
-            self.searches += 1
+            way, spent = find(self._movers[i], taken, self._follow, self._left(), brief)
             self.spent += spent
             if way is None:
                 return ways, i
@@ -182,13 +221,40 @@ class _Search:
         until = LEAVING * (mover.space.apart + mover.space.spacing) / mover.speed
         return _resting(mover.task)._replace(until=until)
 
+    def _joint_steps(self, able: Sequence[int]) -> tuple[list[Way | None], int | None]:
+        """A plan for some robots by joint steps: ways, and one of the robots if there is none."""
+        ways: list[Way | None] = [None] * len(self._movers)
+        movers = [self._movers[i] for i in able]
+        if not all(mover.own.usable[-1] for mover in movers):
+            return ways, able[0]  # a target is too near to an obstacle
+        found = first_plan(movers, self._taken(), self._effort.candidates)
+        self.candidates += found.candidates
+        if found.outcome != "found":
+            self.outcome = found.outcome
+            return ways, able[0]
+        for i, way in zip(able, found.ways, strict=True):
+            ways[i] = way
+        return ways, None
+
+    def _refine(self, ways: list[Way | None], able: Sequence[int]) -> None:
+        """Improve the ways of some robots, in place."""
+        alone = self._alone()
+        known = [(self._movers[i], ways[i], alone[i]) for i in able]
+        movers, own, free = zip(*known, strict=True)
+        if None in free or None in own:
+            return
+        better = Refinement(movers, own, free, self._taken(), self._follow)
+        better.run(self._effort.searches * len(able), self._left())
+        self.spent += better.expansions
+        for i, way in zip(able, better.ways, strict=True):
+            ways[i] = way
+
     def partly(self) -> list[Way | None]:
         """A plan in which robots without a way stay. Each time a robot finds none, the others are planned anew."""
         self._limit = self._effort.expansions
-        staying = self._without_way
-        order = next(self._drawn())
+        staying = list(self._without_way)
         for _ in self._movers:
-            ways, failed = self._in_order([i for i in order if i not in staying], staying)
+            ways, failed = self._in_order(self._by_length(staying), staying)
             if failed is None:
                 return ways
             staying.append(failed)
