@@ -114,7 +114,7 @@ def _messages(trace: Trace, scenario: Scenario) -> Iterator[Message]:
         entities = [_barrier(standing, barrier, t, by[k].tolist()) for barrier, by in moved]
         for robot in standing.robots:
             color = STATE_COLORS[looks[robot.name][k]] if robot.name in looks else UAV_COLOR
-            entities.append(_robot(robot, t, trace.position(robot.name)[k].tolist(), color))
+            entities.append(_robot(robot, t, trace.body(robot.name)[k].tolist(), color))
             yield Message(t, f"/robots/{robot.name}", "airground_drake.Signals", _signals(trace, robot.name, k))
         yield Message(t, "/scene", "foxglove.SceneUpdate", {"deletions": [], "entities": entities})
     for event in trace.events:
@@ -126,7 +126,7 @@ def _messages(trace: Trace, scenario: Scenario) -> Iterator[Message]:
 def _signals(trace: Trace, robot: str, k: int) -> dict[str, Any]:
     """Signals of a robot in row k of the trace."""
     found: dict[str, Any] = {
-        "position_m": _vector(trace.position(robot)[k].tolist()),
+        "position_m": _vector(trace.body(robot)[k].tolist()),
         "command_m_s": _vector(trace.command(robot)[k].tolist()),
     }
     if robot in trace.ugvs:

@@ -80,6 +80,7 @@ class Inputs:
         positions: of all bodies that move, (M, 3), m.
         velocities: of these, (M, 3), m/s.
         law: the UGVs' control law, with the gains in force.
+        headings: of the UGVs, (n,), rad; None if no UGV is a unicycle.
     """
 
     t: float
@@ -87,6 +88,7 @@ class Inputs:
     positions: Array
     velocities: Array
     law: UgvLaw
+    headings: Array | None = None
 
 
 class Gatekeepers(abc.ABC):
@@ -143,6 +145,9 @@ class Gatekeepers(abc.ABC):
         """All obstacles at rest and robots around a UGV, and the obstacles that move within sensing range."""
         near, beside, m = self._world.at(self._near, now.t), self._beside(now, i), len(self._near.still)
         shown = np.append(np.ones(m, dtype=bool), np.isin(near.others[i], beside))
+        turning: dict[str, Any] = {}
+        if now.headings is not None and self._world.steering is not None:
+            turning = {"heading": float(now.headings[i]), "steering": self._world.steering[i]}
         return View(
             t=now.t,
             position=now.positions[i].copy(),
@@ -154,6 +159,7 @@ class Gatekeepers(abc.ABC):
             distances=near.distance[i][shown],
             shares=near.share[i][shown],
             max_speed=float(near.max_speed[i]),
+            **turning,
         )
 
 

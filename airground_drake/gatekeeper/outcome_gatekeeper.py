@@ -166,7 +166,7 @@ class OutcomeGatekeepers(Gatekeepers):
         seen = replace(
             around,
             still=still,
-            distances=np.concatenate([outline.keep(still, self._world.radius[i]), around.distances[m:]]),
+            distances=np.concatenate([self._world.keep(i, still), around.distances[m:]]),
             shares=np.concatenate([np.ones(len(still)), around.shares[m:]]),
             asked=tuple(asked),
         )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -15,6 +15,7 @@ from airground_drake.geometry.motion import Motion
 from airground_drake.intervention.policy import Proposal
 from airground_drake.nsbc.kernels import fill_half_spaces
 from airground_drake.nsbc.law import AcceptedMotion, Numbers, Tracking, UgvLaw, UgvState, command
+from airground_drake.world.steering import HAND, steer
 
 REFUSED, ACCEPTED = 0, 1
 """Modes of a control period: whether the proposal is in force."""
@@ -37,6 +38,8 @@ class View:
         max_speed: own speed limit, m/s.
         asked: under method (d), per part that moves, the motion that its body is asked to make and whether it has
             accepted it, or None.
+        heading: own heading, rad, of a unicycle.
+        steering: numbers of its steering, (4,), see `world.steering`; zeros for a robot that is no unicycle.
     """
 
     t: float
@@ -50,6 +53,8 @@ class View:
     shares: Array
     max_speed: float
     asked: tuple[tuple[Motion, bool] | None, ...] = ()
+    heading: float = 0.0
+    steering: Array = field(default_factory=lambda: np.zeros(4))
 
     def apart(self) -> Array:
         """Signed distances of the own position from the cores, (m + n,), m."""
@@ -85,6 +90,8 @@ class ClosedLoop(NamedTuple):
         shares: share of each avoidance inequality, (m + n,).
         max_speed: own speed limit, m/s.
         substeps: control periods per stage.
+        heading: at the beginning, rad, of a unicycle.
+        steering: numbers of its steering, (4,), see `world.steering`.
     """
 
     law: Numbers
@@ -100,6 +107,8 @@ class ClosedLoop(NamedTuple):
     shares: Array
     max_speed: float
     substeps: int
+    heading: float
+    steering: Array
 
 
 def closed_loop(
@@ -125,6 +134,8 @@ def closed_loop(
         shares=seen.shares,
         max_speed=float(seen.max_speed),
         substeps=substeps,
+        heading=float(seen.heading),
+        steering=seen.steering,
     )
 
 
@@ -132,7 +143,7 @@ class Workspace(NamedTuple):
     """Arrays that one control period writes to, and the UGV's mobility.
 
     See `fill_half_spaces` for `which`, `normal`, `bound` and `retreat`; `rate` and `asked` are the velocities of the
-    preset trajectory and of the proposed motion, (3,), m/s.
+    preset trajectory and of the proposed motion, (3,), m/s; `heading` is that of a unicycle now, (1,), rad.
     """
 
     mobility: Array
@@ -142,11 +153,12 @@ class Workspace(NamedTuple):
     retreat: Array
     rate: Array
     asked: Array
+    heading: Array
 
 
 @njit(cache=True)
 def workspace(loop: ClosedLoop) -> Workspace:
-    """Uninitialised arrays for `advance`."""
+    """Arrays for `advance`, uninitialised but for the heading."""
     count = len(loop.distances)
     plane = np.array([1.0, 1.0, 0.0])
     return Workspace(
@@ -157,6 +169,7 @@ def workspace(loop: ClosedLoop) -> Workspace:
         np.empty(count),
         np.empty(3),
         np.empty(3),
+        np.full(1, loop.heading),
     )
 
 
@@ -164,12 +177,15 @@ def workspace(loop: ClosedLoop) -> Workspace:
 def advance(loop: ClosedLoop, mode: int, k: int, position: Array, work: Workspace) -> Array:
     """Move the UGV through control period k, and return its mean velocity in it, (3,), m/s.
 
-    Only here do predictions assume a plant, the first-order one: it moves straight at its command. A test holds this
-    step against `world.plant.FirstOrder`. Another plant replaces it here.
+    Only here do predictions assume a plant. The steered point of every plant of `world.plant` gets from sample to
+    sample as its command says; that of a unicycle may be shortened, which turns on its heading.
 
     `mode` is REFUSED or ACCEPTED. `position`, (3,), m, is that at the beginning of the period, then that at its end.
     """
     velocity = _command(loop, mode, k, position, work)
+    if loop.steering[HAND] > 0.0:
+        turning = steer(velocity, work.heading[0], loop.steering, loop.law.layer.period)[1]
+        work.heading[0] += 2.0 * (0.5 * turning * loop.law.layer.period)
     for a in range(3):
         position[a] += loop.law.layer.period * velocity[a]
     return velocity
@@ -178,7 +194,7 @@ def advance(loop: ClosedLoop, mode: int, k: int, position: Array, work: Workspac
 @njit(cache=True)
 def _command(loop: ClosedLoop, mode: int, k: int, position: Array, work: Workspace) -> Array:
     """Velocity that the law commands in control period k, (3,), m/s; rates are of the sampled motions."""
-    mobility, which, normal, bound, retreat, rate, asked = work
+    mobility, which, normal, bound, retreat, rate, asked, _ = work
     law, every = loop.law, loop.every
     count = fill_half_spaces(
         position, mobility, loop.still, loop.parts, every, every, loop.places[k], loop.distances, loop.shares,

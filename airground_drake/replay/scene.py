@@ -63,7 +63,7 @@ def scene(trace: Trace, scenario: Scenario) -> Scene:
     still = stage_of(trace, scenario)
 
     def positions(name: str) -> Array:
-        return np.column_stack([np.interp(times, trace.t, axis) for axis in trace.position(name).T])
+        return np.column_stack([np.interp(times, trace.t, axis) for axis in trace.body(name).T])
 
     bodies = tuple(
         DrawnBody(

@@ -22,7 +22,7 @@ def extract(trace: Trace) -> list[dict[str, Any]]:
     found: list[dict[str, Any]] = []
 
     def add(time_s: float, robot: str, kind: str, **more: Any) -> None:
-        where = [float(np.interp(time_s, t, trace.column(f"{robot}.{axis}_m"))) for axis in "xyz"]
+        where = [float(np.interp(time_s, t, axis)) for axis in trace.body(robot).T]
         found.append({"t_s": float(time_s), "robot": robot, "kind": kind, "position_m": where, **more})
 
     for ugv in trace.ugvs:
@@ -76,11 +76,11 @@ def _add_collisions(trace: Trace, add: Any) -> None:
 
 
 def _way(trace: Trace, body: Body) -> PeriodMotion:
-    """Motion of a body's origin between the rows: (T - 1, 3), or (3,) if it never moves."""
+    """Motion of a body's origin between the rows, taken as straight: (T - 1, 3), or (3,) if it never moves."""
     if body.plant is None:
         return PeriodMotion(body.start_m, body.start_m)
-    position = trace.position(body.name)
-    return body.plant.motion(position[:-1], position[1:], np.diff(trace.t))
+    position = trace.body(body.name)
+    return PeriodMotion(position[:-1], position[1:])
 
 
 def _box(way: PeriodMotion, body: Body) -> tuple[Array, Array]:

@@ -46,8 +46,13 @@ def distinct(t: Array, command: Array) -> npt.NDArray[np.intp]:
     return np.unique(np.maximum.accumulate(np.where(led, np.arange(len(t)), 0))[np.append(np.diff(cluster) > 0, True)])
 
 
-def states(t: Array, logged: Mapping[str, Array], ugvs: Sequence[str], bodies: Sequence[str]) -> pd.DataFrame:
-    """`Trace.states` of rows at times (T,), s; what was logged of M bodies has the shape (3 M, T), of UGVs (n, T)."""
+def states(
+    t: Array, logged: Mapping[str, Array], ugvs: Sequence[str], bodies: Sequence[str], signals: Sequence[str] = ()
+) -> pd.DataFrame:
+    """`Trace.states` of rows at times (T,), s; what was logged of M bodies has the shape (3 M, T), of UGVs (n, T).
+
+    `signals` are the names of `plant_signals`, (k, T).
+    """
     columns: dict[str, Array] = {"t_s": t}
     for i, body in enumerate(bodies):
         columns |= {f"{body}.{axis}_m": logged["bodies"][3 * i + a] for a, axis in enumerate("xyz")}
@@ -55,6 +60,7 @@ def states(t: Array, logged: Mapping[str, Array], ugvs: Sequence[str], bodies: S
         columns[f"{ugv}.noise_m"] = logged["noise"][i]
         columns[f"{ugv}.decision_variable_m"] = logged["decision_variable"][i]
         columns |= {f"{ugv}.{name}": logged["status"][FIELDS * i + k] for k, name in enumerate(Status.get_fields())}
+    columns |= {name: logged["plant_signals"][k] for k, name in enumerate(signals)}
     return pd.DataFrame(columns)
 
 
@@ -71,6 +77,8 @@ def samples(
         columns |= {f"{ugv}.ref_{axis}_m": reference[3 * i + a] for a, axis in enumerate("xyz")}
         columns |= {f"{ugv}.ref_v{axis}_m_s": reference[3 * (len(ugvs) + i) + a] for a, axis in enumerate("xyz")}
         columns[f"{ugv}.executing"] = logged["executing"][i, at + 1]
+        if "command_share" in logged:
+            columns[f"{ugv}.command_share"] = logged["command_share"][i, at + 1]
     return pd.DataFrame(columns)
 
 

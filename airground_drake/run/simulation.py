@@ -33,7 +33,7 @@ from airground_drake.scenarios.load import own, resolved, validated
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.systems.components import GatekeepersFactory, make_gatekeepers
 from airground_drake.systems.decision import DecisionVariable
-from airground_drake.systems.diagram import RECORDED, DecisionFactory, Model, PlantFactory, build_model
+from airground_drake.systems.diagram import DecisionFactory, Model, PlantFactory, build_model
 from airground_drake.systems.lifetime import untie
 from airground_drake.world.plant import FirstOrder
 from airground_drake.world.world import Body, World
@@ -78,7 +78,7 @@ class Recorder:
         self._foreign = plants is not None
         builder = DiagramBuilder()
         builder.AddSystem(self._model.diagram)
-        ports = [self._model.diagram.GetOutputPort(name) for name in RECORDED]
+        ports = [self._model.diagram.GetOutputPort(name) for name in self._model.recorded]
         together = builder.AddNamedSystem("recorded_signals", Multiplexer([port.size() for port in ports]))
         for i, port in enumerate(ports):
             builder.Connect(port, together.get_input_port(i))
@@ -117,9 +117,8 @@ class Recorder:
         context.SetAccuracy(EVENT_ACCURACY)
         simulator = Simulator(self._root, context)
         period = self._scenario.control.period_s
-        # velocities are held between samples: Euler's method is exact for straight motion
-        straight = model.world.moves_straight(period) and not self._foreign
-        scheme = "explicit_euler" if straight else "runge_kutta3"
+        # velocities are held between samples: Euler's method is exact for the straight motion of steered points
+        scheme = "runge_kutta3" if self._foreign else "explicit_euler"
         config = SimulatorConfig(integration_scheme=scheme, max_step_size=period, use_error_control=self._foreign)
         ApplySimulatorConfig(config, simulator)
         simulator.set_target_realtime_rate(speed)
@@ -140,8 +139,8 @@ class Recorder:
     def _trace(self, context: Context, seed: int, wall: float) -> Trace:
         model, ugvs, robots = self._model, self._model.world.names("ugv"), self._model.world.robots
         log = self._log.FindLog(context)
-        ends = np.cumsum([model.diagram.GetOutputPort(name).size() for name in RECORDED])
-        data = dict(zip(RECORDED, np.split(log.data(), ends[:-1]), strict=True))
+        ends = np.cumsum([model.diagram.GetOutputPort(name).size() for name in model.recorded])
+        data = dict(zip(model.recorded, np.split(log.data(), ends[:-1]), strict=True))
         t = log.sample_times()
         keep = recording.distinct(t, data["team_command"])
         data = {name: rows[:, keep] for name, rows in data.items()}
@@ -169,7 +168,7 @@ class Recorder:
         uav, t = model.world.names("uav")[0], t[keep]
         trace = Trace(
             meta,
-            states=recording.states(t, data, ugvs, [body.name for body in model.world.moving]),
+            states=recording.states(t, data, ugvs, [body.name for body in model.world.moving], model.world.signals),
             samples=recording.samples(t, self._scenario.control.period_s, data, ugvs, robots),
             decisions=recording.decisions(decided, ugvs, self._own.gatekeeper.route),
             timings=timings,

@@ -2,10 +2,15 @@
 
 `states` has a row at the end of each of the simulator's steps: all control periods, and the isolated event times in
 between. Its values are true values just before the row's time, so an event at the last row's time may be missing. Rows
-closer than 1e-9 s are merged. Between two rows every first-order robot moves on a straight line, and noise is linear.
+closer than 1e-9 s are merged. Between two rows robots move on straight lines, and noise is linear.
 
     t_s
     <body>.x_m .y_m .z_m                      position of a robot, or of an obstacle that moves, world frame
+    <robot>.<signal>                          of a robot that is not where the law steers it: what its plant records.
+                                              x_m, y_m and z_m are then those of the steered point (of a unicycle, the
+                                              chord of its hand point's way), body_x_m, body_y_m and body_z_m those of
+                                              the body; of a unicycle also heading_rad (it does not jump), of a lag
+                                              body_vx_m_s, body_vy_m_s and body_vz_m_s
     <ugv>.noise_m                             integrated noise of (15)
     <ugv>.decision_variable_m                 x, input of the trigger: ||rho_rd - rho|| + noise, unless another
                                               block computes it
@@ -17,10 +22,11 @@ closer than 1e-9 s are merged. Between two rows every first-order robot moves on
 chose, which is held until the next sample.
 
     t_s
-    <robot>.vx_m_s .vy_m_s .vz_m_s            command chosen at this sample
+    <robot>.vx_m_s .vy_m_s .vz_m_s            command chosen at this sample; of a unicycle, as it was shortened
     <ugv>.ref_x_m .ref_y_m .ref_z_m           preset trajectory rho_rd(t)
     <ugv>.ref_vx_m_s .ref_vy_m_s .ref_vz_m_s  its velocity
     <ugv>.executing                           number of the proposal executed from this sample on, -1 without one
+    <ugv>.command_share                       only with unicycles: the share that was left of the law's command
 """
 
 from __future__ import annotations
@@ -176,8 +182,23 @@ class Trace:
         return self.derived(("vectors", *names), lambda: read_only(np.column_stack([column(name) for name in names])))
 
     def position(self, body: str) -> Array:
-        """Positions of a robot, or of an obstacle that moves, (T, 3), m, world frame."""
+        """Positions of an obstacle that moves, or of the point of a robot that the law steers, (T, 3), m, world frame.
+
+        That point is the robot's body unless its plant records another place: see `body`.
+        """
         return self._vectors(self.column, body, "", "m")
+
+    def body(self, robot: str) -> Array:
+        """Positions of the body of a robot, or of an obstacle that moves, (T, 3), m, world frame."""
+        return self._vectors(self.column, robot, "body_", "m") if self.is_apart(robot) else self.position(robot)
+
+    def body_velocity(self, robot: str) -> Array:
+        """Velocities of the body of a robot whose plant records them, (T, 3), m/s, world frame."""
+        return self._vectors(self.column, robot, "body_v", "m_s")
+
+    def is_apart(self, robot: str) -> bool:
+        """Whether the body of a robot is recorded apart from the point that the law steers."""
+        return f"{robot}.body_x_m" in self.states
 
     def there_from(self, name: str) -> int:
         """Row from which on a body is there: the first control sample at or after an obstacle's `appears_s`, or row 0.

@@ -38,7 +38,7 @@ def _in_words(error: ErrorDetails, document: Document, schema: json_schema.Schem
     """An error of pydantic as one line: place, key, value, and what is allowed."""
     kind, given, says = error["type"], error["input"], error.get("ctx", {})
     loc = [str(part) for part in error["loc"]]
-    at = [part for part in (*loc, *says.get("at", ())) if part != json_schema.NAMES]
+    at = _as_written(document.data, [part for part in (*loc, *says.get("at", ())) if part != json_schema.NAMES])
     of_type = kind.endswith(("_type", "missing"))  # the message names the line of the value, not of its key
     key, source = ".".join(at), document.where(*at, key=not of_type)
     if kind == "rule":
@@ -57,3 +57,17 @@ def _in_words(error: ErrorDetails, document: Document, schema: json_schema.Schem
     elif isinstance(given, list) and of_type:
         given = Fault("a list is given")
     return ScenarioError(source, key, given, wanted)
+
+
+def _as_written(data: Any, at: list[str]) -> list[str]:
+    """The way to a value without the number 0 of a mapping that stands for a list with one entry."""
+    found = list[str]()
+    for part in at:
+        if isinstance(data, dict):
+            if part == "0" and part not in data:
+                continue
+            data = data.get(part)
+        elif isinstance(data, list):
+            data = data[int(part)] if part.isdecimal() and int(part) < len(data) else None
+        found.append(part)
+    return found

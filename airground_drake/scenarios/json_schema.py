@@ -89,7 +89,7 @@ def _object(kind: type, made: Schema) -> Schema:
         if unit := unit_of(field.name):
             says["description"] += f" [{unit}]"
         if field.default_factory is not MISSING:
-            says["default"] = [] if says.get("type") == "array" else {}
+            says["default"] = [] if "array" in (says.get("type"), *_types(says)) else {}
     return {
         "type": "object",
         "description": " ".join(made["description"].split()),
@@ -97,6 +97,11 @@ def _object(kind: type, made: Schema) -> Schema:
         "required": made.get("required", []),
         "additionalProperties": False,
     }
+
+
+def _types(says: Schema) -> list[str]:
+    """The types among which a value may choose."""
+    return [str(each.get("type")) for each in says.get("anyOf", ())]
 
 
 def keys_at(whole: Schema, *at: str) -> list[str]:
@@ -139,6 +144,8 @@ def _at(whole: Schema, at: Sequence[str]) -> tuple[Schema, str]:
     """The schema at a place, and the name whose suffix gives the unit."""
     says, name = whole, ""
     for part in at:
+        if part.isdecimal() and "properties" in says:  # one entry of a list may stand for the list
+            continue
         inner = says.get("properties", {}).get(part)
         if inner is not None or not unit_of(name):
             name = name if part.isdecimal() else part

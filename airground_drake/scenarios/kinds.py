@@ -37,7 +37,8 @@ WANTED = "x-wanted"
 """Key for the words in which messages describe an allowed value, where its type and bounds do not say it."""
 
 # Unit by the suffix of a key, the longest suffix first.
-_UNITS = {"rad": "rad", "m_sqrt_s": "m/sqrt(s)", "1_m2_s": "1/(m^2 s)", "m_s": "m/s", "1_s": "1/s", "m": "m", "s": "s"}
+_UNITS = {"rad": "rad", "rad_s": "rad/s", "m_sqrt_s": "m/sqrt(s)", "1_m2_s": "1/(m^2 s)", "m_s": "m/s", "1_s": "1/s",
+          "m": "m", "s": "s"}  # fmt: skip
 
 
 def unit_of(name: str, before: str = "") -> str:
@@ -140,6 +141,21 @@ class ValueRule:
     def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
         """The schema of the annotations before this one, with this rule added."""
         return {**handler(schema), **self.says()}
+
+
+class OneOrList:
+    """One mapping stands for a list with that mapping."""
+
+    def __get_pydantic_core_schema__(self, source: object, handler: GetCoreSchemaHandler) -> CoreSchema:
+        """Make a list before all other checks."""
+        return core_schema.no_info_before_validator_function(
+            lambda value: [value] if isinstance(value, dict) else value, handler(source)
+        )
+
+    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
+        """The list or one of its entries."""
+        several = handler(schema)
+        return {"anyOf": [several["items"], several]}
 
 
 PointOrNone = Annotated[list[Real], Field(strict=True), ValueRule(_all_or_none, lambda: {"minItems": 0, "maxItems": 3})]

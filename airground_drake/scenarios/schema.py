@@ -25,6 +25,7 @@ from airground_drake.scenarios.kinds import (
     GroundPoint,
     Name,
     NotNegative,
+    OneOrList,
     OneValue,
     Place,
     PlaceOrNone,
@@ -54,6 +55,7 @@ MAP = "map"
 """Name of the obstacle that the map is."""
 
 TRIGGERS: tuple[str, ...] = ("automaton", "bare")
+PLANT_KINDS: tuple[str, ...] = ("first_order", "unicycle", "lag", "delay")
 AT_END: tuple[str, ...] = ("stop", "reverse", "loop")
 RULES: tuple[str, ...] = ("hysteresis", "first_stage")
 SETTABLE: tuple[str, ...] = ("decision", "gatekeeper", "intervention")
@@ -72,24 +74,60 @@ class Preset:
 
 
 @dataclass(slots=True)
+class Plant:
+    """How a robot moves. The law steers a point of it, and keeps as much more distance as its body needs: see `budget`.
+
+    - first_order: it moves as it is told.
+    - unicycle (UGVs): a differential drive. The law steers a hand point ahead of its axle, which arrives exactly where
+      the law wants it; commands for which it would have to turn or drive too fast are shortened.
+    - lag: its velocity follows the command with a time constant; the law steers p + tau v.
+    - delay: commands take effect later; the law steers where it will be when those under way are carried out.
+
+    A list combines: a delay, and after it a lag.
+    """
+
+    kind: Annotated[Words, one_of(PLANT_KINDS)] = "first_order"
+    """Which of these."""
+    hand_point_m: NotNegative = 0.0
+    """Of a unicycle: distance of the hand point ahead of the axle; above 0."""
+    heading_rad: Real = 0.0
+    """Of a unicycle: heading at the start, counter-clockwise from x."""
+    max_turn_rad_s: NotNegative = 0.0
+    """Of a unicycle: turning limit; 0: none."""
+    wheel_base_m: NotNegative = 0.0
+    """Of a unicycle: distance of its wheels."""
+    max_wheel_speed_m_s: NotNegative = 0.0
+    """Of a unicycle: speed limit of a wheel; 0: none."""
+    time_constant_s: NotNegative = 0.0
+    """Of a lag: time constant; above 0."""
+    delay_s: NotNegative = 0.0
+    """Of a delay: a whole number of control periods."""
+
+
+Plants = Annotated[list[Plant], Field(strict=True, max_length=2), OneOrList()]
+
+
+@dataclass(slots=True)
 class Ugv:
-    """One UGV: a planar first-order robot, a disc of radius `radius_m` on the ground."""
+    """One UGV: a disc of radius `radius_m` on the ground."""
 
     start_m: GroundPoint
-    """Where it starts; z = 0."""
+    """Where its body starts, of a unicycle the axle; z = 0."""
     target_m: GroundPoint
-    """Its target; z = 0."""
+    """Its target; z = 0. Preset and target are of the point that the law steers."""
     preset: Preset
     """The trajectory that it follows."""
     max_speed_m_s: Positive = 6.0
     """Commands are shortened to this speed."""
     radius_m: NotNegative = 0.0
     """Radius of its body, added to the safe distances of its pairs; 0: a point."""
+    plant: Plants = field(default_factory=list)
+    """How it moves; by default as it is told (first_order)."""
 
 
 @dataclass(slots=True)
 class Uav:
-    """The UAV: a spatial first-order robot whose `task` is to fly over the centroid of the UGVs, eqs (9)-(10).
+    """The UAV, a robot in space whose `task` is to fly over the centroid of the UGVs, eqs (9)-(10).
 
     Another task is named as `module:Class` or `file.py:Class`. `phantoms_m` are obstacles on its map that are
     not there, points without a radius. Its own body is a ball of radius `radius_m`.
@@ -111,6 +149,8 @@ class Uav:
     """Obstacles on its map that are not there."""
     radius_m: NotNegative = 0.0
     """Radius of its body, added to the safe distances of its pairs; 0: a point."""
+    plant: Plants = field(default_factory=list)
+    """How it moves; by default as it is told (first_order)."""
 
 
 @dataclass(slots=True)

@@ -17,15 +17,18 @@ from typing import NamedTuple
 
 import numpy as np
 
+from airground_drake.base.arrays import Array
 from airground_drake.base.errors import Fault, ScenarioError
 from airground_drake.base.exact import decimal
 from airground_drake.base.statuses import COUNTS, NOTHING, alternatives
 from airground_drake.decision.bayes import COMPUTED
 from airground_drake.geometry import convex, outline
 from airground_drake.registry import MODEL_CLAIMS, ROUTES, RUN_CLAIMS
+from airground_drake.scenarios.budget import PairBudget, budget, takes_room
 from airground_drake.scenarios.outlines import outlines_of
+from airground_drake.scenarios.plants import plant_of
 from airground_drake.scenarios.rounding import TOLERANCE_M, Rounding
-from airground_drake.scenarios.schema import ARENA, MAP, Obstacle, Scenario, Vector
+from airground_drake.scenarios.schema import ARENA, MAP, Obstacle, Plant, Scenario, Uav, Ugv, Vector
 from airground_drake.scenarios.shapes import crossing
 
 GAINS = ("avoidance_gain_1_s", "motion_gain_1_s", "formation_gain_1_s", "intervention_gain_1_s")
@@ -179,6 +182,64 @@ def _route(scenario: Scenario) -> Problems:
         route = str(run.set.get(key, ""))
         if route and ROUTES.is_foreign(route) and run.method != "c":
             yield f"runs.{name}.set.{key}", route, f"this run is of method {run.method}: only method c uses a route"
+
+
+KEYS_OF_PLANTS = {
+    "first_order": (),
+    "unicycle": ("hand_point_m", "heading_rad", "max_turn_rad_s", "wheel_base_m", "max_wheel_speed_m_s"),
+    "lag": ("time_constant_s",),
+    "delay": ("delay_s",),
+}
+"""The keys of each kind of plant."""
+
+
+def _plants(scenario: Scenario) -> Problems:
+    """Each plant has the keys of its kind, within limits that the theorems need; a list combines what they combine."""
+    for name, robot in scenario.robots.items():
+        place = f"{f'ugvs.{name}' if name in scenario.ugvs else 'uav'}.plant"
+        kinds = [plant.kind for plant in robot.plant]
+        if len(kinds) > 1 and kinds != ["delay", "lag"]:
+            why = "no theorem covers another combination; chord steering needs a body that obeys at once"
+            yield place, f"[{', '.join(kinds)}]", f"one plant, or a delay and then a lag: {why}"
+        for k, plant in enumerate(robot.plant):
+            key = f"{place}.{k}" if len(kinds) > 1 else place
+            for other in (each for each in _ALL_KEYS if each not in KEYS_OF_PLANTS[plant.kind]):
+                if getattr(plant, other):
+                    allowed = f"keys of {plant.kind}: {', '.join(KEYS_OF_PLANTS[plant.kind]) or 'none'}"
+                    yield f"{key}.{other}", getattr(plant, other), allowed
+            yield from _numbers_of(scenario, key, robot, plant)
+
+
+_ALL_KEYS = tuple(key for keys in KEYS_OF_PLANTS.values() for key in keys)
+
+
+def _numbers_of(scenario: Scenario, key: str, robot: Ugv | Uav, plant: Plant) -> Problems:
+    """The numbers of one plant of a robot."""
+    period = scenario.control.period_s
+    if plant.kind == "lag" and not plant.time_constant_s >= TOLERANCE:
+        yield f"{key}.time_constant_s", plant.time_constant_s, "more than 0 s"
+    if plant.kind == "delay" and not _multiple(plant.delay_s, period):
+        yield f"{key}.delay_s", plant.delay_s, f"a whole multiple of control.period_s = {period:.9g} s, more than 0"
+    if plant.kind != "unicycle":
+        return
+    if isinstance(robot, Uav):
+        yield f"{key}.kind", plant.kind, "another kind: a UAV is no unicycle"
+    if plant.hand_point_m < TOLERANCE:
+        yield f"{key}.hand_point_m", plant.hand_point_m, "more than 0 m: the law steers a point ahead of the axle"
+        return
+    if bool(plant.wheel_base_m) != bool(plant.max_wheel_speed_m_s):
+        missing = "max_wheel_speed_m_s" if plant.wheel_base_m else "wheel_base_m"
+        yield f"{key}.{missing}", 0.0, "more than 0: wheel_base_m and max_wheel_speed_m_s go together"
+    limits = [plant.max_turn_rad_s] if plant.max_turn_rad_s else []
+    if plant.wheel_base_m:
+        limits.append(2.0 * plant.max_wheel_speed_m_s / plant.wheel_base_m)
+    least = 0.5 * robot.max_speed_m_s * period
+    if not (plant.hand_point_m >= least or (limits and min(limits) * period < math.pi)):
+        allowed = (
+            f"at least max_speed_m_s * control.period_s / 2 = {least:.9g} m, or a turning limit below pi / period_s = "
+            f"{math.pi / period:.6g} rad/s: else the axle could swing round within a period"
+        )
+        yield f"{key}.hand_point_m", plant.hand_point_m, allowed
 
 
 def _presets(scenario: Scenario) -> Problems:
@@ -444,6 +505,58 @@ def _within(these: Sequence[_Round], those: Sequence[_Round], distance: float) -
             yield these[i], those[j]
 
 
+def _budget(scenario: Scenario) -> Problems:
+    """The law's distance, which is more than the promise where bodies are not where the law steers them, can be kept.
+
+    The steered points start and end that far from each other, the sensing range covers it, and the UAV flies above it.
+    """
+    period, robots = scenario.control.period_s, scenario.robots
+    if not takes_room(scenario):
+        return
+    start = {
+        name: plant_of(robot, period).steered(np.array(robot.start_m, dtype=np.float64))
+        for name, robot in robots.items()
+    }
+    target = {name: np.array(robot.target_m, dtype=np.float64) for name, robot in robots.items()}
+    outlines = {name: outlines_of(scenario, each) for name, each in scenario.barriers.items()}
+    for pair in budget(scenario):
+        if not pair.terms:
+            continue
+        key = f"ugvs.{pair.first}" if pair.first in scenario.ugvs else "uav"
+        needs = (
+            f"{pair.promised_m:.2f} m between {pair.first} and {pair.second} needs {pair.gap_m:.2f} m in the law "
+            f"({pair.in_words()})"
+        )
+        other = scenario.barriers.get(pair.second)
+        for places, verb in ((start, "start"), (target, "would end")):
+            if other and (other.moves or (other.appears_s and verb == "start")):
+                continue
+            apart = _apart_m(scenario, places, pair, outlines) - pair.radii_m
+            if apart < pair.gap_m - TOLERANCE:
+                yield key, Fault(needs), f"they {verb} {apart:.2f} m apart. Largest term: {pair.largest}"
+        speed = other.expected_speed_m_s if other else robots[pair.second].max_speed_m_s
+        reach = pair.law_m + (robots[pair.first].max_speed_m_s + speed) * period
+        if scenario.control.sensing_range_m < reach:
+            allowed = (
+                f"control.sensing_range_m must be at least {reach + TOLERANCE:.9g} m. Largest term: {pair.largest}"
+            )
+            yield key, Fault(needs), allowed
+        if pair.kind == "air_ground" and not scenario.uav.altitude_m > pair.law_m:
+            yield (
+                key,
+                Fault(needs),
+                f"uav.altitude_m must be more than {pair.law_m:.9g} m. Largest term: {pair.largest}",
+            )
+
+
+def _apart_m(scenario: Scenario, places: dict[str, Array], pair: PairBudget, outlines: dict[str, Array]) -> float:
+    """Distance of a pair when its robots are at some places, as of `PairBudget.law_m`, m."""
+    place = places[pair.first]
+    if pair.second in places:
+        return float(np.linalg.norm(place - places[pair.second]))
+    return float(convex.distances(outlines[pair.second], place, pair.first in scenario.ugvs).min())
+
+
 def _reproduction(scenario: Scenario) -> Problems:
     count = Counter(row.id for row in scenario.reproduction)
     for index, row in enumerate(scenario.reproduction):
@@ -470,7 +583,7 @@ def _keys(value: object, above: str = "") -> Iterator[str]:
 
 
 CHECKS: tuple[Callable[[Scenario], Problems], ...] = (
-    _names, _reserved, _shapes, _map, _blocks, _route, _runs, _presets, _ends, _gains, _periods, _release, _distances,
-    _sensing, _extent, _clearances, _reproduction, _choices,
+    _names, _reserved, _shapes, _map, _blocks, _route, _runs, _plants, _presets, _ends, _gains, _periods, _release,
+    _distances,    _sensing, _extent, _clearances, _budget, _reproduction, _choices,
 )  # fmt: skip
 """Every rule; later ones rely on earlier ones."""

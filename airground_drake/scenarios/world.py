@@ -18,15 +18,16 @@ from airground_drake.world.world import Body, Kind, World
 def make_world(scenario: Scenario) -> World:
     """All bodies of a scenario, and the distances that they keep."""
     safe = scenario.safe_distance
-    robots = [_robot(name, "ugv", ugv) for name, ugv in scenario.ugvs.items()]
-    robots += [_robot(scenario.uav.name, "uav", scenario.uav)]
+    control = scenario.control
+    robots = [_robot(name, "ugv", ugv, control.period_s) for name, ugv in scenario.ugvs.items()]
+    robots += [_robot(scenario.uav.name, "uav", scenario.uav, control.period_s)]
     obstacles = [_obstacle(scenario, name, each) for name, each in scenario.barriers.items()]
     obstacles.sort(key=lambda body: body.plant is None)
     apart: dict[frozenset[Kind], float] = {
         frozenset(("ugv",)): safe.ugv_m,
         frozenset(("ugv", "uav")): safe.air_ground_m,
     }
-    return World((*robots, *obstacles), apart)
+    return World((*robots, *obstacles), apart, control.avoidance_gain_1_s)
 
 
 def _obstacle(scenario: Scenario, name: str, given: Obstacle) -> Body:
@@ -40,6 +41,7 @@ def _obstacle(scenario: Scenario, name: str, given: Obstacle) -> Body:
     )  # fmt: skip
 
 
-def _robot(name: str, kind: Kind, given: Ugv | Uav) -> Body:
-    start = np.array(given.start_m, dtype=np.float64)
-    return Body(name, kind, start, outline.balls(np.zeros(3), given.radius_m), plant_of(given), given.max_speed_m_s)
+def _robot(name: str, kind: Kind, given: Ugv | Uav, period_s: float) -> Body:
+    plant = plant_of(given, period_s)
+    start = plant.steered(np.array(given.start_m, dtype=np.float64))
+    return Body(name, kind, start, outline.balls(np.zeros(3), given.radius_m), plant, given.max_speed_m_s)

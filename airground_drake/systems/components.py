@@ -30,6 +30,7 @@ from airground_drake.intervention.planner import Mover, Planner
 from airground_drake.nsbc.avoidance import Avoidance, Composition
 from airground_drake.nsbc.law import UgvLaw
 from airground_drake.registry import ROUTES, Method
+from airground_drake.scenarios.budget import budget, takes_room
 from airground_drake.scenarios.courses import course
 from airground_drake.scenarios.outlines import outlines_of
 from airground_drake.scenarios.schema import Decision, Scenario
@@ -60,6 +61,7 @@ def make_planner(scenario: Scenario, method: Method) -> Planner:
     mapped, appears, disappears = make_map(scenario)
     given = scenario.intervention
     policies = given.policies if method.intervenes else []
+    radius, apart = _planned_apart(scenario)
     database = BehaviourDatabase(
         [(entry.name, make_policy(entry.name, entry.parameters, given.budget_s)) for entry in policies],
         retry=given.retry_s,
@@ -78,10 +80,28 @@ def make_planner(scenario: Scenario, method: Method) -> Planner:
         mapped_until=disappears,
         movers=make_movers(scenario),
         coasting=scenario.gatekeeper.horizon_s,
-        robot_distance=scenario.safe_distance.ugv_m,
+        robot_distance=apart,
         max_speed=np.array([ugv.max_speed_m_s for ugv in scenario.ugvs.values()]),
-        radius=np.array([ugv.radius_m for ugv in scenario.ugvs.values()]),
+        radius=radius,
     )
+
+
+def _planned_apart(scenario: Scenario) -> tuple[Array, float]:
+    """Radii of the UGVs, (n,), and distance between them, m, with which plans keep the distances of the law.
+
+    A UGV whose plant takes room is planned for as a larger disc.
+    """
+    more, between = dict.fromkeys(scenario.ugvs, 0.0), 0.0
+    every = budget(scenario) if takes_room(scenario) else ()
+    pairs = [each for each in every if each.terms and each.first in more]
+    for pair in pairs:
+        if pair.kind in ("obstacle", "moving"):
+            more[pair.first] = max(more[pair.first], pair.gap_m - pair.promised_m)
+    for pair in pairs:
+        if pair.kind == "ugv":
+            between = max(between, pair.gap_m - pair.promised_m - (more[pair.first] + more[pair.second]))
+    radius = np.array([ugv.radius_m + more[name] for name, ugv in scenario.ugvs.items()])
+    return radius, scenario.safe_distance.ugv_m + between
 
 
 def make_map(scenario: Scenario) -> tuple[Array, Array, Array]:

@@ -34,7 +34,8 @@ from airground_drake.nsbc.law import AcceptedMotion, UgvLaw
 from airground_drake.nsbc.task import Task
 from airground_drake.nsbc.tasks import FormationTask
 from airground_drake.systems.lifetime import weakly
-from airground_drake.systems.signals import UavGains, UgvGains, declare_bodies, no_proposals
+from airground_drake.systems.signals import UavGains, UgvGains, declare_bodies, declare_headings, no_proposals
+from airground_drake.world.steering import steer_all
 from airground_drake.world.world import Neighbours, World
 
 
@@ -70,7 +71,9 @@ class UgvController(_Controller):
     Ports (n UGVs, M bodies that move, world frame):
         in  `bodies` (3M) m; `reference` (6n): preset positions m, then velocities m/s;
             `proposals` abstract, n of Proposal or None; `answers` (2n), see `messages`.
+            With unicycles `headings` (n), rad: their commands are shortened to what they can do, see `world.steering`.
         out `command` (3n) m/s; `executing` (n), number of the proposal executed, -1 without one; both held.
+            With unicycles `command_share` (n), the share that was left of each command, held.
             `gains`, the `UgvGains` in force, for the gatekeeper, which predicts the command.
     Parameters: `UgvGains`; by default those of the law.
     Rate: one update per control period, from t = 0.
@@ -87,6 +90,7 @@ class UgvController(_Controller):
         self.law, self.avoidance, self._world = law, law.avoidance, world
         self._near = world.around(world.select("ugv"))
         self._bodies = declare_bodies(self, world)
+        self._headings = declare_headings(self, world)
         self._reference = self.DeclareVectorInputPort("reference", 6 * n)
         self._proposals = self.DeclareAbstractInputPort("proposals", no_proposals(n))
         self._answers = self.DeclareVectorInputPort("answers", 2 * n)
@@ -94,6 +98,8 @@ class UgvController(_Controller):
         executing = self.DeclareDiscreteState([NOTHING] * n)
         self.DeclareStateOutputPort("command", command)
         self.DeclareStateOutputPort("executing", executing)
+        if self._headings is not None:
+            self.DeclareStateOutputPort("command_share", self.DeclareDiscreteState(np.ones(n)))
         gains = law.avoidance.gain, law.motion_gain, law.intervention_gain
         self._declare_gains(UgvGains, gains, law)
         given = {self._gains_ticket}
@@ -117,8 +123,21 @@ class UgvController(_Controller):
         reference, rate = self._reference.Eval(context).reshape(2, -1, 3)
         proposals = accepted_proposals(self._proposals.Eval(context), self._answers.Eval(context))
         velocity = self.velocity(context.get_time(), positions, reference, rate, proposals, self._in_force(context))
+        if self._headings is not None:
+            discrete.set_value(2, self.shorten(velocity, self._headings.Eval(context)))
         discrete.set_value(0, velocity.ravel())
         discrete.set_value(1, [NOTHING if proposal is None else float(proposal.number) for proposal in proposals])
+
+    def shorten(self, velocity: Array, headings: Array) -> Array:
+        """Shorten commands (n, 3), m/s, in place, to what unicycles with headings (n,), rad, can do.
+
+        Returns:
+            The shares that are left, (n,).
+        """
+        if self._world.steering is None:
+            return np.ones(len(velocity))
+        left: Array = steer_all(velocity, headings, self._world.steering, self.law.avoidance.period)
+        return left
 
     def velocity(
         self,
@@ -129,7 +148,7 @@ class UgvController(_Controller):
         accepted: Sequence[Proposal | None],
         law: UgvLaw | None = None,
     ) -> Array:
-        """Commands of the law.
+        """Commands of the law, before they are shortened.
 
         Args:
             t: time, s.

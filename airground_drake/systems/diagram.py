@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from pydrake.systems.framework import Diagram, DiagramBuilder, InputPort, OutputPort, System
-from pydrake.systems.primitives import Demultiplexer, Multiplexer, TrajectorySource
+from pydrake.systems.primitives import ConstantVectorSource, Demultiplexer, Multiplexer, TrajectorySource
 
 from airground_drake.base.arrays import Array
 from airground_drake.base.errors import PluginError, UnknownNameError
@@ -41,6 +41,8 @@ RECORDED = (
     "bodies", "team_command", "reference", "noise", "decision_variable", "status", "executing",
 )  # fmt: skip
 """Exported output ports of the diagram: the signals of a trace."""
+OF_PLANTS = ("plant_signals", "command_share")
+"""The same, of robots that are not where the law steers them, and of unicycles; only where there are such robots."""
 
 PlantFactory = Callable[[str, Array], System]
 """Makes the plant of a robot from its name and its start (3,), m: a System with one input, the velocity (3,), m/s, and
@@ -65,6 +67,7 @@ class Model:
         gatekeeper: of methods (c) and (d), else None.
         controllers: of the UGVs, and of the UAV.
         plants: by robot, the kind of its plant, or the class of the system that was given for it.
+        recorded: names of the exported output ports that are the signals of a trace.
     """
 
     diagram: Diagram
@@ -75,6 +78,7 @@ class Model:
     gatekeeper: Gatekeeper | None
     controllers: tuple[UgvController, UavController]
     plants: dict[str, str]
+    recorded: tuple[str, ...]
 
 
 def build_diagram(
@@ -158,9 +162,10 @@ def build_model(
     if monitor is not None:
         parts["monitor"] = monitor
     named = {port.get_name(): port for part in parts.values() for port in _outputs(part)}
-    exported = [*RECORDED, *(["violation"] if monitor is not None else [])]
+    recorded = (*RECORDED, *(name for name in OF_PLANTS if name in named))
+    exported = [*recorded, *(["violation"] if monitor is not None else [])]
     diagram = _assembled(f"{scenario.name}_method_{chosen.id}", parts, named, exported)
-    return Model(diagram, world, block, trigger, planner, gatekeeper, controllers, kinds)
+    return Model(diagram, world, block, trigger, planner, gatekeeper, controllers, kinds, recorded)
 
 
 def method_drawn(scenario: Scenario) -> str:
@@ -213,6 +218,7 @@ def _task_planning(
         "proposals": planner.GetOutputPort("proposals"),
         "ugv_command": ugvs.GetOutputPort("command"),
         "executing": ugvs.GetOutputPort("executing"),
+        **({"command_share": ugvs.GetOutputPort("command_share")} if ugvs.HasOutputPort("command_share") else {}),
         "gains": ugvs.GetOutputPort("gains"),
         "uav_command": uav.GetOutputPort("command"),
     }
@@ -244,7 +250,23 @@ def _vehicles(world: World, plants: Mapping[str, System], *, disturbed: bool) ->
         builder.ExportInput(disturbance.GetInputPort(f"disturbance_{robot}"), f"disturbance_{robot}")
     builder.ExportOutput(bodies.get_output_port(), "bodies")
     builder.ExportOutput(team_command.get_output_port(), "team_command")
+    signals = [port for plant in plants.values() for port in _outputs(plant) if port.get_name() == "signals"]
+    if signals:
+        builder.ExportOutput(_together(builder, "plant_signals", signals), "plant_signals")
+    if world.steering is not None:
+        of_ugvs = [{port.get_name(): port for port in _outputs(plants[name])} for name in world.names("ugv")]
+        none = builder.AddNamedSystem("no_heading", ConstantVectorSource([0.0])).get_output_port()
+        headings = [ports.get("heading", none) for ports in of_ugvs]
+        builder.ExportOutput(_together(builder, "headings", headings), "headings")
     return _built("vehicles", builder)
+
+
+def _together(builder: DiagramBuilder, name: str, ports: Sequence[OutputPort]) -> OutputPort:
+    """One output port with the values of several."""
+    multiplexer = builder.AddNamedSystem(name, Multiplexer([port.size() for port in ports]))
+    for i, port in enumerate(ports):
+        builder.Connect(port, multiplexer.get_input_port(i))
+    return multiplexer.get_output_port()
 
 
 def _assembled(

@@ -11,7 +11,15 @@ from airground_drake.gatekeeper.answer import GatekeeperDecision
 from airground_drake.gatekeeper.mpc_gatekeeper import Gatekeepers, GatekeeperState, Inputs
 from airground_drake.intervention.messages import ACCEPT, SILENT, Report
 from airground_drake.systems.lifetime import weakly
-from airground_drake.systems.signals import Answer, UgvGains, declare_bodies, laid_out, no_proposals, no_reports
+from airground_drake.systems.signals import (
+    Answer,
+    UgvGains,
+    declare_bodies,
+    declare_headings,
+    laid_out,
+    no_proposals,
+    no_reports,
+)
 from airground_drake.systems.ticks import Ticks
 from airground_drake.world.world import World
 
@@ -34,7 +42,8 @@ class Gatekeeper(LeafSystem):
 
     Ports (n UGVs, r robots, M bodies that move):
         in  `bodies` (3M) m; `team_command` (3r) m/s, for the predicted motion of the other robots; `gains`, the
-            `UgvGains` that the controllers run with; `proposals` abstract, n of Proposal or None.
+            `UgvGains` that the controllers run with; `proposals` abstract, n of Proposal or None. With unicycles
+            `headings` (n), rad.
         out `answers` (2n), an `Answer` per UGV, and `reports` (abstract), see `messages`; held.
     State: abstract, a `GatekeeperState`.
     Rate: one update per gatekeeper period, from t = 0. Its decisions are published at the end of the simulator's step
@@ -46,7 +55,7 @@ class Gatekeeper(LeafSystem):
         super().__init__()
         n = len(world.names("ugv"))
         self._gatekeepers, self._world = gatekeepers, world
-        self._bodies = declare_bodies(self, world)
+        self._bodies, self._headings = declare_bodies(self, world), declare_headings(self, world)
         self._command = self.DeclareVectorInputPort("team_command", 3 * len(world.robots))
         self._gains = self.DeclareVectorInputPort("gains", len(UgvGains.get_fields()))
         self._proposals = self.DeclareAbstractInputPort("proposals", no_proposals(n))
@@ -109,7 +118,8 @@ class Gatekeeper(LeafSystem):
             return EventStatus.DidNothing()
         velocities = self._world.velocities(context.get_time(), self._command.Eval(context).reshape(-1, 3))
         law = self._gatekeepers.law.with_gains(*self._gains.Eval(context).tolist())
-        now = Inputs(context.get_time(), proposals, positions, velocities, law)
+        headings = None if self._headings is None else self._headings.Eval(context)
+        now = Inputs(context.get_time(), proposals, positions, velocities, law, headings)
         state.get_mutable_abstract_state(self._state).set_value(self._gatekeepers.sample(now, before))
         return EventStatus.Succeeded()
 

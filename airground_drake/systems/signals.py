@@ -38,6 +38,13 @@ def declare_bodies(system: LeafSystem, world: World) -> InputPort:
     return system.DeclareVectorInputPort("bodies", 3 * len(world.moving))
 
 
+def declare_headings(system: LeafSystem, world: World) -> InputPort | None:
+    """Declare the input port `headings` (n), rad, of the UGVs, 0 for those that have none; None without unicycles."""
+    if world.steering is None:
+        return None
+    return system.DeclareVectorInputPort("headings", len(world.steering))
+
+
 def components_of(world: World, *kinds: Kind) -> slice:
     """Slice of the ports `bodies` and `team_command` that belongs to the bodies of some kinds."""
     rows = world.select(*kinds)

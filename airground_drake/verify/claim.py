@@ -10,11 +10,13 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from airground_drake.base.arrays import Array
 from airground_drake.base.errors import TraceError, described
 from airground_drake.base.statuses import PASSING, STATUSES, Status, meets, outcome
 from airground_drake.run.trace import Trace
-from airground_drake.scenarios.plants import plant_of
-from airground_drake.scenarios.schema import Scenario
+from airground_drake.scenarios.schema import Scenario, Uav, Ugv
+from airground_drake.verify.engines.bodies import following_m_s, unicycle_m
+from airground_drake.verify.engines.geometry import MERGE_S, interpolate
 from airground_drake.verify.finding import Evidence, Failure, Finding
 
 __all__ = [
@@ -218,8 +220,13 @@ def other_plants(trace: Trace) -> str:
     """Robots that had another plant than the scenario's, with its class, in words; empty if all are the scenario's."""
     kinds = trace.meta.get("plants", {})
     robots = trace.scenario.robots
-    others = {name: kind for name, kind in kinds.items() if name in robots and kind != plant_of(robots[name]).kind}
+    others = {name: kind for name, kind in kinds.items() if name in robots and kind != _kind(robots[name])}
     return ", ".join(f"{name}: {kind}" for name, kind in others.items())
+
+
+def _kind(robot: Ugv | Uav) -> str:
+    """The kind of the first plant of a robot."""
+    return robot.plant[0].kind if robot.plant else "first_order"
 
 
 def require_motion(trace: Trace) -> None:
@@ -237,12 +244,54 @@ def require_motion(trace: Trace) -> None:
     if len(t) < 2 or (np.diff(t) < 0.0).any():
         raise TraceError("the trace has fewer than two rows, or its time runs backwards")
     for robot in trace.robots:
-        given, position = scenario.robots[robot], trace.position(robot)
-        plant = plant_of(given)
-        off = np.abs(position[1:] - plant.step(position[:-1], trace.command(robot)[1:], np.diff(t))).max(axis=1)
+        position = trace.position(robot)
+        off = np.abs(position[1:] - position[:-1] - np.diff(t)[:, None] * trace.command(robot)[1:]).max(axis=1)
         k = int(np.argmax(off))
-        if off[k] > MOTION_TOLERANCE_M + plant.reach(given.max_speed_m_s, scenario.control.period_s):
+        if off[k] > MOTION_TOLERANCE_M:
             raise TraceError(f"{robot} at t = {t[k + 1]} s is {off[k]:.3g} m from where its command leads to")
+        require_body(trace, robot)
+
+
+def require_body(trace: Trace, robot: str) -> None:
+    """Check that the recorded body of a robot follows from the steered point and the commands, by the robot's plant.
+
+    Raises:
+        TraceError: if it does not, to within `MOTION_TOLERANCE_M`, or does not begin where the scenario says.
+    """
+    given, period, t = trace.scenario.robots[robot], trace.scenario.control.period_s, trace.t
+    if not any(plant.kind != "first_order" for plant in given.plant):
+        return
+    steered, command, found = trace.position(robot), trace.command(robot), trace.body(robot)
+    due = steered
+    for plant in given.plant:
+        if plant.kind == "delay":
+            due = interpolate(t, due, t - plant.delay_s)
+            late = np.round((t - plant.delay_s) / MERGE_S) * MERGE_S
+            before = np.clip(np.searchsorted(np.round(t / MERGE_S) * MERGE_S, late), 0, len(t) - 1)
+            command = np.where((late > 0.0)[:, None], command[before], 0.0)
+        elif plant.kind == "lag":
+            velocity = following_m_s(command, np.diff(t), plant.time_constant_s)
+            _agree(robot, t, trace.body_velocity(robot), velocity, "velocity")
+            due = due - plant.time_constant_s * velocity
+        elif plant.kind == "unicycle":
+            heading, rows = trace.column(f"{robot}.heading_rad"), trace.sample_rows
+            last = rows[np.maximum(np.searchsorted(rows, np.arange(len(t)), side="left") - 1, 0)]
+            both = unicycle_m(steered, heading[last], command, t - t[last], plant.hand_point_m, period)
+            _agree(robot, t, heading[:, None], both[:, 3:], "heading")
+            if heading[0] != plant.heading_rad:
+                raise TraceError(f"{robot} begins with the heading {heading[0]} rad, not {plant.heading_rad}")
+            due = both[:, :3]
+    _agree(robot, t, found, due, "body")
+    if np.abs(found[0] - given.start_m).max() > MOTION_TOLERANCE_M:
+        raise TraceError(f"the body of {robot} begins at {found[0].tolist()} m, not at {given.start_m}")
+
+
+def _agree(robot: str, t: Array, found: Array, due: Array, what: str) -> None:
+    """Raise a TraceError where rows of a recorded signal differ from those that follow from the plant."""
+    off = np.abs(found - due).max(axis=1)
+    k = int(np.argmax(off))
+    if not off[k] <= MOTION_TOLERANCE_M:
+        raise TraceError(f"the {what} of {robot} at t = {t[k]} s is {off[k]:.3g} from where its plant has it")
 
 
 def require_whole_run(trace: Trace) -> None:

@@ -231,7 +231,7 @@ def plot(trace: Trace, axes: Axes | None = None) -> Axes:
 
         _, axes = pyplot.subplots()
     scenario = trace.scenario
-    ways = {robot: trace.position(robot) for robot in trace.robots}
+    ways = {robot: trace.body(robot) for robot in trace.robots}
     frame_of(scenario, ways.items()).show(axes)
     labels, edges = draw_barriers(axes, scenario)
     for robot, appearance in looks_of(scenario, trace.ugvs).items():
@@ -265,7 +265,7 @@ def thumbnail(scenario: Scenario, ways: Mapping[str, Array] | None = None) -> st
 
 def thumbnail_of(trace: Trace, prefix: str) -> str:
     """The thumbnail of a run as an element for HTML; `prefix` is unique in the page."""
-    drawn = thumbnail(trace.scenario, {ugv: trace.position(ugv) for ugv in trace.ugvs})
+    drawn = thumbnail(trace.scenario, {ugv: trace.body(ugv) for ugv in trace.ugvs})
     says = "Ways of the UGVs from above; rings: starts; crosses: targets; grey: obstacles in their safe circles."
     return svg.inline(drawn, prefix, f"Run {trace.run}", says, natural_size=True)
 

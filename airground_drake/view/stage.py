@@ -173,7 +173,7 @@ def stage(scenario: Scenario, visited_m: Array | None = None) -> Stage:
 
 def stage_of(trace: Trace, scenario: Scenario) -> Stage:
     """The stage of a run of a scenario."""
-    return stage(scenario, np.concatenate([trace.position(robot) for robot in trace.robots]))
+    return stage(scenario, np.concatenate([trace.body(robot) for robot in trace.robots]))
 
 
 def barriers_of(scenario: Scenario, mark: float = 0.0) -> tuple[Barrier, ...]:

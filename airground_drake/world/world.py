@@ -12,8 +12,9 @@ import numpy.typing as npt
 
 from airground_drake.base.arrays import Array
 from airground_drake.geometry import outline
+from airground_drake.world.budget import AT_REST, Bounds, law_distance
 from airground_drake.world.motion import SAME_S
-from airground_drake.world.plant import Plant, Scripted
+from airground_drake.world.plant import Plant, Scripted, Unicycle
 
 Kind = Literal["ugv", "uav", "obstacle"]
 KINDS: tuple[Kind, ...] = get_args(Kind)
@@ -28,7 +29,8 @@ class Body:
     Attributes:
         name: unique in its world.
         kind: UGVs stay in their plane.
-        start_m: position of its origin at the start, (3,), m, world frame.
+        start_m: position of its origin at the start, of a robot that of the point that the law steers, (3,), m, world
+            frame.
         shape: outlines of its convex parts about its origin, (k, W), see `geometry.outline`; of a robot, one ball.
         plant: how it moves; None: it never moves.
         max_speed_m_s: speed limit, or the speed that robots expect of an obstacle at most.
@@ -52,6 +54,11 @@ class Body:
             return np.zeros(3)
         return np.array([1.0, 1.0, 0.0]) if self.kind == "ugv" else np.ones(3)
 
+    @property
+    def bounds(self) -> Bounds:
+        """How far a robot may be from where the law steers it."""
+        return self.plant.bounds(self.max_speed_m_s) if self.plant and self.kind in ROBOTS else AT_REST
+
 
 class Neighbours(NamedTuple):
     """What k robots keep away from, as arrays for compiled code: m convex parts at rest, then n parts that move.
@@ -62,7 +69,7 @@ class Neighbours(NamedTuple):
         others: the parts that move around each robot, rows of `parts`, (k, n).
         still: outlines of the parts at rest, (m, W).
         parts: outlines of all parts that move, about the origins of their bodies, (P, W).
-        distance: safe distances between the robot's centre and the cores, (k, m + n), m.
+        distance: distances that the law keeps between the robot's steered point and the cores, (k, m + n), m.
         share: part of the avoidance inequality that the robot takes, (k, m + n).
         mobility: of the robots, (k, 3), 1 where they can move, else 0.
         max_speed: of the robots, (k,), m/s.
@@ -106,10 +113,12 @@ class World:
         apart_m: safe distance between the surfaces of two robots, m, by the set of their kinds. An obstacle's outlines
             say what distance to keep from it. Each of two robots takes half of an inequality, a robot beside an
             obstacle all of it.
+        gain_1_s: gain A of the law, which makes up for drift: see `world.budget`.
     """
 
     bodies: tuple[Body, ...]
     apart_m: Mapping[frozenset[Kind], float]
+    gain_1_s: float = 0.0
 
     def __post_init__(self) -> None:
         """Check the order.
@@ -194,17 +203,27 @@ class World:
 
     @cached_property
     def starts(self) -> Array:
-        """Positions at the start of the bodies that move, (M, 3), m."""
+        """Positions at the start of the bodies that move, of robots those of their steered points, (M, 3), m."""
         return _rows([body.start_m for body in self.moving])
+
+    @cached_property
+    def steering(self) -> Array | None:
+        """Numbers of the UGVs' steering, (n, 4), see `world.steering`; None if no UGV is a unicycle."""
+        plants = [body.plant for body in self.bodies[self.select("ugv")]]
+        if not any(isinstance(plant, Unicycle) for plant in plants):
+            return None
+        return np.array([plant.steering if isinstance(plant, Unicycle) else np.zeros(4) for plant in plants])
+
+    @cached_property
+    def signals(self) -> tuple[str, ...]:
+        """Names of what is recorded of robots that are not where the law steers them, in the order of the world."""
+        robots = [body for body in self.moving if body.kind in ROBOTS and body.plant is not None]
+        return tuple(f"{body.name}.{name}" for body in robots if body.plant for name in body.plant.signals)
 
     @cached_property
     def radius(self) -> Array:
         """Radii of the robots, in the order of the world, m."""
         return np.array([float(body.shape[0, outline.RADIUS]) for body in self.bodies if body.kind in ROBOTS])
-
-    def moves_straight(self, period_s: float) -> bool:
-        """Whether all bodies move on straight lines while their commands are held for a period."""
-        return not any(body.plant and body.plant.reach(body.max_speed_m_s, period_s) for body in self.moving)
 
     def apart(self, first: Kind, second: Kind) -> float:
         """Safe distance between the surfaces of bodies of two kinds, m; 0 if none is declared."""
@@ -218,8 +237,8 @@ class World:
         others = np.array([np.flatnonzero(carrier != i) for i in members], dtype=np.intp).reshape(len(members), -1)
         robots = [self.bodies[i] for i in members]
         distance = [
-            np.concatenate([outline.keep(self.still, radius), self._beside(robot, radius)[other]])
-            for robot, radius, other in zip(robots, self.radius[members], others, strict=True)
+            np.concatenate([self.keep(i, self.still), self._beside(robot, radius)[other]])
+            for i, robot, radius, other in zip(members, robots, self.radius[members], others, strict=True)
         ]
         share = np.where(np.array([body.kind in ROBOTS for body in self.moving]), 0.5, 1.0)[carrier]
         return Neighbours(
@@ -228,11 +247,24 @@ class World:
             _rows([robot.mobility for robot in robots]), np.array([robot.max_speed_m_s for robot in robots]),
         )  # fmt: skip
 
+    def keep(self, robot: int, rows: Array) -> Array:
+        """Distances that the law keeps between a robot's steered point and the cores of obstacles (m, W): (m,), m."""
+        keep, bounds = outline.keep(rows, float(self.radius[robot])), self.bodies[robot].bounds
+        if bounds.exact:
+            return keep
+        at_rest = law_distance(keep, bounds, gain=self.gain_1_s)
+        return np.where(
+            rows[:, outline.SPEED] > 0.0, law_distance(keep, bounds, gain=self.gain_1_s, passive=True), at_rest
+        )
+
     def _beside(self, robot: Body, radius: float) -> Array:
-        """Safe distances between the centre of a robot and the cores of the parts that move, (P,), m."""
+        """The same for the parts that move, of obstacles and of other robots, (P,), m."""
         return np.concatenate([
-            self.apart(robot.kind, body.kind) + (radius + body.shape[:, outline.RADIUS]) if body.kind in ROBOTS
-            else outline.keep(body.shape, radius)
+            law_distance(
+                self.apart(robot.kind, body.kind) + (radius + body.shape[:, outline.RADIUS]), robot.bounds, body.bounds,
+                gain=self.gain_1_s,
+            ) if body.kind in ROBOTS
+            else self.keep(self.index(robot.name), body.shape)
             for body in self.moving
         ])  # fmt: skip
 

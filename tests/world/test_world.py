@@ -12,10 +12,6 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from airground_drake.nsbc.avoidance import Avoidance
-from airground_drake.run import events
-from airground_drake.run.simulation import simulate
-from airground_drake.scenarios.load import load
-from airground_drake.verify import judge
 from airground_drake.world.motion import PeriodMotion
 from airground_drake.world.plant import FirstOrder
 from airground_drake.world.world import ROBOTS, World
@@ -84,18 +80,3 @@ def test_no_point_of_two_motions_is_nearer_than_the_least_distance(
         assert (np.maximum(np.linalg.norm(apart.start + s * change, axis=-1) - off, 0.0) >= least - 1e-9).all()
     nearest = np.linalg.norm(apart.start + share[:, None] * change, axis=-1)
     np.testing.assert_allclose(np.maximum(nearest - off, 0.0), least, atol=1e-12)
-
-
-def test_a_plant_that_leaves_the_straight_line_costs_what_it_may_be_off(monkeypatch: pytest.MonkeyPatch) -> None:
-    """SAFE-TRACE and the events of collisions ask the plant how robots move between the rows."""
-    trace = simulate(load("minimal", ["duration_s=4.0"]), "d")
-    (straight,) = judge(trace, ["SAFE-TRACE"])
-    least = {(p["first"], p["second"]): p["min_distance_m"] for p in straight.evidence["pairs"]}
-    monkeypatch.setattr(FirstOrder, "motion", lambda self, start, end, period_s: PeriodMotion(start, end, 2.0))
-    (off,) = judge(replace(trace), ["SAFE-TRACE"])
-    for pair in off.evidence["pairs"]:
-        both = 4.0 if pair["second"] in trace.robots else 2.0
-        assert pair["min_distance_m"] == max(least[pair["first"], pair["second"]] - both, 0.0)
-    assert off.status == "refuted"
-    told = {event["kind"] for event in events.extract(trace)} - {event["kind"] for event in trace.events}
-    assert told == {"collision"}

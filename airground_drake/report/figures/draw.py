@@ -123,7 +123,7 @@ def _alike(one: Trace, other: Trace) -> bool:
     return bool(one.t[-1] == other.t[-1]) and all(
         np.abs(np.interp(t, one.t, a) - np.interp(t, other.t, b)).max() <= ALIKE_M
         for robot in one.robots
-        for a, b in zip(one.position(robot).T, other.position(robot).T, strict=True)
+        for a, b in zip(one.body(robot).T, other.body(robot).T, strict=True)
     )
 
 
@@ -142,7 +142,7 @@ def _runs(heading: str) -> str:
 def _trajectories(chosen: _Selection) -> Figure:
     first = chosen.first
     frame = frame_of(
-        first.scenario, ((robot, trace.position(robot)) for trace in chosen.runs.values() for robot in first.robots)
+        first.scenario, ((robot, trace.body(robot)) for trace in chosen.runs.values() for robot in first.robots)
     )
     barriers = barriers_of(first.scenario)
     has_walls = not all(each.is_round for each in barriers)
@@ -167,8 +167,8 @@ def _trajectories(chosen: _Selection) -> Figure:
     panels = []
     for position, (heading, trace) in enumerate(chosen.shown.items()):
         drawing = maps.plane(trace, chosen.team, frame, width_in)
-        columns = {f"{r} {a}": trace.position(r)[:, k] for r in robots for k, a in enumerate("xy")}
-        finals = ", ".join(f"{r} ({x:.2f}, {y:.2f}) m" for r in robots for x, y, _ in [trace.position(r)[-1]])
+        columns = {f"{r} {a}": trace.body(r)[:, k] for r in robots for k, a in enumerate("xy")}
+        finals = ", ".join(f"{r} ({x:.2f}, {y:.2f}) m" for r in robots for x, y, _ in [trace.body(r)[-1]])
         says = f"Paths of {', '.join(robots)} in the ground plane; final positions: {finals}."
         table = series(trace, "Positions, m", columns)
         panels.append(panel(drawing, f"trajectories-{position}", f"Map of {heading}", says, heading, table))

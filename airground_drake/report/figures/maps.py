@@ -27,15 +27,15 @@ def plane(trace: Trace, ugvs: Sequence[str], frame: Frame, width_in: float) -> F
     (of_barriers, edges), labels = draw_barriers(axes, trace.scenario), list[Label]()
     for robot in trace.ugvs:
         if robot not in ugvs:
-            axes.plot(*trace.position(robot)[:, :2].T, color=MUTED, linewidth=0.7, zorder=1)
-            axes.plot(*trace.position(robot)[-1, :2], marker=".", markersize=3, color=MUTED, zorder=1)
+            axes.plot(*trace.body(robot)[:, :2].T, color=MUTED, linewidth=0.7, zorder=1)
+            axes.plot(*trace.body(robot)[-1, :2], marker=".", markersize=3, color=MUTED, zorder=1)
     robots = looks_of(trace.scenario, ugvs)
     for robot, appearance in robots.items():
-        way, rows = trace.position(robot), trace.counting_rows(robot)
+        way, rows = trace.body(robot), trace.counting_rows(robot)
         labels += draw_robot(axes, trace.scenario, robot, way, appearance, rows)
     for ugv in ugvs:
         labels += _happenings(axes, trace, ugv)
-    place(axes, [*labels, *of_barriers], [*(trace.position(robot) for robot in robots), *edges])
+    place(axes, [*labels, *of_barriers], [*(trace.body(robot) for robot in robots), *edges])
     return figure
 
 
@@ -56,6 +56,6 @@ def _happenings(axes: Axes, trace: Trace, ugv: str) -> list[Label]:
         at = np.asarray(event["position_m"][:2], dtype=np.float64)
         mark(at, f"{event['kind']} {event['t_s']:.2f} s", markeredgecolor="white", **options)
     if MEASURES["stall_position"](trace, ugv):
-        at = trace.position(ugv)[-1, :2]
+        at = trace.body(ugv)[-1, :2]
         mark(at, "stands still", marker="s", markerfacecolor="none", color=INK, markeredgewidth=1.4)
     return [Label(at, "\n".join(lines)) for at, lines in found]

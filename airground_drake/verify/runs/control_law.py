@@ -92,7 +92,7 @@ def inequalities_of(trace: Trace, robot: str, *, as_seen: bool = False) -> Inequ
     beside = [*(pairs[name] for name in parts.names), *(pairs[name] for name in others)]
     which = np.append(parts.owner[near.core], len(parts.names) + other)
     safe, share, speed = (
-        np.array([getattr(pair, name) for pair in beside])[which] for name in ("safe_m", "share", "speed_m_s")
+        np.array([getattr(pair, name) for pair in beside])[which] for name in ("law_m", "share", "speed_m_s")
     )
     normal = np.concatenate([near.away.normal, offset / np.where(apart > 0.0, apart, 1.0)[:, None]])
     distance = np.append(near.away.distance, apart)

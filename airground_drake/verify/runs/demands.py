@@ -29,6 +29,8 @@ NO_INTERVENTION = "a"
 """Method without interventions."""
 OUTLINES = ("outlines", "moving_outlines")
 """Parameters that are outlines: of what is at rest, and of what moves, about its origin."""
+SAME_M = 1e-12
+"""Distances that differ by no more are equal, m: two ways to add up a budget round differently."""
 PLANAR, SPATIAL = (1.0, 1.0, 0.0), (1.0, 1.0, 1.0)
 """Directions in which UGVs and UAVs move."""
 
@@ -52,7 +54,7 @@ def demanded(trace: Trace) -> dict[str, dict[str, Any]]:
         for i, j in ((first, second), (second, first)):
             if i >= len(barriers):  # a barrier avoids nothing
                 i -= len(barriers)
-                safe[i, j], share[i, j] = pair.safe_m, pair.share
+                safe[i, j], share[i, j] = pair.law_m, pair.share
     outlines = [*outlines_of(trace)]
     at_rest, that_move = (np.concatenate([np.empty(0), *(outlines[k] for k in some)]) for some in (still, moving))
     column = np.concatenate([parts.owner[still], len(barriers) + everybody, parts.owner[moving]])
@@ -133,8 +135,8 @@ def differences(trace: Trace) -> Iterator[dict[str, Any]]:
             given = _without_circles(given or []) if parameter in OUTLINES else np.asarray(given, dtype=np.float64)
             if given.shape != due.shape:
                 yield {**about, "built": f"{given.size} numbers", "scenario": f"{due.size} numbers"}
-            elif (given != due).any():
-                k = int(np.argmax(given != due))
+            elif (other := np.abs(given - due) > (SAME_M if parameter == "safe_m" else 0.0)).any():
+                k = int(np.argmax(other))
                 place = _place(trace, wanted, parameter, k)
                 yield {**about, **place, "built": float(given[k]), "scenario": float(due[k])}
 

@@ -5,14 +5,16 @@ If it moves, its parts are about the origin of its frame, and distances are thos
 Everything about places and distances is here: nobody else computes them.
 
 A distance that users see is the gap of a pair, beside the gap required: between surfaces, below 0 if the bodies
-overlap. `least_gap` and `gap_over_time` are its only sources. The law keeps distances of a robot's centre from the core
-of a barrier (`engines.outlines`) or from the centre of another robot, `Pair.safe_m`.
+overlap. `least_gap` and `gap_over_time` are its only sources. Bodies keep distances of a robot's centre from the core
+of a barrier (`engines.outlines`) or from the centre of another robot, `Pair.safe_m`. The law keeps `Pair.law_m` between
+the points that it steers, which is more if a robot's plant takes room.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 from itertools import combinations
+from math import ceil
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -20,11 +22,12 @@ import numpy.typing as npt
 
 from airground_drake.base.arrays import Array
 from airground_drake.run.trace import Trace
-from airground_drake.scenarios.plants import plant_of
 from airground_drake.scenarios.schema import Obstacle
 from airground_drake.scenarios.shapes import convex_parts
+from airground_drake.verify.engines.bodies import arc_m, lagging_m, law_m, on_arc, on_lag, room_of
 from airground_drake.verify.engines.geometry import (
     MERGE_S,
+    Approach,
     apart_at_least,
     boxes_of,
     closest_approach,
@@ -39,6 +42,7 @@ from airground_drake.verify.engines.outlines import (
     apart_by_blocks,
     away_from,
     closest,
+    least_distances,
     nearest_point,
     over_time,
     within,
@@ -58,6 +62,8 @@ class Pair(NamedTuple):
         row: from which on both are there.
         last: row up to which both are there.
         speed_m_s: at which robots expect the barrier to move at most; above 0 the robot's law is the passive one.
+        more_m: distance that the law keeps beyond `safe_m`.
+        cover_m: how far both bodies may be from the points that the law steers, together.
     """
 
     first: str
@@ -69,6 +75,8 @@ class Pair(NamedTuple):
     row: int = 0
     last: int | None = None
     speed_m_s: float = 0.0
+    more_m: float = 0.0
+    cover_m: float = 0.0
 
     @property
     def rows(self) -> slice:
@@ -77,12 +85,17 @@ class Pair(NamedTuple):
 
     @property
     def safe_m(self) -> float:
-        """Distance of the robot's centre from the other's core that the law keeps, m."""
+        """Distance of the robot's centre from the other's core that is to be kept, m."""
         return self.required_m + self.radii_m
+
+    @property
+    def law_m(self) -> float:
+        """Distance of the robot's steered point from the other's core, or steered point, that the law keeps, m."""
+        return self.safe_m + self.more_m
 
     def keeps_m(self, period_s: float) -> float:
         """The same and V h: who keeps it at a sample keeps d for a period, whatever the barrier does."""
-        return self.safe_m + self.speed_m_s * period_s
+        return self.law_m + self.speed_m_s * period_s
 
 
 class Gap(NamedTuple):
@@ -124,14 +137,23 @@ def declared_pairs(trace: Trace) -> Iterator[Pair]:
     limit = {name: robot.max_speed_m_s for name, robot in trace.scenario.robots.items()}
     there = [(name, each, trace.there_from(name), trace.there_until(name)) for name, each in
              trace.scenario.barriers.items()]  # fmt: skip
+    room = {name: room_of(robot, period) for name, robot in trace.scenario.robots.items()}
+
+    def found(first: str, second: str, apart: float, radii: float, reach: float, **given: Any) -> Pair:
+        pair = Pair(first, second, apart, radii, 0.5 if second in room else 1.0, reach, **given)
+        more = law_m(pair.safe_m, room[first], room.get(second), passive=pair.speed_m_s > 0.0) - pair.safe_m
+        cover = room[first].rolling_m + (room[second].rolling_m if second in room else 0.0)
+        return pair._replace(more_m=more, cover_m=cover)
+
     for robot in trace.robots:
         for name, each, row, last in there:
             radii, speed = radius[robot] + each.radius_m, each.expected_speed_m_s
             apart = each.distance_m or (safe.moving_m if speed else 0.0) or safe.obstacle_m
-            yield Pair(robot, name, apart, radii, 1.0, (limit[robot] + speed) * period, row, last, speed)
+            reach = (limit[robot] + speed) * period
+            yield found(robot, name, apart, radii, reach, row=row, last=last, speed_m_s=speed)
     for robot, other in combinations(trace.robots, 2):
         apart = safe.air_ground_m if uav in (robot, other) else safe.ugv_m
-        yield Pair(robot, other, apart, radius[robot] + radius[other], 0.5, (limit[robot] + limit[other]) * period)
+        yield found(robot, other, apart, radius[robot] + radius[other], (limit[robot] + limit[other]) * period)
 
 
 class Parts(NamedTuple):
@@ -181,8 +203,8 @@ def origin_of(trace: Trace, barrier: str) -> Array | None:
 
 
 def seen_from(trace: Trace, robot: str, barrier: str) -> Array:
-    """Places of a robot at the rows as seen from the origin of a barrier's parts, (T, 3), m."""
-    origin, place = origin_of(trace, barrier), trace.position(robot)
+    """Places of a robot's body at the rows as seen from the origin of a barrier's parts, (T, 3), m."""
+    origin, place = origin_of(trace, barrier), trace.body(robot)
     return place if origin is None else place - origin
 
 
@@ -250,22 +272,77 @@ def numbers_of(trace: Trace) -> dict[frozenset[str], int]:
 
 
 def least_gap(trace: Trace, pair: Pair) -> Gap:
-    """The smallest gap of a pair over continuous time, exact if both move on straight lines, else a lower bound."""
+    """The smallest gap of a pair over continuous time.
+
+    It is exact if both bodies move on straight lines between rows, and to `BENT_M` where it is below the one required;
+    else it is a lower bound.
+    """
 
     def found() -> Gap:
         t, off_m = trace.t[pair.rows], off_m_of(trace, pair.first) + off_m_of(trace, pair.second)
         cores = cores_of(trace).get(pair.second)
         if cores is None:
-            first, second = trace.position(pair.first), trace.position(pair.second)
+            first, second = trace.body(pair.first), trace.body(pair.second)
             distance, t_s, row = closest_approach(t, first[pair.rows], second[pair.rows], off_m)
         else:
             first = seen_from(trace, pair.first, pair.second)[pair.rows]
             distance, row, share = closest(cores, first, planar=is_planar(trace, pair.first))
             distance = max(distance - off_m, 0.0) if off_m and cores.are_points else distance - off_m
             t_s = instant_of(t, row, share)
+        if off_m and distance < pair.safe_m:
+            distance, t_s, row = _least_of_bent(trace, pair, off_m)
         return Gap(pair, distance - pair.radii_m, distance - pair.safe_m, t_s, row + pair.row)
 
     return trace.derived(("least gap", pair.first, pair.second), found)
+
+
+def _least_of_bent(trace: Trace, pair: Pair, off_m: float) -> Approach:
+    """The least distance of a pair whose bodies do not move straight: segments that may be too near are divided."""
+    cores, planar = cores_of(trace).get(pair.second, Cores.at(np.zeros((1, 3)))), is_planar(trace, pair.first)
+    way = _relative(trace, pair, np.arange(len(trace.t))[pair.rows])
+    each = cores.take((slice(None), None))
+    lower = least_distances(each, way[:-1], way[1:], planar=planar)[0].min(axis=0) - off_m
+    parts = min(ceil((off_m / BENT_M) ** 0.5), MOST_PARTS)
+    shares, t = np.linspace(0.0, 1.0, parts + 1), trace.t[pair.rows]
+    found = []
+    for k in np.flatnonzero(lower < pair.safe_m).tolist():
+        places = [bent(trace, name, pair.row + k, shares) for name in (pair.first, pair.second)]
+        fine = places[0] - places[1]
+        least, where = least_distances(each, fine[:-1], fine[1:], planar=planar)
+        least, where = least.min(axis=0), where[least.argmin(axis=0), np.arange(parts)]
+        j = int(np.argmin(least))
+        at = instant_of(t, k + 1, (j + float(where[j])) / parts)
+        found.append(Approach(float(least[j]) - off_m / parts**2, at, k + 1))
+    rest = np.delete(lower, np.flatnonzero(lower < pair.safe_m))
+    if len(rest):
+        k = int(np.flatnonzero(lower == rest.min())[0])
+        found.append(Approach(float(rest.min()), float(t[k]), k + 1))
+    return min(found)
+
+
+def _relative(trace: Trace, pair: Pair, rows: Indices) -> Array:
+    """The body of the first of a pair as seen from the other, or from the origin of its parts, at some rows."""
+    if pair.second in trace.robots:
+        return trace.body(pair.first)[rows] - trace.body(pair.second)[rows]
+    return seen_from(trace, pair.first, pair.second)[rows]
+
+
+def bent(trace: Trace, name: str, row: int, shares: Array) -> Array:
+    """Where a body is at shares (n,) of the time from a row to the next, (n, 3), m; origins of barriers, too."""
+    if name not in trace.robots:
+        way = origin_of(trace, name)
+        return np.zeros((len(shares), 3)) if way is None else way[row] + shares[:, None] * (way[row + 1] - way[row])
+    start, end = trace.body(name)[row : row + 2]
+    robot = trace.scenario.robots[name]
+    if any(plant.kind == "unicycle" for plant in robot.plant):
+        turned = float(np.diff(trace.column(f"{name}.heading_rad")[row : row + 2])[0])
+        return on_arc(start, end, turned, shares)
+    for plant in robot.plant:
+        lasting = float(trace.t[row + 1] - trace.t[row])
+        if plant.kind == "lag" and lasting > 0.0:
+            velocity = trace.body_velocity(name)[row : row + 2]
+            return on_lag((start, end), (velocity[0], velocity[1]), lasting, plant.time_constant_s, shares)
+    return start + shares[:, None] * (end - start)
 
 
 def to_barrier(trace: Trace, pair: Pair, place: Array) -> float:
@@ -279,7 +356,7 @@ def gap_over_time(trace: Trace, pair: Pair) -> Array:
     """The gap of a pair at the rows of a trace, (T,), m; NaN where an obstacle is not there."""
     cores = cores_of(trace).get(pair.second)
     if cores is None:
-        apart = np.linalg.norm(trace.position(pair.first) - trace.position(pair.second), axis=1)
+        apart = np.linalg.norm(trace.body(pair.first) - trace.body(pair.second), axis=1)
         return np.asarray(apart) - pair.radii_m
     found, rows = np.full(len(trace.t), np.nan), pair.rows
     way = seen_from(trace, pair.first, pair.second)[rows]
@@ -288,7 +365,7 @@ def gap_over_time(trace: Trace, pair: Pair) -> Array:
 
 
 def distances_when_there(trace: Trace, robot: str) -> dict[str, float]:
-    """Distances, m, of a robot from the cores of all barriers, by name, at the row from which on each is there."""
+    """Distances, m, of a robot's steered point from the cores of all barriers, by name, at each one's first row."""
     parts, last = parts_of(trace), len(trace.t) - 1
     if not parts.names:
         return {}
@@ -302,10 +379,10 @@ def distances_when_there(trace: Trace, robot: str) -> dict[str, float]:
 
 
 def are_too_near(trace: Trace, robot: str, places: Array, t_s: float, by_m: float) -> npt.NDArray[np.bool_]:
-    """At which places (K, 3), m, a robot is by more than `by_m` too near to a barrier that is there at a time, (K,)."""
+    """At which places (K, 3), m, of its steered point a robot is by more than `by_m` too near to a barrier, (K,)."""
     found, pairs = np.zeros(len(places), dtype=np.bool_), pairs_beside(trace, robot)
     parts, row = parts_of(trace), max(int(np.searchsorted(trace.t, t_s + MERGE_S)) - 1, 0)
-    keep = np.array([pairs[name].safe_m for name in parts.names])[parts.owner] - by_m
+    keep = np.array([pairs[name].law_m for name in parts.names])[parts.owner] - by_m
     rows, most = np.full(len(places), row), float(keep.max(initial=0.0))
     near = contacts(trace, places, rows, most, planar=is_planar(trace, robot))
     found[near.place[near.away.distance < keep[near.core]]] = True
@@ -339,14 +416,14 @@ def _apart_of(trace: Trace) -> Array:
     off = {robot: off_m_of(trace, robot) for robot in robots}
     found = dict[tuple[str, str], float]()
     for robot in robots:
-        apart, place = np.empty(len(parts.owner)), trace.position(robot)
+        apart, place = np.empty(len(parts.owner)), trace.body(robot)
         for some, origin in carried(trace):
             way = place if origin is None else place - origin
             apart[some] = apart_by_blocks(parts.cores.take(some), way).min(axis=1) - off[robot]
         least = np.minimum.reduceat(apart, parts.first) if len(apart) else apart
         found |= {(robot, name): bound for name, bound in zip(parts.names, least.tolist(), strict=True)}
     first, second = np.triu_indices(len(robots), 1)
-    between = apart_at_least(boxes_of(np.stack([trace.position(robot) for robot in robots])), first, second)
+    between = apart_at_least(boxes_of(np.stack([trace.body(robot) for robot in robots])), first, second)
     for bound, i, j in zip(between.tolist(), first.tolist(), second.tolist(), strict=True):
         found[robots[i], robots[j]] = bound - (off[robots[i]] + off[robots[j]])
     return np.array([found[pair.first, pair.second] for pair in pairs_of(trace)])
@@ -354,10 +431,21 @@ def _apart_of(trace: Trace) -> Array:
 
 def off_m_of(trace: Trace, name: str) -> float:
     """How far a body may be from the straight line between its positions at two rows, m."""
-    if name not in trace.robots:
-        return 0.0
-    position = trace.position(name)
-    return plant_of(trace.scenario.robots[name]).motion(position[:-1], position[1:], np.diff(trace.t)).off_m
+    return trace.derived(("off", name), lambda: float(bends_of(trace, name).max(initial=0.0)))
+
+
+def bends_of(trace: Trace, name: str) -> Array:
+    """How far a body may be from the straight line between its positions at two rows, in each segment, (T - 1,), m."""
+    found = np.zeros(len(trace.t) - 1)
+    plants = trace.scenario.robots[name].plant if name in trace.robots else []
+    for plant in plants:
+        place = trace.body(name)
+        if plant.kind == "unicycle":
+            found = found + arc_m(place[:-1], place[1:], np.diff(trace.column(f"{name}.heading_rad")))
+        elif plant.kind == "lag":
+            velocity = trace.body_velocity(name)
+            found = found + lagging_m(velocity[:-1], velocity[1:], np.diff(trace.t), plant.time_constant_s)
+    return found
 
 
 def least_of(bounds: Array, most: int, value: Callable[[int], float]) -> list[int]:
@@ -394,7 +482,7 @@ def snapshot(trace: Trace, names: Iterable[str], t_s: float) -> dict[str, Any]:
     t, given = trace.t, list(names)
     row = min(int(np.searchsorted(t, t_s + MERGE_S)), len(t) - 1)
     moving = [name for name in given if name in trace.robots]
-    places = {name: interpolate(t, trace.position(name), t_s) for name in sorted(moving)}
+    places = {name: interpolate(t, trace.body(name), t_s) for name in sorted(moving)}
     fixed = dict[str, list[float]]()
     for name, cores in cores_of(trace).items():
         if name in given and moving:
@@ -408,6 +496,10 @@ def snapshot(trace: Trace, names: Iterable[str], t_s: float) -> dict[str, Any]:
     }
 
 
+BENT_M = 1e-10
+"""Segments in which a body that does not move straight may be too near are divided until they are this straight, m."""
+MOST_PARTS = 5000
+"""Parts of such a segment at most."""
 DISTANCE_TOLERANCE_M = 1e-9
 """A distance may be this much below the safe one, m: the controller steers *onto* the safe distance, and sums of
 some thousand rounded steps err by 1e-12 m. The reported margin does not contain it."""

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from fractions import Fraction
+from math import ceil
 from typing import NamedTuple
 
 import numpy as np
@@ -21,9 +22,12 @@ from airground_drake.verify.engines.outlines import Cores, Indices, apart_by_blo
 from airground_drake.verify.engines.shortfalls import POINT, SCREEN_M, shortfalls
 from airground_drake.verify.runs.control_law import Inequalities, inequalities_of
 from airground_drake.verify.runs.pairs import (
+    BENT_M,
     DISTANCE_TOLERANCE_M,
+    MOST_PARTS,
     Pair,
     apart_of,
+    bent,
     cores_of,
     gap_over_time,
     is_planar,
@@ -206,10 +210,10 @@ def samples_before(trace: Trace) -> Indices:
 
 
 def steps_of(trace: Trace, robot: str) -> Array:
-    """How far from its place at the control sample a robot gets in each segment between rows, (T - 1,), m."""
+    """How far from its place at the control sample a robot's body gets in each segment between rows, (T - 1,), m."""
 
     def found() -> Array:
-        place, sample = trace.position(robot), trace.position(robot)[samples_before(trace)]
+        place, sample = trace.body(robot), trace.body(robot)[samples_before(trace)]
         ends = [np.linalg.norm(each - sample, axis=1) for each in (place[:-1], place[1:])]
         return np.asarray(np.max(ends, axis=0) + off_m_of(trace, robot))
 
@@ -217,18 +221,19 @@ def steps_of(trace: Trace, robot: str) -> Array:
 
 
 def own_margins(trace: Trace, pair: Pair, robot: str) -> Array:
-    """What a robot left of min(D, d + V h) by its own doing, for the T - 1 segments between rows, (T - 1,), m.
+    """What a robot left of min(D, L) - c by its own doing, for the T - 1 segments between rows, (T - 1,), m.
 
-    The other body is held where it was at the control sample, and D is the distance then. inf: the two were too far
-    apart for one period to matter, or not both there.
+    The other body is held where it was at the control sample. D is the distance of the steered points then, L what the
+    law keeps, V h included, and c how far both bodies may be from the steered points. inf: the two were too far apart
+    for one period to matter, or not both there.
     """
     other, rows = pair.second if robot == pair.first else pair.first, np.arange(len(trace.t) - 1)
     sample = samples_before(trace)
     cores = cores_of(trace).get(other, Cores.at(np.zeros((1, 3))))
-    origin = trace.position(other) if other in trace.robots else origin_of(trace, other)
-    place, planar = trace.position(robot), is_planar(trace, robot)
+    origin = trace.body(other) if other in trace.robots else origin_of(trace, other)
+    place, planar = trace.body(robot), is_planar(trace, robot)
     origin = np.zeros_like(place) if origin is None else origin
-    keeps, off_m = pair.keeps_m(trace.scenario.control.period_s), off_m_of(trace, robot)
+    keeps, off_m = pair.keeps_m(trace.scenario.control.period_s) - pair.cover_m, off_m_of(trace, robot)
     last = len(trace.t) - 1 if pair.last is None else pair.last
     step = steps_of(trace, robot)
     bounds = apart_by_blocks(cores, place - origin).min(axis=1)
@@ -240,8 +245,22 @@ def own_margins(trace: Trace, pair: Pair, robot: str) -> Array:
     near = (at_sample <= keeps + step) & (sample >= pair.row) & (rows < last)
     start, end = (place[rows[near] + k] - origin[sample[near]] for k in (0, 1))
     least = least_distances(each, start, end, planar=planar)[0].min(axis=0, initial=np.inf) - off_m
-    found[near] = least - np.minimum(at_sample[near], keeps)
+    found[near] = least - np.minimum(_steered(trace, pair, robot, each, sample[near]) - pair.cover_m, keeps)
+    for k in np.flatnonzero(found < 0.0).tolist() if off_m else ():
+        parts = min(ceil((off_m / BENT_M) ** 0.5), MOST_PARTS)
+        fine = bent(trace, robot, k, np.linspace(0.0, 1.0, parts + 1)) - origin[sample[k]]
+        exact = least_distances(each, fine[:-1], fine[1:], planar=planar)[0].min() - off_m / parts**2
+        found[k] += float(exact) - float(least[np.count_nonzero(near[:k])])
     return found
+
+
+def _steered(trace: Trace, pair: Pair, robot: str, each: Cores, rows: Indices) -> Array:
+    """Distances of the steered points of a pair, or of one from the cores of an obstacle, at some rows, m."""
+    other = pair.second if robot == pair.first else pair.first
+    origin = trace.position(other) if other in trace.robots else origin_of(trace, other)
+    place = trace.position(robot)[rows]
+    away = away_from(each, place if origin is None else place - origin[rows], planar=is_planar(trace, robot))
+    return np.asarray(away.distance.min(axis=0))
 
 
 class Encounter(NamedTuple):
@@ -344,7 +363,7 @@ def _reaction(speed: float, away: float, limit: float) -> str:
 def _blocked_by(trace: Trace, pair: Pair, periods: Periods, k: int, given: Inequalities, sample: int) -> list[str]:
     """The bodies whose inequalities forbid the straight retreat that a robot should make in a period."""
     h, limit = trace.scenario.control.period_s, trace.scenario.robots[pair.first].max_speed_m_s
-    wished = min(pair.speed_m_s - (float(periods.apart_m[k]) - pair.safe_m) / h, limit)
+    wished = min(pair.speed_m_s - (float(periods.apart_m[k]) - pair.law_m) / h, limit)
     if wished <= BLOCKED_M_S:
         return []
     retreat = wished * periods.normal[k]

@@ -269,8 +269,9 @@ def _guarantees(trace: Trace) -> Iterator[Guarantee]:
     places = {name: trace.position(name)[samples] for name in trace.robots}
     longest = {name: _longest(each, float(last)) for name, each in places.items()}
     pairs, gain = pairs_of(trace), _gain(trace)
-    reach = np.array([pair.safe_m + longest[pair.first] + longest.get(pair.second, 0.0) for pair in pairs])
-    for k in np.flatnonzero(apart_of(trace) <= reach + SCREEN_M).tolist():
+    reach = np.array([pair.law_m + longest[pair.first] + longest.get(pair.second, 0.0) for pair in pairs])
+    beyond = SCREEN_M + np.array([pair.cover_m for pair in pairs])  # of the bodies from the points that are steered
+    for k in np.flatnonzero(apart_of(trace) <= reach + beyond).tolist():
         pair = pairs[k]
         if pair.speed_m_s > 0.0:  # see `passive`
             continue
@@ -279,10 +280,8 @@ def _guarantees(trace: Trace) -> Iterator[Guarantee]:
         there, planar = slice(begin, end), is_planar(trace, pair.first)
         first, beside = places[pair.first][there], _beside(trace, pair, places, there, float(reach[k]))
         asked = Fraction(pair.share), gain, last if end == len(samples) else Fraction(1)
-        missed = [shortfalls(first, place, pair.safe_m, *asked, core, planar=planar) for place, core in beside]
-        begun = [
-            shortage(first[0], place.reshape(-1, 3)[0], pair.safe_m, core, planar=planar) for place, core in beside
-        ]
+        missed = [shortfalls(first, place, pair.law_m, *asked, core, planar=planar) for place, core in beside]
+        begun = [shortage(first[0], place.reshape(-1, 3)[0], pair.law_m, core, planar=planar) for place, core in beside]
         most = np.max([np.zeros(len(first) - 1), *missed], axis=0)
         e, short = Fraction(float(most.max())), max(begun, default=Fraction(0))
         lost = max(e / gain, short) if gain else (len(samples) - 1) * e + short
@@ -374,10 +373,10 @@ def _static(trace: Trace) -> Iterator[_Hypothesis]:
         apart = dict(zip(trace.robots, np.linalg.norm(away, axis=1).tolist(), strict=True))
         apart |= distances_when_there(trace, robot)
         start, about = trace.t[rows], {"first": robot}
-        excess = np.array([np.inf if pair.speed_m_s else apart[pair.second] - pair.safe_m for pair in beside])
+        excess = np.array([np.inf if pair.speed_m_s else apart[pair.second] - pair.law_m for pair in beside])
         if np.isfinite(excess).any():
             yield _Hypothesis("safe start", "m", start, excess, DISTANCE_TOLERANCE_M, about, others)
-        left = [room(pair.safe_m, limit[robot], limit.get(pair.second, pair.speed_m_s)) for pair in beside]
+        left = [room(pair.law_m, limit[robot], limit.get(pair.second, pair.speed_m_s)) for pair in beside]
         yield _Hypothesis("sensing range", "m", start, np.array(left), 0.0, about, others)
 
 

@@ -94,7 +94,7 @@ def _margins(trace: Trace) -> Iterator[OwnMargin]:
     longest = {name: float(steps_of(trace, name).max()) for name in trace.robots}
     for pair, least in zip(pairs_of(trace), apart.tolist(), strict=True):
         for robot in (name for name in (pair.first, pair.second) if name in trace.robots):
-            if least > pair.keeps_m(period) + longest[robot]:
+            if least > pair.keeps_m(period) - pair.cover_m + longest[robot]:
                 continue
             other = pair.second if robot == pair.first else pair.first
             margins = own_margins(trace, pair, robot)

@@ -1,0 +1,103 @@
+"""The distance budget of a scenario: for each pair the distance promised, that in the law, and what each term costs."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import combinations
+from typing import NamedTuple
+
+from airground_drake.scenarios.outlines import gap_m
+from airground_drake.scenarios.plants import plant_of
+from airground_drake.scenarios.schema import Scenario
+from airground_drake.world.budget import AT_REST, Bounds, costs, law_distance
+from airground_drake.world.plant import Unicycle
+
+KEYS = {"dip": "dip", "drift": "drift_m_s", "lag": "time_constant_s", "delay": "delay_s"}
+"""By term of a budget, the key that it comes from; a dip follows from several."""
+
+
+class Term(NamedTuple):
+    """A term of a budget: the key of the plant that it comes from, whose plant ('': of both), and its metres."""
+
+    key: str
+    of: str
+    metres: float
+
+
+class PairBudget(NamedTuple):
+    """The budget of a pair of bodies.
+
+    Attributes:
+        first: a robot.
+        second: a robot, an obstacle, the map or a wall of the arena.
+        kind: `ugv`, `air_ground`, `obstacle`, or `moving` for an obstacle that may move.
+        promised_m: gap to be kept between the surfaces, m.
+        radii_m: sum of both radii, m.
+        law_m: distance that the law keeps between steered points, or a steered point and a core, m.
+        terms: what it takes beyond the promise and the radii, in the order of their addition.
+    """
+
+    first: str
+    second: str
+    kind: str
+    promised_m: float
+    radii_m: float
+    law_m: float
+    terms: tuple[Term, ...]
+
+    @property
+    def gap_m(self) -> float:
+        """The distance in the law less the radii, to compare with the promise, m."""
+        return self.law_m - self.radii_m
+
+    @property
+    def largest(self) -> str:
+        """Key of the term that takes most; '' without terms."""
+        sums = dict[str, float]()
+        for term in self.terms:
+            sums[term.key] = sums.get(term.key, 0.0) + term.metres
+        return max(sums, key=lambda key: sums[key]) if sums else ""
+
+    def in_words(self) -> str:
+        """What the terms take: `hand_point_m 0.078 m each, dip 0.001 m`."""
+        told = []
+        for key in dict.fromkeys(term.key for term in self.terms):
+            parts = [term.metres for term in self.terms if term.key == key]
+            each = f"{parts[0]:.3f} m each" if len(parts) == 2 and parts[0] == parts[1] else f"{sum(parts):.3f} m"
+            told.append(f"{key} {each}")
+        return ", ".join(told)
+
+
+def takes_room(scenario: Scenario) -> bool:
+    """Whether any robot is not where the law steers it, so that the law keeps more than the distances promised."""
+    return any(plant.kind != "first_order" for robot in scenario.robots.values() for plant in robot.plant)
+
+
+def budget(scenario: Scenario) -> Iterator[PairBudget]:
+    """The budgets of all pairs that must keep apart, robot by robot."""
+    safe, gain = scenario.safe_distance, scenario.control.avoidance_gain_1_s
+    bounds, cover = dict[str, Bounds](), dict[str, str]()
+    for name, robot in scenario.robots.items():
+        plant = plant_of(robot, scenario.control.period_s)
+        bounds[name] = plant.bounds(robot.max_speed_m_s)
+        cover[name] = "hand_point_m" if isinstance(plant, Unicycle) else "cover_m"
+
+    def of_pair(first: str, second: str, kind: str, promised: float, radii: float) -> PairBudget:
+        both = bounds[first], bounds.get(second, AT_REST)
+        names, passive = (first, second, ""), kind == "moving"
+        terms = [
+            Term(cover[names[each.of]] if each.term == "cover" else KEYS[each.term], names[each.of], each.metres)
+            for each in costs(promised + radii, *both, gain=gain, passive=passive)
+        ]
+        law = float(law_distance(promised + radii, *both, gain=gain, passive=passive))
+        return PairBudget(first, second, kind, promised, radii, law, tuple(terms))
+
+    radius = {name: robot.radius_m for name, robot in scenario.robots.items()}
+    for one in scenario.robots:
+        for name, each in scenario.barriers.items():
+            kind = "moving" if each.expected_speed_m_s else "obstacle"
+            yield of_pair(one, name, kind, gap_m(scenario, each), radius[one] + each.radius_m)
+    for one, other in combinations(scenario.robots, 2):
+        with_uav = scenario.uav.name in (one, other)
+        promised = safe.air_ground_m if with_uav else safe.ugv_m
+        yield of_pair(one, other, "air_ground" if with_uav else "ugv", promised, radius[one] + radius[other])

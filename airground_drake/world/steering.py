@@ -1,0 +1,129 @@
+"""Chord steering of unicycles, compiled: with which speed and turning rate a hand point arrives where the law wants it.
+
+The hand point is ahead of the axle by l. For a command u = (a, b), in the frame of the body, held for a period h,
+
+    beta = atan(b h / (2 l + a h)),   omega = 2 beta / h,   v = (a cos beta + b sin beta) beta / sin beta,
+
+lead it along an arc to exactly h u. On the way it leaves the straight line by at most |omega| ||(v, l omega)|| h^2 / 8.
+
+A command that asks for too fast a turn is shortened: s u with
+
+    s = min(1, 2 l T / (h (|b| - a T))),   T = tan(omega_max h / 2),
+
+needs |omega| <= omega_max (theorems Turning.turns_within and Turning.shortened_chord). It is shortened further, by
+bisection, until no wheel exceeds its speed limit, |v| + |omega| B / 2 <= w_max.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+from airground_drake.base.arrays import Array
+
+HAND, TURN, HALF_BASE, WHEEL = 0, 1, 2, 3
+"""Entries of the numbers of a steering, (4,): hand point l, m (0: no unicycle); largest turning rate, rad/s; half the
+wheel base, m; largest speed of a wheel, m/s. inf: no limit."""
+BISECTIONS = 50
+"""Halvings in the search for a share that the wheels can do; the result always can be done."""
+
+
+@njit(cache=True)
+def chord(a: float, b: float, hand: float, period: float) -> tuple[float, float]:
+    """Speed v, m/s, and turning rate omega, rad/s, for a command (a, b), m/s, in the frame of the body.
+
+    Args:
+        a: ahead.
+        b: to the left.
+        hand: l, m.
+        period: h, s.
+    """
+    if b == 0.0:
+        return a, 0.0
+    beta = math.atan2(b * period, 2.0 * hand + a * period)
+    return (a * math.cos(beta) + b * math.sin(beta)) * (beta / math.sin(beta)), 2.0 * beta / period
+
+
+@njit(cache=True)
+def share(a: float, b: float, steering: Array, period: float) -> float:
+    """The share s of a command (a, b), m/s, in the frame of the body, that a unicycle can do: above 0, at most 1."""
+    hand, most, found = steering[HAND], steering[TURN], 1.0
+    if most * period < math.pi:
+        tangent = math.tan(0.5 * most * period)
+        excess = period * (abs(b) - a * tangent)
+        if excess > 2.0 * hand * tangent:
+            found = 2.0 * hand * tangent / excess
+    if _wheels(found * a, found * b, steering, period) <= steering[WHEEL]:
+        return found
+    low, high = 0.0, found
+    for _ in range(BISECTIONS):
+        middle = 0.5 * (low + high)
+        if _wheels(middle * a, middle * b, steering, period) <= steering[WHEEL]:
+            low = middle
+        else:
+            high = middle
+    return low
+
+
+@njit(cache=True)
+def _wheels(a: float, b: float, steering: Array, period: float) -> float:
+    """Speed of the faster wheel, m/s."""
+    v, omega = chord(a, b, steering[HAND], period)
+    return abs(v) + abs(omega) * steering[HALF_BASE]
+
+
+@njit(cache=True)
+def steer(velocity: Array, heading: float, steering: Array, period: float) -> tuple[float, float]:
+    """Shorten a command (3,), m/s, world frame, in place, for a unicycle with a heading, rad.
+
+    Returns:
+        The share s that is left of the command, and the turning rate, rad/s.
+    """
+    cos, sin = math.cos(heading), math.sin(heading)
+    left = share(velocity[0] * cos + velocity[1] * sin, velocity[1] * cos - velocity[0] * sin, steering, period)
+    if left < 1.0:
+        for axis in range(3):
+            velocity[axis] *= left
+    a, b = velocity[0] * cos + velocity[1] * sin, velocity[1] * cos - velocity[0] * sin
+    return left, chord(a, b, steering[HAND], period)[1]
+
+
+@njit(cache=True)
+def steer_all(velocity: Array, headings: Array, steering: Array, period: float) -> Array:
+    """Shorten the commands (n, 3), m/s, of UGVs with headings (n,), rad, in place; `steering` is (n, 4).
+
+    Returns:
+        The shares that are left, (n,); 1 for a UGV that is no unicycle.
+    """
+    left = np.ones(len(velocity))
+    for i in range(len(velocity)):
+        if steering[i, HAND] > 0.0:
+            left[i] = steer(velocity[i], headings[i], steering[i], period)[0]
+    return left
+
+
+@njit(cache=True)
+def along(base: Array, velocity: Array, heading: float, elapsed: float, hand: float, period: float) -> Array:
+    """Axle (3,), m, and heading, rad, of a unicycle within a period: (4,).
+
+    Args:
+        base: where a first-order robot would be that started from the hand point, (3,), m, world frame.
+        velocity: the command, (3,), m/s.
+        heading: at the beginning of the period, rad.
+        elapsed: time since then, s.
+        hand: l, m.
+        period: h, s.
+    """
+    cos, sin = math.cos(heading), math.sin(heading)
+    v, omega = chord(velocity[0] * cos + velocity[1] * sin, velocity[1] * cos - velocity[0] * sin, hand, period)
+    half = 0.5 * omega * elapsed
+    length = v * elapsed * (math.sin(half) / half if half != 0.0 else 1.0)  # of the chord of the axle's arc
+    ahead, left = length * math.cos(half) - hand, length * math.sin(half)
+    found = np.empty(4)
+    found[0] = base[0] - elapsed * velocity[0] + (ahead * cos - left * sin)
+    found[1] = base[1] - elapsed * velocity[1] + (ahead * sin + left * cos)
+    found[2] = base[2] - elapsed * velocity[2]
+    found[3] = heading + 2.0 * half
+    return found
