@@ -213,7 +213,7 @@ def _beware(document: Document, every: Sequence[RunOutcome]) -> list[str]:
     if seen := [course for course in main if course.safe and not (course.proof and course.proof.holds)]:
         told.append(clause("elsewhere", who=subject(seen, main)))
     if movers := list(dict.fromkeys(name for course in main for name in course.movers)):
-        who = joined(movers) if len(movers) <= MAX_NAMES else counted(len(movers), "obstacle that may move")
+        who = joined(movers) if len(movers) <= MAX_NAMES else f"{len(movers)} obstacles that may move"
         told.append(clause("beside_movers", who=who))
     home = [course.away == {} for course in every]
     if any(home):
