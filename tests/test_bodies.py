@@ -21,7 +21,7 @@ from airground_drake.export import tables
 from airground_drake.gatekeeper.answer import Basis
 from airground_drake.gatekeeper.outcome_gatekeeper import OutcomeGatekeepers
 from airground_drake.gatekeeper.rollout import View
-from airground_drake.geometry.outline import GAP, unpacked
+from airground_drake.geometry.outline import GAP
 from airground_drake.proofs.export import recorded
 from airground_drake.proofs.too_near import too_near
 from airground_drake.report import attention, document, summary
@@ -35,6 +35,7 @@ from airground_drake.run.trace import Trace
 from airground_drake.scenarios.load import load, validated
 from airground_drake.scenarios.schema import Policy, Run, Scenario
 from airground_drake.verify import judge
+from airground_drake.verify.engines.outlines import unpacked
 from airground_drake.view.stage import stage
 from airground_drake.world.world import World
 

@@ -82,7 +82,8 @@ def conduct(
             rows = died(index) if judged is None else judged
             store.add(rows)
             refuted.update(row["claim"] for row in rows if row["status"] == "refuted")
-            progress.advance(1.0, _refuted(refuted))
+            told = ", ".join(f"{claim} {count}" for claim, count in refuted.most_common(3))
+            progress.advance(1.0, f"refuted: {told or 'nothing'}")
             if rule is not None and rule.met(index, rows):
                 break
         table = store.table()
@@ -96,10 +97,6 @@ def conduct(
     files.write_json(folder / EVIDENCE, found)
     files.write_text(folder / PAGE, page(found, table))
     return found
-
-
-def _refuted(counts: Counter[str]) -> str:
-    return "refuted: " + (", ".join(f"{claim} {count}" for claim, count in counts.most_common(3)) or "nothing")
 
 
 def _manifest(spec: Spec, limits: Limits) -> dict[str, Any]:

@@ -45,7 +45,7 @@ def shrink(data: Json, fails: Fails, traced: Traced, tests: int) -> tuple[Json, 
         The smallest scenario found, and the number of tests.
     """
     steps = (
-        _without_policies,
+        partial(_without_items, part="intervention", key="policies"),
         _without_robots,
         _without_obstacles,
         _plainer,
@@ -71,10 +71,6 @@ def shrink(data: Json, fails: Fails, traced: Traced, tests: int) -> tuple[Json, 
             while (found := first(smaller(data))) is not None:
                 data, changed = found, True
     return data, tests - left
-
-
-def _without_policies(data: Json) -> Iterator[Json]:
-    yield from _without_items(data, "intervention", "policies")
 
 
 def _without_robots(data: Json) -> Iterator[Json]:
@@ -129,15 +125,9 @@ def _without_items(data: Json, part: str, key: str) -> Iterator[Json]:
 
 def _later(traced: Traced, data: Json) -> Iterator[Json]:
     """Begin shortly before the first trigger, at the robots' positions at that time."""
-    yield from _with_seeds(_begun_later(traced, data))
-
-
-def _begun_later(traced: Traced, data: Json) -> Iterator[Json]:
-    trace = traced(data)
-    first = min((event["t_s"] for event in trace.events if event["kind"] == "trigger"), default=0.0) if trace else 0.0
-    for spare in SPARE_S:
-        if trace is not None and first > 1.5 * spare:
-            yield _from(data, trace, first - spare)
+    if (trace := traced(data)) is not None:
+        first = min((event["t_s"] for event in trace.events if event["kind"] == "trigger"), default=0.0)
+        yield from _with_seeds(_from(data, trace, first - spare) for spare in SPARE_S if first > 1.5 * spare)
 
 
 BESIDE_M = 1e-3

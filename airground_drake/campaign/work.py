@@ -8,7 +8,7 @@ import math
 import time
 from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager
-from functools import cache, partial
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -143,6 +143,8 @@ def _happened(trace: Trace) -> Row:
     """Triggers, arrivals of UGVs, and decisions of a run."""
     triggers = [event["t_s"] for event in trace.events if event["kind"] == "trigger"]
     arrivals = [event["t_s"] for event in trace.events if event["kind"] == "arrival" and event["robot"] in trace.ugvs]
+    # Each row has the state of the interval before it.
+    intervened_s = [float(np.diff(trace.t) @ (trace.executing(ugv)[1:] >= 0)) for ugv in trace.ugvs]
     return {
         "ugvs": len(trace.ugvs),
         "triggers": len(triggers),
@@ -152,10 +154,5 @@ def _happened(trace: Trace) -> Row:
         "decisions": len(trace.decisions),
         "accepted": int((trace.decisions["decision"] == "accept").sum()),
         "faults": len(trace.meta["faults"]),
-        "intervened_s": max(map(partial(_intervened, trace), trace.ugvs), default=0.0),
+        "intervened_s": max(intervened_s, default=0.0),
     }
-
-
-def _intervened(trace: Trace, ugv: str) -> float:
-    """How long a UGV followed the UAV, s; each row has the state of the interval before it."""
-    return float(np.diff(trace.t) @ (trace.executing(ugv)[1:] >= 0))

@@ -33,6 +33,8 @@ SHOWN = {
 }
 """Claims that a figure is about, by its identifier."""
 
+UNDATED: dict[str, dict[str, None]] = {"pdf": {"CreationDate": None}, "svg": {"Date": None}}
+"""Metadata without a date, by format, so that the same run gives the same file."""
 _COMMON = {"savefig.dpi": 300, "pdf.fonttype": 42}
 
 
@@ -66,7 +68,7 @@ def write(
             for kind in formats:
                 buffer = io.BytesIO()
                 with canvas.style(settings):
-                    panel.drawing.savefig(buffer, format=kind, metadata=_undated(kind))
+                    panel.drawing.savefig(buffer, format=kind, metadata=UNDATED.get(kind, {}))
                 files.write_bytes(folder / f"{names[-1]}.{kind}", buffer.getvalue())
                 yield folder / f"{names[-1]}.{kind}"
         texts.append(_environment(figure, names, WIDTHS[style], report))
@@ -76,11 +78,6 @@ def write(
     for name, text in {"figures.tex": "\n".join(texts), **tables}.items():
         files.write_text(folder / name, text)
         yield folder / name
-
-
-def _undated(kind: str) -> dict[str, None]:
-    """Metadata without a date, so that the same run gives the same file."""
-    return {"pdf": {"CreationDate": None}, "svg": {"Date": None}}.get(kind, {})
 
 
 def _environment(figure: Figure, names: Sequence[str], width: str, report: Mapping[str, Any]) -> str:

@@ -19,10 +19,11 @@ import numpy as np
 import numpy.typing as npt
 
 from airground_drake.base.arrays import Array
-from airground_drake.gatekeeper.answer import Basis, GatekeeperDecision, Reason
+from airground_drake.gatekeeper.answer import Basis, GatekeeperDecision
 from airground_drake.gatekeeper.mpc_gatekeeper import Gatekeepers, GatekeeperState, Inputs
 from airground_drake.gatekeeper.outcome import Outcome, Outlook, outcomes
 from airground_drake.gatekeeper.patience import Commitment, Patience
+from airground_drake.gatekeeper.reasons import Reason
 from airground_drake.gatekeeper.rollout import View
 from airground_drake.geometry import convex, outline
 from airground_drake.geometry.convex import news_within, within

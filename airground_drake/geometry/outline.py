@@ -95,23 +95,6 @@ def as_tuple(row: Array) -> tuple[float, ...]:
     return tuple(row[: CORNERS + 2 * int(row[COUNT])].tolist())
 
 
-def unpacked(numbers: Iterable[float]) -> Array:
-    """Outlines (m, W) from their numbers without padding, one after the other.
-
-    Raises:
-        ValueError: if the numbers are not those of outlines.
-    """
-    left, rows = list(numbers), []
-    while left:
-        count = left[COUNT] if len(left) > COUNT else 0.0
-        length = CORNERS + 2 * int(count) if 1.0 <= count <= len(left) else 0
-        if not CORNERS < length <= len(left):
-            raise ValueError(f"{len(left)} numbers at the end are no outline")
-        rows.append(left[:length])
-        left = left[length:]
-    return stacked(rows)
-
-
 def same(one: Array, other: Array) -> npt.NDArray[np.bool_]:
     """Whether each outline of one array, (m, W), has the same core as each of another, (k, V): (m, k)."""
     if not (len(one) and len(other)):

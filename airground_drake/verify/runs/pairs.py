@@ -469,11 +469,6 @@ def preset_of(trace: Trace, ugv: str) -> tuple[Array, float]:
     return np.asarray(preset.waypoints_m, dtype=np.float64), preset.speed_m_s
 
 
-def appears_of(trace: Trace) -> Array:
-    """When each convex part of the barriers appears, (m,), s; inf: not before the end."""
-    return np.append(trace.t, np.inf)[lifetimes(trace)[0]]
-
-
 def snapshot(trace: Trace, names: Iterable[str], t_s: float) -> dict[str, Any]:
     """Positions of the robots among `names` at a time, and their velocities just after it.
 

@@ -64,6 +64,7 @@ class SafeOwn(TraceClaim):
         found = sorted(_margins(trace), key=lambda each: each.margin_m)
         worst = found[0] if found else None
         own = worst is not None and not worst.margin_m >= -DISTANCE_TOLERANCE_M
+        within_reach = sum(int((each.apart_m < each.keeps_m + each.pair.reach_m).sum()) for each in beside(trace))
         return Finding(
             "refuted" if own else "holds",
             margin=worst.margin_m if worst else None,
@@ -76,7 +77,7 @@ class SafeOwn(TraceClaim):
                 "came_too_near_themselves": [each._asdict() for each in encounters(trace)],
                 "tolerance_m": DISTANCE_TOLERANCE_M,
             },
-            exercised=_within_reach(trace),
+            exercised=within_reach,
         )
 
 
@@ -105,8 +106,3 @@ def _margins(trace: Trace) -> Iterator[OwnMargin]:
 
 def _against(trace: Trace, worst: OwnMargin) -> dict[str, Any]:
     return worst._asdict() | snapshot(trace, (worst.first, worst.second), worst.t_s)
-
-
-def _within_reach(trace: Trace) -> int:
-    """Periods in which one at full speed would have led nearer than d + V h to an obstacle that may move."""
-    return sum(int((each.apart_m < each.keeps_m + each.pair.reach_m).sum()) for each in beside(trace))
