@@ -17,8 +17,8 @@ from airground_drake.geometry import outline
 from airground_drake.geometry.motion import Motion
 from airground_drake.geometry.outline import BASE, COUNT, EXTENT, GAP, MIDDLE, RADIUS
 from airground_drake.intervention.database import Negotiation
-from airground_drake.intervention.messages import ACCEPT, DONE, REFUSE, Reports, answer_to
-from airground_drake.intervention.planner import Planner, PlannerState, Sighting
+from airground_drake.intervention.messages import ACCEPT, DONE, REFUSE, Reports, Sighting, answer_to
+from airground_drake.intervention.planner import Planner, PlannerState
 from airground_drake.intervention.policy import Proposal
 
 CHOICES: dict[str, tuple[Any, ...]] = {

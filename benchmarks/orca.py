@@ -1,12 +1,15 @@
-"""Optimal reciprocal collision avoidance (ORCA) on a course, through PyRVO (`pip install '.[bench]'`).
+"""Optimal reciprocal collision avoidance (ORCA) through PyRVO (`pip install '.[bench]'`): on courses and among people.
 
-Robots are discs of half the safe distance between two of them; an obstacle is a regular polygon around the disc that
-is left of its safe distance when the robot's radius is taken off. A robot prefers the velocity of the UGVs' own task:
-that of its preset trajectory plus a share of the way back to it. All positions and velocities are exact, and every
-robot runs ORCA: it has no UAV, no trigger and no messages.
+Robots are discs of half the safe distance between two of them; an obstacle is a polygon around all that is left of its
+safe distance when the robot's radius is taken off. A robot prefers the velocity of the UGVs' own task: that of its
+preset trajectory plus a share of the way back to it. All positions and velocities are exact, and every robot runs ORCA:
+it has no UAV, no trigger and no messages. People are agents whose motion is given; robots expect them to give way, too.
 """
 
 from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
 
 import numpy as np
 from maps import MAX_M_S, PRESET_M_S, SAFE_M, Array, Course
@@ -26,8 +29,32 @@ TILT = 1e-3
 never pass each other."""
 
 
+class Traffic(NamedTuple):
+    """Robots, and what is around them.
+
+    Attributes:
+        starts: of the n robots, (n, 2), m.
+        radius: of the discs that are kept apart, m.
+        max_speed: speed limit, m/s.
+        preset: place, (2,), m, and velocity, (2,), m/s, of the preset trajectory of a robot at a time, s.
+        polygons: obstacles, corners counter-clockwise, (n, 2), m; clockwise: the robots are inside.
+        people: where people are at the steps, (k, T + 1, 2), m.
+        of_people: radius of their discs, m.
+        seed: of the tilt.
+    """
+
+    starts: Array
+    radius: float
+    max_speed: float
+    preset: Callable[[int, float], tuple[Array, Array]]
+    polygons: Sequence[Array]
+    people: Array
+    of_people: float
+    seed: int
+
+
 def run(course: Course) -> tuple[Array, Array]:
-    """Simulate.
+    """Simulate a course.
 
     Returns:
         Times, (T,), s, and positions of the robots, (n, T, 3), m.
@@ -35,31 +62,49 @@ def run(course: Course) -> tuple[Array, Array]:
     Raises:
         ImportError: if PyRVO is not installed.
     """
-    from pyrvo import RVOSimulator  # an extra
-
-    radius = SAFE_M / 2.0
-    simulator = RVOSimulator(STEP_S, NEIGHBOUR_M, course.ugvs, HORIZON_S, HORIZON_S, radius, MAX_M_S)
-    for start in course.starts:
-        simulator.add_agent(tuple(start.tolist()))
-    for centre in course.obstacles:
-        simulator.add_obstacle([tuple(corner) for corner in _polygon(centre, SAFE_M - radius).tolist()])
-    simulator.process_obstacles()
-    rng = np.random.default_rng(course.seed)
-    tilts = TILT * rng.choice([-1.0, 1.0], course.ugvs)
     way = course.targets - course.starts
     length = np.linalg.norm(way, axis=1)
-    count = round(course.duration_s / STEP_S)
-    positions = np.zeros((course.ugvs, count + 1, 3))
-    positions[:, 0, :2] = course.starts
+
+    def preset(i: int, t: float) -> tuple[Array, Array]:
+        share = min(t * PRESET_M_S / length[i], 1.0)
+        rate = PRESET_M_S * way[i] / length[i] if share < 1.0 else np.zeros(2)
+        return course.starts[i] + share * way[i], rate
+
+    radius, nobody = SAFE_M / 2.0, np.empty((0, 0, 2))
+    discs = [_polygon(centre, SAFE_M - radius) for centre in course.obstacles]
+    return driven(Traffic(course.starts, radius, MAX_M_S, preset, discs, nobody, 0.0, course.seed), course.duration_s)
+
+
+def driven(given: Traffic, duration_s: float) -> tuple[Array, Array]:
+    """Simulate; the result is that of `run`."""
+    from pyrvo import RVOSimulator  # an extra
+
+    robots, agents = len(given.starts), len(given.starts) + len(given.people)
+    simulator = RVOSimulator(STEP_S, NEIGHBOUR_M, agents, HORIZON_S, HORIZON_S, given.radius, given.max_speed)
+    for start in [*given.starts, *given.people[:, 0]]:
+        simulator.add_agent(tuple(start.tolist()))
+    for k in range(robots, agents):
+        simulator.set_agent_radius(k, given.of_people)
+    for corners in given.polygons:
+        simulator.add_obstacle([tuple(corner) for corner in corners.tolist()])
+    simulator.process_obstacles()
+    tilts = TILT * np.random.default_rng(given.seed).choice([-1.0, 1.0], robots)
+    count = round(duration_s / STEP_S)
+    positions = np.zeros((robots, count + 1, 3))
+    positions[:, 0, :2] = given.starts
+    velocities = np.diff(given.people, axis=1) / STEP_S
     for k in range(count):
-        t = k * STEP_S
-        for i in range(course.ugvs):
-            share = min(t * PRESET_M_S / length[i], 1.0)
-            rate = PRESET_M_S * way[i] / length[i] if share < 1.0 else np.zeros(2)
-            error = course.starts[i] + share * way[i] - positions[i, k, :2]
-            simulator.set_agent_pref_velocity(i, tuple(_limited(_turned(rate + MOTION_GAIN_1_S * error, tilts[i]))))
+        for i in range(robots):
+            place, rate = given.preset(i, k * STEP_S)
+            wish = _turned(rate + MOTION_GAIN_1_S * (place - positions[i, k, :2]), tilts[i])
+            simulator.set_agent_pref_velocity(i, tuple(_limited(wish, given.max_speed)))
+        for j in range(robots, agents):
+            here, velocity = (tuple(each[j - robots, k].tolist()) for each in (given.people, velocities))
+            simulator.set_agent_position(j, here)
+            simulator.set_agent_velocity(j, velocity)
+            simulator.set_agent_pref_velocity(j, velocity)
         simulator.do_step()
-        for i in range(course.ugvs):
+        for i in range(robots):
             positions[i, k + 1, :2] = simulator.get_agent_position(i).to_tuple()
     return STEP_S * np.arange(count + 1), positions
 
@@ -75,6 +120,6 @@ def _turned(velocity: Array, angle: float) -> Array:
     return np.array([c * velocity[0] - s * velocity[1], s * velocity[0] + c * velocity[1]])
 
 
-def _limited(velocity: Array) -> list[float]:
+def _limited(velocity: Array, most: float) -> list[float]:
     speed = float(np.linalg.norm(velocity))
-    return (velocity if speed <= MAX_M_S else velocity * (MAX_M_S / speed)).tolist()
+    return (velocity if speed <= most else velocity * (most / speed)).tolist()
