@@ -19,12 +19,15 @@ from mutation.mutant import PACKAGE, Mutant
 
 RUNNING = (
     "base/arrays.py", "run/events.py", "run/simulation.py",
-    "scenarios/world.py", "decision", "gatekeeper", "geometry", "intervention", "nsbc", "systems", "world",
+    "scenarios/courses.py", "scenarios/outlines.py", "scenarios/shapes.py", "scenarios/world.py",
+    "decision", "gatekeeper", "geometry", "intervention", "nsbc", "systems", "world",
 )  # fmt: skip
 """Files and folders of the code that produces a run."""
 PICTURES = "systems/graphviz.py"
 """The file in these folders that only draws diagrams."""
-PROBES = ("crowd d", "crowd c", "bodies d", "case_b d", "soft_gate c", "crowd b")
+PROBES = ("walls d", "crowd d", "crowd c", "bodies d", "case_b d", "soft_gate c", "crowd b", "walls c")
+SHAPES = ("geometry/convex.py", "geometry/outline.py", "scenarios/", "verify/", "world/")
+"""Beginnings of paths whose mutants are run among walls and things that move only."""
 HYPOTHESES = {
     "systems/components.py": ("test_wiring.py",),
     "systems/diagram.py": ("test_wiring.py",),
@@ -197,13 +200,17 @@ def _local_names(function: ast.FunctionDef) -> dict[str, str]:
 
 
 def files(root: Path, only: Sequence[str] = ()) -> list[str]:
-    """Paths below the package of the running code that have one of the words of `only` in them, if there are any."""
+    """Paths below the package of the running code that have one of the words of `only` in them, if there are any.
+
+    A word that is the path of a file below the package stands for that file, whatever it does.
+    """
     package = root / PACKAGE
     found = [
         file for name in RUNNING for file in ((package / name).rglob("*.py") if "." not in name else [package / name])
     ]
     paths = sorted(file.relative_to(package).as_posix() for file in found)
     running = [path for path in paths if path != PICTURES]
+    running += [word for word in only if word not in running and word.endswith(".py") and (package / word).exists()]
     return [path for path in running if not only or any(word in path for word in only)]
 
 
@@ -245,4 +252,5 @@ def mutant(root: Path, path: str, text: str, edit: Edit) -> Mutant:
         tests = ["tests/test_simulation.py", "tests/test_diagram.py"]
     tests = [*(f"tests/hypotheses/{name}" for name in ours), *tests]
     what = f"{path}:{edit.line}:{edit.start - first}: {edit.kind}: {was[:60]!r} becomes {edit.new[:60]!r}"
-    return Mutant(what, path, "", old, new, PROBES, tuple(tests))
+    probes = tuple(name for name in PROBES if name.startswith("walls")) if path.startswith(SHAPES) else PROBES
+    return Mutant(what, path, "", old, new, probes, tuple(tests))

@@ -29,6 +29,8 @@ PROBES = {
     "bodies b": (str(HERE / "bodies.yaml"), "b"),
     "bodies c": (str(HERE / "bodies.yaml"), "c"),
     "bodies d": (str(HERE / "bodies.yaml"), "d"),
+    "walls c": (str(HERE / "walls.yaml"), "c"),
+    "walls d": (str(HERE / "walls.yaml"), "d"),
     "case_a a": ("case_a", "a"),
     "case_a nearest": ("case_a", "a_recursion_nearest"),
     "case_a listed": ("case_a", "a_recursion_listed"),
