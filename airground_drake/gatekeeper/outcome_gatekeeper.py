@@ -102,7 +102,7 @@ class OutcomeGatekeepers(Gatekeepers):
         if sensed is before.sensed or before.sensed.shape != sensed.shape:
             return ()
         new = np.flatnonzero(sensed[i] & ~before.sensed[i])
-        return tuple(new[~outline.same(self._near.still[new], proposal.mapped).any(axis=1)].tolist())
+        return tuple(new[~outline.is_among(self._near.still[new], proposal.mapped)].tolist())
 
     def _decide(
         self,
@@ -183,7 +183,7 @@ class OutcomeGatekeepers(Gatekeepers):
         apart = np.full(len(claimed), -np.inf)
         sound = outline.are_outlines(claimed)
         apart[sound] = convex.distances(claimed[sound], position, True)
-        known = outline.same(claimed, self._near.still[sensed]).any(axis=1)
+        known = outline.is_among(claimed, self._near.still[sensed])
         new = np.flatnonzero((apart > self.law.avoidance.sensing_range) & ~known)
         nearest = np.argsort(apart[new], kind="stable")[:MOST_CLAIMED]
         return new[np.sort(nearest)]

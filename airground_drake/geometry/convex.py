@@ -260,7 +260,7 @@ def points_are_free(points: Array, rows: Array, keep: Array) -> npt.NDArray[np.b
     free, away = np.ones(len(points), np.bool_), np.empty(3)
     cells = _cells_of(points)
     for m in range(len(rows)):
-        low_x, high_x, low_y, high_y = _reached(rows[m], keep[m])
+        low_x, high_x, low_y, high_y = reached(rows[m], keep[m])
         first, last, bottom, top = _cells_between(cells, low_x, high_x, low_y, high_y)
         for column in range(first, last):
             for i in range(cells.first[column, bottom], cells.first[column, top]):
@@ -288,7 +288,7 @@ def segments_are_free(begin: Array, end: Array, rows: Array, keep: Array, slack:
     for k in range(len(begin)):
         half = max(half, 0.5 * abs(end[k, 0] - begin[k, 0]), 0.5 * abs(end[k, 1] - begin[k, 1]))
     for m in range(len(rows)):
-        low_x, high_x, low_y, high_y = _reached(rows[m], keep[m])
+        low_x, high_x, low_y, high_y = reached(rows[m], keep[m])
         first, last, bottom, top = _cells_between(cells, low_x - half, high_x + half, low_y - half, high_y + half)
         for column in range(first, last):
             for i in range(cells.first[column, bottom], cells.first[column, top]):
@@ -343,7 +343,7 @@ def _cells_of(points: Array) -> _Cells:
 
 
 @njit(cache=True)
-def _reached(row: Array, keep: float) -> tuple[float, float, float, float]:
+def reached(row: Array, keep: float) -> tuple[float, float, float, float]:
     """Least and greatest x, then y, within a distance, m, of a core, with a hair of room."""
     low_x, high_x, low_y, high_y = np.inf, -np.inf, np.inf, -np.inf
     for k in range(int(row[COUNT])):
@@ -477,7 +477,7 @@ def arcs_are_covered(
     near = np.empty(0, np.int64)
     for fill in (False, True):  # the outlines near each circle: first their number, then the outlines
         for m in range(len(rows)):
-            low_x, high_x, low_y, high_y = _reached(rows[m], reach[m] + widest)
+            low_x, high_x, low_y, high_y = reached(rows[m], reach[m] + widest)
             first, last, bottom, top = _cells_between(cells, low_x, high_x, low_y, high_y)
             for column in range(first, last):
                 for i in range(cells.first[column, bottom], cells.first[column, top]):

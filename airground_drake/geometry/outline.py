@@ -95,12 +95,18 @@ def as_tuple(row: Array) -> tuple[float, ...]:
     return tuple(row[: CORNERS + 2 * int(row[COUNT])].tolist())
 
 
-def same(one: Array, other: Array) -> npt.NDArray[np.bool_]:
-    """Whether each outline of one array, (m, W), has the same core as each of another, (k, V): (m, k)."""
+def is_among(one: Array, other: Array) -> npt.NDArray[np.bool_]:
+    """Whether each outline of one array, (m, W), has the same core as one of another, (k, V): (m,)."""
+    found = np.zeros(len(one), dtype=bool)
     if not (len(one) and len(other)):
-        return np.zeros((len(one), len(other)), dtype=bool)
+        return found
     both = joined(one, other)[:, BASE:]
-    found: npt.NDArray[np.bool_] = np.all(np.abs(both[: len(one), None] - both[len(one) :]) <= SAME_M, axis=2)
+    mine, theirs = both[: len(one)], both[len(one) :]
+    theirs = theirs[np.argsort(theirs[:, MIDDLE - BASE])]
+    begin, end = np.searchsorted(theirs[:, MIDDLE - BASE], mine[:, MIDDLE - BASE] + [[-2.0 * SAME_M], [2.0 * SAME_M]])
+    for index in np.flatnonzero(begin < end):
+        some = theirs[begin[index] : end[index]]
+        found[index] = np.all(np.abs(some - mine[index]) <= SAME_M, axis=1).any()
     return found
 
 
@@ -113,21 +119,24 @@ def are_outlines(rows: Array) -> npt.NDArray[np.bool_]:
         np.isfinite(rows).all(axis=1), (rows[:, [GAP, RADIUS, SPEED, EXTENT]] >= 0.0).all(axis=1),
         rows[:, BASE] <= rows[:, TOP], count >= 1.0, count == np.floor(count), CORNERS + 2.0 * count <= rows.shape[1],
     ])  # fmt: skip
-    for k in np.flatnonzero(found):
-        corners = corners_of(rows[k])
-        before, after = corners - np.roll(corners, 1, axis=0), np.roll(corners, -1, axis=0) - corners
-        turns = before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0]
-        reach = np.hypot(*(corners - rows[k, MIDDLE:EXTENT]).T).max()
-        round_once = len(corners) < 3 or abs(_turned(before, after) - 2.0 * np.pi) < 1.0
-        distinct = len(corners) == 1 or (np.hypot(*after.T) > 0.0).all()
-        found[k] = (turns >= 0.0).all() and round_once and distinct and reach <= rows[k, EXTENT]
+    for number in np.unique(count[found]).astype(int):
+        some = np.flatnonzero(found & (count == number))
+        corners = rows[some, CORNERS : CORNERS + 2 * number].reshape(len(some), number, 2)
+        before, after = corners - np.roll(corners, 1, axis=1), np.roll(corners, -1, axis=1) - corners
+        turns = before[..., 0] * after[..., 1] - before[..., 1] * after[..., 0]
+        apart = corners - rows[some, None, MIDDLE:EXTENT]
+        reach = np.hypot(apart[..., 0], apart[..., 1]).max(axis=1)
+        round_once = (number < 3) | (np.abs(_turned(before, after) - 2.0 * np.pi) < 1.0)
+        distinct = (number == 1) | (np.linalg.norm(after, axis=2) > 0.0).all(axis=1)
+        found[some] = (turns >= 0.0).all(axis=1) & round_once & distinct & (reach <= rows[some, EXTENT])
     return found
 
 
-def _turned(before: Array, after: Array) -> float:
-    """By how much a way along edges (n, 2) turns left in all, rad."""
-    turns = np.arctan2(before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0], (before * after).sum(axis=1))
-    return float(turns.sum())
+def _turned(before: Array, after: Array) -> Array:
+    """By how much ways along edges (k, n, 2) turn left in all, (k,), rad."""
+    across = before[..., 0] * after[..., 1] - before[..., 1] * after[..., 0]
+    found: Array = np.arctan2(across, (before * after).sum(axis=2)).sum(axis=1)
+    return found
 
 
 def corners_of(row: Array) -> Array:

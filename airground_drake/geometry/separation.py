@@ -13,7 +13,7 @@ import numpy.typing as npt
 from numba import njit
 
 from airground_drake.base.arrays import Array
-from airground_drake.geometry.convex import nearest
+from airground_drake.geometry.convex import nearest, reached
 from airground_drake.geometry.outline import CORNERS, COUNT, EXTENT, MIDDLE
 
 
@@ -29,8 +29,17 @@ def are_separated(p: Array, q: Array, rows: Array, keep: Array) -> bool:
     """
     parent, odd = np.arange(len(rows)), np.zeros(len(rows), np.bool_)
     inner = _inner_points(rows)
-    for i in range(len(rows)):
-        for j in range(i):
+    boxes = np.empty((len(rows), 4))
+    for k in range(len(rows)):
+        boxes[k] = reached(rows[k], keep[k])
+    order = np.argsort(boxes[:, 0])
+    for first in range(len(rows)):
+        for second in range(first + 1, len(rows)):
+            i, j = max(order[first], order[second]), min(order[first], order[second])
+            if boxes[order[second], 0] > boxes[order[first], 1]:  # so are all that follow
+                break
+            if boxes[i, 2] > boxes[j, 3] or boxes[j, 2] > boxes[i, 3]:
+                continue
             dx, dy = rows[i, MIDDLE] - rows[j, MIDDLE], rows[i, MIDDLE + 1] - rows[j, MIDDLE + 1]
             reach = rows[i, EXTENT] + rows[j, EXTENT] + keep[i] + keep[j]
             if dx * dx + dy * dy >= reach * reach:

@@ -8,9 +8,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any, NamedTuple, Self
 
 import numpy as np
+import numpy.typing as npt
 
 from airground_drake.base.arrays import Array
 from airground_drake.geometry import outline
@@ -154,6 +156,18 @@ class Planner:
         """Radii of the UGVs' bodies, (n,), m."""
         return np.broadcast_to(self.radius, len(self.ugvs))
 
+    @cached_property
+    def _rows(self) -> dict[Outline, list[int]]:
+        """Rows of each outline on the map."""
+        found: dict[Outline, list[int]] = {}
+        for k, row in enumerate(self.mapped):
+            found.setdefault(outline.as_tuple(row), []).append(k)
+        return found
+
+    def _is_on_map(self, given: Outline, there: npt.NDArray[np.bool_]) -> bool:
+        """Whether an outline is one of those on the map that are there, (m,)."""
+        return any(there[k] for k in self._rows.get(given, ()))
+
     def start(self) -> PlannerState:
         """The memory at the beginning of a run."""
         return PlannerState((Negotiation(),) * len(self.ugvs))
@@ -189,15 +203,14 @@ class Planner:
         heard = [report for report, answer in zip(reports, said, strict=True) if answer != SILENT]
         reported = {outline for report in heard for outline in report.sensed}
         there = (np.less_equal(self.mapped_from, t + SAME_S)) & np.less(t + SAME_S, self.mapped_until)
-        mapped = self.mapped[np.broadcast_to(there, len(self.mapped))]
+        there = np.broadcast_to(there, len(self.mapped))
+        mapped = self.mapped[there]
         latest = {each.name: (each, when) for each, when in memory.seen} | {
             each.name: (each, t) for report in heard for each in report.seen
         }
         moving = self._moving(t, {each.name: each for each in sightings}, latest)
         unknown = reported - set(memory.learnt)
-        if unknown:
-            unknown -= set(map(outline.as_tuple, mapped))
-        fresh = tuple(sorted(unknown, key=_place))
+        fresh = tuple(sorted((each for each in unknown if not self._is_on_map(each, there)), key=_place))
         learnt = memory.learnt + fresh
         obstacles = outline.joined(mapped, outline.stacked(learnt)) if learnt else mapped
         talks = self._after_answers(memory.talks, t, intervening, said, learnt=bool(fresh))

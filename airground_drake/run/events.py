@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+from scipy.spatial import cKDTree
 
 from airground_drake.base.arrays import Array
 from airground_drake.geometry import convex, outline
@@ -100,10 +101,16 @@ def visits(apart: PeriodMotion, shape: Array, within: float, planar: bool) -> np
     """
     places = np.concatenate([apart.start, apart.end[-1:]])
     near, passes = np.zeros(len(places), dtype=bool), np.zeros(len(apart.start), dtype=bool)
-    for row in shape:
-        reach = within + row[outline.RADIUS]
-        near |= convex.within(row[None], places, np.nextafter(reach, -np.inf), planar)[:, 0]
-        least = convex.approaches(row, apart.start, apart.end, planar)[0]
-        passes |= least < reach + apart.off_m
+    longest = float(np.linalg.norm(apart.end - apart.start, axis=1).max())
+    far = 1.001 * (within + apart.off_m + longest + shape[:, outline.RADIUS] + shape[:, outline.EXTENT])
+    nearby = cKDTree(places[:, :2]).query_ball_point(shape[:, outline.MIDDLE : outline.EXTENT], far)
+    for row, indices in zip(shape, nearby, strict=True):
+        if not indices:
+            continue
+        some, reach = np.array(indices), within + row[outline.RADIUS]
+        near[some] |= convex.within(row[None], places[some], np.nextafter(reach, -np.inf), planar)[:, 0]
+        some = some[some < len(passes)]
+        least = convex.approaches(row, apart.start[some], apart.end[some], planar)[0]
+        passes[some] |= least < reach + apart.off_m
     enters = near & ~np.append(False, near[:-1])
     return np.flatnonzero(enters | np.append(passes & ~near[:-1] & ~near[1:], False))

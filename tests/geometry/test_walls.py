@@ -217,3 +217,48 @@ def test_a_distance_field_knows_no_way_through_closed_walls_and_bears_walls_far_
     found = length_among(np.array([-3.0, 0.0]), np.array([3.0, 0.0]), far, np.full(3, 0.5))
     assert found == pytest.approx(over_a_square(3.0, 0.5), rel=0.01)
     assert len(DistanceField.to(goal, closed, np.full(4, 0.01), 9.0).nodes) <= 65_000
+
+
+@examples(60)
+@given(st.lists(OUTLINES, max_size=8), st.lists(OUTLINES, max_size=8), st.sampled_from([0.0, 0.4, -0.4, 3.0]))
+def test_what_is_among_others(one: list[Array], other: list[Array], shift: float) -> None:
+    """All pairs are compared, number by number."""
+    rows, others = outline.stacked(one), outline.stacked(other) + shift * outline.SAME_M
+    both = outline.joined(rows, others)[:, outline.BASE :]
+    same = np.abs(both[: len(rows), None] - both[len(rows) :]).max(axis=2) <= outline.SAME_M
+    assert outline.is_among(rows, others).tolist() == same.any(axis=1).tolist()
+
+
+@examples(30, fuzz=2000)
+@given(point, point, fields(12))
+def test_circles_that_others_cover_change_no_path(start: Point, goal: Point, field: tuple[Array, Array]) -> None:
+    """Bit by bit, with all circles in the graph and without those that are covered."""
+    found = []
+    for looked_at in (True, False):
+        with pytest.MonkeyPatch.context() as patch:
+            if not looked_at:
+                patch.setattr(paths._Obstacles, "touchable", property(lambda self: np.ones(len(self.circles[1]), bool)))
+            try:
+                found.append(shortest_path(start, goal, *field).pieces.tolist())
+            except NoPath:
+                found.append([])
+    assert found[0] == found[1]
+
+
+@examples(60, fuzz=2000)
+@given(fields(8), st.floats(-4.0, 4.0), st.floats(0.0, 2.0 * math.pi), st.integers(0, 99))
+def test_which_arcs_are_covered(field: tuple[Array, Array], begin: float, sweep: float, seed: int) -> None:
+    """Of covered arcs no point is outside; an arc near to one core alone, with some room, is covered."""
+    rows, keep = field
+    rng = np.random.default_rng(seed)
+    centres, radii = rng.uniform(0.0, 10.0, (20, 2)), rng.uniform(0.05, 0.6, 20)
+    found = convex.arcs_are_covered(centres, radii, np.full(20, begin), np.full(20, sweep), rows, keep)
+    angles = begin + sweep * np.linspace(0.0, 1.0, 200)
+    unit = np.column_stack([np.cos(angles), np.sin(angles)])
+    for covered, centre, radius in zip(found.tolist(), centres, radii.tolist(), strict=True):
+        apart = np.array(
+            [from_core(arc, arc, outline.corners_of(row)) for row in rows for arc in [centre + radius * unit]]
+        )
+        outside = (apart - keep[:, None]).min(axis=0).max()
+        assert not covered or outside < 1e-9
+        assert covered or (apart - keep[:, None]).max(axis=1).min() > -0.15 * radius
