@@ -265,6 +265,7 @@ POLICIES = Registry(
         "stale_map": "airground_drake.intervention.wrong:StaleMap",
         "noisy": "airground_drake.intervention.wrong:Noisy",
         "hostile": "airground_drake.intervention.wrong:Hostile",
+        "agent": "airground_drake.intervention.agent:Agent",
     },
 )
 """Intervention policies: subclasses of `intervention.policy.Policy`."""

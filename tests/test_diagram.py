@@ -37,6 +37,7 @@ LAYERS = (
     ("testing",),
     ("report", "replay", "audit"),
     ("campaign", "export"),
+    ("environments",),
     ("commands", "notebook", "__main__"),
 )
 """Rooms: a module imports from its own layer or from those above it."""

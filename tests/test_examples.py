@@ -113,14 +113,13 @@ def test_a_supervisor_of_priorities_gets_where_a_fixed_order_does_not() -> None:
     assert table.shape == own.train(episodes=1).shape
 
 
-def test_a_learned_policy_is_trained_and_proposes_ways(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A few generations improve on the first; the weights that are there are better than those."""
+def test_a_learned_policy_is_trained_and_helps(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A small training improves on how it begins; what was learnt is a policy with which a UGV arrives."""
     monkeypatch.syspath_prepend(EXAMPLES)
     learned = importlib.import_module("learned_policy")
-    _, history = learned.train(generations=12)
-    assert min(history) < 0.8 * history[0]
-    kept = np.array(json.loads(learned.WEIGHTS.read_text()))
-    assert learned.price(kept, *learned.situations(np.random.default_rng(7), 500, 2.0), 2.0) < 0.8 * min(history)
+    weights, history = learned.train(rounds=2, size=8, courses=2)
+    assert weights.shape == learned.START.shape
+    assert history[-1] > history[0]
     scenario = load("minimal", {"intervention.policies": [{"name": "learned_policy:Learned",
                                                            "parameters": {"speed_m_s": 3.0}}]})  # fmt: skip
     trace = simulate(scenario, "d")

@@ -86,6 +86,11 @@ class Course:
     max_speed_m_s: Positive = 3.0
     hidden: Annotated[Number, Field(ge=0.0, le=1.0), BeforeValidator(as_float)] = 0.0
 
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the UGVs of the largest team."""
+        return tuple(f"ugv{i + 1}" for i in range(self.ugvs[1]))
+
     def values(self, rng: np.random.Generator, obstacle_m: float, ugv_m: float, altitude_m: float) -> dict[str, Any]:
         """Draw UGVs, obstacles, and the UAV's start and target; returns them by dotted key (REPLACES).
 
@@ -110,11 +115,11 @@ class Course:
         places = self._field(rng, m, ends, least)
         hidden = rng.random(m) < self.hidden
         ugvs = {
-            f"ugv{i + 1}": {
+            name: {
                 "start_m": _ground(start), "target_m": _ground(target), "max_speed_m_s": self.max_speed_m_s,
                 "preset": {"waypoints_m": [_ground(start), _ground(target)], "speed_m_s": self.preset_m_s},
             }
-            for i, (start, target) in enumerate(zip(starts, targets, strict=True))
+            for name, start, target in zip(self.names, starts, targets, strict=False)
         }  # fmt: skip
         obstacles = {
             f"obstacle{k + 1}": {"position_m": _ground(place), "known_to_uav": not hidden[k]}

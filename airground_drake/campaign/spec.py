@@ -17,6 +17,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Annotated, Any, ClassVar
 
@@ -141,7 +142,7 @@ class Spec(File):
         """The scenario with these values by dotted key, on the course of a draw; raises as `draw`."""
         overrides = dict(self.fixed)
         if self.course is not None:
-            base = self._with(overrides)
+            base = self._fixed_part
             distance, rng = base.safe_distance, stream(self.seed, COURSE, index)
             try:
                 overrides |= self.course.values(rng, distance.obstacle_m, distance.ugv_m, base.uav.altitude_m)
@@ -169,6 +170,11 @@ class Spec(File):
                 except ScenarioError:
                     continue  # such a draw is invalid
                 plugins.refuse(scenario, self.source)
+
+    @cached_property
+    def _fixed_part(self) -> Scenario:
+        """The scenario with the values of `fixed`; raises as `draw`."""
+        return self._with(self.fixed)
 
     def _with(self, overrides: Mapping[str, Any]) -> Scenario:
         """The scenario with values by dotted key; raises as `draw`."""

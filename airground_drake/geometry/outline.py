@@ -86,8 +86,12 @@ def stacked(rows: Iterable[ArrayLike]) -> Array:
 
 def joined(*parts: Array) -> Array:
     """Arrays of outlines one after the other, padded to the same width."""
-    width = max(part.shape[1] for part in parts)
-    return np.concatenate([np.pad(part, ((0, 0), (0, width - part.shape[1]))) for part in parts])
+    found = np.zeros((sum(map(len, parts)), max(part.shape[1] for part in parts)))
+    begin = 0
+    for part in parts:
+        found[begin : begin + len(part), : part.shape[1]] = part
+        begin += len(part)
+    return found
 
 
 def as_tuple(row: Array) -> tuple[float, ...]:

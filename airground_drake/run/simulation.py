@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from functools import cache
 from typing import Any
@@ -66,7 +67,7 @@ class Recorder:
         self._run = self._scenario.runs[name]
         composition: Composition = self._run.composition  # type: ignore[assignment]
         self._own = own(self._scenario, name)
-        self._model = build_model(
+        self.model = build_model(
             self._own,
             self._run.method,
             composition,
@@ -77,8 +78,8 @@ class Recorder:
         )
         self._foreign = plants is not None
         builder = DiagramBuilder()
-        builder.AddSystem(self._model.diagram)
-        ports = [self._model.diagram.GetOutputPort(name) for name in self._model.recorded]
+        builder.AddSystem(self.model.diagram)
+        ports = [self.model.diagram.GetOutputPort(name) for name in self.model.recorded]
         together = builder.AddNamedSystem("recorded_signals", Multiplexer([port.size() for port in ports]))
         for i, port in enumerate(ports):
             builder.Connect(port, together.get_input_port(i))
@@ -86,7 +87,7 @@ class Recorder:
         for observer in observers:
             builder.AddSystem(observer)
             for port in (observer.get_input_port(i) for i in range(observer.num_input_ports())):
-                builder.Connect(self._model.diagram.GetOutputPort(port.get_name()), port)
+                builder.Connect(self.model.diagram.GetOutputPort(port.get_name()), port)
         self._root = builder.Build()
         self._root.set_name("recorded")
         untie(self._root)
@@ -110,10 +111,20 @@ class Recorder:
         Raises:
             SimulationError: if Drake or a system stops; names the run and the time.
         """
-        model = self._model
-        seed = self._scenario.seed if seed is None else seed
+        started = time.perf_counter()
+        try:
+            simulator = self.begin(seed, watch, speed)
+            self.advance(simulator, self._scenario.duration_s if duration is None else duration)
+        finally:
+            self.model.planner.close()
+        return self.trace(simulator, seed, time.perf_counter() - started)
+
+    def begin(
+        self, seed: int | None = None, watch: Callable[[float], None] | None = None, speed: float = 0.0
+    ) -> Simulator:
+        """A simulator of the run at its initial state; arguments and errors as of `simulate`."""
         context = self._root.CreateDefaultContext()
-        self._root.SetRandomContext(context, RandomGenerator(seed))
+        self._root.SetRandomContext(context, RandomGenerator(self._scenario.seed if seed is None else seed))
         context.SetAccuracy(EVENT_ACCURACY)
         simulator = Simulator(self._root, context)
         period = self._scenario.control.period_s
@@ -122,22 +133,41 @@ class Recorder:
         config = SimulatorConfig(integration_scheme=scheme, max_step_size=period, use_error_control=self._foreign)
         ApplySimulatorConfig(config, simulator)
         simulator.set_target_realtime_rate(speed)
-        if model.gatekeeper is not None:
-            model.gatekeeper.reset_timing()
+        if self.model.gatekeeper is not None:
+            self.model.gatekeeper.reset_timing()
         if watch is not None:
             simulator.set_monitor(lambda root: watch(root.get_time()))
-        started = time.perf_counter()
-        try:
+        with self._reported(context):
             simulator.Initialize()
-            simulator.AdvanceTo(self._scenario.duration_s if duration is None else duration)
+        return simulator
+
+    def advance(self, simulator: Simulator, until: float) -> None:
+        """Advance a simulator to a time, s; the updates of that instant are still to be made.
+
+        Raises:
+            SimulationError: if Drake or a system stops; names the run and the time.
+        """
+        with self._reported(simulator.get_context()):
+            simulator.AdvanceTo(until)
+
+    @contextmanager
+    def _reported(self, context: Context) -> Iterator[None]:
+        """Errors of Drake or a system in the body as SimulationError."""
+        try:
+            yield
         except (Exception, SystemExit) as error:  # Drake raises many kinds
             raise SimulationError(self._name, context.get_time(), described(error)) from error
-        finally:
-            model.planner.close()
-        return self._trace(context, seed, time.perf_counter() - started)
 
-    def _trace(self, context: Context, seed: int, wall: float) -> Trace:
-        model, ugvs, robots = self._model, self._model.world.names("ugv"), self._model.world.robots
+    def trace(self, simulator: Simulator, seed: int | None, wall: float = 0.0) -> Trace:
+        """The trace of what a simulator has simulated: of a run that lasts until now.
+
+        Args:
+            simulator: from `begin`, advanced.
+            seed: as given to `begin`.
+            wall: duration by the clock, s.
+        """
+        context, seed = simulator.get_context(), self._scenario.seed if seed is None else seed
+        model, ugvs, robots = self.model, self.model.world.names("ugv"), self.model.world.robots
         log = self._log.FindLog(context)
         ends = np.cumsum([model.diagram.GetOutputPort(name).size() for name in model.recorded])
         data = dict(zip(model.recorded, np.split(log.data(), ends[:-1]), strict=True))
@@ -158,7 +188,7 @@ class Recorder:
             "seed": seed,
             "robots": list(robots),
             "ugvs": list(ugvs),
-            "scenario": resolved(self._scenario),
+            "scenario": resolved(self._scenario) | {"duration_s": context.get_time()},
             "events": [],
             **read_back(model, context),
             "plants": model.plants,

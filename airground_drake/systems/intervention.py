@@ -8,6 +8,7 @@ from pydrake.systems.framework import Context, DiscreteValues, EventStatus, Leaf
 
 from airground_drake.base.arrays import Array
 from airground_drake.decision.excursion import INTERVENING
+from airground_drake.intervention.database import BehaviourDatabase
 from airground_drake.intervention.halts import NOT_WATCHED, room, standing, watched
 from airground_drake.intervention.messages import sightings
 from airground_drake.intervention.planner import Planner, PlannerState, sent_after
@@ -15,6 +16,9 @@ from airground_drake.systems.lifetime import weakly
 from airground_drake.systems.signals import FIELDS, components_of, declare_bodies, no_proposals, no_reports
 from airground_drake.systems.ticks import Ticks
 from airground_drake.world.world import ROBOTS, World
+
+_NOT_AHEAD = (-1.0, None)
+"""Nothing has been planned ahead of its update."""
 
 
 class InterventionPlanner(LeafSystem):
@@ -41,6 +45,7 @@ class InterventionPlanner(LeafSystem):
         self._status = self.DeclareVectorInputPort("status", FIELDS * n)
         self._answers = self.DeclareVectorInputPort("answers", 2 * n)
         self._reports = self.DeclareAbstractInputPort("reports", no_reports(n))
+        self._ahead: tuple[float, PlannerState | None] = _NOT_AHEAD
         held = self.DeclareAbstractState(Value(planner.start()))
         self._memory = int(held)
         self.DeclareAbstractOutputPort(
@@ -60,6 +65,15 @@ class InterventionPlanner(LeafSystem):
         memory: PlannerState = context.get_abstract_state(self._memory).get_value()
         return memory
 
+    @property
+    def database(self) -> BehaviourDatabase:
+        """The policies."""
+        return self._planner.database
+
+    def instant(self, number: int) -> float:
+        """Time of a planning instant, s; the first one, 0, is at 0 s."""
+        return self._ticks.instant(number)
+
     def close(self) -> None:
         """End the processes of policies; the next run starts them again."""
         self._planner.database.close()
@@ -78,17 +92,34 @@ class InterventionPlanner(LeafSystem):
         return watched(before, context.get_time(), self._bodies.Eval(context)[self._ugvs], self._room)
 
     def _update(self, context: Context, state: State) -> EventStatus:
+        t, (ahead, memory) = context.get_time(), self._ahead
+        self._ahead = _NOT_AHEAD
+        if ahead != t:
+            memory = self._planned(context)
+        if memory is None:
+            return EventStatus.DidNothing()
+        state.get_mutable_abstract_state(self._memory).set_value(memory)
+        return EventStatus.Succeeded()
+
+    def plan_ahead(self, context: Context) -> None:
+        """Plan for the instant of a context, before the update of that instant, which then takes this result.
+
+        So a step-wise environment sees what the policies are asked. If it is called again, the last result counts.
+        """
+        self._ahead = context.get_time(), self._planned(context)
+
+    def _planned(self, context: Context) -> PlannerState | None:
+        """The memory after a planning instant at the context's time; None if it is none, or changes nothing."""
         t = context.get_time()
         if not self._ticks.due(t):
-            return EventStatus.DidNothing()
+            return None
         before = self.memory(context)
         intervening = [mode == INTERVENING for mode in self._status.Eval(context)[::FIELDS].tolist()]
         if self._planner.idle(before, intervening):
-            return EventStatus.DidNothing()
+            return None
         bodies = self._bodies.Eval(context).reshape(-1, 3)
         answers, reports = self._answers.Eval(context), self._reports.Eval(context)
         stands = standing(self._halts(context), t).tolist()  # of this instant: the state is updated after this
         moving = sightings(self._world, t, bodies)
         memory = self._planner.plan(before, t, bodies[self._robots], intervening, answers, reports, stands, moving)
-        state.get_mutable_abstract_state(self._memory).set_value(sent_after(before, memory, t))
-        return EventStatus.Succeeded()
+        return sent_after(before, memory, t)

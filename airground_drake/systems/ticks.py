@@ -26,3 +26,7 @@ class Ticks:
     def due(self, t: float) -> bool:
         """Whether the event at time t, s, is a tick."""
         return self._every == 1 or round(t / self.period) % self._every == 0
+
+    def instant(self, number: int) -> float:
+        """Time of a tick, s, as Drake computes it; the first one, 0, is at 0 s."""
+        return number * self._every * self.period

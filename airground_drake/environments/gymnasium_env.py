@@ -1,0 +1,115 @@
+"""A Gymnasium environment: one agent proposes for all UGVs, one request after the other."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import gymnasium
+import numpy as np
+
+from airground_drake.campaign.spec import Spec
+from airground_drake.environments.encoding import Encoding, Numbers
+from airground_drake.environments.episode import Episode
+from airground_drake.environments.rewards import Rewards
+from airground_drake.environments.sources import Source
+from airground_drake.intervention.policy import Observation
+from airground_drake.run.trace import Trace
+from airground_drake.scenarios.schema import Scenario
+
+ID = "AirgroundDrake/Intervention-v0"
+"""For `gymnasium.make` and `make_vec`, once this module is imported; `given` is an argument of them."""
+
+
+class InterventionEnv(gymnasium.Env[Numbers, Numbers]):
+    """The UAV's side of a run: each step answers one request for a proposal, and leads to the next request.
+
+    Observation and action: see `Encoding`. Requests of one planning instant are answered one after the other, without
+    time between them; what has been proposed to one UGV is in the observation of the next. A proposal is checked, sent,
+    and judged by the UGV's gatekeeper as that of any policy.
+
+    Reward: see `Rewards`, summed over the UGVs. `terminated` when all robots have been at their targets for 1 s, or
+    when the scenario's time is over; the time is in the observation. `truncated` never. If nothing is asked for in a
+    run, the first step ends it, with the reward 0. `info` has `number` (of the episode), `t_s`, and `ugv`, for which
+    is asked.
+    """
+
+    metadata = {"render_modes": []}  # noqa: RUF012 - as Gymnasium has it
+
+    def __init__(
+        self,
+        given: Scenario | Spec,
+        run: str | None = None,
+        numbers: Sequence[int] | None = None,
+        encoding: Encoding | None = None,
+    ) -> None:
+        """Arguments as of `Source`; the encoding is that of observations and actions."""
+        self.encoding = Encoding() if encoding is None else encoding
+        self._source = Source(given, run, numbers)
+        self.observation_space = gymnasium.spaces.Box(self.encoding.low, self.encoding.high, dtype=np.float32)
+        self.action_space = gymnasium.spaces.Box(-1.0, 1.0, (self.encoding.actions,), np.float32)
+        self._episode: Episode | None = None
+        self._seen: Observation | None = None
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Numbers, dict[str, Any]]:
+        """Begin an episode, and go to its first request.
+
+        Args:
+            seed: of the numbers of this and later episodes.
+            options: `number`: that of the episode, in place of a drawn one.
+
+        Raises:
+            ScenarioError: if the draw is no valid scenario.
+            SimulationError: if Drake or a system stops.
+        """
+        super().reset(seed=seed)
+        number = (options or {}).get("number")
+        self._number = self._source.drawn(self.np_random) if number is None else int(number)
+        self._episode = self._source.episode(self._number)
+        self._look()
+        self._rewards = Rewards(self._episode)
+        return self._observed(), self._info()
+
+    def step(self, action: Numbers) -> tuple[Numbers, float, bool, bool, dict[str, Any]]:
+        """Answer the request, and go to the next one or to the end.
+
+        Raises:
+            ValueError: if the action is not finite numbers of the right shape.
+            RuntimeError: before `reset`.
+            SimulationError: if Drake or a system stops.
+        """
+        episode = self._begun()
+        if self._seen is not None:
+            episode.answer(self._seen.robot, self.encoding.motion(action, self._seen))
+        self._look()
+        reward = sum(self._rewards.since().values())
+        return self._observed(), reward, self._seen is None, False, self._info()
+
+    def trace(self) -> Trace:
+        """What the episode has recorded until now, for `judge`.
+
+        Raises:
+            RuntimeError: before `reset`.
+        """
+        return self._begun().trace()
+
+    def _begun(self) -> Episode:
+        if self._episode is None:
+            raise RuntimeError("call reset first")
+        return self._episode
+
+    def _look(self) -> None:
+        """Go to the next request, and keep it."""
+        self._seen = next(iter(self._begun().requests().values()), None)
+
+    def _observed(self) -> Numbers:
+        return self.encoding.nothing() if self._seen is None else self.encoding.observed(self._seen)
+
+    def _info(self) -> dict[str, Any]:
+        info = {"number": self._number, "t_s": self._begun().t}
+        return info if self._seen is None else info | {"ugv": self._seen.robot}
+
+
+gymnasium.register(id=ID, entry_point=f"{__name__}:{InterventionEnv.__name__}")

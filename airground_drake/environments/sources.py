@@ -1,0 +1,86 @@
+"""Where the episodes of an environment come from: one scenario, or the draws of a campaign."""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from collections.abc import Sequence
+
+import numpy as np
+
+from airground_drake.base.errors import ScenarioError, UnknownNameError
+from airground_drake.campaign.spec import Spec
+from airground_drake.environments.episode import Episode, Stage, with_agent
+from airground_drake.registry import METHODS
+from airground_drake.scenarios.limits import MAX_SEED
+from airground_drake.scenarios.load import validated
+from airground_drake.scenarios.schema import Scenario
+
+MOST_STAGES = 64
+"""Models that are kept; one takes about 0.5 MB."""
+
+
+class Source:
+    """Makes episodes by number: with a scenario the number is the seed of the noise, with a campaign that of the draw.
+
+    Attributes:
+        ugvs: names of all UGVs that an episode may have.
+        numbers: of the episodes that are drawn.
+    """
+
+    def __init__(self, given: Scenario | Spec, run: str | None = None, numbers: Sequence[int] | None = None) -> None:
+        """Choose a run.
+
+        Args:
+            given: a scenario, or a campaign, whose draws have courses.
+            run: default: the last one in which the UAV intervenes.
+            numbers: default: all seeds or draws.
+
+        Raises:
+            ScenarioError: if the scenario is not valid, or no run of it has interventions.
+            UnknownNameError: if it has no such run.
+        """
+        self._given = given if isinstance(given, Spec) else validated(given)
+        self.numbers = range(MAX_SEED) if numbers is None else numbers
+        first = self._given.draw(self.numbers[0]) if isinstance(self._given, Spec) else self._given
+        self._run = _chosen(first, run)
+        self.ugvs = tuple(first.ugvs)
+        if isinstance(given, Spec) and given.course is not None:
+            self.ugvs = given.course.names
+        self._stages = OrderedDict[int, Stage]()
+
+    def drawn(self, rng: np.random.Generator) -> int:
+        """The number of an episode, drawn."""
+        return int(self.numbers[int(rng.integers(len(self.numbers)))])
+
+    def episode(self, number: int) -> Episode:
+        """Begin an episode.
+
+        Raises:
+            ScenarioError: if the draw is no valid scenario.
+            SimulationError: if Drake or a system stops.
+        """
+        if not isinstance(self._given, Spec):
+            return Episode(self._stage(0, self._given), number)
+        stage = self._stages.get(number) or self._stage(number, self._given.draw(number))
+        return Episode(stage)
+
+    def _stage(self, key: int, scenario: Scenario) -> Stage:
+        """The model of a scenario, built if it is not there."""
+        if key not in self._stages:
+            self._stages[key] = Stage(with_agent(scenario, self._run), self._run)
+        self._stages.move_to_end(key)
+        if len(self._stages) > MOST_STAGES:
+            self._stages.popitem(last=False)
+        return self._stages[key]
+
+
+def _chosen(scenario: Scenario, run: str | None) -> str:
+    """The run, which must have interventions."""
+    having = [name for name, each in scenario.runs.items() if METHODS[each.method].intervenes]
+    if run is None and having:
+        return having[-1]
+    if run is None:
+        raise ScenarioError(scenario.name, "runs", list(scenario.runs), "wanted: a run of method b, c or d")
+    if run not in having:
+        raise UnknownNameError("run with interventions", run, having)
+    return run

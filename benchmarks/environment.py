@@ -1,0 +1,95 @@
+"""How fast the step-wise environment is: control periods per second, and resets.
+
+    python benchmarks/environment.py
+    python benchmarks/environment.py case_a lab --seconds 20
+
+An agent proposes two waypoints at random, or in one request of four nothing. A reset begins an episode on a model that
+is there, without the periods up to its first request; a new course needs a new model. Times are of the CPU, of one
+process with one thread.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import time
+from pathlib import Path
+
+os.environ |= dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1")
+
+import numpy as np
+
+from airground_drake.campaign.spec import load_spec
+from airground_drake.environments.encoding import Encoding
+from airground_drake.environments.sources import Source
+from airground_drake.run.simulation import Recorder
+from airground_drake.scenarios.load import load
+from airground_drake.scenarios.schema import Scenario
+
+DEFAULT = ("case_a", "case_b", "warehouse", "crossing")
+CAMPAIGN = Path(__file__).parents[1] / "examples" / "learned.yaml"
+RESETS = 20
+
+
+def played(source: Source, number: int, rng: np.random.Generator) -> tuple[float, int, float]:
+    """Duration of an episode, s, its number of requests, and its CPU time without that of the reset, s."""
+    encoding, episode, count = Encoding(), source.episode(number), 0
+    began = time.process_time()
+    while requests := episode.requests():
+        for robot, seen in requests.items():
+            encoding.observed(seen)
+            action = rng.uniform(-1.0, 1.0, encoding.actions)
+            action[0] += 0.5
+            episode.answer(robot, encoding.motion(action, seen))
+            count += 1
+    return episode.t, count, time.process_time() - began
+
+
+def at_one_go(scenario: Scenario) -> float:
+    """Control periods per second of CPU time of the scenario's last run."""
+    recorder = Recorder(scenario, [*scenario.runs][-1])
+    simulator = recorder.begin()
+    began = time.process_time()
+    recorder.advance(simulator, scenario.duration_s)
+    return scenario.duration_s / scenario.control.period_s / (time.process_time() - began)
+
+
+def times_ms(source: Source, numbers: range) -> list[float]:
+    """CPU times of beginning episodes, ms."""
+    found = []
+    for number in numbers:
+        began = time.process_time()
+        source.episode(number)
+        found.append(1e3 * (time.process_time() - began))
+    return found
+
+
+def main() -> None:
+    """Print a line per scenario, and one about new courses."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("scenarios", nargs="*", default=DEFAULT, help=f"default: {' '.join(DEFAULT)}")
+    parser.add_argument("--seconds", type=float, default=10.0, help="CPU time per scenario (default: 10)")
+    given = parser.parse_args()
+    for name in given.scenarios:
+        scenario = load(name)
+        source, rng = Source(scenario), np.random.default_rng(1)
+        played(source, 0, rng)  # loads and compiles
+        done: list[tuple[float, int, float]] = []
+        while sum(took for _, _, took in done) < given.seconds:
+            done.append(played(source, len(done), rng))
+        simulated, requests, took = (sum(column) for column in zip(*done, strict=True))
+        resets = times_ms(source, range(RESETS))
+        print(
+            f"{name}: {len(scenario.ugvs)} UGVs, {simulated / scenario.control.period_s / took:.0f} periods of "
+            f"{scenario.control.period_s:g} s per second (at one go: {at_one_go(scenario):.0f}), "
+            f"{requests / len(done):.1f} requests per episode, "
+            f"reset {np.median(resets):.1f} ms (worst {max(resets):.1f})"
+        )
+    courses = Source(load_spec(CAMPAIGN))
+    times_ms(courses, range(1))
+    fresh, again = (times_ms(courses, range(1, 1 + RESETS)) for _ in range(2))
+    print(f"new course: {np.median(fresh):.1f} ms (worst {max(fresh):.1f}); again: {np.median(again):.1f} ms")
+
+
+if __name__ == "__main__":
+    main()
