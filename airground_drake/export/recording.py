@@ -71,7 +71,9 @@ SCHEMAS = {"foxglove.SceneUpdate": _SCENE, "foxglove.Log": _LOG, "airground_drak
 
 
 def recorded(trace: Trace, scenario: Scenario) -> bytes:
-    """The MCAP file of a run of a scenario: the topics `/scene`, `/events` and, for each robot, `/robots/NAME`.
+    """The MCAP file of a run of a scenario: the topics `/scene`, `/events`, `/robots/NAME` and `/obstacles/NAME`.
+
+    The last one is there for obstacles that move: the origin of the frame.
 
     Raises:
         ExportError: if the package mcap is not installed.
@@ -116,6 +118,9 @@ def _messages(trace: Trace, scenario: Scenario) -> Iterator[Message]:
             color = STATE_COLORS[looks[robot.name][k]] if robot.name in looks else UAV_COLOR
             entities.append(_robot(robot, t, trace.body(robot.name)[k].tolist(), color))
             yield Message(t, f"/robots/{robot.name}", "airground_drake.Signals", _signals(trace, robot.name, k))
+        for barrier, by in moved:
+            place = {"position_m": _vector((barrier.way_m[0] + by[k]).tolist())}
+            yield Message(t, f"/obstacles/{barrier.name}", "airground_drake.Signals", place)
         yield Message(t, "/scene", "foxglove.SceneUpdate", {"deletions": [], "entities": entities})
     for event in trace.events:
         t, kind, name = float(event["t_s"]), str(event["kind"]), str(event["robot"])

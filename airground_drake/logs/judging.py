@@ -424,8 +424,9 @@ def _too_fast(other: Track, scenario: Json, pair: Pair) -> float:
 def _speed(track: Track) -> float:
     """Largest speed between samples without a gap, m/s."""
     h = np.diff(track.t_s)
+    used = (h > 0.0) & (h <= track.gap_s * (1.0 + 1e-9))
     moved = np.linalg.norm(np.diff(track.places_m, axis=0), axis=1)
-    return float((moved / h)[h <= track.gap_s].max(initial=0.0))
+    return float((moved[used] / h[used]).max(initial=0.0))
 
 
 def _longest(track: Track) -> float:

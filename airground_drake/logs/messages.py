@@ -5,13 +5,13 @@ A message may be an object with attributes (ROS, protobuf) or a dict (JSON).
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from airground_drake.logs.names import is_elsewhere, segments
-from airground_drake.logs.stream import Stream
+from airground_drake.logs.stream import HEADERS, RECEIPT, Stream
 
 NO_PLACES = ("sensor_msgs/", "visualization_msgs/", "rcl_interfaces/", "rosgraph_msgs/", "foxglove.SceneUpdate")
 """Beginnings of types that say nothing about where a robot is, or cannot be told from those that do."""
@@ -40,7 +40,7 @@ def places(message: Any) -> Iterator[Place]:
                 yield Place(str(name), "", "", None, xyz)
         return
     several = _of(message, "transforms")
-    for one in [message] if several is None else several:
+    for one in [message] if several is None else several if isinstance(several, Sequence) else []:
         if (place := _place(one)) is not None:
             yield place
 
@@ -123,7 +123,7 @@ class Gathered:
             stamped = all(stamp is not None for _, stamp, _ in rows)
             times = [stamp if stamped and stamp is not None else received for received, stamp, _ in rows]
             xyz = np.array([place for _, _, place in rows], dtype=np.float64).reshape(-1, 3)
-            clock = "header stamps" if stamped else "times of receipt"
+            clock = HEADERS if stamped else RECEIPT
             whole = np.array(times, dtype=np.int64)
             stream = Stream(
                 self.source, body or topic, whole, np.zeros_like(whole), xyz, "ns", "m", frame, child, clock

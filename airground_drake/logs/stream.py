@@ -16,6 +16,8 @@ PER_S = {"s": 1, "ms": 10**3, "us": 10**6, "ns": 10**9}
 """Units of time, and how many of each are a second."""
 PER_M = {"m": 1.0, "cm": 100.0, "mm": 1000.0}
 """Units of length, and how many of each are a metre."""
+OF_MESSAGES = HEADERS, RECEIPT = "header stamps", "times of receipt"
+"""Clocks of messages."""
 
 
 @dataclass(eq=False)

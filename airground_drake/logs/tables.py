@@ -86,9 +86,8 @@ def _parquet(content: bytes) -> text.Table:
         table = files.read_table(content)
     except ValueError as error:
         raise LogError(str(error)) from None
-    cells = pd.DataFrame(
-        {k: [_written(v) for v in table.iloc[:, k].tolist()] for k in range(table.shape[1])}, dtype=str
-    )
+    texts = {k: [*map(_written, table.iloc[:, k].tolist())] for k in range(table.shape[1])}
+    cells = pd.DataFrame(texts, dtype=str)
     return text.Table([*map(str, table.columns)], cells, range(1, len(table) + 1), [], True, [])
 
 
@@ -123,9 +122,8 @@ def _one_place(places: list[Place]) -> list[Place]:
     """The only place, or the one whose columns have the shortest names."""
     shortest = min(places, key=lambda place: len(place.name))
     if sum(len(place.name) == len(shortest.name) for place in places) > 1:
-        raise LogError(
-            f"it has several places in a row: {listed([p.name for p in places])}; wanted: --map-columns x=..."
-        )
+        several = listed([place.name for place in places])
+        raise LogError(f"it has several places in a row: {several}; wanted: --map-columns x=NAME,y=NAME,z=NAME")
     return [shortest]
 
 

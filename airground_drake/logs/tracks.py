@@ -174,16 +174,12 @@ def _assigned(log: Log, bodies: Collection[str], choice: Choice) -> tuple[dict[s
         of_one = {(each.name, each.child, each.frame): each for each in best}
         if len(of_one) > 1:
             several = ", ".join(f"{each.label}{f' in frame {each.frame}' * bool(each.frame)}" for each in best)
-            wanted = f"--rename {best[0].child or best[0].name}={body}" + " or --frame" * (
-                len({*map(_frame, best)}) > 1
-            )
+            name = best[0].name if len({each.name for each in best}) > 1 else best[0].child
+            frame = ", or --frame FRAME" if len({each.frame for each in best}) > 1 else ""
+            wanted = f"--rename {name}={body}{frame}"
             raise LogError(one_line(f"{body} is in the log more than once: {several[:400]}; wanted: {wanted}"))
         found[body] = _merged(best)
     return found, list(dict.fromkeys(ignored))
-
-
-def _frame(stream: Stream) -> str:
-    return stream.frame
 
 
 def _exist(rename: Mapping[str, str], log: Log, bodies: Collection[str]) -> None:

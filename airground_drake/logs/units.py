@@ -10,7 +10,7 @@ import numpy as np
 
 from airground_drake.check.files import Json
 from airground_drake.check.scenario import robots_of
-from airground_drake.logs.stream import PER_M, PER_S, Stream
+from airground_drake.logs.stream import OF_MESSAGES, PER_M, PER_S, Stream
 
 SINCE_1970 = (("ns", 1e17), ("us", 1e14), ("ms", 1e11), ("s", 1e8))
 """Units of stamps since 1970, and the least such stamp that is taken as one."""
@@ -38,7 +38,7 @@ def settle(streams: Mapping[str, Stream], scenario: Json, time_unit: str, length
     for stream in streams.values():
         stated = stream.time_unit, stream.length_unit
         for unit, stamps, what in ((stated[0], stream.clock, "times"), (stated[1], "", "lengths")):
-            if unit not in ("", "s", "m") and not (unit == "ns" and stamps.startswith(("header", "times"))):
+            if unit not in ("", "s", "m") and not (unit == "ns" and stamps in OF_MESSAGES):
                 said[f"{what} are in {NAMES[unit]}, as the file says"] = None
         stream.time_unit = stream.time_unit or time_unit or _since_1970(stream)
         stream.length_unit = stream.length_unit or length_unit
@@ -71,9 +71,7 @@ def _likely(streams: Mapping[str, Stream], scenario: Json) -> tuple[str, str]:
     """The units of time and length that are still open, together: the first that make the motion possible."""
     robots = robots_of(scenario)
     starts = np.array([robots[name]["start_m"] for name in streams]).reshape(-1, 3)
-    goals = np.array(
-        [robot["target_m"] for robot in scenario["ugvs"].values()] + [r["start_m"] for r in robots.values()]
-    )
+    goals = np.array([each["target_m"] for each in scenario["ugvs"].values()] + starts.tolist())
     size_m = max(1.0, float(np.ptp(goals[:, :2], axis=0).max()))
 
     def found(time: str, length: str) -> tuple[float, float, float]:

@@ -241,7 +241,8 @@ def mcap_protobuf(path: Path, bodies: Motion) -> None:
     for name, fields in kinds.items():
         message = about.message_type.add(name=name)
         for number, (each, kind, of) in enumerate(fields, start=1):
-            message.field.add(name=each, number=number, type=kind, label=field.LABEL_OPTIONAL, type_name=of)
+            more = {"type_name": of} if of else {}
+            message.field.add(name=each, number=number, type=kind, label=field.LABEL_OPTIONAL, **more)
     pool = descriptor_pool.DescriptorPool()
     pool.Add(about)
     make = {name: message_factory.GetMessageClass(pool.FindMessageTypeByName(f"lab.{name}")) for name in kinds}

@@ -1,8 +1,9 @@
-"""`airground judge`: positions from any source."""
+"""`airground judge`: the log of an experiment, judged on the command line."""
 
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -10,8 +11,10 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
+from builders import logs
 from commands.conftest import Airground
 
+from airground_drake.export import recording, tables
 from airground_drake.run.trace import Trace
 
 Run = Callable[[str, str], Trace]
@@ -21,36 +24,63 @@ def sampled(trace: Trace) -> pd.DataFrame:
     """Where the robots of a run were at its control samples."""
     period = trace.scenario.control.period_s
     rows = np.searchsorted(trace.t, period * np.arange(round(trace.t[-1] / period) + 1) - 1e-9)
-    tables = [
+    found = [
         pd.DataFrame(trace.position(robot)[rows], columns=["x_m", "y_m", "z_m"]).assign(t_s=trace.t[rows], body=robot)
         for robot in trace.robots
     ]
-    return pd.concat(tables, ignore_index=True)
+    return pd.concat(found, ignore_index=True)
 
 
 @pytest.fixture
-def judged(tmp_path: Path, airground: Airground) -> Callable[..., str]:
-    def judge(table: pd.DataFrame, scenario: str, code: int = 0) -> str:
+def judged(tmp_path: Path, airground: Airground) -> Callable[..., dict[str, Any]]:
+    def judge(table: pd.DataFrame, scenario: str, *more: str, code: int = 0) -> dict[str, Any]:
         table.to_csv(tmp_path / "positions.csv", index=False)
-        return airground("judge", tmp_path / "positions.csv", "--scenario", scenario, "--json", code=code)
+        said = airground("judge", tmp_path / "positions.csv", "--scenario", scenario, "--json", *more, code=code)
+        found: dict[str, Any] = json.loads(said)
+        return found
 
     return judge
 
 
-def test_a_run_that_obeyed_the_law_is_promised_its_distances(run: Run, judged: Callable[..., str]) -> None:
+def test_a_run_that_obeyed_the_law_is_promised_its_distances(run: Run, judged: Callable[..., dict[str, Any]]) -> None:
     table = sampled(run("case_a", "d"))
-    pairs: list[dict[str, Any]] = json.loads(judged(table, "case_a"))["pairs"]
-    assert len(pairs) == 12
-    assert max(pair["missed_m"] for pair in pairs) <= 1e-12
-    assert all(pair["guarantee_m"] == pytest.approx(pair["safe_m"], abs=1e-9) for pair in pairs)
-    irregular = table[~np.isclose(table["t_s"], 3.0)]  # the law is about equal periods
-    assert {pair["missed_m"] for pair in json.loads(judged(irregular, "case_a"))["pairs"]} == {None}
+    for rows in (table, table[~np.isclose(table["t_s"], 3.0)]):  # intervals need not be equal
+        found = judged(rows, "case_a")
+        assert len(found["pairs"]) == 12
+        assert max(pair["missed_m"] for pair in found["pairs"]) <= 1e-12
+        assert all(pair["promised_m"] == pytest.approx(pair["safe_m"], abs=1e-9) for pair in found["pairs"])
+        assert all(all(pair["hypotheses"].values()) for pair in found["pairs"])
+        assert (found["status"], found["covered"]["all"]) == ("kept", True)
 
 
-def test_a_run_that_hits_an_obstacle_is_exit_code_1(run: Run, judged: Callable[..., str]) -> None:
-    worst = json.loads(judged(sampled(run("case_b", "b")), "case_b", code=1))["pairs"][0]
-    assert (worst["first"], worst["second"], worst["kept"]) == ("ugv1", "sudden", False)
+def test_a_run_that_hits_an_obstacle_is_exit_code_1(run: Run, judged: Callable[..., dict[str, Any]]) -> None:
+    worst = judged(sampled(run("case_b", "b")), "case_b", code=1)["pairs"][0]
+    assert (worst["first"], worst["second"], worst["status"]) == ("ugv1", "sudden", "NOT KEPT")
     assert worst["missed_m"] > 0.1
+    assert worst["hypotheses"]["obeys the avoidance law in every interval"] is False
+    assert worst["came_m"]["ugv1"] > 0.1
+    assert worst["came_m"]["sudden"] == 0.0
+
+
+@pytest.mark.parametrize("kind", ["csv", "mcap"])
+def test_what_the_package_exports_is_judged_like_the_run(
+    kind: str, run: Run, tmp_path: Path, airground: Airground
+) -> None:
+    """Distances between surfaces, as the package itself tells them."""
+    trace = run("forklift", "d")
+    *_, least = tables.write(trace, tmp_path)
+    if kind == "csv":
+        path = tmp_path / f"{trace.run}_states.csv"
+    else:
+        path = tmp_path / "run.mcap"
+        path.write_bytes(recording.recorded(trace, trace.scenario))
+    said = airground("judge", path, "--scenario", "forklift", "--json")
+    pairs = {(pair["first"], pair["second"]): pair["least_m"] for pair in json.loads(said)["pairs"]}
+    expected = {(row.first, row.second): row.min_distance_m for row in pd.read_csv(least).itertuples()}
+    assert {frozenset(pair) for pair in pairs} == {frozenset(pair) for pair in expected}
+    assert len(pairs) > 2
+    for (one, two), least_m in pairs.items():
+        assert least_m == pytest.approx(expected.get((one, two), expected.get((two, one))), abs=1e-6)
 
 
 def test_stamps_since_1970_are_judged_like_those_from_zero_and_the_text_says_what_they_cover(
@@ -62,9 +92,10 @@ def test_stamps_since_1970_are_judged_like_those_from_zero_and_the_text_says_wha
     for name, rows in (("whole", table), ("second", table[table["t_s"].astype(float) < 1311875573.4])):
         rows.to_csv(tmp_path / name, index=False)
         said.append(airground("judge", tmp_path / name, "--scenario", "case_a"))
-    assert "not equally spaced" not in said[0]
-    assert "misses the law by e = 0 m per period, which promises 2 m" in said[0]
-    assert said[1].startswith("The samples cover 0.95 s, from t = 1311875572 s; the scenario lasts 30 s.")
+    assert said[0].startswith("Every distance was kept.\n12 of 12 distances were kept. The log has 30 of")
+    assert "the law held in all 600 intervals: the safety theorem promises 2 m" in said[0]
+    assert "Time 0 is 1311875572.406161 s since 1970." in said[0]
+    assert said[1].startswith("No distance was broken where the log covers it. The log has 0.95 of the scenario's 30 s")
 
 
 def test_no_distance_below_zero_is_promised(run: Run, tmp_path: Path, airground: Airground) -> None:
@@ -73,36 +104,84 @@ def test_no_distance_below_zero_is_promised(run: Run, tmp_path: Path, airground:
                      "control.avoidance_gain_1_s=1", code=1)  # fmt: skip
     assert "promises no distance" in said
     assert "promises -" not in said
+    assert said.startswith("NOT KEPT (ugv1, sudden): overlap by ") or "below it" in said.splitlines()[0]
 
 
-def test_parquet_and_the_text_for_people(run: Run, tmp_path: Path, airground: Airground) -> None:
-    sampled(run("case_a", "d")).to_parquet(tmp_path / "positions.parquet")
-    said = airground("judge", tmp_path / "positions.parquet", "--scenario", "case_a")
-    assert said.startswith(
-        "The samples cover 30 s, from t = 0 s; the scenario lasts 30 s.\n12 of 12 distances were kept."
-    )
-    assert "Not judged: how bodies moved between samples: motion is taken as straight." in said
+@pytest.fixture
+def log(tmp_path: Path) -> list[Path | str]:
+    """A log with a broken distance, and what names its scenario."""
+    path = tmp_path / "run.csv"
+    path.write_text(logs.text(logs.long(logs.motion())))
+    return [path, "--scenario", logs.write_scenario(tmp_path).as_posix()]
+
+
+def test_the_verdict_comes_first_with_margin_time_and_whose_doing_it_was(
+    log: list[Path | str], airground: Airground
+) -> None:
+    first, second, third, *_ = airground("judge", *log, code=1).splitlines()
+    least_m, at_s = logs.least_gaps(logs.motion())[logs.BROKEN]
+    assert first.startswith(f"NOT KEPT (tb_0, tb_1): {least_m:.4f} m at {at_s:.3f} s, required 0.3 m, below it 2.")
+    assert re.fullmatch(r"  tb_0, tb_1: in the second before, tb_1 came 0\.11\d m nearer, tb_0 .*", second)
+    assert third == "5 of 6 distances were kept. The log has 6 of the scenario's 6 s, without gaps."
+
+
+def test_a_position_error_that_decides_is_exit_code_1(log: list[Path | str], airground: Airground) -> None:
+    said = airground("judge", *log, "--position-error", "0.01", "--position-error", "uav=0", code=1)
+    assert said.startswith("NOT ESTABLISHED (tb_0, tb_1): 0.28")
+    assert "± 0.02 m at" in said.splitlines()[0]
+    assert "the position error decides" in said.splitlines()[0]
+
+
+def test_the_page_has_the_verdict_the_map_and_a_replay(
+    log: list[Path | str], tmp_path: Path, airground: Airground
+) -> None:
+    said = airground("judge", *log, "-o", tmp_path / "judged", code=1)
+    page, replay = ((tmp_path / "judged" / name).read_text() for name in ("judged.html", "replay.html"))
+    assert said.splitlines()[0].replace("'", "&#39;") in page
+    assert page.count("<svg") >= 2
+    for words in ("tb_1 came 0.11", "Every pair", "Not judged", 'href="replay.html"', "run.csv", "--position-error"):
+        assert words in page
+    assert "too near, tb_0, tb_1" in replay
+    assert "<script" not in page
+
+
+def test_the_page_of_a_log_with_gaps_draws_none_of_them(tmp_path: Path, airground: Airground) -> None:
+    """The way is drawn in parts, and the page says what must not be concluded."""
+    head, *rows = logs.long(logs.motion())
+    rows = [row for row in rows if not (row[1] == "tb_1" and 2.4 < float(row[0]) < 3.6)]
+    (tmp_path / "gap.csv").write_text(logs.text([head, *rows]))
+    airground("judge", tmp_path / "gap.csv", "--scenario", logs.write_scenario(tmp_path), "-o", tmp_path / "judged")
+    page, replay = ((tmp_path / "judged" / name).read_text() for name in ("judged.html", "replay.html"))
+    assert "distances were kept where a body was not recorded" in page
+    assert "not 2.400 to 3.600 s" in page
+    assert "not recorded, tb_1, for 1.20 s" in replay
 
 
 @pytest.mark.parametrize(
-    ("edit", "says"),
+    ("more", "says"),
     [
-        (lambda table: table.drop(columns="z_m"), "its columns are"),
-        (lambda table: table.rename(columns={"z_m": "z" * 100_000}), "its columns are"),
-        (lambda table: table.assign(body=table["body"].replace("ugv1", "car")), "body 'car' is not a robot"),
-        (lambda table: table[table["body"] != "ugv2"], "ugv2 has 0 rows"),
-        (
-            lambda table: table.assign(x_m=table["x_m"].where(table.index != 7)),
-            "row 7 has a value that is not a finite",
-        ),
-        (lambda table: table.assign(x_m=table["x_m"] * 1e155), "has a value beyond 1e+12; wanted: seconds and metres"),
-        (lambda table: table.iloc[::-1], "does not come after the row before"),
-        (lambda table: table.drop(index=3), "are not sampled at the same times"),
+        (["--rename", "x"], "'x' is not allowed; wanted: NAME=BODY"),
+        (["--map-columns", "time=a"], "'time=a' is not allowed; wanted: t=NAME"),
+        (["--map-columns", "t=a"], "--map-columns t=a: there is no such column; there are t_s, body, x_m"),
+        (["--position-error", "-1"], "'-1' is not allowed"),
+        (["--position-error", "tb_9=0.1"], "the scenario has no tb_9; it has tb_0, tb_1, uav"),
+        (["--without", "tb_9"], "the scenario has no tb_9"),
+        (["--uav", "tb_0"], "--uav tb_0: the scenario has it already"),
+        (["--gap", "-1"], "'-1' is not allowed"),
     ],
 )
-def test_a_bad_table_is_refused(
-    edit: Callable[[pd.DataFrame], pd.DataFrame], says: str, run: Run, judged: Callable[..., str]
-) -> None:
-    said = judged(edit(sampled(run("case_a", "d"))), "case_a", code=2)
-    assert says in said
-    assert len(said) < 1000
+def test_a_wrong_option_is_refused(more: list[str], says: str, log: list[Path | str], airground: Airground) -> None:
+    assert says in airground("judge", *log, *more, code=2)
+
+
+def test_a_missing_file_and_an_empty_folder_are_named(tmp_path: Path, airground: Airground) -> None:
+    scenario = logs.write_scenario(tmp_path)
+    (tmp_path / "empty").mkdir()
+    assert "no such file" in airground("judge", tmp_path / "a", "--scenario", scenario, code=2).lower()
+    assert "has no files" in airground("judge", tmp_path / "empty", "--scenario", scenario, code=2)
+
+
+def test_the_help_teaches_what_a_log_can_be(airground: Airground) -> None:
+    said = airground("judge", "--help")
+    for words in ("MCAP", "ROS bags", "TUM", "--rename /tb3_1/odom=ugv1", "airground init", "exit codes"):
+        assert words in said

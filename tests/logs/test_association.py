@@ -1,0 +1,273 @@
+"""Streams become tracks: gaps, repeated rows, frames, names and units; each rule has a case that needs it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from builders import logs
+from builders.logs import BROKEN, Motion, Ros
+
+from airground_drake.base.errors import LogError
+from airground_drake.logs.judging import BROKEN as NOT_KEPT
+from airground_drake.logs.judging import KEPT, JudgedPair, judge
+from airground_drake.logs.words import lines
+from airground_drake.scenarios.load import load, resolved
+
+FULL = logs.motion()
+
+
+@pytest.fixture(scope="module")
+def document(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
+    return resolved(load(str(logs.write_scenario(tmp_path_factory.mktemp("lab")))))
+
+
+def pair_of(found: list[JudgedPair], *names: str) -> JudgedPair:
+    return next(pair for pair in found if (pair.first, pair.second) == names)
+
+
+def written(folder: Path, table: list[list[str]], name: str = "log.csv") -> Path:
+    (folder / name).write_text(logs.text(table))
+    return folder / name
+
+
+def with_gap(begin_s: float, end_s: float, mark: str | None) -> tuple[list[list[str]], Motion]:
+    """The log without tb_1 for a while: its rows are marked, or missing; and what is left."""
+    head, *rows = logs.long(FULL)
+    inside = [row[1] == "tb_1" and begin_s < float(row[0]) < end_s for row in rows]
+    if mark is None:
+        rows = [row for row, is_in in zip(rows, inside, strict=True) if not is_in]
+    else:
+        rows = [[*row[:2], mark, mark, mark] if is_in else row for row, is_in in zip(rows, inside, strict=True)]
+    t_s, places = FULL["tb_1"]
+    left = (t_s <= begin_s) | (t_s >= end_s)
+    return [head, *rows], {**FULL, "tb_1": (t_s[left], places[left])}
+
+
+@pytest.mark.parametrize("mark", ["NaN", "", "lost", None])
+def test_nothing_is_claimed_in_a_gap(mark: str | None, tmp_path: Path, document: dict[str, Any]) -> None:
+    table, left = with_gap(2.4, 3.6, mark)
+    found = logs.read(written(tmp_path, table), document)
+    judged = judge(found, document)
+    pair = pair_of(judged.pairs, *BROKEN)
+    assert (pair.status, judged.covers_all) == (KEPT, False)
+    assert pair.gaps_s == [(pytest.approx(2.4), pytest.approx(3.6))]
+    assert pair.covered_s == pytest.approx(logs.LASTS_S - 1.2)
+    assert pair.least_m == pytest.approx(logs.least_gaps(left, 0.1)[BROKEN][0], abs=1e-9)
+    assert judged.pairs[-1].first == "tb_0" or judged.pairs[-1].gaps_s
+    text = "\n".join(lines(judged, found))
+    assert "Every distance was kept" not in text
+    assert "tb_0, tb_1 are not covered from 2.400 to 3.600 s" in text
+    assert any("tb_1: 23 rows skipped" in said for said in found.said) == (mark is not None)
+
+
+def test_a_line_across_the_gap_would_say_something_else(tmp_path: Path, document: dict[str, Any]) -> None:
+    """With `--gap` the user takes the motion in the gap as straight; then the pair is covered."""
+    table, left = with_gap(2.4, 3.6, None)
+    pair = pair_of(judge(logs.read(written(tmp_path, table), document, gap_s=2.0), document).pairs, *BROKEN)
+    assert (pair.gaps_s, pair.covered_s) == ([], pytest.approx(logs.LASTS_S))
+    assert pair.least_m == pytest.approx(logs.least_gaps(left)[BROKEN][0], abs=1e-9)
+
+
+def test_one_lost_row_is_no_gap_two_are(tmp_path: Path, document: dict[str, Any]) -> None:
+    for end_s, gaps in ((1.10, 0), (1.15, 1)):
+        table, _ = with_gap(1.0, end_s, None)
+        pair = pair_of(judge(logs.read(written(tmp_path, table), document), document).pairs, *BROKEN)
+        assert len(pair.gaps_s) == gaps
+
+
+def test_a_log_that_is_shorter_than_the_scenario_says_so(tmp_path: Path, document: dict[str, Any]) -> None:
+    short = {name: (t_s[:21], places[:21]) for name, (t_s, places) in FULL.items()}
+    found = logs.read(written(tmp_path, logs.long(short)), document)
+    judged = judge(found, document)
+    assert (judged.status, judged.covers_all) == (KEPT, False)
+    assert "No distance was broken where the log covers it. The log has 1 of the scenario's 6 s" in next(
+        lines(judged, found)
+    )
+
+
+def test_bodies_that_are_never_recorded_together_are_refused(tmp_path: Path, document: dict[str, Any]) -> None:
+    apart = {**FULL, "tb_1": (FULL["tb_1"][0] + 50.0, FULL["tb_1"][1])}
+    with pytest.raises(LogError, match="tb_0 0 to 6 s and tb_1 50 to 56 s are never recorded at the same time"):
+        judge(logs.read(written(tmp_path, logs.long(apart)), document), document)
+
+
+def test_of_two_rows_of_one_time_the_first_counts_and_the_contradiction_is_named(
+    tmp_path: Path, document: dict[str, Any]
+) -> None:
+    head, *rows = logs.long(FULL)
+    k = next(k for k, row in enumerate(rows) if row[:2] == ["3.000000", "tb_1"])
+    other = [*rows[k][:3], f"{float(rows[k][3]) - 0.5:.4f}", rows[k][4]]
+    found = logs.read(written(tmp_path, [head, *rows[: k + 1], other, *rows[k + 1 :]]), document)
+    assert pair_of(judge(found, document).pairs, *BROKEN).least_m == pytest.approx(logs.least_gaps(FULL)[BROKEN][0])
+    assert (
+        "tb_1: 1 rows contradict an earlier one of the same time, at 3 s by 0.5 m; the earlier one counts" in found.said
+    )
+
+
+# --- names and frames ------------------------------------------------------------------------------------------------
+
+
+def posed(folder: Path, frames: dict[str, str], topics: dict[str, str] | None = None, start: bool = False) -> Path:
+    """A ROS 2 bag of odometry, each body in a frame; `start`: each from where it started."""
+    ros, said = Ros(2), []
+    for t, name, place in logs.rows(FULL):
+        ns = logs.EPOCH_NS + round(t * 1e9)
+        own = place - FULL[name][1][0] if start else place
+        said.append(
+            (ns, (topics or {}).get(name, f"/{name}/odom"), *ros.odometry(ns, frames[name], f"{name}/base", own))
+        )
+    logs.write_ros2(folder / "bag", ros, said, "SQLITE3")
+    return folder / "bag"
+
+
+def test_odometry_in_frames_of_each_robots_own_is_refused(tmp_path: Path, document: dict[str, Any]) -> None:
+    path = posed(tmp_path, {name: f"{name}/odom" for name in FULL}, start=True)
+    with pytest.raises(LogError, match="tb_0 in tb_0/odom, tb_1 in tb_1/odom, uav in uav/odom"):
+        logs.read(path, document)
+
+
+def test_a_frame_called_odom_is_refused_unless_it_is_said_to_be_one(tmp_path: Path, document: dict[str, Any]) -> None:
+    path = posed(tmp_path, dict.fromkeys(FULL, "odom"))
+    with pytest.raises(LogError, match="--frame odom if this is one for all"):
+        logs.read(path, document)
+    assert judge(logs.read(path, document, frames=["odom"]), document).status == NOT_KEPT
+
+
+def test_robots_that_all_start_at_zero_are_refused_where_no_frame_is_stated(
+    tmp_path: Path, document: dict[str, Any]
+) -> None:
+    own = {name: (t_s, places - places[0]) for name, (t_s, places) in FULL.items()}
+    with pytest.raises(LogError, match=r"tb_0, tb_1 all start at \(0, 0\)"):
+        logs.read(written(tmp_path, logs.long(own)), document)
+
+
+def test_two_names_of_one_frame_can_be_said_to_be_one(tmp_path: Path, document: dict[str, Any]) -> None:
+    path = posed(tmp_path, {"tb_0": "map", "tb_1": "world", "uav": "map"})
+    with pytest.raises(LogError, match="positions are in different frames"):
+        logs.read(path, document)
+    assert judge(logs.read(path, document, frames=["map", "world"]), document).status == NOT_KEPT
+
+
+def test_a_body_in_two_topics_needs_a_word_from_the_user(tmp_path: Path, document: dict[str, Any]) -> None:
+    ros, said = Ros(2), []
+    for t, name, place in logs.rows(FULL):
+        ns = logs.EPOCH_NS + round(t * 1e9)
+        said.append((ns, f"/{name}/amcl_pose", *ros.stamped(ns, "map", place)))
+        said.append((ns, f"/{name}/odom", *ros.odometry(ns, f"{name}/odom", f"{name}/base", place - FULL[name][1][0])))
+        said.append((ns, f"/{name}/goal_pose", *ros.stamped(ns, "map", 0.0 * place)))
+    logs.write_ros2(tmp_path / "bag", ros, said, "MCAP")
+    with pytest.raises(LogError, match=r"tb_0 is in the log more than once: .*in frame map.*--frame FRAME"):
+        logs.read(tmp_path / "bag", document)
+    assert judge(logs.read(tmp_path / "bag", document, frames=["map"]), document).status == NOT_KEPT
+    rename = {f"/{name}/amcl_pose": name for name in FULL}
+    assert judge(logs.read(tmp_path / "bag", document, rename=rename), document).status == NOT_KEPT
+
+
+def test_transforms_of_a_robots_own_parts_are_not_its_position(tmp_path: Path, document: dict[str, Any]) -> None:
+    said = logs.foxglove(FULL, {})
+    arm = {"parent_frame_id": "tb_0/base", "child_frame_id": "tb_0/arm", "translation": {"x": 0.1, "y": 0.0, "z": 0.2}}
+    arms = []
+    for ns, *_ in said:
+        stamped = {**arm, "timestamp": {"sec": ns // 10**9, "nsec": ns % 10**9}}
+        arms.append((ns + 1, "/tf", "foxglove.FrameTransforms", {"transforms": [stamped]}))
+    logs.mcap_json(tmp_path / "run.mcap", [*said, *arms])
+    assert judge(logs.read(tmp_path / "run.mcap", document), document).status == NOT_KEPT
+
+
+def test_names_that_do_not_fit_are_listed_with_what_helps(tmp_path: Path, document: dict[str, Any]) -> None:
+    path = posed(tmp_path, dict.fromkeys(FULL, "map"), {"tb_1": "/robot_b/odom"})
+    assert judge(logs.read(path, document), document).status == NOT_KEPT  # by the frame that the robot carries
+    other = {"tb_0": FULL["tb_0"], "b": FULL["tb_1"], "uav": FULL["uav"]}
+    path = written(tmp_path, logs.long(other))
+    with pytest.raises(LogError, match="tb_1 is not in the log; names there: tb_0, b, uav; wanted: --rename NAME=tb_1"):
+        logs.read(path, document)
+    assert judge(logs.read(path, document, rename={"b": "tb_1"}), document).status == NOT_KEPT
+    with pytest.raises(LogError, match="the log has no c"):
+        logs.read(path, document, rename={"c": "tb_1"})
+    with pytest.raises(LogError, match="the scenario has no tb_9"):
+        logs.read(path, document, rename={"b": "tb_9"})
+    assert {pair.first for pair in judge(logs.read(path, document, without=["tb_1"]), document).pairs} == {
+        "tb_0",
+        "uav",
+    }
+
+
+# --- heights, further UAVs, errors -----------------------------------------------------------------------------------
+
+
+def test_heights_of_ugvs_do_not_count_between_them(tmp_path: Path, document: dict[str, Any]) -> None:
+    """Markers on two robots may be at different heights; in the plane the robots are as near as before."""
+    up = np.array([0.0, 0.0, 0.4])
+    high = {name: (t_s, places + up * (name == "tb_1")) for name, (t_s, places) in FULL.items()}
+    found = judge(logs.read(written(tmp_path, logs.long(high)), document), document)
+    expected = logs.least_gaps(FULL)
+    for one, two in (BROKEN, ("tb_1", "pillar")):
+        assert pair_of(found.pairs, one, two).least_m == pytest.approx(expected[one, two][0], abs=1e-9)
+    assert pair_of(found.pairs, "tb_1", "uav").least_m == pytest.approx(
+        logs.least_gaps(high)["tb_1", "uav"][0], abs=1e-9
+    )
+
+
+def test_a_further_uav_is_judged_like_the_first(tmp_path: Path, document: dict[str, Any]) -> None:
+    t_s, places = FULL["uav"]
+    both = {**FULL, "uav2": (t_s, places - np.array([0.0, 0.0, 0.9]))}
+    path = written(tmp_path, logs.long(both))
+    assert "uav2: names no body of the scenario" in logs.read(path, document).ignored
+    found = judge(logs.read(path, document, uavs=["uav2"]), document)
+    new = {(pair.first, pair.second): pair for pair in found.pairs if "uav2" in (pair.first, pair.second)}
+    assert {*new} == {("tb_0", "uav2"), ("tb_1", "uav2"), ("uav2", "pillar")}
+    assert new["tb_0", "uav2"].safe_m == logs.GAPS["air_ground_m"]
+
+
+@pytest.mark.parametrize(
+    ("errors_m", "status"),
+    [
+        ({}, NOT_KEPT), ({"tb_0": 0.001, "tb_1": 0.001}, NOT_KEPT), ({"tb_0": 0.02, "tb_1": 0.02}, "open"),
+        ({"uav": 0.5}, NOT_KEPT),
+    ],
+)  # fmt: skip
+def test_position_errors_make_a_distance_open(
+    errors_m: dict[str, float], status: str, tmp_path: Path, document: dict[str, Any]
+) -> None:
+    found = judge(logs.read(written(tmp_path, logs.long(FULL)), document), document, errors_m)
+    pair = pair_of(found.pairs, *BROKEN)
+    assert pair.status == status
+    assert pair.error_m == pytest.approx(sum(errors_m.get(name, 0.0) for name in BROKEN))
+    far = pair_of(found.pairs, "tb_0", "uav")
+    assert far.promised_m == pytest.approx(0.6 - errors_m.get("uav", 0.0) - errors_m.get("tb_0", 0.0), abs=1e-9)
+    assert pair_of(found.pairs, "tb_0", "pillar").error_m == errors_m.get("tb_0", 0.0)
+
+
+def test_the_law_is_judged_in_intervals_of_any_length(tmp_path: Path, document: dict[str, Any]) -> None:
+    """A motion that obeys the law sampled at 20 Hz obeys it in every interval, also where samples are dropped."""
+    calm = {name: FULL[name] for name in ("tb_0", "uav")} | {
+        "tb_1": (FULL["tb_0"][0], FULL["tb_0"][1] + [0.0, 0.62, 0.0])
+    }
+    draw = np.random.default_rng(3)
+    loose = {name: (t_s[kept], places[kept]) for name, (t_s, places) in calm.items()
+             for kept in [np.sort(draw.permutation(len(t_s))[:90])]}  # fmt: skip
+    pair = pair_of(judge(logs.read(written(tmp_path, logs.long(loose)), document, gap_s=1.0), document).pairs, *BROKEN)
+    assert (pair.lacking, pair.hypotheses["obeys the avoidance law in every interval"]) == (0, True)
+    assert pair.promised_m == pytest.approx(0.3)
+    assert len(np.unique(np.round(np.diff(np.union1d(loose["tb_0"][0], loose["tb_1"][0])), 6))) > 2
+
+
+def test_a_shortfall_is_told_with_its_interval_and_its_robot(tmp_path: Path, document: dict[str, Any]) -> None:
+    """A step of 0.1 m towards a robot at rest, from the required distance, lacks 0.1 m; then A h asks for a retreat."""
+    t_s = np.array([0.0, 0.1, 0.4, 0.6])
+    still = np.zeros((4, 3))
+    moving = still + np.array([0.0, 0.6, 0.0])
+    moving[1:, 1] -= 0.1
+    log = {"tb_0": (t_s, still), "tb_1": (t_s, moving), "uav": (t_s, still + np.array([0.0, 0.0, 2.0]))}
+    pair = pair_of(judge(logs.read(written(tmp_path, logs.long(log)), document, gap_s=1.0), document).pairs, *BROKEN)
+    assert (pair.missed_at_s, pair.missed_for_s) == (0.0, pytest.approx(0.1))
+    assert pair.missed_by_m == {"tb_0": pytest.approx(0.0), "tb_1": pytest.approx(0.1)}
+    assert pair.missed_m == pytest.approx(0.1)
+    # at rest 0.1 m inside d: 3/s times 0.3 s asks for 0.09 m, of which each robot lacks its half
+    deficit = max(0.1, 0.1 * (1.0 - 0.9) + 0.09, (0.1 * (1.0 - 0.9) + 0.09) * (1.0 - 0.6) + 0.06)
+    assert pair.promised_m == pytest.approx(0.3 - deficit)
+    assert pair.came_m == {"tb_0": pytest.approx(0.0), "tb_1": pytest.approx(0.1)}
+    assert pair.below_s == [(pytest.approx(0.0, abs=1e-6), pytest.approx(0.6))]

@@ -1,0 +1,330 @@
+"""One experiment in the forms of many loggers: each gets the verdict that its numbers have."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import pandas as pd
+import pytest
+from builders import logs
+from builders.logs import BROKEN, EPOCH_NS, Motion, Ros
+
+from airground_drake.logs.judging import BROKEN as NOT_KEPT
+from airground_drake.logs.judging import KEPT, judge
+from airground_drake.scenarios.load import load, resolved
+
+
+class Form(NamedTuple):
+    """A form that a log can have: what writes it to a folder; what it says; remarks that are wanted."""
+
+    write: Callable[[Path], Path | list[Path]]
+    motion: Motion
+    says: tuple[str, ...] = ()
+    choice: Mapping[str, Any] = {}
+    within_m: float = 1e-9
+
+
+def table(
+    name: str, lines: Callable[[], list[list[str]]], delimiter: str = ",", above: str = ""
+) -> Callable[[Path], Path]:
+    """Writes a table."""
+
+    def write(folder: Path) -> Path:
+        (folder / name).write_text(above + logs.text(lines(), delimiter))
+        return folder / name
+
+    return write
+
+
+FULL, SLOW = logs.motion(), logs.motion(every=2)
+JITTER = logs.own_times({"tb_0": 20.0, "tb_1": 15.0, "uav": 12.0}, 0.35, seed=5)
+LATE = {"tb_0": 0.3, "tb_1": 0.01, "uav": 0.02}
+"""Delays of receipt, s: by times of receipt the distances are wrong."""
+
+
+def planar() -> list[list[str]]:
+    lines = logs.wide(FULL)
+    gone = {lines[0].index("tb_0_z"), lines[0].index("tb_1_z")}
+    return [[cell for k, cell in enumerate(line) if k not in gone] for line in lines]
+
+
+def sparse() -> list[list[str]]:
+    """A body a row, under the names of a ROS topic."""
+    names = list(JITTER)
+    head = ["__time", *(f"/{name}/odom/pose/pose/position/{axis}" for name in names for axis in "xyz")]
+    lines = [head]
+    for t, name, place in logs.rows(JITTER):
+        k = 3 * names.index(name)
+        lines.append([logs.since_1970(t), *[""] * k, *logs.fixed(place), *[""] * (3 * len(names) - k - 3)])
+    return lines
+
+
+def comma() -> list[list[str]]:
+    return [[cell if k == 0 else cell.replace(".", ",") for cell in line] for k, line in enumerate(logs.long(FULL))]
+
+
+def echo(folder: Path) -> Path:
+    """A file per robot, with times of receipt before the stamps of headers."""
+    for name, (t_s, places) in FULL.items():
+        late = round(1e9 * LATE[name])
+        lines = [["%time", "field.header.seq", "field.header.stamp", "field.header.frame_id",
+                  *(f"field.pose.position.{axis}" for axis in "xyz"), "field.pose.orientation.x"]]  # fmt: skip
+        for k, (t, place) in enumerate(zip(t_s, places, strict=True)):
+            ns = EPOCH_NS + round(t * 1e9)
+            lines.append([str(ns + late), str(k), str(ns), "world", *logs.fixed(place), "0.0"])
+        (folder / f"{name}.csv").write_text(logs.text(lines))
+    return folder
+
+
+def plotted(folder: Path) -> Path:
+    """Stamps of headers per topic, in seconds and nanoseconds, beside times of receipt."""
+    names, lines = list(SLOW), []
+    head = ["__time"]
+    for name in names:
+        head += [f"/{name}/pose/header/stamp/sec", f"/{name}/pose/header/stamp/nanosec"]
+        head += [f"/{name}/pose/pose/position/{axis}" for axis in "xyz"]
+    for t, name, place in logs.rows(SLOW):
+        ns, k = EPOCH_NS + round(t * 1e9), 5 * names.index(name)
+        own = [str(ns // 10**9), str(ns % 10**9), *logs.fixed(place)]
+        lines.append([logs.since_1970(t + LATE[name]), *[""] * k, *own, *[""] * (5 * len(names) - k - 5)])
+    return table("plot.csv", lambda: [head, *lines])(folder)
+
+
+def tum(folder: Path) -> Path:
+    for name, (t_s, places) in FULL.items():
+        lines = ["# timestamp tx ty tz qx qy qz qw"] * (name == "tb_0")
+        lines += [" ".join([logs.since_1970(t), *logs.fixed(p), "0 0 0 1"]) for t, p in zip(t_s, places, strict=True)]
+        (folder / f"run3_{name}.tum").write_text("\n".join(lines) + "\n")
+    return folder
+
+
+def euroc(folder: Path) -> Path:
+    """A comment is the header, and units are in brackets."""
+    for name, (t_s, places) in FULL.items():
+        head = "#timestamp [ns],p_RS_R_x [m],p_RS_R_y [m],p_RS_R_z [m],q_RS_x [],v_RS_R_x [m s^-1],v_RS_R_y [m s^-1]\n"
+        lines = [[str(EPOCH_NS + round(t * 1e9)), *logs.fixed(p), "0.0", "9", "9"]
+                 for t, p in zip(t_s, places, strict=True)]  # fmt: skip
+        (folder / f"{name}.csv").write_text(head + logs.text(lines))
+    return folder
+
+
+def mocap_mm() -> list[list[str]]:
+    """Five lines of headers; rotations and positions have the same axes."""
+    columns = [
+        (name, kind, axis)
+        for name in FULL
+        for kind, axes in (("Rotation", "XYZW"), ("Position", "XYZ"))
+        for axis in axes
+    ]
+    ids = [str(sorted(FULL).index(name)) for name, _, _ in columns]
+    lines = [
+        ["", "Type", *["Rigid Body"] * len(columns)], ["", "Name", *(name for name, _, _ in columns)],
+        ["", "ID", *ids], ["", "", *(kind for _, kind, _ in columns)],
+        ["Frame", "Time (Seconds)", *(axis for _, _, axis in columns)],
+    ]  # fmt: skip
+    for k, t in enumerate(FULL["uav"][0]):
+        cells = [c for _, places in FULL.values() for c in ("0.0", "0.0", "0.0", "1.0", *logs.fixed(places[k], 1000.0))]
+        lines.append([str(6 * k), f"{t:.6f}", *cells])
+    return lines
+
+
+def words() -> list[list[str]]:
+    lines = logs.long(FULL)
+    said = ("tracking", "tracking, slow", 'said "go"', "")
+    more = [
+        ["frame", "comment", "battery"],
+        *(["map", said[k % 4], f"{80 - 0.1 * k:.1f} %"] for k in range(len(lines) - 1)),
+    ]
+    return [[*line[:2], *each[:1], *line[2:], *each[1:]] for line, each in zip(lines, more, strict=True)]
+
+
+def twice() -> list[list[str]]:
+    """Equal rows twice, one that contradicts, and disorder."""
+    head, *lines = logs.long(FULL)
+    contradiction = next([*line] for line in lines if line[1] == "uav" and line[0] == "4.000000")
+    contradiction[2] = f"{float(contradiction[2]) + 0.01:.4f}"
+    moved = lines[30:60][::-1]
+    return [head, *lines[:30], *moved, *lines[60:], *lines[100:140], contradiction]
+
+
+def parquet(folder: Path) -> Path:
+    head, *lines = logs.long(FULL)
+    frame = pd.DataFrame(lines, columns=head)
+    frame[head[:1] + head[2:]] = frame[head[:1] + head[2:]].astype(float)
+    frame.to_parquet(folder / "log.parquet")
+    return folder / "log.parquet"
+
+
+def two_files(folder: Path) -> list[Path]:
+    """A log in two parts: the second half is in the first file that is named."""
+    head, *lines = logs.long(FULL)
+    (folder / "b.csv").write_text(logs.text([head, *lines[200:]]))
+    (folder / "a.csv").write_text(logs.text([head, *lines[:200]]))
+    return [folder / "b.csv", folder / "a.csv"]
+
+
+def of_json(folder: Path, profile: str = "") -> Path:
+    logs.mcap_json(folder / "run.mcap", logs.foxglove(JITTER, LATE), profile)
+    return folder / "run.mcap"
+
+
+def of_protobuf(folder: Path) -> Path:
+    logs.mcap_protobuf(folder / "run.mcap", JITTER)
+    return folder / "run.mcap"
+
+
+def gazebo(folder: Path) -> Path:
+    """Model states have no stamps and no frame; the model of the room is no robot."""
+    said = []
+    for k, t in enumerate(FULL["uav"][0]):
+        poses = [{"position": dict(zip("xyz", FULL[name][1][k].tolist(), strict=True))} for name in FULL]
+        states = {"name": ["room", *FULL], "pose": [{"position": {"x": 0.0, "y": 0.0, "z": 0.0}}, *poses]}
+        said.append((EPOCH_NS + round(t * 1e9), "/gazebo/model_states", "gazebo_msgs/ModelStates", states))
+    logs.mcap_json(folder / "run.mcap", said)
+    return folder / "run.mcap"
+
+
+def ros1(folder: Path) -> Path:
+    ros = Ros(1)
+    logs.write_ros1(folder / "run.bag", ros, logs.of_ros(ros, JITTER, LATE, "world"))
+    return folder / "run.bag"
+
+
+def ros2(storage: str) -> Callable[[Path], Path]:
+    def write(folder: Path) -> Path:
+        ros = Ros(2)
+        logs.write_ros2(folder / "bag", ros, logs.of_ros(ros, JITTER, LATE), storage)
+        return folder / "bag"
+
+    return write
+
+
+def ros2_file(folder: Path) -> Path:
+    """An MCAP file of ROS 2 without its folder."""
+    return next(ros2("MCAP")(folder).glob("*.mcap"))
+
+
+def humble(folder: Path) -> Path:
+    ros = Ros(2)
+    logs.write_db3(folder / "run.db3", ros, logs.of_ros(ros, JITTER, LATE))
+    return folder / "run.db3"
+
+
+def lab(bodies: Motion, head: str, stamp: Callable[[float], str] = "{:.6f}".format) -> Callable[[], list[list[str]]]:
+    return lambda: logs.long(bodies, head, stamp)
+
+
+UNDER_1970 = "times are in nanoseconds"
+FORMS = {
+    "long": Form(table("log.csv", lambda: logs.long(FULL)), FULL),
+    "wide": Form(table("log.csv", lambda: logs.wide(FULL)), FULL),
+    "wide, with points": Form(table("log.csv", lambda: logs.wide(FULL, "{}.pos_{}")), FULL),
+    "wide, tabs": Form(table("log.tsv", lambda: logs.wide(FULL), "\t"), FULL),
+    "wide, sparse": Form(table("log.csv", sparse), JITTER),
+    "wide, planar": Form(table("log.csv", planar), FULL, ("no height in the log: tb_0, tb_1",)),
+    "wide, mm in brackets": Form(
+        table("log.csv", lambda: [[c + " [mm]" * (k == 0 and j > 0) for j, c in enumerate(line)]
+                                  for k, line in enumerate(logs.wide(FULL, scale=1000.0))]),
+        FULL, ("millimetres, as the file says",),
+    ),
+    "mm by size": Form(
+        table("log.csv", lambda: logs.wide(FULL, scale=1000.0)), FULL, ("lengths are taken as millimetres",)
+    ),
+    "epoch": Form(table("log.csv", lab(FULL, "timestamp,name,x,y,z", logs.since_1970)), FULL),
+    "epoch, ns": Form(
+        table("log.csv", lab(JITTER, "stamp,robot,x,y,z", lambda t: str(EPOCH_NS + round(t * 1e9)))), JITTER,
+        (UNDER_1970,),
+    ),
+    "echo": Form(echo, FULL, (UNDER_1970,)),
+    "plotted": Form(plotted, SLOW),
+    "ms": Form(
+        table("log.csv", lab(FULL, "t,body,x,y,z", lambda t: str(round(1000 * t)))), FULL, ("taken as milliseconds",)
+    ),
+    "ms, stated": Form(table("log.csv", lab(FULL, "t_ms,body,x,y,z", lambda t: str(round(1000 * t)))), FULL,
+                       ("milliseconds, as the file says",)),
+    "decimal comma": Form(table("log.csv", comma, ";"), FULL),
+    "jitter": Form(table("log.csv", lambda: logs.long(JITTER)), JITTER),
+    "tum": Form(tum, FULL),
+    "euroc": Form(euroc, FULL, ("nanoseconds, as the file says",)),
+    "mocap": Form(
+        table("log.csv", lambda: logs.wide(FULL, "{}.{}"), above="# a, b\n# rate: 120 Hz\n# bodies\n"), FULL
+    ),
+    "mocap, mm": Form(
+        table("log.csv", mocap_mm, above="Format Version,1.23,Length Units,Millimeters,Space,Global\n\n"), FULL,
+        ("millimetres, as the file says",),
+    ),
+    "words": Form(table("log.csv", words), FULL),
+    "twice": Form(table("log.csv", twice), FULL, ("uav: 1 rows contradict", "come twice", "not in the order of time")),
+    "no uav": Form(table("log.csv", lambda: logs.long(logs.motion(("tb_0", "tb_1")))), logs.motion(("tb_0", "tb_1")),
+                   ("uav is not in the log",)),
+    "parquet": Form(parquet, FULL),
+    "two files": Form(two_files, FULL),
+    "other names": Form(
+        table("log.csv", lab({"A": FULL["tb_0"], "B": FULL["tb_1"], "uav": FULL["uav"]}, "clock,who,px_,py_,up")),
+        FULL, (), {"columns": {"t": "clock", "body": "who", "x": "px_", "y": "py_", "z": "up"},
+                   "rename": {"A": "tb_0", "B": "tb_1"}},
+    ),
+    "other names, wide": Form(
+        table("log.csv", lambda: logs.wide(FULL, "{}<{}>")), FULL, (),
+        {"columns": {"x": "{body}<x>", "y": "{body}<y>", "z": "{body}<z>"}},
+    ),
+    "foxglove, JSON": Form(of_json, JITTER),
+    "foxglove, JSON in a profile of ROS 2": Form(lambda folder: of_json(folder, "ros2"), JITTER),
+    "foxglove, protobuf": Form(of_protobuf, JITTER),
+    "gazebo": Form(gazebo, FULL),
+    "ROS 1": Form(ros1, JITTER),
+    "ROS 2, sqlite3": Form(ros2("SQLITE3"), JITTER),
+    "ROS 2, MCAP": Form(ros2("MCAP"), JITTER),
+    "ROS 2, MCAP without folder": Form(ros2_file, JITTER),
+    "ROS 2, no definitions": Form(humble, JITTER),
+}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def document(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
+    return resolved(load(str(logs.write_scenario(tmp_path_factory.mktemp("lab")))))
+
+
+@pytest.mark.parametrize("name", FORMS)
+def test_every_form_gets_the_verdict_of_its_numbers(name: str, tmp_path: Path, document: dict[str, Any]) -> None:
+    form = FORMS[name]
+    found = logs.read(form.write(tmp_path), document, **form.choice)
+    judged = judge(found, document)
+    expected = logs.least_gaps(form.motion)
+    assert {(pair.first, pair.second) for pair in judged.pairs} == {*expected}
+    for pair in judged.pairs:
+        least_m, at_s = expected[pair.first, pair.second]
+        assert pair.least_m == pytest.approx(least_m, abs=form.within_m)
+        assert pair.safe_m == logs.required_m(pair.first, pair.second)
+        if pair.status == NOT_KEPT:
+            shift_s = min(t_s[0] for t_s, _ in form.motion.values()) if found.origin else 0.0
+            assert pair.at_s == pytest.approx(at_s - shift_s, abs=1e-5)
+    assert [(pair.first, pair.second) for pair in judged.pairs if pair.status != KEPT] == [BROKEN]
+    assert [wanted for wanted in form.says if not any(wanted in each for each in found.said)] == []
+
+
+def test_these_numbers_would_be_kept_if_receipt_counted_or_a_unit_were_missed() -> None:
+    """The forms can fail: by another clock, or in millimetres, the verdict is another one."""
+    late = {name: (t_s + LATE[name], places) for name, (t_s, places) in JITTER.items()}
+    assert abs(logs.least_gaps(late)[BROKEN][0] - logs.least_gaps(JITTER)[BROKEN][0]) > 1e-3
+    assert logs.least_gaps(FULL)[BROKEN][0] < 0.3
+    assert [pair for pair, (least_m, _) in logs.least_gaps(FULL).items() if least_m < logs.required_m(*pair)] == [
+        BROKEN
+    ]
+
+
+def test_what_was_not_used_is_named(tmp_path: Path, document: dict[str, Any]) -> None:
+    assert logs.read(FORMS["words"].write(tmp_path), document).ignored == ["log.csv: columns comment, battery"]
+    assert "run.bag: /tb_0/cmd_vel (geometry_msgs/msg/Twist)" in logs.read(ros1(tmp_path), document).ignored
+    assert "room: names no body of the scenario" in logs.read(gazebo(tmp_path), document).ignored
+
+
+def test_nanoseconds_are_not_rounded(tmp_path: Path, document: dict[str, Any]) -> None:
+    """As a floating-point number a stamp would be off by up to 128 ns."""
+    path = FORMS["epoch, ns"].write(tmp_path)
+    track = logs.read(path, document).bodies["tb_1"]
+    first = min(t_s[0] for t_s, _ in JITTER.values())
+    assert np.abs(track.t_s - (JITTER["tb_1"][0] - first)).max() < 1e-12

@@ -1,0 +1,202 @@
+"""Logs that are broken, huge or made to mislead: one line says why, and nothing else happens."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+from builders import logs
+from builders.logs import Ros
+from hypothesis import given
+from hypothesis import strategies as st
+
+from airground_drake.base import files
+from airground_drake.base.errors import LogError
+from airground_drake.logs import bags, text
+from airground_drake.logs.judging import judge
+from airground_drake.scenarios.load import load, resolved
+
+FULL = logs.motion(every=4)
+LONG = logs.text(logs.long(FULL))
+
+
+@pytest.fixture(scope="module")
+def document(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
+    return resolved(load(str(logs.write_scenario(tmp_path_factory.mktemp("lab")))))
+
+
+def of_mcap(folder: Path) -> Path:
+    logs.mcap_json(folder / "a.mcap", logs.foxglove(FULL, {}))
+    return folder / "a.mcap"
+
+
+def of_protobuf(folder: Path) -> Path:
+    logs.mcap_protobuf(folder / "a.mcap", FULL)
+    return folder / "a.mcap"
+
+
+def of_ros1(folder: Path) -> Path:
+    logs.write_ros1(folder / "a.bag", Ros(1), logs.of_ros(Ros(1), FULL, {}))
+    return folder / "a.bag"
+
+
+def of_db3(folder: Path) -> Path:
+    logs.write_db3(folder / "a.db3", Ros(2), logs.of_ros(Ros(2), FULL, {}))
+    return folder / "a.db3"
+
+
+def of_text(folder: Path) -> Path:
+    (folder / "a.csv").write_text(LONG)
+    return folder / "a.csv"
+
+
+WRITERS: list[Callable[[Path], Path]] = [of_mcap, of_protobuf, of_ros1, of_db3, of_text]
+
+
+def judged_or_refused(path: Path, document: dict[str, Any]) -> str:
+    """'' if the log can be judged, else the refusal, which is one line; any other exception is a fault."""
+    try:
+        judge(logs.read(path, document), document)
+    except LogError as error:
+        said = str(error)
+    else:
+        said = ""
+    assert "\n" not in said
+    assert len(said) < 1500
+    return said
+
+
+@pytest.mark.parametrize("write", WRITERS, ids=lambda write: write.__name__)
+def test_a_file_that_ends_early_is_refused_or_judged_as_far_as_it_goes(
+    write: Callable[[Path], Path], tmp_path: Path, document: dict[str, Any]
+) -> None:
+    path = write(tmp_path)
+    assert judged_or_refused(path, document) == ""
+    whole = path.read_bytes()
+    for length in np.linspace(0, len(whole) - 1, 25).astype(int).tolist():
+        path.write_bytes(whole[:length])
+        said = judged_or_refused(path, document)
+        assert said or write is of_text or length > 0.9 * len(whole)
+
+
+@pytest.mark.parametrize("write", WRITERS, ids=lambda write: write.__name__)
+def test_changed_bytes_end_in_a_line_or_in_a_verdict(
+    write: Callable[[Path], Path], tmp_path: Path, document: dict[str, Any]
+) -> None:
+    path, draw = write(tmp_path), np.random.default_rng(1)
+    whole = path.read_bytes()
+    for _ in range(25):
+        changed = bytearray(whole)
+        for k in draw.integers(0, len(whole), 8).tolist():
+            changed[k] = int(draw.integers(256))
+        path.write_bytes(changed)
+        judged_or_refused(path, document)
+
+
+CELLS = st.sampled_from(["1", "2.5", "x", "nan", "", '"', "t", "1e999", "-1", "1,5"])
+TABLES = st.lists(st.lists(CELLS, max_size=6).map(";".join), max_size=9).map("\n".join)
+
+
+@given(st.binary(max_size=400) | st.text(max_size=400).map(str.encode) | TABLES.map(str.encode))
+def test_noise_is_refused(content: bytes) -> None:
+    try:
+        found = text.read(content)
+    except LogError:
+        return
+    assert len(found.labels) == len(found.cells.columns) >= text.FEWEST
+
+
+@pytest.mark.parametrize(
+    "start", [b"\x89MCAP0\r\n", b"#ROSBAG V2.0\n", b"SQLite format 3\0", b"PAR1", b"\x1f\x8b", b""]
+)
+def test_noise_after_the_mark_of_a_kind_is_refused(start: bytes, tmp_path: Path, document: dict[str, Any]) -> None:
+    noise = np.random.default_rng(2).integers(0, 256, 3000).astype(np.uint8).tobytes()
+    (tmp_path / "a.log").write_bytes(start + noise)
+    assert judged_or_refused(tmp_path / "a.log", document)
+
+
+@pytest.mark.parametrize(
+    ("content", "says"),
+    [
+        ("", "it is empty"),
+        ("\n\n# only a comment\n", "no lines with data"),
+        ("hello\nworld\n", "it is no table"),
+        ("t_s,body,x_m,y_m,z_m\n", "no line of it has numbers"),
+        ("a,b,c\n1,2,3\n4,5,6\n", "it lacks a column of times and columns x and y: its columns are a, b, c"),
+        ("t,body,x,x,y\n0,tb_0,0,0,0\n1,tb_0,0,0,0\n", "two columns are called 'x'"),
+        ("t,x_m,y_m,p.x,p.y\n0,1,2,3,4\n1,1,2,3,4\n", ""),
+        (LONG.replace("tb_0", "nobody"), "tb_0 is not in the log"),
+        (LONG.replace(",0.0000,", ",1e155,"), "has a value beyond 1e+12; wanted: seconds and metres"),
+        (LONG.replace("0.0000", "inf"), ""),
+    ],
+)
+def test_a_table_that_cannot_be_used_says_what_is_wanted(
+    content: str, says: str, tmp_path: Path, document: dict[str, Any]
+) -> None:
+    (tmp_path / "a.csv").write_text(content)
+    said = judged_or_refused(tmp_path / "a.csv", document)
+    assert said
+    assert says in said
+
+
+def test_other_encodings_and_line_ends_are_read(tmp_path: Path, document: dict[str, Any]) -> None:
+    for content in (LONG.encode("utf-16"), LONG.encode("utf-8-sig"), LONG.replace("\n", "\r\n").encode(),
+                    LONG.replace("body", "body", 1).encode() + b"# caf\xe9\n"):  # fmt: skip
+        (tmp_path / "a.csv").write_bytes(content)
+        assert judged_or_refused(tmp_path / "a.csv", document) == ""
+
+
+def test_names_that_look_like_no_value_are_names(tmp_path: Path) -> None:
+    """A robot named NA is one."""
+    given = logs.scenario()
+    given["ugvs"] = {"NA": given["ugvs"]["tb_0"], "null": given["ugvs"]["tb_1"]}
+    (tmp_path / "lab.yaml").write_text(yaml.safe_dump(given))
+    table = logs.long({"NA": FULL["tb_0"], "null": FULL["tb_1"], "uav": FULL["uav"]})
+    (tmp_path / "a.csv").write_text(logs.text(table))
+    document = resolved(load(str(tmp_path / "lab.yaml")))
+    assert {*logs.read(tmp_path / "a.csv", document).bodies} == {"NA", "null", "uav"}
+
+
+def test_too_large_a_text_is_refused_before_it_is_read(
+    tmp_path: Path, document: dict[str, Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = of_text(tmp_path)
+    monkeypatch.setattr(text, "MOST_ROWS", 50)
+    assert "it has 93 rows; allowed: 50" in judged_or_refused(path, document)
+    with pytest.raises(OSError, match="allowed: 10"):
+        files.read_bytes(path, 10, links=True)
+
+
+def test_messages_that_lie_about_their_fields_are_left_out(tmp_path: Path, document: dict[str, Any]) -> None:
+    lies: list[Any] = [
+        None, [], "text", 7, {"pose": 1}, {"position": {"x": "a", "y": 1, "z": 2}}, {"transforms": 5},
+        {"name": ["tb_0"], "pose": []}, {"position": {"x": 1e400, "y": 0, "z": 0}}, {"header": {"stamp": {"sec": "x"}}},
+    ]  # fmt: skip
+    said = logs.foxglove(FULL, {})
+    more = [(logs.EPOCH_NS + k, f"/tb_0/lie_{k}", "lie", each) for k, each in enumerate(lies)]
+    logs.mcap_json(tmp_path / "a.mcap", [*said, *more])
+    assert judged_or_refused(tmp_path / "a.mcap", document) == ""
+
+
+@pytest.mark.parametrize(
+    ("package", "write", "says"),
+    [
+        ("mcap.reader", of_mcap, "an MCAP file needs the package mcap"),
+        ("mcap_protobuf.decoder", of_protobuf, "messages in protobuf need the package mcap-protobuf-support"),
+        ("rosbags", of_ros1, "messages of ROS need the package rosbags"),
+        ("rosbags", of_db3, "messages of ROS need the package rosbags"),
+    ],
+)
+def test_a_package_that_is_missing_is_named_in_one_line(
+    package: str, write: Callable[[Path], Path], says: str, tmp_path: Path, document: dict[str, Any],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:  # fmt: skip
+    path = write(tmp_path)
+    monkeypatch.setitem(sys.modules, package, None)
+    said = judged_or_refused(path, document)
+    assert f"{says}: {bags.HINT}" in said
