@@ -1,6 +1,6 @@
 """A coarse roadmap for joint plans: few nodes, one robot's width or so apart, and the ways of the roadmap between them.
 
-The nodes are drawn from the roadmap so that no two are nearer to each other, by way, than a given width. Every node of
+The nodes are drawn from the roadmap so that no two are nearer to each other than a given width, if nothing is in between. Every node of
 the roadmap belongs to the nearest of them by way. Two nodes whose regions touch are joined by the shortest way through
 the common border. So two nodes are connected in the coarse roadmap exactly where they are in the roadmap.
 
@@ -30,6 +30,9 @@ FROM_START = 2.0
 robots that have met have little room for their first move."""
 NO_LONGER = 1.05
 """A smaller robot uses the edge of a larger one between the same nodes, unless its own is shorter by this factor."""
+
+AS_LATTICE = 1.09
+"""Ways along the lattice are at most this much longer than straight ones."""
 
 
 class CoarseGraph(NamedTuple):
@@ -97,7 +100,7 @@ def coarsened(movers: Sequence[Mover], width: float) -> Coarse:
     targets = np.array([mover.own.target for mover in movers], dtype=np.int64)
     places = movers[0].roadmap.nodes
     graphs = [_ways(movers, sizes, size, space) for size, space in enumerate(spaces)]
-    seeds = _nodes(graphs, targets, sizes, width)
+    seeds = _nodes(graphs, places, targets, sizes, width)
     number = np.full(len(places), -1, dtype=np.int64)
     number[seeds] = np.arange(len(seeds))
     edges: dict[tuple[int, ...], _Edge] = {}
@@ -127,19 +130,20 @@ def _ways(movers: Sequence[Mover], sizes: Indices, size: int, space: Space) -> c
     return csr_array((lengths[kept], (tails[kept], heads[kept])), shape=(len(nodes), len(nodes)))
 
 
-def _nodes(graphs: Sequence[csr_array], targets: Indices, sizes: Indices, width: float) -> Indices:
+def _nodes(graphs: Sequence[csr_array], places: Array, targets: Indices, sizes: Indices, width: float) -> Indices:
     """Nodes of the roadmap for the coarse one: the targets, then every node that is `width`, m, from all before it."""
     found = np.zeros(0, dtype=np.int64)
     for size, ways in enumerate(graphs):
         wanted = np.unique(targets[sizes == size])
         always = np.concatenate([found, wanted[~np.isin(wanted, found)]])
         free = np.diff(ways.indptr) > 0
-        found = _packed(ways.indptr, ways.indices, ways.data, always, free, width)
+        found = _packed(places, ways.indptr, ways.indices, ways.data, always, free, width)
     return found
 
 
 @njit(cache=True)
 def _packed(
+    places: Array,
     first: npt.NDArray[np.int32],
     heads: npt.NDArray[np.int32],
     lengths: Array,
@@ -147,27 +151,35 @@ def _packed(
     wanted: npt.NDArray[np.bool_],
     width: float,
 ) -> Indices:
-    """The nodes `always`, and of the `wanted` nodes, in order, those that are `width`, m, by way from all chosen before."""
+    """The nodes `always`, and of the `wanted` nodes, in order, those that are `width`, m, from all chosen before.
+
+    Nodes behind a wall do not count: only those to which a way leads that is hardly longer than the lattice makes it.
+    """
     count = len(first) - 1
-    near = np.full(count, np.inf)
+    covered, way_to = np.zeros(count, np.bool_), np.full(count, np.inf)
     chosen, many = np.empty(count + len(always), np.int64), 0
     for k in range(len(always) + count):
-        node = always[k] if k < len(always) else k - len(always)
-        if k >= len(always) and (near[node] < width or not wanted[node]):
+        seed = always[k] if k < len(always) else k - len(always)
+        if k >= len(always) and (covered[seed] or not wanted[seed]):
             continue
-        chosen[many] = node
+        chosen[many] = seed
         many += 1
-        near[node] = 0.0
-        heap = [(0.0, node)]
+        way_to[seed] = 0.0
+        reached, heap = [seed], [(0.0, seed)]
         while len(heap) > 0:
             way, here = heappop(heap)
-            if way > near[here]:
+            if way > way_to[here]:
                 continue
+            if np.hypot(places[here, 0] - places[seed, 0], places[here, 1] - places[seed, 1]) < width:
+                covered[here] = True
             for e in range(first[here], first[here + 1]):
-                there, further = heads[e], way + lengths[e]
-                if further < width and further < near[there]:
-                    near[there] = further
-                    heappush(heap, (further, np.int64(there)))
+                there, further = np.int64(heads[e]), way + lengths[e]
+                if further < AS_LATTICE * width and further < way_to[there]:
+                    way_to[there] = further
+                    reached.append(there)
+                    heappush(heap, (further, there))
+        for node in reached:
+            way_to[node] = np.inf
     return chosen[:many]
 
 

@@ -31,14 +31,15 @@ WIDTHS = (1.45, 1.02, 0.7, 0.5)
 round a right angle; with the second it stands on the next node."""
 SWAPS_FROM = 1.0
 """The swap rule is used on roadmaps of at least this width: on narrower ones robots cover several nodes."""
-SHARES = (0.01, 0.09, 0.4)
-"""Shares of the candidates that the roadmaps get together, one round after the other."""
-AGAIN = 10
-"""Number of further plans with shuffled moves."""
-AGAIN_AT_MOST = 4.0
+FIRST = 400
+"""Candidates for each robot in the first round; every further round gets twice as many on each roadmap."""
+NOISES = (0.05, 0.3, 1.0)
+"""How much moves are shuffled in each round, in widths, and so on from the first again. Some orders of moves lead into
+a long search, others of the same robots straight to a plan: beginning anew is worth more than going on."""
+AGAIN = 24
+"""Number of further plans with shuffled moves, once one is found: on the roadmap that has it, and on the widest two."""
+AGAIN_AT_MOST = 3.0
 """A further plan may cost this many times as much as the first one."""
-NOISE, MORE_NOISE = 0.05, 0.3
-"""How much moves are shuffled in the first plan and in further ones, in widths."""
 WAITING = 0.5
 """What it costs to wait for a step while others with known motions are under way, in widths."""
 MOST_LAYERS = 400
@@ -72,19 +73,34 @@ def first_plan(movers: Sequence[Mover], fixed: Sequence[OtherRobot], candidates:
     """
     least = min(mover.space.apart for mover in movers)
     searches = [_Search(movers, fixed, share, share * least) for share in WIDTHS]
-    spent = 0
-    for share in SHARES:
+    spent, budget, turn = 0, FIRST * len(movers), 0
+    while spent < candidates and not all(each.exhausted for each in searches):
         for each in searches:
             if each.exhausted:
                 continue
-            budget = int(share * candidates) // len(searches)
-            status, moves, cost = each.run(budget)
-            spent += cost
-            if status == "found":
-                ways, more = each.best(moves, cost)
+            found = each.run(min(budget, candidates - spent), turn)
+            spent += found.candidates
+            if found.status == "found":
+                ways, more = _best(each, found, searches[:2])
                 return FirstPlan("found", ways, spent + more)
+            if spent >= candidates:
+                break
+        budget, turn = 2 * budget, turn + 1
     done = all(each.exhausted for each in searches)
     return FirstPlan("exhausted" if done else "effort spent", (), spent)
+
+
+def _best(found_on: _Search, first: lacam.Steps, others: Sequence[_Search]) -> tuple[tuple[Way, ...], int]:
+    """The best of some plans with shuffled moves, on several roadmaps, and what they cost."""
+    best, spent = found_on.timed(first.moves), 0
+    again = list(dict.fromkeys([found_on, *others]))
+    for turn in range(AGAIN // len(again)):
+        for each in again:
+            found = each.run(int(AGAIN_AT_MOST * first.candidates), AGAIN + turn)
+            spent += found.candidates
+            if found.status == "found":
+                best = min(best, each.timed(found.moves), key=_sum)
+    return tuple(best), spent
 
 
 class _Search:
@@ -105,32 +121,19 @@ class _Search:
             )
             to_go = _to_go(coarse, shut, WAITING * self._width)
             swaps = self._share >= SWAPS_FROM
-            team = Team(
-                coarse.targets, coarse.usable, coarse.sizes, shut, apart, to_go, swaps, NOISE * self._width
-            )
+            team = Team(coarse.targets, coarse.usable, coarse.sizes, shut, apart, to_go, swaps, 0.0)
             self._made = coarse, team, step
         return self._made
 
-    def run(self, candidates: int) -> tuple[lacam.Status, Indices, int]:
-        """Search within this effort; whether there are steps, the steps, and the effort."""
+    def run(self, candidates: int, turn: int) -> lacam.Steps:
+        """Search within this effort; another turn shuffles the moves in another way."""
         coarse, team, _ = self._make()
-        found = lacam.search(coarse.graph, team, coarse.starts, candidates)
+        shuffled = team._replace(noise=NOISES[turn % len(NOISES)] * self._width)
+        found = lacam.search(coarse.graph, shuffled, coarse.starts, candidates, turn)
         self.exhausted = found.status == "exhausted"
-        return found.status, found.moves, found.candidates
+        return found
 
-    def best(self, moves: Indices, cost: int) -> tuple[tuple[Way, ...], int]:
-        """The best of some plans with shuffled moves, and what they cost."""
-        coarse, team, _ = self._make()
-        best, spent = self._timed(moves), 0
-        shuffled = team._replace(noise=MORE_NOISE * self._width)
-        for turn in range(1, AGAIN + 1):
-            found = lacam.search(coarse.graph, shuffled, coarse.starts, int(AGAIN_AT_MOST * cost), turn)
-            spent += found.candidates
-            if found.status == "found":
-                best = min(best, self._timed(found.moves), key=_sum)
-        return tuple(best), spent
-
-    def _timed(self, moves: Indices) -> list[Way]:
+    def timed(self, moves: Indices) -> list[Way]:
         coarse, team, step = self._make()
         short = network.without_loops(coarse.graph, team, moves)
         found = network.motions(coarse.graph, team, short, [mover.speed for mover in self._movers])

@@ -29,7 +29,8 @@ class Effort:
     """Limits of the work on a plan, in counts, so that the plan is the same on every machine.
 
     Attributes:
-        expansions: expanded intervals in all searches for single robots; a quarter is reserved for a partial plan.
+        expansions: expanded intervals in all searches for single robots, times the number of robots by 20 if there are
+            more; a quarter is reserved for a partial plan.
         candidates: moves that the search over joint steps considers; 0: no such search.
         searches: searches for single robots that improve a complete plan, times the number of robots.
     """
@@ -136,7 +137,8 @@ class _Search:
         self._movers, self._fixed, self._follow, self._effort = movers, fixed, follow, effort
         self.spent, self.candidates = 0, 0
         self.outcome: Outcome = "effort spent"
-        self._limit = effort.expansions * 3 // 4
+        self._most = effort.expansions * max(20, len(movers)) // 20
+        self._limit = self._most * 3 // 4
         self._without_way = [i for i, mover in enumerate(movers) if math.isinf(mover.to_go[mover.own.start])]
 
     def complete(self) -> list[Way | None] | None:
@@ -168,7 +170,7 @@ class _Search:
         """The ways that the robots would have without each other; not of those that are known to have none."""
         found: list[Way | None] = []
         for i, mover in enumerate(self._movers):
-            way, spent = (None, 0) if i in self._without_way else find(mover, self._taken(), self._follow, self._left())
+            way, spent = (None, 0) if i in self._without_way else find(mover, self._taken(), self._follow, self._most)
             self.spent += spent
             found.append(way)
         return found
@@ -251,7 +253,7 @@ class _Search:
 
     def partly(self) -> list[Way | None]:
         """A plan in which robots without a way stay. Each time a robot finds none, the others are planned anew."""
-        self._limit = self._effort.expansions
+        self._limit = self._most
         staying = list(self._without_way)
         for _ in self._movers:
             ways, failed = self._in_order(self._by_length(staying), staying)

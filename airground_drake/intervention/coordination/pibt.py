@@ -172,7 +172,7 @@ def give(graph: CoarseGraph, team: Team, step: Step, root: int) -> bool:
             if team.swaps and many > 0:
                 partner = swap_partner(graph, team, step, entered, lists[depth, 0])
                 if partner >= 0:
-                    turn_back(graph, team, step, entered, partner, lists[depth, :many])
+                    many = turn_back(graph, team, step, entered, partner, lists[depth, :many])
             frames[depth, 0], frames[depth, 1], frames[depth, 2] = entered, many, -1
             frames[depth, 3], frames[depth, 4] = partner, counts[2]
             chosen = next_move(graph, team, step, depth)
@@ -238,21 +238,32 @@ def must_go(graph: CoarseGraph, team: Team, step: Step, i: int, j: int) -> bool:
 
 
 @njit(cache=True)
-def turn_back(graph: CoarseGraph, team: Team, step: Step, i: int, partner: int, found: Indices) -> None:
-    """Sort the moves of robot i so that those come first that its partner can follow, and that lead farthest away."""
-    first, heads, at, apart = graph.first, graph.heads, step.at, team.apart
+def turn_back(graph: CoarseGraph, team: Team, step: Step, i: int, partner: int, found: Indices) -> int:
+    """Sort the moves of robot i so that those come first that its partner can follow, and that lead farthest away.
+
+    Moves that lead nearer to the target come last. If the partner already pushes robot i, they are left out: the partner
+    has to wait.
+
+    Returns:
+        The number of moves.
+    """
+    first, heads, at, apart, to_go = graph.first, graph.heads, step.at, team.apart, team.to_go[-1]
     behind = -1
     for edge in range(first[at[partner]], first[at[partner] + 1]):
         if heads[edge] == at[i] and team.usable[partner, edge] and behind < 0:
             behind = edge
+    pushed = step.moves[partner] >= 0 and heads[step.moves[partner]] == at[i]
     reverse = found[::-1].copy()
     many = 0
-    for clear in (True, False):
+    for rank in range(2 if pushed else 3):
         for edge in reverse:
-            free = behind < 0 or not conflicts(graph, edge, behind, apart[i, partner], False)
-            if free == clear:
+            own = 2
+            if to_go[i, heads[edge]] >= to_go[i, at[i]]:
+                own = 1 if behind >= 0 and conflicts(graph, edge, behind, apart[i, partner], False) else 0
+            if own == rank:
                 found[many] = edge
                 many += 1
+    return many
 
 
 @njit(cache=True)
@@ -321,14 +332,14 @@ def swap_partner(graph: CoarseGraph, team: Team, step: Step, i: int, best: int) 
     here, there = at[i], heads[best]
     if there != here:
         j = standing_at(graph, team, step, i, there)
-        if j >= 0 and moves[j] < 0 and must_swap(graph, team, i, j, here, there):
+        if j >= 0 and must_swap(graph, team, i, j, here, there):
             return j if can_swap(graph, team, i, at[j], here, apart[i, j]) else -1
     for edge in range(first[here] + 1, first[here + 1]):
         behind = heads[edge]
         if behind == there or behind == here:
             continue
         j = standing_at(graph, team, step, i, behind)
-        if j < 0 or (moves[j] >= 0 and heads[moves[j]] != here):
+        if j < 0:
             continue
         if np.hypot(places[at[j], 0] - places[there, 0], places[at[j], 1] - places[there, 1]) < apart[i, j]:
             continue
