@@ -317,6 +317,7 @@ MODEL_CLAIMS = Registry(
     "model_claims",
     {
         "SAFE-INV": "airground_drake.verify.model.safe_inv:SafeInv",
+        "SAFE-BUDGET": "airground_drake.verify.model.safe_budget:SafeBudget",
         "SAFE-GATE": "airground_drake.verify.model.safe_gate:SafeGate",
         "SAFE-DIST": "airground_drake.verify.model.safe_dist:SafeDist",
         "ZENO-PROOF": "airground_drake.verify.model.zeno_proof:ZenoProof",

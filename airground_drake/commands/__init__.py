@@ -43,6 +43,7 @@ COMMANDS: dict[str, Command] = {
     "replay": Command("airground_drake.commands.replay", "show the runs of a report: a page each, or a video"),
     "export": Command("airground_drake.commands.export", "write the runs of a report as CSV or MCAP files"),
     "figures": Command("airground_drake.commands.figures", "write the figures of a report as PDF, with LaTeX tables"),
+    "budget": Command("airground_drake.commands.budget", "say what the distances of a scenario cost, term by term"),
     "diagram": Command("airground_drake.commands.diagram", "draw the diagram of a scenario"),
     "list": Command("airground_drake.commands.listing", "list scenarios, methods, policies, routes, tasks and claims"),
     "import": Command("airground_drake.commands.importing", "make a scenario of a BARN world, a ROS map, or MovingAI"),

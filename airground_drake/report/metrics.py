@@ -14,7 +14,7 @@ from airground_drake.report.interventions import avoidance, farthest_from_predic
 from airground_drake.run.collisions import first_collisions
 from airground_drake.run.trace import Trace
 from airground_drake.verify.engines.geometry import interpolate
-from airground_drake.verify.model.pair_kinds import THEOREMS, kind_of
+from airground_drake.verify.model.pair_kinds import MOVING, kind_of
 from airground_drake.verify.runs.gate_record import without_decisions
 from airground_drake.verify.runs.instants import without_proposals
 from airground_drake.verify.runs.live_goal import AT_REST_M, AT_REST_S, moved_at_the_end
@@ -305,7 +305,7 @@ def _listed(trace: Trace, found: dict[str, Gap]) -> dict[str, dict[str, Any]]:
         other: {
             "value": least.gap_m, "t_s": least.t_s, "safe_distance_m": least.pair.required_m,
             **({"appeared": True} if least.at_appearance(trace.t) else {}),
-            **({} if kind_of(trace.scenario, least.pair.first, other) in THEOREMS else {"moves": True}),
+            **({"moves": True} if kind_of(trace.scenario, least.pair.first, other) == MOVING else {}),
         }
         for other, least in found.items()
     }  # fmt: skip

@@ -14,8 +14,9 @@ from airground_drake.run.collisions import first_collisions
 SLACK_M = 1e-9
 """A distance counts as kept if it falls short of the required one by less, as in SAFE-TRACE."""
 
-THEOREMS, CONDITIONS = ("SAFE-INV", "SAFE-GATE"), "SAFE-HYP"
-"""The claims that prove the safety of method (d), and the one that a run met their conditions."""
+THEOREMS, BUDGET, CONDITIONS = ("SAFE-INV", "SAFE-GATE"), "SAFE-BUDGET", "SAFE-HYP"
+"""The claims that prove the safety of method (d); the one that joins them if bodies are not where the law steers them;
+and the one that a run met their conditions."""
 DECLARED = "declared speed"
 """The hypothesis of SAFE-HYP that is about obstacles that move alone."""
 
@@ -141,7 +142,7 @@ class RunOutcome:
         only_speed = against.get("hypothesis") == DECLARED and not against.get("also_broken")
         proved = any(claim["status"] == "proved" for claim in claims(document, THEOREMS[0]))
         self.else_met = proved and (conditions["status"] in PASSING or only_speed)
-        self.proof = self._proof(found) if self.method == "d" else None
+        self.proof = self._proof(found, resolved) if self.method == "d" else None
 
         self.arrived_s = {event["robot"]: event["t_s"] for event in run["events"] if event["kind"] == "arrival"}
         self.away = None if run is NOT_RUN else self._away(resolved, run["metrics"]["final_position_m"])
@@ -152,12 +153,14 @@ class RunOutcome:
         self.on_the_way: Mapping[str, Mapping[str, Any]] = run["metrics"]["on_the_way"]
         self.no_way = no_way(run)
 
-    def _proof(self, found: Mapping[str, Mapping[str, Any]]) -> ProofOutcome:
+    def _proof(self, found: Mapping[str, Mapping[str, Any]], resolved: Mapping[str, Any]) -> ProofOutcome:
         """Whether the run was proved safe; theorems may have been judged for this run alone.
 
         That an obstacle moved faster than declared leaves the proofs for all other pairs as they are.
         """
-        unproved = {name: found.get(name) for name in THEOREMS if found.get(name, UNJUDGED)["status"] != "proved"}
+        plants = [plant for robot in (*resolved["ugvs"].values(), resolved["uav"]) for plant in robot.get("plant", ())]
+        theorems = (*THEOREMS, *((BUDGET,) * any(plant["kind"] != "first_order" for plant in plants)))
+        unproved = {name: found.get(name) for name in theorems if found.get(name, UNJUDGED)["status"] != "proved"}
         if unproved:
             return ProofOutcome("unproved", unproved)
         conditions = found.get(CONDITIONS, UNJUDGED)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from itertools import combinations
 from typing import NamedTuple
 
@@ -101,3 +101,12 @@ def budget(scenario: Scenario) -> Iterator[PairBudget]:
         with_uav = scenario.uav.name in (one, other)
         promised = safe.air_ground_m if with_uav else safe.ugv_m
         yield of_pair(one, other, "air_ground" if with_uav else "ugv", promised, radius[one] + radius[other])
+
+
+def alike(pairs: Iterable[PairBudget]) -> list[list[PairBudget]]:
+    """The pairs with the same numbers together, in the order of the first of each."""
+    groups = dict[object, list[PairBudget]]()
+    for pair in pairs:
+        terms = tuple(sorted((term.key, term.metres) for term in pair.terms))
+        groups.setdefault((pair.kind, pair.promised_m, round(pair.gap_m, 12), terms), []).append(pair)
+    return [*groups.values()]

@@ -79,6 +79,10 @@ class ModelClaim(Claim):
     expected: Status = "proved"
     record: type[Evidence] = Evidence
 
+    def applies_to(self, scenario: Scenario) -> bool:
+        """Whether the claim says anything about a scenario; if not, it is left out."""
+        return True
+
     @abc.abstractmethod
     def inputs(self, scenario: Scenario) -> dict[str, Any]:
         """The constants of a scenario that the claim is about, strict JSON; may be empty."""

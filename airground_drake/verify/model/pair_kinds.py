@@ -11,7 +11,8 @@ from itertools import combinations
 from typing import Any, NamedTuple
 
 from airground_drake.base.exact import decimal
-from airground_drake.scenarios.schema import Scenario
+from airground_drake.scenarios.schema import Scenario, Uav, Ugv
+from airground_drake.verify.engines.bodies import Room, law_m, room_of
 
 SHARES = {"obstacle": (Fraction(1), Fraction(0)), "uav_ugv": (Fraction(1, 2),) * 2, "ugv_ugv": (Fraction(1, 2),) * 2}
 """By kind of pair, the parts of an inequality that its two bodies take; an obstacle stands still and takes none."""
@@ -23,18 +24,28 @@ THEOREMS = {
 """By kind of pair, the theorems that prove its distance. A kind that is not here is never called proved."""
 MOVING = "moving"
 """The kind of a robot beside an obstacle that may move: no theorem keeps its distance."""
+STEERED = "steered"
+"""The kind of a pair with a body that is not where the law steers it: these theorems are about the steered points."""
 
 
 def kind_of(scenario: Scenario, first: str, second: str) -> str:
     """The kind of a pair of bodies, named in either order."""
     for name in (first, second):
-        if name in scenario.barriers:
-            return MOVING if scenario.barriers[name].expected_speed_m_s > 0.0 else "obstacle"
+        if name in scenario.barriers and scenario.barriers[name].expected_speed_m_s > 0.0:
+            return MOVING
+    robots = [scenario.robots[name] for name in (first, second) if name in scenario.robots]
+    if any(plant.kind != "first_order" for robot in robots for plant in robot.plant):
+        return STEERED
+    if len(robots) < 2:
+        return "obstacle"
     return "uav_ugv" if scenario.uav.name in (first, second) else "ugv_ugv"
 
 
 class PairKind(NamedTuple):
-    """Pairs of one kind with the same safe distance, m, of a centre from the other's core, and closing speed, m/s."""
+    """Pairs of one kind with the same distance in the law, m, and closing speed, m/s.
+
+    That is the safe distance of a centre from the other's core, and more if a body is not where the law steers it.
+    """
 
     kind: str
     safe_m: Fraction
@@ -67,13 +78,13 @@ def _kinds(scenario: Scenario) -> Iterator[PairKind]:
 
     Kept are pairs that no other pair exceeds in both distance and speed, and the nearest pair.
     """
-    safe = scenario.safe_distance
-    ugvs = [_Robot(decimal(ugv.radius_m), decimal(ugv.max_speed_m_s)) for ugv in scenario.ugvs.values()]
-    uav = _Robot(decimal(scenario.uav.radius_m), decimal(scenario.uav.max_speed_m_s))
+    safe, period = scenario.safe_distance, scenario.control.period_s
+    ugvs = [_Robot.of(ugv, period) for ugv in scenario.ugvs.values()]
+    uav = _Robot.of(scenario.uav, period)
     barriers = {(decimal(each.distance_m or safe.obstacle_m), decimal(each.radius_m)) for each in
                 scenario.barriers.values() if not each.expected_speed_m_s}  # fmt: skip
     pairs: dict[str, set[tuple[Fraction, Fraction]]] = {
-        "obstacle": {(d + (own.radius_m + r), own.speed_m_s) for own in {*ugvs, uav} for d, r in barriers},
+        "obstacle": {own.beside_a_set(d + (own.radius_m + r)) for own in {*ugvs, uav} for d, r in barriers},
         "uav_ugv": {uav.beside(ugv, safe.air_ground_m) for ugv in ugvs},
         "ugv_ugv": {one.beside(other, safe.ugv_m) for one, other in combinations(ugvs, 2)},
     }
@@ -89,11 +100,27 @@ def _kinds(scenario: Scenario) -> Iterator[PairKind]:
 
 
 class _Robot(NamedTuple):
-    """Its radius and speed limit."""
+    """Its radius, its speed limit, and what its plant takes."""
 
     radius_m: Fraction
     speed_m_s: Fraction
+    room: Room
+
+    @classmethod
+    def of(cls, robot: Ugv | Uav, period_s: float) -> _Robot:
+        return cls(decimal(robot.radius_m), decimal(robot.max_speed_m_s), room_of(robot, period_s))
 
     def beside(self, other: _Robot, apart_m: float) -> tuple[Fraction, Fraction]:
-        """Safe distance of the centres, m, and closing speed, m/s; `apart_m` is the one between surfaces."""
-        return decimal(apart_m) + self.radius_m + other.radius_m, self.speed_m_s + other.speed_m_s
+        """Distance in the law, m, and closing speed, m/s; `apart_m` is the safe one between surfaces."""
+        safe = decimal(apart_m) + self.radius_m + other.radius_m
+        return self._in_the_law(safe, other.room), self.speed_m_s + other.speed_m_s
+
+    def beside_a_set(self, safe_m: Fraction) -> tuple[Fraction, Fraction]:
+        """The same beside an obstacle at rest, from whose core it keeps a distance, m."""
+        return self._in_the_law(safe_m, None), self.speed_m_s
+
+    def _in_the_law(self, safe_m: Fraction, other: Room | None) -> Fraction:
+        """The safe distance and what the plants take, rounded to a float; exact if they take nothing."""
+        if not (self.room.rolling_m or (other and other.rolling_m)):
+            return safe_m
+        return decimal(law_m(float(safe_m), self.room, other, passive=False))

@@ -1,0 +1,83 @@
+"""`airground budget SCENARIO`: what the distances of a scenario cost, kind of pair by kind of pair."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from airground_drake.base import files
+from airground_drake.base.usage import Parser, output_file, overridable
+
+if TYPE_CHECKING:
+    from airground_drake.scenarios.budget import PairBudget
+
+MOST_NAMED = 6
+"""Bodies that are named in a line at most."""
+
+
+def parser() -> argparse.ArgumentParser:
+    """Make the parser."""
+    parser = Parser(
+        prog="airground budget",
+        description="Print, for each kind of pair, the distance that is promised, the one that the law keeps between "
+        "the points that it steers, and what each term takes. Distances are between surfaces.",
+    )
+    parser.add_argument("scenario", help="name of a shipped scenario, or path to a YAML file")
+    parser.add_argument("-o", "--output", type=output_file, metavar="FILE", help="draw the budget, too, as SVG")
+    parser.add_argument("--json", action="store_true", help="print every kind of pair as JSON")
+    overridable(parser)
+    return parser
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Print the budget, and draw it on request."""
+    options = parser().parse_args(arguments)
+    from airground_drake.scenarios.budget import alike, budget
+    from airground_drake.scenarios.load import load
+
+    scenario = load(options.scenario, options.set)
+    groups = alike(budget(scenario))
+    if options.output is not None:
+        from airground_drake.view.budget import drawn
+
+        files.write_text(options.output, drawn([(_about(group), group[0]) for group in groups]))
+    if options.json:
+        print(json.dumps([_entry(group) for group in groups], indent=1))
+        return 0
+    for group in groups:
+        one = group[0]
+        print(f"{_about(group)}: promised {one.promised_m:.3f} m, in the law {one.gap_m:.3f} m")
+        for term in one.terms:
+            owner = f" of {term.of}" if term.of and len(group) == 1 else ""
+            print(f"    {term.key}{owner}: {term.metres:.4f} m")
+    return 0
+
+
+def _about(group: Sequence[PairBudget]) -> str:
+    """The pairs of a group in words."""
+    first, second = (list(dict.fromkeys(getattr(each, name) for each in group)) for name in ("first", "second"))
+    kind = group[0].kind
+    if kind == "ugv":
+        return f"two UGVs ({_named([*dict.fromkeys([*first, *second])])})"
+    if kind == "air_ground":
+        return f"{_named(first)} and {_named(second)}"
+    return f"{_named(first)} beside {_named(second)}{', which may move' if kind == 'moving' else ''}"
+
+
+def _named(names: Sequence[str]) -> str:
+    """Some names, and how many more there are."""
+    more = len(names) - MOST_NAMED
+    return ", ".join(names[:MOST_NAMED]) + (f" and {more} more" if more > 0 else "")
+
+
+def _entry(group: Sequence[PairBudget]) -> dict[str, object]:
+    one = group[0]
+    return {
+        "kind": one.kind,
+        "pairs": [[each.first, each.second] for each in group],
+        "promised_m": one.promised_m,
+        "in_the_law_m": one.gap_m,
+        "terms": [{"key": term.key, "metres": term.metres} for term in one.terms],
+    }

@@ -1,0 +1,139 @@
+"""SAFE-BUDGET: bodies that are not where the law steers them keep their distances if the steered points keep theirs."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from fractions import Fraction
+from typing import Any
+
+from airground_drake.base.exact import decimal
+from airground_drake.proofs import THEOREMS
+from airground_drake.scenarios.budget import alike, budget, takes_room
+from airground_drake.scenarios.schema import Scenario
+from airground_drake.verify.engines.bodies import Room, law_m, room_of
+from airground_drake.verify.finding import Finding
+from airground_drake.verify.model.safe_inv import stable
+from airground_drake.verify.model.theorem import Hypothesis, Proof, TheoremClaim
+
+ROUNDED_M = Fraction(1, 10**12)
+"""Two ways to add up a budget differ by no more than this, m."""
+BASIC = ("Budget.at_samples", "Budget.budget_always")
+BY_KIND = {
+    "unicycle": ("Plants.chord", "Turning.chord_turns", "Turning.shortened_chord", "Turning.shortened"),
+    "lag": ("Plants.lag", "Plants.lag_speed", "Plants.lag_pair", "Plants.lag_needs"),
+    "delay": ("Plants.delay",),
+}
+"""The theorems about each kind of plant."""
+
+
+class SafeBudget(TheoremClaim):
+    """SAFE-BUDGET."""
+
+    id = "SAFE-BUDGET"
+    summary = "The law keeps as much more distance as the robots' plants take, so that their bodies keep the safe one."
+    statement = (
+        "Where the points that the law steers keep the law's distance d_law at the samples, the bodies of robots that "
+        "turn, lag or get their commands late keep the safe distance d at all times. Beside an obstacle that may move "
+        "the same holds of what SAFE-OWN says. For each kind of pair d_law is at least what the theorems ask for."
+    )
+    latex = (
+        r"d_{\mathrm{law}} \ge b + \sum_{i} (c_i + f_i), \quad b = d + V |\delta_i - \delta_j| \text{ or } "
+        r"\sum_i |\tau_i - \tau| V_i + \sqrt{(d + V |\delta_i - \delta_j|)^2 + (\tau V_{\mathrm{rel}})^2}",
+        r"c = l, \quad f = \tfrac{1}{8} |\omega| \lVert w \rVert h^2 \text{ (unicycle, chord steering)}",
+    )
+    method = (
+        "Theorems in Coq about each kind of plant. Their hypotheses on the numbers of the scenario are checked here; "
+        "the distances of the law are computed again in other words, and compared to 1e-12 m. SAFE-HYP checks what a "
+        "run has to meet."
+    )
+    equations = "(7)-(8), (11) in the inequality form of the package (set-based avoidance)"
+    assumptions = (
+        "The plants of the scenario are those of the robots: no slip, no error of a heading, time constant or delay.",
+        "Commands stay within the speed limits (SAFE-HYP checks the run).",
+        "A delay comes before a lag; a robot with either beside a unicycle has the sum of what both take.",
+    )
+    does_not_establish = (
+        "That the steered points keep the law's distance: that is SAFE-INV. Nor that a command was met in full: a "
+        "command that is shortened recovers a distance at a smaller gain."
+    )
+    theorems: tuple[str, ...] = ()
+    margin_of = "distance in the law less what the plants take"
+
+    def applies_to(self, scenario: Scenario) -> bool:
+        """Only a scenario with robots that are not where the law steers them."""
+        return takes_room(scenario)
+
+    def inputs(self, scenario: Scenario) -> dict[str, Any]:
+        """Gain and period; the kinds of plants and what they take; the distances of each kind of pair."""
+        period, robots = scenario.control.period_s, scenario.robots
+        turning = [
+            {
+                "robot": name, "hand_point_m": plant.hand_point_m, "speed_m_s": robot.max_speed_m_s,
+                "turn_rad_s": _limit(plant.max_turn_rad_s, plant.wheel_base_m, plant.max_wheel_speed_m_s),
+            }
+            for name, robot in robots.items() for plant in robot.plant if plant.kind == "unicycle"
+        ]  # fmt: skip
+        return {
+            "avoidance_gain_1_s": scenario.control.avoidance_gain_1_s,
+            "period_s": period,
+            "kinds": sorted({plant.kind for robot in robots.values() for plant in robot.plant} - {"first_order"}),
+            "unicycles": turning,
+            "pairs": [
+                {
+                    "first": one.first, "second": one.second, "kind": one.kind, "law_m": one.law_m,
+                    "safe_m": one.promised_m + one.radii_m,
+                    "rooms": [
+                        list(room_of(robots[name], period)) for name in (one.first, one.second) if name in robots
+                    ],
+                }
+                for one in (group[0] for group in alike(budget(scenario))) if one.terms
+            ],
+        }  # fmt: skip
+
+    def check(self, inputs: dict[str, Any]) -> Finding:
+        """Check the hypotheses; the theorems are those about the kinds of plants that the scenario has."""
+        names = (*BASIC, *(name for kind in inputs["kinds"] for name in BY_KIND[kind]))
+        found = self.hypotheses(inputs)
+        missing = [name for name in names if name not in THEOREMS]
+        if missing:
+            reason = f"not among the theorems: {', '.join(missing)}"
+            evidence = Proof(proof="not checked", theorems={}, hypotheses=found, reason=reason)
+            least = min(found, key=lambda each: each.margin)
+            return Finding("inconclusive", least.margin, least.unit, evidence=evidence, quantity=least.hypothesis)
+        claim = SafeBudget()
+        claim.theorems = names
+        return TheoremClaim.check(claim, inputs)
+
+    def hypotheses(self, inputs: dict[str, Any]) -> Sequence[Hypothesis]:
+        """A h at most 1; hand points ahead, turns of less than half a circle; distances in the law."""
+        gain, h = decimal(inputs["avoidance_gain_1_s"]), decimal(inputs["period_s"])
+        return [*stable(gain, h), *self._unicycles(inputs, h), *self._pairs(inputs)]
+
+    def _unicycles(self, inputs: dict[str, Any], h: Fraction) -> Iterator[Hypothesis]:
+        for each in inputs["unicycles"]:
+            hand, name = decimal(each["hand_point_m"]), each["robot"]
+            yield Hypothesis.of("l", f"{name}: the hand point is ahead of the axle", hand, "m", strict=True)
+            fast = 2 * hand - decimal(each["speed_m_s"]) * h
+            turn = each["turn_rad_s"]
+            half = Fraction(314159265358979, 10**14) - decimal(turn) * h if turn is not None else Fraction(-1)
+            says = f"{name}: V h is at most 2 l, or omega_max h is below pi"
+            yield Hypothesis.of("turn in a period", says, max(fast, half), strict=fast < 0)
+
+    def _pairs(self, inputs: dict[str, Any]) -> Iterator[Hypothesis]:
+        for pair in inputs["pairs"]:
+            first, *second = (Room(*room) for room in pair["rooms"])
+            passive = pair["kind"] == "moving"
+            needed = law_m(pair["safe_m"], first, second[0] if second else None, passive=passive)
+            says = (
+                f"{pair['first']}, {pair['second']}: {pair['law_m']:.6g} m in the law are at least the "
+                f"{needed:.6g} m that keep {pair['safe_m']:.6g} m"
+            )
+            margin = Fraction(pair["law_m"]) - Fraction(needed)
+            yield Hypothesis(self.margin_of, says, float(margin), "m", margin >= -ROUNDED_M)
+
+
+def _limit(turn_rad_s: float, base_m: float, wheel_m_s: float) -> float | None:
+    """Turning limit by the limits of turns and of wheels, rad/s; None without one."""
+    limits = [turn_rad_s or math.inf, 2.0 * wheel_m_s / base_m if base_m else math.inf]
+    return min(limits) if min(limits) < math.inf else None
