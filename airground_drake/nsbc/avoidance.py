@@ -106,4 +106,5 @@ class Avoidance:
             positions: of all bodies that move, (M, 3), m, world frame.
             near: the robots and what is around them.
         """
-        return kernels.commands(lower, positions, *near, *self.layer)
+        velocity: Array = kernels.commands(lower, positions, near, self.layer)
+        return velocity

@@ -15,6 +15,7 @@ from numba import njit
 from airground_drake.base.arrays import Array
 from airground_drake.geometry.convex import may_be_within, nearest
 from airground_drake.geometry.outline import SPEED
+from airground_drake.world.world import Neighbours
 
 MARGIN_M_S = 1e-12
 """Added to every bound in the projection, m/s. The bound of a robot in contact is 0. Without the margin rounding would
@@ -160,26 +161,11 @@ def _recursion(lower: Array, normal: Array, bound: Array, nearest_first: bool) -
 
 
 @njit(cache=True)
-def commands(
-    lower: Array,
-    positions: Array,
-    members: npt.NDArray[np.intp],
-    carrier: npt.NDArray[np.intp],
-    others: npt.NDArray[np.intp],
-    still: Array,
-    parts: Array,
-    distance: Array,
-    share: Array,
-    mobility: Array,
-    max_speed: Array,
-    gain: float,
-    period: float,
-    sensing_range: float,
-    composition: int,
-) -> Array:
-    """Velocities of k robots, (k, 3), m/s; see `Avoidance.command`, with the fields of `Neighbours` and of `Layer`."""
-    # one by one, because numba takes 1.5 us to unpack a named tuple that Python passes, and 0.04 us for an array
-    layer, velocity = Layer(gain, period, sensing_range, composition), limit_speed(lower, max_speed)
+def commands(lower: Array, positions: Array, near: Neighbours, layer: Layer) -> Array:
+    """Velocities of k robots, (k, 3), m/s; see `Avoidance.command`."""
+    # Reading an array of a named tuple within the loop would count references.
+    members, carrier, others, still, parts, distance, share, mobility, max_speed = near
+    velocity = limit_speed(lower, max_speed)
     normal, bound = np.empty((distance.shape[1], 3)), np.empty(distance.shape[1])
     which, retreat = np.empty(distance.shape[1], np.intp), np.empty(distance.shape[1])
     for i in range(len(velocity)):
@@ -188,7 +174,7 @@ def commands(
             layer, which, normal, bound, retreat,
         )  # fmt: skip
         task = yielding(velocity[i], normal[:count], retreat[:count], max_speed[i])
-        velocity[i] = avoid_one(task, normal[:count], bound[:count], composition)
+        velocity[i] = avoid_one(task, normal[:count], bound[:count], layer.composition)
     return velocity
 
 

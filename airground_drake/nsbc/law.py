@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -107,11 +107,8 @@ class UgvLaw:
             if one is not None:
                 executing[i] = True
                 wanted[i], wanted_rate[i], chosen[i] = one
-        own = self.numbers
-        gains = own.motion_gain, own.intervention_gain, own.intervention_on_top
-        tasks = wanted, wanted_rate, chosen, positions, target, rate, executing
-        numbers: tuple[Any, ...] = (*gains, *own.layer, *near, *tasks)
-        velocity: Array = _commands(*numbers)
+        every = AcceptedMotion(wanted, wanted_rate, chosen)
+        velocity: Array = _commands(self.numbers, near, positions, Tracking(target, rate), every, executing)
         return velocity
 
 
@@ -162,34 +159,18 @@ def command(
 
 @njit(cache=True)
 def _commands(
-    motion_gain: float,
-    intervention_gain: float,
-    intervention_on_top: bool,
-    avoidance_gain: float,
-    period: float,
-    sensing_range: float,
-    composition: int,
-    members: npt.NDArray[np.intp],
-    carrier: npt.NDArray[np.intp],
-    others: npt.NDArray[np.intp],
-    still: Array,
-    parts: Array,
-    distance: Array,
-    share: Array,
-    mobility: Array,
-    max_speed: Array,
-    wanted: Array,
-    wanted_rate: Array,
-    chosen: Array,
+    law: Numbers,
+    near: Neighbours,
     positions: Array,
-    target: Array,
-    rate: Array,
+    track: Tracking,
+    asked: AcceptedMotion,
     executing: npt.NDArray[np.bool_],
 ) -> Array:
-    """`command` for n UGVs, (n, 3), m/s: the fields of `Numbers`, `Neighbours` and `AcceptedMotion`, then arrays."""
-    # one by one, because numba takes 1.5 us to unpack a named tuple that Python passes, and 0.04 us for an array
-    layer = Layer(avoidance_gain, period, sensing_range, composition)
-    law = Numbers(motion_gain, intervention_gain, intervention_on_top, layer)
+    """`command` for n UGVs, (n, 3), m/s; the fields of `track` and `asked` have a row per UGV, or a matrix."""
+    # Reading an array of a named tuple within the loop would count references.
+    members, carrier, others, still, parts, distance, share, mobility, max_speed = near
+    target, rate = track
+    wanted, wanted_rate, chosen = asked
     velocity = np.empty(target.shape)
     normal, bound = np.empty((distance.shape[1], 3)), np.empty(distance.shape[1])
     which, retreat = np.empty(distance.shape[1], np.intp), np.empty(distance.shape[1])
@@ -197,8 +178,8 @@ def _commands(
         ugv = UgvState(positions[members[i]], mobility[i], max_speed[i])
         count = fill_half_spaces(
             ugv.position, ugv.mobility, still, parts, carrier, others[i], positions, distance[i], share[i],
-            layer, which, normal, bound, retreat,
+            law.layer, which, normal, bound, retreat,
         )  # fmt: skip
-        asked, track = AcceptedMotion(wanted[i], wanted_rate[i], chosen[i]), Tracking(target[i], rate[i])
-        velocity[i] = command(law, ugv, track, asked, executing[i], normal[:count], bound[:count], retreat[:count])
+        task, own = AcceptedMotion(wanted[i], wanted_rate[i], chosen[i]), Tracking(target[i], rate[i])
+        velocity[i] = command(law, ugv, own, task, executing[i], normal[:count], bound[:count], retreat[:count])
     return velocity
