@@ -11,7 +11,21 @@ import pandas as pd
 import pytest
 from builders.edits import bumped, moved, with_events, with_meta, with_scenario
 from verify.judging import decided
-from verify.runs.cases import A_D, B_C, B_D, DOORWAY, Edit, at, first, problem, proposals, scenario
+from verify.runs.cases import (
+    A_D,
+    B_C,
+    B_D,
+    DOORWAY,
+    Edit,
+    accepted,
+    at,
+    executing,
+    first,
+    problem,
+    proposals,
+    refused,
+    scenario,
+)
 
 from airground_drake.base.arrays import Array
 from airground_drake.base.errors import TraceError
@@ -101,18 +115,6 @@ def cut_short(trace: Trace) -> Trace:
     """The decisions on an accepted proposal stop while it is in force."""
     last = int(np.flatnonzero(executing(trace.decisions))[-1])
     return replace(trace, decisions=trace.decisions.iloc[: last - 3])
-
-
-def accepted(table: pd.DataFrame) -> Any:
-    return table["reason"] == "cheaper"
-
-
-def refused(table: pd.DataFrame) -> Any:
-    return table["reason"] == "stalls"
-
-
-def executing(table: pd.DataFrame) -> Any:
-    return (table["reason"] == "kept") & (table["decision"] == "accept")
 
 
 def messages(edit: Callable[[pd.DataFrame], pd.DataFrame]) -> Edit:

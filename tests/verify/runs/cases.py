@@ -72,6 +72,18 @@ def proposed(*times: float, robot: str = "ugv1") -> Edit:
     return events(lambda all_: all_.extend([{**first_of(all_, "proposal"), "t_s": t, "robot": robot} for t in times]))
 
 
+def accepted(table: pd.DataFrame) -> Any:
+    return table["reason"] == "cheaper"
+
+
+def refused(table: pd.DataFrame) -> Any:
+    return table["reason"] == "stalls"
+
+
+def executing(table: pd.DataFrame) -> Any:
+    return (table["reason"] == "kept") & (table["decision"] == "accept")
+
+
 def first(where: Callable[[pd.DataFrame], Any], **values: Any) -> Edit:
     """Values of the first decision for which something is true, set or called with what is there."""
 

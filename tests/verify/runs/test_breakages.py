@@ -7,7 +7,6 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-import pandas as pd
 import pytest
 from builders.decisions import STAGES
 from builders.edits import bumped, first_of, moved, rows, with_decision, with_scenario
@@ -23,13 +22,16 @@ from verify.runs.cases import (
     A,
     D,
     Edit,
+    accepted,
     at,
     column,
     decisions,
     events,
+    executing,
     first,
     meta,
     problem,
+    refused,
     scenario,
     swapped,
 )  # fmt: skip
@@ -69,18 +71,6 @@ def idle_normals_turned(trace: Trace) -> Trace:
 
 def without_decisions(trace: Trace) -> Trace:
     return replace(trace, decisions=trace.decisions.iloc[:0], problems=trace.problems.iloc[:0])
-
-
-def accepted(table: pd.DataFrame) -> Any:
-    return table["reason"] == "cheaper"
-
-
-def refused(table: pd.DataFrame) -> Any:
-    return table["reason"] == "stalls"
-
-
-def executing(table: pd.DataFrame) -> Any:
-    return (table["reason"] == "kept") & (table["decision"] == "accept")
 
 
 def alternating(trace: Trace) -> Trace:
