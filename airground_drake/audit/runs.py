@@ -41,7 +41,7 @@ def _recursion(scenario: Scenario, traces: Mapping[str, Trace]) -> Item | None:
         found = [(nearest, robot) for robot in trace.ugvs if (nearest := closest_obstacle(trace, robot))]
         if not found:
             return None
-        (value, t_s, obstacle, _), robot = min(found)
+        (value, t_s, obstacle, *_), robot = min(found)
         evidence[name] = {
             "composition": scenario.runs[name].composition,
             "robot": robot,

@@ -32,7 +32,7 @@ def check_events(run: Run) -> str:
         Disagreement: if they differ.
     """
     recorded = [
-        Event(**{name: value for name, value in each.items() if name != "position_m"})
+        Event(**{name: value for name, value in each.items() if name not in ("position_m", "at_m")})
         for each in run.events
         if each["kind"] in ("arrival", "collision")
     ]

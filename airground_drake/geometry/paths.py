@@ -463,7 +463,9 @@ def _route(p: complex, q: complex, around: _Obstacles) -> Array | None:
     """The pieces (see ``Path``) of the shortest path between free points; None if no path exists."""
     if abs(q - p) <= _EPS:
         return np.empty((0, 6))
-    c, r, ways = (each[..., around.touchable] for each in around.circles)
+    c, r, ways = around.circles
+    some = around.touchable
+    c, r, ways = c[some], r[some], ways[:, some]
     a, b, on = _tangents(
         np.concatenate(([p, q], c)), np.concatenate(([0.0, 0.0], r)), np.concatenate((np.zeros((2, 2)), ways), axis=1)
     )

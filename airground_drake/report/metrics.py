@@ -13,6 +13,7 @@ from airground_drake.registry import method_of
 from airground_drake.report.interventions import avoidance, farthest_from_prediction, interventions, messages
 from airground_drake.run.collisions import first_collisions
 from airground_drake.run.trace import Trace
+from airground_drake.scenarios.schema import MAP
 from airground_drake.verify.engines.geometry import interpolate
 from airground_drake.verify.model.pair_kinds import MOVING, kind_of
 from airground_drake.verify.runs.gate_record import without_decisions
@@ -28,6 +29,7 @@ from airground_drake.verify.runs.pairs import (
     numbers_of,
     pair_of,
     pairs_of,
+    place_on_map,
     to_barrier,
 )
 from airground_drake.verify.runs.passive import passive_pairs
@@ -41,12 +43,16 @@ NO_GAP = 1e-9
 
 
 class Nearby(NamedTuple):
-    """Smallest distance of surfaces over continuous time, m; when, s; to what; and the distance required, m."""
+    """Smallest distance of surfaces over continuous time, m; when, s; to what; and the distance required, m.
+
+    `at_m` is the place of the map that was nearest, [x, y], m, if it is the map.
+    """
 
     value: float
     t_s: float
     other: str
     required_m: float
+    at_m: Sequence[float] | None = None
 
 
 def of_run(trace: Trace) -> dict[str, Any]:
@@ -92,7 +98,8 @@ def on_the_way(trace: Trace) -> dict[str, dict[str, Any]]:
     Returns:
         By UGV `stands` (it did not move in the last second), `left_m` (the way to its target along its preset) and
         `left_s` (how long that takes if it comes nearer as fast as in the last second; None if it does not). Where it
-        stands because an obstacle that moves is at its target: `kept_away`, see `_kept_away`.
+        stands because an obstacle that moves is at its target: `kept_away`, see `_kept_away`. Where it stands as near
+        to the map as it may: `at_m`, the nearest place of the map, [x, y], m.
     """
     done = {event["robot"] for event in trace.events if event["kind"] == "arrival"} | {*first_collisions(trace.events)}
     return {ugv: _on_the_way(trace, ugv) for ugv in trace.ugvs if ugv not in done}
@@ -107,7 +114,16 @@ def _on_the_way(trace: Trace, ugv: str) -> dict[str, Any]:
         "left_m": left_m,
         "left_s": left_m / speed_m_s if speed_m_s > 0.0 and not stands else None,
         **({"kept_away": found} if stands and (found := _kept_away(trace, ugv)) else {}),
+        **(place_on_map(trace, ugv, end_s) if stands and _is_at_map(trace, ugv) else {}),
     }
+
+
+def _is_at_map(trace: Trace, ugv: str) -> bool:
+    """Whether a UGV is so near to the map at the end that one control period would have brought it too near."""
+    if MAP not in _obstacles(trace):
+        return False
+    pair = pair_of(trace, ugv, MAP)
+    return float(gap_over_time(trace, pair)[-1]) - pair.required_m < pair.reach_m
 
 
 def _kept_away(trace: Trace, ugv: str) -> dict[str, Any]:
@@ -245,18 +261,24 @@ def _closest_call(trace: Trace) -> dict[str, Any] | None:
 
 def closest_obstacle(trace: Trace, robot: str) -> Nearby | None:
     """Smallest distance of a robot to any obstacle over continuous time, exact; None without obstacles."""
-    return min(_nearby(_least(trace, robot, _obstacles(trace), MOST_OBSTACLES)), default=None)
+    return min(_nearby(trace, _least(trace, robot, _obstacles(trace), MOST_OBSTACLES)), default=None)
 
 
 def close_by(trace: Trace, robot: str) -> list[Nearby]:
     """Smallest distances of a robot to its nearest obstacles and robots, exact, those of least margin first."""
     found = _least(trace, robot, _obstacles(trace), NEAR_OBSTACLES)
     found |= _least(trace, robot, _others(trace, robot), NEAR_ROBOTS)
-    return sorted(_nearby(found), key=lambda at: at.value - at.required_m)
+    return sorted(_nearby(trace, found), key=lambda at: at.value - at.required_m)
 
 
-def _nearby(found: dict[str, Gap]) -> Iterator[Nearby]:
-    return (Nearby(least.gap_m, least.t_s, other, least.pair.required_m) for other, least in found.items())
+def _nearby(trace: Trace, found: dict[str, Gap]) -> Iterator[Nearby]:
+    for other, least in found.items():
+        yield Nearby(least.gap_m, least.t_s, other, least.pair.required_m, **_place(trace, other, least))
+
+
+def _place(trace: Trace, other: str, least: Gap) -> dict[str, list[float]]:
+    """Where on the map a gap was smallest, if it is that to the map."""
+    return place_on_map(trace, least.pair.first, least.t_s) if other == MAP else {}
 
 
 def gap_m(trace: Trace, robot: str, other: str) -> Array:
@@ -298,12 +320,13 @@ def _least(trace: Trace, robot: str, among: Sequence[str], most: int) -> dict[st
 def _listed(trace: Trace, found: dict[str, Gap]) -> dict[str, dict[str, Any]]:
     """The same for report.json.
 
-    `appeared`: the gap was smallest at the instant at which the obstacle appeared. `moves`: the obstacle may move, so
-    that no theorem keeps its distance.
+    `at_m`: the place of the map that was nearest, [x, y], m. `appeared`: the gap was smallest at the instant at which
+    the obstacle appeared. `moves`: the obstacle may move, so that no theorem keeps its distance.
     """
     return {
         other: {
             "value": least.gap_m, "t_s": least.t_s, "safe_distance_m": least.pair.required_m,
+            **_place(trace, other, least),
             **({"appeared": True} if least.at_appearance(trace.t) else {}),
             **({"moves": True} if kind_of(trace.scenario, least.pair.first, other) == MOVING else {}),
         }

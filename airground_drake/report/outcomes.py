@@ -37,7 +37,7 @@ class Near(NamedTuple):
     """The smallest distance of a pair: the gap between the surfaces, below 0 if they overlap.
 
     `appeared`: at the instant at which the other one appeared. `moves`: the other one may move, and no theorem keeps
-    its distance.
+    its distance. `at_m`: the place of the map that was nearest, m, if the other one is the map.
     """
 
     margin_m: float
@@ -48,6 +48,12 @@ class Near(NamedTuple):
     t_s: float
     appeared: bool = False
     moves: bool = False
+    at_m: Sequence[float] | None = None
+
+    @property
+    def whom(self) -> str:
+        """The other one in words."""
+        return named(self.other, self.at_m)
 
     @property
     def is_short(self) -> bool:
@@ -61,7 +67,7 @@ class Near(NamedTuple):
     @property
     def pair(self) -> str:
         """The distance, of whom, and whether it was there from the start."""
-        return f"{self} ({self.robot} to {self.other}{', at the start' * (self.t_s == 0.0)})"
+        return f"{self} ({self.robot} to {self.whom}{', at the start' * (self.t_s == 0.0)})"
 
 
 class ProofOutcome(NamedTuple):
@@ -224,7 +230,7 @@ def pairs(run: Mapping[str, Any]) -> Iterator[Near]:
             for other, found in others.items():
                 value, required = found["value"], found["safe_distance_m"]
                 flags = bool(found.get("appeared")), bool(found.get("moves"))
-                yield Near(value - required, robot, other, value, required, found["t_s"], *flags)
+                yield Near(value - required, robot, other, value, required, found["t_s"], *flags, found.get("at_m"))
 
 
 def claims(document: Document, *names: str, run: str | None = None) -> list[Mapping[str, Any]]:
@@ -244,6 +250,11 @@ def tolerance(document: Document) -> str:
 def triggers(document: Document) -> list[Mapping[str, Any]]:
     """Events of the kind `trigger`, of all runs."""
     return [event for run in document["runs"].values() for event in run["events"] if event["kind"] == "trigger"]
+
+
+def named(body: str, at_m: Sequence[float] | None = None) -> str:
+    """The name of a body in words; of the map, which is everywhere, with the place that is meant, m."""
+    return f"the map at ({', '.join(f'{each + 0.0:.2f}' for each in at_m)})" if at_m else body
 
 
 def distance(value_m: float, required_m: float) -> str:

@@ -7,7 +7,7 @@ from typing import Any
 
 from airground_drake.base.statuses import PASSING
 from airground_drake.registry import METHODS
-from airground_drake.report.outcomes import RunOutcome, distance
+from airground_drake.report.outcomes import RunOutcome, distance, named
 from airground_drake.report.sentences import MAX_NAMES, clause, counted, grouped, joined
 
 SETTINGS = {
@@ -117,7 +117,7 @@ def colliding(course: RunOutcome) -> str:
 
 def collision(hit: Mapping[str, Any]) -> str:
     """Who collided with what and when, by the event."""
-    return clause("collides", hit, what=hit.get("other") or hit["obstacle"])
+    return clause("collides", hit, what=hit.get("other") or named(hit["obstacle"], hit.get("at_m")))
 
 
 def ending(course: RunOutcome, robot: str) -> str:
@@ -128,7 +128,7 @@ def ending(course: RunOutcome, robot: str) -> str:
     if not known:
         return "short of its target"
     if known["stands"]:
-        return "standing still"
+        return f"standing still at {named('map', known['at_m'])}" if "at_m" in known else "standing still"
     left_s = known["left_s"]
     rounded = f" (about {float(f'{left_s:.2g}'):.15g} s more)" if left_s is not None else ""  # without an exponent
     return f"still moving at the end{rounded}"
@@ -174,7 +174,10 @@ def place_of(claim: Mapping[str, Any]) -> dict[str, Any]:
 def bodies_of(claim: Mapping[str, Any]) -> list[str]:
     """The bodies that a claim names."""
     place = place_of(claim)
-    return list(dict.fromkeys(str(place[name]) for name in ROLES if isinstance(place.get(name), str)))
+    there = {role: place[role] for role in ROLES if isinstance(place.get(role), str)}
+    return list(
+        dict.fromkeys(named(name, place.get("at_m") if role == "second" else None) for role, name in there.items())
+    )
 
 
 def in_words(claim: Mapping[str, Any]) -> str:

@@ -65,14 +65,14 @@ SENTENCES = {
     "covered": ": distances from bodies at rest and between robots; beside what moves, that no robot brings itself too "
     "near",
     # Who came how near to what
-    "appears": "{near.other} appears {near} from {near.robot} (nobody's doing)",
-    "comes_within": "{near.robot} comes within {near} of {near.other}",
+    "appears": "{near.whom} appears {near} from {near.robot} (nobody's doing)",
+    "comes_within": "{near.robot} comes within {near} of {near.whom}",
     "collides": "{robot} collides with {what} at {t_s:.2f} s",
     "appeared": "{second} appeared {gap_m:.2f} m from {first}: nobody's doing",
     "met": "{second} {met} {first} at {t_s:.2f} s ({gap_m:.2f} m, required {required_m:.2f} m); {first} {reacted}",
     "caught": "{first} was caught between {second} and {between}, {caught_s[0]:.2f} to {caught_s[1]:.2f} s: {second} "
     "came to {gap_m:.2f} m by its own motion{kept}",
-    "beside": "; {near.required_m:.2f} m from {near.other} was kept",
+    "beside": "; {near.required_m:.2f} m from {near.whom} was kept",
     "too_fast": "{second} moved at {too_fast_m_s:.2f} m/s at {too_fast_s:.2f} s, declared {declared_m_s:.2f}: "
     "{safe_distance_m:.2f} m from {second} is not promised from then on",
     # Arrived?

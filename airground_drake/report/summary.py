@@ -183,7 +183,7 @@ def _safe(course: RunOutcome) -> Line:
         return Line("none", "nothing near")
     proved = bool(course.proof and course.proof.holds)
     told = f"{near}, {'proved' if proved and not near.moves else 'not proved'}"
-    told += f" beside {near.other}; all else proved" * (proved and near.moves)
+    told += f" beside {near.whom}; all else proved" * (proved and near.moves)
     return Line("yes", told) if course.tested else Line("none", f"{told}; not tested")
 
 

@@ -12,6 +12,7 @@ from airground_drake.base.arrays import Array
 from airground_drake.geometry import convex, outline
 from airground_drake.run.collisions import first_collisions
 from airground_drake.run.trace import Trace
+from airground_drake.scenarios.schema import MAP
 from airground_drake.scenarios.world import make_world
 from airground_drake.world.motion import PeriodMotion
 from airground_drake.world.world import ROBOTS, Body
@@ -73,7 +74,16 @@ def _add_collisions(trace: Trace, add: Any) -> None:
             apart = apart._replace(start=apart.start[first:last], end=apart.end[first:last])
             planar = own.mobility[2] == 0.0
             for row in first + visits(apart, body.shape, within, planar) if first < last else ():
-                add(trace.t[row], own.name, "collision", **{role: body.name})
+                at = {"at_m": _nearest(trace, own.name, body, int(row))} if body.name == MAP else {}
+                add(trace.t[row], own.name, "collision", **{role: body.name}, **at)
+
+
+def _nearest(trace: Trace, robot: str, body: Body, row: int) -> list[float]:
+    """The place of a body at rest that is nearest to a robot at a row, [x, y], m."""
+    place = trace.position(robot)[row]
+    apart = convex.distances(body.shape, place, True) - body.shape[:, outline.RADIUS]
+    point: Array = convex.nearest_points(body.shape[[apart.argmin()]], place[None])[0, 0]
+    return point[:2].tolist()
 
 
 def _way(trace: Trace, body: Body) -> PeriodMotion:

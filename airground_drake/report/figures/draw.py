@@ -17,7 +17,7 @@ from airground_drake.registry import method_of
 from airground_drake.report.figures import comparison, maps, timelines
 from airground_drake.report.figures.panels import MAX_TABLE_ROWS, Figure, Panel, Table, panel, series
 from airground_drake.report.metrics import Nearby, close_by, events_of, gap_m, radius_m
-from airground_drake.report.outcomes import SLACK_M, distance
+from airground_drake.report.outcomes import SLACK_M, distance, named
 from airground_drake.report.reproduction import MEASURES
 from airground_drake.run.collisions import first_collisions
 from airground_drake.run.trace import Trace
@@ -196,10 +196,11 @@ def _distances(chosen: _Selection) -> Figure | None:
         table, says = series(trace, "Distances, m", gaps), f"Smallest distances: {smallest}."
         name = f"distances-{len(panels)}"
         panels.append(panel(drawing, name, f"Distances, {heading}", says, _runs(heading), table))
-    pairs = [(*each[0], ugv, heading) for (heading, ugv), each in near.items() if each]
-    value, t_s, other, needed, ugv, heading = min(pairs, key=lambda pair: pair[0] - pair[3])
-    least = "Too close" if value < needed - SLACK_M else "Closest"
-    least += f": {ugv} is {distance(value, needed)} from {other} at {t_s:.2f} s, {needed:g} m required"
+    pairs = [(each[0], ugv, heading) for (heading, ugv), each in near.items() if each]
+    at, ugv, heading = min(pairs, key=lambda pair: pair[0].value - pair[0].required_m)
+    least = "Too close" if at.value < at.required_m - SLACK_M else "Closest"
+    least += f": {ugv} is {distance(at.value, at.required_m)} from {named(at.other, at.at_m)} at {at.t_s:.2f} s"
+    least += f", {at.required_m:g} m required"
     caption = (
         f"{least} ({_runs(heading).lower()}). No line may enter the hatched band. "
         f"Circle: the smallest distance, exact; red: too small.{_left_out(chosen, chosen.ugvs)}"
@@ -208,7 +209,7 @@ def _distances(chosen: _Selection) -> Figure | None:
 
 
 def _told(at: Nearby) -> str:
-    return f"{distance(at.value, at.required_m)} to {at.other} at {at.t_s:.2f} s"
+    return f"{distance(at.value, at.required_m)} to {named(at.other, at.at_m)} at {at.t_s:.2f} s"
 
 
 def _decision(chosen: _Selection) -> Figure:

@@ -22,7 +22,7 @@ import numpy.typing as npt
 
 from airground_drake.base.arrays import Array
 from airground_drake.run.trace import Trace
-from airground_drake.scenarios.schema import Obstacle
+from airground_drake.scenarios.schema import MAP, Obstacle
 from airground_drake.scenarios.shapes import convex_parts
 from airground_drake.verify.engines.bodies import arc_m, lagging_m, law_m, on_arc, on_lag, room_of
 from airground_drake.verify.engines.geometry import (
@@ -350,6 +350,15 @@ def to_barrier(trace: Trace, pair: Pair, place: Array) -> float:
     way = origin_of(trace, pair.second)
     here = place if way is None else place - way[-1]
     return float(away_from(cores_of(trace)[pair.second], here, planar=is_planar(trace, pair.first)).distance.min())
+
+
+def place_on_map(trace: Trace, robot: str, t_s: float) -> dict[str, list[float]]:
+    """`at_m`: the place of the map, [x, y], m, that is nearest to a robot at a time, s; {} without a map."""
+    cores = cores_of(trace).get(MAP)
+    if cores is None:
+        return {}
+    place = interpolate(trace.t, trace.position(robot), t_s)
+    return {"at_m": nearest_point(cores, place, planar=is_planar(trace, robot))[:2].tolist()}
 
 
 def gap_over_time(trace: Trace, pair: Pair) -> Array:

@@ -8,6 +8,7 @@ from functools import cache
 import numpy as np
 
 from airground_drake.run.trace import Trace
+from airground_drake.scenarios.schema import MAP
 from airground_drake.verify.claim import TraceClaim
 from airground_drake.verify.finding import Finding
 from airground_drake.verify.runs.pairs import (
@@ -17,6 +18,7 @@ from airground_drake.verify.runs.pairs import (
     least_of,
     pair_of,
     pairs_of,
+    place_on_map,
     snapshot,
 )
 from airground_drake.verify.runs.passive import encounters
@@ -81,8 +83,10 @@ class SafeTrace(TraceClaim):
             margin=worst.margin_m,
             unit="m",
             quantity="least distance of a pair less its safe distance",
-            where={"first": worst.first, "second": worst.second, "t_s": worst.t_s},
-            counterexample=None if safe else asdict(worst) | _why(trace, worst) | snapshot(trace, both, worst.t_s),
+            where={"first": worst.first, "second": worst.second, "t_s": worst.t_s, **_place(trace, worst)},
+            counterexample=None
+            if safe
+            else asdict(worst) | _place(trace, worst) | _why(trace, worst) | snapshot(trace, both, worst.t_s),
             evidence={
                 "pairs": [asdict(each) for each in listed],
                 "pairs_in_all": len(pairs),
@@ -113,6 +117,11 @@ def _entry(trace: Trace, k: int) -> Distance:
     """Where the k-th pair was closest."""
     pair, gap_m, margin_m, t_s, row = least_gap(trace, pairs_of(trace)[k])
     return Distance(pair.first, pair.second, pair.required_m, gap_m, margin_m, t_s, row, margin_m < pair.reach_m)
+
+
+def _place(trace: Trace, worst: Distance) -> dict[str, list[float]]:
+    """Where on the map, if it is about the map."""
+    return place_on_map(trace, worst.first, worst.t_s) if worst.second == MAP else {}
 
 
 def _why(trace: Trace, worst: Distance) -> dict[str, str]:
