@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from builders import fields
 from commands.conftest import Airground
 
 from airground_drake.geometry import convex, outline
@@ -46,6 +47,18 @@ def least_distance(scenario: Scenario, place: list[float]) -> float:
     """Distance of a UGV at a place from all that is in the way, m."""
     rows = outline.joined(*(outlines_of(scenario, each) for each in scenario.barriers.values()))
     return float((convex.distances(rows, np.array(place), True) - rows[:, outline.RADIUS]).min())
+
+
+def test_the_shipped_field_is_what_the_importer_makes_of_its_world(tmp_path: Path, airground: Airground) -> None:
+    (tmp_path / "field.world").write_text(fields.world(fields.SHIPPED))
+    airground("import", "barn", tmp_path / "field.world", "-o", tmp_path / "field.yaml")
+    made, shipped = load(tmp_path / "field.yaml"), load("barn")
+    assert (made.barriers, made.ugvs, made.uav) == (shipped.barriers, shipped.ugvs, shipped.uav)
+    assert (made.safe_distance, made.control, made.decision) == (
+        shipped.safe_distance,
+        shipped.control,
+        shipped.decision,
+    )
 
 
 def test_a_world_of_barn_is_its_cylinders_and_boxes_with_the_challenges_start_and_goal(
