@@ -214,7 +214,7 @@ FREE: dict[str, Clear] = {
 
 
 @pytest.mark.parametrize("name", FREE)
-@examples(30)
+@examples(12)
 @given(SEEDS)
 def test_segments_that_keep_clear(name: str, seed: int) -> None:
     rng = np.random.default_rng(seed)
