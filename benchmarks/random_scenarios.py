@@ -7,7 +7,9 @@ must not stop, no claim may be an `error`, no oracle may find a fault, the check
 the run, and claims must hold that theorems promise for the run. Prints each scenario that breaks this, by its number,
 which draws it again, and how much was exercised. Exit code 1 if there is such a scenario.
 
-Claims about the model are left out: they take longer than all the rest.
+Claims about the model are left out: they take longer than all the rest. `--reports` also writes each whole report and
+has `airground check` make it again. `--coq` also has Coq prove the distances of runs without obstacles that appear or
+disappear: it must accept those that SAFE-TRACE finds kept, and refuse the others.
 """
 
 from __future__ import annotations
@@ -15,12 +17,14 @@ from __future__ import annotations
 import argparse
 import json
 import multiprocessing
+import subprocess
 import sys
 import tempfile
 import time
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
+from functools import partial
 from itertools import combinations
 from pathlib import Path
 from typing import Any
@@ -31,9 +35,10 @@ import yaml
 from airground_drake.base import files
 from airground_drake.base.errors import AirgroundError, ScenarioError
 from airground_drake.check.command import LIMIT_S
-from airground_drake.check.line import AGREES
+from airground_drake.check.line import AGREES, RECORDED
 from airground_drake.check.report import check_report
 from airground_drake.decision.bayes import optimal_threshold
+from airground_drake.proofs.runs import prove, workshop
 from airground_drake.registry import METHODS, ROUTES
 from airground_drake.report import document
 from airground_drake.run import trace
@@ -75,6 +80,7 @@ class Row:
         trigger, route: as in the scenario.
         triggers, releases, decisions, accepted: how many.
         margin_m: of SAFE-TRACE.
+        coq: what Coq said of the distances, if it was asked.
         statuses: of the claims.
     """
 
@@ -95,6 +101,7 @@ class Row:
     decisions: int = 0
     accepted: int = 0
     margin_m: float | None = None
+    coq: str = ""
     statuses: dict[str, str] = field(default_factory=dict)
 
 
@@ -282,7 +289,7 @@ def _apart(rng: np.random.Generator, count: int, extent: float, least: float) ->
             return [place.tolist() for place in places]
 
 
-def judged(number: int) -> Row:
+def judged(number: int, *, reports: bool = False, by_coq: bool = False) -> Row:
     """Draw, simulate, judge; faults are in the row."""
     started = time.perf_counter()
     row = Row(number)
@@ -302,6 +309,9 @@ def judged(number: int) -> Row:
     row.trigger, row.route = scenario.decision.trigger, scenario.gatekeeper.route
     try:
         of_run, verdicts, row.wrong = tried(scenario)
+        row.wrong += made_again(scenario) if reports else []
+        row.coq, found = proved(of_run, verdicts) if by_coq else ("", [])
+        row.wrong += found
     except AirgroundError as error:
         row.wrong = [str(error)]
         return row
@@ -369,6 +379,41 @@ def _checker(scenario: Scenario, of_run: Trace, verdicts: Sequence[Verdict]) -> 
     return [f"checker on {line.claim}: {line.outcome}: {line.text}"[:300] for line in lines if line.outcome != AGREES]
 
 
+NO_LINES = {"claim": "report", "by": "check", "outcome": "nothing"}
+
+
+def made_again(scenario: Scenario) -> list[str]:
+    """What `airground check` does not agree with in the whole report of a scenario."""
+    with tempfile.TemporaryDirectory() as name:
+        file, report = Path(name) / "drawn.yaml", Path(name) / "report"
+        file.write_text(yaml.safe_dump(resolved(scenario), sort_keys=False), encoding="utf-8")
+        done = _command("report", file, "-o", report, "-q")
+        if not (report / "report.json").exists():
+            return [f"no report: {done.stderr[-250:]}"]
+        done = _command("check", report, "--json", "-q")
+        lines = json.loads(done.stdout)["checks"] if done.stdout else [NO_LINES | {"text": done.stderr[-250:]}]
+    wrong = [line for line in lines if line["outcome"] not in (AGREES, RECORDED)]
+    return [f"{line['by']} on {line['claim']}: {line['text']}"[:300] for line in wrong]
+
+
+def _command(*arguments: str | Path) -> subprocess.CompletedProcess[str]:
+    """A command of the package."""
+    command = [sys.executable, "-m", "airground_drake", *map(str, arguments)]
+    return subprocess.run(command, capture_output=True, text=True, check=False)
+
+
+def proved(of_run: Trace, verdicts: Sequence[Verdict]) -> tuple[str, list[str]]:
+    """What Coq says of the distances of a run, and whether that is wrong."""
+    if any(each.appears_s or each.disappears_s for each in of_run.scenario.barriers.values()):
+        return "not asked", []
+    with workshop() as place:
+        distances, _, _ = prove(place, of_run)
+    margin = next(verdict.margin for verdict in verdicts if verdict.claim.id == "SAFE-TRACE") or 0.0
+    said = "proved" if distances.proved else "refused"
+    wrongly = distances.proved != (margin >= 0.0) and abs(margin) > DISTANCE_TOLERANCE_M
+    return said, [f"Coq: {said}, though the least margin is {margin} m: {distances.why}"[:300]] if wrongly else []
+
+
 def main() -> int:
     """Draw, run, judge."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -376,10 +421,13 @@ def main() -> int:
     parser.add_argument("--first", type=int, default=0, help="number of the first scenario (default: %(default)s)")
     parser.add_argument("--only", type=int, help="this one")
     parser.add_argument("--jobs", type=int, help="processes (default: one for each processor)")
+    parser.add_argument("--reports", action="store_true", help="make each whole report, and have it made again")
+    parser.add_argument("--coq", action="store_true", help="have Coq prove the distances")
     parser.add_argument("--keep", type=Path, help="folder for the scenario files of those that fail")
     parser.add_argument("--rows", type=Path, help="file for a line of JSON per scenario, appended")
     options = parser.parse_args()
     rows: list[Row] = []
+    one = partial(judged, reports=options.reports, by_coq=options.coq)
 
     def take(row: Row) -> None:
         rows.append(row)
@@ -394,14 +442,14 @@ def main() -> int:
                 file.write(json.dumps(asdict(row)) + "\n")
 
     if options.only is not None:
-        take(judged(options.only))
+        take(one(options.only))
     else:
-        _many(options.first, options.number, options.jobs, take)
+        _many(one, options.first, options.number, options.jobs, take)
     print(summary(rows))
     return int(any(row.wrong for row in rows))
 
 
-def _many(first: int, wanted: int, jobs: int | None, take: Callable[[Row], None]) -> None:
+def _many(one: Callable[[int], Row], first: int, wanted: int, jobs: int | None, take: Callable[[Row], None]) -> None:
     """Judge scenarios from a number on, until `wanted` were valid."""
     valid, number = 0, first
     fresh = multiprocessing.get_context("spawn")
@@ -410,7 +458,7 @@ def _many(first: int, wanted: int, jobs: int | None, take: Callable[[Row], None]
         while valid < wanted:
             batch = range(number, number + max(8, (wanted - valid) // 4))
             number = batch.stop
-            for row in pool.imap_unordered(judged, batch):
+            for row in pool.imap_unordered(one, batch):
                 if valid < wanted:
                     take(row)
                     valid += not row.invalid
@@ -424,7 +472,7 @@ def summary(rows: Sequence[Row]) -> str:
         f"{len(rows)} drawn, {len(valid)} valid, {sum(bool(row.wrong) for row in valid)} failed",
         f"refused by validation: {dict(Counter(row.invalid.split(chr(46))[0] for row in rows if row.invalid))}",
     ]
-    for name in ("method", "ugvs", "obstacles", "trigger", "route"):
+    for name in ("method", "ugvs", "obstacles", "trigger", "route", "coq"):
         found = Counter(getattr(row, name) for row in valid)
         lines += [f"{name}: {dict(sorted(found.items()))}"]
     for name in ("shaped", "moving", "appearing", "triggers", "releases", "decisions", "accepted"):
