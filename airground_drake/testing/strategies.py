@@ -29,11 +29,13 @@ from hypothesis.strategies import DrawFn, SearchStrategy
 from airground_drake.decision.bayes import optimal_threshold
 from airground_drake.registry import METHODS, ROUTES
 from airground_drake.scenarios.schema import (
+    AT_END,
     TRIGGERS,
     Control,
     Decision,
     Gatekeeper,
     Intervention,
+    Moves,
     Obstacle,
     Policy,
     Preset,
@@ -68,6 +70,10 @@ HEADINGS = (0.0, 0.5, 1.5707963, -2.0)
 HEIGHTS = (0.0, 1.0, 50.0)
 APPEARANCES = (0.0, 1.5, 30.0)
 """Headings, rad, heights, m, and times of appearance, s, of obstacles."""
+OBSTACLE_SPEEDS = (1.0, 0.5, 1.7)
+"""Speeds of obstacles that move, m/s."""
+PROMISES = (1.0, 0.0, 0.5, 1.5)
+"""Speeds at which obstacles promise to move at most, as shares of the true one; 0: no promise of their own."""
 BAYES = (Threshold("bayes"), Threshold("bayes", drift_m_s=0.5, noise_m_sqrt_s=1.0))
 """Thresholds by the Bayes risk."""
 
@@ -119,6 +125,7 @@ def scenarios(
     durations: SearchStrategy[float] | None = None,
     compositions: SearchStrategy[str] | None = None,
     shapes: SearchStrategy[str] | None = None,
+    moving: SearchStrategy[bool] | None = None,
 ) -> Scenario:
     """A valid scenario with one run, named by its method.
 
@@ -135,6 +142,8 @@ def scenarios(
         compositions: of the avoidance; default: `augmented`, the only one that guarantees distances.
         shapes: of the obstacles, names of `KINDS`; default: any of them in half of the scenarios, which may also have
             an arena, and balls in the others.
+        moving: whether an obstacle moves; default: none does. Some move faster than they promise. Beside them no robot
+            brings itself too near (SAFE-OWN); distances can be broken by the obstacle (SAFE-TRACE).
     """
     count = draw(st.integers(1, 4) if ugvs is None else ugvs)
     method = draw(first_of(*sorted(METHODS, reverse=True)) if methods is None else methods)
@@ -145,7 +154,9 @@ def scenarios(
     if shapes is None:
         shapes = draw(first_of(first_of("ball"), first_of(*KINDS)))
     own = draw(first_of(*OWN_DISTANCES))
-    team, uav, rocks, arena = draw(_maps(count, others, safe, largest, own, shapes))
+    team, uav, rocks, arena = draw(
+        _maps(count, others, safe, largest, own, shapes, st.just(False) if moving is None else moving)
+    )
     speed = max(uav.max_speed_m_s, *(ugv.max_speed_m_s for ugv in team.values()))
     database = draw(DATABASES if policies is None else policies)
     return Scenario(
@@ -188,6 +199,7 @@ def _maps(
     largest: float,
     own: float,
     shapes: SearchStrategy[str],
+    moving: SearchStrategy[bool],
 ) -> tuple[dict[str, Ugv], Uav, dict[str, Obstacle], list[Vector]]:
     """UGVs, UAV and obstacles on a grid, in an arena or without one.
 
@@ -201,6 +213,7 @@ def _maps(
         largest: the largest radius, m.
         own: distance that some obstacles have instead of the scenario's, m; 0: none.
         shapes: of the obstacles.
+        moving: whether they move.
     """
     kinds = [draw(shapes) for _ in range(others)]
     size = draw(first_of(*SIZES)) if {*kinds} - {"ball", "post"} else 0.0
@@ -213,6 +226,9 @@ def _maps(
         f"obstacle_{k + 1}": draw(_obstacles(kind, draw(_places(free, pitch)), size, radii, own))
         for k, kind in enumerate(kinds)
     }
+    for obstacle in points.values():
+        if draw(moving):
+            _move(draw, obstacle, cells, pitch)
     arena = [[-pitch, -pitch], [width * pitch, width * pitch]] if size and draw(first_of(False, True)) else []
     starts, targets = list(free), list(free)
     team = {f"ugv{k + 1}": draw(_ugvs(cells, starts, targets, pitch, radii)) for k in range(count)}
@@ -247,6 +263,17 @@ def _obstacles(
     else:
         found.polygon_m = around
     return found
+
+
+def _move(draw: DrawFn, obstacle: Obstacle, cells: list[Cell], pitch: float) -> None:
+    """Let an obstacle move from its place through middles of cells."""
+    way = _distinct([obstacle.position_m, *draw(_middles(cells, pitch, 3))])
+    at_end = draw(first_of(*AT_END))
+    if len(way) == 1 or (at_end == "loop" and way[0] == way[-1]):
+        way.append([way[0][0] + pitch, *way[0][1:]])
+    speed = draw(first_of(*OBSTACLE_SPEEDS))
+    obstacle.position_m, obstacle.moves = [], Moves(way, speed, draw(first_of(0.0, 1.0)), at_end)
+    obstacle.max_speed_m_s, obstacle.known_motion = speed * draw(first_of(*PROMISES)), draw(first_of(False, True))
 
 
 @st.composite

@@ -16,6 +16,7 @@ from airground_drake.scenarios.schema import Control, Decision, Gatekeeper, Scen
 from airground_drake.scenarios.shapes import convex_parts
 from airground_drake.testing import assert_holds
 from airground_drake.testing.strategies import PARAMETERS, policies, scenarios
+from airground_drake.verify import judge
 
 OF_OBSTACLES = (
     "polygon_m", "segment_m", "size_m", "radius_m", "height_m", "heading_rad", "distance_m", "appears_s",
@@ -44,12 +45,26 @@ def test_given_strategies_are_used(scenario: Scenario) -> None:
     assert from_data(resolved(scenario), "drawn") == scenario
 
 
+@examples(12)
+@given(
+    scenarios(
+        ugvs=st.integers(1, 3), methods=st.sampled_from("da"), durations=st.just(4.0), moving=st.booleans(),
+        obstacles=st.integers(1, 4),
+    )
+)  # fmt: skip
+def test_robots_bring_themselves_too_near_to_nothing_that_moves(scenario: Scenario) -> None:
+    assert from_data(resolved(scenario), "drawn") == scenario
+    (run,) = scenario.runs
+    if any(each.moves for each in scenario.obstacles.values()):
+        assert [verdict.status for verdict in judge(simulate(scenario, run), ["SAFE-OWN"])] == ["holds"]
+
+
 @pytest.mark.slow
 def test_draws_are_valid_and_of_many_kinds() -> None:
     seen: Counter[str] = Counter()
 
     @examples(150)
-    @given(scenarios())
+    @given(scenarios(moving=st.booleans()))
     def draw(scenario: Scenario) -> None:
         assert from_data(resolved(scenario), "drawn") == scenario
         seen.update([f"method {next(iter(scenario.runs))}", f"threshold {scenario.decision.threshold.rule}"])
@@ -62,6 +77,8 @@ def test_draws_are_valid_and_of_many_kinds() -> None:
         for each in scenario.obstacles.values():
             seen.update(["post"] if each.height_m and not (each.polygon_m or each.segment_m or each.size_m) else [])
             seen.update(key for key in OF_OBSTACLES if getattr(each, key))
+            seen.update([each.moves.at_end, "known motion" if each.known_motion else ""] if each.moves else [])
+            seen.update(["broken promise"] if each.moves and each.expected_speed_m_s < each.moves.speed_m_s else [])
             seen.update(["concave"] if each.polygon_m and len(convex_parts(each) or ()) > 1 else [])
 
     draw()
@@ -69,6 +86,7 @@ def test_draws_are_valid_and_of_many_kinds() -> None:
     assert {f"policy {name}" for name in PARAMETERS} <= set(seen)
     assert {name for name in seen if name.startswith("composition")} == {"composition augmented"}
     assert {"arena", "concave", "post", *OF_OBSTACLES} <= set(seen)
+    assert {"stop", "reverse", "loop", "known motion", "broken promise"} <= set(seen)
     assert {"threshold fixed", "threshold bayes", "known True", "known False", "waypoints 4", "radius 0.5"} <= set(seen)
 
 
