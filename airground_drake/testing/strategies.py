@@ -148,7 +148,12 @@ def scenarios(
     count = draw(st.integers(1, 4) if ugvs is None else ugvs)
     method = draw(first_of(*sorted(METHODS, reverse=True)) if methods is None else methods)
     period = draw(first_of(*PERIODS))
-    safe = SafeDistance(draw(first_of(*DISTANCES)), draw(first_of(*DISTANCES)), draw(first_of(1.0, 0.5)))
+    safe = SafeDistance(
+        obstacle_m=draw(first_of(*DISTANCES)),
+        moving_m=draw(first_of(0.0, *DISTANCES)) if moving is not None else 0.0,
+        ugv_m=draw(first_of(*DISTANCES)),
+        air_ground_m=draw(first_of(1.0, 0.5)),
+    )
     largest = draw(first_of(*RADII))
     others = draw(st.integers(0, 6) if obstacles is None else obstacles)
     if shapes is None:
@@ -183,7 +188,7 @@ def _reach(safe: SafeDistance, own: float, radius: float, speed: float, period: 
 
 def _farthest(safe: SafeDistance, own: float) -> float:
     """The largest distance that any two bodies keep, m, if an obstacle may have its own."""
-    return max(safe.obstacle_m, safe.ugv_m, safe.air_ground_m, own)
+    return max(safe.obstacle_m, safe.moving_m, safe.ugv_m, safe.air_ground_m, own)
 
 
 Cell = tuple[int, int]
