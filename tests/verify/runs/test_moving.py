@@ -13,6 +13,7 @@ from persons import RADII, D, H
 from verify.judging import decided
 
 from airground_drake.base.arrays import Array
+from airground_drake.run.simulation import simulate
 from airground_drake.run.trace import Trace
 from airground_drake.verify import TRACE_CLAIMS, judge
 from airground_drake.verify.claim import ModelClaim
@@ -20,7 +21,7 @@ from airground_drake.verify.judging import judge_all
 from airground_drake.verify.model.pair_kinds import THEOREMS, kind_of
 from airground_drake.verify.runs.control_law import least_speeds, retreats
 from airground_drake.verify.runs.pairs import gap_over_time, least_gap, pair_of
-from airground_drake.verify.runs.passive import periods_of
+from airground_drake.verify.runs.passive import encounters, periods_of
 from airground_drake.verify.runs.safe_hyp import DECLARED, PASSIVE
 
 
@@ -52,6 +53,14 @@ def test_a_person_who_walks_through_a_robot_is_named_and_the_robot_is_not() -> N
     assert own.exercised
     (came,) = own.evidence["came_too_near_themselves"]
     assert (came["first"], came["second"], came["own_doing"], came["collided"]) == ("ugv1", "person", False, True)
+
+
+def test_encounters_are_told_in_the_order_in_which_they_were() -> None:
+    late, early = (persons.walking([x, y], [-9.0, y]) for x, y in ((9.0, 0.0), (4.0, 0.1)))
+    trace = simulate(persons.lone("two", -1.0, 0.0, obstacles={"a_late": late, "b_early": early}), "a")
+    told = encounters(trace)
+    assert [each.second for each in told] == ["b_early", "a_late"]
+    assert told[0].t_s < told[1].t_s
 
 
 def test_a_robot_that_has_nowhere_to_retreat_stands_and_the_wall_is_named() -> None:
