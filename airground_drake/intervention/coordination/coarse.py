@@ -1,8 +1,8 @@
 """A coarse roadmap for joint plans: few nodes, one robot's width or so apart, and the ways of the roadmap between them.
 
-The nodes are drawn from the roadmap so that no two are nearer to each other than a given width, if nothing is in between. Every node of
-the roadmap belongs to the nearest of them by way. Two nodes whose regions touch are joined by the shortest way through
-the common border. So two nodes are connected in the coarse roadmap exactly where they are in the roadmap.
+The nodes are drawn from the roadmap so that no two are nearer to each other than a given width, if nothing is in
+between. Every node of the roadmap belongs to the nearest of them by way. Two nodes whose regions touch are joined by
+the shortest way through the common border. So two nodes are connected in the coarse roadmap exactly where they are in the roadmap.
 
 Robots of several sizes share the nodes. The regions are drawn for each size, with the ways that this size can go.
 """
@@ -117,8 +117,8 @@ def coarsened(movers: Sequence[Mover], width: float) -> Coarse:
 
 
 def _ways(movers: Sequence[Mover], sizes: Indices, size: int, space: Space) -> csr_array:
-    """The part of the roadmap for robots of one size: free nodes, and edges from their starts, which may be too near."""
-    roadmap = min((mover for mover in movers), key=lambda each: each.space.apart).roadmap
+    """The roadmap for robots of one size: free nodes, and edges from their starts, which may be too near to things."""
+    roadmap = min(movers, key=lambda each: each.space.apart).roadmap
     nodes, heads, lengths = roadmap.nodes, roadmap.heads, roadmap.lengths
     tails = np.repeat(np.arange(len(nodes)), np.diff(roadmap.first_edge))
     free = space.points_are_free(nodes, 0.0)
@@ -256,18 +256,22 @@ def _graph(places: Array, edges: Sequence[_Edge], sizes: int) -> tuple[CoarseGra
     heads = np.array([edge.head for edge in every], dtype=np.int64)
     lines = [_as_motion(edge.line) for edge in every]
     begins = np.append(0, np.cumsum([len(line) for line in lines])).astype(np.int64)
-    lows = np.array([line[:, 1:].min(axis=0) for line in lines])
-    highs = np.array([line[:, 1:].max(axis=0) for line in lines])
+    rows = np.concatenate(lines)
+    lows, highs = (each.reduceat(rows[:, 1:], begins[:-1]) for each in (np.minimum, np.maximum))
     circles = np.column_stack([0.5 * (lows + highs), 0.5 * np.hypot(*(highs - lows).T)])
-    lengths = np.array([_length(edge.line) for edge in every])
-    graph = CoarseGraph(places, first, heads, lengths, begins, np.concatenate(lines), circles)
+    legs = np.append(0.0, np.cumsum(np.hypot(*np.diff(rows[:, 1:], axis=0).T)))
+    lengths = legs[begins[1:] - 1] - legs[begins[:-1]]
+    graph = CoarseGraph(places, first, heads, lengths, begins, rows, circles)
     return graph, np.array([edge.size for edge in every], dtype=np.int64)
 
 
 def _as_motion(line: Array) -> Array:
     """A polyline (K, 2), m, as a motion from 0 to 1 at constant speed; one row for a single place."""
+    if len(line) == 2 and (line[0] != line[1]).any():
+        found = np.empty((2, 3))
+        found[:, 0], found[:, 1:] = (0.0, 1.0), line
+        return found
     along = np.append(0.0, np.cumsum(np.hypot(*np.diff(line, axis=0).T)))
     if along[-1] == 0.0:
         return np.append(0.0, line[-1])[None]
-    found = np.column_stack([along / along[-1], line])
-    return without_repeats(found)
+    return without_repeats(np.column_stack([along / along[-1], line]))

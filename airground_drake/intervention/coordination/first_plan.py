@@ -38,8 +38,8 @@ NOISES = (0.05, 0.3, 1.0)
 a long search, others of the same robots straight to a plan: beginning anew is worth more than going on."""
 AGAIN = 24
 """Number of further plans with shuffled moves, once one is found: on the roadmap that has it, and on the widest two."""
-AGAIN_AT_MOST = 3.0
-"""A further plan may cost this many times as much as the first one."""
+AGAIN_AT_MOST, AGAIN_SHARE = 3.0, 10
+"""A further plan may cost this many times as much as the first one; all of them, one part in ten of the candidates."""
 WAITING = 0.5
 """What it costs to wait for a step while others with known motions are under way, in widths."""
 MOST_LAYERS = 400
@@ -81,7 +81,7 @@ def first_plan(movers: Sequence[Mover], fixed: Sequence[OtherRobot], candidates:
             found = each.run(min(budget, candidates - spent), turn)
             spent += found.candidates
             if found.status == "found":
-                ways, more = _best(each, found, searches[:2])
+                ways, more = _best(each, found, searches[:2], candidates // AGAIN_SHARE)
                 return FirstPlan("found", ways, spent + more)
             if spent >= candidates:
                 break
@@ -90,13 +90,17 @@ def first_plan(movers: Sequence[Mover], fixed: Sequence[OtherRobot], candidates:
     return FirstPlan("exhausted" if done else "effort spent", (), spent)
 
 
-def _best(found_on: _Search, first: lacam.Steps, others: Sequence[_Search]) -> tuple[tuple[Way, ...], int]:
+def _best(
+    found_on: _Search, first: lacam.Steps, others: Sequence[_Search], candidates: int
+) -> tuple[tuple[Way, ...], int]:
     """The best of some plans with shuffled moves, on several roadmaps, and what they cost."""
     best, spent = found_on.timed(first.moves), 0
     again = list(dict.fromkeys([found_on, *others]))
     for turn in range(AGAIN // len(again)):
         for each in again:
-            found = each.run(int(AGAIN_AT_MOST * first.candidates), AGAIN + turn)
+            if spent >= candidates:
+                break
+            found = each.run(int(min(AGAIN_AT_MOST * first.candidates, candidates - spent)), AGAIN + turn)
             spent += found.candidates
             if found.status == "found":
                 best = min(best, each.timed(found.moves), key=_sum)
@@ -116,9 +120,7 @@ class _Search:
             coarse = coarsened(self._movers, self._width)
             step = _step(coarse, self._movers)
             shut = _shut(coarse, self._movers, self._fixed, step)
-            apart = np.array(
-                [[one.space.apart + other.task.body for other in self._movers] for one in self._movers]
-            )
+            apart = np.array([[one.space.apart + other.task.body for other in self._movers] for one in self._movers])
             to_go = _to_go(coarse, shut, WAITING * self._width)
             swaps = self._share >= SWAPS_FROM
             team = Team(coarse.targets, coarse.usable, coarse.sizes, shut, apart, to_go, swaps, 0.0)
@@ -171,9 +173,7 @@ def _step(coarse: Coarse, movers: Sequence[Mover]) -> float:
     return max(float(lengths[can].max()) / mover.speed for can, mover in zip(coarse.usable, movers, strict=True))
 
 
-def _shut(
-    coarse: Coarse, movers: Sequence[Mover], fixed: Sequence[OtherRobot], step: float
-) -> npt.NDArray[np.bool_]:
+def _shut(coarse: Coarse, movers: Sequence[Mover], fixed: Sequence[OtherRobot], step: float) -> npt.NDArray[np.bool_]:
     """Edges that are shut because known motions are near, see `Team.shut`."""
     last = max((float(other.motion[-1, 0]) for other in fixed), default=0.0)
     layers = 1 + min(MOST_LAYERS, math.ceil(last / step))
@@ -187,9 +187,7 @@ def _shut(
 
 
 @njit(cache=True)
-def _shut_by(
-    graph: CoarseGraph, motion: Array, apart: float, step: float, shut: npt.NDArray[np.bool_]
-) -> None:
+def _shut_by(graph: CoarseGraph, motion: Array, apart: float, step: float, shut: npt.NDArray[np.bool_]) -> None:
     """Mark the edges that a robot cannot travel in each step, as it would come too near to a known motion.
 
     Args:

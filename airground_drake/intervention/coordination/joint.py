@@ -7,8 +7,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-import numpy as np
-
 from airground_drake.geometry.paths import NoPath, shortest_path
 from airground_drake.intervention.coordination.first_plan import first_plan
 from airground_drake.intervention.coordination.neighbourhoods import Refinement
@@ -36,7 +34,7 @@ class Effort:
     """
 
     expansions: int = 400_000
-    candidates: int = 10_000_000
+    candidates: int = 3_000_000
     searches: int = 4
 
 
@@ -146,7 +144,7 @@ class _Search:
         ways, failed = self._in_either_way()
         if failed is not None:
             before = len(self._without_way)
-            self._without_way = [i for i, way in enumerate(self._alone()) if way is None]
+            self._alone()
             if len(self._without_way) > before:
                 ways, failed = self._in_either_way()
         able = self._able()
@@ -167,12 +165,19 @@ class _Search:
         return [i for i in range(len(self._movers)) if i not in self._without_way]
 
     def _alone(self) -> list[Way | None]:
-        """The ways that the robots would have without each other; not of those that are known to have none."""
+        """The ways that the robots would have without each other; notes those that have none."""
         found: list[Way | None] = []
+        taken = self._taken()
         for i, mover in enumerate(self._movers):
-            way, spent = (None, 0) if i in self._without_way else find(mover, self._taken(), self._follow, self._most)
+            if i in self._without_way:
+                found.append(None)
+                continue
+            budget = self._left()
+            way, spent = find(mover, taken, self._follow, budget)
             self.spent += spent
             found.append(way)
+            if way is None and spent < budget:
+                self._without_way.append(i)
         return found
 
     def _left(self) -> int:
@@ -253,7 +258,7 @@ class _Search:
 
     def partly(self) -> list[Way | None]:
         """A plan in which robots without a way stay. Each time a robot finds none, the others are planned anew."""
-        self._limit = self._most
+        self._limit = max(self.spent, self._most * 3 // 4) + self._most // 4
         staying = list(self._without_way)
         for _ in self._movers:
             ways, failed = self._in_order(self._by_length(staying), staying)

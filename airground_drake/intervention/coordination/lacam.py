@@ -112,7 +112,7 @@ def _by_priority(priorities: Array, order: Indices) -> None:
 @njit(cache=True)
 def _have_arrived(team: Team, nodes: Indices, layer: int) -> bool:
     """Whether every robot is at its target, and can stay there."""
-    for i in range(len(nodes)):
+    for i in range(len(nodes)):  # noqa: SIM110 - compiled
         if nodes[i] != team.targets[i] or team.to_go[layer, i, nodes[i]] > 0.0:
             return False
     return True
@@ -140,7 +140,7 @@ def _successor(graph: CoarseGraph, team: Team, step: Step, order: Indices, digit
         for j in range(len(moves)):
             if moves[j] < 0 and must_go(graph, team, step, order[k], j) and not give(graph, team, step, j):
                 return False
-    for i in order:
+    for i in order:  # noqa: SIM110 - compiled
         if moves[i] < 0 and not give(graph, team, step, i):
             return False
     return True

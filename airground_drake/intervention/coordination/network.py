@@ -4,17 +4,17 @@ Two moves of different robots conflict if the places that they pass come nearer 
 conflict keep their order: the later step begins when the earlier one is over. If they are of the same step, they go in
 lockstep, as the search has checked them. All other moves begin as early as they can.
 
-Why no distance falls below what the steps had: consider two robots at one instant. If both move, in steps that conflict,
-they are in lockstep; else their moves are nowhere too near. If one waits where a move of the other passes too near, its
-moves to and from there conflict with that move; so the order says that it waited there during that step, too.
+Why no distance falls below what the steps had: consider two robots at one instant. If both move and their moves
+conflict, they are in lockstep; else their moves are nowhere too near. If one waits where a move of the other passes too
+near, its moves to and from there conflict with that move; so the order says that it waited there in that step, too.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 
 import numpy as np
+import numpy.typing as npt
 from numba import njit
 
 from airground_drake.base.arrays import Array
@@ -35,9 +35,7 @@ def without_loops(graph: CoarseGraph, team: Team, moves: Indices) -> Indices:
 
 
 @njit(cache=True)
-def _cut_loops(
-    graph: CoarseGraph, targets: Indices, apart: Array, shut: Array, sizes: Indices, moves: Indices
-) -> None:
+def _cut_loops(graph: CoarseGraph, targets: Indices, apart: Array, shut: npt.NDArray[np.bool_], sizes: Indices, moves: Indices) -> None:
     first, heads = graph.first, graph.heads
     steps, count = moves.shape
     for i in range(count):
@@ -76,7 +74,7 @@ def motions(graph: CoarseGraph, team: Team, moves: Indices, speeds: Sequence[flo
 
 def in_step(graph: CoarseGraph, moves: Indices, duration: float) -> list[Array]:
     """The robots' timed motions in steps of one duration, s."""
-    begin = duration * np.arange(len(moves))
+    begin: Array = duration * np.arange(len(moves), dtype=np.float64)
     return [_motion(graph, moves[:, i], begin, np.full(len(moves), duration)) for i in range(moves.shape[1])]
 
 
@@ -92,7 +90,7 @@ def _motion(graph: CoarseGraph, edges: Indices, begin: Array, duration: Array) -
 @njit(cache=True)
 def _times(graph: CoarseGraph, apart: Array, moves: Indices, speeds: Array) -> tuple[Array, Array]:
     """Begin and duration of every move, (T, n), s."""
-    heads, lengths, begins = graph.heads, graph.lengths, graph.begins
+    lengths, begins = graph.lengths, graph.begins
     steps, count = moves.shape
     begin, duration = np.zeros((steps, count)), np.zeros((steps, count))
     ready = np.zeros(count)
@@ -167,7 +165,10 @@ def segments_apart(a: Array, b: Array, c: Array, d: Array) -> float:
         if 0.0 <= s <= 1.0 and 0.0 <= t <= 1.0:
             return 0.0
     return min(
-        _from_segment(a, c, vx, vy), _from_segment(b, c, vx, vy), _from_segment(c, a, ux, uy), _from_segment(d, a, ux, uy)
+        _from_segment(a, c, vx, vy),
+        _from_segment(b, c, vx, vy),
+        _from_segment(c, a, ux, uy),
+        _from_segment(d, a, ux, uy),
     )
 
 
@@ -179,13 +180,3 @@ def _from_segment(p: Array, a: Array, ux: float, uy: float) -> float:
     s = min(max((x * ux + y * uy) / squared, 0.0), 1.0) if squared > 0.0 else 0.0
     dx, dy = x - s * ux, y - s * uy
     return float(dx * dx + dy * dy)
-
-
-def arrival(motion: Array) -> float:
-    """When a timed motion (M, 3) has come to its last place, s."""
-    return float(motion[-1, 0]) if len(motion) > 1 else 0.0
-
-
-def total(found: Sequence[Array]) -> float:
-    """Sum of the arrival times, s."""
-    return math.fsum(arrival(each) for each in found)

@@ -5,7 +5,8 @@ Intelligence 2022). Each takes the move that brings it nearest to its target. Ro
 move get theirs next, before all others. If one of them finds none, the next best move is tried.
 
 Swap rule (Okumura, Engineering LaCAM*, AAMAS 2024): in a corridor, a robot that has to change places with the robot
-ahead must lead it back to a junction. It then takes the move that leads farthest from its target, and the other follows.
+ahead must lead it back to a junction. It then takes the move that leads farthest from its target, and the other one
+follows.
 
 Robots are discs that go along polylines in the same step, each at constant speed. Two moves conflict if their exact
 distance falls below the distance that the robots keep, or below the distance at the beginning of the step if that is
@@ -144,11 +145,15 @@ def conflicts(graph: CoarseGraph, one: int, other: int, apart: float, both_arriv
 @njit(cache=True)
 def fits(graph: CoarseGraph, team: Team, step: Step, i: int, edge: int) -> bool:
     """Whether a move of robot i conflicts with no move that another robot has got."""
-    moves, targets, heads, apart = step.moves, team.targets, graph.heads, team.apart
+    moves, targets, heads, apart, circles = step.moves, team.targets, graph.heads, team.apart, graph.circles
+    x, y, radius = circles[edge, 0], circles[edge, 1], circles[edge, 2]
     arrives = heads[edge] == targets[i]
     for j in range(len(moves)):
         other = moves[j]
-        if other >= 0 and j != i:
+        if other < 0 or j == i:
+            continue
+        dx, dy, reach = x - circles[other, 0], y - circles[other, 1], apart[i, j] + radius + circles[other, 2]
+        if dx * dx + dy * dy <= reach * reach:
             both = arrives and heads[other] == targets[j]
             if conflicts(graph, edge, other, apart[i, j], both):
                 return False
@@ -162,8 +167,7 @@ def give(graph: CoarseGraph, team: Team, step: Step, root: int) -> bool:
     The robots that are being given moves are a stack of frames: robot, number of its moves, index of the one that is
     tried, robot to change places with, number of robots with moves before it, and next robot to look at.
     """
-    first, heads = graph.first, graph.heads
-    at, moves, given, counts, frames, lists = step.at, step.moves, step.given, step.counts, step.frames, step.lists
+    at, moves, counts, frames, lists = step.at, step.moves, step.counts, step.frames, step.lists
     depth, entered = 0, root
     while True:
         if entered >= 0:  # a robot that needs a move
@@ -220,10 +224,16 @@ def next_move(graph: CoarseGraph, team: Team, step: Step, depth: int) -> bool:
 @njit(cache=True)
 def next_in_the_way(graph: CoarseGraph, team: Team, step: Step, depth: int) -> int:
     """The next robot without a move that could not stay beside the move of a frame's robot; -1: none."""
-    moves, frames = step.moves, step.frames
+    moves, at, frames, apart, circles, places = (
+        step.moves, step.at, step.frames, team.apart, graph.circles, graph.places
+    )  # fmt: skip
     i = frames[depth, 0]
+    x, y, radius = circles[moves[i], 0], circles[moves[i], 1], circles[moves[i], 2]
     for j in range(frames[depth, 5], len(moves)):
-        if moves[j] < 0 and must_go(graph, team, step, i, j):
+        if moves[j] >= 0:
+            continue
+        dx, dy, reach = x - places[at[j], 0], y - places[at[j], 1], apart[i, j] + radius
+        if dx * dx + dy * dy <= reach * reach and must_go(graph, team, step, i, j):
             frames[depth, 5] = j + 1
             return j
     return -1
@@ -241,8 +251,8 @@ def must_go(graph: CoarseGraph, team: Team, step: Step, i: int, j: int) -> bool:
 def turn_back(graph: CoarseGraph, team: Team, step: Step, i: int, partner: int, found: Indices) -> int:
     """Sort the moves of robot i so that those come first that its partner can follow, and that lead farthest away.
 
-    Moves that lead nearer to the target come last. If the partner already pushes robot i, they are left out: the partner
-    has to wait.
+    Moves that lead nearer to the target come last. If the partner already pushes robot i, they are left out: the
+    partner has to wait.
 
     Returns:
         The number of moves.
@@ -328,7 +338,7 @@ def swap_partner(graph: CoarseGraph, team: Team, step: Step, i: int, best: int) 
         best: edge that it wants to travel.
     """
     places, first, heads = graph.places, graph.first, graph.heads
-    at, moves, apart = step.at, step.moves, team.apart
+    at, apart = step.at, team.apart
     here, there = at[i], heads[best]
     if there != here:
         j = standing_at(graph, team, step, i, there)
@@ -336,15 +346,17 @@ def swap_partner(graph: CoarseGraph, team: Team, step: Step, i: int, best: int) 
             return j if can_swap(graph, team, i, at[j], here, apart[i, j]) else -1
     for edge in range(first[here] + 1, first[here + 1]):
         behind = heads[edge]
-        if behind == there or behind == here:
+        if behind in (there, here):
             continue
         j = standing_at(graph, team, step, i, behind)
         if j < 0:
             continue
         if np.hypot(places[at[j], 0] - places[there, 0], places[at[j], 1] - places[there, 1]) < apart[i, j]:
             continue
-        if there != here and must_swap(graph, team, j, i, here, there) and can_swap(
-            graph, team, i, there, here, apart[i, j]
+        if (
+            there != here
+            and must_swap(graph, team, j, i, here, there)
+            and can_swap(graph, team, i, there, here, apart[i, j])
         ):
             return j
     return -1
@@ -376,7 +388,7 @@ def onward(graph: CoarseGraph, team: Team, i: int, before: int, here: int, apart
     chosen, most, other = -1, 0.0, -1
     for edge in range(first[here] + 1, first[here + 1]):
         there = heads[edge]
-        if there == before or there == here or not team.usable[i, edge]:
+        if there in (before, here) or not team.usable[i, edge]:
             continue
         far = np.hypot(places[there, 0] - places[before, 0], places[there, 1] - places[before, 1])
         if far < apart:
@@ -387,7 +399,7 @@ def onward(graph: CoarseGraph, team: Team, i: int, before: int, here: int, apart
         return 0, -1
     for edge in range(first[here] + 1, first[here + 1]):
         there = heads[edge]
-        if there == before or there == here or there == chosen or not team.usable[i, edge]:
+        if there in (before, here, chosen) or not team.usable[i, edge]:
             continue
         aside = np.hypot(places[there, 0] - places[chosen, 0], places[there, 1] - places[chosen, 1])
         far = np.hypot(places[there, 0] - places[before, 0], places[there, 1] - places[before, 1])

@@ -72,7 +72,7 @@ def test_every_distance_is_kept_at_all_times(
     tasks = [replace(one, body=bodies[k % len(bodies)]) for k, one in enumerate(tasks)]
     room = replace(room, keep=room.keep + np.arange(len(room.keep)) % 2 * bodies[-1])
     fixed = [OtherRobot(np.array([[0.0, -30.0, extent / 2.0], [30.0, 2.0 * extent, extent / 2.0]]), bodies[-1])]
-    found = plan(room, tasks, [1.0] * len(tasks), fixed, effort=Effort(orders=6))
+    found = plan(room, tasks, [1.0] * len(tasks), fixed, effort=Effort(candidates=100_000))
     assert_keeps_distances(room, tasks, found, 1.0, fixed)
     for way, one in zip(found.ways, tasks, strict=True):
         assert way is None or way.motion[-1, 1:].tolist() == one.preset[-1, 1:].tolist()
@@ -86,7 +86,7 @@ def test_every_distance_is_kept_among_walls(seed: int, count: int, field: tuple[
     places = rng.permutation(np.array([(x, y) for x in (0.3, 2.6, 5.2, 7.4, 9.7) for y in (0.4, 3.1, 6.6, 9.3)]))
     tasks = [replace(task(places[2 * k], places[2 * k + 1]), body=body) for k in range(count)]
     room = Space(rows, keep, 0.1, 0.5, 0.1)
-    found = plan(room, tasks, [1.0] * count, effort=Effort(orders=4))
+    found = plan(room, tasks, [1.0] * count, effort=Effort(candidates=100_000))
     assert_keeps_distances(room, tasks, found, 1.0, [])
 
 
@@ -150,8 +150,8 @@ def test_the_preset_is_joined_where_it_is_free_again() -> None:
 
 def test_an_effort_bounds_what_is_spent_and_the_plan_is_the_same_each_time() -> None:
     room, tasks = random_team(3, 5, 4, 14.0)
-    one, two = (plan(room, tasks, [1.0] * 5, effort=Effort(orders=1, expansions=50)) for _ in range(2))
-    assert one.orders <= 1
+    one, two = (plan(room, tasks, [1.0] * 5, effort=Effort(expansions=50, candidates=500)) for _ in range(2))
+    assert one.candidates <= 500 + 3 * 400
     assert one.expansions <= 50
     assert_keeps_distances(room, tasks, one, 1.0, [])
     assert [way.motion.tolist() for way in one.ways if way] == [way.motion.tolist() for way in two.ways if way]
