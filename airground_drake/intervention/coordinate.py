@@ -13,7 +13,7 @@ from airground_drake.base.arrays import Array
 from airground_drake.geometry import outline
 from airground_drake.geometry.motion import Motion
 from airground_drake.intervention.coordination.joint import Effort, Plan, plan
-from airground_drake.intervention.coordination.roadmap import RobotTask, Space
+from airground_drake.intervention.coordination.roadmap import PITCH, RobotTask, Space
 from airground_drake.intervention.coordination.single import OtherRobot, Way
 from airground_drake.intervention.coordination.timed import at_rest, distance, speed, timed, without_repeats
 from airground_drake.intervention.policy import MovingObstacle, Observation, Policy, Teammate
@@ -31,6 +31,10 @@ ON_PRESET_M = 0.5
 BLEND_S = 1.0
 """A UGV without a proposal is predicted to approach its preset with this time constant, s."""
 
+QUICK = Effort(candidates=300_000)
+"""First effort for a group of UGVs: more UGVs may be what it takes."""
+ONE_BY_ONE = Effort(candidates=0)
+"""Without a search over joint steps, which does not depend on the spacing."""
 SAME_PLACE_M = 1e-3
 """A UGV that has moved no farther than this counts as unmoved, m."""
 
@@ -49,7 +53,8 @@ class Coordinate(Policy):
     4. If the UGV `seen.robot` finds no way even alone, less clearance is tried. Without any way, it is not planned for
        again until it has moved or the map has changed.
     5. If it has a way alone, but the joint plan helps nobody, less spacing is tried. A plan that helps nobody is not
-       made again until a UGV has moved, is asked for something else, or the map has changed.
+       made again until a UGV has moved by more than the spacing of the roadmap, is asked for something else, or the map
+       has changed.
 
     Attributes:
         speed: largest speed, m/s; no UGV uses more than SHARE of its limit.
@@ -103,7 +108,7 @@ class Coordinate(Policy):
         if motions is None and alone(own) is not None:
             for spacing in NARROWER[1:]:
                 space = self._space(seen, share * self.clearance, spacing * self.spacing)
-                _, group, found = self._joint(seen, space, cache(partial(self._alone, seen, space)))
+                _, group, found = self._joint(seen, space, cache(partial(self._alone, seen, space)), ONE_BY_ONE)
                 if (motions := self._proposals(seen, group, found)) is not None:
                     return motions
             self._in_vain[waiting] = seen
@@ -125,13 +130,22 @@ class Coordinate(Policy):
             and _has_the_map_of(before, seen)
         )
 
-    def _joint(self, seen: Observation, space: Space, alone: Alone) -> tuple[tuple[float, ...], list[int], Plan]:
-        """The best joint plan: its cost, the indices of its UGVs, and the plan."""
+    def _joint(
+        self, seen: Observation, space: Space, alone: Alone, effort: Effort = QUICK
+    ) -> tuple[tuple[float, ...], list[int], Plan]:
+        """The best joint plan: its cost, the indices of its UGVs, and the plan.
+
+        Args:
+            seen: what the UAV sees.
+            space: obstacles and distances.
+            alone: ways of the UGVs without each other.
+            effort: of each plan; with `QUICK`, the last group gets the full effort if that was not enough.
+        """
         group = self._first_group(seen)
         best: tuple[list[int], Plan] | None = None
         least: tuple[float, ...] = ()
         for _ in range(MOST_PLANS):
-            found = self._plan(seen, space, group)
+            found = self._plan(seen, space, group, effort)
             cost = _cost(seen, group, found)
             if best is None or cost < least:
                 best, least = (group, found), cost
@@ -142,15 +156,19 @@ class Coordinate(Policy):
                 break
             group = sorted([*group, *more])
         assert best is not None
+        if least[0] > 0 and effort is QUICK and found.outcome == "effort spent":
+            found = self._plan(seen, space, group, Effort())
+            if (cost := _cost(seen, group, found)) < least:
+                best, least = (group, found), cost
         return least, *best
 
-    def _plan(self, seen: Observation, space: Space, group: Sequence[int]) -> Plan:
+    def _plan(self, seen: Observation, space: Space, group: Sequence[int], effort: Effort) -> Plan:
         team = seen.team
         fixed = [OtherRobot(predicted(mate, seen.start), mate.radius) for i, mate in enumerate(team) if i not in group]
         fixed += [_as_robot(each, seen) for each in seen.moving]
         tasks = [task_of(team[i], seen.start) for i in group]
         speeds = [min(self.speed, SHARE * team[i].max_speed) for i in group]
-        return plan(space, tasks, speeds, fixed, follow=self.follow, effort=Effort())
+        return plan(space, tasks, speeds, fixed, follow=self.follow, effort=effort)
 
     def _in_the_way(
         self, seen: Observation, space: Space, group: Sequence[int], found: Plan, alone: Alone
@@ -203,12 +221,12 @@ def _has_the_map_of(before: Observation, seen: Observation) -> bool:
 
 
 def _is_as_before(before: Observation, seen: Observation) -> bool:
-    """Whether the map is that of an earlier observation, and every UGV stands where it stood, asked for the same."""
+    """Whether the map is that of an earlier observation, and every UGV is near where it was, asked for the same."""
     return (
         _has_the_map_of(before, seen)
         and [_state(mate) for mate in before.team] == [_state(mate) for mate in seen.team]
         and all(
-            math.dist(one.position, other.position) <= SAME_PLACE_M
+            math.dist(one.position, other.position) <= PITCH * seen.robot_distance
             for one, other in zip(before.team, seen.team, strict=True)
         )
     )
