@@ -24,6 +24,7 @@ if TYPE_CHECKING:
         TraceError,
         UnknownNameError,
     )
+    from airground_drake.campaign.sweep import sweep
     from airground_drake.geometry.motion import Motion
     from airground_drake.intervention.policy import Policy, Proposal
     from airground_drake.report.make import write_report
@@ -56,6 +57,7 @@ __all__ = [
     "load",
     "plot",
     "simulate",
+    "sweep",
     "write_report",
 ]
 
@@ -78,6 +80,7 @@ _HOME = {
     "load": "scenarios.load",
     "plot": "view.plane",
     "simulate": "run.simulation",
+    "sweep": "campaign.sweep",
     "write_report": "report.make",
 }
 

@@ -19,6 +19,7 @@ from airground_drake.campaign.pool import Pool
 from airground_drake.campaign.spec import Spec
 from airground_drake.campaign.stopping import InOrder, Stopping
 from airground_drake.campaign.store import Store
+from airground_drake.campaign.swept import by_value, per_run
 from airground_drake.campaign.work import died, rows_of
 from airground_drake.registry import RUN_CLAIMS
 from airground_drake.scenarios.estimate import DEFAULT_LIMITS, MOST_ROWS, Limits
@@ -90,9 +91,11 @@ def conduct(
     finally:
         store.close()
     stopped = rule.last if rule is not None else None
-    of = {"name": spec.name, "title": spec.title, "spec": spec.source, "stopped": stopped}
+    of: dict[str, Any] = {"name": spec.name, "title": spec.title, "spec": spec.source, "stopped": stopped}
     if stopped is not None:  # other processes may have finished later draws meanwhile
         table = table[table["index"] <= stopped]
+    runs = per_run(table)
+    of["swept"] = [{"key": key, "entries": by_value(runs, key)} for key in spec.swept if key in runs]
     found: dict[str, Any] = strict(evidence(table, spec.marks, spec.dependent)) | of
     files.write_json(folder / EVIDENCE, found)
     files.write_text(folder / PAGE, page(found, table))

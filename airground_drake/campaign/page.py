@@ -13,6 +13,7 @@ from markupsafe import Markup
 from matplotlib.figure import Figure
 
 from airground_drake.base.arrays import Array
+from airground_drake.campaign import swept
 from airground_drake.campaign.rows import JUDGED
 from airground_drake.report.html import number
 from airground_drake.report.sentences import MARKS, Line
@@ -41,7 +42,13 @@ def page(found: dict[str, Any], table: pd.DataFrame) -> str:
         table: the rows.
     """
     template = _environment().get_template("campaign.html.j2")
-    return template.render(found=found, told=told(found), separated=_separated(found), figures=_figures(found, table))
+    return template.render(
+        found=found, told=told(found), separated=_separated(found), figures=_figures(found, table),
+        sweeps=[
+            (each["key"], each["entries"], swept.drawing(each["entries"], each["key"], f"swept{k}"))
+            for k, each in enumerate(found.get("swept", ())) if each["entries"]
+        ],
+    )  # fmt: skip
 
 
 def told(found: Mapping[str, Any]) -> list[Line]:

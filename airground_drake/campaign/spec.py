@@ -118,6 +118,11 @@ class Spec(File):
         """Keys with values that are not independent from draw to draw: `halton` and `grid`."""
         return [key for key, drawn in self.drawn.items() if drawn.kind in (HALTON, GRID)]
 
+    @property
+    def swept(self) -> list[str]:
+        """Keys whose values are gone through in turn."""
+        return [key for key, drawn in self.drawn.items() if drawn.kind == GRID]
+
     def values(self, index: int) -> dict[str, Any]:
         """The values of a draw by dotted key, without those of the course."""
         return values_of(self.drawn, self.seed, index)

@@ -166,9 +166,27 @@ def _summary(found: dict[str, Any], *, looked: bool) -> str:
             said += f", probability of a violation {bounds[0]:.2g} to {bounds[1]:.2g}"
         differs = f"; {claim['differs']} not as expected" if claim["differs"] else ""
         lines.append(f"  {claim['run']:10} {claim['claim']:12} {said}{differs}")
+    for swept in found.get("swept", ()):
+        lines += [f"  by {swept['key']}:", *map(_by_value, swept["entries"])]
     if found["dependent"]:
         lines.append(f"  no intervals: draws are not independent ({', '.join(found['dependent'])})")
     if found["not_judged"]:
         first = found["not_judged"][0]
         lines.append(f"  first that was not judged: draw {first['index']}, {first['ended']}: {first['what']}")
     return "\n".join([*lines, *(f"  undecided: {what}" for what in _undecided(found))])
+
+
+def _by_value(entry: dict[str, Any]) -> str:
+    """What became of the runs with one value of a swept key, as a line."""
+    refuted = [claim for claim, counts in entry["claims"].items() if counts["refuted"]]
+    times = [
+        f"{words} {entry[name]:.4g} s"
+        for name, words in (("first_trigger_s", "first trigger"), ("arrival_s", "last arrival"))
+        if entry[name] is not None
+    ]
+    said = [
+        f"{entry['arrived']} of {entry['ugvs']} arrived",
+        *times,
+        *([f"refuted: {', '.join(refuted)}"] * bool(refuted)),
+    ]
+    return f"    {entry['value']!s:10} {entry['run']:10} {'; '.join(said)}"

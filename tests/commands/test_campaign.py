@@ -50,6 +50,20 @@ def test_it_runs_goes_on_and_says_what_it_found(spec: Path, tmp_path: Path, airg
     assert "another campaign (spec_sha256)" in airground("campaign", spec, "-n", 5, "-o", out, "--resume", code=2)
 
 
+@pytest.mark.usefixtures("in_this_process")
+def test_a_grid_has_a_table_and_a_plot_for_each_key(spec: Path, tmp_path: Path, airground: Airground) -> None:
+    grids = "draw: {duration_s: {grid: [0.5, 1.0]}, control.motion_gain_1_s: {grid: [2.0, 3.0]}}"
+    spec.write_text(f"scenario: minimal\nruns: [d]\nclaims: [SAFE-TRACE]\n{grids}\n", encoding="utf-8")
+    said = airground("campaign", spec, "-o", tmp_path / "out")
+    assert "  by duration_s:\n    0.5        d          0 of 2 arrived\n    1.0 " in said
+    found = json.loads((tmp_path / "out" / "evidence.json").read_text())
+    assert [(each["key"], [e["value"] for e in each["entries"]]) for each in found["swept"]] == [
+        ("duration_s", [0.5, 1.0]), ("control.motion_gain_1_s", [2.0, 3.0]),
+    ]  # fmt: skip
+    text = (tmp_path / "out" / "campaign.html").read_text()
+    assert text.count("What became of the runs, by ") >= 2
+
+
 def test_one_draw_alone_is_the_same_draw_and_a_scenario(spec: Path, tmp_path: Path, airground: Airground) -> None:
     for _ in range(2):  # the same file again
         assert "SAFE-TRACE" in airground("campaign", spec, "--only", 1, "-o", tmp_path / "one.yaml")
