@@ -9,12 +9,12 @@ from pathlib import Path
 from typing import Any
 
 from airground_drake.base import files
-from airground_drake.base.errors import one_line
+from airground_drake.base.errors import one_line, short
 from airground_drake.base.usage import Parser, output_file
 from airground_drake.report import compare
 
 EXIT_WORSE = 1
-PARTS = ("overall", "verdicts", "margins", "exercised", "expectations", "reproduction", "audit", "events")
+PARTS = ("inputs", "overall", "verdicts", "margins", "exercised", "expectations", "reproduction", "audit", "events")
 MOST_LINES, MOST_ROWS = 20, 200
 """Changes of one part that are shown, in the terminal and on the page; `--json` has all."""
 _ABOUT = ("claim", "id", "run", "robot", "kind", "n")
@@ -24,17 +24,18 @@ def parser() -> argparse.ArgumentParser:
     """Make the parser."""
     parser = Parser(
         prog="airground compare",
-        description="What has changed from one report to another: verdicts, margins, what was exercised, events.",
+        description="What differs between two reports: first what they were made from (keys of the scenario, "
+        "versions), then verdicts, margins, what was exercised, events. Changes by rounding are counted, not listed.",
         epilog="verdicts from the best to the worst: "
         + "; ".join(", ".join(alike) for alike in compare.ORDER).replace("_", " ")
         + ". One that was as expected and is no longer is worse, too. Exit codes: 0 nothing is worse than before, 1 "
-        "something is (with --exact: anything differs), 2 usage, or a folder is no report.",
+        "something is (with --exact: any result differs), 2 usage, or a folder is no report.",
     )
     parser.add_argument("before", type=Path, metavar="BEFORE", help="folder of a report")
     parser.add_argument("after", type=Path, metavar="AFTER", help="folder of another")
     parser.add_argument("--json", action="store_true", help="print all of it as JSON")
     parser.add_argument("--html", type=output_file, metavar="FILE", help="write a page")
-    parser.add_argument("--exact", action="store_true", help="exit code 1 if anything differs, to the last digit")
+    parser.add_argument("--exact", action="store_true", help="exit code 1 if any result differs, to the last digit")
     return parser
 
 
@@ -52,21 +53,27 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(json.dumps({**places, **found}, indent=1, allow_nan=False))
     else:
         print("\n".join(one_line(line) for line in _lines(found)))
-    differs = any(found[part] for part in PARTS)
+    differs = any(found[part] for part in PARTS[1:])
     return EXIT_WORSE if found["regressions"] or (options.exact and differs) else 0
 
 
 def _lines(found: Mapping[str, Any]) -> Iterator[str]:
+    changed, rounded = [], 0
     for part in PARTS:
-        changes = sorted(found[part], key=lambda change: not change.get("worse"))
+        hidden = compare.rounded(found, part)
+        changes = sorted((each for each in found[part] if each not in hidden), key=lambda each: not each.get("worse"))
+        rounded += len(hidden)
         if changes:
+            changed.append(f"{len(changes)} {part}")
             yield f"{part}:"
         yield from (f"  {_line(change)}" for change in changes[:MOST_LINES])
         if len(changes) > MOST_LINES:
             yield f"  and {len(changes) - MOST_LINES} more: --json has all"
+    if rounded:
+        yield f"{rounded} number{'' if rounded == 1 else 's'} changed by no more than rounding: --json has all"
     count = found["regressions"]
-    changed = ", ".join(f"{len(found[part])} {part}" for part in PARTS if found[part])
-    yield f"{changed or 'nothing'} changed; {count or 'no'} regression{'' if count == 1 else 's'}"
+    said = ", ".join(changed) or ("nothing else" if rounded else "nothing")
+    yield f"{said} changed; {count or 'no'} regression{'' if count == 1 else 's'}"
 
 
 def _line(change: Mapping[str, Any]) -> str:
@@ -77,7 +84,8 @@ def _line(change: Mapping[str, Any]) -> str:
     percent = "" if relative is None else f" ({100.0 * relative:+.3g} %)"
     expected = " (not as expected)" if change.get("as_expected") is False and change["after"] else ""
     worse = "worse: " if change.get("worse") else ""
-    return f"{worse}{about}: {_side(change['before'])} -> {_side(change['after'])}{unit}{percent}{expected}"
+    was, now = (short(_side(change[side])) for side in ("before", "after"))
+    return f"{worse}{about}: {was} -> {now}{unit}{percent}{expected}"
 
 
 def _side(value: Any) -> str:
@@ -94,12 +102,12 @@ def _page(
 
     worse = [
         _line(change).removeprefix("worse: ")
-        for part in (*PARTS[1:], PARTS[0])
+        for part in (*PARTS[2:], PARTS[1])
         for change in found[part]
         if change["worse"]
     ]
     return render_beside(
         "compare.html.j2", before=before, after=after, found=found, parts=PARTS, most=MOST_ROWS, regressions=worse,
-        rounded={part: [change for change in found[part] if compare.is_rounding(change)] for part in PARTS},
+        rounded={part: compare.rounded(found, part) for part in PARTS},
         places=[str(folder) for folder in folders],
     )  # fmt: skip

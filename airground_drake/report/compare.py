@@ -33,6 +33,11 @@ WITHIN = 1e-8
 LONGEST_INTEGER = 18
 """Maximum number of digits of an integer."""
 
+VERSIONS = ("package", "drake", "python", "packages", "git")
+"""What the provenance says about the code."""
+NO_INPUTS = ("title", "description")
+"""Keys of a scenario that nothing depends on."""
+
 Document = Mapping[str, Any]
 Change = dict[str, Any]
 
@@ -91,12 +96,13 @@ def compared(before: Document, after: Document) -> dict[str, Any]:
     """What differs.
 
     Returns:
-        Strict JSON: `regressions`, a count; lists of changes `overall` (one at most), `verdicts`, `margins`,
+        Strict JSON: `regressions`, a count; lists of changes `inputs`, `overall` (one at most), `verdicts`, `margins`,
         `exercised`, `expectations`, `reproduction`, `audit`, `events`. A change has `before` and `after` (None if
         missing), whether it is `worse`, and what it is about: `claim` and `run`; `id`; or `run`, `robot`,
         `kind` and `n`, the number of the event among those of its kind, from 1. Margins have their `relative` change.
     """
     found: dict[str, Any] = {
+        "inputs": list(_inputs(before, after)),
         "overall": list(_overall(before, after)),
         "verdicts": list(_verdicts(before, after)),
         "margins": [{**each, "relative": _relative(each)} for each in _of_claims(before, after, "margin")],
@@ -113,9 +119,44 @@ def compared(before: Document, after: Document) -> dict[str, Any]:
 
 def is_rounding(change: Change) -> bool:
     """Whether a number changed by no more than rounding differs between versions of numpy, scipy and solvers."""
-    was, now = change["before"], change["after"]
-    both = all(isinstance(side, int | float) and not isinstance(side, bool) for side in (was, now))
-    return both and not change["worse"] and abs(now - was) <= WITHIN * (1.0 + abs(now))
+    return not change["worse"] and _agree(change["before"], change["after"])
+
+
+def rounded(found: Mapping[str, Any], part: str) -> list[Change]:
+    """The changes of a part by no more than rounding; whatever changes in the inputs counts."""
+    return [] if part == "inputs" else [change for change in found[part] if is_rounding(change)]
+
+
+def _agree(was: Any, now: Any) -> bool:
+    """Whether two values are the same but for the rounding of numbers in them."""
+    if isinstance(was, Mapping) and isinstance(now, Mapping):
+        return was.keys() == now.keys() and all(_agree(was[key], now[key]) for key in was)
+    if isinstance(was, list) and isinstance(now, list):
+        return len(was) == len(now) and all(map(_agree, was, now))
+    if all(isinstance(side, int | float) and not isinstance(side, bool) for side in (was, now)):
+        return bool(abs(now - was) <= WITHIN * (1.0 + abs(now)))
+    return type(was) is type(now) and bool(was == now)
+
+
+def _inputs(before: Document, after: Document) -> Iterator[Change]:
+    """Keys of the scenario and versions that differ: what the reports were made from."""
+    old, new = (
+        {key: value for key, value in report["scenario"]["resolved"].items() if key not in NO_INPUTS}
+        | {f"version of {key}": report["provenance"][key] for key in VERSIONS if key in report["provenance"]}
+        for report in (before, after)
+    )
+    yield from _differing(old, new, "")
+
+
+def _differing(was: Any, now: Any, key: str) -> Iterator[Change]:
+    """What differs in nested dicts, and in lists of dicts, by dotted key."""
+    if all(isinstance(side, list) and any(isinstance(each, Mapping) for each in side) for side in (was, now)):
+        was, now = ({str(index): each for index, each in enumerate(side)} for side in (was, now))
+    if isinstance(was, Mapping) and isinstance(now, Mapping):
+        for name in dict.fromkeys([*was, *now]):
+            yield from _differing(was.get(name), now.get(name), f"{key}.{name}" if key else str(name))
+    elif was != now:
+        yield {"id": key, "before": was, "after": now}
 
 
 def _overall(before: Document, after: Document) -> Iterator[Change]:

@@ -98,6 +98,36 @@ def test_only_what_is_worse_is_a_regression_and_the_page_has_every_change(
             assert f'<th scope="row">{about}' in text or f"<td>{about}</td>" in text
 
 
+def test_inputs_that_differ_come_first_and_rounding_is_only_counted(
+    before: Json, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """An input that changes in its last digit is told; so is a key that only one report has. Titles are no inputs."""
+    after = copy.deepcopy(before)
+    resolved = after["scenario"]["resolved"]
+    resolved["control"]["motion_gain_1_s"] += 1e-15
+    resolved["title"] = "another"
+    obstacle = next(iter(resolved["obstacles"]))
+    resolved["obstacles"]["new"] = resolved["obstacles"].pop(obstacle)
+    after["provenance"]["drake"] = "9.9"
+    claim(after, "")["margin"] += 1e-12
+    after["reproduction"][0]["ours"] = [each + 1e-13 for each in after["reproduction"][0]["ours"]]
+    claim(after, "").update(exercised=4)
+    folders = [str(save(tmp_path / "before", before)), str(save(tmp_path / "after", after))]
+    assert main(folders) == 0
+    lines = capsys.readouterr().out.splitlines()
+    told = [line.partition(":")[0].strip() for line in lines[: lines.index("exercised:")]]
+    places = {f"obstacles.{obstacle}", "obstacles.new"}
+    assert told[0] == "inputs"
+    assert set(told[1:]) == {"control.motion_gain_1_s", "version of drake", *places}
+    assert "2 numbers changed by no more than rounding: --json has all" in lines
+    assert "1 exercised changed; no regressions" in lines[-1]
+    assert main([folders[0], folders[0]]) == 0
+    assert main([*folders, "--exact"]) == 1
+    claim(after, "")["margin"] -= 1e-12
+    same = copy.deepcopy(before) | {"provenance": after["provenance"]}
+    assert main([folders[0], str(save(tmp_path / "same", same)), "--exact"]) == 0
+
+
 def test_margins_have_their_relative_change_unless_it_is_too_large_for_a_number(before: Json) -> None:
     was, now = copy.deepcopy(before), copy.deepcopy(before)
     for pair, relative in (((0.5, 0.4), pytest.approx(-0.2)), ((1e-308, 1e308), None)):
