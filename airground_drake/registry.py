@@ -164,6 +164,12 @@ def _misfit(kind: type, parameters: Mapping[str, Any]) -> str:
     return ""
 
 
+def parameters(kind: type) -> list[str]:
+    """The parameters that a class takes by keyword, each with its default: `name`, or `name = value`."""
+    given = [each for each in inspect.signature(kind).parameters.values() if each.kind is each.KEYWORD_ONLY]
+    return [each.name if each.default is each.empty else f"{each.name} = {each.default}" for each in given]
+
+
 def is_plugin(name: str) -> bool:
     """Whether a name has the form `module:Class` or, with folders or without, `file.py:Class`."""
     return re.fullmatch(PLUGIN_PATTERN, name) is not None

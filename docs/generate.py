@@ -8,13 +8,13 @@ from __future__ import annotations
 import argparse
 import html
 import inspect
-import json
 import re
+import textwrap
 from collections import defaultdict
 from collections.abc import Callable, Iterator, Sequence
 from importlib import import_module
 from pathlib import Path
-from typing import Any, get_args
+from typing import get_args
 
 from airground_drake import load, simulate
 from airground_drake.audit.equations import DEVIATIONS, Kind
@@ -24,15 +24,16 @@ from airground_drake.proofs import THEOREMS
 from airground_drake.registry import (
     METHODS,
     MODEL_CLAIMS,
-    PLUGIN,
     POLICIES,
     ROUTES,
     RUN_CLAIMS,
     SAMPLERS,
     UAV_TASKS,
     Registry,
+    parameters,
 )
 from airground_drake.scenarios import json_schema
+from airground_drake.scenarios.keys import sections
 from airground_drake.scenarios.shipped import shipped
 from airground_drake.systems import graphviz
 from airground_drake.systems.diagram import build_diagram, method_drawn
@@ -45,6 +46,10 @@ WIDTH = 120
 
 EQUATIONS = {row.place[1:-1] for row in DEVIATIONS if row.place.startswith("(")}
 """Numbers of the paper's equations."""
+
+REGISTRIES = {
+    "Policies": POLICIES, "Routes": ROUTES, "Tasks of the UAV": UAV_TASKS, "Samplers of `airground falsify`": SAMPLERS,
+}  # fmt: skip
 
 SCENARIO = json_schema.scenario_schema(installed=False)
 
@@ -63,7 +68,11 @@ def main() -> None:
 def pages() -> dict[str, str]:
     """Committed files that follow from the code, by name."""
     schema = json_schema.text(installed=False)
-    return {"extending.md": extending(), "../airground_drake/scenarios/scenario.schema.json": schema}
+    return {
+        "extending.md": extending(),
+        "names.md": names(),
+        "../airground_drake/scenarios/scenario.schema.json": schema,
+    }
 
 
 def diagrams() -> dict[str, str]:
@@ -79,8 +88,7 @@ def diagrams() -> dict[str, str]:
 def parts() -> dict[str, Callable[[], str]]:
     """What the site puts in the place of marks such as `<!-- claims: made when the site is built -->`, by name."""
     return {
-        "claims": claims, "commands": commands, "equations": equations, "keys": scenario, "names": names,
-        "theorems": theorems,
+        "claims": claims, "commands": commands, "equations": equations, "theorems": theorems,
     }  # fmt: skip
 
 
@@ -221,78 +229,49 @@ def _argument(action: argparse.Action) -> str:
 
 
 def names() -> str:
-    """Everything that a scenario may name."""
-    lines = ["### Methods", "", *(f"- `{method.id}`: {method.says}" for method in METHODS.values())]
-    for title, registry in (("Policies", POLICIES), ("Routes", ROUTES), ("Tasks of the UAV", UAV_TASKS)):
-        lines += ["", f"### {title}", "", *(_entry(registry, name) for name in registry.own)]
-    lines += ["", "### Samplers, of `airground falsify`", "", *(_entry(SAMPLERS, name) for name in SAMPLERS.own)]
-    return "\n".join(lines)
+    """The page of all names: keys, methods, policies and the like with their parameters, claims."""
+    lines = [
+        "# Names", "",
+        *wrapped(
+            "What a scenario may name: made from the code by `python docs/generate.py`. `airground list` prints it, too, "
+            "with what installed packages add: `airground list policies coordinate`, `airground list keys control`."
+        ), "",
+        "## Keys of a scenario file", "",
+        *wrapped("NAME stands for a name of your own, N for the number of an item. A unit is in brackets."), "",
+        *keys(),
+        "## Methods", "", *(f"- `{method.id}`: {method.says}" for method in METHODS.values()), "",
+    ]  # fmt: skip
+    for title, registry in REGISTRIES.items():
+        lines += [f"## {title}", ""]
+        for name in registry.own:
+            lines += wrapped(_entry(registry, name))
+        lines.append("")
+    lines += ["## Claims", "", *wrapped("[Claims](claims.md) has what each assumes and does not establish."), ""]
+    for name, claim in _claims():
+        about = "the model" if name in MODEL_CLAIMS.own else "a run"
+        lines += wrapped(f"- `{name}` (about {about}): {claim.summary}")
+    return "\n".join([*lines, ""])
 
 
 def _entry(registry: Registry, name: str) -> str:
     kind = registry.load(name, of=object)
     says = " ".join((inspect.getdoc(kind) or "").split("\n\n")[0].split())
-    given = [p for p in inspect.signature(kind).parameters.values() if p.kind is p.KEYWORD_ONLY]
-    parameters = ", ".join(f"`{p.name}`" + ("" if p.default is p.empty else f" = {p.default}") for p in given)
-    return f"- `{name}`: {says}" + (f" Parameters: {parameters}." if parameters else "")
+    given = parameters(kind)
+    return f"- `{name}`: {says}" + (f" Parameters: {', '.join(f'`{each}`' for each in given)}." if given else "")
 
 
-def scenario() -> str:
+def keys() -> Iterator[str]:
     """Every key of a scenario file."""
-    lines: list[str] = []
-    for path, part in _parts(SCENARIO, ""):
-        entries = [f"- `{key}` ({_allowed(key, part)}): {says['description']}" for key, says in _keys(part)]
-        lines += [f"### {path}" if path else "### The file", "", part["description"], "", *entries, ""]
-    return "\n".join(lines)
+    for section, about, entries in sections(SCENARIO):
+        yield from (f"### {section}" if section else "### The file", "", *wrapped(about), "")
+        for entry in entries:
+            yield from wrapped(f"- `{entry.key}` ({entry.allowed}): {entry.says}")
+        yield ""
 
 
-def _keys(part: dict[str, Any]) -> list[tuple[str, dict[str, Any]]]:
-    return [(key, says) for key, says in part["properties"].items() if key != "<<"]
-
-
-def _parts(part: dict[str, Any], path: str) -> Iterator[tuple[str, dict[str, Any]]]:
-    """A section of the file and those below it, each with its dotted key."""
-    yield path, part
-    for key, says in _keys(part):
-        for where, below in (
-            ("", says),
-            (".NAME", says.get("additionalProperties") or {}),
-            (".N", says.get("items") or {}),
-        ):
-            if "$ref" in below:
-                kind = SCENARIO["$defs"][below["$ref"].rpartition("/")[2]]
-                yield from _parts(kind, f"{path}.{key}{where}".lstrip("."))
-
-
-def _allowed(key: str, part: dict[str, Any]) -> str:
-    """What may stand under a key, and its default."""
-    says = part["properties"][key]
-    words = [_kind(says)]
-    if says.get("type") == "number" and "default" in says:
-        words.append("0 or more" if says["minimum"] == 0 else "above 0")
-    if says.get("type") == "integer":
-        words.append(f"{says['minimum']} to {says['maximum']}")
-    if "default" in says and says["default"] not in ({}, [], ""):
-        words.append(f"default {json.dumps(says['default'])}")
-    elif key in part["required"]:
-        words.append("needed")
-    return ", ".join(words)
-
-
-def _kind(says: dict[str, Any]) -> str:
-    if "anyOf" in says:
-        return f"{_kind(says['anyOf'][0])}, {PLUGIN}"
-    if "enum" in says:
-        return "one of " + ", ".join(f"`{name}`" for name in says["enum"])
-    if "$ref" in says:
-        return "a mapping, see below"
-    if says["type"] == "array":
-        return "a point, [x, y, z]" if says.get("maxItems") == 3 else f"a list of {_kind(says['items'])}"
-    if says["type"] == "object":
-        return "a mapping by name"
-    return {"number": "a number", "integer": "a whole number", "boolean": "true or false", "string": "text"}[
-        says["type"]
-    ]
+def wrapped(text: str) -> list[str]:
+    """A paragraph or an item of a list, in lines."""
+    return textwrap.wrap(text, WIDTH, subsequent_indent="  " * text.startswith("- "), break_on_hyphens=False)
 
 
 if __name__ == "__main__":

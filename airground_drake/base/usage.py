@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import difflib
 import math
 import os
 import sys
@@ -35,7 +36,13 @@ class Parser(argparse.ArgumentParser):
     """Refuses a bad command line in one line."""
 
     def error(self, message: str) -> NoReturn:
-        """Print the message, and exit with 2."""
+        """Print the message, and exit with 2; for arguments that are too many, with those that the command takes."""
+        words = message.removeprefix("unrecognized arguments: ").split()
+        if words != message.split():
+            options = [option for option in self._option_string_actions if option.startswith("--")]
+            close = difflib.get_close_matches(words[0].partition("=")[0], options, n=1) if words[0][0] == "-" else []
+            takes = [action.metavar or action.dest for action in self._actions if not action.option_strings]
+            message += f"; did you mean {close[0]}?" if close else f"; wanted: {' '.join(map(str, takes)) or 'options'}"
         raise SystemExit(refuse(f"{message}; see {self.prog} --help"))
 
 

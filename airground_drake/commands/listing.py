@@ -1,12 +1,26 @@
-"""`airground list [KIND]`: every name that a scenario or the command line can use, a line each."""
+"""`airground list [KIND [NAME]]`: every name that a scenario or the command line can use, or all about one of them."""
 
 from __future__ import annotations
 
 import argparse
+import inspect
+import textwrap
 from collections.abc import Callable, Iterator, Sequence
+from typing import Any
 
+from airground_drake.base.errors import UnknownNameError
 from airground_drake.base.usage import Parser
-from airground_drake.registry import METHODS, MODEL_CLAIMS, POLICIES, ROUTES, RUN_CLAIMS, SAMPLERS, UAV_TASKS, Registry
+from airground_drake.registry import (
+    METHODS,
+    MODEL_CLAIMS,
+    POLICIES,
+    ROUTES,
+    RUN_CLAIMS,
+    SAMPLERS,
+    UAV_TASKS,
+    Registry,
+    parameters,
+)
 from airground_drake.scenarios.shipped import shipped, title
 
 Lines = Iterator[tuple[str, str]]
@@ -16,7 +30,8 @@ Lines = Iterator[tuple[str, str]]
 def parser() -> argparse.ArgumentParser:
     """Make the parser."""
     parser = Parser(prog="airground list", description=f"List {__doc__.partition(': ')[2]}")
-    parser.add_argument("kind", nargs="?", choices=tuple(KINDS), help="default: all of them")
+    parser.add_argument("kind", nargs="?", choices=(*KINDS, KEYS), help="default: all of them but the keys")
+    parser.add_argument("name", nargs="?", metavar="NAME", help="a name, or the beginning of a key: all about it")
     parser.add_argument("--schema", action="store_true", help="the JSON Schema of scenario files instead, for editors")
     return parser
 
@@ -29,6 +44,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
         print(json_schema.text(), end="")
         return 0
+    if options.kind == KEYS:
+        return _print_keys(options.name or "")
+    if options.name is not None:
+        return _print_one(options.kind, options.name)
     for kind in KINDS if options.kind is None else (options.kind,):
         found = list(KINDS[kind]())
         width = max(len(name) for name, _ in found)
@@ -36,16 +55,64 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return 0
 
 
+def _print_one(kind: str, name: str) -> int:
+    """Print what a name stands for, with its parameters."""
+    names = dict(KINDS[kind]())
+    if name not in names:
+        raise UnknownNameError(f"name among the {kind}", name, names)
+    registry = next((each for each in REGISTRIES.get(kind, ()) if name in each), None)
+    lines = [f"{name}: {names[name]}"] if registry is None else _about(registry.load(name, of=object), name)
+    print("\n".join(line for each in lines for line in (textwrap.wrap(each, WIDTH, subsequent_indent="  ") or [""])))
+    return 0
+
+
+def _about(kind: type, name: str) -> list[str]:
+    """Paragraphs about a class: what it says of itself, its parameters, or what a claim states."""
+    if statement := getattr(kind, "statement", ""):
+        claim: Any = kind
+        return [
+            f"{name}: {claim.summary}", statement, f"Decided by: {claim.method}", "Assumes:",
+            *(f"- {each}" for each in claim.assumptions), f"Does not establish: {claim.does_not_establish}",
+        ]  # fmt: skip
+    told, _, more = (inspect.getdoc(kind) or "").partition("\n\n")
+    given = ", ".join(parameters(kind)) or "none"
+    return [f"{name}: {' '.join(told.split())}", f"Parameters: {given}.", *more.splitlines()]
+
+
+def _print_keys(beginning: str) -> int:
+    """Print the keys of a scenario whose dotted key, without names, begins so."""
+    from airground_drake.scenarios.json_schema import scenario_schema
+    from airground_drake.scenarios.keys import sections
+
+    found = [
+        (f"{section.path}.{entry.key}".lstrip("."), entry)
+        for section in sections(scenario_schema())
+        for entry in section.entries
+    ]
+    shown = [(key, entry) for key, entry in found if f"{key}.".startswith(f"{beginning}." if beginning else "")]
+    shown = shown or [(key, entry) for key, entry in found if key.rpartition(".")[2].startswith(beginning)]
+    if not shown:
+        raise UnknownNameError("key", beginning, [key for key, _ in found])
+    for key, entry in shown:
+        allowed = entry.allowed.replace("`", "")
+        print(textwrap.fill(f"{key} ({allowed}): {entry.says.replace('`', '')}", WIDTH, subsequent_indent="  "))
+    return 0
+
+
 def _registered(*registries: Registry) -> Callable[[], Lines]:
     return lambda: ((name, registry.says(name)) for registry in registries for name in registry)
 
 
+REGISTRIES = {
+    "policies": (POLICIES,), "routes": (ROUTES,), "tasks": (UAV_TASKS,), "samplers": (SAMPLERS,),
+    "claims": (RUN_CLAIMS, MODEL_CLAIMS),
+}  # fmt: skip
+
+KEYS = "keys"
+WIDTH = 100
+
 KINDS: dict[str, Callable[[], Lines]] = {
     "scenarios": lambda: ((name, title(name)) for name in shipped()),
     "methods": lambda: ((name, method.says) for name, method in METHODS.items()),
-    "policies": _registered(POLICIES),
-    "routes": _registered(ROUTES),
-    "tasks": _registered(UAV_TASKS),
-    "samplers": _registered(SAMPLERS),
-    "claims": _registered(RUN_CLAIMS, MODEL_CLAIMS),
+    **{kind: _registered(*registries) for kind, registries in REGISTRIES.items()},
 }

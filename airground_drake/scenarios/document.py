@@ -19,6 +19,7 @@ import yaml
 
 from airground_drake.base import files
 from airground_drake.base.errors import Fault, ScenarioError, short
+from airground_drake.scenarios import hints
 from airground_drake.scenarios.shipped import shipped, shipped_files
 
 MAX_BYTES = 2**20
@@ -175,6 +176,8 @@ def _composed(text: str, source: str) -> yaml.Node:
     try:
         root: yaml.Node | None = _Loader(text, source).get_single_node()
     except (yaml.YAMLError, ValueError, OverflowError) as error:
+        if isinstance(error, yaml.MarkedYAMLError) and (found := hints.slip(error, text)):
+            raise ScenarioError(f"{source}:{found.line}", "", Fault(f"not YAML: {found.what}"), found.wanted) from None
         mark = getattr(error, "problem_mark", None)
         line = mark.line + 1 if mark else text.count("\n", 0, getattr(error, "position", 0)) + 1
         problem = getattr(error, "problem", None) or getattr(error, "reason", None)
@@ -326,9 +329,8 @@ def suggestion(name: str, options: Iterable[str]) -> str:
 
 def unknown(source: str, key: str, part: str, options: Sequence[str]) -> ScenarioError:
     """The error of an unknown key; `part` is the last part of the dotted key."""
-    return ScenarioError(
-        source, key, UNKNOWN_KEY, f"{suggestion(part, options)}allowed: {', '.join(options) or 'none'}"
-    )
+    hint = hints.not_modelled(part) or suggestion(part, options)
+    return ScenarioError(source, key, UNKNOWN_KEY, f"{hint}allowed: {', '.join(options) or 'none'}")
 
 
 def _dotted(key: str, part: str) -> str:

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import os
+import re
 import shlex
 import signal
 import subprocess
 import sys
+from collections.abc import Iterator
 from importlib.metadata import entry_points
 from pathlib import Path
 
@@ -17,7 +19,7 @@ from airground_drake.commands import COMMANDS
 from airground_drake.commands.listing import KINDS
 from airground_drake.registry import METHODS, MODEL_CLAIMS, POLICIES, ROUTES, RUN_CLAIMS, SAMPLERS, UAV_TASKS
 from airground_drake.scenarios.limits import MAX_UGVS
-from airground_drake.scenarios.load import load, shipped
+from airground_drake.scenarios.load import load, resolved, shipped
 
 AIRGROUND = (sys.executable, "-m", "airground_drake")
 
@@ -46,6 +48,40 @@ def test_list_has_every_name(airground: Airground) -> None:
     listed = {line.split()[0]: line.split(maxsplit=1)[1:] for line in lines if line.startswith("  ")}
     assert set(listed) == {*shipped(), *METHODS, *POLICIES, *ROUTES, *UAV_TASKS, *SAMPLERS, *RUN_CLAIMS, *MODEL_CLAIMS}
     assert all(listed.values())
+
+
+def test_list_tells_all_about_one_name(airground: Airground) -> None:
+    """Every name of every kind has a text; parameters are those that the class takes."""
+    for kind, names in KINDS.items():
+        for name, _ in names():
+            assert airground("list", kind, name).startswith(f"{name}: ")
+    assert "Parameters: speed_m_s, clearance_m = 0.05, follow_s = 5.0." in airground("list", "policies", "detour")
+    assert "Does not establish: " in airground("list", "claims", "SAFE-TRACE")
+    said = airground("list", "policies", "detuor", code=2)
+    assert "unknown name among the policies 'detuor'; allowed: detour, coordinate" in said
+
+
+def test_list_has_every_key_that_scenarios_have(airground: Airground) -> None:
+    listed = {line.partition(" (")[0] for line in airground("list", "keys").splitlines() if not line.startswith(" ")}
+
+    def keys(value: object, path: str) -> Iterator[str]:
+        if isinstance(value, dict):
+            named = path in ("ugvs", "obstacles", "runs")
+            for key, each in value.items():
+                yield from keys(each, f"{path}.{'NAME' if named else key}".lstrip("."))
+        elif isinstance(value, list) and value and isinstance(value[0], dict):
+            yield from keys(value[0], f"{path}.N")
+        elif not path.endswith((".NAME", ".N")):
+            yield path
+
+    for name in ("case_a", "crowd"):
+        found = {key for key in keys(resolved(load(name)), "") if not key.startswith(FREE)}
+        found = {key for key in found if not re.search(r"\.(parameters|expected|set|stalls_m)\.", key)}
+        assert found - listed == set()
+    assert len(listed) > 100
+    assert airground("list", "keys", "control").count("control.period_s (") == 1
+    assert "ugvs.NAME.max_speed_m_s (" in airground("list", "keys", "max_speed_m_s")
+    assert "unknown key 'nothing'" in airground("list", "keys", "nothing", code=2)
 
 
 @pytest.mark.parametrize(
@@ -101,6 +137,8 @@ def test_diagram_shows_figure_2_of_the_paper(tmp_path: Path, airground: Airgroun
     ).read_bytes()
 
 
+FREE = ("expected.", "claims.")
+"""Mappings with free names at the top of a scenario."""
 SPEC = "scenario: minimal\nruns: [d]\nset: {duration_s: 1.0}\ndraw: {seed: {integer: [0, 9]}}\n"
 MISTAKES = """
                                         # a command is needed: report, run
@@ -115,7 +153,8 @@ report minimal --seed x                 # invalid int value: 'x'
 report minimal -o spec.yaml             # spec.yaml cannot be written
 report minimal --set gatekeeper=&a      #
 report spec.yaml                        # spec.yaml:1: scenario: unknown key
-report a b                              # unrecognized arguments: b
+report a b                              # unrecognized arguments: b; wanted: scenario
+report minimal --fromat html            # did you mean --format?
 run minimal d --set duration_s=1e12     # duration_s
 run minimal d -o spec.yaml/below        # cannot be written: Not a directory; wanted: a folder for the trace
 run minimal z                           # unknown run 'z'; allowed: a, d

@@ -223,6 +223,13 @@ REPLACEMENTS = [
     ("name: small", "name: 17"),
     ("obstacles:\n  rock: {position_m: [5, -5, 0]}", "obstacles:"),
     ("obstacles:\n", "obstacles:\n  stone:\n    known_to_uav: false\n"),
+    ("name: small", "name:small"),
+    ("name: small", "name: small\ntitle: one: two"),
+    ("name: small", 'name: small\ntitle: "one'),
+    ("name: small", "name: small\ntitle: %one"),
+    ("name: small", "name: small\n  title: one"),
+    ("  rock: {", "  rock: {radius_m: [1, "),
+    ("obstacles:\n", "obstacles:\n\tstone: 1\n"),
 ]
 """A text of `SMALL`, and what stands there instead."""
 
@@ -233,6 +240,8 @@ OVERRIDES = [
     "control.period=1",
     "ugvs.ugv9.max_speed_m_s=1",
     "ugvs.ugv9.max_sped_m_s=1",
+    "ugvs.ugv1.max_acceleration_m_s2=1",
+    "intervention.message_delay_s=1",
     "runs.d.expected.LIVE-GAOL=refuted",
     "obstacles.box.x.position_m=[1, 2, 0]",
     "ugvs..start_m=1",

@@ -1,0 +1,79 @@
+"""What helps somebody whose file is refused: mistakes in YAML in plain words, and what no key exists for."""
+
+from __future__ import annotations
+
+import re
+from typing import NamedTuple
+
+import yaml
+
+LIMITS = 'see "Known limits" in docs/verification.md'
+
+NOT_MODELLED = {
+    r"accel|decel|jerk|brak": "acceleration limits are not modelled",
+    r"mass|inertia|torque|force|friction|slip|grip": "forces are not modelled: robots have the velocities that are "
+    "commanded",
+    r"delay|latenc|packet|bandwidth|(message|link|communication).*(loss|rate)": "messages arrive at once, and none is "
+    "lost",
+    r"(sensor|sensing|position|measurement|odometry).*(noise|error|drift)|occlu|field_of_view|fov": "sensing within "
+    "range is perfect",
+    r"batter|energy|fuel|power": "energy is not modelled",
+    r"wind|weather|slope|terrain": "the ground is flat, and there is no wind",
+}  # fmt: skip
+"""What keys with such names would be about, and why there are none."""
+
+
+def not_modelled(name: str) -> str:
+    """Why there is no key with such a name, as the beginning of a message; empty if nothing is known."""
+    for pattern, why in NOT_MODELLED.items():
+        if re.search(pattern, name.lower()):
+            return f"{why}; {LIMITS}; "
+    return ""
+
+
+class Slip(NamedTuple):
+    """A mistake in YAML: its line, from 1, what it is, and what is wanted."""
+
+    line: int
+    what: str
+    wanted: str
+
+
+_NO_SPACE = re.compile(r"\s*(- )?[\w.-]+:[^\s/]")
+"""A key without a space after its colon; `scheme://` is none."""
+_QUOTES = "wanted: quotes around a text with ': ' or ' #' in it"
+
+
+def slip(error: yaml.MarkedYAMLError, text: str) -> Slip | None:
+    """A frequent mistake in plain words; None for others.
+
+    Args:
+        error: of PyYAML.
+        text: the text that it could not read.
+    """
+    mark, problem = error.problem_mark, error.problem or ""
+    if mark is None:
+        return None
+    lines, line = [*text.splitlines(), ""], mark.line + 1
+    begun = error.context_mark.line + 1 if error.context_mark else line
+    here = lines[min(mark.line, len(lines) - 1)]
+    if "'\\t'" in problem:
+        return Slip(line, "a tab where YAML allows none", "wanted: spaces, no tabs")
+    if "cannot start any token" in problem:
+        sign = problem.split("'")[1]
+        return Slip(line, f"a text that begins with {sign}", "wanted: quotes around it")
+    if "mapping values are not allowed" in problem:
+        before = next((n for n in range(mark.line, 0, -1) if lines[n - 1].strip()), 0)
+        if before and _NO_SPACE.match(lines[before - 1]) and ": " not in lines[before - 1]:
+            return Slip(before, "no space after the colon of a key", "wanted: key: value")
+        if len(re.findall(r":(?= |$)", here)) > 1:
+            return Slip(line, "a second colon in a line", _QUOTES)
+        return Slip(line, "a key where none can be", "wanted: keys of one mapping, each in a line, equally indented")
+    if problem.startswith(("expected ',' or ']'", "expected ',' or '}'")):
+        sign = problem[len("expected ',' or '")]
+        return Slip(begun, "brackets that are not closed", f"wanted: {sign} at the end")
+    if "end of stream" in problem and "quoted" in (error.context or ""):
+        return Slip(begun, "quotes that are not closed", "wanted: the same quotes at the end of the text")
+    if problem.startswith("expected <block end>"):
+        return Slip(line, "an indentation that does not fit the lines above", "wanted: equal indentation in a mapping")
+    return None
