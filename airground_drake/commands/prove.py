@@ -60,6 +60,8 @@ def _theorems(*, record: bool, limit_s: float) -> int:
     found = theories.check(limit_s=limit_s)
     for name, theorem in THEOREMS.items():
         print(f"{name}: {theorem.statement}")
+        if theorem.silent_on:
+            print(f"    does not say: {theorem.silent_on}")
         print(f"    axioms: {', '.join(found.axioms[name]) or 'none'}")
     print(
         f"Coq {found.coq}: {len(found.axioms)} theorems in {len(found.sha256)} files, compiled in "

@@ -1,10 +1,37 @@
-(** Signed distances to convex sets are distances as Safety.v and Passive.v take them.
+(** Convex sets, and distances from them as the other theories take them.
 
     A set that moves without turning is a fixed set, seen from its reference point: [x] is the position of a robot less
-    that of the set. A body of radius [r] keeps [d + r] from the set. *)
+    that of the set. Two points are a point and the set {0}. A body of radius [r] keeps [d] if its centre keeps [d + r].
+    "At least [d] away" is said in two ways: [clear], all points of the set are so far away; or [d <= gap x] with the
+    signed distance [gap], which also says how deep [x] is inside. For [d > 0] they are the same ([clear_gap]). *)
 Require Import Reals Lra Psatz List Safety.
 Import ListNotations.
 Local Open Scope R_scope.
+
+(** [x] is [m] or farther from all of the set. *)
+Definition clear (inside : vec -> Prop) m x := forall c, inside c -> m <= norm (sub x c).
+
+(** [y] is the point of the set that is nearest to [x], and [n] points from there to [x]. The set is behind its plane:
+    of a polygon the corners decide that ([at_corners]). *)
+Definition nearest (inside : vec -> Prop) x y n :=
+  inside y /\ along n (sub x y) /\ forall c, inside c -> dot n (sub c y) <= 0.
+
+(** * Points *)
+(** Two points keep away from each other: their difference from the set {0}. *)
+Definition points c := c = V 0 0 0.
+
+Lemma clear_points m x : clear points m x <-> m <= norm x.
+Proof.
+  assert (E : sub x (V 0 0 0) = x) by (apply vec_eq; vectors; ring).
+  split; [intros H; specialize (H _ eq_refl); rewrite E in H; exact H | intros H c ->; rewrite E; exact H].
+Qed.
+
+Lemma nearest_of_points x n : along n x -> nearest points x (V 0 0 0) n.
+Proof.
+  intros Ha; split; [reflexivity | split].
+  - replace (sub x (V 0 0 0)) with x by (apply vec_eq; vectors; ring); exact Ha.
+  - intros c ->; vectors; lra.
+Qed.
 
 (** * Corners *)
 
@@ -25,42 +52,48 @@ Section Signed.
 
 Variables (inside : vec -> Prop) (gap : vec -> R).
 
-(** Outside: [y] is the point nearest to [x], and [n] points from there to [x]. The set is behind its plane. *)
-Definition nearest x y n :=
-  inside y /\ along n (sub x y) /\ (forall c, inside c -> dot n (sub c y) <= 0) /\ gap x = norm (sub x y).
-
 (** Inside: minus the depth, the radius of the largest ball about [x] in the set. The set ends there along [n]. *)
 Definition deep x n := norm n = 1 /\ gap x <= 0 /\
   (forall c, inside c -> dot n (sub c x) <= - gap x) /\ (forall e, norm e <= - gap x -> inside (add x e)).
 
-Definition signed_distance := forall x, exists n, deep x n \/ exists y, nearest x y n.
+(** Outside: the distance from the nearest point. *)
+Definition outside x n := exists y, nearest inside x y n /\ gap x = norm (sub x y).
 
-Lemma behind x n : deep x n \/ (exists y, nearest x y n) ->
-  norm n = 1 /\ forall c, inside c -> gap x + dot n (sub c x) <= 0.
+Definition signed_distance := forall x, exists n, deep x n \/ outside x n.
+
+Lemma behind x n : deep x n \/ outside x n -> norm n = 1 /\ forall c, inside c -> gap x + dot n (sub c x) <= 0.
 Proof.
-  intros [[N [_ [B _]]] | [y [_ [[N X] [B G]]]]]; split; try exact N; intros c Hc; specialize (B c Hc); [lra |].
+  intros [[N [_ [B _]]] | [y [[_ [[N X] B]] G]]]; split; try exact N; intros c Hc; specialize (B c Hc); [lra |].
   pose proof (norm_square n) as Q; rewrite N in Q; rewrite G; set (D := norm (sub x y)) in *.
   replace (dot n (sub c x)) with (dot n (sub c y) - dot n (sub x y)) by (vectors; ring).
   rewrite X; replace (dot n (scale D n)) with (D * dot n n) by (vectors; ring); rewrite <- Q; lra.
 Qed.
 
 (** ** The signed distance is convex: wherever [x] is, [n] leads away. *)
-Theorem leads_away x n : signed_distance -> deep x n \/ (exists y, nearest x y n) -> away gap x n.
+Theorem leads_away x n : signed_distance -> deep x n \/ outside x n -> away gap x n.
 Proof.
   intros S H; apply behind in H; destruct H as [N B]; split; [exact N |]; intros z.
   pose proof (norm_square n) as Q; rewrite N in Q.
-  destruct (S z) as [m [[_ [G [_ I]]] | [y [I [_ [_ G]]]]]].
+  destruct (S z) as [m [[_ [G [_ I]]] | [y [[I _] G]]]].
   - specialize (B (add z (scale (- gap z) n))); enough (E : norm (scale (- gap z) n) <= - gap z).
     + specialize (B (I _ E)); replace (dot n (sub (add z (scale (- gap z) n)) x))
         with (dot n (sub z x) - gap z * dot n n) in B by (vectors; ring); rewrite <- Q in B; lra.
-    + right; unfold norm; replace (dot (scale (- gap z) n) (scale (- gap z) n)) with (- gap z * (- gap z) * dot n n)
-        by (vectors; ring); rewrite <- Q, !Rmult_1_r; apply sqrt_square; lra.
-  - specialize (B y I); pose proof (dot_le n (sub z y)) as C; rewrite N, <- G in C.
+    + rewrite norm_scale, N by lra; lra.
+  - specialize (B y I); pose proof (unit_dot n (sub z y) N) as C; rewrite <- G in C.
     replace (dot n (sub y x)) with (dot n (sub z x) - dot n (sub z y)) in B by (vectors; ring); lra.
 Qed.
 
-Corollary leads_away_somewhere x : signed_distance -> exists n, away gap x n.
-Proof. intros S; destruct (S x) as [n H]; exists n; apply leads_away; assumption. Qed.
+(** ** Both ways to say that [x] is [m] or farther away. *)
+Theorem clear_gap m x : signed_distance -> 0 < m -> (clear inside m x <-> m <= gap x).
+Proof.
+  intros S M; destruct (S x) as [n H]; split.
+  - intros C; destruct H as [[_ [G [_ I]]] | [y [[I _] ->]]]; [| exact (C y I)].
+    assert (Z : norm (V 0 0 0) <= - gap x) by (rewrite norm_0; lra); specialize (C _ (I _ Z)).
+    replace (sub x (add x (V 0 0 0))) with (V 0 0 0) in C by (vectors; f_equal; ring); rewrite norm_0 in C; lra.
+  - intros G c Hc; apply behind in H; destruct H as [N B]; specialize (B c Hc); apply Rle_trans with (1 := G).
+    pose proof (unit_dot n (sub x c) N); replace (dot n (sub c x)) with (- dot n (sub x c)) in B by (vectors; ring);
+      lra.
+Qed.
 
 End Signed.
 
@@ -79,17 +112,17 @@ Proof.
   intros inside U E G L Z; repeat split; [apply (U n b E) | exact Z | |].
   - intros c Hc; specialize (Hc n b E); rewrite G.
     replace (dot n (sub c x)) with (dot n c - dot n x) by (vectors; ring); lra.
-  - intros e He m a Hm; specialize (L m a Hm); pose proof (dot_le m e) as C; rewrite (U m a Hm) in C.
+  - intros e He m a Hm; specialize (L m a Hm); pose proof (unit_dot m e (U m a Hm)) as C.
     replace (dot m (add x e)) with (dot m x + dot m e) by (vectors; ring); lra.
 Qed.
 
-(** ** Outside any convex set, the direction from its nearest point. *)
-Theorem nearest_point (inside : vec -> Prop) gap x y :
+(** ** Outside any convex set, the point of the set at the least distance. *)
+Theorem nearest_point (inside : vec -> Prop) x y :
   (forall a b l, inside a -> inside b -> 0 <= l <= 1 -> inside (add a (scale l (sub b a)))) ->
   inside y -> (forall c, inside c -> norm (sub x y) <= norm (sub x c)) -> 0 < norm (sub x y) ->
-  gap x = norm (sub x y) -> nearest inside gap x y (scale (/ norm (sub x y)) (sub x y)).
+  nearest inside x y (scale (/ norm (sub x y)) (sub x y)).
 Proof.
-  intros C Hy M pos G; split; [exact Hy | split; [apply along_unit, pos | split; [| exact G]]]; intros z Hz.
+  intros C Hy M pos; split; [exact Hy | split; [apply along_unit, pos |]]; intros z Hz.
   set (r := norm (sub x y)) in *; replace (dot (scale (/ r) (sub x y)) (sub z y)) with (/ r * dot (sub x y) (sub z y))
     by (vectors; ring).
   assert (I : 0 < / r) by (apply Rinv_0_lt_compat, pos); enough (dot (sub x y) (sub z y) <= 0) by nra.

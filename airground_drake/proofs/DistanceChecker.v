@@ -23,7 +23,7 @@ Definition parts_up (r : run) (a b : Z) := - (- (a * unit r) / b).
 
 (** Bodies [i] and [j] keep [a / b] metres. *)
 Definition keeps (r : run) (i j : nat) (a b : Z) :=
-  let u := body_of r i in let v := body_of r j in
+  let u := track_of r i in let v := track_of r j in
   if 0 <? b then if has_rows r i then if has_rows r j then
   all_steps (step_keeps (parts_up r a b) (stride u + stride v)) (places u) (places v)
   else false else false else false.
@@ -82,9 +82,9 @@ Fixpoint separate_all d reach (sets : list (list point)) (proofs : list (list (Z
   | _, _ => false
   end.
 
-(** Body [i] keeps [a / b] metres from the hulls of [sets], which move with body [j]. *)
+(** Track [i] keeps [a / b] metres from the hulls of [sets], which move with body [j]. *)
 Definition keeps_clear (r : run) (i j : nat) sets (a b : Z) proofs :=
-  let u := body_of r i in let v := body_of r j in
+  let u := track_of r i in let v := track_of r j in
   if 0 <? b then if has_rows r i then if has_rows r j then
   separate_all (parts_up r a b) (stride u + stride v) sets proofs (places u) (places v)
   else false else false else false.
@@ -117,7 +117,7 @@ Proof.
     pose proof (Rle_0_sqr (s * vv + xv)); unfold Rsqr in *; nra.
 Qed.
 
-Lemma step_sound d b c k s : body_ok b = true -> body_ok c = true -> length (places c) = length (places b) ->
+Lemma step_sound d b c k s : track_ok b = true -> track_ok c = true -> length (places c) = length (places b) ->
   all_steps (step_keeps d (stride b + stride c)) (places b) (places c) = true ->
   (S k < length (places b))%nat -> 0 <= s <= 1 -> IZR d <= norm (apart_at b c k s).
 Proof.
@@ -141,8 +141,8 @@ Qed.
 
 Lemma keeps_means r i j a b : keeps r i j a b = true ->
   0 < IZR b /\ has_rows r i = true /\ has_rows r j = true /\
-  all_steps (step_keeps (parts_up r a b) (stride (body_of r i) + stride (body_of r j)))
-    (places (body_of r i)) (places (body_of r j)) = true.
+  all_steps (step_keeps (parts_up r a b) (stride (track_of r i) + stride (track_of r j)))
+    (places (track_of r i)) (places (track_of r j)) = true.
 Proof. unfold keeps; intros H; split_ifs; to_reals; auto. Qed.
 
 Lemma parts_up_sound r a b : 0 < IZR b -> IZR a * IZR (unit r) <= IZR (parts_up r a b) * IZR b.
@@ -298,7 +298,7 @@ Proof.
   pose proof (listed_ok r i W Heqb1) as Bi; pose proof (listed_ok r j W Heqb2) as Bj.
   unfold has_rows in Heqb1, Heqb2; apply Nat.eqb_eq in Heqb1, Heqb2.
   destruct (separate_each _ _ _ _ _ _ _ H I) as [first [more [vectors K]]].
-  assert (T : moves_by (stride (body_of r i) + stride (body_of r j)) (places (body_of r i)) (places (body_of r j))
+  assert (T : moves_by (stride (track_of r i) + stride (track_of r j)) (places (track_of r i)) (places (track_of r j))
     (P 0 0 0)).
   { intros l Hl; pose proof (moves_within _ l (P 0 0 0) Bi ltac:(lia)) as A.
     pose proof (moves_within _ l (P 0 0 0) Bj ltac:(lia)) as B; rewrite plus_IZR, !real_minus.
@@ -307,7 +307,7 @@ Proof.
   destruct (separate_means _ _ _ _ k _ _ first O _ _ T Logic.I K ltac:(lia)) as [n [S0 S1]].
   clear T.
   apply well_formed_means in W; destruct W as [_ [U _]]; set (u := IZR (unit r)) in *.
-  set (x := apart_at (body_of r i) (body_of r j) k s) in *; set (w := real n); set (d := parts_up r a b) in *.
+  set (x := apart_at (track_of r i) (track_of r j) k s) in *; set (w := real n); set (d := parts_up r a b) in *.
   assert (Iu : 0 < / u) by apply Rinv_0_lt_compat, U.
   destruct (root_sound d n) as [R1 Rd]; fold w in Rd; set (rt := IZR (root d n)) in *.
   assert (B : dot w c <= / u * (dot w x - rt)).

@@ -23,19 +23,6 @@ Proof.
   rewrite norm_square in S; vectors; lra.
 Qed.
 
-Lemma triangle a b : norm (add a b) <= norm a + norm b.
-Proof.
-  pose proof (norm_nonneg a); pose proof (norm_nonneg b); apply Rsqr_incr_0_var; [| lra]; unfold Rsqr.
-  pose proof (dot_le a b); pose proof (norm_square a); pose proof (norm_square b); rewrite norm_square.
-  replace (dot (add a b) (add a b)) with (dot a a + 2 * dot a b + dot b b) by (vectors; ring); nra.
-Qed.
-
-Lemma norm_scale s a : 0 <= s -> norm (scale s a) = s * norm a.
-Proof.
-  intros H; unfold norm; replace (dot (scale s a) (scale s a)) with (Rsqr s * dot a a) by (unfold Rsqr; vectors; ring).
-  rewrite sqrt_mult_alt by apply Rle_0_sqr; rewrite sqrt_Rsqr by exact H; reflexivity.
-Qed.
-
 (** * SAFE-DIST *)
 
 (** ** What is missing of a safe distance after [k] disturbed periods, where [f] was missing at the start. *)

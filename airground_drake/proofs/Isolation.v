@@ -1,6 +1,6 @@
 (** Between two updates the decision variable is largest at an end, and its least value has a closed form: no crossing
     of a level is missed. THR-TRIG checks the hypotheses. *)
-Require Import Reals Lra Psatz Safety Gate.
+Require Import Reals Lra Psatz Safety.
 Local Open Scope R_scope.
 
 (** The error moves from [a] to [b] on a straight line, the noise from [n0] to [n1]; [l] is the share of the step. *)

@@ -1,6 +1,6 @@
-(** Whether a recorded run obeys the avoidance law of Safety.v, up to an error: decided exactly. *)
+(** Entries of a run's table (Mixed.v), for pairs of points: decided exactly, from the recorded positions. *)
 Require Import Reals Lra Psatz ZArith List Bool Lia.
-Require Import Safety Run.
+Require Import Safety Convex Run Mixed.
 Local Open Scope Z_scope.
 
 (** * What is computed: a step of the run is a period, [num / den] stands for A h. Lengths are in parts. *)
@@ -18,34 +18,103 @@ Definition step_meets (num den d e reach : Z) (p p' q q' : point) :=
   let x := minus p q in
   if is_far (d + reach) x then true else meets_law num den d e x (minus (minus p' p) (minus q' q)).
 
-(** At the first row the pair lacks at most [e / gain] of its safe distance. *)
+(** At its first row the pair lacks at most [e / gain] of its safe distance. *)
 Definition starts_within (num den d e : Z) (p q : point) :=
   let m := num * d - den * e in
   if m <=? 0 then true else let x := minus p q in m * m <=? num * num * product x x.
 
-Definition first (b : body) := nth 0 (places b) (P 0 0 0).
+Definition row (b : track) k := nth k (places b) (P 0 0 0).
 
-(** Bodies [i] and [j], safe distance [a / b] metres (a whole number of parts), error [e] parts a step. *)
-Definition obeys_law (r : run) (i j : nat) (num den a b e : Z) :=
-  let u := body_of r i in let v := body_of r j in let d := a * unit r / b in
-  if 0 <? b then if d * b =? a * unit r then if has_rows r i then if has_rows r j then
-  if 0 <? num then if num <=? den then if 0 <=? d then if 0 <=? e then
-  if starts_within num den d e (first u) (first v) then
-  all_steps (step_meets num den d e (stride u + stride v)) (places u) (places v)
-  else false else false else false else false else false else false else false else false else false.
+(** Bodies [i] and [j], distance of the law [a / b] metres (a whole number of parts), error [e] parts a step; [N] steps
+    from the row [K] on. *)
+Definition obeys_law (r : run) (i j : nat) (num den a b e : Z) (K N : nat) :=
+  let u := track_of r i in let v := track_of r j in let d := a * unit r / b in
+  if 0 <? b then if d * b =? a * unit r then if 0 <? num then if num <=? den then if 0 <=? d then if 0 <=? e then
+  if (0 <? N)%nat then if (K + N <? length (times r))%nat then if has_rows r i then if has_rows r j then
+  if starts_within num den d e (row u K) (row v K) then
+  some_steps (step_meets num den d e (stride u + stride v)) N (skipn K (places u)) (skipn K (places v))
+  else false else false else false else false else false else false else false else false else false else false
+  else false.
 
 (** * What it means *)
 Local Open Scope R_scope.
 
-(** The difference of two bodies' positions at row [k], m, and by how much it changes up to the next row. *)
-Definition offset r i j k := scale (/ IZR (unit r)) (apart_at (body_of r i) (body_of r j) k 0).
-Definition change r i j k := sub (offset r i j (S k)) (offset r i j k).
+(** Where body [i] is recorded at the row [k], m, and its step from there. Time is in steps. *)
+Definition row_at (r : run) i k := place_in r (row (track_of r i) k).
+Definition step_of (r : run) i k := sub (row_at r i (S k)) (row_at r i k).
 
-(** In every step the two are too far apart to matter, or they approach no faster than the law allows, up to [e].
-    [g] is A h, [d] the safe distance, m, and [e] the error, m per step. *)
-Definition obeys (r : run) (g : R) (i j : nat) (d e : R) := forall k, (S k < length (times r))%nat ->
-  let D := norm (offset r i j k) in
-  d + norm (change r i j k) <= D \/ 0 < D /\ bound 1 g d D - e <= dot (offset r i j k) (change r i j k) / D.
+(** The record is that of the point that the law steers. Between two rows it leaves its straight line by its dip, and
+    the body stays within its cover. *)
+Definition as_recorded (r : run) i b := drift b = 0 /\ 0 <= dip b /\ (forall k, command b k = step_of r i k) /\
+  forall k s, (S k < length (times r))%nat -> 0 <= s <= 1 ->
+    let off := sub (sub (steered b (INR k + s)) (row_at r i k)) (scale s (step_of r i k)) in
+    norm off <= dip b /\ (s = 0 \/ s = 1 -> norm off <= 0) /\
+    norm (sub (place b (INR k + s)) (steered b (INR k + s))) <= cover b.
+
+Lemma recorded_at r i b k : as_recorded r i b -> (S k < length (times r))%nat -> steered b (INR k) = row_at r i k.
+Proof.
+  intros [_ [_ [_ H]]] K; destruct (H k 0 K ltac:(lra)) as [_ [Z _]]; specialize (Z ltac:(auto)).
+  rewrite Rplus_0_r in Z; apply norm_zero; eapply Rle_trans; [| exact Z]; right; f_equal; apply vec_eq; vectors; ring.
+Qed.
+
+Lemma recorded_conforms r i b k : as_recorded r i b -> (S k < length (times r))%nat -> conforms 1 b k.
+Proof.
+  intros B K s Hs; pose proof (recorded_at r i b k B K) as A; destruct B as [D [P [C H]]].
+  destruct (H k s K Hs) as [T [Z Co]]; unfold sample; rewrite Rmult_1_r, A, C, D; cbv zeta.
+  split; [lra | split; [intros -> | exact Co]]; specialize (Z ltac:(auto)); lra.
+Qed.
+
+(** ** First order: a body that moves on the straight lines between the recorded positions. *)
+Definition straight (r : run) i := let rows := seq 0 (length (times r)) in
+  let p := path (map INR rows) (map (row_at r i) rows) in Body p p (step_of r i) 0 0 0.
+
+Lemma nth_row (A : Type) (f : nat -> A) n k o : (k < n)%nat -> nth k (map f (seq 0 n)) o = f k.
+Proof.
+  intros H; rewrite nth_indep with (d' := f 0%nat) by (rewrite map_length, seq_length; exact H).
+  rewrite map_nth, seq_nth by exact H; reflexivity.
+Qed.
+
+Lemma increasing_rows n : forall a, increasing (map INR (seq a n)).
+Proof.
+  induction n as [| [| n] IH]; intros a; [exact I | exact I |]; specialize (IH (S a)); split; [| exact IH].
+  rewrite S_INR; lra.
+Qed.
+
+Lemma straight_at r i k s : (S k < length (times r))%nat -> 0 <= s <= 1 ->
+  steered (straight r i) (INR k + s) = add (row_at r i k) (scale s (step_of r i k)).
+Proof.
+  intros K Hs; unfold straight; simpl; set (rows := length (times r)) in *.
+  pose proof (path_between k s Hs _ (map (row_at r i) (seq 0 rows)) (increasing_rows rows 0)) as [_ B].
+  - rewrite !map_length; reflexivity.
+  - rewrite map_length, seq_length; exact K.
+  - unfold on_way in B; rewrite !nth_row, S_INR in B by lia; unfold step_of; rewrite <- B; f_equal; ring.
+Qed.
+
+Lemma straight_recorded r i : as_recorded r i (straight r i).
+Proof.
+  split; [reflexivity | split; [simpl; lra | split; [reflexivity |]]]; intros k s K Hs.
+  assert (Z : forall x : vec, norm (sub x x) <= 0).
+  { intros x; right; rewrite <- norm_0; f_equal; apply vec_eq; vectors; ring. }
+  change (place (straight r i)) with (steered (straight r i)); rewrite straight_at by assumption; cbv zeta.
+  replace (sub (sub (add (row_at r i k) (scale s (step_of r i k))) (row_at r i k)) (scale s (step_of r i k)))
+    with (V 0 0 0) by (apply vec_eq; vectors; ring); rewrite norm_0; simpl.
+  split; [lra | split; [intros _; lra |]]; apply Z.
+Qed.
+
+(** These are the positions of the run, with its times in seconds. *)
+Theorem straight_is r t : well_formed r = true -> begins r <= t <= ends r -> exists k s,
+  (S k < length (times r))%nat /\ 0 <= s <= 1 /\
+  forall i, has_rows r i = true -> position r i t = place (straight r i) (INR k + s).
+Proof.
+  intros W Ht; destruct (position_at r t W Ht) as [k [s [K [Hs P]]]]; exists k, s; repeat split; try assumption;
+    try lra.
+  intros i Hi; rewrite (P i Hi); change (place (straight r i)) with (steered (straight r i)).
+  rewrite straight_at by assumption; apply well_formed_means in W; destruct W as [_ [U _]].
+  unfold step_of, row_at, row, on_way; rewrite !nth_real; unfold place_in, metres, real.
+  apply vec_eq; vectors; field; lra.
+Qed.
+
+(** * The law *)
 
 Lemma meets_law_sound num den d e x v : (0 < num)%Z -> (num <= den)%Z -> (0 <= d)%Z ->
   meets_law num den d e x v = true ->
@@ -78,24 +147,6 @@ Proof.
   rewrite B; nra.
 Qed.
 
-Lemma obeys_law_means r i j num den a b e : obeys_law r i j num den a b e = true ->
-  exists d, IZR d * IZR b = IZR a * IZR (unit r) /\ (0 < b)%Z /\ has_rows r i = true /\ has_rows r j = true /\
-  (0 < num)%Z /\ (num <= den)%Z /\ (0 <= d)%Z /\ (0 <= e)%Z /\
-  starts_within num den d e (first (body_of r i)) (first (body_of r j)) = true /\
-  all_steps (step_meets num den d e (stride (body_of r i) + stride (body_of r j)))
-    (places (body_of r i)) (places (body_of r j)) = true.
-Proof.
-  unfold obeys_law; set (d := (a * unit r / b)%Z); intros H; split_ifs; exists d; rewrite <- !mult_IZR.
-  rewrite Z.ltb_lt, Z.leb_le, Z.eqb_eq in *; repeat split; auto; congruence.
-Qed.
-
-Lemma apart_at_row b c k : apart_at b c k 0 = real (minus (nth k (places b) (P 0 0 0)) (nth k (places c) (P 0 0 0))).
-Proof. rewrite real_minus, <- !nth_real; unfold apart_at, on_way; apply vec_eq; vectors; ring. Qed.
-
-Lemma on_way_straight ps k s :
-  on_way ps k s = add (on_way ps k 0) (scale s (sub (on_way ps (S k) 0) (on_way ps k 0))).
-Proof. unfold on_way; apply vec_eq; vectors; ring. Qed.
-
 (** The law has the same form in parts as in metres. *)
 Lemma bound_scales g d D u : 0 < u -> bound 1 g (d / u) (D / u) = bound 1 g d D / u.
 Proof.
@@ -106,164 +157,126 @@ Proof.
     contradiction || (field; lra).
 Qed.
 
-(** ** Soundness: what the checker accepts obeys the law. *)
-Theorem sound r i j num den a b e : well_formed r = true -> obeys_law r i j num den a b e = true ->
-  obeys r (IZR num / IZR den) i j (IZR a / IZR b) (metres r e).
+
+Lemma obeys_law_means r i j num den a b e K N : obeys_law r i j num den a b e K N = true ->
+  exists d, IZR d * IZR b = IZR a * IZR (unit r) /\ (0 < b)%Z /\ has_rows r i = true /\ has_rows r j = true /\
+  (0 < num)%Z /\ (num <= den)%Z /\ (0 <= d)%Z /\ (0 <= e)%Z /\ (0 < N)%nat /\ (K + N < length (times r))%nat /\
+  starts_within num den d e (row (track_of r i) K) (row (track_of r j) K) = true /\
+  some_steps (step_meets num den d e (stride (track_of r i) + stride (track_of r j))) N
+    (skipn K (places (track_of r i))) (skipn K (places (track_of r j))) = true.
 Proof.
-  intros W H k K; apply obeys_law_means in H; destruct H as [d [Ed [B [Ri [Rj [Hn [Hd [Hs [He [_ H]]]]]]]]]].
-  pose proof (listed_ok r i W Ri) as Bi; pose proof (listed_ok r j W Rj) as Bj.
-  apply well_formed_means in W; destruct W as [_ [U _]]; apply IZR_lt in B.
-  unfold has_rows in *; apply Nat.eqb_eq in Ri, Rj.
-  pose proof (step_at _ k _ _ H ltac:(lia) ltac:(congruence) (P 0 0 0)) as St; unfold step_meets in St.
-  pose proof (moves_within _ k (P 0 0 0) Bi ltac:(lia)) as Mi.
-  pose proof (moves_within _ k (P 0 0 0) Bj ltac:(lia)) as Mj.
-  assert (V : 0 < / IZR (unit r)) by apply Rinv_0_lt_compat, U.
-  assert (D : IZR a / IZR b = IZR d / IZR (unit r)).
+  unfold obeys_law; set (d := (a * unit r / b)%Z); intros H; split_ifs; exists d; rewrite <- !mult_IZR.
+  rewrite Z.ltb_lt, Z.leb_le, Z.eqb_eq, Nat.ltb_lt in *; repeat split; auto; congruence.
+Qed.
+
+Lemma row_in_metres r i j k : 0 < IZR (unit r) -> sub (row_at r i k) (row_at r j k) =
+  scale (/ IZR (unit r)) (real (minus (row (track_of r i) k) (row (track_of r j) k))).
+Proof. intros U; rewrite real_minus; unfold row_at, place_in, metres, real; apply vec_eq; vectors; field; lra. Qed.
+
+(** ** Soundness: what the checker accepts is an entry that was checked. [d] is kept of the law's distance. *)
+Theorem sound r i j bi bj num den a b e K N d : well_formed r = true -> obeys_law r i j num den a b e K N = true ->
+  as_recorded r i bi -> as_recorded r j bj ->
+  let n := Numbers (IZR num / IZR den) (IZR a / IZR b) 0 (metres r e) (metres r e) in
+  0 < kept_by n -> 0 <= d + cover bi + cover bj + dip bi + dip bj <= kept_by n ->
+  checked 1 (Entry K N (Together bi bj points n d)).
+Proof.
+  intros W H Bi Bj n R0 Rd; apply obeys_law_means in H.
+  destruct H as [q [Eq [B [Ri [Rj [Hn [Hd [Hq [He [HN [HK [St0 H]]]]]]]]]]]].
+  pose proof (listed_ok r i W Ri) as Ti; pose proof (listed_ok r j W Rj) as Tj.
+  pose proof W as U; apply well_formed_means in U; destruct U as [_ [U _]]; apply IZR_lt in B.
+  assert (IU : 0 < / IZR (unit r)) by apply Rinv_0_lt_compat, U.
+  assert (Pn : 0 < IZR num) by (apply IZR_lt; lia); assert (Pd : IZR num <= IZR den) by (apply IZR_le; lia).
+  assert (Pe : 0 <= IZR e) by (apply IZR_le; lia).
+  assert (G : 0 < IZR num / IZR den <= 1).
+  { split; [apply Rdiv_lt_0_compat; lra | apply Rmult_le_reg_r with (IZR den); [lra | field_simplify; lra]]. }
+  assert (D : IZR a / IZR b = IZR q / IZR (unit r)).
   { apply Rmult_eq_reg_r with (IZR b * IZR (unit r)); [field_simplify; lra | nra]. }
-  unfold change, offset; rewrite scale_sub, !apart_at_row, !norm_scale, D by lra.
-  set (p := nth k (places (body_of r i)) (P 0 0 0)) in *; set (p' := nth (S k) (places (body_of r i)) (P 0 0 0)) in *.
-  set (q := nth k (places (body_of r j)) (P 0 0 0)) in *; set (q' := nth (S k) (places (body_of r j)) (P 0 0 0)) in *.
-  assert (X : sub (real (minus p' q')) (real (minus p q)) = real (minus (minus p' p) (minus q' q))).
-  { rewrite !real_minus; apply vec_eq; vectors; ring. }
-  rewrite X; set (x := real (minus p q)) in *; set (v := real (minus (minus p' p) (minus q' q))) in *.
-  destruct (is_far _ _) eqn:F; [left | right].
-  - apply far_sound in F; rewrite !plus_IZR in F; fold x in F.
-    assert (N : norm v <= IZR (stride (body_of r i)) + IZR (stride (body_of r j))).
-    { unfold v; rewrite !real_minus; eapply Rle_trans; [apply norm_difference | lra]. }
-    unfold Rdiv; rewrite (Rmult_comm (IZR d)), <- Rmult_plus_distr_l; apply Rmult_le_compat_l; lra.
-  - apply meets_law_sound in St; try assumption; fold x v in St; destruct St as [Pos M]; split; [nra |].
-    replace (/ IZR (unit r) * norm x) with (norm x / IZR (unit r)) by (field; lra).
-    rewrite bound_scales by exact U; unfold metres.
-    replace (dot (scale (/ IZR (unit r)) x) (scale (/ IZR (unit r)) v) / (norm x / IZR (unit r)))
-      with (/ IZR (unit r) * (dot x v / norm x)) by (vectors; field; lra).
-    replace (bound 1 _ _ _ / IZR (unit r) - IZR e / IZR (unit r))
-      with (/ IZR (unit r) * (bound 1 (IZR num / IZR den) (IZR d) (norm x) - IZR e)) by (field; lra).
-    apply Rmult_le_compat_l; lra.
-Qed.
-
-(** * Why obeying the law keeps the distance: [disturbed] of Safety.v, for the one body as the other sees it *)
-Section Seen.
-
-Variables (r : run) (i j : nat) (g d e : R).
-Hypotheses (W : well_formed r = true) (Ri : has_rows r i = true) (Rj : has_rows r j = true).
-Hypotheses (g_positive : 0 < g) (no_overshoot : g <= 1) (e_nonneg : 0 <= e) (law : obeys r g i j d e).
-Hypothesis start : d - e / g <= norm (offset r i j 0).
-
-Let rows := length (times r).
-Let sampled k := (S k < rows)%nat.
-(** Time in steps. The other body, [false], stands at 0. *)
-Let seen (who : bool) t :=
-  if who then path (map INR (seq 0 rows)) (map (offset r i j) (seq 0 rows)) t else origin.
-Let step (who : bool) k := if who then change r i j k else origin.
-
-Lemma nth_row (A : Type) (f : nat -> A) k o : (k < rows)%nat -> nth k (map f (seq 0 rows)) o = f k.
-Proof.
-  intros H; rewrite nth_indep with (d' := f 0%nat) by (rewrite map_length, seq_length; exact H).
-  rewrite map_nth, seq_nth by exact H; reflexivity.
-Qed.
-
-Lemma increasing_rows n : forall a, increasing (map INR (seq a n)).
-Proof.
-  induction n as [| [| n] IH]; intros a; [exact I | exact I |]; specialize (IH (S a)); split; [| exact IH].
-  rewrite S_INR; lra.
-Qed.
-
-Lemma seen_at k s : sampled k -> 0 <= s <= 1 ->
-  seen true (sample 1 k + s) = add (offset r i j k) (scale s (change r i j k)).
-Proof.
-  unfold sampled; intros K Hs; unfold seen, sample.
-  pose proof (path_between k s Hs _ (map (offset r i j) (seq 0 rows)) (increasing_rows rows 0)) as [_ B].
-  - rewrite !map_length; reflexivity.
-  - rewrite map_length, seq_length; exact K.
-  - unfold on_way in B; rewrite !nth_row, S_INR in B by lia; unfold change; rewrite <- B; f_equal; ring.
-Qed.
-
-Lemma offset_between k s : scale (/ IZR (unit r)) (apart_at (body_of r i) (body_of r j) k s) =
-  add (offset r i j k) (scale s (change r i j k)).
-Proof.
-  unfold change, offset, apart_at.
-  rewrite (on_way_straight (map real (places (body_of r i))) k s).
-  rewrite (on_way_straight (map real (places (body_of r j))) k s).
-  generalize (on_way (map real (places (body_of r i)))) (on_way (map real (places (body_of r j)))); intros f q.
-  apply vec_eq; vectors; ring.
-Qed.
-
-Theorem obeying_keeps : forall t, begins r <= t <= ends r -> d - e / g <= norm (sub (position r i t) (position r j t)).
-Proof.
-  intros t Ht; destruct (difference_at r i j t W Ri Rj Ht) as [k [s [K [Hs ->]]]].
-  pose proof W as U; apply well_formed_means in U; destruct U as [_ [U _]].
-  pose (gap := fun _ _ : bool => norm).
-  assert (At : forall l q, sampled l -> 0 <= q <= 1 ->
-    distance bool seen gap true false (sample 1 l + q) = norm (add (offset r i j l) (scale q (change r i j l)))).
-  { intros l q Hl Hq; unfold distance, difference, gap; rewrite seen_at by assumption; f_equal; apply vec_eq;
-      unfold seen, origin; vectors; ring. }
-  assert (At0 : forall l, sampled l -> distance bool seen gap true false (sample 1 l) = norm (offset r i j l)).
-  { intros l Hl; replace (sample 1 l) with (sample 1 l + 0) by ring; rewrite At by (assumption || lra).
-    f_equal; apply vec_eq; vectors; ring. }
-  rewrite offset_between, <- At by assumption.
-  apply (disturbed 1 g ltac:(lra) ltac:(lra) bool seen step (fun _ => V 1 1 1) (fun _ => 0) gap
-    (fun a b => a = true /\ b = false) (fun _ _ => d) (fun a _ => if a then 1 else 0)
-    (fun a _ => if a then e else 0) sampled); try lra; try (split; reflexivity); auto.
-  - unfold sampled; lia.
-  - intros [] l q Hl Hq; right; rewrite Rmult_0_l, <- norm_origin; f_equal; unfold moved.
-    + replace (sample 1 l) with (sample 1 l + 0) at 2 by ring; rewrite !seen_at by (assumption || lra).
-      apply vec_eq; unfold step, origin; vectors; ring.
-    + apply vec_eq; unfold seen, step, origin; vectors; ring.
-  - intros a l; apply vec_eq; vectors; ring.
-  - intros a b [-> ->]; split; [reflexivity | intros x; unfold gap, norm; f_equal; vectors; ring].
-  - intros a b x _; apply away_exists.
-  - intros a b [-> ->]; ring.
-  - intros a b l Hl [-> ->]; specialize (law l Hl); cbv zeta in law; destruct law as [F | [Pos M]].
-    + right; unfold far; rewrite At0 by exact Hl; change (step false l) with origin; rewrite norm_origin.
-      unfold step; lra.
-    + left; exists (scale (/ norm (offset r i j l)) (offset r i j l)).
-      assert (X : sub (seen true (sample 1 l)) (seen false (sample 1 l)) = offset r i j l).
-      { replace (sample 1 l) with (sample 1 l + 0) at 1 by ring; rewrite seen_at by (assumption || lra).
-        apply vec_eq; unfold seen, origin; vectors; ring. }
-      split; [| split].
-      * apply away_from_point; unfold difference; rewrite X; apply along_unit, Pos.
-      * unfold meets; rewrite At0 by exact Hl; eapply Rle_trans; [| eapply Rle_trans; [exact M |]]; [lra |].
-        right; unfold step; vectors; field; lra.
-      * apply obstacle; reflexivity.
-  - unfold missed; lra.
-  - replace 0 with (sample 1 0) by (unfold sample; simpl; ring); rewrite At0; [exact start |].
-    unfold sampled; lia.
-Qed.
-
-End Seen.
-
-(** ** What the checker accepts keeps its distance, but for [e / (A h)]. *)
-Theorem law_keeps r i j num den a b e : well_formed r = true -> obeys_law r i j num den a b e = true ->
-  forall t, begins r <= t <= ends r ->
-  IZR a / IZR b - metres r e / (IZR num / IZR den) <= norm (sub (position r i t) (position r j t)).
-Proof.
-  intros W H; pose proof (sound r i j num den a b e W H) as L; apply obeys_law_means in H.
-  destruct H as [d [Ed [B [Ri [Rj [Hn [Hd [_ [He [S _]]]]]]]]]].
-  pose proof W as U; apply well_formed_means in U; destruct U as [_ [U _]].
-  apply IZR_lt in B, Hn; apply IZR_le in Hd, He.
-  apply obeying_keeps; try assumption.
-  - apply Rdiv_lt_0_compat; lra.
-  - apply Rmult_le_reg_r with (IZR den); [lra | field_simplify; lra].
-  - apply Rle_mult_inv_pos; assumption.
-  - unfold offset; rewrite apart_at_row, norm_scale by apply Rlt_le, Rinv_0_lt_compat, U.
-    unfold starts_within, first in S; set (x := minus _ _) in *.
+  assert (E0 : 0 <= metres r e) by (apply Rle_mult_inv_pos; assumption).
+  pose proof (proj1 Bi) as Di; pose proof (proj1 Bj) as Dj.
+  assert (At : forall k, (S k < length (times r))%nat -> apart bi bj (sample 1 k) =
+    scale (/ IZR (unit r)) (real (minus (row (track_of r i) k) (row (track_of r j) k)))).
+  { intros k Hk; unfold apart, sample; rewrite Rmult_1_r, (recorded_at r i), (recorded_at r j) by assumption.
+    apply row_in_metres, U. }
+  unfold checked, what, first, many; split; [| split].
+  - unfold budgeted; fold n; rewrite Di, Dj; unfold n; simpl gain; simpl dlaw; simpl err; simpl short; simpl loss.
+    fold n; set (t := d + cover bi + cover bj + dip bi + dip bj) in *.
+    replace (t ^ 2 + 0 ^ 2) with (t * t) by ring; rewrite sqrt_square by lra.
+    unfold kept_by, n in Rd, R0 |- *; simpl in Rd, R0 |- *; repeat split; try lra; nra.
+  - apply clear_points; rewrite At by lia; rewrite norm_scale by lra.
+    unfold starts_within in St0; set (x := minus _ _) in *.
     pose proof (norm_nonneg (real x)) as N0; pose proof (norm_square (real x)) as N2.
-    assert (M : IZR num * IZR d - IZR den * IZR e <= IZR num * norm (real x)).
+    assert (M : IZR num * IZR q - IZR den * IZR e <= IZR num * norm (real x)).
     { destruct (_ <=? 0)%Z eqn:C; to_reals; [nra |].
-      apply Rsqr_incr_0_var; [unfold Rsqr; rewrite <- N2 in S; nra | nra]. }
-    assert (D : IZR a / IZR b = IZR d / IZR (unit r)).
-    { apply Rmult_eq_reg_r with (IZR b * IZR (unit r)); [field_simplify; lra | nra]. }
-    rewrite D; unfold metres; apply Rmult_le_reg_l with (IZR num * IZR (unit r)); [nra |].
-    replace (IZR num * IZR (unit r) * (IZR d / IZR (unit r) - IZR e / IZR (unit r) / (IZR num / IZR den)))
-      with (IZR num * IZR d - IZR den * IZR e) by (field; lra).
+      apply Rsqr_incr_0_var; [unfold Rsqr; rewrite <- N2 in St0; nra | nra]. }
+    unfold kept_by, n; simpl; rewrite D; unfold metres; apply Rmult_le_reg_l with (IZR num * IZR (unit r)); [nra |].
+    replace (IZR num * IZR (unit r) * (IZR q / IZR (unit r) - 0 - IZR e / IZR (unit r) / (IZR num / IZR den)))
+      with (IZR num * IZR q - IZR den * IZR e) by (field; lra).
     replace (IZR num * IZR (unit r) * (/ IZR (unit r) * norm (real x))) with (IZR num * norm (real x)) by (field; lra).
     exact M.
+  - intros k Hk; split; [apply (recorded_conforms r i); [assumption | lia] |].
+    split; [apply (recorded_conforms r j); [assumption | lia] |].
+    pose proof (some_step_at _ (P 0 0 0) (k - K) _ _ _ H ltac:(lia)) as St; unfold step_meets in St.
+    rewrite !nth_skip in St; replace (K + (k - K))%nat with k in St by lia.
+    replace (K + S (k - K))%nat with (S k) in St by lia.
+    unfold has_rows in *; apply Nat.eqb_eq in Ri, Rj.
+    pose proof (moves_within _ k (P 0 0 0) Ti ltac:(lia)) as Mi.
+    pose proof (moves_within _ k (P 0 0 0) Tj ltac:(lia)) as Mj.
+    destruct Bi as [_ [_ [Ci _]]]; destruct Bj as [_ [_ [Cj _]]].
+    assert (Cm : forall t, step_of r t k =
+      scale (/ IZR (unit r)) (sub (real (row (track_of r t) (S k))) (real (row (track_of r t) k)))).
+    { intros t; unfold step_of, row_at, place_in, metres, real; apply vec_eq; vectors; field; lra. }
+    fold (row (track_of r i) k) (row (track_of r i) (S k)) in Mi, St.
+    fold (row (track_of r j) k) (row (track_of r j) (S k)) in Mj, St.
+    unfold pair_law; rewrite (At k) by lia; rewrite Ci, Cj, Di, Dj, !Cm; simpl dlaw; simpl gain; simpl short; rewrite D.
+    set (p := row (track_of r i) k) in *; set (p' := row (track_of r i) (S k)) in *.
+    set (o := row (track_of r j) k) in *; set (o' := row (track_of r j) (S k)) in *.
+    set (x := minus p o) in *; destruct (is_far _ _) eqn:F; [right; left | left].
+    + apply far_sound in F; rewrite !plus_IZR in F; apply clear_points; rewrite !norm_scale by lra.
+      replace (IZR q / IZR (unit r)) with (/ IZR (unit r) * IZR q) by (field; lra).
+      rewrite !Rplus_0_r, Rmult_1_r, <- !Rmult_plus_distr_l; apply Rmult_le_compat_l; lra.
+    + apply meets_law_sound in St; try assumption; destruct St as [Pos M].
+      exists (scale (/ IZR (unit r)) (real x)), (V 0 0 0), (scale (/ norm (real x)) (real x)).
+      assert (E : sub (scale (/ IZR (unit r)) (real x)) (V 0 0 0) = scale (/ IZR (unit r)) (real x))
+        by (apply vec_eq; vectors; ring).
+      split; [simpl err; right; rewrite <- norm_0; f_equal; apply vec_eq; vectors; ring | split].
+      * apply nearest_of_points; destruct (along_unit (real x) Pos) as [Un Al]; split; [exact Un |].
+        rewrite norm_scale by lra; rewrite Al at 1; apply vec_eq; vectors; ring.
+      * rewrite E, norm_scale by lra; replace (/ IZR (unit r) * norm (real x)) with (norm (real x) / IZR (unit r))
+          by (field; lra); rewrite bound_scales by exact U; unfold metres.
+        rewrite !real_minus in M; set (y := real x) in *.
+        match type of M with _ <= dot y ?v / _ => set (w := v) in * end.
+        match goal with |- _ <= ?rhs => replace rhs with (/ IZR (unit r) * (dot y w / norm y))
+          by (unfold w; vectors; field; lra) end.
+        replace (bound 1 _ _ _ / IZR (unit r) - IZR e / IZR (unit r))
+          with (/ IZR (unit r) * (bound 1 (IZR num / IZR den) (IZR q) (norm y) - IZR e)) by (field; lra).
+        apply Rmult_le_compat_l; lra.
 Qed.
 
-(** ** The law without error, in plain numbers *)
-Corollary obeys_exactly r i j num den a b g d : well_formed r = true -> obeys_law r i j num den a b 0 = true ->
-  g = IZR num / IZR den -> d = IZR a / IZR b -> obeys r g i j d 0.
+(** By how much the body may be off the recorded straight lines, m. *)
+Definition off b := cover b + dip b.
+
+(** Bodies of which the run is a record; body [i] may be off it by [most i]. *)
+Definition recorded (r : run) (most : nat -> R) (b : nat -> body) := forall i, as_recorded r i (b i) /\ off (b i) <=
+  most i.
+
+Lemma first_order_recorded r : recorded r (fun _ => 0) (straight r).
+Proof. intros i; split; [apply straight_recorded | unfold off; simpl; lra]. Qed.
+
+(** ** The same without error, in plain numbers: [l] is the distance of the law, and [d] what the bodies keep. *)
+Corollary obeys_exactly r most bodies i j num den a b K N g l d : well_formed r = true ->
+  obeys_law r i j num den a b 0 K N = true -> recorded r most bodies ->
+  g = IZR num / IZR den -> l = IZR a / IZR b -> 0 <= d -> 0 < l -> d + most i + most j <= l ->
+  checked 1 (Entry K N (Together (bodies i) (bodies j) points (Numbers g l 0 0 0) d)).
 Proof.
-  intros W H -> ->; pose proof (sound r i j num den a b 0 W H) as S; unfold metres in S.
-  replace (0 / IZR (unit r)) with 0 in S by (unfold Rdiv; ring); exact S.
+  intros W H R -> -> Hd Hl Ho; assert (Z : metres r 0 = 0) by (unfold metres, Rdiv; ring).
+  destruct (R i) as [Bi Oi], (R j) as [Bj Oj].
+  pose proof (sound r i j _ _ num den a b 0 K N d W H Bi Bj) as S; cbv zeta in S; rewrite Z in S.
+  assert (C : forall q c, as_recorded r q c -> 0 <= off c).
+  { intros q c [_ [P [_ Q]]]; apply well_formed_means in W; destruct W as [L _].
+    destruct (Q 0%nat 0 ltac:(lia) ltac:(lra)) as [_ [_ T]].
+    pose proof (norm_nonneg (sub (place c (INR 0 + 0)) (steered c (INR 0 + 0)))); unfold off; lra. }
+  pose proof (C i _ Bi); pose proof (C j _ Bj); unfold off in *.
+  assert (E : kept_by (Numbers (IZR num / IZR den) (IZR a / IZR b) 0 0 0) = IZR a / IZR b)
+    by (unfold kept_by; simpl; unfold Rdiv; ring).
+  apply S; rewrite E; lra.
 Qed.

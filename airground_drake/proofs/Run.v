@@ -11,13 +11,13 @@ Local Open Scope Z_scope.
 Record point := P { px : Z; py : Z; pz : Z }.
 
 (** Where a body is at each of the run's times; from one row to the next it moves by [stride] at most. *)
-Record body := Body { stride : Z; places : list point }.
+Record track := Track { stride : Z; places : list point }.
 
 (** Bodies are named by their numbers in the list. *)
-Record run := Run { unit : Z; times : list Z; bodies : list body }.
+Record run := Run { unit : Z; times : list Z; bodies : list track }.
 
-Definition at_rest (rows : nat) (p : point) := Body 0 (repeat p rows).
-Definition body_of (r : run) (i : nat) := nth i (bodies r) (Body 0 []).
+Definition at_rest (rows : nat) (p : point) := Track 0 (repeat p rows).
+Definition track_of (r : run) (i : nat) := nth i (bodies r) (Track 0 []).
 
 (** * What it stands for: positions in metres, in straight lines from row to row *)
 Local Open Scope R_scope.
@@ -37,7 +37,7 @@ Definition place_in (r : run) (p : point) := V (metres r (px p)) (metres r (py p
 
 (** Where body [i] is at time [t], s; m. *)
 Definition position (r : run) (i : nat) (t : R) :=
-  path (map (metres r) (times r)) (map (place_in r) (places (body_of r i))) t.
+  path (map (metres r) (times r)) (map (place_in r) (places (track_of r i))) t.
 
 Definition begins (r : run) := metres r (hd 0%Z (times r)).
 Definition ends (r : run) := metres r (last (times r) 0%Z).
@@ -57,14 +57,14 @@ Fixpoint strides_within (s : Z) (ps : list point) :=
   | _ => true
   end.
 
-Definition body_ok (b : body) := if 0 <=? stride b then strides_within (stride b) (places b) else false.
+Definition track_ok (b : track) := if 0 <=? stride b then strides_within (stride b) (places b) else false.
 
 (** Two rows or more, at increasing times, and strides that are what they say. *)
 Definition well_formed (r : run) :=
-  if (1 <? length (times r))%nat then if 0 <? unit r then if increase (times r) then forallb body_ok (bodies r)
+  if (1 <? length (times r))%nat then if 0 <? unit r then if increase (times r) then forallb track_ok (bodies r)
   else false else false else false.
 
-Definition has_rows (r : run) (i : nat) := (length (places (body_of r i)) =? length (times r))%nat.
+Definition has_rows (r : run) (i : nat) := (length (places (track_of r i)) =? length (times r))%nat.
 
 (** The run covers the times from [a / b] to [c / d], s. *)
 Definition covers (r : run) (a b c d : Z) :=
@@ -80,6 +80,13 @@ Fixpoint all_steps (ps qs : list point) :=
   | p :: (p' :: _) as ps', q :: (q' :: _) as qs' => if ok p p' q q' then all_steps ps' qs' else false
   | _, _ => true
   end.
+(** The same of [n] steps alone. *)
+Fixpoint some_steps (n : nat) (ps qs : list point) :=
+  match n, ps, qs with
+  | O, _, _ => true
+  | S n', p :: (p' :: _) as ps', q :: (q' :: _) as qs' => if ok p p' q q' then some_steps n' ps' qs' else false
+  | _, _, _ => false
+  end.
 End Steps.
 
 (** [reach] or farther apart; one coordinate that is so large saves the multiplications. *)
@@ -94,26 +101,6 @@ Ltac split_ifs := repeat match goal with
 Local Open Scope R_scope.
 
 Definition origin := V 0 0 0.
-
-Lemma vec_eq a b : vx a = vx b -> vy a = vy b -> vz a = vz b -> a = b.
-Proof. destruct a, b; simpl; intros -> -> ->; reflexivity. Qed.
-
-Lemma norm_origin : norm origin = 0.
-Proof. unfold norm, origin, dot; simpl; replace (0 * 0 + 0 * 0 + 0 * 0) with 0 by ring; apply sqrt_0. Qed.
-
-Lemma norm_difference a b : norm (sub a b) <= norm a + norm b.
-Proof.
-  pose proof (norm_nonneg a); pose proof (norm_nonneg b); pose proof (norm_nonneg (sub a b)).
-  apply Rsqr_incr_0; [| lra | lra]; unfold Rsqr; rewrite norm_square; pose proof (dot_le a b).
-  pose proof (norm_square a); pose proof (norm_square b).
-  replace (dot (sub a b) (sub a b)) with (dot a a - 2 * dot a b + dot b b) by (vectors; ring); nra.
-Qed.
-
-Lemma norm_scale u x : 0 <= u -> norm (scale u x) = u * norm x.
-Proof.
-  intros U; unfold norm; replace (dot (scale u x) (scale u x)) with (u * u * dot x x) by (vectors; ring).
-  rewrite sqrt_mult_alt by nra; rewrite sqrt_square by exact U; reflexivity.
-Qed.
 
 Lemma scale_sub u x y : sub (scale u x) (scale u y) = scale u (sub x y).
 Proof. apply vec_eq; vectors; ring. Qed.
@@ -225,6 +212,18 @@ Proof.
   - apply (IH (p' :: ps) (q' :: qs) H); simpl; lia.
 Qed.
 
+Lemma some_step_at ok o k : forall n ps qs, some_steps ok n ps qs = true -> (k < n)%nat ->
+  ok (nth k ps o) (nth (S k) ps o) (nth k qs o) (nth (S k) qs o) = true.
+Proof.
+  induction k as [| k IH]; intros [| n] [| p [| p' ps]] [| q [| q' qs]] H L; try lia; try discriminate H.
+  all: change ((if ok p p' q q' then some_steps ok n (p' :: ps) (q' :: qs) else false) = true) in H; split_ifs.
+  - assumption.
+  - apply (IH n (p' :: ps) (q' :: qs) H); lia.
+Qed.
+
+Lemma nth_skip (o : point) K k : forall l, nth k (skipn K l) o = nth (K + k) l o.
+Proof. induction K as [| K IH]; intros [| p l]; try reflexivity; [destruct k; reflexivity | apply IH]. Qed.
+
 Lemma stride_at s k : (0 <= s)%Z -> forall ps, strides_within s ps = true -> (S k < length ps)%nat ->
   forall o, norm (sub (real (nth (S k) ps o)) (real (nth k ps o))) <= IZR s.
 Proof.
@@ -236,16 +235,16 @@ Proof.
 Qed.
 
 (** No body moves farther than its stride from a row to the next one. *)
-Lemma moves_within b k o : body_ok b = true -> (S k < length (places b))%nat ->
+Lemma moves_within b k o : track_ok b = true -> (S k < length (places b))%nat ->
   norm (sub (real (nth (S k) (places b) o)) (real (nth k (places b) o))) <= IZR (stride b).
 Proof.
-  unfold body_ok; intros H K; split_ifs; apply stride_at; [apply Z.leb_le; assumption | exact H | exact K].
+  unfold track_ok; intros H K; split_ifs; apply stride_at; [apply Z.leb_le; assumption | exact H | exact K].
 Qed.
 
 (** * The run at any time *)
 
 Lemma well_formed_means r : well_formed r = true ->
-  (1 < length (times r))%nat /\ 0 < IZR (unit r) /\ increase (times r) = true /\ forallb body_ok (bodies r) = true.
+  (1 < length (times r))%nat /\ 0 < IZR (unit r) /\ increase (times r) = true /\ forallb track_ok (bodies r) = true.
 Proof. unfold well_formed; intros H; split_ifs; to_reals; rewrite Nat.ltb_lt in *; auto. Qed.
 
 Lemma metres_increasing r : 0 < IZR (unit r) -> forall ts, increase ts = true -> increasing (map (metres r) ts).
@@ -269,30 +268,35 @@ Qed.
 (** The difference of two bodies' positions, in parts, [s] of the way from row [k] to the next one. *)
 Definition apart_at b c k s := sub (on_way (map real (places b)) k s) (on_way (map real (places c)) k s).
 
-Lemma listed_ok r i : well_formed r = true -> has_rows r i = true -> body_ok (body_of r i) = true.
+Lemma listed_ok r i : well_formed r = true -> has_rows r i = true -> track_ok (track_of r i) = true.
 Proof.
-  unfold has_rows, body_of; intros W H; apply well_formed_means in W; destruct W as [L [_ [_ F]]].
+  unfold has_rows, track_of; intros W H; apply well_formed_means in W; destruct W as [L [_ [_ F]]].
   rewrite forallb_forall in F; apply Nat.eqb_eq in H.
-  destruct (nth_in_or_default i (bodies r) (Body 0 [])) as [In | D]; [auto | rewrite D in H; simpl in H; lia].
+  destruct (nth_in_or_default i (bodies r) (Track 0 [])) as [In | D]; [auto | rewrite D in H; simpl in H; lia].
 Qed.
 
-(** The difference of two positions at any time is that at some place between two rows. *)
-Theorem difference_at r i j t : well_formed r = true -> has_rows r i = true -> has_rows r j = true ->
-  begins r <= t <= ends r -> exists k s, (S k < length (times r))%nat /\ 0 <= s <= 1 /\
-  sub (position r i t) (position r j t) = scale (/ IZR (unit r)) (apart_at (body_of r i) (body_of r j) k s).
+(** All bodies are at any time at the same part of their ways from one row to the next. *)
+Theorem position_at r t : well_formed r = true -> begins r <= t <= ends r ->
+  exists k s, (S k < length (times r))%nat /\ 0 <= s <= 1 /\ forall i, has_rows r i = true ->
+  position r i t = scale (/ IZR (unit r)) (on_way (map real (places (track_of r i))) k s).
 Proof.
-  unfold has_rows; rewrite !Nat.eqb_eq; intros W Hi Hj H; apply well_formed_means in W.
-  destruct W as [L [U [I _]]]; pose proof (metres_increasing r U _ I) as M.
+  intros W H; apply well_formed_means in W; destruct W as [L [U [I _]]]; pose proof (metres_increasing r U _ I) as M.
   assert (E : hd 0 (map (metres r) (times r)) = begins r /\ last (map (metres r) (times r)) 0 = ends r).
   { unfold begins, ends; destruct (times r) as [| a l]; [simpl in L; lia |]; split; [reflexivity |].
     clear; revert a; induction l as [| b l IH]; intros a; [reflexivity | apply (IH b)]. }
   destruct (between_some_rows t _ M) as [k [s [K [Hs T]]]]; [rewrite map_length; exact L | lra |].
   rewrite map_length in K; exists k, s; repeat split; [exact K | lra | lra |].
-  assert (At : forall a, length (places (body_of r a)) = length (times r) -> position r a t =
-    scale (/ IZR (unit r)) (on_way (map real (places (body_of r a))) k s)).
-  { intros a La; rewrite <- on_way_in_metres, T by assumption; unfold position.
-    apply (path_between k s Hs); [exact M | rewrite !map_length; exact La | rewrite map_length; exact K]. }
-  rewrite !At by assumption; apply scale_sub.
+  unfold has_rows; intros a La; apply Nat.eqb_eq in La; rewrite <- on_way_in_metres, T by assumption; unfold position.
+  apply (path_between k s Hs); [exact M | rewrite !map_length; exact La | rewrite map_length; exact K].
+Qed.
+
+Corollary difference_at r i j t : well_formed r = true -> has_rows r i = true -> has_rows r j = true ->
+  begins r <= t <= ends r -> exists k s, (S k < length (times r))%nat /\ 0 <= s <= 1 /\
+  sub (position r i t) (position r j t) = scale (/ IZR (unit r)) (apart_at (track_of r i) (track_of r j) k s).
+Proof.
+  intros W Hi Hj H; destruct (position_at r t W H) as [k [s [K [Hs P]]]]; exists k, s; repeat split;
+    [exact K | lra | lra |].
+  rewrite !P by assumption; apply scale_sub.
 Qed.
 
 Lemma covers_sound r a b c d t : well_formed r = true -> covers r a b c d = true ->

@@ -8,7 +8,7 @@
         [A (d - D)]     inside the safe distance,
         [- (D - d) / h] outside of it, which cannot use up the distance left within a period [h].
     The theorems: [lemma] (motion on a straight line), [safe_always], [recovers] (a deficit shrinks by [1 - A h] per
-    period), [disturbed] (velocities that miss the law by [e] cost [e / A]).
+    period). What errors of motion and measurement cost is in Budget.v.
     SAFE-HYP and SAFE-INV check the hypotheses, the ones about a scenario and the ones about a run. *)
 Require Import Reals Lra Psatz.
 Local Open Scope R_scope.
@@ -50,6 +50,66 @@ Proof.
   - apply Rsqr_inj; unfold Rsqr; [apply norm_nonneg | lra |]; rewrite norm_square.
     transitivity (/ norm x * / norm x * (norm x * norm x)); [rewrite norm_square; vectors; ring | field; lra].
   - destruct x; vectors; f_equal; field; lra.
+Qed.
+
+Lemma vec_eq a b : vx a = vx b -> vy a = vy b -> vz a = vz b -> a = b.
+Proof. destruct a, b; simpl; intros -> -> ->; reflexivity. Qed.
+
+Lemma norm_0 : norm (V 0 0 0) = 0.
+Proof. unfold norm, dot; simpl; replace (0 * 0 + 0 * 0 + 0 * 0) with 0 by ring; apply sqrt_0. Qed.
+
+Lemma norm_scale s a : 0 <= s -> norm (scale s a) = s * norm a.
+Proof.
+  intros S; unfold norm; replace (dot (scale s a) (scale s a)) with (s * s * dot a a) by (vectors; ring).
+  rewrite sqrt_mult_alt by nra; rewrite sqrt_square by exact S; reflexivity.
+Qed.
+
+Lemma norm_opposite a : norm (scale (-1) a) = norm a.
+Proof. unfold norm; f_equal; vectors; ring. Qed.
+
+Lemma norm_sym a b : norm (sub a b) = norm (sub b a).
+Proof. unfold norm; f_equal; vectors; ring. Qed.
+
+Lemma triangle a b : norm (add a b) <= norm a + norm b.
+Proof.
+  pose proof (norm_nonneg a); pose proof (norm_nonneg b); apply Rsqr_incr_0_var; [| lra]; unfold Rsqr.
+  pose proof (dot_le a b); pose proof (norm_square a); pose proof (norm_square b); rewrite norm_square.
+  replace (dot (add a b) (add a b)) with (dot a a + 2 * dot a b + dot b b) by (vectors; ring); nra.
+Qed.
+
+Lemma norm_difference a b : norm (sub a b) <= norm a + norm b.
+Proof.
+  rewrite <- (norm_opposite b); replace (sub a b) with (add a (scale (-1) b)) by (apply vec_eq; vectors; ring).
+  apply triangle.
+Qed.
+
+(** [x] is as long as [y], but for the distance of the two. *)
+Lemma nearly x y : norm y - norm (sub x y) <= norm x.
+Proof.
+  pose proof (norm_difference x (sub x y)) as T.
+  replace (sub x (sub x y)) with y in T by (apply vec_eq; vectors; ring); lra.
+Qed.
+
+Lemma unit_dot n x : norm n = 1 -> dot n x <= norm x.
+Proof. intros N; pose proof (dot_le n x) as C; rewrite N in C; lra. Qed.
+
+Lemma norm_zero a b : norm (sub a b) <= 0 -> a = b.
+Proof.
+  intros H; pose proof (norm_nonneg (sub a b)); pose proof (norm_square (sub a b)) as Q.
+  replace (norm (sub a b)) with 0 in Q by lra; destruct a as [a1 a2 a3], b as [b1 b2 b3]; unfold dot, sub in Q.
+  simpl in Q; assert (Z : forall x y z, 0 * 0 = x * x + y * y + z * z -> x = 0) by (intros; nra).
+  pose proof (Z (a1 - b1) _ _ Q); pose proof (Z (a2 - b2) (a1 - b1) (a3 - b3) ltac:(lra)).
+  pose proof (Z (a3 - b3) (a1 - b1) (a2 - b2) ltac:(lra)); f_equal; lra.
+Qed.
+
+(** What is at most [b] along every unit vector is no longer than [b]. *)
+Lemma norm_below x b : (forall n, norm n = 1 -> dot n x <= b) -> 0 <= b -> norm x <= b.
+Proof.
+  intros H Hb; destruct (Req_dec (norm x) 0) as [Z | Z]; [lra |].
+  assert (P : 0 < norm x) by (pose proof (norm_nonneg x); lra); destruct (along_unit x P) as [U _].
+  specialize (H _ U); replace (dot (scale (/ norm x) x) x) with (/ norm x * (norm x * norm x)) in H.
+  - replace (/ norm x * (norm x * norm x)) with (norm x) in H by (field; lra); exact H.
+  - rewrite norm_square; vectors; ring.
 Qed.
 
 (** From [x] to [y] the distance to 0 grows at least by what [y - x] has along the unit vector. *)
@@ -258,19 +318,6 @@ Theorem safe i j : apart i j -> missed i j <= 0 -> d i j <= distance i j 0 ->
 Proof.
   intros Hij He H0 k s Hk Hs.
   pose proof (recovers i j 0 Hij He (Rle_refl 0) ltac:(lra) k s Hk Hs) as P; rewrite Rmult_0_r in P; lra.
-Qed.
-
-(** ** Under disturbance: a pair whose radial speed falls short of the law by [e] never loses more than [e / A]. *)
-Theorem disturbed i j e : apart i j -> 0 < A -> missed i j <= e -> 0 <= e -> d i j - e / A <= distance i j 0 ->
-  forall k s, sampled k -> 0 <= s <= h -> d i j - e / A <= distance i j (sample k + s).
-Proof.
-  intros Hij HA He He0 H0 k s Hk Hs.
-  set (f := e / A) in *; assert (Af : e = A * f) by (unfold f; field; lra); assert (F : 0 <= f) by nra.
-  assert (M : forall r a, 0 <= r <= h -> a <= f -> missing e a r <= f).
-  { intros r a Hr Ha; unfold missing; assert (A * r <= 1) by nra; nra. }
-  assert (K : forall m, deficit e f m <= f) by (intros m; induction m; simpl; [lra | apply M; auto; lra]).
-  pose proof (at_samples i j e f Hij He He0 F H0 k Hk); specialize (K k).
-  pose proof (between i j k s e f Hk Hij Hs He He0 F ltac:(lra)); specialize (M s f Hs (Rle_refl f)); lra.
 Qed.
 
 (** Every time lies in a period. *)

@@ -8,8 +8,9 @@ from pathlib import Path
 from typing import Any
 
 from airground_drake.base import files
-from airground_drake.proofs.export import distances_file, law_file, lawful, recorded, without_vectors
-from airground_drake.proofs.runs import FOUND, SCHEMA, expects_kept
+from airground_drake.proofs.export import distances_file, recorded, without_vectors
+from airground_drake.proofs.runs import FOUND, SCHEMA, expects_kept, listed
+from airground_drake.proofs.table import entries, law_file, lawful, missed
 from airground_drake.proofs.too_near import too_near
 from airground_drake.run.trace import Trace
 
@@ -43,12 +44,13 @@ def _broken(folder: Path, found: Mapping[str, Any], traces: Mapping[str, Trace])
     yield from _unless(FOUND, SCHEMA, found["schema"])
     yield from _unless(FOUND, [], sorted({*found["runs"]} - {*traces}))
     for name, trace in traces.items():
-        exact = recorded(trace)
-        of_run = {f"{exact.name}.v": distances_file(exact, vectors=False), f"{exact.name}_law.v": law_file(exact)}
-        texts |= of_run
         if name not in found["runs"]:
             continue
-        entry, near = found["runs"][name], too_near(exact)
+        exact, entry = recorded(trace), found["runs"][name]
+        table, near = entries(exact), too_near(exact)
+        law = law_file(exact, table, alone=not entry["distances"]["proved"]) if table else ""
+        of_run = {f"{exact.name}.v": distances_file(exact, vectors=False), f"{exact.name}_law.v": law}
+        texts |= of_run
         meta = files.sha256(files.read_bytes(folder.parent / "trace" / name / "meta.json"))
         kept = entry["distances"]["proved"]
         expected = {
@@ -58,10 +60,14 @@ def _broken(folder: Path, found: Mapping[str, Any], traces: Mapping[str, Trace])
         for key, value in expected.items():
             yield from _unless(f"{name}.{key}", value, entry[key])
         yield from _unless(f"{name}.distances.proved", kept and not near, kept)
-        yield from _unless(f"{name}.law.proved", kept and entry["law"]["proved"], entry["law"]["proved"])
+        gaps = listed(missed(exact, table))
+        yield from _unless(f"{name}.law.proved", entry["law"]["proved"] and not gaps, entry["law"]["proved"])
+        yield from _unless(f"{name}.law.missed", gaps, entry["law"].get("missed", []))
+        if "entries" in entry["law"]:
+            yield from _unless(f"{name}.law.entries", len(table), entry["law"]["entries"])
         for answer, file in zip((entry["distances"], entry["law"]), of_run, strict=True):
             yield from _unless(f"{name}: file", file, answer["file"])
-            if answer["proved"] and not (folder / file).is_file():
+            if (answer["proved"] or "entries" in answer) and not (folder / file).is_file():
                 yield f"{name}: {file}", "a file", "nothing"
     for path in sorted(folder.iterdir()):
         if path.name != FOUND:

@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 from airground_drake.base.errors import TraceError
 from airground_drake.base.exact import decimal
+from airground_drake.proofs.coq import without_comments
 from airground_drake.proofs.record import FOLDER
 from airground_drake.proofs.separating import Prism, Vector, separating
 from airground_drake.run.trace import Trace
@@ -218,7 +219,7 @@ def _round(axis: float) -> Fraction:
 
 def _spelled(names: list[str]) -> dict[str, str]:
     """Names for Coq: as they are if that is a free identifier, else by number."""
-    plain = re.compile(r"(?!run_|body_number_)(?!\w*(_and_|_(places|ground|solid)\b))[A-Za-z]\w*", re.ASCII)
+    plain = re.compile(r"(?!run_|body_number_|entry_)(?!\w*(_and_|_(places|ground|solid)\b))[A-Za-z]\w*", re.ASCII)
     return {
         name: name if plain.fullmatch(name) and name not in _taken() else f"body_number_{k}"
         for k, name in enumerate(names)
@@ -228,14 +229,13 @@ def _spelled(names: list[str]) -> dict[str, str]:
 @cache
 def _taken() -> frozenset[str]:
     """Words that mean something in the theories or in an exported file."""
-    words = re.findall(r"\w+", "".join(file.read_text(encoding="utf-8") for file in FOLDER.glob("*.v")))
-    return frozenset({*words, *re.findall(r"\w+", _DISTANCES + _LAW), "exists", "fun", "let", "Set", "Prop", "Type"})
+    theories = "".join(file.read_text(encoding="utf-8") for file in sorted(FOLDER.glob("*.v")))
+    words = re.findall(r"\w+", without_comments(theories))
+    own = {*re.findall(r"\w+", _DISTANCES), "is_well_formed", "decide_entry"}
+    return frozenset({*words, *own, "exists", "fun", "let", "Set", "Prop", "Type"})
 
 
 _DISTANCES = """\
-Lemma is_well_formed : well_formed {run} = true.
-Proof. vm_cast_no_check (eq_refl true). Qed.
-
 Local Open Scope R_scope.
 
 Lemma during t : {interval} -> begins {run} <= t <= ends {run}.
@@ -257,12 +257,6 @@ Ltac decide_clear a b vectors :=
   apply (sets_sound _ _ _ _ a b vectors); [exact is_well_formed | vm_cast_no_check (eq_refl true) | exact (during t T)].
 
 """
-_LAW = """\
-(** Coq computes [obeys_law], and [obeys_exactly] turns the answer into a statement about all rows. *)
-Ltac decide_law num den a b :=
-  apply (obeys_exactly _ _ _ num den a b); [exact is_well_formed | vm_cast_no_check (eq_refl true) | lra | lra].
-
-"""
 
 
 def distances_file(run: Recorded, *, vectors: bool = True) -> str:
@@ -279,20 +273,15 @@ def distances_file(run: Recorded, *, vectors: bool = True) -> str:
     )  # fmt: skip
     together = _theorem(f"{run.name}_keeps_its_distances", f"forall t, {interval} ->", _grouped(run.demands, claims))
     proofs = _grouped(run.demands, [f"({each.lemma} t T)" for each in run.demands])
-    proof = _all_of([_all_of(group) for group in proofs])
+    proof = all_of([all_of(group) for group in proofs])
     return (
         f"(** That {run.name} keeps its distances. Written by `airground prove`, from the positions in trace/. *)\n"
         "Require Import Reals Lra ZArith List.\nRequire Import Safety Run DistanceChecker.\nImport ListNotations.\n"
-        f"Local Open Scope Z_scope.\n\n{_data(run)}{checks}{''.join(lemmas)}"
+        f"Local Open Scope Z_scope.\n\n{data(run)}{checks}{''.join(lemmas)}"
         "(** All pairs: distances of centres, which are the safe distance and both radii, in m; times in s. *)\n"
         f"{together}Proof. intros t T; exact {proof}. Qed.\n\n"
         f"Print Assumptions {run.name}_keeps_its_distances.\n"
     )
-
-
-def lawful(demands: Iterable[Demand]) -> list[Demand]:
-    """The pairs that LawChecker.v can judge: two balls that do not move by themselves."""
-    return [demand for demand in demands if not demand.core and not demand.passive]
 
 
 def _claim(run: Recorded, demand: Demand) -> str:
@@ -319,26 +308,6 @@ def _vectors(run: Recorded, demand: Demand) -> str:
     return f"Definition {demand.lemma}_vectors := ([\n{listed}])%Z.\n"
 
 
-def law_file(run: Recorded) -> str:
-    """The theorem that the pairs of `lawful` obey the avoidance law, without error."""
-    g, balls = real(run.gain), lawful(run.demands)
-    claims = [f"obeys {run.name} {g} {demand.first} {demand.second} {real(demand.safe_m)} 0" for demand in balls]
-    lemmas = [
-        f"Lemma {demand.lemma}_obey : {claim}.\nProof. decide_law {ratio(run.gain)} {ratio(demand.safe_m)}. Qed.\n\n"
-        for demand, claim in zip(balls, claims, strict=True)
-    ]
-    proof = _all_of([_all_of(group) for group in _grouped(balls, [f"{each.lemma}_obey" for each in balls])])
-    pairs = "All pairs" if len(balls) == len(run.demands) else "The pairs of robots, and those with balls at rest"
-    return (
-        f"(** That {run.name} obeys the avoidance law. Written by `airground prove`, from the positions in trace/. *)\n"
-        f"Require Import Reals Lra ZArith.\nRequire Import Safety Run LawChecker {run.name}.\n"
-        f"Local Open Scope R_scope.\n\n{_LAW}{''.join(lemmas)}"
-        f"(** {pairs}: A h, bodies, distance of centres in m, error in m per step. *)\n"
-        f"{_theorem(f'{run.name}_obeys_the_law', '', _grouped(balls, claims))}Proof. exact {proof}. Qed.\n\n"
-        f"Print Assumptions {run.name}_obeys_the_law.\n"
-    )
-
-
 def without_vectors(text: str) -> str:
     """An exported file without its separating vectors: others, found on another machine, may prove the same."""
     return re.sub(r"^Definition \w+_vectors := \(\[[][\s();,P\da-fx-]*\]\)%Z\.\n", "", text, flags=re.MULTILINE)
@@ -355,13 +324,13 @@ def _theorem(name: str, quantifier: str, groups: Sequence[Sequence[str]]) -> str
     return f"Theorem {name} : {quantifier}\n  {together}.\n"
 
 
-def _all_of(proofs: Sequence[str]) -> str:
+def all_of(proofs: Sequence[str]) -> str:
     """A proof of a conjunction from proofs of its parts."""
     return "".join(f"(conj {proof}\n  " for proof in proofs[:-1]) + proofs[-1] + ")" * (len(proofs) - 1)
 
 
-def _data(run: Recorded) -> str:
-    """The integers: bodies, their numbers, convex sets, times."""
+def data(run: Recorded) -> str:
+    """The integers: bodies, their numbers, convex sets, times; and that they make a run."""
     unit = run.unit
     out = [f"(** Positions at the rows, in parts: {unit} parts are 1 m. *)\n"]
     for name, rows in run.rows.items():
@@ -369,7 +338,7 @@ def _data(run: Recorded) -> str:
             out.append(f"Definition {name}_places := at_rest {len(rows)} ({_point(rows[0])}).\n")
         else:
             listed = ";\n".join(map(_point, rows))
-            out.append(f"Definition {name}_places := Body {_stride(rows):#x} [\n{listed}].\n")
+            out.append(f"Definition {name}_places := Track {stride(rows):#x} [\n{listed}].\n")
     out += [f"Definition {name} := {k}%nat.\n" for k, name in enumerate(run.places)]
     for name, sets in run.sets.items():
         corners = ("; ".join(map(_point, each.in_parts(unit).corners)) for each in sets)
@@ -378,6 +347,8 @@ def _data(run: Recorded) -> str:
     times = ";\n".join(_whole(int(time * unit)) for time in run.times)
     bodies = "; ".join(f"{name}_places" for name in run.places)
     out.append(f"Definition {run.name} := Run {unit:#x} [\n{times}] [\n{bodies}].\n\n")
+    checked = "Proof. vm_cast_no_check (eq_refl true). Qed."
+    out.append(f"Lemma is_well_formed : well_formed {run.name} = true.\n{checked}\n\n")
     return "".join(out)
 
 
@@ -389,7 +360,7 @@ def _point(place: Vector) -> str:
     return "P " + " ".join(f"({text})" if text.startswith("-") else text for text in map(_whole, place))
 
 
-def _stride(rows: Sequence[Vector]) -> int:
+def stride(rows: Sequence[Vector]) -> int:
     """The longest step, parts, rounded up."""
     square = max(sum((b - a) ** 2 for a, b in zip(p, q, strict=True)) for p, q in pairwise(rows))
     root = isqrt(square)

@@ -74,7 +74,7 @@ def _coordinates(body: str, text: str, rows: int, unit: int, places: int) -> lis
     """All coordinates of a body in the file, m."""
     [what] = _parts(rf"^Definition {body}_places := (.*?)\.$", text)
     points = _points(what, unit)
-    if len(points) != places or not what.startswith("Body " if places > 1 else f"at_rest {rows} "):
+    if len(points) != places or not what.startswith("Track " if places > 1 else f"at_rest {rows} "):
         raise ReadbackError(f"{body}: {len(points)} places in the file, {places} in the trace")
     return [*chain(*points)]
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -19,12 +19,11 @@ from airground_drake.proofs.export import (
     Recorded,
     demands,
     distances_file,
-    law_file,
-    lawful,
     recorded,
     refuse_unknown,
 )
 from airground_drake.proofs.record import FOLDER, digest
+from airground_drake.proofs.table import Missed, entries, law_file, lawful, missed
 from airground_drake.proofs.too_near import TooNear, too_near
 from airground_drake.run import trace
 from airground_drake.run.trace import Trace
@@ -52,6 +51,8 @@ class CoqReply:
         too_near: pairs that do not keep their distance.
         axioms: of the proof.
         seconds: how long Coq took, s.
+        entries: of the run's table that it accepts; 0 in an answer about distances.
+        missed: pairs with periods that no entry is about.
     """
 
     proved: bool
@@ -62,6 +63,8 @@ class CoqReply:
     too_near: Sequence[TooNear] = ()
     axioms: Sequence[str] = ()
     seconds: float = 0.0
+    entries: int = 0
+    missed: Sequence[Missed] = ()
 
 
 @dataclass(frozen=True)
@@ -121,7 +124,7 @@ def workshop(limit_s: float = coq.LIMIT_S) -> Iterator[Workshop]:
 
 
 def prove(place: Workshop, run: Trace, limit_s: float = coq.LIMIT_S) -> tuple[CoqReply, CoqReply, readback.RereadError]:
-    """Have Coq decide whether a run keeps its distances and, if it does, whether it obeys the law.
+    """Have Coq decide whether a run keeps its distances, and when it obeys the law.
 
     The exported files stay in the workshop.
 
@@ -137,10 +140,33 @@ def prove(place: Workshop, run: Trace, limit_s: float = coq.LIMIT_S) -> tuple[Co
     if distances.refused and (found := too_near(exact)):
         words = f"Coq refuses {_pair(distances.refused)}. In exact arithmetic {'; '.join(map(str, found))}"
         distances = replace(distances, why=words, too_near=found)
-    law = CoqReply(False, f"{exact.name}_obeys_the_law", f"{exact.name}_law.v", "not tried: a distance is not kept")
-    if distances.proved:
-        law = decide(place, exact, law.file, law_file(exact), law.theorem, limit_s)
-    return distances, law, rounded
+    return distances, _decide_law(place, exact, distances.proved, limit_s), rounded
+
+
+def _decide_law(place: Workshop, run: Recorded, kept: bool, limit_s: float) -> CoqReply:
+    """Have Coq prove the table of a run; it is wanted of all pairs and periods.
+
+    Args:
+        place: where the file about distances is.
+        run: the run.
+        kept: whether Coq has accepted that file.
+        limit_s: wall-clock time for Coq, s.
+    """
+    table, theorem, name = entries(run), f"{run.name}_obeys_the_law", f"{run.name}_law.v"
+    gaps = missed(run, table)
+    if not table:
+        return CoqReply(False, theorem, name, "no pair obeys it in any period", missed=gaps)
+    law = decide(place, run, name, law_file(run, table, alone=not kept), theorem, limit_s)
+    if not law.proved:
+        return replace(law, missed=gaps)
+    law = replace(law, entries=len(table), missed=gaps)
+    return replace(law, proved=False, why=_missing(gaps, len(table))) if gaps else law
+
+
+def _missing(gaps: Sequence[Missed], many: int) -> str:
+    """Which pairs miss the law, and when."""
+    pairs = (f"{gap.demand.first} and {gap.demand.second}, {gap.begin_s:.6g} to {gap.end_s:.6g} s" for gap in gaps)
+    return f"{'; '.join(pairs)}. Proved of the other periods, in {many} entries"
 
 
 @contextmanager
@@ -176,7 +202,7 @@ def _pair(demand: Demand) -> str:
 def _about(run: Recorded, text: str, line: int) -> Demand | None:
     """The pair whose lemma is at a line of an exported file."""
     before = "\n".join(text.splitlines()[:line])
-    lemma = before.rpartition("\nLemma ")[2].partition(" ")[0].removesuffix("_obey")
+    lemma = before.rpartition("\nLemma ")[2].partition(" ")[0]
     return next((demand for demand in run.demands if demand.lemma == lemma), None)
 
 
@@ -257,6 +283,10 @@ def document(place: Workshop, found: Sequence[Proved]) -> dict[str, Any]:
 
 def _entry(answer: CoqReply) -> dict[str, Any]:
     entry: dict[str, Any] = {"proved": answer.proved, "theorem": answer.theorem, "file": answer.file}
+    if answer.entries:
+        entry["entries"] = answer.entries
+    if answer.missed:
+        entry["missed"] = listed(answer.missed)
     if answer.proved:
         return entry | {"axioms": list(answer.axioms), "seconds": round(answer.seconds, 3)}
     near = [
@@ -265,3 +295,11 @@ def _entry(answer: CoqReply) -> dict[str, Any]:
         for one in answer.too_near
     ]
     return entry | {"why": answer.why} | ({"too_near": near} if near else {})
+
+
+def listed(gaps: Iterable[Missed]) -> list[dict[str, Any]]:
+    """Pairs with periods that no entry is about, as strict JSON."""
+    return [
+        {"first": gap.demand.first, "second": gap.demand.second, "begin_s": gap.begin_s, "end_s": gap.end_s}
+        for gap in gaps
+    ]

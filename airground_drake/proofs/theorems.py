@@ -20,6 +20,7 @@ class Theorem:
         checked_where: claims (such as "SAFE-HYP") and commands that check the hypotheses.
         statement: what it says, in one plain sentence.
         hypotheses: a sentence each.
+        silent_on: what it does not say, in one plain sentence; empty if nothing needs to be said.
     """
 
     name: str
@@ -27,6 +28,7 @@ class Theorem:
     checked_where: tuple[str, ...]
     statement: str
     hypotheses: tuple[str, ...] = ()
+    silent_on: str = ""
 
 
 _STABLE = "The product of gain and control period, A h, is at most 1: min(A h, 1) stands for it (Safety.capped)."
@@ -37,6 +39,18 @@ _LAW = "At every sample each pair meets its two inequalities, or is too far apar
 _CONVEX = "Distances are signed distances to convex sets that do not turn, such as points, balls and polygons (Convex)."
 _LAYER = (_STABLE, _SHARES, _HELD, _PLANAR, _LAW, _CONVEX)
 _AROUND = ("The signed distance is that from a nearest point, or inside minus the depth (Convex.signed_distance).",)
+_BUDGET = (
+    _STABLE,
+    "At every sample the pair meets the law, up to a slack, with a relative position that is measured up to eps; or it "
+    "is far apart, or stands.",
+    "W is at least the slacks and drifts of the two; dips and covers are what the plants have at most (Mixed).",
+    "eps (1 - A h) <= A h (d_law - eps - W/A), and eps is below d_law - eps - W/A.",
+    "The pair starts at d_law - eps - W/A or farther (Budget.measured_start).",
+)
+_PIECES = "Positions do not jump, and have the plant's derivatives inside the periods."
+_CHORD = "Speed and turning rate are those of chord steering, and constant in a period."
+_LAG = "The velocity goes towards the command at the rate (u - v)/tau."
+_RECORDED = "The bodies are as recorded: no farther off the straight lines between the rows than is said of them."
 _PERIOD = (
     "In the period the robot moves away from the set at min(r, (L - D)/h) or faster; r is the speed of its retreat.",
     "r is not negative.",
@@ -67,11 +81,6 @@ _ALL = (
         _LAYER,
     ),
     Theorem(
-        "Safety.disturbed", "(7)-(8), (11)", (*_RUN_AND_SCENARIO, "SAFE-DIST"),
-        "A pair whose radial speed falls short by at most e keeps d - e/A at all times.",
-        (*_LAYER, "A is positive.", "The pair starts at d - e/A or farther."),
-    ),
-    Theorem(
         "Safety.obstacle", "(7), (11)", ("SAFE-INV",),
         "A body that is held still and takes no share meets its inequality.",
         ("The body has velocity 0, share 0 and slack 0.",),
@@ -97,6 +106,11 @@ _ALL = (
         _AROUND,
     ),
     Theorem(
+        "Convex.clear_gap", "ours", ("SAFE-INV",),
+        "A signed distance of at least m > 0 is a distance of at least m from every point of the set.",
+        _AROUND,
+    ),
+    Theorem(
         "Convex.ball", "ours", ("SAFE-INV",),
         "The distance from a ball or point is convex, and the unit vector away from its centre is a subgradient of it.",
         ("The vector points away from the centre.",),
@@ -112,18 +126,138 @@ _ALL = (
         ("The set is an intersection of half-planes or half-spaces.", "The point is in it."),
     ),
     Theorem(
+        "Budget.at_samples", "(7)-(8), (11)", ("SAFE-HYP",),
+        "At every sample the points that the law steers keep its distance d_law, but for eps and W/A.",
+        _BUDGET,
+        "How fast a pair that starts nearer recovers: that is Safety.recovers.",
+    ),
+    Theorem(
+        "Budget.budget_always", "(7)-(8), (11)", ("SAFE-HYP", "SAFE-DIST"),
+        "Pairs that meet the law, as measured and with the distance d_law, keep the true distance d at all times.",
+        (*_BUDGET, "d_law is at least eps + W/A + sqrt((d + covers + dips)^2 + eps^2)."),
+        "Anything about sets that turn, or about a pair from a period on in which it misses the law by more than W.",
+    ),
+    Theorem(
+        "Budget.measured_start", "ours", ("SAFE-HYP",),
+        "A pair that is measured to be at d_law at the start has the distance from which the budget begins.",
+        ("Its relative position is measured with an error of eps at most.",),
+    ),
+    Theorem(
+        "Budget.smaller_gain", "ours", ("SAFE-HYP",),
+        "What meets the law with a gain meets it with a smaller one.",
+        ("The period is positive.",),
+    ),
+    Theorem(
+        "Pieces.leaves_chord", "ours", ("SAFE-HYP",),
+        "A motion that arrives where its command leads is off the straight line by at most M h^2/8 in between.",
+        ("M bounds its acceleration.", _PIECES),
+    ),
+    Theorem(
+        "Pieces.follows", "ours", ("SAFE-HYP",),
+        "A point that is drawn after one that keeps m from a set at rest, within a of it, keeps sqrt(m^2 - a^2).",
+        ("It starts there.", "It moves straight towards the other one.", _PIECES),
+        "Anything about sets that move.",
+    ),
+    Theorem(
+        "Plants.chord", "ours", ("SAFE-HYP",),
+        "With chord steering the hand point of a unicycle arrives exactly where the command leads; its dip is known.",
+        (_CHORD, _PIECES),
+        "Slip, and errors of the heading.",
+    ),
+    Theorem(
+        "Plants.unicycle_stands", "ours", ("SAFE-HYP", "SAFE-OWN"),
+        "A unicycle that is told to stand neither turns nor drives.",
+        (_CHORD, _PIECES),
+    ),
+    Theorem(
+        "Plants.forwards", "ours", ("SAFE-HYP",),
+        "The axle of a unicycle that never drives backwards keeps sqrt(m^2 - l^2) from sets that its hand point keeps "
+        "m from.",
+        ("It drives at v >= 0, a speed for each period.", "The set is at rest.", "It starts there.", _PIECES),
+        "Anything about other robots, or about sets that move: there the cover l stays.",
+    ),
+    Theorem(
+        "Plants.lag", "ours", ("SAFE-HYP",),
+        "The point p + tau v of a body with lag moves exactly as commanded.",
+        (_LAG, _PIECES),
+        "What a wrong tau costs: that is a drift.",
+    ),
+    Theorem(
+        "Plants.lag_speed", "ours", ("SAFE-HYP",),
+        "A body with lag is never faster than the limit of its commands.",
+        (_LAG, _PIECES, "It is no faster at the start."),
+    ),
+    Theorem(
+        "Plants.lag_pair", "ours", ("SAFE-HYP",),
+        "Where the points steered keep m, two bodies with lags keep sqrt(b^2 - (tau V_rel)^2), "
+        "b = m - |tau_i - tau| V_i - |tau_j - tau| V_j.",
+        ("tau is positive, of your choice, and b not negative.", "Speeds and relative speed are within their limits.",
+         "They start there.", _PIECES),
+    ),
+    Theorem(
+        "Plants.lag_needs", "ours", ("SAFE-HYP",),
+        "That is d or more if b is at least sqrt(d^2 + (tau V_rel)^2).",
+        ("d is not negative.",),
+    ),
+    Theorem(
+        "Plants.delay", "ours", ("SAFE-HYP",),
+        "A body with a delay is, some time later, within V |wait - delay| of the point that the law steers.",
+        ("The law steers the point where the body will be after the commands on their way.",
+         "They are no faster than V."),
+    ),
+    Theorem(
+        "Turning.shortened_chord", "ours", ("SAFE-HYP",),
+        "A command that is shortened as far as the turning limit asks for is followed exactly, within the limit.",
+        ("The hand point is ahead of the axle.", "The limit is less than half a turn per period.", _CHORD, _PIECES),
+        "Limits of wheel speeds: those shorten a command further.",
+    ),
+    Theorem(
+        "Turning.steering_exists", "ours", ("SAFE-HYP",),
+        "There is a chord steering for every command that was shortened like that.",
+        ("The hand point is ahead of the axle.", "The limit is less than half a turn per period."),
+    ),
+    Theorem(
+        "Turning.no_limit", "ours", ("SAFE-HYP",),
+        "A limit of half a turn per period or more never binds.",
+        ("The period is positive.",),
+    ),
+    Theorem(
+        "Turning.chord_turns", "ours", ("SAFE-HYP",),
+        "At speeds up to V chord steering turns at (2/h) asin(V h/(2 l)) at most.",
+        ("V h is at most 2 l.", "2 l + a h is positive, a the command ahead."),
+    ),
+    Theorem(
+        "Turning.shortened", "ours", ("SAFE-HYP",),
+        "A shortened command still meets every inequality that v = 0 meets.",
+        ("The share that is left is above 0 and at most 1.",),
+    ),
+    Theorem(
+        "Turning.shortened_gain", "ours", ("SAFE-HYP",),
+        "Inside the distance of the law a command shortened to the share s meets the law with the gain s A.",
+        ("The share that is left is above 0 and at most 1.",),
+    ),
+    Theorem(
+        "Turning.shortened_obeys", "ours", ("SAFE-HYP", "SAFE-OWN"),
+        "Beside an obstacle that moves a shortened command still obeys, and a retreat at r becomes one at s r.",
+        ("The share that is left is above 0 and at most 1.",),
+        "A retreat that was not asked for in full: of that only r = 0 is left.",
+    ),
+    Theorem(
         "Passive.own_doing", "ours", ("SAFE-HYP", "SAFE-OWN"),
-        "Had the set stood still since the sample, the robot would be at min(D, L) or farther, less its errors w s.",
+        "Had the set stood still since the sample, the robot would be at min(D, L) or farther, less drift, dip and "
+        "cover.",
         _PERIOD,
+        "That the robot keeps a distance: what is missing, the set has moved itself.",
     ),
     Theorem(
         "Passive.kept", "ours", ("SAFE-HYP",),
         "A period that starts at L or farther keeps d, whatever the set does at Vo or slower.",
-        (*_PERIOD, "L is at least d + (w + Vo) h, w the largest velocity error of the robot."),
+        (*_PERIOD, "L is at least d + cover + dip + (w + Vo) h, w the drift of the robot."),
+        "Anything about a period that starts nearer than L.",
     ),
     Theorem(
         "Passive.since", "ours", ("SAFE-HYP", "SAFE-OWN"),
-        "Since any sample the distance has fallen below L by no more than the set's way and the robot's errors.",
+        "Since any sample the distance has fallen below L by no more than the set's way and the robot's drift.",
         _PERIOD,
     ),
     Theorem(
@@ -132,9 +266,67 @@ _ALL = (
         (*_PERIOD, "The distance starts at L or nearer, by what one period can take away."),
     ),
     Theorem(
+        "Passive.held_off", "ours", ("SAFE-HYP",),
+        "Within such a period the distance falls by the dip at most.",
+        (*_PERIOD, "r is at least the speed of the set and the drift of the robot together."),
+    ),
+    Theorem(
         "Passive.loss_is_real", "ours", ("SAFE-DIST",),
         "Without a retreat errors add up: a robot told to stand that drifts towards a point loses all of its drift.",
         ("The drift is not negative.",),
+    ),
+    Theorem(
+        "Mixed.first_order", "ours", ("airground prove DIR",),
+        "A body that moves as commanded conforms to every drift, dip and cover.",
+        ("They are not negative.",),
+    ),
+    Theorem(
+        "Mixed.drifting", "ours", ("SAFE-HYP",),
+        "A body whose velocity errs by w conforms to the drift w; and a set that moves at V, with the command 0, to V.",
+        ("Dip and cover are not negative.",),
+    ),
+    Theorem(
+        "Mixed.unicycle_chord", "ours", ("SAFE-HYP",),
+        "A unicycle with chord steering conforms to no drift, the cover l and the dip |omega| |(v, l omega)| h^2/8.",
+        (_CHORD, _PIECES),
+        "Slip: it may be declared as a drift of one's own plant.",
+    ),
+    Theorem(
+        "Mixed.lagging", "ours", ("SAFE-HYP",),
+        "A body with lag conforms to no drift, no dip and the cover tau V.",
+        (_LAG, "It is no faster than V.", _PIECES),
+    ),
+    Theorem(
+        "Mixed.delayed", "ours", ("SAFE-HYP",),
+        "A body with a delay conforms to no drift, no dip and the cover V |wait - delay|, as it is `wait` later.",
+        ("The law steers the point where the body will be after the commands on their way.",
+         "They are no faster than V."),
+    ),
+    Theorem(
+        "Mixed.entry_keeps", "ours", ("airground prove DIR",),
+        "An entry of a run's table that was checked keeps its promise, whatever is true of the others.",
+        ("Those of its kind: the law in its periods, the plants of its two bodies, and the numbers of its budget.",),
+        "Anything about a pair or a period that no entry is about.",
+    ),
+    Theorem(
+        "Mixed.run_all", "ours", ("airground prove DIR",),
+        "If all entries of a table were checked, all of them keep their promises.",
+        ("The hypotheses of Mixed.entry_keeps.",),
+    ),
+    Theorem(
+        "Mixed.shares", "(7)-(8), (11)", ("SAFE-HYP",),
+        "Two bodies that both meet their shares of the law meet it as a pair.",
+        ("The shares add up to 1.", "Both use the same measured positions."),
+        "Anything about two robots with different measurements.",
+    ),
+    Theorem(
+        "Mixed.from_rest", "ours", ("airground prove DIR",),
+        "Bodies with lag that are at rest at the first sample of their entry need no first distance of their own.",
+        ("b is not negative and at most m.",),
+    ),
+    Theorem(
+        "Mixed.drive_kept", "ours", (),
+        "A robot that drives towards a point, and beside a person, meets the hypotheses: they can be met.",
     ),
     Theorem(
         "Gate.scaled_back", "(20)", ("SAFE-GATE",),
@@ -256,13 +448,24 @@ _ALL = (
     ),
     Theorem(
         "LawChecker.sound", "(7)-(8), (11)", ("airground prove DIR", "SAFE-HYP"),
-        "Two bodies of a recorded run that the checker accepts obey the avoidance law at all rows, up to e per step.",
+        "Entries that the checker accepts were checked: the pair of points obeys the law in their periods, up to e.",
+        ("The hypotheses of DistanceChecker.sound.", _RECORDED),
+    ),
+    Theorem(
+        "LawChecker.obeys_exactly", "(7)-(8), (11)", ("airground prove DIR", "SAFE-HYP"),
+        "The same without error, with the distance of the law and the one that the bodies keep.",
+        ("The hypotheses of LawChecker.sound.",
+         "The distance of the law is at least what the bodies keep and are off."),
+    ),
+    Theorem(
+        "LawChecker.first_order_recorded", "ours", ("airground prove DIR",),
+        "Bodies that move on the straight lines between the rows are recorded, and nothing is off.",
         ("The hypotheses of DistanceChecker.sound.",),
     ),
     Theorem(
-        "LawChecker.law_keeps", "(7)-(8), (11)", ("airground prove DIR", "SAFE-HYP"),
-        "Two bodies that obey the law up to e per step keep d - e/(A h) at all times of the run.",
-        ("The hypotheses of LawChecker.sound.", "The pair starts at d - e/(A h) or farther."),
+        "LawChecker.straight_is", "ours", ("airground prove DIR",),
+        "Their places are the positions that the theorem about distances is about.",
+        ("The hypotheses of DistanceChecker.sound.",),
     ),
     Theorem(
         "Example.can_be_met", "ours", (),

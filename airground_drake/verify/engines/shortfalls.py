@@ -3,13 +3,13 @@
 The unit of time is the control period: the velocity of a body is the step to its next sample, and the gain is
 a = min(A h, 1). The second body is a point or a core: a wall, a polygon or a prism (`outlines.Cores`). Let D be the
 signed distance of the first body from it, d the distance to keep, and n the unit vector away from the nearest point; in
-a polygon, the normal of the nearest edge. The theorem `disturbed` (proofs/Safety.v) asks of each sample that either
+a polygon, the normal of the nearest edge. The theorem `budget` (proofs/Budget.v) asks of each sample that either
 
     n.step_1 >= q_1 b - e_1 and -n.step_2 >= q_2 b - e_2,    b = a (d - D) where D <= d, else d - D,    q_1 + q_2 = 1,
 
 or the two are far: D >= d + ||step_1|| + ||step_2||. If e_1 + e_2 <= e at every sample, then D >= d - e / a at all
-times. Positions and corners are doubles, which are rational numbers, and so is the nearest point of a core: only square
-roots are enclosed.
+times, where that is above 0. Positions and corners are doubles, which are rational numbers, and so is the nearest point
+of a core: only square roots are enclosed.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""SAFE-DIST: the distance that remains when velocities are disturbed (proofs/Safety.v, Gate.v).
+"""SAFE-DIST: the distance that remains when velocities are disturbed (proofs/Budget.v, Gate.v).
 
 Every robot moves with v + e(t), ||e(t)|| <= w, instead of v; W is what the disturbances of a pair add up to: w beside
 an obstacle, 2 w between robots. Other symbols are those of `safe_inv.py`.
@@ -79,7 +79,7 @@ class SafeDist(TheoremClaim):
     )
 
     theorems = (
-        "Safety.disturbed",
+        "Budget.budget_always",
         "Gate.deficit_closed_form",
         "Gate.common_direction",
         "Gate.overhead",
