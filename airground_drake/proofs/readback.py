@@ -31,12 +31,31 @@ class RereadError(NamedTuple):
 
 
 def compare(text: str, trace: Trace) -> RereadError:
-    """Compare an exported file with the run that it should be about.
+    """Compare the file about distances with the run that it should be about.
 
     Raises:
         ReadbackError: at the first difference.
         TraceError: if a column of the trace is missing or not finite.
     """
+    spelled, error = _compare_positions(text, trace)
+    named = [each._replace(first=spelled[each.first], second=spelled[each.second]) for each in demands(trace.scenario)]
+    wanted = [(each.first, each.second, each.sets if each.core else "", each.safe_m) for each in named]
+    _compare_statement(f"run_{trace.run}", text, trace, wanted)
+    return error
+
+
+def compare_positions(text: str, trace: Trace) -> RereadError:
+    """Compare the positions in an exported file with those of the run that it should be about.
+
+    Raises:
+        ReadbackError: at the first difference.
+        TraceError: if a column of the trace is missing or not finite.
+    """
+    return _compare_positions(text, trace)[1]
+
+
+def _compare_positions(text: str, trace: Trace) -> tuple[dict[str, str], RereadError]:
+    """The names of bodies in the file, by their names in the trace, and by how much coordinates differ."""
     run = f"run_{trace.run}"
     unit, times, listed = _parts(rf"^Definition {run} := Run (\w+) \[\n(.*?)\] \[\n(.*?)\]\.$", text)
     if [Fraction(int(t, 0), int(unit, 0)) for t in times.split(";\n")] != [Fraction(t) for t in trace.t.tolist()]:
@@ -64,10 +83,7 @@ def compare(text: str, trace: Trace) -> RereadError:
         off += _off_corners(f"{spelled[name]}_{core}", text, int(unit, 0), parts)
     if max(off) > Fraction(1, 2 * PARTS):
         raise ReadbackError(f"{run}: a position differs from the trace by {float(max(off)):.3g} m")
-    named = [each._replace(first=spelled[each.first], second=spelled[each.second]) for each in asked]
-    wanted = [(each.first, each.second, each.sets if each.core else "", each.safe_m) for each in named]
-    _compare_statement(run, text, trace, wanted)
-    return RereadError(sum(each > 0 for each in off), float(max(off)))
+    return spelled, RereadError(sum(each > 0 for each in off), float(max(off)))
 
 
 def _coordinates(body: str, text: str, rows: int, unit: int, places: int) -> list[Fraction]:

@@ -23,7 +23,7 @@ from airground_drake.proofs.export import (
     refuse_unknown,
 )
 from airground_drake.proofs.record import FOLDER, digest
-from airground_drake.proofs.table import Missed, entries, law_file, lawful, missed
+from airground_drake.proofs.table import Entry, Missed, entries, law_file, lawful, missed
 from airground_drake.proofs.too_near import TooNear, too_near
 from airground_drake.run import trace
 from airground_drake.run.trace import Trace
@@ -140,23 +140,19 @@ def prove(place: Workshop, run: Trace, limit_s: float = coq.LIMIT_S) -> tuple[Co
     if distances.refused and (found := too_near(exact)):
         words = f"Coq refuses {_pair(distances.refused)}. In exact arithmetic {'; '.join(map(str, found))}"
         distances = replace(distances, why=words, too_near=found)
-    return distances, _decide_law(place, exact, distances.proved, limit_s), rounded
+    table = entries(exact)
+    text = law_file(exact, table, alone=not distances.proved) if table else ""
+    if table and not distances.proved:
+        readback.compare_positions(text, run)
+    return distances, _decide_law(place, exact, table, text, limit_s), rounded
 
 
-def _decide_law(place: Workshop, run: Recorded, kept: bool, limit_s: float) -> CoqReply:
-    """Have Coq prove the table of a run; it is wanted of all pairs and periods.
-
-    Args:
-        place: where the file about distances is.
-        run: the run.
-        kept: whether Coq has accepted that file.
-        limit_s: wall-clock time for Coq, s.
-    """
-    table, theorem, name = entries(run), f"{run.name}_obeys_the_law", f"{run.name}_law.v"
-    gaps = missed(run, table)
+def _decide_law(place: Workshop, run: Recorded, table: Sequence[Entry], text: str, limit_s: float) -> CoqReply:
+    """Have Coq prove the table of a run, from its file; it is wanted of all pairs and periods."""
+    theorem, name, gaps = f"{run.name}_obeys_the_law", f"{run.name}_law.v", missed(run, table)
     if not table:
         return CoqReply(False, theorem, name, "no pair obeys it in any period", missed=gaps)
-    law = decide(place, run, name, law_file(run, table, alone=not kept), theorem, limit_s)
+    law = decide(place, run, name, text, theorem, limit_s)
     if not law.proved:
         return replace(law, missed=gaps)
     law = replace(law, entries=len(table), missed=gaps)
