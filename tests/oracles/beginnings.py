@@ -11,6 +11,7 @@ from airground_drake.base.arrays import Array
 from airground_drake.run.trace import Trace
 from airground_drake.scenarios.courses import course
 from airground_drake.verify.claim import TIME_TOLERANCE_S
+from airground_drake.verify.engines.bodies import law_m, room_of
 from airground_drake.verify.engines.geometry import corner_times, interpolate, travelled
 from airground_drake.verify.engines.outlines import GAP, RADIUS, SPEED, Cores, away_from
 from airground_drake.verify.runs.control_law import ON_TOP
@@ -19,6 +20,7 @@ from airground_drake.verify.runs.proposals import ProposalRecord, proposal_of
 from oracles.closed_loops import Scene
 from oracles.control_law import place, selected
 from oracles.sensing import moves, still_parts
+from oracles.turning import numbers_of
 
 
 class Beginning(NamedTuple):
@@ -90,8 +92,11 @@ def scene(
     """
     around = movers(trace, on.ugv, t, after)
     origins = np.stack([each.places for each in around], axis=1) if around else np.empty((len(after), 0, 3))
-    of_movers = np.array([(pair.safe_m, pair.share, pair.speed_m_s) for pair, *_ in around]).reshape(-1, 3).T
+    of_movers = np.array([(pair.law_m, pair.share, pair.speed_m_s) for pair, *_ in around]).reshape(-1, 3).T
     safe, share, speed = np.concatenate([law, of_movers], axis=1)
+    numbers, heading = numbers_of(trace, on.ugv), 0.0
+    if numbers[0]:
+        heading = float(np.interp(t, trace.t, trace.column(f"{on.ugv}.heading_rad")))
     return Scene(
         here=interpolate(trace.t, trace.position(on.ugv), t),
         preset=travelled(*preset_of(trace, on.ugv), t + after),
@@ -106,6 +111,8 @@ def scene(
         safe=safe,
         share=share,
         speed=speed,
+        heading=np.array(heading),
+        numbers=numbers,
     )
 
 
@@ -156,7 +163,12 @@ def known_cores(trace: Trace, row: dict[Any, Any], on: ProposalRecord) -> tuple[
     beside = [pairs[parts.names[k]] for k in parts.owner[known]]
     claimed = on.mapped[told]
     theirs = claimed[:, GAP] + (trace.scenario.ugvs[on.ugv].radius_m + claimed[:, RADIUS])
-    safe, speed = [pair.safe_m for pair in beside], [pair.speed_m_s for pair in beside]
+    room = room_of(trace.scenario.ugvs[on.ugv], trace.scenario.control.period_s)
+    passive = (claimed[:, SPEED] > 0.0).tolist()
+    theirs = np.array(
+        [law_m(safe, room, None, passive=moves_) for safe, moves_ in zip(theirs.tolist(), passive, strict=True)]
+    )
+    safe, speed = [pair.law_m for pair in beside], [pair.speed_m_s for pair in beside]
     law = np.array([np.append(safe, theirs), np.ones(len(known) + len(told)), np.append(speed, claimed[:, SPEED])])
     return Cores.joined([parts.cores.take(known), Cores.of(claimed)]), law
 
@@ -174,6 +186,6 @@ def _other(
     coasting = here + np.minimum(after, trace.scenario.gatekeeper.horizon_s)[:, None] * velocity
     asked, accepted = told.get(other, (None, False))
     if asked is None:
-        return (coasting, coasting), pair.safe_m, pair.share, -np.inf
+        return (coasting, coasting), pair.law_m, pair.share, -np.inf
     goes = place(asked, t + after) + np.exp(-after)[:, None] * (here - place(asked, t))
-    return (goes if accepted else coasting, goes), pair.safe_m, pair.share, float(asked.times_s[-1])
+    return (goes if accepted else coasting, goes), pair.law_m, pair.share, float(asked.times_s[-1])

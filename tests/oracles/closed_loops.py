@@ -13,6 +13,8 @@ from airground_drake.run.trace import Trace
 from airground_drake.verify.engines.outlines import Cores, away_from
 from airground_drake.verify.runs.control_law import PLANE, least_speeds, retreats
 from oracles.control_law import Asked, Inequalities, commanded, tracking
+from oracles.turning import able
+from oracles.turning import rates as rates_of
 
 AT_ONCE = 5_000_000
 """Largest number of coordinates of points that are rolled out side by side, so that they fit into memory."""
@@ -46,6 +48,8 @@ class Scene(NamedTuple):
         safe: distances to keep from all of these, (M + K + L,), m.
         share: of the inequalities, (M + K + L,).
         speed: expected of them at most, (M + K + L,), m/s; 0: the passive law does not apply.
+        heading: of a unicycle, (), rad.
+        numbers: of a unicycle, (4,), see `turning`.
     """
 
     here: Array
@@ -61,6 +65,8 @@ class Scene(NamedTuple):
     safe: Array
     share: Array
     speed: Array
+    heading: Array
+    numbers: Array
 
 
 def stacked(scenes: Sequence[Scene]) -> Scene:
@@ -116,6 +122,7 @@ def roll_out(trace: Trace, scenes: Scene, nudge: Array | float = 0.0) -> Iterato
     In every period each is pushed by `nudge`, (R, 3), m.
     """
     control, h, place = trace.scenario.control, trace.scenario.control.period_s, scenes.here
+    heading = scenes.heading
     rates, wishes = (np.diff(part, axis=1) / h for part in (scenes.preset, scenes.wanted))
     for k in range(scenes.executed.shape[1]):
         offset = place[:, None] - scenes.points[:, k]
@@ -133,7 +140,11 @@ def roll_out(trace: Trace, scenes: Scene, nudge: Array | float = 0.0) -> Iterato
         own = tracking(place, scenes.preset[:, k], rates[:, k], control.motion_gain_1_s, scenes.limit)
         rows = np.flatnonzero(scenes.executed[:, k])
         asked = Asked(scenes.wanted[rows, k], wishes[rows, k], scenes.chosen[rows])
-        place = place + h * commanded(trace, place, own, given, rows, asked, scenes.limit) + nudge
+        velocity = commanded(trace, place, own, given, rows, asked, scenes.limit)
+        if scenes.numbers[..., 0].any():
+            velocity = able(velocity, heading, scenes.numbers, h)
+            heading = heading + h * rates_of(velocity, heading, scenes.numbers, h)[1]
+        place = place + h * velocity + nudge
         yield place
 
 

@@ -27,6 +27,7 @@ from oracles.control_law import (
 )
 from oracles.fault import Fault
 from oracles.protocol import executed_at
+from oracles.turning import able, numbers_of
 
 COMMAND_TOLERANCE_M_S = 1e-6
 """A command may differ from the law by this, m/s. Both are evaluated at the same recorded positions and differ by
@@ -78,6 +79,9 @@ def _law_of_ugv(trace: Trace, ugv: str, samples: Rows) -> Law:
     for rate, wish in product(_preset_rates(waypoints, speed, t), asked):
         own = tracking(position, preset, rate, gain, limit)
         command = commanded(trace, position, own, given, rows, wish, limit)
+        if (numbers := numbers_of(trace, ugv))[0]:
+            heading = trace.column(f"{ugv}.heading_rad")[samples]
+            command = able(command, heading, numbers, scenario.control.period_s)
         away = np.linalg.norm(recorded - command, axis=1)
         closer = ~(away >= found.away)
         found.command[closer], found.away[closer] = command[closer], away[closer]

@@ -148,12 +148,12 @@ def _beside(trace: Trace, row: DecisionRecord, after: Array) -> Iterator[_Beside
     refused = row.constant[0]
     for k in there.parts.tolist():
         core, name = parts.cores.take(slice(k, k + 1)), parts.names[parts.owner[k]]
-        yield _Beside(name, _nearest(core, refused), pairs[name].safe_m, core)
+        yield _Beside(name, _nearest(core, refused), pairs[name].law_m, core)
     for pair, places in zip(there.robots, there.places, strict=True):
-        yield _Beside(pair.second if pair.first == row.robot else pair.first, places, pair.safe_m, Cores.at(places))
+        yield _Beside(pair.second if pair.first == row.robot else pair.first, places, pair.law_m, Cores.at(places))
     for pair, core, places in movers(trace, row.robot, row.t_s, after):
         moved = Cores(core.corners + places[:, None, :2], core.base + places[:, 2], core.top + places[:, 2])
-        yield _Beside(pair.second, _nearest(moved, refused), pair.safe_m, moved)
+        yield _Beside(pair.second, _nearest(moved, refused), pair.law_m, moved)
 
 
 def _nearest(cores: Cores, way: Array) -> Array:

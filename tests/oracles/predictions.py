@@ -113,7 +113,7 @@ def scene_of(trace: Trace, row: DecisionRecord, plan: Array) -> Scene:
     points = np.stack(there.places, axis=1) if there.places else np.empty((len(after), 0, 3))
     parts, pairs = still_parts(trace), pairs_beside(trace, on.ugv)
     beside = [*(pairs[parts.names[k]] for k in parts.owner[there.parts]), *there.robots]
-    law = np.array([(pair.safe_m, pair.share, pair.speed_m_s) for pair in beside]).reshape(-1, 3).T
+    law = np.array([(pair.law_m, pair.share, pair.speed_m_s) for pair in beside]).reshape(-1, 3).T
     loop = scene(trace, on, row.t_s, after, 0, parts.cores.take(there.parts), points, law)
     return loop._replace(executed=np.repeat(plan == 1.0, each))
 

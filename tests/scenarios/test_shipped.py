@@ -47,6 +47,8 @@ def test_every_claim_is_exercised_in_at_least_one_shipped_scenario(
         often[claim["id"]] += claim["exercised"] or 0
     choice, _ = judge_model(load("bayes_threshold"), claims=["THR-CHOICE"])  # the others declare their threshold
     often["THR-CHOICE"] += choice.exercised or 0
+    (budget,) = judge_model(load("lagging"), claims=["SAFE-BUDGET"])
+    often["SAFE-BUDGET"] += budget.exercised or 0
     assert [name for name in (*RUN_CLAIMS.own, *MODEL_CLAIMS.own) if not often[name]] == []
 
 

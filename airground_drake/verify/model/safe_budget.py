@@ -100,7 +100,10 @@ class SafeBudget(TheoremClaim):
             reason = f"not among the theorems: {', '.join(missing)}"
             evidence = Proof(proof="not checked", theorems={}, hypotheses=found, reason=reason)
             least = min(found, key=lambda each: each.margin)
-            return Finding("inconclusive", least.margin, least.unit, evidence=evidence, quantity=least.hypothesis)
+            return Finding(
+                "inconclusive", least.margin, least.unit, evidence=evidence, quantity=least.hypothesis,
+                exercised=len(found),
+            )  # fmt: skip
         claim = SafeBudget()
         claim.theorems = names
         return TheoremClaim.check(claim, inputs)

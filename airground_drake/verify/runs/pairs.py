@@ -296,6 +296,21 @@ def least_gap(trace: Trace, pair: Pair) -> Gap:
     return trace.derived(("least gap", pair.first, pair.second), found)
 
 
+def steered_margin(trace: Trace, pair: Pair) -> float:
+    """The least distance of the points of a pair that the law steers, less what the law keeps, m."""
+
+    def found() -> float:
+        cores, first = cores_of(trace).get(pair.second), trace.position(pair.first)[pair.rows]
+        if cores is None:
+            second = trace.position(pair.second)[pair.rows]
+            return closest_approach(trace.t[pair.rows], first, second).distance_m - pair.law_m
+        origin = origin_of(trace, pair.second)
+        way = first if origin is None else first - origin[pair.rows]
+        return closest(cores, way, planar=is_planar(trace, pair.first)).distance - pair.law_m
+
+    return trace.derived(("steered", pair.first, pair.second), found)
+
+
 def _least_of_bent(trace: Trace, pair: Pair, off_m: float) -> Approach:
     """The least distance of a pair whose bodies do not move straight: segments that may be too near are divided."""
     cores, planar = cores_of(trace).get(pair.second, Cores.at(np.zeros((1, 3)))), is_planar(trace, pair.first)

@@ -158,7 +158,8 @@ class SafeHyp(TraceClaim):
     equations = "(7)-(8), (11) in the inequality form of the package (set-based avoidance)"
     assumptions = (
         "The command of a row is the velocity applied since the row before (the trace's convention).",
-        "Robots move straight from row to row.",
+        "The points that the law steers move straight from row to row. Of robots that turn, lag or get their commands "
+        "late, D and d are those of these points: d_law of SAFE-BUDGET.",
         "Beside an obstacle with `appears_s` the hypotheses are those from the first control sample at or after that "
         "time on, and the safe start is that D >= d at that sample: where it appears nearer, nothing is promised.",
         "No safe start is asked beside an obstacle that may move: where it is near, the robot is passive.",

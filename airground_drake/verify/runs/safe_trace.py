@@ -20,6 +20,7 @@ from airground_drake.verify.runs.pairs import (
     pairs_of,
     place_on_map,
     snapshot,
+    steered_margin,
 )
 from airground_drake.verify.runs.passive import encounters
 
@@ -38,15 +39,19 @@ class SafeTrace(TraceClaim):
         r"\text{for every pair } (i, j)",
     )
     method = (
-        "Exact minimum of the distance on every segment between two rows, in closed form: nothing is sampled. A "
+        "Exact minimum of the distance of the bodies on every segment between two rows, in closed form: nothing is "
+        "sampled. A "
         "straight motion is nearest to a convex core at an end, where it passes a corner or an edge at right angles, "
         "or where it crosses the line of an edge; in a polygon, it is deepest where two edges are equally near. A "
-        "barrier is as near as the nearest of its convex parts. Before that, each recorded step must equal command "
-        "times duration to 1e-9 m, otherwise the verdict is `error`."
+        "barrier is as near as the nearest of its convex parts. A body that turns or lags leaves the straight line: by "
+        "so much the distance is taken shorter, and where that may be too short, the segment is divided until it is "
+        "straight to 1e-10 m. Before that, each recorded step of a steered point must equal command times duration, "
+        "and each recorded body what its plant makes of that, to 1e-9 m; otherwise the verdict is `error`."
     )
     equations = "(7)-(8), (11)"
     assumptions = (
-        "Between two rows every robot moves on a straight line at constant speed (integrator plant, zero-order hold).",
+        "Between two rows every robot moves on a straight line at constant speed (integrator plant, zero-order hold), "
+        "a unicycle on an arc, a body with a lag as the equation of the lag says.",
         "Robots are balls of the scenario's radii r (`radius_m`; by default points), and C is the centre of the other "
         "body. A barrier is all that is within its radius of its core C: a point, walls, a polygon, or a prism up to "
         "its height. A distance is the gap between surfaces; below 0 they overlap. d_ij is the obstacle's own "
@@ -62,7 +67,10 @@ class SafeTrace(TraceClaim):
         "Beside obstacles that move a refutation does not mean that a robot did anything wrong (SAFE-OWN)."
     )
 
-    exercised_by = "pairs that came so close that one control period at full speed would have broken the distance"
+    exercised_by = (
+        "pairs that came so close that one control period at full speed would have broken the distance, or what the "
+        "law keeps between the points that it steers"
+    )
 
     def check(self, trace: Trace) -> Finding:
         """Compare the minimum distance of each pair with its safe distance; the worst pair gives the margin."""
@@ -74,7 +82,8 @@ class SafeTrace(TraceClaim):
 
         least = apart_of(trace) - np.array([pair.safe_m for pair in pairs])
         listed = [entry(k) for k in least_of(least, MOST_LISTED, lambda k: entry(k).margin_m)]
-        close_by = np.flatnonzero(least < np.array([pair.reach_m for pair in pairs])).tolist()
+        reach = np.array([pair.reach_m + pair.cover_m + pair.more_m for pair in pairs])
+        close_by = np.flatnonzero(least < reach).tolist()
         worst = min(listed, key=lambda entry: entry.margin_m)
         safe = worst.margin_m >= -DISTANCE_TOLERANCE_M
         both = (worst.first, worst.second)
@@ -100,7 +109,7 @@ class SafeTrace(TraceClaim):
 class Distance:
     """Where a pair was closest, in row `row`: distances of surfaces, m, and the time, s.
 
-    It was exercised if one control period at full speed would have broken the safe distance.
+    It was exercised if one control period at full speed would have broken the safe distance, or that of the law.
     """
 
     first: str
@@ -116,7 +125,8 @@ class Distance:
 def _entry(trace: Trace, k: int) -> Distance:
     """Where the k-th pair was closest."""
     pair, gap_m, margin_m, t_s, row = least_gap(trace, pairs_of(trace)[k])
-    return Distance(pair.first, pair.second, pair.required_m, gap_m, margin_m, t_s, row, margin_m < pair.reach_m)
+    near = margin_m < pair.reach_m or (pair.more_m > 0.0 and steered_margin(trace, pair) < pair.reach_m)
+    return Distance(pair.first, pair.second, pair.required_m, gap_m, margin_m, t_s, row, near)
 
 
 def _place(trace: Trace, worst: Distance) -> dict[str, list[float]]:

@@ -16,8 +16,9 @@ from airground_drake.verify.model.theorem import TheoremClaim
 from airground_drake.verify.runs.thr_trig import TriggerLevels, isolation
 
 CLAIMS: dict[str, TheoremClaim] = {
-    name: claim for name in MODEL_CLAIMS if isinstance(claim := MODEL_CLAIMS.make(name, of=ModelClaim), TheoremClaim)
-}
+    name: claim for name in MODEL_CLAIMS
+    if isinstance(claim := MODEL_CLAIMS.make(name, of=ModelClaim), TheoremClaim) and claim.theorems
+}  # fmt: skip
 INPUTS = {name: claim.inputs(load("case_a")) for name, claim in CLAIMS.items()}
 LAYER = ("SAFE-INV", "SAFE-GATE")
 

@@ -1,0 +1,31 @@
+"""`airground budget`: what is printed adds up, and the picture names each term."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from xml.etree import ElementTree
+
+import pytest
+
+from airground_drake.commands.budget import main
+
+
+@pytest.mark.parametrize("scenario", ["turtlebots", "lagging", "case_a_unicycle", "case_a"])
+def test_the_terms_add_up(scenario: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main([scenario, "--json"]) == 0
+    groups = json.loads(capsys.readouterr().out)
+    assert groups
+    for each in groups:
+        added = sum(term["metres"] for term in each["terms"])
+        assert each["promised_m"] + added == pytest.approx(each["in_the_law_m"], abs=1e-12)
+        assert bool(each["terms"]) == (each["in_the_law_m"] > each["promised_m"])
+
+
+def test_it_is_printed_and_drawn(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    picture = tmp_path / "budget.svg"
+    assert main(["turtlebots", "-o", str(picture)]) == 0
+    told = capsys.readouterr().out
+    assert "burger beside person, which may move: promised 0.200 m, in the law 0.300 m" in told
+    assert "    hand_point_m of burger: 0.1000 m" in told
+    assert ElementTree.parse(picture).getroot().tag.endswith("svg")
