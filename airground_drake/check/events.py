@@ -43,7 +43,7 @@ def check_events(run: Run) -> str:
             first = min(event for event in (theirs, ours) if event is not None)
             raise Disagreement("arrivals and collisions follow from positions", theirs, ours, first.robot, first.t_s)
     for event in run.events:
-        here = [np.interp(event["t_s"], run.t_s, axis) for axis in run.position_m[event["robot"]].T]
+        here = [np.interp(event["t_s"], run.t_s, axis) for axis in run.body_m[event["robot"]].T]
         about = f"{event['kind']} of {event['robot']}"
         close("place of an event", event["position_m"], here, within=SMALL, about=about, t_s=event["t_s"])
     return f"{len(found) - len(hits)} arrivals, {len(hits)} collisions"

@@ -12,6 +12,7 @@ import numpy.typing as npt
 import pandas as pd
 
 from .files import Json, parse_table, read_bytes, read_json, sha256
+from .plants import Way, moves_as_its_plant, plants_of, unicycle_of
 from .rules import SMALL, Array, NotEstablished, close, holds, same
 from .scenario import Levels, Pair, Preset, as_run, levels_of, moving_of, pairs_of, places_of, preset_of, robots_of
 from .shapes import boxes_of
@@ -28,7 +29,7 @@ LIFETIME = (("appears_s", 0.0), ("disappears_s", math.inf))
 
 @dataclass(frozen=True, eq=False)
 class Run:
-    """One run; T rows. Every robot moves straight from row to row.
+    """One run; T rows. The points that the law steers move straight from row to row.
 
     Attributes:
         name: of the run in its scenario.
@@ -67,7 +68,7 @@ class Run:
     @cached_property
     def apart_m(self) -> dict[tuple[str, str], float]:
         """Lower bound of the distance of each pair, m, so that only near pairs are looked at closely."""
-        box, found = {name: boxes_of(place) for name, place in self.position_m.items()}, {}
+        box, found = {name: boxes_of(place) for name, place in self.body_m.items()}, {}
         for pair in self.pairs:
             (low, high), (other_low, other_high) = box[pair.robot], box[pair.other]
             found[pair.robot, pair.other] = float(pair.shape.bounds_m(low - other_high, high - other_low).min())
@@ -90,10 +91,41 @@ class Run:
 
     @cached_property
     def position_m(self) -> dict[str, Array]:
-        """Places of robots, and of the origins of obstacles' shapes, (T, 3) each; those at rest are at 0."""
+        """Places of steered points, and of the origins of obstacles' shapes, (T, 3) each; those at rest are at 0."""
         recorded = [*self.robots, *self.moving]
         places = {body: np.stack([self.column(f"{body}.{a}_m") for a in "xyz"], axis=1) for body in recorded}
         return places_of(self.scenario, self.t_s) | places
+
+    @cached_property
+    def ways(self) -> dict[str, Way]:
+        """The motions of the robots' bodies."""
+        return {name: self._way(name) for name in self.robots}
+
+    def _way(self, robot: str) -> Way:
+        plants = plants_of(self.robots[robot])
+        if not plants:
+            return Way(self.t_s, self.position_m[robot])
+        place = np.stack([self.column(f"{robot}.body_{a}_m") for a in "xyz"], axis=1)
+        if unicycle_of(self.robots[robot]):
+            return Way(self.t_s, place, heading_rad=self.column(f"{robot}.heading_rad"))
+        lag_s = sum(plant["time_constant_s"] for plant in plants)
+        if not lag_s:
+            return Way(self.t_s, place)
+        velocity = np.stack([self.column(f"{robot}.body_v{a}_m_s") for a in "xyz"], axis=1)
+        return Way(self.t_s, place, velocity_m_s=velocity, lag_s=lag_s)
+
+    @cached_property
+    def body_m(self) -> dict[str, Array]:
+        """Places of the bodies of robots, and of the origins of obstacles' shapes, (T, 3) each."""
+        return self.position_m | {name: way.place_m for name, way in self.ways.items()}
+
+    def bent_m(self, pair: Pair) -> float:
+        """How far both bodies of a pair may be from the straight lines between rows, together, m."""
+        return sum(self._bent_m[name] for name in (pair.robot, pair.other) if name in self.ways)
+
+    @cached_property
+    def _bent_m(self) -> dict[str, float]:
+        return {name: way.bent_m() for name, way in self.ways.items()}
 
     @cached_property
     def moving(self) -> list[str]:
@@ -101,8 +133,17 @@ class Run:
         return moving_of(self.scenario)
 
     def apart(self, pair: Pair) -> Array:
-        """Places of a pair's robot relative to the other's while both are there, (K, 3), m."""
+        """Places of the body of a pair's robot relative to the other's while both are there, (K, 3), m."""
+        return (self.body_m[pair.robot] - self.body_m[pair.other])[self.there(pair.other)]
+
+    def steered_apart(self, pair: Pair) -> Array:
+        """The same of the points that the law steers."""
         return (self.position_m[pair.robot] - self.position_m[pair.other])[self.there(pair.other)]
+
+    def fine(self, name: str, row: int, parts: int) -> Array:
+        """Where a body, or the origin of an obstacle's shape, is from a row to the next, (parts + 1, 3), m."""
+        way = self.ways.get(name) or Way(self.t_s, self.position_m[name])
+        return way.within(row, parts)
 
     def there(self, name: str) -> slice:
         """Rows in which a body is there; they start at the number of rows if it is not there for a control period.
@@ -222,6 +263,10 @@ def _moves_as_commanded(run: Run, robot: str) -> None:
     """position[k] = position[k-1] + (t[k] - t[k-1]) * command, from the declared start; samples hold their command."""
     place, chosen = run.position_m[robot], run.sampled(robot, "v", "m_s")
     command = chosen[np.searchsorted(run.sample_row, np.arange(len(place) - 1), side="right") - 1]
-    close("start of a robot", place[0], run.robots[robot]["start_m"], within=SMALL, about=robot)
+    close("start of a robot", run.body_m[robot][0], run.robots[robot]["start_m"], within=SMALL, about=robot)
     led = place[:-1] + np.diff(run.t_s)[:, None] * command
     close("law of motion", place[1:], led, within=SMALL, about=robot, t_s=run.t_s[1:])
+    if plants_of(run.robots[robot]):
+        held = np.concatenate([np.zeros((1, 3)), command])
+        period_s = float(run.scenario["control"]["period_s"])
+        moves_as_its_plant(robot, run.robots[robot], run.ways[robot], place, held, period_s)

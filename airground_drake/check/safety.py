@@ -6,6 +6,7 @@ D >= d + V h, else n.v >= 0. It is the other inequality with d + V h in place of
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from fractions import Fraction
 from math import isqrt
@@ -14,6 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .files import Json
+from .plants import MOST_PARTS, STRAIGHT_M
 from .rules import SMALL, Array, Disagreement, Found, close, holds
 from .run import Run
 from .scenario import Pair, expected_m_s, written
@@ -26,24 +28,50 @@ FAR_M = 1e-6
 def safe_trace(run: Run) -> Found:
     """SAFE-TRACE: the distance of each pair is at least the safe one at every time; of several parts, the least.
 
-    A pair tests the claim if it comes so near that one period at the speed limits could break it.
+    A pair tests the claim if it comes so near that one period at the speed limits could break it, or what the law keeps
+    between the points that it steers.
     """
     margin, least, most = np.inf, 0, 0
     for pair in run.pairs:
-        closing = pair.closing_m_s * run.scenario["control"]["period_s"]
-        enough = pair.safe_m + max(margin, closing + 2.0 * SMALL)
-        if run.apart_m[pair.robot, pair.other] >= enough:
+        closing, room = pair.closing_m_s * run.scenario["control"]["period_s"], pair.cover_m + pair.more_m
+        enough = pair.safe_m + max(margin, closing + room + 2.0 * SMALL)
+        if run.apart_m[pair.robot, pair.other] - run.bent_m(pair) >= enough:
             continue  # neither the nearest pair nor near enough to count
-        of_pair = pair.shape.least_m(run.apart(pair), enough) - pair.safe_m
-        margin = min(margin, of_pair)
-        least += of_pair - closing < -SMALL
-        most += of_pair - closing <= SMALL
+        of_pair = _least_m(run, pair, enough) - pair.safe_m
+        margin, near = min(margin, of_pair), of_pair
+        if pair.more_m:
+            steered = pair.shape.least_m(run.steered_apart(pair), pair.in_the_law.safe_m + closing + 2.0 * SMALL)
+            near = min(near, steered - pair.in_the_law.safe_m)
+        least += near - closing < -SMALL
+        most += near - closing <= SMALL
     return Found("holds" if margin >= -SMALL else "refuted", float(margin), (least, most))
+
+
+def _least_m(run: Run, pair: Pair, enough: float) -> float:
+    """The least distance of a pair, m, at most `enough`; where bodies bend too near, their ways are divided."""
+    apart, bent = run.apart(pair), run.bent_m(pair)
+    found = pair.shape.least_m(apart, enough + bent) - bent
+    if not bent or found >= pair.safe_m:
+        return min(found, enough)
+    lower = pair.shape.held_m(apart[:-1], apart[:-1], apart[1:], enough + bent)[1] - bent
+    too_near = lower < pair.safe_m
+    parts = _parts(bent)
+    found = min(enough, float(lower[~too_near].min(initial=np.inf)))
+    for row in (run.there(pair.other).start + np.flatnonzero(too_near)).tolist():
+        fine = run.fine(pair.robot, row, parts) - run.fine(pair.other, row, parts)
+        found = min(found, pair.shape.least_m(fine) - bent / parts**2)
+    return found
+
+
+def _parts(bent_m: float) -> int:
+    """Into how many parts a way that is bent is divided, so that each is straight."""
+    return min(math.ceil(math.sqrt(bent_m / STRAIGHT_M)), MOST_PARTS)
 
 
 def safe_own(run: Run) -> Found | None:
     """SAFE-OWN: in each period no robot comes nearer than min(D, d + V h) to the other body, held as at the sample.
 
+    With plants that take room it is min(D, d_law + V h) less that room, D the distance of the steered points.
     It is asked from row to row, where the robot's way from the sample could lead nearer than d + V h. A period beside
     an obstacle that may move tests the claim if one at the speed limits could. None: nothing may move, and SAFE-TRACE
     says the same.
@@ -53,24 +81,33 @@ def safe_own(run: Run) -> Found | None:
     period, margin, least, most = run.scenario["control"]["period_s"], np.inf, 0, 0
     rows = np.arange(len(run.t_s) - 1)
     sample = run.sample_row[np.searchsorted(run.sample_row, rows, side="right") - 1]
-    ways = {robot: run.position_m[robot] for robot in run.robots}
-    step_m = {robot: np.maximum(*(_lengths(way[ends] - way[sample]) for ends in (rows, rows + 1)))
+    ways, bent = {robot: run.body_m[robot] for robot in run.robots}, {name: w.bent_m() for name, w in run.ways.items()}
+    step_m = {robot: np.maximum(*(_lengths(way[ends] - way[sample]) for ends in (rows, rows + 1))) + bent[robot]
               for robot, way in ways.items()}  # fmt: skip
     longest = max(float(step.max()) for step in step_m.values())
     for pair in run.pairs:
-        keeps, closing, there = pair.passive(period).safe_m, pair.closing_m_s * period, run.there(pair.other)
+        keeps, closing = pair.in_the_law.passive(period).safe_m - pair.cover_m, pair.closing_m_s * period
+        there = run.there(pair.other)
         both, reach = rows[there.start : there.stop - 1], keeps + closing + 2.0 * longest
         if run.apart_m[pair.robot, pair.other] > reach:
             continue
         for robot, other in ((pair.robot, pair.other), (pair.other, pair.robot)):
             if robot in ways:
-                held = run.position_m[other][sample[both]]
+                held = run.body_m[other][sample[both]]
                 at, start, end = (ways[robot][k] - held for k in (sample[both], both, both + 1))
                 at_m, least_m = pair.shape.held_m(at, start, end, reach)
                 asked = at_m <= keeps + step_m[robot][both]
-                margin = min(margin, float((least_m - np.minimum(at_m, keeps))[asked].min(initial=np.inf)))
+                point = run.position_m[robot][sample[both]] - run.position_m[other][sample[both]]
+                steered_m = pair.shape.held_m(point, point, point, np.inf)[0] if pair.cover_m else at_m
+                due = np.minimum(steered_m - pair.cover_m, keeps)
+                left = least_m - bent[robot] - due
+                for k in np.flatnonzero(asked & (left < 0.0)).tolist() if bent[robot] else ():
+                    parts = _parts(bent[robot])
+                    fine = run.fine(robot, int(both[k]), parts) - held[k]
+                    left[k] = pair.shape.least_m(fine) - bent[robot] / parts**2 - due[k]
+                margin = min(margin, float(left[asked].min(initial=np.inf)))
         if pair.moves_m_s:
-            spare = (at_m - keeps - closing)[sample[both] == both]
+            spare = (steered_m - pair.cover_m - keeps - closing)[sample[both] == both]
             least, most = least + int((spare < -SMALL).sum()), most + int((spare <= SMALL).sum())
     status = "holds" if margin >= -SMALL else "refuted"
     return Found(status, None if margin == np.inf else margin, (least, most))
@@ -200,18 +237,20 @@ def safe_hyp(run: Run) -> Found:
         _constants(run)
         _motion(run)
         for pair in run.pairs:
-            if run.apart_m[pair.robot, pair.other] > pair.safe_m + pair.closing_m_s * period + FAR_M:
+            law = pair.in_the_law
+            near = law.safe_m + pair.cover_m + pair.closing_m_s * period + FAR_M
+            if run.apart_m[pair.robot, pair.other] > near:
                 continue
             rows = run.period_rows(pair.other)
             own, other = run.position_m[pair.robot][rows], run.position_m[pair.other][rows]
             lasting = float(run.t_s[rows[-1]] - run.t_s[rows[-2]])
             last = Fraction(1) if abs(lasting - period) <= SMALL else Fraction(lasting) / Fraction(period)
             if pair.moves_m_s:
-                missed = float(shortfall_m(own, other, pair.passive(period), Fraction(), last))
+                missed = float(shortfall_m(own, other, law.passive(period), Fraction(), last))
                 about = f"{pair.robot}, {pair.other}"
                 holds("passive law", missed <= SMALL, missed, "missed by nothing", about=about)
             else:
-                lost = max(lost, lost_m(shortfall_m(own, other, pair, gain, last), gain, len(run.sample_row)))
+                lost = max(lost, lost_m(shortfall_m(own, other, law, gain, last), gain, len(run.sample_row)))
     except Disagreement as broken:
         return Found("refuted", because=broken)
     return Found("holds" if lost <= SMALL else "refuted", -lost if lost <= SMALL else None)
@@ -223,12 +262,12 @@ def _constants(run: Run) -> None:
     period, reach = written(control["period_s"]), written(control["sensing_range_m"])
     gain = written(control["avoidance_gain_1_s"]) * period
     holds("gain: A h <= 1", gain <= 1, float(gain), "1 at most")
-    for pair in run.pairs:
+    for pair in (each.in_the_law for each in run.pairs):
         about = f"{pair.robot}, {pair.other}"
         speed = written(limit[pair.robot]) + written(limit.get(pair.other, pair.moves_m_s))
         least = written(pair.safe_m) + speed * period
         holds("sensing range", reach >= least, float(reach), f"{float(least)} at least", about=about)
-        start = np.inf if pair.moves_m_s else pair.shape.least_m(run.apart(pair)[:1])
+        start = np.inf if pair.moves_m_s else pair.shape.least_m(run.steered_apart(pair)[:1])
         holds("safe start", start >= pair.safe_m - SMALL, start, f"{pair.safe_m} at least", about=about)
 
 

@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from .files import Json
+from .plants import Taken, law_m, taken
 from .rules import Array
 from .shapes import POINT, Shape, shape_of
 
@@ -33,6 +34,8 @@ class Pair(NamedTuple):
         share: part of the inequality that each robot takes: 1 beside an obstacle, 1/2 beside a robot.
         shape: of the other; for a UGV walls are endless in height.
         moves_m_s: V, the speed at which an obstacle is expected to move at most; above 0 the passive law is in force.
+        more_m: distance that the law keeps beyond the safe one, between the points that it steers.
+        cover_m: how far both bodies may be from these points, together.
     """
 
     robot: str
@@ -43,11 +46,18 @@ class Pair(NamedTuple):
     share: float
     shape: Shape = POINT
     moves_m_s: float = 0.0
+    more_m: float = 0.0
+    cover_m: float = 0.0
 
     @property
     def safe_m(self) -> float:
         """Safe distance of the robot's centre from the parts of the other's shape, m."""
         return self.gap_m + self.radii_m
+
+    @property
+    def in_the_law(self) -> Pair:
+        """The same with the distance that the law keeps in place of d."""
+        return self._replace(gap_m=self.gap_m + self.more_m) if self.more_m else self
 
     def passive(self, period_s: float) -> Pair:
         """The same with d + V h in place of d."""
@@ -176,7 +186,19 @@ def pairs_of(scenario: Json) -> list[Pair]:
         gap_m = safe["air_ground_m" if other == uav else "ugv_m"]
         radii = radii_m(robots[one], robots[other])
         beside_robots.append(Pair(one, other, gap_m, radii, limit[one] + limit[other], 0.5))
-    return beside_obstacles + beside_robots
+    period_s = float(scenario["control"]["period_s"])
+    room = {name: taken(robot, period_s) for name, robot in robots.items()}
+    return [_with_plants(pair, room) for pair in beside_obstacles + beside_robots]
+
+
+def _with_plants(pair: Pair, room: dict[str, Taken]) -> Pair:
+    """A pair with what the plants of its robots take."""
+    one, other = room[pair.robot], room.get(pair.other)
+    cover = one.cover_m + (other.cover_m if other else 0.0)
+    if not cover:
+        return pair
+    more = law_m(pair.safe_m, one, other, passive=pair.moves_m_s > 0.0) - pair.safe_m
+    return pair._replace(more_m=more, cover_m=cover)
 
 
 def radii_m(one: Json, other: Json) -> float:

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from airground_drake.check import safety
+from airground_drake.check.plants import Way
 from airground_drake.check.run import Run
 from airground_drake.check.scenario import Pair
 from airground_drake.check.shapes import Shape, shape_of
@@ -24,9 +25,10 @@ def run(way_m: list[float], speed_m_s: float = 0.0) -> Run:
     t = PERIOD_S * np.arange(len(way_m))
     own = np.column_stack([way_m, np.zeros(len(t)), np.zeros(len(t))])
     pair = Pair("ugv1", "rock", SAFE_M, 0.0, 1.0 + speed_m_s, 1.0, moves_m_s=speed_m_s)
+    places = {"ugv1": own, "rock": np.zeros((len(t), 3))}
     found = SimpleNamespace(
         t_s=t, sample_row=np.arange(len(t) - 1), pairs=[pair], apart_m={("ugv1", "rock"): 0.0},
-        position_m={"ugv1": own, "rock": np.zeros((len(t), 3))}, apart=lambda _: own,
+        position_m=places, body_m=places, apart=lambda _: own, bent_m=lambda _: 0.0, ways={name: Way(t, place) for name, place in places.items()},
         period_rows=lambda _: np.arange(len(t)), there=lambda _: slice(0, len(t)), robots={"ugv1": {}},
         scenario={
             "control": {"period_s": PERIOD_S, "avoidance_gain_1_s": GAIN_1_S},

@@ -205,7 +205,7 @@ def test_no_pair_of_robots_comes_nearer_than_its_bound(seed: int, rows: int, ste
     rng = np.random.default_rng(seed)
     ways = {name: 5.0 * rng.normal(size=3) + np.cumsum(step * rng.normal(size=(rows, 3)), axis=0) for name in "abc"}
     pairs = [Pair(one, other, 1.0, 0.0, 1.0, 0.5) for one, other in ("ab", "ac", "bc")]
-    bounds = Run.apart_m.func(cast("Any", SimpleNamespace(position_m=ways, pairs=pairs)))
+    bounds = Run.apart_m.func(cast("Any", SimpleNamespace(body_m=ways, pairs=pairs)))
     for pair in pairs:
         assert bounds[pair.robot, pair.other] <= POINT.least_m(ways[pair.robot] - ways[pair.other])
 

@@ -1,0 +1,183 @@
+"""Bodies that are not where the law steers them: unicycles, lags, delays. What they take, and how they move.
+
+The law steers a point that goes straight from row to row. Of the body the plant says:
+
+    unicycle   the axle is l behind the hand point, which goes along an arc with the same ends in each control period
+    delay      the body is where the steered point was
+    lag        tau v' = u - v; the steered point is p + tau v
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from .files import Json
+from .rules import SMALL, Array, close
+
+STRAIGHT_M = 1e-10
+"""Parts of a way that count as straight leave the line by no more, m."""
+MOST_PARTS = 5000
+
+
+class Taken(NamedTuple):
+    """What the plant of a robot takes: of length, m; lag and delay, s; and the limit of its commands, m/s."""
+
+    body_m: float
+    lag_s: float
+    delay_s: float
+    most_m_s: float
+
+    @property
+    def cover_m(self) -> float:
+        """How far the body may be from the steered point, m."""
+        return self.body_m + self.most_m_s * (self.lag_s + self.delay_s)
+
+
+def plants_of(robot: Json) -> list[Json]:
+    """The plants of a robot but for those that move as they are told."""
+    return [plant for plant in robot["plant"] if plant["kind"] != "first_order"]
+
+
+def unicycle_of(robot: Json) -> Json | None:
+    """The plant of a robot that is a unicycle."""
+    return next((plant for plant in robot["plant"] if plant["kind"] == "unicycle"), None)
+
+
+def taken(robot: Json, period_s: float) -> Taken:
+    """What the plants of a robot take."""
+    most, sums = float(robot["max_speed_m_s"]), {"lag": 0.0, "delay": 0.0}
+    for plant in plants_of(robot):
+        if plant["kind"] in sums:
+            sums[plant["kind"]] += plant["time_constant_s"] + plant["delay_s"]
+    drive = unicycle_of(robot)
+    body = drive["hand_point_m"] + _dip_m(drive, most * period_s, period_s) if drive else 0.0
+    return Taken(body, sums["lag"], sums["delay"], most)
+
+
+def _dip_m(drive: Json, chord_m: float, period_s: float) -> float:
+    """|omega| ||w|| h^2 / 8 for the largest turn, where the hand point goes ||w|| h along an arc with this chord."""
+    turns = [drive["max_turn_rad_s"]] if drive["max_turn_rad_s"] else []
+    if drive["wheel_base_m"]:
+        turns.append(2.0 * drive["max_wheel_speed_m_s"] / drive["wheel_base_m"])
+    turned = [turn * period_s for turn in turns]
+    if chord_m <= 2.0 * drive["hand_point_m"]:
+        turned.append(2.0 * math.asin(0.5 * chord_m / drive["hand_point_m"]))
+    angle = min(turned)
+    return angle * chord_m * (0.5 * angle) / math.sin(0.5 * angle) / 8.0 if angle else 0.0
+
+
+def law_m(safe_m: float, one: Taken, other: Taken | None, *, passive: bool) -> float:
+    """Distance that the law keeps so that the bodies keep `safe_m`, m; `other` is None beside an obstacle."""
+    if passive:
+        return safe_m + one.cover_m
+    both = (one, other) if other else (one, Taken(0.0, one.lag_s, one.delay_s, 0.0))
+    late = safe_m + abs(both[0].delay_s - both[1].delay_s) * min(each.most_m_s for each in both)
+    closing, bodies = sum(each.most_m_s for each in both), sum(each.body_m for each in both)
+    if not any(each.lag_s for each in both):
+        return late + bodies
+    found = []
+    for tau in {0.0, both[0].lag_s, both[1].lag_s}:
+        unlike = sum(abs(each.lag_s - tau) * each.most_m_s for each in both)
+        found.append(unlike + math.sqrt(late**2 + (tau * closing) ** 2))
+    return min(found) + bodies
+
+
+class Way(NamedTuple):
+    """The recorded motion of a body: places, (T, 3), m, at times (T,), s; its headings, rad, or velocities, m/s."""
+
+    t_s: Array
+    place_m: Array
+    heading_rad: Array | None = None
+    velocity_m_s: Array | None = None
+    lag_s: float = 0.0
+
+    def bent_m(self) -> float:
+        """The largest distance from the straight line between two rows, m."""
+        chord, lasting = np.diff(self.place_m, axis=0), np.diff(self.t_s)
+        if self.heading_rad is not None:
+            sagitta = 0.5 * np.linalg.norm(chord, axis=1) * np.abs(np.tan(0.25 * np.diff(self.heading_rad)))
+            return float(sagitta.max(initial=0.0))
+        if self.velocity_m_s is not None:
+            fades = 1.0 - np.exp(-lasting / self.lag_s)
+            change = np.linalg.norm(np.diff(self.velocity_m_s, axis=0), axis=1)
+            push = np.divide(change, fades, out=np.zeros_like(fades), where=fades > 0.0) / self.lag_s
+            return float((push * lasting**2 / 8.0).max(initial=0.0))
+        return 0.0
+
+    def within(self, row: int, parts: int) -> Array:
+        """Places at equal times from a row to the next, (parts + 1, 3), m."""
+        begin, end = self.place_m[row], self.place_m[row + 1]
+        share = np.linspace(0.0, 1.0, parts + 1)
+        if self.heading_rad is not None and (turn := float(self.heading_rad[row + 1] - self.heading_rad[row])):
+            chord = complex(*(end - begin)[:2])
+            spot = chord * np.sin(0.5 * turn * share) / math.sin(0.5 * turn) * np.exp(0.5j * turn * (share - 1.0))
+            flat = np.column_stack([spot.real, spot.imag, share * (end - begin)[2]])
+            return np.asarray(begin + flat)
+        if self.velocity_m_s is not None and (lasting := float(self.t_s[row + 1] - self.t_s[row])) > 0.0:
+            before, after = self.velocity_m_s[row], self.velocity_m_s[row + 1]
+            fades = -math.expm1(-lasting / self.lag_s)
+            bend = self.lag_s * (after - before)
+            return np.asarray(
+                begin
+                + np.outer(share, end - begin + bend)
+                - np.outer(-np.expm1(-share * lasting / self.lag_s), bend) / fades
+            )
+        return np.asarray(begin + np.outer(share, end - begin))
+
+
+def moves_as_its_plant(robot: str, spec: Json, way: Way, steered: Array, command: Array, period_s: float) -> None:
+    """Check a recorded body against its plant.
+
+    Args:
+        robot: its name.
+        spec: its entry in the scenario.
+        way: of the body.
+        steered: the steered point at the rows, (T, 3), m.
+        command: in force up to each row, (T, 3), m/s; 0 at the first.
+        period_s: control period.
+
+    Raises:
+        Disagreement: if it differs.
+    """
+    t_s, point, rate = way.t_s, steered, command
+    for plant in plants_of(spec):
+        if plant["kind"] == "delay":
+            then = t_s - plant["delay_s"]
+            point = np.stack([np.interp(then, t_s, axis) for axis in point.T], axis=1)
+            row = np.searchsorted(t_s, then - SMALL)  # the first row at or after that time
+            rate = np.where((then > SMALL)[:, None], rate[np.minimum(row, len(t_s) - 1)], 0.0)
+        elif plant["kind"] == "lag":
+            tau, due = plant["time_constant_s"], np.zeros_like(rate)
+            for k, kept in enumerate(np.exp(-np.diff(t_s) / tau), start=1):
+                due[k] = rate[k] + kept * (due[k - 1] - rate[k])
+            close("velocity of a body", way.velocity_m_s, due, within=SMALL, about=robot, t_s=t_s)
+            point = point - tau * due
+        else:
+            heading, point = _axle(plant, way, point, rate, period_s)
+            close("heading of a body", way.heading_rad, heading, within=SMALL, about=robot, t_s=t_s)
+    close("place of a body", way.place_m, point, within=SMALL, about=robot, t_s=t_s)
+
+
+def _axle(drive: Json, way: Way, steered: Array, command: Array, period_s: float) -> tuple[Array, Array]:
+    """Headings, (T,), and axles, (T, 3), of a unicycle, from its heading at the start on."""
+    hand, begun, heading = float(drive["hand_point_m"]), 0, float(drive["heading_rad"])
+    headings, axles = np.empty(len(steered)), np.empty_like(steered)
+    headings[0], axles[0] = heading, steered[0] - hand * np.array([math.cos(heading), math.sin(heading), 0.0])
+    for k in range(1, len(steered)):
+        since = way.t_s[k] - way.t_s[begun]
+        u = complex(command[k, 0], command[k, 1]) * np.exp(-1j * heading)  # in the frame of the body
+        half = float(np.angle(2.0 * hand + u * period_s)) if u.imag else 0.0
+        whole = u * period_s + hand * (1.0 - np.exp(2j * half))  # of the axle in a period
+        part = since / period_s
+        gone = whole * (math.sin(half * part) / math.sin(half) if half else part) * np.exp(1j * half * (part - 1.0))
+        spot = gone * np.exp(1j * heading)
+        headings[k] = heading + 2.0 * half * part
+        base = steered[k] - since * command[k]
+        axles[k] = base + np.array([spot.real, spot.imag, 0.0])
+        axles[k, :2] -= hand * np.array([math.cos(heading), math.sin(heading)])
+        if abs(since - period_s) <= SMALL:
+            begun, heading = k, float(headings[k])
+    return headings, axles

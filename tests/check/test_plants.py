@@ -1,0 +1,91 @@
+"""The checker on runs with robots that turn, lag or get commands late: same verdicts, and forged bodies are found."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from airground_drake.check import plants, safety
+from airground_drake.check.rules import Disagreement
+from airground_drake.check.run import Run, _moves_as_commanded
+from airground_drake.run.simulation import simulate
+from airground_drake.run.trace import Trace
+from airground_drake.scenarios.load import load, resolved
+from airground_drake.verify import judge
+from airground_drake.verify.engines.bodies import law_m, room_of
+
+RUNS = (("turtlebots", 12.0), ("lagging", 9.0), ("case_a_unicycle", 10.0))
+
+
+def run_of(name: str, duration_s: float) -> tuple[Trace, Run]:
+    trace = simulate(load(name, [f"duration_s={duration_s}"]), "a")
+    return trace, checked(trace, trace.states)
+
+
+def checked(trace: Trace, states: pd.DataFrame) -> Run:
+    return Run("a", resolved(trace.scenario), trace.events, states, trace.samples)
+
+
+@pytest.mark.parametrize(("name", "duration_s"), RUNS)
+def test_the_checker_comes_to_the_same_verdicts(name: str, duration_s: float) -> None:
+    trace, run = run_of(name, duration_s)
+    for robot in run.robots:
+        _moves_as_commanded(run, robot)
+    for claim, check in (
+        ("SAFE-TRACE", safety.safe_trace),
+        ("SAFE-OWN", safety.safe_own),
+        ("SAFE-HYP", safety.safe_hyp),
+    ):
+        ours = check(run)
+        theirs = judge(trace, [claim])
+        assert bool(theirs) == (ours is not None)
+        if theirs and ours is not None:
+            assert ours.status == theirs[0].status
+            assert (ours.margin is None) == (theirs[0].margin is None) or claim == "SAFE-HYP"
+            if ours.margin is not None and theirs[0].margin is not None:
+                assert ours.margin == pytest.approx(theirs[0].margin, abs=1e-9)
+            if ours.exercised is not None:
+                assert ours.exercised[0] <= theirs[0].exercised <= ours.exercised[1]
+
+
+@pytest.mark.parametrize(
+    ("name", "column"),
+    [
+        ("turtlebots", "burger.heading_rad"), ("turtlebots", "tb4.body_x_m"), ("lagging", "cart1.body_vx_m_s"),
+        ("lagging", "cart2.body_y_m"), ("lagging", "uav.body_z_m"),
+    ],
+)  # fmt: skip
+def test_a_forged_body_is_found(name: str, column: str) -> None:
+    trace, _ = run_of(name, 2.0)
+    states = trace.states.copy()
+    states.loc[20, column] += 1e-6
+    run, robot = checked(trace, states), column.partition(".")[0]
+    with pytest.raises(Disagreement):
+        _moves_as_commanded(run, robot)
+
+
+def test_what_plants_take_is_the_same_in_both_programs() -> None:
+    for name, _ in RUNS:
+        scenario = load(name)
+        given: dict[str, Any] = resolved(scenario)
+        period = scenario.control.period_s
+        ours = {each: plants.taken({**given["ugvs"], given["uav"]["name"]: given["uav"]}[each], period)
+                for each in scenario.robots}  # fmt: skip
+        theirs = {each: room_of(robot, period) for each, robot in scenario.robots.items()}
+        for one in scenario.robots:
+            for other in (None, *scenario.robots):
+                both = ours[other] if other else None, theirs[other] if other else None
+                for passive in (False, True) if other is None else (False,):
+                    found = plants.law_m(1.3, ours[one], both[0], passive=passive)
+                    assert found == pytest.approx(law_m(1.3, theirs[one], both[1], passive=passive), abs=1e-13)
+
+
+def test_a_way_that_turns_is_divided_along_its_arc() -> None:
+    turn, radius = 0.4, 2.0
+    ends = np.array([[radius, 0.0, 0.0], [radius * np.cos(turn), radius * np.sin(turn), 0.0]])
+    way = plants.Way(np.array([0.0, 1.0]), ends, heading_rad=np.array([0.5 * np.pi, 0.5 * np.pi + turn]))
+    assert np.linalg.norm(way.within(0, 50), axis=1) == pytest.approx(np.full(51, radius), abs=1e-12)
+    assert way.bent_m() == pytest.approx(radius * (1.0 - np.cos(0.5 * turn)), abs=1e-12)
