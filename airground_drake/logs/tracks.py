@@ -20,6 +20,8 @@ GAP = 2.5
 """A body was not recorded where two of its samples are farther apart than this multiple of the usual time between."""
 SINCE_1970_NS = 10**17
 """From here on, stamps are since 1970; times are then from the first sample."""
+OF_BODY = ".body"
+"""What a table of this package writes after a robot's name if the law steers another point than its body."""
 SAME_M = 1e-9
 """Positions of one body at one time that differ by less are one."""
 ORIGIN_M = 1e-3
@@ -147,6 +149,10 @@ def joined(log: Log, scenario: Json, choice: Choice) -> Tracks:
     uav = scenario["uav"]["name"]
     if uav not in found and uav not in choice.without:
         said.append(f"{uav} is not in the log: its distances are not judged")
+    for name in tracks:
+        if plants := [each["kind"] for each in robots_of(scenario).get(name, {}).get("plant", ())]:
+            told = f"{name} is no point that goes where it is told ({', '.join(plants)})"
+            said.append(f"{told}: what its body lacks of the law need be no fault of its controller")
     _apart_at_the_start(tracks, scenario)
     _heights(tracks, scenario, said)
     return Tracks(tracks, said, [*log.ignored, *ignored], f"{first / 1e9:.6f} s since 1970" if zero else "")
@@ -193,17 +199,18 @@ def _exist(rename: Mapping[str, str], log: Log, bodies: Collection[str]) -> None
 
 
 def _body_of(stream: Stream, bodies: Collection[str], rename: Mapping[str, str]) -> tuple[str, int]:
-    """The body of a stream, or '', and how near its name is: 0 renamed, 1 equal, 2 part of it."""
+    """The body of a stream, or '', and how near its name is: 0 renamed, 1 `OF_BODY`, 2 equal, 3 part of it."""
     if body := names.renamed((stream.name, stream.child, stream.label), rename):
         return body, 0
     for name in filter(None, (stream.name, stream.child)):
-        if name.strip("/") in bodies:
-            return name.strip("/"), 1
+        for rank, plain in ((1, name.removesuffix(OF_BODY)), (2, name.strip("/"))):
+            if plain in bodies and (rank == 2 or plain != name):
+                return plain, rank
         if names.is_elsewhere(name, bodies):
-            return "", 2
+            break
         if body := names.body_of(name, bodies, is_file=stream.is_file):
-            return body, 2
-    return "", 2
+            return body, 3
+    return "", 3
 
 
 def _links(streams: list[Stream]) -> list[Stream]:

@@ -12,6 +12,8 @@ LEAST_TOLD_M = 0.0005
 """Smaller approaches are none, m."""
 ELSEWHERE_M = 0.05
 """A robot that starts farther away from its start in the scenario, and from its safe distance, is named, m."""
+FASTER = 1.01
+"""A robot that moves at more than this multiple of its limit is named; less may be the noise of positions."""
 MOST_NAMED, MOST_PAIRS, MOST_SPANS, MOST_SAID = 3, 20, 4, 12
 """Broken pairs, all pairs, stretches of one pair, and remarks that are printed; `--json` and the page have all."""
 
@@ -29,7 +31,7 @@ def headline(judged: Judged) -> str:
         return f"NOT ESTABLISHED ({pair.first}, {pair.second}): {least(pair)}; the position error decides"
     if not judged.covers_all:
         return f"No distance was broken where the log covers it. {coverage(judged)}"
-    return "Every distance was kept."
+    return "Every distance was kept, with straight motion between samples."
 
 
 def coverage(judged: Judged) -> str:
@@ -95,7 +97,7 @@ def law(pair: JudgedPair) -> str:
 def remarks(judged: Judged) -> Iterator[str]:
     """What does not fit the scenario, although it does not decide about a distance."""
     for name, (speed, limit) in judged.speeds_m_s.items():
-        if speed > limit * (1.0 + SMALL) + SMALL:
+        if speed > FASTER * limit:
             yield f"{name} moves at up to {speed:.3g} m/s, above its limit of {limit:g} m/s"
     near = min((pair.safe_m for pair in judged.pairs), default=0.0)
     if off := {name: away for name, away in judged.away_m.items() if away > max(near, ELSEWHERE_M)}:

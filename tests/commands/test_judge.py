@@ -11,13 +11,18 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
+import yaml
 from builders import logs
 from commands.conftest import Airground
 
 from airground_drake.export import recording, tables
+from airground_drake.run.simulation import simulate
 from airground_drake.run.trace import Trace
+from airground_drake.scenarios.load import load
 
 Run = Callable[[str, str], Trace]
+BETWEEN_M = 5e-4
+"""By how much a body on wheels leaves the straight line between two samples here, at most."""
 
 
 def sampled(trace: Trace) -> pd.DataFrame:
@@ -63,24 +68,32 @@ def test_a_run_that_hits_an_obstacle_is_exit_code_1(run: Run, judged: Callable[.
 
 
 @pytest.mark.parametrize("kind", ["csv", "mcap"])
+@pytest.mark.parametrize("name", ["forklift", "unicycle"])
 def test_what_the_package_exports_is_judged_like_the_run(
-    kind: str, run: Run, tmp_path: Path, airground: Airground
+    kind: str, name: str, run: Run, tmp_path: Path, airground: Airground
 ) -> None:
-    """Distances between surfaces, as the package itself tells them."""
-    trace = run("forklift", "d")
+    """Distances between surfaces, as the package itself tells them: beside what moves, and of a body on wheels."""
+    trace, judged_by = run("forklift", "d") if name == "forklift" else None, "forklift"
+    if trace is None:
+        given = logs.scenario()
+        given["safe_distance"]["ugv_m"] = 0.1
+        given["ugvs"]["tb_0"]["plant"] = {"kind": "unicycle", "hand_point_m": 0.1}
+        judged_by = (tmp_path / "lab.yaml").as_posix()
+        (tmp_path / "lab.yaml").write_text(yaml.safe_dump(given))
+        trace = simulate(load(judged_by), "a")
     *_, least = tables.write(trace, tmp_path)
     if kind == "csv":
         path = tmp_path / f"{trace.run}_states.csv"
     else:
         path = tmp_path / "run.mcap"
         path.write_bytes(recording.recorded(trace, trace.scenario))
-    said = airground("judge", path, "--scenario", "forklift", "--json")
+    said = airground("judge", path, "--scenario", judged_by, "--json")
     pairs = {(pair["first"], pair["second"]): pair["least_m"] for pair in json.loads(said)["pairs"]}
     expected = {(row.first, row.second): row.min_distance_m for row in pd.read_csv(least).itertuples()}
     assert {frozenset(pair) for pair in pairs} == {frozenset(pair) for pair in expected}
     assert len(pairs) > 2
     for (one, two), least_m in pairs.items():
-        assert least_m == pytest.approx(expected.get((one, two), expected.get((two, one))), abs=1e-6)
+        assert least_m == pytest.approx(expected.get((one, two), expected.get((two, one))), abs=BETWEEN_M)
 
 
 def test_stamps_since_1970_are_judged_like_those_from_zero_and_the_text_says_what_they_cover(
@@ -92,7 +105,9 @@ def test_stamps_since_1970_are_judged_like_those_from_zero_and_the_text_says_wha
     for name, rows in (("whole", table), ("second", table[table["t_s"].astype(float) < 1311875573.4])):
         rows.to_csv(tmp_path / name, index=False)
         said.append(airground("judge", tmp_path / name, "--scenario", "case_a"))
-    assert said[0].startswith("Every distance was kept.\n12 of 12 distances were kept. The log has 30 of")
+    first, second, *_ = said[0].splitlines()
+    assert first == "Every distance was kept, with straight motion between samples."
+    assert second == "12 of 12 distances were kept. The log has 30 of the scenario's 30 s, without gaps."
     assert "the law held in all 600 intervals: the safety theorem promises 2 m" in said[0]
     assert "Time 0 is 1311875572.406161 s since 1970." in said[0]
     assert said[1].startswith("No distance was broken where the log covers it. The log has 0.95 of the scenario's 30 s")
