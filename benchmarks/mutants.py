@@ -35,7 +35,7 @@ ROOT = Path(__file__).resolve().parents[1]
 COPIED = (PACKAGE, "tests", "benchmarks", "docs", "pyproject.toml", "README.md")
 LONGEST_S = 900
 """Time limit of a command, s: a mutant may run for ever."""
-RUNS_STAY = ("check", "report", "verify")
+RUNS_STAY = ("check", "logs", "report", "verify")
 """Folders of the code that judges: an edit there changes no run."""
 
 

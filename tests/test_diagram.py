@@ -36,7 +36,7 @@ LAYERS = (
     ("verify",),
     ("testing",),
     ("report", "replay", "audit"),
-    ("campaign", "export"),
+    ("campaign", "export", "logs"),
     ("environments",),
     ("commands", "notebook", "__main__"),
 )

@@ -14,7 +14,7 @@ from mutation.probe import PROBES
 ROOT = Path(__file__).resolve().parents[1]
 CORE = {
     "world", "nsbc", "systems", "decision", "intervention", "gatekeeper", "geometry", "run", "scenarios", "verify",
-    "check",
+    "check", "logs",
 }  # fmt: skip
 
 

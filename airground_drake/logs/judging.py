@@ -43,7 +43,6 @@ HALVINGS = 60
 NOT_JUDGED = (
     "motion between two samples: it is taken as straight",
     "places of obstacles at rest, walls and maps: the scenario's are taken",
-    "distances between UAVs: the scenario promises none",
     "triggers, proposals, decisions, commands and arrivals",
 )
 

@@ -149,6 +149,8 @@ def joined(log: Log, scenario: Json, choice: Choice) -> Tracks:
     uav = scenario["uav"]["name"]
     if uav not in found and uav not in choice.without:
         said.append(f"{uav} is not in the log: its distances are not judged")
+    if choice.uavs:
+        said.append("distances between UAVs are not judged: the scenario promises none")
     for name in tracks:
         if plants := [each["kind"] for each in robots_of(scenario).get(name, {}).get("plant", ())]:
             told = f"{name} is no point that goes where it is told ({', '.join(plants)})"

@@ -13,6 +13,7 @@ ATTACKS = ("tests/hypotheses/test_patience_attacks.py",)
 PLANNER = ("tests/intervention",)
 ROUTES = ("tests/gatekeeper/test_relaxation.py", "tests/gatekeeper/routes/test_contract.py")
 RUNS = "tests/verify/runs"
+ASSOCIATED, FORMS = ("tests/logs/test_association.py",), ("tests/logs/test_forms.py",)
 
 WIRINGS = (
     Mutant(
@@ -400,4 +401,179 @@ JUDGES = (
 )
 """What judges: claims and the checker. On honest runs one that demands less says the same."""
 
-CHOSEN = (*WIRINGS, *BODIES, *LAW, *TRIGGERS, *PROTOCOL, *GATEKEEPER, *JUDGES)
+LOGS = (
+    Mutant(
+        "log: times of receipt in place of stamps",
+        "logs/messages.py",
+        "Gathered.streams",
+        "times = [stamp if stamped and stamp is not None else received",
+        "times = [received",
+        runs=(),
+        tests=FORMS,
+    ),
+    Mutant(
+        "log: a straight line across a gap",
+        "logs/tracks.py",
+        "Track.spans",
+        "> self.gap_s * (1.0 + 1e-9)",
+        "> 1e9",
+        runs=(),
+        tests=ASSOCIATED,
+    ),
+    Mutant(
+        "log: positions in different frames",
+        "logs/tracks.py",
+        "_in_one_frame",
+        "if len({*stated.values()}) > 1:",
+        "if False:",
+        runs=(),
+        tests=ASSOCIATED,
+    ),
+    Mutant(
+        "log: frames called odom are one",
+        "logs/tracks.py",
+        "_in_one_frame",
+        "if len(stated) > 1 and",
+        "if False and",
+        runs=(),
+        tests=ASSOCIATED,
+    ),
+    Mutant(
+        "log: all robots start at zero",
+        "logs/tracks.py",
+        "_apart_at_the_start",
+        "if len(there) > 1 and len(starts) > 1:",
+        "if False:",
+        runs=(),
+        tests=ASSOCIATED,
+    ),
+    Mutant(
+        "log: the last of two contradicting rows counts",
+        "logs/tracks.py",
+        "_track",
+        "new = np.append(True, np.diff(ns) > 0)",
+        "new = np.append(np.diff(ns) > 0, True)",
+        runs=(),
+        tests=ASSOCIATED,
+    ),
+    Mutant(
+        "log: rows are in the order of the file",
+        "logs/tracks.py",
+        "_track",
+        'order = np.argsort(ns, kind="stable")',
+        "order = np.arange(len(ns))",
+        runs=(),
+        tests=FORMS,
+    ),
+    Mutant(
+        "log: the first of several streams counts",
+        "logs/tracks.py",
+        "_assigned",
+        "if len(of_one) > 1:",
+        "if False:",
+        runs=(),
+        tests=ASSOCIATED,
+    ),
+    Mutant(
+        "log: a robot's arm is where it is",
+        "logs/tracks.py",
+        "_links",
+        "if each.frame not in carried",
+        "if True",
+        runs=(),
+        tests=ASSOCIATED,
+    ),
+    Mutant(
+        "log: a goal is where a robot is",
+        "logs/names.py",
+        "is_elsewhere",
+        "return not ELSEWHERE.isdisjoint(words)",
+        "return False",
+        runs=(),
+        tests=ASSOCIATED,
+    ),
+    Mutant(
+        "log: stamps as floating-point numbers",
+        "logs/stream.py",
+        "Stream.ns",
+        "return self.whole * per + self.nano * per // 10**9",
+        "return (self.whole * float(per) + self.nano * per // 10**9).astype(np.int64)",
+        runs=(),
+        tests=FORMS,
+    ),
+    Mutant(
+        "log: milliseconds pass as seconds",
+        "logs/units.py",
+        "_likely",
+        'return time or "s", length or "m"',
+        'return "s", length or "m"',
+        runs=(),
+        tests=FORMS,
+    ),
+    Mutant(
+        "log: millimetres pass as metres",
+        "logs/units.py",
+        "_likely",
+        'return time or "s", length or "m"',
+        'return time or "s", "m"',
+        runs=(),
+        tests=FORMS,
+    ),
+    Mutant(
+        "log: a decimal comma separates columns",
+        "logs/text.py",
+        "_form",
+        'for delimiter in (*DELIMITERS, " "):',
+        'for delimiter in (",", *DELIMITERS, " "):',
+        runs=(),
+        tests=FORMS,
+    ),
+    Mutant(
+        "log: only the robot's own times are looked at",
+        "logs/judging.py",
+        "_knots",
+        "[own.t_s, other.t_s, span]",
+        "[own.t_s, span]",
+        runs=(),
+        tests=FORMS,
+    ),
+    Mutant(
+        "log: markers of robots at different heights",
+        "logs/judging.py",
+        "_seen",
+        "if not (flat or is_obstacle):",
+        "if not is_obstacle:",
+        runs=(),
+        tests=ASSOCIATED,
+    ),
+    Mutant(
+        "log: position errors do not count",
+        "logs/judging.py",
+        "judge",
+        "eps = sum(",
+        "eps = 0.0 * sum(",
+        runs=(),
+        tests=ASSOCIATED,
+    ),
+    Mutant(
+        "log: the law in intervals of their mean length",
+        "logs/judging.py",
+        "_Law.add",
+        "for each in h.tolist()]",
+        "for each in [float(h.mean())] * len(h)]",
+        runs=(),
+        tests=ASSOCIATED,
+    ),
+    Mutant(
+        "log: what is gone is still there",
+        "logs/judging.py",
+        "_both",
+        "during = (other.t_s >= begin - SMALL) & (other.t_s <= end + SMALL)",
+        "during = other.t_s >= begin - SMALL",
+        runs=(),
+        tests=("tests/check/test_moving.py::test_a_person_counts_only_while_it_is_there",),
+    ),
+)
+"""How a log becomes tracks, and how these are judged: a mutant for each rule."""
+
+CHOSEN = (*WIRINGS, *BODIES, *LAW, *TRIGGERS, *PROTOCOL, *GATEKEEPER, *JUDGES, *LOGS)

@@ -200,3 +200,17 @@ def test_the_help_teaches_what_a_log_can_be(airground: Airground) -> None:
     said = airground("judge", "--help")
     for words in ("MCAP", "ROS bags", "TUM", "--rename /tb3_1/odom=ugv1", "airground init", "exit codes"):
         assert words in said
+
+
+def test_the_page_about_logs_shows_what_is_printed(
+    tmp_path: Path, airground: Airground, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    page = (Path(__file__).parents[2] / "docs" / "logs.md").read_text(encoding="utf-8")
+    for name, content in re.findall(r"```\w+\n(?=# file: (\S+)\n)(.*?)```", page, re.DOTALL):
+        (tmp_path / name).write_text(content)
+    monkeypatch.chdir(tmp_path)
+    (command,) = re.findall(r"```bash\nairground (.*?)\n```", page)
+    *_, shown = re.findall(r"```text\n(.*?)```", page, re.DOTALL)
+    *said, replay, judged = airground(*command.split(), code=1).splitlines()
+    assert " ".join(shown.split()) == " ".join("\n".join(said).split())
+    assert (replay, judged) == ("judged/replay.html", "judged/judged.html")
