@@ -25,15 +25,16 @@ BODIES = (
 FRAMES = ("frame", "frame_id", "reference_frame")
 STAMPS = (
     "t", "time", "stamp", "timestamp", "timestamps", "times", "sim_time", "simtime", "elapsed", "clock", "seconds",
-    "secs", "sec", "__time",
+    "secs", "sec", "date", "datetime", "__time",
 )  # fmt: skip
 RECEIPT = ("%time", "receive_time", "received", "recv_time", "log_time", "receipt", "rosbagtimestamp")
 """Names of a column with the times at which messages were received."""
 TARGETS = ("t", "body", "frame", "x", "y", "z")
 """What `--map-columns` can give a name to."""
 _BRACKETS = re.compile(r"(.*?)\s*[\[(]\s*([^\])]*?)\s*[\])]")
-_SUFFIX = re.compile(r"(.+)_(mm|cm|m|s|ms|us|ns)", re.IGNORECASE)
+_SUFFIX = re.compile(r"(.+)[_/](mm|cm|m|s|ms|us|ns)", re.IGNORECASE)
 _AXIS = re.compile(r"(?:(.*?)[/._\s:|-])?(?:(?:t|p|pos|position|pose|translation)_?)?([xyz])", re.IGNORECASE)
+_AXIS_FIRST = re.compile(r"(?:pos_?)?([xyz])[/._\s-](.+)", re.IGNORECASE)
 _WHOLE = re.compile(r"(.*?)[/._]?(?:secs?|seconds)", re.IGNORECASE)
 _REST = ["nsec", "nsecs", "nanosec", "nanosecs", "nanoseconds"]
 
@@ -83,8 +84,7 @@ def columns(labels: Sequence[str], chosen: Mapping[str, str], bodies: Collection
     axes: dict[str, dict[str, tuple[int, str]]] = {}
     for k, label in enumerate(labels):
         base, unit = split_unit(label)
-        found = _AXIS.fullmatch(base)
-        name, axis = ((found[1] or "").strip(), found[2].lower()) if found else ("", "")
+        name, axis = _axis(base, bodies)
         if not axis or (unit and unit not in PER_M) or is_elsewhere(name, bodies):
             continue
         if axis in axes.setdefault(name, {}):
@@ -96,6 +96,14 @@ def columns(labels: Sequence[str], chosen: Mapping[str, str], bodies: Collection
         if {"x", "y"} <= each.keys()
     ]
     return Columns(_times(labels), _named(labels, BODIES), _named(labels, FRAMES), places)
+
+
+def _axis(base: str, bodies: Collection[str]) -> tuple[str, str]:
+    """Name and axis of a column without its unit: `tb1.x`, `tb1_pos_x`, also `x_tb1` of a body; '' if it has none."""
+    if (found := _AXIS_FIRST.fullmatch(base)) and found[2] in bodies:
+        return found[2], found[1].lower()
+    found = _AXIS.fullmatch(base)
+    return ((found[1] or "").strip(), found[2].lower()) if found else ("", "")
 
 
 def split_unit(label: str) -> tuple[str, str]:

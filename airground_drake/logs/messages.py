@@ -15,6 +15,8 @@ from airground_drake.logs.stream import HEADERS, RECEIPT, Stream
 
 NO_PLACES = ("sensor_msgs/", "visualization_msgs/", "rcl_interfaces/", "rosgraph_msgs/", "foxglove.SceneUpdate")
 """Beginnings of types that say nothing about where a robot is, or cannot be told from those that do."""
+LISTS, NAMES = ("transforms", "poses", "rigidbodies"), ("name", "rigid_body_name")
+"""Fields with several positions, such as those of motion capture, and with the name of each one's body."""
 FIXED = "tf_static"
 """Topic of transforms that do not change."""
 ROOTS = ("odom", "map", "world")
@@ -39,9 +41,15 @@ def places(message: Any) -> Iterator[Place]:
             if (xyz := _xyz(_of(pose, "position"))) is not None:
                 yield Place(str(name), "", "", None, xyz)
         return
-    several = _of(message, "transforms")
+    several = _first(*(_of(message, name) for name in LISTS))
     for one in [message] if several is None else several if isinstance(several, Sequence) else []:
-        if (place := _place(one)) is not None:
+        if (place := _place(one)) is None:
+            continue
+        if several is not None and not place.child:  # the header is that of the list
+            head = _first(_of(message, "header"), {})
+            body = _first(*(_of(one, name) for name in NAMES), "")
+            place = place._replace(body=str(body), frame=_frame(head), stamp_ns=_ns(_of(head, "stamp")))
+        if several is None or place.child or place.body:
             yield place
 
 
@@ -53,10 +61,14 @@ def _place(one: Any) -> Place | None:
     xyz = next((found for point in points if (found := _xyz(point)) is not None), None)
     if xyz is None:
         return None
-    frame = _first(_of(head, "frame_id"), _of(one, "parent_frame_id"), "")
+    frame = _frame(head) or str(_first(_of(one, "parent_frame_id"), "")).strip("/")
     child = _first(_of(one, "child_frame_id"), "")
     stamp = _ns(_first(_of(head, "stamp"), _of(head, "timestamp")))
-    return Place("", str(frame).strip("/"), str(child).strip("/"), stamp, xyz)
+    return Place("", frame, str(child).strip("/"), stamp, xyz)
+
+
+def _frame(head: Any) -> str:
+    return str(_first(_of(head, "frame_id"), "")).strip("/")
 
 
 def _of(value: Any, name: str) -> Any:

@@ -21,9 +21,13 @@ from airground_drake.logs.stream import PER_M, Log, Stream, Whole
 
 TUM = ["timestamp", "tx", "ty", "tz", "qx", "qy", "qz", "qw"]
 """Columns of a file in TUM's format, which has no header."""
+ECHO = ["header.stamp.sec", "header.stamp.nanosec", "header.frame_id", "x", "y", "z"]
+"""First columns of what `ros2 topic echo --csv` prints of a pose; of odometry, the other frame stands before x."""
 MOST_BODIES = 2_000
 """Different values in a column that names bodies."""
 _UNITS = re.compile(r"length\W*units?\W+(\w+)", re.IGNORECASE)
+_ISO = re.compile(r"\d{4}-\d\d-\d\d[T ]\d\d:\d\d.*")
+"""Date and time of day."""
 _DECIMAL = re.compile(r"([+-]?)(\d{1,19})(?:\.(\d*))?")
 
 
@@ -55,6 +59,9 @@ def read(path: Path, content: bytes, wanted: Wanted) -> Log:
     labels = table.labels
     if not table.has_header and len(labels) == len(TUM) and not wanted.columns:
         table = table._replace(labels=(labels := TUM))
+    if not table.has_header and not wanted.columns and _is_echo(table):
+        named = [*ECHO[:3], *["child_frame"] * (not text.is_number(table.cells[3][0])), *ECHO[3:]]
+        table = table._replace(labels=(labels := [*named, *labels[len(named) :]]))
     has = columns(labels, wanted.columns, wanted.bodies)
     if not has.times or not has.places:
         lacks = " and ".join(["a column of times"] * (not has.times) + ["columns x and y"] * (not has.places))
@@ -72,6 +79,14 @@ def read(path: Path, content: bytes, wanted: Wanted) -> Log:
         where = f"first line {table.odd[0]}"
         log.ignored.append(f"{path.name}: lines with another number of fields: {len(table.odd)}, {where}")
     return log
+
+
+def _is_echo(table: text.Table) -> bool:
+    """Whether a table without a header begins with seconds since 1970, nanoseconds and the name of a frame."""
+    if len(table.labels) < len(ECHO) + 4:
+        return False
+    sec, nanosec, frame = (table.cells[k].iloc[0] for k in range(3))
+    return sec.isdigit() and len(sec) == 10 and nanosec.isdigit() and not text.is_number(frame)
 
 
 def _columns_of(stream: Stream, labels: list[str]) -> Iterator[int]:
@@ -131,9 +146,10 @@ def _streams(path: Path, table: text.Table, has: Columns, wanted: Wanted) -> Ite
     """The streams of a table; of a long one, those of each body and frame."""
     stated = next((found[1].lower() for line in table.above if (found := _UNITS.search(line))), "")
     length = WORDS.get(stated, stated) if WORDS.get(stated, stated) in PER_M else ""
+    has = has._replace(times=[_dated(table, time) for time in has.times])
     whole = {time: _stamps(table, time) for time in has.times}
     frames = table.cells[has.frame] if has.frame is not None else None
-    if frames is not None and all(text._is_number(each) for each in frames.unique()[:100]):
+    if frames is not None and all(text.is_number(each) for each in frames.unique()[:100]):
         frames = None  # numbers of frames of a camera
     for place in has.places:
         time = next(each for each in (*has.times, has.times[0]) if place.name.startswith(each.owner) or not each.owner)
@@ -154,7 +170,7 @@ def _streams(path: Path, table: text.Table, has: Columns, wanted: Wanted) -> Ite
             yield _stream(
                 Stream(
                     str(path), path.stem if is_file else str(name), stamps[at], nano[at], numbers[at],
-                    "ns" if time.unit == "ns" else time.unit, place.unit or length, str(frame).strip("/"),
+                    time.unit, place.unit or length, str(frame).strip("/"),
                     clock=_clock(table, time), is_file=is_file,
                 ),
                 why[at], [table.lines[k] for k in at],
@@ -193,6 +209,17 @@ def _places(table: text.Table, place: Place) -> tuple[Array, npt.NDArray[np.obje
                             ["empty", "not finite"], "no number")  # fmt: skip
         why[bad] = reasons[bad]
     return numbers, why
+
+
+def _dated(table: text.Table, time: Time) -> Time:
+    """The time, and where it is written as a date, the cells as nanoseconds since 1970."""
+    cells = table.cells[time.whole]
+    if not _ISO.fullmatch(cells.iloc[0]):
+        return time
+    dates = pd.to_datetime(cells, utc=True, errors="coerce", format="ISO8601")
+    stamps = dates.dt.as_unit("ns").astype("int64").astype(str)
+    table.cells[time.whole] = stamps.where(dates.notna(), "")
+    return time._replace(unit="ns")
 
 
 def _stamps(table: text.Table, time: Time) -> tuple[Whole, Whole, npt.NDArray[np.bool_]]:

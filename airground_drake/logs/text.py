@@ -66,7 +66,7 @@ def read(content: bytes) -> Table:
     rows = [_fields(lines[k], delimiter) for k in middle]
     rows = [row for row in rows if len(row) == count]
     comma = delimiter != "," and _decimal_comma(rows)
-    numeric = [2 * sum(_is_number(row[c]) for row in rows) > len(rows) for c in range(count)]
+    numeric = [2 * sum(is_number(row[c]) for row in rows) > len(rows) for c in range(count)]
     first = next((k for k in full if _is_data(_fields(lines[k], delimiter), numeric)), None)
     if first is None:
         raise LogError("no line of it has numbers in the columns that have numbers elsewhere")
@@ -132,7 +132,8 @@ def _count(line: str, delimiter: str) -> int:
     return line.count(delimiter) + 1 if delimiter != " " and '"' not in line else len(_fields(line, delimiter))
 
 
-def _is_number(cell: str) -> bool:
+def is_number(cell: str) -> bool:
+    """Whether a cell is a number, nothing, or not a number by name (nan)."""
     return _NUMBER.fullmatch(cell) is not None
 
 
@@ -144,7 +145,7 @@ def _decimal_comma(rows: Sequence[Sequence[str]]) -> bool:
 def _is_data(row: Sequence[str], numeric: Sequence[bool]) -> bool:
     """Whether a line has numbers, or nothing, where most lines have numbers."""
     cells = [cell for cell, is_one in zip(row, numeric, strict=False) if is_one]
-    return len(row) == len(numeric) and all(map(_is_number, cells)) and any(cells)
+    return len(row) == len(numeric) and all(map(is_number, cells)) and any(cells)
 
 
 def _header(lines: Sequence[str], delimiter: str, count: int) -> tuple[list[str], set[int]]:
@@ -162,5 +163,8 @@ def _header(lines: Sequence[str], delimiter: str, count: int) -> tuple[list[str]
         found.append(k)
         if is_comment:
             break
+    for row in rows[:-1]:  # what stands above several columns is written once
+        for c in range(1, count):
+            row[c] = row[c] or row[c - 1]
     parts = [[row[c] for row in rows if row[c]] for c in range(count)]
     return ["/".join(dict.fromkeys(each)) for each in parts] if rows else [], {*found}

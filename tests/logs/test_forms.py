@@ -187,6 +187,49 @@ def gazebo(folder: Path) -> Path:
     return folder / "run.mcap"
 
 
+def captured(folder: Path) -> Path:
+    """Named poses of motion capture, with one header; a pose without a name is nobody's."""
+    said = []
+    for k, t in enumerate(FULL["uav"][0]):
+        ns = EPOCH_NS + round(t * 1e9)
+        poses = [{"name": name, "pose": {"position": dict(zip("xyz", FULL[name][1][k].tolist(), strict=True))}}
+                 for name in FULL]  # fmt: skip
+        poses.append({"pose": {"position": {"x": 0.0, "y": 0.0, "z": 0.0}}})
+        header = {"stamp": {"sec": ns // 10**9, "nanosec": ns % 10**9}, "frame_id": "world"}
+        said.append((ns + 20_000_000 * (k % 3), "/poses", "NamedPoseArray", {"header": header, "poses": poses}))
+    logs.mcap_json(folder / "run.mcap", said)
+    return folder / "run.mcap"
+
+
+def ros2_echo(folder: Path) -> Path:
+    """What `ros2 topic echo --csv` prints has no header."""
+    for name, (t_s, places) in FULL.items():
+        lines = []
+        for t, place in zip(t_s, places, strict=True):
+            ns = EPOCH_NS + round(t * 1e9)
+            child = [f"{name}/base"] if name == "tb_0" else []
+            lines.append([str(ns // 10**9), str(ns % 10**9), "map", *child, *logs.fixed(place), "0", "0", "0", "1"])
+        (folder / f"{name}.csv").write_text(logs.text(lines))
+    return folder
+
+
+def dated() -> list[list[str]]:
+    return logs.long(FULL, "date,robot,x,y,z", lambda t: f"2026-05-04T12:00:{t:09.6f}Z")
+
+
+def vicon() -> list[list[str]]:
+    """The name of a body stands once above its columns, and units below the axes."""
+    lines: list[list[str]] = [["", ""], ["Frame", "Time"], ["", "s"]]
+    for name in FULL:
+        lines[0] += [f"arena:{name}", "", "", "", "", ""]
+        lines[1] += ["RX", "RY", "RZ", "TX", "TY", "TZ"]
+        lines[2] += ["rad", "rad", "rad", "mm", "mm", "mm"]
+    for k, t in enumerate(FULL["uav"][0]):
+        cells = [c for _, places in FULL.values() for c in ("0", "0", "0", *logs.fixed(places[k], 1000.0))]
+        lines.append([str(k), f"{t:.3f}", *cells])
+    return lines
+
+
 def ros1(folder: Path) -> Path:
     ros = Ros(1)
     logs.write_ros1(folder / "run.bag", ros, logs.of_ros(ros, JITTER, LATE, "world"))
@@ -275,6 +318,14 @@ FORMS = {
     "foxglove, JSON in a profile of ROS 2": Form(lambda folder: of_json(folder, "ros2"), JITTER),
     "foxglove, protobuf": Form(of_protobuf, JITTER),
     "gazebo": Form(gazebo, FULL),
+    "axis before the name": Form(
+        table("log.csv", lambda: [["t", *(f"{axis}_{name}" for name in FULL for axis in "xyz")], *logs.wide(FULL)[1:]]),
+        FULL,
+    ),
+    "dates": Form(table("log.csv", dated), FULL),
+    "Vicon": Form(table("log.csv", vicon), FULL, ("millimetres, as the file says",)),
+    "ROS 2, echo": Form(ros2_echo, FULL),
+    "named poses": Form(captured, FULL),
     "ROS 1": Form(ros1, JITTER),
     "ROS 2, sqlite3": Form(ros2("SQLITE3"), JITTER),
     "ROS 2, MCAP": Form(ros2("MCAP"), JITTER),
