@@ -17,7 +17,7 @@ from airground_drake.proofs.coq import without_comments
 from airground_drake.proofs.record import FOLDER
 from airground_drake.proofs.separating import Prism, Vector, separating
 from airground_drake.run.trace import Trace
-from airground_drake.scenarios.schema import Obstacle, Scenario
+from airground_drake.scenarios.schema import SHAPES, Obstacle, Scenario
 from airground_drake.scenarios.shapes import convex_parts
 
 PARTS = 2**60
@@ -159,7 +159,7 @@ def recorded(trace: Trace) -> Recorded:
 
 COVERED = frozenset(
     {"start_m", "target_m", "preset", "max_speed_m_s", "radius_m", "name", "altitude_m", "task", "phantoms_m"}
-    | {"position_m", "known_to_uav", "polygon_m", "segment_m", "size_m", "heading_rad", "height_m", "distance_m"}
+    | {"position_m", "known_to_uav", *SHAPES, "heading_rad", "height_m", "distance_m"}
     | {"moves", "known_motion", "cells"}
 )
 """Keys of bodies that theorems take into account, or need not."""

@@ -53,6 +53,10 @@ ENDLESS_M = 1e6
 """Height of the arena's walls, m."""
 MAP = "map"
 """Name of the obstacle that the map is."""
+SHAPES = ("polygon_m", "segment_m", "size_m")
+"""Keys that give an obstacle a shape, turned by its heading; `shapes.py` makes convex parts of them."""
+ABOUT = ("size_m",)
+"""Those of them that are about its position, which they need."""
 
 TRIGGERS: tuple[str, ...] = ("automaton", "bare")
 PLANT_KINDS: tuple[str, ...] = ("first_order", "unicycle", "lag", "delay")

@@ -28,7 +28,7 @@ from airground_drake.scenarios.budget import PairBudget, budget, takes_room
 from airground_drake.scenarios.outlines import outlines_of
 from airground_drake.scenarios.plants import plant_of
 from airground_drake.scenarios.rounding import TOLERANCE_M, Rounding
-from airground_drake.scenarios.schema import ARENA, MAP, Obstacle, Plant, Scenario, Uav, Ugv, Vector
+from airground_drake.scenarios.schema import ABOUT, ARENA, MAP, SHAPES, Obstacle, Plant, Scenario, Uav, Ugv, Vector
 from airground_drake.scenarios.shapes import crossing
 
 GAINS = ("avoidance_gain_1_s", "motion_gain_1_s", "formation_gain_1_s", "intervention_gain_1_s")
@@ -91,13 +91,13 @@ def _shapes(scenario: Scenario) -> Problems:
     """Each obstacle has one shape, whose corners go round it once."""
     for name, obstacle in scenario.obstacles.items():
         key = f"obstacles.{name}"
-        given = [shape for shape in ("polygon_m", "segment_m", "size_m") if getattr(obstacle, shape)]
+        given = [shape for shape in SHAPES if getattr(obstacle, shape)]
         if len(given) > 1:
             yield f"{key}.{given[1]}", getattr(obstacle, given[1]), f"one shape: {given[0]} is given, too"
-        if not (obstacle.position_m or obstacle.moves) and given in ([], ["size_m"]):
+        if not (obstacle.position_m or obstacle.moves) and {*given} <= {*ABOUT}:
             yield f"{key}.position_m", Fault("missing"), "wanted: [x, y] or [x, y, z] in m, or polygon_m or segment_m"
         if obstacle.heading_rad and not given:
-            yield f"{key}.heading_rad", obstacle.heading_rad, "0: only polygon_m, segment_m and size_m have a heading"
+            yield f"{key}.heading_rad", obstacle.heading_rad, f"0: only {', '.join(SHAPES)} have a heading"
         if (given or obstacle.height_m) and obstacle.position_m and obstacle.position_m[2]:
             yield f"{key}.position_m", obstacle.position_m, "z = 0: it stands on the ground"
         if obstacle.disappears_s and obstacle.disappears_s <= obstacle.appears_s:
@@ -427,7 +427,7 @@ def _extent(scenario: Scenario) -> Problems:
         points += [(f"ugvs.{name}.preset.waypoints_m.{i}", each) for i, each in enumerate(ugv.preset.waypoints_m)]
     points.append(("uav.start_m", scenario.uav.start_m))
     for name, each in scenario.barriers.items():
-        shape = next((key for key in ("polygon_m", "segment_m", "size_m") if getattr(each, key)), "position_m")
+        shape = next((key for key in SHAPES if getattr(each, key)), "position_m")
         corners = outlines_of(scenario, each)[:, outline.CORNERS :].reshape(-1, 2)  # and zeros
         places = [corners[np.abs(corners).max(axis=1).argmax()].tolist()] + [each.position_m] * bool(each.position_m)
         if each.moves:
