@@ -19,9 +19,10 @@ from airground_drake.verify import TRACE_CLAIMS, judge
 from airground_drake.verify.claim import ModelClaim
 from airground_drake.verify.judging import judge_all
 from airground_drake.verify.model.pair_kinds import THEOREMS, kind_of
+from airground_drake.verify.runs import passive
 from airground_drake.verify.runs.control_law import least_speeds, retreats
 from airground_drake.verify.runs.pairs import gap_over_time, least_gap, pair_of
-from airground_drake.verify.runs.passive import encounters, periods_of
+from airground_drake.verify.runs.passive import encounters, periods_of, steps_of
 from airground_drake.verify.runs.safe_hyp import DECLARED, PASSIVE
 
 
@@ -53,6 +54,13 @@ def test_a_person_who_walks_through_a_robot_is_named_and_the_robot_is_not() -> N
     assert own.exercised
     (came,) = own.evidence["came_too_near_themselves"]
     assert (came["first"], came["second"], came["own_doing"], came["collided"]) == ("ugv1", "person", False, True)
+
+
+def test_a_robot_that_leaves_its_straight_line_gets_farther_from_its_place(monkeypatch: pytest.MonkeyPatch) -> None:
+    trace = persons.run("fork")
+    straight = steps_of(trace, "ugv1")
+    monkeypatch.setattr(passive, "off_m_of", lambda *_: 0.1)
+    np.testing.assert_allclose(steps_of(replace(trace), "ugv1"), straight + 0.1, rtol=1e-12)
 
 
 def test_encounters_are_told_in_the_order_in_which_they_were() -> None:
