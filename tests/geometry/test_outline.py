@@ -86,6 +86,7 @@ def test_what_a_stranger_sends_is_not_taken_for_an_outline(name: str) -> None:
 
 def test_rows_that_are_too_short_are_no_outlines() -> None:
     assert outline.are_outlines(np.zeros((2, 10))).tolist() == [False, False]
+    assert outline.are_outlines(outline.balls(np.zeros((2, 3)))).tolist() == [True, True]
 
 
 @examples(50)
