@@ -48,12 +48,13 @@ def _wrong_maps(trace: Trace) -> Iterator[Fault]:
     """Proposals whose obstacles are not those that the UAV knew; third-party policies may send other maps.
 
     The UAV knows an obstacle that came with an answer from the next planning instant on, if the proposal is in force
-    until then.
+    until then. One that was on its own map, and then disappeared, it need not have learnt.
     """
     scenario, parts, numbers = trace.scenario, still_parts(trace), carried(trace)[0][0].tolist()
     outlines = list(map(tuple, map(np.ndarray.tolist, outlines_of(trace))))
     every = [outlines[k] for k in numbers]
     told_before = np.array([scenario.barriers[parts.names[k]].known_to_uav for k in parts.owner], dtype=np.bool_)
+    once = {every[k] for k in np.flatnonzero(told_before)}
     gap = scenario.safe_distance.obstacle_m
     phantoms = [(gap, 0.0, 0.0, z, z, 1.0, x, y) for x, y, z in scenario.uav.phantoms_m]
     surely, perhaps = _told(trace, every)
@@ -65,7 +66,7 @@ def _wrong_maps(trace: Trace) -> Iterator[Fault]:
         least = {part for part, noticed in surely.items() if noticed <= t + TIME_TOLERANCE_S}
         most = {part for part, answered in perhaps.items() if answered < t - TIME_TOLERANCE_S}
         right = listed[: len(known)] == known and len({*learnt}) == len(learnt)
-        right &= least - {*known} <= {*learnt} <= most - {*known}
+        right &= least - {*known} - once <= {*learnt} <= most - {*known}
         if not right and ":" not in sent.policy:
             yield Fault("map of a proposal", sent.ugv, t, {"learnt": learnt, "told": sorted(most)})
 

@@ -104,6 +104,17 @@ def test_what_moves_is_listed_after_the_robots() -> None:
     assert not faults_of(simulate(scenario, "a"))
 
 
+def test_a_known_obstacle_that_disappears_leaves_the_map() -> None:
+    """The UGV has sensed it, too: the UAV learns nothing from that."""
+    scenario = load("minimal", ["duration_s=10"])
+    scenario.obstacles["rock"].disappears_s, scenario.intervention.retry_s = 9.0, 0.2
+    scenario.intervention.policies = [Policy("hostile", {"speed_m_s": 2.0})]
+    trace = simulate(scenario, "d")
+    sent = [len(mapped) > 0 for mapped in trace.proposals["mapped"]]
+    assert {*sent} == {True, False}
+    assert not faults_of(trace)
+
+
 @pytest.mark.parametrize("name", "bcd")
 def test_proposals_that_concern_one_direction(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     one_direction(monkeypatch)
