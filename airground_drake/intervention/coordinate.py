@@ -12,7 +12,7 @@ import numpy as np
 from airground_drake.base.arrays import Array
 from airground_drake.geometry import outline
 from airground_drake.geometry.motion import Motion
-from airground_drake.intervention.coordination.joint import Effort, Plan, plan
+from airground_drake.intervention.coordination.joint import Effort, Outcome, Plan, plan
 from airground_drake.intervention.coordination.roadmap import PITCH, RobotTask, Space
 from airground_drake.intervention.coordination.single import OtherRobot, Way
 from airground_drake.intervention.coordination.timed import at_rest, distance, speed, timed, without_repeats
@@ -35,6 +35,12 @@ QUICK = Effort(candidates=300_000)
 """First effort for a group of UGVs: more UGVs may be what it takes."""
 ONE_BY_ONE = Effort(candidates=0)
 """Without a search over joint steps, which does not depend on the spacing."""
+REASONS: dict[Outcome, str] = {
+    "complete": "",
+    "exhausted": "no plan on the roadmaps searched, all of them exhausted",
+    "effort spent": "no plan found within the effort",
+}
+"""Why there is no plan, by outcome."""
 SAME_PLACE_M = 1e-3
 """A UGV that has moved no farther than this counts as unmoved, m."""
 
@@ -82,16 +88,21 @@ class Coordinate(Policy):
         self.clearance = clearance_m
         self.spacing = spacing_m
         self.follow = follow_s
-        self._shut_in: dict[str, Observation] = {}
-        self._in_vain: dict[tuple[str, ...], Observation] = {}
+        self._shut_in: dict[str, tuple[Observation, str]] = {}
+        self._in_vain: dict[tuple[str, ...], tuple[Observation, str]] = {}
         warm_up()
 
     def propose(self, seen: Observation) -> dict[str, Motion] | None:
-        """Motions by UGV; None if no triggered UGV can be helped."""
-        if not seen.team or self._is_known_to_be_shut_in(seen):
+        """Motions by UGV; None if no triggered UGV can be helped. `reason` then says why."""
+        self.reason = ""
+        if not seen.team:
+            return None
+        if (known := self._shut_in.get(seen.robot)) is not None and _stands_as_before(known[0], seen):
+            self.reason = known[1]
             return None
         waiting = tuple(seen.team[i].name for i in self._first_group(seen))
-        if (before := self._in_vain.get(waiting)) is not None and _is_as_before(before, seen):
+        if (known := self._in_vain.get(waiting)) is not None and _is_as_before(known[0], seen):
+            self.reason = known[1]
             return None
         own, tried = [mate.name for mate in seen.team].index(seen.robot), []
         for share in NARROWER:
@@ -101,9 +112,10 @@ class Coordinate(Policy):
             lost = tried[-1][0][0]
             if not lost or alone(own) is not None:
                 break
-        else:
-            self._shut_in[seen.robot] = seen
         _, group, found = min(tried, key=lambda each: each[0])
+        self.reason = _reason(seen, group, found)
+        if lost and alone(own) is None:
+            self._shut_in[seen.robot] = seen, self.reason
         motions = self._proposals(seen, group, found)
         if motions is None and alone(own) is not None:
             for spacing in NARROWER[1:]:
@@ -111,24 +123,12 @@ class Coordinate(Policy):
                 _, group, found = self._joint(seen, space, cache(partial(self._alone, seen, space)), ONE_BY_ONE)
                 if (motions := self._proposals(seen, group, found)) is not None:
                     return motions
-            self._in_vain[waiting] = seen
+            self._in_vain[waiting] = seen, self.reason
         return motions
 
     def _first_group(self, seen: Observation) -> list[int]:
         """The indices of the UGVs of the first joint plan."""
         return [i for i, mate in enumerate(seen.team) if mate.name == seen.robot or _waits(mate, seen.t)]
-
-    def _is_known_to_be_shut_in(self, seen: Observation) -> bool:
-        """Whether the UGV has already found no way from here on the same map, even alone.
-
-        Waiting cannot open a way: with time there are fewer places at which the preset can be joined.
-        """
-        before = self._shut_in.get(seen.robot)
-        return (
-            before is not None
-            and math.dist(before.position, seen.position) <= SAME_PLACE_M
-            and _has_the_map_of(before, seen)
-        )
 
     def _joint(
         self, seen: Observation, space: Space, alone: Alone, effort: Effort = QUICK
@@ -218,6 +218,22 @@ def _has_the_map_of(before: Observation, seen: Observation) -> bool:
     moved = any(each.velocity.any() for each in (*before.moving, *seen.moving))
     same = [each.name for each in before.moving] == [each.name for each in seen.moving]
     return before.t <= seen.t and same and not moved and np.array_equal(before.obstacles, seen.obstacles)
+
+
+def _stands_as_before(before: Observation, seen: Observation) -> bool:
+    """Whether a UGV stands where it stood, on the same map. If it had no way even alone, it has none now.
+
+    Waiting cannot open a way: with time there are fewer places at which the preset can be joined.
+    """
+    return math.dist(before.position, seen.position) <= SAME_PLACE_M and _has_the_map_of(before, seen)
+
+
+def _reason(seen: Observation, group: Sequence[int], found: Plan) -> str:
+    """Why a plan leaves UGVs without a way; empty if it leaves none."""
+    if found.outcome == "no plan exists":
+        names = [seen.team[group[i]].name for i in found.separated]
+        return f"no plan exists: on the UAV's map, {', '.join(names)} cannot come to the target"
+    return REASONS[found.outcome]
 
 
 def _is_as_before(before: Observation, seen: Observation) -> bool:

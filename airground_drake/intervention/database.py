@@ -92,6 +92,7 @@ class Asked:
         chosen: whether the plan was sent.
         what: what went wrong; empty if nothing did. A failure counts as no intervention.
         traceback: of the failure.
+        reason: why it left a UGV without a way, if it says so.
     """
 
     t: float
@@ -101,6 +102,7 @@ class Asked:
     chosen: bool = False
     what: str = ""
     traceback: str = ""
+    reason: str = ""
 
 
 Candidate = tuple[int, Asked, dict[str, Motion]]
@@ -213,7 +215,8 @@ class BehaviourDatabase:
             what, traceback = str(fault), fault.traceback
         except (Exception, OutOfTime, SystemExit) as error:  # no failure of a policy may stop the UAV
             what, traceback = described(error, type(policy).propose), traceback_of(error)
-        asked.append(Asked(seen.t, seen.robot, name, tuple(motions), what=what, traceback=traceback))
+        reason = "" if what else self.policies[index][1].reason
+        asked.append(Asked(seen.t, seen.robot, name, tuple(motions), what=what, traceback=traceback, reason=reason))
         return motions
 
 

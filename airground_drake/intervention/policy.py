@@ -182,9 +182,11 @@ class Policy(abc.ABC):
     Attributes:
         counted: whether counts bound the effort of a proposal. Then `intervention.budget_s` does not stop it, and runs
             are the same on every machine.
+        reason: why the last call of `propose` left a UGV without a way, as words for the report; may be empty.
     """
 
     counted: ClassVar[bool] = False
+    reason: str = ""
 
     @abc.abstractmethod
     def propose(self, seen: Observation) -> Motion | Mapping[str, Motion] | None:

@@ -86,8 +86,10 @@ def beforehand(document: Mapping[str, Any]) -> Iterator[Item]:
     """Shown first, also on the terminal: faults of policies and solvers, no way found, and runs that end too early."""
     yield from _of_faults(document["runs"])
     for name, run in document["runs"].items():
-        if lost := no_way(run):
-            yield Item("no_way", found_no_way(lost), run=name, anchor="happened")
+        why: Mapping[str, str] = run["metrics"].get("no_way_reasons", {})
+        for reason, lost in grouped((why.get(ugv, ""), ugv) for ugv in no_way(run)).items():
+            words = found_no_way(lost) + (f": {reason}" if reason else "")
+            yield Item("no_way", words, run=name, anchor="happened")
     scenario = document["scenario"]["resolved"]
     longer = {name: preset_s(**ugv["preset"]) for name, ugv in scenario["ugvs"].items()}
     longer = {name: time_s for name, time_s in longer.items() if time_s > scenario["duration_s"]}

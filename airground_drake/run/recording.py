@@ -184,6 +184,7 @@ def plans(asked: Sequence[Asked], sent: Sequence[tuple[int, Proposal]], ugvs: Se
     rows = [
         {
             "t_s": each.t, "uav": uav, "ugv": each.robot, "policy": each.policy, "outcome": _outcome(each),
+            "reason": each.reason,
             "sent": [numbers[each.t, ugv] for ugv in each.party if each.chosen and (each.t, ugv) in numbers],
         }
         for each in asked

@@ -99,10 +99,10 @@ MESSAGE_COLUMNS = {
   gatekeeper decides on it for the first time. Under method (b) it reads it when it begins to execute it, and does not
   answer."""
 
-PLAN_COLUMNS = {"t_s": "float64", "uav": "str", "ugv": "str", "policy": "str", "outcome": "str"}
+PLAN_COLUMNS = {"t_s": "float64", "uav": "str", "ugv": "str", "policy": "str", "outcome": "str", "reason": "str"}
 """Columns of `Trace.plans`, one row per policy that was asked for a plan for a UGV: the outcome is proposed, passed
-over (another plan ranked higher), nothing or failed. A further column, `sent`, lists the numbers of the plan's
-proposals."""
+over (another plan ranked higher), nothing or failed; the reason says why it left a UGV without a way, and may be empty.
+A further column, `sent`, lists the numbers of the plan's proposals."""
 
 SEEN_COLUMNS = {
     "t_s": "float64", "by": "str", "of": "str", "x_m": "float64", "y_m": "float64", "z_m": "float64",

@@ -2,7 +2,8 @@
 
 The nodes are drawn from the roadmap so that no two are nearer to each other than a given width, if nothing is in
 between. Every node of the roadmap belongs to the nearest of them by way. Two nodes whose regions touch are joined by
-the shortest way through the common border. So two nodes are connected in the coarse roadmap exactly where they are in the roadmap.
+the shortest way through the common border. So two nodes are connected in the coarse roadmap exactly where they are in
+the roadmap.
 
 Robots of several sizes share the nodes. The regions are drawn for each size, with the ways that this size can go.
 """

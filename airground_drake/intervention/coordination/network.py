@@ -35,7 +35,9 @@ def without_loops(graph: CoarseGraph, team: Team, moves: Indices) -> Indices:
 
 
 @njit(cache=True)
-def _cut_loops(graph: CoarseGraph, targets: Indices, apart: Array, shut: npt.NDArray[np.bool_], sizes: Indices, moves: Indices) -> None:
+def _cut_loops(
+    graph: CoarseGraph, targets: Indices, apart: Array, shut: npt.NDArray[np.bool_], sizes: Indices, moves: Indices
+) -> None:
     first, heads = graph.first, graph.heads
     steps, count = moves.shape
     for i in range(count):

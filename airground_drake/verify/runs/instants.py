@@ -39,6 +39,12 @@ def without_proposals(trace: Trace) -> list[str]:
     return [ugv for ugv in trace.ugvs if ugv in asked - got]
 
 
+def reasons(trace: Trace) -> dict[str, str]:
+    """Why UGVs got no proposal, as the policy that was asked last said; without those of which none said anything."""
+    said = trace.plans[trace.plans["reason"] != ""].groupby("ugv", sort=False)["reason"].last()
+    return {ugv: str(said[ugv]) for ugv in without_proposals(trace) if ugv in said.index}
+
+
 def silent(trace: Trace, ugvs: Iterable[str], kind: str) -> Finding:
     """Not run: UGVs were intervened on, but no message of a kind was recorded."""
     reason = f"{', '.join(ugvs)} were in mode 'intervening', but the trace has no {kind}"
