@@ -208,14 +208,15 @@ class BehaviourDatabase:
     def _ask(self, index: int, seen: Observation, asked: list[Asked]) -> dict[str, Motion]:
         """What a policy proposes; adds to `asked`."""
         (name, policy), motions, what, traceback = self.policies[index], dict[str, Motion](), "", ""
+        reason = ""
         try:
             with nullcontext() if policy.counted else time_limit(self.budget):
                 motions = motions_of(policy.propose(seen if isinstance(policy, GuestPolicy) else seen.fresh()), seen)
+                reason = str(policy.reason)
         except PolicyError as fault:
             what, traceback = str(fault), fault.traceback
         except (Exception, OutOfTime, SystemExit) as error:  # no failure of a policy may stop the UAV
             what, traceback = described(error, type(policy).propose), traceback_of(error)
-        reason = "" if what else self.policies[index][1].reason
         asked.append(Asked(seen.t, seen.robot, name, tuple(motions), what=what, traceback=traceback, reason=reason))
         return motions
 
