@@ -42,8 +42,9 @@ AGAIN_AT_MOST, AGAIN_SHARE = 3.0, 10
 """A further plan may cost this many times as much as the first one; all of them, one part in ten of the candidates."""
 WAITING = 0.5
 """What it costs to wait for a step while others with known motions are under way, in widths."""
-MOST_LAYERS = 400
-"""Known motions are followed for so many steps; later they count as over."""
+MOST_LAYERS, MOST_VALUES = 400, 10_000_000
+"""Known motions are followed for so many steps, and for fewer if the ways to the targets in all steps would be more
+values than this. In the last step, all that is left of a known motion counts as being in the way."""
 
 Outcome = Literal["found", "exhausted", "effort spent"]
 
@@ -176,7 +177,8 @@ def _step(coarse: Coarse, movers: Sequence[Mover]) -> float:
 def _shut(coarse: Coarse, movers: Sequence[Mover], fixed: Sequence[OtherRobot], step: float) -> npt.NDArray[np.bool_]:
     """Edges that are shut because known motions are near, see `Team.shut`."""
     last = max((float(other.motion[-1, 0]) for other in fixed), default=0.0)
-    layers = 1 + min(MOST_LAYERS, math.ceil(last / step))
+    most = min(MOST_LAYERS, MOST_VALUES // (len(movers) * len(coarse.graph.places)))
+    layers = 1 + min(most, math.ceil(last / step))
     sizes = int(coarse.sizes.max()) + 1
     found = np.zeros((sizes, layers, len(coarse.graph.heads)), dtype=np.bool_)
     for size in range(sizes):
