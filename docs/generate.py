@@ -233,8 +233,9 @@ def names() -> str:
     lines = [
         "# Names", "",
         *wrapped(
-            "What a scenario may name: made from the code by `python docs/generate.py`. `airground list` prints it, too, "
-            "with what installed packages add: `airground list policies coordinate`, `airground list keys control`."
+            "What a scenario may name: made from the code by `python docs/generate.py`. `airground list` prints it "
+            "with what installed packages add, such as `airground list policies coordinate` and "
+            "`airground list keys control`."
         ), "",
         "## Keys of a scenario file", "",
         *wrapped("NAME stands for a name of your own, N for the number of an item. A unit is in brackets."), "",
