@@ -47,7 +47,7 @@ class Learned(Policy):
         return CODE.motion(act(self.weights, CODE.observed(seen)), seen, self.speed)
 
 
-def train(rounds: int = 10, size: int = 16, courses: int = 8, seed: int = 1) -> tuple[np.ndarray, list[float]]:
+def train(rounds: int = 4, size: int = 8, courses: int = 6, seed: int = 1) -> tuple[np.ndarray, list[float]]:
     """The mean of the last round (6,), and the mean return, s, of the best quarter of each round."""
     from airground_drake.campaign.spec import load_spec
     from airground_drake.environments.gymnasium_env import InterventionEnv
