@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 from pydrake.geometry import Meshcat, MeshcatAnimation
-from pydrake.math import RigidTransform
+from pydrake.math import RigidTransform, RollPitchYaw
 
 from airground_drake.base.arrays import Array
 from airground_drake.replay.proposals import Sent
@@ -30,7 +30,7 @@ def recorded(scene: Scene) -> Meshcat:
     animation = MeshcatAnimation(FRAMES_PER_S)
     for k, body in enumerate(scene.robots):
         meshcat.SetLine(f"/paths/{k}", body.positions.T, 1.0, rgba(PATH_COLOR))
-        _move(meshcat, animation, robot_path(k), body.positions)
+        _move(meshcat, animation, robot_path(k), body.positions, body.headings)
         if body.kind == "UAV":
             _move(meshcat, animation, shadow_path(k), body.positions * [1.0, 1.0, 0.0])
             continue
@@ -66,12 +66,16 @@ def _proposal(meshcat: Meshcat, animation: MeshcatAnimation, scene: Scene, propo
         _show(meshcat, animation, path, standing)
 
 
-def _move(meshcat: Meshcat, animation: MeshcatAnimation, path: str, positions: Array) -> None:
-    """Keyframes where the motion bends."""
-    bent = np.abs(np.diff(positions, n=2, axis=0)).max(axis=1, initial=0.0) > STRAIGHT_M
+def _move(
+    meshcat: Meshcat, animation: MeshcatAnimation, path: str, positions: Array, headings: Array | None = None
+) -> None:
+    """Keyframes where the motion bends, of positions (F, 3), m, and headings (F,), rad."""
+    turned = np.zeros(len(positions)) if headings is None else headings
+    bent = np.abs(np.diff(np.column_stack([positions, turned]), n=2, axis=0)).max(axis=1, initial=0.0) > STRAIGHT_M
+    places = [RigidTransform(RollPitchYaw(0.0, 0.0, turn), at) for at, turn in zip(positions, turned, strict=True)]
     for k in np.flatnonzero(np.concatenate([[True], bent, [True]])[: len(positions)]):
-        animation.SetTransform(int(k), path, RigidTransform(positions[k]))
-    meshcat.SetTransform(path, RigidTransform(positions[0]))
+        animation.SetTransform(int(k), path, places[k])
+    meshcat.SetTransform(path, places[0])
 
 
 def _show(meshcat: Meshcat, animation: MeshcatAnimation, path: str, shown: npt.NDArray[np.bool_]) -> None:

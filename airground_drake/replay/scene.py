@@ -25,9 +25,10 @@ MAX_NAMED_BARRIERS = 8
 
 @dataclass(frozen=True)
 class DrawnBody(Robot):
-    """A robot in a run: positions (F, 3), m, and states (F,), indices of STATES, one per frame."""
+    """A robot in a run, frame by frame: positions (F, 3), m, headings (F,), rad, and states (F,), indices of STATES."""
 
     positions: Array
+    headings: Array
     states: npt.NDArray[np.intp]
 
 
@@ -65,10 +66,15 @@ def scene(trace: Trace, scenario: Scenario) -> Scene:
     def positions(name: str) -> Array:
         return np.column_stack([np.interp(times, trace.t, axis) for axis in trace.body(name).T])
 
+    def headings(name: str) -> Array:
+        recorded = trace.heading(name)
+        return np.zeros(len(times)) if recorded is None else np.interp(times, trace.t, recorded)
+
     bodies = tuple(
         DrawnBody(
             **vars(robot),
             positions=positions(robot.name),
+            headings=headings(robot.name),
             states=states(trace, robot.name, times) if robot.kind == "UGV" else np.zeros(len(times), dtype=np.intp),
         )
         for robot in still.robots

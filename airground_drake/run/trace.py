@@ -196,6 +196,11 @@ class Trace:
         """Velocities of the body of a robot whose plant records them, (T, 3), m/s, world frame."""
         return self._vectors(self.column, robot, "body_v", "m_s")
 
+    def heading(self, robot: str) -> Array | None:
+        """Headings of a robot whose plant records them, (T,), rad, counter-clockwise from x; else None."""
+        name = f"{robot}.heading_rad"
+        return self.column(name) if name in self.states else None
+
     def is_apart(self, robot: str) -> bool:
         """Whether the body of a robot is recorded apart from the point that the law steers."""
         return f"{robot}.body_x_m" in self.states

@@ -151,17 +151,23 @@ def _robot(meshcat: Meshcat, k: int, robot: Robot) -> None:
         _cylinder(meshcat, f"{shadow_path(k)}/disc", r, 0.02 * r, np.zeros(3), "#000000", 0.25)
         return
     for state in range(len(STATES)):
-        _ugv(meshcat, state_path(k, state), r, state)
+        _ugv(meshcat, state_path(k, state), r, state, nose=robot.turns)
     for turn in (45.0, -45.0):
         bar = f"/targets/{k}/{turn:g}"
         meshcat.SetObject(bar, Box(2.4 * r, 0.35 * r, 0.05 * r), rgba(PATH_COLOR))
         meshcat.SetTransform(bar, RigidTransform(RollPitchYaw(0.0, 0.0, np.radians(turn)), robot.target_m))
 
 
-def _ugv(meshcat: Meshcat, path: str, r: float, state: int) -> None:
-    """A low cylinder in the colour of its state, with a cone above it if triggered, a ring if intervened."""
+def _ugv(meshcat: Meshcat, path: str, r: float, state: int, *, nose: bool) -> None:
+    """A low cylinder in the colour of its state, with a cone above it if triggered, a ring if intervened.
+
+    A robot with a heading, which is along x here, has a nose.
+    """
     color = STATE_COLORS[state]
     _cylinder(meshcat, f"{path}/body", r, r, np.zeros(3), color)
+    if nose:
+        meshcat.SetObject(f"{path}/nose", Box(0.9 * r, 0.3 * r, 0.3 * r), rgba(PATH_COLOR))
+        meshcat.SetTransform(f"{path}/nose", RigidTransform([0.9 * r, 0.0, 0.5 * r]))
     if state == TRIGGERED:
         meshcat.SetObject(f"{path}/mark", MeshcatCone(1.4 * r, 0.7 * r, 0.7 * r), rgba(color))
         meshcat.SetTransform(f"{path}/mark", RigidTransform([0.0, 0.0, 1.3 * r]))

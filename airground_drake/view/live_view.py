@@ -5,15 +5,17 @@ from __future__ import annotations
 import math
 
 from pydrake.geometry import Meshcat
-from pydrake.math import RigidTransform
+from pydrake.math import RigidTransform, RollPitchYaw
 from pydrake.systems.framework import Context, LeafSystem
 
+from airground_drake.base.arrays import Array
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.scenarios.world import make_world
 from airground_drake.systems.lifetime import weakly
 from airground_drake.systems.signals import FIELDS, declare_bodies
 from airground_drake.view.draw import barrier_path, draw, robot_path, shadow_path, state_path
 from airground_drake.view.stage import STATES, stage, states_of
+from airground_drake.world.plant import PLACE
 from airground_drake.world.world import ROBOTS
 
 
@@ -21,7 +23,8 @@ class LiveView(LeafSystem):
     """Draws a scenario in a Meshcat, and moves its bodies there as the simulation goes on.
 
     Input ports (n UGVs, M moving bodies), named like the output ports that they belong to: `bodies` (3M), m;
-    `status` (4n), of the event trigger; `executing` (n), see `UgvController`.
+    `status` (4n), of the event trigger; `executing` (n), see `UgvController`; `plant_signals`, if there are any, see
+    `World.signals`.
 
     It publishes at the ends of the simulator's steps, at most FRAMES_PER_S times per second of simulated time. It adds
     no step, so it does not change the run. `meshcat.StartRecording()` records the motion.
@@ -39,6 +42,10 @@ class LiveView(LeafSystem):
         self._bodies = declare_bodies(self, world)
         self._status = self.DeclareVectorInputPort("status", FIELDS * n)
         self._executing = self.DeclareVectorInputPort("executing", n)
+        self._signals = None
+        if world.signals:
+            self._signals = self.DeclareVectorInputPort("plant_signals", len(world.signals))
+        self._names, self._of = world.robots, {name: k for k, name in enumerate(world.signals)}
         self._shown_s = -math.inf
         self.DeclareInitializationPublishEvent(weakly(self._begin))
         self.DeclarePerStepPublishEvent(weakly(self._publish))
@@ -54,15 +61,26 @@ class LiveView(LeafSystem):
         self._shown_s = -math.inf
         self._publish(context)
 
+    def _place(self, signals: Array, positions: Array, headings: list[float]) -> None:
+        """Put the bodies of robots that are not where the law steers them in place of the steered points."""
+        for k, robot in enumerate(self._names):
+            if f"{robot}.{PLACE[0]}" in self._of:
+                positions[k] = [signals[self._of[f"{robot}.{name}"]] for name in PLACE]
+            if f"{robot}.heading_rad" in self._of:
+                headings[k] = float(signals[self._of[f"{robot}.heading_rad"]])
+
     def _publish(self, context: Context) -> None:
         t = context.get_time()
         if t < self._shown_s + 1.0 / self.FRAMES_PER_S - 1e-9:
             return
         self._shown_s = t
-        positions = self._bodies.Eval(context).reshape(-1, 3)
+        positions, headings = self._bodies.Eval(context).reshape(-1, 3).copy(), [0.0] * len(self._names)
+        if self._signals is not None:
+            self._place(self._signals.Eval(context), positions, headings)
         modes, executing = self._status.Eval(context)[::FIELDS], self._executing.Eval(context)
         for k, position in enumerate(positions[self._robots]):
-            self._meshcat.SetTransform(robot_path(k), RigidTransform(position), t)
+            place = RigidTransform(RollPitchYaw(0.0, 0.0, headings[k]), position)
+            self._meshcat.SetTransform(robot_path(k), place, t)
         for k, above in enumerate(positions[self._uavs], start=self._uavs.start):
             self._meshcat.SetTransform(shadow_path(k), RigidTransform(above * [1.0, 1.0, 0.0]), t)
         for k, row, start in self._barriers:

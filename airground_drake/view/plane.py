@@ -12,7 +12,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import PatchCollection, PolyCollection
 from matplotlib.figure import Figure
-from matplotlib.patches import Circle, PathPatch
+from matplotlib.patches import Circle, PathPatch, Polygon
 from matplotlib.path import Path
 
 from airground_drake.base.arrays import Array
@@ -27,6 +27,8 @@ MAX_NAMED_BARRIERS = 12
 THUMBNAIL_IN = (2.5, 1.9)
 """Width and height of a small picture, inches."""
 MAX_THUMBNAIL_UGVS, MAX_THUMBNAIL_POINTS = 20, 200
+WEDGE, WEDGES = 0.008, 9
+"""Least size of the wedge of a robot with a heading, as a share of the picture, and number of wedges on its way."""
 _LEFT_IN, _BESIDE_IN, _BELOW_IN, _ABOVE_IN = 0.5, 0.65, 0.42, 0.1
 """Margin left of a map, both side margins together, margins below and above it, inches."""
 _VOID_DASH, _WAY_DOTS = (0, (1.5, 2.5)), (0, (1.0, 1.5))
@@ -177,7 +179,14 @@ def _name_of(barrier: Barrier) -> Label:
 
 
 def draw_robot(
-    axes: Axes, scenario: Scenario, name: str, way: Array, appearance: Look, rows: int | None = None, **options: Any
+    axes: Axes,
+    scenario: Scenario,
+    name: str,
+    way: Array,
+    appearance: Look,
+    rows: int | None = None,
+    headings: Array | None = None,
+    **options: Any,
 ) -> list[Label]:
     """Draw the way (T, 2) or (T, 3), m, of a robot: its start o, a UGV's target x, its size at both ends.
 
@@ -188,6 +197,7 @@ def draw_robot(
         way: its positions.
         appearance: of the line.
         rows: number of positions that count, by default all; the others are drawn in short dashes.
+        headings: (T,), rad, of a robot that has them: it is drawn as a wedge at some of its positions.
         options: of the line.
 
     Returns:
@@ -198,6 +208,8 @@ def draw_robot(
     parts = [(way[:rows, :2], appearance.dash, options), (way[rows - 1 :, :2], _VOID_DASH, {"linewidth": 0.9})]
     for part, dash, of_line in parts[: 1 + (rows < len(way))]:
         axes.plot(*part[thin(part)].T, color=appearance.color, linestyle=dash, **of_line)
+    if headings is not None:
+        _wedges(axes, way[:rows], headings[:rows], scenario.robots[name].radius_m, appearance.color)
     ends = [way[0], way[-1]]
     for at in ends:
         _disc(axes, at, scenario.robots[name].radius_m, appearance.color)
@@ -206,6 +218,16 @@ def draw_robot(
         ends[1] = np.array(scenario.ugvs[name].target_m)
         axes.plot(*ends[1][:2], marker="x", markersize=7, markeredgewidth=2, color=appearance.color, zorder=4)
     return [Label(at, short(name, 9), appearance.color, weight="bold") for at in ends[name not in scenario.ugvs :]]
+
+
+def _wedges(axes: Axes, way: Array, headings: Array, radius_m: float, color: str) -> None:
+    """A robot as a wedge in the direction of its heading, at the same number of rows apart."""
+    across = max(np.ptp(axes.get_xlim()), np.ptp(axes.get_ylim()))
+    length = max(radius_m, WEDGE * float(across))
+    for k in np.linspace(0, len(way) - 1, WEDGES).astype(int).tolist():
+        turn = headings[k] + np.array([0.0, 2.5, -2.5])
+        corners = way[k, :2] + length * np.column_stack([np.cos(turn), np.sin(turn)])
+        axes.add_patch(Polygon(corners, facecolor="white", edgecolor=color, linewidth=1.0, zorder=3))
 
 
 def looks_of(scenario: Scenario, ugvs: Iterable[str]) -> dict[str, Look]:
@@ -236,7 +258,8 @@ def plot(trace: Trace, axes: Axes | None = None) -> Axes:
     labels, edges = draw_barriers(axes, scenario)
     for robot, appearance in looks_of(scenario, trace.ugvs).items():
         rows = trace.counting_rows(robot)
-        labels += draw_robot(axes, scenario, robot, ways[robot], appearance, rows, label=robot)
+        headings = trace.heading(robot)
+        labels += draw_robot(axes, scenario, robot, ways[robot], appearance, rows, headings, label=robot)
     place(axes, labels, [*ways.values(), *edges])
     axes.set(xlabel="x, m", ylabel="y, m", title=f"{scenario.name}, run {trace.run}")
     return axes

@@ -36,12 +36,13 @@ HIGHEST = 2.0
 
 @dataclass(frozen=True)
 class Robot:
-    """A robot: `kind` is UGV or UAV, `radius_m` as drawn, `target_m` (3,)."""
+    """A robot: `kind` is UGV or UAV, `radius_m` as drawn, `target_m` (3,), `turns` whether it has a heading."""
 
     name: str
     kind: str
     radius_m: float
     target_m: Array
+    turns: bool
 
 
 @dataclass(frozen=True)
@@ -164,7 +165,13 @@ def stage(scenario: Scenario, visited_m: Array | None = None) -> Stage:
     apart = min(scenario.safe_distance.obstacle_m, scenario.safe_distance.ugv_m)
     mark = min(max(SMALLEST * extent, OF_SAFE_DISTANCE * apart), LARGEST * extent)
     robots = tuple(
-        Robot(name, "UGV" if name in scenario.ugvs else "UAV", max(mark, spec.radius_m), np.array(spec.target_m))
+        Robot(
+            name,
+            "UGV" if name in scenario.ugvs else "UAV",
+            max(mark, spec.radius_m),
+            np.array(spec.target_m),
+            any(plant.kind == "unicycle" for plant in spec.plant),
+        )
         for name, spec in specs.items()
     )
     phantoms = np.reshape(scenario.uav.phantoms_m, (-1, 3))

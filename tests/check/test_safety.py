@@ -28,7 +28,8 @@ def run(way_m: list[float], speed_m_s: float = 0.0) -> Run:
     places = {"ugv1": own, "rock": np.zeros((len(t), 3))}
     found = SimpleNamespace(
         t_s=t, sample_row=np.arange(len(t) - 1), pairs=[pair], apart_m={("ugv1", "rock"): 0.0},
-        position_m=places, body_m=places, apart=lambda _: own, bent_m=lambda _: 0.0, ways={name: Way(t, place) for name, place in places.items()},
+        position_m=places, body_m=places, apart=lambda _: own, bent_m=lambda _: 0.0,
+        ways={name: Way(t, place) for name, place in places.items()},
         period_rows=lambda _: np.arange(len(t)), there=lambda _: slice(0, len(t)), robots={"ugv1": {}},
         scenario={
             "control": {"period_s": PERIOD_S, "avoidance_gain_1_s": GAIN_1_S},

@@ -32,7 +32,7 @@ def plane(trace: Trace, ugvs: Sequence[str], frame: Frame, width_in: float) -> F
     robots = looks_of(trace.scenario, ugvs)
     for robot, appearance in robots.items():
         way, rows = trace.body(robot), trace.counting_rows(robot)
-        labels += draw_robot(axes, trace.scenario, robot, way, appearance, rows)
+        labels += draw_robot(axes, trace.scenario, robot, way, appearance, rows, trace.heading(robot))
     for ugv in ugvs:
         labels += _happenings(axes, trace, ugv)
     place(axes, [*labels, *of_barriers], [*(trace.body(robot) for robot in robots), *edges])
