@@ -20,6 +20,7 @@ from airground_drake.base.arrays import Array
 from airground_drake.base.exact import decimal
 from airground_drake.run.trace import Trace
 from airground_drake.verify.claim import TIME_TOLERANCE_S, TraceClaim
+from airground_drake.verify.engines.bodies import room_of
 from airground_drake.verify.engines.geometry import interpolate
 from airground_drake.verify.engines.outlines import Cores, apart_by_blocks
 from airground_drake.verify.engines.shortfalls import POINT, SCREEN_M, rounded_up, shortage, shortfalls
@@ -176,7 +177,8 @@ class SafeHyp(TraceClaim):
     def check(self, trace: Trace) -> Finding:
         """Evaluate all hypotheses; the first violation in time is the counterexample."""
         kept = sorted(guarantees(trace), key=lambda one: one.margin_m)
-        others, moving = [*_static(trace), *_sampled(trace), *_beside_moving(trace)], beside_moving(trace)
+        others = [*_static(trace), *_sampled(trace), *_of_plants(trace), *_beside_moving(trace)]
+        moving, shares = beside_moving(trace), least_shares(trace)
         different = list(differences(trace))
         broken = [h.at(int(k)) for h in [*others, *_avoidance(trace, kept)] for k in h.broken()[:1]]
         broken += [{"hypothesis": BUILT, "t_s": float(trace.t[0]), **each} for each in different[:1]]
@@ -204,7 +206,8 @@ class SafeHyp(TraceClaim):
                     binding,
                 )
             )
-            | ({"beside_moving": [asdict(each) for each in moving]} if moving else {}),
+            | ({"beside_moving": [asdict(each) for each in moving]} if moving else {})
+            | ({"least_command_shares": shares} if shares else {}),
             exercised=sum(binding.values()),
         )
 
@@ -395,3 +398,38 @@ def _sampled(trace: Trace) -> Iterator[_Hypothesis]:
         yield _Hypothesis("speed limit", "m/s", t[:-1], spare, VELOCITY_TOLERANCE_M_S, about)
         if robot in trace.ugvs:
             yield _Hypothesis("planar motion", "m", t, 0.0 - np.abs(place[:, 2] - place[0, 2]), 0.0, about)
+
+
+def least_shares(trace: Trace) -> dict[str, float]:
+    """The least share that was left of a command of each unicycle; inside d_law it recovers at so much of the gain."""
+    names = [ugv for ugv, each in trace.scenario.ugvs.items() if any(plant.kind == "unicycle" for plant in each.plant)]
+    return {name: float(trace.sampled(f"{name}.command_share").min()) for name in names}
+
+
+def _of_plants(trace: Trace) -> Iterator[_Hypothesis]:
+    """Hypotheses of the theorems about plants: limits of turns, wheels and dips, and speeds of bodies that lag."""
+    period, ends = trace.scenario.control.period_s, period_ends(trace)
+    whole = np.flatnonzero(np.diff(trace.t[ends]) > 0.5 * period)
+    first, last = ends[whole], ends[whole + 1]
+    t, lasting = trace.t[first], trace.t[last] - trace.t[first]
+    for name, robot in trace.scenario.robots.items():
+        about = {"robot": name}
+        for plant in robot.plant:
+            if plant.kind == "unicycle":
+                heading, axle = trace.column(f"{name}.heading_rad"), trace.body(name)
+                turned = heading[last] - heading[first]
+                rate, half = np.abs(turned) / lasting, 0.5 * turned
+                chord = np.linalg.norm(axle[last] - axle[first], axis=1)
+                speed = chord / lasting / np.sinc(half / np.pi)
+                if plant.max_turn_rad_s:
+                    spare = plant.max_turn_rad_s - rate
+                    yield _Hypothesis("turning limit", "rad/s", t, spare, VELOCITY_TOLERANCE_M_S, about)
+                if plant.wheel_base_m:
+                    spare = plant.max_wheel_speed_m_s - speed - 0.5 * plant.wheel_base_m * rate
+                    yield _Hypothesis("wheel speeds", "m/s", t, spare, VELOCITY_TOLERANCE_M_S, about)
+                dips = rate * np.hypot(speed, plant.hand_point_m * rate) * lasting**2 / 8.0
+                most = room_of(robot, period).body_m - plant.hand_point_m
+                yield _Hypothesis("dip of the hand point", "m", t, most - dips, DISTANCE_TOLERANCE_M, about)
+            elif plant.kind == "lag":
+                spare = robot.max_speed_m_s - np.linalg.norm(trace.body_velocity(name), axis=1)
+                yield _Hypothesis("speed of the body", "m/s", trace.t, spare, VELOCITY_TOLERANCE_M_S, about)
