@@ -126,13 +126,13 @@ _ALL = (
         ("The set is an intersection of half-planes or half-spaces.", "The point is in it."),
     ),
     Theorem(
-        "Budget.at_samples", "(7)-(8), (11)", ("SAFE-HYP",),
+        "Budget.at_samples", "(7)-(8), (11)", ("SAFE-BUDGET", "SAFE-HYP"),
         "At every sample the points that the law steers keep its distance d_law, but for eps and W/A.",
         _BUDGET,
         "How fast a pair that starts nearer recovers: that is Safety.recovers.",
     ),
     Theorem(
-        "Budget.budget_always", "(7)-(8), (11)", ("SAFE-HYP", "SAFE-DIST"),
+        "Budget.budget_always", "(7)-(8), (11)", ("SAFE-BUDGET", "SAFE-HYP", "SAFE-DIST"),
         "Pairs that meet the law, as measured and with the distance d_law, keep the true distance d at all times.",
         (*_BUDGET, "d_law is at least eps + W/A + sqrt((d + covers + dips)^2 + eps^2)."),
         "Anything about sets that turn, or about a pair from a period on in which it misses the law by more than W.",
@@ -159,7 +159,7 @@ _ALL = (
         "Anything about sets that move.",
     ),
     Theorem(
-        "Plants.chord", "ours", ("SAFE-HYP",),
+        "Plants.chord", "ours", ("SAFE-BUDGET", "SAFE-HYP"),
         "With chord steering the hand point of a unicycle arrives exactly where the command leads; its dip is known.",
         (_CHORD, _PIECES),
         "Slip, and errors of the heading.",
@@ -177,36 +177,36 @@ _ALL = (
         "Anything about other robots, or about sets that move: there the cover l stays.",
     ),
     Theorem(
-        "Plants.lag", "ours", ("SAFE-HYP",),
+        "Plants.lag", "ours", ("SAFE-BUDGET", "SAFE-HYP"),
         "The point p + tau v of a body with lag moves exactly as commanded.",
         (_LAG, _PIECES),
         "What a wrong tau costs: that is a drift.",
     ),
     Theorem(
-        "Plants.lag_speed", "ours", ("SAFE-HYP",),
+        "Plants.lag_speed", "ours", ("SAFE-BUDGET", "SAFE-HYP"),
         "A body with lag is never faster than the limit of its commands.",
         (_LAG, _PIECES, "It is no faster at the start."),
     ),
     Theorem(
-        "Plants.lag_pair", "ours", ("SAFE-HYP",),
+        "Plants.lag_pair", "ours", ("SAFE-BUDGET", "SAFE-HYP"),
         "Where the points steered keep m, two bodies with lags keep sqrt(b^2 - (tau V_rel)^2), "
         "b = m - |tau_i - tau| V_i - |tau_j - tau| V_j.",
         ("tau is positive, of your choice, and b not negative.", "Speeds and relative speed are within their limits.",
          "They start there.", _PIECES),
     ),
     Theorem(
-        "Plants.lag_needs", "ours", ("SAFE-HYP",),
+        "Plants.lag_needs", "ours", ("SAFE-BUDGET", "SAFE-HYP"),
         "That is d or more if b is at least sqrt(d^2 + (tau V_rel)^2).",
         ("d is not negative.",),
     ),
     Theorem(
-        "Plants.delay", "ours", ("SAFE-HYP",),
+        "Plants.delay", "ours", ("SAFE-BUDGET", "SAFE-HYP"),
         "A body with a delay is, some time later, within V |wait - delay| of the point that the law steers.",
         ("The law steers the point where the body will be after the commands on their way.",
          "They are no faster than V."),
     ),
     Theorem(
-        "Turning.shortened_chord", "ours", ("SAFE-HYP",),
+        "Turning.shortened_chord", "ours", ("SAFE-BUDGET", "SAFE-HYP"),
         "A command that is shortened as far as the turning limit asks for is followed exactly, within the limit.",
         ("The hand point is ahead of the axle.", "The limit is less than half a turn per period.", _CHORD, _PIECES),
         "Limits of wheel speeds: those shorten a command further.",
@@ -222,12 +222,12 @@ _ALL = (
         ("The period is positive.",),
     ),
     Theorem(
-        "Turning.chord_turns", "ours", ("SAFE-HYP",),
+        "Turning.chord_turns", "ours", ("SAFE-BUDGET", "SAFE-HYP"),
         "At speeds up to V chord steering turns at (2/h) asin(V h/(2 l)) at most.",
         ("V h is at most 2 l.", "2 l + a h is positive, a the command ahead."),
     ),
     Theorem(
-        "Turning.shortened", "ours", ("SAFE-HYP",),
+        "Turning.shortened", "ours", ("SAFE-BUDGET", "SAFE-HYP"),
         "A shortened command still meets every inequality that v = 0 meets.",
         ("The share that is left is above 0 and at most 1.",),
     ),
@@ -243,14 +243,14 @@ _ALL = (
         "A retreat that was not asked for in full: of that only r = 0 is left.",
     ),
     Theorem(
-        "Passive.own_doing", "ours", ("SAFE-HYP", "SAFE-OWN"),
+        "Passive.own_doing", "ours", ("SAFE-BUDGET", "SAFE-HYP", "SAFE-OWN"),
         "Had the set stood still since the sample, the robot would be at min(D, L) or farther, less drift, dip and "
         "cover.",
         _PERIOD,
         "That the robot keeps a distance: what is missing, the set has moved itself.",
     ),
     Theorem(
-        "Passive.kept", "ours", ("SAFE-HYP",),
+        "Passive.kept", "ours", ("SAFE-BUDGET", "SAFE-HYP"),
         "A period that starts at L or farther keeps d, whatever the set does at Vo or slower.",
         (*_PERIOD, "L is at least d + cover + dip + (w + Vo) h, w the drift of the robot."),
         "Anything about a period that starts nearer than L.",
@@ -286,18 +286,18 @@ _ALL = (
         ("Dip and cover are not negative.",),
     ),
     Theorem(
-        "Mixed.unicycle_chord", "ours", ("SAFE-HYP",),
+        "Mixed.unicycle_chord", "ours", ("SAFE-BUDGET", "SAFE-HYP"),
         "A unicycle with chord steering conforms to no drift, the cover l and the dip |omega| |(v, l omega)| h^2/8.",
         (_CHORD, _PIECES),
         "Slip: it may be declared as a drift of one's own plant.",
     ),
     Theorem(
-        "Mixed.lagging", "ours", ("SAFE-HYP",),
+        "Mixed.lagging", "ours", ("SAFE-BUDGET", "SAFE-HYP"),
         "A body with lag conforms to no drift, no dip and the cover tau V.",
         (_LAG, "It is no faster than V.", _PIECES),
     ),
     Theorem(
-        "Mixed.delayed", "ours", ("SAFE-HYP",),
+        "Mixed.delayed", "ours", ("SAFE-BUDGET", "SAFE-HYP"),
         "A body with a delay conforms to no drift, no dip and the cover V |wait - delay|, as it is `wait` later.",
         ("The law steers the point where the body will be after the commands on their way.",
          "They are no faster than V."),
