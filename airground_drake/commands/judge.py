@@ -23,8 +23,8 @@ what a LOG can be, found by its content:
 `airground export` writes logs that can be judged, too.
 
 the scenario says who the robots are, how large they are, where obstacles stand, and which distances are to be kept.
-Only ugvs (start_m, target_m, radius_m, max_speed_m_s), obstacles and safe_distance matter here. `airground init`
-writes one to start from.
+What matters here: ugvs and uav (start_m, radius_m, max_speed_m_s), obstacles, arena_m, map, safe_distance, duration_s
+and control.avoidance_gain_1_s. `airground init` writes one to start from.
 
 examples:
   airground judge run3.csv --scenario lab.yaml
@@ -107,8 +107,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     errors = _errors(options.position_error, bodies)
     judged = judging.judge(found, document, errors)
     if options.output is not None:
+        from airground_drake.commands.saved import outside_reports
         from airground_drake.logs import page
 
+        outside_reports(options.output, "the page")
         logs = [str(path) for path in options.logs]
         written = page.write(options.output, judged, found, scenario, errors, logs)
     if options.json:

@@ -166,12 +166,14 @@ def judge(tracks: Tracks, scenario: Json, errors_m: Mapping[str, float] | None =
         errors_m: by how much a body's recorded position may be wrong, by its name.
 
     Raises:
-        LogError: if a pair is never recorded at the same time.
+        LogError: if a pair is never recorded at the same time, or the log has one instant only.
     """
     bodies, errors = tracks.bodies, errors_m or {}
     resting, barriers = places_of(scenario, np.zeros(1)), barriers_of(scenario)
     begin = min(float(each.t_s[0]) for each in bodies.values())
     end = max(float(each.t_s[-1]) for each in bodies.values())
+    if begin == end:
+        raise LogError(f"the log has positions at {begin:.6g} s only; wanted: at two times at least")
     found = []
     for pair in _pairs(scenario, bodies):
         own, other = _both(pair, bodies, scenario, resting, barriers, Span(begin, end))

@@ -96,7 +96,7 @@ def _map(judged: Judged, tracks: Tracks, scenario: Scenario) -> Figure:
         appearance = looks.get(known[name], canvas.UAV_LOOK) if name in robots else Look(INK, (0, (1.0, 1.5)), "h")
         parts = _parts(track)
         for part in parts:
-            axes.plot(*part[canvas.thin(part[:, :2]), :2].T, color=appearance.color, linestyle=appearance.dash)
+            axes.plot(*part.T, color=appearance.color, linestyle=appearance.dash)
         axes.plot(*track.places_m[0, :2], "o", markersize=6, color=appearance.color, markerfacecolor="white", zorder=4)
         axes.plot(*track.places_m[-1, :2], "s", markersize=5, color=appearance.color, zorder=4)
         labels += [Label(track.places_m[-1], short(name, 12), appearance.color, weight="bold")]
@@ -121,8 +121,9 @@ def _recorded(pair: JudgedPair, tracks: Tracks) -> list[str]:
 
 
 def _parts(track: Track) -> list[Array]:
-    """Its positions in each stretch."""
-    return [track.places_m[(track.t_s >= each.begin) & (track.t_s <= each.end)] for each in track.spans]
+    """Its way in each stretch, seen from above: (K, 2) each, m, with few enough points to draw."""
+    parts = [track.places_m[(track.t_s >= each.begin) & (track.t_s <= each.end), :2] for each in track.spans]
+    return [part[canvas.thin(part)] for part in parts]
 
 
 def _distances(judged: Judged, tracks: Tracks, scenario: Json) -> list[Figure]:

@@ -155,6 +155,8 @@ def joined(log: Log, scenario: Json, choice: Choice) -> Tracks:
         if plants := [each["kind"] for each in robots_of(scenario).get(name, {}).get("plant", ())]:
             told = f"{name} is no point that goes where it is told ({', '.join(plants)})"
             said.append(f"{told}: what its body lacks of the law need be no fault of its controller")
+    if not tracks:
+        raise LogError("no body is left to judge")
     _apart_at_the_start(tracks, scenario)
     _heights(tracks, scenario, said)
     return Tracks(tracks, said, [*log.ignored, *ignored], f"{first / 1e9:.6f} s since 1970" if zero else "")

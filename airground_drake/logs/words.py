@@ -14,6 +14,8 @@ ELSEWHERE_M = 0.05
 """A robot that starts farther away from its start in the scenario, and from its safe distance, is named, m."""
 FASTER = 1.01
 """A robot that moves at more than this multiple of its limit is named; less may be the noise of positions."""
+LONGER = 1.01
+"""A log that is longer than a scenario by more than this says so."""
 MOST_NAMED, MOST_PAIRS, MOST_SPANS, MOST_SAID = 3, 20, 4, 12
 """Broken pairs, all pairs, stretches of one pair, and remarks that are printed; `--json` and the page have all."""
 
@@ -36,8 +38,10 @@ def headline(judged: Judged) -> str:
 
 def coverage(judged: Judged) -> str:
     """How much of the time is covered, in a sentence."""
-    lasts = min(judged.end_s - judged.begin_s, judged.duration_s)
-    text = f"The log has {lasts:.6g} of the scenario's {judged.duration_s:g} s"
+    lasts = judged.end_s - judged.begin_s
+    text = f"The log has {min(lasts, judged.duration_s):.6g} of the scenario's {judged.duration_s:g} s"
+    if lasts > LONGER * judged.duration_s:
+        text = f"The log lasts {lasts:.6g} s, longer than the scenario's {judged.duration_s:g} s"
     gappy = [pair for pair in judged.pairs if pair.gaps_s]
     if not gappy:
         return f"{text}, without gaps."

@@ -88,6 +88,12 @@ def test_a_log_that_is_shorter_than_the_scenario_says_so(tmp_path: Path, documen
     )
 
 
+def test_a_log_of_one_instant_is_refused(tmp_path: Path, document: dict[str, Any]) -> None:
+    one = {name: (t_s[:1], places[:1]) for name, (t_s, places) in FULL.items()}
+    with pytest.raises(LogError, match="positions at 0 s only; wanted: at two times at least"):
+        judge(logs.read(written(tmp_path, logs.long(one)), document), document)
+
+
 def test_bodies_that_are_never_recorded_together_are_refused(tmp_path: Path, document: dict[str, Any]) -> None:
     apart = {**FULL, "tb_1": (FULL["tb_1"][0] + 50.0, FULL["tb_1"][1])}
     with pytest.raises(LogError, match="tb_0 0 to 6 s and tb_1 50 to 56 s are never recorded at the same time"):
