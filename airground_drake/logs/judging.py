@@ -9,6 +9,7 @@ it lacks e_k, the deficit below d obeys deficit <= (1 - A h) deficit + e_k, by t
 from __future__ import annotations
 
 import copy
+import math
 from collections.abc import Mapping
 from fractions import Fraction
 from typing import Any, NamedTuple
@@ -70,6 +71,8 @@ class JudgedPair(NamedTuple):
         theorem: "Safety" or, beside what may move, "Passive", which promises that a robot does nothing wrong itself.
         too_fast_m_s: largest speed of an obstacle above the declared one; 0 if it kept that.
         promised_m: distance of the true bodies that follows from the theorem; None if not above 0, or for Passive.
+        law_m: distance that a law on positions so wrong has to keep, so that the true bodies keep `safe_m`: the theorem
+            of the distance budget, eps + sqrt(d^2 + eps^2) between centres, for A h = 1.
         came_m: by how much each came nearer to the other in the last second before the least distance.
     """
 
@@ -92,6 +95,7 @@ class JudgedPair(NamedTuple):
     theorem: str
     too_fast_m_s: float
     promised_m: float | None
+    law_m: float
     came_m: dict[str, float]
 
     @property
@@ -303,6 +307,7 @@ def _judged(pair: Pair, own: Track, other: Track, scenario: Json, eps: float, wh
         sum(each.end - each.begin for each in spans), gaps, law.intervals, law.lacking, law.missed, law.missed_at,
         law.missed_for, law.missed_by, law.starts - pair.radii_m, "Passive" if pair.moves_m_s else "Safety", too_fast,
         promised if promised > 0.0 and not pair.moves_m_s else None,
+        eps + math.hypot(pair.safe_m, eps) - pair.radii_m,
         _came(pair, own, other, Span(max(stretch.begin, at - LAST_S), at)),
     )  # fmt: skip
 

@@ -95,7 +95,8 @@ def law(pair: JudgedPair) -> str:
         return f"{held}: {pair.first} {did} too near{fast if pair.too_fast_m_s else ''}"
     promise = f"promises {pair.promised_m:.4g} m" if pair.promised_m is not None else "promises no distance"
     late = "" if pair.starts_m >= pair.safe_m - SMALL else ", and it starts nearer than required"
-    return f"{held}{late}: the safety theorem {promise}"
+    wrong = f"; a law on positions so wrong would have to keep {pair.law_m:.4g} m" if pair.error_m else ""
+    return f"{held}{late}: the safety theorem {promise}{wrong}"
 
 
 def remarks(judged: Judged) -> Iterator[str]:

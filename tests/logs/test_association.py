@@ -245,6 +245,8 @@ def test_position_errors_make_a_distance_open(
     far = pair_of(found.pairs, "tb_0", "uav")
     assert far.promised_m == pytest.approx(0.6 - errors_m.get("uav", 0.0) - errors_m.get("tb_0", 0.0), abs=1e-9)
     assert pair_of(found.pairs, "tb_0", "pillar").error_m == errors_m.get("tb_0", 0.0)
+    eps, centres = pair.error_m, 0.3 + 2 * 0.15
+    assert pair.law_m == pytest.approx(eps + (centres**2 + eps**2) ** 0.5 - 2 * 0.15)
 
 
 def test_the_law_is_judged_in_intervals_of_any_length(tmp_path: Path, document: dict[str, Any]) -> None:
