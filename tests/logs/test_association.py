@@ -279,3 +279,12 @@ def test_a_shortfall_is_told_with_its_interval_and_its_robot(tmp_path: Path, doc
     assert pair.promised_m == pytest.approx(0.3 - deficit)
     assert pair.came_m == {"tb_0": pytest.approx(0.0), "tb_1": pytest.approx(0.1)}
     assert pair.below_s == [(pytest.approx(0.0, abs=1e-6), pytest.approx(0.6))]
+
+
+def test_each_interval_asks_for_a_retreat_of_its_own_length(tmp_path: Path, document: dict[str, Any]) -> None:
+    """Two robots that rest 0.1 m inside d lack 3/s times 0.1 s of it in the first interval, 3/s times 0.3 s then."""
+    t_s, still = np.array([0.0, 0.1, 0.4]), np.zeros((3, 3))
+    log = {"tb_0": (t_s, still), "tb_1": (t_s, still + np.array([0.0, 0.5, 0.0]))}
+    pair = pair_of(judge(logs.read(written(tmp_path, logs.long(log)), document, gap_s=1.0), document).pairs, *BROKEN)
+    assert (pair.missed_m, pair.missed_at_s, pair.missed_for_s) == pytest.approx((0.09, 0.1, 0.3))
+    assert pair.hypotheses["starts at the distance or farther"] is False
