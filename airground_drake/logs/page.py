@@ -183,13 +183,13 @@ def scene(judged: Judged, tracks: Tracks, scenario: Scenario, logs: Sequence[str
     for name, track in tracks.bodies.items():
         if name in scenario.obstacles:
             continue
-        robot = known.get(name) or Robot(name, "UAV", known[scenario.uav.name].radius_m, track.places_m[-1])
+        radius_m = known[scenario.uav.name].radius_m
+        robot = known.get(name) or Robot(name, "UAV", radius_m, track.places_m[-1], turns=False)
+        unturned = {**vars(robot), "turns": False, "headings": np.zeros(len(times))}  # a log need not have headings
         there = np.zeros(len(times), dtype=bool)
         for span in track.spans:
             there |= (times + judged.begin_s >= span.begin) & (times + judged.begin_s <= span.end)
-        bodies.append(
-            DrawnBody(**vars(robot), positions=track.at(times + judged.begin_s), states=np.where(there, 0, -1))
-        )
+        bodies.append(DrawnBody(**unturned, positions=track.at(times + judged.begin_s), states=np.where(there, 0, -1)))
     moved = {}
     for k, barrier in enumerate(still.barriers):
         if barrier.name in tracks.bodies:
