@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import signal
 import time
+import weakref
 from contextlib import suppress
 
 import pytest
@@ -32,3 +33,17 @@ def test_the_outer_limit_holds_within_the_inner_too() -> None:
         _for_ever()
     assert signal.getsignal(signal.SIGALRM) is before
     assert signal.getitimer(signal.ITIMER_REAL)[0] == 0.0
+
+
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
+def test_a_limit_that_python_ignores_in_a_callback_comes_again() -> None:
+    things = [{1}]
+    reference = weakref.ref(things[0], lambda _: time.sleep(10.0))
+
+    def forget_and_wait() -> None:
+        things.clear()  # the callback begins, and is interrupted
+        time.sleep(10.0)
+
+    with pytest.raises(OutOfTime), time_limit(0.05):
+        forget_and_wait()
+    assert reference() is None

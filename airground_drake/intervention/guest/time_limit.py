@@ -11,6 +11,7 @@ from types import FrameType
 
 _LONGEST_S = 1e9  # thirty years; the system's timer takes at most three hundred
 _AT_ONCE_S = 1e-6  # 0 would turn the timer off
+_AGAIN_S = 0.5  # Python ignores an error in a callback of the garbage collector, so it is raised again
 
 
 class OutOfTime(BaseException):
@@ -33,11 +34,11 @@ def time_limit(seconds: float, error: type[BaseException] = OutOfTime) -> Iterat
 
     outer, started = signal.getitimer(signal.ITIMER_REAL)[0], time.monotonic()
     before = signal.signal(signal.SIGALRM, interrupt)
-    signal.setitimer(signal.ITIMER_REAL, min(seconds, outer or _LONGEST_S, _LONGEST_S))
+    signal.setitimer(signal.ITIMER_REAL, min(seconds, outer or _LONGEST_S, _LONGEST_S), _AGAIN_S)
     try:
         yield
     finally:
         signal.setitimer(signal.ITIMER_REAL, 0.0)
         signal.signal(signal.SIGALRM, before)
         if outer:
-            signal.setitimer(signal.ITIMER_REAL, max(outer - (time.monotonic() - started), _AT_ONCE_S))
+            signal.setitimer(signal.ITIMER_REAL, max(outer - (time.monotonic() - started), _AT_ONCE_S), _AGAIN_S)
