@@ -178,7 +178,8 @@ def painted_over(folder: Path) -> None:
 
 def crash_called_proved(folder: Path) -> None:
     """What `airground prove` would write of run b, as if Coq had accepted it."""
-    from airground_drake.proofs.export import distances_file, lawful, recorded
+    from airground_drake.proofs.export import distances_file, recorded
+    from airground_drake.proofs.table import lawful
 
     exact = recorded(load(trace(folder, "b")))
     entry = {
