@@ -47,9 +47,11 @@ def _broken(folder: Path, found: Mapping[str, Any], traces: Mapping[str, Trace])
         if name not in found["runs"]:
             continue
         exact, entry = recorded(trace), found["runs"][name]
-        table, near = entries(exact), too_near(exact)
-        law = law_file(exact, table, alone=not entry["distances"]["proved"]) if table else ""
-        of_run = {f"{exact.name}.v": distances_file(exact, vectors=False), f"{exact.name}_law.v": law}
+        lawfully = recorded(trace, steered=True) if exact.off_m else exact
+        table, near = entries(lawfully), too_near(exact)
+        alone = not entry["distances"]["proved"] or lawfully is not exact
+        law = law_file(lawfully, table, alone=alone) if table else ""
+        of_run = {f"{exact.name}.v": distances_file(exact, vectors=False), f"{lawfully.name}_law.v": law}
         texts |= of_run
         meta = files.sha256(files.read_bytes(folder.parent / "trace" / name / "meta.json"))
         kept = entry["distances"]["proved"]
@@ -60,7 +62,7 @@ def _broken(folder: Path, found: Mapping[str, Any], traces: Mapping[str, Trace])
         for key, value in expected.items():
             yield from _unless(f"{name}.{key}", value, entry[key])
         yield from _unless(f"{name}.distances.proved", kept and not near, kept)
-        gaps = listed(missed(exact, table))
+        gaps = listed(missed(lawfully, table))
         yield from _unless(f"{name}.law.proved", entry["law"]["proved"] and not gaps, entry["law"]["proved"])
         yield from _unless(f"{name}.law.missed", gaps, entry["law"].get("missed", []))
         if "entries" in entry["law"]:

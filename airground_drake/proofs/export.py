@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 from airground_drake.base.errors import TraceError
 from airground_drake.base.exact import decimal
+from airground_drake.proofs import slack
 from airground_drake.proofs.coq import without_comments
 from airground_drake.proofs.record import FOLDER
 from airground_drake.proofs.separating import Prism, Vector, separating
@@ -56,6 +57,9 @@ class Demand(NamedTuple):
         core: what the second body is without its radius: "" for a point, "ground" for flat convex sets, "solid" for
             prisms.
         passive: whether the second body is an obstacle that may move, beside which robots follow the passive law.
+        room_m: how far the two bodies may be off the recorded straight lines in all, m; or, where the law's points are
+            recorded, what the law adds to the distance.
+        late: whether one of the two is a robot with a lag or a delay.
     """
 
     first: str
@@ -64,11 +68,18 @@ class Demand(NamedTuple):
     radii_m: Fraction
     core: str = ""
     passive: bool = False
+    room_m: Fraction = Fraction(0)
+    late: bool = False
+
+    @property
+    def body_m(self) -> Fraction:
+        """Distance of the centres of the bodies, or of a centre from convex sets, m."""
+        return self.required_m + self.radii_m
 
     @property
     def safe_m(self) -> Fraction:
-        """Distance of the centres, or of a centre from convex sets, m, which the theorems are about."""
-        return self.required_m + self.radii_m
+        """The same with room for what is off the recorded straight lines, m: that of the lines."""
+        return self.body_m + self.room_m
 
     @property
     def lemma(self) -> str:
@@ -91,6 +102,7 @@ class Recorded:
         places: of each body, m: one per row, or a single one of a body at rest. In the order of their numbers.
         demands: pairs and distances.
         gain: A h, the product of gain and control period, at most 1 (see `capped` in Safety.v).
+        off_m: how far bodies may be off the straight lines between these places, m; 0 of those that are not named.
         sets: the convex sets of demands, by name, from where their body is.
     """
 
@@ -99,6 +111,7 @@ class Recorded:
     places: Mapping[str, tuple[Place, ...]]
     demands: tuple[Demand, ...]
     gain: Fraction
+    off_m: Mapping[str, Fraction]
     sets: Mapping[str, tuple[ConvexSet, ...]] = field(default_factory=dict)
 
     @cached_property
@@ -132,8 +145,12 @@ class Recorded:
         return [each.in_parts(self.unit) for each in self.sets[demand.sets]] if demand.core else [Prism(((0, 0),))]
 
 
-def recorded(trace: Trace) -> Recorded:
+def recorded(trace: Trace, *, steered: bool = False) -> Recorded:
     """A run with its positions rounded to 1/PARTS m; nothing else is rounded.
+
+    Args:
+        trace: the run.
+        steered: whether it is the record of the points that the law steers, in place of the bodies.
 
     Raises:
         TraceError: if a column is missing or not finite, or no theorem is about a body of the scenario.
@@ -143,16 +160,19 @@ def recorded(trace: Trace) -> Recorded:
     barriers = scenario.barriers
     places: dict[str, tuple[Place, ...]] = {name: (_centre(obstacle),) for name, obstacle in barriers.items()}
     moving = [name for name, obstacle in barriers.items() if obstacle.moves]
-    places |= {name: tuple(map(_rounded, trace.position(name).tolist())) for name in (*moving, *trace.robots)}
+    of = trace.position if steered else trace.body
+    places |= {name: tuple(map(_rounded, of(name).tolist())) for name in (*moving, *trace.robots)}
     spelled = _spelled(list(places))
-    wanted = [each._replace(first=spelled[each.first], second=spelled[each.second]) for each in demands(scenario)]
+    asked = demands_of(trace, steered=steered)
+    wanted = [each._replace(first=spelled[each.first], second=spelled[each.second]) for each in asked]
     names = dict(zip(spelled.values(), spelled, strict=True))
     return Recorded(
-        name=f"run_{trace.run}",
+        name=f"run_{trace.run}{'_steered' if steered else ''}",
         times=tuple(map(Fraction, trace.t.tolist())),
         places={spelled[name]: place for name, place in places.items()},
         demands=tuple(wanted),
         gain=min(decimal(control.avoidance_gain_1_s) * decimal(control.period_s), Fraction(1)),
+        off_m={spelled[name]: off for name, off in off_m(trace, steered=steered).items()},
         sets={each.sets: _sets(barriers[names[each.second]], each.core) for each in wanted if each.core},
     )
 
@@ -160,7 +180,7 @@ def recorded(trace: Trace) -> Recorded:
 COVERED = frozenset(
     {"start_m", "target_m", "preset", "max_speed_m_s", "radius_m", "name", "altitude_m", "task", "phantoms_m"}
     | {"position_m", "known_to_uav", *SHAPES, "heading_rad", "height_m", "distance_m"}
-    | {"moves", "known_motion", "cells"}
+    | {"moves", "known_motion", "cells", "plant"}
 )
 """Keys of bodies that theorems take into account, or need not."""
 
@@ -189,6 +209,26 @@ def _sets(obstacle: Obstacle, core: str) -> tuple[ConvexSet, ...]:
     top = _round(obstacle.height_m if core == "solid" else 0.0)
     parts = convex_parts(obstacle) or []
     return tuple(ConvexSet(tuple((_round(x), _round(y)) for x, y in part), top=top) for part in parts)
+
+
+def off_m(trace: Trace, *, steered: bool = False) -> dict[str, Fraction]:
+    """How far the bodies of robots may be off the straight lines between recorded places, m, if they may be."""
+    of = slack.off_steered_m if steered else slack.off_lines_m
+    return {name: of(trace, name) for name in trace.robots if trace.is_apart(name)}
+
+
+def demands_of(trace: Trace, *, steered: bool = False) -> list[Demand]:
+    """The demands on a run, with room for what its bodies may be off, or for what the law adds."""
+    lines = off_m(trace)
+    found = []
+    for each in demands(trace.scenario):
+        names = [name for name in (each.first, each.second) if name in lines]
+        if steered:
+            room = slack.law_m(trace, each.body_m, each.first, each.second) - each.body_m
+        else:
+            room = sum((lines[name] for name in names), Fraction(0))
+        found.append(each._replace(room_m=room, late=any(slack.is_late(trace, name) for name in names)))
+    return found
 
 
 def demands(scenario: Scenario) -> list[Demand]:
@@ -274,14 +314,75 @@ def distances_file(run: Recorded, *, vectors: bool = True) -> str:
     together = _theorem(f"{run.name}_keeps_its_distances", f"forall t, {interval} ->", _grouped(run.demands, claims))
     proofs = _grouped(run.demands, [f"({each.lemma} t T)" for each in run.demands])
     proof = all_of([all_of(group) for group in proofs])
+    bodies, theorem = "", f"{run.name}_keeps_its_distances"
+    if run.off_m:
+        bodies, theorem = _bodies(run, interval), f"{run.name}_bodies_keep_their_distances"
     return (
         f"(** That {run.name} keeps its distances. Written by `airground prove`, from the positions in trace/. *)\n"
-        "Require Import Reals Lra ZArith List.\nRequire Import Safety Run DistanceChecker.\nImport ListNotations.\n"
-        f"Local Open Scope Z_scope.\n\n{data(run)}{checks}{''.join(lemmas)}"
+        "Require Import Reals Lra ZArith List.\nRequire Import Safety Convex Run DistanceChecker.\n"
+        f"Import ListNotations.\nLocal Open Scope Z_scope.\n\n{data(run)}{checks}{''.join(lemmas)}"
         "(** All pairs: distances of centres, which are the safe distance and both radii, in m; times in s. *)\n"
-        f"{together}Proof. intros t T; exact {proof}. Qed.\n\n"
-        f"Print Assumptions {run.name}_keeps_its_distances.\n"
+        f"{together}Proof. intros t T; exact {proof}. Qed.\n\n{bodies}"
+        f"Print Assumptions {theorem}.\n"
     )
+
+
+def offs(run: Recorded) -> str:
+    """How far bodies may be off the straight lines, by their numbers."""
+    listed = "; ".join(real(run.off_m.get(name, Fraction(0))) for name in run.places)
+    value = f"nth i [{listed}] 0" if run.off_m else "0"
+    return (
+        "(** By how much bodies may be off the straight lines between the rows, m. *)\n"
+        f"Definition {run.name}_off (i : nat) : R := {value}.\n\n"
+    )
+
+
+_BODIES = """\
+(** The bodies themselves. *)
+Section Bodies.
+
+Variable x : nat -> R -> vec.
+Hypothesis near_lines : forall i t, norm (sub (x i t) (position {run} i t)) <= {run}_off i.
+
+Ltac decide_bodies i j keeps :=
+  intros t T; pose proof (keeps t T) as K; pose proof (near_lines i t) as I; pose proof (near_lines j t) as J;
+  unfold {run}_off, i, j in I, J; cbn [nth] in I, J;
+  match type of K with
+  | _ <= norm (sub ?u ?v) => pose proof (nearby u v (x i t) (x j t) _ _ _ I J K); lra
+  | clear _ _ _ _ ?d t => intros corners c Hin Hc; specialize (K corners c Hin Hc);
+      pose proof (nearby _ _ (x i t) (add (x j t) c) _ _ _ I
+        ltac:(replace (sub (add (x j t) c) (add (position {run} j t) c)) with (sub (x j t) (position {run} j t))
+          by (apply vec_eq; vectors; ring); exact J) K); lra
+  end.
+
+"""
+
+
+def _bodies(run: Recorded, interval: str) -> str:
+    """The theorem that the bodies keep their distances, wherever they are near the straight lines."""
+    claims = [_body_claim(run, demand) for demand in run.demands]
+    lemmas = "".join(
+        f"Lemma bodies_{demand.lemma} : forall t, {interval} ->\n  {claim}.\n"
+        f"Proof. decide_bodies {demand.first} {demand.second} {demand.lemma}. Qed.\n\n"
+        for demand, claim in zip(run.demands, claims, strict=True)
+    )
+    proofs = _grouped(run.demands, [f"(bodies_{each.lemma} t T)" for each in run.demands])
+    together = _theorem(
+        f"{run.name}_bodies_keep_their_distances", f"forall t, {interval} ->", _grouped(run.demands, claims)
+    )
+    proof = all_of([all_of(group) for group in proofs])
+    return (
+        f"{offs(run)}{_BODIES.format(run=run.name)}{lemmas}{together}"
+        f"Proof. intros t T; exact {proof}. Qed.\n\nEnd Bodies.\n\n"
+    )
+
+
+def _body_claim(run: Recorded, demand: Demand) -> str:
+    first, second, safe = f"(x {demand.first} t)", f"(x {demand.second} t)", real(demand.body_m)
+    if not demand.core:
+        return f"{safe} <= norm (sub {first} {second})"
+    sets = f"forall corners c, In corners {demand.sets} -> hull (map (place_in {run.name}) corners) c ->"
+    return f"({sets} {safe} <= norm (sub {first} (add {second} c)))"
 
 
 def _claim(run: Recorded, demand: Demand) -> str:

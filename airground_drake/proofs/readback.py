@@ -14,7 +14,7 @@ from itertools import chain
 from typing import NamedTuple
 
 from airground_drake.base.errors import AirgroundError
-from airground_drake.proofs.export import PARTS, demands
+from airground_drake.proofs.export import PARTS, Demand, demands, demands_of, off_m
 from airground_drake.run.trace import Trace
 from airground_drake.scenarios.shapes import convex_parts
 
@@ -38,25 +38,32 @@ def compare(text: str, trace: Trace) -> RereadError:
         TraceError: if a column of the trace is missing or not finite.
     """
     spelled, error = _compare_positions(text, trace)
-    named = [each._replace(first=spelled[each.first], second=spelled[each.second]) for each in demands(trace.scenario)]
+    named = [each._replace(first=spelled[each.first], second=spelled[each.second]) for each in demands_of(trace)]
     wanted = [(each.first, each.second, each.sets if each.core else "", each.safe_m) for each in named]
     _compare_statement(f"run_{trace.run}", text, trace, wanted)
+    if any(trace.is_apart(name) for name in trace.robots):
+        _compare_bodies(f"run_{trace.run}", text, trace, named)
     return error
 
 
-def compare_positions(text: str, trace: Trace) -> RereadError:
+def compare_positions(text: str, trace: Trace, *, steered: bool = False) -> RereadError:
     """Compare the positions in an exported file with those of the run that it should be about.
+
+    Args:
+        text: the file.
+        trace: the run.
+        steered: whether the positions are those of the points that the law steers.
 
     Raises:
         ReadbackError: at the first difference.
         TraceError: if a column of the trace is missing or not finite.
     """
-    return _compare_positions(text, trace)[1]
+    return _compare_positions(text, trace, steered=steered)[1]
 
 
-def _compare_positions(text: str, trace: Trace) -> tuple[dict[str, str], RereadError]:
+def _compare_positions(text: str, trace: Trace, *, steered: bool = False) -> tuple[dict[str, str], RereadError]:
     """The names of bodies in the file, by their names in the trace, and by how much coordinates differ."""
-    run = f"run_{trace.run}"
+    run = f"run_{trace.run}{'_steered' if steered else ''}"
     unit, times, listed = _parts(rf"^Definition {run} := Run (\w+) \[\n(.*?)\] \[\n(.*?)\]\.$", text)
     if [Fraction(int(t, 0), int(unit, 0)) for t in times.split(";\n")] != [Fraction(t) for t in trace.t.tolist()]:
         raise ReadbackError(f"{run}: the times are not those of the trace")
@@ -66,7 +73,8 @@ def _compare_positions(text: str, trace: Trace) -> tuple[dict[str, str], RereadE
         for name, obstacle in trace.scenario.barriers.items()
     }
     moving = [name for name, obstacle in trace.scenario.barriers.items() if obstacle.moves]
-    recorded |= {name: trace.position(name).tolist() for name in (*moving, *trace.robots)}
+    place = trace.position if steered else trace.body
+    recorded |= {name: place(name).tolist() for name in (*moving, *trace.robots)}
     bodies = [name.removesuffix("_places") for name in listed.split("; ")]
     numbers = re.findall(r"^Definition (\w+) := (\d+)%nat\.$", text, re.MULTILINE)
     if numbers != [(name, str(k)) for k, name in enumerate(bodies)] or len(bodies) != len(recorded):
@@ -83,6 +91,13 @@ def _compare_positions(text: str, trace: Trace) -> tuple[dict[str, str], RereadE
         off += _off_corners(f"{spelled[name]}_{core}", text, int(unit, 0), parts)
     if max(off) > Fraction(1, 2 * PARTS):
         raise ReadbackError(f"{run}: a position differs from the trace by {float(max(off)):.3g} m")
+    room = off_m(trace, steered=steered)
+    if room and f"Definition {run}_off (i : nat) : R := nth i" in text:
+        [listed_m] = _parts(rf"^Definition {run}_off \(i : nat\) : R := nth i \[(.*?)\] 0\.$", text)
+        if [_value(each) for each in listed_m.split("; ")] != [room.get(name, Fraction(0)) for name in recorded]:
+            raise ReadbackError(f"{run}: bodies may be off the straight lines by other lengths than their plants say")
+    elif room:
+        raise ReadbackError(f"{run}: how far bodies may be off the straight lines is missing")
     return spelled, RereadError(sum(each > 0 for each in off), float(max(off)))
 
 
@@ -128,6 +143,30 @@ def _compare_statement(run: str, text: str, trace: Trace, wanted: Sequence[tuple
     between = claim.sub("", body)  # has to be conjunctions and their parentheses alone
     if claims != list(wanted) or re.sub(r"[\s()]", "", between) != "/\\" * (len(claims) - 1):
         raise ReadbackError(f"{run}: the theorem does not claim the scenario's distance of every pair")
+
+
+def _compare_bodies(run: str, text: str, trace: Trace, wanted: Sequence[Demand]) -> None:
+    """The theorem about the bodies is about every pair and its distance, and about all that are near their lines."""
+    start, end, body = _parts(
+        rf"^Theorem {run}_bodies_keep_their_distances : forall t, (.*?) <= t <= (.*?) ->\n(.*?)\.\nProof\.", text
+    )
+    number = r"(\d+|\(\d+ / \d+\))"
+    balls = rf"{number} <= norm \(sub \(x (\w+) t\) \(x (\w+) t\)\)"
+    sets = (
+        rf"forall corners c, In corners (\w+) -> hull \(map \(place_in {run}\) corners\) c -> "
+        rf"{number} <= norm \(sub \(x (\w+) t\) \(add \(x (\w+) t\) c\)\)"
+    )
+    claim = re.compile(rf"{sets}|{balls}")
+    claims = [
+        (one or first, other or second, of, _value(least or apart))
+        for of, least, one, other, apart, first, second in claim.findall(body)
+    ]
+    expected = [(each.first, each.second, each.sets if each.core else "", each.body_m) for each in wanted]
+    between = re.sub(r"[\s()]", "", claim.sub("", body))
+    whole = [_value(start), _value(end)] == [Fraction(trace.t[0]), Fraction(trace.t[-1])]
+    near = f"Hypothesis near_lines : forall i t, norm (sub (x i t) (position {run} i t)) <= {run}_off i."
+    if claims != expected or between != "/\\" * (len(claims) - 1) or not whole or near not in text:
+        raise ReadbackError(f"{run}: the theorem about bodies does not claim the scenario's distance of every pair")
 
 
 def _value(text: str) -> Fraction:

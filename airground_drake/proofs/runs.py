@@ -17,7 +17,7 @@ from airground_drake.proofs import coq, readback
 from airground_drake.proofs.export import (
     Demand,
     Recorded,
-    demands,
+    demands_of,
     distances_file,
     recorded,
     refuse_unknown,
@@ -140,18 +140,21 @@ def prove(place: Workshop, run: Trace, limit_s: float = coq.LIMIT_S) -> tuple[Co
     if distances.refused and (found := too_near(exact)):
         words = f"Coq refuses {_pair(distances.refused)}. In exact arithmetic {'; '.join(map(str, found))}"
         distances = replace(distances, why=words, too_near=found)
-    table = entries(exact)
-    text = law_file(exact, table, alone=not distances.proved) if table else ""
-    if table and not distances.proved:
-        readback.compare_positions(text, run)
-    return distances, _decide_law(place, exact, table, text, limit_s), rounded
+    lawfully = recorded(run, steered=True) if exact.off_m else exact
+    table = entries(lawfully)
+    alone = not distances.proved or lawfully is not exact
+    text = law_file(lawfully, table, alone=alone) if table else ""
+    if table and alone:
+        readback.compare_positions(text, run, steered=lawfully is not exact)
+    return distances, _decide_law(place, lawfully, table, text, limit_s), rounded
 
 
 def _decide_law(place: Workshop, run: Recorded, table: Sequence[Entry], text: str, limit_s: float) -> CoqReply:
     """Have Coq prove the table of a run, from its file; it is wanted of all pairs and periods."""
     theorem, name, gaps = f"{run.name}_obeys_the_law", f"{run.name}_law.v", missed(run, table)
     if not table:
-        return CoqReply(False, theorem, name, "no pair obeys it in any period", missed=gaps)
+        why = "no pair obeys it in any period" if gaps else "its table has no pair: see docs/verification.md"
+        return CoqReply(False, theorem, name, why, missed=gaps)
     law = decide(place, run, name, text, theorem, limit_s)
     if not law.proved:
         return replace(law, missed=gaps)
@@ -241,7 +244,7 @@ def prove_report(report: Path, names: Sequence[str] = (), limit_s: float = coq.L
                 if (place.folder / answer.file).exists():
                     files.write_bytes(report / PLACE / answer.file, (place.folder / answer.file).read_bytes())
             meta = files.sha256(files.read_bytes(report / "trace" / name / "meta.json"))
-            asked = demands(run.scenario)
+            asked = demands_of(run)
             counts = len(asked), len(lawful(asked)), len(run.t)
             found.append(Proved(name, expects_kept(run), *counts, distances, law, rounded, meta))
             yield found[-1]

@@ -8,12 +8,13 @@ its distance again. Coq decides every entry once more, and proves that it keeps 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
+from fractions import Fraction
 from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
 
-from airground_drake.proofs.export import Demand, Recorded, all_of, data, ratio, real, stride
+from airground_drake.proofs.export import Demand, Recorded, all_of, data, offs, ratio, real, stride
 from airground_drake.proofs.separating import Vector
 
 
@@ -46,8 +47,8 @@ class Missed(NamedTuple):
 
 
 def lawful(demands: Iterable[Demand]) -> list[Demand]:
-    """The pairs that have entries: two balls that do not move by themselves."""
-    return [demand for demand in demands if not demand.core and not demand.passive]
+    """The pairs that have entries: two balls that do not move by themselves, without a lag or delay."""
+    return [demand for demand in demands if not (demand.core or demand.passive or demand.late)]
 
 
 def entries(run: Recorded) -> list[Entry]:
@@ -105,7 +106,7 @@ _LAW = """\
 Ltac decide_entry i j num den x y :=
   intros b R; apply (obeys_exactly {run} {run}_off b i j num den x y);
   [exact is_well_formed | vm_cast_no_check (eq_refl true) | exact R | lra | lra | lra | lra |];
-  unfold {run}_off; lra.
+  unfold {run}_off, i, j; cbn [nth]; lra.
 
 """
 
@@ -129,8 +130,7 @@ def law_file(run: Recorded, table: Sequence[Entry], *, alone: bool = False) -> s
         "positions in trace/. *)\nRequire Import Reals Lra ZArith List.\n"
         f"Require Import Safety Convex Run Mixed LawChecker{'' if alone else ' ' + run.name}.\nImport ListNotations.\n"
         f"{'Local Open Scope Z_scope.' + chr(10) * 2 + data(run) if alone else ''}Local Open Scope R_scope.\n\n"
-        "(** By how much bodies may be off the recorded straight lines, m. *)\n"
-        f"Definition {run.name}_off (i : nat) := 0.\n\n{_LAW.format(run=run.name)}"
+        f"{offs(run)}{_LAW.format(run=run.name)}"
         f"{''.join(_group(run, name, group) for name, group in zip(names, groups, strict=True))}"
         "(** Entries: first row, number of periods, bodies; A h, distance of the law in m, three errors; distance kept "
         "in m. Time is in periods. *)\n"
@@ -162,6 +162,9 @@ def _group(run: Recorded, name: str, group: Sequence[Entry]) -> str:
 
 
 def _term(run: Recorded, entry: Entry) -> str:
-    """An entry in Coq; without errors, and the bodies keep the distance of the law."""
-    safe, pair = real(entry.demand.safe_m), f"(b {entry.demand.first}) (b {entry.demand.second})"
-    return f"Entry {entry.first} {entry.many} (Together {pair} points (Numbers {real(run.gain)} {safe} 0 0 0) {safe})"
+    """An entry in Coq: without errors of position or velocity."""
+    first, second = entry.demand.first, entry.demand.second
+    off = run.off_m.get(first, Fraction(0)) + run.off_m.get(second, Fraction(0))
+    law, kept = real(entry.demand.safe_m), real(min(entry.demand.body_m, entry.demand.safe_m - off))
+    pair = f"(Together (b {first}) (b {second}) points (Numbers {real(run.gain)} {law} 0 0 0) {kept})"
+    return f"Entry {entry.first} {entry.many} {pair}"

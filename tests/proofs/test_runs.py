@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import copy
 import json
+import math
 import re
 import shutil
 from collections.abc import Callable, Iterable
 from dataclasses import replace
+from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
@@ -27,6 +30,7 @@ from airground_drake.run import trace
 from airground_drake.run.trace import Trace
 from airground_drake.scenarios.schema import Obstacle, Preset, Run, SafeDistance, Scenario, Uav, Ugv
 from airground_drake.testing.plugin import Simulations
+from airground_drake.verify.engines.bodies import following_m_s, unicycle_m
 
 UGV, ROCK = "ugv1", "obstacle_1"
 REFUSED = f"Coq refuses {UGV} and {ROCK}, 2 m"
@@ -355,3 +359,98 @@ def test_what_cannot_be_proved_for_want_of_coq_or_of_files_is_said(
     monkeypatch.setenv("PATH", str(tmp_path))
     assert main(["prove"]) == 2
     assert "coqc is not on the PATH: install Coq" in capsys.readouterr().err
+
+
+def turning(of: Trace, **plant: Any) -> Trace:
+    """Its steered points, as those of two UGVs with a plant, whose bodies are where that puts them; among walls."""
+    meta = copy.deepcopy(dict(of.meta))
+    for name in ("ugv1", "ugv2"):
+        meta["scenario"]["ugvs"][name]["plant"] = [plant]
+    meta["scenario"]["safe_distance"].update(obstacle_m=1.5, ugv_m=0.5, air_ground_m=0.8)
+    meta["scenario"]["obstacles"]["wall_1"] = {"segment_m": [[-6.0, -3.0], [6.0, -3.0]]}
+    table = of.states
+    period = of.scenario.control.period_s
+    for name in ("ugv1", "ugv2"):
+        steered, command, bodies = of.position(name), of.command(name), []
+        if plant["kind"] == "unicycle":
+            now = np.append(steered[0] - [plant["hand_point_m"], 0.0, 0.0], 0.0)
+            for k in range(len(of.t)):
+                heading, since = now[3:], of.t[k : k + 1] - of.t[max(k - 1, 0)]
+                now = unicycle_m(steered[k : k + 1], heading, command[k : k + 1], since, plant["hand_point_m"], period)[
+                    0
+                ]
+                bodies.append(now)
+            columns = ["body_x_m", "body_y_m", "body_z_m", "heading_rad"]
+        else:
+            velocity = following_m_s(command, np.diff(of.t), plant["time_constant_s"])
+            bodies = [*np.hstack([steered - plant["time_constant_s"] * velocity, velocity])]
+            columns = [f"body_{axis}_m" for axis in "xyz"] + [f"body_v{axis}_m_s" for axis in "xyz"]
+        table = table.assign(**{f"{name}.{key}": np.array(bodies)[:, i] for i, key in enumerate(columns)})
+    return replace(of, meta=meta, states=table)
+
+
+UNICYCLE: dict[str, Any] = {"kind": "unicycle", "hand_point_m": 0.2}
+
+
+@pytest.mark.slow
+def test_bodies_of_unicycles_keep_their_distances_and_the_law_keeps_them(run: Simulations, workshop: Workshop) -> None:
+    few = short(turning(run("case_a", "d"), **UNICYCLE), 20)
+    distances, law, _ = prove(workshop, few)
+    assert (distances.proved, distances.why) == (True, "")
+    assert (law.proved, law.why, law.entries) == (True, "", 12)
+    said = (workshop.folder / "run_d.v").read_text(encoding="utf-8")
+    assert "(3 / 2) <= norm (sub (x ugv1 t) (x obstacle_1 t)) /\\" in said
+    assert "In corners wall_1_ground -> hull" in said
+    said = (workshop.folder / law.file).read_text(encoding="utf-8")
+    assert re.search(r"^Entry 0 19 \(Together \(b ugv1\) \(b obstacle_1\) points .* \(3 / 2\)\)", said, re.M)
+
+
+@pytest.mark.slow
+def test_bodies_with_a_lag_keep_their_distances_and_the_law_is_judged_of_the_others(
+    run: Simulations, workshop: Workshop
+) -> None:
+    few = short(turning(run("case_a", "d"), kind="lag", time_constant_s=0.2), 20)
+    distances, law, _ = prove(workshop, few)
+    assert (distances.proved, law.proved, law.entries) == (True, True, 3), "the UAV has no lag"
+
+
+def test_room_comes_from_the_numbers_of_a_plant(run: Simulations) -> None:
+    few = short(turning(run("case_a", "d"), **UNICYCLE), 20)
+    chords, steered = recorded(few), recorded(few, steered=True)
+    speed, h = few.scenario.ugvs["ugv1"].max_speed_m_s, few.scenario.control.period_s
+    half = math.asin(speed * h / 0.4)
+    dip = speed * h * half / (4.0 * math.sin(half) / half)
+    assert float(chords.off_m["ugv1"]) == pytest.approx(dip, rel=1e-9)
+    assert float(steered.off_m["ugv1"]) == pytest.approx(0.2 + dip, rel=1e-9)
+    assert "uav" not in chords.off_m
+    apart = np.linalg.norm(few.body("ugv1") - few.position("ugv1"), axis=1)
+    assert (apart <= float(steered.off_m["ugv1"])).all()
+    [pair] = [each for each in steered.demands if each.lemma == f"{UGV}_and_{ROCK}"]
+    assert (
+        pair.body_m + steered.off_m["ugv1"] <= pair.safe_m <= pair.body_m + steered.off_m["ugv1"] + Fraction(1, 10**12)
+    )
+
+
+EDITS_OF_BODIES: list[tuple[Callable[[str], str], str]] = [
+    (lambda text: re.sub(r"(_off \(i : nat\) : R := nth i \[.*?)\(\d+ / \d+\)", r"\g<1>0", text), "other lengths"),
+    (lambda text: text.replace("((3 / 2) <= norm (sub (x ugv1 t)", "(1 <= norm (sub (x ugv1 t)"), "about bodies"),
+    (
+        lambda text: text.replace(
+            "Hypothesis near_lines : forall i t,", "Hypothesis near_lines : False /\\ forall i t,"
+        ),
+        "about",
+    ),
+    (lambda text: text.replace("bodies_keep_their_distances", "bodies_keep"), "0 times; wanted: once"),
+]
+
+
+@pytest.mark.parametrize(("edit", "why"), EDITS_OF_BODIES)
+def test_a_file_that_says_something_else_of_bodies_is_refused(
+    edit: Callable[[str], str], why: str, run: Simulations
+) -> None:
+    few = short(turning(run("case_a", "d"), **UNICYCLE))
+    text = distances_file(recorded(few))
+    compare(text, few)
+    assert edit(text) != text
+    with pytest.raises(ReadbackError, match=why):
+        compare(edit(text), few)
