@@ -183,6 +183,8 @@ COVERED = frozenset(
     | {"moves", "known_motion", "cells", "plant"}
 )
 """Keys of bodies that theorems take into account, or need not."""
+PLANTS = frozenset({"first_order", "unicycle", "lag", "delay"})
+"""Kinds of plants that `slack` knows."""
 
 
 def refuse_unknown(trace: Trace) -> None:
@@ -197,6 +199,9 @@ def refuse_unknown(trace: Trace) -> None:
             default = default if key.default_factory is MISSING else key.default_factory()
             if key.name not in COVERED and given != default:
                 raise TraceError(f"run {trace.run}: {name} has {key.name}; no theorem is about such a body")
+        for plant in getattr(body, "plant", ()):
+            if plant.kind not in PLANTS:
+                raise TraceError(f"run {trace.run}: {name} has the plant {plant.kind}; no theorem is about such a body")
 
 
 def _centre(obstacle: Obstacle) -> Place:

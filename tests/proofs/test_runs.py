@@ -431,6 +431,14 @@ def test_room_comes_from_the_numbers_of_a_plant(run: Simulations) -> None:
     )
 
 
+def test_a_plant_that_nobody_has_thought_of_is_refused(run: Simulations, monkeypatch: pytest.MonkeyPatch) -> None:
+    few = short(turning(run("case_a", "d"), **UNICYCLE))
+    recorded(few)
+    monkeypatch.setattr(export, "PLANTS", export.PLANTS - {"unicycle"})
+    with pytest.raises(TraceError, match=r"^run d: ugv1 has the plant unicycle; no theorem is about such a body$"):
+        recorded(few)
+
+
 EDITS_OF_BODIES: list[tuple[Callable[[str], str], str]] = [
     (lambda text: re.sub(r"(_off \(i : nat\) : R := nth i \[.*?)\(\d+ / \d+\)", r"\g<1>0", text), "other lengths"),
     (lambda text: text.replace("((3 / 2) <= norm (sub (x ugv1 t)", "(1 <= norm (sub (x ugv1 t)"), "about bodies"),
