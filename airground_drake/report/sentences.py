@@ -116,6 +116,7 @@ SENTENCES = {
     "matches": "✓ {matched} of {all} results match{how}.",
     # Do not conclude that
     "real": "real vehicles are safe: the model is first-order, its sensing perfect",
+    "real_plants": "real vehicles are safe: those here never slip, lag exactly as declared, and sense perfectly",
     "elsewhere": "{who} also safe elsewhere: that was only seen in these runs",
     "beside_movers": "a robot can keep its distance from {who}: what moves can come as near as it likes",
     "other_starts": "{who} also arrive from other starts or with other seeds: arrival is seen, not proved",

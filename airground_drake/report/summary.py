@@ -209,7 +209,9 @@ def _interventions(document: Document, course: RunOutcome) -> str:
 
 def _beware(document: Document, every: Sequence[RunOutcome]) -> list[str]:
     main = [course for course in every if course.plain] or every
-    told = [clause("real")]
+    robots = [*document["scenario"]["resolved"]["ugvs"].values(), document["scenario"]["resolved"]["uav"]]
+    plants = [plant for robot in robots for plant in robot.get("plant", ())]
+    told = [clause("real_plants") if any(plant["kind"] != "first_order" for plant in plants) else clause("real")]
     if seen := [course for course in main if course.safe and not (course.proof and course.proof.holds)]:
         told.append(clause("elsewhere", who=subject(seen, main)))
     if movers := list(dict.fromkeys(name for course in main for name in course.movers)):
