@@ -16,7 +16,8 @@ from airground_drake.intervention.messages import accepted_proposals
 from airground_drake.intervention.policy import Proposal
 from airground_drake.nsbc.avoidance import Avoidance
 from airground_drake.systems.lifetime import weakly
-from airground_drake.systems.signals import declare_bodies, no_proposals
+from airground_drake.systems.signals import declare_bodies, declare_headings, no_proposals
+from airground_drake.world.steering import steer_all
 from airground_drake.world.world import ROBOTS, World
 
 INEQUALITY_TOLERANCE_M_S = 1e-9
@@ -59,6 +60,7 @@ class Sample:
     positions: Array
     reference: Array | None
     commands_before: Array
+    headings: Array | None = None
 
 
 @dataclass(frozen=True)
@@ -96,7 +98,8 @@ class Monitor(LeafSystem):
 
     Ports (n UGVs, r robots, M bodies that move, world frame):
         in  `bodies` (3M) m; `team_command` (3r) m/s; for the laws: `reference` (6n): preset positions m,
-            then velocities m/s; `proposals` abstract, n of Proposal or None; `answers` (2n), see `messages`.
+            then velocities m/s; `proposals` abstract, n of Proposal or None; `answers` (2n), see `messages`. With
+            unicycles `headings` (n), rad: their commands are compared with the law's as these can do them.
         out `violation` (5): 1 from the first violation on, else 0; then its control sample, s, the robot's index in
             the order of the world, the `Rule`, the amount, m/s (-1 each before a violation).
     State: abstract, a `Memory`.
@@ -123,7 +126,7 @@ class Monitor(LeafSystem):
         self._world, self._robots, self._ugvs, self._uav = world, world.robots, world.select("ugv"), world.select("uav")
         self._near = world.around(world.select(*ROBOTS))
         self._avoidance, self._laws, self._terminate = avoidance, laws, terminate
-        self._bodies = declare_bodies(self, world)
+        self._bodies, self._headings = declare_bodies(self, world), declare_headings(self, world)
         self._command = self.DeclareVectorInputPort("team_command", 3 * len(world.robots))
         self._reference = self.DeclareVectorInputPort("reference", 6 * n)
         self._proposals = self.DeclareAbstractInputPort("proposals", no_proposals(n))
@@ -153,7 +156,8 @@ class Monitor(LeafSystem):
         found = None if memory.sample is None else self._first(context, memory.sample)
         reference = self._reference.Eval(context).copy() if self._reference.HasValue(context) else None
         positions, commands = (port.Eval(context).reshape(-1, 3).copy() for port in (self._bodies, self._command))
-        sample = Sample(context.get_time(), positions, reference, commands)
+        headings = None if self._headings is None else self._headings.Eval(context).copy()
+        sample = Sample(context.get_time(), positions, reference, commands, headings)
         state.get_mutable_abstract_state(int(self._memory)).set_value(Memory(sample, found))
         if found is not None and self._terminate:
             what = f"{self._robots[found.robot]} breaks {found.rule.name} by {found.amount_m_s:.3g} m/s"
@@ -191,6 +195,9 @@ class Monitor(LeafSystem):
         if sample.reference is not None and all(port.HasValue(context) for port in ports):
             accepted = accepted_proposals(self._proposals.Eval(context), self._answers.Eval(context))
             reference, rate = sample.reference.reshape(2, -1, 3)
-            due[self._ugvs] = laws.ugvs(sample.t, sample.positions, reference, rate, accepted)
+            wished = laws.ugvs(sample.t, sample.positions, reference, rate, accepted)
+            if sample.headings is not None and self._world.steering is not None:
+                steer_all(wished, sample.headings, self._world.steering, self._avoidance.period)
+            due[self._ugvs] = wished
         due[self._uav] = laws.uav(sample.t, sample.positions, sample.commands_before[self._ugvs])
         return due

@@ -19,6 +19,7 @@ from airground_drake.run.simulation import simulate
 from airground_drake.run.trace import Trace
 from airground_drake.scenarios.load import load
 from airground_drake.scenarios.schema import Ugv
+from airground_drake.systems.diagram import build_diagram, make_monitor
 from airground_drake.systems.plant import steered_plant
 from airground_drake.verify import judge
 from airground_drake.verify.engines.bodies import law_m, room_of
@@ -210,15 +211,39 @@ def test_a_body_that_does_not_follow_its_plant_is_an_error(plant: str, column: s
     assert verdict.status == "error"
 
 
-@pytest.mark.parametrize("less", [0.0, 0.5])
-def test_a_law_that_leaves_out_what_the_plant_takes_is_found(monkeypatch: pytest.MonkeyPatch, less: float) -> None:
+@pytest.mark.parametrize("share", [0.0, 0.5])
+@pytest.mark.parametrize(
+    ("plant", "kind", "term"),
+    [
+        (UNICYCLE, Unicycle, "cover_m"),
+        (UNICYCLE, Unicycle, "dip_m"),
+        (LAG, Lag, "lag_s"),
+        (DELAYED_LAG, Delay, "lag_s"),
+    ],
+)
+def test_a_law_that_leaves_out_a_term_or_half_of_it_is_found(
+    monkeypatch: pytest.MonkeyPatch, plant: str, kind: type, term: str, share: float
+) -> None:
     """SAFE-HYP compares the distances of the controllers with the budget, written again."""
-    bounds = Unicycle.bounds
-    monkeypatch.setattr(
-        Unicycle, "bounds", lambda self, speed: bounds(self, speed)._replace(cover_m=less * self.hand_m)
-    )
-    (verdict,) = judge(run_of(UNICYCLE, "duration_s=1.0"), ["SAFE-HYP"])
+    bounds = kind.bounds  # type: ignore[attr-defined]
+
+    def less(self: Unicycle | Lag | Delay, speed: float) -> Bounds:
+        found: Bounds = bounds(self, speed)
+        return found._replace(**{term: share * getattr(found, term)})
+
+    monkeypatch.setattr(kind, "bounds", less)
+    (verdict,) = judge(run_of(plant, "duration_s=0.5"), ["SAFE-HYP"])
     assert verdict.status == "refuted"
+
+
+def test_a_monitor_knows_what_unicycles_can_do() -> None:
+    scenario = load("case_a_unicycle")  # its first commands are shortened to a tenth
+    monitor = make_monitor(scenario, "a")
+    diagram = build_diagram(scenario, "a", monitor=monitor)
+    simulator = Simulator(diagram)
+    simulator.get_mutable_context().SetAccuracy(1e-6)
+    simulator.AdvanceTo(1.0)
+    assert monitor.violation(monitor.GetMyContextFromRoot(simulator.get_context())) is None
 
 
 @pytest.mark.parametrize(
