@@ -30,7 +30,7 @@ class Effort:
         expansions: expanded intervals in all searches for single robots, times the number of robots by 20 if there are
             more; a quarter is reserved for a partial plan.
         candidates: moves that the search over joint steps considers; 0: no such search.
-        searches: searches for single robots that improve a complete plan, times the number of robots.
+        searches: searches for single robots that improve a complete plan, times the number of robots, at least 20.
     """
 
     expansions: int = 400_000
@@ -251,7 +251,7 @@ class _Search:
         if None in free or None in own:
             return
         better = Refinement(movers, own, free, self._taken(), self._follow)
-        better.run(self._effort.searches * len(able), self._left())
+        better.run(self._effort.searches * max(20, len(able)), self._left())
         self.spent += better.expansions
         for i, way in zip(able, better.ways, strict=True):
             ways[i] = way

@@ -2,18 +2,22 @@
 
 Some ways are taken out and found anew, one after the other, each among all other ways. The new ways are kept if the sum
 of the times at which robots are back on their presets falls. The neighbourhoods are: all robots, in the order in which
-they are back; each robot alone; a late robot and those in its way.
+they are back; each robot alone; a late robot and those in its way; all robots in drawn orders.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
+import numpy as np
+
 from airground_drake.intervention.coordination.single import Mover, OtherRobot, Way, find
 from airground_drake.intervention.coordination.timed import distance
 
 GAIN_S = 1e-3
 """A change must lower the sum of times by more than this, s."""
+DRAWN = 3
+"""Number of drawn orders in which all robots are planned for anew."""
 MOST_IN_THE_WAY = 6
 """Largest number of robots in the way of a late one that are planned for anew with it."""
 
@@ -70,6 +74,9 @@ class Refinement:
                 in_vain.add(first)
             else:
                 in_vain.clear()
+        random = np.random.default_rng(0)
+        for _ in range(DRAWN):
+            yield random.permutation(len(self.ways)).tolist()
 
     def _late(self, i: int) -> float:
         """How much later a robot is back than it would be without the others, s."""
