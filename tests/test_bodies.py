@@ -123,7 +123,7 @@ def test_a_pair_has_one_distance_wherever_users_see_it(ends_at: float, gap_m: fl
     assert (f"ugv1 comes within {told} of rock" if gap_m > 0.0 else "ugv1 collides with rock") in first
     assert gap_m < 0.0 or "required 1.25 m" in first
     drawn = page(report, draw(given, traces), None)
-    assert f"minimum {told.removesuffix(' (overlap)')} to rock" in drawn
+    assert f"{told.removesuffix(' (overlap)')}, not 1.25 m, from rock at" in drawn
     cells = (f'<td class="n">{gap_m:.4f}</td>', '<td class="n">1.25</td>')
     rows = [row for row in drawn.split("<tr") if "<td>ugv1</td><td>rock</td>" in row]
     assert rows

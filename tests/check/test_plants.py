@@ -52,18 +52,19 @@ def test_the_checker_comes_to_the_same_verdicts(name: str, duration_s: float) ->
 
 
 @pytest.mark.parametrize(
-    ("name", "column"),
+    ("name", "column", "rule"),
     [
-        ("turtlebots", "burger.heading_rad"), ("turtlebots", "tb4.body_x_m"), ("lagging", "cart1.body_vx_m_s"),
-        ("lagging", "cart2.body_y_m"), ("lagging", "uav.body_z_m"),
+        ("turtlebots", "burger.heading_rad", "heading"), ("turtlebots", "tb4.body_x_m", "place"),
+        ("lagging", "cart1.body_vx_m_s", "velocity"), ("lagging", "cart2.body_y_m", "place"),
+        ("lagging", "uav.body_z_m", "place"),
     ],
 )  # fmt: skip
-def test_a_forged_body_is_found(name: str, column: str) -> None:
+def test_a_forged_body_is_found(name: str, column: str, rule: str) -> None:
     trace, _ = run_of(name, 2.0)
     states = trace.states.copy()
     states.loc[20, column] += 1e-6
     run, robot = checked(trace, states), column.partition(".")[0]
-    with pytest.raises(Disagreement):
+    with pytest.raises(Disagreement, match=f"{rule} of a body"):
         _moves_as_commanded(run, robot)
 
 

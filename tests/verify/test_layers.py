@@ -13,7 +13,8 @@ import airground_drake
 PACKAGE = Path(airground_drake.__file__).parent
 ALLOWED: dict[str, set[str]] = {
     "engines": {
-        "base.arrays", "base.interruption", "base.statuses", "verify.engines", "verify.finding", "world.motion",
+        "base.arrays", "base.interruption", "base.statuses", "scenarios.schema", "verify.engines", "verify.finding",
+        "world.motion",
     },
     "runs": {
         "base.arrays", "base.errors", "base.exact", "run.collisions", "run.tables", "run.trace", "scenarios.plants",
