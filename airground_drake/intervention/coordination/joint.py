@@ -15,6 +15,9 @@ from airground_drake.intervention.coordination.single import Mover, OtherRobot, 
 from airground_drake.intervention.coordination.smoothing import smooth
 from airground_drake.intervention.coordination.timed import at_rest
 
+REORDERED, REORDERED_SHARE = 40, 10
+"""No further order of the robots begins after so many searches for single robots, or one part in ten of the effort.
+Where another order of few robots succeeds, its plan is better than one from joint steps."""
 LEAVING = 2.0
 """A robot leaves its place within the time in which it travels this many times the distance that robots keep."""
 
@@ -76,9 +79,10 @@ def plan(
     1. The robots are planned for in turn, the longest way first, each among the ways of those before it. If a robot
        finds no way, every robot keeps clear of the starts of later robots until these can have left.
     2. If that fails, robots without a way even alone are left where they are, and the others are planned for again.
-    3. If that fails too, joint steps of these robots are searched on coarse roadmaps (`first_plan`).
-    4. A plan for all of them is improved (`neighbourhoods`).
-    5. Without one, robots that find no way stay where they are, and the others go round them.
+    3. If that fails too, further orders are tried for a short while: who found no way comes first in the next one.
+    4. If these fail, joint steps of the robots are searched on coarse roadmaps (`first_plan`).
+    5. A plan for all of them is improved (`neighbourhoods`).
+    6. Without one, robots that find no way stay where they are, and the others go round them.
 
     Args:
         space: discs and distances for a robot without a body.
@@ -133,7 +137,7 @@ class _Search:
 
     def __init__(self, movers: list[Mover], fixed: tuple[OtherRobot, ...], follow: float, effort: Effort) -> None:
         self._movers, self._fixed, self._follow, self._effort = movers, fixed, follow, effort
-        self.spent, self.candidates = 0, 0
+        self.spent, self._searches, self.candidates = 0, 0, 0
         self.outcome: Outcome = "effort spent"
         self._most = effort.expansions * max(20, len(movers)) // 20
         self._limit = self._most * 3 // 4
@@ -141,13 +145,15 @@ class _Search:
 
     def complete(self) -> list[Way | None] | None:
         """A plan for all robots that have a way alone, or None."""
-        ways, failed = self._in_either_way()
+        ways, failed = self._in_either_way(self._by_length(self._without_way))
         if failed is not None:
             before = len(self._without_way)
             self._alone()
             if len(self._without_way) > before:
-                ways, failed = self._in_either_way()
+                ways, failed = self._in_either_way(self._by_length(self._without_way))
         able = self._able()
+        if failed is not None and len(able) > 1:
+            ways, failed = self._in_other_orders(failed)
         if failed is not None and len(able) > 1:
             ways, failed = self._joint_steps(able)
         if failed is not None:
@@ -187,13 +193,29 @@ class _Search:
         """The robots that are not asked, and those without a way."""
         return [*self._fixed, *(_resting(self._movers[i].task) for i in self._without_way)]
 
-    def _in_either_way(self) -> tuple[list[Way | None], int | None]:
+    def _in_either_way(self, order: Sequence[int]) -> tuple[list[Way | None], int | None]:
         """Plan in one order, plainly and then considerately: ways, and the first robot without a way, or None."""
-        order = self._by_length(self._without_way)
         ways, failed = self._in_order(order, self._without_way)
         if failed is not None and failed != order[0]:
             ways, failed = self._in_order(order, self._without_way, considerate=True)
         return ways, failed
+
+    def _in_other_orders(self, failed: int) -> tuple[list[Way | None], int | None]:
+        """Plan in more orders, as `_in_either_way`: each time, the robot without a way comes first in the next one."""
+        ways: list[Way | None] = [None] * len(self._movers)
+        first = failed
+        order, tried = self._by_length(self._without_way), set()
+        most, limit = self._searches + REORDERED, self.spent + self._most // REORDERED_SHARE
+        while self._searches < most and self.spent < limit:
+            tried.add(tuple(order))
+            order = [first, *(i for i in order if i != first)]
+            if tuple(order) in tried:
+                break
+            ways, now = self._in_either_way(order)
+            if now is None:
+                return ways, None
+            first = now
+        return ways, first
 
     def _by_length(self, but: Sequence[int]) -> list[int]:
         """The robots, the longest way first, without some."""
@@ -215,6 +237,7 @@ class _Search:
         for k, i in enumerate(order):
             brief = [self._leaving(j) for j in order[k + 1 :]] if considerate else []
             way, spent = find(self._movers[i], taken, self._follow, self._left(), brief)
+            self._searches += 1
             self.spent += spent
             if way is None:
                 return ways, i

@@ -127,6 +127,18 @@ def test_deadlocks_are_resolved(
     assert_keeps_distances(room, tasks, found, 1.0, [])
 
 
+def test_a_dense_team_is_planned_for_in_another_order() -> None:
+    """Four in a yard, where the order by length fails; without joint steps, only another order gives all a way."""
+    corners = [(-0.7, -0.7), (2.9, -0.7), (2.9, 2.9), (-0.7, 2.9)]
+    walls = [wall(a, b) for a, b in zip(corners, [*corners[1:], corners[0]], strict=True)]
+    room = Space(outline.stacked(walls), np.full(4, 0.5), 0.1, 0.8, 0.2)
+    starts, targets = [(0.5, 0.9), (1.7, 1.9), (2.0, 0.9), (0.2, 2.1)], [(0.6, 0.8), (2.0, 0.3), (1.9, 2.1), (1.2, 0.0)]
+    tasks = [task(*way) for way in zip(starts, targets, strict=True)]
+    found = plan(room, tasks, [2.4] * 4, effort=Effort(candidates=0))
+    assert found.outcome == "complete"
+    assert_keeps_distances(room, tasks, found, 2.4, [])
+
+
 def test_who_finds_no_way_stays_and_is_gone_round() -> None:
     cage = [(-8.0 + 2.5 * math.cos(a), 2.5 * math.sin(a)) for a in np.linspace(0.0, 2.0 * math.pi, 9)[:-1]]
     tasks = [task((-8.0, 0.0), (8.0, 0.0)), task((4.0, 0.0), (-2.0, 0.0))]
