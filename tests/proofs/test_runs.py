@@ -337,7 +337,7 @@ def test_the_command_proves_a_report_and_writes_down_what_it_found(
     assert main(["prove", str(report), "--run", "d"]) == 1
     said = capsys.readouterr().out
     assert f"run d: all 12 distances kept at all times: not proved: {REFUSED}" in said
-    assert sorted(path.name for path in (report / "proofs").iterdir()) == ["proofs.json", "run_d.v"]
+    assert sorted(path.name for path in (report / "proofs").iterdir()) == ["proofs.json", "run_d.v", "run_d_law.v"]
 
 
 def test_what_cannot_be_proved_for_want_of_coq_or_of_files_is_said(
