@@ -175,7 +175,7 @@ def test_a_queue_along_an_axis_is_squeezed() -> None:
     data["gatekeeper"] |= {"period_s": 0.1, "stages": 30}
     data["intervention"]["period_s"] = 0.1
     data["decision"] |= {"noise_period_s": 0.05, "threshold": {"zeta_m": 2.0}}
-    trace = simulate(from_data(data | {"duration_s": 9.5}, "queue"), "d")
+    trace = simulate(from_data(data | {"duration_s": 14.0}, "queue"), "d")
     assert trace.decisions["refuse_left_m"].max() > 1e3
     assert not faults_of(trace)
 
