@@ -3,8 +3,10 @@
     python benchmarks/planner.py                      # dead ends, alcoves, packed rooms, circles, fields, rooms, maps
     python benchmarks/planner.py --only deadend4 sealed
     python benchmarks/planner.py --random 120 --moving 1
+    python benchmarks/planner.py --runs 60 --only deadend5 rooms27-0
 
-Robots have targets only: their presets are over. The planner is called once, from the starts. Distances are measured by
+Robots have targets only: their presets are over. The planner is called once, from the starts; with `--runs` whole
+scenarios are simulated under (d), with presets straight to the targets. Distances are measured by
 this script. CPU times depend on the machine; compare those of one run. To measure another version of the package, put
 its folder first on the path: `PYTHONPATH=DIR python benchmarks/planner.py`.
 """
@@ -25,6 +27,8 @@ from airground_drake.geometry import outline
 from airground_drake.intervention.coordination.joint import plan
 from airground_drake.intervention.coordination.roadmap import RobotTask, Space
 from airground_drake.intervention.coordination.single import OtherRobot
+from airground_drake.run.simulation import simulate
+from airground_drake.scenarios.load import from_data
 
 Array = npt.NDArray[np.float64]
 Point = Sequence[float]
@@ -297,6 +301,31 @@ def measured(
     return len(times), sum(times), max(times, default=0.0), cpu, worst, str(getattr(found, "outcome", found.complete))
 
 
+def simulated(name: str, of: Team, duration_s: float) -> tuple[list[float], float]:
+    """Times of arrival, s, in a whole run under (d) with `coordinate`, and its CPU time, s."""
+    space, tasks, _ = of
+    ugvs, middle = {}, [*np.mean([task.start for task in tasks], axis=0).tolist(), 3.0]
+    for k, task in enumerate(tasks):
+        start, target = ([*map(float, place), 0.0] for place in (task.start, task.preset[-1, 1:]))
+        end = target if math.dist(start, target) > 1e-3 else [target[0] + 1e-3, *target[1:]]
+        preset = {"waypoints_m": [start, end], "speed_m_s": 1.0}
+        ugvs[f"ugv{k + 1}"] = {"start_m": start, "target_m": target, "preset": preset, "max_speed_m_s": SPEED_M_S / 0.8}
+    places = space.rows[:, outline.MIDDLE : outline.EXTENT].tolist()
+    data = {
+        "name": name.replace("-", "_"), "duration_s": duration_s, "ugvs": ugvs, "runs": {"d": {"method": "d"}},
+        "uav": {"start_m": middle, "target_m": middle, "altitude_m": middle[2]},
+        "obstacles": {f"o{k}": {"position_m": [*place, 0.0]} for k, place in enumerate(places)},
+        "safe_distance": {"obstacle_m": float(space.keep[0]), "ugv_m": APART_M, "air_ground_m": 0.8},
+        "decision": {"threshold": {"zeta_m": 1.0}, "release_m": 0.5},
+        "intervention": {"policies": [{"name": "coordinate"}]},
+    }  # fmt: skip
+    scenario, begin = from_data(data, name), time.process_time()
+    trace = simulate(scenario, "d")
+    cpu = time.process_time() - begin
+    arrivals = (event for event in trace.events if event["kind"] == "arrival")
+    return [event["t_s"] for event in arrivals if event["robot"] in ugvs], cpu
+
+
 def main() -> None:
     """Print a table of instances, or the sums over random teams and every team that lost a robot."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -304,6 +333,7 @@ def main() -> None:
     parser.add_argument("--random", type=int, default=0, metavar="N", help="number of random teams")
     parser.add_argument("--first", type=int, default=0, metavar="SEED", help="seed of the first of them")
     parser.add_argument("--moving", type=int, default=0, help="robots with known motions that cross")
+    parser.add_argument("--runs", type=float, default=0.0, metavar="SECONDS", help="simulate whole runs of that length")
     given = parser.parse_args()
     measured(*dead_end(3))  # compiles
     if given.random:
@@ -315,6 +345,16 @@ def main() -> None:
             if ways < len(tasks) or worst > 2e-9:
                 print(f"seed {seed}: {ways} of {len(tasks)}, {outcome}, shortfall {worst:.1e} m", flush=True)
         print("{:.0f} robots, {:.0f} with a way, sum of times {:.1f} s, CPU {:.1f} s".format(*sums))
+        return
+    if given.runs:
+        print("| instance | robots | arrive | last, s | CPU, s |\n| --- | --- | --- | --- | --- |")
+        for name in given.only:
+            instance = INSTANCES[name]()
+            times, cpu = simulated(name, instance, given.runs)
+            print(
+                f"| {name} | {len(instance[1])} | {len(times)} | {max(times, default=0.0):.1f} | {cpu:.1f} |",
+                flush=True,
+            )
         return
     print("| instance | robots | with a way | sum, s | last, s | CPU, s | outcome | shortfall, m |")
     print("| --- | --- | --- | --- | --- | --- | --- | --- |")

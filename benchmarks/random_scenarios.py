@@ -1,11 +1,12 @@
 """Random scenarios: `python benchmarks/random_scenarios.py -n 500 [--only 17] [--rows FILE]`.
 
-Draws scenarios (1 to 12 UGVs, 0 to 12 obstacles of all shapes that stand, move, appear or disappear, all methods,
-compositions, periods, triggers, thresholds, routes and policies), simulates the valid ones, and judges each run by its
-claims, by the oracles of the tests and by the independent checker, which gets a report folder of the run. The simulator
-must not stop, no claim may be an `error`, no oracle may find a fault, the checker must agree with every verdict about
-the run, and claims must hold that theorems promise for the run. Prints each scenario that breaks this, by its number,
-which draws it again, and how much was exercised. Exit code 1 if there is such a scenario.
+Draws scenarios (1 to 12 UGVs, in every other scenario with plants, 0 to 12 obstacles of all shapes that stand, move,
+appear or disappear, all methods, compositions, periods, triggers, thresholds, routes and policies), simulates the valid
+ones, and judges each run by its claims, by the oracles of the tests and by the independent checker, which gets a report
+folder of the run. The simulator must not stop, no claim may be an `error`, no oracle may find a fault, the checker must
+agree with every verdict about the run, and claims must hold that theorems promise for the run. Prints each scenario
+that breaks this, by its number, which draws it again, and how much was exercised. Exit code 1 if there is such a
+scenario.
 
 Claims about the model are left out: they take longer than all the rest. `--reports` also writes each whole report and
 has `airground check` make it again. `--coq` also has Coq prove the distances of runs without obstacles that appear or
@@ -113,7 +114,8 @@ def draw(number: int, most_ugvs: int = 12) -> dict[str, Any]:
     speed = float(rng.choice([0.5, 1.0, 3.0]))
     d, between, beside = (float(rng.choice([0.5, 1.0, 2.0])) for _ in range(3))
     radii, size = _radii(number, n + m + 1), float(rng.choice([0.0, 0.5, 2.0]))
-    both, own = sum(sorted(radii)[-2:]), float(rng.choice([0.0, 0.3, 3.0]))
+    plants, room_m = _plants(number, n, h, speed)
+    both, own = sum(sorted(radii)[-2:]) + room_m, float(rng.choice([0.0, 0.3, 3.0]))
     apart = max(d, between, own) + both
     extent = 4.0 + 1.5 * (n + m) ** 0.5 * (apart + size)
     starts = _apart(rng, n, extent, apart)
@@ -129,6 +131,7 @@ def draw(number: int, most_ugvs: int = 12) -> dict[str, Any]:
             "preset": {"waypoints_m": [[*p, 0.0] for p in way], "speed_m_s": speed * float(rng.choice([0.3, 1.0]))},
             "max_speed_m_s": speed,
             "radius_m": radii[i],
+            "plant": plants[i],
         }
     parameters: dict[str, dict[str, float]] = {
         "detour": {"speed_m_s": speed}, "stale_map": {"speed_m_s": speed}, "hostile": {"speed_m_s": speed},
@@ -155,7 +158,7 @@ def draw(number: int, most_ugvs: int = 12) -> dict[str, Any]:
         "ugvs": ugvs,
         "uav": {
             "start_m": start, "target_m": [0.0, 3.0 * extent, 3.0 + both], "altitude_m": height,
-            "max_speed_m_s": 2.0 * speed, "radius_m": radii[-1],
+            "max_speed_m_s": 2.0 * speed, "radius_m": radii[-1], "plant": plants[-1],
         },
         "obstacles": obstacles,
         "arena_m": arena if rng.random() < 0.25 else [],
@@ -251,6 +254,28 @@ def _radii(number: int, count: int) -> list[float]:
     rng = np.random.default_rng([20261123, number])
     largest = rng.choice([0.0, 0.0, 0.3, 3.0])
     return [round(float(r), 3) for r in largest * rng.random(count) * (rng.random(count) < 0.7)]
+
+
+def _plants(number: int, count: int, h: float, speed: float) -> tuple[list[list[dict[str, Any]]], float]:
+    """Plants of UGVs, and of the UAV, of which half the scenarios have some; and what two of them take at most, m."""
+    rng = np.random.default_rng([20261127, number])
+    some, lag, late = bool(rng.random() < 0.5), float(rng.choice([0.05, 0.3])), h * float(rng.integers(1, 4))
+    hand = 0.5 * speed * h * float(rng.choice([1.01, 3.0])) + float(rng.choice([0.0, 0.1]))
+    kinds: list[list[dict[str, Any]]] = [
+        [{"kind": "first_order"}],
+        [{"kind": "lag", "time_constant_s": lag}],
+        [{"kind": "delay", "delay_s": late}],
+        [{"kind": "delay", "delay_s": late}, {"kind": "lag", "time_constant_s": lag}],
+    ]
+    limits = {"max_turn_rad_s": float(rng.choice([0.0, 1.0, 5.0]))}
+    if rng.random() < 0.5:
+        limits |= {"wheel_base_m": 0.3, "max_wheel_speed_m_s": 1.2 * speed}
+    found = []
+    for _ in range(count):
+        drive = {"kind": "unicycle", "hand_point_m": hand, "heading_rad": float(rng.uniform(-4.0, 4.0)), **limits}
+        found.append([*kinds, [drive], [drive]][rng.integers(6)] if some else kinds[0])
+    found.append(kinds[rng.integers(4)] if some else kinds[0])
+    return found, some * 2.0 * max(1.2 * hand, 2.0 * speed * (lag + late))
 
 
 def _decision(rng: np.random.Generator, h: float) -> dict[str, Any]:

@@ -221,7 +221,7 @@ def _has_the_map_of(before: Observation, seen: Observation) -> bool:
 
 
 def _stands_as_before(before: Observation, seen: Observation) -> bool:
-    """Whether a UGV stands where it stood, on the same map. If it had no way even alone, it has none now.
+    """Whether a UGV stands where it stood, on the same map. If it had no way even alone, it still has no way.
 
     Waiting cannot open a way: with time there are fewer places at which the preset can be joined.
     """

@@ -68,7 +68,7 @@ def _decoder(encoding: str, schema: Any) -> Decode | None:
 
 
 def _of_ros(encoding: str, schema: Any) -> Decode:
-    """Decode a message of ROS by the definition in the file, or that of the distribution if it has none."""
+    """Decode a message of ROS by the definition in the file, else by that of the distribution."""
     stores, types = _rosbags()
     name = schema.name if "/msg/" in schema.name else schema.name.replace("/", "/msg/", 1)
     store = stores.get_typestore(stores.Stores.ROS1_NOETIC if encoding == "ros1" else stores.Stores.ROS2_HUMBLE)

@@ -50,7 +50,7 @@ class Time(NamedTuple):
 
 
 class Place(NamedTuple):
-    """The columns of a body's coordinates; z is None if there is none."""
+    """The columns of a body's coordinates; z is None without such a column."""
 
     name: str
     x: int
@@ -99,7 +99,7 @@ def columns(labels: Sequence[str], chosen: Mapping[str, str], bodies: Collection
 
 
 def _axis(base: str, bodies: Collection[str]) -> tuple[str, str]:
-    """Name and axis of a column without its unit: `tb1.x`, `tb1_pos_x`, also `x_tb1` of a body; '' if it has none."""
+    """Name and axis of a column without its unit: `tb1.x`, `tb1_pos_x`, also `x_tb1` of a body; else ''."""
     if (found := _AXIS_FIRST.fullmatch(base)) and found[2] in bodies:
         return found[2], found[1].lower()
     found = _AXIS.fullmatch(base)

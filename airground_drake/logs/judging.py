@@ -278,7 +278,7 @@ def _knots(own: Track, other: Track, span: Span) -> Array:
 
 
 def _judged(pair: Pair, own: Track, other: Track, scenario: Json, eps: float, whole: Span) -> JudgedPair | None:
-    """What is found about a pair; None beside what is not there during the log."""
+    """What is found about a pair; None beside an obstacle that is absent during the whole log."""
     if not len(other.t_s):
         return None
     spans = _common(own, other)

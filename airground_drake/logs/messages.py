@@ -118,7 +118,7 @@ class Gathered:
         return topic not in self.unused
 
     def add(self, topic: str, kind: str, received_ns: int, message: Any) -> None:
-        """Take the places of a message; a topic whose first message has none is unused."""
+        """Take the places of a message; a topic whose first message has no place is unused."""
         several = list(places(message))
         if not several and topic not in self.used:
             self.unused[topic] = kind

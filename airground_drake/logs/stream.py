@@ -31,7 +31,7 @@ class Stream:
         name: what the source calls it: a topic, the beginning of columns' names, a value in a column, a file's stem.
         whole: whole units of time, (n,).
         nano: the rest, in billionths of the unit, (n,).
-        places: x, y, z, (n, 3); z is nan where the source has none.
+        places: x, y, z, (n, 3); z is nan where the source lacks it.
         time_unit: key of `PER_S`; '' if the source does not say.
         length_unit: key of `PER_M`; '' likewise.
         frame: coordinate frame, without slashes at the ends; '' if the source does not say.

@@ -196,7 +196,7 @@ def _stream(raw: Stream, why: npt.NDArray[np.object_], lines: list[int], *, is_s
 
 
 def _places(table: text.Table, place: Place) -> tuple[Array, npt.NDArray[np.object_]]:
-    """Coordinates (n, 3), and why a row has none: '' if it has."""
+    """Coordinates (n, 3), and why a row lacks them, else ''."""
     taken = [place.x, place.y, *([] if place.z is None else [place.z])]
     texts = [table.cells[k] for k in taken]
     numbers = np.full((len(table.cells), 3), np.nan)

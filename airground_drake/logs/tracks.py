@@ -41,7 +41,7 @@ class Track:
 
     Attributes:
         t_s: times, (n,).
-        places_m: (n, 3); z is nan if the log has none.
+        places_m: (n, 3); z is nan if the log lacks it.
         gap_s: motion between two samples that are farther apart is unknown.
         told: where it is from: stream, frame and clock.
     """

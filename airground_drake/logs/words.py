@@ -9,7 +9,7 @@ from airground_drake.logs.judging import BROKEN, KEPT, NOT_JUDGED, OPEN, Judged,
 from airground_drake.logs.tracks import Span, Tracks
 
 LEAST_TOLD_M = 0.0005
-"""Smaller approaches are none, m."""
+"""Smaller approaches do not count, m."""
 ELSEWHERE_M = 0.05
 """A robot that starts farther away from its start in the scenario, and from its safe distance, is named, m."""
 FASTER = 1.01

@@ -20,7 +20,7 @@ NOT_MODELLED = {
     r"batter|energy|fuel|power": "energy is not modelled",
     r"wind|weather|slope|terrain": "the ground is flat, and there is no wind",
 }  # fmt: skip
-"""What keys with such names would be about, and why there are none."""
+"""What keys with such names would be about, and why the model lacks it."""
 
 
 def not_modelled(name: str) -> str:
@@ -40,7 +40,7 @@ class Slip(NamedTuple):
 
 
 _NO_SPACE = re.compile(r"\s*(- )?[\w.-]+:[^\s/]")
-"""A key without a space after its colon; `scheme://` is none."""
+"""A key without a space after its colon; `scheme://` does not count."""
 _QUOTES = "wanted: quotes around a text with ': ' or ' #' in it"
 
 

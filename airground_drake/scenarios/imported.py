@@ -20,7 +20,7 @@ from airground_drake.scenarios.document import text_of
 from airground_drake.scenarios.limits import MAX_NAME
 
 MOST_BYTES = 16_000_000
-"""Most bytes of a world, a map or a scenario of others."""
+"""Most bytes of a world, a map or an imported scenario."""
 SPEED_M_S = 1.0
 """Speed of presets."""
 FAITH = 1.5

@@ -140,7 +140,8 @@ class TraceClaim(Claim):
         try:
             others = other_plants(trace)
             if others and not self.any_plant:
-                return Finding("not_run", evidence={"reason": f"the claim is about first-order robots, not {others}"})
+                reason = f"the claim is about the plants of the scenario, not {others}"
+                return Finding("not_run", evidence={"reason": reason})
             if not others:
                 require_motion(trace)
             finding = self.check(trace)

@@ -252,7 +252,7 @@ class _Search:
         return _resting(mover.task)._replace(until=until)
 
     def _joint_steps(self, able: Sequence[int]) -> tuple[list[Way | None], int | None]:
-        """A plan for some robots by joint steps: ways, and one of the robots if there is none."""
+        """A plan for some robots by joint steps: ways and None; without a plan, nothing and one of the robots."""
         ways: list[Way | None] = [None] * len(self._movers)
         movers = [self._movers[i] for i in able]
         if not all(mover.own.usable[-1] for mover in movers):

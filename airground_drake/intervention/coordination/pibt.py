@@ -182,7 +182,7 @@ def give(graph: CoarseGraph, team: Team, step: Step, root: int) -> bool:
             chosen = next_move(graph, team, step, depth)
         else:  # the robot looks for the next one in the way of its move
             chosen = True
-        while not chosen:  # it has none: the robot before takes its next best move
+        while not chosen:  # without a move left, the robot before takes its next best one
             depth -= 1
             if depth < 0:
                 return False
@@ -325,7 +325,7 @@ def sort_moves(graph: CoarseGraph, team: Team, step: Step, i: int, found: Indice
 
 @njit(cache=True)
 def swap_partner(graph: CoarseGraph, team: Team, step: Step, i: int, best: int) -> int:
-    """The robot with which robot i has to change places, and can if it goes back; -1 if there is none.
+    """The robot with which robot i has to change places, and can if it goes back; else -1.
 
     Either it stands where robot i wants to go. Or it stands behind: robot i is at or near its target in a corridor, and
     must come out again to let the other one in.
@@ -364,7 +364,7 @@ def swap_partner(graph: CoarseGraph, team: Team, step: Step, i: int, best: int) 
 
 @njit(cache=True)
 def standing_at(graph: CoarseGraph, team: Team, step: Step, i: int, node: int) -> int:
-    """The robot nearest to a node that keeps robot i from it; -1 if there is none."""
+    """The robot nearest to a node that keeps robot i from it; else -1."""
     places, at, apart = graph.places, step.at, team.apart
     found, least = -1, np.inf
     for j in range(len(at)):

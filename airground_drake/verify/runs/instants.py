@@ -40,7 +40,7 @@ def without_proposals(trace: Trace) -> list[str]:
 
 
 def reasons(trace: Trace) -> dict[str, str]:
-    """Why UGVs got no proposal, as the policy that was asked last said; without those of which none said anything."""
+    """Why UGVs got no proposal, as the last policy that was asked said; UGVs without a reason are left out."""
     said = trace.plans[trace.plans["reason"] != ""].groupby("ugv", sort=False)["reason"].last()
     return {ugv: str(said[ugv]) for ugv in without_proposals(trace) if ugv in said.index}
 
