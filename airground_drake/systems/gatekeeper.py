@@ -73,6 +73,11 @@ class Gatekeeper(LeafSystem):
         self.DeclarePeriodicUnrestrictedUpdateEvent(self._ticks.period, 0.0, weakly(self._update))
 
     @property
+    def judges(self) -> str:
+        """Name of the class that judges the proposals."""
+        return type(self._gatekeepers).__name__
+
+    @property
     def decision_times_s(self) -> list[float]:
         """CPU time of each decision since `reset_timing`, outside the Context: identical runs differ in it."""
         return self._gatekeepers.times_s
