@@ -124,6 +124,7 @@ def _successor(graph: CoarseGraph, team: Team, step: Step, order: Indices, digit
     first, moves, counts = graph.first, step.moves, step.counts
     layer = counts[3]
     moves[:] = -1
+    step.failed[:] = False
     counts[2] = 0
     for k in range(digits[0]):
         i = order[k]
@@ -176,6 +177,7 @@ def _search(
     step = Step(
         np.empty(count, np.int64), np.empty(count, np.int64), np.empty(count, np.int64), np.zeros(5, np.int64),
         np.empty((count, 6), np.int64), np.empty((count, np.diff(first).max()), np.int64),
+        np.zeros(count, np.bool_),
     )  # fmt: skip
     choices, wanted = np.empty(count, np.int64), np.empty(count, np.int64)
     spent = 0

@@ -65,6 +65,7 @@ class Step(NamedTuple):
         counts: candidates so far, largest number of candidates, robots with moves, layer, number of the step, (5,).
         frames: see `give`, (n, 6).
         lists: moves of the robots in the frames, best first, (n, largest number of edges at a node).
+        failed: robots that could not make way for another one, (n,); they are not asked again in this step.
     """
 
     at: Indices
@@ -73,6 +74,7 @@ class Step(NamedTuple):
     counts: Indices
     frames: Indices
     lists: Indices
+    failed: npt.NDArray[np.bool_]
 
 
 @njit(cache=True)
@@ -179,10 +181,11 @@ def give(graph: CoarseGraph, team: Team, step: Step, root: int) -> bool:
                     many = turn_back(graph, team, step, entered, partner, lists[depth, :many])
             frames[depth, 0], frames[depth, 1], frames[depth, 2] = entered, many, -1
             frames[depth, 3], frames[depth, 4] = partner, counts[2]
-            chosen = next_move(graph, team, step, depth)
+            chosen = not (depth > 0 and step.failed[entered]) and next_move(graph, team, step, depth)
         else:  # the robot looks for the next one in the way of its move
             chosen = True
         while not chosen:  # without a move left, the robot before takes its next best one
+            step.failed[frames[depth, 0]] = True
             depth -= 1
             if depth < 0:
                 return False
