@@ -269,8 +269,9 @@ class Planner:
     ) -> list[Negotiation]:
         """Negotiations after the UGVs' answers.
 
-        A proposal is withdrawn if any part of its plan is refused, if its motion is over, or if neither its UGV nor its
-        cause is triggered any more.
+        A proposal is withdrawn if any part of its plan is refused, if its motion is over, or if neither its UGV, nor its
+        cause, nor any party of its joint plan is triggered any more. So a UGV whose part leads it past its preset
+        trajectory goes on: the others' ways were planned with it.
         """
         called = {name for name, one in zip(self.ugvs, intervening, strict=True) if one}
         refused = {talk.proposal.joint for talk, no in zip(talks, said, strict=True) if talk.proposal and no == REFUSE}
@@ -278,7 +279,8 @@ class Planner:
         for name, talk, answer in zip(self.ugvs, talks, said, strict=True):
             proposal = talk.proposal
             party_refused = proposal is not None and bool(proposal.party) and proposal.joint in refused
-            if name not in called and talk.cause not in called:
+            party = proposal.party if proposal else ()
+            if called.isdisjoint((name, talk.cause, *party)):
                 talk = Negotiation()
             elif answer == REFUSE:
                 talk = self.database.after_refusal(talk, t, learnt=learnt)

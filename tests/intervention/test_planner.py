@@ -81,15 +81,21 @@ def test_one_plan_for_all_with_the_cause_of_each() -> None:
     assert len(policy.seen) == 1  # a joint plan answers for all that are in it
 
 
-def test_who_makes_way_does_so_as_long_as_the_cause_needs_it() -> None:
+def test_a_joint_plan_stands_as_long_as_one_party_needs_it() -> None:
     uav = planner(Scripted({"one": wait(9.0), "two": wait(9.0)}))
     memory = step(uav, uav.start(), 1.0, "one")
     memory = step(uav, memory, 1.1, "one two", {"two": ACCEPT})  # it is far from its own preset now
-    memory = step(uav, memory, 1.2, "two", {"two": ACCEPT})
-    assert in_force(memory) == {"two": (1.0, "one")}
+    memory = step(uav, memory, 1.2, "two", {"two": ACCEPT})  # "one" passes its preset on its way
+    assert in_force(memory) == {"one": (1.0, "one"), "two": (1.0, "one")}
     assert in_force(step(uav, memory, 1.3, "")) == {}
     memory = step(uav, uav.start(), 1.0, "one")
     assert in_force(step(uav, memory, 1.1, "")) == {}
+
+
+def test_a_proposal_that_stands_alone_is_withdrawn_when_its_ugv_is_released() -> None:
+    uav = planner(Scripted({"one": wait(9.0)}, {"three": wait(9.0)}))
+    memory = step(uav, step(uav, uav.start(), 1.0, "one"), 1.1, "one three")
+    assert in_force(step(uav, memory, 1.2, "three")) == {"three": (1.1, "three")}
 
 
 def test_one_refusal_withdraws_a_joint_plan_for_all() -> None:

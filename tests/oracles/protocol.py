@@ -169,7 +169,7 @@ def withdrawn_s(trace: Trace, sent: ProposalRecord, *, unless_replaced: bool = F
 
     That is the first instant at which one of these is so:
 
-    - neither the UGV nor its cause is being intervened on;
+    - neither the UGV, nor its cause, nor any party of its joint plan is being intervened on;
     - the motion has run out;
     - another proposal is sent to the UGV (not counted with `unless_replaced`);
     - the UAV has a refusal of it, or of another part of its joint plan.
@@ -185,7 +185,8 @@ def withdrawn_s(trace: Trace, sent: ProposalRecord, *, unless_replaced: bool = F
 def _over(trace: Trace, sent: ProposalRecord, unless_replaced: bool = False) -> tuple[float, bool]:
     """When a proposal is taken back without regard to other parts, s, and whether the UAV has its refusal then."""
     t, period = trace.t, trace.scenario.intervention.period_s
-    called = (trace.column(f"{sent.ugv}.mode") == 1.0) | (trace.column(f"{sent.cause}.mode") == 1.0)
+    who = {sent.ugv, sent.cause, *(part.ugv for part in parts_of(trace, sent))}
+    called = np.any([trace.column(f"{name}.mode") == 1.0 for name in who], axis=0)
     later = [one.issued_s for one in proposals_of(trace) if one.ugv == sent.ugv and one.issued_s > sent.issued_s]
     replaced = np.inf if unless_replaced else min(later, default=np.inf)
     for k in range(round(sent.issued_s / period) + 1, int(t[-1] / period + 1e-6) + 1):
