@@ -2,7 +2,8 @@
 
 Robots get their moves in order of priority (Okumura et al., Priority inheritance with backtracking, Artificial
 Intelligence 2022). Each takes the move that brings it nearest to its target. Robots that could not stay beside that
-move get theirs next, before all others. If one of them finds none, the next best move is tried.
+move get theirs next, before all others. If one of them finds none, the next best move is tried, and this one is not
+asked to make way again in the same step: in a jam, trying all ways to push each other costs more than all steps.
 
 Swap rule (Okumura, Engineering LaCAM*, AAMAS 2024): in a corridor, a robot that has to change places with the robot
 ahead must lead it back to a junction. It then takes the move that leads farthest from its target, and the other one
