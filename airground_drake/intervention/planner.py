@@ -269,8 +269,8 @@ class Planner:
     ) -> list[Negotiation]:
         """Negotiations after the UGVs' answers.
 
-        A proposal is withdrawn if any part of its plan is refused, if its motion is over, or if neither its UGV, nor its
-        cause, nor any party of its joint plan is triggered any more. So a UGV whose part leads it past its preset
+        A proposal is withdrawn if any part of its plan is refused, if its motion is over, or if neither its UGV, nor
+        its cause, nor any party of its joint plan is triggered any more. So a UGV whose part leads it past its preset
         trajectory goes on: the others' ways were planned with it.
         """
         called = {name for name, one in zip(self.ugvs, intervening, strict=True) if one}

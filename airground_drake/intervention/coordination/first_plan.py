@@ -39,7 +39,7 @@ a long search, others of the same robots straight to a plan: beginning anew is w
 AGAIN = 96
 """Number of further plans with shuffled moves, once one is found: on the roadmap that has it, and on the widest two."""
 AGAIN_AT_MOST, AGAIN_SHARE = 2.0, 3
-"""A further plan may cost this many times as much as the first one; all of them, one part in three of the candidates."""
+"""A further plan may cost this many times as much as the first one; all of them, a third of the candidates."""
 WAITING = 0.5
 """What it costs to wait for a step while others with known motions are under way, in widths."""
 MOST_LAYERS, MOST_VALUES = 400, 10_000_000

@@ -18,6 +18,9 @@ from airground_drake.intervention.coordination.timed import at_rest
 REORDERED, REORDERED_SHARE = 40, 10
 """No further order of the robots begins after so many searches for single robots, or one part in ten of the effort.
 Where another order of few robots succeeds, its plan is better than one from joint steps."""
+LATE, LATE_SHARE = 1.4, 30
+"""If a plan by an order takes this many times as long as the robots would alone, a plan by joint steps is made, too,
+within one part in thirty of the candidates; the better one is taken."""
 LEAVING = 2.0
 """A robot leaves its place within the time in which it travels this many times the distance that robots keep."""
 
@@ -81,7 +84,8 @@ def plan(
     2. If that fails, robots without a way even alone are left where they are, and the others are planned for again.
     3. If that fails too, further orders are tried for a short while: who found no way comes first in the next one.
     4. If these fail, joint steps of the robots are searched on coarse roadmaps (`first_plan`).
-    5. A plan for all of them is improved (`neighbourhoods`).
+    5. A plan for all of them is improved (`neighbourhoods`). If it is by an order and takes much longer than the robots
+       would alone, joint steps are searched for a short while, too, and the better plan is taken.
     6. Without one, robots that find no way stay where they are, and the others go round them.
 
     Args:
@@ -127,6 +131,11 @@ def _separated(spaces: Sequence[Space], tasks: Sequence[RobotTask], ways: Sequen
     return tuple(found)
 
 
+def _sum(ways: Sequence[Way | None]) -> float:
+    """Sum of the times at which robots are back on their presets, s."""
+    return math.fsum(way.joined for way in ways if way is not None)
+
+
 def _resting(task: RobotTask) -> OtherRobot:
     """A robot that stays where it is."""
     return OtherRobot(at_rest(task.start), task.body)
@@ -155,11 +164,18 @@ class _Search:
         if failed is not None and len(able) > 1:
             ways, failed = self._in_other_orders(failed)
         if failed is not None and len(able) > 1:
-            ways, failed = self._joint_steps(able)
+            ways, failed = self._joint_steps(able, self._effort.candidates)
+            if failed is None:
+                self._refine(ways, able)
+        elif failed is None and len(able) > 1:
+            alone = self._refine(ways, able)
+            if alone and _sum(ways) > LATE * _sum(alone):
+                others, failed_too = self._joint_steps(able, self._effort.candidates // LATE_SHARE)
+                if failed_too is None:
+                    self._refine(others, able)
+                    ways = min(ways, others, key=_sum)
         if failed is not None:
             return None
-        if len(able) > 1:
-            self._refine(ways, able)
         if self._without_way:
             self.outcome = "exhausted"
         else:
@@ -251,13 +267,13 @@ class _Search:
         until = LEAVING * (mover.space.apart + mover.space.spacing) / mover.speed
         return _resting(mover.task)._replace(until=until)
 
-    def _joint_steps(self, able: Sequence[int]) -> tuple[list[Way | None], int | None]:
+    def _joint_steps(self, able: Sequence[int], candidates: int) -> tuple[list[Way | None], int | None]:
         """A plan for some robots by joint steps: ways and None; without a plan, nothing and one of the robots."""
         ways: list[Way | None] = [None] * len(self._movers)
         movers = [self._movers[i] for i in able]
         if not all(mover.own.usable[-1] for mover in movers):
             return ways, able[0]  # a target is too near to an obstacle
-        found = first_plan(movers, self._taken(), self._effort.candidates)
+        found = first_plan(movers, self._taken(), candidates)
         self.candidates += found.candidates
         if found.outcome != "found":
             self.outcome = found.outcome
@@ -266,18 +282,19 @@ class _Search:
             ways[i] = way
         return ways, None
 
-    def _refine(self, ways: list[Way | None], able: Sequence[int]) -> None:
-        """Improve the ways of some robots, in place."""
+    def _refine(self, ways: list[Way | None], able: Sequence[int]) -> list[Way]:
+        """Improve the ways of some robots, in place; the ways that they would have alone, if all are known."""
         alone = self._alone()
         known = [(self._movers[i], ways[i], alone[i]) for i in able]
         movers, own, free = zip(*known, strict=True)
         if None in free or None in own:
-            return
+            return []
         better = Refinement(movers, own, free, self._taken(), self._follow)
         better.run(self._effort.searches * max(20, len(able)), self._left())
         self.spent += better.expansions
         for i, way in zip(able, better.ways, strict=True):
             ways[i] = way
+        return list(free)
 
     def partly(self) -> list[Way | None]:
         """A plan in which robots without a way stay. Each time a robot finds none, the others are planned anew."""
