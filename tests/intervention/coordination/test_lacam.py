@@ -15,7 +15,7 @@ from properties import examples
 from airground_drake.geometry.outline import balls
 from airground_drake.intervention.coordination import lacam, network
 from airground_drake.intervention.coordination.coarse import CoarseGraph, coarsened
-from airground_drake.intervention.coordination.first_plan import first_plan
+from airground_drake.intervention.coordination.first_plan import FIRST, first_plan
 from airground_drake.intervention.coordination.joint import Effort, plan
 from airground_drake.intervention.coordination.pibt import Team, conflicts
 from airground_drake.intervention.coordination.roadmap import RobotTask, Space, build_roadmap
@@ -168,6 +168,16 @@ def test_robots_turn_round_in_a_dead_end(count: int) -> None:
         p, q = (np.column_stack([np.interp(t, w[:, 0], axis) for axis in w[:, 1:].T]) for w in (one, other))
         assert np.hypot(*(p - q).T).min() >= APART - 1e-9
     assert [way.tolist() for way in motions(again, tasks)] == [way.tolist() for way in ways]
+
+
+@pytest.mark.parametrize("rings", [2, 3])
+def test_a_jam_dissolves_with_little_effort(rings: int) -> None:
+    steps = [(a, b) for a, b in product(range(-rings, rings + 1), repeat=2) if abs(a + b) <= rings and (a, b) != (0, 0)]
+    places = [(APART * (a + 0.5 * b), APART * np.sqrt(0.75) * b) for a, b in steps]
+    rows = balls([[0.0, 0.0, 0.0]])
+    room = Space(rows, np.array([0.75]), 0.01, APART, 0.2)
+    team = movers(room, [task(place, (-4.0 * place[0], -4.0 * place[1])) for place in places])
+    assert first_plan(team, [], 50 * FIRST * len(team)).outcome == "found"
 
 
 def test_robots_that_cannot_change_places_exhaust_every_roadmap() -> None:
