@@ -175,6 +175,19 @@ def is_plugin(name: str) -> bool:
     return re.fullmatch(PLUGIN_PATTERN, name) is not None
 
 
+def source_of(place: str) -> Path | None:
+    """The file of a class named as `module:Class` or `file.py:Class`, in a folder of Python's path; None without one.
+
+    Nothing is imported.
+    """
+    module = place.partition(":")[0]
+    if module.endswith(".py"):
+        return _found(module)
+    inside = module.replace(".", "/")
+    files = (Path(folder or ".", f"{inside}{end}") for folder in sys.path for end in (".py", "/__init__.py"))
+    return next((file for file in files if file.is_file()), None)
+
+
 def _imported(module: str) -> ModuleType:
     """Import a module by its name, or by a file in a folder of Python's path (the last folder is searched first).
 
@@ -184,10 +197,15 @@ def _imported(module: str) -> ModuleType:
     """
     if not module.endswith(".py"):
         return importlib.import_module(module)
-    for path in (Path(folder or ".", module).resolve() for folder in reversed(sys.path)):
-        if path.is_file():
-            return _executed(path)
-    raise ModuleNotFoundError(f"no file {module}")
+    if (path := _found(module)) is None:
+        raise ModuleNotFoundError(f"no file {module}")
+    return _executed(path)
+
+
+def _found(file: str) -> Path | None:
+    """A file in a folder of Python's path; the last folder is searched first."""
+    paths = (Path(folder or ".", file).resolve() for folder in reversed(sys.path))
+    return next((path for path in paths if path.is_file()), None)
 
 
 def _executed(path: Path) -> ModuleType:
@@ -289,6 +307,18 @@ ROUTES = Registry(
 
 UAV_TASKS = Registry("task", "uav_tasks", {"formation": "airground_drake.nsbc.tasks:FormationTask"})
 """Tasks of the UAV below obstacle avoidance: subclasses of `nsbc.task.Task`."""
+
+PLANTS = Registry(
+    "plant",
+    "plants",
+    {
+        "first_order": "airground_drake.world.plant:FirstOrder",
+        "unicycle": "airground_drake.world.plant:Unicycle",
+        "lag": "airground_drake.world.plant:Lag",
+        "delay": "airground_drake.world.plant:Delay",
+    },
+)
+"""Plants of robots: those of `world.plant`, and subclasses of Drake's System."""
 
 SAMPLERS = Registry(
     "sampler",

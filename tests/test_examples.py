@@ -18,8 +18,11 @@ import matplotlib as mpl
 import numpy as np
 import pytest
 
+from airground_drake.report.__main__ import main
 from airground_drake.run.simulation import simulate
+from airground_drake.run.trace import load as load_trace
 from airground_drake.scenarios.load import load
+from airground_drake.verify.judging import judge
 
 pytestmark = pytest.mark.slow
 
@@ -80,7 +83,6 @@ PRINTED = {
     "run": "LIVE-GOAL: holds",
     "sweep": "2.5",
     "own_policy": "ugv1   arrival",
-    "own_plant": "told to keep 2.25 m, it keeps 2.1",
     "own_claim": "SLOW is refuted",
     "own_diagram": "triggered at 0.848062 s; the sine is at 3 m at 0.848062 s",
 }
@@ -93,6 +95,36 @@ def test_a_short_script_shows_one_thing(name: str, capsys: pytest.CaptureFixture
     assert len(path.read_text("utf-8").splitlines()) <= 40
     runpy.run_path(str(path), run_name="__main__")
     assert PRINTED[name] in capsys.readouterr().out
+
+
+def test_a_bicycle_keeps_its_distance_if_its_drift_is_declared(monkeypatch: pytest.MonkeyPatch) -> None:
+    """With the numbers of the documentation; with less, the run says that they do not hold."""
+    monkeypatch.syspath_prepend(EXAMPLES)
+    plant = {"kind": "my_robots/bicycle.py:Bicycle", "drift_m_s": 1.2, "cover_m": 0.21}
+    settings = {"ugvs.ugv1.max_speed_m_s": 1.5, "control.sensing_range_m": 5.0, "runs.d.expected": {}}
+    found = {}
+    for drift in (1.2, 0.6):
+        scenario = load("minimal", {**settings, "ugvs.ugv1.plant": {**plant, "drift_m_s": drift}})
+        trace = simulate(scenario, "d")
+        found[drift] = {verdict.claim.id: verdict.status for verdict in judge(trace)}
+        assert trace.heading("ugv1") is not None
+    assert set(found[1.2].values()) == {"holds"}
+    assert found[0.6]["SAFE-HYP"] == "refuted"
+
+
+def test_a_robot_on_wheels_holds_what_it_declares(tmp_path: Path) -> None:
+    """A report of it, made headless: the UAV leads it round the shelf, and all of its claims are as declared."""
+    options = ["-o", str(tmp_path / "report"), "--format", "json", "--allow-plugins"]
+    assert main([str(EXAMPLES / "turtlebot" / "turtlebot.yaml"), *options]) == 0
+    report = json.loads((tmp_path / "report" / "report.json").read_text())
+    found = {(claim["id"], claim["run"]): claim["status"] for claim in report["claims"]}
+    assert {found[claim, run] for claim in ("SAFE-TRACE", "SAFE-HYP") for run in "ad"} == {"holds"}
+    assert found["SAFE-BUDGET", ""] == "proved"
+    assert [*report["provenance"]["third_party"]] == ["turtlebot.py:TurtleBot"]
+    trace = load_trace(tmp_path / "report" / "trace" / "d")
+    assert 0.01 < trace.sampled("tb.drift_m_s").max() < 0.1
+    assert 0.1 < trace.sampled("tb.cover_m").max() < 0.105
+    assert report["runs"]["d"]["events"][-1]["kind"] == "arrival"
 
 
 def test_a_supervisor_of_priorities_gets_where_a_fixed_order_does_not() -> None:

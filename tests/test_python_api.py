@@ -23,7 +23,7 @@ from airground_drake.nsbc.task import Array
 from airground_drake.nsbc.tasks import PositionTask
 from airground_drake.scenarios.load import resolved, validated
 from airground_drake.scenarios.schema import Scenario
-from airground_drake.systems.plant import first_order_plant
+from airground_drake.systems.plant import OwnPlant
 from airground_drake.verify import judge, verdicts_to_pandas
 
 
@@ -61,8 +61,8 @@ def test_wrong_arguments_say_what_is_allowed(case_a: Scenario) -> None:
         (lambda: build_diagram(case_a, composition="z"), UnknownNameError, "unknown composition 'z'; allowed: aug"),  # type: ignore[arg-type]
         (lambda: airground_drake.nothing, AttributeError, "no attribute 'nothing'"),
         (
-            lambda: build_diagram(case_a, plants=lambda robot, start: Integrator(2)), PluginError,
-            r"the plant of ugv1 has inputs of sizes \[2\].*velocity \(3\) first",
+            lambda: build_diagram(case_a, plants={"ugv1": OwnPlant(lambda start: Integrator(2), 0.0, 0.0)}),
+            PluginError, r"of ugv1 has inputs of sizes \[2\].*velocity \(3\) first",
         ),
     ):  # fmt: skip
         with pytest.raises(error, match=said):
@@ -179,15 +179,13 @@ def test_it_can_be_embedded_and_disturbed(case_a: Scenario) -> None:
 def test_another_plant(case_a: Scenario) -> None:
     """UGV2's motors pass on nine tenths of their command."""
 
-    def weak(robot: str, start: Array) -> System:
-        if robot != "ugv2":
-            return first_order_plant(robot, start)
+    def weak(start: Array) -> System:
         plant = LinearSystem(A=np.zeros((3, 3)), B=0.9 * np.eye(3), C=np.eye(3), D=np.zeros((3, 3)))
         plant.configure_default_state(start)
         return plant
 
     steps = []
-    for plants in (first_order_plant, weak):
+    for plants in ({}, {"ugv2": OwnPlant(weak, drift_m_s=0.0, cover_m=0.0)}):
         diagram = build_diagram(case_a, "d", plants=plants)
         steps.append(positions(diagram, advanced(diagram, 0.05).get_context()) - starts(case_a))
     assert steps[1][1] == pytest.approx(0.9 * steps[0][1])

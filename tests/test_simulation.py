@@ -9,12 +9,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from pydrake.systems.primitives import LinearSystem
 from scenarios.cases import DEADLOCKS
 from scipy.stats import kstest
 from timeline import kinds, times
 
-from airground_drake.base.arrays import Array
 from airground_drake.base.errors import TraceError
 from airground_drake.base.progress import Progress
 from airground_drake.run import runs, trace
@@ -204,22 +202,3 @@ def test_a_uav_without_a_target_of_its_own_arrives_where_its_task_leads() -> Non
     )  # fmt: skip
     (verdict,) = judge(simulate(scenario, "a"), ["LIVE-GOAL"])
     assert verdict.status == "holds"
-
-
-def test_with_plants_of_ones_own_only_claims_about_any_plant_are_judged() -> None:
-    """Motors that lag by 0.2 s: the trace names them, and a theorem about first-order robots says nothing."""
-    made = simulate(load("minimal"), "d", plants=lagging)
-    assert set(made.meta["plants"].values()) == {"pydrake.systems.primitives.LinearSystem"}
-    found = {verdict.claim.id: verdict.status for verdict in judge(made)}
-    assert found.pop("ZENO-TRACE") == "holds"
-    assert set(found.values()) == {"not_run"}
-    assert simulate(load("minimal"), "d").meta["plants"] == {"ugv1": "first_order", "uav": "first_order"}
-
-
-def lagging(_: str, start: Array) -> LinearSystem:
-    """p_dot = u, u_dot = (v - u) / 0.2 s."""
-    eye, zero = np.eye(3), np.zeros((3, 3))
-    a, b = np.block([[zero, eye], [zero, -5.0 * eye]]), np.vstack([zero, 5.0 * eye])
-    plant = LinearSystem(A=a, B=b, C=np.hstack([eye, zero]), D=zero)
-    plant.configure_default_state(np.concatenate([start, np.zeros(3)]))
-    return plant

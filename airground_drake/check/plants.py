@@ -1,10 +1,13 @@
-"""Bodies that are not where the law steers them: unicycles, lags, delays. What they take, and how they move.
+"""Bodies that are not where the law steers them: what they take, and how they move.
 
 The law steers a point that goes straight from row to row. Of the body the plant says:
 
     unicycle   the axle is l behind the hand point, which goes along an arc with the same ends in each control period
     delay      the body is where the steered point was
     lag        tau v' = u - v; the steered point is p + tau v
+
+A plant of one's own is a class that is not here. Its drift and its cover are declared; what the trace records of both
+is compared with the recorded places.
 """
 
 from __future__ import annotations
@@ -13,22 +16,32 @@ import math
 from typing import NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from .files import Json
 from .rules import SMALL, Array, close
 
+Rows = npt.NDArray[np.intp]
+
+KINDS = ("first_order", "unicycle", "lag", "delay")
+"""Kinds of plants; any other is the name of a class."""
 STRAIGHT_M = 1e-10
 """Parts of a way that count as straight leave the line by no more, m."""
 MOST_PARTS = 5000
 
 
 class Taken(NamedTuple):
-    """What the plant of a robot takes: of length, m; lag and delay, s; and the limit of its commands, m/s."""
+    """What the plant of a robot takes: of length, m; lag and delay, s; and the limit of its commands, m/s.
+
+    A drift takes `drift_m` of a distance, and `slip_m` in one period.
+    """
 
     body_m: float
     lag_s: float
     delay_s: float
     most_m_s: float
+    drift_m: float = 0.0
+    slip_m: float = 0.0
 
     @property
     def cover_m(self) -> float:
@@ -46,9 +59,18 @@ def unicycle_of(robot: Json) -> Json | None:
     return next((plant for plant in robot["plant"] if plant["kind"] == "unicycle"), None)
 
 
-def taken(robot: Json, period_s: float) -> Taken:
+def own_of(robot: Json) -> Json | None:
+    """The plant of a robot that is a class of the user's."""
+    return next((plant for plant in robot["plant"] if plant["kind"] not in KINDS), None)
+
+
+def taken(robot: Json, control: Json) -> Taken:
     """What the plants of a robot take."""
-    most, sums = float(robot["max_speed_m_s"]), {"lag": 0.0, "delay": 0.0}
+    most, sums, period_s = float(robot["max_speed_m_s"]), {"lag": 0.0, "delay": 0.0}, float(control["period_s"])
+    if own := own_of(robot):
+        drift = float(own["drift_m_s"])
+        restored = drift / float(control["avoidance_gain_1_s"]) if drift else 0.0
+        return Taken(float(own["cover_m"]), 0.0, 0.0, most, restored, drift * period_s)
     for plant in plants_of(robot):
         if plant["kind"] in sums:
             sums[plant["kind"]] += plant["time_constant_s"] + plant["delay_s"]
@@ -72,10 +94,10 @@ def _dip_m(drive: Json, chord_m: float, period_s: float) -> float:
 def law_m(safe_m: float, one: Taken, other: Taken | None, *, passive: bool) -> float:
     """Distance that the law keeps so that the bodies keep `safe_m`, m; `other` is None beside an obstacle."""
     if passive:
-        return safe_m + one.cover_m
+        return safe_m + one.cover_m + one.drift_m
     both = (one, other) if other else (one, Taken(0.0, one.lag_s, one.delay_s, 0.0))
     late = safe_m + abs(both[0].delay_s - both[1].delay_s) * min(each.most_m_s for each in both)
-    closing, bodies = sum(each.most_m_s for each in both), sum(each.body_m for each in both)
+    closing, bodies = sum(each.most_m_s for each in both), sum(each.body_m + each.drift_m for each in both)
     if not any(each.lag_s for each in both):
         return late + bodies
     found = []
@@ -159,6 +181,33 @@ def moves_as_its_plant(robot: str, spec: Json, way: Way, steered: Array, command
             heading, point = _axle(plant, way, point, rate, period_s)
             close("heading of a body", way.heading_rad, heading, within=SMALL, about=robot, t_s=t_s)
     close("place of a body", way.place_m, point, within=SMALL, about=robot, t_s=t_s)
+
+
+def misses_as_recorded(
+    robot: str, way: Way, steered: Array, command: Array, rows: Rows, recorded: tuple[Array, Array]
+) -> None:
+    """Check what is recorded of a plant of one's own, period by period.
+
+    Args:
+        robot: its name.
+        way: of the body.
+        steered: the steered point at the rows, (T, 3), m.
+        command: at the samples, (S, 3), m/s.
+        rows: of the samples, and the last one, (S + 1,).
+        recorded: drift, m/s, and cover, m, (S,) each.
+
+    Raises:
+        Disagreement: if they are not those of the places.
+    """
+    lasting, t_s = np.diff(way.t_s[rows]), way.t_s[rows[:-1]]
+    missed = np.linalg.norm(np.diff(steered[rows], axis=0) - lasting[:, None] * command, axis=1)
+    close("drift of a plant", recorded[0] * lasting, missed, within=SMALL, about=robot, t_s=t_s)
+    off = []
+    for begin, end, whole in zip(rows[:-1], rows[1:], lasting, strict=True):
+        part = (way.t_s[begin : end + 1, None] - way.t_s[begin]) / whole
+        line = (1.0 - part) * steered[begin] + part * steered[end]
+        off.append(float(np.linalg.norm(way.place_m[begin : end + 1] - line, axis=1).max()))
+    close("cover of a plant", recorded[1], off, within=SMALL, about=robot, t_s=t_s)
 
 
 def _axle(drive: Json, way: Way, steered: Array, command: Array, period_s: float) -> tuple[Array, Array]:

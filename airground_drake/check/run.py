@@ -8,16 +8,14 @@ from functools import cached_property
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 import pandas as pd
 
 from .files import Json, parse_table, read_bytes, read_json, sha256
-from .plants import Way, moves_as_its_plant, plants_of, unicycle_of
+from .plants import Rows, Way, misses_as_recorded, moves_as_its_plant, own_of, plants_of, unicycle_of
 from .rules import SMALL, Array, NotEstablished, close, holds, same
 from .scenario import Levels, Pair, Preset, as_run, levels_of, moving_of, pairs_of, places_of, preset_of, robots_of
 from .shapes import boxes_of
 
-Rows = npt.NDArray[np.intp]
 SCHEMA = "airground_drake.trace/8"
 TABLES = ("states.parquet", "samples.parquet")
 """The tables that are read: positions, noise and triggers; commands and references at the control samples."""
@@ -260,10 +258,18 @@ def _rows_cover_the_run(run: Run) -> None:
 
 
 def _moves_as_commanded(run: Run, robot: str) -> None:
-    """position[k] = position[k-1] + (t[k] - t[k-1]) * command, from the declared start; samples hold their command."""
+    """position[k] = position[k-1] + (t[k] - t[k-1]) * command, from the declared start; samples hold their command.
+
+    A plant of one's own begins there, too, and misses its commands by as much as is recorded.
+    """
     place, chosen = run.position_m[robot], run.sampled(robot, "v", "m_s")
     command = chosen[np.searchsorted(run.sample_row, np.arange(len(place) - 1), side="right") - 1]
     close("start of a robot", run.body_m[robot][0], run.robots[robot]["start_m"], within=SMALL, about=robot)
+    if own_of(run.robots[robot]):
+        rows = np.append(run.sample_row, len(place) - 1)
+        recorded = column_of(run.samples, f"{robot}.drift_m_s"), column_of(run.samples, f"{robot}.cover_m")
+        misses_as_recorded(robot, run.ways[robot], place, chosen, rows, recorded)
+        return
     led = place[:-1] + np.diff(run.t_s)[:, None] * command
     close("law of motion", place[1:], led, within=SMALL, about=robot, t_s=run.t_s[1:])
     if plants_of(run.robots[robot]):

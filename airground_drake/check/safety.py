@@ -15,9 +15,9 @@ from typing import NamedTuple
 import numpy as np
 
 from .files import Json
-from .plants import MOST_PARTS, STRAIGHT_M
+from .plants import MOST_PARTS, STRAIGHT_M, own_of
 from .rules import SMALL, Array, Disagreement, Found, close, holds
-from .run import Run
+from .run import Run, column_of
 from .scenario import Pair, expected_m_s, written
 from .shapes import Away
 
@@ -246,11 +246,12 @@ def safe_hyp(run: Run) -> Found:
             lasting = float(run.t_s[rows[-1]] - run.t_s[rows[-2]])
             last = Fraction(1) if abs(lasting - period) <= SMALL else Fraction(lasting) / Fraction(period)
             if pair.moves_m_s:
-                missed = float(shortfall_m(own, other, law.passive(period), Fraction(), last))
+                missed = float(shortfall_m(own, other, law.passive(period), Fraction(), last)) - pair.slip_m
                 about = f"{pair.robot}, {pair.other}"
                 holds("passive law", missed <= SMALL, missed, "missed by nothing", about=about)
             else:
-                lost = max(lost, lost_m(shortfall_m(own, other, law, gain, last), gain, len(run.sample_row)))
+                lacks = shortfall_m(own, other, law, gain, last)
+                lost = max(lost, lost_m(lacks, gain, len(run.sample_row)) - pair.drift_m)
     except Disagreement as broken:
         return Found("refuted", because=broken)
     return Found("holds" if lost <= SMALL else "refuted", -lost if lost <= SMALL else None)
@@ -275,6 +276,10 @@ def _motion(run: Run) -> None:
     """Robots and obstacles keep their speed limits, and UGVs their height; straight motion is the law of motion."""
     for robot, spec in run.robots.items():
         place = run.position_m[robot]
+        if own := own_of(spec):
+            for key, unit in (("drift_m_s", "m/s"), ("cover_m", "m")):
+                found, about = column_of(run.samples, f"{robot}.{key}"), f"{own[key]} {unit} at most"
+                holds(f"declared {key}", found <= own[key] + SMALL, found, about, about=robot, t_s=run.sample_s)
         speed = np.linalg.norm(run.sampled(robot, "v", "m_s"), axis=1)
         slow, most = speed <= spec["max_speed_m_s"] + SMALL, f"{spec['max_speed_m_s']} at most"
         holds("speed limit", slow, speed, most, about=robot, t_s=run.sample_s)

@@ -35,7 +35,9 @@ class Pair(NamedTuple):
         shape: of the other; for a UGV walls are endless in height.
         moves_m_s: V, the speed at which an obstacle is expected to move at most; above 0 the passive law is in force.
         more_m: distance that the law keeps beyond the safe one, between the points that it steers.
-        cover_m: how far both bodies may be from these points, together.
+        cover_m: how far both bodies may be from these points after a period, together.
+        drift_m: the part of `more_m` that makes up for missed commands.
+        slip_m: how much of its command the robot may miss in a period.
     """
 
     robot: str
@@ -48,6 +50,8 @@ class Pair(NamedTuple):
     moves_m_s: float = 0.0
     more_m: float = 0.0
     cover_m: float = 0.0
+    drift_m: float = 0.0
+    slip_m: float = 0.0
 
     @property
     def safe_m(self) -> float:
@@ -186,19 +190,19 @@ def pairs_of(scenario: Json) -> list[Pair]:
         gap_m = safe["air_ground_m" if other == uav else "ugv_m"]
         radii = radii_m(robots[one], robots[other])
         beside_robots.append(Pair(one, other, gap_m, radii, limit[one] + limit[other], 0.5))
-    period_s = float(scenario["control"]["period_s"])
-    room = {name: taken(robot, period_s) for name, robot in robots.items()}
+    room = {name: taken(robot, scenario["control"]) for name, robot in robots.items()}
     return [_with_plants(pair, room) for pair in beside_obstacles + beside_robots]
 
 
 def _with_plants(pair: Pair, room: dict[str, Taken]) -> Pair:
     """A pair with what the plants of its robots take."""
     one, other = room[pair.robot], room.get(pair.other)
-    cover = one.cover_m + (other.cover_m if other else 0.0)
+    both = [each for each in (one, other) if each]
+    cover, drift = sum(each.cover_m + each.slip_m for each in both), sum(each.drift_m for each in both)
     if not cover:
         return pair
     more = law_m(pair.safe_m, one, other, passive=pair.moves_m_s > 0.0) - pair.safe_m
-    return pair._replace(more_m=more, cover_m=cover)
+    return pair._replace(more_m=more, cover_m=cover, drift_m=drift, slip_m=one.slip_m)
 
 
 def radii_m(one: Json, other: Json) -> float:

@@ -148,6 +148,7 @@ def provenance(scenario: Scenario, started: datetime, command: str) -> dict[str,
         "seed": scenario.seed,
         "started": started.isoformat(timespec="seconds"),
         "command": command,
+        **({"third_party": digests} if (digests := plugins.digests(scenario)) else {}),
     }
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -51,7 +51,7 @@ def states(
 ) -> pd.DataFrame:
     """`Trace.states` of rows at times (T,), s; what was logged of M bodies has the shape (3 M, T), of UGVs (n, T).
 
-    `signals` are the names of `plant_signals`, (k, T).
+    `signals` are the names of `plant_signals` and `own_headings`, (k, T).
     """
     columns: dict[str, Array] = {"t_s": t}
     for i, body in enumerate(bodies):
@@ -60,8 +60,27 @@ def states(
         columns[f"{ugv}.noise_m"] = logged["noise"][i]
         columns[f"{ugv}.decision_variable_m"] = logged["decision_variable"][i]
         columns |= {f"{ugv}.{name}": logged["status"][FIELDS * i + k] for k, name in enumerate(Status.get_fields())}
-    columns |= {name: logged["plant_signals"][k] for k, name in enumerate(signals)}
+    of_plants = [*logged.get("plant_signals", ()), *np.unwrap(logged.get("own_headings", np.empty((0, len(t)))))]
+    columns |= dict(zip(signals, of_plants, strict=True))
     return pd.DataFrame(columns)
+
+
+def measured(states: pd.DataFrame, samples: pd.DataFrame, robots: Iterable[str]) -> dict[str, Array]:
+    """Drift and cover of robots with plants of one's own in each control period: columns of `Trace.samples`, (S,)."""
+    rows, found = np.searchsorted(states["t_s"], samples["t_s"]), dict[str, Array]()
+    ends = np.append(rows, len(states) - 1)
+    t = states["t_s"].to_numpy()
+    for robot in robots:
+        place, body = (
+            states[[f"{robot}.{stem}{axis}_m" for axis in "xyz"]].to_numpy(dtype=np.float64) for stem in ("", "body_")
+        )
+        command = samples[[f"{robot}.v{axis}_m_s" for axis in "xyz"]].to_numpy(dtype=np.float64)
+        missed = np.diff(place[ends], axis=0) / np.diff(t[ends])[:, None] - command
+        line = np.stack([np.interp(t, t[ends], axis) for axis in place[ends].T], axis=1)
+        off = np.linalg.norm(body - line, axis=1)
+        found[f"{robot}.drift_m_s"] = np.linalg.norm(missed, axis=1)
+        found[f"{robot}.cover_m"] = np.maximum(np.maximum.reduceat(off, rows), off[ends[1:]])
+    return found
 
 
 def samples(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from functools import cache
@@ -34,13 +34,16 @@ from airground_drake.scenarios.load import own, resolved, validated
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.systems.components import GatekeepersFactory, make_gatekeepers
 from airground_drake.systems.decision import DecisionVariable
-from airground_drake.systems.diagram import DecisionFactory, Model, PlantFactory, build_model
+from airground_drake.systems.diagram import NO_PLANTS, DecisionFactory, Model, build_model
 from airground_drake.systems.lifetime import untie
+from airground_drake.systems.plant import OwnPlant, declared, own_code
 from airground_drake.world.plant import FirstOrder
 from airground_drake.world.world import Body, World
 
 EVENT_ACCURACY = 1e-6
 """Accuracy of the Context: events are isolated to this, relative to the time scale of 1 s."""
+OWN_ACCURACY = 1e-6
+"""Accuracy of integration where a robot has a plant of one's own: about this many metres in a step."""
 
 
 class Recorder:
@@ -53,7 +56,7 @@ class Recorder:
         decision_block: DecisionFactory = DecisionVariable,
         observers: Sequence[LeafSystem] = (),
         *,
-        plants: PlantFactory | None = None,
+        plants: Mapping[str, OwnPlant] = NO_PLANTS,
         make_gatekeepers: GatekeepersFactory = make_gatekeepers,
     ) -> None:
         """Build the model of a run of the scenario and its logger.
@@ -61,7 +64,7 @@ class Recorder:
         `decision_block`, `observers` and `plants` as in `simulate`, `make_gatekeepers` as in `build_model`; raises as
         `simulate`.
         """
-        self._scenario, self._name = validated(scenario), name
+        self._scenario, self._name = declared(scenario, plants), name
         if name not in self._scenario.runs:
             raise UnknownNameError("run", name, self._scenario.runs)
         self._run = self._scenario.runs[name]
@@ -76,7 +79,7 @@ class Recorder:
             disturbed=False,
             make_gatekeepers=make_gatekeepers,
         )
-        self._foreign = plants is not None
+        self._own_plants = own_code(self._own, plants)
         builder = DiagramBuilder()
         builder.AddSystem(self.model.diagram)
         ports = [self.model.diagram.GetOutputPort(name) for name in self.model.recorded]
@@ -129,8 +132,10 @@ class Recorder:
         simulator = Simulator(self._root, context)
         period = self._scenario.control.period_s
         # velocities are held between samples: Euler's method is exact for the straight motion of steered points
-        scheme = "runge_kutta3" if self._foreign else "explicit_euler"
-        config = SimulatorConfig(integration_scheme=scheme, max_step_size=period, use_error_control=self._foreign)
+        config = SimulatorConfig(integration_scheme="explicit_euler", max_step_size=period, use_error_control=False)
+        if self._own_plants:
+            config.integration_scheme, config.use_error_control = "runge_kutta3", True
+            config.accuracy = OWN_ACCURACY
         ApplySimulatorConfig(config, simulator)
         simulator.set_target_realtime_rate(speed)
         if self.model.gatekeeper is not None:
@@ -156,7 +161,15 @@ class Recorder:
         try:
             yield
         except (Exception, SystemExit) as error:  # Drake raises many kinds
-            raise SimulationError(self._name, context.get_time(), described(error)) from error
+            raise SimulationError(self._name, context.get_time(), self._what(error)) from error
+
+    def _what(self, error: BaseException) -> str:
+        """An error in words, with the place in the file of a plant of one's own, and such plants by name."""
+        own = self._own_plants
+        what = max((described(error, each.function) for each in own.values()), key=len, default=described(error))
+        if not own or any(each.name in what for each in own.values()):
+            return what
+        return f"{what} (plants of one's own: {', '.join(f'{each.name} of {robot}' for robot, each in own.items())})"
 
     def trace(self, simulator: Simulator, seed: int | None, wall: float = 0.0) -> Trace:
         """The trace of what a simulator has simulated: of a run that lasts until now.
@@ -191,15 +204,16 @@ class Recorder:
             "scenario": resolved(self._scenario) | {"duration_s": context.get_time()},
             "events": [],
             **read_back(model, context),
-            "plants": model.plants,
             "decision_block": "" if (kind := type(model.decision_block)) is DecisionVariable else kind.__qualname__,
             "faults": recording.faults(memory.asked),
         }
         uav, t = model.world.names("uav")[0], t[keep]
+        states = recording.states(t, data, ugvs, [body.name for body in model.world.moving], model.signals)
+        samples = recording.samples(t, self._scenario.control.period_s, data, ugvs, robots)
         trace = Trace(
             meta,
-            states=recording.states(t, data, ugvs, [body.name for body in model.world.moving], model.world.signals),
-            samples=recording.samples(t, self._scenario.control.period_s, data, ugvs, robots),
+            states=states,
+            samples=samples.assign(**recording.measured(states, samples, self._own_plants)),
             decisions=recording.decisions(decided, ugvs, self._own.gatekeeper.route),
             timings=timings,
             problems=recording.problems(decided),
@@ -244,7 +258,7 @@ def simulate(
     decision_block: DecisionFactory = DecisionVariable,
     observers: Sequence[LeafSystem] = (),
     speed: float = 0.0,
-    plants: PlantFactory | None = None,
+    plants: Mapping[str, OwnPlant] = NO_PLANTS,
 ) -> Trace:
     """Simulate one run of a scenario.
 
@@ -257,14 +271,14 @@ def simulate(
         observers: systems that watch the run, such as `view.live_view.LiveView`: their input ports have the names of
             the model's output ports, and each has a name of its own. The run does not see them.
         speed: simulated seconds per second at most, for watching; 0: no limit.
-        plants: makes the plant of each robot, in place of those of the scenario: see `build_diagram`. Claims that rest
-            on how a robot moves are `not_run` then.
+        plants: plants of your own, by robot, in place of those of the scenario: as if the scenario named them
+            (`plant.kind`).
 
     Raises:
         ScenarioError: if the scenario, or the seed, is not valid.
         UnknownNameError: if it has no such run.
-        PluginError: if it names a policy, route or task that cannot be made, or the decision block or a plant has
-            other ports.
+        PluginError: if it names a policy, route, task or plant that cannot be made, or the decision block has other
+            ports.
         SimulationError: if Drake or a system stops; names the run and the time.
     """
     if seed is not None:

@@ -2,7 +2,8 @@
 
 `states` has a row at the end of each of the simulator's steps: all control periods, and the isolated event times in
 between. Its values are true values just before the row's time, so an event at the last row's time may be missing. Rows
-closer than 1e-9 s are merged. Between two rows robots move on straight lines, and noise is linear.
+closer than 1e-9 s are merged. Between two rows robots move on straight lines, and noise is linear. A plant of one's own
+need not: its rows are those of an integrator with error control.
 
     t_s
     <body>.x_m .y_m .z_m                      position of a robot, or of an obstacle that moves, world frame
@@ -10,7 +11,9 @@ closer than 1e-9 s are merged. Between two rows robots move on straight lines, a
                                               x_m, y_m and z_m are then those of the steered point (of a unicycle, the
                                               chord of its hand point's way), body_x_m, body_y_m and body_z_m those of
                                               the body; of a unicycle also heading_rad (it does not jump), of a lag
-                                              body_vx_m_s, body_vy_m_s and body_vz_m_s
+                                              body_vx_m_s, body_vy_m_s and body_vz_m_s. Of a plant of one's own x_m, y_m
+                                              and z_m are the steered point itself, and there is a heading_rad if it
+                                              has one
     <ugv>.noise_m                             integrated noise of (15)
     <ugv>.decision_variable_m                 x, input of the trigger: ||rho_rd - rho|| + noise, unless another
                                               block computes it
@@ -27,6 +30,9 @@ chose, which is held until the next sample.
     <ugv>.ref_vx_m_s .ref_vy_m_s .ref_vz_m_s  its velocity
     <ugv>.executing                           number of the proposal executed from this sample on, -1 without one
     <ugv>.command_share                       only with unicycles: the share that was left of the law's command
+    <robot>.drift_m_s .cover_m                only of plants of one's own, in the period that begins here: by how much
+                                              the steered point missed its command, per time; and how far the body was
+                                              from the straight line of that point at most, at the rows
 """
 
 from __future__ import annotations

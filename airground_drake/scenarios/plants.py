@@ -6,7 +6,7 @@ import math
 
 from airground_drake.scenarios.schema import Plant as Given
 from airground_drake.scenarios.schema import Uav, Ugv
-from airground_drake.world.plant import Delay, FirstOrder, Lag, Plant, Unicycle
+from airground_drake.world.plant import Delay, FirstOrder, Lag, Own, Plant, Unicycle
 
 
 def plant_of(robot: Ugv | Uav, period_s: float) -> Plant:
@@ -20,6 +20,8 @@ def plant_of(robot: Ugv | Uav, period_s: float) -> Plant:
 
 
 def _plant(given: Given, period_s: float) -> Plant:
+    if given.is_own:
+        return Own(given.kind, given.drift_m_s, given.cover_m, given.parameters)
     if given.kind == "unicycle":
         limits = given.max_turn_rad_s or math.inf, given.wheel_base_m, given.max_wheel_speed_m_s or math.inf
         return Unicycle(given.hand_point_m, period_s, given.heading_rad, *limits)

@@ -13,7 +13,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from airground_drake.base.errors import ScenarioError
-from airground_drake.registry import POLICIES, ROUTES, UAV_TASKS, Registry, is_plugin
+from airground_drake.base.files import sha256
+from airground_drake.registry import PLANTS, POLICIES, ROUTES, UAV_TASKS, Registry, is_plugin, source_of
 
 if TYPE_CHECKING:  # pydantic, which the schema imports, would delay `report --list`
     from airground_drake.scenarios.schema import Scenario
@@ -32,6 +33,9 @@ def plugins(scenario: Scenario) -> dict[str, str]:
         ("uav.task", scenario.uav.task, UAV_TASKS),
         ("gatekeeper.route", scenario.gatekeeper.route, ROUTES),
     ]
+    for name, robot in scenario.robots.items():
+        place = f"{f'ugvs.{name}' if name in scenario.ugvs else 'uav'}.plant"
+        named += [(f"{place}.kind", plant.kind, PLANTS) for plant in robot.plant]
     for index, policy in enumerate(scenario.intervention.policies):
         named.append((f"intervention.policies.{index}.name", policy.name, POLICIES))
     for run, spec in scenario.runs.items():
@@ -40,6 +44,12 @@ def plugins(scenario: Scenario) -> dict[str, str]:
         named += [(f"runs.{run}.set.{key}", chosen[key], POLICIES) for key in chosen if _POLICY.fullmatch(key)]
     found = {key: name for key, name, registry in named if name not in registry and is_plugin(name)}
     return found | {f"claims.{claim}": place for claim, place in scenario.claims.items()}
+
+
+def digests(scenario: Scenario) -> dict[str, str]:
+    """SHA-256 of the files of third-party code in a scenario, by its name there; nothing is imported."""
+    found = {name: source_of(name) for name in plugins(scenario).values()}
+    return {name: sha256(file.read_bytes()) for name, file in found.items() if file is not None}
 
 
 def refuse(scenario: Scenario, source: str, keys: Collection[str] | None = None) -> None:
@@ -107,10 +117,12 @@ def beside(source: str, *, allow: bool) -> Iterator[None]:
 
 
 def without(scenario: Scenario) -> Scenario:
-    """The scenario with the package's own task and route and without policies; its diagram has the same systems."""
+    """The scenario with the package's own task, route and plants, without policies; its diagram has the same blocks."""
+    plants = {name: [each for each in robot.plant if not each.is_own] for name, robot in scenario.robots.items()}
     return replace(
         scenario,
-        uav=replace(scenario.uav, task="formation"),
+        ugvs={name: replace(ugv, plant=plants[name]) for name, ugv in scenario.ugvs.items()},
+        uav=replace(scenario.uav, task="formation", plant=plants[scenario.uav.name]),
         intervention=replace(scenario.intervention, policies=[]),
         gatekeeper=replace(scenario.gatekeeper, route="mixed_integer", blocks=0, solver="daqp"),
         runs={name: replace(run, set={}) for name, run in scenario.runs.items()},

@@ -14,7 +14,7 @@ from typing import Annotated, Any, ClassVar
 from pydantic import ConfigDict, Field
 
 from airground_drake.base.files import sha256
-from airground_drake.registry import METHODS, MODEL_CLAIMS, POLICIES, ROUTES, RUN_CLAIMS, UAV_TASKS
+from airground_drake.registry import METHODS, MODEL_CLAIMS, PLANTS, POLICIES, ROUTES, RUN_CLAIMS, UAV_TASKS
 from airground_drake.scenarios.kinds import (
     CLAIMS,
     CellRectangle,
@@ -59,7 +59,6 @@ ABOUT = ("size_m",)
 """Those of them that are about its position, which they need."""
 
 TRIGGERS: tuple[str, ...] = ("automaton", "bare")
-PLANT_KINDS: tuple[str, ...] = ("first_order", "unicycle", "lag", "delay")
 AT_END: tuple[str, ...] = ("stop", "reverse", "loop")
 RULES: tuple[str, ...] = ("hysteresis", "first_stage")
 SETTABLE: tuple[str, ...] = ("decision", "gatekeeper", "intervention")
@@ -86,11 +85,13 @@ class Plant:
       the law wants it; commands for which it would have to turn or drive too fast are shortened.
     - lag: its velocity follows the command with a time constant; the law steers p + tau v.
     - delay: commands take effect later; the law steers where it will be when those under way are carried out.
+    - `module:Class` or `file.py:Class`: a Drake System of one's own, with a drift and a cover that are declared. Each
+      run measures both.
 
     A list combines: a delay, and after it a lag.
     """
 
-    kind: Annotated[Words, one_of(PLANT_KINDS)] = "first_order"
+    kind: Annotated[Words, registered(PLANTS)] = "first_order"
     """Which of these."""
     hand_point_m: NotNegative = 0.0
     """Of a unicycle: distance of the hand point ahead of the axle; above 0."""
@@ -106,6 +107,17 @@ class Plant:
     """Of a lag: time constant; above 0."""
     delay_s: NotNegative = 0.0
     """Of a delay: a whole number of control periods."""
+    drift_m_s: NotNegative = 0.0
+    """Of one's own: by how much the steered point misses its command in a control period at most, per time."""
+    cover_m: NotNegative = 0.0
+    """Of one's own: how far the body is at most from the straight line of the steered point in a control period."""
+    parameters: dict[Name, Real] = field(default_factory=dict)
+    """Of one's own: numbers for its class, by name."""
+
+    @property
+    def is_own(self) -> bool:
+        """Whether it is a class of the user's."""
+        return self.kind not in PLANTS.own
 
 
 Plants = Annotated[list[Plant], Field(strict=True, max_length=2), OneOrList()]

@@ -191,6 +191,8 @@ KEYS_OF_PLANTS = {
     "delay": ("delay_s",),
 }
 """The keys of each kind of plant."""
+OWN_KEYS = ("drift_m_s", "cover_m", "parameters")
+"""Those of a plant of one's own."""
 
 
 def _plants(scenario: Scenario) -> Problems:
@@ -200,17 +202,20 @@ def _plants(scenario: Scenario) -> Problems:
         kinds = [plant.kind for plant in robot.plant]
         if len(kinds) > 1 and kinds != ["delay", "lag"]:
             why = "no theorem covers another combination; chord steering needs a body that obeys at once"
+            if any(plant.is_own for plant in robot.plant):
+                why = "a plant of your own does everything itself"
             yield place, f"[{', '.join(kinds)}]", f"one plant, or a delay and then a lag: {why}"
         for k, plant in enumerate(robot.plant):
             key = f"{place}.{k}" if len(kinds) > 1 else place
-            for other in (each for each in _ALL_KEYS if each not in KEYS_OF_PLANTS[plant.kind]):
+            keys = KEYS_OF_PLANTS.get(plant.kind, OWN_KEYS)
+            for other in (each for each in _ALL_KEYS if each not in keys):
                 if getattr(plant, other):
-                    allowed = f"keys of {plant.kind}: {', '.join(KEYS_OF_PLANTS[plant.kind]) or 'none'}"
+                    allowed = f"keys of {plant.kind}: {', '.join(keys) or 'none'}"
                     yield f"{key}.{other}", getattr(plant, other), allowed
             yield from _numbers_of(scenario, key, robot, plant)
 
 
-_ALL_KEYS = tuple(key for keys in KEYS_OF_PLANTS.values() for key in keys)
+_ALL_KEYS = tuple(key for keys in (*KEYS_OF_PLANTS.values(), OWN_KEYS) for key in keys)
 
 
 def _numbers_of(scenario: Scenario, key: str, robot: Ugv | Uav, plant: Plant) -> Problems:
@@ -220,6 +225,8 @@ def _numbers_of(scenario: Scenario, key: str, robot: Ugv | Uav, plant: Plant) ->
         yield f"{key}.time_constant_s", plant.time_constant_s, "more than 0 s"
     if plant.kind == "delay" and not _multiple(plant.delay_s, period):
         yield f"{key}.delay_s", plant.delay_s, f"a whole multiple of control.period_s = {period:.9g} s, more than 0"
+    if plant.drift_m_s and not scenario.control.avoidance_gain_1_s:
+        yield f"{key}.drift_m_s", plant.drift_m_s, "0: without control.avoidance_gain_1_s nothing makes up for a drift"
     if plant.kind != "unicycle":
         return
     if isinstance(robot, Uav):

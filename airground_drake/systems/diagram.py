@@ -8,11 +8,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
 
 from pydrake.systems.framework import Diagram, DiagramBuilder, InputPort, OutputPort, System
 from pydrake.systems.primitives import ConstantVectorSource, Demultiplexer, Multiplexer, TrajectorySource
 
-from airground_drake.base.arrays import Array
 from airground_drake.base.errors import PluginError, UnknownNameError
 from airground_drake.geometry.motion import Motion
 from airground_drake.nsbc.avoidance import COMPOSITIONS, Composition
@@ -34,19 +34,19 @@ from airground_drake.systems import (
     VelocityDisturbance,
     components,
 )
-from airground_drake.systems.plant import PLANTS
-from airground_drake.world.world import ROBOTS, Body, World
+from airground_drake.systems.plant import OwnPlant, declared, plant_system
+from airground_drake.world.plant import Own
+from airground_drake.world.world import ROBOTS, World
 
 RECORDED = (
     "bodies", "team_command", "reference", "noise", "decision_variable", "status", "executing",
 )  # fmt: skip
 """Exported output ports of the diagram: the signals of a trace."""
-OF_PLANTS = ("plant_signals", "command_share")
-"""The same, of robots that are not where the law steers them, and of unicycles; only where there are such robots."""
+OF_PLANTS = ("plant_signals", "own_headings", "command_share")
+"""The same, of robots that are not where the law steers them, of plants of one's own that have a heading, and of
+unicycles; only where there are such robots."""
 
-PlantFactory = Callable[[str, Array], System]
-"""Makes the plant of a robot from its name and its start (3,), m: a System with one input, the velocity (3,), m/s, and
-one output, the position (3,), m, both in the world frame, whose default state has the robot at its start."""
+NO_PLANTS: Mapping[str, OwnPlant] = MappingProxyType({})
 
 DecisionFactory = Callable[[World, Sequence[Motion]], System]
 """Makes the block that computes the decision variables of n UGVs from their world and their presets: a System with the
@@ -66,7 +66,7 @@ class Model:
         planner: the UAV's planner.
         gatekeeper: of methods (c) and (d), else None.
         controllers: of the UGVs, and of the UAV.
-        plants: by robot, the kind of its plant, or the class of the system that was given for it.
+        signals: names of the columns of `plant_signals` and `own_headings`.
         recorded: names of the exported output ports that are the signals of a trace.
     """
 
@@ -77,7 +77,7 @@ class Model:
     planner: InterventionPlanner
     gatekeeper: Gatekeeper | None
     controllers: tuple[UgvController, UavController]
-    plants: dict[str, str]
+    signals: tuple[str, ...]
     recorded: tuple[str, ...]
 
 
@@ -85,7 +85,7 @@ def build_diagram(
     scenario: Scenario,
     method: str | None = None,
     composition: Composition | None = None,
-    plants: PlantFactory | None = None,
+    plants: Mapping[str, OwnPlant] = NO_PLANTS,
     monitor: Monitor | None = None,
     decision_block: DecisionFactory = DecisionVariable,
 ) -> Diagram:
@@ -95,7 +95,7 @@ def build_diagram(
         scenario: from a file or made in Python.
         method: default: that of the scenario's last run.
         composition: of the UGVs' avoidance tasks; default: 'augmented', or without `method` that of the last run.
-        plants: makes the plant of each robot. The claims are about the default, the plants of the scenario.
+        plants: plants of your own, by robot, in place of those of the scenario.
         monitor: watches the diagram while it runs; see `make_monitor`.
         decision_block: makes the block that drives the trigger. The default, `systems.DecisionVariable`, is (15).
 
@@ -109,17 +109,17 @@ def build_diagram(
     Raises:
         ScenarioError: if the scenario is not valid.
         UnknownNameError: if there is no such method or composition.
-        PluginError: if a policy, route or task of the scenario cannot be made, or a plant or the decision block does
-            not have the ports of one.
+        PluginError: if a policy, route, task or plant of the scenario cannot be made, or the decision block does not
+            have the ports of one.
     """
-    return build_model(validated(scenario), method, composition, plants, monitor, decision_block).diagram
+    return build_model(declared(scenario, plants), method, composition, plants, monitor, decision_block).diagram
 
 
 def build_model(
     scenario: Scenario,
     method: str | None = None,
     composition: Composition | None = None,
-    plants: PlantFactory | None = None,
+    plants: Mapping[str, OwnPlant] = NO_PLANTS,
     monitor: Monitor | None = None,
     decision_block: DecisionFactory = DecisionVariable,
     *,
@@ -128,7 +128,8 @@ def build_model(
 ) -> Model:
     """Build and wire all components of one method of a valid scenario; see `build_diagram`.
 
-    Without `disturbed` the diagram has no inputs for disturbances: commands go straight to the plants.
+    `plants` are those that the scenario declares (`systems.plant.declared`). Without
+    `disturbed` the diagram has no inputs for disturbances: commands go straight to the plants.
     `make_gatekeepers` replaces the gatekeepers; claims about decisions are about the default.
     """
     chosen, composition = _chosen(scenario, method, composition)
@@ -140,10 +141,8 @@ def build_model(
     shortest = min(scenario.control.period_s, scenario.decision.noise_period_s)
     trigger = EventTrigger(n, components.make_trigger(scenario, components.threshold(scenario)), shortest)
     decision = _decision_making(scenario, n, block, trigger)
-    made = {body.name: _plant(body, plants, scenario.control.period_s) for body in world.moving}
-    kinds = {body.name: body.plant.kind for body in world.moving if body.plant is not None}
-    if plants is not None:
-        kinds = {name: f"{type(plant).__module__}.{type(plant).__qualname__}" for name, plant in made.items()}
+    made = {body.name: plant_system(body, scenario.control.period_s, plants) for body in world.moving}
+    signals = (*world.signals, *(f"{name}.heading_rad" for name in _own_headings(world, made)))
     vehicles = _vehicles(world, made, disturbed=disturbed)
     planner = InterventionPlanner(components.make_planner(scenario, chosen), world, scenario.control.period_s)
     gatekeeper = None
@@ -165,7 +164,7 @@ def build_model(
     recorded = (*RECORDED, *(name for name in OF_PLANTS if name in named))
     exported = [*recorded, *(["violation"] if monitor is not None else [])]
     diagram = _assembled(f"{scenario.name}_method_{chosen.id}", parts, named, exported)
-    return Model(diagram, world, block, trigger, planner, gatekeeper, controllers, kinds, recorded)
+    return Model(diagram, world, block, trigger, planner, gatekeeper, controllers, signals, recorded)
 
 
 def method_drawn(scenario: Scenario) -> str:
@@ -253,6 +252,8 @@ def _vehicles(world: World, plants: Mapping[str, System], *, disturbed: bool) ->
     signals = [port for plant in plants.values() for port in _outputs(plant) if port.get_name() == "signals"]
     if signals:
         builder.ExportOutput(_together(builder, "plant_signals", signals), "plant_signals")
+    if own := _own_headings(world, plants):
+        builder.ExportOutput(_together(builder, "own_headings", [*own.values()]), "own_headings")
     if world.steering is not None:
         of_ugvs = [{port.get_name(): port for port in _outputs(plants[name])} for name in world.names("ugv")]
         none = builder.AddNamedSystem("no_heading", ConstantVectorSource([0.0])).get_output_port()
@@ -350,22 +351,10 @@ def _uav_controller(scenario: Scenario, world: World) -> UavController:
     )
 
 
-def _plant(body: Body, plants: PlantFactory | None, period_s: float) -> System:
-    """The Drake system of a moving body: the user's for a robot, or that of its plant.
-
-    Raises:
-        PluginError: if the user's system does not have the ports of a plant.
-    """
-    if plants is None or body.kind not in ROBOTS:
-        assert body.plant is not None
-        return PLANTS[body.plant.kind](body, period_s)
-    robot, plant = body.name, plants(body.name, body.start_m)
-    ports = [plant.get_input_port(i).size() for i in range(plant.num_input_ports())]
-    outputs = [plant.get_output_port(i).size() for i in range(plant.num_output_ports())]
-    if ports[:1] != [3] or outputs[:1] != [3]:
-        wanted = "allowed: velocity (3) first among its inputs, position (3) first among its outputs"
-        raise PluginError(f"the plant of {robot} has inputs of sizes {ports}, outputs of sizes {outputs}; {wanted}")
-    return plant
+def _own_headings(world: World, plants: Mapping[str, System]) -> dict[str, OutputPort]:
+    """The headings of plants of one's own that have one, by robot."""
+    own = [body.name for body in world.moving if isinstance(body.plant, Own)]
+    return {name: plants[name].GetOutputPort("heading") for name in own if plants[name].HasOutputPort("heading")}
 
 
 def _checked_block(n: int, block: System) -> System:

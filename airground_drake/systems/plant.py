@@ -1,27 +1,43 @@
-"""The Drake systems of plants, by the kind of the plant, and of disturbances."""
+"""The Drake systems of plants, also of those of one's own, and of disturbances."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import copy
+import re
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import partial
+from types import MappingProxyType
+from typing import Any, NamedTuple
 
 import numpy as np
+from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.framework import (
     BasicVector,
     Context,
     Diagram,
     DiagramBuilder,
     DiscreteValues,
+    InputPortIndex,
     LeafSystem,
+    State,
     System,
 )
 from pydrake.systems.primitives import LinearSystem, TrajectorySource
 from pydrake.trajectories import PiecewisePolynomial
 
 from airground_drake.base.arrays import Array
+from airground_drake.base.errors import PluginError, UnknownNameError, described
+from airground_drake.registry import PLANTS
+from airground_drake.scenarios.load import validated
+from airground_drake.scenarios.schema import Plant as Given
+from airground_drake.scenarios.schema import Scenario
 from airground_drake.systems.lifetime import weakly
 from airground_drake.world.motion import SAME_S
-from airground_drake.world.plant import Delay, FirstOrder, Lag, Plant, Scripted, Unicycle
+from airground_drake.world.plant import FirstOrder, Own, Plant, Scripted, Unicycle
 from airground_drake.world.world import Body
+
+START_M = 1e-9
+"""A body may begin this far from its start, m: forward kinematics err by less."""
 
 
 def first_order_plant(robot: str, start: Array) -> LinearSystem:
@@ -103,14 +119,229 @@ def steered_plant(body: Body, period_s: float) -> Diagram:
     return builder.Build()
 
 
-PLANTS: dict[str, Callable[[Body, float], System]] = {
-    FirstOrder.kind: lambda body, period_s: first_order_plant(body.name, body.start_m),
-    Unicycle.kind: steered_plant,
-    Lag.kind: steered_plant,
-    Delay.kind: steered_plant,
-    Scripted.kind: lambda body, period_s: scripted_plant(body),
-}
-"""Makes the Drake system of a body, by the kind of its plant; the number is the control period, s."""
+class OwnPlant(NamedTuple):
+    """A plant of one's own for one robot, made in Python; in a scenario file it is a class (`plant.kind`).
+
+    Attributes:
+        make: called with `start`, the place of the body, (3,), m, world frame, and the parameters: gives a Drake System
+            as described in docs/extending.md.
+        drift_m_s: by how much the steered point misses its command in a control period at most, per time.
+        cover_m: how far the body is at most from the straight line of the steered point in a control period.
+        parameters: numbers, by name.
+    """
+
+    make: Callable[..., System]
+    drift_m_s: float
+    cover_m: float
+    parameters: Mapping[str, float] = MappingProxyType({})
+
+    @property
+    def name(self) -> str:
+        """What a scenario calls it: `module:Class`, also where it is a function."""
+        called = re.sub(r"\W+", "_", self.make.__qualname__)
+        return f"{self.make.__module__}:{called}"
+
+
+def declared(scenario: Scenario, plants: Mapping[str, OwnPlant]) -> Scenario:
+    """A valid scenario in which some robots have plants of one's own, by name.
+
+    Raises:
+        UnknownNameError: if there is no such robot.
+        ScenarioError: if the scenario is not valid with them.
+    """
+    changed = copy.deepcopy(scenario)
+    for robot, each in plants.items():
+        if robot not in changed.robots:
+            raise UnknownNameError("robot", robot, changed.robots)
+        given = Given(
+            kind=each.name, drift_m_s=each.drift_m_s, cover_m=each.cover_m, parameters={**each.parameters}
+        )  # fmt: skip
+        changed.robots[robot].plant = [given]
+    return validated(changed)
+
+
+class OwnCode(NamedTuple):
+    """Where a plant of one's own comes from: its name in the scenario, and a function in its file."""
+
+    name: str
+    function: object
+
+
+def own_code(scenario: Scenario, plants: Mapping[str, OwnPlant]) -> dict[str, OwnCode]:
+    """All plants of one's own in a scenario, by robot; `plants` are those of `declared`.
+
+    Raises:
+        UnknownNameError, PluginError: if a class cannot be imported or is no Drake System.
+    """
+    named = {robot: each.kind for robot, given in scenario.robots.items() for each in given.plant if each.is_own}
+    found = {}
+    for robot, name in named.items():
+        make = plants[robot].make if robot in plants else PLANTS.load(name, System)
+        found[robot] = OwnCode(name, make.__init__ if isinstance(make, type) else make)  # type: ignore[misc]
+    return found
+
+
+class OwnBody(LeafSystem):
+    """What a plant of one's own says of its body, passed on if all of it is finite.
+
+    A plant that is sampled, such as a discrete MultibodyPlant, jumps from place to place. What is passed on goes
+    straight from each place to the next instead, one step of the plant later: a trace is continuous.
+
+    Ports (world frame):
+        in  `position` (3) and `body` (3), m; `heading` (1), rad, if the plant has one.
+        out the same position; `signals` (3), the body, m; `heading`.
+    State: of a sampled plant, the time of its last step, s, and what the input ports were before it.
+    """
+
+    def __init__(self, name: str, *, turns: bool, step_s: float) -> None:
+        """`name` says in messages whose plant of which class it is; `step_s` is 0 for a plant that is not sampled."""
+        super().__init__()
+        self._name, self._step_s = name, step_s
+        ports = [("position", "position", 3), ("body", "signals", 3), *([("heading", "heading", 1)] if turns else [])]
+        begin = 0
+        for port, output, size in ports:
+            source = self.DeclareVectorInputPort(port, size)
+            calc = partial(weakly(self._calc), source.get_index(), slice(1 + begin, 1 + begin + size))
+            needs = {source.ticket()} | ({self.xd_ticket(), self.time_ticket()} if step_s else set())
+            self.DeclareVectorOutputPort(output, size, calc, prerequisites_of_calc=needs)
+            begin += size
+        if step_s:
+            self.DeclareDiscreteState(1 + begin)
+            self.DeclareInitializationUnrestrictedUpdateEvent(weakly(self._update))
+            # Drake makes unrestricted updates before discrete ones: the plant has not made its step yet
+            self.DeclarePeriodicUnrestrictedUpdateEvent(step_s, 0.0, weakly(self._update))
+
+    def _update(self, context: Context, state: State) -> None:
+        places = [self._now(context, InputPortIndex(k)) for k in range(self.num_input_ports())]
+        held = np.concatenate([[context.get_time()], *places])
+        state.get_mutable_discrete_state().get_mutable_vector(0).SetFromVector(held)
+
+    def _now(self, context: Context, index: InputPortIndex) -> Array:
+        """What a port has now; raises PluginError if that cannot be computed or is not finite."""
+        source = self.get_input_port(index)
+        try:
+            value: Array = source.Eval(context)
+        except Exception as error:
+            raise PluginError(f"{self._name}: {described(error)}") from error
+        if not np.isfinite(value).all():
+            wanted = "allowed: finite numbers"
+            raise PluginError(f"{self._name} has {value.tolist()} at its output {source.get_name()}; {wanted}")
+        return value
+
+    def _calc(self, index: InputPortIndex, held: slice, context: Context, output: BasicVector) -> None:
+        value = self._now(context, index)
+        if self._step_s:
+            before = context.get_discrete_state(0).value()
+            share = min((context.get_time() - before[0]) / self._step_s, 1.0)
+            change = value - before[held]
+            if self.get_input_port(index).get_name() == "heading":
+                change = np.remainder(change + np.pi, 2.0 * np.pi) - np.pi
+            value = before[held] + share * change
+        output.SetFromVector(value)
+
+
+def step_of(system: System) -> float:
+    """The time, s, between the steps of a plant whose states change in steps only, all at once; else 0."""
+    steps = {*_steps(system)}
+    return steps.pop() if len(steps) == 1 and not system.num_continuous_states() else 0.0
+
+
+def _steps(system: System) -> Iterator[float]:
+    """Times between steps of the systems in a system, s."""
+    if isinstance(system, MultibodyPlant):  # whose steps are no discrete updates if its outputs are sampled
+        yield from [system.time_step()] if system.time_step() else []
+    elif isinstance(system, Diagram):
+        for each in system.GetSystems():
+            yield from _steps(each)
+    elif (timing := system.GetUniquePeriodicDiscreteUpdateAttribute()) is not None:
+        yield timing.period_sec()
+
+
+OUTPUTS = {"position": 3, "body": 3, "heading": 1}
+"""Output ports of a plant of one's own, and their sizes; only the first is needed, and may have another name."""
+
+
+def own_plant(body: Body, make: Callable[..., System] | None) -> Diagram:
+    """A plant of one's own behind an `OwnBody`.
+
+    Args:
+        body: whose plant it is.
+        make: in place of the class that the plant names.
+
+    Raises:
+        UnknownNameError, PluginError: if it cannot be made, lacks a port, or does not begin at the start of the body.
+    """
+    assert isinstance(body.plant, Own)
+    name, parameters = body.plant.name, {**body.plant.parameters, "start": body.start_m.copy()}
+    about = f"plant {name!r} of {body.name}"
+    if make is None:
+        system: Any = PLANTS.make(name, System, **parameters)
+    else:
+        try:
+            system = make(**parameters)
+        except Exception as error:
+            raise PluginError(f"{about}: {described(error, make)}") from error
+    if not isinstance(system, System):
+        raise PluginError(
+            f"{about} is made by a function that returns {type(system).__name__}; allowed: a Drake System"
+        )
+    inputs = [system.get_input_port(i).size() for i in range(system.num_input_ports())]
+    ports = [system.get_output_port(i) for i in range(system.num_output_ports())]
+    outputs = {"position": ports[0]} if ports else {}
+    outputs |= {port.get_name(): port for port in ports[1:] if port.get_name() in OUTPUTS}
+    if inputs[:1] != [3] or not outputs or any(port.size() != OUTPUTS[each] for each, port in outputs.items()):
+        found = {port.get_name(): port.size() for port in ports}
+        wanted = (
+            "allowed: velocity (3) first among its inputs, position (3) first among its outputs, and outputs named "
+            "body (3) and heading (1)"
+        )
+        raise PluginError(f"{about} has inputs of sizes {inputs}, outputs of sizes {found}; {wanted}")
+    builder = DiagramBuilder()
+    try:
+        builder.AddNamedSystem("own", system)
+    except Exception as error:  # it is part of another diagram
+        raise PluginError(f"{about}: {described(error)}") from error
+    checked = builder.AddNamedSystem("checked", OwnBody(about, turns="heading" in outputs, step_s=step_of(system)))
+    for port in (checked.get_input_port(i) for i in range(checked.num_input_ports())):
+        builder.Connect(outputs.get(port.get_name(), outputs["position"]), port)
+    builder.ExportInput(system.get_input_port(0), "velocity")
+    for port in (checked.get_output_port(i) for i in range(checked.num_output_ports())):
+        builder.ExportOutput(port, port.get_name())
+    diagram = builder.Build()
+    _begins_at(diagram, body.start_m, about)
+    return diagram
+
+
+def _begins_at(diagram: Diagram, start_m: Array, about: str) -> None:
+    """Refuse a plant whose body is not at its start, (3,), m, in the default context."""
+    try:
+        context = diagram.CreateDefaultContext()
+        diagram.get_input_port().FixValue(context, np.zeros(3))
+        begins = diagram.GetOutputPort("signals").Eval(context)
+    except PluginError:
+        raise
+    except Exception as error:
+        raise PluginError(f"{about}: {described(error)}") from error
+    if np.abs(begins - start_m).max() > START_M:
+        raise PluginError(f"{about} begins at {begins.tolist()} m; allowed: at its start, {start_m.tolist()} m")
+
+
+def plant_system(body: Body, period_s: float, own: Mapping[str, OwnPlant] = MappingProxyType({})) -> System:
+    """The Drake system of a body that moves.
+
+    Args:
+        body: with its plant.
+        period_s: control period.
+        own: plants that were made in Python, by robot.
+
+    Raises:
+        UnknownNameError, PluginError: as `own_plant`.
+    """
+    if isinstance(body.plant, Own):
+        return own_plant(body, own[body.name].make if body.name in own else None)
+    if isinstance(body.plant, FirstOrder):
+        return first_order_plant(body.name, body.start_m)
+    return scripted_plant(body) if isinstance(body.plant, Scripted) else steered_plant(body, period_s)
 
 
 class VelocityDisturbance(LeafSystem):

@@ -6,7 +6,7 @@ import abc
 import json
 from dataclasses import dataclass, field, fields
 from math import ceil
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from airground_drake.base.arrays import Array
 from airground_drake.base.errors import TraceError, described
 from airground_drake.base.statuses import PASSING, STATUSES, Status, meets, outcome
 from airground_drake.run.trace import Trace
-from airground_drake.scenarios.schema import Scenario, Uav, Ugv
+from airground_drake.scenarios.schema import Scenario
 from airground_drake.verify.engines.bodies import following_m_s, unicycle_m
 from airground_drake.verify.engines.geometry import MERGE_S, interpolate
 from airground_drake.verify.finding import Evidence, Failure, Finding
@@ -115,14 +115,9 @@ class ModelClaim(Claim):
 
 
 class TraceClaim(Claim):
-    """A claim about one run, decided from its trace alone.
-
-    Attributes (all of the class):
-        any_plant: whether the claim is about runs with any plants; others rest on how the scenario's plants move.
-    """
+    """A claim about one run, decided from its trace alone."""
 
     expected: Status = "holds"
-    any_plant: ClassVar[bool] = False
 
     @abc.abstractmethod
     def check(self, trace: Trace) -> Finding:
@@ -138,12 +133,7 @@ class TraceClaim(Claim):
     def judge(self, trace: Trace) -> Finding:
         """`check`; a malformed trace, an exception or a pass on half a run is the status `error`."""
         try:
-            others = other_plants(trace)
-            if others and not self.any_plant:
-                reason = f"the claim is about the plants of the scenario, not {others}"
-                return Finding("not_run", evidence={"reason": reason})
-            if not others:
-                require_motion(trace)
+            require_motion(trace)
             finding = self.check(trace)
             if finding.status in PASSING:
                 require_whole_run(trace)
@@ -221,21 +211,10 @@ def require_count(claim: Claim, finding: Finding) -> None:
         raise ValueError(f"{claim.id} was exercised {count!r} times")
 
 
-def other_plants(trace: Trace) -> str:
-    """Robots that had another plant than the scenario's, with its class, in words; empty if all are the scenario's."""
-    kinds = trace.meta.get("plants", {})
-    robots = trace.scenario.robots
-    others = {name: kind for name, kind in kinds.items() if name in robots and kind != _kind(robots[name])}
-    return ", ".join(f"{name}: {kind}" for name, kind in others.items())
-
-
-def _kind(robot: Ugv | Uav) -> str:
-    """The kind of the first plant of a robot."""
-    return robot.plant[0].kind if robot.plant else "first_order"
-
-
 def require_motion(trace: Trace) -> None:
     """Check that each position follows from the one before and the command by the robot's plant, as the trace says.
+
+    Of a plant of one's own, that its drift and cover are those of the recorded positions.
 
     Raises:
         TraceError: if time runs backwards, the run or the robots are not those of the scenario, or a step does
@@ -249,12 +228,38 @@ def require_motion(trace: Trace) -> None:
     if len(t) < 2 or (np.diff(t) < 0.0).any():
         raise TraceError("the trace has fewer than two rows, or its time runs backwards")
     for robot in trace.robots:
+        if any(plant.is_own for plant in scenario.robots[robot].plant):
+            require_measured(trace, robot)
+            continue
         position = trace.position(robot)
         off = np.abs(position[1:] - position[:-1] - np.diff(t)[:, None] * trace.command(robot)[1:]).max(axis=1)
         k = int(np.argmax(off))
         if off[k] > MOTION_TOLERANCE_M:
             raise TraceError(f"{robot} at t = {t[k + 1]} s is {off[k]:.3g} m from where its command leads to")
         require_body(trace, robot)
+
+
+def require_measured(trace: Trace, robot: str) -> None:
+    """Check the recorded drift and cover of a plant of one's own against the recorded positions, and where it begins.
+
+    Raises:
+        TraceError: if they differ by more than `MOTION_TOLERANCE_M`, per period for the drift.
+    """
+    t, samples, place, body = trace.t, trace.sample_rows, trace.position(robot), trace.body(robot)
+    for name, row, end in zip(range(len(samples)), samples, [*samples[1:], len(t) - 1], strict=True):
+        lasting, way = t[end] - t[row], place[end] - place[row]
+        drift = np.linalg.norm(way / lasting - trace.chosen(robot)[name])
+        share = (t[row : end + 1] - t[row]) / lasting
+        cover = np.linalg.norm(body[row : end + 1] - place[row] - share[:, None] * way, axis=1).max()
+        for key, due, within in (
+            ("drift_m_s", drift, MOTION_TOLERANCE_M / lasting),
+            ("cover_m", cover, MOTION_TOLERANCE_M),
+        ):
+            recorded = trace.sampled(f"{robot}.{key}")[name]
+            if abs(recorded - due) > within:
+                what = f"its positions have {due:.9g} in the period from t = {t[row]} s"
+                raise TraceError(f"{key} of {robot} is recorded as {recorded:.9g}, but {what}")
+    _begins(trace, robot)
 
 
 def require_body(trace: Trace, robot: str) -> None:
@@ -287,8 +292,14 @@ def require_body(trace: Trace, robot: str) -> None:
                 raise TraceError(f"{robot} begins with the heading {heading[0]} rad, not {plant.heading_rad}")
             due = both[:, :3]
     _agree(robot, t, found, due, "body")
-    if np.abs(found[0] - given.start_m).max() > MOTION_TOLERANCE_M:
-        raise TraceError(f"the body of {robot} begins at {found[0].tolist()} m, not at {given.start_m}")
+    _begins(trace, robot)
+
+
+def _begins(trace: Trace, robot: str) -> None:
+    """Raise a TraceError where a body does not begin where the scenario says."""
+    begins, start = trace.body(robot)[0], trace.scenario.robots[robot].start_m
+    if np.abs(begins - start).max() > MOTION_TOLERANCE_M:
+        raise TraceError(f"the body of {robot} begins at {begins.tolist()} m, not at {start}")
 
 
 def _agree(robot: str, t: Array, found: Array, due: Array, what: str) -> None:

@@ -10,6 +10,7 @@ of the body from base, command and memory. `systems.plant` makes the Drake syste
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, ClassVar, Protocol
 
@@ -250,6 +251,37 @@ class Delay(_Straight):
     def _of_after(self, memory: Array) -> tuple[Array, Array]:
         """The memory of `after`, and the command that takes effect now."""
         return memory[3 * self.periods :], memory[:3]
+
+
+@dataclass(frozen=True)
+class Own(_Straight):
+    """A Drake System of the user's, whose motion is not known here: `systems.plant` makes it and looks at its ports.
+
+    Its steered point gets to within `drift_m_s` times the control period of where its command leads in each period, and
+    its body stays within `cover_m` of the straight line between the places of that point at the period's ends. A run
+    measures both. Predictions go where the command leads.
+
+    Attributes:
+        name: of its class, `module:Class` or `file.py:Class`.
+        drift_m_s: declared.
+        cover_m: declared.
+        parameters: of its class.
+    """
+
+    kind: ClassVar[str] = "own"
+    name: str
+    drift_m_s: float
+    cover_m: float
+    parameters: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def signals(self) -> tuple[str, ...]:
+        """Place."""
+        return PLACE
+
+    def bounds(self, speed_m_s: float) -> Bounds:
+        """What is declared."""
+        return Bounds(cover_m=self.cover_m, drift_m_s=self.drift_m_s, speed_m_s=speed_m_s)
 
 
 @dataclass(frozen=True, eq=False)

@@ -72,10 +72,9 @@ def test_what_plants_take_is_the_same_in_both_programs() -> None:
     for name, _ in RUNS:
         scenario = load(name)
         given: dict[str, Any] = resolved(scenario)
-        period = scenario.control.period_s
-        ours = {each: plants.taken({**given["ugvs"], given["uav"]["name"]: given["uav"]}[each], period)
-                for each in scenario.robots}  # fmt: skip
-        theirs = {each: room_of(robot, period) for each, robot in scenario.robots.items()}
+        robots = {**given["ugvs"], given["uav"]["name"]: given["uav"]}
+        ours = {each: plants.taken(robots[each], given["control"]) for each in scenario.robots}
+        theirs = {each: room_of(robot, scenario.control) for each, robot in scenario.robots.items()}
         for one in scenario.robots:
             for other in (None, *scenario.robots):
                 both = ours[other] if other else None, theirs[other] if other else None

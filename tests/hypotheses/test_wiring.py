@@ -20,6 +20,7 @@ from airground_drake.nsbc.avoidance import Avoidance, limit_speed
 from airground_drake.nsbc.law import UgvLaw
 from airground_drake.scenarios.load import load
 from airground_drake.systems import controllers, diagram
+from airground_drake.systems.plant import OwnPlant, declared
 from airground_drake.world.world import Neighbours
 
 
@@ -87,10 +88,11 @@ def test_running_code_that_differs_from_the_scenario_is_noticed(name: str, monke
 def test_plants_that_are_faster_than_commanded_are_noticed() -> None:
     eye, zero = np.eye(3), np.zeros((3, 3))
 
-    def plant(robot: str, start: Array) -> LinearSystem:
+    def plant(start: Array) -> LinearSystem:
         found = LinearSystem(A=zero, B=1.1 * eye, C=eye, D=zero)
         found.configure_default_state(start)
         return found
 
-    wrong, _ = differences(load("case_a"), partial(diagram.build_model, plants=plant))
+    plants = {"ugv1": OwnPlant(plant, drift_m_s=0.0, cover_m=0.0)}
+    wrong, _ = differences(declared(load("case_a"), plants), partial(diagram.build_model, plants=plants))
     assert "a plant does not move as its robot is commanded" in wrong

@@ -163,7 +163,7 @@ def known_cores(trace: Trace, row: dict[Any, Any], on: ProposalRecord) -> tuple[
     beside = [pairs[parts.names[k]] for k in parts.owner[known]]
     claimed = on.mapped[told]
     theirs = claimed[:, GAP] + (trace.scenario.ugvs[on.ugv].radius_m + claimed[:, RADIUS])
-    room = room_of(trace.scenario.ugvs[on.ugv], trace.scenario.control.period_s)
+    room = room_of(trace.scenario.ugvs[on.ugv], trace.scenario.control)
     passive = (claimed[:, SPEED] > 0.0).tolist()
     theirs = np.array(
         [law_m(safe, room, None, passive=moves_) for safe, moves_ in zip(theirs.tolist(), passive, strict=True)]

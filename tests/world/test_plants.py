@@ -163,7 +163,7 @@ def test_claims_have_the_same_distances_in_other_words(
     ugvs: list[Ugv] = [replace(ugv, max_speed_m_s=v) for ugv, v in zip(scenario.ugvs.values(), speeds, strict=True)]
     period = scenario.control.period_s
     plants = [_bounds(ugv, period) for ugv in ugvs]
-    rooms = [room_of(ugv, period) for ugv in ugvs]
+    rooms = [room_of(ugv, scenario.control) for ugv in ugvs]
     for passive in (False, True) if alone else (False,):
         due = law_distance(distance, plants[0], AT_REST if alone else plants[1], gain=3.0, passive=passive)
         assert law_m(distance, rooms[0], None if alone else rooms[1], passive=passive) == pytest.approx(due, abs=1e-13)

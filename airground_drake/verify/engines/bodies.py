@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from airground_drake.base.arrays import Array
-from airground_drake.scenarios.schema import Uav, Ugv
+from airground_drake.scenarios.schema import Control, Uav, Ugv
 
 
 class Room(NamedTuple):
@@ -22,28 +22,41 @@ class Room(NamedTuple):
         lag_s: time constant.
         delay_s: of its commands.
         speed_m_s: limit of its commands.
+        drift_m: what missing its commands, by w at most, costs in distance: w / A.
+        slip_m: what it costs in one period: w h.
     """
 
     body_m: float
     lag_s: float
     delay_s: float
     speed_m_s: float
+    drift_m: float = 0.0
+    slip_m: float = 0.0
 
     @property
     def rolling_m(self) -> float:
         """How far the body may be from the steered point in all."""
         return self.body_m + (self.lag_s + self.delay_s) * self.speed_m_s
 
+    @property
+    def is_nothing(self) -> bool:
+        """Whether it takes no distance."""
+        return not (self.rolling_m or self.drift_m)
 
-def room_of(robot: Ugv | Uav, period_s: float) -> Room:
+
+def room_of(robot: Ugv | Uav, control: Control) -> Room:
     """What the plant of a robot takes."""
-    body = lag = delay = 0.0
+    body = lag = delay = drift = 0.0
+    period_s = control.period_s
     for plant in robot.plant:
+        body += plant.cover_m
+        drift += plant.drift_m_s
         if plant.kind == "unicycle":
             body += plant.hand_point_m + _dip_m(plant.hand_point_m, robot.max_speed_m_s, period_s, _turning(plant))
         lag += plant.time_constant_s * (plant.kind == "lag")
         delay += plant.delay_s * (plant.kind == "delay")
-    return Room(body, lag, delay, robot.max_speed_m_s)
+    restored_m = drift / control.avoidance_gain_1_s if drift else 0.0
+    return Room(body, lag, delay, robot.max_speed_m_s, restored_m, drift * period_s)
 
 
 def _turning(plant: object) -> float:
@@ -63,9 +76,9 @@ def _dip_m(hand_m: float, speed_m_s: float, period_s: float, most_rad_s: float) 
 
 def law_m(safe_m: float, one: Room, other: Room | None, *, passive: bool) -> float:
     """Distance that the law must keep for the bodies to keep `safe_m`, m; `other` is None beside an obstacle."""
-    bodies = one.body_m + (other.body_m if other else 0.0)
+    bodies = one.body_m + one.drift_m + (other.body_m + other.drift_m if other else 0.0)
     if passive:
-        return safe_m + one.rolling_m
+        return safe_m + one.rolling_m + one.drift_m
     if not (one.lag_s or one.delay_s or (other and (other.lag_s or other.delay_s))):
         return safe_m + bodies
     if other is None:

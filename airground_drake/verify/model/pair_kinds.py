@@ -11,7 +11,7 @@ from itertools import combinations
 from typing import Any, NamedTuple
 
 from airground_drake.base.exact import decimal
-from airground_drake.scenarios.schema import Scenario, Uav, Ugv
+from airground_drake.scenarios.schema import Control, Scenario, Uav, Ugv
 from airground_drake.verify.engines.bodies import Room, law_m, room_of
 
 SHARES = {"obstacle": (Fraction(1), Fraction(0)), "uav_ugv": (Fraction(1, 2),) * 2, "ugv_ugv": (Fraction(1, 2),) * 2}
@@ -78,9 +78,9 @@ def _kinds(scenario: Scenario) -> Iterator[PairKind]:
 
     Kept are pairs that no other pair exceeds in both distance and speed, and the nearest pair.
     """
-    safe, period = scenario.safe_distance, scenario.control.period_s
-    ugvs = [_Robot.of(ugv, period) for ugv in scenario.ugvs.values()]
-    uav = _Robot.of(scenario.uav, period)
+    safe, control = scenario.safe_distance, scenario.control
+    ugvs = [_Robot.of(ugv, control) for ugv in scenario.ugvs.values()]
+    uav = _Robot.of(scenario.uav, control)
     barriers = {(decimal(each.distance_m or safe.obstacle_m), decimal(each.radius_m)) for each in
                 scenario.barriers.values() if not each.expected_speed_m_s}  # fmt: skip
     pairs: dict[str, set[tuple[Fraction, Fraction]]] = {
@@ -107,8 +107,8 @@ class _Robot(NamedTuple):
     room: Room
 
     @classmethod
-    def of(cls, robot: Ugv | Uav, period_s: float) -> _Robot:
-        return cls(decimal(robot.radius_m), decimal(robot.max_speed_m_s), room_of(robot, period_s))
+    def of(cls, robot: Ugv | Uav, control: Control) -> _Robot:
+        return cls(decimal(robot.radius_m), decimal(robot.max_speed_m_s), room_of(robot, control))
 
     def beside(self, other: _Robot, apart_m: float) -> tuple[Fraction, Fraction]:
         """Distance in the law, m, and closing speed, m/s; `apart_m` is the safe one between surfaces."""
@@ -121,6 +121,6 @@ class _Robot(NamedTuple):
 
     def _in_the_law(self, safe_m: Fraction, other: Room | None) -> Fraction:
         """The safe distance and what the plants take, rounded to a float; exact if they take nothing."""
-        if not (self.room.rolling_m or (other and other.rolling_m)):
+        if self.room.is_nothing and (other is None or other.is_nothing):
             return safe_m
         return decimal(law_m(float(safe_m), self.room, other, passive=False))

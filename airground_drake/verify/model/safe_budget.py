@@ -18,10 +18,13 @@ from airground_drake.verify.model.theorem import Hypothesis, TheoremClaim
 ROUNDED_M = Fraction(1, 10**12)
 """Two ways to add up a budget differ by no more than this, m."""
 BASIC = ("Budget.at_samples", "Budget.budget_always")
+OWN = "own"
+"""Stands for all plants of one's own among the kinds."""
 BY_KIND = {
     "unicycle": ("Plants.chord", "Turning.chord_turns", "Turning.shortened_chord", "Turning.shortened"),
     "lag": ("Plants.lag", "Plants.lag_speed", "Plants.lag_pair", "Plants.lag_needs"),
     "delay": ("Plants.delay",),
+    OWN: ("Mixed.drifting", "Mixed.entry_keeps"),
 }
 """The theorems about each kind of plant."""
 BESIDE_MOVING = ("Passive.own_doing", "Passive.kept", "Mixed.unicycle_chord", "Mixed.lagging", "Mixed.delayed")
@@ -35,13 +38,15 @@ class SafeBudget(TheoremClaim):
     summary = "The law keeps as much more distance as the robots' plants take, so that their bodies keep the safe one."
     statement = (
         "Where the points that the law steers keep the law's distance d_law at the samples, the bodies of robots that "
-        "turn, lag or get their commands late keep the safe distance d at all times. Beside an obstacle that may move "
-        "the same holds of what SAFE-OWN says. For each kind of pair d_law is at least what the theorems ask for."
+        "turn, lag, get their commands late or have a plant of one's own keep the safe distance d at all times. Beside "
+        "an obstacle that may move the same holds of what SAFE-OWN says. For each kind of pair d_law is at least what "
+        "the theorems ask for."
     )
     latex = (
-        r"d_{\mathrm{law}} \ge b + \sum_{i} (c_i + f_i), \quad b = d + V |\delta_i - \delta_j| \text{ or } "
+        r"d_{\mathrm{law}} \ge b + \sum_{i} (c_i + f_i + w_i / A), \quad b = d + V |\delta_i - \delta_j| \text{ or } "
         r"\sum_i |\tau_i - \tau| V_i + \sqrt{(d + V |\delta_i - \delta_j|)^2 + (\tau V_{\mathrm{rel}})^2}",
-        r"c = l, \quad f = \tfrac{1}{8} |\omega| \lVert w \rVert h^2 \text{ (unicycle, chord steering)}",
+        r"c = l, \quad f = \tfrac{1}{8} |\omega| \lVert v \rVert h^2 \text{ (unicycle, chord steering)}; \quad c, w "
+        r"\text{ as declared (one's own)}",
     )
     method = (
         "Theorems in Coq about each kind of plant. Their hypotheses on the numbers of the scenario are checked here; "
@@ -50,7 +55,8 @@ class SafeBudget(TheoremClaim):
     )
     equations = "(7)-(8), (11) in the inequality form of the package (set-based avoidance)"
     assumptions = (
-        "The plants of the scenario are those of the robots: no slip, no error of a heading, time constant or delay.",
+        "The plants of the scenario are those of the robots: no slip, no error of a heading, time constant or delay. "
+        "Plants of one's own drift and cover no more than they declare (SAFE-HYP measures both in the run).",
         "Commands stay within the speed limits (SAFE-HYP checks the run).",
         "A delay comes before a lag; a robot with either beside a unicycle has the sum of what both take.",
     )
@@ -67,7 +73,7 @@ class SafeBudget(TheoremClaim):
 
     def inputs(self, scenario: Scenario) -> dict[str, Any]:
         """Gain and period; the kinds of plants and what they take; the distances of each kind of pair."""
-        period, robots = scenario.control.period_s, scenario.robots
+        control, robots = scenario.control, scenario.robots
         turning = [
             {
                 "robot": name, "hand_point_m": plant.hand_point_m, "speed_m_s": robot.max_speed_m_s,
@@ -76,16 +82,19 @@ class SafeBudget(TheoremClaim):
             for name, robot in robots.items() for plant in robot.plant if plant.kind == "unicycle"
         ]  # fmt: skip
         return {
-            "avoidance_gain_1_s": scenario.control.avoidance_gain_1_s,
-            "period_s": period,
-            "kinds": sorted({plant.kind for robot in robots.values() for plant in robot.plant} - {"first_order"}),
+            "avoidance_gain_1_s": control.avoidance_gain_1_s,
+            "period_s": control.period_s,
+            "kinds": sorted(
+                {OWN if plant.is_own else plant.kind for robot in robots.values() for plant in robot.plant}
+                - {"first_order"}
+            ),
             "unicycles": turning,
             "pairs": [
                 {
                     "first": one.first, "second": one.second, "kind": one.kind, "law_m": one.law_m,
                     "safe_m": one.promised_m + one.radii_m,
                     "rooms": [
-                        list(room_of(robots[name], period)) for name in (one.first, one.second) if name in robots
+                        list(room_of(robots[name], control)) for name in (one.first, one.second) if name in robots
                     ],
                 }
                 for one in (group[0] for group in alike(budget(scenario))) if one.terms

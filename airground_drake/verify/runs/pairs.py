@@ -63,7 +63,10 @@ class Pair(NamedTuple):
         last: row up to which both are there.
         speed_m_s: at which robots expect the barrier to move at most; above 0 the robot's law is the passive one.
         more_m: distance that the law keeps beyond `safe_m`.
-        cover_m: how far both bodies may be from the points that the law steers, together.
+        cover_m: how far both bodies may be from the points that the law steers after a period, together: what plants of
+            one's own may miss of their commands included.
+        drift_m: the part of `more_m` that makes up for missed commands.
+        slip_m: how much of its command the robot may miss in a control period.
     """
 
     first: str
@@ -77,6 +80,8 @@ class Pair(NamedTuple):
     speed_m_s: float = 0.0
     more_m: float = 0.0
     cover_m: float = 0.0
+    drift_m: float = 0.0
+    slip_m: float = 0.0
 
     @property
     def rows(self) -> slice:
@@ -137,13 +142,15 @@ def declared_pairs(trace: Trace) -> Iterator[Pair]:
     limit = {name: robot.max_speed_m_s for name, robot in trace.scenario.robots.items()}
     there = [(name, each, trace.there_from(name), trace.there_until(name)) for name, each in
              trace.scenario.barriers.items()]  # fmt: skip
-    room = {name: room_of(robot, period) for name, robot in trace.scenario.robots.items()}
+    room = {name: room_of(robot, trace.scenario.control) for name, robot in trace.scenario.robots.items()}
 
     def found(first: str, second: str, apart: float, radii: float, reach: float, **given: Any) -> Pair:
         pair = Pair(first, second, apart, radii, 0.5 if second in room else 1.0, reach, **given)
         more = law_m(pair.safe_m, room[first], room.get(second), passive=pair.speed_m_s > 0.0) - pair.safe_m
-        cover = room[first].rolling_m + (room[second].rolling_m if second in room else 0.0)
-        return pair._replace(more_m=more, cover_m=cover)
+        both = [room[name] for name in (first, second) if name in room]
+        cover = sum(each.rolling_m + each.slip_m for each in both)
+        drift = sum(each.drift_m for each in both)
+        return pair._replace(more_m=more, cover_m=cover, drift_m=drift, slip_m=room[first].slip_m)
 
     for robot in trace.robots:
         for name, each, row, last in there:

@@ -135,6 +135,7 @@ def _periods(trace: Trace, pair: Pair) -> Periods:
             place = origin + cores.points[part] if cores.are_points else origin
             asked = Fraction(1), Fraction(0), last
             missed = np.maximum(missed, shortfalls(first, place, keeps, *asked, core, planar=planar, held=True))
+    missed = np.maximum(missed - pair.slip_m, 0.0)  # for which the law keeps more
     moved = np.linalg.norm(np.diff(origin, axis=0), axis=1)
     lasting = np.diff(trace.t[around])
     return Periods(

@@ -53,6 +53,8 @@ PASSIVE = "avoidance beside an obstacle that may move"
 """The hypothesis that the steps met the passive law."""
 DECLARED = "declared speed"
 """The hypothesis that an obstacle moved no faster than it was expected to."""
+DRIFT, COVER = "declared drift", "declared cover"
+"""The hypotheses that a plant of one's own has the drift and the cover that it declares."""
 BUILT = "controller parameters"
 """The hypothesis that the controllers were built with what the scenario demands."""
 
@@ -90,8 +92,8 @@ class Guarantee(NamedTuple):
         pair: the two bodies.
         missed_m: how far each sample misses the inequalities, e_i + e_j, (K,), m per control period; 0: both are met.
         short_m: how much too close the pair started, or was when its obstacle appeared, m.
-        gap_m: d - max(e / a, short_m) with d the gap required, e the largest of `missed_m` and a = min(A h, 1).
-            Without a gain nothing is restored: d - K e - short_m.
+        gap_m: d - max(e / a - w / A, short_m) with d the gap required, e the largest of `missed_m`, a = min(A h, 1),
+            and w the drift that plants of one's own declare. Without a gain nothing is restored: d - K e - short_m.
     """
 
     pair: Pair
@@ -288,7 +290,7 @@ def _guarantees(trace: Trace) -> Iterator[Guarantee]:
         begun = [shortage(first[0], place.reshape(-1, 3)[0], pair.law_m, core, planar=planar) for place, core in beside]
         most = np.max([np.zeros(len(first) - 1), *missed], axis=0)
         e, short = Fraction(float(most.max())), max(begun, default=Fraction(0))
-        lost = max(e / gain, short) if gain else (len(samples) - 1) * e + short
+        lost = max(e / gain - Fraction(pair.drift_m), short) if gain else (len(samples) - 1) * e + short
         missed_m = np.concatenate([np.zeros(begin), most, np.zeros(len(samples) - end)])
         yield Guarantee(pair, missed_m, rounded_up(short), -rounded_up(lost - Fraction(pair.required_m)))
 
@@ -321,7 +323,7 @@ def _avoidance(trace: Trace, kept: Sequence[Guarantee]) -> Iterator[_Hypothesis]
     """The distance that is lost, m, because a sample misses the inequalities."""
     t, gain = trace.sampled("t_s"), float(_gain(trace))
     for one in kept:
-        lost = one.missed_m / gain if gain else one.missed_m * len(t)
+        lost = np.maximum(one.missed_m / gain - one.pair.drift_m, 0.0) if gain else one.missed_m * len(t)
         about = {"first": one.pair.first, "second": one.pair.second}
         yield _Hypothesis(AVOIDANCE, "m", t, 0.0 - lost, DISTANCE_TOLERANCE_M, about)
 
@@ -387,13 +389,15 @@ def _static(trace: Trace) -> Iterator[_Hypothesis]:
 def _sampled(trace: Trace) -> Iterator[_Hypothesis]:
     """Hypotheses at the control samples: their spacing, straight motion between them, speed limits, planar motion."""
     period, robots, t, samples = trace.scenario.control.period_s, trace.scenario.robots, trace.t, trace.sample_rows
+    own = {name for name, robot in robots.items() if any(plant.is_own for plant in robot.plant)}
     spacing = np.diff(np.append(t[samples], t[-1]))
     yield _Hypothesis("sampling", "s", t[samples], period - spacing, TIME_TOLERANCE_S, {})
     ends = np.append(samples, len(t) - 1)
     for robot in trace.robots:
         place, about = trace.position(robot), {"robot": robot}
         off = np.linalg.norm(place - interpolate(t[ends], place[ends], t), axis=1)
-        yield _Hypothesis("straight motion", "m", t, 0.0 - off, DISTANCE_TOLERANCE_M, about)
+        if robot not in own:  # whose cover is from the straight line
+            yield _Hypothesis("straight motion", "m", t, 0.0 - off, DISTANCE_TOLERANCE_M, about)
         spare = robots[robot].max_speed_m_s - np.linalg.norm(trace.command(robot)[1:], axis=1)
         yield _Hypothesis("speed limit", "m/s", t[:-1], spare, VELOCITY_TOLERANCE_M_S, about)
         if robot in trace.ugvs:
@@ -428,8 +432,14 @@ def _of_plants(trace: Trace) -> Iterator[_Hypothesis]:
                     spare = plant.max_wheel_speed_m_s - speed - 0.5 * plant.wheel_base_m * rate
                     yield _Hypothesis("wheel speeds", "m/s", t, spare, VELOCITY_TOLERANCE_M_S, about)
                 dips = rate * np.hypot(speed, plant.hand_point_m * rate) * lasting**2 / 8.0
-                most = room_of(robot, period).body_m - plant.hand_point_m
+                most = room_of(robot, trace.scenario.control).body_m - plant.hand_point_m
                 yield _Hypothesis("dip of the hand point", "m", t, most - dips, DISTANCE_TOLERANCE_M, about)
             elif plant.kind == "lag":
                 spare = robot.max_speed_m_s - np.linalg.norm(trace.body_velocity(name), axis=1)
                 yield _Hypothesis("speed of the body", "m/s", trace.t, spare, VELOCITY_TOLERANCE_M_S, about)
+            elif plant.is_own:
+                samples = trace.sampled("t_s")
+                spare = plant.drift_m_s - trace.sampled(f"{name}.drift_m_s")
+                yield _Hypothesis(DRIFT, "m/s", samples, spare, VELOCITY_TOLERANCE_M_S, about)
+                spare = plant.cover_m - trace.sampled(f"{name}.cover_m")
+                yield _Hypothesis(COVER, "m", samples, spare, DISTANCE_TOLERANCE_M, about)

@@ -59,7 +59,6 @@ class ZenoTrace(TraceClaim):
     )
 
     exercised_by = "gaps between consecutive triggers of one UGV"
-    any_plant = True
 
     def check(self, trace: Trace) -> Finding:
         """Compare the smallest gap of each UGV with the bound."""
