@@ -116,6 +116,8 @@ SENTENCES = {
     "matches": "✓ {matched} of {all} results match{how}.",
     # Do not conclude that
     "real": "real vehicles are safe: the model is first-order, its sensing perfect",
+    "real_own": "real vehicles are safe: {robot} showed {drift_m_s:.2g} of {declared_drift_m_s:.3g} m/s drift and "
+    "{cover_m:.3g} of {declared_cover_m:.3g} m cover here, not everywhere",
     "real_plants": "real vehicles are safe: those here never slip, lag exactly as declared, and sense perfectly",
     "elsewhere": "{who} also safe elsewhere: that was only seen in these runs",
     "beside_movers": "a robot can keep its distance from {who}: what moves can come as near as it likes",

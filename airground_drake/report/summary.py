@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from textwrap import wrap
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from airground_drake.base.errors import one_line
 from airground_drake.base.statuses import NOT_EXERCISED, UNDECIDED, outcome
@@ -207,11 +207,22 @@ def _interventions(document: Document, course: RunOutcome) -> str:
     return f"{told or 'no answer'}{why}{failed}"
 
 
+def _own_plants(document: Document) -> list[dict[str, Any]]:
+    """What SAFE-HYP says of each robot with a plant of one's own, with the largest numbers of all runs."""
+    found = dict[str, dict[str, Any]]()
+    for claim in document["claims"]:
+        for each in (claim["evidence"] or {}).get("own_plants", ()) if claim["id"] == "SAFE-HYP" else ():
+            before = found.setdefault(each["robot"], each)
+            found[each["robot"]] = each | {key: max(each[key], before[key]) for key in ("drift_m_s", "cover_m")}
+    return [*found.values()]
+
+
 def _beware(document: Document, every: Sequence[RunOutcome]) -> list[str]:
     main = [course for course in every if course.plain] or every
     robots = [*document["scenario"]["resolved"]["ugvs"].values(), document["scenario"]["resolved"]["uav"]]
     plants = [plant for robot in robots for plant in robot.get("plant", ())]
-    told = [clause("real_plants") if any(plant["kind"] != "first_order" for plant in plants) else clause("real")]
+    own, real = _own_plants(document), "real_plants" if any(p["kind"] != "first_order" for p in plants) else "real"
+    told = [clause("real_own", each) for each in own[:MAX_NAMES]] or [clause(real)]
     if seen := [course for course in main if course.safe and not (course.proof and course.proof.holds)]:
         told.append(clause("elsewhere", who=subject(seen, main)))
     if movers := list(dict.fromkeys(name for course in main for name in course.movers)):

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pydrake.geometry import HalfSpace, MeshcatVisualizer, StartMeshcat
+from pydrake.geometry import Box, MeshcatVisualizer, StartMeshcat
 from pydrake.math import RigidTransform
 from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import AddMultibodyPlantSceneGraph, CoulombFriction
@@ -28,8 +28,8 @@ class TurtleBot(Diagram):
         builder = DiagramBuilder()
         plant, scene = AddMultibodyPlantSceneGraph(builder, STEP_S)
         (robot,) = Parser(plant).AddModels(str(Path(__file__).with_name("turtlebot.urdf")))
-        ground, rubber = HalfSpace(), CoulombFriction(0.9, 0.9)
-        plant.RegisterCollisionGeometry(plant.world_body(), RigidTransform(), ground, "ground", rubber)
+        ground, below, rubber = Box(40.0, 40.0, 1.0), RigidTransform([0.0, 0.0, -0.5]), CoulombFriction(0.9, 0.9)
+        plant.RegisterCollisionGeometry(plant.world_body(), below, ground, "ground", rubber)
         for motor in ("left_motor", "right_motor"):
             plant.GetJointActuatorByName(motor).set_controller_gains(PdControllerGains(p=0.0, d=MOTOR_NM_S))
         plant.Finalize()

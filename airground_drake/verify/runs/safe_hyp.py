@@ -180,7 +180,7 @@ class SafeHyp(TraceClaim):
         """Evaluate all hypotheses; the first violation in time is the counterexample."""
         kept = sorted(guarantees(trace), key=lambda one: one.margin_m)
         others = [*_static(trace), *_sampled(trace), *_of_plants(trace), *_beside_moving(trace)]
-        moving, shares = beside_moving(trace), least_shares(trace)
+        moving, shares, own = beside_moving(trace), least_shares(trace), own_plants(trace)
         different = list(differences(trace))
         broken = [h.at(int(k)) for h in [*others, *_avoidance(trace, kept)] for k in h.broken()[:1]]
         broken += [{"hypothesis": BUILT, "t_s": float(trace.t[0]), **each} for each in different[:1]]
@@ -209,7 +209,8 @@ class SafeHyp(TraceClaim):
                 )
             )
             | ({"beside_moving": [asdict(each) for each in moving]} if moving else {})
-            | ({"least_command_shares": shares} if shares else {}),
+            | ({"least_command_shares": shares} if shares else {})
+            | ({"own_plants": [asdict(each) for each in own]} if own else {}),
             exercised=sum(binding.values()),
         )
 
@@ -408,6 +409,29 @@ def least_shares(trace: Trace) -> dict[str, float]:
     """The least share that was left of a command of each unicycle; inside d_law it recovers at so much of the gain."""
     names = [ugv for ugv, each in trace.scenario.ugvs.items() if any(plant.kind == "unicycle" for plant in each.plant)]
     return {name: float(trace.sampled(f"{name}.command_share").min()) for name in names}
+
+
+@dataclass(frozen=True)
+class OwnPlant:
+    """The largest drift, m/s, and cover, m, of a robot with a plant of one's own in a run, and what is declared."""
+
+    robot: str
+    plant: str
+    drift_m_s: float
+    declared_drift_m_s: float
+    cover_m: float
+    declared_cover_m: float
+
+
+def own_plants(trace: Trace) -> list[OwnPlant]:
+    """All robots with plants of one's own."""
+    given = [(name, each) for name, robot in trace.scenario.robots.items() for each in robot.plant if each.is_own]
+    most = {
+        name: [float(trace.sampled(f"{name}.{key}").max()) for key in ("drift_m_s", "cover_m")] for name, _ in given
+    }
+    return [
+        OwnPlant(name, each.kind, most[name][0], each.drift_m_s, most[name][1], each.cover_m) for name, each in given
+    ]
 
 
 def _of_plants(trace: Trace) -> Iterator[_Hypothesis]:
