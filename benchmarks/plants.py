@@ -39,6 +39,7 @@ OBSTACLES = {
 PLANTS: dict[str, Plant] = {
     "first order": FirstOrder(),
     "unicycle, l = 0.35 m": Unicycle(0.35, H),
+    "unicycle, 0.35 m, never backwards": Unicycle(0.35, H, backwards=False),
     "unicycle, l = 0.1 m, 2 rad/s": Unicycle(0.1, H, max_turn_rad_s=2.0),
     "unicycle, l = 0.1 m, wheels": Unicycle(0.1, H, wheel_base_m=0.3, max_wheel_m_s=0.8),
     "lag 0.1 s": Lag(0.1),
@@ -49,6 +50,7 @@ PLANTS: dict[str, Plant] = {
 DRIVE = "{kind: unicycle, hand_point_m: 0.2, max_turn_rad_s: 2.0, wheel_base_m: 0.4, max_wheel_speed_m_s: 1.2}"
 IN_DRAKE = {
     "unicycle": DRIVE,
+    "unicycle that never drives backwards": DRIVE.replace("}", ", backwards: false}"),
     "lag": "{kind: lag, time_constant_s: 0.2}",
     "delay and lag": "[{kind: delay, delay_s: 0.125}, {kind: lag, time_constant_s: 0.2}]",
 }
@@ -74,11 +76,14 @@ def attack(plant: Plant, rows: Array, periods: int, seed: int = 1) -> Worst:
         side = rng.choice([-1.0, 1.0])
         if isinstance(plant, Unicycle):
             memory = rng.uniform(-np.pi, np.pi, 1)
+            while _nearest(plant, rows, base, memory, np.zeros(3)) < SAFE_M:
+                memory = rng.uniform(-np.pi, np.pi, 1)
         for _ in range(PERIODS_A_RUN):
             side = -side if mode == 1 else side
             found = []
             for wish in _wishes(base, side, mode, rng):
-                command = law.velocity(base[None], near, base[None], wish[None], [None])[0]
+                steered = (memory, plant.steering[None]) if isinstance(plant, Unicycle) else None
+                command = law.velocity(base[None], near, base[None], wish[None], [None], steered)[0]
                 if isinstance(plant, Unicycle):
                     steer(command, float(memory[0]), plant.steering, H)
                 found.append((_nearest(plant, rows, base, memory, command), command))
@@ -130,7 +135,8 @@ def same_in_drake(plant: str, periods: int = 100) -> tuple[int, int]:
         k = int(np.searchsorted(rows, begin))
         positions = np.array([trace.position(name)[begin] for name in trace.robots])
         reference, rate = trace.reference("ugv1")[k], trace.reference_rate("ugv1")[k]
-        command = law.velocity(positions, near, reference[None], rate[None], [None])[0]
+        steered = (memory, robot.plant.steering[None]) if isinstance(robot.plant, Unicycle) else None
+        command = law.velocity(positions, near, reference[None], rate[None], [None], steered)[0]
         if isinstance(robot.plant, Unicycle):
             steer(command, float(memory[0]), robot.plant.steering, period)
         led = positions[0] + period * command
@@ -151,7 +157,7 @@ def main() -> int:
     parser.add_argument("-n", "--periods", type=int, default=100_000, help="of each attack (default: 100,000)")
     periods, broken = parser.parse_args().periods, 0
     print(f"d = {SAFE_M} m, V = {SPEED} m/s, A = {GAIN} 1/s, h = {H} s, {periods} periods each")
-    print("plant                            beside    law - d, m   used, m    of it   least, m")
+    print("plant                              beside    law - d, m   used, m    of it   least, m")
     for name, plant in PLANTS.items():
         for beside, rows in OBSTACLES.items():
             worst = attack(plant, rows, periods)
@@ -159,7 +165,7 @@ def main() -> int:
             broken += not kept
             share = f"{100.0 * worst.used_m / worst.more_m:4.0f} %" if worst.more_m else "     -"
             print(
-                f"{name:32s} {beside:8s} {worst.more_m:11.5f} {worst.used_m:9.5f} {share} {worst.least_m:10.5f}"
+                f"{name:34s} {beside:8s} {worst.more_m:11.5f} {worst.used_m:9.5f} {share} {worst.least_m:10.5f}"
                 f"{'' if kept else '  BROKEN'}",
                 flush=True,
             )

@@ -33,7 +33,8 @@ MOST_PARTS = 5000
 class Taken(NamedTuple):
     """What the plant of a robot takes: of length, m; lag and delay, s; and the limit of its commands, m/s.
 
-    A drift takes `drift_m` of a distance, and `slip_m` in one period.
+    A drift takes `drift_m` of a distance, and `slip_m` in one period. `drawn_m` is the part of `body_m` by which a
+    robot that never drives backwards is behind its steered point.
     """
 
     body_m: float
@@ -42,6 +43,7 @@ class Taken(NamedTuple):
     most_m_s: float
     drift_m: float = 0.0
     slip_m: float = 0.0
+    drawn_m: float = 0.0
 
     @property
     def cover_m(self) -> float:
@@ -76,7 +78,8 @@ def taken(robot: Json, control: Json) -> Taken:
             sums[plant["kind"]] += plant["time_constant_s"] + plant["delay_s"]
     drive = unicycle_of(robot)
     body = drive["hand_point_m"] + _dip_m(drive, most * period_s, period_s) if drive else 0.0
-    return Taken(body, sums["lag"], sums["delay"], most)
+    drawn = float(drive["hand_point_m"]) if drive and not drive["backwards"] else 0.0
+    return Taken(body, sums["lag"], sums["delay"], most, drawn_m=drawn)
 
 
 def _dip_m(drive: Json, chord_m: float, period_s: float) -> float:
@@ -95,6 +98,8 @@ def law_m(safe_m: float, one: Taken, other: Taken | None, *, passive: bool) -> f
     """Distance that the law keeps so that the bodies keep `safe_m`, m; `other` is None beside an obstacle."""
     if passive:
         return safe_m + one.cover_m + one.drift_m
+    if other is None and one.drawn_m:
+        return math.sqrt(safe_m**2 + one.drawn_m**2) + (one.body_m - one.drawn_m)
     both = (one, other) if other else (one, Taken(0.0, one.lag_s, one.delay_s, 0.0))
     late = safe_m + abs(both[0].delay_s - both[1].delay_s) * min(each.most_m_s for each in both)
     closing, bodies = sum(each.most_m_s for each in both), sum(each.body_m + each.drift_m for each in both)

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .files import Json
-from .plants import MOST_PARTS, STRAIGHT_M, own_of
+from .plants import MOST_PARTS, STRAIGHT_M, own_of, unicycle_of
 from .rules import SMALL, Array, Disagreement, Found, close, holds
 from .run import Run, column_of
 from .scenario import Pair, expected_m_s, written
@@ -270,12 +270,27 @@ def _constants(run: Run) -> None:
         holds("sensing range", reach >= least, float(reach), f"{float(least)} at least", about=about)
         start = np.inf if pair.moves_m_s else pair.shape.least_m(run.steered_apart(pair)[:1])
         holds("safe start", start >= pair.safe_m - SMALL, start, f"{pair.safe_m} at least", about=about)
+        if pair.drawn_m:
+            start, due = pair.shape.least_m(run.apart(pair)[:1]), pair.safe_m - pair.more_m
+            holds("safe start of the axle", start >= due - SMALL, start, f"{due} at least", about=about)
+
+
+def _rolled_m(run: Run, robot: str) -> Array:
+    """How far a unicycle went ahead from row to row, m: below 0 if it drove backwards."""
+    way = run.ways[robot]
+    assert way.heading_rad is not None
+    middle = 0.5 * (way.heading_rad[1:] + way.heading_rad[:-1])
+    step = np.diff(way.place_m, axis=0)
+    return np.asarray(step[:, 0] * np.cos(middle) + step[:, 1] * np.sin(middle))
 
 
 def _motion(run: Run) -> None:
     """Robots and obstacles keep their speed limits, and UGVs their height; straight motion is the law of motion."""
     for robot, spec in run.robots.items():
         place = run.position_m[robot]
+        drive = unicycle_of(spec)
+        if drive and not drive["backwards"]:
+            holds("never backwards", _rolled_m(run, robot) >= -SMALL, _rolled_m(run, robot), "0 at least", about=robot)
         if own := own_of(spec):
             for key, unit in (("drift_m_s", "m/s"), ("cover_m", "m")):
                 found, about = column_of(run.samples, f"{robot}.{key}"), f"{own[key]} {unit} at most"

@@ -15,7 +15,7 @@ from airground_drake.geometry.motion import Motion
 from airground_drake.intervention.policy import Proposal
 from airground_drake.nsbc.kernels import fill_half_spaces
 from airground_drake.nsbc.law import AcceptedMotion, Numbers, Tracking, UgvLaw, UgvState, command
-from airground_drake.world.steering import HAND, steer
+from airground_drake.world.steering import HAND, NUMBERS, ahead, steer
 
 REFUSED, ACCEPTED = 0, 1
 """Modes of a control period: whether the proposal is in force."""
@@ -39,7 +39,7 @@ class View:
         asked: under method (d), per part that moves, the motion that its body is asked to make and whether it has
             accepted it, or None.
         heading: own heading, rad, of a unicycle.
-        steering: numbers of its steering, (4,), see `world.steering`; zeros for a robot that is no unicycle.
+        steering: numbers of its steering, (5,), see `world.steering`; zeros for a robot that is no unicycle.
     """
 
     t: float
@@ -54,7 +54,7 @@ class View:
     max_speed: float
     asked: tuple[tuple[Motion, bool] | None, ...] = ()
     heading: float = 0.0
-    steering: Array = field(default_factory=lambda: np.zeros(4))
+    steering: Array = field(default_factory=lambda: np.zeros(NUMBERS))
 
     def apart(self) -> Array:
         """Signed distances of the own position from the cores, (m + n,), m."""
@@ -91,7 +91,7 @@ class ClosedLoop(NamedTuple):
         max_speed: own speed limit, m/s.
         substeps: control periods per stage.
         heading: at the beginning, rad, of a unicycle.
-        steering: numbers of its steering, (4,), see `world.steering`.
+        steering: numbers of its steering, (5,), see `world.steering`.
     """
 
     law: Numbers
@@ -159,7 +159,7 @@ class Workspace(NamedTuple):
 @njit(cache=True)
 def workspace(loop: ClosedLoop) -> Workspace:
     """Arrays for `advance`, uninitialised but for the heading."""
-    count = len(loop.distances)
+    count = len(loop.distances) + 1
     plane = np.array([1.0, 1.0, 0.0])
     return Workspace(
         plane,
@@ -194,12 +194,15 @@ def advance(loop: ClosedLoop, mode: int, k: int, position: Array, work: Workspac
 @njit(cache=True)
 def _command(loop: ClosedLoop, mode: int, k: int, position: Array, work: Workspace) -> Array:
     """Velocity that the law commands in control period k, (3,), m/s; rates are of the sampled motions."""
-    mobility, which, normal, bound, retreat, rate, asked, _ = work
+    mobility, which, normal, bound, retreat, rate, asked, heading = work
     law, every = loop.law, loop.every
     count = fill_half_spaces(
         position, mobility, loop.still, loop.parts, every, every, loop.places[k], loop.distances, loop.shares,
         law.layer, which, normal, bound, retreat,
     )  # fmt: skip
+    if ahead(heading[0], loop.steering, normal[count]):
+        bound[count], retreat[count] = 0.0, 0.0
+        count += 1
     for a in range(3):
         rate[a] = (loop.preset[k + 1, a] - loop.preset[k, a]) / law.layer.period
         asked[a] = (loop.wanted[k + 1, a] - loop.wanted[k, a]) / law.layer.period

@@ -18,6 +18,7 @@ from numba import njit
 from airground_drake.base.arrays import Array
 from airground_drake.nsbc.avoidance import Avoidance
 from airground_drake.nsbc.kernels import Layer, avoid_one, fill_half_spaces, limit_one, yielding
+from airground_drake.world.steering import NUMBERS, ahead
 from airground_drake.world.world import Neighbours
 
 
@@ -89,7 +90,13 @@ class UgvLaw:
         return Numbers(*gains, self.intervention_on_top, self.avoidance.layer)
 
     def velocity(
-        self, positions: Array, near: Neighbours, target: Array, rate: Array, asked: Sequence[AcceptedMotion | None]
+        self,
+        positions: Array,
+        near: Neighbours,
+        target: Array,
+        rate: Array,
+        asked: Sequence[AcceptedMotion | None],
+        steered: tuple[Array, Array] | None = None,
     ) -> Array:
         """Commands of n UGVs, (n, 3), m/s: `command` for each.
 
@@ -99,6 +106,8 @@ class UgvLaw:
             target: of the UGVs' own task (6), (n, 3), m.
             rate: velocity of the target, (n, 3), m/s.
             asked: per UGV, what the accepted intervention asks for, or None.
+            steered: of unicycles, the headings (n,), rad, and the numbers of their steering, (n, 5): those that never
+                drive backwards get no command to. None: there is no unicycle.
         """
         count = len(target)
         executing, chosen = np.zeros(count, dtype=np.bool_), np.zeros((count, 3, 3))
@@ -108,7 +117,9 @@ class UgvLaw:
                 executing[i] = True
                 wanted[i], wanted_rate[i], chosen[i] = one
         every = AcceptedMotion(wanted, wanted_rate, chosen)
-        velocity: Array = _commands(self.numbers, near, positions, Tracking(target, rate), every, executing)
+        headings, steering = (np.zeros(count), np.zeros((count, NUMBERS))) if steered is None else steered
+        track = Tracking(target, rate)
+        velocity: Array = _commands(self.numbers, near, positions, track, every, executing, headings, steering)
         return velocity
 
 
@@ -165,6 +176,8 @@ def _commands(
     track: Tracking,
     asked: AcceptedMotion,
     executing: npt.NDArray[np.bool_],
+    headings: Array,
+    steering: Array,
 ) -> Array:
     """`command` for n UGVs, (n, 3), m/s; the fields of `track` and `asked` have a row per UGV, or a matrix."""
     # Reading an array of a named tuple within the loop would count references.
@@ -172,14 +185,17 @@ def _commands(
     target, rate = track
     wanted, wanted_rate, chosen = asked
     velocity = np.empty(target.shape)
-    normal, bound = np.empty((distance.shape[1], 3)), np.empty(distance.shape[1])
-    which, retreat = np.empty(distance.shape[1], np.intp), np.empty(distance.shape[1])
+    most = distance.shape[1] + 1
+    normal, bound, which, retreat = np.empty((most, 3)), np.empty(most), np.empty(most, np.intp), np.empty(most)
     for i in range(len(target)):
         ugv = UgvState(positions[members[i]], mobility[i], max_speed[i])
         count = fill_half_spaces(
             ugv.position, ugv.mobility, still, parts, carrier, others[i], positions, distance[i], share[i],
             law.layer, which, normal, bound, retreat,
         )  # fmt: skip
+        if ahead(headings[i], steering[i], normal[count]):
+            bound[count], retreat[count] = 0.0, 0.0
+            count += 1
         task, own = AcceptedMotion(wanted[i], wanted_rate[i], chosen[i]), Tracking(target[i], rate[i])
         velocity[i] = command(law, ugv, own, task, executing[i], normal[:count], bound[:count], retreat[:count])
     return velocity

@@ -201,8 +201,8 @@ def refuse_unknown(trace: Trace) -> None:
                 raise TraceError(f"run {trace.run}: {name} has {key.name}; no theorem is about such a body")
         for plant in getattr(body, "plant", ()):
             if plant.kind not in PLANTS:
-                why = "of whose motion between the rows nothing is known; SAFE-BUDGET says what is proved of it"
-                raise TraceError(f"run {trace.run}: {name} has the plant {plant.kind}, {why}")
+                why = "SAFE-BUDGET says what is proved of it" if plant.is_own else "no theorem is about such a body"
+                raise TraceError(f"run {trace.run}: {name} has the plant {plant.kind}; {why}")
 
 
 def _centre(obstacle: Obstacle) -> Place:

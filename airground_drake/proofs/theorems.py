@@ -170,7 +170,7 @@ _ALL = (
         (_CHORD, _PIECES),
     ),
     Theorem(
-        "Plants.forwards", "ours", ("SAFE-HYP",),
+        "Plants.forwards", "ours", ("SAFE-BUDGET", "SAFE-HYP"),
         "The axle of a unicycle that never drives backwards keeps sqrt(m^2 - l^2) from sets that its hand point keeps "
         "m from.",
         ("It drives at v >= 0, a speed for each period.", "The set is at rest.", "It starts there.", _PIECES),
@@ -281,7 +281,7 @@ _ALL = (
         ("They are not negative.",),
     ),
     Theorem(
-        "Mixed.drifting", "ours", ("SAFE-HYP",),
+        "Mixed.drifting", "ours", ("SAFE-BUDGET", "SAFE-HYP"),
         "A body whose velocity errs by w conforms to the drift w; and a set that moves at V, with the command 0, to V.",
         ("Dip and cover are not negative.",),
     ),

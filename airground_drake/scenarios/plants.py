@@ -24,5 +24,5 @@ def _plant(given: Given, period_s: float) -> Plant:
         return Own(given.kind, given.drift_m_s, given.cover_m, given.parameters)
     if given.kind == "unicycle":
         limits = given.max_turn_rad_s or math.inf, given.wheel_base_m, given.max_wheel_speed_m_s or math.inf
-        return Unicycle(given.hand_point_m, period_s, given.heading_rad, *limits)
+        return Unicycle(given.hand_point_m, period_s, given.heading_rad, *limits, given.backwards)
     return Lag(given.time_constant_s) if given.kind == "lag" else FirstOrder()

@@ -103,6 +103,9 @@ class Plant:
     """Of a unicycle: distance of its wheels."""
     max_wheel_speed_m_s: NotNegative = 0.0
     """Of a unicycle: speed limit of a wheel; 0: none."""
+    backwards: YesNo = True
+    """Of a unicycle: whether it may drive backwards. If not, the law keeps less distance from what is at rest, and a
+    robot whose target is straight behind it can stand for ever."""
     time_constant_s: NotNegative = 0.0
     """Of a lag: time constant; above 0."""
     delay_s: NotNegative = 0.0

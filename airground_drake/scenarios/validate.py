@@ -186,7 +186,7 @@ def _route(scenario: Scenario) -> Problems:
 
 KEYS_OF_PLANTS = {
     "first_order": (),
-    "unicycle": ("hand_point_m", "heading_rad", "max_turn_rad_s", "wheel_base_m", "max_wheel_speed_m_s"),
+    "unicycle": ("hand_point_m", "heading_rad", "max_turn_rad_s", "wheel_base_m", "max_wheel_speed_m_s", "backwards"),
     "lag": ("time_constant_s",),
     "delay": ("delay_s",),
 }
@@ -209,12 +209,13 @@ def _plants(scenario: Scenario) -> Problems:
             key = f"{place}.{k}" if len(kinds) > 1 else place
             keys = KEYS_OF_PLANTS.get(plant.kind, OWN_KEYS)
             for other in (each for each in _ALL_KEYS if each not in keys):
-                if getattr(plant, other):
+                if getattr(plant, other) != getattr(_DEFAULT, other):
                     allowed = f"keys of {plant.kind}: {', '.join(keys) or 'none'}"
                     yield f"{key}.{other}", getattr(plant, other), allowed
             yield from _numbers_of(scenario, key, robot, plant)
 
 
+_DEFAULT = Plant()
 _ALL_KEYS = tuple(key for keys in (*KEYS_OF_PLANTS.values(), OWN_KEYS) for key in keys)
 
 

@@ -122,9 +122,11 @@ class UgvController(_Controller):
         positions = _finite(self._bodies.Eval(context)).reshape(-1, 3)
         reference, rate = self._reference.Eval(context).reshape(2, -1, 3)
         proposals = accepted_proposals(self._proposals.Eval(context), self._answers.Eval(context))
-        velocity = self.velocity(context.get_time(), positions, reference, rate, proposals, self._in_force(context))
-        if self._headings is not None:
-            discrete.set_value(2, self.shorten(velocity, self._headings.Eval(context)))
+        headings = None if self._headings is None else self._headings.Eval(context)
+        law = self._in_force(context)
+        velocity = self.velocity(context.get_time(), positions, reference, rate, proposals, headings, law)
+        if headings is not None:
+            discrete.set_value(2, self.shorten(velocity, headings))
         discrete.set_value(0, velocity.ravel())
         discrete.set_value(1, [NOTHING if proposal is None else float(proposal.number) for proposal in proposals])
 
@@ -146,6 +148,7 @@ class UgvController(_Controller):
         reference: Array,
         rate: Array,
         accepted: Sequence[Proposal | None],
+        headings: Array | None = None,
         law: UgvLaw | None = None,
     ) -> Array:
         """Commands of the law, before they are shortened.
@@ -156,6 +159,7 @@ class UgvController(_Controller):
             reference: preset positions, (n, 3), m.
             rate: preset velocities, (n, 3), m/s.
             accepted: per UGV, the accepted proposal or None.
+            headings: of the UGVs, (n,), rad, where some are unicycles.
             law: default: the one with the default gains.
 
         Returns:
@@ -163,7 +167,9 @@ class UgvController(_Controller):
         """
         law = self.law if law is None else law
         asked = [None if p is None else AcceptedMotion(*p.motion.at(t), p.chosen) for p in accepted]
-        return law.velocity(positions, self._world.at(self._near, t), reference, rate, asked)
+        steering = self._world.steering
+        steered = None if steering is None or headings is None else (headings, steering)
+        return law.velocity(positions, self._world.at(self._near, t), reference, rate, asked, steered)
 
 
 class UavController(_Controller):

@@ -80,13 +80,13 @@ class Laws:
     """Laws that commands are compared with, made separately from those of the diagram.
 
     Attributes:
-        ugvs: commands (n, 3), m/s, from the time, positions (M, 3), preset positions and velocities (n, 3) each, and
-            the accepted proposal or None of each UGV.
+        ugvs: commands (n, 3), m/s, from the time, positions (M, 3), preset positions and velocities (n, 3) each, the
+            accepted proposal or None of each UGV, and with unicycles the headings (n,), rad.
         uav: command (3,), m/s, from the time, positions (M, 3), m, and the UGVs' commands (n, 3), m/s, one sample
             earlier.
     """
 
-    ugvs: Callable[[float, Array, Array, Array, Sequence[Proposal | None]], Array]
+    ugvs: Callable[[float, Array, Array, Array, Sequence[Proposal | None], Array | None], Array]
     uav: Callable[[float, Array, Array], Array]
 
 
@@ -195,7 +195,7 @@ class Monitor(LeafSystem):
         if sample.reference is not None and all(port.HasValue(context) for port in ports):
             accepted = accepted_proposals(self._proposals.Eval(context), self._answers.Eval(context))
             reference, rate = sample.reference.reshape(2, -1, 3)
-            wished = laws.ugvs(sample.t, sample.positions, reference, rate, accepted)
+            wished = laws.ugvs(sample.t, sample.positions, reference, rate, accepted, sample.headings)
             if sample.headings is not None and self._world.steering is not None:
                 steer_all(wished, sample.headings, self._world.steering, self._avoidance.period)
             due[self._ugvs] = wished

@@ -16,6 +16,7 @@ only promises that the robot does not come nearer by itself. There lag and delay
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from typing import NamedTuple
 
@@ -34,6 +35,8 @@ class Bounds(NamedTuple):
         lag_s: time constant with which the body's velocity follows the command, s.
         delay_s: time after which a command takes effect, s.
         speed_m_s: largest command, m/s.
+        drawn: whether the body is drawn after the steered point, as a trailer: then beside a set at rest a cover l
+            costs sqrt(d^2 + l^2) - d (theorem Plants.forwards).
     """
 
     cover_m: float = 0.0
@@ -42,6 +45,7 @@ class Bounds(NamedTuple):
     lag_s: float = 0.0
     delay_s: float = 0.0
     speed_m_s: float = 0.0
+    drawn: bool = False
 
     @property
     def exact(self) -> bool:
@@ -79,6 +83,8 @@ def law_distance(
     if not passive:
         kept = kept + _delay(one, other)
         kept = _lagging(kept, one, other)
+    if _draws(one, other, passive=passive):
+        kept = np.hypot(kept, one.cover_m)
     return kept + sum(cost.metres for cost in _added(one, other, gain=gain, passive=passive))
 
 
@@ -89,18 +95,25 @@ def costs(distance: float, one: Bounds, other: Bounds = AT_REST, *, gain: float,
         delay = _delay(one, other)
         lag = float(_lagging(distance + delay, one, other)) - (distance + delay)
         found += [Cost("delay", -1, delay), Cost("lag", -1, lag)]
+    if _draws(one, other, passive=passive):
+        found.insert(0, Cost("cover", 0, math.hypot(distance, one.cover_m) - distance))
     return [cost for cost in found if cost.metres > 0.0]
 
 
 def _added(one: Bounds, other: Bounds, *, gain: float, passive: bool) -> Iterator[Cost]:
     """The terms that are the same for all distances, but for a delay."""
     for k, bounds in enumerate((one, other)):
-        yield Cost("cover", k, bounds.cover_m)
+        yield Cost("cover", k, 0.0 if k == 0 and _draws(one, other, passive=passive) else bounds.cover_m)
         yield Cost("dip", k, bounds.dip_m)
         yield Cost("drift", k, bounds.drift_m_s / gain if bounds.drift_m_s else 0.0)
         if passive:
             yield Cost("lag", k, bounds.lag_s * bounds.speed_m_s)
             yield Cost("delay", k, bounds.delay_s * bounds.speed_m_s)
+
+
+def _draws(one: Bounds, other: Bounds, *, passive: bool) -> bool:
+    """Whether the first body is drawn after its steered point beside a set at rest."""
+    return one.drawn and other == AT_REST and not passive
 
 
 def _delay(one: Bounds, other: Bounds) -> float:

@@ -18,7 +18,7 @@ import numpy as np
 
 from airground_drake.base.arrays import Array
 from airground_drake.world.budget import Bounds
-from airground_drake.world.steering import HALF_BASE, HAND, TURN, WHEEL, along, chord
+from airground_drake.world.steering import FORWARD, HALF_BASE, HAND, NUMBERS, TURN, WHEEL, along, chord
 
 if TYPE_CHECKING:
     from airground_drake.geometry.motion import Motion
@@ -112,6 +112,7 @@ class Unicycle(_Straight):
         max_turn_rad_s: turning limit.
         wheel_base_m: distance of the wheels, m.
         max_wheel_m_s: speed limit of a wheel.
+        backwards: whether it may drive backwards.
     """
 
     kind: ClassVar[str] = "unicycle"
@@ -121,6 +122,7 @@ class Unicycle(_Straight):
     max_turn_rad_s: float = math.inf
     wheel_base_m: float = 0.0
     max_wheel_m_s: float = math.inf
+    backwards: bool = True
 
     @property
     def signals(self) -> tuple[str, ...]:
@@ -129,10 +131,11 @@ class Unicycle(_Straight):
 
     @property
     def steering(self) -> Array:
-        """Numbers for `world.steering`, (4,)."""
-        found = np.empty(4)
+        """Numbers for `world.steering`, (5,)."""
+        found = np.zeros(NUMBERS)
         found[HAND], found[TURN] = self.hand_m, self.max_turn_rad_s
         found[HALF_BASE], found[WHEEL] = 0.5 * self.wheel_base_m, self.max_wheel_m_s
+        found[FORWARD] = not self.backwards
         return found
 
     def turning_rad_s(self, speed_m_s: float) -> float:
@@ -148,11 +151,14 @@ class Unicycle(_Straight):
         return start + self.hand_m * ahead
 
     def bounds(self, speed_m_s: float) -> Bounds:
-        """Cover l. The hand point runs through an arc with a chord of at most V h: dip omega V h^2 / (8 sinc)."""
+        """Cover l. The hand point runs through an arc with a chord of at most V h: dip omega V h^2 / (8 sinc).
+
+        An axle that never goes backwards is drawn after the hand point.
+        """
         half = 0.5 * self.turning_rad_s(speed_m_s) * self.period_s
         sinc = math.sin(half) / half if half else 1.0
         dip = 0.25 * half * speed_m_s * self.period_s / sinc
-        return Bounds(cover_m=self.hand_m, dip_m=dip, speed_m_s=speed_m_s)
+        return Bounds(cover_m=self.hand_m, dip_m=dip, speed_m_s=speed_m_s, drawn=not self.backwards)
 
     def memory(self) -> Array:
         """The heading."""

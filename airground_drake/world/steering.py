@@ -12,6 +12,9 @@ A command that asks for too fast a turn is shortened: s u with
 
 needs |omega| <= omega_max (theorems Turning.turns_within and Turning.shortened_chord). It is shortened further, by
 bisection, until no wheel exceeds its speed limit, |v| + |omega| B / 2 <= w_max.
+
+A unicycle that never drives backwards has v >= 0 if a >= 0: the law takes that as one more inequality (`ahead`), and
+where its other tasks come first, or inequalities contradict each other, a command with a < 0 makes it stand.
 """
 
 from __future__ import annotations
@@ -23,9 +26,10 @@ from numba import njit
 
 from airground_drake.base.arrays import Array
 
-HAND, TURN, HALF_BASE, WHEEL = 0, 1, 2, 3
-"""Entries of the numbers of a steering, (4,): hand point l, m (0: no unicycle); largest turning rate, rad/s; half the
-wheel base, m; largest speed of a wheel, m/s. inf: no limit."""
+HAND, TURN, HALF_BASE, WHEEL, FORWARD = 0, 1, 2, 3, 4
+"""Entries of the numbers of a steering, (5,): hand point l, m (0: no unicycle); largest turning rate, rad/s; half the
+wheel base, m; largest speed of a wheel, m/s; 1 if it never drives backwards, else 0. inf: no limit."""
+NUMBERS = 5
 BISECTIONS = 50
 """Halvings in the search for a share that the wheels can do; the result always can be done."""
 
@@ -79,9 +83,12 @@ def steer(velocity: Array, heading: float, steering: Array, period: float) -> tu
     """Shorten a command (3,), m/s, world frame, in place, for a unicycle with a heading, rad.
 
     Returns:
-        The share s that is left of the command, and the turning rate, rad/s.
+        The share s that is left of the command, 0 if it stands, and the turning rate, rad/s.
     """
     cos, sin = math.cos(heading), math.sin(heading)
+    if steering[FORWARD] > 0.0 and velocity[0] * cos + velocity[1] * sin < 0.0:
+        velocity[:] = 0.0
+        return 0.0, 0.0
     left = share(velocity[0] * cos + velocity[1] * sin, velocity[1] * cos - velocity[0] * sin, steering, period)
     if left < 1.0:
         for axis in range(3):
@@ -92,7 +99,7 @@ def steer(velocity: Array, heading: float, steering: Array, period: float) -> tu
 
 @njit(cache=True)
 def steer_all(velocity: Array, headings: Array, steering: Array, period: float) -> Array:
-    """Shorten the commands (n, 3), m/s, of UGVs with headings (n,), rad, in place; `steering` is (n, 4).
+    """Shorten the commands (n, 3), m/s, of UGVs with headings (n,), rad, in place; `steering` is (n, 5).
 
     Returns:
         The shares that are left, (n,); 1 for a UGV that is no unicycle.
@@ -102,6 +109,15 @@ def steer_all(velocity: Array, headings: Array, steering: Array, period: float) 
         if steering[i, HAND] > 0.0:
             left[i] = steer(velocity[i], headings[i], steering[i], period)[0]
     return left
+
+
+@njit(cache=True)
+def ahead(heading: float, steering: Array, direction: Array) -> bool:
+    """Whether a robot never drives backwards; writes the unit vector ahead of it, for a heading in rad, if so."""
+    if steering[FORWARD] == 0.0:
+        return False
+    direction[0], direction[1], direction[2] = math.cos(heading), math.sin(heading), 0.0
+    return True
 
 
 @njit(cache=True)

@@ -15,6 +15,7 @@ from airground_drake.geometry import outline
 from airground_drake.world.budget import AT_REST, Bounds, law_distance
 from airground_drake.world.motion import SAME_S
 from airground_drake.world.plant import Plant, Scripted, Unicycle
+from airground_drake.world.steering import NUMBERS
 
 Kind = Literal["ugv", "uav", "obstacle"]
 KINDS: tuple[Kind, ...] = get_args(Kind)
@@ -208,11 +209,11 @@ class World:
 
     @cached_property
     def steering(self) -> Array | None:
-        """Numbers of the UGVs' steering, (n, 4), see `world.steering`; None if no UGV is a unicycle."""
+        """Numbers of the UGVs' steering, (n, 5), see `world.steering`; None if no UGV is a unicycle."""
         plants = [body.plant for body in self.bodies[self.select("ugv")]]
         if not any(isinstance(plant, Unicycle) for plant in plants):
             return None
-        return np.array([plant.steering if isinstance(plant, Unicycle) else np.zeros(4) for plant in plants])
+        return np.array([plant.steering if isinstance(plant, Unicycle) else np.zeros(NUMBERS) for plant in plants])
 
     @cached_property
     def signals(self) -> tuple[str, ...]:

@@ -13,15 +13,22 @@ from airground_drake.check.rules import Disagreement
 from airground_drake.check.run import Run, _moves_as_commanded
 from airground_drake.run.simulation import simulate
 from airground_drake.run.trace import Trace
-from airground_drake.scenarios.load import load, resolved
+from airground_drake.scenarios.load import load, resolved, validated
+from airground_drake.scenarios.schema import Scenario
 from airground_drake.verify import judge
 from airground_drake.verify.engines.bodies import law_m, room_of
 
-RUNS = (("turtlebots", 12.0), ("lagging", 9.0), ("case_a_unicycle", 10.0))
+FORWARDS = [f"ugvs.{name}.plant.backwards=false" for name in ("burger", "waffle", "tb4")]
+RUNS = (("turtlebots", 12.0), ("lagging", 9.0), ("case_a_unicycle", 10.0), ("turtlebots forwards", 12.0))
+
+
+def given(name: str) -> Scenario:
+    scenario, _, forwards = name.partition(" ")
+    return load(scenario, FORWARDS if forwards else [])
 
 
 def run_of(name: str, duration_s: float) -> tuple[Trace, Run]:
-    trace = simulate(load(name, [f"duration_s={duration_s}"]), "a")
+    trace = simulate(validated(given(name), [f"duration_s={duration_s}"]), "a")
     return trace, checked(trace, trace.states)
 
 
@@ -70,10 +77,10 @@ def test_a_forged_body_is_found(name: str, column: str, rule: str) -> None:
 
 def test_what_plants_take_is_the_same_in_both_programs() -> None:
     for name, _ in RUNS:
-        scenario = load(name)
-        given: dict[str, Any] = resolved(scenario)
-        robots = {**given["ugvs"], given["uav"]["name"]: given["uav"]}
-        ours = {each: plants.taken(robots[each], given["control"]) for each in scenario.robots}
+        scenario = given(name)
+        everything: dict[str, Any] = resolved(scenario)
+        robots = {**everything["ugvs"], everything["uav"]["name"]: everything["uav"]}
+        ours = {each: plants.taken(robots[each], everything["control"]) for each in scenario.robots}
         theirs = {each: room_of(robot, scenario.control) for each, robot in scenario.robots.items()}
         for one in scenario.robots:
             for other in (None, *scenario.robots):

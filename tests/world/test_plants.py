@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import math
 from dataclasses import replace
 
@@ -15,6 +16,9 @@ from scipy.integrate import solve_ivp
 
 from airground_drake.base.arrays import Array
 from airground_drake.base.errors import ScenarioError
+from airground_drake.geometry import outline
+from airground_drake.nsbc.avoidance import Avoidance
+from airground_drake.nsbc.law import UgvLaw
 from airground_drake.run.simulation import simulate
 from airground_drake.run.trace import Trace
 from airground_drake.scenarios.load import load
@@ -27,10 +31,11 @@ from airground_drake.verify.runs.pairs import least_gap, pairs_of
 from airground_drake.world.budget import AT_REST, Bounds, costs, law_distance
 from airground_drake.world.plant import Delay, Lag, Unicycle
 from airground_drake.world.steering import steer
-from airground_drake.world.world import Body
+from airground_drake.world.world import Body, World
 
 H = 0.05
 UNICYCLE = "{kind: unicycle, hand_point_m: 0.3, max_turn_rad_s: 2.0, wheel_base_m: 0.4, max_wheel_speed_m_s: 1.5}"
+FORWARDS = UNICYCLE.replace("}", ", backwards: false}")
 LAG = "{kind: lag, time_constant_s: 0.2}"
 DELAYED_LAG = "[{kind: delay, delay_s: 0.1}, {kind: lag, time_constant_s: 0.1}]"
 
@@ -147,13 +152,18 @@ def test_the_distance_in_the_law() -> None:
     turning = Bounds(cover_m=0.3, dip_m=0.01, drift_m_s=0.3)
     assert law_distance(0.6, turning, turning, gain=3.0) == pytest.approx(0.6 + 2 * (0.3 + 0.01 + 0.1))
     assert law_distance(0.6, slow, gain=3.0, passive=True) == pytest.approx(0.65)
+    drawn = Bounds(cover_m=0.8, dip_m=0.01, speed_m_s=1.0, drawn=True)
+    assert law_distance(0.6, drawn, gain=3.0) == pytest.approx(1.01)
+    assert sum(each.metres for each in costs(0.6, drawn, gain=3.0)) == pytest.approx(0.41)
+    assert law_distance(0.6, drawn, gain=3.0, passive=True) == pytest.approx(1.41)  # as beside another robot
+    assert law_distance(0.6, drawn, Bounds(speed_m_s=0.5), gain=3.0) == pytest.approx(1.41)
     both = costs(0.6, turning, slow, gain=3.0)
     assert 0.6 + sum(each.metres for each in both) == pytest.approx(law_distance(0.6, turning, slow, gain=3.0))
 
 
 @examples(100)
 @given(
-    st.lists(st.sampled_from([UNICYCLE, LAG, DELAYED_LAG, "{kind: first_order}"]), min_size=2, max_size=2),
+    st.lists(st.sampled_from([UNICYCLE, FORWARDS, LAG, DELAYED_LAG, "{kind: first_order}"]), min_size=2, max_size=2),
     st.lists(st.floats(0.2, 3.0), min_size=2, max_size=2), st.floats(0.1, 2.0), st.booleans(),
 )  # fmt: skip
 def test_claims_have_the_same_distances_in_other_words(
@@ -181,7 +191,7 @@ def run_of(plant: str, *more: str) -> Trace:
     return simulate(load("minimal", [*given_, "uav.target_m=[10, 0, 3]", "duration_s=12.0", *more]), "d")
 
 
-@pytest.mark.parametrize("plant", [UNICYCLE, LAG, DELAYED_LAG])
+@pytest.mark.parametrize("plant", [UNICYCLE, FORWARDS, LAG, DELAYED_LAG])
 def test_a_run_keeps_its_distances_and_meets_the_hypotheses(plant: str) -> None:
     """The least gap is no more than that of finely sampled bodies, which follow from the equations."""
     trace = run_of(plant)
@@ -192,6 +202,57 @@ def test_a_run_keeps_its_distances_and_meets_the_hypotheses(plant: str) -> None:
     assert gap.margin_m <= gaps.min() - gap.pair.safe_m + 1e-12
     assert gap.margin_m >= gaps.min() - gap.pair.safe_m - 2e-3
     assert gap.pair.law_m > gap.pair.safe_m
+
+
+@examples(60)
+@given(st.integers(0, 10**6), st.floats(0.1, 0.5), st.booleans())
+def test_a_unicycle_that_never_drives_backwards_does_not(seed: int, hand: float, near: bool) -> None:
+    """Under the law, beside a wall or not, whatever the task asks for; it keeps what it could do, and turns."""
+    rng, plant = np.random.default_rng(seed), Unicycle(hand, H, max_turn_rad_s=3.0, backwards=False)
+    rows = outline.stacked([outline.prism([[0.0, -9.0], [0.0, 9.0]], gap=0.5)])
+    robot = Body("robot", "ugv", np.zeros(3), plant=plant, max_speed_m_s=1.0)
+    around = World((robot, Body("wall", "obstacle", np.zeros(3), rows)), {}, 3.0).around(slice(0, 1))
+    law = UgvLaw(Avoidance(3.0, H), 1.0, 1.0, False)
+    place = np.array([[around.distance[0, 0] + rng.uniform(0.0, 0.1 if near else 9.0), 0.0, 0.0]])
+    heading, wish = rng.uniform(-np.pi, np.pi, 1), np.append(rng.uniform(-2.0, 2.0, 2), 0.0)
+    ahead = np.array([np.cos(heading[0]), np.sin(heading[0]), 0.0])
+    command = law.velocity(place, around, place, wish[None], [None], (heading, plant.steering[None]))[0]
+    assert command @ ahead >= 0.0
+    least = np.array([(around.distance[0, 0] - place[0, 0]) / H, 0.0])  # along x, away from the wall; and ahead
+    normals, wished = np.stack([[1.0, 0.0], ahead[:2]]), wish[:2] * min(1.0, 1.0 / np.linalg.norm(wish))
+    nearest = [wished, *(wished + (b - n @ wished) * n for n, b in zip(normals, least, strict=True))]
+    nearest.append(np.linalg.solve(normals, least))
+    allowed = [v for v in nearest if (normals @ v >= least - 1e-9).all()]
+    due = min(allowed, key=lambda v: float(np.linalg.norm(v - wished)))
+    np.testing.assert_allclose(command[:2], due, atol=1e-8)
+    share, _ = steer(command, float(heading[0]), plant.steering, H)
+    assert share > 0.0
+    back = -ahead  # where another task comes first, as under method (b), it stands
+    assert steer(back, float(heading[0]), plant.steering, H) == (0.0, 0.0)
+    assert not back.any()
+
+
+def test_its_target_straight_behind_it_stands_for_ever_but_for_a_little_aside_it_turns() -> None:
+    found = []
+    for heading in (math.pi, 3.1):
+        given = FORWARDS.replace("}", f", heading_rad: {heading}}}")
+        start = ["ugvs.ugv1.max_speed_m_s=1.5", "ugvs.ugv1.preset.speed_m_s=0.5", "obstacles={}", "duration_s=30"]
+        trace = simulate(load("minimal", [f"ugvs.ugv1.plant={given}", "uav.altitude_m=3", *start]), "a")
+        assert {each.status for each in judge(trace, ["SAFE-TRACE", "SAFE-HYP"])} == {"holds"}
+        found.append(float(np.linalg.norm(trace.position("ugv1")[-1] - [10.0, 0.0, 0.0])))
+    assert found == pytest.approx([10.3, 0.0], abs=0.02)  # half a step past its target, it may not come back
+
+
+def test_a_run_that_goes_backwards_breaks_the_hypothesis_that_it_does_not() -> None:
+    given = UNICYCLE.replace("}", ", heading_rad: 3.0}")
+    trace = simulate(load("minimal", [f"ugvs.ugv1.plant={given}", "uav.altitude_m=3", "duration_s=2"]), "a")
+    (before,) = judge(trace, ["SAFE-HYP"])
+    resolved = copy.deepcopy(trace.meta["scenario"])
+    resolved["ugvs"]["ugv1"]["plant"][0]["backwards"] = False
+    (after,) = judge(replace(trace, meta={**trace.meta, "scenario": resolved}), ["SAFE-HYP"])
+    worst = {each["hypothesis"]: each["margin"] for each in after.evidence["worst"]}  # type: ignore[index]
+    assert (before.status, after.status) == ("holds", "refuted")
+    assert worst["never backwards"] < -0.1
 
 
 @pytest.mark.parametrize(
@@ -217,6 +278,8 @@ def test_a_body_that_does_not_follow_its_plant_is_an_error(plant: str, column: s
     [
         (UNICYCLE, Unicycle, "cover_m"),
         (UNICYCLE, Unicycle, "dip_m"),
+        (FORWARDS, Unicycle, "cover_m"),
+        (FORWARDS, Unicycle, "dip_m"),
         (LAG, Lag, "lag_s"),
         (DELAYED_LAG, Delay, "lag_s"),
     ],

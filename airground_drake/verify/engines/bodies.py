@@ -24,6 +24,7 @@ class Room(NamedTuple):
         speed_m_s: limit of its commands.
         drift_m: what missing its commands, by w at most, costs in distance: w / A.
         slip_m: what it costs in one period: w h.
+        drawn_m: part of `body_m` by which the body is drawn after the steered point, as a trailer.
     """
 
     body_m: float
@@ -32,6 +33,7 @@ class Room(NamedTuple):
     speed_m_s: float
     drift_m: float = 0.0
     slip_m: float = 0.0
+    drawn_m: float = 0.0
 
     @property
     def rolling_m(self) -> float:
@@ -46,17 +48,18 @@ class Room(NamedTuple):
 
 def room_of(robot: Ugv | Uav, control: Control) -> Room:
     """What the plant of a robot takes."""
-    body = lag = delay = drift = 0.0
+    body = lag = delay = drift = drawn = 0.0
     period_s = control.period_s
     for plant in robot.plant:
         body += plant.cover_m
         drift += plant.drift_m_s
         if plant.kind == "unicycle":
             body += plant.hand_point_m + _dip_m(plant.hand_point_m, robot.max_speed_m_s, period_s, _turning(plant))
+            drawn += 0.0 if plant.backwards else plant.hand_point_m
         lag += plant.time_constant_s * (plant.kind == "lag")
         delay += plant.delay_s * (plant.kind == "delay")
     restored_m = drift / control.avoidance_gain_1_s if drift else 0.0
-    return Room(body, lag, delay, robot.max_speed_m_s, restored_m, drift * period_s)
+    return Room(body, lag, delay, robot.max_speed_m_s, restored_m, drift * period_s, drawn)
 
 
 def _turning(plant: object) -> float:
@@ -79,6 +82,8 @@ def law_m(safe_m: float, one: Room, other: Room | None, *, passive: bool) -> flo
     bodies = one.body_m + one.drift_m + (other.body_m + other.drift_m if other else 0.0)
     if passive:
         return safe_m + one.rolling_m + one.drift_m
+    if other is None and one.drawn_m:
+        return math.hypot(safe_m, one.drawn_m) + bodies - one.drawn_m
     if not (one.lag_s or one.delay_s or (other and (other.lag_s or other.delay_s))):
         return safe_m + bodies
     if other is None:

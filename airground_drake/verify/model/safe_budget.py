@@ -9,7 +9,7 @@ from typing import Any
 
 from airground_drake.base.exact import decimal
 from airground_drake.scenarios.budget import alike, budget, takes_room
-from airground_drake.scenarios.schema import Scenario
+from airground_drake.scenarios.schema import Plant, Scenario
 from airground_drake.verify.engines.bodies import Room, law_m, room_of
 from airground_drake.verify.finding import Finding
 from airground_drake.verify.model.safe_inv import stable
@@ -20,10 +20,13 @@ ROUNDED_M = Fraction(1, 10**12)
 BASIC = ("Budget.at_samples", "Budget.budget_always")
 OWN = "own"
 """Stands for all plants of one's own among the kinds."""
+FORWARDS = "unicycle that never drives backwards"
+"""One more theorem about such a unicycle."""
 BY_KIND = {
     "unicycle": ("Plants.chord", "Turning.chord_turns", "Turning.shortened_chord", "Turning.shortened"),
     "lag": ("Plants.lag", "Plants.lag_speed", "Plants.lag_pair", "Plants.lag_needs"),
     "delay": ("Plants.delay",),
+    FORWARDS: ("Plants.forwards",),
     OWN: ("Mixed.drifting", "Mixed.entry_keeps"),
 }
 """The theorems about each kind of plant."""
@@ -47,6 +50,7 @@ class SafeBudget(TheoremClaim):
         r"\sum_i |\tau_i - \tau| V_i + \sqrt{(d + V |\delta_i - \delta_j|)^2 + (\tau V_{\mathrm{rel}})^2}",
         r"c = l, \quad f = \tfrac{1}{8} |\omega| \lVert v \rVert h^2 \text{ (unicycle, chord steering)}; \quad c, w "
         r"\text{ as declared (one's own)}",
+        r"b + c = \sqrt{d^2 + l^2} \text{ beside a set at rest (never backwards)}",
     )
     method = (
         "Theorems in Coq about each kind of plant. Their hypotheses on the numbers of the scenario are checked here; "
@@ -84,10 +88,7 @@ class SafeBudget(TheoremClaim):
         return {
             "avoidance_gain_1_s": control.avoidance_gain_1_s,
             "period_s": control.period_s,
-            "kinds": sorted(
-                {OWN if plant.is_own else plant.kind for robot in robots.values() for plant in robot.plant}
-                - {"first_order"}
-            ),
+            "kinds": sorted({kind for robot in robots.values() for plant in robot.plant for kind in _kinds(plant)}),
             "unicycles": turning,
             "pairs": [
                 {
@@ -138,6 +139,13 @@ class SafeBudget(TheoremClaim):
             )
             margin = Fraction(pair["law_m"]) - Fraction(needed)
             yield Hypothesis(self.margin_of, says, float(margin), "m", margin >= -ROUNDED_M)
+
+
+def _kinds(plant: Plant) -> list[str]:
+    """The keys in `BY_KIND` of a plant."""
+    if plant.is_own:
+        return [OWN]
+    return [*([plant.kind] if plant.kind in BY_KIND else []), *([] if plant.backwards else [FORWARDS])]
 
 
 def _limit(turn_rad_s: float, base_m: float, wheel_m_s: float) -> float | None:

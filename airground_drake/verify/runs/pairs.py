@@ -67,6 +67,7 @@ class Pair(NamedTuple):
             one's own may miss of their commands included.
         drift_m: the part of `more_m` that makes up for missed commands.
         slip_m: how much of its command the robot may miss in a control period.
+        drawn_m: how far a robot that never drives backwards is behind its steered point, beside a barrier at rest.
     """
 
     first: str
@@ -82,6 +83,7 @@ class Pair(NamedTuple):
     cover_m: float = 0.0
     drift_m: float = 0.0
     slip_m: float = 0.0
+    drawn_m: float = 0.0
 
     @property
     def rows(self) -> slice:
@@ -150,7 +152,8 @@ def declared_pairs(trace: Trace) -> Iterator[Pair]:
         both = [room[name] for name in (first, second) if name in room]
         cover = sum(each.rolling_m + each.slip_m for each in both)
         drift = sum(each.drift_m for each in both)
-        return pair._replace(more_m=more, cover_m=cover, drift_m=drift, slip_m=room[first].slip_m)
+        drawn = room[first].drawn_m if second not in room and not pair.speed_m_s else 0.0
+        return pair._replace(more_m=more, cover_m=cover, drift_m=drift, slip_m=room[first].slip_m, drawn_m=drawn)
 
     for robot in trace.robots:
         for name, each, row, last in there:

@@ -11,6 +11,7 @@ from dataclasses import asdict, dataclass
 from fractions import Fraction
 from functools import cache
 from itertools import groupby
+from math import hypot, inf, nextafter
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -22,7 +23,7 @@ from airground_drake.run.trace import Trace
 from airground_drake.verify.claim import TIME_TOLERANCE_S, TraceClaim
 from airground_drake.verify.engines.bodies import room_of
 from airground_drake.verify.engines.geometry import interpolate
-from airground_drake.verify.engines.outlines import Cores, apart_by_blocks
+from airground_drake.verify.engines.outlines import Cores, apart_by_blocks, away_from
 from airground_drake.verify.engines.shortfalls import POINT, SCREEN_M, rounded_up, shortage, shortfalls
 from airground_drake.verify.finding import Finding
 from airground_drake.verify.runs.control_law import inequalities_of
@@ -36,6 +37,7 @@ from airground_drake.verify.runs.pairs import (
     is_planar,
     pairs_of,
     parts_of,
+    seen_from,
     snapshot,
 )
 from airground_drake.verify.runs.passive import beside, beside_moving, last_period, period_ends, speeds
@@ -53,6 +55,8 @@ PASSIVE = "avoidance beside an obstacle that may move"
 """The hypothesis that the steps met the passive law."""
 DECLARED = "declared speed"
 """The hypothesis that an obstacle moved no faster than it was expected to."""
+FORWARDS = "never backwards"
+"""The hypothesis that a unicycle that must not drive backwards does not."""
 DRIFT, COVER = "declared drift", "declared cover"
 """The hypotheses that a plant of one's own has the drift and the cover that it declares."""
 BUILT = "controller parameters"
@@ -293,6 +297,9 @@ def _guarantees(trace: Trace) -> Iterator[Guarantee]:
         e, short = Fraction(float(most.max())), max(begun, default=Fraction(0))
         lost = max(e / gain - Fraction(pair.drift_m), short) if gain else (len(samples) - 1) * e + short
         missed_m = np.concatenate([np.zeros(begin), most, np.zeros(len(samples) - end)])
+        if lost > 0 and pair.drawn_m:  # the body keeps sqrt(m^2 - l^2) where its steered point keeps m
+            kept = max(pair.safe_m**2 - 2.0 * float(lost) * hypot(pair.safe_m, pair.drawn_m) + float(lost) ** 2, 0.0)
+            lost = Fraction(nextafter(pair.safe_m - kept**0.5, inf))
         yield Guarantee(pair, missed_m, rounded_up(short), -rounded_up(lost - Fraction(pair.required_m)))
 
 
@@ -381,10 +388,20 @@ def _static(trace: Trace) -> Iterator[_Hypothesis]:
         apart |= distances_when_there(trace, robot)
         start, about = trace.t[rows], {"first": robot}
         excess = np.array([np.inf if pair.speed_m_s else apart[pair.second] - pair.law_m for pair in beside])
+        excess = np.minimum(excess, [_axle_excess(trace, pair) for pair in beside])
         if np.isfinite(excess).any():
             yield _Hypothesis("safe start", "m", start, excess, DISTANCE_TOLERANCE_M, about, others)
         left = [room(pair.law_m, limit[robot], limit.get(pair.second, pair.speed_m_s)) for pair in beside]
         yield _Hypothesis("sensing range", "m", start, np.array(left), 0.0, about, others)
+
+
+def _axle_excess(trace: Trace, pair: Pair) -> float:
+    """By how much a body that is drawn after its steered point exceeds its distance at first, m; inf for others."""
+    if not pair.drawn_m:
+        return np.inf
+    place = seen_from(trace, pair.first, pair.second)[pair.row]
+    found = away_from(cores_of(trace)[pair.second], place, planar=is_planar(trace, pair.first))
+    return float(found.distance.min()) - pair.safe_m
 
 
 def _sampled(trace: Trace) -> Iterator[_Hypothesis]:
@@ -449,6 +466,11 @@ def _of_plants(trace: Trace) -> Iterator[_Hypothesis]:
                 rate, half = np.abs(turned) / lasting, 0.5 * turned
                 chord = np.linalg.norm(axle[last] - axle[first], axis=1)
                 speed = chord / lasting / np.sinc(half / np.pi)
+                if not plant.backwards:
+                    middle = 0.5 * (heading[first] + heading[last])
+                    ahead = np.column_stack([np.cos(middle), np.sin(middle)])
+                    gone = np.einsum("ka,ka->k", (axle[last] - axle[first])[:, :2], ahead)
+                    yield _Hypothesis(FORWARDS, "m/s", t, gone / lasting, VELOCITY_TOLERANCE_M_S, about)
                 if plant.max_turn_rad_s:
                     spare = plant.max_turn_rad_s - rate
                     yield _Hypothesis("turning limit", "rad/s", t, spare, VELOCITY_TOLERANCE_M_S, about)
