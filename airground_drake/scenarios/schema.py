@@ -104,8 +104,8 @@ class Plant:
     max_wheel_speed_m_s: NotNegative = 0.0
     """Of a unicycle: speed limit of a wheel; 0: none."""
     backwards: YesNo = True
-    """Of a unicycle: whether it may drive backwards. If not, the law keeps less distance from what is at rest, and a
-    robot whose target is straight behind it can stand for ever."""
+    """Of a unicycle: whether it may drive backwards. If not, the law keeps less distance from what is at rest; but a
+    robot can stand for ever if its target is straight behind it, or if it would have to turn towards a wall."""
     time_constant_s: NotNegative = 0.0
     """Of a lag: time constant; above 0."""
     delay_s: NotNegative = 0.0

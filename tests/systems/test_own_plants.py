@@ -169,6 +169,27 @@ def test_the_law_makes_up_for_the_drift_that_is_declared_and_no_more(declared: f
     assert (broken(trace) == "declared drift") == (declared < 0.3)
 
 
+PERSON = {"radius_m": 0.3, "moves": {"waypoints_m": [[12.0, 0.0], [-6.0, 0.0]], "speed_m_s": 0.8}}
+
+
+@pytest.mark.parametrize(("declared", "wind"), [(0.3, 0.3), (0.1, 0.3), (0.3, -0.3)])
+def test_beside_somebody_who_walks_both_programs_say_the_same(declared: float, wind: float) -> None:
+    """The robot retreats, with the wind or against it, and comes no nearer by its own doing than it declares."""
+    settings = {**SETTINGS, "obstacles.rock": PERSON, "safe_distance.moving_m": 1.0, "ugvs.ugv1.max_speed_m_s": 2.0}
+    plants = {"ugv1": OwnPlant(Robot, declared, 0.0, {"wind_m_s": wind})}
+    trace = simulate(load("minimal", settings), "a", plants=plants)
+    found = statuses(trace, "SAFE-TRACE", "SAFE-OWN", "SAFE-HYP")
+    promised = "holds" if declared >= 0.3 else "refuted"
+    assert found == {"SAFE-TRACE": "holds", "SAFE-OWN": promised, "SAFE-HYP": promised}
+    run = replace(checked(trace), name="a")
+    ours = (safety.safe_trace(run), safety.safe_own(run), safety.safe_hyp(run))
+    assert [each.status for each in ours if each] == [*found.values()]
+    (own,) = judge(trace, ["SAFE-OWN"])
+    assert ours[1] is not None
+    assert (ours[1].margin or 0.0) == pytest.approx(own.margin or 0.0, abs=1e-9)
+    assert own.exercised
+
+
 def test_the_theorem_is_about_the_declared_numbers() -> None:
     (verdict,) = judge_model(of(Robot, drift_m_s=0.3, cover_m=0.1).scenario, claims=["SAFE-BUDGET"])
     assert verdict.status == "proved"
