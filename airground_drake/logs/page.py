@@ -175,10 +175,16 @@ def _table(pair: JudgedPair, over_time: Mapping[tuple[str, str], Sequence[tuple[
 
 
 def scene(judged: Judged, tracks: Tracks, scenario: Scenario, logs: Sequence[str]) -> Scene:
-    """The log as a replay shows it, from its first position on; a UGV is hidden while it was not recorded."""
+    """The log as a replay shows it, from its first position on; bodies are hidden while they were not recorded."""
     still = stage(scenario, np.concatenate([track.places_m for track in tracks.bodies.values()]))
     times = frame_times(np.array([judged.end_s - judged.begin_s]))
     known = {robot.name: robot for robot in still.robots}
+
+    def positions(track: Track) -> Array:
+        at_s = times + judged.begin_s
+        there = np.any([(at_s >= span.begin) & (at_s <= span.end) for span in track.spans], axis=0)
+        return np.where(there[:, None], track.at(at_s), np.nan)
+
     bodies = []
     for name, track in tracks.bodies.items():
         if name in scenario.obstacles:
@@ -186,16 +192,13 @@ def scene(judged: Judged, tracks: Tracks, scenario: Scenario, logs: Sequence[str
         radius_m = known[scenario.uav.name].radius_m
         robot = known.get(name) or Robot(name, "UAV", radius_m, track.places_m[-1], turns=False)
         unturned = {**vars(robot), "turns": False, "headings": np.zeros(len(times))}  # a log need not have headings
-        there = np.zeros(len(times), dtype=bool)
-        for span in track.spans:
-            there |= (times + judged.begin_s >= span.begin) & (times + judged.begin_s <= span.end)
-        bodies.append(DrawnBody(**unturned, positions=track.at(times + judged.begin_s), states=np.where(there, 0, -1)))
+        bodies.append(DrawnBody(**unturned, positions=positions(track), states=np.zeros(len(times), dtype=np.intp)))
     moved = {}
     for k, barrier in enumerate(still.barriers):
         if barrier.name in tracks.bodies:
             stands = scenario.obstacles[barrier.name].position_m
             home = barrier.way_m[0] if len(barrier.way_m) else np.array([*stands, 0.0, 0.0])[:3]
-            moved[k] = (tracks.bodies[barrier.name].at(times + judged.begin_s) - home) * [1.0, 1.0, 0.0]
+            moved[k] = (positions(tracks.bodies[barrier.name]) - home) * [1.0, 1.0, 0.0]
     events = [
         {"t_s": max(0.0, span.begin - judged.begin_s), "kind": "too near", "robot": f"{pair.first}, {pair.second}"}
         for pair in judged.pairs if pair.status == BROKEN for span in pair.below_s
@@ -206,6 +209,7 @@ def scene(judged: Judged, tracks: Tracks, scenario: Scenario, logs: Sequence[str
     ]  # fmt: skip
     return Scene(
         **{**vars(still), "robots": tuple(bodies)}, scenario=scenario, run=", ".join(Path(each).name for each in logs),
-        says="Recorded positions, from the first one on.", times_s=times, moved_m=moved, proposals=(),
+        says="Recorded positions. Nothing is shown of a body where it was not recorded.", times_s=times, moved_m=moved,
+        proposals=(), has_states=False,
         events=tuple(sorted(events, key=lambda event: float(str(event["t_s"])))),
     )  # fmt: skip

@@ -63,7 +63,7 @@ _LOOKS = {
 def _data(scene: Scene) -> dict[str, Any]:
     """Data for the page's script: the names to show, and their places in Meshcat's tree."""
     return {
-        "title": f"{scene.scenario.name}, run {scene.run}",
+        "title": f"{scene.scenario.name}, {'run' if scene.has_states else 'log'} {scene.run}",
         "end_s": float(scene.times_s[-1]),
         "frame_s": 1.0 / FRAMES_PER_S,
         "marks": STATE_MARKS,

@@ -29,18 +29,24 @@ def recorded(scene: Scene) -> Meshcat:
     draw(meshcat, scene)
     animation = MeshcatAnimation(FRAMES_PER_S)
     for k, body in enumerate(scene.robots):
-        meshcat.SetLine(f"/paths/{k}", body.positions.T, 1.0, rgba(PATH_COLOR))
+        known = _known(body.positions)
+        edges = np.flatnonzero(np.diff(known, prepend=False, append=False)).reshape(-1, 2)
+        for j, (begin, end) in enumerate(edges):
+            meshcat.SetLine(f"/paths/{k}/{j}", body.positions[begin:end].T, 1.0, rgba(PATH_COLOR))
         _move(meshcat, animation, robot_path(k), body.positions, body.headings)
+        _show(meshcat, animation, robot_path(k), known)
         if body.kind == "UAV":
             _move(meshcat, animation, shadow_path(k), body.positions * [1.0, 1.0, 0.0])
+            _show(meshcat, animation, shadow_path(k), known)
             continue
         for state in range(len(STATES)):
             _show(meshcat, animation, state_path(k, state), body.states == state)
     for k, barrier in enumerate(scene.barriers):
+        there = (scene.times_s >= barrier.appears_s) & (scene.times_s < barrier.disappears_s)
         if k in scene.moved_m:
             _move(meshcat, animation, barrier_path(k), scene.moved_m[k])
-        if barrier.appears_s or np.isfinite(barrier.disappears_s):
-            there = (scene.times_s >= barrier.appears_s) & (scene.times_s < barrier.disappears_s)
+            there = there & _known(scene.moved_m[k])
+        if not there.all():
             _show(meshcat, animation, barrier_path(k), there)
     for k, proposal in enumerate(scene.proposals):
         _proposal(meshcat, animation, scene, proposal, k)
@@ -66,16 +72,28 @@ def _proposal(meshcat: Meshcat, animation: MeshcatAnimation, scene: Scene, propo
         _show(meshcat, animation, path, standing)
 
 
+def _known(positions: Array) -> npt.NDArray[np.bool_]:
+    """At which frames a body was recorded, (F,)."""
+    known: npt.NDArray[np.bool_] = np.isfinite(positions).all(axis=1)
+    return known
+
+
 def _move(
     meshcat: Meshcat, animation: MeshcatAnimation, path: str, positions: Array, headings: Array | None = None
 ) -> None:
     """Keyframes where the motion bends, of positions (F, 3), m, and headings (F,), rad."""
-    turned = np.zeros(len(positions)) if headings is None else headings
-    bent = np.abs(np.diff(np.column_stack([positions, turned]), n=2, axis=0)).max(axis=1, initial=0.0) > STRAIGHT_M
-    places = [RigidTransform(RollPitchYaw(0.0, 0.0, turn), at) for at, turn in zip(positions, turned, strict=True)]
-    for k in np.flatnonzero(np.concatenate([[True], bent, [True]])[: len(positions)]):
-        animation.SetTransform(int(k), path, places[k])
-    meshcat.SetTransform(path, places[0])
+    turned, known = np.zeros(len(positions)) if headings is None else headings, _known(positions)
+    bends = np.abs(np.diff(np.column_stack([positions, turned]), n=2, axis=0)).max(axis=1, initial=0.0)
+    is_straight = np.zeros(len(positions), dtype=bool)
+    is_straight[1:-1] = bends <= STRAIGHT_M  # not beside a frame that is NaN
+    places = {
+        int(k): RigidTransform(RollPitchYaw(0.0, 0.0, turned[k]), positions[k])
+        for k in np.flatnonzero(known & ~is_straight)
+    }
+    for k, place in places.items():
+        animation.SetTransform(k, path, place)
+    for place in [*places.values()][:1]:
+        meshcat.SetTransform(path, place)
 
 
 def _show(meshcat: Meshcat, animation: MeshcatAnimation, path: str, shown: npt.NDArray[np.bool_]) -> None:

@@ -25,7 +25,10 @@ MAX_NAMED_BARRIERS = 8
 
 @dataclass(frozen=True)
 class DrawnBody(Robot):
-    """A robot in a run, frame by frame: positions (F, 3), m, headings (F,), rad, and states (F,), indices of STATES."""
+    """A robot in a run, frame by frame: positions (F, 3), m, headings (F,), rad, and states (F,), indices of STATES.
+
+    Positions are NaN where it was not recorded.
+    """
 
     positions: Array
     headings: Array
@@ -36,7 +39,8 @@ class DrawnBody(Robot):
 class Scene(Stage):
     """A run. `times_s` (F,) are those of the frames, the last one the end.
 
-    `moved_m` is by how much each barrier that moves has moved at each frame, (F, 3), m, by its number.
+    `moved_m` is by how much each barrier that moves has moved at each frame, (F, 3), m, by its number; NaN where it was
+    not recorded. `has_states` is whether states are known: a log has none.
     """
 
     robots: tuple[DrawnBody, ...]
@@ -47,6 +51,7 @@ class Scene(Stage):
     moved_m: Mapping[int, Array]
     proposals: tuple[Sent, ...]
     events: tuple[Mapping[str, Any], ...]
+    has_states: bool = True
 
 
 def scene(trace: Trace, scenario: Scenario) -> Scene:

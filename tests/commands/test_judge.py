@@ -170,6 +170,7 @@ def test_the_page_of_a_log_with_gaps_draws_none_of_them(tmp_path: Path, airgroun
     assert "distances were kept where a body was not recorded" in page
     assert "not 2.400 to 3.600 s" in page
     assert "not recorded, tb_1, for 1.20 s" in replay
+    assert "UGV: own task" not in replay  # a log does not say so
 
 
 @pytest.mark.parametrize(

@@ -6,6 +6,7 @@ import json
 import re
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from pydrake.geometry import Meshcat, MeshcatAnimation
 
@@ -55,6 +56,29 @@ def test_only_frames_that_change_something_are_kept(monkeypatch: pytest.MonkeyPa
     corners = 9  # of the path, each between two frames
     assert 2 <= len(kept) <= 3 * corners
     assert (kept[0], kept[-1]) == (0, len(scene.times_s) - 1)
+
+
+def test_nothing_is_drawn_where_a_body_was_not_recorded(monkeypatch: pytest.MonkeyPatch, scene: Scene) -> None:
+    """Its path has a part before the gap and one after it; in between the body is hidden, and does not move."""
+    shown: dict[str, list[tuple[int, bool]]] = {}
+    moved: dict[str, list[int]] = {}
+
+    class Noting(MeshcatAnimation):  # type: ignore[misc]
+        def SetProperty(self, frame: int, path: str, name: str, value: bool) -> None:
+            shown.setdefault(path, []).append((frame, value))
+
+        def SetTransform(self, frame: int, path: str, *rest: object) -> None:
+            moved.setdefault(path, []).append(frame)
+
+    monkeypatch.setattr(recording, "MeshcatAnimation", Noting)
+    monkeypatch.setattr(Meshcat, "SetAnimation", lambda *_: None)
+    positions = scene.robots[0].positions.copy()
+    positions[100:120] = np.nan
+    meshcat = recording.recorded(replace(scene, robots=(replace(scene.robots[0], positions=positions),), proposals=()))
+    assert [meshcat.HasPath(f"/paths/0/{k}") for k in range(3)] == [True, True, False]
+    assert shown["/robots/0"] == [(0, True), (100, False), (120, True)]
+    assert {99, 120} <= set(moved["/robots/0"])
+    assert not set(range(100, 120)) & set(moved["/robots/0"])
 
 
 def test_another_page_of_meshcat_is_noticed(monkeypatch: pytest.MonkeyPatch, scene: Scene) -> None:
