@@ -45,7 +45,7 @@ def recorded(scene: Scene) -> Meshcat:
         there = (scene.times_s >= barrier.appears_s) & (scene.times_s < barrier.disappears_s)
         if k in scene.moved_m:
             _move(meshcat, animation, barrier_path(k), scene.moved_m[k])
-            there = there & _known(scene.moved_m[k])
+            there[~_known(scene.moved_m[k])] = False
         if not there.all():
             _show(meshcat, animation, barrier_path(k), there)
     for k, proposal in enumerate(scene.proposals):
@@ -74,8 +74,7 @@ def _proposal(meshcat: Meshcat, animation: MeshcatAnimation, scene: Scene, propo
 
 def _known(positions: Array) -> npt.NDArray[np.bool_]:
     """At which frames a body was recorded, (F,)."""
-    known: npt.NDArray[np.bool_] = np.isfinite(positions).all(axis=1)
-    return known
+    return np.asarray(np.isfinite(positions).all(axis=1))
 
 
 def _move(
