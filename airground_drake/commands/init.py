@@ -1,4 +1,4 @@
-"""`airground init FILE`: write a small scenario to start from, or one of a fleet."""
+"""`airground init FILE`: write a scenario to start from: a small one, a copy of a shipped one, or one of a fleet."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from airground_drake.scenarios.shipped import argument, json_schema_file, shippe
 MOST_OBSTACLES = 2000 - MAX_UGVS
 """With the largest number of UGVs, as many bodies as the checker accepts."""
 MODEL = "minimal"
-"""The shipped scenario that is copied."""
+"""The shipped scenario that is copied by default."""
 
 
 def parser() -> argparse.ArgumentParser:
@@ -26,6 +26,7 @@ def parser() -> argparse.ArgumentParser:
         prog="airground init", description="Write a small scenario that runs: a UGV, an obstacle in its way, a UAV."
     )
     parser.add_argument("file", type=output_file, nargs="?", default=Path("scenario.yaml"), help="default: %(default)s")
+    parser.add_argument("--like", choices=shipped_files(), metavar="NAME", help="copy this shipped scenario instead")
     parser.add_argument(
         "--fleet", type=whole(1, MAX_UGVS), metavar="N", help="N UGVs that cross a field of obstacles instead"
     )
@@ -41,13 +42,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = parser().parse_args(arguments)
     if options.fleet is None and (options.obstacles, options.seed) != (None, None):
         return refuse("--obstacles and --seed need --fleet")
+    if None not in (options.fleet, options.like):
+        return refuse("--like and --fleet exclude each other")
     path: Path = options.file
     files.try_to_create(path)
     name = re.sub(r"^[\W\d_]+|[\W_]+$", "", re.sub(r"\W+", "_", path.stem, flags=re.ASCII))[:MAX_NAME] or MODEL
     if options.fleet is None:
-        text = shipped_files()[MODEL].read_text(encoding="utf-8")
+        model = options.like or MODEL
+        text = shipped_files()[model].read_text(encoding="utf-8")
         # the lines before the name are about the shipped file
-        text = text[text.index("name:") :].replace(f"name: {MODEL}", f'name: "{name}"', 1)
+        text = re.sub(r"name:.*", f'name: "{name}"', text[text.index("name:") :], count=1)
     else:
         seed = 1 if options.seed is None else options.seed
         text = fleet(options.fleet, options.obstacles or 5 * options.fleet, seed, name)

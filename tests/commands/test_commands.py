@@ -9,6 +9,7 @@ import signal
 import subprocess
 import sys
 from collections.abc import Iterator
+from dataclasses import replace
 from importlib.metadata import entry_points
 from pathlib import Path
 
@@ -106,6 +107,15 @@ def test_init_writes_a_scenario_and_prints_what_runs_it(
     scenario = load(*shlex.split(taken))
     assert (scenario.name, list(scenario.ugvs)) == (name, ["ugv1"])
     assert not Path("nowhere").exists()
+
+
+def test_init_copies_a_shipped_scenario(tmp_path: Path, airground: Airground) -> None:
+    """But for its name: the copy of each is a scenario with the same robots, obstacles and runs."""
+    for name in shipped():
+        airground("init", tmp_path / f"copy_of_{name}.yaml", "--like", name)
+        copy, model = load(tmp_path / f"copy_of_{name}.yaml"), load(name)
+        assert copy.name == f"copy_of_{name}"
+        assert replace(copy, name=name) == model
 
 
 def test_init_writes_a_fleet(tmp_path: Path, airground: Airground) -> None:
@@ -228,6 +238,8 @@ diagram minimal --set duration_s=-1     # duration_s
 diagram minimal --part nothing          # unknown part 'nothing'; allowed: decision_making
 diagram minimal -o spec.yaml            # cannot be written
 init mine.yaml --obstacles 3            # --obstacles and --seed need --fleet
+init mine.yaml --fleet 4 --like lab     # --like and --fleet exclude each other
+init mine.yaml --like nowhere           # invalid choice: 'nowhere'
 init mine.yaml --fleet 101              # a whole number from 1 to 100
 init spec.yaml                          # spec.yaml exists; name a file that does not
 init nowhere/../spec.yaml               # spec.yaml exists; name a file that does not
