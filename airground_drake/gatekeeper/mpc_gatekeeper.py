@@ -29,6 +29,7 @@ from airground_drake.intervention.messages import (
     Proposals,
     Report,
     Reports,
+    Sighting,
     answer_to,
     sightings,
 )
@@ -137,8 +138,10 @@ class Gatekeepers(abc.ABC):
         """The report with an answer: the obstacles within sensing range, and the reason."""
         i = decision.robot
         near = self._near.still[self._in_range(decision.t, now.positions[i])]
-        beside = {self._world.moving[body].name for body in self._near.carrier[self._beside(now, i)]}
-        seen = tuple(each for each in sightings(self._world, now.t, now.positions) if each.name in beside)
+        seen: tuple[Sighting, ...] = ()
+        if len(self._world.moving) > len(self._world.robots):
+            beside = {self._world.moving[body].name for body in self._near.carrier[self._beside(now, i)]}
+            seen = tuple(each for each in sightings(self._world, now.t, now.positions) if each.name in beside)
         return Report(decision.answer, tuple(map(outline.as_tuple, near)), decision.reason, in_words(decision), seen)
 
     def _view(self, now: Inputs, i: int) -> View:

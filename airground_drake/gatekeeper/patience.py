@@ -47,7 +47,7 @@ class Patience:
 
     def rested(self, now: Commitment, t: float) -> Commitment:
         """At time t, s: the tries count anew after a rest."""
-        if not now.executing and t >= now.since + self.rest:
+        if now.tries and not now.executing and t >= now.since + self.rest:
             return replace(now, tries=0)
         return now
 

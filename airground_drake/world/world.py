@@ -197,7 +197,7 @@ class World:
         scripts = [body.plant.script.at(t)[1] for body in self.moving if isinstance(body.plant, Scripted)]
         return np.concatenate([commands, scripts]) if scripts else commands
 
-    @property
+    @cached_property
     def robots(self) -> tuple[str, ...]:
         """Names of the robots."""
         return self.names(*ROBOTS)
