@@ -10,18 +10,16 @@ import numpy as np
 
 from airground_drake.campaign.spec import Spec
 from airground_drake.environments.encoding import Encoding, Numbers
-from airground_drake.environments.episode import Episode
 from airground_drake.environments.rewards import Rewards
-from airground_drake.environments.sources import Source
+from airground_drake.environments.sources import Episodes
 from airground_drake.intervention.policy import Observation
-from airground_drake.run.trace import Trace
 from airground_drake.scenarios.schema import Scenario
 
 ID = "AirgroundDrake/Intervention-v0"
 """For `gymnasium.make` and `make_vec`, once this module is imported; `given` is an argument of them."""
 
 
-class InterventionEnv(gymnasium.Env[Numbers, Numbers]):
+class InterventionEnv(Episodes, gymnasium.Env[Numbers, Numbers]):
     """The UAV's side of a run: each step answers one request for a proposal, and leads to the next request.
 
     Observation and action: see `Encoding`. Requests of one planning instant are answered one after the other, without
@@ -43,12 +41,10 @@ class InterventionEnv(gymnasium.Env[Numbers, Numbers]):
         numbers: Sequence[int] | None = None,
         encoding: Encoding | None = None,
     ) -> None:
-        """Arguments as of `Source`; the encoding is that of observations and actions."""
-        self.encoding = Encoding() if encoding is None else encoding
-        self._source = Source(given, run, numbers)
+        """Arguments as of `Episodes`."""
+        super().__init__(given, run, numbers, encoding)
         self.observation_space = gymnasium.spaces.Box(self.encoding.low, self.encoding.high, dtype=np.float32)
         self.action_space = gymnasium.spaces.Box(-1.0, 1.0, (self.encoding.actions,), np.float32)
-        self._episode: Episode | None = None
         self._seen: Observation | None = None
 
     def reset(
@@ -65,11 +61,9 @@ class InterventionEnv(gymnasium.Env[Numbers, Numbers]):
             SimulationError: if Drake or a system stops.
         """
         super().reset(seed=seed)
-        number = (options or {}).get("number")
-        self._number = self._source.drawn(self.np_random) if number is None else int(number)
-        self._episode = self._source.episode(self._number)
+        episode = self._begin(self.np_random, options)
         self._look()
-        self._rewards = Rewards(self._episode)
+        self._rewards = Rewards(episode)  # of the time from the first request on
         return self._observed(), self._info()
 
     def step(self, action: Numbers) -> tuple[Numbers, float, bool, bool, dict[str, Any]]:
@@ -86,19 +80,6 @@ class InterventionEnv(gymnasium.Env[Numbers, Numbers]):
         self._look()
         reward = sum(self._rewards.since().values())
         return self._observed(), reward, self._seen is None, False, self._info()
-
-    def trace(self) -> Trace:
-        """What the episode has recorded until now, for `judge`.
-
-        Raises:
-            RuntimeError: before `reset`.
-        """
-        return self._begun().trace()
-
-    def _begun(self) -> Episode:
-        if self._episode is None:
-            raise RuntimeError("call reset first")
-        return self._episode
 
     def _look(self) -> None:
         """Go to the next request, and keep it."""

@@ -12,15 +12,13 @@ from pettingzoo import ParallelEnv
 
 from airground_drake.campaign.spec import Spec
 from airground_drake.environments.encoding import Encoding, Numbers
-from airground_drake.environments.episode import Episode
 from airground_drake.environments.rewards import Rewards
-from airground_drake.environments.sources import Source
+from airground_drake.environments.sources import Episodes
 from airground_drake.intervention.policy import Observation
-from airground_drake.run.trace import Trace
 from airground_drake.scenarios.schema import Scenario
 
 
-class TeamEnv(ParallelEnv[str, Numbers, Numbers]):
+class TeamEnv(Episodes, ParallelEnv[str, Numbers, Numbers]):
     """The UAV's side of a run, with an agent for each UGV; each step leads to the next instant with a request.
 
     Observation and action: see `Encoding`. The first number of an observation says whether a proposal for that UGV is
@@ -38,9 +36,8 @@ class TeamEnv(ParallelEnv[str, Numbers, Numbers]):
         numbers: Sequence[int] | None = None,
         encoding: Encoding | None = None,
     ) -> None:
-        """Arguments as of `InterventionEnv`."""
-        self.encoding = Encoding() if encoding is None else encoding
-        self._source = Source(given, run, numbers)
+        """Arguments as of `Episodes`."""
+        super().__init__(given, run, numbers, encoding)
         self.possible_agents = list(self._source.ugvs)
         self.agents: list[str] = []
         self.render_mode = None
@@ -50,7 +47,6 @@ class TeamEnv(ParallelEnv[str, Numbers, Numbers]):
             name: Box(-1.0, 1.0, (self.encoding.actions,), np.float32) for name in self.possible_agents
         }
         self._rng = seeding.np_random(None)[0]
-        self._episode: Episode | None = None
         self._requests: dict[str, Observation] = {}
 
     def observation_space(self, agent: str) -> Box:
@@ -67,12 +63,10 @@ class TeamEnv(ParallelEnv[str, Numbers, Numbers]):
         """Begin an episode, and go to its first request; arguments and errors as of `InterventionEnv.reset`."""
         if seed is not None:
             self._rng = seeding.np_random(seed)[0]
-        number = (options or {}).get("number")
-        self._number = self._source.drawn(self._rng) if number is None else int(number)
-        self._episode = self._source.episode(self._number)
-        self.agents = list(self._episode.stage.ugvs)
-        self._requests = self._episode.requests()
-        self._rewards = Rewards(self._episode)
+        episode = self._begin(self._rng, options)
+        self.agents = list(episode.stage.ugvs)
+        self._requests = episode.requests()
+        self._rewards = Rewards(episode)
         return self._observed(self.agents), self._infos(self.agents)
 
     def step(
@@ -100,19 +94,6 @@ class TeamEnv(ParallelEnv[str, Numbers, Numbers]):
             self._observed(agents), {name: rewards[name] for name in agents}, dict.fromkeys(agents, over),
             dict.fromkeys(agents, False), self._infos(agents),
         )  # fmt: skip
-
-    def trace(self) -> Trace:
-        """What the episode has recorded until now, for `judge`.
-
-        Raises:
-            RuntimeError: before `reset`.
-        """
-        return self._begun().trace()
-
-    def _begun(self) -> Episode:
-        if self._episode is None:
-            raise RuntimeError("call reset first")
-        return self._episode
 
     def _observed(self, agents: Sequence[str]) -> dict[str, Numbers]:
         return {

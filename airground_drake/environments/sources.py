@@ -1,16 +1,19 @@
-"""Where the episodes of an environment come from: one scenario, or the draws of a campaign."""
+"""Where the episodes of an environment come from: one scenario, or the draws of a campaign; the present episode."""
 
 from __future__ import annotations
 
 from collections import OrderedDict
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
 from airground_drake.base.errors import ScenarioError, UnknownNameError
 from airground_drake.campaign.spec import Spec
+from airground_drake.environments.encoding import Encoding
 from airground_drake.environments.episode import Episode, Stage, with_agent
 from airground_drake.registry import METHODS
+from airground_drake.run.trace import Trace
 from airground_drake.scenarios.limits import MAX_SEED
 from airground_drake.scenarios.load import validated
 from airground_drake.scenarios.schema import Scenario
@@ -72,6 +75,46 @@ class Source:
         if len(self._stages) > MOST_STAGES:
             self._stages.popitem(last=False)
         return self._stages[key]
+
+
+class Episodes:
+    """What both environments have in common: the present episode, and where it comes from.
+
+    Attributes:
+        encoding: of observations and actions.
+    """
+
+    def __init__(
+        self,
+        given: Scenario | Spec,
+        run: str | None = None,
+        numbers: Sequence[int] | None = None,
+        encoding: Encoding | None = None,
+    ) -> None:
+        """Arguments and errors as of `Source`; the encoding is that of observations and actions."""
+        self.encoding = Encoding() if encoding is None else encoding
+        self._source = Source(given, run, numbers)
+        self._episode: Episode | None = None
+
+    def trace(self) -> Trace:
+        """What the episode has recorded until now, for `judge`.
+
+        Raises:
+            RuntimeError: before `reset`.
+        """
+        return self._begun().trace()
+
+    def _begin(self, rng: np.random.Generator, options: Mapping[str, Any] | None) -> Episode:
+        """Begin the episode with the number in the options, or a drawn one."""
+        number = (options or {}).get("number")
+        self._number = self._source.drawn(rng) if number is None else int(number)
+        self._episode = self._source.episode(self._number)
+        return self._episode
+
+    def _begun(self) -> Episode:
+        if self._episode is None:
+            raise RuntimeError("call reset first")
+        return self._episode
 
 
 def _chosen(scenario: Scenario, run: str | None) -> str:
