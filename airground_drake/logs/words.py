@@ -32,7 +32,7 @@ def headline(judged: Judged) -> str:
         pair = unsure[0]
         return f"NOT ESTABLISHED ({pair.first}, {pair.second}): {least(pair)}; the position error decides"
     if not judged.covers_all:
-        return f"No distance was broken where the log covers it. {coverage(judged)}"
+        return "No distance was broken where the log covers it."
     return "Every distance was kept, with straight motion between samples."
 
 
@@ -86,8 +86,8 @@ def law(pair: JudgedPair) -> str:
         who = ", ".join(f"{name} {each:.3g} m" for name, each in pair.missed_by_m.items() if each > SMALL)
         by = f" ({who})" if len(pair.missed_by_m) > 1 and who else ""
         held = (
-            f"the law lacks e = {pair.missed_m:.3g} m in {pair.missed_for_s:.4g} s at {pair.missed_at_s:.3f} s{by}, "
-            f"and something in {pair.lacking} of {pair.intervals} intervals"
+            f"the law was missed in {pair.lacking} of {pair.intervals} intervals, by up to e = {pair.missed_m:.3g} m, "
+            f"in the {pair.missed_for_s:.4g} s from {pair.missed_at_s:.3f} s{by}"
         )
     if pair.passive:
         did = "never brought itself" if pair.missed_m <= SMALL else "brought itself"

@@ -127,7 +127,8 @@ def _proof(of_d: Runs) -> Iterator[Line]:
     for (lacking, refuted, status), alike in told.items():
         covered = clause("covered") * any(course.movers for course in alike)
         runs, who = joined([course.name for course in alike]), joined([*chain(*labels(alike, of_d))])
-        line = say(status, runs=runs, who=who, lacking=lacking, covered=covered)
+        single = len([*chain(*labels(alike, of_d))]) == 1
+        line = say(status, runs=runs, who=who, s="s" * single, lacking=lacking, covered=covered)
         yield line._replace(mark="no") if refuted else line
 
 
@@ -267,7 +268,8 @@ def _threshold(document: Document, every: Runs, exact: Claims, quality: Claims, 
     if unknown:
         yield say("not_judged", runs=", ".join(unknown))
     if not fired and runs:
-        yield say("never_fired", zeta=zeta)
+        largest = [ugv["largest_decision_variable_m"] for claim in exact for ugv in claim["evidence"].get("ugvs", ())]
+        yield say("never_fired", zeta=zeta, largest=clause("largest", largest=max(largest)) if largest else "")
     elif exact and not bad and not unknown:
         times = sorted({round(event["t_s"], 3) for event in fired})
         often = f"{len(fired)} times{f' in {len(runs)} runs' * (len(runs) > 1)}, first " * (len(times) > 1)
@@ -336,7 +338,7 @@ def _for_own_numbers(found: Mapping[str, Any], assumed: Mapping[str, Any]) -> It
         cost_s, best = row["extra_risk"] / assumed["c1_1_s"], row["optimum_m"]
         delay = clause("delay", row, ideal=f"{best:.2g} m is best" if best else "the lower, the better", cost_s=cost_s)
         is_least = cost_s < NEGLIGIBLE_S
-        line = say("own", row, robot=robot, run=run, what="too, no threshold is better" if is_least else delay)
+        line = say("own", row, robot=robot, run=run, what="no threshold is better" if is_least else delay)
         yield line if is_least else line._replace(mark="partly")
 
 

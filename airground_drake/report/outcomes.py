@@ -65,9 +65,19 @@ class Near(NamedTuple):
         return distance(self.value_m, self.required_m)
 
     @property
+    def compared(self) -> str:
+        """The distance beside the required one."""
+        return f"{self} {'<' if self.is_short else '≥'} {self.required_m:g} m"
+
+    @property
     def pair(self) -> str:
         """The distance, of whom, and whether it was there from the start."""
-        return f"{self} ({self.robot} to {self.whom}{', at the start' * (self.t_s == 0.0)})"
+        return f"{self} ({self.between})"
+
+    @property
+    def between(self) -> str:
+        """The pair, and whether its smallest distance was there from the start."""
+        return f"{self.robot} to {self.whom}{', at the start' * (self.t_s == 0.0)}"
 
 
 class ProofOutcome(NamedTuple):

@@ -57,13 +57,12 @@ SENTENCES = {
     "broken": "✗ {run.name}: {what}{expected}.",
     "unknown": "? {runs}: not known, {why}.",
     "printed": "✗ {runs} with recursion (5) as printed: {home}{what}{expected}.",
-    "tested": "✓ Proved for {who}, whatever the UAV asks for{covered}.",
+    "tested": "✓ Proved: {who} keep{s} every distance{covered}, whatever the UAV asks.",
     "idle": "\N{EN DASH} Proved for {who}, but nothing came near: its conditions hold with nothing to check.",
     "refuted": "✗ The proof does not apply to {runs}: its conditions did not hold ({lacking}).",
     "undecided": "? Not known whether the proof applies to {runs} ({lacking}).",
     "unproved": "? Not proved for {who} ({lacking}).",
-    "covered": ": distances from bodies at rest and between robots; beside what moves, that no robot brings itself too "
-    "near",
+    "covered": " between robots and from bodies at rest, and drives no robot too near to what moves",
     # Who came how near to what
     "appears": "{near.whom} appears {near} from {near.robot} (nobody's doing)",
     "comes_within": "{near.robot} comes within {near} of {near.whom}",
@@ -97,21 +96,22 @@ SENTENCES = {
     # Threshold?
     "mistriggered": "✗ {run}: a trigger is missed, spurious or at the wrong time (THR-TRIG).",
     "not_judged": "? {runs}: not known whether triggers are missed (THR-TRIG).",
-    "never_fired": "\N{EN DASH} Not tested here: nothing reached the {zeta} m.",
-    "fired": "✓ Fired at {zeta} m, {when}. Follows its own variable exactly: none missed, none spurious.",
+    "never_fired": "\N{EN DASH} Never fired{largest}: the threshold is {zeta} m.",
+    "largest": " at decision variables up to {largest:.3g} m",
+    "fired": "✓ Fired exactly when the decision variable reached {zeta} m, {when}.",
     "not_compared": "? {runs}: not compared with the task error without noise (THR-QUALITY).",
     "compared": "✓ Against the task error without noise{where}: {timing}.",
     "less_off": "  {runs}: less far off.",
     "off": "up to {off_s:.2f} s {early} (at {error_m:.2f} m)",
     "ddm": "  Decisions about {ugv} in run {run}: {wrong:.2g} % wrong{mean}. By (17)-(18), for its {drift_m_s:.2g} m/s "
     "and {noise_m_sqrt_s:g} m/√s: {due:.2g} % wrong, {decision_time_of_17_s:.2g} s.",
-    "optimal": "✓ {zeta:.4g} m is the Bayes optimum for the assumed {drift_m_s:.4g} m/s and {noise_m_sqrt_s:.4g} m/√s"
-    "{never}.",
-    "chosen": "✓ {zeta:.4g} m, {rule}, costs {more} the Bayes optimum {best:.4g} m for the assumed {drift_m_s:.4g} m/s "
-    "and {noise_m_sqrt_s:.4g} m/√s{never}.",
+    "optimal": "✓ {zeta:.4g} m is the Bayes optimum for the assumed drift {drift_m_s:.4g} m/s and noise "
+    "{noise_m_sqrt_s:.4g} m/√s{never}.",
+    "chosen": "✓ {zeta:.4g} m, {rule}, costs {more} the Bayes optimum {best:.4g} m for the assumed drift "
+    "{drift_m_s:.4g} m/s and noise {noise_m_sqrt_s:.4g} m/√s{never}.",
     "never": "; no task error here grows faster than {fastest:.3g} m/s",
-    "own": "✓ {robot} had {drift_m_s:.2g} m/s and {noise_m_sqrt_s:g} m/√s in run {run}: for these, {what}.",
-    "delay": "{ideal}, and {threshold_m:.4g} m costs as much as a delay of {cost_s:.2g} s",
+    "own": "✓ For the drift and noise of {robot} in run {run}, {what}.",
+    "delay": "{ideal}; {threshold_m:.4g} m costs as much as a delay of {cost_s:.2g} s",
     # Paper?
     "matches": "✓ {matched} of {all} results match{how}.",
     # Do not conclude that

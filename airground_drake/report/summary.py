@@ -38,8 +38,6 @@ class FirstScreen(NamedTuple):
 
     headline: Line
     rows: list[Row]
-    required: str
-    """The distances that pairs must keep, with their unit."""
     within: str
     """The arrival tolerance with its unit, '' if it is the default."""
     answers: list[Answer]
@@ -59,11 +57,9 @@ def first_screen(document: Document) -> FirstScreen:
     """The first screen of a report, from report.json."""
     every = courses(document)
     tabulated = len(every) > 1 and not document["reproduction"]
-    required = sorted({near.required_m for course in every for near in course.near})
     return FirstScreen(
         headline(document),
         [_row(document, course) for course in every] if tabulated else [],
-        f"{' to '.join(f'{each:g}' for each in dict.fromkeys(required[:1] + required[-1:]))} m" if required else "",
         tolerance(document),
         answers(document, every, tabulated=tabulated),
         _beware(document, every),
@@ -176,14 +172,15 @@ def _safe(course: RunOutcome) -> Line:
     if course.safe is None:
         return Line("open", f"not known, {course.why}")
     if course.blameless:
-        return Line("partly", f"{near.pair}: not its own doing" if near else "not the robots' own doing")
+        return Line("partly", f"{near.compared} ({near.between}): not its own doing" if near else "not its own doing")
     if not course.safe:
-        return Line("no", f"{near.pair}{more_pairs(course)}" if near else course.why)
+        return Line("no", f"{near.compared} ({near.between}){more_pairs(course)}" if near else course.why)
     if not near:
         return Line("none", "nothing near")
     proved = bool(course.proof and course.proof.holds)
-    told = f"{near}, {'proved' if proved and not near.moves else 'not proved'}"
-    told += f" beside {near.whom}; all else proved" * (proved and near.moves)
+    movers = course.movers or [near.whom] * near.moves
+    told = f"{near.compared}, {'proved' if proved else 'not proved'}"
+    told += f", except from {movers[0] if len(movers) == 1 else 'what moves'}" * (proved and bool(movers))
     return Line("yes", told) if course.tested else Line("none", f"{told}; not tested")
 
 
@@ -276,7 +273,7 @@ def _marked(line: Line) -> str:
 def _table(screen: FirstScreen) -> list[str]:
     """The table of methods in columns of equal width."""
     arrived = f"arrived?{f' (within {screen.within})' if screen.within else ''}"
-    cells = [["", "method", f"safe? ({screen.required})", arrived, "UAV proposals"]]
+    cells = [["", "method", "safe?", arrived, "UAV proposals"]]
     cells += [[row.run, row.method, _marked(row.safe), _marked(row.arrived), row.interventions] for row in screen.rows]
     widths = [max(map(len, column)) for column in zip(*cells, strict=True)]
     return [one_line("  ".join(map(str.ljust, row, widths)).rstrip()) for row in cells] if screen.rows else []

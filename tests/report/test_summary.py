@@ -494,12 +494,12 @@ def proof(status: str, mark: str, pattern: str) -> None:
 
 
 PROOF = re.compile(
-    r"(?:Proved for|The proof does not apply to|Not (?:proved for|known whether the proof applies to)) "
-    r"(\(d\)|[\w, ]+?)(?:,? (?:\(|whatever)|, but|: )"
+    r"(?:Proved:|Proved for|The proof does not apply to|Not (?:proved for|known whether the proof applies to)) "
+    r"(\(d\)|[\w, ]+?)(?:,? (?:\(|keep)|, but|: )"
 )
 
 
-proof("tested", "yes", r"Proved for (.*), whatever the UAV asks for\.")
+proof("tested", "yes", r"Proved: (.*?) keeps? every distance, whatever the UAV asks\.")
 proof("idle", "none", r"Proved for (.*), but nothing came near: its conditions hold with nothing to check\.")
 proof("refuted", "no", r"The proof does not apply to (.*): its conditions did not hold \((SAFE-HYP: .*)\)\.")
 proof("open", "open", r"Not known whether the proof applies to (.*) \((SAFE-HYP: .*)\)\.")
@@ -603,13 +603,13 @@ def _(world: World, mark: str, runs: str) -> bool:
     return mark == "open" and names(runs) == runs_with(world, "THR-TRIG", *UNDECIDED)
 
 
-@says("Threshold?", r"Not tested here: nothing reached the 3 m\.")
+@says("Threshold?", r"Never fired: the threshold is 3 m\.")
 def _(world: World, mark: str) -> bool:
     return mark == "none" and not world.fired_s
 
 
-@says("Threshold?", r"Fired at 3 m, (?:(\d+) times(?: in (\d+) runs)?, first )?at ([\d.]+) s\. "
-                    r"Follows its own variable exactly: none missed, none spurious\.")  # fmt: skip
+@says("Threshold?", r"Fired exactly when the decision variable reached 3 m, "
+                    r"(?:(\d+) times(?: in (\d+) runs)?, first )?at ([\d.]+) s\.")  # fmt: skip
 def _(world: World, mark: str, count: str | None, runs: str | None, first: str) -> bool:
     fired, sure = world.fired_s, not runs_with(world, "THR-TRIG", "refuted", *UNDECIDED)
     there = sum(ran.there for ran in world.runs.values())
@@ -645,13 +645,13 @@ def _(world: World, mark: str, runs: str) -> bool:
     return max(late_s[name] for name in names(runs)) <= min(late_s[name] for name in {*late_s} - {*names(runs)})
 
 
-@says("Threshold?", r"3 m is the Bayes optimum for the assumed 6 m/s and 10 m/√s\.")
+@says("Threshold?", r"3 m is the Bayes optimum for the assumed drift 6 m/s and noise 10 m/√s\.")
 def _(world: World, mark: str) -> bool:
     return mark == "yes" and bool(world.drifts)
 
 
-@says("Threshold?", r"ugv1 had 0\.56 m/s and 0\.004 m/√s in run (\w+): for these, (?:too, no threshold is better|"
-                    r"0\.28 m is best, and 3 m costs as much as a delay of ([\d.]+) s)\.")  # fmt: skip
+@says("Threshold?", r"For the drift and noise of ugv1 in run (\w+), (?:no threshold is better|"
+                    r"0\.28 m is best; 3 m costs as much as a delay of ([\d.]+) s)\.")  # fmt: skip
 def _(world: World, mark: str, run: str, delay_s: str | None) -> bool:
     """The run for whose numbers the threshold costs most."""
     most = max(world.drifts.values())
@@ -850,12 +850,12 @@ def test_a_collision_has_the_time_of_the_event_and_nothing_after_it_counts() -> 
 
 
 AGAINST = "Against the task error without noise"
-BEST = "the Bayes optimum 2.992 m for the assumed 6 m/s and 10 m/√s."
+BEST = "the Bayes optimum 2.992 m for the assumed drift 6 m/s and noise 10 m/√s."
 OFTEN_WRONG: Document = {
     "drift_m_s": 0.56, "noise_m_sqrt_s": 10.0, "error_rate": 5 / 7, "error_rate_of_18": 0.4916, "decision_time_s": 8.3,
     "decision_time_of_17_s": 0.09, "decision_time_without_noise_s": 5.35,
 }  # fmt: skip
-FIRED = "Fired at 3 m, at 14.479 s. Follows its own variable exactly: none missed, none spurious."
+FIRED = "Fired exactly when the decision variable reached 3 m, at 14.479 s."
 
 
 def test_early_false_and_missed_triggers_are_told_beside_the_theory_of_the_ddm() -> None:
@@ -879,9 +879,10 @@ def test_early_false_and_missed_triggers_are_told_beside_the_theory_of_the_ddm()
          ("partly", f"3 m, by (19) as printed (rule printed), costs 5 % more risk than {BEST}")),
         ("printed", "declared", 1.0, 6.0,
          ("partly", f"3 m, by (19) as printed (rule printed), costs 3.5 times the risk of {BEST}")),
-        ("bayes", "optimal", 0.0, 6.0, ("yes", "3 m is the Bayes optimum for the assumed 6 m/s and 10 m/√s.")),
-        ("bayes", "optimal", 0.0, 11.0, ("none", "3 m is the Bayes optimum for the assumed 11 m/s and 10 m/√s; no task "
-                                                 "error here grows faster than 10 m/s.")),
+        ("bayes", "optimal", 0.0, 6.0,
+         ("yes", "3 m is the Bayes optimum for the assumed drift 6 m/s and noise 10 m/√s.")),
+        ("bayes", "optimal", 0.0, 11.0, ("none", "3 m is the Bayes optimum for the assumed drift 11 m/s and noise "
+                                                 "10 m/√s; no task error here grows faster than 10 m/s.")),
     ],
 )  # fmt: skip
 def test_which_rule_gave_the_threshold_and_what_it_costs_for_the_assumed_numbers(
@@ -895,9 +896,9 @@ def test_which_rule_gave_the_threshold_and_what_it_costs_for_the_assumed_numbers
 @pytest.mark.parametrize(
     ("noise", "best", "extra", "mark", "told"),
     [
-        (0.004, 0.00016, 2.68, "partly", "0.00016 m is best, and 3 m costs as much as a delay of 5.4 s."),
-        (0.0, 0.0, 2.68, "partly", "the lower, the better, and 3 m costs as much as a delay of 5.4 s."),
-        (10.0, 2.99, 1e-4, "yes", "too, no threshold is better."),
+        (0.004, 0.00016, 2.68, "partly", "0.00016 m is best; 3 m costs as much as a delay of 5.4 s."),
+        (0.0, 0.0, 2.68, "partly", "the lower, the better; 3 m costs as much as a delay of 5.4 s."),
+        (10.0, 2.99, 1e-4, "yes", "no threshold is better."),
     ],
 )
 def test_what_the_threshold_costs_for_the_numbers_of_the_run(
@@ -909,7 +910,16 @@ def test_what_the_threshold_costs_for_the_numbers_of_the_run(
     found["claims"].append(choice("fixed", "declared", 0.0, rows))
     given, said = lines(found, "Threshold?")[-1]
     assert given == mark
-    assert said == f"ugv1 had 0.56 m/s and {noise:g} m/√s in run a: for these, {told}"
+    assert said == f"For the drift and noise of ugv1 in run a, {told}"
+
+
+def test_without_a_trigger_the_largest_decision_variable_is_told() -> None:
+    found = document(World({"a": Ran("a"), "d": Ran()}))
+    for run, largest in (("a", 1.234), ("d", 0.5)):
+        evidence = {"ugvs": [{"largest_decision_variable_m": 0.1}, {"largest_decision_variable_m": largest}]}
+        found["claims"].append(claim("THR-TRIG", run, "holds", evidence=evidence))
+    told = ("none", "Never fired at decision variables up to 1.23 m: the threshold is 3 m.")
+    assert lines(found, "Threshold?")[0] == told
 
 
 @pytest.mark.parametrize(("dwell_s", "mark"), [(0.5, "yes"), (0.05, "yes"), (0.049, "partly"), (1e-6, "partly")])
