@@ -13,7 +13,7 @@ from airground_drake.maps.grid import Grid
 from airground_drake.maps.rectangles import Cells
 
 AROUND_M = 1.0
-"""A site is the cell farthest from obstacles in a square of this side, m."""
+"""A site is the cell farthest from obstacles in a square of this side, m, as long as there are such cells."""
 
 
 def ways(grid: Grid, clearance_m: float, count: int) -> tuple[Array, float]:
@@ -41,14 +41,17 @@ def ways(grid: Grid, clearance_m: float, count: int) -> tuple[Array, float]:
     peaks = open_ & (clear == ndimage.maximum_filter(np.where(open_, clear, 0.0), side))
     far = np.where(peaks, np.iinfo(np.int32).max, -1).astype(np.int32)  # steps from the sites so far
     sites = list[tuple[int, int]]()
+    beside = np.where(open_ & ~peaks, np.iinfo(np.int32).max, -1).astype(np.int32)  # bare rooms have few peaks
     apart = math.ceil(2.0 * clearance_m / grid.frame.cell_m)
     while len(sites) < 2 * count:
         site = np.unravel_index(np.argmax(far if sites else np.where(peaks, clear, -1.0)), far.shape)
         if far[site] < apart:
-            raise ValueError(f"there is room for {len(sites) // 2}, with {clearance_m:g} m around each")
+            site = np.unravel_index(np.argmax(beside), beside.shape)
+            if beside[site] < apart:
+                raise ValueError(f"there is room for {len(sites) // 2}, with {clearance_m:g} m around each")
         sites.append((int(site[0]), int(site[1])))
         steps = _steps(open_, sites[-1])
-        far = np.where(peaks, np.minimum(far, steps), -1)
+        far, beside = (np.where(each >= 0, np.minimum(each, steps), -1) for each in (far, beside))
     starts, free = sites[:count], sites[count:]
     pairs = []
     longest = 0
