@@ -88,6 +88,19 @@ def _meet(a: Corner, b: Corner, c: Corner, d: Corner) -> bool:
     return not apart and turn(a, b, c) * turn(a, b, d) <= 0.0 and turn(c, d, a) * turn(c, d, b) <= 0.0
 
 
+def near_edge(corners: Sequence[Corner], least: float) -> int | None:
+    """A corner of a polygon that is at most as far as `least`, m, from an edge that does not end there; its number."""
+    points = np.array(corners)
+    begin, n = np.roll(points, 1, axis=0), len(points)
+    edge = points - begin
+    to = points[:, None] - begin
+    share = np.clip((to * edge).sum(axis=2) / (edge**2).sum(axis=1), 0.0, 1.0)
+    apart = np.linalg.norm(to - share[..., None] * edge, axis=2)
+    k = np.arange(n)
+    apart[k, k] = apart[k, (k + 1) % n] = math.inf
+    return int(apart.min(axis=1).argmin()) if apart.min() <= least else None
+
+
 def split(corners: Sequence[Corner]) -> list[list[Corner]]:
     """Convex polygons that together are a polygon without crossings; corners counter-clockwise.
 

@@ -29,7 +29,7 @@ from airground_drake.scenarios.outlines import outlines_of
 from airground_drake.scenarios.plants import plant_of
 from airground_drake.scenarios.rounding import TOLERANCE_M, Rounding
 from airground_drake.scenarios.schema import ABOUT, ARENA, MAP, SHAPES, Obstacle, Plant, Scenario, Uav, Ugv, Vector
-from airground_drake.scenarios.shapes import crossing
+from airground_drake.scenarios.shapes import crossing, near_edge
 
 GAINS = ("avoidance_gain_1_s", "motion_gain_1_s", "formation_gain_1_s", "intervention_gain_1_s")
 ARRIVES = "LIVE-GOAL"  # the claim that every UGV ends where it is to end
@@ -145,6 +145,9 @@ def _corners(key: str, corners: Sequence[Vector], least: int, *, closed: bool) -
     if closed and corners and (met := crossing([(x, y) for x, y in corners])):
         one, other = (list(corners[k]) for k in met)
         yield key, corners, f"edges that do not meet: those that end at {one} and at {other} do"
+    elif closed and corners and (thin := near_edge([(x, y) for x, y in corners], TOLERANCE)) is not None:
+        allowed = f"a corner more than {TOLERANCE:g} m from the edges that do not end there (segment_m: a thin wall)"
+        yield f"{key}.{thin}", corners[thin], allowed
 
 
 def _blocks(scenario: Scenario) -> Problems:
@@ -338,6 +341,10 @@ def _distances(scenario: Scenario) -> Problems:
         if not safe.collision_m < getattr(safe, name):
             allowed = f"less than safe_distance.{name} = {getattr(safe, name):.9g} m"
             yield "safe_distance.collision_m", safe.collision_m, allowed
+    for name, each in scenario.barriers.items():
+        if each.distance_m and not safe.collision_m < each.distance_m:
+            allowed = f"more than safe_distance.collision_m = {safe.collision_m:.9g} m, or 0"
+            yield f"{_key_of(name)}.distance_m", each.distance_m, allowed
     radii = scenario.uav.radius_m + max(ugv.radius_m for ugv in scenario.ugvs.values())
     if not altitude > safe.air_ground_m + radii:
         least = f"safe_distance.air_ground_m = {safe.air_ground_m:.9g} m{_and(radii)}"
@@ -440,7 +447,8 @@ def _extent(scenario: Scenario) -> Problems:
         places = [corners[np.abs(corners).max(axis=1).argmax()].tolist()] + [each.position_m] * bool(each.position_m)
         if each.moves:
             shape, places = "moves.waypoints_m", [*places, *each.moves.waypoints_m]
-        points += [(f"{_key_of(name)}.{'file' if name == MAP else shape}", place) for place in places]
+        key = f"{_key_of(name)}.{'file' if name == MAP else shape}"
+        points += [("arena_m" if name.startswith(ARENA) else key, place) for place in places]
     key, point = max(points, key=lambda entry: max(map(abs, entry[1])))
     farthest = max(map(abs, point))
     allowed = loss.largest_extent(duration) - speed * duration

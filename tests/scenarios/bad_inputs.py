@@ -62,6 +62,12 @@ EDITS: list[tuple[str, object]] = [
     ("duration_s", 1e10),
     ("duration_s", 1e-9),
     ("intervention.policies.0.parameters.speed_m_s", math.nan),
+    # shapes
+    ("obstacles.rock", {"polygon_m": [[4, 0], [5, 0], [6, 0], [5.5, 1]], "distance_m": 0.05}),
+    ("obstacles.rock", {"polygon_m": [[4, 0], [6, 0], [4, 1], [6, 1]]}),
+    ("obstacles.rock", {"polygon_m": [[4, 0], [6, 0], [5, 1e-10]]}),
+    ("obstacles.rock", {"polygon_m": [[4, 0], [5, 0], [6, 1e-12], [5.5, 2e-12]]}),
+    ("arena_m", [[-1e7, -30], [1e7, 30]]),
     # names
     ("name", "a b"),
     ("name", "n" * 65),
