@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 from itertools import combinations
-from math import ceil
+from math import ceil, inf
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -327,17 +327,26 @@ def _least_of_bent(trace: Trace, pair: Pair, off_m: float) -> Approach:
     way = _relative(trace, pair, np.arange(len(trace.t))[pair.rows])
     each = cores.take((slice(None), None))
     lower = least_distances(each, way[:-1], way[1:], planar=planar)[0].min(axis=0) - off_m
-    parts = min(ceil((off_m / BENT_M) ** 0.5), MOST_PARTS)
-    shares, t = np.linspace(0.0, 1.0, parts + 1), trace.t[pair.rows]
-    found = []
-    for k in np.flatnonzero(lower < pair.safe_m).tolist():
-        places = [bent(trace, name, pair.row + k, shares) for name in (pair.first, pair.second)]
-        fine = places[0] - places[1]
-        least, where = least_distances(each, fine[:-1], fine[1:], planar=planar)
-        least, where = least.min(axis=0), where[least.argmin(axis=0), np.arange(parts)]
-        j = int(np.argmin(least))
-        at = instant_of(t, k + 1, (j + float(where[j])) / parts)
-        found.append(Approach(float(least[j]) - off_m / parts**2, at, k + 1))
+    most, t = min(ceil((off_m / BENT_M) ** 0.5), MOST_PARTS), trace.t[pair.rows]
+    found = list[Approach]()
+    for k in sorted(np.flatnonzero(lower < pair.safe_m).tolist(), key=lower.__getitem__):
+        best = min(found).distance_m if found else inf
+        if lower[k] > best:
+            break
+        for parts in (min(FEW_PARTS, most), most):  # few tell of most segments that the least distance is elsewhere
+            shares = np.linspace(0.0, 1.0, parts + 1)
+            places = [bent(trace, name, pair.row + k, shares) for name in (pair.first, pair.second)]
+            fine = places[0] - places[1]
+            least, where = least_distances(each, fine[:-1], fine[1:], planar=planar)
+            least, where = least.min(axis=0), where[least.argmin(axis=0), np.arange(parts)]
+            j = int(np.argmin(least))
+            nearest = Approach(
+                float(least[j]) - off_m / parts**2, instant_of(t, k + 1, (j + float(where[j])) / parts), k + 1
+            )
+            if nearest.distance_m > best:
+                break
+        else:
+            found.append(nearest)
     rest = np.delete(lower, np.flatnonzero(lower < pair.safe_m))
     if len(rest):
         k = int(np.flatnonzero(lower == rest.min())[0])
@@ -529,6 +538,8 @@ BENT_M = 1e-10
 """Segments in which a body that does not move straight may be too near are divided until they are this straight, m."""
 MOST_PARTS = 5000
 """Parts of such a segment at most."""
+FEW_PARTS = 50
+"""Parts into which it is divided first."""
 DISTANCE_TOLERANCE_M = 1e-9
 """A distance may be this much below the safe one, m: the controller steers *onto* the safe distance, and sums of
 some thousand rounded steps err by 1e-12 m. The reported margin does not contain it."""
