@@ -139,6 +139,7 @@ FAULTY: tuple[tuple[str, str, Edit, str], ...] = (
     ("loser inflated", RELAXED, column(objective_accept=lambda v: 2.0 * v, objective_refuse=lambda v: 2.0 * v),
      "throughout"),
     ("worst plan", RELAXED, other_plan(worst, bounded=False), "objective above"),
+    ("dearer than rounded", RELAXED, column(objective=lambda v: 1.001 * v), "above the rounded plan's"),
     ("worse plan proved", BINARY, other_plan(beside_the_best, bounded=True), "lower bound overstated"),
     ("bound too high", BINARY, column(route_bound=lambda v: 1.001 * v, gap=0.0), "lower bound"),
     ("optimal with a gap", BINARY, column(route_bound=lambda v: 0.9999 * v, gap=1e-4), "but with a gap"),
