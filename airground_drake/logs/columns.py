@@ -50,13 +50,13 @@ class Time(NamedTuple):
 
 
 class Place(NamedTuple):
-    """The columns of a body's coordinates; z is None without such a column."""
+    """The columns of a body's coordinates, and their units; z is None without such a column."""
 
     name: str
     x: int
     y: int
     z: int | None
-    unit: str
+    units: Sequence[str]
 
 
 class Columns(NamedTuple):
@@ -91,7 +91,13 @@ def columns(labels: Sequence[str], chosen: Mapping[str, str], bodies: Collection
             raise LogError(f"two columns are called {label!r}; wanted: one, or --map-columns {axis}=NAME")
         axes[name][axis] = k, unit
     places = [
-        Place(name, each["x"][0], each["y"][0], each["z"][0] if "z" in each else None, each["x"][1])
+        Place(
+            name,
+            each["x"][0],
+            each["y"][0],
+            each["z"][0] if "z" in each else None,
+            [each[axis][1] for axis in "xyz" if axis in each],
+        )
         for name, each in axes.items()
         if {"x", "y"} <= each.keys()
     ]
@@ -109,7 +115,7 @@ def _axis(base: str, bodies: Collection[str]) -> tuple[str, str]:
 def split_unit(label: str) -> tuple[str, str]:
     """A label without its unit, and the unit: `x_mm`, `x [mm]`, `Time (Seconds)`; '' if it names none."""
     if found := _BRACKETS.fullmatch(label):
-        return found[1], WORDS.get(found[2].lower(), found[2].lower()) or "none"
+        return found[1].rstrip("/"), WORDS.get(found[2].lower(), found[2].lower()) or "none"
     if (found := _SUFFIX.fullmatch(label)) and not _AXIS.fullmatch(label):
         return found[1], found[2].lower()
     return label, ""

@@ -57,7 +57,8 @@ def read(path: Path, content: bytes, wanted: Wanted) -> Log:
     """
     table = _parquet(content) if content[:4] == b"PAR1" else text.read(content)
     labels = table.labels
-    if not table.has_header and len(labels) == len(TUM) and not wanted.columns:
+    no_words = all(not line.strip() or line.lstrip().startswith("#") for line in table.above)
+    if not table.has_header and len(labels) == len(TUM) and no_words and not wanted.columns:
         table = table._replace(labels=(labels := TUM))
     if not table.has_header and not wanted.columns and _is_echo(table):
         named = [*ECHO[:3], *["child_frame"] * (not text.is_number(table.cells[3][0])), *ECHO[3:]]
@@ -156,7 +157,7 @@ def _streams(path: Path, table: text.Table, has: Columns, wanted: Wanted) -> Ite
         numbers, why = _places(table, place)
         stamps, nano, stamped = whole[time]
         why[~stamped & (why == "")] = "no time"
-        if not (numbers[:, :2] == numbers[:, :2]).any():
+        if len(has.places) > 1 and not np.isfinite(numbers[:, :2]).any():
             continue
         alone = len(has.places) == 1
         keys = pd.DataFrame({
@@ -170,7 +171,7 @@ def _streams(path: Path, table: text.Table, has: Columns, wanted: Wanted) -> Ite
             yield _stream(
                 Stream(
                     str(path), path.stem if is_file else str(name), stamps[at], nano[at], numbers[at],
-                    time.unit, place.unit or length, str(frame).strip("/"),
+                    time.unit, place.units[0] or length, str(frame).strip("/"),
                     clock=_clock(table, time), is_file=is_file,
                 ),
                 why[at], [table.lines[k] for k in at],
@@ -196,13 +197,22 @@ def _stream(raw: Stream, why: npt.NDArray[np.object_], lines: list[int], *, is_s
 
 
 def _places(table: text.Table, place: Place) -> tuple[Array, npt.NDArray[np.object_]]:
-    """Coordinates (n, 3), and why a row lacks them, else ''."""
+    """Coordinates (n, 3), in the unit of x, and why a row lacks them, else ''.
+
+    Raises:
+        LogError: if only some of the columns say their unit.
+    """
+    if not all(place.units) and any(place.units):
+        named = listed([table.labels[k] for k in (place.x, place.y, place.z) if k is not None])
+        raise LogError(f"some of the columns {named} have a unit, others not; wanted: one for each, or none")
     taken = [place.x, place.y, *([] if place.z is None else [place.z])]
     texts = [table.cells[k] for k in taken]
     numbers = np.full((len(table.cells), 3), np.nan)
     why = np.full(len(table.cells), "", dtype=object)
     for axis, cells in enumerate(texts):
         numbers[:, axis] = pd.to_numeric(cells, errors="coerce").to_numpy(dtype=np.float64)
+        if place.units[axis] != place.units[0]:
+            numbers[:, axis] *= PER_M[place.units[0]] / PER_M[place.units[axis]]
         bad = ~np.isfinite(numbers[:, axis]) & (why == "")
         low = cells.str.lower().to_numpy()
         reasons = np.select([low == "", np.isin(low, ["nan", "null", "none", "na", "n/a", "inf", "-inf"])],
@@ -214,7 +224,7 @@ def _places(table: text.Table, place: Place) -> tuple[Array, npt.NDArray[np.obje
 def _dated(table: text.Table, time: Time) -> Time:
     """The time, and where it is written as a date, the cells as nanoseconds since 1970."""
     cells = table.cells[time.whole]
-    if not _ISO.fullmatch(cells.iloc[0]):
+    if not _ISO.fullmatch(next(filter(None, cells), "")):
         return time
     dates = pd.to_datetime(cells, utc=True, errors="coerce", format="ISO8601")
     stamps = dates.dt.as_unit("ns").astype("int64").astype(str)

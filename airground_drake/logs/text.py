@@ -14,9 +14,9 @@ from typing import NamedTuple
 
 import pandas as pd
 
-from airground_drake.base.errors import LogError
+from airground_drake.base.errors import LogError, short
 
-DELIMITERS = (";", "\t", ",")
+DELIMITERS = (";", "\t", ",", "|")
 """In this order: a table with decimal commas has as many commas in each line, too. Blanks come last."""
 SAMPLE = 200
 """Lines in the middle of a file from which its form is found."""
@@ -24,6 +24,8 @@ ALIKE = 0.6
 """Least share of these lines that have the usual number of fields."""
 FEWEST, MOST = 3, 20_000
 """Columns of a table."""
+MOST_HEADERS = 20
+"""Lines of a header."""
 MOST_ROWS = 10_000_000
 _NUMBER = re.compile(r"[+-]?(\d+([.,]\d*)?|[.,]\d+)([eE][+-]?\d+)?|[+-]?(nan|inf|infinity)|", re.IGNORECASE)
 _COMMA = re.compile(r"[+-]?\d*,\d+([eE][+-]?\d+)?")
@@ -56,8 +58,7 @@ def read(content: bytes) -> Table:
     Raises:
         LogError: if it is no text, or no table.
     """
-    lines = _decoded(content).split("\n")
-    lines = [line.rstrip("\r") for line in lines]
+    lines = _decoded(content).replace("\r\n", "\n").replace("\r", "\n").split("\n")
     full = [k for k, line in enumerate(lines) if line.strip() and not line.lstrip().startswith("#")]
     if not full:
         raise LogError("it has no lines with data")
@@ -69,8 +70,14 @@ def read(content: bytes) -> Table:
     numeric = [2 * sum(is_number(row[c]) for row in rows) > len(rows) for c in range(count)]
     first = next((k for k in full if _is_data(_fields(lines[k], delimiter), numeric)), None)
     if first is None:
-        raise LogError("no line of it has numbers in the columns that have numbers elsewhere")
-    labels, header = _header(lines[:first], delimiter, count)
+        raise LogError("it has no rows of numbers; wanted: a table with times and positions")
+    unnamed = next((k for k in range(count) if any(row[count - 1 - k] for row in rows)), 0)
+    labels, header = _header(lines[:first], delimiter, count, unnamed)
+    if len(header) > MOST_HEADERS:
+        said = short(lines[max(header)])
+        raise LogError(
+            f"lines {min(header) + 1} to {first} have words where most lines have numbers: line {first} is {said}"
+        )
     data = [k for k in full if k >= first]
     if len(data) > MOST_ROWS:
         raise LogError(f"it has {len(data)} rows; allowed: {MOST_ROWS}")
@@ -148,8 +155,11 @@ def _is_data(row: Sequence[str], numeric: Sequence[bool]) -> bool:
     return len(row) == len(numeric) and all(map(is_number, cells)) and any(cells)
 
 
-def _header(lines: Sequence[str], delimiter: str, count: int) -> tuple[list[str], set[int]]:
-    """Names of the columns, and the numbers of the lines that they are from; a comment may be the header."""
+def _header(lines: Sequence[str], delimiter: str, count: int, unnamed: int) -> tuple[list[str], set[int]]:
+    """Names of the columns, and the numbers of the lines that they are from; a comment may be the header.
+
+    A delimiter at the end of each row, or of the header, makes no column: the last `unnamed` columns are empty.
+    """
     found: list[int] = []
     rows: list[list[str]] = []
     for k in range(len(lines) - 1, -1, -1):
@@ -157,6 +167,9 @@ def _header(lines: Sequence[str], delimiter: str, count: int) -> tuple[list[str]
         row = _fields(lines[k].lstrip().lstrip("#"), delimiter)
         if not lines[k].strip() or (is_comment and rows):
             break
+        row += [""] * (count - len(row) if count - len(row) <= unnamed else 0)
+        while len(row) > count and not row[-1]:
+            row.pop()
         if len(row) != count or not any(row):
             break
         rows.insert(0, row)

@@ -24,6 +24,8 @@ OF_BODY = ".body"
 """What a table of this package writes after a robot's name if the law steers another point than its body."""
 SAME_M = 1e-9
 """Positions of one body at one time that differ by less are one."""
+CONTRADICTORY = 0.1
+"""Share of a body's rows that may contradict others: with more, stamps are too coarse, or recordings are mixed."""
 ORIGIN_M = 1e-3
 """Robots that start so close to (0, 0) start there."""
 
@@ -134,6 +136,9 @@ def joined(log: Log, scenario: Json, choice: Choice) -> Tracks:
     said = units.settle(found, scenario, choice.time_unit, choice.length_unit)
     for name in (*scenario["ugvs"], *choice.uavs, *(n for n, each in scenario["obstacles"].items() if each["moves"])):
         if name not in found and name not in choice.without:
+            for stream in log.streams:
+                if stream.skipped and not len(stream.whole) and _body_of(stream, bodies, choice.rename)[0] == name:
+                    raise LogError(one_line(f"{name} has no usable rows: {_skipped(stream)}; wanted: {_USABLE}"))
             there = ", ".join(dict.fromkeys(each.label for each in log.streams)) or "none"
             wanted = f"--rename NAME={name}, or --without {name}"
             raise LogError(one_line(f"{name} is not in the log; names there: {there[:300]}; wanted: {wanted}"))
@@ -253,6 +258,18 @@ def _in_one_frame(frames: Mapping[str, str], allowed: Collection[str]) -> None:
                                 f"{several}; {wanted}"))  # fmt: skip
 
 
+def _skipped(stream: Stream) -> str:
+    """Rows of a stream that cannot be used, in words."""
+    first = stream.first_skipped
+    return ", ".join(
+        f"{count} with {reason}{f', first in {first[reason]}' * bool(first.get(reason))}"
+        for reason, count in stream.skipped.items()
+    )
+
+
+_USABLE = "seconds, or dates such as 2026-05-04T10:00:00.050Z, and numbers for x and y"
+
+
 def _track(name: str, stream: Stream, ns: Whole, gap_s: float, said: list[str]) -> Track:
     """The track of a stream, whose stamps are ns after time 0: sorted, each time once."""
     places = stream.places / PER_M[stream.length_unit]
@@ -271,6 +288,11 @@ def _track(name: str, stream: Stream, ns: Whole, gap_s: float, said: list[str]) 
     same, other = (~new) & (apart <= SAME_M), (~new) & (apart > SAME_M)
     if same.any():
         said.append(f"{name}: {int(same.sum())} rows come twice; each counts once")
+    if other.sum() > CONTRADICTORY * len(ns):
+        raise LogError(
+            one_line(f"{name}: {int(other.sum())} of {len(ns)} rows are elsewhere at the same time as another row; "
+                     "wanted: stamps as fine as the rows, of one recording")
+        )  # fmt: skip
     if other.any():
         k = int(np.argmax(np.where(other, apart, -1.0)))
         said.append(

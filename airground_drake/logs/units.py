@@ -14,6 +14,8 @@ from airground_drake.logs.stream import OF_MESSAGES, PER_M, PER_S, Stream
 
 SINCE_1970 = (("ns", 1e17), ("us", 1e14), ("ms", 1e11), ("s", 1e8))
 """Units of stamps since 1970, and the least such stamp that is taken as one."""
+TOO_LONG = 1_000.0
+"""Stamps that would make a log so many times longer than the scenario are not since 1970: they are of a finer unit."""
 IMPOSSIBLE = 20.0
 """So many times the speed limits, the duration or the size of a scenario are taken as a sign of another unit."""
 NAMES = {
@@ -40,7 +42,7 @@ def settle(streams: Mapping[str, Stream], scenario: Json, time_unit: str, length
         for unit, stamps, what in ((stated[0], stream.clock, "times"), (stated[1], "", "lengths")):
             if unit not in ("", "s", "m") and not (unit == "ns" and stamps in OF_MESSAGES):
                 said[f"{what} are in {NAMES[unit]}, as the file says"] = None
-        stream.time_unit = stream.time_unit or time_unit or _since_1970(stream)
+        stream.time_unit = stream.time_unit or time_unit or _since_1970(stream, float(scenario["duration_s"]))
         stream.length_unit = stream.length_unit or length_unit
         if stream.time_unit in ("ms", "us", "ns") and not stated[0]:
             why = "as chosen" if time_unit else "by their size, stamps since 1970"
@@ -62,9 +64,10 @@ def settle(streams: Mapping[str, Stream], scenario: Json, time_unit: str, length
     return list(said)
 
 
-def _since_1970(stream: Stream) -> str:
+def _since_1970(stream: Stream, duration_s: float) -> str:
     largest = float(np.abs(stream.whole).max(initial=0))
-    return next((unit for unit, least in SINCE_1970 if largest >= least), "")
+    unit = next((unit for unit, least in SINCE_1970 if largest >= least), "")
+    return unit if unit and float(np.ptp(stream.ns(unit))) / 1e9 <= TOO_LONG * duration_s else ""
 
 
 def _likely(streams: Mapping[str, Stream], scenario: Json) -> tuple[str, str]:

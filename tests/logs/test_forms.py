@@ -276,6 +276,27 @@ FORMS = {
     "mm by size": Form(
         table("log.csv", lambda: logs.wide(FULL, scale=1000.0)), FULL, ("lengths are taken as millimetres",)
     ),
+    "units of each column": Form(
+        table("log.csv", lambda: [["t_s", "body", "x_mm", "y_m", "z [cm]"], *(
+            [row[0], row[1], f"{float(row[2]) * 1e3:.3f}", row[3], f"{float(row[4]) * 1e2:.3f}"]
+            for row in logs.long(FULL)[1:])]),
+        FULL, ("millimetres, as the file says",),
+    ),
+    "rows of units": Form(
+        table("log.csv", lambda: [["time", "body", "x", "y", "z"], ["[s]", "[-]", "[mm]", "[mm]", "[mm]"],
+                                  *logs.long(FULL, scale=1000.0)[1:]]),
+        FULL, ("millimetres, as the file says",),
+    ),
+    "a delimiter at the end of rows": Form(
+        table("log.csv", lambda: [row + [""] * (k > 0) for k, row in enumerate(logs.long(FULL))]), FULL
+    ),
+    "a delimiter at the end of the header": Form(
+        table("log.csv", lambda: [row + [""] * (k == 0) for k, row in enumerate(logs.long(FULL))]), FULL
+    ),
+    "us since the start of a computer": Form(
+        table("log.csv", lab(FULL, "t,body,x,y,z", lambda t: str(5_123_456_789 + round(1e6 * t)))),
+        {name: (t_s + 5123.456789, places) for name, (t_s, places) in FULL.items()}, ("taken as microseconds",),
+    ),
     "epoch": Form(table("log.csv", lab(FULL, "timestamp,name,x,y,z", logs.since_1970)), FULL),
     "epoch, ns": Form(
         table("log.csv", lab(JITTER, "stamp,robot,x,y,z", lambda t: str(EPOCH_NS + round(t * 1e9)))), JITTER,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -126,7 +127,12 @@ def test_noise_after_the_mark_of_a_kind_is_refused(start: bytes, tmp_path: Path,
         ("", "it is empty"),
         ("\n\n# only a comment\n", "no lines with data"),
         ("hello\nworld\n", "it is no table"),
-        ("t_s,body,x_m,y_m,z_m\n", "no line of it has numbers"),
+        ("t_s,body,x_m,y_m,z_m\n", "it has no rows of numbers"),
+        ("t_s,qw,qx,qy,qz,x,y,z,extra\n" + "0.1,1,0,0,0,1,2,0\n0.2,1,0,0,0,1,2,0\n" * 9, "it lacks a column of times"),
+        (re.sub(r"(?m)^(\d)", r"at \1", LONG, count=30), "have words where most lines have numbers: line"),
+        (re.sub(r"(?m)^(\d)", r"04/05/2026 \1", LONG), "tb_0 has no usable rows: 31 with no time, first in line 2"),
+        (LONG.replace("x_m", "x"), "some of the columns x, y_m, z_m have a unit, others not"),
+        (re.sub(r"(?m)^(\d+)\.\d+", r"\1", LONG), "rows are elsewhere at the same time as another row; wanted: stamps"),
         ("a,b,c\n1,2,3\n4,5,6\n", "it lacks a column of times and columns x and y: its columns are a, b, c"),
         ("t,body,x,x,y\n0,tb_0,0,0,0\n1,tb_0,0,0,0\n", "two columns are called 'x'"),
         ("t,x_m,y_m,p.x,p.y\n0,1,2,3,4\n1,1,2,3,4\n", ""),
@@ -146,6 +152,7 @@ def test_a_table_that_cannot_be_used_says_what_is_wanted(
 
 def test_other_encodings_and_line_ends_are_read(tmp_path: Path, document: dict[str, Any]) -> None:
     for content in (LONG.encode("utf-16"), LONG.encode("utf-8-sig"), LONG.replace("\n", "\r\n").encode(),
+                    LONG.replace("\n", "\r").encode(),
                     LONG.replace("body", "body", 1).encode() + b"# caf\xe9\n"):  # fmt: skip
         (tmp_path / "a.csv").write_bytes(content)
         assert judged_or_refused(tmp_path / "a.csv", document) == ""
