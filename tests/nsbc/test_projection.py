@@ -123,6 +123,15 @@ def test_normals_that_depend_on_each_other(seed: int, kind: str, planar: bool) -
         np.testing.assert_allclose(kernels._closest_feasible(lower, normal, bound), expected, atol=1e-6)
 
 
+@pytest.mark.parametrize("by", [0.0, 1e-17, -1e-17, 1e-15])
+def test_a_robot_that_just_fits_between_two_walls_slides_along(by: float) -> None:
+    normal, bound = np.array([[0.0, 1.0, 0.0], [0.0, -1.0, 0.0]]), np.full(2, by)
+    for aside in (-1e-17, 1e-17, 0.3, -0.3):
+        velocity = kernels.avoid_one(np.array([1.0, aside, 0.0]), normal, bound, kernels.AUGMENTED)
+        assert velocity == pytest.approx([1.0, 0.0, 0.0], abs=1e-9)
+        assert (normal @ velocity >= np.minimum(bound, 0.0)).all()
+
+
 def test_robots_in_contact_slide_along() -> None:
     """At exactly the safe distance the bound is 0: without the margin, a miss of 1e-17 m/s would stop the robot."""
     rng = np.random.default_rng(1)
