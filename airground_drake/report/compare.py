@@ -139,10 +139,11 @@ def _agree(was: Any, now: Any) -> bool:
 
 
 def _inputs(before: Document, after: Document) -> Iterator[Change]:
-    """Keys of the scenario and versions that differ: what the reports were made from."""
+    """Keys of the scenario, versions and third-party files that differ: what the reports were made from."""
     old, new = (
         {key: value for key, value in report["scenario"]["resolved"].items() if key not in NO_INPUTS}
         | {f"version of {key}": report["provenance"][key] for key in VERSIONS if key in report["provenance"]}
+        | {f"SHA-256 of {name}": digest for name, digest in report["provenance"].get("third_party", {}).items()}
         for report in (before, after)
     )
     yield from _differing(old, new, "")

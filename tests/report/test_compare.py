@@ -109,6 +109,8 @@ def test_inputs_that_differ_come_first_and_rounding_is_only_counted(
     obstacle = next(iter(resolved["obstacles"]))
     resolved["obstacles"]["new"] = resolved["obstacles"].pop(obstacle)
     after["provenance"]["drake"] = "9.9"
+    before["provenance"]["third_party"] = {"mine.py:Plant": "1" * 64, "mine.py:Policy": "2" * 64}
+    after["provenance"]["third_party"] = {"mine.py:Plant": "3" * 64, "mine.py:Policy": "2" * 64}
     claim(after, "")["margin"] += 1e-12
     after["reproduction"][0]["ours"] = [each + 1e-13 for each in after["reproduction"][0]["ours"]]
     claim(after, "").update(exercised=4)
@@ -118,7 +120,7 @@ def test_inputs_that_differ_come_first_and_rounding_is_only_counted(
     told = [line.partition(":")[0].strip() for line in lines[: lines.index("exercised:")]]
     places = {f"obstacles.{obstacle}", "obstacles.new"}
     assert told[0] == "inputs"
-    assert set(told[1:]) == {"control.motion_gain_1_s", "version of drake", *places}
+    assert set(told[1:]) == {"control.motion_gain_1_s", "version of drake", "SHA-256 of mine.py", *places}
     assert "2 numbers changed by no more than rounding: --json has all" in lines
     assert "1 exercised changed; no regressions" in lines[-1]
     assert main([folders[0], folders[0]]) == 0
