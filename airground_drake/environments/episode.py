@@ -56,7 +56,7 @@ class Stage:
             run: name of its run.
 
         Raises:
-            PluginError: if it names a policy, route or task that cannot be made.
+            PluginError: if it names a policy, route, task or plant that cannot be made.
         """
         self.scenario, self.run = scenario, run
         self.recorder = Recorder(scenario, run)

@@ -69,7 +69,7 @@ def write_report(
     Raises:
         LimitError: if the scenario asks for more than the limits.
         FolderError: if the folder holds something that is no report, is in use, or cannot be written; before the work.
-        PluginError: if the scenario names a policy, route or task that cannot be made.
+        PluginError: if the scenario names a policy, route, task or plant that cannot be made.
         OSError: if something cannot be written, after all.
     """
     wanted, output = Wanted() if wanted is None else wanted, Path(output)

@@ -103,7 +103,7 @@ def simulate_all(
 
     Raises:
         ScenarioError: if the scenario is not valid.
-        PluginError: if it names a policy, route, task or solver that cannot be made.
+        PluginError: if it names a policy, route, task, plant or solver that cannot be made.
         SimulationError: if a simulation stops before its end, or stands still.
         AirgroundError: if its process dies.
     """

@@ -19,6 +19,7 @@ from pydrake.systems.framework import (
     DiscreteValues,
     InputPortIndex,
     LeafSystem,
+    OutputPort,
     State,
     System,
 )
@@ -26,7 +27,7 @@ from pydrake.systems.primitives import LinearSystem, TrajectorySource
 from pydrake.trajectories import PiecewisePolynomial
 
 from airground_drake.base.arrays import Array
-from airground_drake.base.errors import PluginError, UnknownNameError, described
+from airground_drake.base.errors import PluginError, UnknownNameError, described, short
 from airground_drake.registry import PLANTS
 from airground_drake.scenarios.load import validated
 from airground_drake.scenarios.schema import Plant as Given
@@ -138,8 +139,9 @@ class OwnPlant(NamedTuple):
     @property
     def name(self) -> str:
         """What a scenario calls it: `module:Class`, also where it is a function."""
-        called = re.sub(r"\W+", "_", self.make.__qualname__)
-        return f"{self.make.__module__}:{called}"
+        made_by = self.make if hasattr(self.make, "__qualname__") else type(self.make)
+        called = re.sub(r"\W+", "_", made_by.__qualname__)
+        return f"{made_by.__module__}:{called}"
 
 
 def declared(scenario: Scenario, plants: Mapping[str, OwnPlant]) -> Scenario:
@@ -147,12 +149,17 @@ def declared(scenario: Scenario, plants: Mapping[str, OwnPlant]) -> Scenario:
 
     Raises:
         UnknownNameError: if there is no such robot.
+        PluginError: if what is given is no plant of one's own.
         ScenarioError: if the scenario is not valid with them.
     """
     changed = copy.deepcopy(scenario)
     for robot, each in plants.items():
         if robot not in changed.robots:
             raise UnknownNameError("robot", robot, changed.robots)
+        made: Any = each
+        if not isinstance(made, OwnPlant) or not callable(made.make):
+            wanted = "allowed: an OwnPlant, made by a class or a function"
+            raise PluginError(f"the plant of {robot} is {short(repr(made))}; {wanted}")
         given = Given(
             kind=each.name, drift_m_s=each.drift_m_s, cover_m=each.cover_m, parameters={**each.parameters}
         )  # fmt: skip
@@ -296,20 +303,25 @@ def own_plant(body: Body, make: Callable[..., System] | None) -> Diagram:
             "body (3) and heading (1)"
         )
         raise PluginError(f"{about} has inputs of sizes {inputs}, outputs of sizes {found}; {wanted}")
-    builder = DiagramBuilder()
     try:
-        builder.AddNamedSystem("own", system)
-    except Exception as error:  # it is part of another diagram
+        diagram = _checked(system, outputs, OwnBody(about, turns="heading" in outputs, step_s=step_of(system)))
+    except RuntimeError as error:  # it is part of another diagram
         raise PluginError(f"{about}: {described(error)}") from error
-    checked = builder.AddNamedSystem("checked", OwnBody(about, turns="heading" in outputs, step_s=step_of(system)))
+    _begins_at(diagram, body.start_m, about)
+    return diagram
+
+
+def _checked(system: System, outputs: Mapping[str, OutputPort], checked: OwnBody) -> Diagram:
+    """A plant of one's own with its outputs, by name, behind an `OwnBody`."""
+    builder = DiagramBuilder()
+    builder.AddNamedSystem("own", system)
+    builder.AddNamedSystem("checked", checked)
     for port in (checked.get_input_port(i) for i in range(checked.num_input_ports())):
         builder.Connect(outputs.get(port.get_name(), outputs["position"]), port)
     builder.ExportInput(system.get_input_port(0), "velocity")
     for port in (checked.get_output_port(i) for i in range(checked.num_output_ports())):
         builder.ExportOutput(port, port.get_name())
-    diagram = builder.Build()
-    _begins_at(diagram, body.start_m, about)
-    return diagram
+    return builder.Build()
 
 
 def _begins_at(diagram: Diagram, start_m: Array, about: str) -> None:

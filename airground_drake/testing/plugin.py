@@ -34,7 +34,7 @@ class Simulations(Protocol):
         Raises:
             ScenarioError: if the scenario or an override is not valid.
             UnknownNameError: if it has no such run.
-            PluginError: if it names a policy, route or task that cannot be made.
+            PluginError: if it names a policy, route, task or plant that cannot be made.
             SimulationError: if the simulation stops.
         """
 

@@ -68,6 +68,15 @@ class RaisesAtItsOutput(LeafSystem):
         output.SetFromVector(self._start)
 
 
+def taken() -> Diagram:
+    builder = DiagramBuilder()
+    builder.AddNamedSystem("taken", Robot(np.zeros(3)))
+    return builder.Build()
+
+
+TAKEN = taken()
+
+
 class Elsewhere(Robot):
     def __init__(self, start: Array) -> None:
         super().__init__(start + np.array([0.0, 1e-3, 0.0]))
@@ -235,6 +244,8 @@ def test_a_forged_record_is_found(table: str, column: str) -> None:
         (Flat, PluginError, r"of ugv1 has inputs of sizes \[2\].*velocity \(3\) first .*body \(3\) and heading"),
         (NoBattery, PluginError, "NoBattery' of ugv1: RuntimeError: no battery"),
         (lambda start: None, PluginError, "is made by a function that returns NoneType; allowed: a Drake System"),
+        (lambda start: TAKEN.GetSubsystemByName("taken"), PluginError, "already been built into a different Diagram"),
+        ("Robot", PluginError, "the plant of ugv1 is .*; allowed: an OwnPlant, made by a class or a function"),
     ],
 )
 def test_a_plant_that_fails_says_which_and_why(make: Any, error: type[Exception], said: str) -> None:
