@@ -197,7 +197,7 @@ class OwnBody(LeafSystem):
     Ports (world frame):
         in  `position` (3) and `body` (3), m; `heading` (1), rad, if the plant has one.
         out the same position; `signals` (3), the body, m; `heading`.
-    State: of a sampled plant, the time of its last step, s, and what the input ports were before it.
+    State: of a sampled plant, the time of its last step, s, -inf before the first, and what the input ports were then.
     """
 
     def __init__(self, name: str, *, turns: bool, step_s: float) -> None:
@@ -213,8 +213,7 @@ class OwnBody(LeafSystem):
             self.DeclareVectorOutputPort(output, size, calc, prerequisites_of_calc=needs)
             begin += size
         if step_s:
-            self.DeclareDiscreteState(1 + begin)
-            self.DeclareInitializationUnrestrictedUpdateEvent(weakly(self._update))
+            self.DeclareDiscreteState(np.append(-np.inf, np.zeros(begin)))
             # Drake makes unrestricted updates before discrete ones: the plant has not made its step yet
             self.DeclarePeriodicUnrestrictedUpdateEvent(step_s, 0.0, weakly(self._update))
 

@@ -178,6 +178,27 @@ def test_the_law_makes_up_for_the_drift_that_is_declared_and_no_more(declared: f
     assert (broken(trace) == "declared drift") == (declared < 0.3)
 
 
+def stepping(start: Array, step_s: float) -> LinearSystem:
+    """A robot that jumps, every so often, to where its command led it."""
+    eye = np.eye(3)
+    plant = LinearSystem(A=eye, B=step_s * eye, C=eye, D=np.zeros((3, 3)), time_period=step_s)
+    plant.configure_default_state(start)
+    return plant
+
+
+def test_a_plant_that_jumps_is_passed_on_as_going_straight_one_of_its_steps_later() -> None:
+    """So no trigger is late, and the trace is continuous; the robot need not start at the origin."""
+    scenario = load("minimal", {**SETTINGS, "ugvs.ugv1.start_m": [0.5, 0.3, 0.0]})
+    trace = simulate(scenario, "d", plants={"ugv1": OwnPlant(stepping, 1.2, 0.03, {"step_s": 0.005})})
+    assert set(statuses(trace).values()) == {"holds"}
+    place, command = trace.position("ugv1"), trace.command("ugv1")
+    assert place[0].tolist() == [0.5, 0.3, 0.0]
+    late = trace.t - 0.005
+    led = np.cumsum(np.diff(trace.t, prepend=0.0)[:, None] * command, axis=0) + place[0]
+    due = np.stack([np.interp(late, trace.t, axis) for axis in led.T], axis=1)
+    assert np.abs(place - due).max() < 1e-9
+
+
 PERSON = {"radius_m": 0.3, "moves": {"waypoints_m": [[12.0, 0.0], [-6.0, 0.0]], "speed_m_s": 0.8}}
 
 
