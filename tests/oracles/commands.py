@@ -23,6 +23,7 @@ from oracles.control_law import (
     rates,
     retreating,
     selected,
+    squeezed,
     tracking,
 )
 from oracles.fault import Fault
@@ -52,7 +53,10 @@ def wrong_commands(trace: Trace) -> list[Fault]:
         laws[trace.scenario.uav.name] = _law_of_uav(trace, samples)
     found = []
     for robot, law in laws.items():
-        if (wrong := np.flatnonzero(~(law.away <= COMMAND_TOLERANCE_M_S))).size:
+        wrong = np.flatnonzero(~(law.away <= COMMAND_TOLERANCE_M_S))
+        if wrong.size and (given := as_seen(trace, robot)).normal.shape[1] > 1:
+            wrong = wrong[~squeezed(given, trace.chosen(robot))[wrong]]
+        if wrong.size:
             k = int(wrong[0])
             recorded, due = (v.tolist() for v in (trace.chosen(robot)[k], law.command[k]))
             found.append(Fault("command", robot, float(trace.t[samples][k]), {"due": due, "recorded": recorded}))

@@ -21,6 +21,8 @@ from oracles.projection import closest, least_violation, shortened
 MARGIN_M_S = 1e-12
 """The law's closest velocity keeps its inequalities by this much, m/s. Without it the corner of two nearly parallel
 inequalities (a robot squeezed between an obstacle and another robot) is elsewhere by far more."""
+TOUCHED_M_S, OPPOSITE = 1e-9, 1e-9
+"""A robot touches a body whose inequality asks for no more, m/s; unit normals are opposite up to this."""
 
 
 class Inequalities(NamedTuple):
@@ -94,6 +96,18 @@ def avoiding(below: Array, given: Inequalities, composition: str, *, planar: boo
         found[~met] = least_violation(normal[~met, :, :axes], level[~met])
     velocity[missed, :axes] = shortened(found, normal[:, :, :axes], bound)
     return velocity
+
+
+def squeezed(given: Inequalities, velocity: Array) -> npt.NDArray[np.bool_]:
+    """Samples in which a robot touches two bodies on opposite sides, and velocities (B, 3) keep to all inequalities.
+
+    No margin fits between them: it is up to rounding how much of the velocity along both is left. What counts is that
+    the inequalities are met.
+    """
+    touched = np.abs(given.bound) <= TOUCHED_M_S
+    opposite = np.einsum("bkd,bld->bkl", given.normal, given.normal) < -1.0 + OPPOSITE
+    between = (opposite & touched[:, :, None] & touched[:, None, :]).any(axis=(1, 2))
+    return np.asarray(between & (given.slack(velocity) >= -MARGIN_M_S).all(axis=1))
 
 
 def _recursion(below: Array, normal: Array, bound: Array, *, nearest_first: bool) -> Array:
