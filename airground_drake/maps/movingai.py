@@ -46,7 +46,8 @@ def cells(text: str, source: str) -> Cells:
     if len(rows) < height or any(map(str.strip, rows[height:])):
         where, fault = f"{source}:{min(len(rows), height) + len(HEADER)}", Fault(f"{len(rows)} rows")
         raise ScenarioError(where, "map", fault, f"as many as height = {height} are wanted")
-    for number, row in enumerate(rows[:height], len(HEADER) + 1):
+    rows = [row.rstrip() for row in rows[:height]]
+    for number, row in enumerate(rows, len(HEADER) + 1):
         if len(row) != width:
             fault = Fault(f"{len(row)} characters")
             raise ScenarioError(f"{source}:{number}", "map", fault, f"as many as width = {width} are wanted")

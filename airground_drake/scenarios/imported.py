@@ -6,7 +6,7 @@ import math
 import os
 import re
 from collections.abc import Collection, Sequence
-from pathlib import Path
+from pathlib import Path, PureWindowsPath
 from typing import NamedTuple
 
 import numpy as np
@@ -151,7 +151,9 @@ def mapf(path: Path, map_path: Path | None, name: str, folder: Path, agents: int
         ScenarioError: if the files cannot be used, or have fewer agents.
     """
     text = _text(path)
-    map_path = map_path or path.parent / Path(movingai.map_name(text)).name
+    if not (named := movingai.map_name(text)):
+        raise ScenarioError(str(path), "", Fault("no agent is in it"), "wanted: a scenario of MovingAI")
+    map_path = map_path or path.parent / PureWindowsPath(named).name  # which knows both kinds of slashes
     cells = movingai.cells(_text(map_path), str(map_path))
     found = movingai.agents(text, str(path), cells)
     moving = [each for each in found if each.start != each.goal]

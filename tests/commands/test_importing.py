@@ -112,8 +112,8 @@ def test_robots_of_ones_own_and_their_size(tmp_path: Path, airground: Airground)
 def test_a_benchmark_of_movingai_becomes_a_map_of_ros_with_a_frame_round_it(
     tmp_path: Path, airground: Airground
 ) -> None:
-    (tmp_path / "room.map").write_text(MAP)
-    (tmp_path / "some.scen").write_text(SCEN)
+    (tmp_path / "room.map").write_text(MAP.replace("\n", "  \r\n"))
+    (tmp_path / "some.scen").write_text(SCEN.replace("room.map", "maps\\room.map"))
     said = airground("import", "mapf", tmp_path / "some.scen", "--agents", 2, "--cell-m", 2, "-o", tmp_path / "s.yaml")
     assert said.splitlines()[:2] == ["5 x 4 cells of 2 m: 3 in the way", "the first 2 agents"]
     scenario = load(tmp_path / "s.yaml")
@@ -152,6 +152,7 @@ import ros-map depot.yaml --distance-m 3        # there is room for 0, with 3.2 
 import ros-map depot.yaml --ugvs 2 --ugv a:2,7:15,7 # use one of the two
 import ros-map depot.yaml --ugv a:2,7:15,0.1    # a would end -0.2
 import mapf some.scen --agents 4                # some.scen: 3 agents with a way to go; --agents 4 needs as many
+import mapf none.scen                           # none.scen: no agent is in it; wanted: a scenario of MovingAI
 import mapf some.scen --map nowhere.map         # nowhere.map: No such file
 import mapf some.scen --map some.scen           # some.scen:1: type: missing
 import mapf some.scen --cell-m 0                # a number from 0.1 to 100
@@ -172,6 +173,7 @@ def test_a_mistake_is_one_line_and_leaves_nothing(
         shutil.copy(MAPS / name, name)
     Path("room.map").write_text(MAP)
     Path("some.scen").write_text(SCEN)
+    Path("none.scen").write_text("version 1\n")
     Path("empty.world").write_text("<sdf><world name='w'/></sdf>")
     Path("binary.map").write_bytes(b"\xff\xfe")
     Path("taken_map.pgm").touch()
