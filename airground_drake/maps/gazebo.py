@@ -62,7 +62,7 @@ def world(text: str, source: str) -> Gazebo:
     """The obstacles in a world file that may be hostile.
 
     A model is where `<state>` says, if it is in there; else where the model says. Left out are models that a plug-in
-    moves, models within models, included models, and meshes.
+    moves, models within models, included models, meshes, and what does not stand out of the ground.
 
     Args:
         text: of the file.
@@ -87,7 +87,11 @@ def world(text: str, source: str) -> Gazebo:
         pose = reader.pose(model if state is None or state.find("pose") is None else state)
         for link in model.iterfind("link"):
             for collision in link.iterfind("collision"):
-                solids += reader.solids(collision, pose @ reader.pose(link) @ reader.pose(collision))
+                for solid in reader.solids(collision, pose @ reader.pose(link) @ reader.pose(collision)):
+                    if solid.top > 0.0:
+                        solids.append(solid)
+                    else:
+                        left_out.append(f"{name}, whose top is not above the ground")
         left_out += [*reader.left_out, *(f"{each.get('name')} within {name}" for each in model.iterfind("model"))]
     return Gazebo(solids, left_out)
 
@@ -106,7 +110,9 @@ class _Reader:
             return Pose()
         if frame := given.get("relative_to") or given.get("frame"):
             raise self._wrong(given, frame, "wanted: a pose in the frame of the element around it")
-        x, y, z, roll, pitch, yaw = _numbers(given, 6, self.source)
+        x, y, z, *angles = _numbers(given, 6, self.source)
+        in_degrees = given.get("degrees") in ("true", "1")
+        roll, pitch, yaw = map(math.radians, angles) if in_degrees else angles
         if max(abs(math.remainder(angle, math.tau)) for angle in (roll, pitch)) > TILTED:
             raise self._wrong(given, f"{roll:g} {pitch:g}", "roll and pitch must be 0: shapes stand upright")
         return Pose(x, y, z, yaw)

@@ -84,7 +84,7 @@ def barn(path: Path, name: str, robots: Sequence[Robot], sizes: Sizes) -> Import
     for solid in world.solids:
         own = _new_name(solid.name, taken)
         taken.add(own)
-        place = f"position_m: {_list((solid.pose.x, solid.pose.y, 0.0))}, height_m: {_number(max(solid.top, 0.0))}"
+        place = f"position_m: {_list((solid.pose.x, solid.pose.y, 0.0))}, height_m: {_number(solid.top)}"
         size = f"radius_m: {_number(solid.size[0])}"
         if len(solid.size) == 2:
             size = f"size_m: {_list(solid.size)}, heading_rad: {_number(solid.pose.heading)}"
