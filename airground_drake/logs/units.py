@@ -8,6 +8,7 @@ from itertools import product
 
 import numpy as np
 
+from airground_drake.base.errors import LogError, one_line
 from airground_drake.check.files import Json
 from airground_drake.check.scenario import robots_of
 from airground_drake.logs.stream import OF_MESSAGES, PER_M, PER_S, Stream
@@ -16,6 +17,8 @@ SINCE_1970 = (("ns", 1e17), ("us", 1e14), ("ms", 1e11), ("s", 1e8))
 """Units of stamps since 1970, and the least such stamp that is taken as one."""
 TOO_LONG = 1_000.0
 """Stamps that would make a log so many times longer than the scenario are not since 1970: they are of a finer unit."""
+NEAR_M = 0.1
+"""A log that begins so close to where a body starts begins there, m."""
 IMPOSSIBLE = 20.0
 """So many times the speed limits, the duration or the size of a scenario are taken as a sign of another unit."""
 NAMES = {
@@ -35,6 +38,9 @@ def settle(streams: Mapping[str, Stream], scenario: Json, time_unit: str, length
 
     Returns:
         Remarks.
+
+    Raises:
+        LogError: if units that are not stated differ between bodies.
     """
     said = dict[str, None]()
     for stream in streams.values():
@@ -53,6 +59,7 @@ def settle(streams: Mapping[str, Stream], scenario: Json, time_unit: str, length
     if open_time or open_length:
         judged = {name: each for name, each in streams.items() if name in robots_of(scenario) and len(each.whole) > 1}
         time, length = _likely(judged, scenario)
+        _alike({name: each for name, each in judged.items() if not each.length_unit}, length, scenario)
     for each in open_time:
         each.time_unit = time
     for each in open_length:
@@ -62,6 +69,18 @@ def settle(streams: Mapping[str, Stream], scenario: Json, time_unit: str, length
     if open_length and length != "m":
         said[f"lengths are taken as {NAMES[length]}: as metres, no robot could be so far away, or so fast"] = None
     return list(said)
+
+
+def _alike(streams: Mapping[str, Stream], length: str, scenario: Json) -> None:
+    """Refuse a stream that begins where its body starts if it is in metres, where all are taken as in another unit."""
+    for name, each in streams.items():
+        start = np.array(robots_of(scenario)[name]["start_m"][:2])
+        off = {unit: float(np.linalg.norm(each.places[0, :2] / PER_M[unit] - start)) for unit in ("m", length)}
+        if off["m"] <= NEAR_M and off[length] > 5.0 * NEAR_M:
+            raise LogError(
+                one_line(f"lengths of {each.label} fit {name}'s start in metres, others only fit in {NAMES[length]}; "
+                         "wanted: one unit for all, or units in the names of columns (x_mm)")
+            )  # fmt: skip
 
 
 def _since_1970(stream: Stream, duration_s: float) -> str:
