@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from airground_drake.base.arrays import Array
 from airground_drake.base.errors import LogError, one_line
@@ -26,6 +27,9 @@ SAME_M = 1e-9
 """Positions of one body at one time that differ by less are one."""
 CONTRADICTORY = 0.1
 """Share of a body's rows that may contradict others: with more, stamps are too coarse, or recordings are mixed."""
+LOST_M, LOST = 0.05, 5.0
+"""A tracking system may write (0, 0) where it has lost a body. Rows there are taken as such if the body would have had
+to go there and back farther than this, and this many times faster than it ever goes elsewhere."""
 ORIGIN_M = 1e-3
 """Robots that start so close to (0, 0) start there."""
 
@@ -299,10 +303,31 @@ def _track(name: str, stream: Stream, ns: Whole, gap_s: float, said: list[str]) 
             f"{name}: {int(other.sum())} rows contradict an earlier one of the same time, at {ns[k] / 1e9:.6g} s by "
             f"{apart[k]:.3g} m; the earlier one counts"
         )
-    t_s = ns[new] / 1e9
+    t_s, places = ns[new] / 1e9, places[new]
+    lost = _lost(t_s, places)
+    if lost.any():
+        said.append(
+            f"{name}: {int(lost.sum())} rows skipped, at (0, 0), where it cannot have been: taken as lost, first at "
+            f"{t_s[lost][0]:.6g} s"
+        )
+    t_s, places = t_s[~lost], places[~lost]
     usual = float(np.median(np.diff(t_s))) if len(t_s) > 1 else 0.0
     told = {"stream": stream.label, "frame": stream.frame, "clock": stream.clock, "source": stream.source}
-    return Track(t_s, places[new], gap_s or GAP * usual, told)
+    return Track(t_s, places, gap_s or GAP * usual, told)
+
+
+def _lost(t_s: Array, places: Array) -> npt.NDArray[np.bool_]:
+    """Which rows are at (0, 0) without a way there and back that the body can have gone, (n,)."""
+    there = (places[:, :2] == 0.0).all(axis=1)
+    if there.all() or not there.any():
+        return np.zeros(len(t_s), dtype=np.bool_)
+    steps = np.hypot(*np.diff(places[:, :2], axis=0).T)
+    speeds = steps / np.diff(t_s)
+    usual = float(speeds[~there[1:] & ~there[:-1]].max(initial=0.0))
+    leaps = (steps > LOST_M) & (speeds > LOST * usual)
+    number = np.append(0, np.cumsum(there[1:] != there[:-1]))  # of the stretch of rows that each row is in
+    walked = number[np.append(False, (there[1:] != there[:-1]) & ~leaps)]
+    return there & ~np.isin(number, np.append(walked, walked - 1))
 
 
 def _apart_at_the_start(tracks: Mapping[str, Track], scenario: Json) -> None:

@@ -46,7 +46,7 @@ def with_gap(begin_s: float, end_s: float, mark: str | None) -> tuple[list[list[
     return [head, *rows], {**FULL, "tb_1": (t_s[left], places[left])}
 
 
-@pytest.mark.parametrize("mark", ["NaN", "", "lost", None])
+@pytest.mark.parametrize("mark", ["NaN", "", "lost", "0", None])
 def test_nothing_is_claimed_in_a_gap(mark: str | None, tmp_path: Path, document: dict[str, Any]) -> None:
     table, left = with_gap(2.4, 3.6, mark)
     found = logs.read(written(tmp_path, table), document)
@@ -61,6 +61,16 @@ def test_nothing_is_claimed_in_a_gap(mark: str | None, tmp_path: Path, document:
     assert "Every distance was kept" not in text
     assert "tb_0, tb_1 are not covered from 2.400 to 3.600 s" in text
     assert any("tb_1: 23 rows skipped" in said for said in found.said) == (mark is not None)
+
+
+def test_who_starts_at_the_origin_and_drives_off_is_not_lost(tmp_path: Path, document: dict[str, Any]) -> None:
+    t_s, places = FULL["tb_1"]
+    from_origin = places - places[0]
+    from_origin[t_s <= 2.0] = 0.0
+    from_origin[t_s > 2.0] -= from_origin[t_s > 2.0][0] - [0.02, 0.0, 0.0]
+    found = logs.read(written(tmp_path, logs.long({**FULL, "tb_1": (t_s, from_origin)})), document)
+    assert not any("lost" in said for said in found.said)
+    assert len(found.bodies["tb_1"].t_s) == len(t_s)
 
 
 def test_a_line_across_the_gap_would_say_something_else(tmp_path: Path, document: dict[str, Any]) -> None:
