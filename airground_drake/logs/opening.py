@@ -20,18 +20,25 @@ MOST_FILES = 1_000
 
 
 def opened(paths: Sequence[Path], wanted: Wanted) -> Log:
-    """The streams of the files and folders of a log.
+    """The streams of the files and folders of a log. A folder may have other files, too: these are named as not used.
 
     Raises:
-        LogError: if one cannot be used; names the file.
+        LogError: if a file cannot be used, or no file of the folders; names it.
         OSError: if one cannot be opened.
     """
     log = Log()
-    for path in (inner for outer in paths for inner in _files(outer)):
-        try:
-            log.add(_read(path, wanted))
-        except LogError as error:
-            raise LogError(one_line(f"{path}: {error}")) from None
+    for outer in paths:
+        for path in _files(outer):
+            try:
+                log.add(_read(path, wanted))
+            except LogError as error:
+                told = one_line(f"{path}: {error}")
+                if not outer.is_dir():
+                    raise LogError(told) from None
+                log.unusable.append(told)
+    if log.unusable and not log.streams:
+        raise LogError(log.unusable[0])
+    log.ignored += log.unusable
     return log
 
 

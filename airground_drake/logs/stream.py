@@ -74,10 +74,12 @@ class Log:
     Attributes:
         streams: that may be about bodies.
         ignored: what was not used, and why: columns, topics, files; each as it is said.
+        unusable: files of folders that are no logs, and why; they are among those ignored.
     """
 
     streams: list[Stream] = field(default_factory=list)
     ignored: list[str] = field(default_factory=list)
+    unusable: list[str] = field(default_factory=list)
 
     def add(self, other: Log) -> None:
         """Take over what another log has."""

@@ -145,7 +145,9 @@ def joined(log: Log, scenario: Json, choice: Choice) -> Tracks:
                     raise LogError(one_line(f"{name} has no usable rows: {_skipped(stream)}; wanted: {_USABLE}"))
             there = ", ".join(dict.fromkeys(each.label for each in log.streams)) or "none"
             wanted = f"--rename NAME={name}, or --without {name}"
-            raise LogError(one_line(f"{name} is not in the log; names there: {there[:300]}; wanted: {wanted}"))
+            likely = [each for each in log.unusable if name in each] or log.unusable
+            lacks = f"; not usable: {likely[0]}" if likely else ""
+            raise LogError(one_line(f"{name} is not in the log; names there: {there[:300]}{lacks}; wanted: {wanted}"))
     stamps = {name: each.ns(each.time_unit) for name, each in found.items()}
     first = min(int(each.min()) for each in stamps.values())
     zero = first if first >= SINCE_1970_NS else 0

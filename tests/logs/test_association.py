@@ -98,6 +98,25 @@ def test_a_log_that_is_shorter_than_the_scenario_says_so(tmp_path: Path, documen
     assert "The log has 1 of the scenario's 6 s" in second
 
 
+def test_a_folder_may_have_other_files_and_a_log_that_cannot_be_read_is_told(
+    tmp_path: Path, document: dict[str, Any]
+) -> None:
+    written(tmp_path, logs.long({"tb_0": FULL["tb_0"]}), "tb_0.csv")
+    written(tmp_path, logs.long({"tb_1": FULL["tb_1"]}), "tb_1.csv")
+    (tmp_path / "README.md").write_text("The second lap.\n")
+    (tmp_path / "hall.jpg").write_bytes(b"\xff\xd8\xff\xe0 no picture")
+    found = logs.read(tmp_path, document)
+    assert sorted(found.bodies) == ["tb_0", "tb_1"]
+    assert sum(name in "\n".join(found.ignored) for name in ("README.md", "hall.jpg")) == 2
+    (tmp_path / "tb_1.csv").write_bytes(b"")
+    with pytest.raises(
+        LogError, match=r"tb_1 is not in the log; names there: tb_0; not usable: .*tb_1.csv: it is empty; wanted: "
+    ):
+        logs.read(tmp_path, document)
+    with pytest.raises(LogError, match=r"README\.md: "):
+        logs.read(tmp_path / "README.md", document)
+
+
 def test_a_log_of_one_instant_is_refused(tmp_path: Path, document: dict[str, Any]) -> None:
     one = {name: (t_s[:1], places[:1]) for name, (t_s, places) in FULL.items()}
     with pytest.raises(LogError, match="positions at 0 s only; wanted: at two times at least"):
