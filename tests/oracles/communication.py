@@ -15,7 +15,7 @@ from airground_drake.verify.runs.instants import intervening
 from airground_drake.verify.runs.pairs import carried
 from airground_drake.verify.runs.proposals import proposals_of
 from oracles.fault import Fault
-from oracles.protocol import answers_to, withdrawn_s
+from oracles.protocol import answers_to, parties, withdrawn_s
 from oracles.sensing import are_there, beyond_range, still_parts
 
 SENSED_M = 1e-9
@@ -30,14 +30,14 @@ def wrong_messages(trace: Trace) -> list[Fault]:
 
 
 def _out_of_turn(trace: Trace) -> Iterator[Fault]:
-    """Messages while neither the UGV nor the one that it was to make way for was being intervened on.
+    """Messages while nobody was being intervened on: the UGV, the one that it was to make way for, or another party.
 
     After a release the UAV withdraws its proposal at its next planning instant, and the gatekeeper notices at its next
     sample: one period each is allowed.
     """
     allowance = trace.scenario.intervention.period_s + trace.scenario.gatekeeper.period_s
     for sent in proposals_of(trace):
-        spans = np.concatenate([intervening(trace, ugv) for ugv in sorted({sent.ugv, sent.cause})])
+        spans = np.concatenate([intervening(trace, ugv) for ugv in parties(trace, sent)])
         begins, ends = spans[:, 0] - TIME_TOLERANCE_S, spans[:, 1] + allowance + TIME_TOLERANCE_S
         messages = [("proposal", sent.issued_s), *(("decision", answer.t_s) for answer in answers_to(trace, sent))]
         if wrong := [(kind, t) for kind, t in messages if not ((t >= begins) & (t <= ends)).any()]:

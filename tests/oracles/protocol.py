@@ -101,6 +101,11 @@ def parts_of(trace: Trace, sent: ProposalRecord) -> list[ProposalRecord]:
     return [one for one in proposals_of(trace) if sent.party and one is not sent and (one.issued_s, one.party) == same]
 
 
+def parties(trace: Trace, sent: ProposalRecord) -> list[str]:
+    """The UGVs for which a proposal stands: its own, its cause, and those of the other parts of its joint plan."""
+    return sorted({sent.ugv, sent.cause, *(part.ugv for part in parts_of(trace, sent))})
+
+
 def executed_at(trace: Trace, ugv: str) -> list[ProposalRecord | None]:
     """The proposal that a UGV should execute, at each control sample of the run, or None.
 
@@ -185,8 +190,7 @@ def withdrawn_s(trace: Trace, sent: ProposalRecord, *, unless_replaced: bool = F
 def _over(trace: Trace, sent: ProposalRecord, unless_replaced: bool = False) -> tuple[float, bool]:
     """When a proposal is taken back without regard to other parts, s, and whether the UAV has its refusal then."""
     t, period = trace.t, trace.scenario.intervention.period_s
-    who = {sent.ugv, sent.cause, *(part.ugv for part in parts_of(trace, sent))}
-    called = np.any([trace.column(f"{name}.mode") == 1.0 for name in who], axis=0)
+    called = np.any([trace.column(f"{name}.mode") == 1.0 for name in parties(trace, sent)], axis=0)
     later = [one.issued_s for one in proposals_of(trace) if one.ugv == sent.ugv and one.issued_s > sent.issued_s]
     replaced = np.inf if unless_replaced else min(later, default=np.inf)
     for k in range(round(sent.issued_s / period) + 1, int(t[-1] / period + 1e-6) + 1):

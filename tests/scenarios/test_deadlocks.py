@@ -69,7 +69,7 @@ def test_under_method_d_everybody_arrives_and_every_claim_holds(name: str) -> No
     """Of the smaller ones; `.ci/run` has the reports of all."""
     trace = simulate(load(name), "d")
     for ugv in trace.ugvs:
-        assert kinds(trace, ugv)[-1] == "arrival"
+        assert "arrival" in kinds(trace, ugv)
     for verdict in judge(trace):
         assert verdict.as_expected, (verdict.claim.id, verdict)
 
