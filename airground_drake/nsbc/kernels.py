@@ -126,13 +126,13 @@ def avoid_one(lower: Array, normal: Array, bound: Array, composition: int) -> Ar
         found = _scale_back(found, normal, bound)
         if _dot(found, found) >= 1e-6 * speed or speed < CONTRADICTION_M_S:
             return found
+        # between two bodies that it touches no margin fits: the exact bounds, which let it slide along
         touched = np.where(bound <= CONTRADICTION_M_S, np.minimum(bound, 0.0), bound)
-        exactly, missed = _closest(
-            lower, normal, touched, CONTRADICTION_M_S
-        )  # no margin fits between two that it touches
-        if missed == 0.0:
-            exactly = _scale_back(exactly, normal, bound)
-        return exactly if missed == 0.0 and _dot(exactly, exactly) > _dot(found, found) else found
+        exactly, missed = _closest(lower, normal, touched, CONTRADICTION_M_S)
+        if missed > 0.0:
+            return found
+        exactly = _scale_back(exactly, normal, bound)
+        return exactly if _dot(exactly, exactly) > _dot(found, found) else found
     return _recursion(lower, normal, bound, composition == RECURSION_NEAREST)
 
 
