@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from copy import deepcopy
 from dataclasses import replace
 from typing import Any
@@ -17,6 +18,7 @@ from hypothesis import strategies as st
 from properties import examples
 
 from airground_drake.geometry.outline import balls
+from airground_drake.replay.proposals import sent
 from airground_drake.run import events
 from airground_drake.run.trace import Trace
 from airground_drake.scenarios.schema import Obstacle
@@ -77,6 +79,17 @@ def crossing(flight: float = 0.0, **more: Any) -> Trace:
     scenario = lone([0.0] * 3, [0.0] * 3, STILL, 2.0, **more)
     scenario["uav"] |= {"start_m": [-4.0, 0.0, 0.0], "target_m": [-4.0, 0.0, 0.0]}
     return simulate(scenario, drive=lambda t: [[float(t >= 1.0), 0.0, 0.0], [flight * (t < 1.0), 0.0, 0.0]])
+
+
+def test_a_ugv_that_has_done_its_part_refuses_nothing(run: Callable[..., Trace]) -> None:
+    trace = run("doorway", "d")
+    kinds = [event["kind"] for event in trace.events]
+    assert {"accept", "over"} <= {*kinds}
+    assert "refuse" not in kinds
+    of_proposals = [span for each in sent(trace) for span in each.spans]
+    assert {span.outcome for span in of_proposals} == {"asked", "accepted"}
+    begins = {event["robot"]: event["t_s"] for event in trace.events if event["kind"] == "over"}
+    assert begins.items() <= {(each.robot, each.spans[-1].end_s) for each in sent(trace)}
 
 
 def test_nothing_after_a_collision_counts() -> None:

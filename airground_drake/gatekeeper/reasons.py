@@ -10,6 +10,8 @@ Reason = Literal[
     "stalls", "makes_way", "exhausted", "over",
 ]  # fmt: skip
 """Reasons of answers: see `answer.settle` for method (c), `outcome_gatekeeper` for method (d)."""
+OVER: Reason = "over"
+"""No refusal: the proposal was executed for as long as it was accepted."""
 
 
 class Words(NamedTuple):

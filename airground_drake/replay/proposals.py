@@ -8,6 +8,7 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 
 from airground_drake.base.arrays import Array
+from airground_drake.gatekeeper.reasons import OVER
 from airground_drake.run.trace import Trace
 
 Outcome = Literal["asked", "accepted", "refused"]
@@ -38,8 +39,9 @@ class Sent(NamedTuple):
 def sent(trace: Trace) -> tuple[Sent, ...]:
     """All proposals of a run, in the order of the trace.
 
-    A gatekeeper's latest decision on a proposal counts, up to its last one. Without a gatekeeper (method (b)), a
-    proposal is accepted while the UGV executes it. The next proposal to the same UGV replaces it.
+    A gatekeeper's latest decision on a proposal counts, up to its last one, or until it says that the proposal is over.
+    Without a gatekeeper (method (b)), a proposal is accepted while the UGV executes it. The next proposal to the same
+    UGV replaces it.
     """
     return tuple(
         Sent(str(row["robot"]), str(row["policy"]), np.reshape(row["positions_m"], (-1, 3)), tuple(_spans(trace, row)))
@@ -64,7 +66,9 @@ def _answers(trace: Trace, row: Mapping[Any, Any]) -> tuple[list[tuple[float, Ou
     issued = float(row["issued_s"])
     changes: list[tuple[float, Outcome]] = [(issued, "asked")]
     decided = trace.decisions[trace.decisions["number"] == row["number"]]
-    for t, decision in zip(decided["t_s"], decided["decision"], strict=True):
+    for t, decision, reason in zip(decided["t_s"], decided["decision"], decided["reason"], strict=True):
+        if reason == OVER:
+            return changes, float(t)
         if changes[-1][1] != _ANSWERS[decision]:
             changes.append((float(t), _ANSWERS[decision]))
     if len(decided):

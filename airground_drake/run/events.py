@@ -1,4 +1,7 @@
-"""Events of a run: trigger, release, proposal, accept, refuse, arrival, collision."""
+"""Events of a run: trigger, release, proposal, accept, refuse, over, arrival, collision.
+
+A UGV that has executed a proposal for as long as it was accepted is on its own again: `over`. It has refused nothing.
+"""
 
 from __future__ import annotations
 
@@ -9,6 +12,7 @@ import numpy.typing as npt
 from scipy.spatial import cKDTree
 
 from airground_drake.base.arrays import Array
+from airground_drake.gatekeeper.reasons import OVER
 from airground_drake.geometry import convex, outline
 from airground_drake.run.collisions import first_collisions
 from airground_drake.run.trace import Trace
@@ -36,10 +40,12 @@ def extract(trace: Trace) -> list[dict[str, Any]]:
     for ugv, issued, policy in zip(*sent, strict=True):
         add(issued, ugv, "proposal", policy=policy)
     previous: dict[int, str] = {}
-    for row in trace.decisions[["t_s", "robot", "policy", "number", "decision", "status"]].to_dict("records"):
+    columns = ["t_s", "robot", "policy", "number", "decision", "reason", "status"]
+    for row in trace.decisions[columns].to_dict("records"):
         if previous.get(row["number"]) != row["decision"]:
             previous[row["number"]] = row["decision"]
-            add(row["t_s"], row["robot"], row["decision"], policy=row["policy"], status=row["status"])
+            kind = OVER if row["reason"] == OVER else row["decision"]
+            add(row["t_s"], row["robot"], kind, policy=row["policy"], status=row["status"])
     _add_collisions(trace, add)
     hits = first_collisions(found)
     for robot in trace.robots:

@@ -31,7 +31,7 @@ from airground_drake.view.canvas import (
     time_line,
 )
 
-MARKS = {"trigger": "^", "release": "v", "proposal": "D", "accept": "o", "refuse": "X"}
+MARKS = {"trigger": "^", "release": "v", "proposal": "D", "accept": "o", "refuse": "X", "over": "s"}
 """Markers of events by kind."""
 MAX_ROWS, MAX_TOLD, TOLD_CHARS = 16, 7, 58
 """Maximum number of rows of the event figure, of events listed beside a row, and of characters in a line."""
@@ -115,7 +115,7 @@ def events(rows: Sequence[tuple[Trace, str]]) -> Figure:
         _bars(axes, trace, trace.executing(ugv) >= 0, y + 0.17, facecolor="#cfe6dc", hatch="////")
         for kind, marker in MARKS.items():
             times = [event["t_s"] for event in events_of(trace, ugv, kind)]
-            color = {"refuse": ALARM, "release": MUTED}.get(kind, "#0060a8")
+            color = {"refuse": ALARM, "release": MUTED, "over": MUTED}.get(kind, "#0060a8")
             level_y = y + (-0.17 if kind in ("trigger", "release") else 0.17)
             axes.plot(times, [level_y] * len(times), linestyle="none", marker=marker, markersize=6, color=color)
     return figure
