@@ -23,7 +23,7 @@ from airground_drake.intervention.coordination import lacam, network
 from airground_drake.intervention.coordination.coarse import Coarse, CoarseGraph, coarsened
 from airground_drake.intervention.coordination.intervals import Indices
 from airground_drake.intervention.coordination.pibt import Team
-from airground_drake.intervention.coordination.single import ROUNDING_M, Mover, OtherRobot, Way
+from airground_drake.intervention.coordination.single import ROUNDING_M, Mover, OtherRobot, Way, sum_of_times
 from airground_drake.intervention.coordination.timed import closest, distance, without_repeats
 
 WIDTHS = (1.45, 1.02, 0.7, 0.5)
@@ -104,7 +104,7 @@ def _best(
             found = each.run(int(min(AGAIN_AT_MOST * first.candidates, candidates - spent)), AGAIN + turn)
             spent += found.candidates
             if found.status == "found":
-                best = min(best, each.timed(found.moves), key=_sum)
+                best = min(best, each.timed(found.moves), key=sum_of_times)
     return tuple(best), spent
 
 
@@ -153,10 +153,6 @@ class _Search:
                 if distance(motion, other.motion) < least - ROUNDING_M:
                     return False
         return True
-
-
-def _sum(ways: Sequence[Way]) -> float:
-    return math.fsum(way.joined for way in ways)
 
 
 def _way(mover: Mover, motion: Array) -> Way:

@@ -11,7 +11,7 @@ from airground_drake.geometry.paths import NoPath, shortest_path
 from airground_drake.intervention.coordination.first_plan import first_plan
 from airground_drake.intervention.coordination.neighbourhoods import Refinement
 from airground_drake.intervention.coordination.roadmap import RobotTask, Space, build_roadmap
-from airground_drake.intervention.coordination.single import Mover, OtherRobot, Way, find
+from airground_drake.intervention.coordination.single import Mover, OtherRobot, Way, find, sum_of_times
 from airground_drake.intervention.coordination.smoothing import smooth
 from airground_drake.intervention.coordination.timed import at_rest
 
@@ -131,11 +131,6 @@ def _separated(spaces: Sequence[Space], tasks: Sequence[RobotTask], ways: Sequen
     return tuple(found)
 
 
-def _sum(ways: Sequence[Way | None]) -> float:
-    """Sum of the times at which robots are back on their presets, s."""
-    return math.fsum(way.joined for way in ways if way is not None)
-
-
 def _resting(task: RobotTask) -> OtherRobot:
     """A robot that stays where it is."""
     return OtherRobot(at_rest(task.start), task.body)
@@ -163,24 +158,26 @@ class _Search:
         able = self._able()
         if failed is not None and len(able) > 1:
             ways, failed = self._in_other_orders(failed)
-        if failed is not None and len(able) > 1:
-            ways, failed = self._joint_steps(able, self._effort.candidates)
-            if failed is None:
-                self._refine(ways, able)
-        elif failed is None and len(able) > 1:
+        found = ways if failed is None else None
+        if len(able) > 1:
+            found = self._improved(found, able)
+        if found is not None:
+            self.outcome = "exhausted" if self._without_way else "complete"
+        return found
+
+    def _improved(self, ways: list[Way | None] | None, able: Sequence[int]) -> list[Way | None] | None:
+        """A better plan than that of an order, or one by joint steps if no order has one; None without either."""
+        candidates = self._effort.candidates
+        if ways is not None:
             alone = self._refine(ways, able)
-            if alone and _sum(ways) > LATE * _sum(alone):
-                others, failed_too = self._joint_steps(able, self._effort.candidates // LATE_SHARE)
-                if failed_too is None:
-                    self._refine(others, able)
-                    ways = min(ways, others, key=_sum)
-        if failed is not None:
-            return None
-        if self._without_way:
-            self.outcome = "exhausted"
-        else:
-            self.outcome = "complete"
-        return ways
+            if not alone or sum_of_times(ways) <= LATE * sum_of_times(alone):
+                return ways
+            candidates //= LATE_SHARE
+        others = self._joint_steps(able, candidates)
+        if others is None:
+            return ways
+        self._refine(others, able)
+        return others if ways is None else min(ways, others, key=sum_of_times)
 
     def _able(self) -> list[int]:
         """The robots that are not known to be without a way even alone."""
@@ -267,20 +264,20 @@ class _Search:
         until = LEAVING * (mover.space.apart + mover.space.spacing) / mover.speed
         return _resting(mover.task)._replace(until=until)
 
-    def _joint_steps(self, able: Sequence[int], candidates: int) -> tuple[list[Way | None], int | None]:
-        """A plan for some robots by joint steps: ways and None; without a plan, nothing and one of the robots."""
-        ways: list[Way | None] = [None] * len(self._movers)
+    def _joint_steps(self, able: Sequence[int], candidates: int) -> list[Way | None] | None:
+        """A plan for some robots by joint steps."""
         movers = [self._movers[i] for i in able]
         if not all(mover.own.usable[-1] for mover in movers):
-            return ways, able[0]  # a target is too near to an obstacle
+            return None  # a target is too near to an obstacle
         found = first_plan(movers, self._taken(), candidates)
         self.candidates += found.candidates
         if found.outcome != "found":
             self.outcome = found.outcome
-            return ways, able[0]
+            return None
+        ways: list[Way | None] = [None] * len(self._movers)
         for i, way in zip(able, found.ways, strict=True):
             ways[i] = way
-        return ways, None
+        return ways
 
     def _refine(self, ways: list[Way | None], able: Sequence[int]) -> list[Way]:
         """Improve the ways of some robots, in place; the ways that they would have alone, if all are known."""

@@ -49,6 +49,11 @@ class Way:
     rows: int
 
 
+def sum_of_times(ways: Sequence[Way | None]) -> float:
+    """Sum of the times at which robots are back on their presets, s: what plans are compared by."""
+    return math.fsum(way.joined for way in ways if way is not None)
+
+
 @dataclass(frozen=True, eq=False)
 class Mover:
     """One robot on a roadmap.
