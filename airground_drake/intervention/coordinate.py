@@ -53,8 +53,8 @@ class Coordinate(Policy):
 
     1. The first plan is for the triggered UGVs without a proposal in force. They avoid obstacles, robots that stand,
        and the predicted motions of all others.
-    2. If one of them finds no way, the next plan includes willing UGVs in its way, the last one all of them. A parked
-       UGV steps aside and comes back.
+    2. If one of them finds no way, the next plan includes willing UGVs in its way. A parked UGV steps aside and comes
+       back.
     3. If no plan gives every UGV a way, the plan with the fewest UGVs left behind is proposed.
     4. If the UGV `seen.robot` finds no way even alone, less clearance is tried. Without any way, it is not planned for
        again until it has moved or the map has changed.
@@ -144,14 +144,14 @@ class Coordinate(Policy):
         group = self._first_group(seen)
         best: tuple[list[int], Plan] | None = None
         least: tuple[float, ...] = ()
-        for k in range(MOST_PLANS):
+        for _ in range(MOST_PLANS):
             found = self._plan(seen, space, group, effort)
             cost = _cost(seen, group, found)
             if best is None or cost < least:
                 best, least = (group, found), cost
             if cost[0] == 0:
                 break
-            more = self._in_the_way(seen, space, group, found, alone, everybody=k == MOST_PLANS - 2)
+            more = self._in_the_way(seen, space, group, found, alone)
             if not more:
                 break
             group = sorted([*group, *more])
@@ -171,21 +171,20 @@ class Coordinate(Policy):
         return plan(space, tasks, speeds, fixed, follow=self.follow, effort=effort)
 
     def _in_the_way(
-        self, seen: Observation, space: Space, group: Sequence[int], found: Plan, alone: Alone, *, everybody: bool
+        self, seen: Observation, space: Space, group: Sequence[int], found: Plan, alone: Alone
     ) -> list[int]:
         """Willing UGVs outside the group that are in the way of its triggered UGVs without a way.
 
-        A UGV is in the way if it comes near the way that such a UGV would have alone. Without any near one, or if
-        `everybody` may be asked, all willing UGVs are returned. If no such UGV has a way even alone, nobody can help:
-        the list is empty.
+        A UGV is in the way if it comes near the way that such a UGV would have alone. Without any near one, all willing
+        UGVs are returned. If no such UGV has a way even alone, nobody can help: the list is empty.
         """
         lost = [i for i, way in zip(group, found.ways, strict=True) if way is None and seen.team[i].triggered]
         ways = [(seen.team[i], way) for i in lost if (way := alone(i)) is not None]
         if not ways:
             return []
         others = [i for i, mate in enumerate(seen.team) if i not in group and _is_willing(mate, seen.t)]
-        near: list[int] = []
-        for j in [] if everybody else others:
+        near = []
+        for j in others:
             other, ahead = seen.team[j], predicted(seen.team[j], seen.start)
             apart = space.spacing + space.apart
             if any(distance(way.motion, ahead) < apart + (mate.radius + other.radius) for mate, way in ways):

@@ -116,8 +116,8 @@ def sent_after(before: PlannerState, after: PlannerState, t: float) -> PlannerSt
 class Planner:
     """The UAV's planner. It plans on the UAV's own map, which may miss obstacles.
 
-    The policies are asked for each triggered UGV. They may also propose that other UGVs make way for it; such a
-    proposal stays in force as long as the triggered UGV's intervention. A refusal withdraws the proposal and all other
+    The policies are asked for each triggered UGV. They may also propose that other UGVs make way for it; such a joint
+    plan stays in force as long as one of its UGVs is triggered. A refusal withdraws the proposal and all other
     parts of its joint plan; after a rest the next policy is asked. UGVs report the obstacles that they sense with every
     answer, and the UAV adds these to its map. See docs/design.md.
 
