@@ -257,7 +257,7 @@ def _radii(number: int, count: int) -> list[float]:
 
 
 def _plants(number: int, count: int, h: float, speed: float) -> tuple[list[list[dict[str, Any]]], float]:
-    """Plants of UGVs, and of the UAV, of which half the scenarios have some; and what two of them take at most, m."""
+    """Plants of UGVs and of the UAV, in half of the scenarios; and what two of them take at most, m."""
     rng = np.random.default_rng([20261127, number])
     some, lag, late = bool(rng.random() < 0.5), float(rng.choice([0.05, 0.3])), h * float(rng.integers(1, 4))
     hand = 0.5 * speed * h * float(rng.choice([1.01, 3.0])) + float(rng.choice([0.0, 0.1]))

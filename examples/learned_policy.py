@@ -156,7 +156,7 @@ def outcome(number: int) -> dict[str, tuple]:
 
 
 def compare(number: int, jobs: int = 2) -> str:
-    """A table in Markdown: what became of the runs on maps of which the policy has seen none."""
+    """A table in Markdown: how runs ended on maps that the policy was not trained on."""
     with ProcessPoolExecutor(jobs) as pool:
         every = list(pool.map(outcome, range(HELD_BACK, HELD_BACK + number)))
     lines = ["| run | arrived | mean time, s | proposals | accepted |", "| --- | --- | --- | --- | --- |"]

@@ -40,7 +40,7 @@ class Scene(Stage):
     """A run. `times_s` (F,) are those of the frames, the last one the end.
 
     `moved_m` is by how much each barrier that moves has moved at each frame, (F, 3), m, by its number; NaN where it was
-    not recorded. `has_states` is whether states are known: a log has none.
+    not recorded. `has_states` says whether the states of UGVs are known, as they are in runs and not in logs.
     """
 
     robots: tuple[DrawnBody, ...]

@@ -149,7 +149,7 @@ def declared(scenario: Scenario, plants: Mapping[str, OwnPlant]) -> Scenario:
 
     Raises:
         UnknownNameError: if there is no such robot.
-        PluginError: if what is given is no plant of one's own.
+        PluginError: if something else than an `OwnPlant` is given.
         ScenarioError: if the scenario is not valid with them.
     """
     changed = copy.deepcopy(scenario)
@@ -184,7 +184,7 @@ def own_code(scenario: Scenario, plants: Mapping[str, OwnPlant]) -> dict[str, Ow
     found = {}
     for robot, name in named.items():
         make = plants[robot].make if robot in plants else PLANTS.load(name, System)
-        found[robot] = OwnCode(name, make.__init__ if isinstance(make, type) else make)  # type: ignore[misc]
+        found[robot] = OwnCode(name, vars(make).get("__init__", make) if isinstance(make, type) else make)
     return found
 
 
@@ -201,7 +201,13 @@ class OwnBody(LeafSystem):
     """
 
     def __init__(self, name: str, *, turns: bool, step_s: float) -> None:
-        """`name` says in messages whose plant of which class it is; `step_s` is 0 for a plant that is not sampled."""
+        """Declare the ports.
+
+        Args:
+            name: of the plant and its robot, for messages.
+            turns: whether the plant has a heading.
+            step_s: time between the steps of a sampled plant, s; 0 for any other.
+        """
         super().__init__()
         self._name, self._step_s = name, step_s
         ports = [("position", "position", 3), ("body", "signals", 3), *([("heading", "heading", 1)] if turns else [])]
@@ -227,7 +233,7 @@ class OwnBody(LeafSystem):
         source = self.get_input_port(index)
         try:
             value: Array = source.Eval(context)
-        except Exception as error:
+        except Exception as error:  # the user's code may raise anything
             raise PluginError(f"{self._name}: {described(error)}") from error
         if not np.isfinite(value).all():
             wanted = "allowed: finite numbers"
@@ -285,7 +291,7 @@ def own_plant(body: Body, make: Callable[..., System] | None) -> Diagram:
     else:
         try:
             system = make(**parameters)
-        except Exception as error:
+        except Exception as error:  # the user's code may raise anything
             raise PluginError(f"{about}: {described(error, make)}") from error
     if not isinstance(system, System):
         raise PluginError(
@@ -331,7 +337,7 @@ def _begins_at(diagram: Diagram, start_m: Array, about: str) -> None:
         begins = diagram.GetOutputPort("signals").Eval(context)
     except PluginError:
         raise
-    except Exception as error:
+    except Exception as error:  # likewise
         raise PluginError(f"{about}: {described(error)}") from error
     if np.abs(begins - start_m).max() > START_M:
         raise PluginError(f"{about} begins at {begins.tolist()} m; allowed: at its start, {start_m.tolist()} m")
