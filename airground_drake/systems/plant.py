@@ -6,6 +6,7 @@ import copy
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
+from inspect import isfunction
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
@@ -184,7 +185,8 @@ def own_code(scenario: Scenario, plants: Mapping[str, OwnPlant]) -> dict[str, Ow
     found = {}
     for robot, name in named.items():
         make = plants[robot].make if robot in plants else PLANTS.load(name, System)
-        found[robot] = OwnCode(name, vars(make).get("__init__", make) if isinstance(make, type) else make)
+        functions = filter(isfunction, vars(make).values()) if isinstance(make, type) else ()
+        found[robot] = OwnCode(name, next(iter(functions), make))
     return found
 
 

@@ -13,14 +13,18 @@ from airground_drake.intervention.coordination.neighbourhoods import Refinement
 from airground_drake.intervention.coordination.roadmap import RobotTask, Space, build_roadmap
 from airground_drake.intervention.coordination.single import Mover, OtherRobot, Way, find, sum_of_times
 from airground_drake.intervention.coordination.smoothing import smooth
-from airground_drake.intervention.coordination.timed import at_rest
+from airground_drake.intervention.coordination.timed import at_rest, speed
 
 REORDERED, REORDERED_SHARE = 40, 10
 """No further order of the robots begins after so many searches for single robots, or one part in ten of the effort.
 Where another order of few robots succeeds, its plan is better than one from joint steps."""
 LATE, LATE_SHARE = 1.4, 30
 """If a plan by an order takes this many times as long as the robots would alone, a plan by joint steps is made, too,
-within one part in thirty of the candidates; the better one is taken."""
+within one part in thirty of the candidates; the better one is taken. Not among known motions: there robots that go in
+steps of one duration lose more time than an order does."""
+WORTH = 1.1
+"""A plan by joint steps is improved beside one by an order only if it does not take longer than this many times that
+one: improving it takes most of the time."""
 LEAVING = 2.0
 """A robot leaves its place within the time in which it travels this many times the distance that robots keep."""
 
@@ -170,11 +174,12 @@ class _Search:
         candidates = self._effort.candidates
         if ways is not None:
             alone = self._refine(ways, able)
-            if not alone or sum_of_times(ways) <= LATE * sum_of_times(alone):
+            among_motions = any(speed(other.motion) > 0.0 for other in self._fixed)
+            if among_motions or not alone or sum_of_times(ways) <= LATE * sum_of_times(alone):
                 return ways
             candidates //= LATE_SHARE
         others = self._joint_steps(able, candidates)
-        if others is None:
+        if others is None or (ways is not None and sum_of_times(others) > WORTH * sum_of_times(ways)):
             return ways
         self._refine(others, able)
         return others if ways is None else min(ways, others, key=sum_of_times)

@@ -12,12 +12,13 @@ from builders.shapes import fields, from_core, wall
 from builders.teams import Array, motions, random_team, space, task
 from hypothesis import given
 from hypothesis import strategies as st
+from planner import alcove
 from properties import examples
 
 from airground_drake.geometry import outline
 from airground_drake.intervention.coordination.joint import Effort, Plan, plan
 from airground_drake.intervention.coordination.roadmap import RobotTask, Space, build_roadmap
-from airground_drake.intervention.coordination.single import OtherRobot, _wished
+from airground_drake.intervention.coordination.single import OtherRobot, _wished, sum_of_times
 from airground_drake.intervention.coordination.timed import free_pieces
 
 CORRIDOR = [(x, y) for x in np.arange(-6.0, 6.1, 1.5) for y in (-2.3, 2.3)]
@@ -137,6 +138,14 @@ def test_a_dense_team_is_planned_for_in_another_order() -> None:
     found = plan(room, tasks, [2.4] * 4, effort=Effort(candidates=0))
     assert found.outcome == "complete"
     assert_keeps_distances(room, tasks, found, 2.4, [])
+
+
+def test_joint_steps_are_taken_where_the_plan_of_an_order_takes_long() -> None:
+    room, tasks, speeds = alcove()
+    one_by_one, both = plan(room, tasks, speeds, effort=Effort(candidates=0)), plan(room, tasks, speeds)
+    assert one_by_one.complete
+    assert both.complete
+    assert sum_of_times(both.ways) < 0.85 * sum_of_times(one_by_one.ways)
 
 
 def test_who_finds_no_way_stays_and_is_gone_round() -> None:
