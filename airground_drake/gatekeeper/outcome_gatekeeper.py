@@ -6,6 +6,9 @@ withdrawn, its motion is over, or it has been executed for as long as it may be.
 or the other choice looks cheaper. There is one exception: when the UGV senses an obstacle that it did not know at the
 acceptance, it compares both outcomes again. That is no new try: `patience` bounds how often a UGV goes along.
 
+If a UGV refuses its part of a joint plan, those that judge their parts at the same sample refuse them, too. So a plan
+that nobody executes costs nobody a try.
+
 Safety does not rest on this: an accepted motion is executed below the avoidance inequalities.
 """
 
@@ -28,7 +31,16 @@ from airground_drake.gatekeeper.rollout import View
 from airground_drake.geometry import convex, outline
 from airground_drake.geometry.convex import news_within, within
 from airground_drake.geometry.motion import Motion
-from airground_drake.intervention.messages import ACCEPT, DONE, REFUSE, SILENT, Proposals, Report, answer_to
+from airground_drake.intervention.messages import (
+    ACCEPT,
+    DONE,
+    JOINT_REFUSED,
+    REFUSE,
+    SILENT,
+    Proposals,
+    Report,
+    answer_to,
+)
 from airground_drake.intervention.policy import Proposal
 from airground_drake.nsbc.law import UgvLaw
 from airground_drake.world.plant import Scripted
@@ -60,26 +72,26 @@ class OutcomeGatekeepers(Gatekeepers):
         """Judge every new proposal by its outcome; keep to the answer to every other."""
         sensed = self._remembered(now.t, now.positions, before)
         known = replace(before, sensed=sensed)
-        answers: list[float] = []
-        reports: list[Report] = []
+        said = [answer_to(proposal, before.answers, i) for i, proposal in enumerate(now.proposals)]
         held = list(before.commitments)
-        decisions: list[GatekeeperDecision] = []
-        for i, proposal in enumerate(now.proposals):
-            standing = answer_to(proposal, before.answers, i)
+        for i, standing in enumerate(said):
             if held[i].executing and standing != ACCEPT:  # withdrawn
                 held[i] = self._patience.stop(held[i], now.t)
             held[i] = self._patience.rested(held[i], now.t)
-            if proposal is None:
-                answers += [SILENT, -1.0]
-                reports.append(Report())
-                continue
-            started = thread_time()
-            decision, held[i] = self._decide(now, known, before, i, proposal, standing, held[i])
-            self.times_s.append(thread_time() - started)
-            decision = replace(decision, answer=before.count + len(decisions))
-            decisions.append(decision)
-            answers += [_answer(decision, standing), proposal.number]
-            reports.append(self._report(now, decision))
+        judged: list[GatekeeperDecision] = []
+        for i, proposal in enumerate(now.proposals):
+            if proposal is not None:
+                started = thread_time()
+                judged.append(self._decide(now, known, before, i, proposal, said[i], held[i]))
+                self.times_s.append(thread_time() - started)
+        answers, reports = [SILENT, -1.0] * len(said), [Report()] * len(said)
+        decisions: list[GatekeeperDecision] = []
+        for decision in _jointly(judged, said):
+            i = decision.robot
+            held[i] = self._after(held[i], decision, said[i])
+            decisions.append(replace(decision, tries=held[i].tries, answer=before.count + len(decisions)))
+            answers[2 * i : 2 * i + 2] = _answer(decision, said[i]), decision.proposal.number
+            reports[i] = self._report(now, decisions[-1])
         return replace(
             known, answers=tuple(answers), reports=tuple(reports), decisions=tuple(decisions), commitments=tuple(held),
             count=before.count + len(decisions),
@@ -113,8 +125,8 @@ class OutcomeGatekeepers(Gatekeepers):
         proposal: Proposal,
         standing: float,
         held: Commitment,
-    ) -> tuple[GatekeeperDecision, Commitment]:
-        """Judge a new proposal, watch over an accepted one, keep to a refusal: the decision, and the new commitment."""
+    ) -> GatekeeperDecision:
+        """Judge a new proposal, watch over an accepted one, keep to a refusal."""
         reason: Reason = "kept"
         refuse = accept = None
         basis, new = Basis(), self._discovered(known.sensed, before, i, proposal)
@@ -129,14 +141,15 @@ class OutcomeGatekeepers(Gatekeepers):
             favour = proposal.cause in self._ugvs and proposal.cause != self._ugvs[i]
             reason = reason_of(refuse, accept, favour=favour)
         accepted = reason in ACCEPTING or (reason == "kept" and standing == ACCEPT)
-        if accepted and standing == SILENT:
-            held = self._patience.accept(held, now.t, proposal.motion.end)
-        elif standing == ACCEPT and not accepted:
-            held = self._patience.stop(held, now.t)
-        decision = GatekeeperDecision(
-            now.t, i, proposal, accepted, reason, refuse=refuse, accept=accept, tries=held.tries, basis=basis
-        )
-        return decision, held
+        return GatekeeperDecision(now.t, i, proposal, accepted, reason, refuse=refuse, accept=accept, basis=basis)
+
+    def _after(self, held: Commitment, decision: GatekeeperDecision, standing: float) -> Commitment:
+        """A UGV's commitment after a decision, when its answer so far is `standing`."""
+        if decision.accepted and standing == SILENT:
+            return self._patience.accept(held, decision.t, decision.proposal.motion.end)
+        if standing == ACCEPT and not decision.accepted:
+            return self._patience.stop(held, decision.t)
+        return held
 
     def foresee(self, seen: View, law: UgvLaw, proposal: Proposal) -> tuple[Outcome, Outcome]:
         """The outcomes of refusing and of accepting, from what a UGV knows."""
@@ -187,6 +200,17 @@ class OutcomeGatekeepers(Gatekeepers):
         new = np.flatnonzero((apart > self.law.avoidance.sensing_range) & ~known)
         nearest = np.argsort(apart[new], kind="stable")[:MOST_CLAIMED]
         return new[np.sort(nearest)]
+
+
+def _jointly(judged: Sequence[GatekeeperDecision], said: Sequence[float]) -> list[GatekeeperDecision]:
+    """The decisions of a sample: who would accept a part of a joint plan of which another part is refused, refuses."""
+    refused = {each.proposal.joint for each in judged if _answer(each, said[each.robot]) == REFUSE}
+    return [
+        replace(each, accepted=False, reason=JOINT_REFUSED)
+        if each.accepted and said[each.robot] == SILENT and each.proposal.party and each.proposal.joint in refused
+        else each
+        for each in judged
+    ]
 
 
 def _answer(decision: GatekeeperDecision, standing: float) -> float:

@@ -7,7 +7,7 @@ from typing import Literal, NamedTuple
 Reason = Literal[
     "cheaper", "not_cheaper", "waits", "no_difference", "kept", "dwell", "reversed", "no_plan",
     "first_stage",
-    "stalls", "makes_way", "exhausted", "over",
+    "stalls", "makes_way", "exhausted", "over", "joint_refused",
 ]  # fmt: skip
 """Reasons of answers: see `answer.settle` for method (c), `outcome_gatekeeper` for method (d)."""
 OVER: Reason = "over"
@@ -45,6 +45,7 @@ WORDS: dict[Reason, Words] = {
     ),
     "makes_way": Words("the UGV makes way for another one and still reaches its goal"),
     "exhausted": Words("the UGV has used all of its tries and has not rested since", "it had used all of its tries"),
+    "joint_refused": Words("another UGV refuses its part of the joint plan", "another UGV refused its part"),
     "over": Words("the time for which the proposal was accepted is over"),
 }
 

@@ -10,7 +10,7 @@ A joint plan takes effect only while all its parts in force are accepted: see `a
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 from airground_drake.base.arrays import Array
 from airground_drake.intervention.policy import Proposal
@@ -20,6 +20,8 @@ from airground_drake.world.world import World
 ACCEPT, SILENT, REFUSE, DONE = 1.0, 0.0, -1.0, 2.0
 NOTHING = -1.0
 """Number of the proposal that a UGV executes if it executes none."""
+JOINT_REFUSED: Literal["joint_refused"] = "joint_refused"
+"""Reason of a UGV that would accept its part of a joint plan, and refuses it because another UGV refuses its own."""
 
 Point = tuple[float, float, float]
 """A place, m, world frame."""

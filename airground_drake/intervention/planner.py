@@ -21,6 +21,7 @@ from airground_drake.intervention.database import Asked, BehaviourDatabase, Nego
 from airground_drake.intervention.messages import (
     ACCEPT,
     DONE,
+    JOINT_REFUSED,
     REFUSE,
     SILENT,
     Outline,
@@ -213,7 +214,7 @@ class Planner:
         fresh = tuple(sorted((each for each in unknown if not self._is_on_map(each, there)), key=_place))
         learnt = memory.learnt + fresh
         obstacles = outline.joined(mapped, outline.stacked(learnt)) if learnt else mapped
-        talks = self._after_answers(memory.talks, t, intervening, said, learnt=bool(fresh))
+        talks = self._after_answers(memory.talks, t, intervening, said, reports, learnt=bool(fresh))
         asked = list(memory.asked)
         newest = max((number for number, _ in memory.read[-len(self.ugvs) :]), default=-1)
         read = [(report.number, t) for report in heard if report.number > newest]
@@ -264,6 +265,7 @@ class Planner:
         t: float,
         intervening: Sequence[bool],
         said: Sequence[float],
+        reports: Reports,
         *,
         learnt: bool,
     ) -> list[Negotiation]:
@@ -271,18 +273,20 @@ class Planner:
 
         A proposal is withdrawn if any part of its plan is refused, if its motion is over, or if neither its UGV, nor
         its cause, nor any party of its joint plan is triggered any more. So a UGV whose part leads it past its preset
-        trajectory goes on: the others' ways were planned with it.
+        trajectory goes on: the others' ways were planned with it. A UGV that refuses only because another one does is
+        asked again at once.
         """
         called = {name for name, one in zip(self.ugvs, intervening, strict=True) if one}
-        refused = {talk.proposal.joint for talk, no in zip(talks, said, strict=True) if talk.proposal and no == REFUSE}
+        own = [a == REFUSE and each.reason != JOINT_REFUSED for a, each in zip(said, reports, strict=True)]
+        refused = {talk.proposal.joint for talk, no in zip(talks, own, strict=True) if talk.proposal and no}
         found = []
-        for name, talk, answer in zip(self.ugvs, talks, said, strict=True):
+        for name, talk, answer, refuses in zip(self.ugvs, talks, said, own, strict=True):
             proposal = talk.proposal
             party_refused = proposal is not None and bool(proposal.party) and proposal.joint in refused
             party = proposal.party if proposal else ()
             if called.isdisjoint((name, talk.cause, *party)):
                 talk = Negotiation()
-            elif answer == REFUSE:
+            elif refuses or (answer == REFUSE and not party_refused):
                 talk = self.database.after_refusal(talk, t, learnt=learnt)
             elif proposal is not None and (party_refused or answer == DONE or t >= proposal.motion.end):
                 talk = replace(talk, proposal=None)

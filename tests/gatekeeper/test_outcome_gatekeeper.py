@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from builders.problems import LAW
@@ -31,11 +33,11 @@ class Team:
         self.gate = OutcomeGatekeepers(world(("ugv", "other"), rocks), LAW, [preset] * 2, Outlook(5.0), patience)
         self.memory, self.t, self.calls = GatekeeperState.empty(2), 0.0, 0
 
-    def sees(self, proposal: Proposal | None, x: float = 20.0) -> Commitment:
+    def sees(self, proposal: Proposal | None, x: float = 20.0, other: Proposal | None = None) -> Commitment:
         self.t += 0.05
         places = np.array([[x, 0.0, 0.0], [0.0, 90.0, 0.0], [x, 0.0, 9.0]])
-        if not self.gate.idle(self.t, (proposal, None), places, self.memory):
-            now = Inputs(self.t, (proposal, None), places, np.zeros((3, 3)), self.gate.law)
+        if not self.gate.idle(self.t, (proposal, other), places, self.memory):
+            now = Inputs(self.t, (proposal, other), places, np.zeros((3, 3)), self.gate.law)
             self.memory, self.calls = self.gate.sample(now, self.memory), self.calls + 1
         return self.memory.commitments[0]
 
@@ -87,6 +89,34 @@ def test_only_another_ugv_is_made_way_for(cause: str, answer: float) -> None:
     assert [decision.reason for decision in team.memory.decisions] == [
         "makes_way" if cause == "other" else "not_cheaper"
     ]
+
+
+def part(number: int, cause: str, joint: int = 0) -> Proposal:
+    """A part of a joint plan, accepted only as a favour; those with an odd number are for the other UGV."""
+    motion = Motion(STAYS.times, np.array([[0.0, 90.0, 0.0]] * 2)) if number % 2 else STAYS
+    return replace(making_way(number, cause), motion=motion, issued=float(joint), party=("other", "ugv"))
+
+
+def test_who_shares_a_joint_plan_with_one_that_refuses_refuses_too_and_has_not_tried() -> None:
+    team = Team()
+    for number in range(0, 10, 2):  # more often than there are tries
+        turn = team.sees(part(number, "other", number), other=part(number + 1, "other", number))
+        assert [each.reason for each in team.memory.decisions] == ["joint_refused", "not_cheaper"]
+        assert [each.tries for each in team.memory.decisions] == [0, 0]
+        assert team.memory.answers == (REFUSE, number, REFUSE, number + 1)
+        assert turn == Commitment()
+    team.sees(part(8, "other", 8), other=None)  # the other part is gone: a refusal stays a refusal
+    assert [each.reason for each in team.memory.decisions] == ["kept"]
+    assert team.memory.answers[:2] == (REFUSE, 8)
+
+
+def test_only_new_acceptances_of_the_same_joint_plan_are_reversed() -> None:
+    team = Team()
+    assert team.sees(part(0, "other"), other=None).tries == 1
+    team.sees(part(0, "other"), other=part(1, "other"))  # was sent late: what was accepted before stands, unexecuted
+    assert [each.reason for each in team.memory.decisions] == ["kept", "not_cheaper"]
+    assert team.sees(part(2, "other", 1), other=part(3, "other", 2)).executing
+    assert [each.reason for each in team.memory.decisions] == ["makes_way", "not_cheaper"]
 
 
 def test_a_withdrawal_is_noticed_when_nothing_else_is_proposed() -> None:

@@ -167,10 +167,10 @@ def test_attacks_use_all_tries_and_no_more_and_only_another_ugv_is_made_way_for(
 
 
 TURNED = [
-    ("standing != ACCEPT:  # withdrawn", "proposal is None:"),
+    ("standing != ACCEPT:  # withdrawn", "now.proposals[i] is None:"),
     (
-        "            held[i] = self._patience.rested(held[i], now.t)\n            if proposal is None:\n",
-        "            if proposal is None:\n                held[i] = self._patience.rested(held[i], now.t)\n",
+        "            held[i] = self._patience.rested(held[i], now.t)\n",
+        "            held[i] = held[i] if now.proposals[i] else self._patience.rested(held[i], now.t)\n",
     ),
     ("proposal.cause in self._ugvs and proposal", "proposal"),
 ]

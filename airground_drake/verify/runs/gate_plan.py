@@ -47,6 +47,8 @@ BLOCKS = 10
 """All plans of at most so many choices are evaluated by exact distances, too."""
 MOST_BLOCKS = 12
 """All plans of so many blocks can be evaluated along half-planes; they enclose the optimum of the route's problem."""
+JOINT_REFUSED = "joint_refused"
+"""Reason of a refusal that follows from another UGV's, not from the UGV's own two outcomes."""
 NO_PROBLEM = "method (d) compares two predicted outcomes and solves no problem (26)"
 
 
@@ -272,8 +274,8 @@ def _clear(trace: Trace, row: DecisionRecord, positions: Array, period: float) -
 
 
 def _judge_outcomes(trace: Trace, rows: Sequence[DecisionRecord]) -> Finding:
-    """Method (d): the choice of every decision for which both outcomes were predicted."""
-    looked = [row for row in rows if row.given["accept_stalls"] >= 0.0]
+    """Method (d): the choice of every decision for which both outcomes were predicted, and that was the UGV's own."""
+    looked = [row for row in rows if row.given["accept_stalls"] >= 0.0 and row.given["reason"] != JOINT_REFUSED]
     compared = [one for row in looked for one in _compare_choice(trace, row)]
     gaps = [_above_the_other(row) for row in looked]
     evidence = Choices(

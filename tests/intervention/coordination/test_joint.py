@@ -173,7 +173,7 @@ def test_an_effort_bounds_what_is_spent_and_the_plan_is_the_same_each_time() -> 
     room, tasks = random_team(3, 5, 4, 14.0)
     one, two = (plan(room, tasks, [1.0] * 5, effort=Effort(expansions=50, candidates=500)) for _ in range(2))
     assert one.candidates <= 500 + 3 * 400
-    assert one.expansions <= 50
+    assert one.expansions <= 50 + 2 * 50  # to find a plan, and to improve it
     assert_keeps_distances(room, tasks, one, 1.0, [])
     assert [way.motion.tolist() for way in one.ways if way] == [way.motion.tolist() for way in two.ways if way]
 
