@@ -2,9 +2,11 @@
 
     git clone https://github.com/Daffan/the-barn-challenge
     python benchmarks/barn.py the-barn-challenge/jackal_helper/worlds/BARN --every 10 -o rows.jsonl
+    python benchmarks/barn.py ... --plant '{kind: unicycle, hand_point_m: 0.05, max_turn_rad_s: 4.0}'
 
 Each world becomes a scenario as by `airground import barn`: the robot is as wide as BARN's, keeps 0.1 m from all
-cylinders and knows those within 4 m; the UAV knows all of them. The shortest way keeps the same distance.
+cylinders and knows those within 4 m; the UAV knows all of them. The shortest way keeps what the law keeps; that
+is more for a robot that turns.
 """
 
 from __future__ import annotations
@@ -27,6 +29,7 @@ from airground_drake.scenarios.imported import Sizes, barn
 from airground_drake.scenarios.load import from_data
 from airground_drake.scenarios.outlines import outlines_of
 from airground_drake.scenarios.schema import Scenario
+from airground_drake.scenarios.world import make_world
 
 SIZES = Sizes(0.215, 0.1)
 METHODS = ("a", "d")
@@ -37,15 +40,17 @@ def shortest_s(scenario: Scenario) -> float | None:
     rows = outline.joined(*(outlines_of(scenario, each) for each in scenario.barriers.values()))
     (ugv,) = scenario.ugvs.values()
     try:
-        way = shortest_path(ugv.start_m[:2], ugv.target_m[:2], rows, outline.keep(rows, ugv.radius_m))
+        way = shortest_path(ugv.start_m[:2], ugv.target_m[:2], rows, make_world(scenario).keep(0, rows))
     except NoPath:
         return None
     return way.length_m / ugv.preset.speed_m_s
 
 
-def rows_of(path: Path) -> Iterator[dict[str, Any]]:
-    """What came of each method in a world."""
-    scenario = from_data(yaml.safe_load(barn(path, path.stem, [], SIZES).text), str(path))
+def rows_of(path: Path, plant: dict[str, Any]) -> Iterator[dict[str, Any]]:
+    """What came of each method in a world, for a robot with a plant, see docs/keys.md."""
+    data = yaml.safe_load(barn(path, path.stem, [], SIZES).text)
+    data["ugvs"]["ugv1"] |= {"plant": plant} if plant else {}
+    scenario = from_data(data, str(path))
     least = shortest_s(scenario)
     for method in METHODS:
         trace = simulate(scenario, method)
@@ -61,6 +66,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folder", type=Path, help="with files world_0.world, world_1.world and so on")
     parser.add_argument("--every", type=int, default=1, metavar="N", help="every N-th world (default: all)")
+    parser.add_argument("--plant", type=yaml.safe_load, default={}, help="of the robot, as in a scenario")
     parser.add_argument("-o", "--output", type=Path, metavar="JSONL", help="of rows; worlds that are in it are not run")
     given = parser.parse_args()
     worlds = sorted(given.folder.glob("world_*.world"), key=lambda path: int(path.stem.removeprefix("world_")))
@@ -72,7 +78,7 @@ def main() -> None:
     done = {row["world"] for row in rows}
     for path in worlds[:: given.every]:
         if path.stem not in done:
-            new = list(rows_of(path))
+            new = list(rows_of(path, given.plant))
             rows += new
             if given.output:
                 with given.output.open("a", encoding="utf-8") as stream:

@@ -70,7 +70,7 @@ def run(course: Course) -> tuple[Array, Array]:
         rate = PRESET_M_S * way[i] / length[i] if share < 1.0 else np.zeros(2)
         return course.starts[i] + share * way[i], rate
 
-    radius, nobody = SAFE_M / 2.0, np.empty((0, 0, 2))
+    radius, nobody = SAFE_M / 2.0, np.empty((0, 1, 2))
     discs = [_polygon(centre, SAFE_M - radius) for centre in course.obstacles]
     return driven(Traffic(course.starts, radius, MAX_M_S, preset, discs, nobody, 0.0, course.seed), course.duration_s)
 
