@@ -105,8 +105,8 @@ def read_text(path: Path) -> str:
     return read_bytes(path, LARGEST_TEXT).decode()
 
 
-def read_table(content: bytes) -> pd.DataFrame:
-    """The table in a Parquet file that may be hostile: numbers, texts and lists of numbers.
+def read_table(content: bytes, *, times: bool = False) -> pd.DataFrame:
+    """The table in a Parquet file that may be hostile: numbers, texts and lists of numbers; with `times` also times.
 
     The declared types and sizes are checked before the file is unpacked. A few bytes may stand for a long text in a
     million rows, so texts are counted before they are copied into their rows.
@@ -120,6 +120,7 @@ def read_table(content: bytes) -> pd.DataFrame:
     import pyarrow.parquet as pq
 
     numbers = (pa.types.is_floating, pa.types.is_integer, pa.types.is_boolean, pa.types.is_null)
+    numbers += (pa.types.is_timestamp,) * times
     try:
         file = pq.ParquetFile(io.BytesIO(content))
         schema, about = file.schema_arrow, file.metadata

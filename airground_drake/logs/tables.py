@@ -97,9 +97,9 @@ def _columns_of(stream: Stream, labels: list[str]) -> Iterator[int]:
 
 
 def _parquet(content: bytes) -> text.Table:
-    """A table of numbers and texts; ValueError as `files.read_table`."""
+    """A table of numbers, times and texts; ValueError as `files.read_table`."""
     try:
-        table = files.read_table(content)
+        table = files.read_table(content, times=True)
     except ValueError as error:
         raise LogError(str(error)) from None
     texts = {k: [*map(_written, table.iloc[:, k].tolist())] for k in range(table.shape[1])}
@@ -108,7 +108,9 @@ def _parquet(content: bytes) -> text.Table:
 
 
 def _written(value: Any) -> str:
-    return "" if value is None else repr(value) if isinstance(value, float) else str(value)
+    if value is None or value is pd.NaT:
+        return ""
+    return repr(value) if isinstance(value, float) else str(value)
 
 
 def _of_bodies(has: Columns, table: text.Table, wanted: Wanted) -> Columns:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -150,10 +151,12 @@ def twice() -> list[list[str]]:
     return [head, *lines[:30], *moved, *lines[60:], *lines[100:140], contradiction]
 
 
-def parquet(folder: Path) -> Path:
+def parquet(folder: Path, dates: bool = False) -> Path:
     head, *lines = logs.long(FULL)
     frame = pd.DataFrame(lines, columns=head)
     frame[head[:1] + head[2:]] = frame[head[:1] + head[2:]].astype(float)
+    if dates:
+        frame[head[0]] = pd.Timestamp("2026-05-04T10:00:00Z") + pd.to_timedelta(frame[head[0]], unit="s")
     frame.to_parquet(folder / "log.parquet")
     return folder / "log.parquet"
 
@@ -325,6 +328,7 @@ FORMS = {
     "no uav": Form(table("log.csv", lambda: logs.long(logs.motion(("tb_0", "tb_1")))), logs.motion(("tb_0", "tb_1")),
                    ("uav is not in the log",)),
     "parquet": Form(parquet, FULL),
+    "parquet with dates": Form(partial(parquet, dates=True), FULL),
     "two files": Form(two_files, FULL),
     "other names": Form(
         table("log.csv", lab({"A": FULL["tb_0"], "B": FULL["tb_1"], "uav": FULL["uav"]}, "clock,who,px_,py_,up")),
