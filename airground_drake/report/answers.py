@@ -109,7 +109,9 @@ def _encounters(course: RunOutcome) -> str:
 
 def _intrusion(course: RunOutcome) -> str:
     """Who came how near to what, when, and how many others did."""
-    hits = list(dict.fromkeys(map(collision, course.hits.values())))
+    unknown = ", which the UAV did not know"
+    every = course.hits.values()
+    hits = list(dict.fromkeys(collision(hit) + unknown * (hit.get("obstacle") in course.unknown) for hit in every))
     if hits:
         more = len(hits) - MAX_NAMES
         told = "; ".join([*hits[:MAX_NAMES], *[f"{more} more collisions"] * (more > 0)])

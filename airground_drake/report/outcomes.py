@@ -107,6 +107,7 @@ class RunOutcome:
         plain: whether priorities are composed as the package does it; False: by a recursion that is only compared.
         movers: obstacles that may move.
         walls: obstacles that are walls.
+        unknown: obstacles that the UAV never hears of: not on its map, in a run whose UGVs send no answers.
         near: pairs, those of least margin first.
         safe: whether every pair kept its distance; None: not known.
         why: why that is not known, or what SAFE-TRACE says if the distances alone do not decide.
@@ -135,6 +136,8 @@ class RunOutcome:
         self.name, self.method, self.plain = name, str(spec["method"]), spec["composition"] == "augmented"
         self.movers = [each for each, of in obstacles.items() if of.get("moves") or of.get("max_speed_m_s")]
         self.walls = [each for each, of in obstacles.items() if of.get("segment_m")]
+        silent = self.helped and self.method in METHODS and not METHODS[self.method].gated
+        self.unknown = [each for each, of in obstacles.items() if silent and not of.get("known_to_uav", True)]
 
         unique = {frozenset((pair.robot, pair.other)): pair for pair in reversed([*pairs(run)])}
         self.near = sorted(unique.values())

@@ -9,7 +9,7 @@ from __future__ import annotations
 import ast
 import re
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from math import inf
 from pathlib import Path
 from string import Formatter
@@ -847,6 +847,15 @@ def test_a_collision_has_the_time_of_the_event_and_nothing_after_it_counts() -> 
         "b: ugv1 collides with rock at 11.40 s.",
         "b: ugv1 collides with rock at 11.40 s, at (3.37, 5.10) m: nothing after that counts.",
     ]
+
+
+@pytest.mark.parametrize(("run", "told"), [("b", ", which the UAV did not know"), ("a", ""), ("c", ""), ("d", "")])
+def test_a_collision_with_what_the_uav_never_hears_of_says_so(run: str, told: str) -> None:
+    """Under (a) it asks for nothing, under (c) and (d) answers tell it what UGVs sense."""
+    given = document(World({run: replace(HIT, method=run)}))
+    given["scenario"]["resolved"]["obstacles"] = {"rock": {"known_to_uav": False}}
+    (line,) = summary.first_screen(given).answers[0].lines[:1]
+    assert line.text == f"{run}: ugv1 collides with rock at 11.40 s{told}."
 
 
 AGAINST = "Against the task error without noise"
