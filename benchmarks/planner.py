@@ -237,7 +237,7 @@ INSTANCES: dict[str, Callable[[], Team]] = {
     **{f"field30-{seed}": partial(field, 30, 3 + seed) for seed in range(3)},
     **{f"rooms9-{seed}": partial(rooms, seed, 9) for seed in range(3)},
     **{f"rooms{n}-{seed}": partial(rooms, seed, n) for seed in range(2) for n in (18, 27)},
-    **{f"{kind}32-{n}": partial(cells, kind, n) for kind in ("empty", "random", "room") for n in (20, 40, 64)},
+    **{f"{kind}32-{n}": partial(cells, kind, n) for kind in ("empty", "random", "room") for n in (20, 40, 64, 100)},
 }  # fmt: skip
 
 

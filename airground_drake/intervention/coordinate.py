@@ -20,6 +20,8 @@ from airground_drake.intervention.policy import MovingObstacle, Observation, Pol
 
 SHARE = 0.8
 """A plan uses this share of a UGV's speed limit; the rest is for catching up."""
+MOST_HALVINGS = 3
+"""The speed is halved no more often than this."""
 MOST_PLANS = 4
 """Largest number of joint plans that are tried for one proposal, each with more UGVs."""
 NARROWER = (1.0, 0.1, 0.01)
@@ -61,6 +63,7 @@ class Coordinate(Policy):
     5. If it has a way alone, but the joint plan helps nobody, less spacing is tried. A plan that helps nobody is not
        made again until a UGV has moved by more than the spacing of the roadmap, is asked for something else, or the map
        has changed.
+    6. A UGV that refuses a motion because it would come to rest short of its goal gets a slower one next time.
 
     Attributes:
         speed: largest speed, m/s; no UGV uses more than SHARE of its limit.
@@ -167,7 +170,7 @@ class Coordinate(Policy):
         fixed = [OtherRobot(predicted(mate, seen.start), mate.radius) for i, mate in enumerate(team) if i not in group]
         fixed += [_as_robot(each, seen) for each in seen.moving]
         tasks = [task_of(team[i], seen.start) for i in group]
-        speeds = [min(self.speed, SHARE * team[i].max_speed) for i in group]
+        speeds = [self._pace(team[i]) for i in group]
         return plan(space, tasks, speeds, fixed, follow=self.follow, effort=effort)
 
     def _in_the_way(
@@ -194,8 +197,14 @@ class Coordinate(Policy):
     def _alone(self, seen: Observation, space: Space, i: int) -> Way | None:
         """The way that a UGV would have without other UGVs."""
         mate = seen.team[i]
-        pace = min(self.speed, SHARE * mate.max_speed)
-        return plan(space, [task_of(mate, seen.start)], [pace], follow=self.follow).ways[0]
+        return plan(space, [task_of(mate, seen.start)], [self._pace(mate)], follow=self.follow).ways[0]
+
+    def _pace(self, mate: Teammate) -> float:
+        """The speed at which a UGV is planned for, m/s: half of it after each motion with which it would stall.
+
+        A robot that turns or lags falls behind a motion that is too fast for it, and then cuts its corners.
+        """
+        return min(self.speed, SHARE * mate.max_speed) / 2.0 ** min(mate.stalls, MOST_HALVINGS)
 
     def _proposals(self, seen: Observation, group: Sequence[int], found: Plan) -> dict[str, Motion] | None:
         motions = {}
@@ -251,7 +260,7 @@ def _is_as_before(before: Observation, seen: Observation) -> bool:
 def _state(mate: Teammate) -> tuple[object, ...]:
     """What a plan depends on besides the UGV's position."""
     asked = mate.proposal and (mate.proposal.issued, mate.proposal.number)
-    return mate.name, mate.triggered, mate.standing, mate.resting, mate.answered, asked
+    return mate.name, mate.triggered, mate.standing, mate.resting, mate.answered, mate.stalls, asked
 
 
 def task_of(mate: Teammate, start: float) -> RobotTask:

@@ -22,6 +22,8 @@ NOTHING = -1.0
 """Number of the proposal that a UGV executes if it executes none."""
 JOINT_REFUSED: Literal["joint_refused"] = "joint_refused"
 """Reason of a UGV that would accept its part of a joint plan, and refuses it because another UGV refuses its own."""
+STALLS: Literal["stalls"] = "stalls"
+"""Reason of a UGV that would come to rest short of its goal with the proposal, no nearer than without."""
 
 Point = tuple[float, float, float]
 """A place, m, world frame."""

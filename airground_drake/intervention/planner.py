@@ -24,6 +24,7 @@ from airground_drake.intervention.messages import (
     JOINT_REFUSED,
     REFUSE,
     SILENT,
+    STALLS,
     Outline,
     Proposals,
     Reports,
@@ -280,14 +281,14 @@ class Planner:
         own = [a == REFUSE and each.reason != JOINT_REFUSED for a, each in zip(said, reports, strict=True)]
         refused = {talk.proposal.joint for talk, no in zip(talks, own, strict=True) if talk.proposal and no}
         found = []
-        for name, talk, answer, refuses in zip(self.ugvs, talks, said, own, strict=True):
+        for name, talk, answer, refuses, report in zip(self.ugvs, talks, said, own, reports, strict=True):
             proposal = talk.proposal
             party_refused = proposal is not None and bool(proposal.party) and proposal.joint in refused
             party = proposal.party if proposal else ()
             if called.isdisjoint((name, talk.cause, *party)):
                 talk = Negotiation()
             elif refuses or (answer == REFUSE and not party_refused):
-                talk = self.database.after_refusal(talk, t, learnt=learnt)
+                talk = self.database.after_refusal(talk, t, learnt=learnt, stalls=report.reason == STALLS)
             elif proposal is not None and (party_refused or answer == DONE or t >= proposal.motion.end):
                 talk = replace(talk, proposal=None)
             found.append(talk)
@@ -315,6 +316,7 @@ class Planner:
                 proposal=talks[i].proposal,
                 answered=_WORDS.get(answer_to(talks[i].proposal, answers, i), "silent"),
                 refusals=talks[i].refusals,
+                stalls=talks[i].stalls,
                 resting=talks[i].refused_lately(t),
                 radius=float(self.radii[i]),
             )

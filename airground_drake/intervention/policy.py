@@ -34,6 +34,7 @@ class Teammate:
         proposal: its proposal in force, or None.
         answered: its answer to that proposal.
         refusals: number of proposals that it has refused in the current intervention.
+        stalls: how many of these it refused because it would have come to rest short of its goal.
         resting: whether it gets no proposal now because it has refused one recently.
         radius: of its body, m.
     """
@@ -48,6 +49,7 @@ class Teammate:
     proposal: Proposal | None = None
     answered: Answered = "silent"
     refusals: int = 0
+    stalls: int = 0
     resting: bool = False
     radius: float = 0.0
 

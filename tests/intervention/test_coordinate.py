@@ -69,6 +69,14 @@ def test_two_that_block_each_other_get_motions_that_fit_together() -> None:
     assert max(motion.max_speed for motion in found.values()) <= 0.8 + 1e-9
 
 
+def test_a_robot_that_would_have_stalled_gets_slower_motions() -> None:
+    one, other = mate("one", [-1.0, 0.0], [6.0, 0.0], stalls=2), mate("other", [1.0, 0.0], [-6.0, 0.0])
+    found = propose(seen([one, other]))
+    assert 0.15 < found["one"].max_speed <= 0.2 + 1e-9 < found["other"].max_speed
+    (crawls,) = propose(seen([replace(one, stalls=40)])).values()
+    assert 0.05 < crawls.max_speed <= 0.1 + 1e-9
+
+
 def test_a_parked_robot_is_asked_aside_and_back_only_where_it_is_in_the_way() -> None:
     found = propose(seen([COMES, PARKED], BAY))
     assert list(found) == ["comes", "parked"]

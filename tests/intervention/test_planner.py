@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -56,14 +56,16 @@ def step(
     intervening: str,
     answers: Mapping[str, float] | None = None,
     report: Report = NOBODY[0],
+    reasons: Sequence[str] = ("",) * 3,
 ) -> PlannerState:
     """One planning instant; who is intervened on, and answers to the proposals in force, by name."""
+    reports = tuple(report._replace(reason=reason) for reason in reasons)
     given = []
     for name, talk in zip(UGVS, memory.talks, strict=True):
         number = talk.proposal.number if talk.proposal else -1
         given += [(answers or {}).get(name, SILENT), number]
     called = [name in intervening.split() for name in UGVS]
-    return sent_after(memory, uav.plan(memory, t, PLACES, called, np.array(given), (report,) * 3), t)
+    return sent_after(memory, uav.plan(memory, t, PLACES, called, np.array(given), reports), t)
 
 
 def in_force(memory: PlannerState) -> dict[str, tuple[float, str]]:
@@ -109,6 +111,21 @@ def test_one_refusal_withdraws_a_joint_plan_for_all() -> None:
     assert (two.proposal, two.refusals, two.resting) == (None, 1, True)
     assert (one.proposal, one.resting, three.proposal, three.resting) == (None, False, None, False)
     assert not step(uav, memory, 2.2, "one three").talks[1].proposal  # nobody asks it for itself
+
+
+def test_who_refuses_only_because_another_does_is_asked_again_at_once() -> None:
+    policy = Scripted({"one": wait(9.0), "two": wait(9.0), "three": wait(9.0)})
+    uav, no = planner(policy), dict.fromkeys(UGVS, REFUSE)
+    memory = step(uav, uav.start(), 1.0, "one three")
+    step(uav, memory, 1.1, "one three", no, reasons=["joint_refused", "stalls", "joint_refused"])
+    one, two, three = policy.seen[1].team
+    assert [(each.refusals, each.stalls, each.resting) for each in (one, two, three)] == [
+        (0, 0, False), (1, 1, True), (0, 0, False),
+    ]  # fmt: skip
+    uav = planner(Scripted({"one": wait(9.0)}))
+    memory = step(uav, uav.start(), 1.0, "one")
+    memory = step(uav, memory, 1.1, "one", {"one": REFUSE}, reasons=["joint_refused"] * 3)
+    assert memory.talks[0].refusals == 1  # nobody else refused
 
 
 def test_another_plan_stays_in_force_when_a_joint_plan_is_refused() -> None:
