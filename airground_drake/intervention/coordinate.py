@@ -63,7 +63,7 @@ class Coordinate(Policy):
     5. If it has a way alone, but the joint plan helps nobody, less spacing is tried. A plan that helps nobody is not
        made again until a UGV has moved by more than the spacing of the roadmap, is asked for something else, or the map
        has changed.
-    6. A UGV that refuses a motion because it would come to rest short of its goal gets a slower one next time.
+    6. A UGV that could not follow a motion, or would have stalled on the way, gets a slower one next time.
 
     Attributes:
         speed: largest speed, m/s; no UGV uses more than SHARE of its limit.
@@ -200,11 +200,11 @@ class Coordinate(Policy):
         return plan(space, [task_of(mate, seen.start)], [self._pace(mate)], follow=self.follow).ways[0]
 
     def _pace(self, mate: Teammate) -> float:
-        """The speed at which a UGV is planned for, m/s: half of it after each motion with which it would stall.
+        """The speed at which a UGV is planned for, m/s: half of it after each motion that was too fast for it.
 
-        A robot that turns or lags falls behind a motion that is too fast for it, and then cuts its corners.
+        A robot that turns or lags falls behind such a motion, and then cuts its corners.
         """
-        return min(self.speed, SHARE * mate.max_speed) / 2.0 ** min(mate.stalls, MOST_HALVINGS)
+        return min(self.speed, SHARE * mate.max_speed) / 2.0 ** min(mate.too_fast, MOST_HALVINGS)
 
     def _proposals(self, seen: Observation, group: Sequence[int], found: Plan) -> dict[str, Motion] | None:
         motions = {}
@@ -260,7 +260,7 @@ def _is_as_before(before: Observation, seen: Observation) -> bool:
 def _state(mate: Teammate) -> tuple[object, ...]:
     """What a plan depends on besides the UGV's position."""
     asked = mate.proposal and (mate.proposal.issued, mate.proposal.number)
-    return mate.name, mate.triggered, mate.standing, mate.resting, mate.answered, mate.stalls, asked
+    return mate.name, mate.triggered, mate.standing, mate.resting, mate.answered, mate.too_fast, asked
 
 
 def task_of(mate: Teammate, start: float) -> RobotTask:

@@ -55,7 +55,7 @@ class Negotiation:
         proposal: the proposal in force, or None.
         turn: index of the policy that made the proposal, or that is asked next.
         refusals: number of refused proposals since the trigger.
-        stalls: how many of these were refused because the UGV would have come to rest short of its goal.
+        too_fast: number of motions since then that the UGV could not follow, see `Teammate`.
         in_vain: how many times in a row no policy had a proposal.
         retry_at: earliest time for a new proposal, s.
         cause: name of the UGV whose trigger led to the last proposal; empty before the first.
@@ -64,7 +64,7 @@ class Negotiation:
     proposal: Proposal | None = None
     turn: int = 0
     refusals: int = 0
-    stalls: int = 0
+    too_fast: int = 0
     in_vain: int = 0
     retry_at: float = -1.0
     cause: str = ""
@@ -146,20 +146,22 @@ class BehaviourDatabase:
             if isinstance(policy, GuestPolicy):
                 policy.close()
 
-    def after_refusal(self, held: Negotiation, t: float, *, learnt: bool = False, stalls: bool = False) -> Negotiation:
+    def after_refusal(
+        self, held: Negotiation, t: float, *, learnt: bool = False, too_fast: bool = False
+    ) -> Negotiation:
         """The negotiation after the UGV has refused its proposal: after a rest it is the next policy's turn.
 
         Args:
             held: negotiation with the refused proposal.
             t: time, s.
             learnt: whether the UAV has learnt of an obstacle with the refusal; then a ranking starts again at the best.
-            stalls: whether the UGV refused because it would have come to rest short of its goal.
+            too_fast: whether the UGV refused because it would have come to rest short of its goal.
         """
         turn = 0 if learnt and self.ranking == "predicted" else held.turn + 1
         return Negotiation(
             turn=turn,
             refusals=held.refusals + 1,
-            stalls=held.stalls + stalls,
+            too_fast=held.too_fast + too_fast,
             retry_at=t + self.retry,
             cause=held.cause,
         )
@@ -186,7 +188,7 @@ class BehaviourDatabase:
             party = tuple(sorted(motions)) if self.joint and len(motions) > 1 else ()
             for robot, motion in motions.items():
                 mate = None if robot == seen.robot else next(each for each in seen.team if each.name == robot)
-                before = held if mate is None else Negotiation(refusals=mate.refusals, stalls=mate.stalls)
+                before = held if mate is None else Negotiation(refusals=mate.refusals, too_fast=mate.too_fast)
                 cause = robot if mate is None or mate.triggered else seen.robot
                 proposal = Proposal(
                     chosen.policy, seen.t, motion, cause=cause, mapped=seen.obstacles, party=party

@@ -34,6 +34,8 @@ from airground_drake.intervention.messages import (
 from airground_drake.intervention.policy import Answered, MovingObstacle, Observation, Proposal, Teammate
 from airground_drake.world.motion import SAME_S
 
+BEHIND_S = 1.0
+"""A motion has left a UGV behind if from its end the UGV is farther than it could go in this time."""
 _WORDS: dict[float, Answered] = {ACCEPT: "accepted", REFUSE: "refused"}
 
 
@@ -215,7 +217,7 @@ class Planner:
         fresh = tuple(sorted((each for each in unknown if not self._is_on_map(each, there)), key=_place))
         learnt = memory.learnt + fresh
         obstacles = outline.joined(mapped, outline.stacked(learnt)) if learnt else mapped
-        talks = self._after_answers(memory.talks, t, intervening, said, reports, learnt=bool(fresh))
+        talks = self._after_answers(memory.talks, t, positions, intervening, said, reports, learnt=bool(fresh))
         asked = list(memory.asked)
         newest = max((number for number, _ in memory.read[-len(self.ugvs) :]), default=-1)
         read = [(report.number, t) for report in heard if report.number > newest]
@@ -264,6 +266,7 @@ class Planner:
         self,
         talks: Sequence[Negotiation],
         t: float,
+        positions: Array,
         intervening: Sequence[bool],
         said: Sequence[float],
         reports: Reports,
@@ -275,22 +278,24 @@ class Planner:
         A proposal is withdrawn if any part of its plan is refused, if its motion is over, or if neither its UGV, nor
         its cause, nor any party of its joint plan is triggered any more. So a UGV whose part leads it past its preset
         trajectory goes on: the others' ways were planned with it. A UGV that refuses only because another one does is
-        asked again at once.
+        asked again at once. A UGV that a motion has left behind counts it as too fast.
         """
         called = {name for name, one in zip(self.ugvs, intervening, strict=True) if one}
         own = [a == REFUSE and each.reason != JOINT_REFUSED for a, each in zip(said, reports, strict=True)]
         refused = {talk.proposal.joint for talk, no in zip(talks, own, strict=True) if talk.proposal and no}
         found = []
-        for name, talk, answer, refuses, report in zip(self.ugvs, talks, said, own, reports, strict=True):
+        for i, (name, talk, answer, refuses) in enumerate(zip(self.ugvs, talks, said, own, strict=True)):
             proposal = talk.proposal
             party_refused = proposal is not None and bool(proposal.party) and proposal.joint in refused
             party = proposal.party if proposal else ()
             if called.isdisjoint((name, talk.cause, *party)):
                 talk = Negotiation()
             elif refuses or (answer == REFUSE and not party_refused):
-                talk = self.database.after_refusal(talk, t, learnt=learnt, stalls=report.reason == STALLS)
+                talk = self.database.after_refusal(talk, t, learnt=learnt, too_fast=reports[i].reason == STALLS)
             elif proposal is not None and (party_refused or answer == DONE or t >= proposal.motion.end):
-                talk = replace(talk, proposal=None)
+                off = np.linalg.norm(positions[i] - proposal.motion.positions[-1]) if t >= proposal.motion.end else 0.0
+                behind = bool(off > BEHIND_S * self.max_speed[i])
+                talk = replace(talk, proposal=None, too_fast=talk.too_fast + behind)
             found.append(talk)
         return found
 
@@ -316,7 +321,7 @@ class Planner:
                 proposal=talks[i].proposal,
                 answered=_WORDS.get(answer_to(talks[i].proposal, answers, i), "silent"),
                 refusals=talks[i].refusals,
-                stalls=talks[i].stalls,
+                too_fast=talks[i].too_fast,
                 resting=talks[i].refused_lately(t),
                 radius=float(self.radii[i]),
             )

@@ -34,7 +34,8 @@ class Teammate:
         proposal: its proposal in force, or None.
         answered: its answer to that proposal.
         refusals: number of proposals that it has refused in the current intervention.
-        stalls: how many of these it refused because it would have come to rest short of its goal.
+        too_fast: number of motions that it could not follow: it refused them because it would have stalled on the way,
+            or was left behind by them.
         resting: whether it gets no proposal now because it has refused one recently.
         radius: of its body, m.
     """
@@ -49,7 +50,7 @@ class Teammate:
     proposal: Proposal | None = None
     answered: Answered = "silent"
     refusals: int = 0
-    stalls: int = 0
+    too_fast: int = 0
     resting: bool = False
     radius: float = 0.0
 

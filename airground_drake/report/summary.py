@@ -13,7 +13,6 @@ from typing import Any, NamedTuple
 from airground_drake.base.errors import one_line
 from airground_drake.base.statuses import NOT_EXERCISED, UNDECIDED, outcome
 from airground_drake.gatekeeper.reasons import refusal
-from airground_drake.intervention.messages import JOINT_REFUSED
 from airground_drake.registry import METHODS
 from airground_drake.report.answers import Answer, answers
 from airground_drake.report.outcomes import Document, RunOutcome, courses, tolerance, triggers
@@ -201,7 +200,7 @@ def _interventions(document: Document, course: RunOutcome) -> str:
     for found in (run["metrics"]["gatekeeper"] or {}).get("refusals", {}).values():
         for reason, count in found.items():
             reasons[refusal(reason)] += count
-    del reasons[refusal(JOINT_REFUSED)]  # that of the UGV which did not want to says more
+    del reasons[refusal("joint_refused")]  # that of the UGV which did not want to says more
     why = f": {reasons.most_common(1)[0][0]}" if kinds["refuse"] and reasons else ""
     return f"{told or 'no answer'}{why}{failed}"
 

@@ -69,11 +69,11 @@ def test_two_that_block_each_other_get_motions_that_fit_together() -> None:
     assert max(motion.max_speed for motion in found.values()) <= 0.8 + 1e-9
 
 
-def test_a_robot_that_would_have_stalled_gets_slower_motions() -> None:
-    one, other = mate("one", [-1.0, 0.0], [6.0, 0.0], stalls=2), mate("other", [1.0, 0.0], [-6.0, 0.0])
+def test_a_robot_that_could_not_follow_gets_slower_motions() -> None:
+    one, other = mate("one", [-1.0, 0.0], [6.0, 0.0], too_fast=2), mate("other", [1.0, 0.0], [-6.0, 0.0])
     found = propose(seen([one, other]))
     assert 0.15 < found["one"].max_speed <= 0.2 + 1e-9 < found["other"].max_speed
-    (crawls,) = propose(seen([replace(one, stalls=40)])).values()
+    (crawls,) = propose(seen([replace(one, too_fast=40)])).values()
     assert 0.05 < crawls.max_speed <= 0.1 + 1e-9
 
 

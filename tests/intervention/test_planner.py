@@ -119,13 +119,24 @@ def test_who_refuses_only_because_another_does_is_asked_again_at_once() -> None:
     memory = step(uav, uav.start(), 1.0, "one three")
     step(uav, memory, 1.1, "one three", no, reasons=["joint_refused", "stalls", "joint_refused"])
     one, two, three = policy.seen[1].team
-    assert [(each.refusals, each.stalls, each.resting) for each in (one, two, three)] == [
+    assert [(each.refusals, each.too_fast, each.resting) for each in (one, two, three)] == [
         (0, 0, False), (1, 1, True), (0, 0, False),
     ]  # fmt: skip
     uav = planner(Scripted({"one": wait(9.0)}))
     memory = step(uav, uav.start(), 1.0, "one")
     memory = step(uav, memory, 1.1, "one", {"one": REFUSE}, reasons=["joint_refused"] * 3)
     assert memory.talks[0].refusals == 1  # nobody else refused
+
+
+@pytest.mark.parametrize(("end", "too_fast"), [(0.0, 0), (0.9, 0), (1.1, 1)])
+def test_a_motion_that_leaves_its_ugv_behind_was_too_fast(end: float, too_fast: int) -> None:
+    """It is at (0, 0) at a limit of 1 m/s."""
+    motion = Motion(np.array([0.0, 2.0]), np.array([[0.0, 0.0, 0.0], [end, 0.0, 0.0]]))
+    uav = planner(Scripted({"one": motion}))
+    memory = step(uav, uav.start(), 1.0, "one")
+    assert step(uav, memory, 1.9, "one", {"one": ACCEPT}).talks[0].too_fast == 0
+    assert step(uav, memory, 2.1, "one", {"one": DONE}).talks[0].too_fast == too_fast
+    assert step(uav, memory, 2.1, "", {"one": DONE}).talks[0].too_fast == 0
 
 
 def test_another_plan_stays_in_force_when_a_joint_plan_is_refused() -> None:
