@@ -130,9 +130,9 @@ def not_withdrawn(patch: pytest.MonkeyPatch) -> None:
     """A proposal outlives the release of its UGV."""
     honest = Planner._after_answers
 
-    def after(self: Planner, talks: Any, t: float, intervening: Any, *heard: Any, learnt: bool) -> Any:
+    def after(self: Planner, talks: Any, t: float, places: Any, intervening: Any, *heard: Any, learnt: bool) -> Any:
         calling = [one or talk.proposal is not None for one, talk in zip(intervening, talks, strict=True)]
-        return honest(self, talks, t, calling, *heard, learnt=learnt)
+        return honest(self, talks, t, places, calling, *heard, learnt=learnt)
 
     patch.setattr(Planner, "_after_answers", after)
 
