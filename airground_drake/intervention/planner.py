@@ -139,6 +139,8 @@ class Planner:
         mapped_until: when each disappears, likewise.
         movers: obstacles that move.
         coasting: time for which an obstacle that moves is predicted to keep its velocity; then it stands, s.
+        trails: per UGV, whether its plant may fall behind a motion within its speed limit, as one that turns; default:
+            none does.
     """
 
     ugvs: tuple[str, ...]
@@ -154,6 +156,7 @@ class Planner:
     mapped_until: Array | float = np.inf
     movers: tuple[Mover, ...] = ()
     coasting: float = 3.0
+    trails: tuple[bool, ...] = ()
 
     @property
     def radii(self) -> Array:
@@ -278,23 +281,26 @@ class Planner:
         A proposal is withdrawn if any part of its plan is refused, if its motion is over, or if neither its UGV, nor
         its cause, nor any party of its joint plan is triggered any more. So a UGV whose part leads it past its preset
         trajectory goes on: the others' ways were planned with it. A UGV that refuses only because another one does is
-        asked again at once. A UGV that a motion has left behind counts it as too fast.
+        asked again at once. If a UGV that
+        may fall behind would have stalled, or was left behind, its motion was too fast.
         """
         called = {name for name, one in zip(self.ugvs, intervening, strict=True) if one}
         own = [a == REFUSE and each.reason != JOINT_REFUSED for a, each in zip(said, reports, strict=True)]
         refused = {talk.proposal.joint for talk, no in zip(talks, own, strict=True) if talk.proposal and no}
         found = []
         for i, (name, talk, answer, refuses) in enumerate(zip(self.ugvs, talks, said, own, strict=True)):
-            proposal = talk.proposal
+            proposal, trails = talk.proposal, bool(self.trails and self.trails[i])
             party_refused = proposal is not None and bool(proposal.party) and proposal.joint in refused
             party = proposal.party if proposal else ()
             if called.isdisjoint((name, talk.cause, *party)):
                 talk = Negotiation()
             elif refuses or (answer == REFUSE and not party_refused):
-                talk = self.database.after_refusal(talk, t, learnt=learnt, too_fast=reports[i].reason == STALLS)
+                talk = self.database.after_refusal(
+                    talk, t, learnt=learnt, too_fast=trails and reports[i].reason == STALLS
+                )
             elif proposal is not None and (party_refused or answer == DONE or t >= proposal.motion.end):
                 off = np.linalg.norm(positions[i] - proposal.motion.positions[-1]) if t >= proposal.motion.end else 0.0
-                behind = bool(off > BEHIND_S * self.max_speed[i])
+                behind = trails and bool(off > BEHIND_S * self.max_speed[i])
                 talk = replace(talk, proposal=None, too_fast=talk.too_fast + behind)
             found.append(talk)
         return found

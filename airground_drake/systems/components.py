@@ -83,6 +83,7 @@ def make_planner(scenario: Scenario, method: Method) -> Planner:
         robot_distance=apart,
         max_speed=np.array([ugv.max_speed_m_s for ugv in scenario.ugvs.values()]),
         radius=radius,
+        trails=tuple(any(each.kind != "first_order" for each in ugv.plant) for ugv in scenario.ugvs.values()),
     )
 
 

@@ -46,7 +46,7 @@ class Scripted(Policy):
 def planner(policy: Policy) -> Planner:
     presets = tuple(Motion(np.zeros(1), place[None]) for place in PLACES[:3])
     database = BehaviourDatabase([("scripted", policy)], retry=1.0, ranking="listed")
-    return Planner(UGVS, database, 0.1, presets, PLACES[:3], stacked([]), 1.0, np.ones(3))
+    return Planner(UGVS, database, 0.1, presets, PLACES[:3], stacked([]), 1.0, np.ones(3), trails=(True, True, False))
 
 
 def step(
@@ -137,6 +137,14 @@ def test_a_motion_that_leaves_its_ugv_behind_was_too_fast(end: float, too_fast: 
     assert step(uav, memory, 1.9, "one", {"one": ACCEPT}).talks[0].too_fast == 0
     assert step(uav, memory, 2.1, "one", {"one": DONE}).talks[0].too_fast == too_fast
     assert step(uav, memory, 2.1, "", {"one": DONE}).talks[0].too_fast == 0
+
+
+def test_no_motion_is_too_fast_for_a_ugv_that_follows_at_once() -> None:
+    away = Motion(np.array([0.0, 2.0]), np.array([[0.0, 0.0, 0.0], [0.0, 5.0, 0.0]]))
+    uav = planner(Scripted({"three": away}, {"three": away}))
+    memory = step(uav, uav.start(), 1.0, "three")
+    assert step(uav, memory, 2.1, "three", {"three": DONE}).talks[2].too_fast == 0
+    assert step(uav, memory, 1.1, "three", {"three": REFUSE}, reasons=["stalls"] * 3).talks[2].too_fast == 0
 
 
 def test_another_plan_stays_in_force_when_a_joint_plan_is_refused() -> None:
