@@ -33,7 +33,7 @@ from airground_drake.registry import ROUTES, Method
 from airground_drake.scenarios.budget import budget, takes_room
 from airground_drake.scenarios.courses import course
 from airground_drake.scenarios.outlines import outlines_of
-from airground_drake.scenarios.schema import Decision, Scenario
+from airground_drake.scenarios.schema import Decision, Plant, Scenario
 from airground_drake.scenarios.world import make_world
 
 SAME_TIME = 1e-12
@@ -83,8 +83,15 @@ def make_planner(scenario: Scenario, method: Method) -> Planner:
         robot_distance=apart,
         max_speed=np.array([ugv.max_speed_m_s for ugv in scenario.ugvs.values()]),
         radius=radius,
-        trails=tuple(any(each.kind != "first_order" for each in ugv.plant) for ugv in scenario.ugvs.values()),
+        trails=tuple(any(_trails(ugv.max_speed_m_s, each) for each in ugv.plant) for ugv in scenario.ugvs.values()),
     )
+
+
+def _trails(speed_m_s: float, plant: Plant) -> bool:
+    """Whether a plant may fall behind a motion within the speed limit; wheels alone cost little."""
+    if plant.kind == "unicycle":
+        return 0.0 < plant.max_turn_rad_s * plant.hand_point_m < speed_m_s
+    return plant.kind != "first_order"
 
 
 def _planned_apart(scenario: Scenario) -> tuple[Array, float]:
