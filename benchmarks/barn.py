@@ -47,7 +47,7 @@ def shortest_s(scenario: Scenario) -> float | None:
 
 
 def rows_of(path: Path, plant: dict[str, Any]) -> Iterator[dict[str, Any]]:
-    """What came of each method in a world, for a robot with a plant, see docs/keys.md."""
+    """What came of each method in a world, for a robot with a plant (a key of scenarios)."""
     data = yaml.safe_load(barn(path, path.stem, [], SIZES).text)
     data["ugvs"]["ugv1"] |= {"plant": plant} if plant else {}
     scenario = from_data(data, str(path))

@@ -203,7 +203,7 @@ class OutcomeGatekeepers(Gatekeepers):
 
 
 def _jointly(judged: Sequence[GatekeeperDecision], said: Sequence[float]) -> list[GatekeeperDecision]:
-    """The decisions of a sample: who would accept a part of a joint plan of which another part is refused, refuses."""
+    """The decisions of a sample. Where a part of a joint plan is refused, no other part of it is newly accepted."""
     refused = {each.proposal.joint for each in judged if _answer(each, said[each.robot]) == REFUSE}
     return [
         replace(each, accepted=False, reason=JOINT_REFUSED)

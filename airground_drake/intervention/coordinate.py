@@ -63,7 +63,7 @@ class Coordinate(Policy):
     5. If it has a way alone, but the joint plan helps nobody, less spacing is tried. A plan that helps nobody is not
        made again until a UGV has moved by more than the spacing of the roadmap, is asked for something else, or the map
        has changed.
-    6. A UGV that turns or lags and could not follow a motion, or would have stalled on the way, gets a slower one.
+    6. A UGV whose turning limit or lag kept it behind a motion, or would have, gets a slower one next time.
 
     Attributes:
         speed: largest speed, m/s; no UGV uses more than SHARE of its limit.
@@ -202,7 +202,7 @@ class Coordinate(Policy):
     def _pace(self, mate: Teammate) -> float:
         """The speed at which a UGV is planned for, m/s: half of it after each motion that was too fast for it.
 
-        A robot that turns or lags falls behind such a motion, and then cuts its corners.
+        A robot that falls behind a motion cuts its corners.
         """
         return min(self.speed, SHARE * mate.max_speed) / 2.0 ** min(mate.too_fast, MOST_HALVINGS)
 

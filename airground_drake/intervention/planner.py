@@ -139,8 +139,7 @@ class Planner:
         mapped_until: when each disappears, likewise.
         movers: obstacles that move.
         coasting: time for which an obstacle that moves is predicted to keep its velocity; then it stands, s.
-        trails: per UGV, whether its plant may fall behind a motion within its speed limit, as one that turns; default:
-            none does.
+        trails: per UGV, whether its plant may fall behind a motion within its speed limit; default: none does.
     """
 
     ugvs: tuple[str, ...]

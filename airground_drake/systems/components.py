@@ -88,7 +88,7 @@ def make_planner(scenario: Scenario, method: Method) -> Planner:
 
 
 def _trails(speed_m_s: float, plant: Plant) -> bool:
-    """Whether a plant may fall behind a motion within the speed limit; wheels alone cost little."""
+    """Whether a plant may fall behind a motion within the speed limit: by a turning limit, a lag, or as it likes."""
     if plant.kind == "unicycle":
         return 0.0 < plant.max_turn_rad_s * plant.hand_point_m < speed_m_s
     return plant.kind != "first_order"

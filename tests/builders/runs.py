@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from functools import cache
 
+import planner
+
+from airground_drake.run import simulation
 from airground_drake.run.trace import Trace
 from airground_drake.scenarios.schema import Decision, Obstacle, Threshold
 from builders.scenarios import STILL, case_a, lone
@@ -59,3 +62,9 @@ def beside_a_rock(step: float = 0.0, start: float = -2.0) -> Trace:
     """A UGV stands at the safe distance of an obstacle and takes one step into it, m."""
     scenario = lone([start, 0.0, 0.0], [start, 0.0, 0.0], STILL, 3.0, obstacles={"o": Obstacle([0.0] * 3)})
     return simulate(scenario, drive=lambda t: [[step / 0.025 * (round(t / 0.025) == 7), 0.0, 0.0], [0.0] * 3])
+
+
+@cache
+def dead_end() -> Trace:
+    """Under (d), ugv1 would accept its part of a joint plan, but the other three refuse theirs; later all accept."""
+    return simulation.simulate(planner.scenario_of("deadend4", planner.dead_end(4), 3.0), "d")

@@ -324,3 +324,18 @@ def test_the_planner_has_each_ugv_s_own_limits() -> None:
     made = make_planner(scenario, METHODS["d"])
     assert made.max_speed.tolist() == [2.5, scenario.ugvs["ugv2"].max_speed_m_s] != [2.5, 2.5]
     assert made.radii.tolist() == [0.0, 0.1]
+
+
+@pytest.mark.parametrize(
+    ("plant", "behind"),
+    [
+        ("{}", False),
+        ("{kind: lag, time_constant_s: 0.1}", True),
+        ("{kind: unicycle, hand_point_m: 0.2}", False),  # no turning limit
+        ("{kind: unicycle, hand_point_m: 0.2, max_turn_rad_s: 4.0}", True),
+        ("{kind: unicycle, hand_point_m: 0.2, max_turn_rad_s: 20.0}", False),  # 4 m/s at the hand point, limit 3 m/s
+    ],
+)
+def test_who_may_fall_behind_a_motion(plant: str, behind: bool) -> None:
+    scenario = load("minimal", [f"ugvs.ugv1.plant={plant}", "ugvs.ugv1.max_speed_m_s=3.0"])
+    assert make_planner(scenario, METHODS["d"]).trails == (behind,)

@@ -32,6 +32,7 @@ from airground_drake.verify.runs.gate_record import (
     reasons_of,
 )
 from airground_drake.verify.runs.pairs import are_too_near
+from airground_drake.verify.runs.proposals import proposal_of
 from airground_drake.verify.runs.sum_up_rounding import compare_rounding, integrated_error_s, is_rounded
 
 SPEED_TOLERANCE = 1e-4
@@ -48,7 +49,7 @@ BLOCKS = 10
 MOST_BLOCKS = 12
 """All plans of so many blocks can be evaluated along half-planes; they enclose the optimum of the route's problem."""
 JOINT_REFUSED = "joint_refused"
-"""Reason of a refusal that follows from another UGV's, not from the UGV's own two outcomes."""
+"""Reason of a refusal that follows from another UGV's refusal, and not from the UGV's own two outcomes."""
 NO_PROBLEM = "method (d) compares two predicted outcomes and solves no problem (26)"
 
 
@@ -111,8 +112,10 @@ class GatePlan(GateClaim):
         "Under method (c) the plan of every decision satisfies (26b)-(26e) at its recorded cost, no step of it is "
         "faster than the UGV may be, and relaxed plans were rounded by sum-up rounding, with an integrated error of at "
         "most half a stage. Under method (d) a plan is one of two choices for good: no decision chose to stop short of "
-        "the goal where the other choice would not, or would stop nearer to it. The margin is no condition: it is the "
-        "largest gap between the cost of a plan and the optimum of the half-plane problem, where that is known."
+        "the goal where the other choice would not, or would stop nearer to it. Only a UGV that refuses its part of a "
+        "joint plan because another UGV refuses its own is not asked for that: the other refusal must be there. The "
+        "margin is no condition: it is the largest gap between the cost of a plan and the optimum of the half-plane "
+        "problem, where that is known."
     )
     latex = (
         r"\rho_k = \rho_{k-1} + \Delta t (\omega_k a_k + (1 - \omega_k) b_k), \quad \rho_0 = p(t), \quad "
@@ -275,8 +278,14 @@ def _clear(trace: Trace, row: DecisionRecord, positions: Array, period: float) -
 
 def _judge_outcomes(trace: Trace, rows: Sequence[DecisionRecord]) -> Finding:
     """Method (d): the choice of every decision for which both outcomes were predicted, and that was the UGV's own."""
-    looked = [row for row in rows if row.given["accept_stalls"] >= 0.0 and row.given["reason"] != JOINT_REFUSED]
+    own = [row for row in rows if row.given["reason"] != JOINT_REFUSED]
+    looked = [row for row in own if row.given["accept_stalls"] >= 0.0]
     compared = [one for row in looked for one in _compare_choice(trace, row)]
+    refused = {_part(trace, row) for row in own if row.given["decision"] == "refuse"}
+    for row in rows:
+        if row.given["reason"] == JOINT_REFUSED:
+            alone = row.given["decision"] != "refuse" or _part(trace, row) not in refused
+            compared.append(Deviation(row, "no other UGV refuses its part of the joint plan", float(alone), 0.0))
     gaps = [_above_the_other(row) for row in looked]
     evidence = Choices(
         decisions=len(rows),
@@ -288,6 +297,12 @@ def _judge_outcomes(trace: Trace, rows: Sequence[DecisionRecord]) -> Finding:
         largest_gap_to_enumeration=max(gaps, default=None),
     )
     return conclude(Finding("holds", evidence=asdict(evidence), exercised=len(looked)), compared)
+
+
+def _part(trace: Trace, row: DecisionRecord) -> tuple[float, float, Sequence[str]]:
+    """When a decision was made, s, and the joint plan that it is about: when it was sent, s, and its parties."""
+    on = proposal_of(trace, row.number)
+    return row.t_s, on.issued_s, on.party or (on.ugv,)
 
 
 def _compare_choice(trace: Trace, row: DecisionRecord) -> Iterator[Deviation]:

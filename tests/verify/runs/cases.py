@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 from builders.decisions import STAGES
 from builders.edits import first_of, with_decision, with_meta, with_samples, with_scenario, with_states
-from builders.runs import beside_a_rock, chattering, leaking, refractory, run_of
+from builders.runs import beside_a_rock, chattering, dead_end, leaking, refractory, run_of
 
 from airground_drake.run.trace import Trace
 
@@ -20,12 +20,12 @@ EIGHT = [f"gatekeeper.stages={STAGES}", "gatekeeper.horizon_s=0.4"]
 SIXTH = 5
 """The decision that is edited: the best plan there changes its mode."""
 
-A, D = "synthetic a", "synthetic d"
+A, D, JOINT = "synthetic a", "synthetic d", "dead end"
 A_D, B_C, B_D, DOORWAY, SWAP = "case_a d", "case_b c", "case_b d", "doorway d", "swap c"
 RELAXED, BINARY, LOCAL, BLOCKS = "relaxed", "mixed_integer", "nonlinear", "blocks"
 SYNTHETIC: dict[str, Callable[[], Trace]] = {
     A: lambda: run_of("a"), D: lambda: run_of("d"), "refractory": refractory, "leaking": leaking,
-    "chattering": chattering, "at a rock": beside_a_rock,
+    "chattering": chattering, "at a rock": beside_a_rock, JOINT: dead_end,
 }  # fmt: skip
 
 
@@ -78,6 +78,10 @@ def accepted(table: pd.DataFrame) -> Any:
 
 def refused(table: pd.DataFrame) -> Any:
     return table["reason"] == "stalls"
+
+
+def for_another(table: pd.DataFrame) -> Any:
+    return table["reason"] == "joint_refused"
 
 
 def executing(table: pd.DataFrame) -> Any:
