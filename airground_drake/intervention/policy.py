@@ -34,8 +34,8 @@ class Teammate:
         proposal: its proposal in force, or None.
         answered: its answer to that proposal.
         refusals: number of proposals that it has refused in the current intervention.
-        too_fast: number of motions that its plant could not follow, by its turning limit or lag: it refused them because
-            it would have stalled on the way, or was left behind by them.
+        too_fast: number of motions that its plant could not follow, by its turning limit or lag: it would have stalled
+            on the way and refused them, or was left behind by them.
         resting: whether it gets no proposal now because it has refused one recently.
         radius: of its body, m.
     """
