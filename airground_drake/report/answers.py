@@ -109,9 +109,7 @@ def _encounters(course: RunOutcome) -> str:
 
 def _intrusion(course: RunOutcome) -> str:
     """Who came how near to what, when, and how many others did."""
-    unknown = ", which the UAV did not know"
-    every = course.hits.values()
-    hits = list(dict.fromkeys(collision(hit) + unknown * (hit.get("obstacle") in course.unknown) for hit in every))
+    hits = list(dict.fromkeys(collision(hit, course.unknown) for hit in course.hits.values()))
     if hits:
         more = len(hits) - MAX_NAMES
         told = "; ".join([*hits[:MAX_NAMES], *[f"{more} more collisions"] * (more > 0)])

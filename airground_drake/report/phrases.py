@@ -115,9 +115,10 @@ def colliding(course: RunOutcome) -> str:
     return f"{_robots([*course.hits])} collide{'s' * (len(course.hits) == 1)}"
 
 
-def collision(hit: Mapping[str, Any]) -> str:
-    """Who collided with what and when, by the event."""
-    return clause("collides", hit, what=hit.get("other") or named(hit["obstacle"], hit.get("at_m")))
+def collision(hit: Mapping[str, Any], unknown: Sequence[str] = ()) -> str:
+    """Who collided with what and when, by the event; and whether that is among the obstacles unknown to the UAV."""
+    what = hit.get("other") or named(hit["obstacle"], hit.get("at_m"))
+    return clause("collides", hit, what=what + ", which the UAV did not know," * (hit.get("obstacle") in unknown))
 
 
 def ending(course: RunOutcome, robot: str) -> str:

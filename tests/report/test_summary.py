@@ -849,13 +849,13 @@ def test_a_collision_has_the_time_of_the_event_and_nothing_after_it_counts() -> 
     ]
 
 
-@pytest.mark.parametrize(("run", "told"), [("b", ", which the UAV did not know"), ("a", ""), ("c", ""), ("d", "")])
+@pytest.mark.parametrize(("run", "told"), [("b", ", which the UAV did not know,"), ("a", ""), ("c", ""), ("d", "")])
 def test_a_collision_with_what_the_uav_never_hears_of_says_so(run: str, told: str) -> None:
     """Under (a) it asks for nothing, under (c) and (d) answers tell it what UGVs sense."""
     given = document(World({run: replace(HIT, method=run)}))
     given["scenario"]["resolved"]["obstacles"] = {"rock": {"known_to_uav": False}}
     (line,) = summary.first_screen(given).answers[0].lines[:1]
-    assert line.text == f"{run}: ugv1 collides with rock at 11.40 s{told}."
+    assert line.text == f"{run}: ugv1 collides with rock{told} at 11.40 s."
 
 
 AGAINST = "Against the task error without noise"
