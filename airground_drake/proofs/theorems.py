@@ -232,7 +232,7 @@ _ALL = (
         ("The share that is left is above 0 and at most 1.",),
     ),
     Theorem(
-        "Turning.shortened_gain", "ours", ("SAFE-HYP",),
+        "Turning.shortened_gain", "ours", ("SAFE-HYP", "SAFE-DIST"),
         "Inside the distance of the law a command shortened to the share s meets the law with the gain s A.",
         ("The share that is left is above 0 and at most 1.",),
     ),

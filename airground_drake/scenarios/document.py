@@ -223,10 +223,14 @@ def replace(document: Document, override: str) -> None:
     key, equals, text = override.partition("=")
     if not equals or not key.strip():
         raise ScenarioError(source, "", override, "wanted: dotted.key=value, such as control.period_s=0.05")
-    at = tuple(key.strip().split("."))
-    if at[::2][:2] == ("runs", "set"):  # whose keys have dots
-        at = at[:3] + (".".join(at[3:]),) * (len(at) > 3)
+    at = place_of(key)
     put(document, at, parsed(text, source, at).data, source)
+
+
+def place_of(key: str) -> tuple[str, ...]:
+    """The names and indices of a dotted key."""
+    at = tuple(key.strip().split("."))
+    return at[:3] + (".".join(at[3:]),) * (len(at) > 3) if at[::2][:2] == ("runs", "set") else at  # its keys have dots
 
 
 def put(document: Document, at: tuple[str, ...], new: Any, source: str) -> None:

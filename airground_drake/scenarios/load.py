@@ -14,10 +14,10 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from airground_drake.base.errors import Fault, ScenarioError
+from airground_drake.base.errors import Fault, ScenarioError, short
 from airground_drake.base.exact import decimal
 from airground_drake.scenarios import map_file, validate
-from airground_drake.scenarios.document import Document, of_data, put, read, replace, simple
+from airground_drake.scenarios.document import Document, of_data, place_of, put, read, replace
 from airground_drake.scenarios.filled import filled
 from airground_drake.scenarios.schema import Scenario, Vector
 from airground_drake.scenarios.shipped import shipped
@@ -39,7 +39,7 @@ def load(name_or_path: str | Path, overrides: Overrides = ()) -> Scenario:
     Raises:
         ScenarioError: if the file cannot be read or an override or the scenario is not valid.
     """
-    return _build(read(name_or_path)[0], _texts(overrides))
+    return _build(read(name_or_path)[0], overrides)
 
 
 def validated(scenario: Scenario, overrides: Overrides = ()) -> Scenario:
@@ -73,7 +73,7 @@ def from_data(data: Mapping[str, Any], source: str, overrides: Overrides = ()) -
     Raises:
         ScenarioError: if it is not valid.
     """
-    return _build(of_data(data, source), _texts(overrides))
+    return _build(of_data(data, source), overrides)
 
 
 def resolved(scenario: Scenario) -> dict[str, Any]:
@@ -87,10 +87,14 @@ def resolved(scenario: Scenario) -> dict[str, Any]:
     return dataclasses.asdict(scenario)
 
 
-def _build(document: Document, overrides: Sequence[str]) -> Scenario:
+def _build(document: Document, overrides: Overrides) -> Scenario:
     """The scenario of a document with overrides, checked."""
-    for override in overrides:
-        replace(document, override)
+    if isinstance(overrides, Mapping):
+        for key, value in overrides.items():
+            _put(document, str(key), value)
+    else:
+        for override in overrides:
+            replace(document, override)
     scenario = _checked(document)
     for name, run in scenario.runs.items():
         if run.set:
@@ -180,25 +184,15 @@ def _over_the_targets(scenario: Scenario) -> Vector:
     return [x, y, scenario.uav.altitude_m]
 
 
-def _texts(overrides: Overrides) -> list[str]:
-    """Overrides as on the command line.
+def _put(document: Document, key: str, value: Any) -> None:
+    """Change a document: put a value made in Python at a dotted key.
 
     Raises:
-        ScenarioError: if a value has no text in YAML.
+        ScenarioError: if the value has no text in YAML, or the item does not exist.
     """
-    if not isinstance(overrides, Mapping):
-        return list(overrides)
-    texts = []
-    for key, value in overrides.items():
-        try:
-            texts.append(f"{key}={_yaml_of(json.dumps(simple(value), ensure_ascii=False))}")
-        except (TypeError, ValueError) as error:
-            raise ScenarioError(
-                "override", str(key), Fault(str(error)), "wanted: a number, text, list or dict"
-            ) from None
-    return texts
-
-
-def _yaml_of(text: str) -> str:
-    """JSON as YAML: other characters as single escapes, as YAML would read a surrogate pair of JSON as two."""
-    return "".join(each if " " <= each <= "~" else f"\\U{ord(each):08x}" for each in text)
+    new = of_data(value, f"override {key}").data
+    try:
+        text = json.dumps(new, ensure_ascii=False)
+    except (TypeError, ValueError) as error:
+        raise ScenarioError("override", key, Fault(str(error)), "wanted: a number, text, list or dict") from None
+    put(document, place_of(key), new, f"--set {short(f'{key}={text}')}")

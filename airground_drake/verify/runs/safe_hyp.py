@@ -213,7 +213,7 @@ class SafeHyp(TraceClaim):
                 )
             )
             | ({"beside_moving": [asdict(each) for each in moving]} if moving else {})
-            | ({"least_command_shares": shares} if shares else {})
+            | ({"least_shares": [asdict(each) for each in shares]} if shares else {})
             | ({"own_plants": [asdict(each) for each in own]} if own else {}),
             exercised=sum(binding.values()),
         )
@@ -422,10 +422,21 @@ def _sampled(trace: Trace) -> Iterator[_Hypothesis]:
             yield _Hypothesis("planar motion", "m", t, 0.0 - np.abs(place[:, 2] - place[0, 2]), 0.0, about)
 
 
-def least_shares(trace: Trace) -> dict[str, float]:
-    """The least share that was left of a command of each unicycle; inside d_law it recovers at so much of the gain."""
+@dataclass(frozen=True)
+class LeastShare:
+    """The least share s that was left of a command of a unicycle in a run, and the gain s A of its recoveries, 1/s."""
+
+    robot: str
+    share: float
+    gain_1_s: float
+
+
+def least_shares(trace: Trace) -> list[LeastShare]:
+    """Of each unicycle; a command in full has the share 1."""
+    gain = trace.scenario.control.avoidance_gain_1_s
     names = [ugv for ugv, each in trace.scenario.ugvs.items() if any(plant.kind == "unicycle" for plant in each.plant)]
-    return {name: float(trace.sampled(f"{name}.command_share").min()) for name in names}
+    shares = [float(trace.sampled(f"{name}.command_share").min()) for name in names]
+    return [LeastShare(name, share, share * gain) for name, share in zip(names, shares, strict=True)]
 
 
 @dataclass(frozen=True)
