@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from fractions import Fraction
+from functools import lru_cache
 
 
+@lru_cache(maxsize=1024)  # a scenario has few different numbers, and each is asked for often
 def decimal(number: float) -> Fraction:
     """The decimal number that a float prints as, exactly: 0.1 is 1/10."""
     return Fraction(repr(float(number)))

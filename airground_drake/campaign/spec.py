@@ -157,8 +157,7 @@ class Spec(File):
         for run in self.runs:
             if run not in scenario.runs:
                 raise _unknown(self.source, "runs", run, scenario.runs)
-        runs = {run: scenario.runs[run] for run in self.runs} if self.runs else scenario.runs
-        return replace(scenario, name=f"{_identifier(self.name)[: MAX_NAME - 1 - len(str(index))]}_{index}", runs=runs)
+        return replace(scenario, name=f"{_identifier(self.name)[: MAX_NAME - 1 - len(str(index))]}_{index}")
 
     def refuse_plugins(self) -> None:
         """Refuse third-party code in the scenario and in everything that may be drawn.
@@ -183,7 +182,7 @@ class Spec(File):
 
     def _with(self, overrides: Mapping[str, Any]) -> Scenario:
         """The scenario with values by dotted key; raises as `draw`."""
-        return from_data(self.data, self.scenario, overrides)
+        return from_data(self.data, self.scenario, overrides, self.runs)
 
 
 def load_spec(path: Path) -> Spec:

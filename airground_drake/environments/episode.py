@@ -12,7 +12,7 @@ from airground_drake.intervention.agent import Agent, Proposed
 from airground_drake.intervention.policy import Observation
 from airground_drake.run.simulation import Recorder
 from airground_drake.run.trace import Trace
-from airground_drake.scenarios.load import own, validated
+from airground_drake.scenarios.load import own
 from airground_drake.scenarios.schema import Policy, Scenario
 
 AGENT = "agent"
@@ -34,14 +34,12 @@ def with_agent(scenario: Scenario, run: str) -> Scenario:
     policies = own_keys.intervention.policies
     if AGENT not in (each.name for each in policies):
         policies = [Policy(AGENT)]
-    return validated(
-        replace(
-            own_keys,
-            intervention=replace(own_keys.intervention, policies=policies),
-            runs={run: replace(own_keys.runs[run], set={})},
-            reproduction=[],
-            choices=[],
-        )
+    return replace(
+        own_keys,
+        intervention=replace(own_keys.intervention, policies=policies),
+        runs={run: replace(own_keys.runs[run], set={})},
+        reproduction=[],
+        choices=[],
     )
 
 

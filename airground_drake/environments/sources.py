@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import OrderedDict
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -46,6 +47,8 @@ class Source:
         self.numbers = range(MAX_SEED) if numbers is None else numbers
         first = self._given.draw(self.numbers[0]) if isinstance(self._given, Spec) else self._given
         self._run = _chosen(first, run)
+        if isinstance(self._given, Spec):
+            self._given = replace(self._given, runs=(self._run,))
         self.ugvs = tuple(first.ugvs)
         if isinstance(given, Spec) and given.course is not None:
             self.ugvs = given.course.names

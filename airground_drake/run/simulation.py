@@ -61,10 +61,10 @@ class Recorder:
     ) -> None:
         """Build the model of a run of the scenario and its logger.
 
-        `decision_block`, `observers` and `plants` as in `simulate`, `make_gatekeepers` as in `build_model`; raises as
-        `simulate`.
+        `scenario` is valid and declares the `plants` (`systems.plant.declared`). `decision_block`, `observers` and
+        `plants` as in `simulate`, `make_gatekeepers` as in `build_model`; raises as `simulate`.
         """
-        self._scenario, self._name = declared(scenario, plants), name
+        self._scenario, self._name = scenario, name
         if name not in self._scenario.runs:
             raise UnknownNameError("run", name, self._scenario.runs)
         self._run = self._scenario.runs[name]
@@ -283,4 +283,5 @@ def simulate(
     """
     if seed is not None:
         scenario = validated(scenario, {"seed": seed})
-    return Recorder(scenario, run, decision_block, observers, plants=plants).simulate(watch=watch, speed=speed)
+    valid = declared(scenario, plants)
+    return Recorder(valid, run, decision_block, observers, plants=plants).simulate(watch=watch, speed=speed)

@@ -6,7 +6,6 @@ checks the data against the dataclasses of `schema.py` and builds them. `validat
 
 from __future__ import annotations
 
-import copy
 import dataclasses
 import json
 import math
@@ -17,7 +16,7 @@ from typing import Any
 from airground_drake.base.errors import Fault, ScenarioError, short
 from airground_drake.base.exact import decimal
 from airground_drake.scenarios import map_file, validate
-from airground_drake.scenarios.document import Document, of_data, place_of, put, read, replace
+from airground_drake.scenarios.document import Document, of_data, place_of, put, read, replace, simple
 from airground_drake.scenarios.filled import filled
 from airground_drake.scenarios.schema import Scenario, Vector
 from airground_drake.scenarios.shipped import shipped
@@ -62,18 +61,19 @@ def validated(scenario: Scenario, overrides: Overrides = ()) -> Scenario:
         raise ScenarioError(source, "", Fault(str(error)), "wanted: a Scenario") from None
 
 
-def from_data(data: Mapping[str, Any], source: str, overrides: Overrides = ()) -> Scenario:
+def from_data(data: Mapping[str, Any], source: str, overrides: Overrides = (), runs: Sequence[str] = ()) -> Scenario:
     """A scenario from nested dicts and lists, such as `resolved` gives, checked like a file.
 
     Args:
         data: with the keys of a scenario file.
         source: where the data come from, for messages.
         overrides: as in `load`.
+        runs: to be kept, if the scenario has them all; default: all.
 
     Raises:
         ScenarioError: if it is not valid.
     """
-    return _build(of_data(data, source), overrides)
+    return _build(of_data(data, source), overrides, runs)
 
 
 def resolved(scenario: Scenario) -> dict[str, Any]:
@@ -87,14 +87,17 @@ def resolved(scenario: Scenario) -> dict[str, Any]:
     return dataclasses.asdict(scenario)
 
 
-def _build(document: Document, overrides: Overrides) -> Scenario:
-    """The scenario of a document with overrides, checked."""
+def _build(document: Document, overrides: Overrides, runs: Sequence[str] = ()) -> Scenario:
+    """The scenario of a document with overrides, checked; only with some runs, if it has them."""
     if isinstance(overrides, Mapping):
         for key, value in overrides.items():
             _put(document, str(key), value)
     else:
         for override in overrides:
             replace(document, override)
+    given = document.data.get("runs") if runs and isinstance(document.data, dict) else None
+    if isinstance(given, dict) and {*runs} <= given.keys():
+        document.data["runs"] = {name: given[name] for name in runs}
     scenario = _checked(document)
     for name, run in scenario.runs.items():
         if run.set:
@@ -119,7 +122,7 @@ def _as_set(document: Document, run: str, settings: Mapping[str, Any]) -> Scenar
     Raises:
         ScenarioError: if the result is not valid; the message names the run.
     """
-    changed = Document(copy.deepcopy(document.data), document.source, dict(document.places))
+    changed = Document(simple(document.data), document.source, dict(document.places))
     try:
         for key, value in settings.items():
             put(changed, tuple(key.split(".")), value, document.where("runs", run, "set", key))

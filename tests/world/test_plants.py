@@ -232,6 +232,20 @@ def test_a_unicycle_that_never_drives_backwards_does_not(seed: int, hand: float,
     assert not back.any()
 
 
+def test_the_gain_that_a_turning_limit_leaves_is_that_of_the_command_shortened_most() -> None:
+    """Where a command is shortened, the robot turns as fast as it may: at the start, towards a target behind it."""
+    slow = "{kind: unicycle, hand_point_m: 0.3, max_turn_rad_s: 0.8, heading_rad: 2.5}"
+    trace = run_of(slow)
+    (found,) = judge(trace, ["SAFE-HYP"])
+    (least,) = found.evidence["least_shares"]  # type: ignore[index]
+    shares = trace.sampled("ugv1.command_share")
+    turned = np.diff(trace.column("ugv1.heading_rad")[trace.sample_rows]) / trace.scenario.control.period_s
+    assert least == {"robot": "ugv1", "share": shares.min(), "gain_1_s": shares.min() * 3.0}
+    assert 0.01 < shares.min() < 0.5
+    np.testing.assert_allclose(np.abs(turned[shares[:-1] < 1.0]), 0.8, atol=1e-9)
+    assert (np.abs(turned[shares[:-1] == 1.0]) < 0.8).all()
+
+
 def test_its_target_straight_behind_it_stands_for_ever_but_for_a_little_aside_it_turns() -> None:
     found = []
     for heading in (math.pi, 3.1):
