@@ -8,7 +8,6 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import ndimage
 
 from airground_drake.base.arrays import Array
 from airground_drake.maps.rectangles import Cells, Rectangles
@@ -73,6 +72,8 @@ class Grid(NamedTuple):
         Args:
             robots: where they are, [x, y], m.
         """
+        from scipy import ndimage  # takes long to import, and most scenarios have no map
+
         free = np.pad(~self.occupied, 1, constant_values=True)  # a way round the map
         regions = ndimage.label(free)[0]
         cells = np.clip(self.cells(np.reshape(robots, (-1, 2))) + 1, 0, np.array(free.shape) - 1)
@@ -86,6 +87,8 @@ class Grid(NamedTuple):
 
         It is at most the distance from the cell. Where nothing is occupied, it is infinite.
         """
+        from scipy import ndimage
+
         if not self.occupied.any():
             return np.full(self.occupied.shape, math.inf)
         return (ndimage.distance_transform_edt(~self.occupied) - math.sqrt(0.5)) * self.frame.cell_m
