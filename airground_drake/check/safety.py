@@ -56,10 +56,12 @@ def _least_m(run: Run, pair: Pair, enough: float) -> float:
     lower = pair.shape.held_m(apart[:-1], apart[:-1], apart[1:], enough + bent)[1] - bent
     too_near = lower < pair.safe_m
     parts = _parts(bent)
+    left = bent / parts**2
     found = min(enough, float(lower[~too_near].min(initial=np.inf)))
-    for row in (run.there(pair.other).start + np.flatnonzero(too_near)).tolist():
-        fine = run.fine(pair.robot, row, parts) - run.fine(pair.other, row, parts)
-        found = min(found, pair.shape.least_m(fine) - bent / parts**2)
+    begin = run.there(pair.other).start
+    for k in (each for each in np.argsort(lower).tolist() if too_near[each]):  # others are farther than the nearest
+        fine = run.fine(pair.robot, begin + k, parts) - run.fine(pair.other, begin + k, parts)
+        found = min(found, pair.shape.least_m(fine, found + left, parts) - left)
     return found
 
 
@@ -88,7 +90,7 @@ def safe_own(run: Run) -> Found | None:
     for pair in run.pairs:
         keeps, closing = pair.in_the_law.passive(period).safe_m - pair.cover_m, pair.closing_m_s * period
         there = run.there(pair.other)
-        both, reach = rows[there.start : there.stop - 1], keeps + closing + 2.0 * longest
+        both, reach = rows[there.start : there.stop - 1], keeps + closing + 2.0 * (longest + pair.cover_m)
         if run.apart_m[pair.robot, pair.other] > reach:
             continue
         for robot, other in ((pair.robot, pair.other), (pair.other, pair.robot)):
@@ -104,7 +106,7 @@ def safe_own(run: Run) -> Found | None:
                 for k in np.flatnonzero(asked & (left < 0.0)).tolist() if bent[robot] else ():
                     parts = _parts(bent[robot])
                     fine = run.fine(robot, int(both[k]), parts) - held[k]
-                    left[k] = pair.shape.least_m(fine) - bent[robot] / parts**2 - due[k]
+                    left[k] = pair.shape.least_m(fine, steps=parts) - bent[robot] / parts**2 - due[k]
                 margin = min(margin, float(left[asked].min(initial=np.inf)))
         if pair.moves_m_s:
             spare = (steered_m - pair.cover_m - keeps - closing)[sample[both] == both]

@@ -134,16 +134,16 @@ class Shape:
         apart = np.linalg.norm(np.maximum(gap, 0.0), axis=2) - ROUNDING_M
         return np.where(apart > 0.0, apart, -np.inf)
 
-    def near(self, places: Array) -> Iterator[tuple[float, Part, slice]]:
+    def near(self, places: Array, steps: int = ROWS) -> Iterator[tuple[float, Part, slice]]:
         """Each part with each slice of places, the nearest first, and a lower bound of its distance, m."""
-        bounds = self.bounds_m(*boxes_of(places))
+        bounds = self.bounds_m(*boxes_of(places, steps))
         for k in np.argsort(bounds, axis=None):
             begin, part = divmod(int(k), len(self.parts))
-            yield float(bounds.flat[k]), self.parts[part], slice(ROWS * begin, ROWS * (begin + 1) + 1)
+            yield float(bounds.flat[k]), self.parts[part], slice(steps * begin, steps * (begin + 1) + 1)
 
-    def least_m(self, places: Array, reach_m: float = np.inf) -> float:
+    def least_m(self, places: Array, reach_m: float = np.inf, steps: int = ROWS) -> float:
         """Least signed distance along the straight steps from place to place, m, at most `reach_m`."""
-        for bound, part, rows in self.near(places):
+        for bound, part, rows in self.near(places, steps):
             if bound >= reach_m:
                 break
             at_m = part.signed_m(places[rows])
@@ -182,9 +182,9 @@ class Shape:
 POINT = Shape([Part([(0.0, 0.0)], 0.0, 0.0)])
 
 
-def boxes_of(places: Array) -> tuple[Array, Array]:
+def boxes_of(places: Array, steps: int = ROWS) -> tuple[Array, Array]:
     """Two opposite corners of a box round each slice of places (K, 3), m: (S, 3) each. A row joins two slices."""
-    begin = np.arange(0, max(len(places) - 1, 1), ROWS)
+    begin = np.arange(0, max(len(places) - 1, 1), steps)
     low, high = np.minimum.reduceat(places, begin), np.maximum.reduceat(places, begin)
     low[:-1], high[:-1] = np.minimum(low[:-1], places[begin[1:]]), np.maximum(high[:-1], places[begin[1:]])
     return low, high
