@@ -52,6 +52,12 @@ def test_the_checker_agrees_with_a_run_of_one_period() -> None:
     assert tried(drawn("c", {"decision": AT_ONCE}, 1, 77))[2] == []
 
 
+@pytest.mark.parametrize("number", [20089, 20051], ids=["steered_point_within_reach", "bent_ways_that_overlap"])
+def test_the_checker_agrees_where_bodies_are_apart_from_their_steered_points(number: int) -> None:
+    """The second: robots in contact in many periods on bent ways. The checker once did not end within its limit."""
+    assert tried(from_data(draw(number), "drawn"))[2] == []
+
+
 def test_points_are_listed_as_the_controllers_list_them() -> None:
     """Recursion (5) depends on what comes first: here an obstacle and a robot, both in the way of a UGV."""
     data = draw(366) | {"runs": {"a": {"method": "a", "composition": "recursion_listed"}}}
