@@ -14,7 +14,8 @@ WORDS = {
     "meter": "m", "meters": "m", "metre": "m", "metres": "m", "millimeter": "mm", "millimeters": "mm",
     "millimetre": "mm", "millimetres": "mm", "centimeter": "cm", "centimeters": "cm", "centimetre": "cm",
     "centimetres": "cm", "sec": "s", "secs": "s", "second": "s", "seconds": "s", "msec": "ms", "milliseconds": "ms",
-    "usec": "us", "microseconds": "us", "nsec": "ns", "nanosec": "ns", "nanoseconds": "ns",
+    "usec": "us", "microseconds": "us", "\u00b5s": "us", "\u03bcs": "us", "nsec": "ns", "nanosec": "ns",
+    "nanoseconds": "ns",
 }  # fmt: skip
 """Other words for units."""
 BODIES = (
@@ -24,29 +25,41 @@ BODIES = (
 """Names of a column that says whose row it is."""
 FRAMES = ("frame", "frame_id", "reference_frame")
 STAMPS = (
-    "t", "time", "stamp", "timestamp", "timestamps", "times", "sim_time", "simtime", "elapsed", "clock", "seconds",
-    "secs", "sec", "date", "datetime", "__time",
+    "t", "time", "stamp", "timestamp", "timestamps", "times", "sim_time", "simtime", "elapsed", "elapsed_time", "clock",
+    "ros_time", "unix_time", "epoch_time", "epoch", "header_stamp", "seconds", "secs", "sec", "date", "datetime",
+    "__time",
 )  # fmt: skip
 RECEIPT = ("%time", "receive_time", "received", "recv_time", "log_time", "receipt", "rosbagtimestamp")
 """Names of a column with the times at which messages were received."""
 TARGETS = ("t", "body", "frame", "x", "y", "z")
 """What `--map-columns` can give a name to."""
 _BRACKETS = re.compile(r"(.*?)\s*[\[(]\s*([^\])]*?)\s*[\])]")
-_SUFFIX = re.compile(r"(.+)[_/](mm|cm|m|s|ms|us|ns)", re.IGNORECASE)
+_SUFFIX = re.compile(r"(.+?)\s*[_/]\s*(mm|cm|m|s|ms|us|ns|secs?|seconds|msec|usec|nsec)", re.IGNORECASE)
 _AXIS = re.compile(r"(?:(.*?)[/._\s:|-])?(?:(?:t|p|pos|position|pose|translation)_?)?([xyz])", re.IGNORECASE)
 _AXIS_FIRST = re.compile(r"(?:pos_?)?([xyz])[/._\s-](.+)", re.IGNORECASE)
+_POSITIONS = ("", "p", "pos", "position", "pose", "place", "point", "location", "translation", "xyz")
+"""Last words of names of places, but for those of bodies; '' is that of plain x and y."""
 _WHOLE = re.compile(r"(.*?)[/._]?(?:secs?|seconds)", re.IGNORECASE)
 _REST = ["nsec", "nsecs", "nanosec", "nanosecs", "nanoseconds"]
 
 
 class Time(NamedTuple):
-    """A column of stamps; `rest` is that of nanoseconds, if `whole` has seconds. `owner` begins what it belongs to."""
+    """A column of stamps; `rest` is that of nanoseconds, if `whole` has seconds.
+
+    `owner` is the beginning of the names of the places that it belongs to; '' for all.
+    """
 
     whole: int
     rest: int | None
     unit: str
     rank: int
     owner: str
+
+
+    def is_of(self, place: Place) -> bool:
+        """Whether it may be the clock of a place."""
+        after = place.name[len(self.owner) :]
+        return not self.owner or (place.name.startswith(self.owner) and not after[:1].isalnum())
 
 
 class Place(NamedTuple):
@@ -57,6 +70,11 @@ class Place(NamedTuple):
     y: int
     z: int | None
     units: Sequence[str]
+
+    @property
+    def is_position(self) -> bool:
+        """Whether its name says so, or nothing else."""
+        return re.split(r"[^a-z]+", self.name.lower())[-1] in _POSITIONS
 
 
 class Columns(NamedTuple):
@@ -80,12 +98,15 @@ def columns(labels: Sequence[str], chosen: Mapping[str, str], bodies: Collection
     Raises:
         LogError: if a chosen column is missing, or two columns have one meaning.
     """
-    labels = _mapped(labels, chosen)
+    labels, mapped = _mapped(labels, chosen)
+    given = {split_unit(target)[0] for target, name in chosen.items() if "{body}" not in name}
     axes: dict[str, dict[str, tuple[int, str]]] = {}
     for k, label in enumerate(labels):
         base, unit = split_unit(label)
         name, axis = _axis(base, bodies)
         if not axis or (unit and unit not in PER_M) or is_elsewhere(name, bodies):
+            continue
+        if axis in given and not name and k not in mapped:
             continue
         if axis in axes.setdefault(name, {}):
             raise LogError(f"two columns are called {label!r}; wanted: one, or --map-columns {axis}=NAME")
@@ -101,12 +122,33 @@ def columns(labels: Sequence[str], chosen: Mapping[str, str], bodies: Collection
         for name, each in axes.items()
         if {"x", "y"} <= each.keys()
     ]
-    return Columns(_times(labels), _named(labels, BODIES), _named(labels, FRAMES), places)
+    times = [each for each in _times(labels, {*axes, *bodies}) if "t" not in given or each.whole in mapped]
+    body, frame = (
+        _named([label if target not in given or k in mapped else "" for k, label in enumerate(labels)], names)
+        for target, names in (("body", BODIES), ("frame", FRAMES))
+    )
+    return Columns(times, body, frame, places)
+
+
+def clock_of(place: Place, times: Sequence[Time], labels: Sequence[str]) -> Time:
+    """The stamps of a place: its own; of several columns with one name, the last before it.
+
+    Raises:
+        LogError: if all columns of stamps are those of other places.
+    """
+    own = next((each for each in times if each.is_of(place)), None)
+    if own is None:
+        named = listed([labels[each.whole] for each in times])
+        raise LogError(f"{place.name} has no times of its own: there are {named}; wanted: --map-columns t=NAME")
+    alike = [each for each in times if labels[each.whole] == labels[own.whole] and each.whole < place.x]
+    return max(alike, key=lambda each: each.whole, default=own)
 
 
 def _axis(base: str, bodies: Collection[str]) -> tuple[str, str]:
     """Name and axis of a column without its unit: `tb1.x`, `tb1_pos_x`, also `x_tb1` of a body; else ''."""
     if (found := _AXIS_FIRST.fullmatch(base)) and found[2] in bodies:
+        return found[2], found[1].lower()
+    if found and found[2].lower() in _POSITIONS:
         return found[2], found[1].lower()
     found = _AXIS.fullmatch(base)
     return ((found[1] or "").strip(), found[2].lower()) if found else ("", "")
@@ -117,13 +159,13 @@ def split_unit(label: str) -> tuple[str, str]:
     if found := _BRACKETS.fullmatch(label):
         return found[1].rstrip("/"), WORDS.get(found[2].lower(), found[2].lower()) or "none"
     if (found := _SUFFIX.fullmatch(label)) and not _AXIS.fullmatch(label):
-        return found[1], found[2].lower()
+        return found[1], WORDS.get(found[2].lower(), found[2].lower())
     return label, ""
 
 
-def _mapped(labels: Sequence[str], chosen: Mapping[str, str]) -> list[str]:
-    """The labels, with those that `--map-columns` names replaced by the usual ones."""
-    found = list(labels)
+def _mapped(labels: Sequence[str], chosen: Mapping[str, str]) -> tuple[list[str], set[int]]:
+    """The labels, with those that `--map-columns` names replaced by the usual ones, and the numbers of these."""
+    found, mapped = list(labels), set[int]()
     for target, pattern in chosen.items():
         names = [re.escape(each) for each in pattern.split("{body}")]
         matching = re.compile(r"(?P<body>.+)".join(names[:2]) if len(names) > 1 else names[0])
@@ -132,7 +174,8 @@ def _mapped(labels: Sequence[str], chosen: Mapping[str, str]) -> list[str]:
             raise LogError(f"--map-columns {target}={pattern}: there is no such column; there are {listed(labels)}")
         for k, hit in hits:
             found[k] = f"{hit['body']}.{target}" if len(names) > 1 else target
-    return found
+            mapped.add(k)
+    return found, mapped
 
 
 def listed(names: Sequence[str], most: int = 12) -> str:
@@ -151,26 +194,40 @@ def _named(labels: Sequence[str], names: Sequence[str]) -> int | None:
     return next((last.index(name) for name in names if name in last), None)
 
 
-def _times(labels: Sequence[str]) -> list[Time]:
-    """Stamps of headers, then others, then times of receipt."""
-    found = []
+def _times(labels: Sequence[str], names: Collection[str]) -> list[Time]:
+    """Stamps of headers, then others, dates, and times of receipt; `names` are those of places and bodies."""
+    found, rests = [], set[int]()
     low = [label.lower() for label in labels]
     for k, label in enumerate(low):
         base, unit = split_unit(label)
+        owner, last = _owner(labels[k], names)
         whole = _WHOLE.fullmatch(label)
         if whole and (rest := [low.index(f"{whole[1]}{mark}{each}") for each in _REST for mark in ("", ".", "/", "_")
                                if f"{whole[1]}{mark}{each}" in low]):  # fmt: skip
             of_header = "header" in segments(whole[1]) or whole[1].endswith("stamp")
-            found.append(Time(k, rest[0], "s", 0 if of_header else 1, _owner(labels[k])))
-        elif _last(label) in STAMPS and (not unit or unit in PER_S):
-            parts = segments(base)
-            rank = 0 if parts[-2:] == ["header", "stamp"] else 2 if base == "__time" else 1
-            found.append(Time(k, None, unit, rank, _owner(labels[k])))
-        elif base in RECEIPT or _last(label) in RECEIPT:
+            found.append(Time(k, rest[0], "s", 0 if of_header else 1, owner))
+            rests.add(rest[0])
+        elif last in STAMPS and (not unit or unit in PER_S):
+            of_header = segments(base)[-2:] == ["header", "stamp"] or last in ("stamp", "header_stamp")
+            rank = 0 if of_header else 2 if last in ("__time", "date") else 1
+            found.append(Time(k, None, unit, rank, owner))
+        elif base in RECEIPT or last in RECEIPT:
             found.append(Time(k, None, unit, 3, ""))
-    return sorted(found, key=lambda each: (each.rank, -len(each.owner)))
+    used = (each for each in found if each.whole not in rests)
+    return sorted(used, key=lambda each: (each.rank, -len(each.owner)))
 
 
-def _owner(label: str) -> str:
-    """The beginning of the columns that a column of stamps belongs to: what stands before `header`, or all."""
-    return re.split(r"[/._]?header[/._]", label, maxsplit=1)[0] if re.search(r"header[/._]", label) else ""
+def _owner(label: str, names: Collection[str]) -> tuple[str, str]:
+    """The beginning of the columns that a column of stamps belongs to, '' for all, and its own name in small letters.
+
+    That is what stands before `header`, or before the last part if places or bodies have that name: `a.t`, `a_t`.
+    """
+    base = split_unit(label)[0]
+    if re.search(r"header[/._]", label):
+        return re.split(r"[/._]?header[/._]", label, maxsplit=1)[0], _last(label)
+    found = re.fullmatch(r"(.*)([/._\s:|-])(.*)", base)
+    if found and found[3].lower() in STAMPS:
+        before = found[1]
+        if any(name == before or name.startswith(f"{before}{found[2]}") for name in names):
+            return before, found[3].lower()
+    return "", _last(label)

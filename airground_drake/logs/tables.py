@@ -15,7 +15,7 @@ from airground_drake.base import files
 from airground_drake.base.arrays import Array
 from airground_drake.base.errors import LogError
 from airground_drake.logs import text
-from airground_drake.logs.columns import WORDS, Columns, Place, Time, columns, listed
+from airground_drake.logs.columns import WORDS, Columns, Place, Time, clock_of, columns, listed
 from airground_drake.logs.names import body_of, renamed
 from airground_drake.logs.stream import PER_M, Log, Stream, Whole
 
@@ -137,12 +137,12 @@ def _numbers_of(has: Columns) -> set[int | None]:
 
 
 def _one_place(places: list[Place]) -> list[Place]:
-    """The only place, or the one whose columns have the shortest names."""
-    shortest = min(places, key=lambda place: len(place.name))
-    if sum(len(place.name) == len(shortest.name) for place in places) > 1:
-        several = listed([place.name for place in places])
+    """The only place, or the only one whose name says that it is a position."""
+    named = [place for place in places if place.is_position] if len(places) > 1 else places
+    if len(named) != 1:
+        several = listed([place.name or "x, y" for place in places])
         raise LogError(f"it has several places in a row: {several}; wanted: --map-columns x=NAME,y=NAME,z=NAME")
-    return [shortest]
+    return named
 
 
 def _streams(path: Path, table: text.Table, has: Columns, wanted: Wanted) -> Iterator[Stream]:
@@ -155,7 +155,7 @@ def _streams(path: Path, table: text.Table, has: Columns, wanted: Wanted) -> Ite
     if frames is not None and all(text.is_number(each) for each in frames.unique()[:100]):
         frames = None  # numbers of frames of a camera
     for place in has.places:
-        time = next(each for each in (*has.times, has.times[0]) if place.name.startswith(each.owner) or not each.owner)
+        time = clock_of(place, has.times, table.labels)
         numbers, why = _places(table, place)
         stamps, nano, stamped = whole[time]
         why[~stamped & (why == "")] = "no time"
