@@ -55,7 +55,6 @@ class Time(NamedTuple):
     rank: int
     owner: str
 
-
     def is_of(self, place: Place) -> bool:
         """Whether it may be the clock of a place."""
         after = place.name[len(self.owner) :]

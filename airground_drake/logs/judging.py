@@ -11,6 +11,7 @@ from __future__ import annotations
 import copy
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 from fractions import Fraction
 from typing import Any, NamedTuple
 
@@ -41,6 +42,8 @@ STEPS = 100
 """Parts of that time, in which the two motions are told apart."""
 HALVINGS = 60
 """Halvings of an interval in the search for a time."""
+MOST_SPARE = 0.05
+"""Share of a scenario's duration that a log may lack to cover all of it: two intervals, but no more than this."""
 NOT_JUDGED = (
     "motion between two samples: it is taken as straight",
     "places of obstacles at rest, walls and maps: the scenario's are taken",
@@ -134,6 +137,7 @@ class Judged(NamedTuple):
         end_s: last one.
         duration_s: of the scenario.
         longest_s: longest interval in which motion was taken as straight.
+        usual_s: longest of the bodies' usual times between two samples.
         stray_m: how far a robot can be from that straight line at its speed limit.
         speeds_m_s: largest speed of each robot in the log, and its limit.
         away_m: how far each robot starts from where the scenario has it.
@@ -144,6 +148,7 @@ class Judged(NamedTuple):
     end_s: float
     duration_s: float
     longest_s: float
+    usual_s: float
     stray_m: float
     speeds_m_s: dict[str, tuple[float, float]]
     away_m: dict[str, float]
@@ -157,7 +162,8 @@ class Judged(NamedTuple):
     @property
     def covers_all(self) -> bool:
         """Whether no pair has a gap, and the log is as long as the scenario, but for one interval at either end."""
-        lasts = self.end_s - self.begin_s >= self.duration_s - 2.0 * self.longest_s - SMALL
+        spare_s = min(2.0 * self.usual_s, MOST_SPARE * self.duration_s)
+        lasts = self.end_s - self.begin_s >= self.duration_s - spare_s - SMALL
         return lasts and not any(pair.gaps_s for pair in self.pairs)
 
 
@@ -194,7 +200,10 @@ def judge(tracks: Tracks, scenario: Json, errors_m: Mapping[str, float] | None =
     stray = max((0.5 * limit * longest[name] for name, (_, limit) in speeds.items()), default=0.0)
     pairs = sorted(found, key=lambda one: one.margin_m)
     lasts = float(scenario["duration_s"])
-    return Judged(pairs, begin, end, lasts, max(longest.values()), stray, speeds, away)
+    if not pairs:
+        raise LogError(f"no distance is left to judge: of {', '.join(bodies)} nothing else is in the log or scenario")
+    usual = max(each.usual_s for each in bodies.values())
+    return Judged(pairs, begin, end, lasts, max(longest.values()), usual, stray, speeds, away)
 
 
 def courses(tracks: Tracks, scenario: Json) -> dict[tuple[str, str], list[tuple[Array, Array]]]:
@@ -223,7 +232,7 @@ def _both(
         if pair.other in barriers:
             begin, end = _there(barriers[pair.other], whole)
             during = (other.t_s >= begin - SMALL) & (other.t_s <= end + SMALL)
-            other = Track(other.t_s[during], other.places_m[during], other.gap_s)
+            other = replace(other, t_s=other.t_s[during], places_m=other.places_m[during])
         return own, other
     return own, _standing(resting[pair.other], barriers[pair.other], whole)
 
@@ -251,7 +260,7 @@ def _seen(track: Track, name: str, pair: Pair, scenario: Json) -> Track:
     places[:, 2] = height_m(scenario, name)
     if is_obstacle and not scenario["obstacles"][name]["moves"]:
         places[:, :2] -= np.array(scenario["obstacles"][name]["position_m"] or [0.0, 0.0])[:2]
-    return Track(track.t_s, places, track.gap_s)
+    return replace(track, places_m=places)
 
 
 def _standing(place: Array, body: Json, whole: Span) -> Track:
@@ -298,8 +307,7 @@ def _judged(pair: Pair, own: Track, other: Track, scenario: Json, eps: float, wh
         below += _below(pair.shape, apart, t_s, pair.safe_m - SMALL)
         law.add(t_s, own_m, other_m)
     body = barriers_of(scenario).get(pair.other)
-    usual = own.gap_s if not np.isfinite(other.gap_s) else max(own.gap_s, other.gap_s)
-    gaps = _gaps(spans, _there(body, whole) if body else whole, usual)
+    gaps = _gaps(spans, _there(body, whole) if body else whole, own, other)
     too_fast = _too_fast(other, scenario, pair)
     promised = pair.gap_m - law.deficit - eps
     return JudgedPair(
@@ -399,13 +407,14 @@ def _below(shape: Shape, apart: Array, t_s: Array, need_m: float) -> list[Span]:
     return found
 
 
-def _gaps(spans: list[Span], whole: Span, usual_s: float) -> list[Span]:
-    """Stretches between those in which both were recorded; at the ends of the log only those longer than usual."""
+def _gaps(spans: list[Span], whole: Span, own: Track, other: Track) -> list[Span]:
+    """Stretches between those in which both were recorded; at the ends only where one lacks more than is usual."""
     edges = [whole.begin, *(edge for span in spans for edge in span), whole.end]
     found = [Span(*both) for both in zip(edges[::2], edges[1::2], strict=True)]
     inner = [each for each in found[1:-1] if each.end > each.begin]
-    outer = [each for each in (found[0], found[-1]) if each.end - each.begin > usual_s * (1.0 + 1e-9)]
-    return sorted([*inner, *outer])
+    late = max(each.t_s[0] - whole.begin - each.gap_s * (1.0 + 1e-9) for each in (own, other))
+    early = max(whole.end - each.t_s[-1] - each.gap_s * (1.0 + 1e-9) for each in (own, other))
+    return sorted([*inner, *(gap for gap, lacks in ((found[0], late), (found[-1], early)) if lacks > 0.0)])
 
 
 def _came(pair: Pair, own: Track, other: Track, span: Span) -> dict[str, float]:
@@ -430,15 +439,14 @@ def _too_fast(other: Track, scenario: Json, pair: Pair) -> float:
 def _speed(track: Track) -> float:
     """Largest speed between samples without a gap, m/s."""
     h = np.diff(track.t_s)
-    used = (h > 0.0) & (h <= track.gap_s * (1.0 + 1e-9))
+    used = (h > 0.0) & track.is_known
     moved = np.linalg.norm(np.diff(track.places_m, axis=0), axis=1)
     return float((moved[used] / h[used]).max(initial=0.0))
 
 
 def _longest(track: Track) -> float:
     """Longest time between samples without a gap, s; 0 for what stands."""
-    h = np.diff(track.t_s)
-    return float(h[h <= track.gap_s * (1.0 + 1e-9)].max(initial=0.0)) if np.isfinite(track.gap_s) else 0.0
+    return float(np.diff(track.t_s)[track.is_known].max(initial=0.0)) if np.isfinite(track.gap_s) else 0.0
 
 
 def as_json(judged: Judged, tracks: Tracks) -> dict[str, Any]:

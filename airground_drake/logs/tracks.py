@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import combinations, pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -15,7 +16,7 @@ from airground_drake.check.files import Json
 from airground_drake.check.limits import LARGEST
 from airground_drake.check.scenario import expected_m_s, robots_of
 from airground_drake.logs import names, units
-from airground_drake.logs.stream import PER_M, Log, Stream, Whole
+from airground_drake.logs.stream import OF_MESSAGES, PER_M, RECEIPT, Log, Stream, Whole
 
 GAP = 2.5
 """A body was not recorded where two of its samples are farther apart than this multiple of the usual time between."""
@@ -28,10 +29,14 @@ SAME_M = 1e-9
 CONTRADICTORY = 0.1
 """Share of a body's rows that may contradict others: with more, stamps are too coarse, or recordings are mixed."""
 LOST_M, LOST = 0.05, 5.0
-"""A tracking system may write (0, 0) where it has lost a body. Rows there are taken as such if the body would have had
-to go there and back farther than this, and this many times faster than it ever goes elsewhere."""
+"""A body leaps if it goes farther than this from one row to the next, and this many times faster than it can. Tracking
+systems do so where they lose a body: they write (0, 0), another number, or the last place again."""
 ORIGIN_M = 1e-3
 """Robots that start so close to (0, 0) start there."""
+MOST_PASSES = 100
+"""Of a search for rows that are lost."""
+MOST_RECORDINGS, FEW = 20, 5
+"""Stretches in the order of time that are compared with each other, and rows of one at least."""
 
 
 class Span(NamedTuple):
@@ -50,17 +55,26 @@ class Track:
         places_m: (n, 3); z is nan if the log lacks it.
         gap_s: motion between two samples that are farther apart is unknown.
         told: where it is from: stream, frame and clock.
+        leaps_s: times of samples to which the body cannot have come from the one before.
+        usual_s: usual time between two samples.
     """
 
     t_s: Array
     places_m: Array
     gap_s: float
     told: dict[str, str] = field(default_factory=dict)
+    leaps_s: tuple[float, ...] = ()
+    usual_s: float = 0.0
+
+    @property
+    def is_known(self) -> npt.NDArray[np.bool_]:
+        """In which intervals between two samples the motion is known, (n - 1,)."""
+        return (np.diff(self.t_s) <= self.gap_s * (1.0 + 1e-9)) & ~np.isin(self.t_s[1:], self.leaps_s)
 
     @property
     def spans(self) -> list[Span]:
         """Stretches without a gap; one sample alone is a stretch of length 0."""
-        cut = np.flatnonzero(np.diff(self.t_s) > self.gap_s * (1.0 + 1e-9))
+        cut = np.flatnonzero(~self.is_known)
         begins, ends = self.t_s[np.append(0, cut + 1)], self.t_s[np.append(cut, len(self.t_s) - 1)]
         return [Span(*both) for both in zip(begins.tolist(), ends.tolist(), strict=True)]
 
@@ -148,15 +162,22 @@ def joined(log: Log, scenario: Json, choice: Choice) -> Tracks:
             likely = [each for each in log.unusable if name in each] or log.unusable
             lacks = f"; not usable: {likely[0]}" if likely else ""
             raise LogError(one_line(f"{name} is not in the log; names there: {there[:300]}{lacks}; wanted: {wanted}"))
+    if len(clocks := {each.clock for each in found.values() if each.clock in OF_MESSAGES}) > 1:
+        late = ", ".join(name for name, each in found.items() if each.clock == RECEIPT)
+        said.append(f"clocks differ: {late} by {RECEIPT}, others by {(clocks - {RECEIPT}).pop()}")
     stamps = {name: each.ns(each.time_unit) for name, each in found.items()}
     first = min(int(each.min()) for each in stamps.values())
     zero = first if first >= SINCE_1970_NS else 0
     tracks = {}
     for name, stream in ((body, found[body]) for body in bodies if body in found):
-        if np.isnan(stream.places[:, 2]).any() and name not in scenario["ugvs"] and name not in scenario["obstacles"]:
-            said.append(f"{name} has no height in the log: its distances are not judged")
-            continue
-        tracks[name] = _track(name, stream, stamps[name] - zero, choice.gap_s, said)
+        ns, flat = stamps[name] - zero, np.isnan(stream.places[:, 2])
+        if flat.any() and name not in scenario["ugvs"] and name not in scenario["obstacles"]:
+            if flat.all():
+                said.append(f"{name} has no height in the log: its distances are not judged")
+                continue
+            stream.skipped["no height"] += int(flat.sum())
+            stream.places, ns = stream.places[~flat], ns[~flat]
+        tracks[name] = _track(name, stream, ns, choice.gap_s, _fastest(name, scenario), _start(name, scenario), said)
     uav = scenario["uav"]["name"]
     if uav not in found and uav not in choice.without:
         said.append(f"{uav} is not in the log: its distances are not judged")
@@ -252,13 +273,13 @@ def _merged(streams: list[Stream]) -> Stream:
 def _in_one_frame(frames: Mapping[str, str], allowed: Collection[str]) -> None:
     """Refuse positions in different frames, and frames of odometry, which begin where each robot stood."""
     stated = {name: frame for name, frame in frames.items() if frame}
-    several = ", ".join(f"{name} in {frame}" for name, frame in stated.items())
+    several = ", ".join(f"{name} in {frame or 'no named frame'}" for name, frame in frames.items())
     if allowed:
         return
     if len({*stated.values()}) > 1:
         wanted = "wanted: positions in one frame, such as map or world; or --frame for each name of that one frame"
         raise LogError(one_line(f"positions are in different frames: {several}; {wanted}"))
-    if len(stated) > 1 and names.segments(next(iter(stated.values())))[-1] == "odom":
+    if len(frames) > 1 and stated and names.segments(next(iter(stated.values())))[-1] == "odom":
         wanted = "wanted: positions in one frame, such as map or world; or --frame odom if this is one for all"
         raise LogError(one_line(f"odometry is in a frame of each robot's own, though both may be called odom: "
                                 f"{several}; {wanted}"))  # fmt: skip
@@ -276,7 +297,22 @@ def _skipped(stream: Stream) -> str:
 _USABLE = "seconds, or dates such as 2026-05-04T10:00:00.050Z, and numbers for x and y"
 
 
-def _track(name: str, stream: Stream, ns: Whole, gap_s: float, said: list[str]) -> Track:
+def _fastest(name: str, scenario: Json) -> float:
+    """A speed that a body does not exceed by far: its limit; of an obstacle, that of the fastest body, m/s."""
+    limits = {each: float(robot["max_speed_m_s"]) for each, robot in robots_of(scenario).items()}
+    expected = expected_m_s(scenario["obstacles"][name]) if name in scenario["obstacles"] else 0.0
+    return limits.get(name, max(expected, *limits.values()))
+
+
+def _start(name: str, scenario: Json) -> Array | None:
+    """Where a robot of the scenario starts, (2,), m."""
+    robots = robots_of(scenario)
+    return np.array(robots[name]["start_m"][:2], dtype=np.float64) if name in robots else None
+
+
+def _track(
+    name: str, stream: Stream, ns: Whole, gap_s: float, fastest_m_s: float, start: Array | None, said: list[str]
+) -> Track:
     """The track of a stream, whose stamps are ns after time 0: sorted, each time once."""
     places = stream.places / PER_M[stream.length_unit]
     if not (np.abs(np.nan_to_num(places)) <= LARGEST).all() or np.abs(ns).max() / 1e9 > LARGEST:
@@ -284,6 +320,7 @@ def _track(name: str, stream: Stream, ns: Whole, gap_s: float, said: list[str]) 
     for reason, count in stream.skipped.items():
         where = f", first in {at}" if (at := stream.first_skipped.get(reason)) else ""
         said.append(f"{name}: {count} rows skipped, {reason}{where}")
+    _of_one_recording(name, ns, places, fastest_m_s)
     if disorder := int((np.diff(ns) < 0).sum()):
         said.append(f"{name}: rows are not in the order of time in {disorder} places; they were sorted")
     order = np.argsort(ns, kind="stable")
@@ -306,30 +343,74 @@ def _track(name: str, stream: Stream, ns: Whole, gap_s: float, said: list[str]) 
             f"{apart[k]:.3g} m; the earlier one counts"
         )
     t_s, places = ns[new] / 1e9, places[new]
-    lost = _lost(t_s, places)
+    lost = _lost(t_s, places, fastest_m_s, start)
     if lost.any():
         said.append(
-            f"{name}: {int(lost.sum())} rows skipped, at (0, 0), where it cannot have been: taken as lost, first at "
+            f"{name}: {int(lost.sum())} rows skipped, where it cannot have been: taken as lost, first at "
             f"{t_s[lost][0]:.6g} s"
         )
     t_s, places = t_s[~lost], places[~lost]
+    leaps = t_s[1:][_leaps(t_s, places, fastest_m_s)]
+    if len(leaps):
+        said.append(
+            f"{name}: {len(leaps)} steps that are more than {LOST:g} times faster than {fastest_m_s:g} m/s, first to "
+            f"{leaps[0]:.6g} s: nothing is claimed of them"
+        )
     usual = float(np.median(np.diff(t_s))) if len(t_s) > 1 else 0.0
     told = {"stream": stream.label, "frame": stream.frame, "clock": stream.clock, "source": stream.source}
-    return Track(t_s, places, gap_s or GAP * usual, told)
+    return Track(t_s, places, gap_s or GAP * usual, told, tuple(leaps.tolist()), usual)
 
 
-def _lost(t_s: Array, places: Array) -> npt.NDArray[np.bool_]:
-    """Which rows are at (0, 0) without a way there and back that the body can have gone, (n,)."""
-    there = (places[:, :2] == 0.0).all(axis=1)
-    if there.all() or not there.any():
-        return np.zeros(len(t_s), dtype=np.bool_)
+def _of_one_recording(name: str, ns: Whole, places: Array, fastest_m_s: float) -> None:
+    """Refuse rows of two recordings of the same time that contradict each other."""
+    ends = [0, *(np.flatnonzero(np.diff(ns) < 0) + 1).tolist(), len(ns)]
+    longest = sorted(pairwise(ends), key=lambda each: each[0] - each[1])[:MOST_RECORDINGS]
+    for one, other in combinations([slice(*each) for each in longest if each[1] - each[0] >= FEW], 2):
+        t, t_other = ns[one], ns[other]
+        there = (t_other >= t[0]) & (t_other <= t[-1])
+        if there.sum() < FEW:
+            continue
+        between = [np.interp(t_other[there], t, axis) for axis in places[one, :2].T]
+        apart = np.hypot(*(places[other, :2][there].T - between))
+        step_s = float(np.median(np.diff(t))) / 1e9
+        if np.median(apart) > LOST_M + step_s * fastest_m_s:
+            raise LogError(
+                one_line(f"{name}: rows of two recordings of the same time, {float(np.median(apart)):.3g} m apart; "
+                         "wanted: one recording")
+            )  # fmt: skip
+
+
+def _leaps(t_s: Array, places: Array, fastest_m_s: float) -> npt.NDArray[np.bool_]:
+    """In which intervals a body leaps, (n - 1,)."""
     steps = np.hypot(*np.diff(places[:, :2], axis=0).T)
-    speeds = steps / np.diff(t_s)
-    usual = float(speeds[~there[1:] & ~there[:-1]].max(initial=0.0))
-    leaps = (steps > LOST_M) & (speeds > LOST * usual)
-    number = np.append(0, np.cumsum(there[1:] != there[:-1]))  # of the stretch of rows that each row is in
-    walked = number[np.append(False, (there[1:] != there[:-1]) & ~leaps)]
-    return there & ~np.isin(number, np.append(walked, walked - 1))
+    return np.asarray((steps > LOST_M) & (steps > LOST * fastest_m_s * np.diff(t_s)))
+
+
+def _lost(t_s: Array, places: Array, fastest_m_s: float, start: Array | None) -> npt.NDArray[np.bool_]:
+    """Which rows are where the body cannot have been, (n,).
+
+    They are between two leaps, fewer than the rows on either side or as few and at (0, 0), and the body can have gone
+    from one side to the other. At either end of the log they are at (0, 0), unless the body starts there.
+    """
+    kept = np.arange(len(t_s))
+    starts_there = start is not None and float(np.hypot(*start)) <= LOST_M
+    for _ in range(MOST_PASSES):
+        cuts = np.flatnonzero(_leaps(t_s[kept], places[kept], fastest_m_s)) + 1
+        if not len(cuts):
+            break
+        begins, ends = np.append(0, cuts), np.append(cuts, len(kept))
+        rows, at_origin = ends - begins, np.logical_and.reduceat((places[kept, :2] == 0.0).all(axis=1), begins)
+        gone = at_origin & np.isin(np.arange(len(rows)), (0, len(rows) - 1))
+        gone[0] &= not starts_there
+        before, after = kept[ends[:-2] - 1], kept[begins[2:]]  # of all but the first and the last
+        way = np.hypot(*(places[after, :2] - places[before, :2]).T)
+        possible = (way <= LOST_M) | (way <= LOST * fastest_m_s * (t_s[after] - t_s[before]))
+        gone[1:-1] = (rows[1:-1] < np.minimum(rows[:-2], rows[2:]) + at_origin[1:-1]) & possible
+        gone[1:] &= ~gone[:-1]  # neighbours one after the other
+        if not gone.any():
+            break
+        kept = kept[~np.repeat(gone, rows)]
+    return ~np.isin(np.arange(len(t_s)), kept)
 
 
 def _apart_at_the_start(tracks: Mapping[str, Track], scenario: Json) -> None:
