@@ -105,8 +105,11 @@ def read_text(path: Path) -> str:
     return read_bytes(path, LARGEST_TEXT).decode()
 
 
-def read_table(content: bytes, *, times: bool = False) -> pd.DataFrame:
-    """The table in a Parquet file that may be hostile: numbers, texts and lists of numbers; with `times` also times.
+def read_table(content: bytes, *, others: bool = False) -> pd.DataFrame:
+    """The table in a Parquet file that may be hostile: numbers, texts and lists of numbers.
+
+    With `others`, as programs other than this one write them, also times and categories of texts; an index that was
+    kept becomes the first columns.
 
     The declared types and sizes are checked before the file is unpacked. A few bytes may stand for a long text in a
     million rows, so texts are counted before they are copied into their rows.
@@ -120,11 +123,12 @@ def read_table(content: bytes, *, times: bool = False) -> pd.DataFrame:
     import pyarrow.parquet as pq
 
     numbers = (pa.types.is_floating, pa.types.is_integer, pa.types.is_boolean, pa.types.is_null)
-    numbers += (pa.types.is_timestamp,) * times
+    numbers += (pa.types.is_timestamp,) * others
+    categories = [pa.dictionary(index, pa.string()) for index in (pa.int8(), pa.int16(), pa.int32())] * others
     try:
         file = pq.ParquetFile(io.BytesIO(content))
         schema, about = file.schema_arrow, file.metadata
-        texts = [field.name for field in schema if field.type in (pa.string(), pa.large_string())]
+        texts = [field.name for field in schema if field.type in (pa.string(), pa.large_string(), *categories)]
         for field in schema:
             kind = field.type.value_type if pa.types.is_list(field.type) else field.type
             if not (field.name in texts or any(is_kind(kind) for is_kind in numbers)):
@@ -137,7 +141,8 @@ def read_table(content: bytes, *, times: bool = False) -> pd.DataFrame:
             parts = [part for column in coded.columns for part in column.chunks]
             sizes = (pc.sum(pc.binary_length(part.dictionary).take(part.indices)).as_py() or 0 for part in parts)
             _within("bytes of text", sum(sizes), MOST_UNPACKED)
-        return pd.read_parquet(io.BytesIO(content))
+        table = pd.read_parquet(io.BytesIO(content))
+        return table.reset_index() if others and not isinstance(table.index, pd.RangeIndex) else table
     except Exception as error:  # pyarrow raises many kinds
         raise ValueError(f"no table that can be used: {error}") from error
 

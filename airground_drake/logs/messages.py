@@ -5,13 +5,15 @@ A message may be an object with attributes (ROS, protobuf) or a dict (JSON).
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
+import pandas as pd
 
 from airground_drake.logs.names import is_elsewhere, segments
-from airground_drake.logs.stream import HEADERS, RECEIPT, Stream
+from airground_drake.logs.stream import HEADERS, PER_S, RECEIPT, SINCE_1970, Stream
 
 NO_PLACES = ("sensor_msgs/", "visualization_msgs/", "rcl_interfaces/", "rosgraph_msgs/", "foxglove.SceneUpdate")
 """Beginnings of types that say nothing about where a robot is, or cannot be told from those that do."""
@@ -57,7 +59,9 @@ def _place(one: Any) -> Place | None:
     head = _first(_of(one, "header"), one)
     pose = _first(_of(one, "pose"), _of(one, "transform"), one)
     pose = _first(_of(pose, "pose"), pose)
-    points = (_of(pose, name) for name in ("position", "translation", "point", "position_m"))
+    points = [_of(pose, name) for name in ("position", "translation", "point", "position_m")]
+    if _of(one, "theta") is not None:  # Pose2D
+        points.append({"x": _of(one, "x"), "y": _of(one, "y"), "z": math.nan})
     xyz = next((found for point in points if (found := _xyz(point)) is not None), None)
     if xyz is None:
         return None
@@ -88,7 +92,15 @@ def _xyz(point: Any) -> tuple[float, float, float] | None:
 
 
 def _ns(stamp: Any) -> int | None:
-    """A stamp of a header in nanoseconds; 0 means that none was set."""
+    """A stamp of a header in nanoseconds, also as a number or a date; 0 means that none was set."""
+    if isinstance(stamp, str):
+        try:
+            return int(pd.Timestamp(stamp).as_unit("ns").value) or None
+        except ValueError:
+            return None
+    if isinstance(stamp, (int, float)) and math.isfinite(stamp):
+        per = next((PER_S[unit] for unit, least in SINCE_1970 if abs(stamp) >= least), 1)
+        return round(stamp * (10**9 // per)) or None
     whole = _first(*(_of(stamp, name) for name in ("sec", "secs", "seconds")))
     rest = _first(*(_of(stamp, name) for name in ("nanosec", "nsec", "nsecs", "nanos")), 0)
     try:
@@ -132,7 +144,10 @@ class Gathered:
     def streams(self) -> Iterator[Stream]:
         """One stream per topic, body, frame and child frame."""
         for (topic, body, frame, child), rows in self.found.items():
-            stamped = all(stamp is not None for _, stamp, _ in rows)
+            without = sum(stamp is None for _, stamp, _ in rows)
+            stamped = without < 0.5 * len(rows)
+            if stamped:
+                rows = [row for row in rows if row[1] is not None]
             times = [stamp if stamped and stamp is not None else received for received, stamp, _ in rows]
             xyz = np.array([place for _, _, place in rows], dtype=np.float64).reshape(-1, 3)
             clock = HEADERS if stamped else RECEIPT
@@ -140,7 +155,9 @@ class Gathered:
             stream = Stream(
                 self.source, body or topic, whole, np.zeros_like(whole), xyz, "ns", "m", frame, child, clock
             )
-            good = np.isfinite(xyz).all(axis=1)
+            if stamped and without:
+                stream.skipped["no stamp"] = without
+            good = np.isfinite(xyz[:, :2]).all(axis=1)
             if not good.all():
                 first = int(np.argmin(good))
                 stream.skipped["not finite"] = int((~good).sum())

@@ -11,6 +11,7 @@ ELSEWHERE = {
     "orientation", "rotation", "quaternion", "quat", "rot", "twist", "linear", "angular", "velocity", "vel",
     "acceleration", "accel", "acc", "force", "torque", "imu", "gyro", "mag", "euler", "rpy", "cmd", "command", "goal",
     "target", "ref", "reference", "desired", "setpoint", "plan", "waypoint", "initialpose", "covariance", "error",
+    "marker", "markers",
 }  # fmt: skip
 """Words in a name that say that it is not about where a body is."""
 

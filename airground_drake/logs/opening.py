@@ -48,7 +48,8 @@ def _files(path: Path) -> list[Path]:
         return [path]
     inside = sorted(each for each in path.iterdir() if each.is_file() and not each.name.startswith("."))
     if not inside:
-        raise LogError(one_line(f"{path}: the folder has no files"))
+        inner = "; folders in it are not read" if any(path.iterdir()) else ""
+        raise LogError(one_line(f"{path}: the folder has no files{inner}"))
     if len(inside) > MOST_FILES:
         raise LogError(one_line(f"{path}: the folder has {len(inside)} files; allowed: {MOST_FILES}"))
     if any(each.name == ABOUT for each in inside):

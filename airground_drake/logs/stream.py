@@ -14,6 +14,8 @@ Whole = npt.NDArray[np.int64]
 
 PER_S = {"s": 1, "ms": 10**3, "us": 10**6, "ns": 10**9}
 """Units of time, and how many of each are a second."""
+SINCE_1970 = (("ns", 1e17), ("us", 1e14), ("ms", 1e11), ("s", 1e8))
+"""Units of stamps since 1970, and the least such stamp that is taken as one."""
 PER_M = {"m": 1.0, "cm": 100.0, "mm": 1000.0}
 """Units of length, and how many of each are a metre."""
 OF_MESSAGES = HEADERS, RECEIPT = "header stamps", "times of receipt"

@@ -28,6 +28,7 @@ MOST_BODIES = 2_000
 _UNITS = re.compile(r"length\W*units?\W+(\w+)", re.IGNORECASE)
 _ISO = re.compile(r"\d{4}-\d\d-\d\d[T ]\d\d:\d\d.*")
 """Date and time of day."""
+_NOTHING = ("nan", "null", "none", "na", "n/a")
 _DECIMAL = re.compile(r"([+-]?)(\d{1,19})(?:\.(\d*))?")
 
 
@@ -70,7 +71,7 @@ def read(path: Path, content: bytes, wanted: Wanted) -> Log:
             f"it lacks {lacks}: its columns are {listed(labels)}; wanted: such as t_s, body, x_m, y_m, z_m, or "
             "--map-columns t=NAME,body=NAME,x=NAME,y=NAME,z=NAME"
         )
-    has = _of_bodies(has, table, wanted)
+    has = _of_bodies(has, table, wanted, path)
     log = Log(list(_streams(path, table, has, wanted)))
     used = {k for place in has.places for k in (place.x, place.y, place.z)} | {has.body, has.frame}
     used |= {k for each in log.streams for k in _columns_of(each, labels)}
@@ -99,7 +100,7 @@ def _columns_of(stream: Stream, labels: list[str]) -> Iterator[int]:
 def _parquet(content: bytes) -> text.Table:
     """A table of numbers, times and texts; ValueError as `files.read_table`."""
     try:
-        table = files.read_table(content, times=True)
+        table = files.read_table(content, others=True)
     except ValueError as error:
         raise LogError(str(error)) from None
     texts = {k: [*map(_written, table.iloc[:, k].tolist())] for k in range(table.shape[1])}
@@ -113,7 +114,13 @@ def _written(value: Any) -> str:
     return repr(value) if isinstance(value, float) else str(value)
 
 
-def _of_bodies(has: Columns, table: text.Table, wanted: Wanted) -> Columns:
+def _file_of(path: Path, wanted: Wanted) -> str:
+    """The name of a file that is about one body: its stem, or its folder's name if only that names a body."""
+    by_folder = wanted.body(path.parent.name) and not wanted.body(path.stem, is_file=True)
+    return path.parent.name if by_folder else path.stem
+
+
+def _of_bodies(has: Columns, table: text.Table, wanted: Wanted, path: Path) -> Columns:
     """Choose between a long table, with a column of bodies and one place, and a wide one."""
     wide = [place for place in has.places if place.name and wanted.body(place.name)]
     if wide:
@@ -124,8 +131,10 @@ def _of_bodies(has: Columns, table: text.Table, wanted: Wanted) -> Columns:
         values = table.cells[k].unique()
         if len(values) <= MOST_BODIES and any(wanted.body(value) for value in values):
             return has._replace(body=k, places=_one_place(has.places))
-    if has.body is not None and table.cells[has.body].nunique() > max(1, len(table.cells) // 4):
-        has = has._replace(body=None)  # it counts rows
+    if has.body is not None:
+        several, of_file = table.cells[has.body].nunique(), wanted.body(_file_of(path, wanted), is_file=True)
+        if several > max(1, len(table.cells) // 4) or (several == 1 and of_file):
+            has = has._replace(body=None)  # it counts rows, or names a frame or a kind of robot
     if has.body is not None:
         return has._replace(places=_one_place(has.places))
     return has
@@ -172,7 +181,7 @@ def _streams(path: Path, table: text.Table, has: Columns, wanted: Wanted) -> Ite
             is_file = has.body is None and alone and not wanted.body(place.name)
             yield _stream(
                 Stream(
-                    str(path), path.stem if is_file else str(name), stamps[at], nano[at], numbers[at],
+                    str(path), _file_of(path, wanted) if is_file else str(name), stamps[at], nano[at], numbers[at],
                     time.unit, place.units[0] or length, str(frame).strip("/"),
                     clock=_clock(table, time), is_file=is_file,
                 ),
@@ -215,10 +224,12 @@ def _places(table: text.Table, place: Place) -> tuple[Array, npt.NDArray[np.obje
         numbers[:, axis] = pd.to_numeric(cells, errors="coerce").to_numpy(dtype=np.float64)
         if place.units[axis] != place.units[0]:
             numbers[:, axis] *= PER_M[place.units[0]] / PER_M[place.units[axis]]
-        bad = ~np.isfinite(numbers[:, axis]) & (why == "")
         low = cells.str.lower().to_numpy()
-        reasons = np.select([low == "", np.isin(low, ["nan", "null", "none", "na", "n/a", "inf", "-inf"])],
+        reasons = np.select([np.isin(low, ["", "-"]), np.isin(low, [*_NOTHING, "inf", "-inf"])],
                             ["empty", "not finite"], "no number")  # fmt: skip
+        bad = ~np.isfinite(numbers[:, axis]) & (why == "")
+        if axis == 2:
+            bad &= ~np.isin(low, ["", "-", *_NOTHING])  # UGVs need no height
         why[bad] = reasons[bad]
     return numbers, why
 

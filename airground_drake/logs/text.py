@@ -58,7 +58,7 @@ def read(content: bytes) -> Table:
     Raises:
         LogError: if it is no text, or no table.
     """
-    lines = _decoded(content).replace("\r\n", "\n").replace("\r", "\n").split("\n")
+    lines = re.sub(r"\r+\n", "\n", _decoded(content)).replace("\r", "\n").split("\n")
     full = [k for k, line in enumerate(lines) if line.strip() and not line.lstrip().startswith("#")]
     if not full:
         raise LogError("it has no lines with data")
@@ -66,7 +66,7 @@ def read(content: bytes) -> Table:
     delimiter, count = _form([lines[k] for k in middle])
     rows = [_fields(lines[k], delimiter) for k in middle]
     rows = [row for row in rows if len(row) == count]
-    comma = delimiter != "," and _decimal_comma(rows)
+    commas = [] if delimiter == "," else [c for c in range(count) if _decimal_comma([row[c] for row in rows])]
     numeric = [2 * sum(is_number(row[c]) for row in rows) > len(rows) for c in range(count)]
     first = next((k for k in full if _is_data(_fields(lines[k], delimiter), numeric)), None)
     if first is None:
@@ -89,9 +89,8 @@ def read(content: bytes) -> Table:
         skip_blank_lines=False,
     )  # fmt: skip
     cells = cells.apply(lambda column: column.str.strip())
-    if comma:
-        for c in (c for c in range(count) if numeric[c]):
-            cells[c] = cells[c].str.replace(",", ".", regex=False)
+    for c in commas:
+        cells[c] = cells[c].str.replace(",", ".", regex=False)
     above = [line for k, line in enumerate(lines[:first]) if k not in header]
     odd = [k + 1 for k in data if k not in chosen]
     named = labels or [str(c + 1) for c in range(count)]
@@ -144,9 +143,19 @@ def is_number(cell: str) -> bool:
     return _NUMBER.fullmatch(cell) is not None
 
 
-def _decimal_comma(rows: Sequence[Sequence[str]]) -> bool:
-    every = [cell for row in rows for cell in row]
-    return any(map(_COMMA.fullmatch, every)) and not any(map(_POINT.fullmatch, every))
+def _decimal_comma(column: Sequence[str]) -> bool:
+    """Whether the numbers of a column have decimal commas.
+
+    Raises:
+        LogError: if they may be those of thousands: -2,000 beside 700.
+    """
+    with_comma = [cell for cell in column if _COMMA.fullmatch(cell)]
+    if not with_comma or any(map(_POINT.fullmatch, column)):
+        return False
+    whole = [cell for cell in column if re.fullmatch(r"[+-]?[1-9]\d{1,2}", cell)]
+    if whole and all(re.fullmatch(r"[+-]?[1-9]\d{0,2},\d{3}", cell) for cell in with_comma):
+        raise LogError(f"numbers such as {with_comma[0]} stand beside {whole[0]}; wanted: no commas of thousands")
+    return True
 
 
 def _is_data(row: Sequence[str], numeric: Sequence[bool]) -> bool:
@@ -165,6 +174,8 @@ def _header(lines: Sequence[str], delimiter: str, count: int, unnamed: int) -> t
     for k in range(len(lines) - 1, -1, -1):
         is_comment = lines[k].lstrip().startswith("#")
         row = _fields(lines[k].lstrip().lstrip("#"), delimiter)
+        if not lines[k].strip() and not rows:
+            continue
         if not lines[k].strip() or (is_comment and rows):
             break
         row += [""] * (count - len(row) if count - len(row) <= unnamed else 0)

@@ -114,7 +114,7 @@ class Choice(NamedTuple):
     """
 
     rename: Mapping[str, str] = {}
-    frames: Collection[str] = ()
+    frames: Sequence[str] = ()
     without: Collection[str] = ()
     uavs: Sequence[str] = ()
     gap_s: float = 0.0
@@ -157,11 +157,7 @@ def joined(log: Log, scenario: Json, choice: Choice) -> Tracks:
             for stream in log.streams:
                 if stream.skipped and not len(stream.whole) and _body_of(stream, bodies, choice.rename)[0] == name:
                     raise LogError(one_line(f"{name} has no usable rows: {_skipped(stream)}; wanted: {_USABLE}"))
-            there = ", ".join(dict.fromkeys(each.label for each in log.streams)) or "none"
-            wanted = f"--rename NAME={name}, or --without {name}"
-            likely = [each for each in log.unusable if name in each] or log.unusable
-            lacks = f"; not usable: {likely[0]}" if likely else ""
-            raise LogError(one_line(f"{name} is not in the log; names there: {there[:300]}{lacks}; wanted: {wanted}"))
+            raise LogError(_not_there(name, log, choice))
     if len(clocks := {each.clock for each in found.values() if each.clock in OF_MESSAGES}) > 1:
         late = ", ".join(name for name, each in found.items() if each.clock == RECEIPT)
         said.append(f"clocks differ: {late} by {RECEIPT}, others by {(clocks - {RECEIPT}).pop()}")
@@ -194,6 +190,18 @@ def joined(log: Log, scenario: Json, choice: Choice) -> Tracks:
     return Tracks(tracks, said, [*log.ignored, *ignored], f"{first / 1e9:.6f} s since 1970" if zero else "")
 
 
+def _not_there(name: str, log: Log, choice: Choice) -> str:
+    """What is said where a body is missing."""
+    frames = sorted({each.frame for each in log.streams if each.frame})
+    if choice.frames and frames and not {*frames} & {*choice.frames}:
+        return one_line(f"--frame {choice.frames[0]}: the log has no such frame; it has {', '.join(frames)[:300]}")
+    there = ", ".join(dict.fromkeys(each.label for each in log.streams))
+    there = f"names there: {there[:300]}" if there else "no positions are there"
+    likely = [each for each in log.unusable if name in each] or log.unusable or (log.ignored if not log.streams else [])
+    lacks = f"; not usable: {', '.join(likely[:3])[:300]}" if likely else ""
+    return one_line(f"{name} is not in the log; {there}{lacks}; wanted: --rename NAME={name}, or --without {name}")
+
+
 def _assigned(log: Log, bodies: Collection[str], choice: Choice) -> tuple[dict[str, Stream], list[str]]:
     """The stream of each body, and what is said of the others."""
     _exist(choice.rename, log, bodies)
@@ -217,8 +225,8 @@ def _assigned(log: Log, bodies: Collection[str], choice: Choice) -> tuple[dict[s
         if len(of_one) > 1:
             several = ", ".join(f"{each.label}{f' in frame {each.frame}' * bool(each.frame)}" for each in best)
             name = best[0].name if len({each.name for each in best}) > 1 else best[0].child
-            frame = ", or --frame FRAME" if len({each.frame for each in best}) > 1 else ""
-            wanted = f"--rename {name}={body}{frame}"
+            frame = "--frame FRAME" if len({each.frame for each in best}) > 1 else ""
+            wanted = ", or ".join(filter(None, [f"--rename {name}={body}" if name else "", frame]))
             raise LogError(one_line(f"{body} is in the log more than once: {several[:400]}; wanted: {wanted}"))
         found[body] = _merged(best)
     return found, list(dict.fromkeys(ignored))

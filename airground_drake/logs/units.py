@@ -11,14 +11,14 @@ import numpy as np
 from airground_drake.base.errors import LogError, one_line
 from airground_drake.check.files import Json
 from airground_drake.check.scenario import robots_of
-from airground_drake.logs.stream import OF_MESSAGES, PER_M, PER_S, Stream
+from airground_drake.logs.stream import OF_MESSAGES, PER_M, PER_S, SINCE_1970, Stream
 
-SINCE_1970 = (("ns", 1e17), ("us", 1e14), ("ms", 1e11), ("s", 1e8))
-"""Units of stamps since 1970, and the least such stamp that is taken as one."""
 TOO_LONG = 1_000.0
 """Stamps that would make a log so many times longer than the scenario are not since 1970: they are of a finer unit."""
 NEAR_M = 0.1
 """A log that begins so close to where a body starts begins there, m."""
+LONG, SELDOM_S = 2.0, 4.0
+"""Whole numbers so far apart, in a log so many times longer than the scenario, are milliseconds."""
 IMPOSSIBLE = 20.0
 """So many times the speed limits, the duration or the size of a scenario are taken as a sign of another unit."""
 NAMES = {
@@ -89,6 +89,13 @@ def _since_1970(stream: Stream, duration_s: float) -> str:
     return unit if unit and float(np.ptp(stream.ns(unit))) / 1e9 <= TOO_LONG * duration_s else ""
 
 
+def _seldom(streams: Mapping[str, Stream], usual: str, lasting: float) -> str:
+    """Milliseconds, if as seconds a log would be much longer than the scenario, and its samples seconds apart."""
+    steps = [np.diff(each.ns("s")) / 1e9 for each in streams.values() if not each.time_unit]
+    seldom = steps and min(float(np.median(each)) for each in steps) >= SELDOM_S
+    return "ms" if usual == "s" and lasting > LONG and seldom else ""
+
+
 def _likely(streams: Mapping[str, Stream], scenario: Json) -> tuple[str, str]:
     """The units of time and length that are still open, together: the first that make the motion possible."""
     robots = robots_of(scenario)
@@ -112,10 +119,15 @@ def _likely(streams: Mapping[str, Stream], scenario: Json) -> tuple[str, str]:
 
     times = [""] if all(each.time_unit for each in streams.values()) else [*PER_S]
     lengths = [""] if all(each.length_unit for each in streams.values()) else [*PER_M]
+    if streams and lengths[0]:
+        fitting = [unit for unit in lengths if found(times[0], unit)[2] * size_m <= NEAR_M]
+        lengths = lengths if lengths[0] in fitting else fitting[:1] or lengths
     possible = [both for both in product(times, lengths) if max(found(*both)) <= IMPOSSIBLE]
     usual = times[0], lengths[0]
-    if not streams or not possible or usual in possible:
+    if not streams or not possible:
         return usual[0] or "s", usual[1] or "m"
+    if usual in possible:
+        return _seldom(streams, usual[0], found(*usual)[0]) or usual[0] or "s", usual[1] or "m"
 
     def oddness(both: tuple[str, str]) -> float:
         lasting, speed, away = found(*both)

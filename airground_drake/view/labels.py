@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+import io
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -47,11 +49,12 @@ def place(axes: Axes, labels: Sequence[Label], lines: Sequence[Array]) -> None:
     figure, (width_in, _) = axes.get_figure(root=True), size_in(axes)
     mark = MARK_PT * (figure.dpi if figure else 72.0) / 72.0
     kept = [line[thin(line, MAX_LINE_POINTS), :2] for line in lines]
-    textalloc.allocate(
-        axes, at[:, 0], at[:, 1], [label.text for label in labels], x_scatter=at[:, 0], y_scatter=at[:, 1],
-        x_lines=[line[:, 0] for line in kept], y_lines=[line[:, 1] for line in kept],
-        scatter_sizes=[np.array(mark)] * len(at),
-        min_distance=1.5 * MARK_PT / (72.0 * width_in), max_distance=FARTHEST, nbr_candidates=CANDIDATES,
-        textsize=[label.size_pt for label in labels], textcolor=[label.color for label in labels],
-        fontweight=[label.weight for label in labels], linecolor=MUTED, linewidth=0.6, zorder=5, bbox=_BOX,
-    )  # fmt: skip
+    with contextlib.redirect_stdout(io.StringIO()):  # it prints where it finds no free place
+        textalloc.allocate(
+            axes, at[:, 0], at[:, 1], [label.text for label in labels], x_scatter=at[:, 0], y_scatter=at[:, 1],
+            x_lines=[line[:, 0] for line in kept], y_lines=[line[:, 1] for line in kept],
+            scatter_sizes=[np.array(mark)] * len(at),
+            min_distance=1.5 * MARK_PT / (72.0 * width_in), max_distance=FARTHEST, nbr_candidates=CANDIDATES,
+            textsize=[label.size_pt for label in labels], textcolor=[label.color for label in labels],
+            fontweight=[label.weight for label in labels], linecolor=MUTED, linewidth=0.6, zorder=5, bbox=_BOX,
+        )  # fmt: skip
