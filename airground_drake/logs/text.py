@@ -67,7 +67,7 @@ def read(content: bytes) -> Table:
     rows = [_fields(lines[k], delimiter) for k in middle]
     rows = [row for row in rows if len(row) == count]
     commas = [] if delimiter == "," else [c for c in range(count) if _decimal_comma([row[c] for row in rows])]
-    numeric = [2 * sum(is_number(row[c]) for row in rows) > len(rows) for c in range(count)]
+    numeric = [_is_numeric([row[c] for row in rows]) for c in range(count)]
     first = next((k for k in full if _is_data(_fields(lines[k], delimiter), numeric)), None)
     if first is None:
         raise LogError("it has no rows of numbers; wanted: a table with times and positions")
@@ -141,6 +141,12 @@ def _count(line: str, delimiter: str) -> int:
 def is_number(cell: str) -> bool:
     """Whether a cell is a number, nothing, or not a number by name (nan)."""
     return _NUMBER.fullmatch(cell) is not None
+
+
+def _is_numeric(column: Sequence[str]) -> bool:
+    """Whether most cells of a column that are not empty are numbers."""
+    full = [cell for cell in column if cell]
+    return 2 * sum(map(is_number, full)) > len(full)
 
 
 def _decimal_comma(column: Sequence[str]) -> bool:

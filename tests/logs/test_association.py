@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import pytest
 from builders import logs
 from builders.logs import BROKEN, Motion, Ros
@@ -46,7 +47,7 @@ def with_gap(begin_s: float, end_s: float, mark: str | None) -> tuple[list[list[
     return [head, *rows], {**FULL, "tb_1": (t_s[left], places[left])}
 
 
-@pytest.mark.parametrize("mark", ["NaN", "", "lost", "0", None])
+@pytest.mark.parametrize("mark", ["NaN", "", "lost", "0", "9999", None])
 def test_nothing_is_claimed_in_a_gap(mark: str | None, tmp_path: Path, document: dict[str, Any]) -> None:
     table, left = with_gap(2.4, 3.6, mark)
     found = logs.read(written(tmp_path, table), document)
@@ -61,6 +62,76 @@ def test_nothing_is_claimed_in_a_gap(mark: str | None, tmp_path: Path, document:
     assert "Every distance was kept" not in text
     assert "tb_0, tb_1 are not covered from 2.400 to 3.600 s" in text
     assert any("tb_1: 23 rows skipped" in said for said in found.said) == (mark is not None)
+
+
+def test_where_a_body_leaps_nothing_is_claimed(tmp_path: Path, document: dict[str, Any]) -> None:
+    """The last place is written again while it is lost, as if it stood: only the leap at the end shows it."""
+    t_s, places = FULL["tb_1"]
+    held = places.copy()
+    held[(t_s > 2.4) & (t_s < 3.6)] = places[t_s <= 2.4][-1]
+    found = logs.read(written(tmp_path, logs.long({**FULL, "tb_1": (t_s, held)})), document)
+    judged = judge(found, document)
+    assert pair_of(judged.pairs, *BROKEN).gaps_s == [(pytest.approx(3.55), pytest.approx(3.6))]
+    assert not judged.covers_all
+    assert any("tb_1: 1 steps that are more than 5 times faster than 1 m/s" in said for said in found.said)
+
+
+def test_one_that_is_recorded_seldom_hides_no_gap_of_the_other(tmp_path: Path, document: dict[str, Any]) -> None:
+    """tb_1 is recorded every 2 s, and tb_0 ends 3 s before the log does."""
+    (t_0, places_0), (t_1, places_1) = FULL["tb_0"], FULL["tb_1"]
+    late = {"tb_0": (t_0[t_0 <= 3.0], places_0[t_0 <= 3.0]), "tb_1": (t_1[::40], places_1[::40])}
+    judged = judge(logs.read(written(tmp_path, logs.long({**FULL, **late})), document), document)
+    assert pair_of(judged.pairs, *BROKEN).gaps_s == [(pytest.approx(3.0), pytest.approx(6.0))]
+    assert not judged.covers_all
+
+
+def test_two_recordings_of_one_time_are_refused(tmp_path: Path, document: dict[str, Any]) -> None:
+    aside = {name: (t_s + 0.007, places + np.array([0.0, 0.9, 0.0])) for name, (t_s, places) in FULL.items()}
+    (tmp_path / "runs").mkdir()
+    written(tmp_path / "runs", logs.long(FULL), "run1.csv")
+    written(tmp_path / "runs", logs.long(aside), "run2.csv")
+    with pytest.raises(LogError, match=r"rows of two recordings of the same time, 0\.9 m apart; wanted: one recording"):
+        logs.read(tmp_path / "runs", document)
+
+
+def test_nothing_to_judge_is_no_verdict(tmp_path: Path) -> None:
+    alone = resolved(load(str(logs.write_scenario(tmp_path, obstacles={}))))
+    found = logs.read(written(tmp_path, logs.long({"tb_0": FULL["tb_0"]})), alone, without=["tb_1", "uav"])
+    with pytest.raises(LogError, match="no distance is left to judge: of tb_0 nothing else is in the log or scenario"):
+        judge(found, alone)
+
+
+@pytest.mark.parametrize("form", ["float", "date", "one zero"])
+def test_stamps_of_headers_count_in_every_form(form: str, tmp_path: Path, document: dict[str, Any]) -> None:
+    """Messages come 0.3 s late; a message without a stamp is left out."""
+    said = []
+    for k, t in enumerate(FULL["uav"][0]):
+        ns = logs.EPOCH_NS + round(t * 1e9)
+        whole, rest = divmod(ns, 10**9)
+        for name, (_, places) in FULL.items():
+            stamp: Any = {"sec": whole, "nanosec": rest}
+            if form == "one zero" and (k, name) == (7, "tb_0"):
+                stamp = {"sec": 0, "nanosec": 0}
+            stamp = ns / 1e9 if form == "float" else stamp
+            if form == "date":
+                stamp = f"{pd.Timestamp(ns, tz='UTC').isoformat()}"
+            position = dict(zip("xyz", places[k].tolist(), strict=True))
+            message = {"header": {"stamp": stamp, "frame_id": "map"}, "pose": {"position": position}}
+            said.append((ns + 300_000_000 * (name == "tb_0"), f"/{name}/pose", "PoseStamped", message))
+    logs.mcap_json(tmp_path / "run.mcap", said)
+    found = logs.read(tmp_path / "run.mcap", document)
+    least_m, _ = logs.least_gaps(FULL)[BROKEN]
+    assert pair_of(judge(found, document).pairs, *BROKEN).least_m == pytest.approx(least_m, abs=1e-6)
+    assert {each.told["clock"] for each in found.bodies.values()} == {"header stamps"}
+
+
+def test_odometry_of_one_robot_beside_positions_without_a_frame_is_refused(
+    tmp_path: Path, document: dict[str, Any]
+) -> None:
+    head, *rows = logs.long(FULL)
+    framed = [[*row, "tb_0/odom" if row[1] == "tb_0" else ""] for row in rows]
+    with pytest.raises(LogError, match="odometry is in a frame of each robot's own"):
+        logs.read(written(tmp_path, [[*head, "frame_id"], *framed]), document)
 
 
 def test_who_starts_at_the_origin_and_drives_off_is_not_lost(tmp_path: Path, document: dict[str, Any]) -> None:

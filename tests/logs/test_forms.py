@@ -151,6 +151,45 @@ def twice() -> list[list[str]]:
     return [head, *lines[:30], *moved, *lines[60:], *lines[100:140], contradiction]
 
 
+def own_clocks() -> list[list[str]]:
+    """Each body has its own times, which begin and end elsewhere and have another rate."""
+    lines = [[f"{name}.{each}" for name in JITTER for each in ("t", "x", "y", "z")]]
+    for k in range(max(len(t_s) for t_s, _ in JITTER.values())):
+        own = (
+            [f"{float(t_s[k])!r}", *logs.fixed(places[k])] if k < len(t_s) else [""] * 4
+            for t_s, places in JITTER.values()
+        )
+        lines.append([cell for cells in own for cell in cells])
+    return lines
+
+
+def velocities() -> list[list[str]]:
+    head, *lines = logs.long(FULL)
+    return [[*head[:2], "pos_x", "pos_y", "pos_z", "v_x", "v_y"], *([*line, "0.4", "0"] for line in lines)]
+
+
+def by_folder(folder: Path) -> list[Path]:
+    """A file per robot; the frame that it carries is the same in all, and folders have the robots' names."""
+    for name, (t_s, places) in FULL.items():
+        rows = [[repr(t), "base_footprint", *logs.fixed(p)] for t, p in zip(t_s.tolist(), places, strict=True)]
+        (folder / name).mkdir()
+        (folder / name / "pose.csv").write_text(logs.text([["t", "child_frame_id", "x", "y", "z"], *rows]))
+    return [folder / name / "pose.csv" for name in FULL]
+
+
+def two_line_ends(folder: Path) -> Path:
+    (folder / "log.csv").write_bytes(logs.text(logs.long(FULL)).replace("\n", "\r\r\n").encode())
+    return folder / "log.csv"
+
+
+def parquet_of_frames(folder: Path) -> Path:
+    """With the times as an index, and the bodies as categories."""
+    head, *lines = logs.long(FULL)
+    frame = pd.DataFrame(lines, columns=head).astype({name: float for name in head if name != "body"})
+    frame.astype({"body": "category"}).set_index("t_s").to_parquet(folder / "log.parquet")
+    return folder / "log.parquet"
+
+
 def parquet(folder: Path, dates: bool = False) -> Path:
     head, *lines = logs.long(FULL)
     frame = pd.DataFrame(lines, columns=head)
@@ -329,6 +368,15 @@ FORMS = {
                    ("uav is not in the log",)),
     "parquet": Form(parquet, FULL),
     "parquet with dates": Form(partial(parquet, dates=True), FULL),
+    "parquet of a frame": Form(parquet_of_frames, FULL),
+    "times of each body": Form(table("log.csv", own_clocks), JITTER),
+    "velocities beside positions": Form(table("log.csv", velocities), FULL),
+    "a folder per robot": Form(by_folder, FULL),
+    "cm by where robots start": Form(
+        table("log.csv", lambda: [["t", "body", "x", "y", "z"], *logs.long(FULL, scale=100.0)[1:]]), FULL,
+        ("lengths are taken as centimetres",),
+    ),
+    "two line ends": Form(two_line_ends, FULL),
     "two files": Form(two_files, FULL),
     "other names": Form(
         table("log.csv", lab({"A": FULL["tb_0"], "B": FULL["tb_1"], "uav": FULL["uav"]}, "clock,who,px_,py_,up")),
