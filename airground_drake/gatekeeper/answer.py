@@ -48,7 +48,7 @@ class Basis(NamedTuple):
 
     Attributes:
         sensed: obstacles within sensing range.
-        known: under method (d), obstacles sensed so far.
+        known: under method (d), obstacles sensed so far and not seen to be gone.
         new: of these, those sensed for the first time that are not on the proposal's map.
         told: rows of the proposal's map that the UGV believed.
         asked: under method (d), the proposals that other UGVs had and had not refused: number, and whether accepted.

@@ -48,7 +48,7 @@ class GatekeeperState:
         reports: what came with them.
         decisions: those of the last sample that was not idle.
         commitments: under method (d), each UGV's tries and rests.
-        sensed: under method (d), which outlines at rest each UGV has sensed so far, (n, m).
+        sensed: under method (d), which outlines at rest each UGV has sensed and not seen to be gone, (n, m).
         count: number of answers so far.
     """
 

@@ -98,14 +98,20 @@ class OutcomeGatekeepers(Gatekeepers):
         )  # fmt: skip
 
     def _remembered(self, t: float, positions: Array, before: GatekeeperState) -> np.ndarray:
-        """Which outlines each UGV has sensed up to time t, s, (n, m); the very same array if nothing is new."""
+        """Which outlines each UGV has sensed up to time t, s, (n, m), and has not seen to be gone since.
+
+        The very same array if nothing changes.
+        """
         still, own = self._world.at(self._near, t).still, positions[self._near.members]
-        reach = self.law.avoidance.sensing_range
-        if before.sensed.shape != (len(own), len(still)):
+        reach, known = self.law.avoidance.sensing_range, before.sensed
+        if known.shape != (len(own), len(still)):
             return within(still, own, reach, True)
-        if news_within(still, own, reach, True, before.sensed):
-            return before.sensed | within(still, own, reach, True)
-        return before.sensed
+        gone = known.any(axis=0) & ~self._world.there(t, self._world.resting)[self._world.owner]
+        if gone.any():
+            seen = np.zeros(known.shape, dtype=bool)
+            seen[:, gone] = within(self._near.still[gone], own, reach, True)
+            known = known & ~seen if (known & seen).any() else known
+        return known | within(still, own, reach, True) if news_within(still, own, reach, True, known) else known
 
     def _discovered(
         self, sensed: npt.NDArray[np.bool_], before: GatekeeperState, i: int, proposal: Proposal

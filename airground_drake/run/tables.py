@@ -49,7 +49,7 @@ since the UGV last rested.
 The lists say what a prediction rested on; they are empty where nothing was predicted. Obstacles are indices in the
 order of the scenario:
 - sensed: obstacles within sensing range.
-- known: obstacles sensed so far (method (d)).
+- known: obstacles sensed so far and not seen to be gone (method (d)).
 - new: obstacles sensed for the first time that are not on the proposal's map (method (d)).
 - told: rows of the proposal's map that were believed (method (d)).
 - asked, asked_accepted: numbers of the proposals that other UGVs had and had not refused, and whether they had accepted

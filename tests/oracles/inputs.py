@@ -27,7 +27,7 @@ from airground_drake.verify.runs.acceptances import METHOD
 from airground_drake.verify.runs.proposals import ProposalRecord, proposal_of, proposals_of
 from oracles.fault import Fault
 from oracles.protocol import answers_to
-from oracles.sensing import are_same, are_there, beyond_range, first_sensed, still_parts
+from oracles.sensing import are_same, are_there, beyond_range, first_sensed, seen_gone, still_parts
 
 MOST_CLAIMED = 64
 """Outlines of a message that a UGV takes into account."""
@@ -58,7 +58,8 @@ def _compared(trace: Trace, row: dict[Any, Any]) -> Iterator[tuple[str, list[Any
     if trace.meta["method"] != METHOD:
         return
     on, first = proposal_of(trace, int(row["number"])), first_sensed(trace, ugv)
-    known = np.flatnonzero(first <= t + TIME_TOLERANCE_S)
+    gone = trace.derived(("seen gone", ugv), lambda: seen_gone(trace, ugv))
+    known = np.flatnonzero((first <= t + TIME_TOLERANCE_S) & (gone > t + TIME_TOLERANCE_S))
     yield "known", known.tolist(), recorded["known"]
     cores = still_parts(trace).cores
     shown = are_same(cores, Cores.of(on.mapped)).any(axis=1)

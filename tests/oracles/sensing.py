@@ -98,13 +98,28 @@ def are_same(one: Cores, other: Cores) -> npt.NDArray[np.bool_]:
 
 def first_sensed(trace: Trace, ugv: str) -> Array:
     """When a UGV senses each part for the first time, at the gatekeeper's samples, (m,), s; inf if never."""
+    times, cores, there = _near(trace, ugv)
+    found = np.full(len(still_parts(trace).owner), np.inf)
+    np.minimum.at(found, cores[there], times[there])
+    return found
+
+
+def seen_gone(trace: Trace, ugv: str) -> Array:
+    """When a UGV first has each part that it has sensed within range, and it is gone, (m,), s; inf if never."""
+    times, cores, there = _near(trace, ugv)
+    first = first_sensed(trace, ugv)
+    gone = ~there & (times > first[cores])
+    found = np.full(len(first), np.inf)
+    np.minimum.at(found, cores[gone], times[gone])
+    return found
+
+
+def _near(trace: Trace, ugv: str) -> tuple[Array, Indices, npt.NDArray[np.bool_]]:
+    """Times of the gatekeeper's samples, s, at which a part is within sensing range; the part; whether it is there."""
     period_s = trace.scenario.gatekeeper.period_s
     samples = period_s * np.arange(np.floor(trace.t[-1] / period_s + 1e-9) + 1.0)
     was = interpolate(trace.t, trace.position(ugv), np.minimum(samples, trace.t[-1]))
     parts = still_parts(trace)
     near = within(parts.cores, was, trace.scenario.control.sensing_range_m, planar=True)
-    found = np.full(len(parts.owner), np.inf)
-    then = np.array([are_there(trace, t) for t in samples]).reshape(len(samples), len(found))
-    there = then[near.place, near.core]
-    np.minimum.at(found, near.core[there], samples[near.place[there]])
-    return found
+    then = np.array([are_there(trace, t) for t in samples]).reshape(len(samples), len(parts.owner))
+    return samples[near.place], near.core, then[near.place, near.core]

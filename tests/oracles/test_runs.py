@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import persons
 import pytest
+import yaml
 from builders.edits import with_scenario
 from builders.rooms import room
 from random_scenarios import draw
@@ -52,6 +53,30 @@ def test_a_shipped_run_has_no_fault(run: Run, scenario: str, name: str) -> None:
 def test_every_shipped_run_has_no_fault(run: Run, scenario: str) -> None:
     for name in load(scenario).runs:
         assert not faults_of(run(scenario, name)), name
+
+
+DOOR = """
+name: door
+duration_s: 20
+ugvs:
+  r1:
+    start_m: [-4, 0, 0]
+    target_m: [4, 0, 0]
+    preset: {waypoints_m: [[-4, 0, 0], [4, 0, 0]], speed_m_s: 0.6}
+    max_speed_m_s: 1
+    radius_m: 0.2
+uav: {start_m: [-4, 0, 2.5], altitude_m: 2.5}
+obstacles:
+  wall: {segment_m: [[0, -2], [0, 3.8]]}
+  door: {segment_m: [[0, -3.8], [0, -2]], disappears_s: 5}
+arena_m: [[-6, -3.8], [6, 3.8]]
+safe_distance: {obstacle_m: 0.2, ugv_m: 0.2, air_ground_m: 1}
+control: {period_s: 0.05, sensing_range_m: 3}
+decision: {threshold: {rule: fixed, zeta_m: 1}, release_m: 0.6, noise_period_s: 0.05}
+intervention: {policies: [{name: coordinate}]}
+gatekeeper: {period_s: 0.2}
+runs: {d: {method: d}}
+"""
 
 
 def of_draw(number: int, most_ugvs: int = 6) -> Trace:
@@ -112,6 +137,14 @@ def test_a_known_obstacle_that_disappears_leaves_the_map() -> None:
     trace = simulate(scenario, "d")
     sent = [len(mapped) > 0 for mapped in trace.proposals["mapped"]]
     assert {*sent} == {True, False}
+    assert not faults_of(trace)
+
+
+def test_a_ugv_forgets_what_it_sees_to_be_gone() -> None:
+    """It has sensed the door before that opens, and then takes the way through it."""
+    data = yaml.safe_load(DOOR)
+    trace = simulate(from_data(data, "door"), "d")
+    assert [event["robot"] for event in trace.events if event["kind"] == "arrival"] == ["uav", "r1"]
     assert not faults_of(trace)
 
 
