@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 from airground_drake.base.statuses import NOTHING, PASSING, UNDECIDED
 from airground_drake.report.outcomes import Document, ProofOutcome, RunOutcome, claims, distance, tolerance, triggers
 from airground_drake.report.phrases import (
+    appeared,
     collision,
     encounter,
     ending,
@@ -110,14 +111,14 @@ def _encounters(course: RunOutcome) -> str:
 def _intrusion(course: RunOutcome) -> str:
     """Who came how near to what, when, and how many others did."""
     hits = list(dict.fromkeys(collision(hit, course.unknown) for hit in course.hits.values()))
-    if hits:
+    if hits and not appeared(course):
         more = len(hits) - MAX_NAMES
         told = "; ".join([*hits[:MAX_NAMES], *[f"{more} more collisions"] * (more > 0)])
     elif course.near and course.near[0].is_short:
         told = f"{intrusion(course)} at {course.near[0].t_s:.2f} s, required {course.near[0].required_m:g} m"
     else:
         return intrusion(course)
-    others = more_pairs(course, max(1, len(hits)))
+    others = more_pairs(course, 1 if appeared(course) else max(1, len(hits)))
     return f"{told}{others}{' too close' * bool(others)}"
 
 

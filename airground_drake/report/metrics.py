@@ -94,11 +94,15 @@ def of_run(trace: Trace) -> dict[str, Any]:
     }
 
 
+CREEPING = 0.1
+"""A UGV that goes slower than this share of its preset's speed at the end creeps: how long it takes is not told."""
+
+
 def on_the_way(trace: Trace) -> dict[str, dict[str, Any]]:
     """UGVs that neither arrived nor collided, and how far they had come when the run ended.
 
     Returns:
-        By UGV `stands` (it did not move in the last second), `left_m` (the way to its target along its preset) and
+        By UGV `stands` (it did not move in the last second), `creeps` (it hardly did), `left_m` (the way to its target along its preset) and
         `left_s` (how long that takes if it comes nearer as fast as in the last second; None if it does not). Where it
         stands because an obstacle that moves is at its target: `kept_away`, see `_kept_away`. Where it stands as near
         to the map as it may: `at_m`, the nearest place of the map, [x, y], m.
@@ -110,11 +114,14 @@ def on_the_way(trace: Trace) -> dict[str, dict[str, Any]]:
 def _on_the_way(trace: Trace, ugv: str) -> dict[str, Any]:
     begin_s, end_s = max(trace.t[-1] - AT_REST_S, trace.t[0]), trace.t[-1]
     before_m, left_m = (_way_left_m(trace, ugv, time_s) for time_s in (begin_s, end_s))
-    stands, speed_m_s = moved_at_the_end(trace, ugv) <= AT_REST_M, (before_m - left_m) / (end_s - begin_s)
+    moved_m = moved_at_the_end(trace, ugv)
+    stands, speed_m_s = moved_m <= AT_REST_M, (before_m - left_m) / (end_s - begin_s)
+    creeps = not stands and moved_m < CREEPING * trace.scenario.ugvs[ugv].preset.speed_m_s * (end_s - begin_s)
     return {
         "stands": stands,
+        "creeps": creeps,
         "left_m": left_m,
-        "left_s": left_m / speed_m_s if speed_m_s > 0.0 and not stands else None,
+        "left_s": left_m / speed_m_s if speed_m_s > 0.0 and not (stands or creeps) else None,
         **({"kept_away": found} if stands and (found := _kept_away(trace, ugv)) else {}),
         **(place_on_map(trace, ugv, end_s) if stands and _is_at_map(trace, ugv) else {}),
     }

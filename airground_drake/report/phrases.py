@@ -69,7 +69,7 @@ def trouble(course: RunOutcome) -> str:
     if course.blameless:
         told = [encounter(course, course.encounters[0])]
     elif course.safe is False:
-        told = [colliding(course) if course.hits else intrusion(course)]
+        told = [intrusion(course) if appeared(course) or not course.hits else colliding(course)]
     away = [robot for robot in course.away or () if robot not in course.hits]
     return ", and ".join([*told, *([_absent(course, away)] if away else [])])
 
@@ -78,6 +78,8 @@ def encounter(course: RunOutcome, one: Mapping[str, Any]) -> str:
     """How an obstacle that moves came too near to a robot by its own motion, and what the robot did."""
     if one["appeared"]:
         return clause("appeared", one)
+    if one["t_s"] == 0.0:
+        return clause("starts", one)
     if one["caught_s"] and (around := one["blocked_by"]):
         between = joined([f"{'wall ' * (name in course.walls)}{name}" for name in around[:MAX_NAMES]])
         kept = {clause("beside", near=near) for near in course.near
@@ -102,6 +104,13 @@ def intrusion(course: RunOutcome) -> str:
     if course.near and course.near[0].is_short:
         return clause("appears" if course.near[0].appeared else "comes_within", near=course.near[0])
     return course.why
+
+
+def appeared(course: RunOutcome) -> bool:
+    """Whether all that collided did so with obstacles that appeared on them, the first one named by `intrusion`."""
+    on = {(near.robot, near.other) for near in course.near if near.appeared and near.is_short}
+    all_on = all((robot, hit.get("obstacle")) in on for robot, hit in course.hits.items())
+    return bool(course.hits) and all_on and course.near[0].appeared
 
 
 def more_pairs(course: RunOutcome, named: int = 1) -> str:
@@ -130,6 +139,8 @@ def ending(course: RunOutcome, robot: str) -> str:
         return "short of its target"
     if known["stands"]:
         return f"standing still at {named('map', known['at_m'])}" if "at_m" in known else "standing still"
+    if known["creeps"]:
+        return "hardly moving at the end"
     left_s = known["left_s"]
     rounded = f" (about {float(f'{left_s:.2g}'):.15g} s more)" if left_s is not None else ""  # without an exponent
     return f"still moving at the end{rounded}"

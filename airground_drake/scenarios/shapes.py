@@ -109,19 +109,37 @@ def split(corners: Sequence[Corner]) -> list[list[Corner]]:
     """
     around = list(corners) if area(corners) > 0.0 else list(corners)[::-1]
     parts = [list(each) for each in _triangles(around)] if not _is_convex(around) else [around]
-    joined = True
-    while joined:
-        joined = False
-        for i in range(len(parts)):
-            for j in range(i + 1, len(parts)):
-                if both := _united(parts[i], parts[j]):
-                    parts[i] = both
-                    del parts[j]
-                    joined = True
-                    break
-            if joined:
+    return [_without_straight_corners(part) for part in _joined(parts)]
+
+
+def _joined(parts: list[list[Corner]]) -> list[list[Corner]]:
+    """Convex polygons, of which each was united with a later one, the first that is possible, as often as possible."""
+    there: dict[int, list[Corner]] = dict(enumerate(parts))
+    at = {edge: i for i, part in there.items() for edge in _edges(part)}
+    apart = set[tuple[int, int]]()  # pairs whose union is not convex
+    i = 0
+    while i < len(parts):
+        beside = sorted({at[b, a] for a, b in _edges(there[i]) if (b, a) in at} - {i}) if i in there else []
+        for j in beside:
+            if j > i and (i, j) not in apart:
+                both = _united(there[i], there[j])
+                if both is None:
+                    apart.add((i, j))
+                    continue
+                apart -= {pair for k in beside for pair in ((i, k), (k, i), (j, k), (k, j))}
+                for edge in (*_edges(there[i]), *_edges(there.pop(j))):
+                    at.pop(edge, None)
+                there[i] = both
+                at |= dict.fromkeys(_edges(both), i)
+                i = min(i, *(k for k in beside if k != j)) if len(beside) > 1 else i
                 break
-    return [_without_straight_corners(part) for part in parts]
+        else:
+            i += 1
+    return list(there.values())
+
+
+def _edges(part: Sequence[Corner]) -> list[tuple[Corner, Corner]]:
+    return list(zip(part, [*part[1:], part[0]], strict=True))
 
 
 def _is_convex(corners: Sequence[Corner]) -> bool:
@@ -133,10 +151,10 @@ def _triangles(corners: list[Corner]) -> list[tuple[Corner, Corner, Corner]]:
     """Triangles that together are a polygon."""
     left, found = list(corners), []
     while len(left) > 3:
+        points = np.array(left)
         for k in range(len(left)):
             a, b, c = left[k - 2], left[k - 1], left[k]
-            others = (p for p in left if p not in (a, b, c))
-            if turn(a, b, c) > 0.0 and not any(_in_triangle(p, a, b, c) for p in others):
+            if turn(a, b, c) > 0.0 and not _any_in_triangle(points, a, b, c):
                 found.append((a, b, c))
                 del left[k - 1]
                 break
@@ -148,18 +166,25 @@ def _triangles(corners: list[Corner]) -> list[tuple[Corner, Corner, Corner]]:
     return found
 
 
-def _in_triangle(p: Corner, a: Corner, b: Corner, c: Corner) -> bool:
-    return turn(a, b, p) >= 0.0 and turn(b, c, p) >= 0.0 and turn(c, a, p) >= 0.0
+def _any_in_triangle(points: Array, a: Corner, b: Corner, c: Corner) -> bool:
+    """Whether one of some points (n, 2), other than the corners, is in a triangle."""
+    x, y = points.T
+    inside = np.ones(len(points), dtype=bool)
+    for (px, py), (qx, qy) in ((a, b), (b, c), (c, a)):
+        inside &= (qx - px) * (y - qy) - (qy - py) * (x - qx) >= 0.0
+    for corner in (a, b, c):
+        inside &= (x != corner[0]) | (y != corner[1])
+    return bool(inside.any())
 
 
 def _united(one: list[Corner], other: list[Corner]) -> list[Corner] | None:
     """The union of two convex polygons that share an edge, if it is convex."""
+    at = {edge: m for m, edge in enumerate(_edges(other), start=1)}
     for k in range(len(one)):
-        a, b = one[k - 1], one[k]  # the other polygon goes from b to a
-        for m in range(len(other)):
-            if (other[m - 1], other[m]) == (b, a):
-                both = [*one[k:], *one[:k], *[*other[m:], *other[:m]][1:-1]]
-                return both if _is_convex(both) else None
+        if m := at.get((one[k], one[k - 1])):  # the other polygon goes the other way
+            m %= len(other)
+            both = [*one[k:], *one[:k], *[*other[m:], *other[:m]][1:-1]]
+            return both if _is_convex(both) else None
     return None
 
 

@@ -111,6 +111,13 @@ def _shapes(scenario: Scenario) -> Problems:
         yield from _corners(f"{key}.polygon_m", obstacle.polygon_m, 3, closed=True)
     if scenario.arena_m and any(one == other for one, other in zip(*scenario.arena_m, strict=True)):
         yield "arena_m", scenario.arena_m, "two opposite corners of a rectangle"
+    elif scenario.arena_m:
+        low, high = np.min(scenario.arena_m, axis=0), np.max(scenario.arena_m, axis=0)
+        for key, robot in (*((f"ugvs.{name}", each) for name, each in scenario.ugvs.items()), ("uav", scenario.uav)):
+            for name in ("start_m", "target_m"):
+                place = np.array(getattr(robot, name)[:2])
+                if not ((low < place) & (place < high)).all():
+                    yield f"{key}.{name}", getattr(robot, name), f"a place within arena_m = {scenario.arena_m}"
 
 
 def _way(key: str, obstacle: Obstacle, *, flat: bool) -> Problems:
@@ -469,6 +476,14 @@ def _extent(scenario: Scenario) -> Problems:
         yield "control.avoidance_gain_1_s", control.avoidance_gain_1_s, f"0, or at least {gain / _SHORT:.6g} 1/s, {why}"
 
 
+def _filled(scenario: Scenario) -> str:
+    """Which free or unknown cells of the map count as occupied."""
+    cells = scenario.map.cells if scenario.map else None
+    told = [f"{cells.unsure} unknown ones"] * bool(cells and cells.unsure and cells.unknown == "occupied")
+    told += [f"{cells.unreached} free ones that cannot be reached from any start"] * bool(cells and cells.unreached)
+    return f" (of whose cells {' and '.join(told)} count as occupied)" if told else ""
+
+
 class _Round(NamedTuple):
     """A robot: its key in the scenario, its name, its place, m, and its radius, m."""
 
@@ -494,7 +509,8 @@ def _clearances(scenario: Scenario) -> Problems:
                 apart = convex.distances(rows, np.array(robot.point), robot is not uav) - rows[:, outline.RADIUS]
                 gap = float(apart.min()) - robot.radius
                 if gap < least - TOLERANCE:
-                    yield _too_near(robot, attribute, f"{verb} {gap:.9g} m from {name}", kind, least)
+                    what = f"{verb} {gap:.9g} m from {name}{_filled(scenario) if name == MAP else ''}"
+                    yield _too_near(robot, attribute, what, kind, least)
         for robots, others, kind in ((ugvs, ugvs, "ugv_m"), ([uav], ugvs, "air_ground_m")):
             least = getattr(scenario.safe_distance, kind)
             for robot, other in _within(robots, others, least - TOLERANCE):
