@@ -17,7 +17,7 @@ import math
 from bisect import bisect_right
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from itertools import accumulate
+from itertools import accumulate, count
 from typing import Self
 
 import numpy as np
@@ -28,7 +28,7 @@ from scipy.spatial import cKDTree
 
 from airground_drake.base.arrays import Array, read_only
 from airground_drake.geometry import convex, outline
-from airground_drake.geometry.outline import BASE, CORNERS, COUNT, TOP
+from airground_drake.geometry.outline import BASE, CORNERS, COUNT, MIDDLE, TOP
 from airground_drake.geometry.separation import are_separated
 
 Points = NDArray[np.complex128]
@@ -43,6 +43,9 @@ shorter pieces are left out of the path."""
 
 FEW = 64
 """Up to this number of circles all obstacles enter the graph; beyond it only those that a path runs into."""
+
+SEARCHES = 12
+"""After so many searches more obstacles enter the graph than the path runs into: a quarter as many again."""
 
 AT_ONCE = 1_000_000
 """Largest number of pairs of a segment and a disc that are tested together, to limit memory."""
@@ -166,6 +169,11 @@ class _Obstacles:
         round_ones = rows[:, COUNT] == 1.0
         c, r = _outermost(rows[round_ones, CORNERS : CORNERS + 2] @ np.array((1.0, 1.0j)), keep[round_ones])
         return cls(c, r, rows[~round_ones], np.maximum(keep[~round_ones], 2.0 * TOL))
+
+    @property
+    def middles(self) -> Array:
+        """The middles of discs and polygons, (m + k, 2), m."""
+        return np.concatenate((_places(self.c), self.rows[:, MIDDLE : MIDDLE + 2]))
 
     @property
     def corners(self) -> tuple[Points, Points, Points]:
@@ -436,12 +444,17 @@ def _route_among(p: complex, q: complex, around: _Obstacles) -> Array | None:
     if len(around.circles[1]) <= FEW:
         return _route(p, q, around)
     some = around.entered(_rows(np.array([p]), np.array([q - p]), np.zeros(1), np.array([abs(q - p)])))
-    while True:
+    for searches in count(1):
         route = _route(p, q, around.some(some))
-        more = some if route is None else some | around.entered(route)
-        if (more == some).all():
+        new = np.zeros_like(some) if route is None else around.entered(route) & ~some
+        if not new.any():
             return route
-        some = more
+        some |= new
+        if searches >= SEARCHES:  # it feels its way along a wall of many parts: more of them at once
+            apart, _ = cKDTree(around.middles[new]).query(around.middles)
+            apart[some] = np.inf
+            some[np.argsort(apart, kind="stable")[: int(some.sum()) // 4]] = True
+    raise AssertionError  # `count` has no end
 
 
 def _entered(pieces: Array, c: Points, r: Array) -> NDArray[np.bool_]:

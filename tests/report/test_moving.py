@@ -12,6 +12,8 @@ import pytest
 
 from airground_drake.report import document, summary
 from airground_drake.report.outcomes import courses
+from airground_drake.run.simulation import simulate
+from airground_drake.scenarios.load import load
 from airground_drake.verify.judging import judge_all
 
 Document = dict[str, Any]
@@ -131,3 +133,25 @@ def test_who_stands_elsewhere_is_not_kept_away_by_a_person() -> None:
     ])  # fmt: skip
     assert screen(gone).startswith("[✗] Safe, but not all arrive: ugv1 is standing still")
     assert screen(made("leaving")).startswith("[✓] All arrive safely")
+
+
+@pytest.mark.parametrize(
+    ("obstacle", "says"),
+    [
+        (
+            {"moves": {"waypoints_m": [[0.0, 1.0, 0.0], [0.0, 9.0, 0.0]], "speed_m_s": 0.5, "start_s": 2.0}},
+            "[≈] d: ugv1 starts 1.00 m from thing, required 2.00 m: nobody's doing.",
+        ),
+        (
+            {"position_m": [1.2, 0.0, 0.0], "radius_m": 0.6, "appears_s": 1.0},
+            "[✗] d: thing appears -0.400 m (overlap) from ugv1 (nobody's doing) at 1.00 s, required 2 m.",
+        ),
+    ],
+)
+def test_nobody_is_blamed_for_how_a_run_begins_or_for_what_appears(obstacle: dict[str, Any], says: str) -> None:
+    changes = {"obstacles": {"thing": obstacle}, "runs": {"d": {"method": "d"}}, "duration_s": 4.0}
+    scenario = load("minimal", changes)
+    traces = {"d": simulate(scenario, "d")}
+    verdicts = judge_all(scenario, traces.values())
+    found = screen(document.build(scenario, traces, verdicts, {"package": "0.1.0", "seed": 1, "started": "now"}))
+    assert says in " ".join(found.split())

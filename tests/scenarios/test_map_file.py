@@ -185,7 +185,7 @@ MISTAKES: list[tuple[Callable[[Path], object], str]] = [
     (lambda folder: write(folder, obstacles={"map_1": {"position_m": [50, 50, 0]}}), "does not begin with map_"),
     (
         lambda folder: write(folder, safe_distance={"obstacle_m": 0.6}),
-        "ugv1 starts 0.25 m from map, at least safe_distance.obstacle_m = 0.6 m is needed",
+        "free ones that cannot be reached from any start count as occupied), at least safe_distance.obstacle_m = 0.6 m",
     ),
     (changing(image=None), "room.yaml:1: image: missing; wanted: the path of a PGM, PPM, PNG or BMP file"),
     (changing(image="no.pgm"), "room.yaml:2: image: "),
