@@ -280,7 +280,7 @@ def _is_convex(corners: Sequence[Corner]) -> bool:
 
 def _ears(corners: Sequence[Corner]) -> list[tuple[Corner, ...]]:
     """Triangles that turn left, with no other corner in them."""
-    left, found = [*corners], []
+    left, found = [*corners], list[tuple[Corner, ...]]()
     while len(left) > 2:
         points = np.array(left)
         for k in range(len(left)):

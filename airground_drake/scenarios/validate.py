@@ -479,8 +479,10 @@ def _extent(scenario: Scenario) -> Problems:
 def _filled(scenario: Scenario) -> str:
     """Which free or unknown cells of the map count as occupied."""
     cells = scenario.map.cells if scenario.map else None
-    told = [f"{cells.unsure} unknown ones"] * bool(cells and cells.unsure and cells.unknown == "occupied")
-    told += [f"{cells.unreached} free ones that cannot be reached from any start"] * bool(cells and cells.unreached)
+    if cells is None:
+        return ""
+    told = [f"{cells.unsure} unknown ones"] * bool(cells.unsure and cells.unknown == "occupied")
+    told += [f"{cells.unreached} free ones that cannot be reached from any start"] * bool(cells.unreached)
     return f" (of whose cells {' and '.join(told)} count as occupied)" if told else ""
 
 

@@ -144,7 +144,7 @@ def test_who_stands_elsewhere_is_not_kept_away_by_a_person() -> None:
         ),
         (
             {"position_m": [1.2, 0.0, 0.0], "radius_m": 0.6, "appears_s": 1.0},
-            "[✗] d: thing appears -0.400 m (overlap) from ugv1 (nobody's doing) at 1.00 s, required 2 m.",
+            "[✗] Not safe. Under (d), thing appears -0.400 m (overlap) from ugv1 (nobody's doing).",
         ),
     ],
 )
