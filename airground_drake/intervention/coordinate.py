@@ -26,8 +26,9 @@ MOST_PLANS = 4
 """Largest number of joint plans that are tried for one proposal, each with more UGVs."""
 NARROWER = (1.0, 0.1, 0.01)
 """Shares of the clearance, and of the spacing. The next share of the clearance is tried if the UGV has no way even
-alone: its own task may have led it through a gap that is too narrow for the full clearance. The next share of the
-spacing is tried if a joint plan helps nobody: UGVs that have met stand nearer to each other than the full spacing."""
+alone, or all joint steps on the roadmaps are exhausted: a gap, or the place where one waits for another, may be too
+narrow for the full clearance. The next share of the spacing is tried if a joint plan helps nobody: UGVs that have met
+stand nearer to each other than the full spacing."""
 ON_PRESET_M = 0.5
 """A motion that ends this near to the preset, m, is predicted to go on along the preset."""
 BLEND_S = 1.0
@@ -113,7 +114,7 @@ class Coordinate(Policy):
             alone = cache(partial(self._alone, seen, space))
             tried.append(self._joint(seen, space, alone))
             lost = tried[-1][0][0]
-            if not lost or alone(own) is not None:
+            if not lost or (alone(own) is not None and tried[-1][2].outcome != "exhausted"):
                 break
         _, group, found = min(tried, key=lambda each: each[0])
         self.reason = _reason(seen, group, found)

@@ -144,6 +144,30 @@ def test_a_joint_plan_in_vain_is_made_again_only_in_another_situation(monkeypatc
     assert plans_for([one, other], 20.0, obstacles=len(corridor) - 1) > 0
 
 
+def test_a_bay_that_is_too_narrow_for_the_full_clearance_is_waited_in() -> None:
+    """Two change places in a corridor; the bay is 1 m wide, and who waits in it needs 0.8 m."""
+    north = [[-4.6, 0.5], [-0.5, 0.5], [-0.5, 1.5], [0.5, 1.5], [0.5, 0.5], [4.6, 0.5], [4.6, -0.5]]
+    ugvs = {
+        name: {"start_m": [x, 0.0, 0.0], "target_m": [-x, 0.0, 0.0], "max_speed_m_s": 1.0, "radius_m": 0.2}
+        | {"preset": {"waypoints_m": [[x, 0.0, 0.0], [-x, 0.0, 0.0]], "speed_m_s": 0.6}}
+        for name, x in (("r1", -4.0), ("r2", 4.0))
+    }
+    scenario = from_data(
+        {
+            "name": "bay", "duration_s": 18.0, "ugvs": ugvs, "runs": {"d": {"method": "d"}},
+            "uav": {"start_m": [0.0, 0.0, 2.5], "altitude_m": 2.5},
+            "obstacles": {"wall": {"segment_m": [*north, [-4.6, -0.5], [-4.6, 0.5]]}},
+            "safe_distance": {"obstacle_m": 0.2, "ugv_m": 0.2, "air_ground_m": 1.0},
+            "control": {"period_s": 0.05, "sensing_range_m": 3.0}, "gatekeeper": {"period_s": 0.2},
+            "intervention": {"policies": [{"name": "coordinate"}]},
+            "decision": {"threshold": {"zeta_m": 1.0}, "release_m": 0.6, "noise_period_s": 0.05},
+        },
+        "bay",
+    )  # fmt: skip
+    arrived = {event["robot"] for event in simulate(scenario, "d").events if event["kind"] == "arrival"}
+    assert arrived == {"r1", "r2", "uav"}
+
+
 def test_ugvs_that_have_met_are_planned_for_with_less_spacing() -> None:
     """Twelve on a tight circle, which drive through its centre: where they stop, the full spacing has no room."""
     ends = [(4.8 * math.cos(k * math.pi / 6.0), 4.8 * math.sin(k * math.pi / 6.0)) for k in range(12)]
