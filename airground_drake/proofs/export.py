@@ -60,6 +60,7 @@ class Demand(NamedTuple):
         room_m: how far the two bodies may be off the recorded straight lines in all, m; or, where the law's points are
             recorded, what the law adds to the distance.
         late: whether one of the two is a robot with a lag or a delay.
+        called: what the scenario calls the two, where `first` and `second` are names for Coq.
     """
 
     first: str
@@ -70,6 +71,7 @@ class Demand(NamedTuple):
     passive: bool = False
     room_m: Fraction = Fraction(0)
     late: bool = False
+    called: tuple[str, str] = ("", "")
 
     @property
     def body_m(self) -> Fraction:
@@ -164,8 +166,10 @@ def recorded(trace: Trace, *, steered: bool = False) -> Recorded:
     places |= {name: tuple(map(_rounded, of(name).tolist())) for name in (*moving, *trace.robots)}
     spelled = _spelled(list(places))
     asked = demands_of(trace, steered=steered)
-    wanted = [each._replace(first=spelled[each.first], second=spelled[each.second]) for each in asked]
-    names = dict(zip(spelled.values(), spelled, strict=True))
+    wanted = [
+        each._replace(first=spelled[each.first], second=spelled[each.second], called=(each.first, each.second))
+        for each in asked
+    ]
     return Recorded(
         name=f"run_{trace.run}{'_steered' if steered else ''}",
         times=tuple(map(Fraction, trace.t.tolist())),
@@ -173,7 +177,7 @@ def recorded(trace: Trace, *, steered: bool = False) -> Recorded:
         demands=tuple(wanted),
         gain=min(decimal(control.avoidance_gain_1_s) * decimal(control.period_s), Fraction(1)),
         off_m={spelled[name]: off for name, off in off_m(trace, steered=steered).items()},
-        sets={each.sets: _sets(barriers[names[each.second]], each.core) for each in wanted if each.core},
+        sets={each.sets: _sets(barriers[each.called[1]], each.core) for each in wanted if each.core},
     )
 
 

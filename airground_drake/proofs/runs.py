@@ -164,7 +164,7 @@ def _decide_law(place: Workshop, run: Recorded, table: Sequence[Entry], text: st
 
 def _missing(gaps: Sequence[Missed], many: int) -> str:
     """Which pairs miss the law, and when."""
-    pairs = (f"{gap.demand.first} and {gap.demand.second}, {gap.begin_s:.6g} to {gap.end_s:.6g} s" for gap in gaps)
+    pairs = (f"{' and '.join(gap.demand.called)}, {gap.begin_s:.6g} to {gap.end_s:.6g} s" for gap in gaps)
     return f"{'; '.join(pairs)}. Proved of the other periods, in {many} entries"
 
 
@@ -195,7 +195,7 @@ def decide(place: Workshop, run: Recorded, name: str, text: str, theorem: str, l
 
 
 def _pair(demand: Demand) -> str:
-    return f"{demand.first} and {demand.second}, {float(demand.required_m):g} m"
+    return f"{' and '.join(demand.called)}, {float(demand.required_m):g} m"
 
 
 def _about(run: Recorded, text: str, line: int) -> Demand | None:
@@ -289,7 +289,7 @@ def _entry(answer: CoqReply) -> dict[str, Any]:
     if answer.proved:
         return entry | {"axioms": list(answer.axioms), "seconds": round(answer.seconds, 3)}
     near = [
-        {"first": one.demand.first, "second": one.demand.second, "safe_distance_m": float(one.demand.required_m)}
+        {"first": one.demand.called[0], "second": one.demand.called[1], "safe_distance_m": float(one.demand.required_m)}
         | {"least_m": one.least_m, "short_m": one.short_m, "t_s": one.t_s}
         for one in answer.too_near
     ]
@@ -299,6 +299,6 @@ def _entry(answer: CoqReply) -> dict[str, Any]:
 def listed(gaps: Iterable[Missed]) -> list[dict[str, Any]]:
     """Pairs with periods that no entry is about, as strict JSON."""
     return [
-        {"first": gap.demand.first, "second": gap.demand.second, "begin_s": gap.begin_s, "end_s": gap.end_s}
+        {"first": gap.demand.called[0], "second": gap.demand.called[1], "begin_s": gap.begin_s, "end_s": gap.end_s}
         for gap in gaps
     ]

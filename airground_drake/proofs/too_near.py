@@ -34,7 +34,7 @@ class TooNear:
 
     def __str__(self) -> str:
         """The pair, its distance and the time."""
-        pair = f"{self.demand.first} and {self.demand.second}"
+        pair = " and ".join(self.demand.called)
         wanted = f"{self.short_m:.3g} m less than {float(self.demand.required_m):g} m"
         return f"{pair} are {self.least_m:.6g} m apart at {self.t_s:.6g} s, {wanted}"
 

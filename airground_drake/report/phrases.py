@@ -7,7 +7,7 @@ from typing import Any
 
 from airground_drake.base.statuses import PASSING
 from airground_drake.registry import METHODS
-from airground_drake.report.outcomes import RunOutcome, distance, named
+from airground_drake.report.outcomes import RunOutcome, distance, metres, named
 from airground_drake.report.sentences import MAX_NAMES, clause, counted, grouped, joined
 
 SETTINGS = {
@@ -88,7 +88,8 @@ def encounter(course: RunOutcome, one: Mapping[str, Any]) -> str:
         return clause("caught", one, between=between, kept="".join(sorted(kept))) + stood
     speed = f", {one['speed_m_s']:.2f} m/s" if one["reaction"].startswith("retreated") else ""
     met = "ran into" if one["collided"] else "came too near to"
-    return clause("met", one, met=met, reacted=f"{one['reaction']}{speed}")
+    gap = metres(one["gap_m"], one["required_m"], decimals=2)
+    return clause("met", one, met=met, gap=gap, reacted=f"{one['reaction']}{speed}")
 
 
 def too_fast(course: RunOutcome) -> str:

@@ -69,7 +69,7 @@ SENTENCES = {
     "collides": "{robot} collides with {what} at {t_s:.2f} s",
     "starts": "{first} starts {gap_m:.2f} m from {second}, required {required_m:.2f} m: nobody's doing",
     "appeared": "{second} appeared {gap_m:.2f} m from {first}: nobody's doing",
-    "met": "{second} {met} {first} at {t_s:.2f} s ({gap_m:.2f} m, required {required_m:.2f} m); {first} {reacted}",
+    "met": "{second} {met} {first} at {t_s:.2f} s ({gap}, required {required_m:.2f} m); {first} {reacted}",
     "caught": "{first} was caught between {second} and {between}, {caught_s[0]:.2f} to {caught_s[1]:.2f} s: {second} "
     "came to {gap_m:.2f} m by its own motion{kept}",
     "beside": "; {near.required_m:.2f} m from {near.whom} was kept",
