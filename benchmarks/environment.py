@@ -3,9 +3,9 @@
     python benchmarks/environment.py
     python benchmarks/environment.py case_a lab --seconds 20
 
-An agent proposes two waypoints at random, or in one request of four nothing. A reset begins an episode on a model that
-is there, without the periods up to its first request; a new course needs a new model. Times are of the CPU, of one
-process with one thread.
+An agent proposes two random waypoints, or nothing in one request of four. A reset begins an episode on a model that
+exists already; its time excludes the periods up to the first request. A new course needs a new model. Times are of the
+CPU, of one process with one thread.
 """
 
 from __future__ import annotations

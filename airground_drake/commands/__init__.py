@@ -34,7 +34,7 @@ COMMANDS: dict[str, Command] = {
     "run": Command("airground_drake.commands.run", "simulate one run and print its events, or watch it in Meshcat"),
     "verify": Command("airground_drake.verify.__main__", "judge claims anew, on a saved run or about a model"),
     "check": Command("airground_drake.commands.check", "check a report from its files alone"),
-    "judge": Command("airground_drake.commands.judge", "judge sampled positions that come from elsewhere"),
+    "judge": Command("airground_drake.commands.judge", "judge a log of your own: which distances were kept"),
     "compare": Command("airground_drake.commands.compare", "say what has changed from one report to another"),
     "index": Command("airground_drake.commands.index", "list the reports in a folder on a page"),
     "prove": Command("airground_drake.commands.prove", "have Coq check the theorems, or prove the runs of a report"),

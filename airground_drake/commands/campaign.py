@@ -39,7 +39,7 @@ def parser() -> argparse.ArgumentParser:
     )
     parser.add_argument(
         "-o", "--output", type=output_folder, metavar="DIR",
-        help="default: campaigns/<name>; new, or --resume; with --only, the file of the scenario",
+        help="a new folder, or with --resume an old one (default: campaigns/<name>); with --only: the scenario's file",
     )  # fmt: skip
     parser.add_argument("--resume", action="store_true", help="go on with what the folder has")
     parser.add_argument(
@@ -52,7 +52,7 @@ def parser() -> argparse.ArgumentParser:
     )
     parser.add_argument(
         "--limit-steps", type=positive, default=DEFAULT_LIMITS.work, metavar="N",
-        help="a draw that asks for more is invalid: robots moved by one step, over all runs (default: %(default).0g)",
+        help="a draw with more simulated steps, counted per robot, over all runs, is invalid (default: %(default).0g)",
     )  # fmt: skip
     parser.add_argument(
         "--limit-time", type=positive, default=DEFAULT_LIMITS.time, metavar="S",

@@ -117,12 +117,12 @@ _ALL = (
     ),
     Theorem(
         "Convex.nearest_point", "ours", ("SAFE-INV",),
-        "Outside a convex set that is the direction from its nearest point.",
+        "Outside a convex set the unit vector away from it is the direction from its nearest point.",
         ("The set is convex.", "No point of it is nearer, and the point is not in it."),
     ),
     Theorem(
         "Convex.nearest_edge", "ours", ("SAFE-INV",),
-        "Inside a polygon it is the normal of the nearest edge, whose line is as far as the set is deep.",
+        "Inside a polygon the unit vector away is normal to the nearest edge, whose line is as far as the set is deep.",
         ("The set is an intersection of half-planes or half-spaces.", "The point is in it."),
     ),
     Theorem(
@@ -196,7 +196,7 @@ _ALL = (
     ),
     Theorem(
         "Plants.lag_needs", "ours", ("SAFE-BUDGET", "SAFE-HYP"),
-        "That is d or more if b is at least sqrt(d^2 + (tau V_rel)^2).",
+        "The distance of Plants.lag_pair is d or more if b is at least sqrt(d^2 + (tau V_rel)^2).",
         ("d is not negative.",),
     ),
     Theorem(

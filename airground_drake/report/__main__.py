@@ -161,17 +161,17 @@ def parser() -> argparse.ArgumentParser:
         help="also simulate every run with the seeds 1 to N, and say how many keep all distances and bring all home",
     )  # fmt: skip
     parser.add_argument(
-        "--no-cache", action="store_true", help="redo every proof instead of reusing one whose inputs are unchanged"
+        "--no-cache", action="store_true", help="repeat ZENO-REFINE and THR-DDM instead of reusing earlier results"
     )
     parser.add_argument(plugins.OPTION, action="store_true", help=plugins.HELP)
     parser.add_argument(plugins.SHOW, action="store_true", help=plugins.SHOW_HELP)
     parser.add_argument(
         "--limit-steps", type=positive, default=DEFAULT_LIMITS.work, metavar="N",
-        help="refuse a scenario that asks for more: robots moved by one step, over all runs (default: %(default).0g)",
+        help="refuse a scenario with more simulated steps, counted per robot, over all runs (default: %(default).0g)",
     )  # fmt: skip
     parser.add_argument(
         "--limit-memory", type=positive, default=DEFAULT_LIMITS.memory / GIB, metavar="GIB",
-        help="refuse a scenario that asks for more (default: %(default)g)",
+        help="refuse a scenario that needs more memory (default: %(default)g)",
     )  # fmt: skip
     parser.add_argument("--open", action="store_true", help="open the report in a browser")
     parser.add_argument("--list", action="store_true", help="list the shipped scenarios")

@@ -126,10 +126,10 @@ def _proof(of_d: Runs) -> Iterator[Line]:
     """Whether the safety of method (d) is proved, one sentence per status."""
     told = grouped(((*_lacking(course.proof), course.proof.status), course) for course in of_d if course.proof)
     for (lacking, refuted, status), alike in told.items():
-        covered = clause("covered") * any(course.movers for course in alike)
         runs, who = joined([course.name for course in alike]), joined([*chain(*labels(alike, of_d))])
-        single = len([*chain(*labels(alike, of_d))]) == 1
-        line = say(status, runs=runs, who=who, s="s" * single, lacking=lacking, covered=covered)
+        s = "s" * (len([*chain(*labels(alike, of_d))]) == 1)
+        covered = clause("covered", s=s) * any(course.movers for course in alike)
+        line = say(status, runs=runs, who=who, s=s, lacking=lacking, covered=covered)
         yield line._replace(mark="no") if refuted else line
 
 

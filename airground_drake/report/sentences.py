@@ -49,7 +49,7 @@ SENTENCES = {
     "unsafe": "✗ Not safe{failures}",
     "safe_but": "✗ Safe, but {what}.",
     "safe_but_away": "✗ Safe, but not all arrive{failures}",
-    "blameless": "No robot brought a distance below the required one itself",
+    "blameless": "No robot itself brought a distance below the required one",
     # Safe?
     "kept": "✓ {runs}: minimum distance {near.pair}, required {near.required_m:g} m.",
     "kept_idly": "\N{EN DASH} {runs}: minimum distance {near.pair}, required {near.required_m:g} m; nothing came near, "
@@ -62,7 +62,7 @@ SENTENCES = {
     "refuted": "✗ The proof does not apply to {runs}: its conditions did not hold ({lacking}).",
     "undecided": "? Not known whether the proof applies to {runs} ({lacking}).",
     "unproved": "? Not proved for {who} ({lacking}).",
-    "covered": " between robots and from bodies at rest, and drives no robot too near to what moves",
+    "covered": " between robots and from bodies at rest, and drive{s} no robot too near to what moves",
     # Who came how near to what
     "appears": "{near.whom} appears {near} from {near.robot} (nobody's doing)",
     "comes_within": "{near.robot} comes within {near} of {near.whom}",

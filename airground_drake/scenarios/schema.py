@@ -111,11 +111,11 @@ class Plant:
     delay_s: NotNegative = 0.0
     """Of a delay: a whole number of control periods."""
     drift_m_s: NotNegative = 0.0
-    """Of one's own: by how much the steered point misses its command in a control period at most, per time."""
+    """Of your own plant: how far its steered point misses a command in a period at most, divided by the period."""
     cover_m: NotNegative = 0.0
-    """Of one's own: how far the body is at most from the straight line of the steered point in a control period."""
+    """Of your own plant: how far the body is at most from the steered point's straight line in a control period."""
     parameters: dict[Name, Real] = field(default_factory=dict)
-    """Of one's own: numbers for its class, by name."""
+    """Of your own plant: numbers for its class, by name."""
 
     @property
     def is_own(self) -> bool:

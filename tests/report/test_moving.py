@@ -17,7 +17,7 @@ from airground_drake.scenarios.load import load
 from airground_drake.verify.judging import judge_all
 
 Document = dict[str, Any]
-OWN = "No robot brought a distance below the required one itself."
+OWN = "No robot itself brought a distance below the required one."
 STILL = "Still proved: no robot brought itself too near; distances from walls and robots."
 HEADLINES = {
     "standing": (

@@ -44,8 +44,8 @@ class LiveGate(LiveWait):
         "The gatekeeper is sampled every period. Rounding of times is not counted.",
     )
     does_not_establish = (
-        "That a proposal is accepted, or that the UGV is where it was predicted to be: that depends on the others. "
-        "LIVE-WAIT bounds the time."
+        "That a proposal is accepted, or that the UGV is where it was predicted to be: that depends on the other "
+        "robots. LIVE-WAIT bounds the time."
     )
 
     theorems = ("Patience.kept", "Patience.over_in_time")

@@ -69,8 +69,8 @@ class SafeDist(TheoremClaim):
         "w is 10 % of the largest speed limit, but at most A/4 times the smallest safe distance, so that at least half "
         "of it is left. It is a choice, not a property of a robot.",
         "Positions are measured exactly and without delay.",
-        "While two of them are out of sensing range, robots ask for no more than their speed limits, to which w comes "
-        "on top. The layer itself may ask for more within a safe distance of something else.",
+        "While a pair is out of sensing range, its robots command no more than their speed limits, and w comes on top. "
+        "The layer itself may ask for more within a safe distance of something else.",
     )
     does_not_establish = (
         "That the disturbance of a real robot stays below w; nor any distance from an obstacle that may move: the "

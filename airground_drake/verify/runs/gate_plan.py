@@ -112,8 +112,8 @@ class GatePlan(GateClaim):
         "Under method (c) the plan of every decision satisfies (26b)-(26e) at its recorded cost, no step of it is "
         "faster than the UGV may be, and relaxed plans were rounded by sum-up rounding, with an integrated error of at "
         "most half a stage. Under method (d) a plan is one of two choices for good: no decision chose to stop short of "
-        "the goal where the other choice would not, or would stop nearer to it. Only a UGV that refuses its part of a "
-        "joint plan because another UGV refuses its own is not asked for that: the other refusal must be there. The "
+        "the goal where the other choice would not, or would stop nearer to it. The exception is a UGV that refuses "
+        "its part of a joint plan because another UGV refuses its own: then the other refusal must be recorded. The "
         "margin is no condition: it is the largest gap between the cost of a plan and the optimum of the half-plane "
         "problem, where that is known."
     )

@@ -22,7 +22,7 @@ class SafeOwn(TraceClaim):
     """SAFE-OWN."""
 
     id = "SAFE-OWN"
-    summary = "No robot brought a distance below the required one itself, whatever the obstacles that move did."
+    summary = "No robot itself brought a distance below the required one, whatever the obstacles that move did."
     statement = (
         "In every control period, with the other body held where it was at the control sample, no robot came nearer to "
         "it than min(D, d + V h): D is the distance at the sample, d the required one, V the speed at which the other "

@@ -58,9 +58,9 @@ class SafeTrace(TraceClaim):
         "its height. A distance is the gap between surfaces; below 0 they overlap. d_ij is the obstacle's own "
         "`distance_m`, or the safe distance of the kind of pair.",
         "For a UGV, walls have no end in height. Obstacles stand still for the whole run, as the scenario lists them, "
-        "or move without turning as the trace says, straight between two rows. One with `appears_s` or `disappears_s` "
-        "is judged from the first control sample at or after the one up to that at or after the other, both instants "
-        "included.",
+        "or move without turning as the trace says, straight between two rows. An obstacle with `appears_s` is judged "
+        "from the first control sample at or after that time on, one with `disappears_s` up to the first at or after "
+        "that time, both instants included.",
     )
     does_not_establish = (
         "Safety of any other run, start or seed, or of a plant that does not follow its velocity exactly (SAFE-DIST); "

@@ -100,8 +100,8 @@ class ThrQuality(TraceClaim):
     id = "THR-QUALITY"
     summary = "The UAV stepped in when the real task error, without noise, was about at the threshold."
     statement = (
-        "At every trigger, and while the UAV watched without one, the task error without noise was as the threshold "
-        "has it, to within the width of the hysteresis: no trigger came at a smaller error, no larger error went "
+        "At every trigger, and while the UAV watched without one, the task error without noise agreed with the "
+        "threshold to within the width of the hysteresis: no trigger came at a smaller error, no larger error went "
         "without a trigger."
     )
     latex = (
