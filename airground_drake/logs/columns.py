@@ -135,7 +135,7 @@ def clock_of(place: Place, times: Sequence[Time], labels: Sequence[str]) -> Time
     Raises:
         LogError: if all columns of stamps are those of other places.
     """
-    own = next((each for each in times if each.is_of(place)), None)
+    own = next((each for each in times if each.is_of(place) or not place.name), None)
     if own is None:
         named = listed([labels[each.whole] for each in times])
         raise LogError(f"{place.name} has no times of its own: there are {named}; wanted: --map-columns t=NAME")

@@ -66,8 +66,9 @@ def read(content: bytes) -> Table:
     delimiter, count = _form([lines[k] for k in middle])
     rows = [_fields(lines[k], delimiter) for k in middle]
     rows = [row for row in rows if len(row) == count]
-    commas = [] if delimiter == "," else [c for c in range(count) if _decimal_comma([row[c] for row in rows])]
-    numeric = [_is_numeric([row[c] for row in rows]) for c in range(count)]
+    columns = [[row[c] for row in rows] for c in range(count)]
+    comma = delimiter != "," and any([_decimal_comma(column) for column in columns])
+    numeric = [_is_numeric(column) for column in columns]
     first = next((k for k in full if _is_data(_fields(lines[k], delimiter), numeric)), None)
     if first is None:
         raise LogError("it has no rows of numbers; wanted: a table with times and positions")
@@ -89,8 +90,9 @@ def read(content: bytes) -> Table:
         skip_blank_lines=False,
     )  # fmt: skip
     cells = cells.apply(lambda column: column.str.strip())
-    for c in commas:
-        cells[c] = cells[c].str.replace(",", ".", regex=False)
+    if comma:
+        for c in (c for c in range(count) if numeric[c] and not any(map(_POINT.fullmatch, columns[c]))):
+            cells[c] = cells[c].str.replace(",", ".", regex=False)
     above = [line for k, line in enumerate(lines[:first]) if k not in header]
     odd = [k + 1 for k in data if k not in chosen]
     named = labels or [str(c + 1) for c in range(count)]

@@ -112,6 +112,13 @@ def test_noise_is_refused(content: bytes) -> None:
     assert len(found.labels) == len(found.cells.columns) >= text.FEWEST
 
 
+def test_decimal_commas_are_read_where_the_middle_of_a_column_shows_none() -> None:
+    rows = [f"{t},5;a;{'0,5' if abs(t - 300) > 290 else '0'};1.2" for t in range(600)]
+    table = text.read("\n".join(["t;robot;x;version", *rows]).encode())
+    assert {*table.cells[2]} == {"0.5", "0"}
+    assert {*table.cells[3]} == {"1.2"}
+
+
 @pytest.mark.parametrize(
     "start", [b"\x89MCAP0\r\n", b"#ROSBAG V2.0\n", b"SQLite format 3\0", b"PAR1", b"\x1f\x8b", b""]
 )
