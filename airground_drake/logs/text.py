@@ -67,7 +67,7 @@ def read(content: bytes) -> Table:
     rows = [_fields(lines[k], delimiter) for k in middle]
     rows = [row for row in rows if len(row) == count]
     columns = [[row[c] for row in rows] for c in range(count)]
-    comma = delimiter != "," and any([_decimal_comma(column) for column in columns])
+    commas = [delimiter != "," and _decimal_comma(column) for column in columns]
     numeric = [_is_numeric(column) for column in columns]
     first = next((k for k in full if _is_data(_fields(lines[k], delimiter), numeric)), None)
     if first is None:
@@ -90,7 +90,7 @@ def read(content: bytes) -> Table:
         skip_blank_lines=False,
     )  # fmt: skip
     cells = cells.apply(lambda column: column.str.strip())
-    if comma:
+    if any(commas):
         for c in (c for c in range(count) if numeric[c] and not any(map(_POINT.fullmatch, columns[c]))):
             cells[c] = cells[c].str.replace(",", ".", regex=False)
     above = [line for k, line in enumerate(lines[:first]) if k not in header]
