@@ -17,7 +17,7 @@ from airground_drake.scenarios.schema import MAP
 from airground_drake.verify.engines.geometry import interpolate
 from airground_drake.verify.model.pair_kinds import MOVING, kind_of
 from airground_drake.verify.runs.gate_record import without_decisions
-from airground_drake.verify.runs.instants import reasons, without_proposals
+from airground_drake.verify.runs.instants import lost_at_the_end, reasons, without_proposals
 from airground_drake.verify.runs.live_goal import AT_REST_M, AT_REST_S, moved_at_the_end
 from airground_drake.verify.runs.pairs import (
     DISTANCE_TOLERANCE_M,
@@ -64,9 +64,9 @@ def of_run(trace: Trace) -> dict[str, Any]:
         least margin), `final_position_m`, `duration_s`, `wall_s` and `realtime_factor` (None if not measured),
         `event_counts` (robot -> kind -> count), `gatekeeper` (see `gatekeeper`), `on_the_way` (see `on_the_way`),
         `interventions`, `messages` and `avoidance` (see `report.interventions`), `without_proposals` (UGVs that were
-        intervened on for long enough and got no proposal), `no_way_reasons` (why, where the policy says so) and
-        `without_decisions` (those that got one and did not
-        decide).
+        intervened on for long enough and got no proposal), `lost_at_the_end` (UGVs for which the UAV found no way when
+        it last looked for one), `no_way_reasons` (why, where the policy says so) and `without_decisions` (those that
+        got one and did not decide).
     """
     method, wall_s = method_of(trace.meta["method"]), trace.timings.get("wall_s")
     duration_s = float(trace.t[-1] - trace.t[0])
@@ -89,6 +89,7 @@ def of_run(trace: Trace) -> dict[str, Any]:
         "messages": messages(trace),
         "avoidance": avoidance(trace),
         "without_proposals": without_proposals(trace) if method.intervenes else [],
+        "lost_at_the_end": lost_at_the_end(trace) if method.intervenes else [],
         "no_way_reasons": reasons(trace) if method.intervenes else {},
         "without_decisions": without_decisions(trace) if method.gated else [],
     }

@@ -231,9 +231,10 @@ def courses(document: Document) -> list[RunOutcome]:
 
 
 def no_way(run: Mapping[str, Any]) -> list[str]:
-    """UGVs that the UAV was called for and found no way for in a run: it sent nothing, and no policy failed."""
+    """UGVs that the UAV was called for and found no way for in a run, ever or at the end, though no policy failed."""
     failed = {fault["robot"] for fault in run["faults"]}
-    return [ugv for ugv in run["metrics"]["without_proposals"] if ugv not in failed]
+    lost = [*run["metrics"]["without_proposals"], *run["metrics"].get("lost_at_the_end", ())]
+    return [ugv for ugv in dict.fromkeys(lost) if ugv not in failed]
 
 
 def pairs(run: Mapping[str, Any]) -> Iterator[Near]:

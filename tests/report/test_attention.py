@@ -10,7 +10,9 @@ from hypothesis import strategies as st
 from report.cases import FINE, built, verdict
 
 from airground_drake.report import attention, phrases
+from airground_drake.run.simulation import simulate
 from airground_drake.run.trace import Trace
+from airground_drake.scenarios.load import load
 from airground_drake.scenarios.schema import Scenario
 
 AT = {"first": "ugv1", "second": "obstacle_1", "t_s": 7.717}
@@ -82,6 +84,28 @@ def test_for_whom_the_uav_found_no_way(scenario: Scenario, traces: dict[str, Tra
     assert (item.words, item.run) == ("the UAV found no way for ugv1 and ugv2", "c")
     report["runs"]["c"]["faults"] = [{"t_s": 1.0, "robot": "ugv1", "policy": "mine", "what": "no"}]
     assert [item.words for item in attention.items(report)][1:] == ["the UAV found no way for ugv2"]
+
+
+def test_for_whom_the_uav_finds_no_way_any_more() -> None:
+    """It sent one, but then a door shut for good."""
+    scenario = load(
+        "minimal",
+        {
+            "arena_m": [[-2.0, -3.0], [12.0, 3.0]],
+            "safe_distance.obstacle_m": 0.4,
+            "obstacles": {
+                "wall": {"segment_m": [[6.0, -1.0], [6.0, 3.0]]},
+                "door": {"segment_m": [[6.0, -3.0], [6.0, -1.0]], "appears_s": 9.0, "known_to_uav": False},
+            },
+            "intervention.policies": [{"name": "coordinate"}],
+            "runs": {"d": {"method": "d"}},
+            "duration_s": 14.0,
+        },
+    )
+    trace = simulate(scenario, "d")
+    found = [item.words for item in attention.items(built(scenario, {"d": trace}, [verdict("d", "holds")]))]
+    assert len(trace.proposals) == 1
+    assert "the UAV found no way for ugv1: no plan exists: on the UAV's map, ugv1 cannot come to the target" in found
 
 
 KEYS = st.sampled_from([*phrases.ROLES, *TOO_NEAR, *END, "t_s", "hypothesis", "margin", "unit", "kind"])

@@ -39,10 +39,26 @@ def without_proposals(trace: Trace) -> list[str]:
     return [ugv for ugv in trace.ugvs if ugv in asked - got]
 
 
+def lost_at_the_end(trace: Trace) -> list[str]:
+    """UGVs that are still intervened on at the end, and for which the UAV found no way when it last looked for one."""
+    return [ugv for ugv in trace.ugvs if _is_lost(trace, ugv)]
+
+
+def _is_lost(trace: Trace, ugv: str) -> bool:
+    switched = [
+        each["kind"] for each in trace.events if each["robot"] == ugv and each["kind"] in ("trigger", "release")
+    ]
+    asked = trace.plans[trace.plans["ugv"] == ugv]
+    last = asked[asked["t_s"] == asked["t_s"].max()]
+    found = bool(last["outcome"].isin(["proposed", "passed over"]).any())
+    return switched[-1:] == ["trigger"] and bool((last["reason"] != "").any()) and not found
+
+
 def reasons(trace: Trace) -> dict[str, str]:
     """Why UGVs got no proposal, as the last policy that was asked said; UGVs without a reason are left out."""
     said = trace.plans[trace.plans["reason"] != ""].groupby("ugv", sort=False)["reason"].last()
-    return {ugv: str(said[ugv]) for ugv in without_proposals(trace) if ugv in said.index}
+    lost = [*without_proposals(trace), *lost_at_the_end(trace)]
+    return {ugv: str(said[ugv]) for ugv in dict.fromkeys(lost) if ugv in said.index}
 
 
 def silent(trace: Trace, ugvs: Iterable[str], kind: str) -> Finding:
