@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import os
+import struct
 from collections.abc import Callable, Collection
 from pathlib import Path
 from typing import Any
@@ -12,6 +14,8 @@ from airground_drake.logs.messages import Gathered
 from airground_drake.logs.stream import Log
 
 HINT = "pip install 'airground_drake[logs]'"
+MCAP = b"\x89MCAP0\r\n"
+"""How an MCAP file begins and ends."""
 LONGEST_MESSAGE = 50_000_000
 """Bytes of a message that is decoded."""
 Decode = Callable[[bytes], Any]
@@ -24,13 +28,18 @@ def read_mcap(path: Path, bodies: Collection[str]) -> Log:
         LogError: if it cannot be read, or a package is missing.
     """
     try:
-        from mcap.reader import make_reader
+        from mcap.exceptions import EndOfFile
+        from mcap.reader import NonSeekingReader, make_reader
     except ImportError:
         raise LogError(f"an MCAP file needs the package mcap: {HINT}") from None
     gathered, decoders = Gathered(str(path), tuple(bodies)), dict[int, Decode | None]()
     with path.open("rb") as file:
+        file.seek(-len(MCAP), os.SEEK_END)
+        is_cut = file.read() != MCAP  # as after a crash of the recorder
+        file.seek(0)
         try:
-            for schema, channel, message in make_reader(file).iter_messages():
+            reader = NonSeekingReader(file) if is_cut else make_reader(file)
+            for schema, channel, message in reader.iter_messages(log_time_order=not is_cut):
                 kind = schema.name if schema else ""
                 if not gathered.may_have(channel.topic, kind) or len(message.data) > LONGEST_MESSAGE:
                     continue
@@ -48,8 +57,10 @@ def read_mcap(path: Path, bodies: Collection[str]) -> Log:
         except LogError:
             raise
         except Exception as error:  # the package raises many kinds
-            raise LogError(f"it cannot be read as MCAP to its end: {described(error)}") from None
-    return Log(list(gathered.streams()), [f"{path.name}: {each}" for each in gathered.ignored()])
+            if not (is_cut and isinstance(error, (EndOfFile, struct.error)) and gathered.used):
+                raise LogError(f"it cannot be read as MCAP to its end: {described(error)}") from None
+    cut = ["cut off, and read up to there"] * is_cut
+    return Log(list(gathered.streams()), [f"{path.name}: {each}" for each in (*cut, *gathered.ignored())])
 
 
 def _decoder(encoding: str, schema: Any) -> Decode | None:

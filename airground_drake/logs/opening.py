@@ -11,7 +11,7 @@ from airground_drake.logs import bags, tables
 from airground_drake.logs.stream import Log
 from airground_drake.logs.tables import Wanted
 
-MCAP, ROS1, SQLITE, GZIP = b"\x89MCAP0\r\n", b"#ROSBAG V2.0", b"SQLite format 3\0", b"\x1f\x8b"
+ROS1, SQLITE, GZIP = b"#ROSBAG V2.0", b"SQLite format 3\0", b"\x1f\x8b"
 """How files of these kinds begin."""
 ABOUT = "metadata.yaml"
 """A folder with it is a ROS 2 bag."""
@@ -63,7 +63,7 @@ def _read(path: Path, wanted: Wanted) -> Log:
         return bags.read_ros(path, wanted.bodies)
     with open(files.open_regular(path, links=True), "rb") as file:
         start = file.read(64)
-    if start.startswith(MCAP):
+    if start.startswith(bags.MCAP):
         return bags.read_mcap(path, wanted.bodies)
     if start.startswith((ROS1, SQLITE)):
         return bags.read_ros(path, wanted.bodies)

@@ -82,7 +82,17 @@ def test_a_file_that_ends_early_is_refused_or_judged_as_far_as_it_goes(
     for length in np.linspace(0, len(whole) - 1, 25).astype(int).tolist():
         path.write_bytes(whole[:length])
         said = judged_or_refused(path, document)
-        assert said or write is of_text or length > 0.9 * len(whole)
+        assert said or write in (of_text, of_mcap, of_protobuf) or length > 0.9 * len(whole)
+
+
+def test_a_recording_that_was_cut_off_is_judged_as_far_as_it_goes(tmp_path: Path, document: dict[str, Any]) -> None:
+    path = tmp_path / "a.mcap"
+    logs.mcap_json(path, logs.foxglove(FULL, {}), chunk_size=4096)
+    path.write_bytes(path.read_bytes()[: path.stat().st_size // 3])
+    found = logs.read(path, document)
+    assert "a.mcap: cut off, and read up to there" in found.ignored
+    assert 1.0 < found.bodies["tb_0"].t_s[-1] < 4.0
+    assert not judge(found, document).covers_all
 
 
 @pytest.mark.parametrize("write", WRITERS, ids=lambda write: write.__name__)
