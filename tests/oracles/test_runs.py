@@ -206,7 +206,7 @@ def test_a_queue_along_an_axis_is_squeezed() -> None:
     data["uav"] = {"start_m": [-15.0, 0.0, 2.0], "target_m": [5.0, 0.0, 2.0]}
     data["control"] |= {"period_s": 0.05, "sensing_range_m": 6.0}
     data["gatekeeper"] |= {"period_s": 0.1, "stages": 30}
-    data["intervention"]["period_s"] = 0.1
+    data["intervention"] |= {"period_s": 0.1, "policies": [{"name": "hostile", "parameters": {"speed_m_s": 3.0}}]}
     data["decision"] |= {"noise_period_s": 0.05, "threshold": {"zeta_m": 2.0}}
     trace = simulate(from_data(data | {"duration_s": 14.0}, "queue"), "d")
     assert trace.decisions["refuse_left_m"].max() > 1e3
