@@ -18,7 +18,7 @@ TOO_LONG = 1_000.0
 NEAR_M = 0.1
 """A log that begins so close to where a body starts begins there, m."""
 LONG, SELDOM_S = 2.0, 4.0
-"""Whole numbers so far apart, in a log so many times longer than the scenario, are milliseconds."""
+"""Times so far apart, in a log so many times longer than the scenario, are milliseconds if no robot is too fast then."""
 IMPOSSIBLE = 20.0
 """So many times the speed limits, the duration or the size of a scenario are taken as a sign of another unit."""
 NAMES = {
@@ -89,11 +89,10 @@ def _since_1970(stream: Stream, duration_s: float) -> str:
     return unit if unit and float(np.ptp(stream.ns(unit))) / 1e9 <= TOO_LONG * duration_s else ""
 
 
-def _seldom(streams: Mapping[str, Stream], usual: str, lasting: float) -> str:
-    """Milliseconds, if as seconds a log would be much longer than the scenario, and its samples seconds apart."""
+def _is_seldom(streams: Mapping[str, Stream], lasting: float) -> bool:
+    """Whether a log in seconds would be much longer than the scenario, with its samples seconds apart."""
     steps = [np.diff(each.ns("s")) / 1e9 for each in streams.values() if not each.time_unit]
-    seldom = steps and min(float(np.median(each)) for each in steps) >= SELDOM_S
-    return "ms" if usual == "s" and lasting > LONG and seldom else ""
+    return lasting > LONG and min(float(np.median(each)) for each in steps) >= SELDOM_S
 
 
 def _likely(streams: Mapping[str, Stream], scenario: Json) -> tuple[str, str]:
@@ -127,7 +126,9 @@ def _likely(streams: Mapping[str, Stream], scenario: Json) -> tuple[str, str]:
     if not streams or not possible:
         return usual[0] or "s", usual[1] or "m"
     if usual in possible:
-        return _seldom(streams, usual[0], found(*usual)[0]) or usual[0] or "s", usual[1] or "m"
+        if usual[0] and _is_seldom(streams, found(*usual)[0]) and found("ms", usual[1])[1] <= 1.0:
+            return "ms", usual[1] or "m"
+        return usual[0] or "s", usual[1] or "m"
 
     def oddness(both: tuple[str, str]) -> float:
         lasting, speed, away = found(*both)
