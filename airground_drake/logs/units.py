@@ -18,7 +18,7 @@ TOO_LONG = 1_000.0
 NEAR_M = 0.1
 """A log that begins so close to where a body starts begins there, m."""
 LONG, SELDOM_S = 2.0, 4.0
-"""Times so far apart, in a log so many times longer than the scenario, are milliseconds if no robot is too fast then."""
+"""Times so far apart, in a log so much longer than the scenario, are milliseconds if no robot is too fast then."""
 IMPOSSIBLE = 20.0
 """So many times the speed limits, the duration or the size of a scenario are taken as a sign of another unit."""
 NAMES = {
