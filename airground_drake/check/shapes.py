@@ -12,7 +12,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from fractions import Fraction
-from functools import cache
 from itertools import pairwise
 from typing import NamedTuple, TypeVar
 
@@ -246,17 +245,19 @@ def split(corners: Sequence[Corner]) -> list[list[Corner]]:
     Raises:
         NotEstablished: if there is no ear.
     """
-    around = (*corners,) if sum(a[0] * b[1] - a[1] * b[0] for a, b in edges_of(corners)) > 0.0 else (*corners,)[::-1]
+    around = [*corners] if sum(a[0] * b[1] - a[1] * b[0] for a, b in edges_of(corners)) > 0.0 else [*corners][::-1]
     parts = [around] if _is_convex(around) else _ears(around)
-    union_of = cache(_union)
-    while True:
-        owner = {edge: k for k, part in enumerate(parts) for edge in edges_of(part)}
-        pairs = sorted((i, owner[b, a]) for (a, b), i in owner.items() if owner.get((b, a), -1) > i)
-        both = next(((i, j, union) for i, j in pairs if (union := union_of(parts[i], parts[j]))), None)
+    k = 0
+    while k < len(parts):
+        back = {(b, a) for a, b in edges_of(parts[k])}
+        beside = (m for m in range(k + 1, len(parts)) if not back.isdisjoint(edges_of(parts[m])))
+        both = next(((m, union) for m in beside if (union := _union(parts[k], parts[m]))), None)
         if both is None:
-            return [[corner for corner, turn in zip(part, _turns(part), strict=True) if turn > 0.0] for part in parts]
-        parts[both[0]] = both[2]
-        del parts[both[1]]
+            k += 1  # where a union turns right, it does so whatever is joined to it
+        else:
+            del parts[both[0]]
+            parts[k] = both[1]
+    return [[corner for corner, turn in zip(part, _turns(part), strict=True) if turn > 0.0] for part in parts]
 
 
 def edges_of(corners: Sequence[T]) -> list[tuple[T, T]]:
@@ -278,13 +279,13 @@ def _is_convex(corners: Sequence[Corner]) -> bool:
     return min(_turns(corners)) >= 0.0
 
 
-def _ears(corners: Sequence[Corner]) -> list[tuple[Corner, ...]]:
+def _ears(corners: Sequence[Corner]) -> list[list[Corner]]:
     """Triangles that turn left, with no other corner in them."""
-    left, found = [*corners], list[tuple[Corner, ...]]()
+    left, found = [*corners], []
     while len(left) > 2:
         points = np.array(left)
         for k in range(len(left)):
-            a, b, c = ear = (left[k - 2], left[k - 1], left[k])
+            a, b, c = ear = [left[k - 2], left[k - 1], left[k]]
             if _turn(a, b, c) > 0.0 and not _surrounds(ear, points):
                 break
         else:
@@ -294,18 +295,18 @@ def _ears(corners: Sequence[Corner]) -> list[tuple[Corner, ...]]:
     return found
 
 
-def _surrounds(ear: tuple[Corner, ...], points: Array) -> bool:
-    """Whether a triangle contains one of some points (K, 2) that is none of its corners."""
+def _surrounds(ear: list[Corner], points: Array) -> bool:
+    """Whether any of the points, (K, 2), is in a triangle, other than its corners."""
     sides = [(b[0] - a[0]) * (points[:, 1] - b[1]) - (b[1] - a[1]) * (points[:, 0] - b[0]) for a, b in edges_of(ear)]
     inside = np.flatnonzero(np.min(sides, axis=0) >= 0.0)
     return any((x, y) not in ear for x, y in points[inside].tolist())
 
 
-def _union(one: tuple[Corner, ...], other: tuple[Corner, ...]) -> tuple[Corner, ...] | None:
+def _union(one: list[Corner], other: list[Corner]) -> list[Corner] | None:
     """The union of two parts that share an edge, if it is convex."""
     for a, b in edges_of(one):
         if (b, a) in edges_of(other):
             k, m = one.index(b), other.index(a)
-            both = (*one[k:], *one[:k], *[*other[m:], *other[:m]][1:-1])
+            both = [*one[k:], *one[:k], *[*other[m:], *other[:m]][1:-1]]
             return both if _is_convex(both) else None
     return None

@@ -113,28 +113,24 @@ def split(corners: Sequence[Corner]) -> list[list[Corner]]:
 
 
 def _joined(parts: list[list[Corner]]) -> list[list[Corner]]:
-    """Convex polygons, of which each was united with a later one, the first that is possible, as often as possible."""
-    there: dict[int, list[Corner]] = dict(enumerate(parts))
+    """Convex polygons that cover the same. Each takes in later ones, the first first, while it stays convex.
+
+    All corners are on the outline: at a corner where a union turns too far, it does so whatever joins it later.
+    """
+    there = dict(enumerate(parts))
     at = {edge: i for i, part in there.items() for edge in _edges(part)}
-    apart = set[tuple[int, int]]()  # pairs whose union is not convex
-    i = 0
-    while i < len(parts):
-        beside = sorted({at[b, a] for a, b in _edges(there[i]) if (b, a) in at} - {i}) if i in there else []
-        for j in beside:
-            if j > i and (i, j) not in apart:
-                both = _united(there[i], there[j])
-                if both is None:
-                    apart.add((i, j))
-                    continue
-                apart -= {pair for k in beside for pair in ((i, k), (k, i), (j, k), (k, j))}
-                for edge in (*_edges(there[i]), *_edges(there.pop(j))):
-                    at.pop(edge, None)
+    for i in range(len(parts)):
+        refused = set(range(i + 1))
+        while i in there:
+            beside = {at[b, a] for a, b in _edges(there[i]) if (b, a) in at} - refused
+            if not beside:
+                break
+            j = min(beside)
+            refused.add(j)
+            if both := _united(there[i], there[j]):
+                del there[j]
                 there[i] = both
                 at |= dict.fromkeys(_edges(both), i)
-                i = min(i, *(k for k in beside if k != j)) if len(beside) > 1 else i
-                break
-        else:
-            i += 1
     return list(there.values())
 
 

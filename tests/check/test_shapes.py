@@ -5,7 +5,7 @@ from __future__ import annotations
 import cmath
 import math
 from fractions import Fraction
-from itertools import pairwise
+from itertools import combinations, pairwise
 from types import SimpleNamespace
 from typing import Any, cast
 
@@ -21,6 +21,7 @@ from airground_drake.check.run import Run
 from airground_drake.check.scenario import Pair, pairs_of
 from airground_drake.check.shapes import POINT, ROWS, Shape, boxes_of, shape_of, split
 from airground_drake.geometry import outline
+from airground_drake.scenarios import shapes
 from airground_drake.scenarios.load import from_data, load, resolved
 from airground_drake.scenarios.outlines import outlines_of
 from airground_drake.scenarios.schema import Obstacle
@@ -127,6 +128,22 @@ def test_the_normal_bounds_the_distance_after_any_step(
                 if np.linalg.norm(n) > 1e-6:
                     after = part.signed_m(np.array(place) + steps)
                     assert (after >= here + steps @ n / np.linalg.norm(n) - 1e-9).all()
+
+
+@given(polygons())
+def test_no_union_is_left_out_if_all_pairs_are_tried_again_after_each(given_corners: Corners) -> None:
+    corners = [(x, y) for x, y in given_corners][:: 1 if shapes.area([(x, y) for x, y in given_corners]) > 0.0 else -1]
+    parts = [[*triangle] for triangle in shapes._triangles(corners)]
+
+    def first() -> tuple[int, int, list[shapes.Corner]] | None:
+        pairs = combinations(range(len(parts)), 2)
+        return next(((i, j, both) for i, j in pairs if (both := shapes._united(parts[i], parts[j]))), None)
+
+    while found := first():
+        i, j, parts[i] = found
+        del parts[j]
+    if not shapes._is_convex(corners):
+        assert shapes.split(corners) == [shapes._without_straight_corners(part) for part in parts]
 
 
 @given(corners=polygons(), at=st.sampled_from([[], [0.0, 0.0, 0.0], [1.5, -0.7, 0.0]]), turn=st.floats(-4.0, 4.0))
