@@ -17,7 +17,7 @@ import math
 from bisect import bisect_right
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from itertools import accumulate, count
+from itertools import accumulate
 from typing import Self
 
 import numpy as np
@@ -444,17 +444,17 @@ def _route_among(p: complex, q: complex, around: _Obstacles) -> Array | None:
     if len(around.circles[1]) <= FEW:
         return _route(p, q, around)
     some = around.entered(_rows(np.array([p]), np.array([q - p]), np.zeros(1), np.array([abs(q - p)])))
-    for searches in count(1):
+    searches = 0
+    while True:
         route = _route(p, q, around.some(some))
         new = np.zeros_like(some) if route is None else around.entered(route) & ~some
         if not new.any():
             return route
-        some |= new
+        some, searches = some | new, searches + 1
         if searches >= SEARCHES:  # it feels its way along a wall of many parts: more of them at once
             apart, _ = cKDTree(around.middles[new]).query(around.middles)
             apart[some] = np.inf
             some[np.argsort(apart, kind="stable")[: int(some.sum()) // 4]] = True
-    raise AssertionError  # `count` has no end
 
 
 def _entered(pieces: Array, c: Points, r: Array) -> NDArray[np.bool_]:

@@ -105,9 +105,8 @@ def on_the_way(trace: Trace) -> dict[str, dict[str, Any]]:
     Returns:
         By UGV `stands` (it did not move in the last second), `creeps` (it hardly did), `left_m` (the way to its target
         along its preset) and `left_s` (how long that takes if it comes nearer as fast as in the last second; None if
-        it does not, or creeps). Where it stands because an obstacle that moves is at its target:
-        `kept_away`, see `_kept_away`. Where it stands as near to the map as it may: `at_m`, the nearest place of the
-        map, [x, y], m.
+        it does not, or creeps). Where it stands because an obstacle that moves is at its target: `kept_away`, see
+        `_kept_away`. Where it stands as near to the map as it may: `at_m`, the nearest place of the map, [x, y], m.
     """
     done = {event["robot"] for event in trace.events if event["kind"] == "arrival"} | {*first_collisions(trace.events)}
     return {ugv: _on_the_way(trace, ugv) for ugv in trace.ugvs if ugv not in done}

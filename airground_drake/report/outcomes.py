@@ -26,7 +26,10 @@ UNJUDGED: Mapping[str, Any] = {
 """What is known of a claim that was not judged."""
 NOT_RUN: Mapping[str, Any] = {
     "events": [], "faults": [],
-    "metrics": {"min_distance_m": {}, "min_robot_distance_m": {}, "on_the_way": {}, "without_proposals": []},
+    "metrics": {
+        "min_distance_m": {}, "min_robot_distance_m": {}, "on_the_way": {}, "without_proposals": [],
+        "lost_at_the_end": [],
+    },
 }  # fmt: skip
 """What is known of a run that was not run."""
 
@@ -233,7 +236,7 @@ def courses(document: Document) -> list[RunOutcome]:
 def no_way(run: Mapping[str, Any]) -> list[str]:
     """UGVs that the UAV was called for and found no way for in a run, ever or at the end, though no policy failed."""
     failed = {fault["robot"] for fault in run["faults"]}
-    lost = [*run["metrics"]["without_proposals"], *run["metrics"].get("lost_at_the_end", ())]
+    lost = [*run["metrics"]["without_proposals"], *run["metrics"]["lost_at_the_end"]]
     return [ugv for ugv in dict.fromkeys(lost) if ugv not in failed]
 
 

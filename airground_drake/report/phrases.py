@@ -140,7 +140,7 @@ def ending(course: RunOutcome, robot: str) -> str:
         return "short of its target"
     if known["stands"]:
         return f"standing still at {named('map', known['at_m'])}" if "at_m" in known else "standing still"
-    if known.get("creeps"):
+    if known["creeps"]:
         return "hardly moving at the end"
     left_s = known["left_s"]
     rounded = f" (about {float(f'{left_s:.2g}'):.15g} s more)" if left_s is not None else ""  # without an exponent

@@ -225,3 +225,17 @@ def test_a_path_among_many_discs_is_found_from_those_in_its_way(start: Point, go
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(paths, "FEW", 0)
         assert length_or_inf(start, goal, discs) == pytest.approx(at_once, abs=1e-7)
+        patch.setattr(paths, "SEARCHES", 0)  # others beside these enter the graph, too
+        assert length_or_inf(start, goal, discs) == pytest.approx(at_once, abs=1e-7)
+
+
+def test_a_way_along_a_wall_of_many_parts_takes_few_searches(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Round one disc the next is in the way, and so on to the end of the wall."""
+    discs = [(0.4 * k, 0.4 * k, 0.3) for k in range(-80, 81)]
+    searches, search = list[int](), paths._route
+    monkeypatch.setattr(paths, "_route", lambda p, q, some: searches.append(len(some.r)) or search(p, q, some))
+    found = find((2.0, -2.0), (-2.0, 2.0), discs)
+    assert clearance(sample(found)[1], discs) >= -TOL
+    assert len(searches) < 30
+    monkeypatch.setattr(paths, "FEW", 1000)
+    assert found.length_m == pytest.approx(find((2.0, -2.0), (-2.0, 2.0), discs).length_m, abs=1e-7)

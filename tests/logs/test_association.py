@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Any
 
@@ -92,6 +93,66 @@ def test_two_recordings_of_one_time_are_refused(tmp_path: Path, document: dict[s
     written(tmp_path / "runs", logs.long(aside), "run2.csv")
     with pytest.raises(LogError, match=r"rows of two recordings of the same time, 0\.9 m apart; wanted: one recording"):
         logs.read(tmp_path / "runs", document)
+
+
+def test_a_log_sampled_seldom_that_is_shorter_than_the_scenario_says_so(
+    tmp_path: Path, document: dict[str, Any]
+) -> None:
+    """It lacks 2 s, one of its intervals, of 6 s."""
+    seldom = {name: (t_s[:81:40], places[:81:40]) for name, (t_s, places) in FULL.items()}
+    assert not judge(logs.read(written(tmp_path, logs.long(seldom)), document), document).covers_all
+
+
+@pytest.mark.parametrize(("speed_m_s", "unit"), [(0.4, "milliseconds"), (0.0004, "")])
+def test_whole_numbers_far_apart_are_milliseconds_if_robots_are_not_too_fast_then(
+    speed_m_s: float, unit: str, tmp_path: Path
+) -> None:
+    """5 s, or 5,000 s, beside a scenario of 600 s; the second robot would drive at 400 m/s."""
+    long = resolved(load(str(logs.write_scenario(tmp_path, duration_s=600.0))))
+    t_s = np.arange(0.0, 5.1, 0.05)
+    way = 0.4 * (t_s if unit else 1000.0 * t_s)[:, None] * [1.0, 0.0, 0.0]
+    both = {name: (1000.0 * t_s, np.array([x, y, 0.0]) + way) for name, (x, y) in logs.UGVS.items()}
+    found = logs.read(written(tmp_path, logs.long(both, "t,body,x,y,z")), long)
+    assert any("times are taken as milliseconds" in said for said in found.said) == bool(unit)
+
+
+def test_a_robot_that_stands_at_the_origin_at_first_is_there(tmp_path: Path) -> None:
+    ugvs = logs.scenario()["ugvs"]
+    ugvs["tb_1"] |= {"start_m": [0.0, 0.0, 0.0], "preset": {"waypoints_m": [[0.0, 0.0, 0.0], [1.6, 0.7, 0.0]]}}
+    document = resolved(load(str(logs.write_scenario(tmp_path, ugvs=ugvs))))
+    t_s, places = FULL["tb_1"]
+    there = places.copy()
+    there[t_s <= 2.0] = 0.0  # and then it leaps
+    found = logs.read(written(tmp_path, logs.long({**FULL, "tb_1": (t_s, there)})), document)
+    assert len(found.bodies["tb_1"].t_s) == len(t_s)
+    assert not any("lost" in said for said in found.said)
+
+
+@pytest.mark.parametrize(
+    ("head", "row", "choice", "says"),
+    [
+        ("t,body,odom_x,odom_y,gps_x,gps_y", "{t},{name},{x},{y},{x},{y}", {}, "it has several places in a row: odom"),
+        ("t;body;x;y", "{t};{name};{mm};0", {}, "numbers such as -2,000 stand beside 700; wanted: no commas of"),
+        ("t,body,x,y,frame_id", "{t},{name},{x},{y},map", {"frames": ["mpa"]}, "the log has no such frame; it has map"),
+        ("tb_0.t,tb_0.x,tb_0.y,tb_1.x,tb_1.y", "{t},{x},{y},{x},{y}", {}, "tb_1 has no times of its own: there are"),
+    ],
+)
+def test_what_could_be_read_in_two_ways_is_refused(
+    head: str, row: str, choice: dict[str, Any], says: str, tmp_path: Path, document: dict[str, Any]
+) -> None:
+    lines = [row.format(t=t, name=name, x=place[0], y=place[1], mm=("700", "-2,000")[k % 2])
+             for k, (t, name, place) in enumerate(logs.rows(FULL))]  # fmt: skip
+    (tmp_path / "log.csv").write_text("\n".join([head, *lines]))
+    with pytest.raises(LogError, match=re.escape(says)):
+        logs.read(tmp_path / "log.csv", document, **choice)
+
+
+def test_what_the_command_line_names_has_the_last_word(tmp_path: Path, document: dict[str, Any]) -> None:
+    rows = logs.long(FULL)[1:]
+    others = [["0.0", row[0], *row[1:], "9", "9"] for row in rows]
+    path = written(tmp_path, [["time", "acq", "body", "east", "north", "up", "x", "y"], *others])
+    found = logs.read(path, document, columns={"t": "acq", "x": "east", "y": "north", "z": "up"})
+    assert pair_of(judge(found, document).pairs, *BROKEN).least_m == pytest.approx(logs.least_gaps(FULL)[BROKEN][0])
 
 
 def test_nothing_to_judge_is_no_verdict(tmp_path: Path) -> None:

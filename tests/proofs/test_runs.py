@@ -27,7 +27,9 @@ from airground_drake.proofs.record import closure
 from airground_drake.proofs.runs import Workshop, expects_kept, prove
 from airground_drake.proofs.too_near import too_near
 from airground_drake.run import trace
+from airground_drake.run.simulation import simulate
 from airground_drake.run.trace import Trace
+from airground_drake.scenarios.load import load
 from airground_drake.scenarios.schema import Obstacle, Preset, Run, SafeDistance, Scenario, Uav, Ugv
 from airground_drake.testing.plugin import Simulations
 from airground_drake.verify.engines.bodies import following_m_s, unicycle_m
@@ -94,6 +96,14 @@ def test_some_rounding_errors_short_is_too_short(
         [] if kept else [(f"{UGV}_and_{ROCK}", pytest.approx(short_m, abs=2e-15))]
     )
     assert law.proved or {gap.demand.lemma for gap in law.missed} == {f"{UGV}_and_{ROCK}"}
+
+
+def test_a_body_whose_name_means_something_in_coq_is_named_as_in_the_scenario() -> None:
+    ran = simulate(load("minimal", {"obstacles": {"p": {"position_m": [3.0, 0.0]}}, "duration_s": 2.0}), "a")
+    rock = next(each for each in recorded(ran).demands if "p" in each.called)
+    assert (rock.called, rock.second) == (("ugv1", "p"), "body_number_0")
+    (near,) = too_near(recorded(moved(ran, 3, np.array([2.5, 0.0, 0.0]))))
+    assert str(near).startswith("ugv1 and p are ")
 
 
 def test_every_pair_that_comes_too_near_is_named_with_its_distance_and_time(run: Simulations) -> None:

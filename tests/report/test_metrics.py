@@ -77,7 +77,7 @@ def test_seeds_are_those_from_1_on_and_the_reports_own_runs_serve_for_theirs(own
 
 @pytest.mark.parametrize(
     ("speed", "stands", "left_m", "left_s"),
-    [(1.0, False, 29.0, 29.0), (0.0, True, 31.0, None), (-1.0, False, 33.0, None)],
+    [(1.0, False, 29.0, 29.0), (0.0, True, 31.0, None), (-1.0, False, 33.0, None), (0.05, False, 30.9, None)],
 )
 def test_how_far_a_ugv_has_come_and_how_long_it_would_need(
     speed: float, stands: bool, left_m: float, left_s: float | None
@@ -89,3 +89,4 @@ def test_how_far_a_ugv_has_come_and_how_long_it_would_need(
     found = metrics.on_the_way(trace)["ugv1"]
     assert (found["stands"], found["left_m"]) == (stands, pytest.approx(left_m))
     assert found["left_s"] == (None if left_s is None else pytest.approx(left_s))
+    assert found["creeps"] == (0.0 < speed < 0.1)

@@ -271,9 +271,10 @@ def _run(ran: Ran) -> Document:
     metrics = {
         "min_distance_m": {"ugv1": rock, "uav": {}}, "min_robot_distance_m": {"ugv1": uav, "uav": {}},
         "final_position_m": {r: TARGETS[r] if ran.end(r).how == "home" else STUCK for r in TARGETS},
-        "on_the_way": {r: {"stands": ran.end(r).how != "moves", "left_m": 9.0, "left_s": ran.end(r).left_s}
+        "on_the_way": {r: {"stands": ran.end(r).how != "moves", "creeps": False, "left_m": 9.0,
+                           "left_s": ran.end(r).left_s}
                        for r in ("ugv1", "ugv2") if not ran.arrived(r) and r not in ran.first},
-        "without_proposals": ran.unasked, "gatekeeper": None,
+        "without_proposals": ran.unasked, "lost_at_the_end": [], "gatekeeper": None,
         "messages": None if ran.method == "a" else {
             "proposals": ran.sent[0], "answers": ran.sent[1],
             "always_on": {"proposals": 240, "answers": 480 * (ran.method in "cd")},

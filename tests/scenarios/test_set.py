@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
+import pytest
 from scenarios.cases import SMALL_DATA, edit
 
+from airground_drake.base.errors import ScenarioError
 from airground_drake.report import document
 from airground_drake.run.simulation import simulate
 from airground_drake.scenarios.load import from_data
@@ -32,6 +34,15 @@ def test_a_run_is_simulated_judged_and_shown_with_what_it_sets() -> None:
     assert shown["set"] == settings
     trace.meta["scenario"]["runs"]["other"]["set"]["decision.threshold.zeta_m"] = 2.5
     assert judge(trace, ["THR-TRIG"])[0].status == "error"  # another threshold
+
+
+def test_only_the_runs_that_are_asked_for_are_checked() -> None:
+    data = edit(SMALL_DATA, "runs.other", {"method": "a", "set": {"decision.threshold.zeta_m": -1}})
+    with pytest.raises(ScenarioError, match="as run other sets it"):
+        from_data(data, "small")
+    assert [*from_data(data, "small", runs=["d"]).runs] == ["d"]
+    with pytest.raises(ScenarioError, match="as run other sets it"):
+        from_data(data, "small", runs=["d", "unknown"])
 
 
 def test_claims_about_the_model_are_judged_for_a_run_that_changes_their_constants() -> None:

@@ -62,6 +62,14 @@ def test_every_number_of_the_schema_has_a_lower_bound() -> None:
 # --- scenarios in which rounding could take more from a safe distance than SAFE-TRACE tolerates
 
 
+@pytest.mark.parametrize("key", ["ugvs.ugv1.start_m", "ugvs.ugv1.target_m", "uav.start_m", "uav.target_m"])
+def test_robots_start_and_end_within_the_arena(key: str) -> None:
+    arena = {"arena_m": [[14.0, -6.0], [-4.0, 6.0]]}
+    load("minimal", arena)
+    with pytest.raises(ScenarioError, match=rf"{key}: .* is not allowed; a place within arena_m = "):
+        load("minimal", {**arena, key: [11.0, 6.0, 3.0 * key.startswith("uav")]})
+
+
 def test_one_tolerance() -> None:
     """Claims about a run share no code with the scenario's side."""
     assert TOLERANCE_M == DISTANCE_TOLERANCE_M

@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 import math
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -237,7 +238,8 @@ def test_the_gain_that_a_turning_limit_leaves_is_that_of_the_command_shortened_m
     slow = "{kind: unicycle, hand_point_m: 0.3, max_turn_rad_s: 0.8, heading_rad: 2.5}"
     trace = run_of(slow)
     (found,) = judge(trace, ["SAFE-HYP"])
-    (least,) = found.evidence["least_shares"]  # type: ignore[index]
+    evidence: Any = found.evidence
+    (least,) = evidence["least_shares"]
     shares = trace.sampled("ugv1.command_share")
     turned = np.diff(trace.column("ugv1.heading_rad")[trace.sample_rows]) / trace.scenario.control.period_s
     assert least == {"robot": "ugv1", "share": shares.min(), "gain_1_s": shares.min() * 3.0}

@@ -299,10 +299,10 @@ class Encounter(NamedTuple):
         """Whose doing it was, in a sentence without a full stop."""
         if self.appeared:
             return f"{self.second} appeared {self.gap_m:.2f} m from {self.first}: nobody's doing"
-        if self.t_s == 0.0:
-            return f"{self.first} starts {self.gap_m:.2f} m from {self.second}: nobody's doing"
         if self.own_doing:
             return f"{self.first} brought itself to {self.gap_m:.2f} m from {self.second}"
+        if self.t_s == 0.0:
+            return f"{self.first} starts {self.gap_m:.2f} m from {self.second}: nobody's doing"
         speed = f", {self.speed_m_s:.2f} m/s" if self.reaction.startswith("retreated") else ""
         blocked = f", blocked by {' and '.join(self.blocked_by)}" if self.blocked_by else ""
         came = f"{self.second} came to {self.gap_m:.2f} m by its own motion"
