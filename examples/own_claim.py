@@ -1,4 +1,4 @@
-"""A claim of one's own about a run: what it states, how it is decided, and what it does not establish.
+"""A user's own claim about a run: what it states, how it is decided, and what it does not establish.
 
 python examples/own_claim.py
 """

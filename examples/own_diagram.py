@@ -1,4 +1,4 @@
-"""One block in a diagram of one's own: the event trigger, driven by a sine, without a scenario.
+"""One block in your own diagram: the event trigger, driven by a sine, without a scenario.
 
 python examples/own_diagram.py
 """

@@ -1,4 +1,4 @@
-"""A policy of one's own: the UAV asks the stuck UGV to go round on one side.
+"""A user's own policy: the UAV asks the stuck UGV to go round on one side.
 
 python examples/own_policy.py
 """

@@ -6,7 +6,7 @@ The law steers a point that goes straight from row to row. Of the body the plant
     delay      the body is where the steered point was
     lag        tau v' = u - v; the steered point is p + tau v
 
-A plant of one's own is a class that is not here. Its drift and its cover are declared; what the trace records of both
+A user's plant is a class that is not here. Its drift and its cover are declared; what the trace records of both
 is compared with the recorded places.
 """
 
@@ -191,7 +191,7 @@ def moves_as_its_plant(robot: str, spec: Json, way: Way, steered: Array, command
 def misses_as_recorded(
     robot: str, way: Way, steered: Array, command: Array, rows: Rows, recorded: tuple[Array, Array]
 ) -> None:
-    """Check what is recorded of a plant of one's own, period by period.
+    """Check what is recorded of a user's plant, period by period.
 
     Args:
         robot: its name.

@@ -260,7 +260,7 @@ def _rows_cover_the_run(run: Run) -> None:
 def _moves_as_commanded(run: Run, robot: str) -> None:
     """position[k] = position[k-1] + (t[k] - t[k-1]) * command, from the declared start; samples hold their command.
 
-    A plant of one's own begins there, too, and misses its commands by as much as is recorded.
+    A user's plant begins there, too, and misses its commands by as much as is recorded.
     """
     place, chosen = run.position_m[robot], run.sampled(robot, "v", "m_s")
     command = chosen[np.searchsorted(run.sample_row, np.arange(len(place) - 1), side="right") - 1]

@@ -289,7 +289,7 @@ _ALL = (
         "Mixed.unicycle_chord", "ours", ("SAFE-BUDGET", "SAFE-HYP"),
         "A unicycle with chord steering conforms to no drift, the cover l and the dip |omega| |(v, l omega)| h^2/8.",
         (_CHORD, _PIECES),
-        "Slip: it may be declared as a drift of one's own plant.",
+        "Slip: it may be declared as a drift of a user's plant.",
     ),
     Theorem(
         "Mixed.lagging", "ours", ("SAFE-BUDGET", "SAFE-HYP"),

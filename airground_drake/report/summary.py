@@ -206,7 +206,7 @@ def _interventions(document: Document, course: RunOutcome) -> str:
 
 
 def _own_plants(document: Document) -> list[dict[str, Any]]:
-    """What SAFE-HYP says of each robot with a plant of one's own, with the largest numbers of all runs."""
+    """What SAFE-HYP says of each robot with a user's plant, with the largest numbers of all runs."""
     found = dict[str, dict[str, Any]]()
     for claim in document["claims"]:
         for each in (claim["evidence"] or {}).get("own_plants", ()) if claim["id"] == "SAFE-HYP" else ():

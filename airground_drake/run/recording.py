@@ -66,7 +66,7 @@ def states(
 
 
 def measured(states: pd.DataFrame, samples: pd.DataFrame, robots: Iterable[str]) -> dict[str, Array]:
-    """Drift and cover of robots with plants of one's own in each control period: columns of `Trace.samples`, (S,)."""
+    """Drift and cover of robots with users' plants in each control period: columns of `Trace.samples`, (S,)."""
     rows, found = np.searchsorted(states["t_s"], samples["t_s"]), dict[str, Array]()
     ends = np.append(rows, len(states) - 1)
     t = states["t_s"].to_numpy()

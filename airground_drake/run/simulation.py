@@ -43,7 +43,7 @@ from airground_drake.world.world import Body, World
 EVENT_ACCURACY = 1e-6
 """Accuracy of the Context: events are isolated to this, relative to the time scale of 1 s."""
 OWN_ACCURACY = 1e-6
-"""Accuracy of integration where a robot has a plant of one's own: about this many metres in a step."""
+"""Accuracy of integration where a robot has a user's plant: about this many metres in a step."""
 
 
 class Recorder:
@@ -164,12 +164,12 @@ class Recorder:
             raise SimulationError(self._name, context.get_time(), self._what(error)) from error
 
     def _what(self, error: BaseException) -> str:
-        """An error in words, with the place in the file of a plant of one's own, and such plants by name."""
+        """An error in words, with the place in the file of a user's plant, and such plants by name."""
         own = self._own_plants
         what = max((described(error, each.function) for each in own.values()), key=len, default=described(error))
         if not own or any(each.name in what for each in own.values()):
             return what
-        return f"{what} (plants of one's own: {', '.join(f'{each.name} of {robot}' for robot, each in own.items())})"
+        return f"{what} (users' plants: {', '.join(f'{each.name} of {robot}' for robot, each in own.items())})"
 
     def trace(self, simulator: Simulator, seed: int | None, wall: float = 0.0) -> Trace:
         """The trace of what a simulator has simulated: of a run that lasts until now.

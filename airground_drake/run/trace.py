@@ -2,7 +2,7 @@
 
 `states` has a row at the end of each of the simulator's steps: all control periods, and the isolated event times in
 between. Its values are true values just before the row's time, so an event at the last row's time may be missing. Rows
-closer than 1e-9 s are merged. Between two rows robots move on straight lines, and noise is linear. A plant of one's own
+closer than 1e-9 s are merged. Between two rows robots move on straight lines, and noise is linear. A user's plant
 need not: its rows are those of an integrator with error control.
 
     t_s
@@ -11,7 +11,7 @@ need not: its rows are those of an integrator with error control.
                                               x_m, y_m and z_m are then those of the steered point (of a unicycle, the
                                               chord of its hand point's way), body_x_m, body_y_m and body_z_m those of
                                               the body; of a unicycle also heading_rad (it does not jump), of a lag
-                                              body_vx_m_s, body_vy_m_s and body_vz_m_s. Of a plant of one's own x_m, y_m
+                                              body_vx_m_s, body_vy_m_s and body_vz_m_s. Of a user's plant x_m, y_m
                                               and z_m are the steered point itself, and there is a heading_rad if it
                                               has one
     <ugv>.noise_m                             integrated noise of (15)
@@ -30,7 +30,7 @@ chose, which is held until the next sample.
     <ugv>.ref_vx_m_s .ref_vy_m_s .ref_vz_m_s  its velocity
     <ugv>.executing                           number of the proposal executed from this sample on, -1 without one
     <ugv>.command_share                       only with unicycles: the share that was left of the law's command
-    <robot>.drift_m_s .cover_m                only of plants of one's own, in the period that begins here: by how much
+    <robot>.drift_m_s .cover_m                only of users' plants, in the period that begins here: by how much
                                               the steered point missed its command, per time; and how far the body was
                                               from the straight line of that point at most, at the rows
 """

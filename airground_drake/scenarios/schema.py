@@ -78,14 +78,14 @@ class Preset:
 
 @dataclass(slots=True)
 class Plant:
-    """How a robot moves. The law steers a point of it, and keeps as much more distance as its body needs: see `budget`.
+    """How a robot moves. The law steers a point of it, and keeps what its body needs on top: see `budget`.
 
     - first_order: it moves as it is told.
     - unicycle (UGVs): a differential drive. The law steers a hand point ahead of its axle, which arrives exactly where
       the law wants it; commands for which it would have to turn or drive too fast are shortened.
     - lag: its velocity follows the command with a time constant; the law steers p + tau v.
     - delay: commands take effect later; the law steers where it will be when those under way are carried out.
-    - `module:Class` or `file.py:Class`: a Drake System of one's own, with a drift and a cover that are declared. Each
+    - `module:Class` or `file.py:Class`: the user's own Drake System, with a drift and a cover that are declared. Each
       run measures both.
 
     A list combines: a delay, and after it a lag.
@@ -592,7 +592,7 @@ class Scenario:
     runs: Annotated[dict[Name, Run], Field(min_length=1)] = field(kw_only=True)
     """The simulations, by name."""
     claims: Annotated[dict[Words, Words], CLAIMS] = field(default_factory=dict)
-    """Claims of one's own, by identifier."""
+    """The user's own claims, by identifier."""
     expected: Annotated[dict[Words, Words], expected_of(MODEL_CLAIMS)] = field(default_factory=dict)
     """Expected verdicts of claims about the model, by claim."""
     reproduction: list[Reproduction] = field(default_factory=list)

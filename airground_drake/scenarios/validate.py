@@ -202,7 +202,7 @@ KEYS_OF_PLANTS = {
 }
 """The keys of each kind of plant."""
 OWN_KEYS = ("drift_m_s", "cover_m", "parameters")
-"""Those of a plant of one's own."""
+"""Those of a user's plant."""
 
 
 def _plants(scenario: Scenario) -> Problems:

@@ -43,7 +43,7 @@ RECORDED = (
 )  # fmt: skip
 """Exported output ports of the diagram: the signals of a trace."""
 OF_PLANTS = ("plant_signals", "own_headings", "command_share")
-"""The same, of robots that are not where the law steers them, of plants of one's own that have a heading, and of
+"""The same, of robots that are not where the law steers them, of users' plants that have a heading, and of
 unicycles; only where there are such robots."""
 
 NO_PLANTS: Mapping[str, OwnPlant] = MappingProxyType({})
@@ -352,7 +352,7 @@ def _uav_controller(scenario: Scenario, world: World) -> UavController:
 
 
 def _own_headings(world: World, plants: Mapping[str, System]) -> dict[str, OutputPort]:
-    """The headings of plants of one's own that have one, by robot."""
+    """The headings of users' plants that have one, by robot."""
     own = [body.name for body in world.moving if isinstance(body.plant, Own)]
     return {name: plants[name].GetOutputPort("heading") for name in own if plants[name].HasOutputPort("heading")}
 

@@ -1,4 +1,4 @@
-"""The Drake systems of plants, also of those of one's own, and of disturbances."""
+"""The Drake systems of plants, users' own among them, and of disturbances."""
 
 from __future__ import annotations
 
@@ -122,7 +122,7 @@ def steered_plant(body: Body, period_s: float) -> Diagram:
 
 
 class OwnPlant(NamedTuple):
-    """A plant of one's own for one robot, made in Python; in a scenario file it is a class (`plant.kind`).
+    """A user's plant for one robot, made in Python; in a scenario file it is a class (`plant.kind`).
 
     Attributes:
         make: called with `start`, the place of the body, (3,), m, world frame, and the parameters: gives a Drake System
@@ -146,7 +146,7 @@ class OwnPlant(NamedTuple):
 
 
 def declared(scenario: Scenario, plants: Mapping[str, OwnPlant]) -> Scenario:
-    """A valid scenario in which some robots have plants of one's own, by name.
+    """A valid scenario in which some robots have users' plants, by name.
 
     Raises:
         UnknownNameError: if there is no such robot.
@@ -169,14 +169,14 @@ def declared(scenario: Scenario, plants: Mapping[str, OwnPlant]) -> Scenario:
 
 
 class OwnCode(NamedTuple):
-    """Where a plant of one's own comes from: its name in the scenario, and a function in its file."""
+    """Where a user's plant comes from: its name in the scenario, and a function in its file."""
 
     name: str
     function: object
 
 
 def own_code(scenario: Scenario, plants: Mapping[str, OwnPlant]) -> dict[str, OwnCode]:
-    """All plants of one's own in a scenario, by robot; `plants` are those of `declared`.
+    """All users' plants in a scenario, by robot; `plants` are those of `declared`.
 
     Raises:
         UnknownNameError, PluginError: if a class cannot be imported or is no Drake System.
@@ -191,7 +191,7 @@ def own_code(scenario: Scenario, plants: Mapping[str, OwnPlant]) -> dict[str, Ow
 
 
 class OwnBody(LeafSystem):
-    """What a plant of one's own says of its body, passed on if all of it is finite.
+    """What a user's plant says of its body, passed on if all of it is finite.
 
     A plant that is sampled, such as a discrete MultibodyPlant, jumps from place to place. What is passed on goes
     straight from each place to the next instead, one step of the plant later: a trace is continuous.
@@ -272,11 +272,11 @@ def _steps(system: System) -> Iterator[float]:
 
 
 OUTPUTS = {"position": 3, "body": 3, "heading": 1}
-"""Output ports of a plant of one's own, and their sizes; only the first is needed, and may have another name."""
+"""Output ports of a user's plant, and their sizes; only the first is needed, and may have another name."""
 
 
 def own_plant(body: Body, make: Callable[..., System] | None) -> Diagram:
-    """A plant of one's own behind an `OwnBody`.
+    """A user's plant behind an `OwnBody`.
 
     Args:
         body: whose plant it is.
@@ -319,7 +319,7 @@ def own_plant(body: Body, make: Callable[..., System] | None) -> Diagram:
 
 
 def _checked(system: System, outputs: Mapping[str, OutputPort], checked: OwnBody) -> Diagram:
-    """A plant of one's own with its outputs, by name, behind an `OwnBody`."""
+    """A user's plant with its outputs, by name, behind an `OwnBody`."""
     builder = DiagramBuilder()
     builder.AddNamedSystem("own", system)
     builder.AddNamedSystem("checked", checked)

@@ -214,7 +214,7 @@ def require_count(claim: Claim, finding: Finding) -> None:
 def require_motion(trace: Trace) -> None:
     """Check that each position follows from the one before and the command by the robot's plant, as the trace says.
 
-    Of a plant of one's own, that its drift and cover are those of the recorded positions.
+    Of a user's plant, that its drift and cover are those of the recorded positions.
 
     Raises:
         TraceError: if time runs backwards, the run or the robots are not those of the scenario, or a step does
@@ -240,7 +240,7 @@ def require_motion(trace: Trace) -> None:
 
 
 def require_measured(trace: Trace, robot: str) -> None:
-    """Check the recorded drift and cover of a plant of one's own against the recorded positions, and where it begins.
+    """Check the recorded drift and cover of a user's plant against the recorded positions, and where it begins.
 
     Raises:
         TraceError: if they differ by more than `MOTION_TOLERANCE_M`, per period for the drift.

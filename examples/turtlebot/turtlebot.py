@@ -1,4 +1,4 @@
-"""A plant of one's own: a differential drive on its wheels, with contact, friction and motors, in a MultibodyPlant."""
+"""A user's plant: a differential drive on its wheels, with contact, friction and motors, in a MultibodyPlant."""
 
 from __future__ import annotations
 

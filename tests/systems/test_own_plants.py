@@ -1,4 +1,4 @@
-"""Plants of one's own: Drake Systems with a declared drift and cover, which each run measures."""
+"""Users' plants: Drake Systems with a declared drift and cover, which each run measures."""
 
 from __future__ import annotations
 
@@ -117,7 +117,7 @@ class Lagging(Diagram):
 
 
 def of(make: Callable[..., System], drift_m_s: float = 0.0, cover_m: float = 0.0, **parameters: float) -> Trace:
-    """A run of `minimal` in which the UGV has a plant of one's own."""
+    """A run of `minimal` in which the UGV has a user's plant."""
     return simulate(load("minimal", SETTINGS), "d", plants={"ugv1": OwnPlant(make, drift_m_s, cover_m, parameters)})
 
 

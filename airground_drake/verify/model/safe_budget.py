@@ -19,7 +19,7 @@ ROUNDED_M = Fraction(1, 10**12)
 """Two ways to add up a budget differ by no more than this, m."""
 BASIC = ("Budget.at_samples", "Budget.budget_always")
 OWN = "own"
-"""Stands for all plants of one's own among the kinds."""
+"""Stands for all users' plants among the kinds."""
 FORWARDS = "unicycle that never drives backwards"
 """One more theorem about such a unicycle."""
 BY_KIND = {
@@ -38,31 +38,31 @@ class SafeBudget(TheoremClaim):
     """SAFE-BUDGET."""
 
     id = "SAFE-BUDGET"
-    summary = "The law keeps as much more distance as the robots' plants take, so that their bodies keep the safe one."
+    summary = "The law keeps a larger distance, by what turning, lags and delays cost: so bodies keep the safe one."
     statement = (
         "Where the points that the law steers keep the law's distance d_law at the samples, the bodies of robots that "
-        "turn, lag, get their commands late or have a plant of one's own keep the safe distance d at all times. Beside "
-        "an obstacle that may move the same holds of what SAFE-OWN says. For each kind of pair d_law is at least what "
-        "the theorems ask for."
+        "turn, lag, get their commands late or have a plant of the user's own keep the safe distance d at all times. "
+        "Beside an obstacle that may move, the bodies keep in the same way what SAFE-OWN states. For each kind of pair "
+        "d_law is at least what the theorems ask for."
     )
     latex = (
         r"d_{\mathrm{law}} \ge b + \sum_{i} (c_i + f_i + w_i / A), \quad b = d + V |\delta_i - \delta_j| \text{ or } "
         r"\sum_i |\tau_i - \tau| V_i + \sqrt{(d + V |\delta_i - \delta_j|)^2 + (\tau V_{\mathrm{rel}})^2}",
         r"c = l, \quad f = \tfrac{1}{8} |\omega| \lVert v \rVert h^2 \text{ (unicycle, chord steering)}; \quad c, w "
-        r"\text{ as declared (one's own)}",
+        r"\text{ as declared (the user's own)}",
         r"b + c = \sqrt{d^2 + l^2} \text{ beside a set at rest (never backwards)}",
     )
     method = (
         "Theorems in Coq about each kind of plant. Their hypotheses on the numbers of the scenario are checked here; "
-        "the distances of the law are computed again in other words, and compared to 1e-12 m. SAFE-HYP checks what a "
-        "run has to meet."
+        "the distances of the law are computed again by separate code, and must agree to 1e-12 m. SAFE-HYP checks what "
+        "a run has to meet."
     )
     equations = "(7)-(8), (11) in the inequality form of the package (set-based avoidance)"
     assumptions = (
         "The plants of the scenario are those of the robots: no slip, no error of a heading, time constant or delay. "
-        "Plants of one's own drift and cover no more than they declare (SAFE-HYP measures both in the run).",
+        "The user's own plants drift and cover no more than they declare (SAFE-HYP measures both in the run).",
         "Commands stay within the speed limits (SAFE-HYP checks the run).",
-        "A delay comes before a lag; a robot with either beside a unicycle has the sum of what both take.",
+        "A delay comes before a lag. Between a robot with either and a unicycle, what both cost is added up.",
     )
     does_not_establish = (
         "That the steered points keep the law's distance: that is SAFE-INV. Nor that a command was met in full: a "

@@ -61,13 +61,13 @@ class SafeDist(TheoremClaim):
     equations = "(7)-(8), (11) in the inequality form of the package (set-based avoidance)"
     assumptions = (
         "The disturbance may change at any time, but is bounded by w in every direction (for a UGV: in its plane).",
-        "An obstacle at rest is a convex set, or several, each a point of its own in what follows. Inside a safe "
+        "An obstacle at rest is a convex set, or several, each counted as one point in what follows. Inside a safe "
         "distance v = 0 is not feasible, and the inequalities of several points can contradict each other; the layer "
         "then takes the least violation. So: one violated inequality at a time, or a common direction g as in the "
         "statement. A UGV straight under the UAV has no such direction; there its disturbance does not count either, "
         "and the UAV's half suffices (`Gate.overhead`).",
         "w is 10 % of the largest speed limit, but at most A/4 times the smallest safe distance, so that at least half "
-        "of it is left. It is a choice, not a property of a robot.",
+        "of that distance is left. It is a choice, not a property of a robot.",
         "Positions are measured exactly and without delay.",
         "While a pair is out of sensing range, its robots command no more than their speed limits, and w comes on top. "
         "The layer itself may ask for more within a safe distance of something else.",

@@ -71,8 +71,8 @@ class ThrChoice(ModelClaim):
     equations = "(16)-(20), Table 1"
     assumptions = ("Drift and noise of the rule are those that the user assumes; (16)-(18) without initial deviation.",)
     does_not_establish = (
-        "That the assumed drift and noise are those of the runs: compare the rows of the runs. A declared threshold is "
-        "not optimal. The risk says nothing about what an intervention brings."
+        "That the assumed drift and noise are those of the runs: compare the rows of the runs. A declared threshold "
+        "need not be optimal. The risk says nothing about what an intervention brings."
     )
     expected: Status = "holds"
     exercised_by = "thresholds that are, or must be, the optimum"

@@ -51,14 +51,14 @@ class ThrOpt(TheoremClaim):
         r"\text{ for some } \zeta",
     )
     method = (
-        "Theorems in Coq. Checked here, by signs in ball arithmetic: where both roots are, and by how much the risk at "
-        "the printed root is higher at least. The drifts for which the threshold in force solves the equation, at most "
-        "two, are enclosed, too."
+        "Theorems in Coq. Checked here, by signs in ball arithmetic: where both roots are, and a lower bound on how "
+        "much higher the risk at the printed root is. The drifts for which the threshold in force solves the equation, "
+        "at most two, are enclosed, too."
     )
     equations = "(16)-(19)"
     assumptions = (
         "(17) and (18) with the initial deviation in seconds, that is divided by the drift (THR-DDM).",
-        "Constants are the decimals that the scenario's numbers print as; the drift is constant.",
+        "Constants are the decimal numbers as which the scenario's values print; the drift is constant.",
     )
     does_not_establish = (
         "That minimising this risk is the right aim, that c1, c2, drift and noise are well chosen, or which threshold "

@@ -42,7 +42,7 @@ class ThrRoot(TheoremClaim):
     )
     equations = "(19) with c2/c1 for the printed c1/c2"
     assumptions = (
-        "Constants are the decimals that the scenario's numbers print as.",
+        "Constants are the decimal numbers as which the scenario's values print.",
         "With a fixed threshold the root is not in force; it then says which threshold the rule's numbers ask for.",
     )
     does_not_establish = (

@@ -63,8 +63,8 @@ class Pair(NamedTuple):
         last: row up to which both are there.
         speed_m_s: at which robots expect the barrier to move at most; above 0 the robot's law is the passive one.
         more_m: distance that the law keeps beyond `safe_m`.
-        cover_m: how far both bodies may be from the points that the law steers after a period, together: what plants of
-            one's own may miss of their commands included.
+        cover_m: how far both bodies may be from the points that the law steers after a period, together: what users'
+            plants may miss of their commands included.
         drift_m: the part of `more_m` that makes up for missed commands.
         slip_m: how much of its command the robot may miss in a control period.
         drawn_m: how far a robot that never drives backwards is behind its steered point, beside a barrier at rest.

@@ -58,7 +58,7 @@ DECLARED = "declared speed"
 FORWARDS = "never backwards"
 """The hypothesis that a unicycle that must not drive backwards does not."""
 DRIFT, COVER = "declared drift", "declared cover"
-"""The hypotheses that a plant of one's own has the drift and the cover that it declares."""
+"""The hypotheses that a user's plant has the drift and the cover that it declares."""
 BUILT = "controller parameters"
 """The hypothesis that the controllers were built with what the scenario demands."""
 
@@ -97,7 +97,7 @@ class Guarantee(NamedTuple):
         missed_m: how far each sample misses the inequalities, e_i + e_j, (K,), m per control period; 0: both are met.
         short_m: how much too close the pair started, or was when its obstacle appeared, m.
         gap_m: d - max(e / a - w / A, short_m) with d the gap required, e the largest of `missed_m`, a = min(A h, 1),
-            and w the drift that plants of one's own declare. Without a gain nothing is restored: d - K e - short_m.
+            and w the drift that users' plants declare. Without a gain nothing is restored: d - K e - short_m.
     """
 
     pair: Pair
@@ -441,7 +441,7 @@ def least_shares(trace: Trace) -> list[LeastShare]:
 
 @dataclass(frozen=True)
 class OwnPlant:
-    """The largest drift, m/s, and cover, m, of a robot with a plant of one's own in a run, and what is declared."""
+    """The largest drift, m/s, and cover, m, of a robot with a user's plant in a run, and what is declared."""
 
     robot: str
     plant: str
@@ -452,7 +452,7 @@ class OwnPlant:
 
 
 def own_plants(trace: Trace) -> list[OwnPlant]:
-    """All robots with plants of one's own."""
+    """All robots with users' plants."""
     given = [(name, each) for name, robot in trace.scenario.robots.items() for each in robot.plant if each.is_own]
     most = {
         name: [float(trace.sampled(f"{name}.{key}").max()) for key in ("drift_m_s", "cover_m")] for name, _ in given

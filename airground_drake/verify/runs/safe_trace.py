@@ -51,7 +51,7 @@ class SafeTrace(TraceClaim):
     equations = "(7)-(8), (11)"
     assumptions = (
         "Between two rows every robot moves on a straight line at constant speed (integrator plant, zero-order hold), "
-        "a unicycle on an arc, a body with a lag as the equation of the lag says. So does a plant of one's own, whose "
+        "a unicycle on an arc, a body with a lag as the equation of the lag says. So does a user's plant, whose "
         "rows are the steps of an integrator with error control.",
         "Robots are balls of the scenario's radii r (`radius_m`; by default points), and C is the centre of the other "
         "body. A barrier is all that is within its radius of its core C: a point, walls, a polygon, or a prism up to "

@@ -79,11 +79,11 @@ class ThrTrig(TraceClaim):
         "used between rows, too; if not, or if another block computes x, x is taken as linear between rows. It is cut "
         "at the preset's corners and at its turning points (closed form) into monotone pieces; crossings are then sign "
         "changes, located by Brent's method to 1e-12 s. The automaton is run again on x, and its events and the mode "
-        "column are compared one by one. If a period of the noise has several rows, all must have the same sample, "
-        "given the leak. Theorems in Coq say why the running trigger misses nothing in a step: its largest value is at "
-        "an end, and its least one has a closed form, with p the distance of the error's line from 0, "
-        "k = (n1 - n0)/|e1 - e0| and w = sqrt(1 - k^2). The evidence has their hypotheses: the noise changes its rate "
-        "at control samples only. Tests compare the running trigger with dense sampling."
+        "column are compared one by one. All rows within one period of the noise must show the same sample of it, once "
+        "the leak is taken into account. Theorems in Coq say why the running trigger misses nothing in a step: its "
+        "largest value is at an end, and its least one has a closed form, with p the distance of the error's line from "
+        "0, k = (n1 - n0)/|e1 - e0| and w = sqrt(1 - k^2). The evidence has their hypotheses: the noise changes its "
+        "rate at control samples only. Tests compare the running trigger with dense sampling."
     )
     equations = "(15), (20)"
     assumptions = (
