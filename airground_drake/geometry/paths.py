@@ -175,6 +175,12 @@ class _Obstacles:
         """The middles of discs and polygons, (m + k, 2), m."""
         return np.concatenate((_places(self.c), self.rows[:, MIDDLE : MIDDLE + 2]))
 
+    @cached_property
+    def cells(self) -> NDArray[np.intp]:
+        """The square cell that has the middle of each disc and polygon, as wide as the longest distance to keep."""
+        size = max(self.r.max(initial=0.0), self.keep.max(initial=0.0))
+        return np.unique(np.floor(self.middles / size), axis=0, return_inverse=True)[1].ravel()
+
     @property
     def corners(self) -> tuple[Points, Points, Points]:
         """All corners, (n,), polygon by polygon, and the corners before and after each."""
@@ -451,10 +457,12 @@ def _route_among(p: complex, q: complex, around: _Obstacles) -> Array | None:
         if not new.any():
             return route
         some, searches = some | new, searches + 1
-        if searches >= SEARCHES:  # it feels its way along a wall of many parts: more of them at once
+        if searches >= SEARCHES:  # it feels its way along a wall of many parts: more of them at once, one from a cell
             apart, _ = cKDTree(around.middles[new]).query(around.middles)
-            apart[some] = np.inf
-            some[np.argsort(apart, kind="stable")[: int(some.sum()) // 4]] = True
+            apart[np.isin(around.cells, around.cells[some])] = np.inf
+            order = np.argsort(apart, kind="stable")
+            nearest = order[np.sort(np.unique(around.cells[order], return_index=True)[1])]
+            some[nearest[np.isfinite(apart[nearest])][: int(some.sum()) // 4]] = True
 
 
 def _entered(pieces: Array, c: Points, r: Array) -> NDArray[np.bool_]:
