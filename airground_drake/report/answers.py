@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 from airground_drake.base.statuses import NOTHING, PASSING, UNDECIDED
 from airground_drake.report.outcomes import Document, ProofOutcome, RunOutcome, claims, distance, tolerance, triggers
 from airground_drake.report.phrases import (
+    RECURSION,
     appeared,
     collision,
     encounter,
@@ -91,7 +92,8 @@ def _safe(document: Document, every: Runs) -> Iterator[Line]:
     if printed:
         what = _intrusion(min(printed, key=lambda course: course.near[:1]))
         home = "all arrive, but " * all(course.away == {} for course in printed)
-        yield say("printed", runs=counted(len(printed), "run"), home=home, what=what, expected=_expected(printed))
+        runs = counted(len(printed), "run")
+        yield say("printed", runs=runs, recursion=RECURSION, home=home, what=what, expected=_expected(printed))
 
 
 def _names(those: Runs) -> str:
@@ -239,14 +241,21 @@ def _over_seeds(rows: Claims, kept: Claims) -> Line:
 
 def _zeno(document: Document, every: Runs, proofs: Claims, traces: Claims) -> Iterator[Line]:
     resolved = document["scenario"]["resolved"]
-    decision, period_s = resolved["decision"], resolved["control"]["period_s"]
-    for status in (claim["status"] for claim in proofs if not claim["run"]):
-        if status == "proved":
-            dwell_s = decision["min_inter_event_s"]  # below the control period it keeps nothing apart that matters
-            yield say("dwell" if dwell_s >= period_s else "short_dwell", dwell_s=dwell_s, period_s=period_s)
+    period_s, of_runs = resolved["control"]["period_s"], {claim["run"] for claim in proofs}
+    others = [course.name for course in every if course.name not in of_runs]
+    told = grouped(
+        ((claim["status"], claim["inputs"].get("dwell_s")), claim["run"] or ", ".join(others))
+        for claim in proofs
+        if claim["run"] or others or not every
+    )
+    for (status, dwell_s), names in told.items():
+        where = f" ({', '.join(names)})" * (len(told) > 1)
+        if status == "proved":  # a dwell below the control period keeps nothing apart that matters
+            name = "dwell" if dwell_s >= period_s else "short_dwell"
+            yield say(name, where=where, dwell_s=dwell_s, period_s=period_s)
         else:
-            bare = ", as the trigger is the bare threshold" * (decision["trigger"] == "bare")
-            line = say("no_dwell", bare=bare, status=status.replace("_", " "))
+            bare = ", as the trigger is the bare threshold" * (dwell_s == 0.0)
+            line = say("no_dwell", where=where, bare=bare, status=status.replace("_", " "))
             yield line._replace(mark="no") if status == "refuted" else line
     bad = [claim for claim in traces if claim["status"] == "refuted"]
     for claim in bad:
@@ -264,7 +273,8 @@ def _zeno(document: Document, every: Runs, proofs: Claims, traces: Claims) -> It
 def _threshold(document: Document, every: Runs, exact: Claims, quality: Claims, choice: Claims) -> Iterator[Line]:
     runs, fired = document["runs"], triggers(document)
     bad, unknown = _with(exact, ["refuted"]), _with(exact, UNDECIDED)
-    zeta = " or ".join(f"{zeta:.4g}" for zeta in dict.fromkeys(run["zeta_m"] for run in runs.values()))
+    having = [run for run in runs.values() if any(event["kind"] == "trigger" for event in run["events"])]
+    zeta = " or ".join(f"{zeta:.4g}" for zeta in dict.fromkeys(run["zeta_m"] for run in having or runs.values()))
     yield from (say("mistriggered", run=run) for run in bad)
     if unknown:
         yield say("not_judged", runs=", ".join(unknown))
@@ -273,7 +283,7 @@ def _threshold(document: Document, every: Runs, exact: Claims, quality: Claims, 
         yield say("never_fired", zeta=zeta, largest=clause("largest", largest=max(largest)) if largest else "")
     elif exact and not bad and not unknown:
         times = sorted({round(event["t_s"], 3) for event in fired})
-        often = f"{len(fired)} times{f' in {len(runs)} runs' * (len(runs) > 1)}, first " * (len(times) > 1)
+        often = f"{len(fired)} times{f' in {len(having)} runs' * (len(having) > 1)}, first " * (len(times) > 1)
         yield say("fired", zeta=zeta, when=f"{often}at {times[0]:.3f} s")
     yield from _quality(quality)
     for claim in choice:
@@ -293,12 +303,17 @@ def _quality(of_runs: Claims) -> Iterator[Line]:
         yield say("not_compared", runs=", ".join(unknown))
     tested = [claim for claim in of_runs if claim["status"] not in UNDECIDED and claim["exercised"]]
     tested.sort(key=lambda claim: float(claim["margin"]))
-    told = grouped(((claim["status"] == "refuted", _timing(claim["evidence"])), claim["run"]) for claim in tested)
-    for (bad, timing), names in list(told.items())[:MAX_TOLD]:
-        line = say("compared", where=f" ({', '.join(names)})" * (len(told) > 1), timing=timing)
+    allowed = {claim["evidence"]["tolerance_m"] for claim in tested}
+    told = grouped(
+        ((claim["status"] == "refuted", _timing(claim["evidence"]), claim["evidence"]["tolerance_m"]), claim["run"])
+        for claim in tested
+    )
+    for (bad, timing, tolerance_m), names in list(told.items())[:MAX_TOLD]:
+        within = f", {tolerance_m:.3g} m off allowed" * (len(allowed) > 1)
+        line = say("compared", where=f" ({', '.join(names)}{within})" * (len(told) > 1), timing=timing)
         yield line._replace(mark="no") if bad else line
     if others := [name for names in list(told.values())[MAX_TOLD:] for name in names]:
-        yield say("less_off", runs=", ".join(others))
+        yield say("no_worse", runs=", ".join(others))
     if tested and tested[0]["status"] == "refuted" and (ddm := tested[0]["evidence"]["ddm"]):
         ugv = max(ddm, key=lambda name: ddm[name]["error_rate"] or 0.0)
         wrong, due = (100 * (ddm[ugv][key] or 0.0) for key in ("error_rate", "error_rate_of_18"))

@@ -127,7 +127,7 @@ class RunOutcome:
         stuck: robots among those away that stand where the scenario declares a stall.
         on_the_way: UGVs among them that did not collide, and how far they had come (`metrics.on_the_way`).
         no_way: UGVs that the UAV was called for and found no way for.
-        proof: of its safety under method (d); None under other methods.
+        proof: of its safety under method (d); None under other methods, and of a run that is not plain.
     """
 
     def __init__(self, document: Document, name: str) -> None:
@@ -164,7 +164,7 @@ class RunOutcome:
         only_speed = against.get("hypothesis") == DECLARED and not against.get("also_broken")
         proved = any(claim["status"] == "proved" for claim in claims(document, THEOREMS[0]))
         self.else_met = proved and (conditions["status"] in PASSING or only_speed)
-        self.proof = self._proof(found, resolved) if self.method == "d" else None
+        self.proof = self._proof(found, resolved) if self.method == "d" and self.plain else None
 
         self.arrived_s = {event["robot"]: event["t_s"] for event in run["events"] if event["kind"] == "arrival"}
         self.away = None if run is NOT_RUN else self._away(resolved, run["metrics"]["final_position_m"])

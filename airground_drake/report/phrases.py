@@ -18,6 +18,8 @@ SETTINGS = {
     ("gatekeeper.rule", "first_stage"): "first stage applied",
 }
 """What keys of the gatekeeper of method (c) mean, in a few words."""
+RECURSION = "recursion (5) as printed"
+"""What a run has in place of the package's composition of priorities."""
 ROLES = ("first", "second", "robot", "other")
 """Keys that hold the name of a body in the place of a claim."""
 
@@ -26,10 +28,10 @@ def of_run(resolved: Mapping[str, Any], course: RunOutcome) -> str:
     """What a run is: its method, or the method's identifier and what the run sets differently."""
     if course.method not in METHODS:
         return course.method
-    if changed := resolved["runs"][course.name].get("set"):
-        says = [SETTINGS.get((key, str(value)), f"{key} {value}") for key, value in changed.items()]
-        return f"({course.method}) with {', '.join(says)}"
-    return METHODS[course.method].says
+    changed = resolved["runs"][course.name].get("set") or {}
+    says = [SETTINGS.get((key, str(value)), f"{key} {value}") for key, value in changed.items()]
+    says += [RECURSION] * (not course.plain)
+    return f"({course.method}) with {', '.join(says)}" if says else METHODS[course.method].says
 
 
 def gatekeeper(resolved: Mapping[str, Any]) -> str:
@@ -95,7 +97,7 @@ def encounter(course: RunOutcome, one: Mapping[str, Any]) -> str:
 def too_fast(course: RunOutcome) -> str:
     """Which obstacles moved faster than declared, and what is proved all the same."""
     still = ["no robot brought itself too near"] * (course.own_doing is False)
-    still += ["distances from walls and robots"] * course.else_met
+    still += ["all other distances"] * course.else_met
     told = "; ".join(clause("too_fast", each) for each in course.faster.values())
     return told + (f". Still proved: {'; '.join(still)}" if still else "")
 
@@ -103,7 +105,8 @@ def too_fast(course: RunOutcome) -> str:
 def intrusion(course: RunOutcome) -> str:
     """Who came how near to what in a run that was not safe."""
     if course.near and course.near[0].is_short:
-        return clause("appears" if course.near[0].appeared else "comes_within", near=course.near[0])
+        near = course.near[0]
+        return clause(("appears_on" if near.value_m < 0.0 else "appears") if near.appeared else "comes_within", near=near)
     return course.why
 
 

@@ -56,7 +56,7 @@ SENTENCES = {
     "so this was not tested.",
     "broken": "✗ {run.name}: {what}{expected}.",
     "unknown": "? {runs}: not known, {why}.",
-    "printed": "✗ {runs} with recursion (5) as printed: {home}{what}{expected}.",
+    "printed": "✗ {runs} with {recursion}: {home}{what}{expected}.",
     "tested": "✓ Proved: {who} keep{s} every distance{covered}, whatever the UAV asks.",
     "idle": "\N{EN DASH} Proved for {who}, but nothing came near: its conditions hold with nothing to check.",
     "refuted": "✗ The proof does not apply to {runs}: its conditions did not hold ({lacking}).",
@@ -65,6 +65,7 @@ SENTENCES = {
     "covered": " between robots and from bodies at rest, and drive{s} no robot too near to what moves",
     # Who came how near to what
     "appears": "{near.whom} appears {near} from {near.robot} (nobody's doing)",
+    "appears_on": "{near.whom} appears on {near.robot} (nobody's doing)",
     "comes_within": "{near.robot} comes within {near} of {near.whom}",
     "collides": "{robot} collides with {what} at {t_s:.2f} s",
     "starts": "{first} starts {gap_m:.2f} m from {second}, required {required_m:.2f} m: nobody's doing",
@@ -87,10 +88,10 @@ SENTENCES = {
     "worst_seed": "; worst: {apart} ({first} to {second}, seed {seed}), required {safe_distance_m:g} m",
     "no_noise": "  There is no decision noise: the seed changes nothing but what third-party code makes of it.",
     # Zeno-free?
-    "dwell": "✓ Proved: triggers are at least {dwell_s:g} s apart.",
-    "short_dwell": "≈ Proved: triggers are at least {dwell_s:g} s apart. No practical protection: that is shorter than "
+    "dwell": "✓ Proved{where}: triggers are at least {dwell_s:g} s apart.",
+    "short_dwell": "≈ Proved{where}: triggers are at least {dwell_s:g} s apart. No practical protection: that is shorter than "
     "the control period, {period_s:g} s.",
-    "no_dwell": "? Not proved{bare} (ZENO-PROOF: {status}).",
+    "no_dwell": "? Not proved{where}{bare} (ZENO-PROOF: {status}).",
     "too_soon": "✗ {run}: two triggers {gap} apart.",
     "gaps": "  Seen: {gaps} between triggers{smallest}.",
     "no_gaps": "  These runs cannot show it: {why}. Scenario dwell does.",
@@ -102,7 +103,7 @@ SENTENCES = {
     "fired": "✓ Fired exactly when the decision variable reached {zeta} m, {when}.",
     "not_compared": "? {runs}: not compared with the task error without noise (THR-QUALITY).",
     "compared": "✓ Against the task error without noise{where}: {timing}.",
-    "less_off": "  {runs}: less far off.",
+    "no_worse": "  {runs}: no worse.",
     "off": "up to {off_s:.2f} s {early} (at {error_m:.2f} m)",
     "ddm": "  Decisions about {ugv} in run {run}: {wrong:.2g} % wrong{mean}. By (17)-(18), for its {drift_m_s:.2g} m/s "
     "and {noise_m_sqrt_s:g} m/√s: {due:.2g} % wrong, {decision_time_of_17_s:.2g} s.",
@@ -110,7 +111,7 @@ SENTENCES = {
     "{noise_m_sqrt_s:.4g} m/√s{never}.",
     "chosen": "✓ {zeta:.4g} m, {rule}, costs {more} the Bayes optimum {best:.4g} m for the assumed drift "
     "{drift_m_s:.4g} m/s and noise {noise_m_sqrt_s:.4g} m/√s{never}.",
-    "never": "; no task error here grows faster than {fastest:.3g} m/s",
+    "never": "; within the speed limits no task error grows faster than {fastest:.3g} m/s",
     "own": "✓ For the drift and noise of {robot} in run {run}, {what}.",
     "delay": "{ideal}; {threshold_m:.4g} m costs as much as a delay of {cost_s:.2g} s",
     # Paper?

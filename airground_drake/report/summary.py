@@ -6,7 +6,7 @@ Marks follow what happened in the runs. Whether the scenario declares that is an
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from textwrap import wrap
 from typing import Any, NamedTuple
 
@@ -21,6 +21,10 @@ from airground_drake.report.sentences import MARKS, MAX_NAMES, Line, clause, cou
 
 WIDTH = 110
 """Characters of a line on a terminal, about."""
+
+
+ANSWERS = "accepted", "accepted and given up later", "refused"
+"""What becomes of proposals."""
 
 
 class Row(NamedTuple):
@@ -69,7 +73,8 @@ def first_screen(document: Document) -> FirstScreen:
 
 def headline(document: Document) -> Line:
     """The report in a sentence, and in another one if a verdict is not the one that the scenario declares."""
-    mark, told = _outcome(courses(document))
+    every = courses(document)
+    mark, told = _outcome(every, _main(document, every))
     differs = sum(claim["as_expected"] is False and claim["status"] not in UNDECIDED for claim in document["claims"])
     differs += sum(not each["as_expected"] for each in document["overall"]["numbers"])
     if not differs:
@@ -78,9 +83,13 @@ def headline(document: Document) -> Line:
     return Line("partly" if mark == "yes" else mark, clause("undeclared", told=told, checks=checks, are=are))
 
 
-def _outcome(every: Sequence[RunOutcome]) -> Line:
+def _main(document: Document, every: Sequence[RunOutcome]) -> Sequence[RunOutcome]:
+    """The runs that the headline is about: not those that show the paper's recursion in a comparison with the paper."""
+    return ([course for course in every if course.plain] if document["reproduction"] else []) or every
+
+
+def _outcome(every: Sequence[RunOutcome], main: Sequence[RunOutcome]) -> Line:
     """What came of the runs, in a sentence."""
-    main = [course for course in every if course.plain] or every
     unsafe = [course for course in main if course.safe is False]
     fine = [course for course in main if course.fine]
     short = [course for course in main if course.away and course not in unsafe]
@@ -163,7 +172,9 @@ def _row(document: Document, course: RunOutcome) -> Row:
         return Row(course.name, says, _safe(course), Line("open", "not known"), "not run")
     count = len(resolved["ugvs"])
     uav = "; not the UAV" * (bool(course.away) and course.there == count)
-    arrived = Line("no" if course.away else "yes", f"{course.there} of {count}{uav}")
+    collided = sum(robot in resolved["ugvs"] for robot in course.hits if robot in course.away)
+    told = f"{course.there} of {count}{f'; {collided} collided' * bool(collided)}{uav}"
+    arrived = Line("no" if course.away else "yes", told)
     return Row(course.name, says, _safe(course), arrived, _interventions(document, course))
 
 
@@ -194,15 +205,34 @@ def _interventions(document: Document, course: RunOutcome) -> str:
     failed = f"; {failed}" if failed else ""
     if course.method in METHODS and not METHODS[course.method].gated:
         return f"{kinds['proposal']} obeyed{failed}"
-    answered = {"accepted": kinds["accept"], "refused": kinds["refuse"]}
-    told = ", ".join(f"{count} {answer}" for answer, count in answered.items() if count)
+    answered = Counter(_answer(answers) for answers in _answers(run["events"]))
+    told = ", ".join(f"{answered[answer]} {answer}" for answer in ANSWERS if answered[answer])
     reasons = Counter[str]()
     for found in (run["metrics"]["gatekeeper"] or {}).get("refusals", {}).values():
         for reason, count in found.items():
             reasons[refusal(reason)] += count
     del reasons[refusal("joint_refused")]  # that of the UGV which did not want to says more
-    why = f": {reasons.most_common(1)[0][0]}" if kinds["refuse"] and reasons else ""
+    why = f": {reasons.most_common(1)[0][0]}" if answered["refused"] and reasons else ""
     return f"{told or 'no answer'}{why}{failed}"
+
+
+def _answers(events: Sequence[Mapping[str, Any]]) -> list[list[str]]:
+    """The answers to each proposal, in order."""
+    latest, found = dict[str, list[str]](), list[list[str]]()
+    for event in events:
+        if event["kind"] == "proposal":
+            found.append([])
+            latest[event["robot"]] = found[-1]
+        elif event["kind"] in ("accept", "refuse") and event["robot"] in latest:
+            latest[event["robot"]].append(event["kind"])
+    return found
+
+
+def _answer(answers: Sequence[str]) -> str:
+    """What became of a proposal, one of `ANSWERS`; '' without an answer."""
+    if "accept" in answers:
+        return "accepted" if answers[-1] == "accept" else "accepted and given up later"
+    return "refused" if answers else ""
 
 
 def _own_plants(document: Document) -> list[dict[str, Any]]:
@@ -216,7 +246,7 @@ def _own_plants(document: Document) -> list[dict[str, Any]]:
 
 
 def _beware(document: Document, every: Sequence[RunOutcome]) -> list[str]:
-    main = [course for course in every if course.plain] or every
+    main = _main(document, every)
     robots = [*document["scenario"]["resolved"]["ugvs"].values(), document["scenario"]["resolved"]["uav"]]
     plants = [plant for robot in robots for plant in robot.get("plant", ())]
     own, real = _own_plants(document), "real_plants" if any(p["kind"] != "first_order" for p in plants) else "real"

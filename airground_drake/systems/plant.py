@@ -190,6 +190,10 @@ def own_code(scenario: Scenario, plants: Mapping[str, OwnPlant]) -> dict[str, Ow
     return found
 
 
+GROUND_M = 1e-6
+"""By so much a UGV's plant may be off the ground, by rounding, m: walls have no end in height for UGVs."""
+
+
 class OwnBody(LeafSystem):
     """What a user's plant says of its body, passed on if all of it is finite.
 
@@ -202,16 +206,17 @@ class OwnBody(LeafSystem):
     State: of a sampled plant, the time of its last step, s, -inf before the first, and what the input ports were then.
     """
 
-    def __init__(self, name: str, *, turns: bool, step_s: float) -> None:
+    def __init__(self, name: str, *, turns: bool, on_ground: bool, step_s: float) -> None:
         """Declare the ports.
 
         Args:
             name: of the plant and its robot, for messages.
             turns: whether the plant has a heading.
+            on_ground: whether it must stay at the height 0: a UGV.
             step_s: time between the steps of a sampled plant, s; 0 for any other.
         """
         super().__init__()
-        self._name, self._step_s = name, step_s
+        self._name, self._on_ground, self._step_s = name, on_ground, step_s
         ports = [("position", "position", 3), ("body", "signals", 3), *([("heading", "heading", 1)] if turns else [])]
         begin = 0
         for port, output, size in ports:
@@ -231,7 +236,7 @@ class OwnBody(LeafSystem):
         state.get_mutable_discrete_state().get_mutable_vector(0).SetFromVector(held)
 
     def _now(self, context: Context, index: InputPortIndex) -> Array:
-        """What a port has now; raises PluginError if that cannot be computed or is not finite."""
+        """What a port has now; raises PluginError if that cannot be computed, is not finite, or is off the ground."""
         source = self.get_input_port(index)
         try:
             value: Array = source.Eval(context)
@@ -239,6 +244,9 @@ class OwnBody(LeafSystem):
             raise PluginError(f"{self._name}: {described(error)}") from error
         if not np.isfinite(value).all():
             wanted = "allowed: finite numbers"
+            raise PluginError(f"{self._name} has {value.tolist()} at its output {source.get_name()}; {wanted}")
+        if self._on_ground and len(value) == 3 and abs(value[2]) > GROUND_M:
+            wanted = f"allowed for a UGV: the height 0, to {GROUND_M:g} m"
             raise PluginError(f"{self._name} has {value.tolist()} at its output {source.get_name()}; {wanted}")
         return value
 
@@ -311,7 +319,11 @@ def own_plant(body: Body, make: Callable[..., System] | None) -> Diagram:
         )
         raise PluginError(f"{about} has inputs of sizes {inputs}, outputs of sizes {found}; {wanted}")
     try:
-        diagram = _checked(system, outputs, OwnBody(about, turns="heading" in outputs, step_s=step_of(system)))
+        diagram = _checked(
+            system,
+            outputs,
+            OwnBody(about, turns="heading" in outputs, on_ground=body.kind == "ugv", step_s=step_of(system)),
+        )
     except RuntimeError as error:  # it is part of another diagram
         raise PluginError(f"{about}: {described(error)}") from error
     _begins_at(diagram, body.start_m, about)

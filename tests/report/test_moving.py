@@ -18,7 +18,7 @@ from airground_drake.verify.judging import judge_all
 
 Document = dict[str, Any]
 OWN = "No robot itself brought a distance below the required one."
-STILL = "Still proved: no robot brought itself too near; distances from walls and robots."
+STILL = "Still proved: no robot brought itself too near; all other distances."
 HEADLINES = {
     "standing": (
         "[≈] person ran into ugv1 at 4.83 s (0.00 m, required 0.30 m); ugv1 retreated at its limit, 1.00 m/s. " + OWN
@@ -104,7 +104,7 @@ def test_what_is_still_proved_follows_from_the_other_hypotheses_and_from_own_doi
     unproved = edited("too fast", lambda found: of_claim(found, "SAFE-INV").update(status="inconclusive"))
     assert "distances from walls" not in screen(unproved).splitlines()[0]
     own = edited("too fast", lambda found: of_claim(found, "SAFE-OWN").update(status="inconclusive"))
-    assert "Still proved: distances from walls and robots." in screen(own).splitlines()[0]
+    assert "Still proved: all other distances." in screen(own).splitlines()[0]
 
 
 def test_a_person_is_never_proved_and_what_is_proved_names_its_pairs() -> None:
@@ -144,7 +144,7 @@ def test_who_stands_elsewhere_is_not_kept_away_by_a_person() -> None:
         ),
         (
             {"position_m": [1.2, 0.0, 0.0], "radius_m": 0.6, "appears_s": 1.0},
-            "[✗] Not safe. Under (d), thing appears -0.400 m (overlap) from ugv1 (nobody's doing).",
+            "[✗] Not safe. Under (d), thing appears on ugv1 (nobody's doing).",
         ),
     ],
 )

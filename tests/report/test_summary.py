@@ -140,7 +140,13 @@ class World:
 
     @property
     def main(self) -> dict[str, Ran]:
-        return {name: ran for name, ran in self.runs.items() if not ran.printed} or self.runs
+        """The runs that the headline is about: in a comparison with the paper not those with its recursion."""
+        return {name: ran for name, ran in self.runs.items() if not (ran.printed and self.rows)} or self.runs
+
+    @property
+    def of_d(self) -> set[str]:
+        """The runs of method (d) as the package composes it."""
+        return {name for name, ran in self.runs.items() if ran.method == "d" and not ran.printed}
 
     def meant(self, text: str, among: Iterable[str]) -> set[str]:
         """The runs that a text means, by name or by method, "(d)", which stands for all of its runs."""
@@ -192,7 +198,7 @@ class World:
 
 def claim(name: str, run: str = "", status: str = "holds", **more: Any) -> Document:
     known = {"id": name, "run": run, "status": status, "expected": status, "as_expected": True, "exercised": 6}
-    place = {"where": {}, "margin": -0.5, "unit": "m", "quantity": "", "exercised_by": "things"}
+    place = {"where": {}, "margin": -0.5, "unit": "m", "quantity": "", "exercised_by": "things", "inputs": {}}
     return {**known, **place, "evidence": {}, "counterexample": None, **more}
 
 
@@ -200,7 +206,8 @@ def late(late_s: float, false: int) -> Document:
     """A finding of THR-QUALITY: one trigger so late, and false alarms."""
     counts = {"served": 1, "early": 0, "false": false, "missed": 0}
     latest = {"late_s": late_s, "error_m": 5.84}
-    return {"margin": -late_s, "evidence": {"counts": counts, "latest": latest, "earliest": None, "ddm": {}}}
+    told = {"counts": counts, "latest": latest, "earliest": None, "ddm": {}, "tolerance_m": 0.1}
+    return {"margin": -late_s, "evidence": told}
 
 
 def choice(rule: str, kind: str, extra: float, runs: Document, drift: float = 6.0) -> Document:
@@ -227,6 +234,7 @@ def document(world: World) -> Document:
         gap_s = world.runs[run].claims[name][3] if run else 0.0
         missed = {"hypothesis": "avoidance", "first": f"first_of_{run}", "margin": -0.5, "t_s": 7.0}
         found = {
+            "ZENO-PROOF": {"inputs": {"dwell_s": 0.5}},
             "ZENO-TRACE": {"evidence": {"smallest_gap": {"gap_s": gap_s}}, "counterexample": {"gap_s": gap_s}},
             "SAFE-HYP": {"counterexample": missed},
             "THR-QUALITY": late(gap_s, 2 * (status == "refuted")),
@@ -483,7 +491,7 @@ def proof(status: str, mark: str, pattern: str) -> None:
 
     @says("Safe?", pattern)
     def _(world: World, given: str, runs: str, why: str = "") -> bool:
-        of_d = {name for name, ran in world.runs.items() if ran.method == "d"}
+        of_d = world.of_d
         meant = of_d if runs == "(d)" else {*names(runs)}
         told = {"refuted": "first_of_{}: avoidance missed by 0.5 m", "unproved": ""}.get(status, "")
         return (
@@ -613,7 +621,7 @@ def _(world: World, mark: str) -> bool:
                     r"(?:(\d+) times(?: in (\d+) runs)?, first )?at ([\d.]+) s\.")  # fmt: skip
 def _(world: World, mark: str, count: str | None, runs: str | None, first: str) -> bool:
     fired, sure = world.fired_s, not runs_with(world, "THR-TRIG", "refuted", *UNDECIDED)
-    there = sum(ran.there for ran in world.runs.values())
+    there = sum(ran.there and bool(ran.triggers_s) for ran in world.runs.values())
     numbers = (int(count or len(fired)), int(runs or there)) == (len(fired), there)
     return (
         mark == "yes" and sure and bool(runs_with(world, "THR-TRIG", *PASSING)) and float(first) == fired[0] and numbers
@@ -640,7 +648,7 @@ def _(world: World, mark: str, runs: str | None, late_s: str, false: str) -> boo
     )
 
 
-@says("Threshold?", rf"{RUNS}: less far off\.")
+@says("Threshold?", rf"{RUNS}: no worse\.")
 def _(world: World, mark: str, runs: str) -> bool:
     late_s = {name: each[3] for name, each in compared(world).items()}
     return max(late_s[name] for name in names(runs)) <= min(late_s[name] for name in {*late_s} - {*names(runs)})
@@ -679,7 +687,7 @@ def _(world: World, mark: str) -> bool:
 
 @says("beware", r"(.*) (?:is|are) also safe elsewhere: that was only seen in these runs")
 def _(world: World, mark: str, who: str) -> bool:
-    proved = {name for name in world.main if world.runs[name].method == "d" and world.proof(name) in ("tested", "idle")}
+    proved = {name for name in world.of_d if world.proof(name) in ("tested", "idle")}
     return world.meant(who, world.main) == {name for name, ran in world.main.items() if ran.safe} - proved
 
 
@@ -764,7 +772,7 @@ def told(world: World, question: str, lines: Iterable[Line]) -> list[Line]:
 def test_each_sentence_follows_from_what_happened_and_from_nothing_else(world: World) -> None:
     found = document(world)
     screen = summary.first_screen(found)
-    runs, of_d = world.runs, {name for name, ran in world.runs.items() if ran.method == "d"}
+    runs, of_d = world.runs, world.of_d
     unsafe = {name for name, ran in runs.items() if ran.safe is False}
 
     assert screen.headline.mark == due_mark(world)
@@ -794,7 +802,8 @@ def test_each_sentence_follows_from_what_happened_and_from_nothing_else(world: W
         tested = ran.safe and ran.claims["SAFE-TRACE"][1] > 0
         due = "open" if ran.safe is None else "no" if not ran.safe else "yes" if tested else "none"
         assert (row.safe.mark, row.arrived.mark) == (due, "open" if not ran.there else "no" if ran.away else "yes")
-        proved = ran.method == "d" and world.proof(row.run) in ("tested", "idle")
+        proved = row.run in of_d and world.proof(row.run) in ("tested", "idle")
+        assert ("recursion (5) as printed" in row.method) == ran.printed
         assert not ran.safe or (", proved" in row.safe.text) == proved
         count = len({"ugv1", "ugv2"} - ran.away)
         assert not ran.there or row.arrived.text.startswith(f"{count} of 2")
@@ -871,7 +880,7 @@ FIRED = "Fired exactly when the decision variable reached 3 m, at 14.479 s."
 def test_early_false_and_missed_triggers_are_told_beside_the_theory_of_the_ddm() -> None:
     found = document(World({"a": Ran("a", triggers_s=[14.479], claims={"THR-TRIG": FINE})}))
     counts = {"served": 2, "early": 0, "false": 8, "missed": 1}
-    evidence = {"counts": counts, "latest": None, "earliest": {"late_s": -0.2, "error_m": 2.5}}
+    evidence = {"counts": counts, "latest": None, "earliest": {"late_s": -0.2, "error_m": 2.5}, "tolerance_m": 0.1}
     found["claims"].append(claim("THR-QUALITY", "a", "refuted", evidence=evidence | {"ddm": {"ugv1": OFTEN_WRONG}}))
     assert lines(found, "Threshold?") == [
         ("yes", FIRED),
@@ -892,7 +901,8 @@ def test_early_false_and_missed_triggers_are_told_beside_the_theory_of_the_ddm()
         ("bayes", "optimal", 0.0, 6.0,
          ("yes", "3 m is the Bayes optimum for the assumed drift 6 m/s and noise 10 m/√s.")),
         ("bayes", "optimal", 0.0, 11.0, ("none", "3 m is the Bayes optimum for the assumed drift 11 m/s and noise "
-                                                 "10 m/√s; no task error here grows faster than 10 m/s.")),
+                                                 "10 m/√s; within the speed limits no task error grows faster than "
+                                                 "10 m/s.")),
     ],
 )  # fmt: skip
 def test_which_rule_gave_the_threshold_and_what_it_costs_for_the_assumed_numbers(
@@ -935,15 +945,51 @@ def test_without_a_trigger_the_largest_decision_variable_is_told() -> None:
 @pytest.mark.parametrize(("dwell_s", "mark"), [(0.5, "yes"), (0.05, "yes"), (0.049, "partly"), (1e-6, "partly")])
 def test_a_dwell_below_the_control_period_is_no_protection(dwell_s: float, mark: str) -> None:
     found = document(World({"d": Ran()}, {"ZENO-PROOF": "proved"}))
-    found["scenario"]["resolved"]["decision"]["min_inter_event_s"] = dwell_s
+    next(each for each in found["claims"] if each["id"] == "ZENO-PROOF")["inputs"] = {"dwell_s": dwell_s}
     (first, *_) = lines(found, "Zeno-free?")
     assert first[0] == mark
     assert ("No practical protection: that is shorter than the control period, 0.05 s" in first[1]) == (mark != "yes")
 
 
+def test_the_dwell_of_each_run_is_told() -> None:
+    """The scenario's trigger is proved; that of one run is bare, that of another one has a dwell of its own."""
+    found = document(World({"a": Ran("a"), "bare": Ran("a"), "short": Ran("a")}, {"ZENO-PROOF": "proved"}))
+    found["claims"].append(claim("ZENO-PROOF", "bare", "refuted", inputs={"dwell_s": 0.0}))
+    found["claims"].append(claim("ZENO-PROOF", "short", "proved", inputs={"dwell_s": 0.06}))
+    assert lines(found, "Zeno-free?")[:3] == [
+        ("yes", "Proved (a): triggers are at least 0.5 s apart."),
+        ("no", "Not proved (bare), as the trigger is the bare threshold (ZENO-PROOF: refuted)."),
+        ("yes", "Proved (short): triggers are at least 0.06 s apart."),
+    ]
+
+
+def test_only_thresholds_that_were_reached_are_said_to_be() -> None:
+    found = document(World({"a": Ran("a", triggers_s=[5.0], claims={"THR-TRIG": FINE}), "never": Ran("a")}))
+    found["runs"]["never"]["zeta_m"] = 50.0
+    assert lines(found, "Threshold?")[0] == ("yes", "Fired exactly when the decision variable reached 3 m, at 5.000 s.")
+
+
+def test_what_was_allowed_is_told_where_it_differs() -> None:
+    found = document(World({"a": Ran("a"), "bare": Ran("a")}))
+    for run, status, allowed_m in (("a", "refuted", 0.05), ("bare", "holds", 0.15)):
+        evidence = late(0.1, 0)["evidence"] | {"tolerance_m": allowed_m}
+        found["claims"].append(claim("THR-QUALITY", run, status, margin=allowed_m - 0.1, evidence=evidence))
+    assert [text.partition(": ")[0] for _, text in lines(found, "Threshold?") if text.startswith(AGAINST)] == [
+        f"{AGAINST} (a, 0.05 m off allowed)", f"{AGAINST} (bare, 0.15 m off allowed)",
+    ]  # fmt: skip
+
+
+def test_a_proposal_that_is_given_up_counts_once() -> None:
+    found = document(World({"c": Ran("c"), "d": Ran("d")}))
+    kinds = ["proposal", "accept", "refuse", "proposal", "refuse", "accept", "proposal"]
+    found["runs"]["c"]["events"] = [{"kind": kind, "t_s": 15.0, "robot": "ugv1"} for kind in kinds]
+    (row, _) = summary.first_screen(found).rows
+    assert row.interventions == "1 accepted, 1 accepted and given up later"
+
+
 def test_what_became_of_proposals() -> None:
     found = document(World({"b": Ran("b"), "c": Ran("c"), "d": Ran("d")}))
-    for run, kinds in {"b": ["proposal"], "c": ["proposal", "refuse", "refuse"], "d": ["proposal", "accept"]}.items():
+    for run, kinds in {"b": ["proposal"], "c": ["proposal", "refuse", "proposal", "refuse"], "d": ["proposal", "accept"]}.items():
         found["runs"][run]["events"] = [{"kind": kind, "t_s": 15.0, "robot": "ugv1"} for kind in kinds]
     found["runs"]["c"]["metrics"]["gatekeeper"] = {"refusals": {"ugv1": {"waits": 2, "no_plan": 1}}}
     rows = summary.first_screen(found).rows
