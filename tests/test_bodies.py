@@ -197,7 +197,7 @@ def test_where_it_appears_too_near_is_nobodys_doing() -> None:
     found = {verdict.claim.id: verdict for verdict in judge(trace, ("SAFE-TRACE", "SAFE-HYP"))}
     seen = found["SAFE-TRACE"].counterexample or {}
     assert (seen["t_s"], seen["min_distance_m"]) == pytest.approx((4.2, 0.8))
-    assert seen["why"] == "rock appeared at 4.2 s this near to ugv1: nobody's doing"
+    assert seen["why"] == "rock appeared at 4.2 s too near to ugv1: nobody's doing"
     broken = found["SAFE-HYP"].counterexample or {}
     assert (broken["hypothesis"], broken["t_s"]) == ("safe start", pytest.approx(4.2))
     assert not faults_of(trace)
@@ -244,7 +244,7 @@ def test_the_page_says_that_it_appeared_there() -> None:
     assert metrics["appeared"] is True
     built = document.build(trace.scenario, {"d": trace}, judge(trace), {"package": "", "seed": 1, "started": ""})
     (course,) = (course for course in courses(built) if course.name == "d")
-    assert intrusion(course) == "rock appears 0.800 m from ugv1 (nobody's doing)"
+    assert intrusion(course) == "rock appears too near to ugv1 (0.800 m, nobody's doing)"
     gap = gap_m(trace, "ugv1", "rock")
     np.testing.assert_array_equal(np.isnan(gap), np.arange(len(gap)) < trace.there_from("rock"))
     assert stage(trace.scenario).barriers[0].appears_s == 4.2

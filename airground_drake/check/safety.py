@@ -73,7 +73,8 @@ def _parts(bent_m: float) -> int:
 def safe_own(run: Run) -> Found | None:
     """SAFE-OWN: in each period no robot comes nearer than min(D, d + V h) to the other body, held as at the sample.
 
-    With plants that take room it is min(D, d_law + V h) less that room, D the distance of the steered points.
+    With plants that take room it is min(D, d_law + V h) less that room, D the distance of the steered points; bodies
+    that are nearer already may stay so.
     It is asked from row to row, where the robot's way from the sample could lead nearer than d + V h. A period beside
     an obstacle that may move tests the claim if one at the speed limits could. None: nothing may move, and SAFE-TRACE
     says the same.
@@ -101,7 +102,7 @@ def safe_own(run: Run) -> Found | None:
                 asked = at_m <= keeps + step_m[robot][both]
                 point = run.position_m[robot][sample[both]] - run.position_m[other][sample[both]]
                 steered_m = pair.shape.held_m(point, point, point, np.inf)[0] if pair.cover_m else at_m
-                due = np.minimum(steered_m - pair.cover_m, keeps)
+                due = np.minimum(np.minimum(steered_m - pair.cover_m, at_m), keeps)
                 left = least_m - bent[robot] - due
                 for k in np.flatnonzero(asked & (left < 0.0)).tolist() if bent[robot] else ():
                     parts = _parts(bent[robot])

@@ -117,7 +117,8 @@ def _intrusion(course: RunOutcome) -> str:
         more = len(hits) - MAX_NAMES
         told = "; ".join([*hits[:MAX_NAMES], *[f"{more} more collisions"] * (more > 0)])
     elif course.near and course.near[0].is_short:
-        told = f"{intrusion(course)} at {course.near[0].t_s:.2f} s, required {course.near[0].required_m:g} m"
+        at = ", nearest at" if course.near[0].appeared else " at"
+        told = f"{intrusion(course)}{at} {course.near[0].t_s:.2f} s, required {course.near[0].required_m:g} m"
     else:
         return intrusion(course)
     others = more_pairs(course, 1 if appeared(course) else max(1, len(hits)))

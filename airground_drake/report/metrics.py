@@ -23,6 +23,7 @@ from airground_drake.verify.runs.pairs import (
     DISTANCE_TOLERANCE_M,
     Gap,
     apart_of,
+    at_appearance,
     gap_over_time,
     least_gap,
     least_of,
@@ -337,7 +338,7 @@ def _listed(trace: Trace, found: dict[str, Gap]) -> dict[str, dict[str, Any]]:
         other: {
             "value": least.gap_m, "t_s": least.t_s, "safe_distance_m": least.pair.required_m,
             **_place(trace, other, least),
-            **({"appeared": True} if least.at_appearance(trace.t) else {}),
+            **({"appeared": True} if at_appearance(trace, least) else {}),
             **({"moves": True} if kind_of(trace.scenario, least.pair.first, other) == MOVING else {}),
         }
         for other, least in found.items()

@@ -106,7 +106,8 @@ def intrusion(course: RunOutcome) -> str:
     """Who came how near to what in a run that was not safe."""
     if course.near and course.near[0].is_short:
         near = course.near[0]
-        return clause(("appears_on" if near.value_m < 0.0 else "appears") if near.appeared else "comes_within", near=near)
+        appears = "appears_on" if near.value_m < 0.0 else "appears"
+        return clause(appears if near.appeared else "comes_within", near=near)
     return course.why
 
 

@@ -64,7 +64,7 @@ SENTENCES = {
     "unproved": "? Not proved for {who} ({lacking}).",
     "covered": " between robots and from bodies at rest, and drive{s} no robot too near to what moves",
     # Who came how near to what
-    "appears": "{near.whom} appears {near} from {near.robot} (nobody's doing)",
+    "appears": "{near.whom} appears too near to {near.robot} ({near}, nobody's doing)",
     "appears_on": "{near.whom} appears on {near.robot} (nobody's doing)",
     "comes_within": "{near.robot} comes within {near} of {near.whom}",
     "collides": "{robot} collides with {what} at {t_s:.2f} s",
@@ -89,8 +89,8 @@ SENTENCES = {
     "no_noise": "  There is no decision noise: the seed changes nothing but what third-party code makes of it.",
     # Zeno-free?
     "dwell": "✓ Proved{where}: triggers are at least {dwell_s:g} s apart.",
-    "short_dwell": "≈ Proved{where}: triggers are at least {dwell_s:g} s apart. No practical protection: that is shorter than "
-    "the control period, {period_s:g} s.",
+    "short_dwell": "≈ Proved{where}: triggers are at least {dwell_s:g} s apart. No practical protection: that is "
+    "shorter than the control period, {period_s:g} s.",
     "no_dwell": "? Not proved{where}{bare} (ZENO-PROOF: {status}).",
     "too_soon": "✗ {run}: two triggers {gap} apart.",
     "gaps": "  Seen: {gaps} between triggers{smallest}.",

@@ -989,7 +989,11 @@ def test_a_proposal_that_is_given_up_counts_once() -> None:
 
 def test_what_became_of_proposals() -> None:
     found = document(World({"b": Ran("b"), "c": Ran("c"), "d": Ran("d")}))
-    for run, kinds in {"b": ["proposal"], "c": ["proposal", "refuse", "proposal", "refuse"], "d": ["proposal", "accept"]}.items():
+    for run, kinds in {
+        "b": ["proposal"],
+        "c": ["proposal", "refuse", "proposal", "refuse"],
+        "d": ["proposal", "accept"],
+    }.items():
         found["runs"][run]["events"] = [{"kind": kind, "t_s": 15.0, "robot": "ugv1"} for kind in kinds]
     found["runs"]["c"]["metrics"]["gatekeeper"] = {"refusals": {"ugv1": {"waits": 2, "no_plan": 1}}}
     rows = summary.first_screen(found).rows

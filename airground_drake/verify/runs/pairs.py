@@ -122,10 +122,6 @@ class Gap(NamedTuple):
     t_s: float
     row: int
 
-    def at_appearance(self, t: Array) -> bool:
-        """Whether it was smallest when the obstacle appeared; t: times of the rows, (T,), s."""
-        return self.pair.row > 0 and bool(self.t_s <= t[self.pair.row])
-
 
 def pairs_of(trace: Trace) -> tuple[Pair, ...]:
     """All robot/barrier and robot/robot pairs of a run, with the safe distances of its scenario.
@@ -304,6 +300,23 @@ def least_gap(trace: Trace, pair: Pair) -> Gap:
         return Gap(pair, distance - pair.radii_m, distance - pair.safe_m, t_s, row + pair.row)
 
     return trace.derived(("least gap", pair.first, pair.second), found)
+
+
+def at_appearance(trace: Trace, gap: Gap) -> bool:
+    """Whether the gap of a pair was smallest when its obstacle appeared.
+
+    A robot that turns, lags or gets its commands late may come as much nearer afterwards as it cannot help.
+    """
+    pair, row = gap.pair, gap.pair.row
+    if not row or gap.t_s <= trace.t[row]:
+        return row > 0
+    cores = cores_of(trace)[pair.second].take((slice(None), None))
+    away = away_from(cores, _relative(trace, pair, np.array([row])), planar=is_planar(trace, pair.first))
+    then_m = float(away.distance.min()) - pair.radii_m
+    robot = trace.scenario.robots[pair.first]
+    coasts_m = robot.max_speed_m_s * sum(plant.time_constant_s + plant.delay_s for plant in robot.plant)
+    more_m = max(pair.cover_m, coasts_m)
+    return then_m < pair.required_m and more_m > 0.0 and gap.gap_m >= then_m - more_m
 
 
 def steered_margin(trace: Trace, pair: Pair) -> float:

@@ -27,6 +27,7 @@ from airground_drake.verify.runs.pairs import (
     MOST_PARTS,
     Pair,
     apart_of,
+    at_appearance,
     bent,
     cores_of,
     gap_over_time,
@@ -225,7 +226,8 @@ def own_margins(trace: Trace, pair: Pair, robot: str) -> Array:
     """What a robot left of min(D, L) - c by its own doing, for the T - 1 segments between rows, (T - 1,), m.
 
     The other body is held where it was at the control sample. D is the distance of the steered points then, L what the
-    law keeps, V h included, and c how far both bodies may be from the steered points. inf: the two were too far apart
+    law keeps, V h included, and c how far both bodies may be from the steered points. Bodies that are nearer than D - c
+    already, as when an obstacle appears beside a robot that lags, may stay so. inf: the two were too far apart
     for one period to matter, or not both there.
     """
     other, rows = pair.second if robot == pair.first else pair.first, np.arange(len(trace.t) - 1)
@@ -246,7 +248,8 @@ def own_margins(trace: Trace, pair: Pair, robot: str) -> Array:
     near = (at_sample <= keeps + step) & (sample >= pair.row) & (rows < last)
     start, end = (place[rows[near] + k] - origin[sample[near]] for k in (0, 1))
     least = least_distances(each, start, end, planar=planar)[0].min(axis=0, initial=np.inf) - off_m
-    found[near] = least - np.minimum(_steered(trace, pair, robot, each, sample[near]) - pair.cover_m, keeps)
+    steered = _steered(trace, pair, robot, each, sample[near]) - pair.cover_m
+    found[near] = least - np.minimum(np.minimum(steered, at_sample[near]), keeps)
     for k in np.flatnonzero(found < 0.0).tolist() if off_m else ():
         parts = min(ceil((off_m / BENT_M) ** 0.5), MOST_PARTS)
         fine = bent(trace, robot, k, np.linspace(0.0, 1.0, parts + 1)) - origin[sample[k]]
@@ -350,7 +353,7 @@ def _encounter(trace: Trace, pair: Pair) -> Encounter:
     names = dict.fromkeys(name for each in blocked[begin : end + 1] for name in each) if end >= 0 else {}
     return Encounter(
         pair.first, pair.second, pair.required_m, max(least.gap_m, 0.0), t_s, bool(len(hits)), own,
-        least.at_appearance(trace.t), _reaction(speed, away, limit), speed, [*names], caught,
+        at_appearance(trace, least), _reaction(speed, away, limit), speed, [*names], caught,
     )  # fmt: skip
 
 

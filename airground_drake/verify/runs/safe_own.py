@@ -28,7 +28,7 @@ class SafeOwn(TraceClaim):
         "it than min(D, d + V h): D is the distance at the sample, d the required one, V the speed at which the other "
         "body is expected to move at most, 0 for robots and bodies at rest. What was lost besides, the other body "
         "moved itself. Where a body is not where the law steers it, D is the distance of the steered points less what "
-        "the plants take."
+        "the plants take, or that of the bodies if they are nearer already."
     )
     latex = (
         r"\mathrm{dist}(p_i(t_k + s), C_j(t_k)) \ge \min(D_k, \, d_{ij} + V_j h) - 10^{-9} \text{ m}, \quad "

@@ -14,6 +14,7 @@ from airground_drake.verify.finding import Finding
 from airground_drake.verify.runs.pairs import (
     DISTANCE_TOLERANCE_M,
     apart_of,
+    at_appearance,
     least_gap,
     least_of,
     pair_of,
@@ -140,6 +141,6 @@ def _why(trace: Trace, worst: Distance) -> dict[str, str]:
     pair = pair_of(trace, worst.first, worst.second)
     if pair.speed_m_s > 0.0:
         return {"why": next(each.told() for each in encounters(trace) if each[:2] == (pair.first, pair.second))}
-    if not least_gap(trace, pair).at_appearance(trace.t):
+    if not at_appearance(trace, least_gap(trace, pair)):
         return {}
-    return {"why": f"{worst.second} appeared at {worst.t_s:.9g} s this near to {worst.first}: nobody's doing"}
+    return {"why": f"{worst.second} appeared at {trace.t[pair.row]:.9g} s too near to {worst.first}: nobody's doing"}
