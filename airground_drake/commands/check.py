@@ -9,13 +9,14 @@ Each line names its source among these four.
 from __future__ import annotations
 
 import json
+import shutil
 import subprocess
 import sys
 import tempfile
 from collections.abc import Iterator, Sequence
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from airground_drake.base.progress import Progress, progress_bar
 from airground_drake.base.usage import refuse
@@ -86,7 +87,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 lines += again("simulated again", "airground_drake.report.simulated", *allowed)
             if options.coq:
                 progress.stage("proving with Coq")
-                lines += _proved_again(options.report)
+                lines += _proved_again(options.report, [*lines])
     except checker.UsageError as error:
         return refuse(error)
     except SystemExit:  # --help has been printed
@@ -133,24 +134,46 @@ def made_again(
             yield line("report", "", OPEN, f"not all was {by}: {why[0]}", "the files can be used")
 
 
-def _proved_again(folder: Path) -> Iterator[CheckLine]:
-    """Have Coq prove each run, from positions written anew."""
+def _proved_again(folder: Path, lines: Sequence[CheckLine]) -> Iterator[CheckLine]:
+    """Have Coq prove each run, from positions written anew in a temporary folder; compare with proofs.json, if any."""
+    from airground_drake.base import files
     from airground_drake.check.files import read_json
     from airground_drake.check.rules import Disagreement, NotEstablished
 
     line = partial(CheckLine, "proofs", by="Coq")
-    command = [sys.executable, "-P", "-m", "airground_drake", "prove", str(folder)]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
-    try:
-        found = read_json(folder / "proofs" / "proofs.json") if done.returncode < EXIT_UNUSABLE else {"runs": {}}
-    except (Disagreement, NotEstablished) as error:
-        yield line("", OPEN, f"what Coq found cannot be read: {error}", "what Coq found can be read")
+    if any(each.outcome != AGREES for each in lines if each.claim in NEEDED):
+        yield line("", OPEN, "not proved again, since a check above failed", "the files are the report's")
         return
+    with files.temporary_folder() as copy:
+        shutil.copytree(folder / "trace", copy / "trace", symlinks=True)
+        command = [sys.executable, "-P", "-m", "airground_drake", "prove", str(copy)]
+        done = subprocess.run(command, capture_output=True, text=True, check=False)
+        there = folder / "proofs" / "proofs.json"
+        try:
+            found = read_json(copy / "proofs" / "proofs.json") if done.returncode < EXIT_UNUSABLE else {"runs": {}}
+            recorded = read_json(there)["runs"] if there.exists() else {}
+        except (Disagreement, NotEstablished, KeyError, TypeError) as error:
+            yield line("", OPEN, f"what Coq found cannot be read: {error}", "what Coq found can be read")
+            return
     for run, entry in found["runs"].items():
-        kept, law = entry["distances"]["proved"], entry["law"]["proved"]
-        outcome = AGREES if kept or not entry["expected"] else DISAGREES
-        words = "machine-checked for this run: " if kept else "not proved: "
-        says = f"{words}every distance is kept; the law {'is obeyed without error' if law else 'is not proved'}"
-        yield line(run, outcome, says, "" if outcome == AGREES else "expected distances are kept")
+        yield _compared(run, entry, recorded.get(run))
     if not found["runs"]:
         yield line("", OPEN, (done.stderr.strip().splitlines() or ["Coq said nothing"])[-1], "Coq can be asked")
+
+
+def _compared(run: str, entry: Any, recorded: Any) -> CheckLine:
+    """What Coq finds of a run now, beside its entry of the recorded proofs.json; None if it has none."""
+    from airground_drake.report.lines import differences, short
+
+    line = partial(CheckLine, "proofs", run, by="Coq")
+    kept, law = entry["distances"]["proved"], entry["law"]["proved"]
+    words = "machine-checked for this run: " if kept else "not proved: "
+    says = f"{words}every distance is kept; the law {'is obeyed without error' if law else 'is not proved'}"
+    if recorded is None:
+        says += "; the report has no proof of this run"
+    elif differing := [each for each in differences(recorded, entry) if not each[0].endswith((".seconds", ".why"))]:
+        about, theirs, ours = differing[0]
+        says = f"Coq here: {about} is {short(ours)}; recorded {short(theirs)}"
+        return line(DISAGREES, says, "proofs.json says what Coq finds", about, recorded=theirs, recomputed=ours)
+    outcome = AGREES if kept or not entry["expected"] else DISAGREES
+    return line(outcome, says, "" if outcome == AGREES else "expected distances are kept")

@@ -93,11 +93,8 @@ def _runs(options: argparse.Namespace) -> int:
 def _lines(found: Proved) -> list[str]:
     """The lines about a run."""
     lines = []
-    some = (
-        ""
-        if found.lawful == found.pairs
-        else f" by {found.lawful} pairs (of robots without lag, and with balls at rest)"
-    )
+    pairs = "1 pair" if found.lawful == 1 else f"{found.lawful} pairs"
+    some = "" if found.lawful == found.pairs else f" by {pairs} (of robots without lag, and with balls at rest)"
     for what, answer in (
         (f"all {found.pairs} distances kept at all times", found.distances),
         (f"avoidance law obeyed without error{some}", found.law),

@@ -222,7 +222,9 @@ def _same_text(name: str, folder: Path, rebuilt: str, *, other_drawings: bool = 
         drawings = bool(k % 2) and theirs is not None and ours is not None
         if theirs == ours or (drawings and _is_same_drawing(theirs, ours, shapes=not other_drawings)):
             continue
-        both = zip_longest((theirs or "").splitlines(), (ours or "").splitlines(), fillvalue="")
+        both = zip_longest(
+            (theirs or "").splitlines(keepends=True), (ours or "").splitlines(keepends=True), fillvalue=""
+        )
         return different(name, "", "the page", *next(lines for lines in both if lines[0] != lines[1]))
     how = "; drawings by another version of matplotlib: only texts and kinds of elements were compared, no shapes"
     how *= other_drawings

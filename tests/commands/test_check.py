@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import os
 import shutil
@@ -117,10 +118,28 @@ def test_claims_are_judged_again_where_drake_cannot_be_imported(short: Path) -> 
     assert {line["claim"] for line in lines if line["outcome"] != "agrees"} == {"provenance"}
 
 
+def digests(folder: Path) -> dict[str, str]:
+    """SHA-256 of each file of a report."""
+    return {str(path): hashlib.sha256(path.read_bytes()).hexdigest() for path in folder.rglob("*") if path.is_file()}
+
+
+def test_other_line_ends_in_the_page_disagree(short: Path, tmp_path: Path, airground: Airground) -> None:
+    page = copy(short, tmp_path / "copy") / "report.html"
+    page.write_bytes(page.read_bytes().replace(b"\n", b"\r\n"))
+    mend(page.parent)
+    lines = airground("check", page.parent, code=1).splitlines()
+    (line,) = (each for each in lines if each.startswith("report.html"))
+    assert "DISAGREES" in line
+    assert r"\r\n" in line
+
+
 @pytest.mark.slow
 @pytest.mark.skipif(shutil.which("coqc") is None and not os.environ.get("CI"), reason="Coq is not installed")
 def test_coq_proves_the_runs_again(short: Path, tmp_path: Path, airground: Airground) -> None:
-    lines = json.loads(airground("check", "--json", "--coq", copy(short, tmp_path / "copy")))["checks"]
+    folder = copy(short, tmp_path / "copy")
+    before = digests(folder)
+    lines = json.loads(airground("check", "--json", "--coq", folder))["checks"]
+    assert digests(folder) == before
     (proved,) = (line for line in lines if line["by"] == "Coq")
     assert (proved["run"], proved["outcome"]) == ("d", "agrees")
     assert proved["text"].startswith("machine-checked for this run: every distance is kept; the law is obeyed")
