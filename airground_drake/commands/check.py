@@ -32,8 +32,8 @@ NEEDED = ("files", "trace")
 EXIT_UNUSABLE = 2
 """Exit code of `airground prove` without Coq, or with a report that it cannot read."""
 ALWAYS = (
-    "what the scenario asks for and expects; provenance, measured times; "
-    "findings of `report audit` that rest on other runs"
+    "what the scenario asks for and expects; number of seeds; provenance, measured times; "
+    "metadata of tables; Coq's version and words; findings of `report audit` that rest on other runs"
 )
 """What is taken as recorded: a forger may change it in all its places, unnoticed."""
 NOT_SIMULATED = "policies, seeds and faults; messages and decisions; other seeds, third-party claims, block diagram"
@@ -44,7 +44,7 @@ Each line says what was checked, on which run, and by whom:
   (made again)        the report from its recorded traces, by its own code: claims, numbers, pages, figures
   (simulated again)   with --simulate, within the size limits of `airground report`: every run, other seeds,
                       third-party claims, the block diagram
-  (Coq)               with --coq: the distances of every run
+  (Coq)               with --coq: the distances of every run, proved in a temporary copy; proofs.json beside them
 and what came out:
   agrees              the files bear out what the report says
   DISAGREES           the files contradict the report or each other: the rule, the time, both values

@@ -9,13 +9,18 @@ from typing import Any
 
 from airground_drake.base import files
 from airground_drake.proofs.export import distances_file, recorded, without_vectors
-from airground_drake.proofs.runs import FOUND, SCHEMA, expects_kept, listed
+from airground_drake.proofs.readback import compare
+from airground_drake.proofs.record import ALLOWED_AXIOMS, FOLDER, closure, digest
+from airground_drake.proofs.runs import CHECKERS, FOUND, SCHEMA, expects_kept, listed
 from airground_drake.proofs.table import entries, law_file, lawful, missed
 from airground_drake.proofs.too_near import too_near
 from airground_drake.run.trace import Trace
 
 Broken = tuple[str, Any, Any]
 """What is wrong, what it should be, and what is recorded."""
+
+_PROVED, _UNPROVED = ("axioms", "seconds", "entries"), ("why", "too_near", "entries", "missed")
+"""What is said of a theorem that is proved, and of one that is not, besides name and file."""
 
 
 def broken_rules(folder: Path, traces: Mapping[str, Trace]) -> tuple[dict[str, Any], list[Broken]]:
@@ -42,6 +47,8 @@ def broken_rules(folder: Path, traces: Mapping[str, Trace]) -> tuple[dict[str, A
 def _broken(folder: Path, found: Mapping[str, Any], traces: Mapping[str, Trace]) -> Iterator[Broken]:
     texts: dict[str, str] = {}
     yield from _unless(FOUND, SCHEMA, found["schema"])
+    yield from _unless(f"keys of {FOUND}", ["coq", "runs", "schema", "theory"], sorted(found))
+    yield from _unless("theory", {name: digest(FOLDER / name) for name in closure(CHECKERS)}, found["theory"])
     yield from _unless(FOUND, [], sorted({*found["runs"]} - {*traces}))
     for name, trace in traces.items():
         if name not in found["runs"]:
@@ -55,10 +62,13 @@ def _broken(folder: Path, found: Mapping[str, Any], traces: Mapping[str, Trace])
         texts |= of_run
         meta = files.sha256(files.read_bytes(folder.parent / "trace" / name / "meta.json"))
         kept = entry["distances"]["proved"]
+        rounding = compare(distances_file(exact), trace)
         expected = {
             "meta_sha256": meta, "expected": expects_kept(trace), "rows": len(trace.t), "pairs": len(exact.demands),
-            "lawful_pairs": len(lawful(exact.demands)),
+            "lawful_pairs": len(lawful(exact.demands)), "rounded_coordinates": rounding.coordinates,
+            "rounded_by_m": rounding.most_m,
         }  # fmt: skip
+        yield from _unless(f"{name}: keys", sorted({*expected, "distances", "law"}), sorted(entry))
         for key, value in expected.items():
             yield from _unless(f"{name}.{key}", value, entry[key])
         yield from _unless(f"{name}.distances.proved", kept and not near, kept)
@@ -67,8 +77,15 @@ def _broken(folder: Path, found: Mapping[str, Any], traces: Mapping[str, Trace])
         yield from _unless(f"{name}.law.missed", gaps, entry["law"].get("missed", []))
         if "entries" in entry["law"]:
             yield from _unless(f"{name}.law.entries", len(table), entry["law"]["entries"])
-        for answer, file in zip((entry["distances"], entry["law"]), of_run, strict=True):
+        theorems = f"{exact.name}_keeps_its_distances", f"{lawfully.name}_obeys_the_law"
+        for answer, file, theorem in zip((entry["distances"], entry["law"]), of_run, theorems, strict=True):
             yield from _unless(f"{name}: file", file, answer["file"])
+            yield from _unless(f"{name}: theorem", theorem, answer["theorem"])
+            unknown = {*answer} - {"proved", "theorem", "file", *(_PROVED if answer["proved"] else _UNPROVED)}
+            yield from _unless(f"{name}: unknown keys about {theorem}", [], sorted(unknown))
+            if answer["proved"]:
+                axioms = answer["axioms"]
+                yield from _unless(f"{name}: axioms of {theorem}", sorted(ALLOWED_AXIOMS & {*axioms}) or "some", axioms)
             if (answer["proved"] or "entries" in answer) and not (folder / file).is_file():
                 yield f"{name}: {file}", "a file", "nothing"
     for path in sorted(folder.iterdir()):

@@ -179,19 +179,30 @@ def painted_over(folder: Path) -> None:
 def crash_called_proved(folder: Path) -> None:
     """What `airground prove` would write of run b, as if Coq had accepted it."""
     from airground_drake.proofs.export import distances_file, recorded
+    from airground_drake.proofs.readback import compare
+    from airground_drake.proofs.record import ALLOWED_AXIOMS, FOLDER, closure, digest
+    from airground_drake.proofs.runs import CHECKERS
     from airground_drake.proofs.table import lawful
 
-    exact = recorded(load(trace(folder, "b")))
+    run = load(trace(folder, "b"))
+    exact = recorded(run)
+    rounded = compare(distances_file(exact), run)
+    proof = {"proved": True, "axioms": sorted(ALLOWED_AXIOMS), "seconds": 1.0}
     entry = {
         "expected": False,
         "meta_sha256": hashlib.sha256((trace(folder, "b") / "meta.json").read_bytes()).hexdigest(),
         "rows": len(read_table(folder, run="b")), "pairs": len(exact.demands),
         "lawful_pairs": len(lawful(exact.demands)),
-        "distances": {"proved": True, "theorem": f"{exact.name}_keeps_its_distances", "file": f"{exact.name}.v"},
-        "law": {"proved": False, "file": f"{exact.name}_law.v", "why": "it took longer than 1 s"},
+        "rounded_coordinates": rounded.coordinates, "rounded_by_m": rounded.most_m,
+        "distances": proof | {"theorem": f"{exact.name}_keeps_its_distances", "file": f"{exact.name}.v"},
+        "law": {
+            "proved": False, "theorem": f"{exact.name}_obeys_the_law", "file": f"{exact.name}_law.v",
+            "why": "it took longer than 1 s",
+        },
     }  # fmt: skip
     (folder / "proofs").mkdir()
-    found = {"schema": "airground_drake.proofs/1", "coq": "8.16.1", "theory": {}, "runs": {"b": entry}}
+    found = {"schema": "airground_drake.proofs/1", "coq": "8.16.1", "runs": {"b": entry}}
+    found["theory"] = {name: digest(FOLDER / name) for name in closure(CHECKERS)}
     write(folder / "proofs" / "proofs.json", json.dumps(found).encode())
     write(folder / "proofs" / f"{exact.name}.v", distances_file(exact).encode())
     proved.write(folder)

@@ -21,6 +21,7 @@ from airground_drake.base.arrays import Array
 from airground_drake.base.errors import TraceError
 from airground_drake.commands import main
 from airground_drake.proofs import coq, export
+from airground_drake.proofs.compare import broken_rules
 from airground_drake.proofs.export import demands, distances_file, recorded, without_vectors
 from airground_drake.proofs.readback import ReadbackError, compare
 from airground_drake.proofs.record import closure
@@ -329,6 +330,25 @@ def report(tmp_path: Path, run: Simulations) -> Path:
     return tmp_path / "report"
 
 
+def _each_forged_value_is_found(report: Path, found: dict[str, Any]) -> None:
+    """What can be computed without Coq is compared, and nothing is added to proofs.json."""
+    traces = {"d": trace.load(report / "trace" / "d")}
+    assert broken_rules(report / "proofs", traces)[1] == []
+    for *parents, key, value in (
+        ("certified", True), ("theory", {}), ("runs", "d", "certified", True), ("runs", "d", "rounded_by_m", -5.0),
+        ("runs", "d", "rounded_coordinates", -1), ("runs", "d", "distances", "theorem", "all_safe_for_ever"),
+        ("runs", "d", "distances", "axioms", []), ("runs", "d", "law", "axioms", ["False.exists"]),
+        ("runs", "d", "law", "theorem", "lawful"), ("runs", "d", "law", "certified", True),
+    ):  # fmt: skip
+        forged = copy.deepcopy(found)
+        place = forged
+        for parent in parents:
+            place = place[parent]
+        place[key] = value
+        (report / "proofs" / "proofs.json").write_text(json.dumps(forged), encoding="utf-8")
+        assert len(broken_rules(report / "proofs", traces)[1]) == 1, (parents, key)
+
+
 @pytest.mark.slow
 @pytest.mark.usefixtures("compiled_before")
 def test_the_command_proves_a_report_and_writes_down_what_it_found(
@@ -340,6 +360,7 @@ def test_the_command_proves_a_report_and_writes_down_what_it_found(
     assert found["coq"] == coq_version
     assert found["runs"]["d"]["distances"]["proved"] is found["runs"]["d"]["law"]["proved"] is True
     assert sorted(path.name for path in (report / "proofs").iterdir()) == ["proofs.json", "run_d.v", "run_d_law.v"]
+    _each_forged_value_is_found(report, found)
 
     of = trace.load(report / "trace" / "d")
     rock = np.array(of.scenario.obstacles[ROCK].position_m)
