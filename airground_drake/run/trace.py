@@ -84,7 +84,6 @@ class Trace:
             resolved scenario as nested dicts), `events` (list, by time), `controllers` (what the controllers were
             built with, read back from the diagram: see `systems.controllers.read_back`), `decision_block` (name of
             the class that computes the decision variables, read back from the diagram; empty for that of (15)),
-            `plants` (by robot: the kind of its plant, or the class of a system that was given for it),
             `faults` (list of errors in policies: `t_s`, `robot`, `policy`, `what`; the first of a policy may have a
             `traceback`).
         states, samples: see the module's docstring.
