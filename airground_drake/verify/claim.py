@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import abc
 import json
-from dataclasses import dataclass, field, fields
-from math import ceil
+from dataclasses import dataclass, field, fields, replace
+from math import ceil, isfinite
+from numbers import Integral, Real
 from typing import Any
 
 import numpy as np
@@ -35,6 +36,9 @@ by 1e-15 m."""
 
 TIME_TOLERANCE_S = 1e-9
 """Two instants that differ by less are the same, s: rounding of multiples of a period errs by 1e-14 s."""
+
+MARGIN_ROUNDING = 1e-6
+"""A claim may hold with a margin that is this much below 0, in its unit: claims allow for rounding."""
 
 
 class Claim(abc.ABC):
@@ -107,7 +111,7 @@ class ModelClaim(Claim):
             return Finding("error", evidence=Failure(inputs["error"]))
         try:
             finding = self.check(inputs)
-            require_count(self, finding)
+            finding = well_formed(self, finding)
             json.dumps(finding.to_json(), allow_nan=False)
         except (Exception, SystemExit) as error:  # whatever went wrong, the claim was not decided
             return Finding("error", evidence=Failure(described(error)))
@@ -137,7 +141,7 @@ class TraceClaim(Claim):
             finding = self.check(trace)
             if finding.status in PASSING:
                 require_whole_run(trace)
-            require_count(self, finding)
+            finding = well_formed(self, finding)
             json.dumps(finding.to_json(), allow_nan=False)  # a margin that is not a number must not pass
         except (Exception, SystemExit) as error:  # whatever went wrong, the claim was not decided
             return Finding("error", evidence=Failure(described(error)))
@@ -196,19 +200,28 @@ class Verdict(Finding):
         }
 
 
-def require_count(claim: Claim, finding: Finding) -> None:
-    """Check that a claim with `exercised_by` has counted it.
+def well_formed(claim: Claim, finding: Finding) -> Finding:
+    """The finding, its count as an `int`, once it is checked that it does not contradict itself.
 
     Raises:
-        ValueError: if its status is unknown, if it passes without a count, or if the count is no whole number from 0.
+        ValueError: if the status is unknown, if a margin is no finite number, if a claim holds or is proved with a
+            negative margin (beyond `MARGIN_ROUNDING`), if a claim with `exercised_by` passes without a count, or if the
+            count is no whole number from 0.
     """
     if finding.status not in STATUSES:
         raise ValueError(f"{claim.id} found {finding.status!r}; allowed: {', '.join(STATUSES)}")
-    count = finding.exercised
+    margin, count = finding.margin, finding.exercised
+    if margin is not None and (not isinstance(margin, Real) or isinstance(margin, bool) or not isfinite(margin)):
+        raise ValueError(f"{claim.id} found the margin {margin!r}; allowed: a finite number, or None")
+    if margin is not None and finding.status in ("holds", "proved") and margin < -MARGIN_ROUNDING:
+        raise ValueError(f"{claim.id} found {finding.status!r} with the margin {margin!r}; allowed: one from 0, or None")
     if count is None and claim.exercised_by and finding.status in PASSING:
         raise ValueError(f"{claim.id} passes without a count of {claim.exercised_by}")
-    if count is not None and (type(count) is not int or count < 0):
-        raise ValueError(f"{claim.id} was exercised {count!r} times")
+    if count is None:
+        return finding
+    if not isinstance(count, Integral) or isinstance(count, bool) or count < 0:
+        raise ValueError(f"{claim.id} was exercised {count!r} times; allowed: a whole number from 0, or None")
+    return replace(finding, exercised=int(count))
 
 
 def require_motion(trace: Trace) -> None:

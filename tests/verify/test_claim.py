@@ -6,6 +6,7 @@ import json
 from collections.abc import Callable
 from typing import Any
 
+import numpy as np
 import pytest
 from builders.edits import bumped, dropped, rows, set_nan, with_meta, with_scenario
 from builders.runs import passing_by, run_of
@@ -68,6 +69,10 @@ def test_of_a_broken_trace_no_claim_passes(name: str) -> None:
         (SystemExit(0), "SystemExit: 0"),
         (Finding("holds", margin=float("nan"), exercised=1), "ValueError"),
         (Finding("ok", exercised=1), "ValueError: LIVE-GOAL found 'ok'"),  # type: ignore[arg-type]
+        (Finding("holds", margin=-5.0, exercised=1), "ValueError: LIVE-GOAL found 'holds' with the margin -5.0"),
+        (Finding("holds", margin="big", exercised=1), "ValueError: LIVE-GOAL found the margin 'big'"),  # type: ignore[arg-type]
+        (Finding("holds", exercised=-3), "ValueError: LIVE-GOAL was exercised -3 times; allowed: a whole number"),
+        (Finding("holds", exercised=1.5), "ValueError: LIVE-GOAL was exercised 1.5 times"),  # type: ignore[arg-type]
         (None, "AttributeError"),
     ],
 )
@@ -81,6 +86,15 @@ def test_a_check_that_fails_is_an_error(returned: Any, error: str) -> None:
     finding = Failing().judge(run_of("d"))
     assert (finding.status, type(finding.evidence)) == ("error", Failure)
     assert finding.evidence.error.startswith(error)
+
+
+def test_a_count_of_numpy_is_a_count() -> None:
+    class Counting(type(CLAIMS["LIVE-GOAL"])):  # type: ignore[misc]
+        def check(self, trace: Trace) -> Finding:
+            return Finding("refuted", margin=-1.0, exercised=np.int64(2))  # type: ignore[arg-type]
+
+    finding = Counting().judge(run_of("d"))
+    assert (finding.status, finding.exercised, type(finding.exercised)) == ("refuted", 2, int)
 
 
 def test_half_a_run_can_refute_but_not_pass() -> None:

@@ -20,7 +20,7 @@ from airground_drake.run.trace import Trace
 from airground_drake.scenarios.load import load
 from airground_drake.verify import Finding, judge
 from airground_drake.verify.__main__ import main
-from airground_drake.verify.claim import Verdict, require_count
+from airground_drake.verify.claim import Verdict, well_formed
 
 IDLE = [
     "duration_s=0.5",
@@ -90,7 +90,7 @@ def test_a_claim_that_says_what_exercises_it_must_count_it(
     claim = type(CLAIMS["LIVE-GOAL"])()
     claim.exercised_by = counted
     try:
-        require_count(claim, Finding(status, exercised=count))
+        well_formed(claim, Finding(status, exercised=count))
     except ValueError:
         assert not allowed
     else:
