@@ -134,10 +134,18 @@ class TraceClaim(Claim):
         """Whether the claim says anything about a run of this method; if not, it is left out."""
         return True
 
+    def may_apply(self, trace: Trace) -> bool:
+        """`applies`; a claim that cannot say is judged, which turns the exception into the status `error`."""
+        try:
+            return self.applies(trace)
+        except (Exception, SystemExit):
+            return True
+
     def judge(self, trace: Trace) -> Finding:
-        """`check`; a malformed trace, an exception or a pass on half a run is the status `error`."""
+        """`check`; a malformed trace, an exception (also of `applies`) or a pass on half a run is `error`."""
         try:
             require_motion(trace)
+            self.applies(trace)
             finding = self.check(trace)
             if finding.status in PASSING:
                 require_whole_run(trace)

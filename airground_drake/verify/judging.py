@@ -70,7 +70,7 @@ def judge(trace: Trace, claims: Collection[str] | None = None, progress: Progres
 
 def _applicable(trace: Trace, claims: Collection[str] | None = None) -> list[TraceClaim]:
     added = trace.meta.get("scenario", {}).get("claims")
-    return [claim for claim in run_claims(claims, added) if claim.applies(trace)]
+    return [claim for claim in run_claims(claims, added) if claim.may_apply(trace)]
 
 
 def _verdicts(trace: Trace, claims: Sequence[TraceClaim], findings: Sequence[Finding]) -> list[Verdict]:

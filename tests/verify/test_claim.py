@@ -88,6 +88,15 @@ def test_a_check_that_fails_is_an_error(returned: Any, error: str) -> None:
     assert finding.evidence.error.startswith(error)
 
 
+def test_a_claim_that_cannot_say_whether_it_applies_is_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
+    def applies(self: Any, trace: Trace) -> bool:
+        raise ValueError("applies")
+
+    monkeypatch.setattr(type(CLAIMS["LIVE-GOAL"]), "applies", applies)
+    (verdict,) = judge(run_of("d"), claims=["LIVE-GOAL"])
+    assert (verdict.status, verdict.evidence.error) == ("error", "ValueError: applies")
+
+
 def test_a_count_of_numpy_is_a_count() -> None:
     class Counting(type(CLAIMS["LIVE-GOAL"])):  # type: ignore[misc]
         def check(self, trace: Trace) -> Finding:
