@@ -227,7 +227,7 @@ class PaperGatekeepers(Gatekeepers):
         kind = type(self._route)
         try:
             found: object = self._route.solve(replace(problem), budget)
-        except Exception as error:
+        except (Exception, SystemExit) as error:
             raise PluginError(f"route {kind.__qualname__} raised {described(error, kind.solve)}") from error
         if not isinstance(found, Solution):
             returned = f"{short(repr(found))}, of type {type(found).__qualname__}"

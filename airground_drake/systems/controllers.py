@@ -25,7 +25,7 @@ from pydrake.systems.framework import (
 )
 
 from airground_drake.base.arrays import Array, read_only
-from airground_drake.base.errors import PluginError, short
+from airground_drake.base.errors import PluginError, described, short
 from airground_drake.geometry import outline
 from airground_drake.intervention.messages import NOTHING, accepted_proposals
 from airground_drake.intervention.policy import Proposal
@@ -249,7 +249,7 @@ class UavController(_Controller):
             gain: of the task, 1/s; default: as it was built.
 
         Raises:
-            PluginError: if the task does not ask for a velocity.
+            PluginError: if the task raises or does not ask for a velocity; names the task.
         """
         avoidance = self.avoidance if avoidance is None else avoidance
         gain = self._gain if gain is None else gain
@@ -262,8 +262,14 @@ class UavController(_Controller):
         ugvs, own = positions[self._ugvs], positions[self._own]
         if self._task is FormationTask:
             return FormationTask(ugvs, ugv_commands, self._altitude, gain).velocity(own)
-        task = self._task(read_only(ugvs), read_only(ugv_commands), self._altitude, gain)
-        return _velocity_of(task, read_only(own))
+        name = getattr(self._task, "__name__", type(self._task).__name__)
+        try:
+            task = self._task(read_only(ugvs), read_only(ugv_commands), self._altitude, gain)
+            asked: object = task.velocity(read_only(own))
+        except (Exception, SystemExit) as error:
+            place = getattr(self._task, "__init__", None)
+            raise PluginError(f"the UAV's task {name} raised {described(error, place)}") from error
+        return _velocity_of(name, asked, own)
 
 
 def read_back(system: LeafSystem, avoidance: Avoidance, near: Neighbours, robots: int) -> dict[str, Any]:
@@ -311,9 +317,17 @@ def _finite(positions: Array) -> Array:
     return positions
 
 
-def _velocity_of(task: Task, position: Array) -> Array:
-    asked = np.asarray(task.velocity(position))
+def _velocity_of(task: str, answer: object, position: Array) -> Array:
+    """What a task of this name asks for, checked.
+
+    Raises:
+        PluginError: if that is not finite numbers of the shape of the position.
+    """
+    try:
+        asked = np.asarray(answer)
+    except ValueError as error:  # rows of different lengths
+        raise PluginError(f"the UAV's task {task} asks for a velocity that is no array: {described(error)}") from error
     if asked.shape != position.shape or asked.dtype.kind not in "fiu" or not np.isfinite(asked).all():
         given, wanted = short(repr(asked.tolist())), f"wanted: {position.shape} finite numbers, m/s"
-        raise PluginError(f"the UAV's task {type(task).__name__} asks for {given} as velocity; {wanted}")
+        raise PluginError(f"the UAV's task {task} asks for {given} as velocity; {wanted}")
     return asked.astype(np.float64, copy=False)

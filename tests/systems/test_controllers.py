@@ -32,8 +32,8 @@ def moves_uav(given: dict[str, Array]) -> Any:
 @pytest.mark.parametrize(
     ("does", "error", "said"),
     [
-        (moves_ugvs, ValueError, "read-only"),
-        (moves_uav, ValueError, "read-only"),
+        (moves_ugvs, PluginError, r"^the UAV's task Odd raised .*read-only"),
+        (moves_uav, PluginError, r"^the UAV's task Odd raised .*read-only"),
         *(
             (
                 lambda _, asked=asked: asked,
@@ -60,6 +60,18 @@ def test_a_task_that_asks_for_no_velocity_or_moves_robots_is_stopped(
     case_a = load("case_a")
     controller = UavController(make_world(case_a), make_avoidance(case_a), gain=1.0, altitude=2.0, task=Odd)
     with pytest.raises(error, match=said):
+        controller.velocity(0.0, np.zeros((3, 3)), np.zeros((2, 3)))
+
+
+@pytest.mark.parametrize("problem", [RuntimeError("task broke"), SystemExit(0)])
+def test_a_task_whose_constructor_fails_is_named(problem: BaseException) -> None:
+    class Broken(FormationTask):
+        def __init__(self, *_: Any) -> None:
+            raise problem
+
+    case_a = load("case_a")
+    controller = UavController(make_world(case_a), make_avoidance(case_a), gain=1.0, altitude=2.0, task=Broken)
+    with pytest.raises(PluginError, match=rf"task Broken raised test_controllers.py:\d+ {type(problem).__name__}"):
         controller.velocity(0.0, np.zeros((3, 3)), np.zeros((2, 3)))
 
 

@@ -79,7 +79,14 @@ class Exchanging(Writing):
         object.__setattr__(problem, "accept", np.zeros_like(problem.accept))
 
 
-@pytest.mark.parametrize("route", [Writing, Unlocking])
+class Exiting(Writing):
+    """Ends the program."""
+
+    def write(self, problem: Problem) -> None:
+        raise SystemExit(3)
+
+
+@pytest.mark.parametrize("route", [Writing, Unlocking, Exiting])
 def test_a_route_that_writes_into_its_problem_is_named(case_a: Scenario, route: type) -> None:
     case_a.gatekeeper.route, case_a.duration_s = "hostile", 16.0
     with (
