@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from bisect import bisect_left, bisect_right
 from collections.abc import Sequence
+from contextlib import suppress
 from itertools import pairwise
 from typing import Any
 
@@ -22,6 +23,7 @@ from pydrake.systems.framework import (
 )
 
 from airground_drake.base.arrays import Array
+from airground_drake.base.errors import PluginError, short
 from airground_drake.decision.excursion import anything_due, extremes, gathered, spans, transitions_due, variables
 from airground_drake.decision.trigger import Mode, Trigger, TriggerState
 from airground_drake.geometry.motion import Motion
@@ -119,8 +121,22 @@ class DecisionBlock(LeafSystem):
     def _with_variable(self, signals: Array) -> Array:
         """Signals whose x of (15) is replaced by that of this block."""
         rows = signals[1:].reshape(-1, 5)
-        rows[:, 4] = self.value(signals[0], rows[:, :4].copy())
+        rows[:, 4] = self._valued(signals[0], rows[:, :4].copy())
         return signals
+
+    def _valued(self, t: float, parts: Array) -> Array:
+        """`value`, checked: with a number that is not finite, the trigger would never see a crossing.
+
+        Raises:
+            PluginError: if it is not n finite numbers.
+        """
+        given: object = self.value(t, parts)
+        with suppress(TypeError, ValueError):
+            x = np.asarray(given, dtype=np.float64)
+            if x.shape == (len(parts),) and np.isfinite(x).all():
+                return x
+        wanted = f"wanted: {len(parts)} finite numbers, m"
+        raise PluginError(f"decision block {type(self).__name__} returned {short(repr(given))} as x; {wanted}")
 
     def _calc_variable(self, context: Context, output: BasicVector) -> None:
         output.SetFromVector(self.get_cache_entry(self._signals).Eval(context)[5::5])
@@ -158,7 +174,7 @@ class DecisionBlock(LeafSystem):
         for j in bent:
             reference = self._presets[j].sample(times)
             parts[:, j, :3] += reference - reference[0] - shares[:, None] * (reference[-1] - reference[0])
-        x = [self.value(t, part) for t, part in zip(times, parts, strict=True)]
+        x = [self._valued(t, part) for t, part in zip(times, parts, strict=True)]
         stretches = pairwise(zip(times, parts, x, strict=True))
         ranges = np.array(
             [self.extremes(t0, p0, t1, p1, np.array([x0, x1])) for (t0, p0, x0), (t1, p1, x1) in stretches]

@@ -13,7 +13,7 @@ from types import MappingProxyType
 from pydrake.systems.framework import Diagram, DiagramBuilder, InputPort, OutputPort, System
 from pydrake.systems.primitives import ConstantVectorSource, Demultiplexer, Multiplexer, TrajectorySource
 
-from airground_drake.base.errors import PluginError, UnknownNameError
+from airground_drake.base.errors import PluginError, UnknownNameError, short
 from airground_drake.geometry.motion import Motion
 from airground_drake.nsbc.avoidance import COMPOSITIONS, Composition
 from airground_drake.nsbc.task import Task
@@ -137,6 +137,8 @@ def build_model(
     n = len(world.names("ugv"))
     law = components.make_law(scenario, chosen, composition)
     # first, so that the seed of its noise does not depend on what a plant may draw
+    if not callable(decision_block) or (isinstance(decision_block, type) and not issubclass(decision_block, System)):
+        raise PluginError(f"decision_block is {short(repr(decision_block))}; allowed: a subclass of DecisionBlock")
     block = _checked_block(n, decision_block(world, presets))
     shortest = min(scenario.control.period_s, scenario.decision.noise_period_s)
     trigger = EventTrigger(n, components.make_trigger(scenario, components.threshold(scenario)), shortest)
@@ -363,6 +365,8 @@ def _checked_block(n: int, block: System) -> System:
     Raises:
         PluginError: if it lacks the output ports of a decision block of n UGVs.
     """
+    if not isinstance(block, System):
+        raise PluginError(f"decision_block makes {short(repr(block))}; allowed: a System such as a DecisionBlock")
     sizes = {port.get_name(): port.size() for port in _outputs(block)}
     wanted = {"decision_variable": n, "decision_range": 2 * n}
     if any(sizes.get(name) != size for name, size in wanted.items()):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import pathlib
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -222,6 +223,29 @@ def test_a_recorded_signal_drives_the_trigger_and_its_crossings_are_isolated() -
     assert decided("THR-TRIG", trace).status == "holds"
     late = [{**e, "t_s": e["t_s"] + 0.001 * (e["kind"] == "release")} for e in trace.events]
     assert decided("THR-TRIG", replace(trace, meta={**trace.meta, "events": late})).status == "refuted"
+
+
+@pytest.mark.parametrize("x", [None, np.full(2, np.nan), np.zeros(3), "x"])
+def test_a_decision_block_that_returns_no_numbers_is_named(x: Any) -> None:
+    class Odd(DecisionBlock):
+        def value(self, t: float, parts: Array) -> Any:
+            return x
+
+    with pytest.raises(SimulationError, match=r"decision block Odd returned .*; wanted: 2 finite numbers"):
+        simulate(load("case_a", {"duration_s": 15.0}), "b", decision_block=Odd)
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ("x", "decision_block is 'x'"),
+        (int, "decision_block is <class 'int'>"),
+        (lambda world, presets: 3, "decision_block makes 3"),
+    ],
+)
+def test_what_makes_no_decision_block_is_refused(given: Any, said: str) -> None:
+    with pytest.raises(PluginError, match=said):
+        build_diagram(load("case_a"), decision_block=given)
 
 
 def test_a_decision_block_without_a_range_is_refused() -> None:
