@@ -122,7 +122,8 @@ def _of_faults(runs: Mapping[str, Mapping[str, Any]]) -> Iterator[Item]:
             about = f"policy {kind['policy']}"
             yield Item("error", f"{kind['what']} ({often})", run=name, about=about, anchor="happened")
         if len(kinds) > MAX_FAULTS:
-            yield Item("error", f"{len(kinds) - MAX_FAULTS} more kinds of faults", run=name, anchor="happened")
+            more = len(kinds) - MAX_FAULTS
+            yield Item("error", f"{counted(more, 'more kind')} of fault{'s' * (more > 1)}", run=name, anchor="happened")
 
 
 def faults_together(faults: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
