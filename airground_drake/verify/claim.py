@@ -222,7 +222,9 @@ def well_formed(claim: Claim, finding: Finding) -> Finding:
     if margin is not None and (not isinstance(margin, Real) or isinstance(margin, bool) or not isfinite(margin)):
         raise ValueError(f"{claim.id} found the margin {margin!r}; allowed: a finite number, or None")
     if margin is not None and finding.status in ("holds", "proved") and margin < -MARGIN_ROUNDING:
-        raise ValueError(f"{claim.id} found {finding.status!r} with the margin {margin!r}; allowed: one from 0, or None")
+        raise ValueError(
+            f"{claim.id} found {finding.status!r} with the margin {margin!r}; allowed: one from 0, or None"
+        )
     if count is None and claim.exercised_by and finding.status in PASSING:
         raise ValueError(f"{claim.id} passes without a count of {claim.exercised_by}")
     if count is None:
