@@ -48,6 +48,17 @@ class Body:
     appears_s: float = 0.0
     disappears_s: float = np.inf
 
+    def __post_init__(self) -> None:
+        """Check the kind and the speed limit.
+
+        Raises:
+            ValueError: if there is no such kind, or the limit is no number from 0.
+        """
+        if self.kind not in KINDS:
+            raise ValueError(f"body {self.name!r} is of kind {self.kind!r}; allowed: {', '.join(KINDS)}")
+        if not self.max_speed_m_s >= 0.0:
+            raise ValueError(f"max_speed_m_s of body {self.name!r} is {self.max_speed_m_s}; allowed: from 0")
+
     @property
     def mobility(self) -> Array:
         """(3,): 1 in directions in which it can move, else 0."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,7 +15,7 @@ from hypothesis.extra.numpy import arrays
 from airground_drake.nsbc.avoidance import Avoidance
 from airground_drake.world.motion import PeriodMotion
 from airground_drake.world.plant import FirstOrder
-from airground_drake.world.world import ROBOTS, World
+from airground_drake.world.world import ROBOTS, Body, World
 
 WORLD = world(
     ("one", "two"), [[5.0, 0.0, 0.0], [9.0, 0.0, 0.0]], 2.0, 1.5, 1.0,
@@ -80,3 +81,9 @@ def test_no_point_of_two_motions_is_nearer_than_the_least_distance(
         assert (np.maximum(np.linalg.norm(apart.start + s * change, axis=-1) - off, 0.0) >= least - 1e-9).all()
     nearest = np.linalg.norm(apart.start + share[:, None] * change, axis=-1)
     np.testing.assert_allclose(np.maximum(nearest - off, 0.0), least, atol=1e-12)
+
+
+@pytest.mark.parametrize(("kind", "speed"), [("truck", 1.0), ("ugv", -2.0), ("ugv", np.nan)])
+def test_a_body_of_no_kind_or_speed_is_refused(kind: Any, speed: float) -> None:
+    with pytest.raises(ValueError, match=r"'robot' is .*; allowed: "):
+        Body("robot", kind, np.zeros(3), max_speed_m_s=speed)
