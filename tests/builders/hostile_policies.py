@@ -262,3 +262,14 @@ KINDS: dict[str, Kind] = {
     "leaves_a_child_behind": wild(None, lambda seen: fork(lambda: None, forever)),
     **{name: wild("PermissionError", lambda seen, does=does: does(os.getppid())) for name, does in TO_PARENT.items()},
 }
+
+
+class CountedRaises(Policy):
+    """Cannot say whether its work is counted."""
+
+    @property
+    def counted(self) -> bool:  # type: ignore[override]
+        raise RuntimeError("not counted")
+
+    def propose(self, seen: Observation) -> None:
+        """Nothing."""

@@ -251,3 +251,8 @@ def _confined() -> bool:
     )
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
     return done.stdout == "True True\n"
+
+
+def test_a_policy_that_cannot_say_whether_its_work_is_counted_says_why() -> None:
+    with pytest.raises(PluginError, match=r"its `counted` raised .*RuntimeError: not counted"):
+        GuestPolicy("builders.hostile_policies:CountedRaises", {}, LONG_S)

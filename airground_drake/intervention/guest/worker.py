@@ -24,10 +24,14 @@ def main(channel: int) -> None:
         order = decoded(connection.recv_bytes(), ())
         try:
             policy = POLICIES.make(order["name"], of=Policy, **dict(order["parameters"]))
+            counted = policy.counted is True
         except AirgroundError as error:
             connection.send_bytes(encoded({"fault": str(error)}))
             os._exit(0)
-        connection.send_bytes(encoded({"counted": policy.counted is True}))
+        except BaseException as error:  # `counted` may be a property
+            connection.send_bytes(encoded({"fault": f"its `counted` raised {described(error)}"}))
+            os._exit(0)
+        connection.send_bytes(encoded({"counted": counted}))
         while True:
             connection.send_bytes(encoded(answer(policy, connection.recv_bytes())))
     os._exit(0)  # also if the policy has started threads that still run
