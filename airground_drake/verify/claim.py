@@ -218,7 +218,8 @@ def well_formed(claim: Claim, finding: Finding) -> Finding:
     """
     if finding.status not in STATUSES:
         raise ValueError(f"{claim.id} found {finding.status!r}; allowed: {', '.join(STATUSES)}")
-    margin, count = finding.margin, finding.exercised
+    margin: Any = finding.margin  # of third-party code, whatever its type
+    count: Any = finding.exercised
     if margin is not None and (not isinstance(margin, Real) or isinstance(margin, bool) or not isfinite(margin)):
         raise ValueError(f"{claim.id} found the margin {margin!r}; allowed: a finite number, or None")
     if margin is not None and finding.status in ("holds", "proved") and margin < -MARGIN_ROUNDING:
