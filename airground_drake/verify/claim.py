@@ -220,7 +220,7 @@ def well_formed(claim: Claim, finding: Finding) -> Finding:
         raise ValueError(f"{claim.id} found {finding.status!r}; allowed: {', '.join(STATUSES)}")
     margin: Any = finding.margin  # of third-party code, whatever its type
     count: Any = finding.exercised
-    if margin is not None and (not isinstance(margin, Real) or isinstance(margin, bool) or not isfinite(margin)):
+    if margin is not None and (isinstance(margin, bool) or not isinstance(margin, Real) or not isfinite(margin)):
         raise ValueError(f"{claim.id} found the margin {margin!r}; allowed: a finite number, or None")
     if margin is not None and finding.status in ("holds", "proved") and margin < -MARGIN_ROUNDING:
         raise ValueError(
@@ -230,7 +230,7 @@ def well_formed(claim: Claim, finding: Finding) -> Finding:
         raise ValueError(f"{claim.id} passes without a count of {claim.exercised_by}")
     if count is None:
         return finding
-    if not isinstance(count, Integral) or isinstance(count, bool) or count < 0:
+    if isinstance(count, bool) or not isinstance(count, Integral) or count < 0:
         raise ValueError(f"{claim.id} was exercised {count!r} times; allowed: a whole number from 0, or None")
     return replace(finding, exercised=int(count))
 
