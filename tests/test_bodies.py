@@ -203,6 +203,22 @@ def test_where_it_appears_too_near_is_nobodys_doing() -> None:
     assert not faults_of(trace)
 
 
+@pytest.mark.parametrize("appears_s", [4.6, 5.1])  # ahead of it; under it
+def test_a_robot_that_lags_is_not_blamed_for_what_appears(appears_s: float) -> None:
+    """It comes nearer for as long as its lag makes it, and steers back from the first sample on."""
+    changes = (
+        "ugvs.ugv1.plant={kind: lag, time_constant_s: 0.3}", "ugvs.ugv1.max_speed_m_s=1.5", "ugvs.ugv1.radius_m=0.2",
+        "safe_distance.obstacle_m=0.5", "obstacles.rock.radius_m=0.3",
+        "obstacles.person={radius_m: 0.2, moves: {waypoints_m: [[0, 9], [4, 9]], speed_m_s: 0.5}}",
+    )  # fmt: skip
+    trace = simulate(sudden(appears_s, *changes), "d")
+    found = {verdict.claim.id: verdict for verdict in judge(trace, ("SAFE-TRACE", "SAFE-OWN"))}
+    seen = found["SAFE-TRACE"].counterexample or {}
+    assert seen["t_s"] > appears_s
+    assert seen["why"] == f"rock appeared at {appears_s} s too near to ugv1: nobody's doing"
+    assert found["SAFE-OWN"].status == "holds"
+
+
 def test_it_collides_with_nobody_before_it_appears() -> None:
     """ugv1 drives over the place at 5 s."""
     passed, hit = (simulate(sudden(t, "runs={d: {method: d}}"), "d") for t in (8.0, 5.0))

@@ -55,6 +55,11 @@ class Nowhere(Robot):
         derivatives.SetFromVector(np.full(3, np.nan if context.get_time() > 0.5 else 0.0))
 
 
+class Flies(Robot):
+    def DoCalcTimeDerivatives(self, context: Any, derivatives: Any) -> None:
+        derivatives.SetFromVector([*self._velocity.Eval(context)[:2], 0.2])
+
+
 class RaisesAtItsOutput(LeafSystem):
     def __init__(self, start: Array) -> None:
         super().__init__()
@@ -261,6 +266,7 @@ def test_a_forged_record_is_found(table: str, column: str) -> None:
         (Raises, SimulationError, r"test_own_plants\.py:\d+ ValueError: motor on fire .*Raises of ugv1"),
         (Nowhere, SimulationError, r"Nowhere' of ugv1 has \[nan, nan, nan\] at its output position; allowed: finite"),
         (RaisesAtItsOutput, SimulationError, r"RaisesAtItsOutput' of ugv1: RuntimeError: no encoder"),
+        (Flies, SimulationError, r"Flies' of ugv1 has .* at its output position; allowed for a UGV: the height 0"),
         (Elsewhere, PluginError, r"Elsewhere' of ugv1 begins at \[0\.0, 0\.001, 0\.0\] m; allowed: at its start"),
         (Flat, PluginError, r"of ugv1 has inputs of sizes \[2\].*velocity \(3\) first .*body \(3\) and heading"),
         (NoBattery, PluginError, "NoBattery' of ugv1: RuntimeError: no battery"),
