@@ -162,7 +162,7 @@ def _proved_again(folder: Path, lines: Sequence[CheckLine]) -> Iterator[CheckLin
 
 
 def _compared(run: str, entry: Any, recorded: Any) -> CheckLine:
-    """What Coq finds of a run now, beside its entry of the recorded proofs.json; None if it has none."""
+    """The answer of Coq about a run, compared with the recorded one (None: proofs.json has none)."""
     from airground_drake.report.lines import differences, short
 
     line = partial(CheckLine, "proofs", run, by="Coq")
