@@ -1,7 +1,7 @@
 """Robots that turn and lag under hostile commands: how much of the distance budget an attack can use up.
 
 `python benchmarks/plants.py`: for each plant, periods of the running law in which the task below it is hostile: it
-circles the obstacle, goes to and fro, wanders, or takes of several commands the one that brings the body nearest. It
+circles the obstacle, goes to and fro, wanders, or takes the command, of several, that brings the body nearest. It
 prints what the law keeps beyond the distance promised, how much of that the worst body used up, and whether a run in
 Drake is the same as the law and the plant step by step, bit by bit. The exit code is 1 if a promise is broken.
 """

@@ -300,7 +300,7 @@ _BAYES = ("drift_m_s", "noise_m_sqrt_s", "c1_1_s", "c2")
 
 
 def _composition(rng: np.random.Generator, method: str) -> str:
-    """Mostly the one that is proved; the recursions have no guarantee."""
+    """Mostly the proved method; the recursions have no guarantee."""
     if method == "d" or rng.random() < 0.8:
         return "augmented"
     return str(rng.choice(["recursion_nearest", "recursion_listed"]))

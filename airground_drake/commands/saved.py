@@ -25,7 +25,7 @@ def parser_of(name: str, description: str) -> argparse.ArgumentParser:
 
 
 def runs_of(folder: Path, run: str | None = None) -> Sequence[str]:
-    """Return the runs of a report that have left a trace, or only the one that is named.
+    """Return the runs of a report that have left a trace, or only the named run.
 
     Raises:
         FolderError: if it is no report, or one without runs.

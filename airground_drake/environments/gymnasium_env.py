@@ -57,6 +57,7 @@ class InterventionEnv(Episodes, gymnasium.Env[Numbers, Numbers]):
             options: `number`: that of the episode, in place of a drawn one.
 
         Raises:
+            ValueError: if the number is no whole number from 0.
             ScenarioError: if the draw is no valid scenario.
             SimulationError: if Drake or a system stops.
         """

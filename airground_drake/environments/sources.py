@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import OrderedDict
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from numbers import Integral
 from typing import Any
 
 import numpy as np
@@ -110,6 +111,8 @@ class Episodes:
     def _begin(self, rng: np.random.Generator, options: Mapping[str, Any] | None) -> Episode:
         """Begin the episode with the number in the options, or a drawn one."""
         number = (options or {}).get("number")
+        if number is not None and not (isinstance(number, Integral) and 0 <= number <= MAX_SEED):
+            raise ValueError(f"options: number: {number!r}; allowed: a whole number from 0 to {MAX_SEED}")
         self._number = self._source.drawn(rng) if number is None else int(number)
         self._episode = self._source.episode(self._number)
         return self._episode

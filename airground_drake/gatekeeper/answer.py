@@ -122,8 +122,8 @@ def settle(
     no difference. It is refused if that plan accepts it later, even if accepting throughout costs less than refusing
     throughout: so a UGV may wait for ever. A standing answer is reversed only if the best plan starts with the other
     choice and is cheaper, by the switching margin, than to keep the answer throughout, and not before the dwell is
-    over. (The best plan that keeps the answer for one more stage costs nearly the same as the one that changes it now:
-    that comparison would decide nothing.)
+    over. (It would decide nothing to compare with the best plan that keeps the answer for one more stage: that plan
+    costs nearly the same as changing now.)
 
     Args:
         solution: the route's.

@@ -66,7 +66,7 @@ class DistanceField:
             goal: (2,), m.
             rows: outlines of the obstacles, (m, W), m >= 1.
             keep: distances from their cores, (m,), m.
-            half: half the side of the square, m. No node is outside; nor is one far from all obstacles.
+            half: half the side of the square, m. Nodes are inside it and near obstacles only.
         """
         low, high = outline.box(rows)
         room = float(keep.max())

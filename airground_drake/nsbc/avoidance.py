@@ -68,12 +68,20 @@ class Avoidance:
             projection over the active set, shortened to be exact in floating point. 'recursion_nearest' and
             'recursion_listed' apply (5) as printed to the same constraints, with the nearest or the first listed
             obstacle as highest priority. They are there to show that (5) is not safe.
+
+    Raises:
+        ValueError: if gain, period or sensing range is not positive, or gain or period is not finite.
     """
 
     gain: float
     period: float
     sensing_range: float = np.inf
     composition: Composition = "augmented"
+
+    def __post_init__(self) -> None:
+        """Refuse numbers with which no distance is kept."""
+        if not (0.0 < self.gain < np.inf and 0.0 < self.period < np.inf and self.sensing_range > 0.0):
+            raise ValueError(f"{self}; wanted: finite gain > 0 and period > 0, sensing_range > 0")
 
     @property
     def layer(self) -> kernels.Layer:

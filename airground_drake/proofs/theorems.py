@@ -453,7 +453,7 @@ _ALL = (
     ),
     Theorem(
         "LawChecker.obeys_exactly", "(7)-(8), (11)", ("airground prove DIR", "SAFE-HYP"),
-        "The same without error, with the distance of the law and the one that the bodies keep.",
+        "The same without error, with the distances of the law and of the bodies.",
         ("The hypotheses of LawChecker.sound.",
          "The distance of the law is at least what the bodies keep and are off."),
     ),

@@ -101,7 +101,7 @@ def write(
     """
     dot = graphviz.dot(build_diagram(plugins.without(scenario), method_drawn(scenario)))
     pages = {"diagram.dot": dot, "diagram.svg": graphviz.svg(dot)}
-    required = [claim.id for claim in model_claims(added=scenario.claims) if claim.applies_to(scenario)]
+    required = [claim.id for claim in model_claims(added=scenario.claims) if claim.may_apply(scenario)]
     traces = judged.traces
     report = document.build(
         scenario, traces, judged.verdicts, provenance,

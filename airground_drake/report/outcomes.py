@@ -15,8 +15,8 @@ SLACK_M = 1e-9
 """A distance counts as kept if it falls short of the required one by less, as in SAFE-TRACE."""
 
 THEOREMS, BUDGET, CONDITIONS = ("SAFE-INV", "SAFE-GATE"), "SAFE-BUDGET", "SAFE-HYP"
-"""The claims that prove the safety of method (d); the one that joins them if bodies are not where the law steers them;
-and the one that a run met their conditions."""
+"""The claims that prove the safety of method (d). BUDGET joins them if bodies are not at the steered points. CONDITIONS
+checks that a run met their conditions."""
 DECLARED = "declared speed"
 """The hypothesis of SAFE-HYP that is about obstacles that move alone."""
 

@@ -36,7 +36,7 @@ def write(folder: Path) -> bool:
         Whether there is a page; without report.json or without report.html nothing is done.
 
     Raises:
-        ReportError: if the page or a trace that was proved is not the one that report.json names; nothing is changed.
+        ReportError: if the page or a proved trace differs from the one that report.json names; nothing is changed.
         OSError: if a file cannot be read or written.
     """
     page, record = folder / PAGES["html"], folder / PAGES["json"]

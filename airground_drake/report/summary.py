@@ -72,7 +72,7 @@ def first_screen(document: Document) -> FirstScreen:
 
 
 def headline(document: Document) -> Line:
-    """The report in a sentence, and in another one if a verdict is not the one that the scenario declares."""
+    """The report in a sentence; a second sentence follows if a verdict differs from what the scenario declares."""
     every = courses(document)
     mark, told = _outcome(every, _main(document, every))
     differs = sum(claim["as_expected"] is False and claim["status"] not in UNDECIDED for claim in document["claims"])

@@ -1,4 +1,4 @@
-"""What helps somebody whose file is refused: mistakes in YAML in plain words, and what no key exists for."""
+"""Help for a file that is refused: mistakes in YAML in plain words, and what to write where no key exists."""
 
 from __future__ import annotations
 

@@ -109,7 +109,7 @@ class InterventionPlanner(LeafSystem):
         self._ahead = context.get_time(), self._planned(context)
 
     def _planned(self, context: Context) -> PlannerState | None:
-        """The memory after a planning instant at the context's time; None if it is none, or changes nothing."""
+        """The memory after planning at the context's time; None at another time, or if nothing changes."""
         t = context.get_time()
         if not self._ticks.due(t):
             return None

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from fractions import Fraction
+from math import isfinite
 
 
 class Ticks:
@@ -18,8 +19,15 @@ class Ticks:
     """
 
     def __init__(self, period: float, control: float) -> None:
-        """The sampling period must be a multiple of the control period up to 1e-9; both in s."""
-        self._every = round(period / control)
+        """Both in s.
+
+        Raises:
+            ValueError: if the sampling period is no multiple of the control period, up to 1e-9 of it.
+        """
+        times = period / control if isfinite(period) and control > 0.0 else 0.0
+        self._every = round(times)
+        if self._every < 1 or abs(times - self._every) > 1e-9 * times:
+            raise ValueError(f"period {period!r} s; wanted: a multiple of the control period, {control!r} s")
         exact = Fraction(period) == self._every * Fraction(control)
         self._every, self.period = (1, period) if exact else (self._every, control)
 

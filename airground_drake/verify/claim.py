@@ -87,6 +87,13 @@ class ModelClaim(Claim):
         """Whether the claim says anything about a scenario; if not, it is left out."""
         return True
 
+    def may_apply(self, scenario: Scenario) -> bool:
+        """`applies_to`; a claim that cannot say is asked for inputs, which turns the exception into an error."""
+        try:
+            return self.applies_to(scenario)
+        except (Exception, SystemExit):
+            return True
+
     @abc.abstractmethod
     def inputs(self, scenario: Scenario) -> dict[str, Any]:
         """The constants of a scenario that the claim is about, strict JSON; may be empty."""
@@ -99,8 +106,9 @@ class ModelClaim(Claim):
         """
 
     def judge_inputs(self, scenario: Scenario) -> dict[str, Any]:
-        """`inputs`; an exception becomes inputs that `judge` turns into the status `error`."""
+        """`inputs`; an exception, also of `applies_to`, becomes inputs that `judge` turns into the status `error`."""
         try:
+            self.applies_to(scenario)
             return self.inputs(scenario)
         except (Exception, SystemExit) as error:
             return {"error": described(error)}

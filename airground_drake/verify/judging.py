@@ -171,7 +171,7 @@ class _Asked(NamedTuple):
 
 def _asked(scenario: Scenario, claims: Collection[str] | None = None) -> list[_Asked]:
     """The claims about the model, and again for each run whose `set` gives one of them other constants."""
-    chosen = [claim for claim in model_claims(claims, scenario.claims) if claim.applies_to(scenario)]
+    chosen = [claim for claim in model_claims(claims, scenario.claims) if claim.may_apply(scenario)]
     asked = [_Asked(claim, "", claim.judge_inputs(scenario)) for claim in chosen]
     changed = {name: own(scenario, name) for name, run in scenario.runs.items() if run.set}
     return asked + [

@@ -162,7 +162,7 @@ def _fill(axes: Axes, parts: Sequence[Array], appearance: _Look, zorder: float) 
 
 
 def _draw_arena(axes: Axes, rings: Sequence[Array]) -> None:
-    """Draw the frame of an arena, (4, 2), and the one that robots' surfaces keep to, if there is an arena."""
+    """Draw the frame of an arena, (4, 2), and the frame that robots' surfaces keep to, if there is an arena."""
     if rings:
         frame, inner = ([*ring, ring[0]] for ring in rings)
         band = Path.make_compound_path(Path(frame, closed=True), Path(inner[::-1], closed=True))

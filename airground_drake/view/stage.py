@@ -197,7 +197,7 @@ def barriers_of(scenario: Scenario, mark: float = 0.0) -> tuple[Barrier, ...]:
 
 
 def arena_of(scenario: Scenario) -> tuple[Array, ...]:
-    """The frame of the arena, and the one that robots' surfaces keep to: corners (4, 2) each, m; none without arena."""
+    """The frames of the arena and of what robots' surfaces keep to: corners (4, 2) each, m; none without arena."""
     if not scenario.arena_m:
         return ()
     low, high = np.min(scenario.arena_m, axis=0), np.max(scenario.arena_m, axis=0)

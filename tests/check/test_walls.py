@@ -57,7 +57,7 @@ def scene(name: str) -> dict[str, Any]:
 
 
 def with_map(data: dict[str, Any]) -> dict[str, Any]:
-    """With a map of two rectangles in the way, as a report has it; its files are needed by nobody."""
+    """With a map of two rectangles in the way, as a report records it; its files need not exist."""
     cells = {
         "file": "lab.yaml", "unknown": "occupied", "sha256": {}, "cell_m": 0.5, "origin": [1.0, -2.0, 0.1], "rows": 9,
         "columns": 9, "occupied": 6, "unsure": 0, "unreached": 0, "rectangles": [[0, 3, 0, 1], [3, 9, 1, 2]],

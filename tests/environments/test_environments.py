@@ -166,6 +166,12 @@ def test_what_an_agent_proposes_is_checked_like_any_proposal() -> None:
     assert len(trace.proposals) == 0
 
 
+@pytest.mark.parametrize("number", [-5, 1.5, "3"])
+def test_the_number_of_an_episode_is_a_whole_one(number: Any) -> None:
+    with pytest.raises(ValueError, match=rf"number: {number!r}; allowed: a whole number from 0"):
+        InterventionEnv(load("minimal")).reset(options={"number": number})
+
+
 def test_the_return_is_the_time_away_and_a_run_ends_when_all_are_there() -> None:
     env = InterventionEnv(load("minimal"))
     _, info = env.reset(options={"number": 1})

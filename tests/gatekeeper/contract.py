@@ -65,7 +65,7 @@ def check_contract(route: Route, problem: Problem, budget: Budget = DEFAULT) -> 
 
 
 def _check_arrays(solution: Solution, problem: Problem) -> None:
-    """The plan is the one that is claimed, rounding is (28)-(29), and no plan that is there beats the bound."""
+    """The plan costs what is claimed, rounding is (28)-(29), and no plan found here beats the bound."""
     assert solution.plan is not None
     assert solution.positions is not None
     assert solution.plan.shape == (problem.stages,)

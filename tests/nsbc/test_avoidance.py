@@ -42,6 +42,12 @@ def scene(
     return found, np.array(positions)
 
 
+@pytest.mark.parametrize("given", [(np.nan, 0.05), (-1.0, 0.05), (3.0, 0.0), (3.0, np.inf), (3.0, 0.05, -1.0)])
+def test_numbers_with_which_no_distance_is_kept_are_refused(given: tuple[float, ...]) -> None:
+    with pytest.raises(ValueError, match="wanted: finite gain > 0 and period > 0, sensing_range > 0"):
+        Avoidance(*given)
+
+
 def closest(position: np.ndarray, velocity: np.ndarray, centre: np.ndarray, other: np.ndarray, h: float) -> float:
     """Exact minimum distance between two points in uniform motion over one period."""
     x, v = position - centre, (velocity - other) * h

@@ -179,7 +179,7 @@ def _other(
     """Where another robot is predicted to be, (S + 1, 3), m; its safe distance, its share, when its motion is over.
 
     The places come twice: if the proposal is refused, and if it is accepted. A motion that the other robot has not
-    accepted yet counts in the latter only.
+    accepted yet counts in the second only.
     """
     other = pair.second if pair.first == robot else pair.first
     here, velocity = moves(trace, other, t)

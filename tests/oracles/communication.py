@@ -30,7 +30,7 @@ def wrong_messages(trace: Trace) -> list[Fault]:
 
 
 def _out_of_turn(trace: Trace) -> Iterator[Fault]:
-    """Messages while nobody was being intervened on: the UGV, the one that it was to make way for, or another party.
+    """Messages while nobody was being intervened on: the UGV, the UGV that it was to make way for, or another party.
 
     After a release the UAV withdraws its proposal at its next planning instant, and the gatekeeper notices at its next
     sample: one period each is allowed.

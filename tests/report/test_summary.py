@@ -760,7 +760,7 @@ WORLDS = st.builds(
 
 
 def told(world: World, question: str, lines: Iterable[Line]) -> list[Line]:
-    """The lines of a question, each of which follows from the world."""
+    """The lines of a question; each line follows from the world."""
     found = list(lines)
     for line in found:
         assert follows(world, question, line), (question, line)
@@ -952,7 +952,7 @@ def test_a_dwell_below_the_control_period_is_no_protection(dwell_s: float, mark:
 
 
 def test_the_dwell_of_each_run_is_told() -> None:
-    """The scenario's trigger is proved; that of one run is bare, that of another one has a dwell of its own."""
+    """The scenario's trigger is proved; one run has a bare threshold, and another run its own dwell time."""
     found = document(World({"a": Ran("a"), "bare": Ran("a"), "short": Ran("a")}, {"ZENO-PROOF": "proved"}))
     found["claims"].append(claim("ZENO-PROOF", "bare", "refuted", inputs={"dwell_s": 0.0}))
     found["claims"].append(claim("ZENO-PROOF", "short", "proved", inputs={"dwell_s": 0.06}))

@@ -15,7 +15,14 @@ from hypothesis import strategies as st
 from properties import examples
 from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorConfig
 from pydrake.systems.framework import DiagramBuilder
-from pydrake.systems.primitives import Integrator, LogVectorOutput, PassThrough, TrajectorySource, ZeroOrderHold
+from pydrake.systems.primitives import (
+    ConstantVectorSource,
+    Integrator,
+    LogVectorOutput,
+    PassThrough,
+    TrajectorySource,
+    ZeroOrderHold,
+)
 from pydrake.trajectories import PiecewisePolynomial
 from verify.judging import decided
 
@@ -102,6 +109,17 @@ def test_a_dip_below_the_release_level_within_a_step_is_a_release() -> None:
     assert times(status, 3) == [pytest.approx(reached, abs=2e-6)]
     assert len(times(status, 2)) == 2
     assert times(status, 2)[1] == pytest.approx((4.0 + np.sqrt(9.0 - 0.25)) / 8.0, abs=2e-6)
+
+
+def test_a_decision_variable_that_is_not_a_number_is_an_error() -> None:
+    """No comparison with a level would notice it: the trigger would never fire."""
+    builder = DiagramBuilder()
+    system = builder.AddSystem(EventTrigger(1, TRIGGER))
+    for name, count in (("decision_variable", 1), ("decision_range", 2)):
+        source = builder.AddSystem(ConstantVectorSource(np.full(count, np.nan)))
+        builder.Connect(source.get_output_port(), system.GetInputPort(name))
+    with pytest.raises(ValueError, match=r"decision_range is \[nan, nan\] at .* s; wanted: numbers"):
+        Simulator(builder.Build()).AdvanceTo(1.0)
 
 
 def test_a_dip_too_short_to_be_isolated_is_a_release_and_a_trigger_at_once() -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -30,6 +32,14 @@ def test_every_tick_is_one_of_the_controllers(every: int, control: float, k: int
 @pytest.mark.parametrize(("period", "control"), [(0.05, 0.025), (0.1, 0.1), (0.2, 0.1)])
 def test_periods_that_are_exact_multiples_are_declared_as_they_are(period: float, control: float) -> None:
     assert Ticks(period, control).period == period
+
+
+@pytest.mark.parametrize(
+    ("period", "control"), [(0.05, 0.1), (0.25, 0.1), (0.0, 0.1), (-0.1, 0.1), (0.1, 0.0), (math.nan, 0.1)]
+)
+def test_other_periods_are_refused(period: float, control: float) -> None:
+    with pytest.raises(ValueError, match="a multiple of the control period"):
+        Ticks(period, control)
 
 
 def test_answers_are_executed_from_the_sample_at_which_they_are_given(case_a: Scenario) -> None:

@@ -13,8 +13,10 @@ from builders.runs import passing_by, run_of
 from verify.judging import CLAIMS, GATE, UNRECORDED, decided
 
 from airground_drake.run.trace import Trace, load, save
-from airground_drake.verify import Finding, judge
+from airground_drake.scenarios.schema import Scenario
+from airground_drake.verify import Finding, judge, judge_model
 from airground_drake.verify.finding import Failure
+from airground_drake.verify.model.safe_budget import SafeBudget
 
 
 @pytest.mark.parametrize("method", "abcd")
@@ -94,6 +96,17 @@ def test_a_claim_that_cannot_say_whether_it_applies_is_an_error(monkeypatch: pyt
 
     monkeypatch.setattr(type(CLAIMS["LIVE-GOAL"]), "applies", applies)
     (verdict,) = judge(run_of("d"), claims=["LIVE-GOAL"])
+    assert (verdict.status, verdict.evidence.error) == ("error", "ValueError: applies")
+
+
+def test_a_claim_about_the_model_that_cannot_say_whether_it_applies_is_an_error(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def applies_to(self: Any, scenario: Scenario) -> bool:
+        raise ValueError("applies")
+
+    monkeypatch.setattr(SafeBudget, "applies_to", applies_to)
+    (verdict,) = judge_model(run_of("d").scenario, claims=["SAFE-BUDGET"])
     assert (verdict.status, verdict.evidence.error) == ("error", "ValueError: applies")
 
 

@@ -167,7 +167,7 @@ def fits(graph: CoarseGraph, team: Team, step: Step, i: int, edge: int) -> bool:
 def give(graph: CoarseGraph, team: Team, step: Step, root: int) -> bool:
     """Give a robot a move, and moves to all robots in the way of it; False, and nothing is changed, if that fails.
 
-    The robots that are being given moves are a stack of frames: robot, number of its moves, index of the one that is
+    The robots that are being given moves are a stack of frames: robot, number of its moves, index of the move
     tried, robot to change places with, number of robots with moves before it, and next robot to look at.
     """
     at, moves, counts, frames, lists = step.at, step.moves, step.counts, step.frames, step.lists

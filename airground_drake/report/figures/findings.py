@@ -126,7 +126,7 @@ def speeds(item: Mapping[str, Any]) -> Lines:
 
 
 def one_or_two(item: Mapping[str, Any]) -> Lines:
-    """Item 18: mean decision time over the drift, with two thresholds and with the one that the trigger has."""
+    """Item 18: mean decision time over the drift, with two thresholds and with the trigger's single one."""
     known = item["evidence"]["Table 1, drift assumed"]
     zeta, noise, at = known["zeta_m"], known["noise_m_sqrt_s"], known["drift_m_s"]
     drift = np.geomspace(0.1 * at, 10.0 * at, POINTS)

@@ -228,7 +228,7 @@ def _least(cores: Cores, start: Array, end: Array, shares: Array, planar: bool) 
 
 @np.errstate(divide="ignore", invalid="ignore")
 def _turning_points(cores: Cores, start: Array, end: Array, planar: bool) -> Array:
-    """Shares of a straight motion at one of which it is nearest to a core that it does not enter, (..., C)."""
+    """Shares of a straight motion, (..., C); at one of them it is nearest to a core that it does not enter."""
     step, edges = (end - start)[..., None, :], _edges(cores.corners)
     flat, to = step[..., :2], cores.corners - start[..., None, :2]
     crossed = (to * edges.outward).sum(axis=-1) / (flat * edges.outward).sum(axis=-1)
@@ -328,7 +328,7 @@ class Contacts(NamedTuple):
 
 
 def within(cores: Cores, places: Array, reach: float, *, planar: bool) -> Contacts:
-    """Which of K places (K, 3), m, in the order of a way, are within a distance, m, of which of m cores."""
+    """Pairs of a place and a core within a distance, m: K places (K, 3), m, in the order of a way, and m cores."""
     found = list(_within(cores, places, reach, planar)) if len(places) else []
     none = np.empty(0, dtype=np.intp)
     place, core = (np.concatenate([none, *(each[k] for each in found)]) for k in (0, 1))

@@ -65,8 +65,8 @@ class SafeBudget(TheoremClaim):
         "A delay comes before a lag. Between a robot with either and a unicycle, what both cost is added up.",
     )
     does_not_establish = (
-        "That the steered points keep the law's distance: that is SAFE-INV. Nor that a command was met in full: a "
-        "command that is shortened recovers a distance at a smaller gain."
+        "That the steered points keep the law's distance (SAFE-INV does), or that a command was met in full: a "
+        "shortened command recovers a distance at a smaller gain."
     )
     theorems: tuple[str, ...] = ()
     margin_of = "distance in the law less what the plants take"

@@ -147,7 +147,7 @@ class GatePlan(GateClaim):
         "normals. A half-plane is part of it only where some plan can come nearer than d: elsewhere (26d) asks for "
         "nothing.",
         "The cost of the choice that lost is the recorded one.",
-        "The relaxed plan recorded is the one that was rounded.",
+        "The recorded relaxed plan was rounded, and no other.",
         "Under method (d), the recorded outcomes of both choices.",
     )
     does_not_establish = (

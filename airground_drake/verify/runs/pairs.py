@@ -228,9 +228,9 @@ def carried(trace: Trace) -> list[tuple[Indices, Array | None]]:
 
 
 def contacts(trace: Trace, places: Array, rows: Indices, reach: float, *, planar: bool) -> Contacts:
-    """Which places (K, 3), m, in the order of a way, are within a distance, m, of which parts of the barriers.
+    """Pairs of a place and a part of a barrier within a distance, m; the places, (K, 3), m, are in the order of a way.
 
-    Barriers that move are where they are at K rows; those that are not there are nowhere.
+    Barriers that move are taken where they are at each of the K rows; those that are absent there count for nothing.
     """
     parts = parts_of(trace)
     found = list[Contacts]()

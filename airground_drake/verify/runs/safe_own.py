@@ -47,7 +47,7 @@ class SafeOwn(TraceClaim):
         "V is the declared speed (`max_speed_m_s`), whether it is true or not: SAFE-HYP compares it with the run.",
     )
     does_not_establish = (
-        "That a distance was kept: an obstacle that moves can come as near as it likes (SAFE-TRACE). Nor that a robot "
+        "That a distance was kept (SAFE-TRACE does): an obstacle that moves can come as near as it likes. That a robot "
         "got out of its way. It says nothing about any other run."
     )
 

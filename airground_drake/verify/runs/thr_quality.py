@@ -134,7 +134,7 @@ class ThrQuality(TraceClaim):
     exercised_by = "triggers, and excursions without one"
 
     def check(self, trace: Trace) -> Finding:
-        """Judge the decisions of each UGV; the one that is farthest off decides."""
+        """Judge the decisions of each UGV; the finding is about the UGV that is farthest off."""
         zeta, release, dwell = levels_of(trace)
         tolerance = zeta - release if release < zeta else zeta / 2.0
         decisions: list[Decided] = []

@@ -101,7 +101,7 @@ def edge_rows(graph: CoarseGraph, edge: int) -> Array:
 
 
 def reachable(graph: CoarseGraph, starts: tuple[int, ...], targets: tuple[int, ...]) -> bool:
-    """Breadth first over all configurations and all joint moves: what no search can do better."""
+    """Breadth first over all configurations and all joint moves: no search finds a shorter plan."""
     together: dict[tuple[int, int], bool] = {}
 
     def allowed(one: int, other: int) -> bool:
