@@ -119,8 +119,7 @@ def _of_faults(runs: Mapping[str, Mapping[str, Any]]) -> Iterator[Item]:
         for kind in kinds[:MAX_FAULTS]:
             count, first_s = kind["count"], kind["first_s"]
             often = f"{count} times, first at {first_s:.2f} s" if count > 1 else f"once, at {first_s:.2f} s"
-            about = f"policy {kind['policy']}"
-            yield Item("error", f"{kind['what']} ({often})", run=name, about=about, anchor="happened")
+            yield Item("error", f"policy {kind['policy']}: {kind['what']} ({often})", run=name, anchor="happened")
         if len(kinds) > MAX_FAULTS:
             more = len(kinds) - MAX_FAULTS
             yield Item("error", f"{counted(more, 'more kind')} of fault{'s' * (more > 1)}", run=name, anchor="happened")

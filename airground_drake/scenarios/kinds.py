@@ -81,10 +81,16 @@ def _on_the_ground(point: list[float]) -> list[float]:
     return point
 
 
+def _in_the_air(point: list[float]) -> list[float]:
+    if point and point[2] < 0.0:
+        raise refused(point, "z must be 0 m or more: below is the ground")
+    return point
+
+
 def _all_or_none(point: list[float]) -> list[float]:
     if len(point) not in (0, 3):
         raise refused(point, "3 numbers in m: [x, y, z]")
-    return point
+    return _in_the_air(point)
 
 
 def _place(point: list[float]) -> list[float]:
@@ -115,6 +121,7 @@ Share = Annotated[Number, Field(ge=SMALLEST, le=1.0), BeforeValidator(as_float)]
 NotNegative = Annotated[Number, Field(ge=0.0), BeforeValidator(as_float)]
 Point = Annotated[list[Real], Field(strict=True, min_length=3, max_length=3)]  # no set, which has no order
 GroundPoint = Annotated[Point, AfterValidator(_on_the_ground)]
+AirPoint = Annotated[Point, AfterValidator(_in_the_air)]
 
 
 @dataclass(frozen=True)
@@ -158,7 +165,9 @@ class OneOrList:
         return {"anyOf": [several["items"], several]}
 
 
-PointOrNone = Annotated[list[Real], Field(strict=True), ValueRule(_all_or_none, lambda: {"minItems": 0, "maxItems": 3})]
+AirPointOrNone = Annotated[
+    list[Real], Field(strict=True), ValueRule(_all_or_none, lambda: {"minItems": 0, "maxItems": 3})
+]
 PlaceOrNone = Annotated[
     list[Real], Field(strict=True), ValueRule(_place_or_none, lambda: {"minItems": 0, "maxItems": 3})
 ]

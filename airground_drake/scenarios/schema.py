@@ -17,6 +17,8 @@ from airground_drake.base.files import sha256
 from airground_drake.registry import METHODS, MODEL_CLAIMS, PLANTS, POLICIES, ROUTES, RUN_CLAIMS, UAV_TASKS
 from airground_drake.scenarios.kinds import (
     CLAIMS,
+    AirPoint,
+    AirPointOrNone,
     CellRectangle,
     Corner,
     CornersOrNone,
@@ -30,7 +32,6 @@ from airground_drake.scenarios.kinds import (
     Place,
     PlaceOrNone,
     Point,
-    PointOrNone,
     Positive,
     Real,
     Share,
@@ -154,9 +155,9 @@ class Uav:
 
     name: Name = "uav"
     """Its name in traces and reports."""
-    start_m: Point = field(kw_only=True)
+    start_m: AirPoint = field(kw_only=True)
     """Where it starts."""
-    target_m: PointOrNone = field(default_factory=list)
+    target_m: AirPointOrNone = field(default_factory=list)
     """Its target; left out or empty: over the centroid of the UGVs' targets, at `altitude_m`."""
     altitude_m: Positive = 2.0
     """Height over the centroid of the UGVs; more than `air_ground_m` plus both radii."""

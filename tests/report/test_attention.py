@@ -66,8 +66,8 @@ def test_what_is_missing_or_faulty_or_ends_too_early(scenario: Scenario, traces:
     report["overall"] |= {"undemonstrated": [7]}
     report["scenario"]["resolved"]["duration_s"] = 15.0
     first, second, early, *rest = attention.items(report)
-    assert first.words == "boom.py:5 ValueError: no (14 times, first at 6.05 s)"
-    assert second.words == "late (once, at 9.00 s)"
+    assert first.words == "policy mine: boom.py:5 ValueError: no (14 times, first at 6.05 s)"
+    assert second.words == "policy mine: late (once, at 9.00 s)"
     assert early.words.startswith("duration_s = 15 ends the runs before the presets of ugv1, ugv2 do (2")
     assert [(item.words, item.anchor) for item in rest] == [
         ("no claim was checked on the run", "claims"), ("finding 7 about the paper", "audit"),

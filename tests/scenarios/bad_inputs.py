@@ -129,6 +129,8 @@ EDITS: list[tuple[str, object]] = [
     ("runs.d.set", {"intervention.policies.1.name": "detour"}),
     # plane, presets
     ("ugvs.one.start_m", [0, 0, 1]),
+    ("uav.start_m", [0, 0, -3]),
+    ("uav.target_m", [0, 0, -3]),
     ("runs.d.stalls_m.one", [1, 0, 1]),
     ("ugvs.one.preset.waypoints_m", [[0, 0, 0]]),
     ("ugvs.one.preset.waypoints_m.1", [0, 0, 0]),
