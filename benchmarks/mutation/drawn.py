@@ -236,6 +236,28 @@ def draw(root: Path, count: int, seed: int, only: Sequence[str] = ()) -> list[Mu
     return mutants
 
 
+def _tests(root: Path, path: str) -> list[str]:
+    """The test file that is named like a file of the package, and others beside it that import the file.
+
+    The whole folder of tests, if none has the name.
+    """
+    folder, name = Path("tests", path).parent, Path(path).stem
+    while not (root / folder).exists():  # tests of a nested folder may lie one above
+        folder = folder.parent
+    if folder == Path("tests"):
+        return ["tests/test_simulation.py", "tests/test_diagram.py"]
+    named = folder / f"test_{name}.py"
+    if not (root / named).exists():
+        return [str(folder)]
+    package = re.escape(f"{PACKAGE}.{Path(path).parent.as_posix().replace('/', '.')}")
+    imports = re.compile(rf"^from {package}(\.{name} import | import .*\b{name}\b)", flags=re.MULTILINE)
+    beside = (each.relative_to(root) for each in sorted((root / folder).glob("test_*.py")))
+    return [
+        str(named),
+        *(str(each) for each in beside if each != named and imports.search((root / each).read_text("utf-8"))),
+    ]
+
+
 def mutant(root: Path, path: str, text: str, edit: Edit) -> Mutant:
     """An edit of a file as a mutant: with whole lines, as many as are there once."""
     first, last = text.rfind("\n", 0, edit.start) + 1, text.find("\n", edit.end)
@@ -244,13 +266,7 @@ def mutant(root: Path, path: str, text: str, edit: Edit) -> Mutant:
     old, new = text[first:last], text[first : edit.start] + edit.new + text[edit.end : last]
     was = " ".join(text[edit.start : edit.end].split())
     ours = next((names for beginning, names in HYPOTHESES.items() if path.startswith(beginning)), ())
-    folder, name = Path("tests", path).parent, Path(path).name
-    while not (root / folder).exists():  # tests of a nested folder may lie one above
-        folder = folder.parent
-    tests = [str(folder / f"test_{name}")] if (root / folder / f"test_{name}").exists() else [str(folder)]
-    if folder == Path("tests"):
-        tests = ["tests/test_simulation.py", "tests/test_diagram.py"]
-    tests = [*(f"tests/hypotheses/{name}" for name in ours), *tests]
+    tests = [*(f"tests/hypotheses/{name}" for name in ours), *_tests(root, path)]
     what = f"{path}:{edit.line}:{edit.start - first}: {edit.kind}: {was[:60]!r} becomes {edit.new[:60]!r}"
     probes = tuple(name for name in PROBES if name.startswith("walls")) if path.startswith(SHAPES) else PROBES
     return Mutant(what, path, "", old, new, probes, tuple(tests))

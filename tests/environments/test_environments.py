@@ -22,6 +22,7 @@ from airground_drake.environments.pettingzoo_env import TeamEnv
 from airground_drake.environments.sources import Source
 from airground_drake.geometry import outline
 from airground_drake.geometry.motion import Motion
+from airground_drake.intervention.planner import Planner
 from airground_drake.intervention.policy import Observation, Policy
 from airground_drake.registry import POLICIES
 from airground_drake.run.simulation import simulate
@@ -164,6 +165,16 @@ def test_what_an_agent_proposes_is_checked_like_any_proposal() -> None:
         "ValueError", "TypeError", "ValueError",
     ]  # fmt: skip
     assert len(trace.proposals) == 0
+
+
+def test_policies_are_asked_once_at_each_instant_and_again_with_an_answer(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked, plan = list[float](), Planner.plan
+    monkeypatch.setattr(Planner, "plan", lambda self, before, t, *rest: asked.append(t) or plan(self, before, t, *rest))
+    env = InterventionEnv(load("minimal"))
+    env.reset(options={"number": 1})
+    for _ in range(3):
+        env.step(np.array([1.0, 0.0, 0.4, 0.5, 0.4], dtype=np.float32))
+    assert 3 < len(set(asked)) <= len(asked) <= len(set(asked)) + 3
 
 
 @pytest.mark.parametrize("number", [-5, 1.5, "3"])

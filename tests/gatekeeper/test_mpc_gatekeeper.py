@@ -14,7 +14,7 @@ from airground_drake.gatekeeper.answer import Rules, settle
 from airground_drake.gatekeeper.budget import Budget
 from airground_drake.gatekeeper.mpc_gatekeeper import GatekeeperState, Inputs, PaperGatekeepers
 from airground_drake.gatekeeper.problem import Horizon, Problem
-from airground_drake.gatekeeper.solution import Solution
+from airground_drake.gatekeeper.solution import Solution, Status
 from airground_drake.geometry.motion import Motion
 from airground_drake.intervention.messages import ACCEPT, REFUSE, SILENT
 from airground_drake.intervention.policy import Proposal
@@ -68,8 +68,27 @@ def test_once_reversed_the_same_costs_do_not_reverse_an_answer_back(
 class Agreeing:
     """A route that accepts everything."""
 
+    status: Status = "optimal"
+
     def solve(self, problem: Problem, budget: Budget) -> Solution:
-        return Solution(True, "optimal", objective=-1.0)
+        return Solution(True, self.status, objective=-1.0)
+
+
+class NotFinite(Agreeing):
+    """A route that says that the data are not finite."""
+
+    status = "refused_not_finite"
+
+
+def test_without_a_plan_it_is_refused_and_no_costs_are_told() -> None:
+    law, motion = (
+        UgvLaw(Avoidance(3.0, 0.05, 4.0), 2.0, 1.5, intervention_on_top=True),
+        Motion(np.zeros(1), np.zeros((1, 3))),
+    )
+    gate = PaperGatekeepers(world(("ugv",)), law, [motion], NotFinite(), Horizon(4, 1, 1.0, 1.0), RULES)
+    now = Inputs(0.05, (Proposal("way", 0.0, motion, number=0),), np.zeros((2, 3)), np.zeros((2, 3)), law)
+    (decision,) = gate.sample(now, GatekeeperState.empty(1)).decisions
+    assert (decision.accepted, decision.throughout) == (False, (-1.0, -1.0))
 
 
 def test_the_dwell_of_an_answer_begins_anew_with_each_proposal() -> None:

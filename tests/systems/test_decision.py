@@ -232,6 +232,20 @@ def test_a_subclass_of_the_built_in_block_has_its_own_say() -> None:
     assert not trace.column("ugv1.decision_variable_m").any()
 
 
+class EndsOnly(DecisionVariable):
+    """Knows x at the ends of steps only."""
+
+    extremes = DecisionBlock.extremes
+
+
+def test_with_the_ends_of_steps_a_crossing_is_isolated_too() -> None:
+    scenario = load("case_a", {"duration_s": 15.0})
+    (exact, *_), (ends, *_) = (
+        of_kind(simulate(scenario, "b", decision_block=b), "trigger") for b in (DecisionVariable, EndsOnly)
+    )
+    assert ends == pytest.approx(exact, abs=2e-6)
+
+
 def test_a_recorded_signal_drives_the_trigger_and_its_crossings_are_isolated() -> None:
     scenario = load("case_a", {"duration_s": 5.0, "decision.release_m": 1.0})
     trace = simulate(scenario, "b", decision_block=Played)

@@ -63,5 +63,5 @@ def reasons(trace: Trace) -> dict[str, str]:
 
 def silent(trace: Trace, ugvs: Iterable[str], kind: str) -> Finding:
     """Not run: UGVs were intervened on, but no message of a kind was recorded."""
-    reason = f"{', '.join(ugvs)} were in mode 'intervening', but the trace has no {kind}"
+    reason = f"{', '.join(ugvs)}: in mode 'intervening', but the trace has no {kind}"
     return Finding("not_run", evidence={"reason": reason, "faults": trace.meta["faults"]})
