@@ -230,7 +230,7 @@ def _obstacle(
 
 
 def _shape(rng: np.random.Generator, size: float, height: float) -> dict[str, Any]:
-    """The keys of a shape; of a ball there are none."""
+    """The keys of a shape; a ball has none."""
     kind = str(rng.choice(["ball", "post", "box", "wall", "polygon"])) if size else "ball"
     if kind == "ball":
         return {}

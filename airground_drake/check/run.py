@@ -33,8 +33,8 @@ class Run:
         name: of the run in its scenario.
         scenario: as resolved, with the values that the run sets.
         events: by time.
-        states: see airground_drake/run/trace.py for the columns.
-        samples: likewise.
+        states: columns as in airground_drake/run/trace.py.
+        samples: columns as in airground_drake/run/trace.py.
     """
 
     name: str

@@ -197,7 +197,7 @@ def shortfalls_m(
         pair: share, and shape of what it avoids.
         safe_m: distance to be kept in each period, (K,).
         gain: A h of each period, (K,).
-        lasts: by what the steps of each period are divided, (K,); by default by 1.
+        lasts: divisors of the steps of each period, (K,); by default 1.
     """
     reach = np.linalg.norm(np.diff(own_m, axis=0), axis=1) + np.linalg.norm(np.diff(other_m, axis=0), axis=1)
     lasts = lasts or [Fraction(1)] * len(reach)
@@ -251,7 +251,7 @@ def safe_hyp(run: Run) -> Found:
             if pair.moves_m_s:
                 missed = float(shortfall_m(own, other, law.passive(period), Fraction(), last)) - pair.slip_m
                 about = f"{pair.robot}, {pair.other}"
-                holds("passive law", missed <= SMALL, missed, "missed by nothing", about=about)
+                holds("passive law", missed <= SMALL, missed, "0 m/s missed", about=about)
             else:
                 lacks = shortfall_m(own, other, law, gain, last)
                 lost = max(lost, lost_m(lacks, gain, len(run.sample_row)) - pair.drift_m)

@@ -47,7 +47,7 @@ class Part:
     """A convex part of a shape. Its methods take places (K, 3), m."""
 
     def __init__(self, corners: Sequence[Corner], base_m: float, top_m: float) -> None:
-        """Make a part from its corners, counter-clockwise, and the heights from which to which it stands."""
+        """Make a part from its corners, counter-clockwise, and the heights of its base and its top."""
         self.corners, self.base_m, self.top_m = corners, base_m, top_m
         self.begin = np.array(corners, dtype=np.float64)
         self.edge = np.roll(self.begin, -1, axis=0) - self.begin
@@ -68,8 +68,8 @@ class Part:
         """Least signed distances on straight steps from `start` to `end`, (K, 3), where below `reach_m`: (K,), m.
 
         Args:
-            start: as above.
-            end: likewise.
+            start: places at the beginning of each step, m.
+            end: places at the end of each step, m.
             at_m: signed distances of both, (K,), m.
             reach_m: of a step that stays beyond it, the result may be too large.
         """

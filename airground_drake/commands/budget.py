@@ -21,8 +21,8 @@ def parser() -> argparse.ArgumentParser:
     """Make the parser."""
     parser = Parser(
         prog="airground budget",
-        description="Print, for each kind of pair, the distance that is promised, the one that the law keeps between "
-        "the points that it steers, and what each term takes. Distances are between surfaces.",
+        description="Print, for each kind of pair, the promised distance, the distance that the law keeps between "
+        "steered points, and what each term takes. Distances are between surfaces.",
     )
     parser.add_argument("scenario", help="name of a shipped scenario, or path to a YAML file")
     parser.add_argument("-o", "--output", type=output_file, metavar="FILE", help="draw the budget, too, as SVG")

@@ -136,7 +136,7 @@ class Planner:
         max_speed: speed limits of the UGVs, (n,), m/s.
         radius: radii of the UGVs' bodies, (n,), m, or one for all.
         mapped_from: when each of `mapped` appears, (m,), s, or one time for all.
-        mapped_until: when each disappears, likewise.
+        mapped_until: when each disappears, in the same order.
         movers: obstacles that move.
         coasting: time for which an obstacle that moves is predicted to keep its velocity; then it stands, s.
         trails: per UGV, whether its plant may fall behind a motion within its speed limit; default: none does.

@@ -35,9 +35,9 @@ class Stream:
         nano: the rest, in billionths of the unit, (n,).
         places: x, y, z, (n, 3); z is nan where the source lacks it.
         time_unit: key of `PER_S`; '' if the source does not say.
-        length_unit: key of `PER_M`; '' likewise.
+        length_unit: key of `PER_M`; '' if the source does not say.
         frame: coordinate frame, without slashes at the ends; '' if the source does not say.
-        child: frame that the body carries; '' likewise.
+        child: frame that the body carries; '' if the source does not say.
         clock: what the stamps are: "header stamps", "times of receipt", or the name of a column.
         is_file: whether `name` is the stem of a file.
         skipped: rows without a position or a stamp, by the reason.

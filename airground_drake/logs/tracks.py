@@ -110,7 +110,7 @@ class Choice(NamedTuple):
         uavs: further UAVs.
         gap_s: see `Track`; 0 for `GAP` times the usual time between two samples.
         time_unit: of stamps without one; '' to find out.
-        length_unit: likewise.
+        length_unit: of positions without one; '' to find out.
     """
 
     rename: Mapping[str, str] = {}

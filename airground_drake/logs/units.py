@@ -34,7 +34,7 @@ def settle(streams: Mapping[str, Stream], scenario: Json, time_unit: str, length
         streams: by body.
         scenario: as resolved.
         time_unit: of streams that do not say theirs; '' to find out.
-        length_unit: likewise.
+        length_unit: of streams that do not say theirs; '' to find out.
 
     Returns:
         Remarks.

@@ -139,7 +139,7 @@ class _Search:
         return best
 
     def end(self, vector: Vector, row: int) -> int:
-        """The last row up to which a vector serves, from a row on; that row itself if it serves no period."""
+        """The last row of the periods from a row on that a vector serves; the row itself if it serves none."""
         if not any(vector):
             return row
         along = max(_dot(vector, corner) for corner in self._corners)

@@ -263,7 +263,7 @@ _ALL = (
     Theorem(
         "Passive.restored", "ours", ("SAFE-HYP",),
         "A retreat that is as fast as what comes nearer in a period loses nothing in it.",
-        (*_PERIOD, "The distance starts at L or nearer, by what one period can take away."),
+        (*_PERIOD, "The distance starts at L, or nearer by at most what one period can take away."),
     ),
     Theorem(
         "Passive.held_off", "ours", ("SAFE-HYP",),

@@ -59,8 +59,8 @@ def judge(
         progress: is told what is done.
         drawn: whether to draw figures.
         kept: as in `make.Wanted`.
-        seeds: likewise.
-        audit: likewise.
+        seeds: as in `make.Wanted`.
+        audit: as in `make.Wanted`.
 
     Raises:
         PluginError: if a claim of the scenario cannot be made.

@@ -25,9 +25,9 @@ REPORT = "airground_drake.report/3"
 ORDER = (("proved",), ("holds", "supported"), ("not_exercised",), (*UNDECIDED, "gone"), ("refuted",))
 """Verdicts from the best to the worst, as `statuses.outcome` names them; `gone`: no verdict any more."""
 ROWS = (("reproduced",), ("calibrated",), ("by_construction",), ("ambiguous",), ("not_reproduced", "gone"))
-"""Rows of the reproduction table, likewise."""
+"""Rows of the reproduction table: the same."""
 OVERALL = (("as_expected",), ("inconclusive",), ("not_as_expected",))
-"""Over all claims, likewise."""
+"""Over all claims: the same."""
 WITHIN = 1e-8
 """Numbers agree to this times 1 plus their size: versions of numpy, scipy and solvers round differently."""
 LONGEST_INTEGER = 18

@@ -74,7 +74,7 @@ class Near(NamedTuple):
 
     @property
     def pair(self) -> str:
-        """The distance, of whom, and whether it was there from the start."""
+        """The distance, between whom, and whether it was there from the start."""
         return f"{self} ({self.between})"
 
     @property

@@ -461,7 +461,7 @@ class Gatekeeper:
     longest_s: Positive = 30.0
     """Longest time for which an accepted proposal is executed."""
     settling_s: Positive = 10.0
-    """Time past the end of motion and preset trajectory up to which outcomes are compared."""
+    """Outcomes are compared up to this time after the end of motion and preset trajectory."""
     tries: Count = 5
     """Number of acceptances before a rest."""
     rest_s: Positive = 5.0

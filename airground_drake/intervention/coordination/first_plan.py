@@ -34,8 +34,8 @@ SWAPS_FROM = 1.0
 FIRST = 400
 """Candidates for each robot in the first round; every further round gets twice as many on each roadmap."""
 NOISES = (0.05, 0.3, 1.0)
-"""How much moves are shuffled in each round, in widths, and so on from the first again. Some orders of moves lead into
-a long search, others of the same robots straight to a plan: beginning anew is worth more than going on."""
+"""How much moves are shuffled in each round, in widths, in turn. Some orders of moves lead into a long search, others
+of the same robots straight to a plan: beginning anew is worth more than going on."""
 AGAIN = 96
 """Number of further plans with shuffled moves, once one is found: on the roadmap that has it, and on the widest two."""
 AGAIN_AT_MOST, AGAIN_SHARE = 2.0, 3

@@ -38,7 +38,9 @@ class SafeBudget(TheoremClaim):
     """SAFE-BUDGET."""
 
     id = "SAFE-BUDGET"
-    summary = "The law keeps a larger distance, by what turning, lags and delays cost: so bodies keep the safe one."
+    summary = (
+        "The law keeps the safe distance plus what turning, lags and delays cost, so bodies keep the safe distance."
+    )
     statement = (
         "Where the points that the law steers keep the law's distance d_law at the samples, the bodies of robots that "
         "turn, lag, get their commands late or have a plant of the user's own keep the safe distance d at all times. "

@@ -81,7 +81,7 @@ class Plans(Choices):
     """The evidence where problems (26) were solved; gaps and enclosures are relative to the cheaper constant plan.
 
     Attributes:
-        without_a_plan: refusals for want of a plan.
+        without_a_plan: refusals because there was no plan.
         largest_slack_m: how far a plan leads inside a safe distance at most.
         plans_with_slack: how many do.
         rounded_plans: decisions with a relaxed plan.
@@ -154,7 +154,7 @@ class GatePlan(GateClaim):
         "That the prediction is right, or that the run went as predicted. (26d) is soft: a feasible plan may lead "
         "inside a safe distance, at the cost of its slack (SAFE-TRACE is about safety). A wide gap refutes nothing: "
         "half-planes are conservative, and the best plan by exact distances may cost less than their optimum. The "
-        "gatekeeper takes the cheapest plan it knows, which need not be the rounded one. Refusals for want of a plan "
+        "gatekeeper takes the cheapest plan it knows, which need not be the rounded one. Refusals without a plan "
         "are only listed."
     )
 
