@@ -111,9 +111,11 @@ class Episodes:
     def _begin(self, rng: np.random.Generator, options: Mapping[str, Any] | None) -> Episode:
         """Begin the episode with the number in the options, or a drawn one."""
         number = (options or {}).get("number")
-        if number is not None and not (isinstance(number, Integral) and 0 <= number <= MAX_SEED):
+        if number is None:
+            number = self._source.drawn(rng)
+        if not isinstance(number, Integral) or int(number) not in range(MAX_SEED + 1):
             raise ValueError(f"options: number: {number!r}; allowed: a whole number from 0 to {MAX_SEED}")
-        self._number = self._source.drawn(rng) if number is None else int(number)
+        self._number = int(number)
         self._episode = self._source.episode(self._number)
         return self._episode
 

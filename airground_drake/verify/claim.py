@@ -255,7 +255,7 @@ def require_motion(trace: Trace) -> None:
     scenario, t = trace.scenario, trace.t
     if trace.run not in scenario.runs or scenario.runs[trace.run].method != trace.meta["method"]:
         raise TraceError(f"the scenario declares no run {trace.run!r} of method {trace.meta['method']!r}")
-    if trace.ugvs != list(scenario.ugvs) or trace.robots != [*trace.ugvs, scenario.uav.name]:
+    if trace.ugvs != list(scenario.ugvs) or trace.robots != list(scenario.robots):
         raise TraceError(f"the trace is of the robots {trace.robots}, which are not those of its scenario")
     if len(t) < 2 or (np.diff(t) < 0.0).any():
         raise TraceError("the trace has fewer than two rows, or its time runs backwards")

@@ -12,7 +12,7 @@ from airground_drake.decision.trigger import Mode
 from airground_drake.geometry import convex, outline
 from airground_drake.run.trace import Trace
 from airground_drake.scenarios.outlines import outlines_of
-from airground_drake.scenarios.schema import ARENA, Scenario, Uav, Ugv
+from airground_drake.scenarios.schema import ARENA, Scenario
 from airground_drake.view.geometry import outer_edges
 from airground_drake.view.looks import OBSTACLE_COLOR, UNSEEN_COLOR
 
@@ -157,7 +157,7 @@ class Stage:
 
 def stage(scenario: Scenario, visited_m: Array | None = None) -> Stage:
     """The stage of a scenario; it contains the positions `visited_m` (M, 3), m; default: the starts."""
-    specs: dict[str, Ugv | Uav] = {**scenario.ugvs, scenario.uav.name: scenario.uav}
+    specs = scenario.robots
     if visited_m is None:
         visited_m = np.array([spec.start_m for spec in specs.values()])
     low, high = _bounds(scenario, visited_m)

@@ -95,7 +95,7 @@ class SafeDist(TheoremClaim):
         """The constants of SAFE-INV, and the bound on the disturbance, m/s."""
         given = constants(scenario)
         least = float(min(each.safe_m for each in kinds_of(given)))
-        fastest = max(scenario.uav.max_speed_m_s, *(ugv.max_speed_m_s for ugv in scenario.ugvs.values()))
+        fastest = max(robot.max_speed_m_s for robot in scenario.robots.values())
         return {**given, "disturbance_m_s": min(0.1 * fastest, given["avoidance_gain_1_s"] * least / 4.0)}
 
     def hypotheses(self, inputs: dict[str, Any]) -> list[Hypothesis]:
