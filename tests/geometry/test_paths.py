@@ -219,6 +219,15 @@ def test_start_inside_discs(angle: float, depth: float, goal: Point, discs: list
     assert path.length_m >= leg + math.dist(leave.tolist(), goal) - 1e-9
 
 
+def test_a_start_deep_inside_small_discs_leaves_all_of_them() -> None:
+    """Where the nearest way out is many radii away, farther discs count, too."""
+    discs = [(0.5 * x, 0.5 * y, 0.5) for x in range(-6, 7) for y in range(-6, 7)]
+    path = find((0.1, 0.0), (9.0, 0.0), discs)
+    leave = path.at(float(path.pieces[0, 5]))[0]
+    assert clearance(leave[None], discs) == pytest.approx(0.0, abs=TOL)
+    assert path.pieces[0, 5] == pytest.approx(math.hypot(2.9 + math.sqrt(0.5**2 - 0.25**2), 0.25), abs=1e-9)
+
+
 @given(point, point, scene)
 def test_a_path_among_many_discs_is_found_from_those_in_its_way(start: Point, goal: Point, discs: list[Disc]) -> None:
     at_once = length_or_inf(start, goal, discs)

@@ -114,6 +114,15 @@ def test_the_start_leaves_by_the_nearest_place_of_the_boundary(start: Point) -> 
     assert min(float(lacking(place, rows, keep).max()) for place in ring) > 0.0
 
 
+def test_a_start_deep_inside_a_row_of_walls_leaves_all_of_them() -> None:
+    """Where the nearest way out is farther than the distance kept, farther walls count, too."""
+    rows, keep = outline.stacked([wall((0.5 * k, -2.0), (0.5 * k, 2.0)) for k in range(-6, 7)]), np.full(13, 0.5)
+    path = shortest_path((0.1, 0.1), (9.0, 0.0), rows, keep)
+    left = path.at(float(path.pieces[0, 5]))[0]
+    assert lacking(left, rows, keep).max() == pytest.approx(0.0, abs=TOL)
+    assert path.pieces[0, 5] == pytest.approx(math.hypot(0.15, 1.9 + math.sqrt(0.5**2 - 0.25**2)), abs=1e-9)
+
+
 @examples(30, fuzz=2000)
 @given(point, point, fields(6))
 def test_a_path_is_shortest_and_keeps_its_distances(start: Point, goal: Point, field: tuple[Array, Array]) -> None:
