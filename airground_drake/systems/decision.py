@@ -233,7 +233,7 @@ class EventTrigger(LeafSystem):
     State: the status; the times at which the step and the run began, s; the number of short steps in a row.
     Parameters: `TriggerLevels`; by default those of the trigger.
     Rate: one update per step of the simulator.
-    Raises: ValueError if a decision variable is not a number. RuntimeError after `MOST_SHORT` short steps in a row
+    Raises: PluginError if a decision variable is not a number. RuntimeError after `MOST_SHORT` short steps in a row
     without a transition. While an event is isolated, steps become so short that robots far from the origin no longer
     move in them: their coordinates are rounded. Then x never gets to its level.
     """
@@ -300,7 +300,8 @@ class EventTrigger(LeafSystem):
         t, spans = context.get_time(), self._range.Eval(context)
         before, levels = context.get_discrete_state(0).value(), context.get_numeric_parameter(0).value()
         if np.isnan(spans).any():  # no comparison with a level would notice it
-            raise ValueError(f"decision_range is {spans.tolist()} at {t:g} s; wanted: numbers")
+            told = "from a decision block, a plant or a disturbance"
+            raise PluginError(f"decision_range is not a number, {told}: {short(repr(spans.tolist()))}")
         if anything_due(before, t, spans, levels):
             least, most = spans[: self._count], spans[self._count :]
             discrete.set_value(0, self._after(context, before, self._variable.Eval(context), least, most))

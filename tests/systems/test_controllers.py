@@ -75,13 +75,17 @@ def test_a_task_whose_constructor_fails_is_named(problem: BaseException) -> None
         controller.velocity(0.0, np.zeros((3, 3)), np.zeros((2, 3)))
 
 
-def test_a_robot_that_is_nowhere_ends_the_run() -> None:
+@pytest.mark.parametrize(
+    ("robot", "told"),
+    [("uav", "positions are not finite"), ("ugv2", r"decision_range is not a number, .* or a disturbance")],
+)
+def test_a_robot_that_is_nowhere_ends_the_run(robot: str, told: str) -> None:
     builder = DiagramBuilder()
     team = builder.AddSystem(build_diagram(load("case_a"), "d"))
     nowhere = builder.AddSystem(ConstantVectorSource(np.full(3, np.nan)))
-    builder.Connect(nowhere.get_output_port(), team.GetInputPort("disturbance_ugv2"))
+    builder.Connect(nowhere.get_output_port(), team.GetInputPort(f"disturbance_{robot}"))
     simulator = Simulator(builder.Build())
     config = SimulatorConfig(integration_scheme="explicit_euler", max_step_size=0.025, use_error_control=False)
     ApplySimulatorConfig(config, simulator)
-    with pytest.raises(PluginError, match="positions are not finite"):
+    with pytest.raises(PluginError, match=told):
         simulator.AdvanceTo(1.0)
