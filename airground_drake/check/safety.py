@@ -251,7 +251,7 @@ def safe_hyp(run: Run) -> Found:
             if pair.moves_m_s:
                 missed = float(shortfall_m(own, other, law.passive(period), Fraction(), last)) - pair.slip_m
                 about = f"{pair.robot}, {pair.other}"
-                holds("passive law", missed <= SMALL, missed, "0 m/s missed", about=about)
+                holds("passive law", missed <= SMALL, missed, "0 m missed", about=about)
             else:
                 lacks = shortfall_m(own, other, law, gain, last)
                 lost = max(lost, lost_m(lacks, gain, len(run.sample_row)) - pair.drift_m)

@@ -197,7 +197,7 @@ def _runs(document: Document, every: Runs) -> Iterator[Line]:
 
 
 def _messages(document: Document, every: Runs) -> Iterator[Line]:
-    """What the UAV sent and the UGVs answered, beside a scheme without a trigger."""
+    """What the UAV sent and withdrew, and the UGVs answered, beside a scheme without a trigger."""
     helped = (course.name for course in every if course.helped and course.name in document["runs"])
     taken = {name: document["runs"][name]["metrics"]["messages"] for name in helped}
     told = grouped((_of_kinds(found), run) for run, found in taken.items() if found["proposals"])
@@ -210,9 +210,8 @@ def _messages(document: Document, every: Runs) -> Iterator[Line]:
 
 
 def _of_kinds(count: Mapping[str, int]) -> str:
-    """Numbers of proposals and answers."""
-    answered = f" and {counted(count['answers'], 'answer')}" if count["answers"] else ""
-    return f"{counted(count['proposals'], 'proposal')}{answered}"
+    """How many proposals, withdrawals and answers; kinds without any are left out."""
+    return joined([counted(n, kind) for kind in ("proposal", "withdrawal", "answer") if (n := count.get(f"{kind}s"))])
 
 
 def _seeds(document: Document, every: Runs, kept: Claims) -> Iterator[Line]:

@@ -91,23 +91,24 @@ def messages(trace: Trace) -> dict[str, Any] | None:
     """How many messages a run took, and how many an always-on scheme takes; None without a UAV that intervenes.
 
     Returns:
-        `proposals`, `answers` (each is a decision of the gatekeeper), as often as they were delivered, `always_on` (the
-        same two, if every UGV got a proposal in every planning period and decided in every period of the gatekeeper),
-        `robots` (the two by UGV).
+        `proposals`, `withdrawals` of proposals, `answers` (each is a decision of the gatekeeper), as often as they were
+        delivered, `always_on` (proposals and answers, if every UGV got a proposal in every planning period and decided
+        in every period of the gatekeeper), `robots` (the three by UGV).
     """
     method, scenario, ugvs = method_of(trace.meta["method"]), trace.scenario, trace.ugvs
     if not method.intervenes:
         return None
     delivered = trace.messages[trace.messages["received_s"].notna()]
-    proposals, answers = (delivered[delivered["kind"] == kind] for kind in ("proposal", "answer"))
+    parties = {"proposal": "receiver", "withdrawal": "receiver", "answer": "sender"}
     robots = {
-        ugv: {"proposals": int((proposals["receiver"] == ugv).sum()), "answers": int((answers["sender"] == ugv).sum())}
+        ugv: {f"{kind}s": int(((delivered["kind"] == kind) & (delivered[party] == ugv)).sum())
+              for kind, party in parties.items()}
         for ugv in ugvs
-    }
+    }  # fmt: skip
     before_s = scenario.duration_s - TIME_TOLERANCE_S  # the first instant is at 0
     planned, decided = (math.ceil(before_s / each.period_s) for each in (scenario.intervention, scenario.gatekeeper))
     return {
-        **{kind: sum(each[kind] for each in robots.values()) for kind in ("proposals", "answers")},
+        **{f"{kind}s": sum(each[f"{kind}s"] for each in robots.values()) for kind in parties},
         "always_on": {"proposals": len(ugvs) * planned, "answers": len(ugvs) * decided * method.gated},
         "robots": robots,
     }

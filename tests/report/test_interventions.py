@@ -64,8 +64,12 @@ def test_messages_beside_always_on_supervision(run: Run) -> None:
     """`case_a` lasts 30 s, has two UGVs, and periods of 0.05 s."""
     trace = run("case_a", "d")
     assert messages(trace) == {
-        "proposals": 1, "answers": len(trace.decisions), "always_on": {"proposals": 1200, "answers": 1200},
-        "robots": {"ugv1": {"proposals": 1, "answers": len(trace.decisions)}, "ugv2": {"proposals": 0, "answers": 0}},
+        "proposals": 1, "withdrawals": 1, "answers": len(trace.decisions),
+        "always_on": {"proposals": 1200, "answers": 1200},
+        "robots": {
+            "ugv1": {"proposals": 1, "withdrawals": 1, "answers": len(trace.decisions)},
+            "ugv2": {"proposals": 0, "withdrawals": 0, "answers": 0},
+        },
     }  # fmt: skip
     assert (messages(run("case_a", "b")) or {})["always_on"] == {"proposals": 1200, "answers": 0}
     assert messages(run("case_a", "a")) is None

@@ -284,7 +284,7 @@ def _run(ran: Ran) -> Document:
                        for r in ("ugv1", "ugv2") if not ran.arrived(r) and r not in ran.first},
         "without_proposals": ran.unasked, "lost_at_the_end": [], "gatekeeper": None,
         "messages": None if ran.method == "a" else {
-            "proposals": ran.sent[0], "answers": ran.sent[1],
+            "proposals": ran.sent[0], "withdrawals": ran.sent[0] // 2, "answers": ran.sent[1],
             "always_on": {"proposals": 240, "answers": 480 * (ran.method in "cd")},
         },
     }  # fmt: skip
@@ -427,9 +427,10 @@ def _(world: World, mark: str, count: str) -> bool:
 def _(world: World, mark: str, told: str, answers: str | None) -> bool:
     """What each run took that sent anything, and what the scheme takes whose runs answer, too."""
     helped = {name: ran for name, ran in world.runs.items() if ran.there and ran.method != "a"}
-    parts = [re.fullmatch(rf"{RUNS}: (\d+) proposals?(?: and (\d+) answers?)?", part) for part in told.split("; ")]
-    found = {name: (int(p[2]), int(p[3] or 0)) for p in parts if p for name in names(p[1])}
-    sent = {name: ran.sent for name, ran in helped.items() if ran.sent[0]}
+    kinds = r"(\d+) proposals?(?:(?:,| and) (\d+) withdrawals?)?(?: and (\d+) answers?)?"
+    parts = [re.fullmatch(rf"{RUNS}: {kinds}", part) for part in told.split("; ")]
+    found = {name: (int(p[2]), int(p[3] or 0), int(p[4] or 0)) for p in parts if p for name in names(p[1])}
+    sent = {name: (ran.sent[0], ran.sent[0] // 2, ran.sent[1]) for name, ran in helped.items() if ran.sent[0]}
     return not mark and found == sent and bool(answers) == any(ran.method in "cd" for ran in helped.values())
 
 
