@@ -70,7 +70,7 @@ class Avoidance:
             obstacle as highest priority. They are there to show that (5) is not safe.
 
     Raises:
-        ValueError: if gain is negative, period or sensing range not positive, or gain or period not finite.
+        ValueError: if gain or sensing range is negative, the period not positive, or gain or period not finite.
     """
 
     gain: float
@@ -80,8 +80,8 @@ class Avoidance:
 
     def __post_init__(self) -> None:
         """Refuse numbers with which no distance is kept."""
-        if not (0.0 <= self.gain < np.inf and 0.0 < self.period < np.inf and self.sensing_range > 0.0):
-            raise ValueError(f"{self}; wanted: finite gain >= 0 and period > 0, sensing_range > 0")
+        if not (0.0 <= self.gain < np.inf and 0.0 < self.period < np.inf and self.sensing_range >= 0.0):
+            raise ValueError(f"{self}; wanted: finite gain >= 0 and period > 0, sensing_range >= 0")
 
     @property
     def layer(self) -> kernels.Layer:
