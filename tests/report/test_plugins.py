@@ -80,7 +80,8 @@ def test_a_run_with_hostile_policies_is_reported_as_it_was(
     capsys.readouterr()
     assert main(["case_a", "-o", str(tmp_path), *arguments, "--allow-plugins"]) == 0
     first = capsys.readouterr().out.splitlines()[0]
-    assert re.fullmatch(r"hostile_policies\.py:\d+ SystemExit: 0 \(.*at \d+\.\d\d s\), run d", first)
+    policy = re.escape("policy builders.hostile_policies:Hostile")
+    assert re.fullmatch(rf"{policy}: hostile_policies\.py:\d+ SystemExit: 0 \(.*at \d+\.\d\d s\), run d", first)
     document = json.loads((tmp_path / "report.json").read_text())
     assert {c["status"] for c in document["claims"] if c["id"] in ("SAFE-TRACE", "SAFE-HYP")} == {"holds"}
     said = " ".join(fault["what"] for fault in document["runs"]["d"]["faults"])
