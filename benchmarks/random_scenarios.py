@@ -230,7 +230,7 @@ def _obstacle(
 
 
 def _shape(rng: np.random.Generator, size: float, height: float) -> dict[str, Any]:
-    """The keys of a shape; a ball has none."""
+    """Draw a shape: its keys in a scenario, {} for a ball."""
     kind = str(rng.choice(["ball", "post", "box", "wall", "polygon"])) if size else "ball"
     if kind == "ball":
         return {}
@@ -381,7 +381,7 @@ def _must_hold(of_run: Trace, found: Mapping[str, Verdict]) -> set[str]:
     must = set(ALWAYS)
     if scenario.decision.trigger != "automaton" or scenario.decision.min_inter_event_s == 0.0:
         must.discard("ZENO-TRACE")
-    worst = Counter[str]()  # margins, 0 where there is none
+    worst = Counter[str]()  # margins, 0 by default
     for entry in found["SAFE-HYP"].evidence["worst"]:
         worst[entry["hypothesis"]] = min(worst[entry["hypothesis"]], entry["margin"])
     if given.method in "ad" and given.composition == "augmented" and worst["safe start"] >= -DISTANCE_TOLERANCE_M:

@@ -100,7 +100,7 @@ def read_text(path: Path) -> str:
 
     Raises:
         OSError: as `read_bytes`.
-        UnicodeDecodeError: if it is no such text.
+        UnicodeDecodeError: if it is not such text.
     """
     return read_bytes(path, LARGEST_TEXT).decode()
 

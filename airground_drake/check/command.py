@@ -83,7 +83,7 @@ def checked(folder: Path, limit_s: float, told: Callable[[CheckLine], object] = 
     """All checks of a report, without warnings of numpy; `told` is called with each when it is done.
 
     Raises:
-        UsageError: if the folder is no report.
+        UsageError: if the folder is not a report.
     """
     import numpy as np
 
@@ -95,9 +95,9 @@ def checked(folder: Path, limit_s: float, told: Callable[[CheckLine], object] = 
             warnings.simplefilter("ignore")  # numbers out of all proportion are refused by the rules, not by numpy
             return check_report(folder, limit_s, told)
     except Disagreement as broken:
-        raise UsageError(f"{folder} is no report: {broken.rule}: {broken.about} is {broken.recorded}") from None
+        raise UsageError(f"{folder} is not a report: {broken.rule}: {broken.about} is {broken.recorded}") from None
     except NotEstablished as error:
-        raise UsageError(f"{folder} is no report: {error.rule}: {error.about}: {error.why}") from None
+        raise UsageError(f"{folder} is not a report: {error.rule}: {error.about}: {error.why}") from None
 
 
 def verdict(lines: Sequence[CheckLine]) -> int:

@@ -72,7 +72,7 @@ def read_bytes(path: Path) -> bytes:
         with os.fdopen(handle, "rb") as file:
             about = os.fstat(file.fileno())
             if not stat.S_ISREG(about.st_mode):
-                raise NotEstablished("the file can be read", "it is no regular file", path.name)
+                raise NotEstablished("the file can be read", "it is not a regular file", path.name)
             if about.st_size > LARGEST_FILE:
                 raise NotEstablished("the file can be read", f"it has {about.st_size} bytes", path.name)
             return file.read()

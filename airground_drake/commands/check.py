@@ -162,7 +162,7 @@ def _proved_again(folder: Path, lines: Sequence[CheckLine]) -> Iterator[CheckLin
 
 
 def _compared(run: str, entry: Any, recorded: Any) -> CheckLine:
-    """The answer of Coq about a run, compared with the recorded one (None: proofs.json has none)."""
+    """Compare what Coq finds of a run with its entry in proofs.json, `recorded`; None if it has no entry."""
     from airground_drake.report.lines import differences, short
 
     line = partial(CheckLine, "proofs", run, by="Coq")

@@ -29,7 +29,7 @@ def parser() -> argparse.ArgumentParser:
         epilog="verdicts from the best to the worst: "
         + "; ".join(", ".join(alike) for alike in compare.ORDER).replace("_", " ")
         + ". One that was as expected and is no longer is worse, too. Exit codes: 0 nothing is worse than before, 1 "
-        "something is (with --exact: any result differs), 2 usage, or a folder is no report.",
+        "something is (with --exact: any result differs), 2 usage, or a folder is not a report.",
     )
     parser.add_argument("before", type=Path, metavar="BEFORE", help="folder of a report")
     parser.add_argument("after", type=Path, metavar="AFTER", help="folder of another")

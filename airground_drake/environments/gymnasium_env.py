@@ -57,8 +57,8 @@ class InterventionEnv(Episodes, gymnasium.Env[Numbers, Numbers]):
             options: `number`: that of the episode, in place of a drawn one.
 
         Raises:
-            ValueError: if the number is no whole number from 0.
-            ScenarioError: if the draw is no valid scenario.
+            ValueError: if the number is not a whole number from 0.
+            ScenarioError: if the draw is not a valid scenario.
             SimulationError: if Drake or a system stops.
         """
         super().reset(seed=seed)

@@ -63,7 +63,7 @@ class Source:
         """Begin an episode.
 
         Raises:
-            ScenarioError: if the draw is no valid scenario.
+            ScenarioError: if the draw is not a valid scenario.
             SimulationError: if Drake or a system stops.
         """
         if not isinstance(self._given, Spec):
@@ -109,12 +109,16 @@ class Episodes:
         return self._begun().trace()
 
     def _begin(self, rng: np.random.Generator, options: Mapping[str, Any] | None) -> Episode:
-        """Begin the episode with the number in the options, or a drawn one."""
+        """Begin the episode with the number in the options, or a drawn one.
+
+        Raises:
+            ValueError: if the number is not a whole number from 0.
+        """
         number = (options or {}).get("number")
         if number is None:
             number = self._source.drawn(rng)
         if not isinstance(number, Integral) or int(number) not in range(MAX_SEED + 1):
-            raise ValueError(f"options: number: {number!r}; allowed: a whole number from 0 to {MAX_SEED}")
+            raise ValueError(f"number of the episode: {number!r}; allowed: a whole number from 0 to {MAX_SEED}")
         self._number = int(number)
         self._episode = self._source.episode(self._number)
         return self._episode

@@ -54,7 +54,7 @@ def read(path: Path, content: bytes, wanted: Wanted) -> Log:
     """The streams of a table: a text, or Parquet.
 
     Raises:
-        LogError: if it is no table, or lacks a column.
+        LogError: if it is not a table, or lacks a column.
     """
     table = _parquet(content) if content[:4] == b"PAR1" else text.read(content)
     labels = table.labels

@@ -56,7 +56,7 @@ def read(content: bytes) -> Table:
     """The table in a text file.
 
     Raises:
-        LogError: if it is no text, or no table.
+        LogError: if it is not text, or not a table.
     """
     lines = re.sub(r"\r+\n", "\n", _decoded(content)).replace("\r", "\n").split("\n")
     full = [k for k, line in enumerate(lines) if line.strip() and not line.lstrip().startswith("#")]
@@ -122,7 +122,9 @@ def _form(lines: Sequence[str]) -> tuple[str, int]:
             if count > MOST:
                 raise LogError(f"it has {count} columns; allowed: {MOST}")
             return delimiter, count
-    raise LogError("it is no table: its lines have no common number of fields, by semicolons, tabs, commas or blanks")
+    raise LogError(
+        "it is not a table: its lines have no common number of fields, by semicolons, tabs, commas or blanks"
+    )
 
 
 def _fields(line: str, delimiter: str) -> list[str]:

@@ -69,7 +69,7 @@ def world(text: str, source: str) -> Gazebo:
         source: its path, for messages.
 
     Raises:
-        ScenarioError: if it is no such world, or has shapes that do not stand upright.
+        ScenarioError: if it is not such a world, or has shapes that do not stand upright.
     """
     root = _parsed(text, source)
     found = root.find("world") if root.tag == "sdf" else root if root.tag == "world" else None

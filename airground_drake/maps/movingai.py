@@ -29,7 +29,7 @@ def cells(text: str, source: str) -> Cells:
     """Which cells of a `.map` file are in the way, (rows, columns), the lowest row first.
 
     Raises:
-        ScenarioError: if it is no such map.
+        ScenarioError: if it is not such a map.
     """
     lines = text.splitlines()
     sizes = {}
@@ -60,7 +60,7 @@ def agents(text: str, source: str, in_the_way: Cells) -> list[Agent]:
     """The agents of a `.scen` file, on the map whose cells are given.
 
     Raises:
-        ScenarioError: if it is no such scenario, or one on another map.
+        ScenarioError: if it is not such a scenario, or one on another map.
     """
     height, width = in_the_way.shape
     first, *lines = text.splitlines() or [""]

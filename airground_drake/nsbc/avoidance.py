@@ -79,7 +79,7 @@ class Avoidance:
     composition: Composition = "augmented"
 
     def __post_init__(self) -> None:
-        """Refuse numbers with which no distance is kept."""
+        """Refuse numbers that mean nothing."""
         if not (0.0 <= self.gain < np.inf and 0.0 < self.period < np.inf and self.sensing_range >= 0.0):
             raise ValueError(f"{self}; wanted: finite gain >= 0 and period > 0, sensing_range >= 0")
 

@@ -25,9 +25,9 @@ REPORT = "airground_drake.report/3"
 ORDER = (("proved",), ("holds", "supported"), ("not_exercised",), (*UNDECIDED, "gone"), ("refuted",))
 """Verdicts from the best to the worst, as `statuses.outcome` names them; `gone`: no verdict any more."""
 ROWS = (("reproduced",), ("calibrated",), ("by_construction",), ("ambiguous",), ("not_reproduced", "gone"))
-"""Rows of the reproduction table: the same."""
+"""Statuses of rows of the reproduction table, from the best to the worst."""
 OVERALL = (("as_expected",), ("inconclusive",), ("not_as_expected",))
-"""Over all claims: the same."""
+"""Overall statuses, from the best to the worst."""
 WITHIN = 1e-8
 """Numbers agree to this times 1 plus their size: versions of numpy, scipy and solvers round differently."""
 LONGEST_INTEGER = 18
@@ -58,7 +58,7 @@ def read(folder: Path) -> Document:
         _require_usable(document)
     except (OSError, ValueError, TypeError, LookupError, AttributeError, RecursionError) as error:
         why = getattr(error, "strerror", None) or f"{type(error).__name__}: {error}"
-        raise ReportError(one_line(f"{path} is no report that can be used: {why}"[:300])) from None
+        raise ReportError(one_line(f"{path} is not a report that can be used: {why}"[:300])) from None
     return dict(document)
 
 

@@ -57,7 +57,7 @@ def prepare(folder: Path) -> None:
     """Create the folder if need be, see that a report may be written there, and remove what killed runs have left.
 
     Raises:
-        FolderError: if it holds something that is no report, or cannot be created or written.
+        FolderError: if it holds something that is not a report, or cannot be created or written.
     """
     with files.wanted(folder, "a folder for the report"):
         folder.mkdir(parents=True, exist_ok=True)

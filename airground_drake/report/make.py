@@ -68,7 +68,7 @@ def write_report(
 
     Raises:
         LimitError: if the scenario asks for more than the limits.
-        FolderError: if the folder holds something that is no report, is in use, or cannot be written; before the work.
+        FolderError: before the work, if the folder holds anything but a report, is in use, or cannot be written.
         PluginError: if the scenario names a policy, route, task or plant that cannot be made.
         OSError: if something cannot be written, after all.
     """

@@ -41,7 +41,7 @@ DECISION_COLUMNS = {
 }
 DECISION_LISTS = ("sensed", "known", "new", "told", "asked", "asked_accepted")
 """Columns of `Trace.decisions`, one row per robot and gatekeeper call; -1 where a number does not apply. `number` is
-the proposal's in `Trace.proposals`, `answer` the answer's in `Trace.messages`. Columns up to
+that of `Trace.proposals`, `answer` the number of an answer in `Trace.messages`. Columns up to
 `predicted_clearance_m` belong to decisions by problem (26), the others to decisions by outcomes: the outcome of either
 choice by `gatekeeper.outcome` (cost, 1 if the UGV comes to rest short of its goal, way left), and the number of tries
 since the UGV last rested.

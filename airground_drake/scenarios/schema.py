@@ -237,8 +237,8 @@ class Obstacle:
 class MapCells:
     """What was read from the files of a map: filled in when a scenario is loaded.
 
-    So the scenario in a report needs no other file. A free cell that no robot can reach from its start
-    counts as occupied.
+    So the scenario in a report needs no other file. A free cell that no robot can reach from its start counts as
+    occupied.
     """
 
     file: Words

@@ -351,7 +351,7 @@ def _begins_at(diagram: Diagram, start_m: Array, about: str) -> None:
         begins = diagram.GetOutputPort("signals").Eval(context)
     except PluginError:
         raise
-    except Exception as error:  # of user code
+    except Exception as error:  # the user's code may raise anything
         raise PluginError(f"{about}: {described(error)}") from error
     if np.abs(begins - start_m).max() > START_M:
         raise PluginError(f"{about} begins at {begins.tolist()} m; allowed: at its start, {start_m.tolist()} m")

@@ -39,7 +39,7 @@ def declare_bodies(system: LeafSystem, world: World) -> InputPort:
 
 
 def declare_headings(system: LeafSystem, world: World) -> InputPort | None:
-    """Declare the input port `headings` (n), rad, of the UGVs, 0 for those that have none; None without unicycles."""
+    """Declare the input port `headings` (n), rad, of the UGVs, 0 without a heading; None without unicycles."""
     if world.steering is None:
         return None
     return system.DeclareVectorInputPort("headings", len(world.steering))

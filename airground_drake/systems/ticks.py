@@ -22,7 +22,7 @@ class Ticks:
         """Both in s.
 
         Raises:
-            ValueError: if the sampling period is no multiple of the control period, up to 1e-9 of it.
+            ValueError: if the sampling period is not a multiple of the control period, to a relative 1e-9.
         """
         times = period / control if isfinite(period) and control > 0.0 else 0.0
         self._every = round(times)

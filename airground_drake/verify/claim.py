@@ -220,9 +220,9 @@ def well_formed(claim: Claim, finding: Finding) -> Finding:
     """The finding, its count as an `int`, once it is checked that it does not contradict itself.
 
     Raises:
-        ValueError: if the status is unknown, if a margin is no finite number, if a claim holds or is proved with a
+        ValueError: if the status is unknown, if a margin is not a finite number, if a claim holds or is proved with a
             negative margin (beyond `MARGIN_ROUNDING`), if a claim with `exercised_by` passes without a count, or if the
-            count is no whole number from 0.
+            count is not a whole number from 0.
     """
     if finding.status not in STATUSES:
         raise ValueError(f"{claim.id} found {finding.status!r}; allowed: {', '.join(STATUSES)}")

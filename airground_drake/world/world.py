@@ -52,7 +52,7 @@ class Body:
         """Check the kind and the speed limit.
 
         Raises:
-            ValueError: if there is no such kind, or the limit is no number from 0.
+            ValueError: if there is no such kind, or the limit is not a number from 0.
         """
         if self.kind not in KINDS:
             raise ValueError(f"body {self.name!r} is of kind {self.kind!r}; allowed: {', '.join(KINDS)}")

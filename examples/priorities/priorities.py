@@ -86,9 +86,8 @@ def command(scene: Scene, position: Array, order: int) -> Array:
     if order and len(away):
         turn = 1.0 if order == 1 else -1.0
         along = turn * np.column_stack([away[:, 1], -away[:, 0], np.zeros(len(away))])
-        first = Round(
-            along[np.argmax((along @ away.T).min(axis=1))], SPEED_M_S
-        )  # the direction that leads out of a corner
+        out_of_a_corner = along[np.argmax((along @ away.T).min(axis=1))]
+        first = Round(out_of_a_corner, SPEED_M_S)
         wanted = first.velocity(row) + wanted @ null_space(first.jacobian(row)[0])
     around = Neighbours.at_rest(balls(scene.obstacles, gap=DISTANCE_M), limit)
     return AVOIDANCE.command(wanted, row, around)[0]

@@ -276,7 +276,7 @@ RULES: dict[str, tuple[str, Edit]] = {
 
 
 def special(name: str, make: Callable[[Path], Any]) -> Edit:
-    """What is no regular file in the place of a file."""
+    """What is not a regular file in the place of a file."""
 
     def edit(folder: Path) -> None:
         (folder / name).unlink(missing_ok=True)

@@ -177,7 +177,7 @@ list nothing                            # invalid choice: 'nothing'
 verify                                  # the following arguments are required: target
 verify . SAFE-TRACE                     #
 compare one                             # the following arguments are required: AFTER
-compare . .                             # is no report
+compare . .                             # is not a report
 index .                                 # there are no reports
 index nowhere                           # there are no reports
 prove . --run z                         #
@@ -219,10 +219,10 @@ judge spec.yaml --scenario minimal      # spec.yaml:
 judge spec.yaml --scenario spec.yaml    # spec.yaml:
 export report x --to csv                # unknown run 'x'; allowed: c, d
 export report --to csv -o report        # is in the report
-export . --to csv                       # . is no report
+export . --to csv                       # . is not a report
 replay report x                         # unknown run 'x'; allowed: c, d
-replay report/trace                     # is no report
-replay nowhere d                        # is no report
+replay report/trace                     # is not a report
+replay nowhere d                        # is not a report
 replay report -o report/new             # is in the report
 replay report -o mine.txt               # mine.txt cannot be written: File exists; wanted: a folder for the pages
 replay report -o x.html                 # x.html is one file for the runs c, d; name a RUN, or a folder
@@ -232,7 +232,7 @@ replay report --video x.webp            # --video needs a RUN
 replay report d --video x.webp --live   # not allowed with
 replay report d --video x.webp --speed nan # a number from 0.1 to 100
 replay report d --speed 2               # --speed needs --video
-figures spec.yaml                       # is no report
+figures spec.yaml                       # is not a report
 diagram nowhere.yaml                    # nowhere.yaml
 diagram minimal --set duration_s=-1     # duration_s
 diagram minimal --part nothing          # unknown part 'nothing'; allowed: decision_making

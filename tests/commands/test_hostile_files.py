@@ -77,7 +77,7 @@ def test_a_report_json(kind: str, honest: Path, hostile: Path, airground: Airgro
     (hostile / "report.json").unlink()
     FILES[kind](hostile / "report.json")
     for pair in ((honest, hostile), (hostile, honest)):
-        assert "report.json is no report" in airground("compare", *pair, code=2)
+        assert "report.json is not a report" in airground("compare", *pair, code=2)
     assert "no reports" in airground("index", hostile.parent, code=2)
     assert "no report" in airground("replay", hostile, "-o", hostile.parent, code=2)
     (hostile / "notes.txt").touch()
@@ -120,7 +120,7 @@ def test_a_trace_is_of_its_own_files(hostile: Path, airground: Airground) -> Non
 @pytest.mark.parametrize("kind", FILES)
 def test_a_page_in_the_place_of_a_list(kind: str, hostile: Path, airground: Airground) -> None:
     FILES[kind](hostile.parent / "index.html")
-    said = airground("index", hostile.parent, code=0 if kind == "itself" else 2)  # a link to itself is no file
+    said = airground("index", hostile.parent, code=0 if kind == "itself" else 2)  # a link to itself is not a file
     assert "index.html" in said
 
 

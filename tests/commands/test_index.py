@@ -40,7 +40,7 @@ def test_every_report_is_there_with_its_verdict_a_link_and_a_picture(
     for words, times in (
         ("2 reports in", 1), ('href="plain/report.html"', 1), ('href="a%20b/100%25/report.json"', 1), ("<svg", 1),
         ("as declared</span>", 2), ("<strong>No method brings everyone home safely. Under (a), ugv1 comes within", 2),
-        ("bad/report.json is no report", 1), ("<script", 0),
+        ("bad/report.json is not a report", 1), ("<script", 0),
     ):  # fmt: skip
         assert page.count(words) == times, words
     assert "no trace" in page

@@ -179,7 +179,7 @@ def test_policies_are_asked_once_at_each_instant_and_again_with_an_answer(monkey
 
 @pytest.mark.parametrize("number", [-5, 1.5, "3"])
 def test_the_number_of_an_episode_is_a_whole_one(number: Any) -> None:
-    with pytest.raises(ValueError, match=rf"number: {number!r}; allowed: a whole number from 0"):
+    with pytest.raises(ValueError, match=rf"number of the episode: {number!r}; allowed: a whole number from 0"):
         InterventionEnv(load("minimal")).reset(options={"number": number})
 
 

@@ -81,10 +81,8 @@ class NotFinite(Agreeing):
 
 
 def test_without_a_plan_it_is_refused_and_no_costs_are_told() -> None:
-    law, motion = (
-        UgvLaw(Avoidance(3.0, 0.05, 4.0), 2.0, 1.5, intervention_on_top=True),
-        Motion(np.zeros(1), np.zeros((1, 3))),
-    )
+    law = UgvLaw(Avoidance(3.0, 0.05, 4.0), 2.0, 1.5, intervention_on_top=True)
+    motion = Motion(np.zeros(1), np.zeros((1, 3)))
     gate = PaperGatekeepers(world(("ugv",)), law, [motion], NotFinite(), Horizon(4, 1, 1.0, 1.0), RULES)
     now = Inputs(0.05, (Proposal("way", 0.0, motion, number=0),), np.zeros((2, 3)), np.zeros((2, 3)), law)
     (decision,) = gate.sample(now, GatekeeperState.empty(1)).decisions

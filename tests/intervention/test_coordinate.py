@@ -122,7 +122,7 @@ def test_a_robot_that_is_shut_in_is_planned_for_again_only_elsewhere_or_on_anoth
 
 
 def test_a_joint_plan_in_vain_is_made_again_only_in_another_situation(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Two UGVs face each other in a corridor without a bay: each has a way alone, together they have none."""
+    """Two UGVs face each other in a corridor without a bay: each has a way alone, but not together."""
     plans: list[Plan] = []
 
     def counted(*given: Any, **options: Any) -> Plan:

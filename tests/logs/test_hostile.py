@@ -143,7 +143,7 @@ def test_noise_after_the_mark_of_a_kind_is_refused(start: bytes, tmp_path: Path,
     [
         ("", "it is empty"),
         ("\n\n# only a comment\n", "no lines with data"),
-        ("hello\nworld\n", "it is no table"),
+        ("hello\nworld\n", "it is not a table"),
         ("t_s,body,x_m,y_m,z_m\n", "it has no rows of numbers"),
         ("t_s,qw,qx,qy,qz,x,y,z,extra\n" + "0.1,1,0,0,0,1,2,0\n0.2,1,0,0,0,1,2,0\n" * 9, "it lacks a column of times"),
         (re.sub(r"(?m)^(\d)", r"at \1", LONG, count=30), "have words where most lines have numbers: line"),

@@ -43,7 +43,7 @@ def scene(
 
 
 @pytest.mark.parametrize("given", [(np.nan, 0.05), (-1.0, 0.05), (3.0, 0.0), (3.0, np.inf), (3.0, 0.05, -1.0)])
-def test_numbers_with_which_no_distance_is_kept_are_refused(given: tuple[float, ...]) -> None:
+def test_numbers_that_mean_nothing_are_refused(given: tuple[float, ...]) -> None:
     with pytest.raises(ValueError, match="wanted: finite gain >= 0 and period > 0, sensing_range >= 0"):
         Avoidance(*given)
 

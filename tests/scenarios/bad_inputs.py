@@ -210,7 +210,7 @@ FILES: list[str | bytes] = [
         )
     ),
 ]
-"""What is no scenario at all."""
+"""What is not a scenario at all."""
 
 REPLACEMENTS = [
     ("seed: 3", "seed: 3\nseed: 4"),

@@ -63,7 +63,7 @@ class NonlinearRoute:
         return cheapest(problem, plans, relaxed=relaxed, rounded=rounded)
 
     def _relax(self, problem: Problem, start: Evaluation, budget: Budget) -> tuple[Array | None, Status]:
-        """Omega (N,) where the solver ended, None if that is no number; how it ended."""
+        """Omega (N,) where the solver ended, None if that is not a number; how it ended."""
         program, omega, guess = relaxation(problem, start)
         try:
             result = self._solver.Solve(program, guess, _options(budget))

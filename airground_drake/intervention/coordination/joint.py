@@ -193,7 +193,7 @@ class _Search:
         return [i for i in range(len(self._movers)) if i not in self._without_way]
 
     def _alone(self) -> list[Way | None]:
-        """The ways that the robots would have without each other; notes those that have none."""
+        """The ways that the robots would have without each other; notes robots without a way."""
         found: list[Way | None] = []
         taken = self._taken()
         for i, mover in enumerate(self._movers):

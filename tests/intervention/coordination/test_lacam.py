@@ -1,4 +1,4 @@
-"""The search over joint steps finds a plan where there is one on its graph, and proves where there is none."""
+"""The search over joint steps finds a plan wherever its graph has one, and else proves that it has none."""
 
 from __future__ import annotations
 
@@ -101,7 +101,7 @@ def edge_rows(graph: CoarseGraph, edge: int) -> Array:
 
 
 def reachable(graph: CoarseGraph, starts: tuple[int, ...], targets: tuple[int, ...]) -> bool:
-    """Breadth first over all configurations and all joint moves: no search finds a shorter plan."""
+    """Whether joint moves lead to the targets: breadth first over all configurations, so that none is left out."""
     together: dict[tuple[int, int], bool] = {}
 
     def allowed(one: int, other: int) -> bool:
