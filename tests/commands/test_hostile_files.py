@@ -79,7 +79,7 @@ def test_a_report_json(kind: str, honest: Path, hostile: Path, airground: Airgro
     for pair in ((honest, hostile), (hostile, honest)):
         assert "report.json is not a report" in airground("compare", *pair, code=2)
     assert "no reports" in airground("index", hostile.parent, code=2)
-    assert "no report" in airground("replay", hostile, "-o", hostile.parent, code=2)
+    assert "is not a report" in airground("replay", hostile, "-o", hostile.parent, code=2)
     (hostile / "notes.txt").touch()
     assert "and no report" in airground("report", "minimal", "-o", hostile, code=2)
 
