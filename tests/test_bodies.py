@@ -215,7 +215,9 @@ def test_a_robot_that_lags_is_not_blamed_for_what_appears(appears_s: float) -> N
     found = {verdict.claim.id: verdict for verdict in judge(trace, ("SAFE-TRACE", "SAFE-OWN"))}
     seen = found["SAFE-TRACE"].counterexample or {}
     assert seen["t_s"] > appears_s
-    assert seen["why"] == f"rock appeared at {appears_s} s too near to ugv1: nobody's doing"
+    told, drove = seen["why"].split("; ")
+    assert told == f"rock appeared at {appears_s} s too near to ugv1: nobody's doing"
+    assert drove.endswith("m on by commands under way")
     assert found["SAFE-OWN"].status == "holds"
 
 

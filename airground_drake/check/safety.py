@@ -74,7 +74,8 @@ def safe_own(run: Run) -> Found | None:
     """SAFE-OWN: in each period no robot comes nearer than min(D, d + V h) to the other body, held as at the sample.
 
     With plants that take room it is min(D, d_law + V h) less that room, D the distance of the steered points; bodies
-    that are nearer already may stay so.
+    that are nearer already may stay so. In segments in which the bodies are nearer than d at an end, it is at least
+    min(D, d), D the distance of the bodies, once they have been d apart.
     It is asked from row to row, where the robot's way from the sample could lead nearer than d + V h. A period beside
     an obstacle that may move tests the claim if one at the speed limits could. None: nothing may move, and SAFE-TRACE
     says the same.
@@ -92,17 +93,21 @@ def safe_own(run: Run) -> Found | None:
         keeps, closing = pair.in_the_law.passive(period).safe_m - pair.cover_m, pair.closing_m_s * period
         there = run.there(pair.other)
         both, reach = rows[there.start : there.stop - 1], keeps + closing + 2.0 * (longest + pair.cover_m)
-        if run.apart_m[pair.robot, pair.other] > reach:
+        if run.apart_m[pair.robot, pair.other] > max(reach, pair.safe_m + longest):
             continue
+        apart_m = pair.shape.held_m(run.apart(pair), run.apart(pair), run.apart(pair), np.inf)[0]
+        kept = apart_m >= pair.safe_m - SMALL  # who starts or appears too near is not asked until once apart
+        too_near = np.logical_or.accumulate(kept)[:-1] & ~(kept[:-1] & kept[1:])
         for robot, other in ((pair.robot, pair.other), (pair.other, pair.robot)):
             if robot in ways:
                 held = run.body_m[other][sample[both]]
                 at, start, end = (ways[robot][k] - held for k in (sample[both], both, both + 1))
                 at_m, least_m = pair.shape.held_m(at, start, end, reach)
-                asked = at_m <= keeps + step_m[robot][both]
+                asked = too_near | (at_m <= keeps + step_m[robot][both])
                 point = run.position_m[robot][sample[both]] - run.position_m[other][sample[both]]
                 steered_m = pair.shape.held_m(point, point, point, np.inf)[0] if pair.cover_m else at_m
                 due = np.minimum(np.minimum(steered_m - pair.cover_m, at_m), keeps)
+                due = np.where(too_near, np.maximum(due, np.minimum(at_m, pair.safe_m)), due)
                 left = least_m - bent[robot] - due
                 for k in np.flatnonzero(asked & (left < 0.0)).tolist() if bent[robot] else ():
                     parts = _parts(bent[robot])
@@ -273,9 +278,22 @@ def _constants(run: Run) -> None:
         holds("sensing range", reach >= least, float(reach), f"{float(least)} at least", about=about)
         start = np.inf if pair.moves_m_s else pair.shape.least_m(run.steered_apart(pair)[:1])
         holds("safe start", start >= pair.safe_m - SMALL, start, f"{pair.safe_m} at least", about=about)
-        if pair.drawn_m:
-            start, due = pair.shape.least_m(run.apart(pair)[:1]), pair.safe_m - pair.more_m
-            holds("safe start of the axle", start >= due - SMALL, start, f"{due} at least", about=about)
+        if pair.start_s is not None:
+            start, due = _first_m(run, pair), pair.safe_m - pair.more_m
+            holds("safe start of the bodies", start >= due - SMALL, start, f"{due} at least", about=about)
+
+
+def _first_m(run: Run, pair: Pair) -> float:
+    """The least distance of the bodies of a pair when both are first there, and under commands given before, m."""
+    rows, bent = run.there(pair.other), run.bent_m(pair)
+    many = int(np.searchsorted(run.t_s[rows], run.t_s[rows.start] + pair.start_s - SMALL)) + 1
+    apart = run.apart(pair)[:many]
+    if len(apart) < 2 or not bent:
+        return pair.shape.least_m(apart)
+    parts = _parts(bent)
+    ways = (run.fine(pair.robot, rows.start + k, parts) - run.fine(pair.other, rows.start + k, parts)
+            for k in range(len(apart) - 1))  # fmt: skip
+    return min(pair.shape.least_m(way, steps=parts) for way in ways) - bent / parts**2
 
 
 def _rolled_m(run: Run, robot: str) -> Array:

@@ -38,7 +38,8 @@ class Pair(NamedTuple):
         cover_m: how far both bodies may be from these points after a period, together.
         drift_m: the part of `more_m` that makes up for missed commands.
         slip_m: how much of its command the robot may miss in a period.
-        drawn_m: how far a robot that never drives backwards is behind its steered point, beside what is at rest.
+        start_s: for how long from the start on the bodies have to be clear by themselves, since commands given before
+            lead them; None where their steered points say enough.
     """
 
     robot: str
@@ -53,7 +54,7 @@ class Pair(NamedTuple):
     cover_m: float = 0.0
     drift_m: float = 0.0
     slip_m: float = 0.0
-    drawn_m: float = 0.0
+    start_s: float | None = None
 
     @property
     def safe_m(self) -> float:
@@ -204,8 +205,9 @@ def _with_plants(pair: Pair, room: dict[str, Taken]) -> Pair:
     if not cover:
         return pair
     more = law_m(pair.safe_m, one, other, passive=pair.moves_m_s > 0.0) - pair.safe_m
-    drawn = 0.0 if other or pair.moves_m_s else one.drawn_m
-    return pair._replace(more_m=more, cover_m=cover, drift_m=drift, slip_m=one.slip_m, drawn_m=drawn)
+    late = any(each.lag_s or each.delay_s for each in both) or (one.drawn_m and not other)
+    start_s = max(each.delay_s for each in both) if late and not pair.moves_m_s else None
+    return pair._replace(more_m=more, cover_m=cover, drift_m=drift, slip_m=one.slip_m, start_s=start_s)
 
 
 def radii_m(one: Json, other: Json) -> float:

@@ -97,6 +97,33 @@ def law_m(safe_m: float, one: Room, other: Room | None, *, passive: bool) -> flo
     return min(choices) + bodies
 
 
+def kept_m(points_m: float, one: Room, other: Room | None) -> float:
+    """Distance that bodies keep where their steered points keep `points_m`, m: the inverse of `law_m`, not passive.
+
+    -inf where nothing is promised: within tau V of a set, say, the body may be anywhere beside it.
+    """
+    left = points_m - one.body_m - one.drift_m - (other.body_m + other.drift_m if other else 0.0)
+    if other is None:
+        behind = one.drawn_m or one.lag_s * one.speed_m_s
+        return _leg(left + one.drawn_m, behind)
+    late = min(one.speed_m_s, other.speed_m_s) * abs(one.delay_s - other.delay_s)
+    both = one.speed_m_s + other.speed_m_s
+    found = []
+    for tau in (0.0, one.lag_s, other.lag_s):
+        apart = sum(abs(each.lag_s - tau) * each.speed_m_s for each in (one, other))
+        found.append(_leg(left - apart, tau * both) - late)
+    return max(found)
+
+
+def _leg(hypotenuse: float, leg: float) -> float:
+    """The other leg of a right-angled triangle, from below; -inf if there is none."""
+    if leg == 0.0:
+        return hypotenuse
+    if hypotenuse < leg:
+        return -math.inf
+    return max(math.sqrt((hypotenuse - leg) * (hypotenuse + leg)) * (1.0 - 1e-15), 0.0)
+
+
 def arc_m(start: Array, end: Array, turned_rad: Array) -> Array:
     """How far arcs leave their chords, (...), m: from places (..., 3), m, with headings that turn by (...), rad."""
     chord = np.linalg.norm(end - start, axis=-1)

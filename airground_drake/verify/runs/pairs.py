@@ -68,6 +68,8 @@ class Pair(NamedTuple):
         drift_m: the part of `more_m` that makes up for missed commands.
         slip_m: how much of its command the robot may miss in a control period.
         drawn_m: how far a robot that never drives backwards is behind its steered point, beside a barrier at rest.
+        under_way_s: for how long commands already given lead the bodies, where the theorem asks for a safe start of the
+            bodies, too (drawn, lagging or late ones); None where it does not.
     """
 
     first: str
@@ -84,6 +86,7 @@ class Pair(NamedTuple):
     drift_m: float = 0.0
     slip_m: float = 0.0
     drawn_m: float = 0.0
+    under_way_s: float | None = None
 
     @property
     def rows(self) -> slice:
@@ -149,7 +152,11 @@ def declared_pairs(trace: Trace) -> Iterator[Pair]:
         cover = sum(each.rolling_m + each.slip_m for each in both)
         drift = sum(each.drift_m for each in both)
         drawn = room[first].drawn_m if second not in room and not pair.speed_m_s else 0.0
-        return pair._replace(more_m=more, cover_m=cover, drift_m=drift, slip_m=room[first].slip_m, drawn_m=drawn)
+        needs_start = drawn or (not pair.speed_m_s and any(each.lag_s or each.delay_s for each in both))
+        under_way = max(each.delay_s for each in both) if needs_start else None
+        return pair._replace(
+            more_m=more, cover_m=cover, drift_m=drift, slip_m=room[first].slip_m, drawn_m=drawn, under_way_s=under_way
+        )
 
     for robot in trace.robots:
         for name, each, row, last in there:
@@ -283,40 +290,43 @@ def least_gap(trace: Trace, pair: Pair) -> Gap:
     It is exact if both bodies move on straight lines between rows, and to `BENT_M` where it is below the one required;
     else it is a lower bound.
     """
+    return trace.derived(("least gap", pair.first, pair.second), lambda: _least_gap(trace, pair))
 
-    def found() -> Gap:
-        t, off_m = trace.t[pair.rows], off_m_of(trace, pair.first) + off_m_of(trace, pair.second)
-        cores = cores_of(trace).get(pair.second)
-        if cores is None:
-            first, second = trace.body(pair.first), trace.body(pair.second)
-            distance, t_s, row = closest_approach(t, first[pair.rows], second[pair.rows], off_m)
-        else:
-            first = seen_from(trace, pair.first, pair.second)[pair.rows]
-            distance, row, share = closest(cores, first, planar=is_planar(trace, pair.first))
-            distance = max(distance - off_m, 0.0) if off_m and cores.are_points else distance - off_m
-            t_s = instant_of(t, row, share)
-        if off_m and distance < pair.safe_m:
-            distance, t_s, row = _least_of_bent(trace, pair, off_m)
-        return Gap(pair, distance - pair.radii_m, distance - pair.safe_m, t_s, row + pair.row)
 
-    return trace.derived(("least gap", pair.first, pair.second), found)
+def _least_gap(trace: Trace, pair: Pair) -> Gap:
+    t, off_m = trace.t[pair.rows], off_m_of(trace, pair.first) + off_m_of(trace, pair.second)
+    cores = cores_of(trace).get(pair.second)
+    if cores is None:
+        first, second = trace.body(pair.first), trace.body(pair.second)
+        distance, t_s, row = closest_approach(t, first[pair.rows], second[pair.rows], off_m)
+    else:
+        first = seen_from(trace, pair.first, pair.second)[pair.rows]
+        distance, row, share = closest(cores, first, planar=is_planar(trace, pair.first))
+        distance = max(distance - off_m, 0.0) if off_m and cores.are_points else distance - off_m
+        t_s = instant_of(t, row, share)
+    if off_m and distance < pair.safe_m:
+        distance, t_s, row = _least_of_bent(trace, pair, off_m)
+    return Gap(pair, distance - pair.radii_m, distance - pair.safe_m, t_s, row + pair.row)
+
+
+def start_margin(trace: Trace, pair: Pair) -> float:
+    """By how much the bodies of a pair exceed their distance when both are first there, m; inf where none is needed.
+
+    Commands that were given before then lead a body with a delay on for that time, so its way counts, too.
+    """
+    if pair.under_way_s is None:
+        return inf
+    until = trace.t[pair.row] + pair.under_way_s - MERGE_S
+    last = len(trace.t) - 1 if pair.last is None else pair.last
+    end = min(int(np.searchsorted(trace.t, until)), last)
+    if end > pair.row:
+        return _least_gap(trace, pair._replace(last=end)).margin_m
+    return float(gap_over_time(trace, pair)[pair.row]) - pair.required_m
 
 
 def at_appearance(trace: Trace, gap: Gap) -> bool:
-    """Whether the gap of a pair was smallest when its obstacle appeared.
-
-    A robot that turns, lags or gets its commands late may come as much nearer afterwards as it cannot help.
-    """
-    pair, row = gap.pair, gap.pair.row
-    if not row or gap.t_s <= trace.t[row]:
-        return row > 0
-    cores = cores_of(trace)[pair.second].take((slice(None), None))
-    away = away_from(cores, _relative(trace, pair, np.array([row])), planar=is_planar(trace, pair.first))
-    then_m = float(away.distance.min()) - pair.radii_m
-    robot = trace.scenario.robots[pair.first]
-    coasts_m = robot.max_speed_m_s * sum(plant.time_constant_s + plant.delay_s for plant in robot.plant)
-    more_m = max(pair.cover_m, coasts_m)
-    return then_m < pair.required_m and more_m > 0.0 and gap.gap_m >= then_m - more_m
+    """Whether the gap of a pair was smallest when its obstacle appeared."""
+    return gap.pair.row > 0 and gap.t_s <= trace.t[gap.pair.row]
 
 
 def steered_margin(trace: Trace, pair: Pair) -> float:

@@ -11,7 +11,7 @@ from dataclasses import asdict, dataclass
 from fractions import Fraction
 from functools import cache
 from itertools import groupby
-from math import hypot, inf, nextafter
+from math import inf, isfinite, nextafter
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -21,9 +21,9 @@ from airground_drake.base.arrays import Array
 from airground_drake.base.exact import decimal
 from airground_drake.run.trace import Trace
 from airground_drake.verify.claim import TIME_TOLERANCE_S, TraceClaim
-from airground_drake.verify.engines.bodies import room_of
+from airground_drake.verify.engines.bodies import kept_m, room_of
 from airground_drake.verify.engines.geometry import interpolate
-from airground_drake.verify.engines.outlines import Cores, apart_by_blocks, away_from
+from airground_drake.verify.engines.outlines import Cores, apart_by_blocks
 from airground_drake.verify.engines.shortfalls import POINT, SCREEN_M, rounded_up, shortage, shortfalls
 from airground_drake.verify.finding import Finding
 from airground_drake.verify.runs.control_law import inequalities_of
@@ -37,8 +37,8 @@ from airground_drake.verify.runs.pairs import (
     is_planar,
     pairs_of,
     parts_of,
-    seen_from,
     snapshot,
+    start_margin,
 )
 from airground_drake.verify.runs.passive import beside, beside_moving, last_period, period_ends, speeds
 
@@ -57,6 +57,8 @@ DECLARED = "declared speed"
 """The hypothesis that an obstacle moved no faster than it was expected to."""
 FORWARDS = "never backwards"
 """The hypothesis that a unicycle that must not drive backwards does not."""
+START, BODIES = "safe start", "safe start of the bodies"
+"""The hypotheses that a pair begins apart: the points that the law steers, and the bodies that lag or come late."""
 DRIFT, COVER = "declared drift", "declared cover"
 """The hypotheses that a user's plant has the drift and the cover that it declares."""
 BUILT = "controller parameters"
@@ -95,15 +97,19 @@ class Guarantee(NamedTuple):
     Attributes:
         pair: the two bodies.
         missed_m: how far each sample misses the inequalities, e_i + e_j, (K,), m per control period; 0: both are met.
-        short_m: how much too close the pair started, or was when its obstacle appeared, m.
-        gap_m: d - max(e / a - w / A, short_m) with d the gap required, e the largest of `missed_m`, a = min(A h, 1),
-            and w the drift that users' plants declare. Without a gain nothing is restored: d - K e - short_m.
+        short_m: how much too close the steered points started, or were when the obstacle appeared, m.
+        gap_m: what the bodies keep where their steered points keep m - max(e / a - w / A, short_m). There m is the
+            distance in the law, e the largest of `missed_m`, a = min(A h, 1), and w the drift that users' plants
+            declare. Without a gain nothing is restored, and the points keep m - K e - short_m. -inf: nothing is
+            promised.
+        why: the reason if nothing is promised.
     """
 
     pair: Pair
     missed_m: Array
     short_m: float
     gap_m: float
+    why: str = ""
 
     @property
     def margin_m(self) -> float:
@@ -113,9 +119,10 @@ class Guarantee(NamedTuple):
 
 @dataclass(frozen=True)
 class Hypotheses:
-    """The evidence: the largest shortfall, the least distance promised (None: no pair came within reach), and details.
+    """The evidence: the largest shortfall, the least distance promised, and details.
 
-    `pairs` are those with the least guarantee, `worst` is the least margin of each other hypothesis.
+    `guarantee_m` is None if no pair came within reach, or nothing is promised for one that did. `pairs` are those with
+    the least guarantee, `worst` is the least margin of each other hypothesis.
     """
 
     e_m: float
@@ -168,7 +175,9 @@ class SafeHyp(TraceClaim):
         "The points that the law steers move straight from row to row. Of robots that turn, lag or get their commands "
         "late, D and d are those of these points: d_law of SAFE-BUDGET.",
         "Beside an obstacle with `appears_s` the hypotheses are those from the first control sample at or after that "
-        "time on, and the safe start is that D >= d at that sample: where it appears nearer, nothing is promised.",
+        "time on, and the safe start is that D >= d at that sample. The bodies of robots that lag, get their commands "
+        "late or never drive backwards must be clear then, too, and so must their ways under commands already given, "
+        "for the time of the delay. If they are not, nothing is promised for the pair.",
         "No safe start is asked beside an obstacle that may move: where it is near, the robot is passive.",
     )
     does_not_establish = (
@@ -203,7 +212,7 @@ class SafeHyp(TraceClaim):
             evidence=asdict(
                 Hypotheses(
                     float(max((one.missed_m.max() for one in kept), default=0.0)),
-                    kept[0].gap_m if kept else None,
+                    _finite(kept[0].gap_m) if kept else None,
                     listed,
                     len(kept),
                     different,
@@ -248,7 +257,9 @@ def _shown(
     if first and first["hypothesis"] == BUILT:
         return first
     name = first["hypothesis"] if first else AVOIDANCE
-    least: dict[str, Any] = {"margin": kept[0].margin_m if kept else 0.0, "unit": "m", "hypothesis": AVOIDANCE}
+    least: dict[str, Any] = {
+        "margin": _finite(kept[0].margin_m) if kept else 0.0, "unit": "m", "hypothesis": AVOIDANCE
+    }  # fmt: skip
     least |= {key: listed[0][key] for key in ("first", "second")} if kept else {}
     return min((one for one in worst if one["hypothesis"] == name), key=lambda one: float(one["margin"]), default=least)
 
@@ -258,7 +269,11 @@ def _listed(trace: Trace, one: Guarantee) -> dict[str, Any]:
     e, k = float(one.missed_m.max()), int(np.argmax(one.missed_m))
     described = {"first": one.pair.first, "second": one.pair.second, "safe_distance_m": one.pair.required_m}
     t = float(trace.t[trace.sample_rows[k]]) if e > 0.0 else None
-    return {**described, "guarantee_m": one.gap_m, "e_m": e, "t_s": t}
+    return {**described, "guarantee_m": _finite(one.gap_m), "e_m": e, "t_s": t, **({"why": one.why} if one.why else {})}
+
+
+def _finite(metres: float) -> float | None:
+    return metres if isfinite(metres) else None
 
 
 def _gain(trace: Trace) -> Fraction:
@@ -297,10 +312,18 @@ def _guarantees(trace: Trace) -> Iterator[Guarantee]:
         e, short = Fraction(float(most.max())), max(begun, default=Fraction(0))
         lost = max(e / gain - Fraction(pair.drift_m), short) if gain else (len(samples) - 1) * e + short
         missed_m = np.concatenate([np.zeros(begin), most, np.zeros(len(samples) - end)])
-        if lost > 0 and pair.drawn_m:  # the body keeps sqrt(m^2 - l^2) where its steered point keeps m
-            kept = max(pair.safe_m**2 - 2.0 * float(lost) * hypot(pair.safe_m, pair.drawn_m) + float(lost) ** 2, 0.0)
-            lost = Fraction(nextafter(pair.safe_m - kept**0.5, inf))
-        yield Guarantee(pair, missed_m, rounded_up(short), -rounded_up(lost - Fraction(pair.required_m)))
+        gap, why = -rounded_up(lost - Fraction(pair.required_m)), ""
+        if pair.under_way_s is not None:
+            start = start_margin(trace, pair)
+            if not start >= -DISTANCE_TOLERANCE_M:
+                gap, why = -inf, f"{BODIES} missed by {-start:.3g} m"
+            elif lost > 0:  # it comes off what the points keep, from which follows what the bodies keep
+                room = {name: room_of(trace.scenario.robots[name], trace.scenario.control)
+                        for name in (pair.first, pair.second) if name in trace.robots}  # fmt: skip
+                points = nextafter(pair.law_m - rounded_up(lost), -inf)
+                kept = kept_m(points, room[pair.first], room.get(pair.second)) - pair.radii_m
+                gap, why = min(gap, kept), "" if isfinite(kept) else "the steered points came too near"
+        yield Guarantee(pair, missed_m, rounded_up(short), gap, why)
 
 
 def _beside(
@@ -388,20 +411,12 @@ def _static(trace: Trace) -> Iterator[_Hypothesis]:
         apart |= distances_when_there(trace, robot)
         start, about = trace.t[rows], {"first": robot}
         excess = np.array([np.inf if pair.speed_m_s else apart[pair.second] - pair.law_m for pair in beside])
-        excess = np.minimum(excess, [_axle_excess(trace, pair) for pair in beside])
-        if np.isfinite(excess).any():
-            yield _Hypothesis("safe start", "m", start, excess, DISTANCE_TOLERANCE_M, about, others)
+        of_bodies = np.array([start_margin(trace, pair) for pair in beside])
+        for name, margins in ((START, excess), (BODIES, of_bodies)):
+            if np.isfinite(margins).any():
+                yield _Hypothesis(name, "m", start, margins, DISTANCE_TOLERANCE_M, about, others)
         left = [room(pair.law_m, limit[robot], limit.get(pair.second, pair.speed_m_s)) for pair in beside]
         yield _Hypothesis("sensing range", "m", start, np.array(left), 0.0, about, others)
-
-
-def _axle_excess(trace: Trace, pair: Pair) -> float:
-    """By how much a body that is drawn after its steered point exceeds its distance at first, m; inf for others."""
-    if not pair.drawn_m:
-        return np.inf
-    place = seen_from(trace, pair.first, pair.second)[pair.row]
-    found = away_from(cores_of(trace)[pair.second], place, planar=is_planar(trace, pair.first))
-    return float(found.distance.min()) - pair.safe_m
 
 
 def _sampled(trace: Trace) -> Iterator[_Hypothesis]:

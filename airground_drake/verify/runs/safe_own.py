@@ -11,8 +11,9 @@ from airground_drake.base.errors import TraceError
 from airground_drake.run.trace import Trace
 from airground_drake.verify.claim import TraceClaim
 from airground_drake.verify.finding import Finding
+from airground_drake.verify.runs.encounters import own_margins, steps_of
 from airground_drake.verify.runs.pairs import DISTANCE_TOLERANCE_M, apart_of, pairs_of, snapshot
-from airground_drake.verify.runs.passive import beside, encounters, own_margins, steps_of
+from airground_drake.verify.runs.passive import beside
 
 MOST_LISTED = 300
 """Pairs that the evidence lists at most: those of least margin."""
@@ -28,7 +29,8 @@ class SafeOwn(TraceClaim):
         "it than min(D, d + V h): D is the distance at the sample, d the required one, V the speed at which the other "
         "body is expected to move at most, 0 for robots and bodies at rest. What was lost besides, the other body "
         "moved itself. Where a body is not where the law steers it, D is the distance of the steered points less what "
-        "the plants take, or that of the bodies if they are nearer already."
+        "the plants take, or that of the bodies if they are nearer already. Where the distance was broken, no robot's "
+        "body came nearer by its own motion than min(D, d), D that of the bodies: not by commands under way, either."
     )
     latex = (
         r"\mathrm{dist}(p_i(t_k + s), C_j(t_k)) \ge \min(D_k, \, d_{ij} + V_j h) - 10^{-9} \text{ m}, \quad "
@@ -44,6 +46,7 @@ class SafeOwn(TraceClaim):
     equations = "(7)-(8), (11); n.v >= 0 beside obstacles that may move"
     assumptions = (
         "Those of SAFE-TRACE. Obstacles move without turning, as recorded.",
+        "The theorem promises nothing of what a lag, a delay or a hand point covers: there the run decides alone.",
         "V is the declared speed (`max_speed_m_s`), whether it is true or not: SAFE-HYP compares it with the run.",
     )
     does_not_establish = (
@@ -75,7 +78,6 @@ class SafeOwn(TraceClaim):
             counterexample=_against(trace, worst) if worst and own else None,
             evidence={
                 "robots_beside_others": [each._asdict() for each in found[:MOST_LISTED]],
-                "came_too_near_themselves": [each._asdict() for each in encounters(trace)],
                 "tolerance_m": DISTANCE_TOLERANCE_M,
             },
             exercised=within_reach,
@@ -96,10 +98,10 @@ def _margins(trace: Trace) -> Iterator[OwnMargin]:
     longest = {name: float(steps_of(trace, name).max()) for name in trace.robots}
     for pair, least in zip(pairs_of(trace), apart.tolist(), strict=True):
         for robot in (name for name in (pair.first, pair.second) if name in trace.robots):
-            if least > pair.keeps_m(period) - pair.cover_m + longest[robot]:
+            if least > max(pair.keeps_m(period) - pair.cover_m, pair.safe_m) + longest[robot]:
                 continue
             other = pair.second if robot == pair.first else pair.first
-            margins = own_margins(trace, pair, robot)
+            margins = own_margins(trace, pair, robot).least
             k = int(np.argmin(margins)) if not np.isnan(margins).any() else int(np.argmax(np.isnan(margins)))
             if margins[k] != np.inf:
                 yield OwnMargin(robot, other, float(margins[k]), float(trace.t[k + 1]))

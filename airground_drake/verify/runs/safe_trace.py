@@ -11,19 +11,17 @@ from airground_drake.run.trace import Trace
 from airground_drake.scenarios.schema import MAP
 from airground_drake.verify.claim import TraceClaim
 from airground_drake.verify.finding import Finding
+from airground_drake.verify.runs.encounters import encounters
 from airground_drake.verify.runs.pairs import (
     DISTANCE_TOLERANCE_M,
     apart_of,
-    at_appearance,
     least_gap,
     least_of,
-    pair_of,
     pairs_of,
     place_on_map,
     snapshot,
     steered_margin,
 )
-from airground_drake.verify.runs.passive import encounters
 
 MOST_LISTED = 300
 """Pairs that the evidence lists at most: those of least margin."""
@@ -101,6 +99,7 @@ class SafeTrace(TraceClaim):
             evidence={
                 "pairs": [asdict(each) for each in listed],
                 "pairs_in_all": len(pairs),
+                "encounters": [encounter._asdict() for encounter in encounters(trace)[:MOST_LISTED]],
                 "tolerance_m": DISTANCE_TOLERANCE_M,
             },
             exercised=sum(entry(k).exercised for k in close_by),
@@ -137,10 +136,5 @@ def _place(trace: Trace, worst: Distance) -> dict[str, list[float]]:
 
 
 def _why(trace: Trace, worst: Distance) -> dict[str, str]:
-    """Whose doing it was: of an obstacle that moves, or nobody's if the pair was nearest when its obstacle appeared."""
-    pair = pair_of(trace, worst.first, worst.second)
-    if pair.speed_m_s > 0.0:
-        return {"why": next(each.told() for each in encounters(trace) if each[:2] == (pair.first, pair.second))}
-    if not at_appearance(trace, least_gap(trace, pair)):
-        return {}
-    return {"why": f"{worst.second} appeared at {trace.t[pair.row]:.9g} s too near to {worst.first}: nobody's doing"}
+    """Whose doing it was."""
+    return {"why": next(each.told(trace) for each in encounters(trace) if each[:2] == (worst.first, worst.second))}

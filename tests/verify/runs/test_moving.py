@@ -19,10 +19,11 @@ from airground_drake.verify import TRACE_CLAIMS, judge
 from airground_drake.verify.claim import ModelClaim
 from airground_drake.verify.judging import judge_all
 from airground_drake.verify.model.pair_kinds import THEOREMS, kind_of
-from airground_drake.verify.runs import passive
+from airground_drake.verify.runs import encounters as encounters_module
 from airground_drake.verify.runs.control_law import least_speeds, retreats
+from airground_drake.verify.runs.encounters import encounters, steps_of
 from airground_drake.verify.runs.pairs import gap_over_time, least_gap, pair_of
-from airground_drake.verify.runs.passive import encounters, periods_of, steps_of
+from airground_drake.verify.runs.passive import periods_of
 from airground_drake.verify.runs.safe_hyp import DECLARED, PASSIVE
 
 
@@ -52,14 +53,14 @@ def test_a_person_who_walks_through_a_robot_is_named_and_the_robot_is_not() -> N
     assert true.counterexample["why"] == why
     assert own.status == met.status == "holds"
     assert own.exercised
-    (came,) = own.evidence["came_too_near_themselves"]
-    assert (came["first"], came["second"], came["own_doing"], came["collided"]) == ("ugv1", "person", False, True)
+    (came,) = true.evidence["encounters"]
+    assert (came["first"], came["second"], came["doing"], came["collided"]) == ("ugv1", "person", "other", True)
 
 
 def test_a_robot_that_leaves_its_straight_line_gets_farther_from_its_place(monkeypatch: pytest.MonkeyPatch) -> None:
     trace = persons.run("fork")
     straight = steps_of(trace, "ugv1")
-    monkeypatch.setattr(passive, "off_m_of", lambda *_: 0.1)
+    monkeypatch.setattr(encounters_module, "off_m_of", lambda *_: 0.1)
     np.testing.assert_allclose(steps_of(replace(trace), "ugv1"), straight + 0.1, rtol=1e-12)
 
 
@@ -76,9 +77,9 @@ def test_a_robot_that_has_nowhere_to_retreat_stands_and_the_wall_is_named() -> N
     true, own = decided("SAFE-TRACE", trace), decided("SAFE-OWN", trace)
     assert true.counterexample is not None
     assert true.counterexample["why"].endswith("ugv1 stood, blocked by back")
-    (came,) = own.evidence["came_too_near_themselves"]
+    (came,) = true.evidence["encounters"]
     assert own.status == decided("SAFE-HYP", trace).status == "holds"
-    assert came["blocked_by"] == ["back"]
+    assert came["blocked_by"] == ("back",)
     begin, end = came["caught_s"]
     gap = of_person(trace)
     samples = trace.sample_rows

@@ -1,0 +1,296 @@
+"""Whose doing it was that two bodies came nearer than required.
+
+The other body is held where it was at each control sample; what a robot's body then takes of the distance, its own
+motion took. The law promises less of a body that is not where the law steers it: what lags, delays and hand points
+cover. What a body takes within that, commands already under way took.
+"""
+
+from __future__ import annotations
+
+from math import ceil
+from typing import NamedTuple
+
+import numpy as np
+
+from airground_drake.base.arrays import Array
+from airground_drake.run.trace import Trace
+from airground_drake.verify.engines.outlines import Cores, Indices, apart_by_blocks, away_from, least_distances
+from airground_drake.verify.runs.control_law import Inequalities, inequalities_of
+from airground_drake.verify.runs.pairs import (
+    BENT_M,
+    DISTANCE_TOLERANCE_M,
+    MOST_PARTS,
+    Gap,
+    Pair,
+    apart_of,
+    bent,
+    cores_of,
+    gap_over_time,
+    is_planar,
+    least_gap,
+    numbers_of,
+    off_m_of,
+    origin_of,
+    pairs_of,
+    parts_of,
+)
+from airground_drake.verify.runs.passive import AT_LIMIT_M_S, STANDING_M_S, Periods, periods_of
+
+BLOCKED_M_S = 1e-6
+"""An inequality blocks a retreat if the retreat would miss it by more than this, m/s."""
+
+
+def samples_before(trace: Trace) -> Indices:
+    """The row of the last control sample at or before the beginning of each segment between rows, (T - 1,)."""
+    samples = trace.sample_rows
+    return samples[np.searchsorted(samples, np.arange(len(trace.t) - 1), side="right") - 1]
+
+
+def steps_of(trace: Trace, robot: str) -> Array:
+    """How far from its place at the control sample a robot's body gets in each segment between rows, (T - 1,), m."""
+
+    def found() -> Array:
+        place, sample = trace.body(robot), trace.body(robot)[samples_before(trace)]
+        ends = [np.linalg.norm(each - sample, axis=1) for each in (place[:-1], place[1:])]
+        return np.asarray(np.max(ends, axis=0) + off_m_of(trace, robot))
+
+    return trace.derived(("steps", robot), found)
+
+
+class OwnMargins(NamedTuple):
+    """What a robot left of a distance by its own doing, in the T - 1 segments between rows, (T - 1,), m.
+
+    inf: the two were too far apart for one period to matter, or not both there.
+
+    Attributes:
+        of_law: of min(D, L) - c, which the theorem promises. D is the distance of the steered points at the control
+            sample, L what the law keeps, V h included, and c how far both bodies may be from the steered points. Bodies
+            that are nearer than D - c already may stay so.
+        of_body: of min(D, d) where the gap is below the required one: D of the bodies at the sample, d the distance to
+            keep. Only c lets it fall below the margin of the law. Where two bodies start or appear too near, it is not
+            asked until they have been apart.
+    """
+
+    of_law: Array
+    of_body: Array
+
+    @property
+    def least(self) -> Array:
+        """The smaller of both, (T - 1,), m."""
+        return np.minimum(self.of_law, self.of_body)
+
+
+def own_margins(trace: Trace, pair: Pair, robot: str) -> OwnMargins:
+    """What a robot left of the distance of a pair by its own doing: the other body is held as at the control sample."""
+    other, rows = pair.second if robot == pair.first else pair.first, np.arange(len(trace.t) - 1)
+    sample = samples_before(trace)
+    cores = cores_of(trace).get(other, Cores.at(np.zeros((1, 3))))
+    origin = trace.body(other) if other in trace.robots else origin_of(trace, other)
+    place, planar = trace.body(robot), is_planar(trace, robot)
+    origin = np.zeros_like(place) if origin is None else origin
+    keeps, off_m = pair.keeps_m(trace.scenario.control.period_s) - pair.cover_m, off_m_of(trace, robot)
+    last = len(trace.t) - 1 if pair.last is None else pair.last
+    step = steps_of(trace, robot)
+    bounds = apart_by_blocks(cores, place - origin).min(axis=1)
+    each = cores.take(np.flatnonzero(bounds <= max(keeps, pair.safe_m) + step.max())).take((slice(None), None))
+    found = OwnMargins(np.full(len(rows), np.inf), np.full(len(rows), np.inf))
+    if not len(each.base):
+        return found
+    at_sample = away_from(each, place[sample] - origin[sample], planar=planar).distance.min(axis=0)
+    there = (sample >= pair.row) & (rows < last)
+    gaps, short = gap_over_time(trace, pair), pair.required_m - DISTANCE_TOLERANCE_M
+    broken = there & (rows >= _first_apart(pair, gaps)) & (np.minimum(gaps[:-1], gaps[1:]) < short)
+    near = there & ((at_sample <= keeps + step) | broken)
+    start, end = (place[rows[near] + k] - origin[sample[near]] for k in (0, 1))
+    least = least_distances(each, start, end, planar=planar)[0].min(axis=0, initial=np.inf) - off_m
+    steered = _steered(trace, pair, robot, each, sample[near]) - pair.cover_m
+    of_law = np.minimum(np.minimum(steered, at_sample[near]), keeps)
+    of_body = np.where(broken[near], np.minimum(at_sample[near], pair.safe_m), -np.inf)
+    due = np.maximum(of_law, of_body)
+    for k in np.flatnonzero(least < due).tolist() if off_m else ():
+        row = int(rows[near][k])
+        parts = min(ceil((off_m / BENT_M) ** 0.5), MOST_PARTS)
+        fine = bent(trace, robot, row, np.linspace(0.0, 1.0, parts + 1)) - origin[sample[row]]
+        least[k] = least_distances(each, fine[:-1], fine[1:], planar=planar)[0].min() - off_m / parts**2
+    found.of_law[near], found.of_body[near] = least - of_law, least - of_body
+    return found
+
+
+def _first_apart(pair: Pair, gaps: Array) -> int:
+    """The first row at which a pair that is there has its distance; without one, the number of rows."""
+    apart = np.flatnonzero(gaps[pair.row :] >= pair.required_m - DISTANCE_TOLERANCE_M)
+    return pair.row + int(apart[0]) if len(apart) else len(gaps)
+
+
+def _steered(trace: Trace, pair: Pair, robot: str, each: Cores, rows: Indices) -> Array:
+    """Distances of the steered points of a pair, or of one from the cores of an obstacle, at some rows, m."""
+    other = pair.second if robot == pair.first else pair.first
+    origin = trace.position(other) if other in trace.robots else origin_of(trace, other)
+    place = trace.position(robot)[rows]
+    away = away_from(each, place if origin is None else place - origin[rows], planar=is_planar(trace, robot))
+    return np.asarray(away.distance.min(axis=0))
+
+
+class Encounter(NamedTuple):
+    """How two bodies came nearer to each other than required.
+
+    Attributes:
+        first: the robot.
+        second: the obstacle or the other robot.
+        required_m: gap to keep.
+        gap_m: the least gap; 0 where they overlap.
+        t_s: when they collided, or else when the gap was least.
+        collided: whether they did; the model lets both go on.
+        doing: `robot` if the motion of a robot itself took of the distance; `under way` if it did so only within what
+            the law grants to a body that lags or gets its commands late; `other` if the other body's motion took all;
+            `nobody` if they started or appeared there.
+        under_way_m: how far a body that lags or gets its commands late drove on, from where it was last as far as
+            required, or where the other appeared, to where the gap was least; 0 unless that is why, or it appeared.
+        appeared: whether the obstacle appeared nearer than required.
+        reaction: what the robot did beside an obstacle that may move: `retreated at its limit`, `retreated`, `stood` or
+            `moved aside`; '' beside others.
+        speed_m_s: of the robot's command then.
+        blocked_by: the bodies whose inequalities kept it from retreating.
+        caught_s: from when to when they did, without a pause; () if never.
+    """
+
+    first: str
+    second: str
+    required_m: float
+    gap_m: float
+    t_s: float
+    collided: bool
+    doing: str
+    under_way_m: float
+    appeared: bool
+    reaction: str = ""
+    speed_m_s: float = 0.0
+    blocked_by: tuple[str, ...] = ()
+    caught_s: tuple[float, ...] = ()
+
+    def told(self, trace: Trace) -> str:
+        """Whose doing it was, in a sentence without a full stop."""
+        if self.doing == "under way":
+            drove = f"{self.first} drove {self.under_way_m:.2f} m on by commands under way"
+            return f"{drove}, to {self.gap_m:.2f} m from {self.second}"
+        if self.doing == "robot":
+            return f"{self.first} brought itself to {self.gap_m:.2f} m from {self.second}"
+        if self.doing == "nobody" and self.appeared:
+            t_s = trace.t[trace.there_from(self.second)]
+            told = f"{self.second} appeared at {t_s:.9g} s too near to {self.first}: nobody's doing"
+            if not self.under_way_m:
+                return told
+            return f"{told}; {self.first} drove {self.under_way_m:.2f} m on by commands under way"
+        if self.doing == "nobody":
+            return f"{self.first} starts {self.gap_m:.2f} m from {self.second}: nobody's doing"
+        speed = f", {self.speed_m_s:.2f} m/s" if self.reaction.startswith("retreated") else ""
+        blocked = f", blocked by {' and '.join(self.blocked_by)}" if self.blocked_by else ""
+        came = f"{self.second} came to {self.gap_m:.2f} m by its own motion"
+        return f"{came}; {self.first} {self.reaction}{speed}{blocked}"
+
+
+def encounters(trace: Trace) -> list[Encounter]:
+    """The pairs that came nearer to each other than required, by time."""
+
+    def found() -> list[Encounter]:
+        apart, numbers = apart_of(trace), numbers_of(trace)
+        near = [pair for pair in pairs_of(trace) if apart[numbers[frozenset((pair.first, pair.second))]] <= pair.safe_m]
+        least = [least_gap(trace, pair) for pair in near]
+        short = [gap for gap in least if gap.margin_m < -DISTANCE_TOLERANCE_M]
+        return sorted((_encounter(trace, gap) for gap in short), key=lambda encounter: encounter.t_s)
+
+    return trace.derived("encounters", found)
+
+
+def _encounter(trace: Trace, least: Gap) -> Encounter:
+    pair, gaps = least.pair, gap_over_time(trace, least.pair)
+    hits = np.flatnonzero(gaps <= trace.scenario.safe_distance.collision_m)
+    t_s = float(trace.t[hits[0]]) if len(hits) else least.t_s
+    appeared = pair.row > 0 and bool(gaps[pair.row] < pair.required_m - DISTANCE_TOLERANCE_M)
+    doing = _whose_doing(trace, least)
+    drove_on = doing == "under way" or (doing == "nobody" and appeared and _is_late(trace, pair.first))
+    under_way_m = _way_m(trace, pair, gaps, least.t_s) if drove_on else 0.0
+    found = Encounter(
+        pair.first, pair.second, pair.required_m, max(least.gap_m, 0.0), t_s, bool(len(hits)), doing, under_way_m,
+        appeared,
+    )  # fmt: skip
+    return _with_reaction(trace, pair, gaps, found) if pair.speed_m_s > 0.0 else found
+
+
+def _whose_doing(trace: Trace, least: Gap) -> str:
+    pair = least.pair
+    robots = [name for name in (pair.first, pair.second) if name in trace.robots]
+    own = {robot: own_margins(trace, pair, robot) for robot in robots}
+    if any(margins.of_law.min(initial=np.inf) < -DISTANCE_TOLERANCE_M for margins in own.values()):
+        return "robot"
+    taking = [robot for robot in robots if own[robot].of_body.min(initial=np.inf) < -DISTANCE_TOLERANCE_M]
+    if taking:
+        return "under way" if any(_is_late(trace, robot) for robot in taking) else "robot"
+    if least.row <= _first_apart(pair, gap_over_time(trace, pair)):
+        return "nobody"
+    origin = None if pair.second in trace.robots else origin_of(trace, pair.second)
+    moved = origin is not None and bool(np.ptp(origin[pair.rows], axis=0).any())
+    return "other" if moved else "robot"
+
+
+def _is_late(trace: Trace, robot: str) -> bool:
+    """Whether commands under way lead the body of a robot."""
+    return any(plant.kind in ("lag", "delay") for plant in trace.scenario.robots[robot].plant)
+
+
+def _way_m(trace: Trace, pair: Pair, gaps: Array, t_s: float) -> float:
+    """Way of the body of the robot of a pair, from the last row at which the gap was kept up to a time, m."""
+    end = min(int(np.searchsorted(trace.t, t_s)), len(trace.t) - 1)
+    apart = np.flatnonzero(gaps[pair.row : end] >= pair.required_m - DISTANCE_TOLERANCE_M)
+    begin = pair.row + (int(apart[-1]) if len(apart) else 0)
+    return float(np.linalg.norm(np.diff(trace.body(pair.first)[begin : end + 1], axis=0), axis=1).sum())
+
+
+def _with_reaction(trace: Trace, pair: Pair, gaps: Array, found: Encounter) -> Encounter:
+    """The same with what the robot did beside an obstacle that may move, and what kept it from more."""
+    periods, t_s = periods_of(trace, pair), found.t_s
+    before = np.flatnonzero((trace.t[periods.row] < t_s) | (periods.row == pair.row))
+    k = int(before[-1])
+    given, samples = inequalities_of(trace, pair.first), trace.sample_rows
+    number = np.searchsorted(samples, periods.row)
+    blocked = [_blocked_by(trace, pair, periods, int(each), given, int(number[each])) for each in before]
+    short = pair.required_m - DISTANCE_TOLERANCE_M
+    held = [bool(each) and gaps[row] < short for each, row in zip(blocked, periods.row[before], strict=True)]
+    end = max((each for each in range(len(held)) if held[each]), default=-1)
+    begin = end
+    while begin > 0 and held[begin - 1]:
+        begin -= 1
+    ends = np.append(trace.t[periods.row], t_s)
+    caught = (float(ends[begin]), float(min(ends[end + 1], max(t_s, ends[end])))) if end >= 0 else ()
+    velocity = periods.velocity[k]
+    speed, limit = float(np.linalg.norm(velocity)), trace.scenario.robots[pair.first].max_speed_m_s
+    away = float(periods.normal[k] @ velocity)
+    names = dict.fromkeys(name for each in blocked[begin : end + 1] for name in each) if end >= 0 else {}
+    return found._replace(
+        reaction=_reaction(speed, away, limit), speed_m_s=speed, blocked_by=(*names,), caught_s=caught
+    )
+
+
+def _reaction(speed: float, away: float, limit: float) -> str:
+    """What a robot did, from its speed, how fast that led away from the obstacle, and its limit, m/s."""
+    if speed <= STANDING_M_S:
+        return "stood"
+    if away <= STANDING_M_S:
+        return "moved aside"
+    return "retreated at its limit" if speed >= limit - AT_LIMIT_M_S else "retreated"
+
+
+def _blocked_by(trace: Trace, pair: Pair, periods: Periods, k: int, given: Inequalities, sample: int) -> list[str]:
+    """The bodies whose inequalities forbid the straight retreat that a robot should make in a period."""
+    h, limit = trace.scenario.control.period_s, trace.scenario.robots[pair.first].max_speed_m_s
+    wished = min(pair.speed_m_s - (float(periods.apart_m[k]) - pair.law_m) / h, limit)
+    if wished <= BLOCKED_M_S:
+        return []
+    retreat = wished * periods.normal[k]
+    of_sample = np.flatnonzero(given.sample == sample)
+    missed = given.normal[of_sample] @ retreat < given.bound[of_sample] - BLOCKED_M_S
+    parts = parts_of(trace)
+    columns = given.column[of_sample[missed]].tolist()
+    m = len(parts.owner)
+    names = [parts.names[parts.owner[c]] if c < m else trace.robots[c - m] for c in columns]
+    return [name for name in dict.fromkeys(names) if name != pair.second]
