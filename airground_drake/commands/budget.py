@@ -52,6 +52,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         for term in one.terms:
             owner = f" of {term.of}" if term.of and len(group) == 1 else ""
             print(f"    {term.key}{owner}: {term.metres:.4f} m")
+        if one.start:
+            print(f"    promised only with {one.start}")
     return 0
 
 
@@ -80,4 +82,5 @@ def _entry(group: Sequence[PairBudget]) -> dict[str, object]:
         "promised_m": one.promised_m,
         "in_the_law_m": one.gap_m,
         "terms": [{"key": term.key, "metres": term.metres} for term in one.terms],
+        **({"promised_only_with": one.start} if one.start else {}),
     }

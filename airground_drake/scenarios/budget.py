@@ -35,6 +35,7 @@ class PairBudget(NamedTuple):
         radii_m: sum of both radii, m.
         law_m: distance that the law keeps between steered points, or a steered point and a core, m.
         terms: what it takes beyond the promise and the radii, in the order of their addition.
+        start: what the promise asks for where the obstacle appears later than at the start; '' if nothing.
     """
 
     first: str
@@ -44,6 +45,7 @@ class PairBudget(NamedTuple):
     radii_m: float
     law_m: float
     terms: tuple[Term, ...]
+    start: str = ""
 
     @property
     def gap_m(self) -> float:
@@ -90,8 +92,10 @@ def budget(scenario: Scenario) -> Iterator[PairBudget]:
             for each in costs(promised + radii, *both, gain=gain, passive=passive)
         ]
         law = float(law_distance(promised + radii, *both, gain=gain, passive=passive))
-        return PairBudget(first, second, kind, promised, radii, law, tuple(terms))
+        start = _start(bounds[first], promised, law - radii) if kind == "obstacle" and appears.get(second) else ""
+        return PairBudget(first, second, kind, promised, radii, law, tuple(terms), start)
 
+    appears = {name: obstacle.appears_s for name, obstacle in scenario.obstacles.items()}
     radius = {name: robot.radius_m for name, robot in scenario.robots.items()}
     for one in scenario.robots:
         for name, each in scenario.barriers.items():
@@ -103,10 +107,22 @@ def budget(scenario: Scenario) -> Iterator[PairBudget]:
         yield of_pair(one, other, "air_ground" if with_uav else "ugv", promised, radius[one] + radius[other])
 
 
+def _start(robot: Bounds, promised_m: float, gap_m: float) -> str:
+    """What has to hold of a robot where an obstacle appears, so that its distance is promised from then on."""
+    if robot.exact:
+        return f"{gap_m:.3f} m when it appears"
+    of_point = f"{gap_m:.3f} m of the steered point when it appears"
+    if not (robot.lag_s or robot.delay_s or robot.drawn):
+        return of_point
+    way_m = robot.delay_s * robot.speed_m_s
+    way = f", also on its way of up to {way_m:.3f} m under commands already given" if way_m else ""
+    return f"{of_point}, and {promised_m:.3f} m of the body{way}"
+
+
 def alike(pairs: Iterable[PairBudget]) -> list[list[PairBudget]]:
     """The pairs with the same numbers together, in the order of the first of each."""
     groups = dict[object, list[PairBudget]]()
     for pair in pairs:
         terms = tuple(sorted((term.key, term.metres) for term in pair.terms))
-        groups.setdefault((pair.kind, pair.promised_m, round(pair.gap_m, 12), terms), []).append(pair)
+        groups.setdefault((pair.kind, pair.promised_m, round(pair.gap_m, 12), terms, pair.start), []).append(pair)
     return [*groups.values()]

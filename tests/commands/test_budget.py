@@ -29,3 +29,23 @@ def test_it_is_printed_and_drawn(capsys: pytest.CaptureFixture[str], tmp_path: P
     assert "burger beside person, which may move: promised 0.200 m, in the law 0.300 m" in told
     assert "    hand_point_m of burger: 0.1000 m" in told
     assert ElementTree.parse(picture).getroot().tag.endswith("svg")
+
+
+def test_beside_what_appears_it_says_what_has_to_be_clear(capsys: pytest.CaptureFixture[str]) -> None:
+    late = "ugvs.ugv1.plant={kind: delay, delay_s: 0.5}"
+    assert (
+        main(
+            [
+                "minimal",
+                "--set",
+                late,
+                "--set",
+                "obstacles.rock.appears_s=2",
+                "--set",
+                "uav={start_m: [0, 0, 9], altitude_m: 9}",
+            ]
+        )
+        == 0
+    )
+    told = capsys.readouterr().out
+    assert "m of the body, also on its way of up to" in told

@@ -43,7 +43,9 @@ class SafeBudget(TheoremClaim):
     )
     statement = (
         "Where the points that the law steers keep the law's distance d_law at the samples, the bodies of robots that "
-        "turn, lag, get their commands late or have a plant of the user's own keep the safe distance d at all times. "
+        "turn, lag, get their commands late or have a plant of the user's own keep the safe distance d at all times, "
+        "from a start at which they have it. Beside an obstacle that appears later, that is where a body that lags or "
+        "gets its commands late, and its way under commands already given, are clear (SAFE-HYP). "
         "Beside an obstacle that may move, the bodies keep in the same way what SAFE-OWN states. For each kind of pair "
         "d_law is at least what the theorems ask for."
     )
