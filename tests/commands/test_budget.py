@@ -33,19 +33,7 @@ def test_it_is_printed_and_drawn(capsys: pytest.CaptureFixture[str], tmp_path: P
 
 def test_beside_what_appears_it_says_what_has_to_be_clear(capsys: pytest.CaptureFixture[str]) -> None:
     late = "ugvs.ugv1.plant={kind: delay, delay_s: 0.5}"
-    assert (
-        main(
-            [
-                "minimal",
-                "--set",
-                late,
-                "--set",
-                "obstacles.rock.appears_s=2",
-                "--set",
-                "uav={start_m: [0, 0, 9], altitude_m: 9}",
-            ]
-        )
-        == 0
-    )
+    given = [late, "obstacles.rock.appears_s=2", "uav={start_m: [0, 0, 9], altitude_m: 9}", "control.sensing_range_m=9"]
+    assert main(["minimal", *(word for change in given for word in ("--set", change))]) == 0
     told = capsys.readouterr().out
-    assert "m of the body, also on its way of up to" in told
+    assert "2.000 m of the body, also on its way of up to 3.000 m under commands already given" in told
