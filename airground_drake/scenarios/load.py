@@ -10,6 +10,7 @@ import dataclasses
 import json
 import math
 from collections.abc import Mapping, Sequence
+from copy import deepcopy
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +19,7 @@ from airground_drake.base.exact import decimal
 from airground_drake.scenarios import map_file, validate
 from airground_drake.scenarios.document import Document, of_data, place_of, put, read, replace, simple
 from airground_drake.scenarios.filled import filled
-from airground_drake.scenarios.schema import Scenario, Vector
+from airground_drake.scenarios.schema import SET, Scenario, Vector
 from airground_drake.scenarios.shipped import shipped
 
 __all__ = ["from_data", "load", "own", "resolved", "shipped", "validated"]
@@ -89,12 +90,14 @@ def resolved(scenario: Scenario) -> dict[str, Any]:
 
 def _build(document: Document, overrides: Overrides, runs: Sequence[str] = ()) -> Scenario:
     """The scenario of a document with overrides, checked; only with some runs, if it has them."""
+    given = _choices(document)
     if isinstance(overrides, Mapping):
         for key, value in overrides.items():
             _put(document, str(key), value)
     else:
         for override in overrides:
             replace(document, override)
+    _mark_set(document, given)
     given = document.data.get("runs") if runs and isinstance(document.data, dict) else None
     if isinstance(given, dict) and {*runs} <= given.keys():
         document.data["runs"] = {name: given[name] for name in runs}
@@ -103,6 +106,34 @@ def _build(document: Document, overrides: Overrides, runs: Sequence[str] = ()) -
         if run.set:
             _as_set(document, name, run.set)
     return scenario
+
+
+Chosen = list[tuple[Any, Any, Any]]
+"""Entries of `choices`, a copy of each, and a copy of the value that it is about."""
+
+
+def _choices(document: Document) -> Chosen:
+    """Those of a document that names are given in."""
+    listed = document.data.get("choices") if isinstance(document.data, dict) else None
+    entries = [each for each in listed if isinstance(each, dict)] if isinstance(listed, list) else []
+    return [(each, dict(each), deepcopy(_value_at(document.data, str(each.get("key"))))) for each in entries]
+
+
+def _mark_set(document: Document, given: Chosen) -> None:
+    """Replace the reasons for values that overrides have changed, unless they have changed the entry, too."""
+    for (entry, as_given, value), (now, _, changed) in zip(given, _choices(document), strict=False):
+        if now is entry and entry == as_given and value != changed:
+            had = f"; the file has {json.dumps(value)}" if isinstance(value, int | float | str) else ""
+            entry |= {"source": SET, "reason": f"set by an override{had}"}
+
+
+def _value_at(data: Any, key: str) -> Any:
+    """Value at a dotted key of a document's data; None if there is none."""
+    for part in place_of(key):
+        if isinstance(data, list):
+            data = dict(zip(map(str, range(len(data))), data, strict=True))
+        data = data.get(part) if isinstance(data, dict) else None
+    return data
 
 
 def own(scenario: Scenario, run: str) -> Scenario:
