@@ -75,7 +75,8 @@ def simulate(scenario: Scenario, run: str) -> tuple[Trace, list[Prediction]]:
 
 def literal_rule() -> Item:
     """Item 25: if the first stage of each rounded plan is executed, no acceptance lasts."""
-    literal, ours, table, settings = {}, {}, {}, {}
+    literal, ours, settings = {}, {}, {}
+    table: dict[str, dict[str, dict[str, Any]]] = {}
     for name, duration_s in DURATIONS_S.items():
         scenario = load(name, {"reproduction": [], "duration_s": duration_s})
         trace, predictions = simulate(scenario, "c_literal")

@@ -102,3 +102,10 @@ def test_an_override_takes_the_place_of_the_reason_for_a_value() -> None:
     }
     assert policies["intervention.policies"].source == "set"
     assert load("case_a", {"choices": []}).choices == []
+
+
+def test_a_choice_about_what_an_override_removes_is_dropped() -> None:
+    for name in CASES:
+        scenario = load(name, ["runs={d: {method: d}}", "reproduction=[]"])
+        kept = {choice.key for choice in scenario.choices}
+        assert kept == {choice.key for choice in load(name).choices if not choice.key.startswith("runs.")}
