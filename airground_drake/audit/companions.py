@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
 from pydrake.solvers import ClarabelSolver, MathematicalProgram
 
 from airground_drake.audit.item import Item, item
+from airground_drake.audit.literal import literal_rule
 from airground_drake.base.arrays import Array
 from airground_drake.gatekeeper.outcome import Outcome
 from airground_drake.gatekeeper.outcome_gatekeeper import OutcomeGatekeepers
@@ -54,7 +54,7 @@ def companion_findings() -> list[Item]:
     """Items 7, 10, 11 and 23 to 25."""
     direct, gated = (_run("case_b", run, "duration_s=13.0", PAPERS_ROUTE) for run in ("b", "c"))
     return [
-        _sign(), _soft_gate(), _no_dynamics(gated), _method_b(direct, gated), _proper_tasks(direct), _literal_rule(),
+        _sign(), _soft_gate(), _no_dynamics(gated), _method_b(direct, gated), _proper_tasks(direct), literal_rule(),
     ]  # fmt: skip
 
 
@@ -221,38 +221,3 @@ def _proper_tasks(direct: Trace) -> Item:
         {"wrong_intervention_to_obstacle_m": away, "safe_distance_m": d},
         away < d, {"ends_at_m": ends.tolist(), "obstacle_m": obstacle.tolist(), "rest": "by reading"},
     )  # fmt: skip
-
-
-def _literal_rule() -> Item:
-    """Item 25: if the first stage of each rounded plan is executed, no acceptance lasts."""
-    answers = {
-        name: {
-            rule: _answers(_run(name, run, f"duration_s={duration_s}.0"))
-            for rule, run in (("literal", "c_literal"), ("ours", "c"))
-        }
-        for name, duration_s in (("case_a", 18), ("case_b", 16))
-    }
-    literal, ours = (
-        [sum((a, b) == ("accept", "refuse") for (_, a), (_, b) in pairwise(found[rule])) for found in answers.values()]
-        for rule in ("literal", "ours")
-    )
-    return item(
-        25, "(28)-(29), Figures 6 and 10",
-        "The paper's gatekeeper, taken literally, solves (27) by multiple shooting, rounds it by (28)-(29), and "
-        "executes the first stage of the rounded plan at every sample. In both cases it takes an acceptance back about "
-        "a second later and then accepts again, because the UGV's own task is cheaper for a moment. The paper "
-        "describes one lasting acceptance in Figures 6 and 10. Here an answer changes only by a margin and after a "
-        "dwell. The finding holds for our weights and speeds; the paper gives none.",
-        {"acceptances_taken_back": literal}, {"acceptances_taken_back": ours},
-        min(literal) > 0 and max(ours) == 0,
-        {
-            "answers": answers, "runs": "c_literal and c of case_a (18 s) and case_b (16 s)", "figures": "by reading",
-            "literal": {name: load(name).runs["c_literal"].set for name in answers},
-        },
-    )  # fmt: skip
-
-
-def _answers(trace: Trace) -> list[tuple[float, str]]:
-    """When UGV1 accepted or refused, s, and which."""
-    kinds = "accept", "refuse"
-    return [(round(e["t_s"], 9), e["kind"]) for e in trace.events if e["robot"] == "ugv1" and e["kind"] in kinds]

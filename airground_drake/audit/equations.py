@@ -36,15 +36,25 @@ class PaperDeviation(NamedTuple):
 _PROGRAM = ("gatekeeper.problem:Problem", "gatekeeper.binary_program:BinaryProgram")
 
 DEVIATIONS: tuple[PaperDeviation, ...] = (
-    PaperDeviation("(1)", "task value sigma = f(rho)", ("nsbc.task:Task.value",), "faithful"),
-    PaperDeviation("(2)", "its rate, through the Jacobian", ("nsbc.task:Task.jacobian",), "faithful"),
+    PaperDeviation(
+        "(1)", "task value sigma = f(rho)",
+        ("nsbc.kernels:fill_half_spaces", "nsbc.law:command", "nsbc.task:Task.value"), "faithful",
+        "The laws have their tasks written out: a robot's distances, a UGV's position, the UAV's position over the "
+        "centroid. `nsbc.task.Task` is the general form, for a task of your own (`uav.task`).",
+    ),
+    PaperDeviation(
+        "(2)", "its rate, through the Jacobian",
+        ("nsbc.kernels:fill_half_spaces", "nsbc.law:command", "nsbc.task:Task.jacobian"), "faithful",
+        "Of a distance it is a unit vector, of a position the identity.",
+    ),
     PaperDeviation(
         "(3)", "velocity by the pseudoinverse", ("nsbc.task:pseudoinverse",), "changed",
-        "J^+ is applied to the rate of the task, not of the configuration. It is the Moore-Penrose inverse.",
+        "J^+ is applied to the rate of the task, not of the configuration. It is the Moore-Penrose inverse. The laws "
+        "use it for J_int only: the other Jacobians are unit vectors and the identity.",
         "Otherwise the sizes do not match. J^T (J J^T)^-1 does not exist where a task is singular.", (8,),
     ),
     PaperDeviation(
-        "(4)", "the same in closed loop", ("nsbc.task:Task.velocity",), "changed",
+        "(4)", "the same in closed loop", ("nsbc.law:command", "nsbc.tasks:PositionTask.velocity"), "changed",
         "Error and rate are those of the task, sigma_d - sigma, not of the configuration.",
         "Otherwise the sizes do not match.", (8,),
     ),
@@ -57,7 +67,7 @@ DEVIATIONS: tuple[PaperDeviation, ...] = (
     ),
     PaperDeviation(
         "(6)", "move to the target",
-        ("nsbc.tasks:PositionTask", "systems.controllers:UgvController", "nsbc.law:command"), "changed",
+        ("systems.controllers:UgvController", "nsbc.law:command"), "changed",
         "The desired value is the moving preset trajectory rho_rd, which ends at the target, not the fixed target. "
         "Its rate is fed forward. The command is shortened to the UGV's speed limit.",
         "(15) and (25) measure the error from the preset trajectory. With the fixed target a UGV would leave it at "
@@ -65,12 +75,12 @@ DEVIATIONS: tuple[PaperDeviation, ...] = (
     ),
     PaperDeviation(
         "(7)", "obstacle avoidance of a UGV: task value",
-        ("nsbc.tasks:DistanceTask", "systems.controllers:UgvController"), "faithful",
+        ("nsbc.kernels:fill_half_spaces", "systems.controllers:UgvController"), "faithful",
         "Other robots count as obstacles, each of a pair with half of the task. Bodies have radii, which add to d.",
     ),
     PaperDeviation(
         "(8)", "obstacle avoidance of a UGV: velocity",
-        ("nsbc.tasks:DistanceTask", "nsbc.avoidance:Avoidance"), "changed",
+        ("nsbc.kernels:fill_half_spaces", "nsbc.avoidance:Avoidance"), "changed",
         "An inequality instead of an equality. The gain A acts only inside d, where n.v >= A (d - D). "
         "Outside, the inequality is n.v >= -(D - d) / h, without the gain. It binds only where the lower tasks would "
         "break it, and only within the sensing range. Obstacles count as standing.",
@@ -156,7 +166,7 @@ DEVIATIONS: tuple[PaperDeviation, ...] = (
         "The two velocities of a stage are taken along two roll-outs of the UGV's closed loop, accepting throughout "
         "and refusing throughout, not at the position that the plan has reached. A stage is one Euler step.",
         "The integer program needs a motion that is linear in omega. The motion is exact for the two constant plans.",
-        (11,),
+        (11, 25),
     ),
     PaperDeviation(
         "(24)", "gatekeeper: one choice per stage", _PROGRAM, "faithful",
@@ -180,15 +190,16 @@ DEVIATIONS: tuple[PaperDeviation, ...] = (
         "(27)", "its relaxation", ("gatekeeper.routes.nonlinear:relaxation", "gatekeeper.binary_program:BinaryProgram"),
         "changed",
         "The relaxation is solved under the routes `relaxed` (half-planes) and `nonlinear` (circles, "
-        "multiple shooting); the default route does not need its solution.",
-        "As printed, (27c) is not relaxed, and (27) has no kinematics.", (8, 11, 14, 22),
+        "multiple shooting, from the cheaper constant plan to a local optimum); the default route does not need it.",
+        "As printed, (27c) is not relaxed, and (27) has no kinematics. The paper gives no start.", (8, 11, 14, 22, 25),
     ),
     PaperDeviation(
         "(28)", "sum-up rounding: accumulated deficit", ("gatekeeper.relaxation:sum_up_rounding",), "changed",
         "The routes `relaxed` and `nonlinear` compute it. They return the cheapest plan by (25) among the rounded "
         "one and others, such as the two constant ones. A standing answer changes only by a margin and after a dwell. "
         "`gatekeeper.rule: first_stage` executes the first stage of the rounded plan; with the route `nonlinear` that "
-        "is the paper to the letter, run `c_literal` of `case_a` and `case_b`.",
+        "is by the letter of (27)-(29), with two choices that the paper leaves open (finding 25): run `c_literal` of "
+        "`case_a` and `case_b`.",
         "The rounded plan can cost more than refusing throughout. The first stage alone reverses answers.", (22, 25),
     ),
     PaperDeviation(

@@ -8,6 +8,7 @@ from math import dist
 import numpy as np
 
 from airground_drake.audit.item import Item, item
+from airground_drake.base.arrays import Array
 from airground_drake.scenarios.schema import Scenario
 
 
@@ -45,12 +46,8 @@ def _intervention_rate(scenario: Scenario) -> Item:
 def _stall(scenario: Scenario) -> Item:
     """Item 20: the printed point of the stall is not 2 m from the obstacles."""
     printed, d = (3.3, 5.1), scenario.safe_distance.obstacle_m
-    centres = [np.array(scenario.obstacles[name].position_m[:2]) for name in ("obstacle_1", "obstacle_2")]
+    centres, point = between_obstacles(scenario)
     away = [dist(printed, centre) for centre in centres]
-    middle, between = (centres[0] + centres[1]) / 2.0, centres[1] - centres[0]
-    length = float(np.linalg.norm(between))
-    across = np.array([between[1], -between[0]]) / length * np.sqrt(d**2 - (length / 2.0) ** 2)
-    point = min(middle + across, middle - across, key=lambda p: dist(p, printed))
     return item(
         20, "section 5.1, Figure 5",
         f"The paper says that UGV1 stalls at ({printed[0]:g}, {printed[1]:g}), at a distance 'constant at 2 m'. The "
@@ -63,6 +60,19 @@ def _stall(scenario: Scenario) -> Item:
         {"obstacles_m": [centre.tolist() for centre in centres], "safe_distance_m": d},
         unit="m",
     )  # fmt: skip
+
+
+def between_obstacles(scenario: Scenario) -> tuple[list[Array], Array]:
+    """The two obstacles between which UGV1 stalls, and the point at the safe distance from both, [x, y], m.
+
+    Of the two such points it is the one at which UGV1 arrives first.
+    """
+    d = scenario.safe_distance.obstacle_m
+    centres = [np.array(scenario.obstacles[name].position_m[:2]) for name in ("obstacle_1", "obstacle_2")]
+    middle, between = (centres[0] + centres[1]) / 2.0, centres[1] - centres[0]
+    length = float(np.linalg.norm(between))
+    across = np.array([between[1], -between[0]]) / length * np.sqrt(d**2 - (length / 2.0) ** 2)
+    return centres, min(middle + across, middle - across, key=lambda point: float(point[1]))
 
 
 def _uav_target(scenario: Scenario) -> Item:

@@ -91,7 +91,7 @@ def _timing(scenario: Scenario, traces: Mapping[str, Trace]) -> Item | None:
             continue
         preset, zeta = scenario.ugvs[robot].preset, float(traces[name].meta["zeta_m"])
         stall = MEASURES["stall_position"](traces[name], robot)
-        travelled = _leaves_ball(preset, stall, zeta) if stall else None
+        travelled = leaves_ball(preset, stall, zeta) if stall else None
         if travelled is None:
             continue
         reach = np.linspace(0.0, 1.2 * travelled, REFERENCE_POINTS)
@@ -116,7 +116,7 @@ def _timing(scenario: Scenario, traces: Mapping[str, Trace]) -> Item | None:
     return None
 
 
-def _leaves_ball(preset: Preset, centre: list[float], radius: float) -> float | None:
+def leaves_ball(preset: Preset, centre: list[float], radius: float) -> float | None:
     """Distance travelled along a preset trajectory when it last leaves the ball, m; None if it never does.
 
     On each leg p + u e (e a unit vector, u in m) the crossings solve ||p + u e - centre|| = radius; the larger

@@ -16,7 +16,7 @@ from .rules import SMALL, Array, NotEstablished, close, holds, same
 from .scenario import Levels, Pair, Preset, as_run, levels_of, moving_of, pairs_of, places_of, preset_of, robots_of
 from .shapes import boxes_of
 
-SCHEMA = "airground_drake.trace/8"
+SCHEMA = "airground_drake.trace/9"
 TABLES = ("states.parquet", "samples.parquet")
 """The tables that are read: positions, noise and triggers; commands and references at the control samples."""
 SHARED = ("method", "composition", "seed", "zeta_m", "events", "faults")

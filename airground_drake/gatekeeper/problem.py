@@ -9,7 +9,7 @@ import numpy as np
 
 from airground_drake.base.arrays import Array, read_only
 from airground_drake.gatekeeper.cost import Terms, half_plane_cost, plan_cost
-from airground_drake.gatekeeper.rollout import ACCEPTED, REFUSED, View, closed_loop, follow
+from airground_drake.gatekeeper.rollout import ACCEPTED, REFUSED, ClosedLoop, View, closed_loop, follow
 from airground_drake.geometry import convex, outline
 from airground_drake.intervention.policy import Proposal
 from airground_drake.nsbc.law import UgvLaw
@@ -113,17 +113,28 @@ class Evaluation:
     clearance: float
 
 
+def sensed(seen: View, law: UgvLaw) -> View:
+    """The view with only what is within sensing range: all that a prediction knows."""
+    return seen.restrict(seen.apart() <= law.avoidance.sensing_range)
+
+
+def predicted_loop(seen: View, law: UgvLaw, proposal: Proposal, horizon: Horizon) -> ClosedLoop:
+    """One UGV's closed loop over the horizon, among bodies that keep their velocities; of a view as `sensed`."""
+    samples = law.avoidance.period * np.arange(0.0, horizon.stages * horizon.substeps + 1.0)
+    places = seen.places + samples[:, None, None] * seen.velocities
+    return closed_loop(seen, law, proposal, samples, places, horizon.substeps)
+
+
 def predicted_problem(seen: View, law: UgvLaw, proposal: Proposal, horizon: Horizon) -> Problem:
     """(26) for one UGV: roll out both choices and keep what it senses and might come near.
 
     (26) knows points. Of a core that is no point these are, at each stage, its nearest to the refused roll-out; there
     is no guarantee that an accepted one keeps its distance from the others.
     """
-    seen = seen.restrict(seen.apart() <= law.avoidance.sensing_range)
+    seen = sensed(seen, law)
     dt, stages = horizon.substeps * law.avoidance.period, np.ones(horizon.stages, dtype=np.int64)
-    samples = law.avoidance.period * np.arange(0.0, horizon.stages * horizon.substeps + 1.0)
-    places = seen.places + samples[:, None, None] * seen.velocities
-    loop = closed_loop(seen, law, proposal, samples, places, horizon.substeps)
+    loop = predicted_loop(seen, law, proposal, horizon)
+    places = loop.places
     (_, accept), (standing, refuse) = (follow(loop, mode * stages) for mode in (ACCEPTED, REFUSED))
     squared = np.maximum(np.square(accept).sum(axis=1), np.square(refuse).sum(axis=1))
     # a plan that switches may be faster than both constant ones, but for a retreat not above the speed limit

@@ -37,7 +37,7 @@ WORDS: dict[Reason, Words] = {
     "kept": Words("as answered before"),
     "dwell": Words("as answered before: it is too early for another answer"),
     "reversed": Words("the best plan begins with the other answer, and is cheaper than this one throughout"),
-    "first_stage": Words("the plan begins with this answer", "waiting looked cheaper"),
+    "first_stage": Words("the plan begins with this answer", "its plan began with refusing"),
     "no_plan": Words("no outcome could be computed", "no outcome could be computed"),
     "stalls": Words(
         "with the proposal the UGV would come to rest short of its goal, no nearer than without",

@@ -1,4 +1,4 @@
-"""Compiled inner loops of set-based avoidance (numba); `avoidance.py` explains and wraps them.
+"""Compiled inner loops of set-based avoidance (7)-(8) (numba); `avoidance.py` explains and wraps them.
 
 Scalar code without temporaries, because the gatekeeper computes the command of hundreds of thousands of periods. No
 fast-math: results are those of IEEE arithmetic in the order written.
@@ -62,6 +62,9 @@ def fill_half_spaces(
     retreat: Array,
 ) -> int:
     """Write the velocity constraints of one robot, those within sensing range, and return their number K.
+
+    Of each distance (7) these are the value D, (1), the Jacobian, (2), which is the unit vector n away from what is
+    avoided, and from these a bound on n.v, (8) as an inequality.
 
     Args:
         position: of the robot, (3,), m.

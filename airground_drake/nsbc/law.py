@@ -1,5 +1,7 @@
 """The UGVs' control law: avoidance (7)-(8), tracking (6) and intervention (14), composed as (5) or (20).
 
+The tasks (6) and (14) are of the form (4) with the position as value (1) and the identity as Jacobian (2).
+
 Compiled, and written once: the controllers command by it (`UgvLaw.velocity`), and the gatekeeper rolls it out
 (`command`, called in `gatekeeper/rollout.py`).
 """

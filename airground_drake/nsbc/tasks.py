@@ -1,7 +1,7 @@
-"""The tasks of the paper: move to target or track, keep a distance, stay over the centroid.
+"""Tasks of the UAV: track a position, stay over the centroid.
 
-The UAV's controller runs the task it is given, by default `FormationTask`. The UGVs' law is compiled: it has
-`DistanceTask` as inequalities (`avoidance.py`), and `PositionTask` and the intervention (14) in closed form (`law.py`).
+The UAV's controller runs the task it is given, by default `FormationTask`. The UGVs' law is compiled and has its tasks
+written out: distances (7)-(8) as inequalities (`kernels.py`), tracking (6) and the intervention (14) (`law.py`).
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from airground_drake.nsbc.task import Task
 
 
 class PositionTask(Task):
-    """Move-to-target and preset-trajectory tracking, eq (6): sigma = rho, J = I (gain B).
+    """Go to a place, or track one that moves: sigma = rho, J = I. The form of (6), for the UAV and tasks of your own.
 
     Attributes:
         target: desired positions, (n, 3), m.
@@ -41,38 +41,8 @@ class PositionTask(Task):
         return self.target, self.rate
 
     def velocity(self, position: Array) -> Array:
-        """Eq (6), (n, 3) m/s; the pseudoinverse of the identity is the identity."""
+        """Eq (4), (n, 3) m/s; the pseudoinverse of the identity is the identity."""
         return self.rate + self.gain * (self.target - position)
-
-
-class DistanceTask(Task):
-    """Obstacle avoidance as an equality, eqs (7)-(8): sigma = ||rho - rho_o||, sigma_d = d (gain A).
-
-    Attributes:
-        obstacle: centre of the obstacle, (3,) or (n, 3), m.
-        distance: safe distance d, m.
-    """
-
-    def __init__(self, obstacle: Array, distance: float, gain: float) -> None:
-        """Keep `distance` m from `obstacle`; raises ValueError on a bad gain."""
-        super().__init__(gain)
-        self.obstacle = obstacle
-        self.distance = distance
-
-    def value(self, position: Array) -> Array:
-        """Distance D to the obstacle, (n, 1), m."""
-        return np.linalg.norm(position - self.obstacle, axis=-1, keepdims=True)
-
-    def jacobian(self, position: Array) -> Array:
-        """Unit row vector away from the obstacle, (n, 1, 3); zero at the centre, where it is undefined."""
-        offset = position - self.obstacle
-        norm = np.linalg.norm(offset, axis=-1, keepdims=True)
-        unit = np.divide(offset, norm, out=np.zeros_like(offset), where=norm > 0.0)
-        return unit[..., None, :]
-
-    def desired(self) -> tuple[Array, Array]:
-        """Safe distance and zero rate, each (1,), m and m/s."""
-        return np.array([self.distance]), np.zeros(1)
 
 
 class FormationTask(PositionTask):

@@ -18,6 +18,7 @@ from airground_drake.registry import method_of
 from airground_drake.report import metrics, reproduction
 from airground_drake.report.sentences import counted
 from airground_drake.run.trace import Trace
+from airground_drake.scenarios.document import place_of
 from airground_drake.scenarios.plugins import OPTION
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.verify.claim import Verdict
@@ -220,7 +221,7 @@ def _run(scenario: Scenario, trace: Trace) -> dict[str, Any]:
 
 def _lookup(resolved: Any, key: str) -> Any:
     """Value at a dotted path of the resolved scenario, None if the path leads nowhere."""
-    for part in key.split("."):
+    for part in place_of(key):
         if isinstance(resolved, list):
             resolved = {str(position): each for position, each in enumerate(resolved)}
         if not isinstance(resolved, dict) or part not in resolved:

@@ -33,12 +33,24 @@ YES_NO = "yes/no"
 
 MEASURES: dict[str, Measure] = {}
 """Measures by name; `@measure` adds one."""
+DETAILS: dict[str, Callable[[Trace, str], list[str]]] = {}
+"""By measure, what the reason of a row tells of the run at hand; `@detail_of` adds one."""
 
 
 def measure(function: Measure) -> Measure:
     """Register a measure under its function's name (a decorator)."""
     MEASURES[function.__name__] = function
     return function
+
+
+def detail_of(*names: str) -> Callable[[Callable[[Trace, str], list[str]]], Callable[[Trace, str], list[str]]]:
+    """Register what to tell of a run about some measures (a decorator)."""
+
+    def register(function: Callable[[Trace, str], list[str]]) -> Callable[[Trace, str], list[str]]:
+        DETAILS.update(dict.fromkeys(names, function))
+        return function
+
+    return register
 
 
 @measure
@@ -138,11 +150,35 @@ def recovery_duration(trace: Trace, robot: str) -> list[float]:
 @measure
 def intervention_succeeds(trace: Trace, robot: str) -> list[float]:
     """1 if the robot arrives, triggered only at the threshold, and the gatekeeper accepted and never refused."""
-    triggers = _times(trace, robot, "trigger")
+    return [float(not _shortcomings(trace, robot))]
+
+
+@detail_of("intervention_succeeds")
+def _shortcomings(trace: Trace, robot: str) -> list[str]:
+    """What an intervention lacks to succeed as in the paper."""
+    triggers, accepted, refused = (_times(trace, robot, kind) for kind in ("trigger", "accept", "refuse"))
     x, zeta = _decision_variable(trace, robot)
-    at_threshold = np.interp(triggers, trace.t, x) >= zeta - TRIGGER_TOLERANCE_M
-    accepted, refused = (bool(_times(trace, robot, kind)) for kind in ("accept", "refuse"))
-    return [float(bool(triggers) and bool(at_threshold.all()) and accepted and not refused and _arrived(trace, robot))]
+    early = [t for t in triggers if np.interp(t, trace.t, x) < zeta - TRIGGER_TOLERANCE_M]
+    found = [] if triggers else ["it never triggers"]
+    found += [f"it triggers below the threshold at {_listed(early)}"] if early else []
+    found += [] if accepted else ["the gatekeeper never accepts"]
+    found += [f"the gatekeeper refuses at {_listed(refused)}"] if refused else []
+    return found + ["it does not arrive"] * (not _arrived(trace, robot))
+
+
+@measure
+def acceptance_lasts(trace: Trace, robot: str) -> list[float]:
+    """1 if the gatekeeper never refused after its first acceptance and the robot arrives; empty without acceptance."""
+    return [float(not _taken_back(trace, robot))] if _times(trace, robot, "accept") else []
+
+
+@detail_of("acceptance_lasts")
+def _taken_back(trace: Trace, robot: str) -> list[str]:
+    """What became of an acceptance that did not last."""
+    accepted = _times(trace, robot, "accept")[:1]
+    refused = [t for t in _times(trace, robot, "refuse") if accepted and t > accepted[0]]
+    found = [f"accepted at {_listed(accepted)}, refused at {_listed(refused)}"] if refused else []
+    return found + ["it does not arrive"] * (not _arrived(trace, robot))
 
 
 @measure
@@ -153,15 +189,25 @@ def minimum_distance(trace: Trace, robot: str) -> list[float]:
 
 
 @measure
-def acceptance_time(trace: Trace, robot: str) -> list[float]:
-    """Time of the first acceptance by the gatekeeper, s."""
-    return _times(trace, robot, "accept")[:1]
+def accepted_proposal_time(trace: Trace, robot: str) -> list[float]:
+    """Time at which the UAV sent the proposal that the gatekeeper first accepted, s."""
+    return _sent(trace, robot, "accept")
 
 
 @measure
-def refusal_time(trace: Trace, robot: str) -> list[float]:
-    """Time of the first refusal by the gatekeeper, s."""
-    return _times(trace, robot, "refuse")[:1]
+def refused_proposal_time(trace: Trace, robot: str) -> list[float]:
+    """Time at which the UAV sent the proposal that the gatekeeper first refused, s."""
+    return _sent(trace, robot, "refuse")
+
+
+@detail_of("accepted_proposal_time")
+def _accepted(trace: Trace, robot: str) -> list[str]:
+    return [f"accepted at {_listed(times)}" for times in (_times(trace, robot, "accept")[:1],) if times]
+
+
+@detail_of("refused_proposal_time")
+def _refused(trace: Trace, robot: str) -> list[str]:
+    return [f"refused at {_listed(times)}" for times in (_times(trace, robot, "refuse")[:1],) if times]
 
 
 @measure
@@ -201,6 +247,7 @@ def rows(scenario: Scenario, traces: Mapping[str, Trace]) -> list[dict[str, Any]
 
 def _row(row: Reproduction, traces: Mapping[str, Trace]) -> dict[str, Any]:
     ours, reason = _evaluate(row, traces)
+    details = DETAILS[row.measure](traces[row.run], row.robot) if ours and row.measure in DETAILS else []
     tolerance = 0.0 if row.unit == YES_NO else row.tolerance
     difference = max(abs(a - b) for a, b in zip(ours, row.paper, strict=True)) if ours else None
     within = difference is not None and difference <= tolerance * (1.0 + 1e-9) + 1e-12
@@ -216,7 +263,7 @@ def _row(row: Reproduction, traces: Mapping[str, Trace]) -> dict[str, Any]:
         "difference": difference,
         "tolerance": tolerance,
         "status": _status(row, within),
-        "why": "; ".join(filter(None, (reason, "" if within else row.ambiguous, row.why))),
+        "why": "; ".join(filter(None, (reason, *details, "" if within else row.ambiguous, row.why))),
     }
 
 
@@ -269,6 +316,16 @@ def _decision_variable(trace: Trace, ugv: str) -> tuple[Array, float]:
 
 def _times(trace: Trace, robot: str, kind: str) -> list[float]:
     return [float(event["t_s"]) for event in events_of(trace, robot, kind)]
+
+
+def _sent(trace: Trace, robot: str, answer: str) -> list[float]:
+    """When the proposal with the first answer of a kind was sent, s."""
+    answered = _times(trace, robot, answer)[:1]
+    return [t for t in _times(trace, robot, "proposal") if answered and t <= answered[0]][-1:]
+
+
+def _listed(times_s: list[float]) -> str:
+    return f"{', '.join(f'{t:.2f}' for t in times_s)} s"
 
 
 def _planar(position: Any) -> list[float]:

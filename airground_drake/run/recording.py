@@ -125,7 +125,7 @@ def _decision(decision: GatekeeperDecision, robot: str, route: str) -> dict[str,
         "number": decision.proposal.number,
         "answer": decision.answer,
         "issued_s": decision.proposal.issued,
-        "decision": "accept" if decision.accepted else "refuse",
+        "decision": _word(decision.accepted),
         "reason": decision.reason,
         "sensed": list(rested_on.sensed),
         "known": list(rested_on.known),
@@ -148,8 +148,9 @@ def _decision(decision: GatekeeperDecision, robot: str, route: str) -> dict[str,
     return row | {
         "status": solution.status,
         "route": route,
-        "first_stage": "accept" if solution.accept_first else "refuse",
+        "plan_first_stage": _word(solution.accept_first),
         "relaxed_first_stage": solution.relaxed_first_stage,
+        "rounded_first_stage": "" if solution.rounded is None else _word(bool(solution.rounded[0])),
         "objective": solution.objective,
         "route_bound": solution.route_bound,
         "gap": solution.gap,
@@ -160,6 +161,10 @@ def _decision(decision: GatekeeperDecision, robot: str, route: str) -> dict[str,
         "rounding_deviation_s": solution.rounding_deviation,
         "predicted_clearance_m": solution.clearance,
     }
+
+
+def _word(accepts: bool) -> str:
+    return "accept" if accepts else "refuse"
 
 
 def problems(decided: Sequence[GatekeeperDecision]) -> pd.DataFrame:

@@ -7,7 +7,7 @@ from typing import Any
 
 import pandas as pd
 
-SCHEMA = "airground_drake.trace/8"
+SCHEMA = "airground_drake.trace/9"
 
 DECISION_COLUMNS = {
     "t_s": "float64",
@@ -20,8 +20,9 @@ DECISION_COLUMNS = {
     "reason": "str",
     "status": "str",
     "route": "str",
-    "first_stage": "str",
+    "plan_first_stage": "str",
     "relaxed_first_stage": "float64",
+    "rounded_first_stage": "str",
     "objective": "float64",
     "route_bound": "float64",
     "gap": "float64",
@@ -45,6 +46,10 @@ that of `Trace.proposals`, `answer` the number of an answer in `Trace.messages`.
 `predicted_clearance_m` belong to decisions by problem (26), the others to decisions by outcomes: the outcome of either
 choice by `gatekeeper.outcome` (cost, 1 if the UGV comes to rest short of its goal, way left), and the number of tries
 since the UGV last rested.
+
+Three columns are about the first stage: `plan_first_stage` of the plan returned, the cheapest by (25) that the route
+evaluated; `relaxed_first_stage` and `rounded_first_stage` of the relaxation, before and after sum-up rounding. They may
+differ. `decision` is the answer: by the rule `first_stage` it is `rounded_first_stage`, if the route rounds.
 
 The lists say what a prediction rested on; they are empty where nothing was predicted. Obstacles are indices in the
 order of the scenario:

@@ -10,15 +10,16 @@ import dataclasses
 import json
 import math
 from collections.abc import Mapping, Sequence
+from copy import deepcopy
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from airground_drake.base.errors import Fault, ScenarioError, short
 from airground_drake.base.exact import decimal
 from airground_drake.scenarios import map_file, validate
 from airground_drake.scenarios.document import Document, of_data, place_of, put, read, replace, simple
 from airground_drake.scenarios.filled import filled
-from airground_drake.scenarios.schema import Scenario, Vector
+from airground_drake.scenarios.schema import SET, Scenario, Vector
 from airground_drake.scenarios.shipped import shipped
 
 __all__ = ["from_data", "load", "own", "resolved", "shipped", "validated"]
@@ -89,6 +90,7 @@ def resolved(scenario: Scenario) -> dict[str, Any]:
 
 def _build(document: Document, overrides: Overrides, runs: Sequence[str] = ()) -> Scenario:
     """The scenario of a document with overrides, checked; only with some runs, if it has them."""
+    chosen = _choices(document)
     if isinstance(overrides, Mapping):
         for key, value in overrides.items():
             _put(document, str(key), value)
@@ -98,11 +100,56 @@ def _build(document: Document, overrides: Overrides, runs: Sequence[str] = ()) -
     given = document.data.get("runs") if runs and isinstance(document.data, dict) else None
     if isinstance(given, dict) and {*runs} <= given.keys():
         document.data["runs"] = {name: given[name] for name in runs}
+    _mark_set(document, chosen)
     scenario = _checked(document)
     for name, run in scenario.runs.items():
         if run.set:
             _as_set(document, name, run.set)
     return scenario
+
+
+class Chosen(NamedTuple):
+    """An entry of `choices`, a copy of it, and the values that its key leads through, to the one that it is about."""
+
+    entry: dict[str, Any]
+    copy: dict[str, Any]
+    way: list[Any]
+
+
+def _choices(document: Document) -> list[Chosen]:
+    listed = document.data.get("choices") if isinstance(document.data, dict) else None
+    entries = [each for each in listed if isinstance(each, dict)] if isinstance(listed, list) else []
+    return [Chosen(each, dict(each), deepcopy(_way(document.data, str(each.get("key"))))) for each in entries]
+
+
+def _way(data: Any, key: str) -> list[Any]:
+    """The values of a document that a dotted key leads through, as far as they are there."""
+    found = []
+    for part in place_of(key):
+        if isinstance(data, list):
+            data = dict(zip(map(str, range(len(data))), data, strict=True))
+        if not isinstance(data, dict) or part not in data:
+            break
+        data = data[part]
+        found.append(data)
+    return found
+
+
+def _mark_set(document: Document, before: Sequence[Chosen]) -> None:
+    """Replace the reasons for values that overrides have changed, and drop choices about what they have removed.
+
+    Entries that overrides have changed or added themselves stay as they are.
+    """
+    for old, now in zip(before, _choices(document), strict=False):
+        if now.entry is not old.entry or now.entry != old.copy:
+            continue
+        depth = len(place_of(str(now.entry.get("key"))))
+        if len(now.way) < len(old.way):
+            document.data["choices"].remove(now.entry)
+        elif len(now.way) == depth and (len(old.way) < depth or old.way[-1] != now.way[-1]):
+            had = old.way[-1] if len(old.way) == depth else None
+            told = f"; the file has {json.dumps(had)}" if isinstance(had, int | float | str) else ""
+            now.entry.update(source=SET, reason=f"set by an override{told}")
 
 
 def own(scenario: Scenario, run: str) -> Scenario:

@@ -61,6 +61,8 @@ ABOUT = ("size_m",)
 
 TRIGGERS: tuple[str, ...] = ("automaton", "bare")
 AT_END: tuple[str, ...] = ("stop", "reverse", "loop")
+SET = "set"
+"""Source of a value that an override changed."""
 RULES: tuple[str, ...] = ("hysteresis", "first_stage")
 SETTABLE: tuple[str, ...] = ("decision", "gatekeeper", "intervention")
 """Sections in which a run may set its own values. All runs share bodies, distances and controllers: a report draws them
@@ -416,12 +418,13 @@ class Gatekeeper:
 
     Under method (c) a decision on a proposal is reversed only for a plan that is cheaper by the (relative) switching
     margin, and not before `min_dwell_s` have passed. This rule is ours. The paper's rule, `first_stage`, executes the
-    first stage of each rounded plan, whatever the earlier answers were; with the route `nonlinear` that is (27)-(29) to
-    the letter. A decision may take `budget_iterations` iterations of the solver of a relaxation and 2,000 iterations of
-    the searches of `mixed_integer`. The budget 'counted' has no other limit: a run is the same on every machine on
-    which these iterations take less than 1 s, ten times the usual. The budget 'wall_clock', for real time, also limits
-    a decision to the share `budget_share` of the sampling period. `terminal_weight_s` is the w of a terminal cost w a
-    ||rho_rd - rho_N||^2 besides (25); the paper has no such cost.
+    first stage of each rounded plan, whatever the earlier answers were; with the route `nonlinear` that is by the
+    letter of (27)-(29), with two choices that the paper leaves open: the search starts at the cheaper constant plan,
+    and the velocities of (23) are those along the constant plans. A decision may take `budget_iterations` iterations of
+    the solver of a relaxation and 2,000 iterations of the searches of `mixed_integer`. The budget 'counted' has no
+    other limit: a run is the same on every machine on which these iterations take less than 1 s, ten times the usual.
+    The budget 'wall_clock', for real time, also limits a decision to the share `budget_share` of the sampling period.
+    `terminal_weight_s` is the w of a terminal cost w a ||rho_rd - rho_N||^2 besides (25); the paper has no such cost.
 
     Method (d) compares outcomes instead, up to `settling_s` past the end of motion and preset trajectory. An accepted
     proposal is executed for `longest_s` at most. After `tries` accepted proposals a UGV accepts no other until it has
@@ -531,11 +534,15 @@ class Reproduction:
 
 @dataclass(slots=True)
 class Choice:
-    """Origin of a value that is not from the paper: `source` is 'calibrated' or 'ours'."""
+    """Origin of a value that is not from the paper.
+
+    `source` is 'calibrated' if it was chosen so that a result matches the paper's, else 'ours'. An override of the
+    value (`--set`) makes it 'set', and takes the place of the reason.
+    """
 
     key: Words
     """Dotted key of the value."""
-    source: Annotated[Words, one_of(("calibrated", "ours"))]
+    source: Annotated[Words, one_of(("calibrated", "ours", SET))]
     """Its origin."""
     paper: Words = ""
     """The paper's value or statement."""

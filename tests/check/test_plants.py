@@ -79,7 +79,7 @@ def test_an_axle_that_begins_too_near_or_rolls_back_is_found() -> None:
     trace, _ = run_of("turtlebots forwards", 2.0)
     states, place = trace.states.copy(), ["burger.body_x_m", "burger.body_y_m"]
     states.loc[0, place] = next(iter(trace.scenario.barriers.values())).position_m[:2]
-    assert refuted_for(trace, states) == "safe start of the axle"
+    assert refuted_for(trace, states) == "safe start of the bodies"
     states, heading = trace.states.copy(), trace.states["burger.heading_rad"][20]
     states.loc[20, place] -= 0.1 * np.array([np.cos(heading), np.sin(heading)])
     assert refuted_for(trace, states) == "never backwards"

@@ -9,11 +9,13 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
-from airground_drake.audit import companions, formulas, readings, thresholds
+from airground_drake.audit import companions, formulas, literal, readings, thresholds
 from airground_drake.audit.typeset import typeset
 from airground_drake.decision import bayes
+from airground_drake.gatekeeper.solution import ConstantPlans
 from airground_drake.scenarios.load import load
 from airground_drake.verify import Finding, cache_folder, judge_model
 
@@ -63,7 +65,8 @@ def test_the_numbers_of_the_audit(items: dict[int, dict[str, Any]], companion_it
     assert items[4]["evidence"]["optimal_zeta_at_case_a_drift_m"] == pytest.approx(0.2803, abs=1e-4)
     assert items[5]["ours"]["mean_of_two_thresholds_s"] == pytest.approx(0.09)
     assert items[5]["ours"]["median_first_passage_s"] == pytest.approx(0.1978, abs=1e-4)
-    assert items[17]["evidence"]["speed_if_it_begins_there_m_s"] == pytest.approx(0.4506, abs=1e-4)
+    assert items[17]["ours"]["speed_m_s"] == pytest.approx({"case_a": 0.5606, "case_b": 0.7642}, abs=1e-4)
+    assert items[17]["evidence"]["speed_if_it_begins_there_m_s"] == pytest.approx(0.4476, abs=1e-4)
     assert items[18]["paper"]["time_s"] == pytest.approx(0.0890, abs=1e-4)
     assert items[18]["ours"]["time_s"] == pytest.approx(3.0 / 6.05, rel=1e-4)
     assert items[20]["paper"]["distances_m"] == pytest.approx([1.942, 2.025], abs=5e-4)
@@ -74,12 +77,41 @@ def test_the_numbers_of_the_audit(items: dict[int, dict[str, Any]], companion_it
     assert companion_items[10]["evidence"][companions.LIGHT]["accepted"] == 0
     assert companion_items[11]["paper"]["cost_accept_minus_refuse"] == pytest.approx(0.0, abs=1e-9)
     assert companion_items[11]["ours"]["cost_accept_minus_refuse"] == pytest.approx(2.625, abs=5e-4)
-    literal = {name: found["literal"] for name, found in companion_items[25]["evidence"]["answers"].items()}
-    assert literal["case_a"][:2] == [(14.55, "accept"), (15.55, "refuse")]
-    assert literal["case_b"][1:3] == [(13.1, "accept"), (14.1, "refuse")]
+    back = companion_items[25]["evidence"]["taken_back"]
+    assert {name: (each["t_s"], each["lasts_s"]) for name, each in back.items()} == {
+        "case_a": pytest.approx((15.55, 0.05)), "case_b": pytest.approx((14.1, 0.05)),
+    }  # fmt: skip
     to_the_letter = {"gatekeeper.route": "nonlinear", "gatekeeper.rule": "first_stage"}
-    assert companion_items[25]["evidence"]["literal"] == dict.fromkeys(literal, to_the_letter)
+    assert companion_items[25]["evidence"]["literal"] == dict.fromkeys(back, to_the_letter)
     assert companion_items[11]["ours"]["cost_with_slack_accept_minus_refuse"] > 9000.0
+
+
+def test_what_the_paper_leaves_open_changes_the_literal_answers(companion_items: dict[int, dict[str, Any]]) -> None:
+    """Against an independent program for (27), which gave these first shares and costs."""
+    assert companion_items[25]["evidence"]["taken_back"]["case_a"]["accept_throughout"] == pytest.approx(
+        10.56, abs=5e-3
+    )
+    assert companion_items[25]["evidence"]["taken_back"]["case_a"]["refuse_throughout"] == pytest.approx(
+        16.08, abs=5e-3
+    )
+    table = companion_items[25]["evidence"]["answers_by_open_choice"]
+    as_run, other, moved = (
+        table[f"case_a, 14.55 s, {name}"] for name in (literal.AS_RUN, literal.OTHER_START, literal.AT_THE_PLAN)
+    )
+    assert [each["answer"] for each in (as_run, other, moved)] == ["accept", "refuse", "refuse"]
+    assert [each["cost"] for each in (as_run, other)] == pytest.approx([22.55, 46.49], abs=0.01)
+    assert moved["first_share"] == pytest.approx(0.14, abs=0.01)
+
+
+def test_constant_plans_lead_where_the_closed_loop_does_wherever_the_velocities_are_from() -> None:
+    """Between them, a plan mixes the velocities of the place that it has reached."""
+    scenario = load("case_a", {"duration_s": 14.6, "reproduction": [], "choices": []})
+    problem, loop = literal.simulate(scenario, "c_literal")[1][0][1:]
+    plans = ConstantPlans.of(problem)
+    for plan in plans.both:
+        assert literal.cost_at_the_plan(problem, loop, plan.omega) == pytest.approx(plan.objective)
+    half = np.full(problem.stages, 0.5)
+    assert np.abs(literal.positions_at_the_plan(loop, half) - problem.positions(half)).max() > 0.1
 
 
 def test_with_the_printed_equation_in_the_code_item_2_would_not_pass(

@@ -134,7 +134,8 @@ def test_audit_is_made_from_the_runs_and_leaves_out_what_they_do_not_show(
     assert (report["overall"]["status"], report["overall"]["undemonstrated"]) == ("not_as_expected", [2])
 
 
-def test_a_choice_may_be_an_entry_of_a_list() -> None:
-    resolved = {"ugvs": {"ugv1": {"start_m": [1.0, 2.0]}}, "policies": [{"name": "detour"}]}
-    looked = [document._lookup(resolved, key) for key in ("ugvs.ugv1.start_m.1", "policies.0.name", "policies.1.name")]
-    assert looked == [2.0, "detour", None]
+def test_a_choice_may_be_an_entry_of_a_list_or_what_a_run_sets() -> None:
+    runs = {"c_literal": {"set": {"gatekeeper.route": "nonlinear"}}}
+    resolved = {"ugvs": {"ugv1": {"start_m": [1.0, 2.0]}}, "policies": [{"name": "detour"}], "runs": runs}
+    keys = "ugvs.ugv1.start_m.1", "policies.0.name", "policies.1.name", "runs.c_literal.set.gatekeeper.route"
+    assert [document._lookup(resolved, key) for key in keys] == [2.0, "detour", None, "nonlinear"]

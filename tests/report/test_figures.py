@@ -135,6 +135,15 @@ def test_runs_with_identical_paths_share_a_panel(scenario: Scenario, traces: dic
     )
 
 
+def test_a_run_that_sets_values_is_named_by_them(scenario: Scenario, traces: dict[str, Trace]) -> None:
+    run = Run("c", set={"gatekeeper.route": "nonlinear", "gatekeeper.rule": "first_stage", "control.period_s": 0.1})
+    trajectories, *_ = draw.draw(replace(scenario, runs={"c": run}), {"c": traces["c"]})
+    assert trajectories.panels[0].heading == (
+        "Run c: method (c) with (27) by multiple shooting, sum-up rounding (28)-(29), first stage applied, "
+        "control.period_s 0.1"
+    )
+
+
 def test_a_shortfall_says_from_whom(scenario: Scenario, traces: dict[str, Trace], drawn: list[Figure]) -> None:
     assert {"ugv1 to obstacle_2", "ugv1 to uav"} <= set(drawn[1].panels[0].table.columns)
     one = {"printed": replace(traces["a_printed"], meta={**traces["a_printed"].meta, "run": "printed"})}

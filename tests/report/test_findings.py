@@ -27,7 +27,7 @@ def test_what_is_computed_is_drawn_with_its_marks() -> None:
         "audit-3": "by finite differences: (0.1, 0.438)",
         "audit-4": "6.07 m/s: (6.07, 3)",
         "audit-5": "10, finite differences: (10, 0.09)",
-        "audit-17": "reported, case_b: (0.769, 10.6)",
+        "audit-17": "reported, case_b: (0.764, 10.6)",
         "audit-18": "one, finite differences: (6.05, 0.496)",
     }.items():
         assert says in drawn[name].caption

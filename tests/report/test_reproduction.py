@@ -26,7 +26,10 @@ AND_BACK: Corners = [(0, 3.3, 0.5), (29, *STALL), (29.5, 3.37, 5.105), (30, *STA
 NEAR: Corners = [(0, 3.3, 0.5), (9, 3.9, 5.3), (30, 3.9, 5.3)]
 PASSING: Corners = [(0, 0.7, 1.0), (30, 0.7, 7.3)]
 TWO = [float(np.hypot(3.9 - x, 5.3 - y)) for x, y in ((1.7, 4.0), (4.0, 7.0))]
-TIMES = [event(3, "trigger", "ugv2"), event(5, "refuse"), event(6, "accept"), event(7, "trigger")]
+TIMES = [
+    event(3, "trigger", "ugv2"), event(4, "proposal"), event(5, "refuse"), event(5.5, "proposal"), event(6, "accept"),
+    event(7, "trigger"), event(8, "proposal"),
+]  # fmt: skip
 RECOVERY = {0: 0.0, 9.9: 2.0, 10.0: 3.0 - 2e-9, 10.1: 3.0 - 1e-9, 11.0: 4.0, 12.0: 3.04, 12.1: 2.94, 30.0: 0.0}
 TRIGGERED = [event(10.0, "trigger")]
 ANSWERED = [*TRIGGERED, event(12.0, "accept")]
@@ -65,8 +68,13 @@ ANSWERED = [*TRIGGERED, event(12.0, "accept")]
         ("arrives", [0], STALLING, [], {}),
         ("trigger_time", [7], STALLING, TIMES, {}),
         ("trigger_time", [], STALLING, [], {}),
-        ("acceptance_time", [6], STALLING, TIMES, {}),
-        ("refusal_time", [5], STALLING, TIMES, {}),
+        ("accepted_proposal_time", [5.5], STALLING, TIMES, {}),
+        ("accepted_proposal_time", [], STALLING, TIMES[:4], {}),
+        ("refused_proposal_time", [4], STALLING, TIMES, {}),
+        ("acceptance_lasts", [1], GOING_ROUND, [event(11.0, "refuse"), *ANSWERED[1:]], {}),
+        ("acceptance_lasts", [0], GOING_ROUND, [*ANSWERED, event(14.7, "refuse")], {}),
+        ("acceptance_lasts", [0], STALLING, ANSWERED, {}),
+        ("acceptance_lasts", [], GOING_ROUND, TRIGGERED, {}),
         ("execution_time", [14.5], STALLING, TIMES, {}),  # the row before the signal rises, whatever the events say
         ("recovery_duration", [2.04], STALLING, TRIGGERED, {"x": RECOVERY}),  # not the fall at the trigger itself
         ("recovery_duration", [], STALLING, [], {"x": RECOVERY}),
@@ -109,6 +117,21 @@ def test_rows_and_what_they_say_of_the_tolerance(scenario: Scenario, traces: dic
     found = reproduction.rows(replace(scenario, reproduction=[exact, own, replace(own, paper=[10.6])]), traces)
     assert [row["status"] for row in found] == ["calibrated", "by_construction", "not_reproduced"]
     assert found[0]["why"] == "speed set"
+
+
+def test_reasons_tell_what_happened_in_the_run_at_hand(scenario: Scenario) -> None:
+    row = replace(scenario.reproduction[2], measure="intervention_succeeds", run="a", why="ours")
+    told = []
+    for events in (SUCCESS, [*SUCCESS, event(14.7, "refuse"), event(15.7, "refuse")], TRIGGERED):
+        trace = make_trace(make_scenario(), "a", GOING_ROUND, events)
+        told += [each["why"] for each in reproduction.rows(replace(scenario, reproduction=[row]), {"a": trace})]
+    assert told[0] == "ours"
+    assert told[1] == "the answer differs; the gatekeeper refuses at 14.70, 15.70 s; ours"
+    assert "the gatekeeper never accepts; ours" in told[2]
+    sent = replace(row, measure="refused_proposal_time", paper=[4.05], unit="s", tolerance=0.1)
+    trace = make_trace(make_scenario(), "a", STALLING, TIMES)
+    (found,) = reproduction.rows(replace(scenario, reproduction=[sent]), {"a": trace})
+    assert (found["ours"], found["why"].endswith("; refused at 5.00 s; ours")) == (4.0, True)
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,4 @@
-"""The paper's route to the letter: (27) by multiple shooting, solved as a nonlinear program, then (28)-(29)."""
+"""The paper's route by the letter: (27) by multiple shooting, solved as a nonlinear program, then (28)-(29)."""
 
 from __future__ import annotations
 
@@ -37,8 +37,12 @@ class NonlinearRoute:
     Such an r exists exactly if ||p - o|| >= max(0, d - u), which is (26d); all functions are smooth, also at
     p = o. Only pairs that some plan can bring within d are in the program.
 
-    The start is the cheaper constant plan. The plan returned is the cheapest, by the exact cost (25), of the
-    rounded one and the two constant ones. A local optimum bounds nothing: `route_bound` and `gap` are -1.
+    The search starts at the cheaper constant plan; the paper does not say where. (27) takes the velocities of (23) from
+    the problem, where they do not depend on the plan (`problem.predicted_problem`). The audit computes what these two
+    choices decide (finding 25).
+
+    The plan returned is the cheapest, by the exact cost (25), of the rounded one and the two constant ones. A local
+    optimum bounds nothing: `route_bound` and `gap` are -1.
 
     Budget: major iterations and the time left go to the solver. If it stops early, its iterate is rounded like an
     optimum; the status is then 'budget_spent' and the bound `unavoidable_cost`.
@@ -53,7 +57,7 @@ class NonlinearRoute:
         return guarded(problem, budget, self._solve)
 
     def _solve(self, problem: Problem, constants: ConstantPlans, budget: Budget) -> Solution:
-        relaxed, status = self._relax(problem, constants.better, budget)
+        relaxed, status = self.relax(problem, constants.better, budget)
         if relaxed is None:
             return without_optimum(problem, constants, budget)
         rounded = sum_up_rounding(relaxed)
@@ -62,8 +66,11 @@ class NonlinearRoute:
             return cut_short(problem, plans, unavoidable_cost(problem), status, relaxed=relaxed, rounded=rounded)
         return cheapest(problem, plans, relaxed=relaxed, rounded=rounded)
 
-    def _relax(self, problem: Problem, start: Evaluation, budget: Budget) -> tuple[Array | None, Status]:
-        """Omega (N,) where the solver ended, None if that is not a number; how it ended."""
+    def relax(self, problem: Problem, start: Evaluation, budget: Budget) -> tuple[Array | None, Status]:
+        """A local optimum of (27): omega (N,), None if that is not a number; how the solver ended.
+
+        Which local optimum it is depends on the plan from which the search starts.
+        """
         program, omega, guess = relaxation(problem, start)
         try:
             result = self._solver.Solve(program, guess, _options(budget))

@@ -1,6 +1,6 @@
 """Relaxation (27) with half-planes for (27d), a convex quadratic program, then sum-up rounding (28)-(29).
 
-The positions are eliminated, which is equivalent to multiple shooting; `nonlinear` is (27) to the letter.
+The positions are eliminated, which is equivalent to multiple shooting; `nonlinear` is (27) by the letter.
 """
 
 from __future__ import annotations

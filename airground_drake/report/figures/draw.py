@@ -18,6 +18,7 @@ from airground_drake.report.figures import comparison, maps, timelines
 from airground_drake.report.figures.panels import MAX_TABLE_ROWS, Figure, Panel, Table, panel, series
 from airground_drake.report.metrics import Nearby, close_by, events_of, gap_m, radius_m
 from airground_drake.report.outcomes import SLACK_M, distance, named
+from airground_drake.report.phrases import SETTINGS
 from airground_drake.report.reproduction import MEASURES
 from airground_drake.run.collisions import first_collisions
 from airground_drake.run.trace import Trace
@@ -114,7 +115,7 @@ def _select(scenario: Scenario, traces: Mapping[str, Trace]) -> _Selection:
     ranked = sorted(first.ugvs, key=rank)
     few = MAX_TEAM if len(ranked) <= MAX_TEAM else MAX_UGVS
     team, ugvs = ([name for name in first.ugvs if name in ranked[:most]] for most in (few, MAX_UGVS))
-    return _Selection(runs, {_heading(group, runs): runs[group[0]] for group in groups}, team, ugvs)
+    return _Selection(runs, {_heading(group, runs, scenario): runs[group[0]] for group in groups}, team, ugvs)
 
 
 def _alike(one: Trace, other: Trace) -> bool:
@@ -127,11 +128,13 @@ def _alike(one: Trace, other: Trace) -> bool:
     )
 
 
-def _heading(group: list[str], runs: Mapping[str, Trace]) -> str:
+def _heading(group: list[str], runs: Mapping[str, Trace], scenario: Scenario) -> str:
     if len(group) > 1:
         return f"Runs {' = '.join(group)}: identical paths"
     method = str(runs[group[0]].meta["method"])
-    return f"Run {group[0]}: method ({method}), {method_of(method).says}"
+    changed = scenario.runs[group[0]].set
+    says = ", ".join(SETTINGS.get((key, str(value)), f"{key} {value}") for key, value in changed.items())
+    return f"Run {group[0]}: method ({method}){f' with {says}' if says else f', {method_of(method).says}'}"
 
 
 def _runs(heading: str) -> str:

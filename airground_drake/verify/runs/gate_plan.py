@@ -253,7 +253,7 @@ def compare_plan(trace: Trace, row: DecisionRecord) -> Iterator[Deviation]:
             shift = given[f"{name}_throughout"] - thus
             yield Deviation(row, f"{name} throughout", shift, cost_tolerance(thus), recomputed=thus)
         yield Deviation(row, "the other choice is cheaper", max(0.0, given["objective"] - other), tolerance)
-        yield Deviation(row, "first stage", float(given["first_stage"] != first), 0.0, plan=first)
+        yield Deviation(row, "first stage", float(given["plan_first_stage"] != first), 0.0, plan=first)
         shift = given["predicted_clearance_m"] - clearance
         yield Deviation(row, "predicted clearance, m", shift, POSITION_TOLERANCE_M, recomputed_m=clearance)
     for name, positions, clear in ways:

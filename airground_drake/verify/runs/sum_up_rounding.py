@@ -50,3 +50,5 @@ def compare_rounding(row: DecisionRecord) -> Iterator[Deviation]:
     yield Deviation(row, "integrated rounding error beyond half a stage, s", beyond, TIE * row.dt, error_s=error)
     yield Deviation(row, "recorded rounding error, s", given["rounding_deviation_s"] - error, TIE, recomputed_s=error)
     yield Deviation(row, "recorded relaxed first stage", given["relaxed_first_stage"] - relaxed[0], TIE)
+    first = "accept" if rounded[0] == 1.0 else "refuse"
+    yield Deviation(row, "recorded rounded first stage", float(given["rounded_first_stage"] != first), 0.0)

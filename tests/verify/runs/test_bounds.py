@@ -133,7 +133,7 @@ def test_the_gap_to_the_best_of_all_plans_is_evidence(base: Callable[[str], Trac
     def other(row: dict[str, Any], given: dict[str, Any]) -> None:
         given |= {"plan": plan, "positions_m": data.positions(plan).ravel()}
         row |= dict.fromkeys(("objective", "objective_accept", "objective_refuse"), max(costs))
-        row |= {"first_stage": "accept" if plan[0] == 1.0 else "refuse"}
+        row |= {"plan_first_stage": "accept" if plan[0] == 1.0 else "refuse"}
         row |= {"predicted_clearance_m": float(rows_of(base(BINARY))[SIXTH].clearance(data.positions(plan)).min())}
 
     found = decided("GATE-PLAN", decision(other)(base(BINARY)))

@@ -164,7 +164,8 @@ BREAKAGES: dict[str, tuple[tuple[str, str, Edit, str, str], ...]] = {
     ),
     "GATE-PLAN": (
         ("fractional", RELAXED, problem(plan=at(3, 0.5)), R, "omega is not binary"),
-        ("first stage", RELAXED, column(first_stage=swapped), R, "first stage"),
+        ("first stage", RELAXED, column(plan_first_stage=swapped), R, "first stage"),
+        ("rounded first stage", RELAXED, column(rounded_first_stage=swapped), R, "rounded first stage"),
         ("rounded otherwise", RELAXED, problem(rounded=at(4, lambda v: 1.0 - v)), R, "rounded against the rule"),
         ("not rounded", RELAXED, problem(rounded=at(4, 0.5)), R, "rounded omega is not binary"),
         ("relaxed outside", RELAXED, problem(relaxed=at(0, 1.0 + 1e-6)), R, "outside [0, 1]"),
