@@ -214,7 +214,7 @@ def test_messages_that_lie_about_their_fields_are_left_out(tmp_path: Path, docum
 @pytest.mark.parametrize(
     ("package", "write", "says"),
     [
-        ("mcap.reader", of_mcap, "an MCAP file needs the package mcap"),
+        ("mcap.exceptions", of_mcap, "an MCAP file needs the package mcap"),
         ("mcap_protobuf.decoder", of_protobuf, "messages in protobuf need the package mcap-protobuf-support"),
         ("rosbags", of_ros1, "messages of ROS need the package rosbags"),
         ("rosbags", of_db3, "messages of ROS need the package rosbags"),
