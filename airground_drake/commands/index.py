@@ -47,7 +47,7 @@ def _write(place: Path) -> Path:
     for each in filter(folder.is_report, below):
         try:
             entries.append(_entry(each, place, f"run-{len(entries)}"))
-        except ReportError as error:
+        except (ReportError, FolderError) as error:
             problems.append(str(error))
     if not entries:
         why = f": {problems[0]}" if problems else ""
@@ -59,8 +59,9 @@ def _write(place: Path) -> Path:
 
 
 def _entry(report: Path, place: Path, prefix: str) -> dict[str, Any]:
-    """Return the values that the page shows of a report; ReportError if it cannot be used."""
+    """Return the values that the page shows of a report; ReportError or FolderError if it cannot be used."""
     document = compare.read(report)
+    files.refuse_links(report)
     leads_to = report / (folder.PAGES["html"] if (report / folder.PAGES["html"]).is_file() else folder.PAGES["json"])
     where = report.relative_to(place).as_posix()
     link = quote(leads_to.relative_to(place).as_posix())

@@ -161,6 +161,19 @@ def test_a_folder_of_a_campaign_or_of_proofs_is_no_link(hostile: Path, tmp_path:
         next(prove_report(hostile))
 
 
+@pytest.mark.parametrize("part", ["trace", "trace/c"])
+def test_no_command_reads_a_run_through_a_link(part: str, hostile: Path, tmp_path: Path, airground: Airground) -> None:
+    elsewhere = (hostile / part).rename(tmp_path / "elsewhere")
+    (hostile / part).symlink_to(elsewhere)
+    for command in (["replay"], ["export", "--to", "csv"], ["export", "--to", "mcap"], ["figures"]):
+        assert "is a link" in airground(*command, hostile, "-o", tmp_path / "out", code=2)
+    with pytest.raises(FolderError, match="is a link"):
+        next(prove_report(hostile))
+    assert "is a link" in airground("index", hostile.parent, code=2)
+    assert "a report has regular files and folders only" in airground("check", hostile, code=2)
+    assert not [*tmp_path.glob("out/*")]
+
+
 def test_nothing_is_written_through_a_link_or_over_a_pipe(honest: Path, hostile: Path, airground: Airground) -> None:
     elsewhere = (hostile / "trace").rename(hostile.parent / "elsewhere")
     (hostile / "trace").symlink_to(elsewhere)
