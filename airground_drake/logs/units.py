@@ -192,7 +192,7 @@ def _chosen(
     others = [
         (time, length) for (time, length), motion in moving.items()
         if length in lengths[1:] and motion.is_possible and motion.away <= IMPOSSIBLE
-        and (is_far or time == times[0])  # who is not far away need not change both units
+        and (time == times[0] or (is_far and moving[times[0], usual].lasting > IMPOSSIBLE))  # else one unit is enough
         and (motion.speed * IMPOSSIBLE >= 1.0 or not possible)  # else it is one who drives slowly in another frame
     ]  # fmt: skip
     if others and (is_far or not possible):
