@@ -50,14 +50,16 @@ def _files(path: Path, log: Log) -> list[Path]:
     inside = sorted(each for each in path.iterdir() if not each.name.startswith("."))
     regular = [each for each in inside if stat.S_ISREG(each.lstat().st_mode)]
     others = [each for each in inside if each not in regular and (each.is_symlink() or not each.is_dir())]
+    if any(each.name == ABOUT for each in regular):
+        recordings = [each for each in regular if each.suffix in RECORDINGS]
+        regular = recordings or [each for each in regular if each.name != ABOUT]
     log.ignored += [f"{each.name}: {'a link' if each.is_symlink() else 'no regular file'}" for each in others]
     if not regular:
-        why = "; links in it are not followed" if others else "; folders in it are not read" if inside else ""
+        why = "; folders in it are not read" if inside else ""
+        why = f": {', '.join(log.ignored[-len(others) :][:3])}; wanted: regular files" if others else why
         raise LogError(one_line(f"{path}: the folder has no files{why}"))
     if len(regular) > MOST_FILES:
         raise LogError(one_line(f"{path}: the folder has {len(regular)} files; allowed: {MOST_FILES}"))
-    if any(each.name == ABOUT for each in regular):
-        return [each for each in regular if each.suffix in RECORDINGS] or regular
     return regular
 
 
