@@ -9,7 +9,7 @@ from typing import Any
 from urllib.parse import quote
 
 from airground_drake.base import files
-from airground_drake.base.errors import FolderError, ReportError, TraceError
+from airground_drake.base.errors import FolderError, ReportError, TraceError, one_line
 from airground_drake.base.usage import Parser
 from airground_drake.report import compare, folder, summary
 from airground_drake.report.sentences import Line
@@ -30,7 +30,7 @@ def parser() -> argparse.ArgumentParser:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Write the page, and print its path."""
-    print(_write(parser().parse_args(arguments).folder))
+    print(one_line(str(_write(parser().parse_args(arguments).folder))))
     return 0
 
 

@@ -174,6 +174,20 @@ def test_no_command_reads_a_run_through_a_link(part: str, hostile: Path, tmp_pat
     assert not [*tmp_path.glob("out/*")]
 
 
+def test_names_of_files_control_no_terminal(honest: Path, tmp_path: Path, airground: Airground) -> None:
+    reports = tmp_path / "re\x1b[2Jports\u202e"
+    shutil.copytree(honest, reports / "a")
+    for command in (["replay"], ["export", "--to", "csv"]):
+        said = airground(*command, honest, "-o", reports / "out")
+        assert "re\\x1b[2Jports\\u202e" in said
+        assert all(line.isprintable() for line in said.splitlines())
+    assert airground("index", reports).strip().isprintable()
+    rows = [f"{t},{name},{t},0,9" for t in range(3) for name in ("ugv1", "\x1b[31m", "\x9b31m")]
+    (tmp_path / "log.csv").write_text("\n".join(["t,body,x,y,\x1b[2J", *rows]))
+    said = airground("judge", tmp_path / "log.csv", "--scenario", "minimal")
+    assert all(line.isprintable() for line in said.splitlines())
+
+
 def test_nothing_is_written_through_a_link_or_over_a_pipe(honest: Path, hostile: Path, airground: Airground) -> None:
     elsewhere = (hostile / "trace").rename(hostile.parent / "elsewhere")
     (hostile / "trace").symlink_to(elsewhere)
