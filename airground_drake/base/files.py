@@ -14,6 +14,7 @@ import stat
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO
 
@@ -73,6 +74,19 @@ def _be_regular(about: os.stat_result, path: Path) -> None:
     if not stat.S_ISREG(about.st_mode):
         what = "a link, not a regular file" if stat.S_ISLNK(about.st_mode) else "not a regular file"
         raise OSError(errno.EINVAL, what, str(path))
+
+
+def refuse_links(folder: Path) -> None:
+    """Refuse a folder of a stranger if folders in it are links: other files would be read or written through them.
+
+    That is asked of a report or saved run before its files are opened; `open_regular` follows no link to a file.
+
+    Raises:
+        FolderError: if a folder in it, or in one of its folders, is a link; names it.
+    """
+    for path in chain(folder.glob("*"), folder.glob("*/*")):
+        if path.is_symlink() and path.is_dir():
+            raise FolderError(one_line(f"{path} is a link; wanted: a folder"))
 
 
 def open_pipe(path: Path) -> BinaryIO:

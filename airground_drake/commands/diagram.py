@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from airground_drake.base import files
-from airground_drake.base.errors import UnknownNameError
+from airground_drake.base.errors import UnknownNameError, one_line
 from airground_drake.base.usage import Parser, output_folder, overridable
 from airground_drake.registry import METHODS
 from airground_drake.scenarios import plugins
@@ -53,5 +53,5 @@ def main(arguments: Sequence[str] | None = None) -> int:
     for kind in options.format or ("dot", "svg"):
         path = options.output / f"{name}.{kind}"
         files.write_bytes(path, graphviz.drawn(text, kind))
-        print(path)
+        print(one_line(str(path)))
     return 0

@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from airground_drake.base import files
+from airground_drake.base.errors import one_line
 from airground_drake.base.usage import output_folder
 from airground_drake.commands.saved import outside_reports, parser_of, runs_of, trace_of
 
@@ -31,7 +32,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     outside_reports(options.output, "the files")
     for name in runs:
         for path in _written(options.folder, name, options.to, options.output):
-            print(path)
+            print(one_line(str(path)))
     return 0
 
 

@@ -6,6 +6,7 @@ import argparse
 from collections.abc import Sequence
 from pathlib import Path
 
+from airground_drake.base.errors import one_line
 from airground_drake.base.usage import formats_of, output_folder
 from airground_drake.commands.saved import outside_reports, parser_of, runs_of, trace_of
 
@@ -42,5 +43,5 @@ def main(arguments: Sequence[str] | None = None) -> int:
     traces = {name: saved[name][0] for name in document["runs"] if name in saved}
     scenario = saved[next(iter(traces))][1]
     for path in figures.write(document, scenario, traces, options.output, options.style, options.format):
-        print(path)
+        print(one_line(str(path)))
     return 0

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from airground_drake.base import files
-from airground_drake.base.errors import ScenarioError
+from airground_drake.base.errors import ScenarioError, one_line
 from airground_drake.base.usage import Parser, between, output_file, positive, refuse, whole
 from airground_drake.scenarios.limits import MAX_NAME, MAX_UGVS
 from airground_drake.scenarios.shipped import argument
@@ -92,7 +92,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         for path in written:
             path.unlink()
         raise
-    print("\n".join([*made.says, *map(str, made.beside), str(options.output)]))
+    print("\n".join(map(one_line, [*made.says, *map(str, made.beside), str(options.output)])))
     print(f"next: airground report {argument(options.output)}")
     return 0
 

@@ -9,7 +9,7 @@ from typing import Any
 from urllib.parse import quote
 
 from airground_drake.base import files
-from airground_drake.base.errors import FolderError, ReportError, TraceError
+from airground_drake.base.errors import FolderError, ReportError, TraceError, one_line
 from airground_drake.base.usage import Parser
 from airground_drake.report import compare, folder, summary
 from airground_drake.report.sentences import Line
@@ -30,7 +30,7 @@ def parser() -> argparse.ArgumentParser:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Write the page, and print its path."""
-    print(_write(parser().parse_args(arguments).folder))
+    print(one_line(str(_write(parser().parse_args(arguments).folder))))
     return 0
 
 
@@ -47,7 +47,7 @@ def _write(place: Path) -> Path:
     for each in filter(folder.is_report, below):
         try:
             entries.append(_entry(each, place, f"run-{len(entries)}"))
-        except ReportError as error:
+        except (ReportError, FolderError) as error:
             problems.append(str(error))
     if not entries:
         why = f": {problems[0]}" if problems else ""
@@ -59,8 +59,9 @@ def _write(place: Path) -> Path:
 
 
 def _entry(report: Path, place: Path, prefix: str) -> dict[str, Any]:
-    """Return the values that the page shows of a report; ReportError if it cannot be used."""
+    """Return the values that the page shows of a report; ReportError or FolderError if it cannot be used."""
     document = compare.read(report)
+    files.refuse_links(report)
     leads_to = report / (folder.PAGES["html"] if (report / folder.PAGES["html"]).is_file() else folder.PAGES["json"])
     where = report.relative_to(place).as_posix()
     link = quote(leads_to.relative_to(place).as_posix())

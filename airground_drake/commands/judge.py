@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from airground_drake.base.errors import one_line
-from airground_drake.base.usage import Parser, between, output_folder, overridable
+from airground_drake.base.usage import Parser, between, output_folder, overridable, refuse
 
 MOST_GAP_S, MOST_ERROR_M = 1e6, 1e6
 EPILOG = """\
@@ -67,6 +67,15 @@ def parser() -> argparse.ArgumentParser:
     parser.add_argument("--time-unit", choices=("s", "ms", "us", "ns"), default="", help="of times without a unit")
     parser.add_argument("--length-unit", choices=("m", "cm", "mm"), default="", help="of lengths without a unit")
     parser.add_argument(
+        "--rate-hz", type=between(1e-3, 1e6), default=0.0, metavar="HZ",
+        help="frames per second of times that are numbers of frames",
+    )  # fmt: skip
+    parser.add_argument(
+        "--axes", type=_axes, action="append", default=[], metavar="[BODY=]AXES",
+        help="which axes of the log are x, y and z (up) of the scenario: y,x,-z for NED, such as x,-z,y if y is up "
+        "(default: x,y,z; asked for if they seem to be others)",
+    )  # fmt: skip
+    parser.add_argument(
         "--gap", type=between(0.0, MOST_GAP_S), default=0.0, metavar="S",
         help="nothing is claimed between two positions of a body that are farther apart than this (default: 2.5 times "
         "the body's usual time between two); closer ones are joined by a straight line",
@@ -98,10 +107,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     rename = dict(options.rename)
     choice = tracks.Choice(
         rename, [each.strip("/") for each in options.frame], options.without, options.uav, options.gap,
-        options.time_unit, options.length_unit,
+        options.time_unit, options.length_unit, options.rate_hz, dict(options.axes),
     )  # fmt: skip
     bodies = tracks.bodies_of(document, options.uav)
-    tracks.known(document, choice, [name for name, _ in options.position_error if name])
+    tracks.known(document, choice, [name for name, _ in (*options.position_error, *options.axes) if name])
+    if options.rate_hz and options.time_unit:
+        return refuse("--rate-hz is for times that are numbers of frames, --time-unit for others: use one of the two")
     log = opening.opened(options.logs, tables.Wanted(bodies, rename, options.map_columns))
     found = tracks.joined(log, document, choice)
     errors = _errors(options.position_error, bodies)
@@ -130,15 +141,29 @@ def _named(text: str) -> tuple[str, str]:
     return name, body
 
 
+def _axes(text: str) -> tuple[str, str]:
+    from airground_drake.logs.axes import parsed
+
+    name, _, given = text.rpartition("=")
+    try:
+        parsed(given)
+    except ValueError:
+        wanted = "wanted: x, y and z in the order of the scenario's axes, with a minus where they point the other way"
+        raise argparse.ArgumentTypeError(f"{text!r} is not allowed; {wanted}: x,-z,y") from None
+    return name, given
+
+
 def _mapped(text: str) -> dict[str, str]:
     from airground_drake.logs.columns import TARGETS, split_unit
 
-    found = {}
+    found = dict[str, str]()
     for part in text.split(","):
         target, _, name = part.partition("=")
         if split_unit(target)[0] not in TARGETS or not name:
             wanted = f"wanted: t=NAME,body=NAME,x=NAME,... of {', '.join(TARGETS)}, with a unit where needed: x_mm=NAME"
             raise argparse.ArgumentTypeError(f"{part!r} is not allowed; {wanted}")
+        if any(split_unit(each)[0] == split_unit(target)[0] for each in found):
+            raise argparse.ArgumentTypeError(f"{text!r} is not allowed; wanted: one name for {split_unit(target)[0]}")
         found[target] = name
     return found
 

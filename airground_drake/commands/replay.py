@@ -49,7 +49,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     elif options.video:
         outside_reports(options.video.parent, "the video")
         video.write(scene(*trace_of(folder, options.run)), options.video, options.speed or SPEED)
-        print(options.video)
+        print(one_line(str(options.video)))
     else:
         for name, path in _paths(options.output, runs).items():
             outside_reports(path.parent, "the pages")
@@ -58,7 +58,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 why = "is not a replay of this run of"
                 raise FolderError(one_line(f"{path} {why} {folder}; it is left alone; name another place, with -o"))
             files.write_text(path, f"{page(scene(*trace_of(folder, name)))}{mark}\n")
-            print(path)
+            print(one_line(str(path)))
     return 0
 
 

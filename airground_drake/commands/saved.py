@@ -28,12 +28,13 @@ def runs_of(folder: Path, run: str | None = None) -> Sequence[str]:
     """Return the runs of a report that have left a trace, or only the named run.
 
     Raises:
-        FolderError: if it is not a report, or one without runs.
+        FolderError: if it is not a report, one without runs, or one with links in the place of folders.
         UnknownNameError: if it has no such run.
     """
-    found = sorted(path.parent.name for path in folder.glob("trace/*/meta.json"))
     if not is_report(folder):
         raise FolderError(one_line(f"{folder} is not a report; allowed: a folder that `airground report` has written"))
+    files.refuse_links(folder)
+    found = sorted(path.parent.name for path in folder.glob("trace/*/meta.json"))
     if not found:
         raise FolderError(one_line(f"{folder} has no runs to replay; allowed: a report with trace/RUN/meta.json"))
     if run not in (None, *found):

@@ -31,6 +31,11 @@ STAMPS = (
 )  # fmt: skip
 RECEIPT = ("%time", "receive_time", "received", "recv_time", "log_time", "receipt", "rosbagtimestamp")
 """Names of a column with the times at which messages were received."""
+COUNTERS = (
+    "frame", "frames", "frame_id", "frameid", "frame_number", "framenumber", "frame_no", "frame_nr", "frame_num",
+    "frame_index", "frame_idx", "step", "tick", "sample",
+)  # fmt: skip
+"""Names of a column with the numbers of frames, which are no times."""
 TARGETS = ("t", "body", "frame", "x", "y", "z")
 """What `--map-columns` can give a name to."""
 _BRACKETS = re.compile(r"(.*?)\s*[\[(]\s*([^\])]*?)\s*[\])]")
@@ -77,12 +82,27 @@ class Place(NamedTuple):
 
 
 class Columns(NamedTuple):
-    """Columns by number: stamps in the order of preference, the body of a row, frames, and places."""
+    """Columns by number: stamps in the order of preference, the body of a row, frames, and places.
+
+    `chosen` has what `--map-columns` says of a column.
+    """
 
     times: list[Time]
     body: int | None
     frame: int | None
     places: list[Place]
+    chosen: dict[int, str]
+
+    def refuse_unused(self, used: Collection[int | None]) -> None:
+        """Raise LogError for what `--map-columns` says if it has no effect: `used` are the columns that are used."""
+        by_choice: dict[str, list[int]] = {}
+        for k, said in self.chosen.items():
+            by_choice.setdefault(said, []).append(k)
+        for said, those in by_choice.items():
+            if not any(k in used for k in those):
+                raise LogError(
+                    f"--map-columns {said} has no effect on this table; wanted: only columns that are needed"
+                )
 
 
 def columns(labels: Sequence[str], chosen: Mapping[str, str], bodies: Collection[str]) -> Columns:
@@ -126,7 +146,7 @@ def columns(labels: Sequence[str], chosen: Mapping[str, str], bodies: Collection
         _named([label if target not in given or k in mapped else "" for k, label in enumerate(labels)], names)
         for target, names in (("body", BODIES), ("frame", FRAMES))
     )
-    return Columns(times, body, frame, places)
+    return Columns(times, body, frame, places, mapped)
 
 
 def clock_of(place: Place, times: Sequence[Time], labels: Sequence[str]) -> Time:
@@ -162,9 +182,14 @@ def split_unit(label: str) -> tuple[str, str]:
     return label, ""
 
 
-def _mapped(labels: Sequence[str], chosen: Mapping[str, str]) -> tuple[list[str], set[int]]:
-    """The labels, with those that `--map-columns` names replaced by the usual ones, and the numbers of these."""
-    found, mapped = list(labels), set[int]()
+def counts_frames(label: str) -> bool:
+    """Whether a column has the numbers of frames, by its name."""
+    return re.sub(r"[\s_-]+", "_", label.split("/")[-1].strip().lower()) in COUNTERS
+
+
+def _mapped(labels: Sequence[str], chosen: Mapping[str, str]) -> tuple[list[str], dict[int, str]]:
+    """The labels, with the usual ones where `--map-columns` names them, and what it says of these, by number."""
+    found, mapped = list(labels), dict[int, str]()
     for target, pattern in chosen.items():
         names = [re.escape(each) for each in pattern.split("{body}")]
         matching = re.compile(r"(?P<body>.+)".join(names[:2]) if len(names) > 1 else names[0])
@@ -173,7 +198,7 @@ def _mapped(labels: Sequence[str], chosen: Mapping[str, str]) -> tuple[list[str]
             raise LogError(f"--map-columns {target}={pattern}: there is no such column; there are {listed(labels)}")
         for k, hit in hits:
             found[k] = f"{hit['body']}.{target}" if len(names) > 1 else target
-            mapped.add(k)
+            mapped[k] = f"{target}={pattern}"
     return found, mapped
 
 

@@ -40,6 +40,8 @@ LAST_S = 1.0
 """Who approached whom is told of this time before the least distance, s."""
 STEPS = 100
 """Parts of that time, in which the two motions are told apart."""
+STAMP_S = 2e-9
+"""The time between two stamps is known to this."""
 HALVINGS = 60
 """Halvings of an interval in the search for a time."""
 MOST_SPARE = 0.05
@@ -70,7 +72,8 @@ class JudgedPair(NamedTuple):
         missed_at_s: when that interval begins.
         missed_for_s: its length.
         missed_by_m: what each robot lacks of its share in that interval, m.
-        starts_m: least distance at the beginning of a stretch.
+        starts_m: least distance at the beginning of a stretch: of the log, after a gap, or when an obstacle appears.
+        starts_s: when that stretch begins.
         theorem: "Safety" or, beside what may move, "Passive", which promises that a robot does nothing wrong itself.
         too_fast_m_s: largest speed of an obstacle above the declared one; 0 if it kept that.
         promised_m: distance of the true bodies that follows from the theorem; None if not above 0, or for Passive.
@@ -95,6 +98,7 @@ class JudgedPair(NamedTuple):
     missed_for_s: float
     missed_by_m: dict[str, float]
     starts_m: float
+    starts_s: float
     theorem: str
     too_fast_m_s: float
     promised_m: float | None
@@ -178,7 +182,8 @@ def judge(tracks: Tracks, scenario: Json, errors_m: Mapping[str, float] | None =
     Raises:
         LogError: if a pair is never recorded at the same time, or the log has one instant only.
     """
-    bodies, errors = tracks.bodies, errors_m or {}
+    bodies = tracks.bodies
+    errors = {name: each for name, each in (errors_m or {}).items() if name in bodies}
     resting, barriers = places_of(scenario, np.zeros(1)), barriers_of(scenario)
     begin = min(float(each.t_s[0]) for each in bodies.values())
     end = max(float(each.t_s[-1]) for each in bodies.values())
@@ -187,8 +192,7 @@ def judge(tracks: Tracks, scenario: Json, errors_m: Mapping[str, float] | None =
     found = []
     for pair in _pairs(scenario, bodies):
         own, other = _both(pair, bodies, scenario, resting, barriers, Span(begin, end))
-        eps = sum(errors.get(name, 0.0) for name in (pair.robot, pair.other) if name in bodies)
-        if (one := _judged(pair, own, other, scenario, eps, Span(begin, end))) is not None:
+        if (one := _judged(pair, own, other, scenario, errors, Span(begin, end))) is not None:
             found.append(one)
     robots = {name: robot for name, robot in robots_of(scenario).items() if name in bodies}
     speeds = {name: (_speed(bodies[name]), float(robot["max_speed_m_s"])) for name, robot in robots.items()}
@@ -286,10 +290,13 @@ def _knots(own: Track, other: Track, span: Span) -> Array:
     return t_s[(t_s >= span.begin) & (t_s <= span.end)]
 
 
-def _judged(pair: Pair, own: Track, other: Track, scenario: Json, eps: float, whole: Span) -> JudgedPair | None:
+def _judged(
+    pair: Pair, own: Track, other: Track, scenario: Json, errors_m: Mapping[str, float], whole: Span
+) -> JudgedPair | None:
     """What is found about a pair; None beside an obstacle that is absent during the whole log."""
     if not len(other.t_s):
         return None
+    eps = errors_m.get(pair.robot, 0.0) + errors_m.get(pair.other, 0.0)  # that of what is not in the log is 0
     spans = _common(own, other)
     if not spans:
         times = (f"{n} {t.t_s[0]:.6g} to {t.t_s[-1]:.6g} s" for n, t in ((pair.robot, own), (pair.other, other)))
@@ -308,12 +315,13 @@ def _judged(pair: Pair, own: Track, other: Track, scenario: Json, eps: float, wh
         law.add(t_s, own_m, other_m)
     body = barriers_of(scenario).get(pair.other)
     gaps = _gaps(spans, _there(body, whole) if body else whole, own, other)
-    too_fast = _too_fast(other, scenario, pair)
+    too_fast = _too_fast(other, scenario, pair, errors_m.get(pair.other, 0.0))
     promised = pair.gap_m - law.deficit - eps
     return JudgedPair(
         pair.robot, pair.other, pair.gap_m, least - pair.radii_m, at, eps, below,
         sum(each.end - each.begin for each in spans), gaps, law.intervals, law.lacking, law.missed, law.missed_at,
-        law.missed_for, law.missed_by, law.starts - pair.radii_m, "Passive" if pair.moves_m_s else "Safety", too_fast,
+        law.missed_for, law.missed_by, law.starts - pair.radii_m, law.starts_s,
+        "Passive" if pair.moves_m_s else "Safety", too_fast,
         promised if promised > 0.0 and not pair.moves_m_s else None,
         eps + math.hypot(pair.safe_m, eps) - pair.radii_m,
         _came(pair, own, other, Span(max(stretch.begin, at - LAST_S), at)),
@@ -328,14 +336,15 @@ class _Law:
         self.intervals = self.lacking = 0
         self.missed = self.missed_at = self.missed_for = self.deficit = 0.0
         self.missed_by: dict[str, float] = {}
-        self.starts = np.inf
+        self.starts, self.starts_s = np.inf, 0.0
 
     def add(self, t_s: Array, own_m: Array, other_m: Array) -> None:
         """Judge the intervals of a stretch; beside what may move, d + V h stands for d, without a gain."""
         pair, h = self.pair, np.diff(t_s)
         moves = pair.moves_m_s > 0.0
         start = pair.shape.least_m(own_m[:1] - other_m[:1])
-        self.starts = min(self.starts, start)
+        if start < self.starts:
+            self.starts, self.starts_s = start, float(t_s[0])
         deficit = max(0.0, pair.safe_m - start)
         self.deficit = max(self.deficit, deficit)
         if not len(h):
@@ -428,20 +437,35 @@ def _came(pair: Pair, own: Track, other: Track, span: Span) -> dict[str, float]:
     return {pair.robot: float(by_own), pair.other: float(by_other)}
 
 
-def _too_fast(other: Track, scenario: Json, pair: Pair) -> float:
-    """Largest speed of an obstacle, if it is above the declared one, m/s; else 0."""
+def _too_fast(other: Track, scenario: Json, pair: Pair, error_m: float) -> float:
+    """Largest speed of an obstacle, if it is above the declared one for certain, m/s; else 0."""
     if pair.other not in scenario["obstacles"]:
         return 0.0
-    speed, declared = _speed(other), expected_m_s(scenario["obstacles"][pair.other])
-    return speed if speed > declared * (1.0 + SMALL) + SMALL else 0.0
+    moved, lasts = _moved(other)
+    declared = expected_m_s(scenario["obstacles"][pair.other])
+    over = moved > declared * (lasts + STAMP_S) + 2.0 * error_m + SMALL
+    return float((moved[over] / lasts[over]).max(initial=0.0))
 
 
 def _speed(track: Track) -> float:
-    """Largest speed between samples without a gap, m/s."""
-    h = np.diff(track.t_s)
-    used = (h > 0.0) & track.is_known
-    moved = np.linalg.norm(np.diff(track.places_m, axis=0), axis=1)
-    return float((moved[used] / h[used]).max(initial=0.0))
+    """Largest speed without a gap, m/s."""
+    moved, lasts = _moved(track)
+    return float((moved / lasts).max(initial=0.0))
+
+
+def _moved(track: Track) -> tuple[Array, Array]:
+    """How far a body is from each sample at a later one, m, and how much later that is, s; not across a gap.
+
+    That is half the usual time at least: of samples that are nanoseconds apart, rounding makes up any speed.
+    """
+    t_s, n = track.t_s, len(track.t_s)
+    later = np.searchsorted(t_s, t_s + 0.5 * track.usual_s, side="left")
+    later = np.maximum(later, np.arange(n) + 1)
+    first = np.flatnonzero(later < n)
+    gaps = np.append(0, np.cumsum(~track.is_known))
+    first = first[gaps[first] == gaps[later[first]]]
+    moved = np.linalg.norm(track.places_m[later[first]] - track.places_m[first], axis=1)
+    return moved, t_s[later[first]] - t_s[first]
 
 
 def _longest(track: Track) -> float:

@@ -13,7 +13,7 @@ import numpy as np
 import pandas as pd
 
 from airground_drake.logs.names import is_elsewhere, segments
-from airground_drake.logs.stream import HEADERS, PER_S, RECEIPT, SINCE_1970, Stream
+from airground_drake.logs.stream import HEADERS, PER_S, RECEIPT, Stream, unit_since_1970
 
 NO_PLACES = ("sensor_msgs/", "visualization_msgs/", "rcl_interfaces/", "rosgraph_msgs/", "foxglove.SceneUpdate")
 """Beginnings of types that say nothing about where a robot is, or cannot be told from those that do."""
@@ -21,6 +21,8 @@ LISTS, NAMES = ("transforms", "poses", "rigidbodies"), ("name", "rigid_body_name
 """Fields with several positions, such as those of motion capture, and with the name of each one's body."""
 FIXED = "tf_static"
 """Topic of transforms that do not change."""
+SECONDS, LAST_NS = 1e8, 2**63 - 1
+"""Numbers below are seconds, if they are the stamp of a header; the last nanosecond that is counted."""
 ROOTS = ("odom", "map", "world")
 """Frames that are no robot, although a robot's name may stand before them."""
 
@@ -99,14 +101,19 @@ def _ns(stamp: Any) -> int | None:
         except ValueError:
             return None
     if isinstance(stamp, (int, float)) and math.isfinite(stamp):
-        per = next((PER_S[unit] for unit, least in SINCE_1970 if abs(stamp) >= least), 1)
-        return round(stamp * (10**9 // per)) or None
+        unit = unit_since_1970(stamp, stamp) or ("s" if abs(stamp) < SECONDS else "")
+        return _in_64_bits(round(stamp * (10**9 // PER_S[unit]))) if unit else None
     whole = _first(*(_of(stamp, name) for name in ("sec", "secs", "seconds")))
     rest = _first(*(_of(stamp, name) for name in ("nanosec", "nsec", "nsecs", "nanos")), 0)
     try:
-        return (int(whole) * 10**9 + int(rest)) or None
-    except (TypeError, ValueError):
+        return _in_64_bits(int(whole) * 10**9 + int(rest))
+    except (TypeError, ValueError, OverflowError):
         return None
+
+
+def _in_64_bits(ns: int) -> int | None:
+    """A stamp other than 0 that 64 bits hold, or None."""
+    return ns if 0 < abs(ns) < 2**63 else None
 
 
 class Gathered:
@@ -139,11 +146,12 @@ class Gathered:
             if (segments(place.child) or [""])[-1] in ROOTS:
                 continue
             key = topic, place.body, place.frame, place.child
-            self.found.setdefault(key, []).append((received_ns, place.stamp_ns, place.xyz))
+            self.found.setdefault(key, []).append((min(received_ns, LAST_NS), place.stamp_ns, place.xyz))
 
     def streams(self) -> Iterator[Stream]:
         """One stream per topic, body, frame and child frame."""
         for (topic, body, frame, child), rows in self.found.items():
+            rows.sort(key=lambda row: row[0])  # by receipt: a file may have them in the order of its parts
             without = sum(stamp is None for _, stamp, _ in rows)
             stamped = without < 0.5 * len(rows)
             if stamped:

@@ -9,17 +9,24 @@ import numpy as np
 import numpy.typing as npt
 
 from airground_drake.base.arrays import Array
+from airground_drake.base.errors import LogError, one_line
 
 Whole = npt.NDArray[np.int64]
 
 PER_S = {"s": 1, "ms": 10**3, "us": 10**6, "ns": 10**9}
 """Units of time, and how many of each are a second."""
-SINCE_1970 = (("ns", 1e17), ("us", 1e14), ("ms", 1e11), ("s", 1e8))
-"""Units of stamps since 1970, and the least such stamp that is taken as one."""
+YEAR_2000_S, YEAR_2100_S = 946_684_800, 4_102_444_800
+"""Stamps since 1970 that are between these are taken as such."""
 PER_M = {"m": 1.0, "cm": 100.0, "mm": 1000.0}
 """Units of length, and how many of each are a metre."""
 OF_MESSAGES = HEADERS, RECEIPT = "header stamps", "times of receipt"
 """Clocks of messages."""
+LAST = np.iinfo(np.int64).max
+
+
+def unit_since_1970(least: float, largest: float) -> str:
+    """The unit in which numbers are stamps since 1970, from 2000 to 2100; '' if there is none."""
+    return next((unit for unit, per in PER_S.items() if YEAR_2000_S <= least / per <= largest / per <= YEAR_2100_S), "")
 
 
 @dataclass(eq=False)
@@ -40,6 +47,7 @@ class Stream:
         child: frame that the body carries; '' if the source does not say.
         clock: what the stamps are: "header stamps", "times of receipt", or the name of a column.
         is_file: whether `name` is the stem of a file.
+        counts_frames: whether stamps are numbers of frames, by the name of their column.
         skipped: rows without a position or a stamp, by the reason.
         first_skipped: where the first of them is, by the reason: "line 12"; '' if the source has no lines.
     """
@@ -55,6 +63,7 @@ class Stream:
     child: str = ""
     clock: str = ""
     is_file: bool = False
+    counts_frames: bool = False
     skipped: Counter[str] = field(default_factory=Counter)
     first_skipped: dict[str, str] = field(default_factory=dict)
 
@@ -64,9 +73,16 @@ class Stream:
         return f"{self.name} ({self.child})" if self.child and self.child != self.name else self.name
 
     def ns(self, unit: str) -> Whole:
-        """Stamps in nanoseconds, (n,), if they are in a unit of time."""
+        """Stamps in nanoseconds, (n,), if they are in a unit of time; LogError if 64 bits do not hold them."""
         per = 10**9 // PER_S[unit]
+        if max(map(abs, map(int, (self.whole.min(initial=0), self.whole.max(initial=0))))) > (2**63 - 1) // per - 1:
+            raise LogError(one_line(f"{self.label} has times of more than 292 years; wanted: --time-unit, or seconds"))
         return self.whole * per + self.nano * per // 10**9
+
+    def elapsed_s(self, unit: str) -> Array:
+        """Times since the least stamp, (n,), s, if stamps are in a unit of time."""
+        since = (self.whole - self.whole.min(initial=LAST)).view(np.uint64)  # differences of 64 bits wrap around
+        return (since + self.nano / 1e9) / PER_S[unit]
 
 
 @dataclass(eq=False)

@@ -15,7 +15,7 @@ from airground_drake.base import files
 from airground_drake.base.arrays import Array
 from airground_drake.base.errors import LogError
 from airground_drake.logs import text
-from airground_drake.logs.columns import WORDS, Columns, Place, Time, clock_of, columns, listed
+from airground_drake.logs.columns import WORDS, Columns, Place, Time, clock_of, columns, counts_frames, listed
 from airground_drake.logs.names import body_of, renamed
 from airground_drake.logs.stream import PER_M, Log, Stream, Whole
 
@@ -23,6 +23,8 @@ TUM = ["timestamp", "tx", "ty", "tz", "qx", "qy", "qz", "qw"]
 """Columns of a file in TUM's format, which has no header."""
 ECHO = ["header.stamp.sec", "header.stamp.nanosec", "header.frame_id", "x", "y", "z"]
 """First columns of what `ros2 topic echo --csv` prints of a pose; of odometry, the other frame stands before x."""
+UNIT_LENGTH = 0.05
+"""The length of a quaternion differs from 1 by less."""
 MOST_BODIES = 2_000
 """Different values in a column that names bodies."""
 _UNITS = re.compile(r"length\W*units?\W+(\w+)", re.IGNORECASE)
@@ -59,12 +61,14 @@ def read(path: Path, content: bytes, wanted: Wanted) -> Log:
     table = _parquet(content) if content[:4] == b"PAR1" else text.read(content)
     labels = table.labels
     no_words = all(not line.strip() or line.lstrip().startswith("#") for line in table.above)
-    if not table.has_header and len(labels) == len(TUM) and no_words and not wanted.columns:
+    if not table.has_header and len(labels) == len(TUM) and no_words and not wanted.columns and _has_turns(table):
         table = table._replace(labels=(labels := TUM))
     if not table.has_header and not wanted.columns and _is_echo(table):
         named = [*ECHO[:3], *["child_frame"] * (not text.is_number(table.cells[3][0])), *ECHO[3:]]
         table = table._replace(labels=(labels := [*named, *labels[len(named) :]]))
     has = columns(labels, wanted.columns, wanted.bodies)
+    if not has.times and (counter := _counter(table)) is not None:
+        has = has._replace(times=[Time(counter, None, "", 1, "")])
     if not has.times or not has.places:
         lacks = " and ".join(["a column of times"] * (not has.times) + ["columns x and y"] * (not has.places))
         raise LogError(
@@ -73,8 +77,11 @@ def read(path: Path, content: bytes, wanted: Wanted) -> Log:
         )
     has = _of_bodies(has, table, wanted, path)
     log = Log(list(_streams(path, table, has, wanted)))
-    used = {k for place in has.places for k in (place.x, place.y, place.z)} | {has.body, has.frame}
-    used |= {k for each in log.streams for k in _columns_of(each, labels)}
+    clocks = [clock_of(place, has.times, labels) for place in has.places]
+    used = {k for place in has.places for k in (place.x, place.y, place.z)} | {has.body}
+    used |= {k for time in clocks for k in (time.whole, time.rest)}
+    used |= {has.frame} if _frames(table, has) is not None else set()
+    has.refuse_unused(used)
     if others := [label or f"column {k + 1}" for k, label in enumerate(labels) if k not in used]:
         log.ignored.append(f"{path.name}: columns {listed(others)}")
     if table.odd:
@@ -91,10 +98,22 @@ def _is_echo(table: text.Table) -> bool:
     return sec.isdigit() and len(sec) == 10 and nanosec.isdigit() and not text.is_number(frame)
 
 
-def _columns_of(stream: Stream, labels: list[str]) -> Iterator[int]:
-    for name in stream.clock.split(" and "):
-        if name in labels:
-            yield labels.index(name)
+def _has_turns(table: text.Table) -> bool:
+    """Whether the last four columns of most rows are a quaternion of length 1, as those of TUM are."""
+    numbers = table.cells.iloc[:, -4:].apply(pd.to_numeric, errors="coerce").to_numpy(dtype=np.float64)
+    return bool((np.abs(np.linalg.norm(numbers, axis=1) - 1.0) <= UNIT_LENGTH).mean() > 0.5)
+
+
+def _counter(table: text.Table) -> int | None:
+    """The column with the numbers of frames, if there is one."""
+    those = (k for k, label in enumerate(table.labels) if counts_frames(label))
+    return next((k for k in those if all(map(text.is_number, table.cells[k].unique()[:100]))), None)
+
+
+def _frames(table: text.Table, has: Columns) -> pd.Series | None:
+    """The coordinate frames of the rows; None without a column of them, or if that has the numbers of frames."""
+    cells = table.cells[has.frame] if has.frame is not None else None
+    return None if cells is None or all(text.is_number(each) for each in cells.unique()[:100]) else cells
 
 
 def _parquet(content: bytes) -> text.Table:
@@ -131,7 +150,7 @@ def _of_bodies(has: Columns, table: text.Table, wanted: Wanted, path: Path) -> C
         values = table.cells[k].unique()
         if len(values) <= MOST_BODIES and any(wanted.body(value) for value in values):
             return has._replace(body=k, places=_one_place(has.places))
-    if has.body is not None:
+    if has.body is not None and has.body not in has.chosen:
         several, of_file = table.cells[has.body].nunique(), wanted.body(_file_of(path, wanted), is_file=True)
         if several > max(1, len(table.cells) // 4) or (several == 1 and of_file):
             has = has._replace(body=None)  # it counts rows, or names a frame or a kind of robot
@@ -160,9 +179,7 @@ def _streams(path: Path, table: text.Table, has: Columns, wanted: Wanted) -> Ite
     length = WORDS.get(stated, stated) if WORDS.get(stated, stated) in PER_M else ""
     has = has._replace(times=[_dated(table, time) for time in has.times])
     whole = {time: _stamps(table, time) for time in has.times}
-    frames = table.cells[has.frame] if has.frame is not None else None
-    if frames is not None and all(text.is_number(each) for each in frames.unique()[:100]):
-        frames = None  # numbers of frames of a camera
+    frames = _frames(table, has)
     for place in has.places:
         time = clock_of(place, has.times, table.labels)
         numbers, why = _places(table, place)
@@ -183,7 +200,7 @@ def _streams(path: Path, table: text.Table, has: Columns, wanted: Wanted) -> Ite
                 Stream(
                     str(path), _file_of(path, wanted) if is_file else str(name), stamps[at], nano[at], numbers[at],
                     time.unit, place.units[0] or length, str(frame).strip("/"),
-                    clock=_clock(table, time), is_file=is_file,
+                    clock=_clock(table, time), is_file=is_file, counts_frames=counts_frames(table.labels[time.whole]),
                 ),
                 why[at], [table.lines[k] for k in at],
                 is_sparse=has.body is None and len(has.places) > 1 and bool((why == "empty").mean() > 0.5),

@@ -15,7 +15,7 @@ from airground_drake.base.errors import LogError, one_line
 from airground_drake.check.files import Json
 from airground_drake.check.limits import LARGEST
 from airground_drake.check.scenario import expected_m_s, robots_of
-from airground_drake.logs import names, units
+from airground_drake.logs import axes, names, units
 from airground_drake.logs.stream import OF_MESSAGES, PER_M, RECEIPT, Log, Stream, Whole
 
 GAP = 2.5
@@ -111,6 +111,8 @@ class Choice(NamedTuple):
         gap_s: see `Track`; 0 for `GAP` times the usual time between two samples.
         time_unit: of stamps without one; '' to find out.
         length_unit: of positions without one; '' to find out.
+        rate_hz: frames per second of stamps that are numbers of frames; 0 for other stamps.
+        axes: of the log along x, y and z of the scenario, by body, '' for all others: "x,-z,y"; none to find out.
     """
 
     rename: Mapping[str, str] = {}
@@ -120,6 +122,8 @@ class Choice(NamedTuple):
     gap_s: float = 0.0
     time_unit: str = ""
     length_unit: str = ""
+    rate_hz: float = 0.0
+    axes: Mapping[str, str] = {}
 
 
 def bodies_of(scenario: Json, uavs: Sequence[str] = ()) -> list[str]:
@@ -151,7 +155,13 @@ def joined(log: Log, scenario: Json, choice: Choice) -> Tracks:
     bodies = [name for name in bodies_of(scenario, choice.uavs) if name not in choice.without]
     found, ignored = _assigned(log, bodies, choice)
     _in_one_frame({name: each.frame for name, each in found.items()}, choice.frames)
-    said = units.settle(found, scenario, choice.time_unit, choice.length_unit)
+    for name, stream in found.items():
+        if not (np.abs(np.nan_to_num(stream.places)) <= LARGEST * max(PER_M.values())).all():
+            raise LogError(one_line(f"{name} has a value beyond {LARGEST:g}; wanted: seconds and metres"))
+    axes.chosen(found, choice.axes)
+    said = units.settle(found, scenario, choice.time_unit, choice.length_unit, choice.rate_hz)
+    said += [f"axes{f' of {name}' * bool(name)}: {each} are x, y, z, as chosen" for name, each in choice.axes.items()]
+    said += axes.recognised(found, scenario, found if "" in choice.axes else choice.axes)
     for name in (*scenario["ugvs"], *choice.uavs, *(n for n, each in scenario["obstacles"].items() if each["moves"])):
         if name not in found and name not in choice.without:
             for stream in log.streams:
@@ -323,7 +333,7 @@ def _track(
 ) -> Track:
     """The track of a stream, whose stamps are ns after time 0: sorted, each time once."""
     places = stream.places / PER_M[stream.length_unit]
-    if not (np.abs(np.nan_to_num(places)) <= LARGEST).all() or np.abs(ns).max() / 1e9 > LARGEST:
+    if not (np.abs(np.nan_to_num(places)) <= LARGEST).all():
         raise LogError(one_line(f"{name} has a value beyond {LARGEST:g}; wanted: seconds and metres"))
     for reason, count in stream.skipped.items():
         where = f", first in {at}" if (at := stream.first_skipped.get(reason)) else ""

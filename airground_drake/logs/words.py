@@ -94,7 +94,8 @@ def law(pair: JudgedPair) -> str:
         fast = f"; {pair.second} moved at {pair.too_fast_m_s:.3g} m/s, above its declared speed"
         return f"{held}: {pair.first} {did} too near{fast if pair.too_fast_m_s else ''}"
     promise = f"promises {pair.promised_m:.4g} m" if pair.promised_m is not None else "promises no distance"
-    late = "" if pair.starts_m >= pair.safe_m - SMALL else ", and it starts nearer than required"
+    late = f", and what was recorded from {pair.starts_s:.3f} s on starts nearer than required"
+    late = "" if pair.starts_m >= pair.safe_m - SMALL else late
     wrong = f"; a law on positions so wrong would have to keep {pair.law_m:.4g} m" if pair.error_m else ""
     return f"{held}{late}: the safety theorem {promise}{wrong}"
 

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from airground_drake.base import files
-from airground_drake.base.errors import FolderError, TraceError, UnknownNameError, one_line
+from airground_drake.base.errors import TraceError, UnknownNameError, one_line
 from airground_drake.base.statuses import NOTHING, declared
 from airground_drake.proofs import coq, readback
 from airground_drake.proofs.export import (
@@ -214,15 +214,14 @@ def prove_report(report: Path, names: Sequence[str] = (), limit_s: float = coq.L
         limit_s: wall-clock time for one call of Coq, s.
 
     Raises:
-        FolderError: if its folder `proofs` is a link.
+        FolderError: if one of its folders is a link.
         UnknownNameError: if the report has no run with a name in `names`.
         TraceError: if a trace cannot be read, or no theorem is about a body of its scenario.
         CoqError: if a theory is not accepted.
         NoCoqError: if Coq is not installed.
         OSError: if the folder cannot be written.
     """
-    if (report / PLACE).is_symlink():
-        raise FolderError(one_line(f"{report / PLACE} is a link; wanted: a folder"))
+    files.refuse_links(report)
     there = sorted(path.parent.name for path in report.glob("trace/*/meta.json"))
     for name in names:
         if name not in there:

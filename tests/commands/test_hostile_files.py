@@ -161,6 +161,33 @@ def test_a_folder_of_a_campaign_or_of_proofs_is_no_link(hostile: Path, tmp_path:
         next(prove_report(hostile))
 
 
+@pytest.mark.parametrize("part", ["trace", "trace/c"])
+def test_no_command_reads_a_run_through_a_link(part: str, hostile: Path, tmp_path: Path, airground: Airground) -> None:
+    elsewhere = (hostile / part).rename(tmp_path / "elsewhere")
+    (hostile / part).symlink_to(elsewhere)
+    for command in (["replay"], ["export", "--to", "csv"], ["export", "--to", "mcap"], ["figures"]):
+        assert "is a link" in airground(*command, hostile, "-o", tmp_path / "out", code=2)
+    with pytest.raises(FolderError, match="is a link"):
+        next(prove_report(hostile))
+    assert "is a link" in airground("index", hostile.parent, code=2)
+    assert "a report has regular files and folders only" in airground("check", hostile, code=2)
+    assert not [*tmp_path.glob("out/*")]
+
+
+def test_names_of_files_control_no_terminal(honest: Path, tmp_path: Path, airground: Airground) -> None:
+    reports = tmp_path / "re\x1b[2Jports\u202e"
+    shutil.copytree(honest, reports / "a")
+    for command in (["replay"], ["export", "--to", "csv"]):
+        said = airground(*command, honest, "-o", reports / "out")
+        assert "re\\x1b[2Jports\\u202e" in said
+        assert all(line.isprintable() for line in said.splitlines())
+    assert airground("index", reports).strip().isprintable()
+    rows = [f"{t},{name},{t},0,9" for t in range(3) for name in ("ugv1", "\x1b[31m", "\x9b31m")]
+    (tmp_path / "log.csv").write_text("\n".join(["t,body,x,y,\x1b[2J", *rows]))
+    said = airground("judge", tmp_path / "log.csv", "--scenario", "minimal")
+    assert all(line.isprintable() for line in said.splitlines())
+
+
 def test_nothing_is_written_through_a_link_or_over_a_pipe(honest: Path, hostile: Path, airground: Airground) -> None:
     elsewhere = (hostile / "trace").rename(hostile.parent / "elsewhere")
     (hostile / "trace").symlink_to(elsewhere)

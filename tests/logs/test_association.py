@@ -449,3 +449,38 @@ def test_each_interval_asks_for_a_retreat_of_its_own_length(tmp_path: Path, docu
     pair = pair_of(judge(logs.read(written(tmp_path, logs.long(log)), document, gap_s=1.0), document).pairs, *BROKEN)
     assert (pair.missed_m, pair.missed_at_s, pair.missed_for_s) == pytest.approx((0.09, 0.1, 0.3))
     assert pair.hypotheses["starts at the distance or farther"] is False
+
+
+def test_rows_nanoseconds_apart_make_no_speed(tmp_path: Path) -> None:
+    """A run's rows stand 1.6 ns apart at an event; rounded to whole nanoseconds that is 2 ns, or 1 ns."""
+    walks = {"radius_m": 0.2, "moves": {"waypoints_m": [[1.0, -2.0], [1.0, 2.0]], "speed_m_s": 0.6}}
+    person = {**walks, "max_speed_m_s": 0.6}
+    document = resolved(load(str(logs.write_scenario(tmp_path, obstacles={"person": person}))))
+    whole = np.arange(0.0, 6.0, 0.05)
+    t_s = np.sort(np.concatenate([whole, whole + 0.0123456784, whole + 0.0123456800]))
+    way = np.stack([0.0 * t_s + 1.0, -2.0 + 0.6 * t_s, 0.0 * t_s], axis=1)
+    drive = np.stack([-1.0 + 1.0 * t_s / 3.0, 0.0 * t_s, 0.0 * t_s], axis=1)
+    rows = [["t_s", "body", "x_m", "y_m", "z_m"]]
+    for name, places in (("person", way), ("tb_0", 3.0 * drive), ("tb_1", drive + np.array([0.0, 0.7, 0.0]))):
+        rows += [
+            [f"{t!r}", name, *(f"{c!r}" for c in place)] for t, place in zip(t_s.tolist(), places.tolist(), strict=True)
+        ]
+    judged = judge(logs.read(written(tmp_path, rows), document, without=["uav"]), document)
+    assert {pair.too_fast_m_s for pair in judged.pairs if pair.passive} == {0.0}
+    assert judged.speeds_m_s["tb_0"][0] == pytest.approx(1.0, rel=1e-6)
+    faster = [[*row[:3], f"{1.001 * float(row[3])!r}", row[4]] if row[1] == "person" else row for row in rows]
+    judged = judge(logs.read(written(tmp_path, faster), document, without=["uav"]), document)
+    assert [pair.too_fast_m_s for pair in judged.pairs if pair.passive] == pytest.approx(2 * [0.6006], rel=1e-6)
+
+
+def test_a_stretch_after_a_gap_that_starts_too_near_is_told_with_its_time(
+    tmp_path: Path, document: dict[str, Any]
+) -> None:
+    """The log starts 0.4 m apart; after a gap of tb_1 it goes on inside the required 0.3 m."""
+    table, _ = with_gap(2.4, 3.0, None)
+    found = logs.read(written(tmp_path, table), document)
+    judged = judge(found, document)
+    pair = pair_of(judged.pairs, *BROKEN)
+    assert (pair.starts_s, pair.hypotheses["starts at the distance or farther"]) == (pytest.approx(3.0), False)
+    told = next(line for line in lines(judged, found) if "tb_0, tb_1: NOT KEPT" in line)
+    assert "and what was recorded from 3.000 s on starts nearer than required" in told

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+import sqlite3
+from collections.abc import Callable, Iterable, Mapping
 from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -10,6 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pandas as pd
 import pytest
+import zstandard
 from builders import logs
 from builders.logs import BROKEN, EPOCH_NS, Motion, Ros
 
@@ -41,6 +43,8 @@ def table(
 
 
 FULL, SLOW = logs.motion(), logs.motion(every=2)
+PART = {name: (t_s[50:81], places[50:81]) for name, (t_s, places) in FULL.items()}
+FLAT = logs.motion(("tb_0", "tb_1"))
 JITTER = logs.own_times({"tb_0": 20.0, "tb_1": 15.0, "uav": 12.0}, 0.35, seed=5)
 LATE = {"tb_0": 0.3, "tb_1": 0.01, "uav": 0.02}
 """Delays of receipt, s: by times of receipt the distances are wrong."""
@@ -298,6 +302,51 @@ def humble(folder: Path) -> Path:
     return folder / "run.db3"
 
 
+def packed(of: Callable[[Path], Path]) -> Callable[[Path], Path]:
+    """As ROS 2 packs whole recordings."""
+
+    def write(folder: Path) -> Path:
+        path = of(folder)
+        (folder / "packed").mkdir()
+        (folder / "packed" / f"{path.name}.zstd").write_bytes(zstandard.compress(path.read_bytes()))
+        (folder / "packed" / "metadata.yaml").write_text("rosbag2_bagfile_information: {}\n")
+        return folder / "packed"
+
+    return write
+
+
+def packed_messages(folder: Path) -> Path:
+    path = humble(folder)
+    with sqlite3.connect(path) as base:
+        rows = base.execute("SELECT id, data FROM messages").fetchall()
+        base.executemany(
+            "UPDATE messages SET data = ? WHERE id = ?", [(zstandard.compress(data), k) for k, data in rows]
+        )
+    base.close()
+    return path
+
+
+def turned(bodies: Motion, axes: str, names: Iterable[str] = ("tb_0", "tb_1", "uav")) -> Motion:
+    """Positions along other axes: `y,x,-z` has the scenario's y first."""
+    found = dict(bodies)
+    for name in names:
+        t_s, places = bodies[name]
+        columns = [places[:, "xyz".index(part[-1])] * (-1.0 if part[0] == "-" else 1.0) for part in axes.split(",")]
+        found[name] = t_s, np.stack(columns, axis=1) + 0.0
+    return found
+
+
+def per_file(bodies: Motion, name: str) -> Callable[[Path], Path]:
+    """A file per body."""
+
+    def write(folder: Path) -> Path:
+        for body in bodies:
+            table(name.format(body), lambda body=body: logs.long({body: bodies[body]}))(folder)
+        return folder
+
+    return write
+
+
 def lab(bodies: Motion, head: str, stamp: Callable[[float], str] = "{:.6f}".format) -> Callable[[], list[list[str]]]:
     return lambda: logs.long(bodies, head, stamp)
 
@@ -404,6 +453,42 @@ FORMS = {
     "ROS 2, MCAP": Form(ros2("MCAP"), JITTER),
     "ROS 2, MCAP without folder": Form(ros2_file, JITTER),
     "ROS 2, no definitions": Form(humble, JITTER),
+    "ROS 2, packed file": Form(packed(humble), JITTER),
+    "ROS 2, packed messages": Form(packed_messages, JITTER),
+    "ms with mm": Form(
+        table("log.csv", lambda: logs.long(FULL, "t,body,x,y,z", lambda t: str(round(1000 * t)), 1000.0)), FULL,
+        ("taken as milliseconds: as seconds, the log would last 6000 s", "taken as millimetres: as metres, tb_"),
+    ),
+    "us with m, a part of the experiment": Form(
+        table("log.csv", lab(PART, "t,body,x,y,z", lambda t: str(5_000_000 + round(1e6 * t)))),
+        {name: (t_s + 5.0, places) for name, (t_s, places) in PART.items()},
+        ("taken as microseconds: as seconds, the log would last 1.5e+06 s",),
+    ),
+    "ns of a simulation from 1 s on": Form(
+        table("log.csv", lab(FULL, "stamp,robot,x,y,z", lambda t: str(10**9 + round(1e9 * t)))),
+        {name: (t_s + 1.0, places) for name, (t_s, places) in FULL.items()}, ("taken as nanoseconds",),
+    ),
+    "frames": Form(
+        table("log.csv", lab(FULL, "frame,id,x,y,z", lambda t: str(round(20 * t)))), FULL,
+        ("times are numbers of frames, 20 per second: as chosen",), {"rate_hz": 20.0},
+    ),
+    "NED": Form(
+        per_file(turned(FULL, "y,x,-z"), "{}_vehicle_local_position_0.csv"), FULL,
+        ("positions of tb_0, tb_1, uav are taken as NED",),
+    ),
+    "a drone in NED above robots in a hall's frame": Form(
+        table("log.csv", lambda: [
+            [*line, "frame_id" if k == 0 else "local_ned" if line[1] == "uav" else ""]
+            for k, line in enumerate(logs.long(turned(FULL, "y,x,-z", ["uav"])))]),
+        FULL, ("positions of uav are taken as NED",),
+    ),
+    "y up": Form(
+        table("log.csv", lambda: logs.long(turned(FULL, "x,z,-y"))), FULL,
+        ("axes: x,-z,y are x, y, z, as chosen",), {"axes": {"": "x,-z,y"}},
+    ),
+    "one coordinate that is constant": Form(
+        table("log.csv", lambda: logs.long({name: FLAT[name] for name in ("tb_0", "tb_1")})), FLAT
+    ),
 }  # fmt: skip
 
 

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import os
 import re
+import shutil
+import sqlite3
 import sys
+import tempfile
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -11,6 +15,7 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
+import zstandard
 from builders import logs
 from builders.logs import Ros
 from hypothesis import given
@@ -211,10 +216,153 @@ def test_messages_that_lie_about_their_fields_are_left_out(tmp_path: Path, docum
     assert judged_or_refused(tmp_path / "a.mcap", document) == ""
 
 
+def bomb_mcap(how: str) -> Callable[[Path], Path]:
+    def write(folder: Path) -> Path:
+        from mcap.writer import CompressionType, Writer
+
+        with (folder / "a.mcap").open("wb") as file:
+            writer = Writer(file, compression=CompressionType[how])
+            writer.start()
+            channel = writer.register_channel("/tb_0/pose", "json", 0)
+            writer.add_message(channel, 1, b" " * LARGE + b"1", 1)
+            writer.finish()
+        return folder / "a.mcap"
+
+    return write
+
+
+def bomb_ros1(how: str) -> Callable[[Path], Path]:
+    def write(folder: Path) -> Path:
+        from rosbags.rosbag1 import Writer
+
+        ros, bag = Ros(1), Writer(folder / "a.bag")
+        bag.set_compression(Writer.CompressionFormat[how])
+        with bag:
+            topic = bag.add_connection("/tb_0/name", "std_msgs/msg/String", typestore=ros.store)
+            bag.write(topic, 1, LARGE.to_bytes(4, "little") + b" " * LARGE)
+        return folder / "a.bag"
+
+    return write
+
+
+def bomb_messages(folder: Path) -> Path:
+    path = of_db3(folder)
+    with sqlite3.connect(path) as base:
+        base.execute("UPDATE messages SET data = ? WHERE topic_id > 1", (zstandard.compress(b" " * LARGE),))
+    base.close()
+    return path
+
+
+def bomb_file(folder: Path) -> Path:
+    (folder / "bag").mkdir()
+    (folder / "bag" / "metadata.yaml").write_text("rosbag2_bagfile_information: {}\n")
+    (folder / "bag" / "a.db3.zstd").write_bytes(zstandard.compress(b" " * LARGE))
+    return folder / "bag"
+
+
+LARGE = 5_000_000
+BOMBS = {
+    "MCAP, zstd": bomb_mcap("ZSTD"), "MCAP, lz4": bomb_mcap("LZ4"), "ROS 1, lz4": bomb_ros1("LZ4"),
+    "ROS 1, bz2": bomb_ros1("BZ2"), "messages, zstd": bomb_messages, "file, zstd": bomb_file,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", BOMBS)
+def test_what_unpacks_to_too_much_is_refused_before_it_is_unpacked(
+    kind: str, tmp_path: Path, document: dict[str, Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path, left = BOMBS[kind](tmp_path), {*Path(tempfile.gettempdir()).glob("airground_drake.*")}
+    monkeypatch.setattr(files, "LARGEST_FILE", LARGE // 5)
+    monkeypatch.setattr(files, "MOST_UNPACKED", LARGE // 5)
+    assert "it unpacks to more than 1000000 bytes, the most allowed" in judged_or_refused(path, document)
+    assert {*Path(tempfile.gettempdir()).glob("airground_drake.*")} <= left
+
+
+def test_all_parts_of_a_file_are_counted_together(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(files, "MOST_UNPACKED", 3 * LARGE)
+    unpacker, part = bags.Unpacker(1000), zstandard.compress(b" " * LARGE)
+    assert [len(unpacker.unpacked(part, "zstd")) for _ in range(3)] == 3 * [LARGE]
+    with pytest.raises(LogError, match="it unpacks to more than 0 bytes"):
+        unpacker.unpacked(part, "zstd")
+
+
+def test_only_regular_files_of_a_folder_are_read(tmp_path: Path, document: dict[str, Any]) -> None:
+    """A pipe would make a bag wait for ever, and a link may lead to the file of somebody else."""
+    bag = tmp_path / "bag"
+    bag.mkdir()
+    (bag / "metadata.yaml").write_text(
+        "rosbag2_bagfile_information: {version: 5, storage_identifier: sqlite3, relative_file_paths: [a.db3]}\n"
+    )
+    os.mkfifo(bag / "a.db3")
+    (bag / "b.db3").symlink_to(of_db3(tmp_path))
+    said = "bag: the folder has no files: a.db3: no regular file, b.db3: a link; wanted: regular files"
+    assert said in judged_or_refused(bag, document)
+    shutil.copy(tmp_path / "a.db3", bag / "c.db3")
+    found = logs.read(bag, document)
+    assert {"a.db3: no regular file", "b.db3: a link"} <= {*found.ignored}
+    (tmp_path / "links").mkdir()
+    (tmp_path / "links" / "a.csv").symlink_to(of_text(tmp_path))
+    assert "the folder has no files: a.csv: a link; wanted: regular files" in judged_or_refused(
+        tmp_path / "links", document
+    )
+
+
+@pytest.mark.parametrize("kind", ["ROS 1", "ROS 2", "MCAP"])
+def test_a_broken_definition_loses_its_topic_only(kind: str, tmp_path: Path, document: dict[str, Any]) -> None:
+    thing, broken = "lab_msgs/msg/Thing", "float64 x\nthis is no definition\n"
+    if kind == "ROS 1":
+        from rosbags.rosbag1 import Writer
+
+        ros, path = Ros(1), tmp_path / "a.bag"
+        with Writer(path) as bag:
+            topics = {"/tb_0/thing": bag.add_connection("/tb_0/thing", thing, msgdef=broken, md5sum="0" * 32)}
+            bag.write(topics["/tb_0/thing"], 1, b"12345678")
+            for received, topic, name, message in logs.of_ros(ros, FULL, {}):
+                if topic not in topics:
+                    topics[topic] = bag.add_connection(topic, name, typestore=ros.store)
+                bag.write(topics[topic], received, ros.raw(name, message))
+    elif kind == "ROS 2":
+        path = of_db3(tmp_path)
+        with sqlite3.connect(path) as base:
+            base.executescript("CREATE TABLE message_definitions(topic_type, encoding, encoded_message_definition)")
+            base.execute("INSERT INTO message_definitions VALUES (?, 'ros2msg', ?)", (thing, broken))
+            base.execute("INSERT INTO topics VALUES (99, '/tb_0/thing', ?, 'cdr', '')", (thing,))
+            base.execute("INSERT INTO messages VALUES (NULL, 99, 1, ?)", (b"123456789012",))
+        base.close()
+    else:
+        from mcap.writer import Writer as McapWriter
+
+        ros, path, ids = Ros(2), tmp_path / "a.mcap", dict[str, int]()
+        said: list[Any] = [(0, "/tb_0/thing", thing, None), *logs.of_ros(ros, FULL, {})]
+        with path.open("wb") as file:
+            writer = McapWriter(file)
+            writer.start()
+            for received, topic, name, message in said:
+                if topic not in ids:
+                    text = broken.encode() if message is None else b""
+                    ids[topic] = writer.register_channel(topic, "cdr", writer.register_schema(name, "ros2msg", text))
+                raw = ros.raw(name, message) if message is not None else b"123456789012"
+                writer.add_message(ids[topic], received, raw, received)
+            writer.finish()
+    found = logs.read(path, document)
+    assert {*found.bodies} == {"tb_0", "tb_1", "uav"}
+    assert any("/tb_0/thing (lab_msgs/msg/Thing: " in each for each in found.ignored)
+
+
+@pytest.mark.parametrize("stamp", [{"sec": 2**62, "nanosec": 0}, 2**62, 1e300])
+def test_stamps_beyond_64_bits_are_none(stamp: Any, tmp_path: Path, document: dict[str, Any]) -> None:
+    said = [(2**64 - 1, topic, kind, {**message, "timestamp": stamp})
+            for _, topic, kind, message in logs.foxglove(FULL, {}) if "pose" in message]  # fmt: skip
+    logs.mcap_json(
+        tmp_path / "a.mcap", [*logs.foxglove({**FULL, "uav": (FULL["uav"][0][:0], FULL["uav"][1][:0])}, {}), *said]
+    )
+    assert judged_or_refused(tmp_path / "a.mcap", document)
+
+
 @pytest.mark.parametrize(
     ("package", "write", "says"),
     [
-        ("mcap.reader", of_mcap, "an MCAP file needs the package mcap"),
+        ("mcap.exceptions", of_mcap, "an MCAP file needs the package mcap"),
         ("mcap_protobuf.decoder", of_protobuf, "messages in protobuf need the package mcap-protobuf-support"),
         ("rosbags", of_ros1, "messages of ROS need the package rosbags"),
         ("rosbags", of_db3, "messages of ROS need the package rosbags"),
