@@ -22,7 +22,7 @@ NO_BODIES = {
     "sdf": {"light"},
     "world": {
         "atmosphere", "audio", "frame", "gravity", "gui", "joint", "light", "magnetic_field", "physics", "plugin",
-        "scene", "spherical_coordinates", "wind",
+        "road", "scene", "spherical_coordinates", "wind",
     },
     "state": {"iterations", "joint", "light", "real_time", "sim_time", "wall_time"},
     "model": {

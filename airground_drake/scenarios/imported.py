@@ -101,7 +101,7 @@ def barn(path: Path, name: str, robots: Sequence[Robot], sizes: Sizes, height_m:
         place = f"position_m: {_list((solid.pose.x, solid.pose.y, 0.0))}, height_m: {_number(solid.top)}"
         size = f"radius_m: {_number(solid.size[0])}"
         if len(solid.size) == 2:
-            size = f"size_m: {_list(solid.size)}, heading_rad: {_number(solid.pose.heading)}"
+            size = f"size_m: {_list(solid.size)}, heading_rad: {_number(math.remainder(solid.pose.heading, math.tau))}"
         lines.append(f"  {own}: {{{place}, {size}}}")
     says = [f"{len(lines)} obstacle{'' if len(lines) == 1 else 's'}", *dict.fromkeys(left_out)]
     top = max(solid.top for solid in world.solids)
