@@ -9,7 +9,7 @@ import numpy as np
 from airground_drake.scenarios.hints import fast
 from airground_drake.scenarios.schema import SafeDistance, Scenario
 
-SMALL_M, NARROW_M = 0.5, 8.0
+SMALL_M, NARROW_M = 0.5, 6.0
 """Robots with a smaller radius, and worlds with shorter sides, are small for the paper's distances, m."""
 
 

@@ -38,5 +38,5 @@ def test_small_robots_and_worlds_with_the_papers_distances_and_great_speeds_are_
     assert [*notes(load("minimal", changes))] == said
 
 
-def test_no_shipped_scenario_has_notes() -> None:
-    assert [(name, note) for name in shipped() for note in notes(load(name))] == []
+def test_shipped_scenarios_have_no_notes_but_the_one_that_is_small() -> None:
+    assert {name for name in shipped() for _ in notes(load(name))} == {"dwell"}
