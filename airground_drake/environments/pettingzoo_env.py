@@ -31,6 +31,7 @@ class TeamEnv(Episodes, ParallelEnv[str, Numbers, Numbers]):
     the reward of its UGV, and all agents stay until the end.
     """
 
+    _ignored = ("options",)  # which PettingZoo's own API test gives
     metadata = {"name": "airground_drake_team_v0", "render_modes": []}  # noqa: RUF012 - as PettingZoo has it
 
     def __init__(

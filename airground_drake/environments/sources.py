@@ -89,6 +89,9 @@ class Episodes:
         encoding: of observations and actions.
     """
 
+    _ignored: tuple[str, ...] = ()
+    """Options of `reset` that are neither used nor refused."""
+
     def __init__(
         self,
         given: Scenario | Spec | None = None,
@@ -128,7 +131,7 @@ class Episodes:
         Raises:
             ValueError: if the number is not a whole number from 0, or there are other options.
         """
-        if unknown := [repr(name) for name in options or {} if name != "number"]:
+        if unknown := [repr(name) for name in options or {} if name not in ("number", *self._ignored)]:
             raise ValueError(f"unknown options of reset: {', '.join(unknown)}; allowed: 'number'")
         number = (options or {}).get("number")
         if number is None:

@@ -147,7 +147,10 @@ def ros_map(path: Path, name: str, folder: Path, robots: Sequence[Robot], count:
         says.append(f"starts and targets were chosen: at least {needed:g} m from obstacles, with a way between them")
     corners = grid.frame.points(np.array([[0, 0], [0, rows], [columns, 0], [columns, rows]]))
     space = _Space(longest, float(np.abs(corners).max()))
-    return _scenario(path, name, robots, sizes, says, _map(os.path.relpath(path, folder)), space)
+    file = os.path.relpath(path, folder)
+    if not file.isprintable():
+        raise ScenarioError(str(path), "", Fault("a scenario cannot name this path"), "wanted: printable UTF-8")
+    return _scenario(path, name, robots, sizes, says, _map(file), space)
 
 
 def mapf(

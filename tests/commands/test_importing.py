@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 import shutil
 from pathlib import Path
 
@@ -177,6 +178,13 @@ def test_what_is_chosen_is_never_refused(
     asked = dict(zip(options[::2], options[1::2], strict=True)).get("--max-speed-m-s", ugv.max_speed_m_s)
     assert ugv.max_speed_m_s == asked
     assert f"at most at {asked:g} m/s" in said
+
+
+def test_a_map_whose_path_no_scenario_can_name_is_refused_as_such(tmp_path: Path, airground: Airground) -> None:
+    folder = tmp_path / os.fsdecode(b"b\xff")
+    folder.mkdir()
+    said = airground("import", "ros-map", large_map(folder, 20.0), "--ugvs", 1, "-o", tmp_path / "s.yaml", code=2)
+    assert "a scenario cannot name this path; wanted: printable UTF-8" in said
 
 
 def test_a_high_obstacle_and_large_distances_are_never_refused(tmp_path: Path, airground: Airground) -> None:

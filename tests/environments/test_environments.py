@@ -175,8 +175,9 @@ def test_policies_are_asked_once_at_each_instant_and_again_with_an_answer(monkey
     monkeypatch.setattr(Planner, "plan", lambda self, before, t, *rest: asked.append(t) or plan(self, before, t, *rest))
     env = InterventionEnv(load("minimal"))
     env.reset(options={"number": 1})
-    for _ in range(3):
-        env.step(np.array([1.0, 0.0, 0.4, 0.5, 0.4], dtype=np.float32))
+    over = False
+    while not over:
+        _, _, over, _, _ = env.step(np.array([1.0, 0.0, 0.4, 0.5, 0.4], dtype=np.float32))
     assert 3 < len(set(asked)) <= len(asked) <= len(set(asked)) + 3
 
 
