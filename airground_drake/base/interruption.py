@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import ctypes
 import fcntl
+import io
 import os
 import select
 import signal
@@ -37,6 +38,8 @@ CURRENT_FOLDER = {"PYTHONSAFEPATH": "1", "NUMBA_CACHE_DIR": "", "NUMBA_CACHE_LOC
 """Environment in which nothing in the current folder is executed: child interpreters do not import from there, and
 numba's configuration file there cannot choose a cache, which numba would unpickle. The user's own settings stay.
 """
+NO_HOME = {"XDG_CACHE_HOME": os.devnull}
+"""Added for a user without a home: numba would keep its cache in a folder named ~ in the current folder."""
 
 _PR_SET_PDEATHSIG, _PR_SET_CHILD_SUBREAPER = 1, 36
 
@@ -46,9 +49,13 @@ _exit_code: int | None = None
 
 def begin() -> None:
     """Begin a command, before the imports that take seconds: see this module."""
-    for name, value in CURRENT_FOLDER.items():
+    has_home = os.path.isabs(os.path.expanduser("~"))
+    for name, value in (CURRENT_FOLDER if has_home else CURRENT_FOLDER | NO_HOME).items():
         os.environ.setdefault(name, value)
     _open_standard_streams()
+    for stream in (sys.stdout, sys.stderr):  # an encoding may lack a character; a path may not be text
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")
     if sys.platform == "linux":
         _go_on_in_a_child()
     end_on_signals()

@@ -91,7 +91,7 @@ def falsify(search: Search, sampler: Sampler, number: int, pool: Pool, progress:
     Args:
         search: judges a point.
         sampler: chooses points.
-        number: least number of points; the last batch is finished.
+        number: largest number of points; the last batch of the sampler is cut, and the sampler is not told of it.
         pool: does the work.
         progress: receives the progress.
 
@@ -100,14 +100,16 @@ def falsify(search: Search, sampler: Sampler, number: int, pool: Pool, progress:
     """
     best = Best(0, np.inf, np.empty(0), False)
     while best.tried < number and not best.found:
-        points = _asked(sampler, dimensions(search.spec.drawn))
+        asked = _asked(sampler, dimensions(search.spec.drawn))
+        points = asked[: number - best.tried]
         values = np.full(len(points), np.inf)
         found = np.zeros(len(points), dtype=bool)
         for k, judged in pool(partial(search.at, points), range(len(points))):
             if judged is not None:
                 values[k], found[k] = judged
-        with _guarded(sampler, "tell"):
-            sampler.tell(points.copy(), values.copy())
+        if len(points) == len(asked):
+            with _guarded(sampler, "tell"):
+                sampler.tell(points.copy(), values.copy())
         k = int(np.argmin(np.where(found, values, np.inf))) if found.any() else int(values.argmin())
         tried = best.tried + len(points)
         if found.any() or values[k] < best.value:

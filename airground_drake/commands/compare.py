@@ -89,6 +89,8 @@ def _line(change: Mapping[str, Any]) -> str:
 
 
 def _side(value: Any) -> str:
+    if value in ("", [], {}):
+        return "empty"
     if isinstance(value, Mapping):
         return ", ".join(f"{name} {_side(item)}" for name, item in value.items())
     return f"{value:.9g}" if isinstance(value, float) else "none" if value is None else str(value)

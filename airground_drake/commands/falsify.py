@@ -19,6 +19,7 @@ from airground_drake.campaign.rows import COLUMNS
 from airground_drake.registry import RUN_CLAIMS, SAMPLERS, is_plugin
 from airground_drake.scenarios import plugins
 from airground_drake.scenarios.estimate import DEFAULT_LIMITS
+from airground_drake.scenarios.hints import plugin_path
 from airground_drake.scenarios.shipped import argument
 
 if TYPE_CHECKING:
@@ -53,7 +54,11 @@ def parser() -> argparse.ArgumentParser:
         "--shrink", type=whole(0), default=300, metavar="N",
         help="runs for shrinking a counterexample (default: %(default)s)",
     )  # fmt: skip
-    parser.add_argument("-o", "--output", type=output_file, metavar="FILE", help="new; default: <name>_<sampler>.yaml")
+    parser.add_argument(
+        "-o", "--output", type=output_file, metavar="FILE",
+        help="new; without a counterexample, the scenario nearest to one (default: <name>_<sampler>.yaml, written only "
+        "for a counterexample)",
+    )  # fmt: skip
     parallel(parser)
     parser.add_argument(plugins.OPTION, action="store_true", help=plugins.HELP)
     return parser
@@ -88,6 +93,9 @@ def _run(spec: Spec, options: argparse.Namespace) -> int:
         raise UnknownNameError("claim about runs", options.claim, RUN_CLAIMS)
     if not dimensions(spec.drawn):
         raise ScenarioError(spec.source, "draw", Fault("nothing is drawn"), "wanted: keys to search over")
+    if not SAMPLERS.accepts(options.sampler):
+        allowed = f"one of {', '.join(SAMPLERS.allowed)}{plugin_path(options.sampler)}"
+        raise ScenarioError("--sampler", "", options.sampler, allowed)
     if options.sampler not in SAMPLERS and is_plugin(options.sampler) and not options.allow_plugins:
         raise ScenarioError("--sampler", "", options.sampler, plugins.WANTED)
     if not options.allow_plugins:
@@ -113,8 +121,9 @@ def _run(spec: Spec, options: argparse.Namespace) -> int:
         return EXIT_UNDECIDED
     what = f"least margin of {options.claim}" if options.most is None else f"largest {options.most}"
     value = best.value if options.most is None else -best.value
-    print(f"{tried}, {what} {value:.6g}")
-    _save(search, best, path, options.shrink)
+    print(f"{tried}, {what} {value:.6g}: {'a' if best.found else 'no'} counterexample")
+    if best.found or options.output:
+        _save(search, best, path, options.shrink)
     return EXIT_FOUND if best.found else 0
 
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from airground_drake.base import files
 from airground_drake.base.errors import ScenarioError, one_line
-from airground_drake.base.usage import Parser, between, output_file, positive, refuse, whole
+from airground_drake.base.usage import Parser, between, output_file, refuse, whole
 from airground_drake.scenarios.limits import MAX_NAME, MAX_UGVS
 from airground_drake.scenarios.shipped import argument
 
@@ -19,14 +19,18 @@ if TYPE_CHECKING:
     from airground_drake.scenarios.imported import Imported
 
 FORMATS = {
-    "barn": ("radius_m", "distance_m", "ugv"),
-    "ros-map": ("radius_m", "distance_m", "ugv", "ugvs"),
-    "mapf": ("agents", "map", "cell_m"),
+    "barn": ("radius_m", "distance_m", "ugv", "max_speed_m_s", "height_m"),
+    "ros-map": ("radius_m", "distance_m", "ugv", "max_speed_m_s", "ugvs"),
+    "mapf": ("agents", "map", "cell_m", "max_speed_m_s"),
 }
 """What can be imported, and the options for it."""
 RADII_M = {"barn": 0.215, "ros-map": 0.15}
 """Default radius of a UGV: half the width of BARN's Jackal; a TurtleBot."""
 DISTANCE_M, UGVS, AGENTS, CELL_M = 0.1, 3, 4, 1.0
+HEIGHT_M = 1.0
+"""Default height of UGVs, m: robots of this kind are lower, with what they carry."""
+SIZES = (0.001, 100.0)
+"""Least and greatest radius and distance, m."""
 
 
 def parser() -> argparse.ArgumentParser:
@@ -51,12 +55,20 @@ def parser() -> argparse.ArgumentParser:
         "--ugvs", type=whole(1, MAX_UGVS), metavar="N", help=f"ros-map: UGVs to find room for (default: {UGVS})"
     )
     parser.add_argument(
-        "--radius-m", type=positive, metavar="R",
+        "--radius-m", type=between(*SIZES), metavar="R",
         help="barn, ros-map: radius of UGVs (default: " + ", ".join(f"{k} {v:g}" for k, v in RADII_M.items()) + ")",
     )  # fmt: skip
     parser.add_argument(
-        "--distance-m", type=positive, metavar="D",
+        "--distance-m", type=between(*SIZES), metavar="D",
         help=f"barn, ros-map: what UGVs keep from obstacles and from one another (default: {DISTANCE_M:g})",
+    )  # fmt: skip
+    parser.add_argument(
+        "--max-speed-m-s", type=between(0.01, 50.0), metavar="V",
+        help="largest speed of UGVs; presets have two thirds of it (default: 1.5, less for the smallest UGVs)",
+    )  # fmt: skip
+    parser.add_argument(
+        "--height-m", type=between(*SIZES), metavar="H",
+        help=f"barn: height of UGVs; shapes that begin above it are left out (default: {HEIGHT_M:g})",
     )  # fmt: skip
     parser.add_argument(
         "--agents", type=whole(1, MAX_UGVS), metavar="N", help=f"mapf: the first N agents (default: {AGENTS})"
@@ -71,7 +83,7 @@ def parser() -> argparse.ArgumentParser:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Write the scenario, with a map's files where it needs some; existing files are left alone."""
     options = parser().parse_args(arguments)
-    for option in ("ugv", "ugvs", "radius_m", "distance_m", "agents", "map", "cell_m"):
+    for option in ("ugv", "ugvs", "radius_m", "distance_m", "agents", "map", "cell_m", "max_speed_m_s", "height_m"):
         if getattr(options, option) is not None and option not in FORMATS[options.format]:
             fitting = " and ".join(each for each, theirs in FORMATS.items() if option in theirs)
             return refuse(f"--{option.replace('_', '-')} is for {fitting}")
@@ -102,12 +114,15 @@ def _imported(options: argparse.Namespace) -> Imported:
 
     path, folder = options.file, options.output.parent
     name = imported.scenario_name(options.output.stem, options.format.replace("-", "_"))
+    speed = options.max_speed_m_s
     if options.format == "mapf":
-        return imported.mapf(path, options.map, name, folder, options.agents or AGENTS, options.cell_m or CELL_M)
-    sizes = imported.Sizes(options.radius_m or RADII_M[options.format], options.distance_m or DISTANCE_M)
+        cell_m = options.cell_m or CELL_M
+        return imported.mapf(path, options.map, name, folder, options.agents or AGENTS, cell_m, speed)
+    radius_m, distance_m = options.radius_m or RADII_M[options.format], options.distance_m or DISTANCE_M
+    sizes = imported.Sizes(radius_m, distance_m, speed)
     robots = [imported.Robot(*each) for each in options.ugv or ()]
     if options.format == "barn":
-        return imported.barn(path, name, robots, sizes)
+        return imported.barn(path, name, robots, sizes, options.height_m or HEIGHT_M)
     return imported.ros_map(path, name, folder, robots, options.ugvs or UGVS, sizes)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -64,7 +65,7 @@ def _entry(report: Path, place: Path, prefix: str) -> dict[str, Any]:
     files.refuse_links(report)
     leads_to = report / (folder.PAGES["html"] if (report / folder.PAGES["html"]).is_file() else folder.PAGES["json"])
     where = report.relative_to(place).as_posix()
-    link = quote(leads_to.relative_to(place).as_posix())
+    link = quote(os.fsencode(leads_to.relative_to(place)))
     kept = {part: document[part] for part in ("scenario", "overall", "provenance")}
     return {
         **kept, "place": where, "link": link, "headline": _headline(document),

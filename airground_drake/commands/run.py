@@ -44,6 +44,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if options.speed and not options.meshcat:
         return refuse("--speed needs --meshcat")
     from airground_drake.scenarios.load import load
+    from airground_drake.scenarios.notes import notes
 
     overrides = [*options.set, *([] if options.seed is None else [f"seed={options.seed}"])]
     scenario = load(options.scenario, overrides)
@@ -55,6 +56,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         files.make_folder(options.output, "the trace")
     if announced := estimate(replace(scenario, runs={name: scenario.runs[name]})).announcement:
         print(announced, file=sys.stderr)
+    for note in notes(scenario):
+        print(f"note: {note}", file=sys.stderr)
     if scenario.map is not None:
         print(scenario.map.cells, file=sys.stderr)
     from airground_drake.run import trace as traces

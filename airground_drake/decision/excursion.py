@@ -15,9 +15,9 @@ from __future__ import annotations
 
 import numpy as np
 import numpy.typing as npt
-from numba import njit
 
 from airground_drake.base.arrays import Array
+from airground_drake.base.compiling import njit
 
 SUPERVISING, INTERVENING = 0, 1
 """Modes of `decision.trigger.Mode`, as numba takes them; the third is REFRACTORY."""

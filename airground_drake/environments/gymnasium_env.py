@@ -5,8 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-import gymnasium
 import numpy as np
+
+from airground_drake.environments.extra import needed
+
+with needed():
+    import gymnasium
 
 from airground_drake.campaign.spec import Spec
 from airground_drake.environments.encoding import Encoding, Numbers
@@ -16,7 +20,7 @@ from airground_drake.intervention.policy import Observation
 from airground_drake.scenarios.schema import Scenario
 
 ID = "AirgroundDrake/Intervention-v0"
-"""For `gymnasium.make` and `make_vec`, once this module is imported; `given` is an argument of them."""
+"""For `gymnasium.make` and `make_vec`, once this module is imported; arguments as of `InterventionEnv`."""
 
 
 class InterventionEnv(Episodes, gymnasium.Env[Numbers, Numbers]):
@@ -36,7 +40,7 @@ class InterventionEnv(Episodes, gymnasium.Env[Numbers, Numbers]):
 
     def __init__(
         self,
-        given: Scenario | Spec,
+        given: Scenario | Spec | None = None,
         run: str | None = None,
         numbers: Sequence[int] | None = None,
         encoding: Encoding | None = None,
@@ -57,7 +61,7 @@ class InterventionEnv(Episodes, gymnasium.Env[Numbers, Numbers]):
             options: `number`: that of the episode, in place of a drawn one.
 
         Raises:
-            ValueError: if the number is not a whole number from 0.
+            ValueError: if the number is not a whole number from 0, or there are other options.
             ScenarioError: if the draw is not a valid scenario.
             SimulationError: if Drake or a system stops.
         """
@@ -72,15 +76,16 @@ class InterventionEnv(Episodes, gymnasium.Env[Numbers, Numbers]):
 
         Raises:
             ValueError: if the action is not finite numbers of the right shape.
-            RuntimeError: before `reset`.
+            RuntimeError: before `reset`, or after the end of the episode.
             SimulationError: if Drake or a system stops.
         """
-        episode = self._begun()
+        episode = self._going_on()
         if self._seen is not None:
             episode.answer(self._seen.robot, self.encoding.motion(action, self._seen))
         self._look()
         reward = sum(self._rewards.since().values())
-        return self._observed(), reward, self._seen is None, False, self._info()
+        self._over = self._seen is None
+        return self._observed(), reward, self._over, False, self._info()
 
     def _look(self) -> None:
         """Go to the next request, and keep it."""

@@ -6,9 +6,13 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from gymnasium.spaces import Box
-from gymnasium.utils import seeding
-from pettingzoo import ParallelEnv
+
+from airground_drake.environments.extra import needed
+
+with needed():
+    from gymnasium.spaces import Box
+    from gymnasium.utils import seeding
+    from pettingzoo import ParallelEnv
 
 from airground_drake.campaign.spec import Spec
 from airground_drake.environments.encoding import Encoding, Numbers
@@ -27,11 +31,12 @@ class TeamEnv(Episodes, ParallelEnv[str, Numbers, Numbers]):
     the reward of its UGV, and all agents stay until the end.
     """
 
+    _ignored = ("options",)  # which PettingZoo's own API test gives
     metadata = {"name": "airground_drake_team_v0", "render_modes": []}  # noqa: RUF012 - as PettingZoo has it
 
     def __init__(
         self,
-        given: Scenario | Spec,
+        given: Scenario | Spec | None = None,
         run: str | None = None,
         numbers: Sequence[int] | None = None,
         encoding: Encoding | None = None,
@@ -77,18 +82,19 @@ class TeamEnv(Episodes, ParallelEnv[str, Numbers, Numbers]):
         """Answer the requests of this instant, and go to the next instant with any, or to the end.
 
         Raises:
-            KeyError: if an agent that is asked has no action.
-            ValueError: if its action is not finite numbers of the right shape.
-            RuntimeError: before `reset`.
+            ValueError: if an agent that is asked has no action, or not finite numbers of the right shape.
+            RuntimeError: before `reset`, or after the end of the episode.
             SimulationError: if Drake or a system stops.
         """
-        episode, agents = self._begun(), self.agents
+        episode, agents = self._going_on(), self.agents
+        if missing := [name for name in self._requests if name not in actions]:
+            raise ValueError(f"no action for {', '.join(missing)}; asked for now: {', '.join(self._requests)}")
         motions = {name: self.encoding.motion(actions[name], seen) for name, seen in self._requests.items()}
         for name, motion in motions.items():
             episode.answer(name, motion)
         self._requests = episode.requests()
         rewards = self._rewards.since()
-        over = not self._requests
+        over = self._over = not self._requests
         self.agents = [] if over else agents
         return (
             self._observed(agents), {name: rewards[name] for name in agents}, dict.fromkeys(agents, over),

@@ -6,7 +6,7 @@ from collections import OrderedDict
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from numbers import Integral
-from typing import Any
+from typing import Any, NoReturn
 
 import numpy as np
 
@@ -17,9 +17,10 @@ from airground_drake.environments.episode import Episode, Stage, with_agent
 from airground_drake.registry import METHODS
 from airground_drake.run.trace import Trace
 from airground_drake.scenarios.limits import MAX_SEED
-from airground_drake.scenarios.load import validated
+from airground_drake.scenarios.load import load, validated
 from airground_drake.scenarios.schema import Scenario
 
+DEFAULT = "minimal"
 MOST_STAGES = 64
 """Models that are kept; one takes about 0.5 MB."""
 
@@ -88,17 +89,33 @@ class Episodes:
         encoding: of observations and actions.
     """
 
+    _ignored: tuple[str, ...] = ()
+    """Options of `reset` that are neither used nor refused."""
+
     def __init__(
         self,
-        given: Scenario | Spec,
+        given: Scenario | Spec | None = None,
         run: str | None = None,
         numbers: Sequence[int] | None = None,
         encoding: Encoding | None = None,
     ) -> None:
-        """Arguments and errors as of `Source`; the encoding is that of observations and actions."""
+        """Arguments and errors as of `Source`; the encoding is that of observations and actions.
+
+        Without a scenario, it is the shipped one called `DEFAULT`.
+        """
         self.encoding = Encoding() if encoding is None else encoding
-        self._source = Source(given, run, numbers)
+        self._source = Source(load(DEFAULT) if given is None else given, run, numbers)
         self._episode: Episode | None = None
+        self._over = False
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> NoReturn:
+        """Refuse, and say why.
+
+        Raises:
+            TypeError: always.
+        """
+        wanted = "make a second environment and reset it with the same number: its episodes are the same"
+        raise TypeError(f"{type(self).__name__} cannot be copied: its model is a Drake diagram; {wanted}")
 
     def trace(self) -> Trace:
         """What the episode has recorded until now, for `judge`.
@@ -112,21 +129,34 @@ class Episodes:
         """Begin the episode with the number in the options, or a drawn one.
 
         Raises:
-            ValueError: if the number is not a whole number from 0.
+            ValueError: if the number is not a whole number from 0, or there are other options.
         """
+        if unknown := [repr(name) for name in options or {} if name not in ("number", *self._ignored)]:
+            raise ValueError(f"unknown options of reset: {', '.join(unknown)}; allowed: 'number'")
         number = (options or {}).get("number")
         if number is None:
             number = self._source.drawn(rng)
         if not isinstance(number, Integral) or int(number) not in range(MAX_SEED + 1):
             raise ValueError(f"number of the episode: {number!r}; allowed: a whole number from 0 to {MAX_SEED}")
         self._number = int(number)
-        self._episode = self._source.episode(self._number)
+        self._episode, self._over = self._source.episode(self._number), False
         return self._episode
 
     def _begun(self) -> Episode:
         if self._episode is None:
             raise RuntimeError("call reset first")
         return self._episode
+
+    def _going_on(self) -> Episode:
+        """The episode of a step.
+
+        Raises:
+            RuntimeError: if there is none, or it is over.
+        """
+        episode = self._begun()
+        if self._over:
+            raise RuntimeError("the episode is over: call reset")
+        return episode
 
 
 def _chosen(scenario: Scenario, run: str | None) -> str:

@@ -20,10 +20,10 @@ from typing import Any, NamedTuple
 
 import daqp
 import numpy as np
-from numba import njit
 from pydrake.solvers import SolutionResult
 
 from airground_drake.base.arrays import Array
+from airground_drake.base.compiling import njit
 from airground_drake.gatekeeper.standard_form import Flags, Indices, StandardForm, times
 
 _BINARY, _SOFT, _NO_BOUND = 16, 8, 1e30

@@ -18,9 +18,9 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numba import njit
 
 from airground_drake.base.arrays import Array
+from airground_drake.base.compiling import njit
 from airground_drake.gatekeeper.rollout import ACCEPTED, REFUSED, ClosedLoop, View, advance, closed_loop, workspace
 from airground_drake.geometry import convex, outline
 from airground_drake.geometry.distance_field import length_among

@@ -7,9 +7,9 @@ from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from numba import njit
 
 from airground_drake.base.arrays import Array
+from airground_drake.base.compiling import njit
 from airground_drake.gatekeeper.cost import Terms, add_stage, slack_at
 
 Blocks = npt.NDArray[np.int64]

@@ -6,11 +6,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from numba import njit
 from pydrake.solvers import MathematicalProgram
 from pydrake.symbolic import Variable
 
 from airground_drake.base.arrays import Array
+from airground_drake.base.compiling import njit
 
 Indices = npt.NDArray[np.intp]
 Flags = npt.NDArray[np.bool_]

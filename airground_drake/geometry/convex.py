@@ -9,9 +9,9 @@ from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from numba import njit
 
 from airground_drake.base.arrays import Array
+from airground_drake.base.compiling import njit
 from airground_drake.geometry.outline import BASE, CORNERS, COUNT, EXTENT, MIDDLE, TOP
 
 FAR = 1.0 + 1e-12

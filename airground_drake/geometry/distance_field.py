@@ -17,9 +17,9 @@ from heapq import heappop, heappush
 
 import numpy as np
 import numpy.typing as npt
-from numba import njit
 
 from airground_drake.base.arrays import Array
+from airground_drake.base.compiling import njit
 from airground_drake.geometry import convex, outline
 
 MOST_NODES = 60_000

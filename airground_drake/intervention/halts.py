@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import numpy.typing as npt
-from numba import njit
 
 from airground_drake.base.arrays import Array
+from airground_drake.base.compiling import njit
 
 STANDS_S = 1.0
 """A UGV stands once it has stayed at one place for this long, s."""

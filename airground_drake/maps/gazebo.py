@@ -16,8 +16,20 @@ MOST_ELEMENTS = 1_000_000
 TILTED = 1e-6
 """Roll or pitch above which something does not stand upright, rad."""
 SHAPES = ("box", "cylinder", "sphere")
-FLAT = ("plane", "heightmap", "empty")
-"""Geometries that stand in nobody's way."""
+EMPTY = "empty"
+"""The geometry of nothing."""
+NO_BODIES = {
+    "sdf": {"light"},
+    "world": {
+        "atmosphere", "audio", "frame", "gravity", "gui", "joint", "light", "magnetic_field", "physics", "plugin",
+        "road", "scene", "spherical_coordinates", "wind",
+    },
+    "state": {"iterations", "joint", "light", "real_time", "sim_time", "wall_time"},
+    "model": {
+        "allow_auto_disable", "enable_wind", "frame", "gripper", "joint", "plugin", "pose", "self_collide", "static",
+    },
+}  # fmt: skip
+"""Elements that are in nobody's way, by the element around them. Other elements are read, or named as left out."""
 
 
 class Pose(NamedTuple):
@@ -42,17 +54,19 @@ class Solid(NamedTuple):
         name: of its model.
         pose: of its middle.
         size: length and width of a box, m; the radius alone, m, for cylinders and balls.
-        top: its height over the ground, m.
+        bottom: height of its lower edge over the ground, m.
+        top: height of its upper edge over the ground, m.
     """
 
     name: str
     pose: Pose
     size: tuple[float, ...]
+    bottom: float
     top: float
 
 
 class Gazebo(NamedTuple):
-    """The solids of a world, and a sentence for each thing in it that was left out."""
+    """The solids of a world, and the names of all other bodies in it, which were left out, each with the reason."""
 
     solids: list[Solid]
     left_out: list[str]
@@ -62,7 +76,8 @@ def world(text: str, source: str) -> Gazebo:
     """The obstacles in a world file that may be hostile.
 
     A model is where `<state>` says, if it is in there; else where the model says. Left out are models that a plug-in
-    moves, models within models, included models, meshes, and what does not stand out of the ground.
+    moves, models within models, included models, actors, populations, shapes other than `SHAPES`, and what does not
+    stand out of the ground.
 
     Args:
         text: of the file.
@@ -75,8 +90,14 @@ def world(text: str, source: str) -> Gazebo:
     found = root.find("world") if root.tag == "sdf" else root if root.tag == "world" else None
     if found is None:
         raise ScenarioError(f"{source}:{root.get(LINE)}", root.tag, Fault("no world"), "wanted: <sdf> with a <world>")
+    left_out = list[str]()
+    if root is not found:
+        root.remove(found)
+        left_out += _others(root)
+    left_out += _others(found, "model", "state")
+    left_out += [f"{each} in <state>" for state in found.iterfind("state") for each in _others(state, "model")]
     states = {each.get("name"): each for each in found.iterfind("state/model")}
-    solids, left_out = list[Solid](), [f"<include> of {_text(each, 'uri')}" for each in found.iterfind("include")]
+    solids = list[Solid]()
     for model in found.iterfind("model"):
         name = model.get("name") or "model"
         if model.find("plugin") is not None and _text(model, "static") not in ("1", "true"):
@@ -85,15 +106,9 @@ def world(text: str, source: str) -> Gazebo:
         state = states.get(model.get("name"))
         reader = _Reader(source, name, _scale(state, source))
         pose = reader.pose(model if state is None or state.find("pose") is None else state)
-        for link in model.iterfind("link"):
-            for collision in link.iterfind("collision"):
-                for solid in reader.solids(collision, pose @ reader.pose(link) @ reader.pose(collision)):
-                    if solid.top > 0.0:
-                        solids.append(solid)
-                    else:
-                        left_out.append(f"{name}, whose top is not above the ground")
-        left_out += [*reader.left_out, *(f"{each.get('name')} within {name}" for each in model.iterfind("model"))]
-    return Gazebo(solids, left_out)
+        solids += reader.model(model, pose)
+        left_out += reader.left_out
+    return Gazebo(solids, [*dict.fromkeys(left_out)])
 
 
 class _Reader:
@@ -102,6 +117,20 @@ class _Reader:
     def __init__(self, source: str, name: str, scale: tuple[float, ...]) -> None:
         self.source, self.name, self.scale = source, name, scale
         self.left_out: list[str] = []
+
+    def model(self, model: ElementTree.Element, pose: Pose) -> Iterator[Solid]:
+        """The solids of a model at a pose, if they stand out of the ground."""
+        for link in model.iterfind("link"):
+            for collision in link.iterfind("collision"):
+                for solid in self.solids(collision, pose @ self.pose(link) @ self.pose(collision)):
+                    if solid.top > 0.0:
+                        yield solid
+                    else:
+                        self.left_out.append(f"{self.name}, whose top is not above the ground")
+        within = [f"{each} within {self.name}" for each in _others(model, "link")]
+        if not within and model.find("link/collision/geometry/*") is None:
+            within = [f"{self.name}, which has no <collision>"]
+        self.left_out += within
 
     def pose(self, of: ElementTree.Element) -> Pose:
         """The pose that an element gives, or that of its frame."""
@@ -120,20 +149,25 @@ class _Reader:
     def solids(self, collision: ElementTree.Element, pose: Pose) -> Iterator[Solid]:
         """The solid of a `<collision>`, if it is in the way of robots."""
         for shape in collision.iterfind("geometry/*"):
-            if shape.tag in FLAT:
+            if shape.tag == EMPTY or (shape.tag == "plane" and self._is_level(shape)):
                 continue
             if shape.tag not in SHAPES:
                 self.left_out.append(f"a {shape.tag} of {self.name}")
             elif shape.tag == "box":
                 length, width, height = self._sizes(shape, "size", 3, self.scale)
-                yield Solid(self.name, pose, (length, width), pose.z + 0.5 * height)
+                yield Solid(self.name, pose, (length, width), pose.z - 0.5 * height, pose.z + 0.5 * height)
             else:
                 across, along, up = self.scale
                 if across != along or (shape.tag == "sphere" and across != up):
                     raise self._wrong(shape, " ".join(map(str, self.scale)), "round shapes keep their proportions")
                 (radius,) = self._sizes(shape, "radius", 1, (across,))
                 (height,) = self._sizes(shape, "length", 1, (up,)) if shape.tag == "cylinder" else (2.0 * radius,)
-                yield Solid(self.name, pose, (radius,), pose.z + 0.5 * height)
+                yield Solid(self.name, pose, (radius,), pose.z - 0.5 * height, pose.z + 0.5 * height)
+
+    def _is_level(self, plane: ElementTree.Element) -> bool:
+        normal = plane.find("normal")
+        x, y, z = (0.0, 0.0, 1.0) if normal is None else _numbers(normal, 3, self.source)
+        return math.hypot(x, y) <= TILTED * abs(z)
 
     def _sizes(self, shape: ElementTree.Element, key: str, count: int, scale: tuple[float, ...]) -> tuple[float, ...]:
         """Sizes above 0, m."""
@@ -147,6 +181,18 @@ class _Reader:
 
     def _wrong(self, at: ElementTree.Element, value: object, allowed: str) -> ScenarioError:
         return ScenarioError(f"{self.source}:{at.get(LINE)}", f"{self.name}: <{at.tag}>", value, allowed)
+
+
+def _others(of: ElementTree.Element, *read: str) -> Iterator[str]:
+    """The names of the bodies in an element, but for those with a tag that is read."""
+    for body in of:
+        if body.tag in (*read, *NO_BODIES[of.tag]):
+            continue
+        name = body.get("name") or _text(body, "name")
+        if body.tag == "include":
+            yield f"<include> of {_text(body, 'uri')}" + (f" as {name}" if name else "")
+        else:
+            yield name if body.tag == "model" and name else f"<{body.tag}> {name}".strip()
 
 
 def _scale(state: ElementTree.Element | None, source: str) -> tuple[float, ...]:

@@ -10,9 +10,9 @@ from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from numba import njit
 
 from airground_drake.base.arrays import Array
+from airground_drake.base.compiling import njit
 from airground_drake.geometry.convex import may_be_within, nearest
 from airground_drake.geometry.outline import SPEED
 from airground_drake.world.world import Neighbours

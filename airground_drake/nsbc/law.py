@@ -15,9 +15,9 @@ from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from numba import njit
 
 from airground_drake.base.arrays import Array
+from airground_drake.base.compiling import njit
 from airground_drake.nsbc.avoidance import Avoidance
 from airground_drake.nsbc.kernels import Layer, avoid_one, fill_half_spaces, limit_one, yielding
 from airground_drake.world.steering import NUMBERS, ahead

@@ -70,7 +70,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 0
     command = ["airground", "report", *(sys.argv[1:] if arguments is None else arguments)]
     try:
-        return _reported(options, shlex.join(command))
+        return _reported(options, one_line(shlex.join(command)))
     except LimitError as error:
         return refuse(f"{error}; see --limit-steps and --limit-memory")
     except (ScenarioError, PluginError, UnknownNameError, FolderError) as error:
@@ -84,6 +84,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _reported(options: argparse.Namespace, command: str) -> int:
     """Load the scenario and report on it."""
     from airground_drake.scenarios.load import load
+    from airground_drake.scenarios.notes import notes
 
     overrides = [*options.set, *([] if options.seed is None else [f"seed={options.seed}"])]
     audited = options.scenario == AUDIT
@@ -98,6 +99,8 @@ def _reported(options: argparse.Namespace, command: str) -> int:
     limits = Limits(options.limit_steps, options.limit_memory * GIB)
     if not options.quiet and (announced := estimate(scenario).announcement):
         print(announced, file=sys.stderr)
+    for note in () if options.quiet else notes(scenario):
+        print(f"note: {note}", file=sys.stderr)
     if not options.quiet and scenario.map is not None:
         print(scenario.map.cells, file=sys.stderr)
     with (

@@ -56,6 +56,8 @@ def _in_words(error: ErrorDetails, document: Document, schema: json_schema.Schem
         given = Fault("a mapping is given" if of_type else f"{len(given)} entries")
     elif isinstance(given, list) and of_type:
         given = Fault("a list is given")
+        if "mapping" in wanted and "keys" not in wanted:
+            wanted += "; write NAME: {...} for each entry, without a dash"
     return ScenarioError(source, key, given, wanted)
 
 

@@ -31,6 +31,27 @@ def not_modelled(name: str) -> str:
     return ""
 
 
+FAST_M_S, FAR_M = 50.0, 1000.0
+"""Greater speeds and coordinates may be in another unit."""
+
+
+def fast(speed_m_s: float) -> str:
+    """The end of a message about a speed, m/s, that may be in another unit; '' for others."""
+    return f"; speeds are in m/s: this is {3.6 * speed_m_s:g} km/h" if speed_m_s > FAST_M_S else ""
+
+
+def far(place_m: float) -> str:
+    """The end of a message about a coordinate, m, that may be in another unit; '' for others."""
+    return f"; coordinates are in m: this is {place_m / 1000.0:g} km" if place_m > FAR_M else ""
+
+
+def plugin_path(name: str) -> str:
+    """The end of a message that refuses a name of third-party code, if it looks like a path; '' if not."""
+    looks_like_a_path = re.search(r"[/\\]|\.py\b", name)
+    rule = " with a path from the folder of the scenario, such as robots/mine.py:Mine: folders and file have letters, "
+    return f"{rule}digits, _ and - only, so no .., no / at the beginning, no spaces" if looks_like_a_path else ""
+
+
 class Slip(NamedTuple):
     """A mistake in YAML: its line, from 1, what it is, and what is wanted."""
 

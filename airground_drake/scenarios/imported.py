@@ -5,8 +5,9 @@ from __future__ import annotations
 import math
 import os
 import re
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path, PureWindowsPath
+from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
@@ -18,18 +19,22 @@ from airground_drake.maps.rectangles import Cells
 from airground_drake.scenarios import map_file
 from airground_drake.scenarios.document import text_of
 from airground_drake.scenarios.limits import MAX_NAME
+from airground_drake.scenarios.rounding import Rounding
+from airground_drake.scenarios.schema import Control
 
 MOST_BYTES = 16_000_000
 """Most bytes of a world, a map or an imported scenario."""
-SPEED_M_S = 1.0
-"""Speed of presets."""
+MAX_SPEED_M_S, UAV_MAX_SPEED_M_S = 1.5, 10.0
+RESERVE = 1.5
+"""The largest speed of UGVs is this many times that of their presets."""
 FAITH = 1.5
-"""A run lasts this many times as long as the longest way at `SPEED_M_S`, and `PATIENCE_S` longer."""
+"""A run lasts this many times as long as the longest way at the speed of presets, and `PATIENCE_S` longer."""
 PATIENCE_S = 20.0
+PERIOD_S = 0.05
 BARN = ((-2.25, 3.0), (-2.25, 13.0))
 """Start and goal of the BARN challenge in its worlds 0 to 299 (`run.py` of its repository), m."""
 CLEARANCE_M = 1.0
-"""The UAV flies at least so far above the highest obstacle."""
+"""The UAV flies at least so far above the highest shape, and keeps as much from UGVs if it flies high enough."""
 
 Point = tuple[float, float]
 
@@ -43,15 +48,17 @@ class Robot(NamedTuple):
 
 
 class Sizes(NamedTuple):
-    """Sizes of robots and distances, m.
+    """Sizes and speeds of UGVs.
 
     Attributes:
         radius_m: radius of each UGV.
         distance_m: what UGVs keep from obstacles and from one another, between surfaces.
+        max_speed_m_s: largest speed; None: `MAX_SPEED_M_S`, or less where radius and distance are below 0.1 m together.
     """
 
     radius_m: float
     distance_m: float
+    max_speed_m_s: float | None
 
 
 class Imported(NamedTuple):
@@ -68,31 +75,40 @@ class Imported(NamedTuple):
     says: list[str]
 
 
-def barn(path: Path, name: str, robots: Sequence[Robot], sizes: Sizes) -> Imported:
+def barn(path: Path, name: str, robots: Sequence[Robot], sizes: Sizes, height_m: float) -> Imported:
     """The scenario of a Gazebo world; without robots, one goes where the BARN challenge asks it to go.
+
+    What begins above the height of UGVs is no obstacle of theirs: it is left out, and the UAV flies over it.
 
     Raises:
         ScenarioError: if the file cannot be used.
     """
     world = gazebo.world(_text(path), str(path))
+    left_out = [f"left out: {each}" for each in world.left_out]
     if not world.solids:
         allowed = "wanted: a world with cylinders, spheres or boxes in its models"
-        raise ScenarioError(str(path), "", Fault("no obstacle is in it"), allowed)
+        raise ScenarioError(str(path), "", Fault("; ".join(["no obstacle is in it", *left_out])), allowed)
     robots = robots or [Robot("ugv1", *BARN)]
     taken = {each.name for each in robots} | {"uav"}
-    lines = ["obstacles:"]
+    lines = list[str]()
     for solid in world.solids:
+        if solid.bottom > height_m:
+            above = f"{solid.name}, which begins {_number(solid.bottom)} m above the ground"
+            left_out.append(f"left out: {above}: UGVs of {height_m:g} m pass under it (--height-m)")
+            continue
         own = _new_name(solid.name, taken)
         taken.add(own)
         place = f"position_m: {_list((solid.pose.x, solid.pose.y, 0.0))}, height_m: {_number(solid.top)}"
         size = f"radius_m: {_number(solid.size[0])}"
         if len(solid.size) == 2:
-            size = f"size_m: {_list(solid.size)}, heading_rad: {_number(solid.pose.heading)}"
+            size = f"size_m: {_list(solid.size)}, heading_rad: {_number(math.remainder(solid.pose.heading, math.tau))}"
         lines.append(f"  {own}: {{{place}, {size}}}")
-    says = [f"{len(world.solids)} obstacles", *(f"left out: {each}" for each in world.left_out)]
+    says = [f"{len(lines)} obstacle{'' if len(lines) == 1 else 's'}", *dict.fromkeys(left_out)]
     top = max(solid.top for solid in world.solids)
+    extent = max(max(map(abs, solid.pose[:2])) + math.hypot(*solid.size) for solid in world.solids)
     longest = max(math.dist(each.start, each.target) for each in robots)
-    return Imported(_scenario(path, name, robots, sizes, says, lines, 2.0 * longest, top), {}, says)
+    lines = ["obstacles:", *lines] if lines else []
+    return _scenario(path, name, robots, sizes, says, lines, _Space(2.0 * longest, extent, top))
 
 
 def ros_map(path: Path, name: str, folder: Path, robots: Sequence[Robot], count: int, sizes: Sizes) -> Imported:
@@ -129,11 +145,17 @@ def ros_map(path: Path, name: str, folder: Path, robots: Sequence[Robot], count:
             for number, (start, target) in enumerate(pairs.tolist(), 1)
         ]
         says.append(f"starts and targets were chosen: at least {needed:g} m from obstacles, with a way between them")
+    corners = grid.frame.points(np.array([[0, 0], [0, rows], [columns, 0], [columns, rows]]))
+    space = _Space(longest, float(np.abs(corners).max()))
     file = os.path.relpath(path, folder)
-    return Imported(_scenario(path, name, robots, sizes, says, _map(file), longest), {}, says)
+    if not file.isprintable():
+        raise ScenarioError(str(path), "", Fault("a scenario cannot name this path"), "wanted: printable UTF-8")
+    return _scenario(path, name, robots, sizes, says, _map(file), space)
 
 
-def mapf(path: Path, map_path: Path | None, name: str, folder: Path, agents: int, cell_m: float) -> Imported:
+def mapf(
+    path: Path, map_path: Path | None, name: str, folder: Path, agents: int, cell_m: float, max_speed_m_s: float | None
+) -> Imported:
     """The scenario of a benchmark of MovingAI: its map as a map_server's, its first agents as UGVs.
 
     A UGV's radius is a fifth of a cell. It keeps a tenth of a cell from others and from obstacles, so it fits through
@@ -146,6 +168,7 @@ def mapf(path: Path, map_path: Path | None, name: str, folder: Path, agents: int
         folder: in which they will be.
         agents: number of agents.
         cell_m: side of a cell, m.
+        max_speed_m_s: as of `Sizes`.
 
     Raises:
         ScenarioError: if the files cannot be used, or have fewer agents.
@@ -178,8 +201,62 @@ def mapf(path: Path, map_path: Path | None, name: str, folder: Path, agents: int
             }
         ).encode(),
     }  # fmt: skip
-    sizes = Sizes(0.2 * cell_m, 0.1 * cell_m)
-    return Imported(_scenario(path, name, robots, sizes, says, _map(about.name), longest), beside, says)
+    sizes = Sizes(0.2 * cell_m, 0.1 * cell_m, max_speed_m_s)
+    space = _Space(longest, (max(rows, columns) + 1) * cell_m)
+    return _scenario(path, name, robots, sizes, says, _map(about.name), space, beside)
+
+
+class _Space(NamedTuple):
+    """Where robots are.
+
+    Attributes:
+        longest: a length that no robot's way should exceed, m.
+        extent: largest coordinate of an obstacle or of the map, m.
+        top: height of the highest shape, m.
+    """
+
+    longest: float
+    extent: float
+    top: float = 0.0
+
+
+class _Pace(NamedTuple):
+    """How fast robots are, and for how long.
+
+    Attributes:
+        ugv: largest speed of a UGV, m/s.
+        uav: largest speed of the UAV, m/s.
+        sensing: sensing range, m; it covers what closes in a period.
+        needed: what the longest way needs, s.
+        duration: of a run, s.
+    """
+
+    ugv: float
+    uav: float
+    sensing: float
+    needed: float
+    duration: float
+
+
+def _pace(sizes: Sizes, space: _Space, air_ground_m: float) -> _Pace:
+    """How fast robots are, and for how long.
+
+    Rounding limits how far robots may go (`rounding.py`). For long ways the UAV is slower; if that does not suffice,
+    the run is shorter than needed.
+    """
+    radius, distance = sizes.radius_m, sizes.distance_m
+    ugv = sizes.max_speed_m_s or min(MAX_SPEED_M_S, RESERVE * 10.0 * (radius + distance))
+    needed = math.ceil((FAITH * RESERVE * space.longest / ugv + PATIENCE_S) / 10.0) * 10.0
+    most = 0.0
+    for uav in (max(UAV_MAX_SPEED_M_S, 2.0 * ugv), 2.0 * ugv):
+        closing = max(ugv + uav, 2.0 * ugv)
+        reach = distance + air_ground_m + 2.0 * radius + closing * PERIOD_S  # more than any pair needs
+        sensing = max(4.0, 10.0 * radius, reach)
+        loss = Rounding(sensing, closing, PERIOD_S, Control().avoidance_gain_1_s)
+        most = 0.999 * loss.longest(space.extent, uav)  # numbers are rounded in the file
+        if needed <= most:
+            break
+    return _Pace(ugv, uav, sensing, needed, min(needed, max(math.floor(most / 10.0) * 10.0, 10.0)))
 
 
 def _scenario(
@@ -189,10 +266,10 @@ def _scenario(
     sizes: Sizes,
     says: Sequence[str],
     world: Sequence[str],
-    longest: float,
-    top: float = 0.0,
-) -> str:
-    """The text of a scenario.
+    space: _Space,
+    beside: Mapping[Path, bytes] = MappingProxyType({}),
+) -> Imported:
+    """The scenario of robots in a world.
 
     Args:
         path: of the file that it is made of.
@@ -201,33 +278,41 @@ def _scenario(
         sizes: of robots and distances.
         says: what was read and chosen; becomes comments.
         world: lines with the obstacles or the map.
-        longest: a length, m, that no robot's way should exceed.
-        top: height of the highest obstacle, m.
+        space: where robots are.
+        beside: content of further files, by path.
     """
-    altitude = max(2.0, top + CLEARANCE_M, 2.0 * (sizes.radius_m + sizes.distance_m))
-    speed = min(SPEED_M_S, 10.0 * (sizes.radius_m + sizes.distance_m))  # m/s
-    duration = math.ceil((FAITH * longest / speed + PATIENCE_S) / 10.0) * 10.0
+    radius, distance = sizes.radius_m, sizes.distance_m
+    altitude = max(2.0, space.top + max(CLEARANCE_M, 2.0 * distance), 2.0 * (radius + distance))
+    air_ground = min(0.5 * altitude - radius, max(CLEARANCE_M, distance))
+    places = [altitude, *(abs(place) for each in robots for place in (*each.start, *each.target))]
+    pace = _pace(sizes, space._replace(extent=max(space.extent, *places)), air_ground)
+    speed = pace.ugv / RESERVE
+    says = [*says, f"UGVs drive at {_number(speed)} m/s, at most at {_number(pace.ugv)} m/s (--max-speed-m-s)"]
+    if pace.duration < pace.needed:
+        short = f"runs end after {_number(pace.duration)} s, the longest that rounding allows in a world of this size"
+        says.append(f"{short}; the longest way may take {_number(pace.needed)} s")
     middle = np.mean([each.start for each in robots], axis=0)
-    kept = f"UGVs have a radius of {_number(sizes.radius_m)} m, and keep {_number(sizes.distance_m)} m from others"
+    kept = f"UGVs have a radius of {_number(radius)} m, and keep {_number(distance)} m from others"
     comments = [f"Made by `airground import` of {path.name}", *says, f"{kept}; presets are straight"]
     lines = [
         *(f"# {one_line(each)}" for each in comments),
         f'name: "{name}"',
         text_of({"title": one_line(f"{len(robots)} UGV{'s' * (len(robots) > 1)} in {path.name}")}).strip(),
-        f"duration_s: {_number(duration)}",
+        f"duration_s: {_number(pace.duration)}",
         "",
         "uav:",
         f"  start_m: {_list((*middle, altitude))}",
         f"  altitude_m: {_number(altitude)}",
+        f"  max_speed_m_s: {_number(pace.uav)}",
         "",
         "safe_distance:",
-        f"  obstacle_m: {_number(sizes.distance_m)}",
-        f"  ugv_m: {_number(sizes.distance_m)}",
-        f"  air_ground_m: {_number(0.5 * altitude - sizes.radius_m)}",
-        f"  collision_m: {_number(0.1 * sizes.distance_m)}",
+        f"  obstacle_m: {_number(distance)}",
+        f"  ugv_m: {_number(distance)}",
+        f"  air_ground_m: {_number(air_ground)}",
+        f"  collision_m: {_number(0.1 * distance)}",
         "",
-        f"control: {{period_s: 0.05, sensing_range_m: {_number(max(4.0, 10.0 * sizes.radius_m))}}}",
-        "decision: {threshold: {rule: fixed, zeta_m: 1.0}, release_m: 0.5, noise_period_s: 0.05}",
+        f"control: {{period_s: {PERIOD_S:g}, sensing_range_m: {_number(pace.sensing)}}}",
+        f"decision: {{threshold: {{rule: fixed, zeta_m: 1.0}}, release_m: 0.5, noise_period_s: {PERIOD_S:g}}}",
         "intervention: {policies: [{name: coordinate}]}",
         "gatekeeper: {period_s: 0.2}",
         "",
@@ -240,11 +325,11 @@ def _scenario(
             f"    start_m: {start}",
             f"    target_m: {target}",
             f"    preset: {{waypoints_m: [{start}, {target}], speed_m_s: {_number(speed)}}}",
-            f"    max_speed_m_s: {_number(1.5 * speed)}",
-            f"    radius_m: {_number(sizes.radius_m)}",
+            f"    max_speed_m_s: {_number(pace.ugv)}",
+            f"    radius_m: {_number(radius)}",
         ]
     runs = ["runs:", "  a: {method: a, expected: {LIVE-GOAL: nothing}}", "  d: {method: d}"]
-    return "\n".join([*lines, "", *world, "", *runs]) + "\n"
+    return Imported("\n".join([*lines, "", *world, "", *runs]) + "\n", {**beside}, says)
 
 
 def _map(file: str) -> list[str]:

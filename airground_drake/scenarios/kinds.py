@@ -22,6 +22,7 @@ from airground_drake.base.arrays import LARGEST
 from airground_drake.base.statuses import COUNTS, EXPECTATIONS, NOTHING, alternatives, declared
 from airground_drake.maps.rectangles import MOST_CELLS
 from airground_drake.registry import MODEL_CLAIMS, PLUGIN, PLUGIN_PATTERN, RUN_CLAIMS, Registry, is_plugin
+from airground_drake.scenarios.hints import plugin_path
 from airground_drake.scenarios.limits import MAX_CORNERS, MAX_NAME, MAX_SEED, MAX_TEXT
 
 SMALLEST = 1e-9  # of a positive number
@@ -204,7 +205,7 @@ def registered(registry: Registry) -> ValueRule:
 
     def check(value: str) -> str:
         if not registry.accepts(value):
-            raise refused(value, f"one of {', '.join(registry.allowed)}")
+            raise refused(value, f"one of {', '.join(registry.allowed)}{plugin_path(value)}")
         return value
 
     return ValueRule(check, lambda: {"anyOf": [{"enum": registry}, PLUG_IN]})
@@ -259,7 +260,7 @@ def _claims_of_others(value: dict[str, str]) -> dict[str, str]:
             what = f"a new identifier of at most {MAX_NAME} capitals, digits and hyphens, such as MY-CLAIM"
             raise refused(claim, what, claim)
         if not is_plugin(place):
-            raise refused(place, PLUGIN, claim)
+            raise refused(place, f"{PLUGIN}{plugin_path(place)}", claim)
     return value
 
 

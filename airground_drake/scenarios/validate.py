@@ -24,6 +24,7 @@ from airground_drake.base.statuses import COUNTS, NOTHING, alternatives
 from airground_drake.decision.bayes import COMPUTED
 from airground_drake.geometry import convex, outline
 from airground_drake.registry import MODEL_CLAIMS, ROUTES, RUN_CLAIMS
+from airground_drake.scenarios import hints
 from airground_drake.scenarios.budget import PairBudget, budget, takes_room
 from airground_drake.scenarios.outlines import outlines_of
 from airground_drake.scenarios.plants import plant_of
@@ -118,6 +119,19 @@ def _shapes(scenario: Scenario) -> Problems:
                 place = np.array(getattr(robot, name)[:2])
                 if not ((low < place) & (place < high)).all():
                     yield f"{key}.{name}", getattr(robot, name), f"a place within arena_m = {scenario.arena_m}"
+
+
+def _headings(scenario: Scenario) -> Problems:
+    """Headings are at most one turn: greater ones are degrees."""
+    headings = {f"obstacles.{name}": each.heading_rad for name, each in scenario.obstacles.items()}
+    for name, robot in scenario.robots.items():
+        place = f"ugvs.{name}" if name in scenario.ugvs else "uav"
+        several = len(robot.plant) > 1
+        headings |= {f"{place}.plant{f'.{k}' * several}": each.heading_rad for k, each in enumerate(robot.plant)}
+    for key, heading in headings.items():
+        if abs(heading) > math.tau + TOLERANCE:
+            degrees = f"{heading:g} degrees are {math.radians(heading):.6g} rad"
+            yield f"{key}.heading_rad", heading, f"from -{math.tau:.6g} to {math.tau:.6g} rad; {degrees}"
 
 
 def _way(key: str, obstacle: Obstacle, *, flat: bool) -> Problems:
@@ -429,6 +443,7 @@ def _sensing(scenario: Scenario) -> Problems:
         apart = f"{kind} {least:.9g} m{_and(one.radius + other.radius)}"
         total = f"{apart} + closing {one.speed + other.speed:.9g} m/s * control.period_s {period:.9g} s"
         allowed = f"at least {_shown(needed, ROUND_CEILING)} m for {one.name} and {other.name}: {total}"
+        allowed += hints.fast(max(one.speed, other.speed))
         yield "control.sensing_range_m", scenario.control.sensing_range_m, allowed
 
 
@@ -467,10 +482,12 @@ def _extent(scenario: Scenario) -> Problems:
         yield (
             key,
             point,
-            f"coordinates of at most {allowed * _SHORT:.6g} m in size, {why} within duration_s = {duration:.9g} s",
+            f"coordinates of at most {allowed * _SHORT:.6g} m in size, {why} within duration_s = {duration:.9g} s"
+            f"{hints.far(farthest)}",
         )
     elif longest > 0.0:
-        yield "duration_s", duration, f"at most {longest * _SHORT:.6g} s at {speed:.9g} m/s, {why}"
+        allowed_s = f"at most {longest * _SHORT:.6g} s at {speed:.9g} m/s, {why}"
+        yield "duration_s", duration, f"{allowed_s}{hints.fast(speed) or hints.far(farthest)}"
     else:
         gain = loss.least_gain(farthest + speed * duration, duration)
         yield "control.avoidance_gain_1_s", control.avoidance_gain_1_s, f"0, or at least {gain / _SHORT:.6g} 1/s, {why}"
@@ -617,7 +634,7 @@ def _keys(value: object, above: str = "") -> Iterator[str]:
 
 
 CHECKS: tuple[Callable[[Scenario], Problems], ...] = (
-    _names, _reserved, _shapes, _map, _blocks, _route, _runs, _plants, _presets, _ends, _gains, _periods, _release,
-    _distances,    _sensing, _extent, _clearances, _budget, _reproduction, _choices,
+    _names, _reserved, _shapes, _headings, _map, _blocks, _route, _runs, _plants, _presets, _ends, _gains, _periods,
+    _release, _distances, _sensing, _extent, _clearances, _budget, _reproduction, _choices,
 )  # fmt: skip
 """Every rule; later ones rely on earlier ones."""

@@ -139,10 +139,11 @@ class OwnPlant(NamedTuple):
 
     @property
     def name(self) -> str:
-        """What a scenario calls it: `module:Class`, also where it is a function."""
+        """What a scenario calls it: `module:Class`, also where it is a function, or its file is called my-robots.py."""
         made_by = self.make if hasattr(self.make, "__qualname__") else type(self.make)
-        called = re.sub(r"\W+", "_", made_by.__qualname__)
-        return f"{made_by.__module__}:{called}"
+        words = [*str(made_by.__module__).split("."), made_by.__qualname__]
+        *module, called = (re.sub(r"\W+|^(?=\d|$)", "_", word) for word in words)
+        return f"{'.'.join(module)}:{called}"
 
 
 def declared(scenario: Scenario, plants: Mapping[str, OwnPlant]) -> Scenario:

@@ -22,9 +22,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
 from airground_drake.base.arrays import Array
+from airground_drake.base.compiling import njit
 
 HAND, TURN, HALF_BASE, WHEEL, FORWARD = 0, 1, 2, 3, 4
 """Entries of the numbers of a steering, (5,): hand point l, m (0: no unicycle); largest turning rate, rad/s; half the

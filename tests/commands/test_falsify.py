@@ -55,7 +55,7 @@ def falsified(tmp_path: Path, airground: Airground) -> Airground:
 
 @pytest.mark.slow
 def test_a_violation_is_found_and_made_small(falsified: Airground, tmp_path: Path) -> None:
-    assert "made small" in falsified("b", "--sampler", "halton", code=1)
+    assert "made small" in falsified("b", "--sampler", "halton", "-n", 16, code=1)
     for name in ("found", "found_small"):
         scenario = load(tmp_path / f"{name}.yaml")
         (verdict,) = judge(simulate(scenario, "b"), claims=["SAFE-TRACE"])
@@ -81,9 +81,25 @@ def test_a_name_that_is_too_long_for_the_small_scenario_is_refused_before_the_se
 
 @pytest.mark.usefixtures("in_this_process")
 def test_without_a_violation_the_worst_is_kept(falsified: Airground, tmp_path: Path) -> None:
-    falsified("d", code=0)
+    assert "2 tried by cma" in (said := falsified("d", code=0))
+    assert ": no counterexample" in said
     assert load(tmp_path / "found.yaml").name == "pushed_0"
     assert not (tmp_path / "found_small.yaml").exists()
+
+
+@pytest.mark.usefixtures("in_this_process")
+def test_without_a_violation_nothing_is_written_unless_it_is_asked_for(
+    falsified: Airground, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, airground: Airground
+) -> None:
+    falsified("d", "-o", tmp_path / "kept.yaml", code=0)
+    monkeypatch.chdir(tmp_path)
+    airground("falsify", "pushed.yaml", "--jobs", 1, "-n", 1, "--sampler", "halton")
+    assert {path.name for path in tmp_path.iterdir()} == {"pushed.yaml", "corner.py", "kept.yaml"}
+
+
+@pytest.mark.usefixtures("in_this_process")
+def test_a_sampler_whose_path_is_not_allowed_is_told_why(falsified: Airground) -> None:
+    assert "robots/mine.py:Mine: folders and file have" in falsified("d", "--sampler", "../corner.py:Corner", code=2)
 
 
 @pytest.mark.slow
@@ -130,5 +146,5 @@ def test_a_claim_that_applies_to_no_run_is_refused(falsified: Airground) -> None
 @pytest.mark.usefixtures("in_this_process")
 def test_where_nothing_is_measured_it_says_so(falsified: Airground, tmp_path: Path) -> None:
     said = falsified("a", "--most", "first_trigger_s", "--sampler", "halton", code=3, duration="0.1")
-    assert said == "pushed: 16 tried by halton, never judged: no first_trigger_s in any of them\n"
+    assert said == "pushed: 2 tried by halton, never judged: no first_trigger_s in any of them\n"
     assert not (tmp_path / "found.yaml").exists()

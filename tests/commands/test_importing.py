@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 import shutil
 from pathlib import Path
 
@@ -129,6 +130,71 @@ def test_a_benchmark_of_movingai_becomes_a_map_of_ros_with_a_frame_round_it(
     airground("import", "mapf", tmp_path / "some.scen", "-o", tmp_path / "s.yaml", code=2)
 
 
+def test_a_shape_above_the_ugvs_is_no_obstacle_and_is_named(tmp_path: Path, airground: Airground) -> None:
+    """The UAV flies over it. It is an obstacle for higher UGVs."""
+    lamp = PILLAR.format(name="lamp", shape="<box><size>1 1 0.2</size></box>").replace("9 9 0", "5 0 2.8")
+    (tmp_path / "lamp.world").write_text(f"<sdf><world name='w'>{lamp}</world></sdf>")
+    said = airground("import", "barn", tmp_path / "lamp.world", "-o", tmp_path / "lamp.yaml")
+    assert said.startswith("0 obstacles\nleft out: lamp, which begins 2.7 m above the ground")
+    scenario = load(tmp_path / "lamp.yaml")
+    assert not scenario.barriers
+    assert scenario.uav.altitude_m > 2.9
+    airground("import", "barn", tmp_path / "lamp.world", "--height-m", 2.75, "-o", tmp_path / "high.yaml")
+    assert [*load(tmp_path / "high.yaml").barriers] == ["lamp"]
+
+
+def large_map(folder: Path, side_m: float) -> Path:
+    """A square room with a wall across, which leaves a gap at one end."""
+    n = int(side_m / 0.5)
+    cells = np.full((n, n), 254, np.uint8)
+    cells[[0, -1]] = cells[:, [0, -1]] = 0
+    cells[n // 2, :-40] = 0
+    (folder / "large.pgm").write_bytes(b"P5 %d %d 255\n" % (n, n) + cells.tobytes())
+    about = "image: large.pgm\nresolution: 0.5\norigin: [0, 0, 0]\nnegate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.2\n"
+    (folder / "large.yaml").write_text(about)
+    return folder / "large.yaml"
+
+
+@pytest.mark.parametrize(
+    ("side_m", "options", "in_time"),
+    [
+        (200, (), True),
+        (200, ("--max-speed-m-s", 0.22), True),
+        (200, ("--max-speed-m-s", 20), True),
+        (600, ("--max-speed-m-s", 0.5), False),
+        (50, ("--radius-m", 0.001, "--distance-m", 0.001), True),
+        (100, ("--distance-m", 6), True),
+        (100, ("--radius-m", 6), True),
+    ],
+)
+def test_what_is_chosen_is_never_refused(
+    side_m: float, options: tuple[object, ...], in_time: bool, tmp_path: Path, airground: Airground
+) -> None:
+    """Duration, speeds and ranges follow the size of the map, and the UGVs that are asked for."""
+    path = tmp_path / "large.s.yaml"
+    said = airground("import", "ros-map", large_map(tmp_path, side_m), "--ugvs", 1, *options, "-o", path)
+    assert ("the longest that rounding allows" in said) == (not in_time)
+    (ugv,) = load(path).ugvs.values()
+    asked = dict(zip(options[::2], options[1::2], strict=True)).get("--max-speed-m-s", ugv.max_speed_m_s)
+    assert ugv.max_speed_m_s == asked
+    assert f"at most at {asked:g} m/s" in said
+
+
+def test_a_map_whose_path_no_scenario_can_name_is_refused_as_such(tmp_path: Path, airground: Airground) -> None:
+    folder = tmp_path / os.fsdecode(b"b\xff")
+    folder.mkdir()
+    said = airground("import", "ros-map", large_map(folder, 20.0), "--ugvs", 1, "-o", tmp_path / "s.yaml", code=2)
+    assert "a scenario cannot name this path; wanted: printable UTF-8" in said
+
+
+def test_a_high_obstacle_and_large_distances_are_never_refused(tmp_path: Path, airground: Airground) -> None:
+    tower = PILLAR.format(name="tower", shape="<box><size>1 1 80</size></box>")
+    (tmp_path / "tower.world").write_text(f"<sdf><world name='w'>{tower}</world></sdf>")
+    for k, distance in enumerate((0.1, 5.0)):
+        path = tmp_path / f"tower_{k}.yaml"
+        airground("import", "barn", tmp_path / "tower.world", "--distance-m", distance, "-o", path)
+
+
 MISTAKES = """
 import                                          # the following arguments are required: format, FILE
 import gazebo x                                 # invalid choice: 'gazebo'
@@ -142,7 +208,9 @@ import barn w.world --agents 2                  # --agents is for mapf
 import barn w.world --ugv a:1,2:3               # wanted: NAME:X,Y:X,Y with start and target in m
 import barn w.world --ugv a:1,2:3,nan           # wanted: NAME:X,Y:X,Y
 import barn w.world --ugv 1a:1,2:3,4            # wanted: NAME:X,Y:X,Y
-import barn w.world --radius-m 0                # a number above 0
+import barn w.world --radius-m 0                # a number from 0.001 to 100
+import barn mesh.world                          # no obstacle is in it; left out: a mesh of house; wanted: a world with
+import ros-map depot.yaml --height-m 1          # --height-m is for barn
 import barn w.world -o w.world                  # w.world exists; name a file that does not
 import barn w.world --ugv a:-4.4,0:0,5          # a starts -0.29 m from unit_cylinder_0, at least safe_distance.
 import barn w.world --ugv map_1:-2,3:-2,13      # ugvs.map_1: 'map_1' is not allowed
@@ -175,6 +243,8 @@ def test_a_mistake_is_one_line_and_leaves_nothing(
     Path("some.scen").write_text(SCEN)
     Path("none.scen").write_text("version 1\n")
     Path("empty.world").write_text("<sdf><world name='w'/></sdf>")
+    mesh = PILLAR.format(name="house", shape="<mesh/>")
+    Path("mesh.world").write_text(f"<sdf><world name='w'>{mesh}</world></sdf>")
     Path("binary.map").write_bytes(b"\xff\xfe")
     Path("taken_map.pgm").touch()
     before = {path: path.read_bytes() for path in tmp_path.iterdir()}

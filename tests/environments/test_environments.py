@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import copy
+import importlib
+import sys
 import warnings
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -172,8 +175,9 @@ def test_policies_are_asked_once_at_each_instant_and_again_with_an_answer(monkey
     monkeypatch.setattr(Planner, "plan", lambda self, before, t, *rest: asked.append(t) or plan(self, before, t, *rest))
     env = InterventionEnv(load("minimal"))
     env.reset(options={"number": 1})
-    for _ in range(3):
-        env.step(np.array([1.0, 0.0, 0.4, 0.5, 0.4], dtype=np.float32))
+    over = False
+    while not over:
+        _, _, over, _, _ = env.step(np.array([1.0, 0.0, 0.4, 0.5, 0.4], dtype=np.float32))
     assert 3 < len(set(asked)) <= len(asked) <= len(set(asked)) + 3
 
 
@@ -288,3 +292,47 @@ def test_mistakes_are_named() -> None:
     with pytest.raises(ValueError, match="wanted: 5 finite numbers"):
         env.step(np.full(5, np.nan, dtype=np.float32))
     assert isinstance(env.trace().to_pandas(), pd.DataFrame)
+
+
+@pytest.mark.parametrize("kind", [InterventionEnv, TeamEnv])
+def test_mistakes_in_an_episode_are_named(kind: type[InterventionEnv] | type[TeamEnv]) -> None:
+    """Both kinds: options that do not exist, steps after the end, copies."""
+    env = kind(load("minimal", {"duration_s": 0.5}))
+    with pytest.raises(ValueError, match="unknown options of reset: 'nmber'; allowed: 'number'"):
+        env.reset(options={"nmber": 3})
+    env.reset(options={"number": 1})
+    action: Any = {"ugv1": np.zeros(5)} if isinstance(env, TeamEnv) else np.zeros(5)
+    assert env.step(action)[2] in (True, {"ugv1": True})
+    with pytest.raises(RuntimeError, match="the episode is over: call reset"):
+        env.step(action)
+    with pytest.raises(
+        TypeError, match=f"{kind.__name__} cannot be copied: its model is a Drake diagram; make a second"
+    ):
+        copy.deepcopy(env)
+    env.reset(options={"number": 1})
+    env.step(action)
+
+
+def test_an_action_that_is_missing_is_named() -> None:
+    env = TeamEnv(load("minimal"))
+    _, infos = env.reset(options={"number": 1})
+    assert infos["ugv1"]["asked"]
+    with pytest.raises(ValueError, match="no action for ugv1; asked for now: ugv1"):
+        env.step({})
+
+
+def test_the_registered_environment_needs_no_arguments() -> None:
+    observation, _ = gymnasium.make(ID).reset(seed=1)
+    assert observation[0] == 1.0
+
+
+def test_a_package_that_is_missing_is_named_with_its_extra(monkeypatch: pytest.MonkeyPatch) -> None:
+    for package in ("gymnasium", "pettingzoo"):
+        name = f"airground_drake.environments.{package}_env"
+        with monkeypatch.context() as patch:
+            patch.setitem(sys.modules, package, None)
+            patch.delitem(sys.modules, name)
+            with pytest.raises(
+                ImportError, match=f"need the package {package}: pip install 'airground_drake\\[gym\\]'"
+            ):
+                importlib.import_module(name)

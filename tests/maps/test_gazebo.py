@@ -44,7 +44,7 @@ def test_frames_are_within_frames_and_the_state_moves_a_model(
     if (due := sum(each[2] for each in frames) + 1.5) <= 1e-9:  # by rounding it may be at the ground, too
         assert due > -1e-9 or world(text) == ([], ["pillar, whose top is not above the ground"])
         return
-    ((name, found, size, top),) = world(text).solids
+    ((name, found, size, bottom, top),) = world(text).solids
     place, turned = 0j, 1 + 0j
     for x, y, _, heading in frames:
         place += turned * complex(x, y)
@@ -52,7 +52,7 @@ def test_frames_are_within_frames_and_the_state_moves_a_model(
     assert complex(found.x, found.y) == pytest.approx(place, abs=1e-12 * 60)
     assert cmath.exp(1j * found.heading) == pytest.approx(turned, abs=1e-12)
     assert (name, size) == ("pillar", (1.0, 2.0))
-    assert top == pytest.approx(due)
+    assert (bottom, top) == pytest.approx((due - 3.0, due))
 
 
 def test_headings_in_degrees_are_read_as_such() -> None:
@@ -76,6 +76,31 @@ def test_cylinders_spheres_and_boxes_are_read_and_the_rest_is_named() -> None:
     assert found.left_out == [
         "<include> of model://sun", "a mesh of c", "inner within c", "walker, which a plug-in moves",
     ]  # fmt: skip
+
+
+LEFT_OUT = {
+    "<actor name='walker'><skin/></actor>": "<actor> walker",
+    f"<population name='cans'>{model(CYLINDER)}</population>": "<population> cans",
+    "<include><uri>model://house</uri><name>home</name></include>": "<include> of model://house as home",
+    model(CYLINDER, more="<include><uri>model://shelf</uri></include>"): "<include> of model://shelf within pillar",
+    model(CYLINDER, more="<actor name='walker'/>"): "<actor> walker within pillar",
+    f"<state><insertions>{model(CYLINDER)}</insertions></state>": "<insertions> in <state>",
+    model("<capsule><radius>1</radius></capsule>"): "a capsule of pillar",
+    model("<heightmap/>"): "a heightmap of pillar",
+    model("<plane><normal>1 0 0</normal></plane>"): "a plane of pillar",
+    "<model name='seen'><link><visual name='v'/></link></model>": "seen, which has no <collision>",
+}
+
+
+@pytest.mark.parametrize("text", LEFT_OUT)
+def test_every_body_is_read_or_named(text: str) -> None:
+    """Also what stands beside the first world in the file; light, physics and the like are no bodies."""
+    silent = "<light name='sun'/><physics/><gravity>0 0 -9.8</gravity><state><sim_time>1 0</sim_time></state>"
+    named = world(silent + text + model("<empty/>", name="nothing"))
+    assert LEFT_OUT[text] in named.left_out
+    assert len(named.left_out) == 1
+    beside = gazebo.world("<sdf><world name='w'/><world name='other'/></sdf>", "w.world")
+    assert beside.left_out == ["<world> other"]
 
 
 RELATIVE = "relative_to='x' f="

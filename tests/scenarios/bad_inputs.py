@@ -68,6 +68,14 @@ EDITS: list[tuple[str, object]] = [
     ("obstacles.rock", {"polygon_m": [[4, 0], [6, 0], [5, 1e-10]]}),
     ("obstacles.rock", {"polygon_m": [[4, 0], [5, 0], [6, 1e-12], [5.5, 2e-12]]}),
     ("arena_m", [[-1e7, -30], [1e7, 30]]),
+    # what a person means: degrees, a list, millimetres, a path
+    ("obstacles.rock", {"position_m": [5, -5], "size_m": [1, 1], "heading_rad": 90}),
+    ("ugvs.one.plant", {"kind": "unicycle", "hand_point_m": 0.2, "heading_rad": -90}),
+    ("obstacles", [{"name": "rock", "position_m": [5, -5]}]),
+    ("uav.max_speed_m_s", 250),
+    ("ugvs.one.start_m", [5000, 0, 0]),
+    ("uav.task", "../mine.py:Mine"),
+    ("claims", {"MINE": "/home/me/mine.py:Mine"}),
     # names
     ("name", "a b"),
     ("name", "n" * 65),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -22,7 +23,7 @@ from airground_drake.run.trace import Trace
 from airground_drake.scenarios import plugins
 from airground_drake.scenarios.load import load, resolved
 from airground_drake.systems.diagram import build_diagram
-from airground_drake.systems.plant import OwnPlant, first_order_plant
+from airground_drake.systems.plant import OwnPlant, declared, first_order_plant
 from airground_drake.verify import judge, judge_model
 from airground_drake.world.budget import Bounds, law_distance
 
@@ -202,6 +203,14 @@ def test_a_plant_that_jumps_is_passed_on_as_going_straight_one_of_its_steps_late
     led = np.cumsum(np.diff(trace.t, prepend=0.0)[:, None] * command, axis=0) + place[0]
     due = np.stack([np.interp(late, trace.t, axis) for axis in led.T], axis=1)
     assert np.abs(place - due).max() < 1e-9
+
+
+@pytest.mark.parametrize("module", ["my-robots", "robots.2nd", "my robots", "__main__"])
+def test_a_plant_may_be_of_a_module_whose_name_is_no_identifier(module: str) -> None:
+    """As of a file my-robots.py: its name in the scenario is still valid."""
+    kind = type("Robot", (Robot,), {"__module__": module})
+    scenario = declared(load("minimal"), {"ugv1": OwnPlant(kind, 0.0, 0.0)})
+    assert scenario.ugvs["ugv1"].plant[0].kind == re.sub(r"[- ]|(?=2)", "_", module) + ":Robot"
 
 
 PERSON = {"radius_m": 0.3, "moves": {"waypoints_m": [[12.0, 0.0], [-6.0, 0.0]], "speed_m_s": 0.8}}

@@ -16,11 +16,11 @@ from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from numba import njit
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
 from airground_drake.base.arrays import Array
+from airground_drake.base.compiling import njit
 from airground_drake.intervention.coordination.intervals import Indices
 from airground_drake.intervention.coordination.roadmap import Space
 from airground_drake.intervention.coordination.single import Mover

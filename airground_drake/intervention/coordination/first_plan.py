@@ -14,11 +14,11 @@ from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
-from numba import njit
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
 from airground_drake.base.arrays import Array
+from airground_drake.base.compiling import njit
 from airground_drake.intervention.coordination import lacam, network
 from airground_drake.intervention.coordination.coarse import Coarse, CoarseGraph, coarsened
 from airground_drake.intervention.coordination.intervals import Indices

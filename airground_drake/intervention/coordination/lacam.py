@@ -13,9 +13,9 @@ from __future__ import annotations
 from typing import Literal, NamedTuple
 
 import numpy as np
-from numba import njit
 
 from airground_drake.base.arrays import Array
+from airground_drake.base.compiling import njit
 from airground_drake.intervention.coordination.coarse import CoarseGraph
 from airground_drake.intervention.coordination.intervals import Indices
 from airground_drake.intervention.coordination.pibt import Step, Team, fits, give, mixed, must_go

@@ -15,9 +15,9 @@ from collections.abc import Sequence
 
 import numpy as np
 import numpy.typing as npt
-from numba import njit
 
 from airground_drake.base.arrays import Array
+from airground_drake.base.compiling import njit
 from airground_drake.intervention.coordination.coarse import CoarseGraph
 from airground_drake.intervention.coordination.intervals import Indices
 from airground_drake.intervention.coordination.pibt import ROUNDING_M, Team, conflicts
