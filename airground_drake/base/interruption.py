@@ -1,8 +1,7 @@
 """How SIGINT and SIGTERM end a command and its child processes at once.
 
 The stack is not unwound: an exception in a signal handler may be lost in a callback, and `with` blocks wait for busy
-pools. The handler kills all descendants of this process, removes its temporary files, prints one line, and exits. If a
-process is killed, the processes that it has forked end with it.
+pools. The handler kills all descendants of this process, removes its temporary files, prints one line, and exits.
 
 On Linux a command works in a child of the process that was started (`begin`). The parent only waits. If the child is
 killed, the parent kills its descendants, removes its temporary files, and says so. If the parent is killed, the child
@@ -18,7 +17,6 @@ import os
 import select
 import signal
 import sys
-import threading
 import time
 import traceback
 from collections.abc import Callable
@@ -130,7 +128,6 @@ def end_on_signals() -> None:
     for each in STOPPING:
         if signal.getsignal(each) is not signal.SIG_IGN:  # `nohup` ignores them
             signal.signal(each, end)
-    _end_forks_with_parent()
 
 
 def _open_standard_streams() -> None:
@@ -233,20 +230,3 @@ def end_with_pipe(reader: int) -> None:
         fcntl.fcntl(reader, fcntl.F_SETFL, os.O_ASYNC)
         if select.select([reader], [], [], 0.0)[0]:  # it was closed before
             os._exit(1)
-
-
-def _end_forks_with_parent() -> None:
-    """Make processes that the main thread forks end with this one. Another thread may end before its process."""
-    parent, from_main = 0, False
-
-    def before() -> None:
-        nonlocal parent, from_main
-        parent, from_main = os.getpid(), threading.current_thread() is threading.main_thread()
-
-    def in_child() -> None:
-        if from_main:
-            end_with_parent()
-            if os.getppid() != parent:
-                os._exit(1)
-
-    os.register_at_fork(before=before, after_in_child=in_child)

@@ -111,9 +111,14 @@ def start_in_process(work: Callable[[], T]) -> Callable[[], T]:
         return work
     context = multiprocessing.get_context("fork")
     receiver, sender = context.Pipe(duplex=False)
+
+    def done() -> None:
+        end_with_parent()
+        sender.send(work())
+
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", DeprecationWarning)  # idle threads of numerical libraries survive a fork
-        process = context.Process(target=lambda: sender.send(work()), daemon=True)
+        process = context.Process(target=done, daemon=True)
         process.start()
     sender.close()
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
@@ -19,11 +19,9 @@ from airground_drake.campaign.pool import Pool
 from airground_drake.campaign.rows import Row
 from airground_drake.campaign.search import Sampler
 from airground_drake.campaign.spec import Spec
-from airground_drake.campaign.work import rows_at, rows_of_scenario, trace_of
-from airground_drake.run.trace import Trace
+from airground_drake.campaign.work import rows_at, rows_of_scenario
 from airground_drake.scenarios.estimate import Limits
 from airground_drake.scenarios.load import from_data
-from airground_drake.scenarios.schema import Scenario
 
 
 @dataclass(frozen=True)
@@ -50,22 +48,14 @@ class Search:
 
     def fails(self, data: dict[str, Any]) -> bool:
         """Whether a scenario, as nested dicts and lists, is valid and a counterexample."""
-        scenario = _valid(data)
-        return scenario is not None and self._judge(rows_of_scenario(self.spec, scenario, self.limits))[1]
-
-    def trace(self, data: dict[str, Any]) -> Trace | None:
-        """The trace of a scenario's first run; None if it is not valid, or cannot be simulated."""
-        scenario = _valid(data)
-        return None if scenario is None else trace_of(self.spec, scenario, self.limits)
+        try:
+            scenario = from_data(data, "smaller scenario")
+        except ScenarioError:
+            return False
+        return self._judge(rows_of_scenario(self.spec, scenario, self.limits))[1]
 
     def _judge(self, rows: list[Row]) -> tuple[float, bool]:
         return self.objective.value(rows), self.objective.found(rows)
-
-
-def _valid(data: dict[str, Any]) -> Scenario | None:
-    with suppress(ScenarioError):
-        return from_data(data, "smaller scenario")
-    return None
 
 
 @dataclass(frozen=True)

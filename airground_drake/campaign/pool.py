@@ -6,9 +6,9 @@ import itertools
 import logging
 import uuid
 from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, ProcessPoolExecutor, wait
+from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, wait
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from functools import partial
 from typing import Any, Protocol, TypeVar
 
@@ -37,63 +37,43 @@ class Pool(Protocol):
 
 @contextmanager
 def local(jobs: int) -> Iterator[Pool]:
-    """A pool of `jobs` processes on this machine."""
+    """A pool of `jobs` processes on this machine, which are kept between calls.
+
+    When a process dies, its pool ends the others, too. Items that were handed out are then done again, each in its own
+    process, and new items go to a new pool.
+    """
     with ExitStack() as alive:
-        yield _Local(jobs, alive)
+        pool = alive.enter_context(processes(jobs))
+
+        def submit(call: Callable[[], T]) -> Future[T]:
+            nonlocal pool
+            with suppress(BrokenProcessPool):
+                return pool.submit(call)
+            alive.close()
+            pool = alive.enter_context(processes(jobs))
+            return pool.submit(call)
+
+        def finished(work: Callable[[int], T], items: Iterable[int]) -> Iterator[tuple[int, T | None]]:
+            waiting, under_way = iter(items), dict[Future[T], int]()
+            while True:
+                for item in itertools.islice(waiting, AHEAD * jobs - len(under_way)):
+                    under_way[submit(partial(work, item))] = item
+                if not under_way:
+                    return
+                for future in wait(under_way, return_when=FIRST_COMPLETED).done:
+                    item = under_way.pop(future)
+                    yield item, _result_of(future, partial(work, item))
+
+        yield finished
 
 
-class _Local:
-    """Processes that are kept between calls. When one dies, all are replaced."""
-
-    def __init__(self, jobs: int, alive: ExitStack) -> None:
-        self._jobs, self._alive = jobs, alive
-        self._processes: ProcessPoolExecutor = alive.enter_context(processes(jobs))
-
-    def __call__(self, work: Callable[[int], T], items: Iterable[int]) -> Iterator[tuple[int, T | None]]:
-        """See `Pool`.
-
-        If a process dies, its pool ends the others, too. Items that were handed out are then done again, each in its
-        own process.
-        """
-        waiting, under_way = iter(items), dict[Future[T], int]()
-        while True:
-            for item in itertools.islice(waiting, AHEAD * self._jobs - len(under_way)):
-                under_way[_submitted(self._processes, partial(work, item))] = item
-            if not under_way:
-                return
-            done = wait(under_way, return_when=FIRST_COMPLETED).done
-            if any(map(_lost, done)):
-                done = set(under_way)
-                wait(done)
-                self._alive.close()
-                self._processes = self._alive.enter_context(processes(self._jobs))
-            for future in done:
-                item = under_way.pop(future)
-                yield item, _alone(partial(work, item)) if _lost(future) else future.result()
-
-
-def _submitted(pool: ProcessPoolExecutor, call: Callable[[], T]) -> Future[T]:
-    """The future of a call; it has failed if a process of the pool has just died."""
-    try:
-        return pool.submit(call)
-    except BrokenProcessPool as error:
-        future = Future[T]()
-        future.set_exception(error)
-        return future
-
-
-def _lost(future: Future[T]) -> bool:
-    """Whether a process died before this was finished."""
-    return isinstance(future.exception(), BrokenProcessPool)
-
-
-def _alone(call: Callable[[], T]) -> T | None:
-    """The result of a call in its own process, tried DEATHS times; None if the process always dies."""
+def _result_of(future: Future[T], call: Callable[[], T]) -> T | None:
+    """The result of a call. If its process has died, it is tried DEATHS times alone; None if it always dies."""
+    with suppress(BrokenProcessPool):
+        return future.result()
     for _ in range(DEATHS):
-        with processes(1) as one:
-            future = _submitted(one, call)
-            if not _lost(future):
-                return future.result()
+        with suppress(BrokenProcessPool), processes(1) as one:
+            return one.submit(call).result()
     return None
 
 

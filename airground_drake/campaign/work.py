@@ -84,15 +84,6 @@ def rows_of_scenario(spec: Spec, scenario: Scenario, limits: Limits, common: Row
         gc.collect()  # Python does not see the size of a diagram, and would wait for hundreds
 
 
-def trace_of(spec: Spec, scenario: Scenario, limits: Limits) -> Trace | None:
-    """The trace of a scenario's first run; None if it cannot be simulated within the limits."""
-    try:
-        with _within(spec, scenario, limits):
-            return simulate(scenario, next(iter(scenario.runs)))
-    except (Exception, SystemExit, DrawOutOfTime):  # third-party code
-        return None
-
-
 @contextmanager
 def _within(spec: Spec, scenario: Scenario, limits: Limits) -> Iterator[None]:
     """Find or refuse third-party code; limit the time of the body.

@@ -164,7 +164,7 @@ def _save(search: Search, best: Best, path: Path, tests: int) -> None:
     for run in scenario.runs if best.found else ():
         alone = data | {"runs": {run: data["runs"][run]}}
         if search.fails(alone):
-            smaller, used = shrink(alone, search.fails, search.trace, tests)
+            smaller, used = shrink(alone, search.fails, tests)
             small = _small(path)
             write(small, smaller | {"name": f"{scenario.name[: MAX_NAME - len('_small')]}_small"})
             print(

@@ -58,11 +58,11 @@ def trace_of(folder: Path, run: str) -> tuple[Trace, Scenario]:
     """Load the trace of a run, and the scenario that it was simulated with.
 
     Raises:
-        TraceError: if the trace cannot be used.
+        TraceError: if the trace cannot be used, or is of another run.
         ScenarioError: if its scenario cannot be used.
     """
     from airground_drake.run import trace
     from airground_drake.scenarios.load import from_data
 
-    saved = trace.load(folder / "trace" / run)
+    saved = trace.load(folder / "trace" / run, run)
     return saved, from_data(saved.meta["scenario"], str(folder / "trace" / run))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 import time
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -216,7 +215,7 @@ def prove_report(report: Path, names: Sequence[str] = (), limit_s: float = coq.L
     Raises:
         FolderError: if one of its folders is a link.
         UnknownNameError: if the report has no run with a name in `names`.
-        TraceError: if a trace cannot be read, or no theorem is about a body of its scenario.
+        TraceError: if a trace cannot be read or is of another run, or no theorem is about a body of its scenario.
         CoqError: if a theory is not accepted.
         NoCoqError: if Coq is not installed.
         OSError: if the folder cannot be written.
@@ -228,10 +227,8 @@ def prove_report(report: Path, names: Sequence[str] = (), limit_s: float = coq.L
             raise UnknownNameError(f"run of {report}", name, there)
     if not there:
         raise TraceError(f"{report} has no trace/*/meta.json; wanted: the folder of a report")
-    runs = {name: trace.load(report / "trace" / name) for name in names or there}
-    for name, run in runs.items():
-        if run.run != name or not re.fullmatch(r"\w+", name, re.ASCII):
-            raise TraceError(one_line(f"{report / 'trace' / name}: the trace is of run {run.run!r}"))
+    runs = {name: trace.load(report / "trace" / name, name) for name in names or there}
+    for run in runs.values():
         with _usable(run):
             refuse_unknown(run)
     found: list[Proved] = []

@@ -18,7 +18,10 @@ from itertools import zip_longest
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from airground_drake.base import files
+from airground_drake.base.arrays import Array
 from airground_drake.base.statuses import meets
 from airground_drake.check.line import AGREES, DISAGREES, OPEN, RECORDED
 from airground_drake.registry import MODEL_CLAIMS
@@ -28,9 +31,16 @@ from airground_drake.report.lines import Line, differences, different, line_of, 
 WITHIN_PX = 0.02
 """Coordinates in drawings agree to this: they are rounded to 0.01."""
 
+WITHIN_SCRIPT = 1e-9
+"""Places (m) and velocities (m/s) that a scenario prescribes agree to this: thousands of roundings err by less."""
+CORNER_S = 1e-9
+"""A velocity so near to a corner of its preset, s, may be that of either side."""
+
 _DRAWING = re.compile(r"(<svg\b.*?</svg>)", re.DOTALL)
 _TEXT = re.compile(r">\s*([^<>\s][^<>]*)<")
-_NUMBER = re.compile(r"(-?\d+(?:\.\d+)?)")
+_GEOMETRY = re.compile(r'(\s(?:d|points|[xyr]|[cr][xy]|[xy][12]|width|height|viewBox|transform)="(?![^"]*scale)[^"]*")')
+"""Attributes in which numbers may differ by rounding. A scale of 0.01 may not become 0."""
+_NUMBER = re.compile(r"(-?[0-9]+(?:\.[0-9]+)?)")
 Judge = Callable[[Any, Sequence[Any]], Sequence[Any]]
 """From a scenario and its traces to verdicts, like `judge_all`."""
 
@@ -46,12 +56,16 @@ def lines(folder: Path, judge: Judge | None = None) -> Iterator[Line]:
         ScenarioError, TraceError, OSError: if a file cannot be used.
     """
     from airground_drake.run import trace
-    from airground_drake.scenarios.load import from_data
+    from airground_drake.scenarios.load import from_data, own
     from airground_drake.verify import judge_all
 
     report = json.loads(files.read_text(folder / "report.json"))
     scenario = from_data(report["scenario"]["resolved"], str(folder / "report.json"))
-    traces = {name: with_events(trace.load(folder / "trace" / name)) for name in scenario.runs}
+    traces = {name: with_events(trace.load(folder / "trace" / name, name)) for name in scenario.runs}
+    unscripted = [line for name, each in traces.items() for line in off_script(each, own(scenario, name))]
+    if unscripted:
+        yield from unscripted
+        return  # what is judged on such a run is not about the scenario
     again = document_again(report, scenario, traces, judge or judge_all)
     other_code = _other_code(report["provenance"])
     parts = [_with_note(line, other_code) for line in _parts(report, again, scenario)]
@@ -65,6 +79,30 @@ def lines(folder: Path, judge: Judge | None = None) -> Iterator[Line]:
     except Exception as error:  # the parts that are taken as recorded may have any content
         why = f"{type(error).__name__}: {error}"
         yield line_of("report.html", "", OPEN, f"the pages cannot be made again: {short(why)}", "pages")
+
+
+def off_script(trace: Any, scenario: Any) -> Iterator[Line]:
+    """A line for each moving obstacle and preset trajectory that is not where the scenario of the run says."""
+    from airground_drake.geometry.motion import Motion
+    from airground_drake.scenarios.world import make_world
+    from airground_drake.world.plant import Scripted
+
+    def compared(what: str, t_s: Array, theirs: Array, *allowed: Array) -> Iterator[Line]:
+        off = np.min([np.abs(theirs - ours).max(axis=1) for ours in allowed], axis=0) > WITHIN_SCRIPT
+        for k in np.flatnonzero(off)[:1]:
+            about = f"the {what} at t = {t_s[k]:.9g} s"
+            yield different("trace", trace.run, about, theirs[k].tolist(), allowed[0][k].tolist())
+
+    for body in make_world(scenario).bodies:
+        if isinstance(body.plant, Scripted):
+            place = body.plant.script.sample(trace.t)
+            yield from compared(f"place of {body.name}, m,", trace.t, trace.position(body.name), place)
+    t_s = trace.sampled("t_s")
+    for name, ugv in scenario.ugvs.items():
+        preset = Motion.at_speed(np.array(ugv.preset.waypoints_m), ugv.preset.speed_m_s)
+        yield from compared(f"preset of {name}, m,", t_s, trace.reference(name), preset.sample(t_s))
+        rates = (np.array([preset.at(t)[1] for t in t_s + by]) for by in (CORNER_S, -CORNER_S))
+        yield from compared(f"velocity of the preset of {name}, m/s,", t_s, trace.reference_rate(name), *rates)
 
 
 def with_events(trace: Any) -> Any:
@@ -177,7 +215,9 @@ def _map(folder: Path, scenario: Any) -> Iterator[Line]:
     if not (folder / of_map(about)).exists():
         yield line_of("map", "", OPEN, "the report has no copy of its files")
         return
-    made = map_file.cells(replace(scenario.map, file=of_map(about)), folder, recorded.starts_m, str(folder))
+    made = map_file.cells(
+        replace(scenario.map, file=of_map(about)), folder, recorded.starts_m, str(folder), copied=True
+    )
     found = list(differences(asdict(recorded), asdict(replace(made, file=recorded.file))))
     yield from (different("map", "", place, theirs, ours) for place, theirs, ours in found[:1])
     if not found:
@@ -226,13 +266,14 @@ def _same_text(name: str, folder: Path, rebuilt: str, *, other_drawings: bool = 
             (theirs or "").splitlines(keepends=True), (ours or "").splitlines(keepends=True), fillvalue=""
         )
         return different(name, "", "the page", *next(lines for lines in both if lines[0] != lines[1]))
-    how = "; drawings by another version of matplotlib: only texts and kinds of elements were compared, no shapes"
-    how *= other_drawings
-    return line_of(name, "", AGREES, f"as recorded{how}")
+    if other_drawings and recorded != rebuilt:
+        how = "drawings by another version of matplotlib: only texts and kinds of elements were compared, no shapes"
+        return line_of(name, "", RECORDED, how)
+    return line_of(name, "", AGREES, "as recorded")
 
 
 def _is_same_drawing(theirs: str, ours: str, *, shapes: bool) -> bool:
-    """Whether two drawings have the same texts and, with `shapes`, the same elements at the same places.
+    """Whether two drawings have the same texts and, with `shapes`, are equal except for rounded coordinates.
 
     Without `shapes`, theirs has no other kinds of elements and attributes than ours: so nothing is painted outside of
     the drawing, is active, or leads to another page.
@@ -241,6 +282,12 @@ def _is_same_drawing(theirs: str, ours: str, *, shapes: bool) -> bool:
         return False
     if not shapes:
         return theirs.count("<!") + theirs.count("<?") == 0 and _kinds(theirs) <= _kinds(ours)
+    one, other = _GEOMETRY.split(theirs), _GEOMETRY.split(ours)  # every second part is an attribute
+    return one[::2] == other[::2] and all(map(_is_near, one[1::2], other[1::2]))
+
+
+def _is_near(theirs: str, ours: str) -> bool:
+    """Whether two attributes are equal except for numbers, and these to WITHIN_PX."""
     one, other = _NUMBER.split(theirs), _NUMBER.split(ours)  # every second part is a number
     words = one[::2] == other[::2]
     return words and all(abs(float(a) - float(b)) <= WITHIN_PX for a, b in zip(one[1::2], other[1::2], strict=True))

@@ -56,7 +56,7 @@ def lines(folder: Path, *, allow_plugins: bool = False, progress: Progress = SIL
     scenario = from_data(report["scenario"]["resolved"], str(folder))
     seeds = max((row["seed"] for row in report["seeds"]), default=0)
     within(scenario, DEFAULT_LIMITS, 1 + seeds)
-    recorded = {name: trace.load(folder / "trace" / name) for name in scenario.runs}
+    recorded = {name: trace.load(folder / "trace" / name, name) for name in scenario.runs}
     others = _other_versions(report["provenance"])
     with plugins.admitted(scenario, str(folder), allow=allow_plugins):
         made = simulate_all(scenario, progress=progress)

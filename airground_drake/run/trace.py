@@ -39,6 +39,7 @@ from __future__ import annotations
 
 import io
 import json
+import re
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from math import ceil
@@ -64,6 +65,7 @@ from airground_drake.run.tables import (
     TABLES,
     typed,
 )
+from airground_drake.scenarios.kinds import NAME_PATTERN
 from airground_drake.scenarios.recorded import of_run
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.world.motion import SAME_S
@@ -335,17 +337,25 @@ def save(trace: Trace, folder: Path) -> list[str]:
     return [*tables, "timings.json", "meta.json"]
 
 
-def load(folder: Path) -> Trace:
+def load(folder: Path, run: str = "") -> Trace:
     """Load a saved trace.
 
+    Args:
+        folder: of the trace.
+        run: that it must be of; default: any.
+
     Raises:
-        TraceError: if it has another schema, or a file is missing, unreadable, or differs from its digest in
-            `meta.json`.
+        TraceError: if it has another schema, is of another run or its run has no plain name, or a file is missing,
+            unreadable, or differs from its digest in `meta.json`.
     """
     try:
         meta = json.loads(files.read_text(folder / "meta.json"))
         if meta.get("schema") != SCHEMA:
             raise TraceError(f"{folder}: schema {meta.get('schema')!r}, this version reads {SCHEMA!r}: simulate again")
+        if not re.fullmatch(NAME_PATTERN, meta["run"]):  # files are named after it
+            raise TraceError(f"{folder}: its run is {meta['run']!r}; allowed: a name of letters, digits and _")
+        if run not in ("", meta["run"]):
+            raise TraceError(f"{folder}: its run is {meta['run']!r}; wanted: {run!r}")
         timings = json.loads(files.read_text(folder / "timings.json"))
         digests, tables = meta.pop("files"), {}
         for name in TABLES:

@@ -79,12 +79,13 @@ class MapFile(NamedTuple):
         return Grid(occupied, self.frame)
 
 
-def read(path: Path, where: str = "") -> MapFile:
+def read(path: Path, where: str = "", *, copied: bool = False) -> MapFile:
     """The map of a map_server's YAML file.
 
     Args:
         path: of the YAML file.
         where: file and line of the scenario that names the map, if any: for the message if there is no such file.
+        copied: whether both files are copies in one folder: of the image's path only the name counts.
 
     Raises:
         ScenarioError: if one of the two files cannot be read or used.
@@ -98,7 +99,7 @@ def read(path: Path, where: str = "") -> MapFile:
     if about.free_thresh > about.occupied_thresh:
         allowed = f"at most occupied_thresh = {about.occupied_thresh:g}"
         raise ScenarioError(document.where("free_thresh"), "free_thresh", about.free_thresh, allowed)
-    image = path.parent / about.image
+    image = path.parent / (Path(about.image).name if copied else about.image)
     content = _content(image, MOST_BYTES, document.where("image"), "image", "a PGM, PPM, PNG or BMP file")
     try:
         cells = occupancy(
@@ -114,7 +115,7 @@ def read(path: Path, where: str = "") -> MapFile:
     return MapFile(cells, Frame(about.resolution, (x, y, heading)), {path: data, image: content})
 
 
-def cells(given: Map, folder: Path, starts: Sequence[Sequence[float]], where: str) -> MapCells:
+def cells(given: Map, folder: Path, starts: Sequence[Sequence[float]], where: str, *, copied: bool = False) -> MapCells:
     """What the files of a scenario's map say.
 
     Args:
@@ -122,11 +123,12 @@ def cells(given: Map, folder: Path, starts: Sequence[Sequence[float]], where: st
         folder: of the scenario.
         starts: of all robots, [x, y, ...], m; what none of them can reach is filled.
         where: file and line of the scenario that name the map, for messages.
+        copied: as of `read`.
 
     Raises:
         ScenarioError: if the files cannot be used, or need too many rectangles.
     """
-    found = read(folder / given.file, where)
+    found = read(folder / given.file, where, copied=copied)
     grid = found.grid(unknown=given.unknown == "occupied")
     starts_m = [[*each[:2]] for each in starts]
     filled = grid.filled(starts_m)

@@ -5,6 +5,8 @@ from __future__ import annotations
 from mutation.mutant import Mutant
 
 WIRING = ("tests/hypotheses/test_wiring.py",)
+CROWD = ("tests/check/test_honest_runs.py::test_a_crowd",)
+BODY = ("tests/test_events.py", "tests/test_bodies.py")
 TRIGGER = (
     "tests/hypotheses/test_transitions.py", "tests/hypotheses/test_isolation.py", "tests/decision",
     "tests/systems/test_decision.py",
@@ -22,6 +24,7 @@ WIRINGS = (
         "make_world",
         'frozenset(("ugv", "uav")): safe.air_ground_m',
         'frozenset(("ugv", "uav")): 0.9 * safe.air_ground_m',
+        tests=(*WIRING, *CROWD),
     ),
     Mutant(
         "share 1 for robots",
@@ -29,6 +32,7 @@ WIRINGS = (
         "World.around",
         "for body in self.moving]), 0.5, 1.0)",
         "for body in self.moving]), 1.0, 1.0)",
+        tests=("tests/world", *WIRING),
     ),
     Mutant(
         "UGVs may leave the ground",
@@ -36,7 +40,7 @@ WIRINGS = (
         "Body.mobility",
         'if self.kind == "ugv" else',
         "if False else",
-        tests=WIRING,
+        tests=("tests/world", *WIRING),
     ),
     Mutant(
         "robots avoid only what the UAV knows",
@@ -44,6 +48,7 @@ WIRINGS = (
         "make_world",
         "for name, each in scenario.barriers.items()",
         "for name, each in scenario.barriers.items() if each.known_to_uav",
+        tests=(*WIRING, *CROWD),
     ),
     Mutant(
         "sensing range cut",
@@ -51,6 +56,7 @@ WIRINGS = (
         "make_avoidance",
         "control.period_s, control.sensing_range_m, composition)",
         "control.period_s, 0.6 * control.sensing_range_m, composition)",
+        tests=(*WIRING, *CROWD),
     ),
     Mutant(
         "the disturbance is subtracted",
@@ -70,7 +76,7 @@ BODIES = (
         "outlines_of",
         "found = balls(obstacle.position_m or np.zeros(3), obstacle.radius_m, gap)",
         "found = balls(obstacle.position_m or np.zeros(3), 0.0, gap)",
-        runs=("bodies d", "bodies c"),
+        tests=BODY,
     ),
     Mutant(
         "collisions are of centres",
@@ -78,7 +84,7 @@ BODIES = (
         "_add_collisions",
         "within = collision_m + float(radius)",
         "within = collision_m",
-        runs=("bodies b",),
+        tests=BODY,
     ),
     Mutant(
         "plans take robots for points",
@@ -86,7 +92,6 @@ BODIES = (
         "_wished",
         "return space.apart + other.radius + space.spacing",
         "return space.apart + space.spacing",
-        runs=(),
         tests=("tests/intervention/coordination",),
     ),
 )
@@ -99,7 +104,6 @@ LAW = (
         "avoid_one",
         "found = _scale_back(found, normal, bound)",
         "found = found",
-        runs=("crowd d",),
         tests=(*WIRING, "tests/nsbc/test_avoidance.py"),
     ),
     Mutant(
@@ -108,7 +112,6 @@ LAW = (
         "_closest_feasible",
         "return velocity if missed == 0.0 else _least_violation(normal, bound + MARGIN_M_S)",
         "return velocity",
-        runs=("crowd b", "crowd d"),
         tests=(*WIRING, "tests/nsbc/test_projection.py"),
     ),
     Mutant(
@@ -117,6 +120,7 @@ LAW = (
         "command",
         "    if law.intervention_on_top:\n        return task\n",
         "    if not law.intervention_on_top:\n        return task\n",
+        tests=(*CROWD, *WIRING),
     ),
     Mutant(
         "own task not filtered",
@@ -124,6 +128,7 @@ LAW = (
         "command",
         "        return avoid_one(own, normal, bound, composition)\n",
         "        return own\n",
+        tests=(*WIRING, *CROWD),
     ),
     Mutant(
         "UGVs sampled at half the rate",
@@ -131,6 +136,7 @@ LAW = (
         "UgvController.__init__",
         "self.DeclarePeriodicDiscreteUpdateEvent(law.avoidance.period, 0.0, weakly(self._update))",
         "self.DeclarePeriodicDiscreteUpdateEvent(2.0 * law.avoidance.period, 0.0, weakly(self._update))",
+        tests=(*CROWD, *WIRING),
     ),
     Mutant(
         "executed whatever the answer, the answer recorded",
@@ -138,6 +144,7 @@ LAW = (
         "UgvController._update",
         "reference, rate, proposals, headings, law)",
         "reference, rate, self._proposals.Eval(context), headings, law)",
+        tests=(*CROWD, *WIRING),
     ),
     Mutant(
         "presets end with a jump to the target",
@@ -145,7 +152,6 @@ LAW = (
         "Motion.at",
         "return self.positions[max(k, 0)], np.zeros(3)",
         "return self.positions[-1], np.zeros(3)",
-        runs=("crowd b", "crowd d"),
         tests=("tests/geometry/test_motion.py",),
     ),
 )
@@ -218,6 +224,7 @@ PROTOCOL = (
         "Gatekeeper._calc_answers",
         "output.SetFromVector(self._memory(context).answers)",
         "pass",
+        tests=CROWD,
     ),
     Mutant(
         "proposals are not withdrawn after a release",
@@ -225,6 +232,7 @@ PROTOCOL = (
         "Planner._after_answers",
         "            if called.isdisjoint((name, talk.cause, *party)):\n",
         "            if False:\n",
+        tests=("tests/intervention/test_planner.py", *CROWD),
     ),
     Mutant(
         "a part of a joint plan outlives another UGV's refusal",
@@ -268,7 +276,6 @@ GATEKEEPER = (
         "_dual_bound",
         "total -= pressure * pressure / (4.0 * ",
         "total -= pressure * pressure / (8.0 * ",
-        runs=("case_b d",),
         tests=ROUTES,
     ),
     Mutant(
@@ -277,6 +284,7 @@ GATEKEEPER = (
         "_command",
         "mode == ACCEPTED, normal[:count], bound[:count], retreat[:count])",
         "mode == ACCEPTED, normal[:0], bound[:0], retreat[:0])",
+        tests=("tests/gatekeeper/test_closed_loop.py", *CROWD),
     ),
     Mutant(
         "a first stage that refuses is accepted",
@@ -284,6 +292,7 @@ GATEKEEPER = (
         "_first_answer",
         "    if solution.accept_first:",
         "    if True:",
+        tests=("tests/gatekeeper/test_mpc_gatekeeper.py", *CROWD),
     ),
     Mutant(
         "obstacles out of sight are forgotten",
@@ -291,7 +300,6 @@ GATEKEEPER = (
         "OutcomeGatekeepers._remembered",
         "return known | within(still, own, reach, True) if",
         "return within(still, own, reach, True) if",
-        runs=("crowd d",),
         tests=("tests/gatekeeper/test_outcome_gatekeeper.py",),
     ),
     Mutant(
@@ -300,7 +308,6 @@ GATEKEEPER = (
         "reason_of",
         "if accept.better_than(refuse):",
         "if not refuse.better_than(accept):",
-        runs=("crowd d",),
         tests=("tests/gatekeeper/test_outcome_gatekeeper.py",),
     ),
     Mutant(
@@ -309,7 +316,6 @@ GATEKEEPER = (
         "Gatekeepers.idle",
         "return not any(proposals) and not any(before.answers[::2])",
         "return not any(proposals)",
-        runs=("crowd d",),
         tests=ATTACKS,
     ),
     Mutant(
@@ -318,7 +324,6 @@ GATEKEEPER = (
         "OutcomeGatekeepers.sample",
         "if held[i].executing and standing != ACCEPT:  # withdrawn",
         "if held[i].executing and proposal is None:  # withdrawn",
-        runs=("crowd d",),
         tests=ATTACKS,
     ),
     Mutant(
@@ -327,7 +332,6 @@ GATEKEEPER = (
         "OutcomeGatekeepers.sample",
         "            held[i] = self._patience.rested(held[i], now.t)\n",
         "            held[i] = held[i] if now.proposals[i] else self._patience.rested(held[i], now.t)\n",
-        runs=("crowd d",),
         tests=ATTACKS,
     ),
 )
@@ -341,7 +345,6 @@ JUDGES = (
         "SafeTrace.check",
         ">= -DISTANCE_TOLERANCE_M",
         ">= -0.05",
-        runs=("case_b d", "soft_gate c", "crowd b"),
         tests=(f"{RUNS}/test_distances.py",),
     ),
     Mutant(
@@ -350,7 +353,6 @@ JUDGES = (
         "_shortfall",
         "max(part * bound - ",
         "max(bound - ",
-        runs=("case_b d", "soft_gate c", "crowd b"),
         tests=("tests/verify/engines/test_shortfalls.py",),
     ),
     Mutant(
@@ -359,7 +361,6 @@ JUDGES = (
         "",
         "EVENT_TOLERANCE_S = 1e-5",
         "EVENT_TOLERANCE_S = 0.1",
-        runs=("case_b d", "soft_gate c", "crowd b"),
         tests=(f"{RUNS}/test_tolerances.py",),
     ),
     Mutant(
@@ -368,7 +369,6 @@ JUDGES = (
         "_wrong",
         "if early and one.end_s not in one.news_s:",
         "if False:",
-        runs=("case_b d",),
         tests=(f"{RUNS}/test_breakages.py",),
     ),
     Mutant(
@@ -377,7 +377,6 @@ JUDGES = (
         "TraceClaim.judge",
         "            if finding.status in PASSING:\n",
         "            if False:\n",
-        runs=(),
         tests=("tests/verify/test_claim.py",),
     ),
     Mutant(
@@ -386,7 +385,6 @@ JUDGES = (
         "read_run",
         'same("SHA-256 of a table", meta["files"][table], sha256(content[table]), about=table)',
         "pass",
-        runs=(),
         tests=(f"{RULES}[table with other bytes]",),
     ),
     Mutant(
@@ -395,7 +393,6 @@ JUDGES = (
         "_moves_as_commanded",
         'close("law of motion", place[1:], led, within=SMALL,',
         'close("law of motion", place[1:], led, within=1e9,',
-        runs=(),
         tests=(f"{RULES}[elsewhere in a row]",),
     ),
 )
@@ -408,7 +405,6 @@ LOGS = (
         "Gathered.streams",
         "times = [stamp if stamped and stamp is not None else received",
         "times = [received",
-        runs=(),
         tests=FORMS,
     ),
     Mutant(
@@ -417,7 +413,6 @@ LOGS = (
         "Track.is_known",
         "& ~np.isin(self.t_s[1:], self.leaps_s)",
         "",
-        runs=(),
         tests=ASSOCIATED,
     ),
     Mutant(
@@ -426,7 +421,6 @@ LOGS = (
         "Track.is_known",
         "<= self.gap_s * (1.0 + 1e-9)",
         "<= 1e9",
-        runs=(),
         tests=ASSOCIATED,
     ),
     Mutant(
@@ -435,7 +429,6 @@ LOGS = (
         "_in_one_frame",
         "if len({*stated.values()}) > 1:",
         "if False:",
-        runs=(),
         tests=ASSOCIATED,
     ),
     Mutant(
@@ -444,7 +437,6 @@ LOGS = (
         "_in_one_frame",
         "if len(frames) > 1 and",
         "if False and",
-        runs=(),
         tests=ASSOCIATED,
     ),
     Mutant(
@@ -453,7 +445,6 @@ LOGS = (
         "_apart_at_the_start",
         "if len(there) > 1 and len(starts) > 1:",
         "if False:",
-        runs=(),
         tests=ASSOCIATED,
     ),
     Mutant(
@@ -462,7 +453,6 @@ LOGS = (
         "_track",
         "new = np.append(True, np.diff(ns) > 0)",
         "new = np.append(np.diff(ns) > 0, True)",
-        runs=(),
         tests=ASSOCIATED,
     ),
     Mutant(
@@ -471,7 +461,6 @@ LOGS = (
         "_track",
         'order = np.argsort(ns, kind="stable")',
         "order = np.arange(len(ns))",
-        runs=(),
         tests=FORMS,
     ),
     Mutant(
@@ -480,7 +469,6 @@ LOGS = (
         "_assigned",
         "if len(of_one) > 1:",
         "if False:",
-        runs=(),
         tests=ASSOCIATED,
     ),
     Mutant(
@@ -489,7 +477,6 @@ LOGS = (
         "_links",
         "if each.frame not in carried",
         "if True",
-        runs=(),
         tests=ASSOCIATED,
     ),
     Mutant(
@@ -498,7 +485,6 @@ LOGS = (
         "is_elsewhere",
         "return not ELSEWHERE.isdisjoint(words)",
         "return False",
-        runs=(),
         tests=ASSOCIATED,
     ),
     Mutant(
@@ -507,7 +493,6 @@ LOGS = (
         "Stream.ns",
         "return self.whole * per + self.nano * per // 10**9",
         "return (self.whole * float(per) + self.nano * per // 10**9).astype(np.int64)",
-        runs=(),
         tests=FORMS,
     ),
     Mutant(
@@ -516,7 +501,6 @@ LOGS = (
         "_likely",
         'return time or "s", length or "m"',
         'return "s", length or "m"',
-        runs=(),
         tests=FORMS,
     ),
     Mutant(
@@ -525,7 +509,6 @@ LOGS = (
         "_likely",
         'return time or "s", length or "m"',
         'return time or "s", "m"',
-        runs=(),
         tests=FORMS,
     ),
     Mutant(
@@ -534,7 +517,6 @@ LOGS = (
         "_form",
         'for delimiter in (*DELIMITERS, " "):',
         'for delimiter in (",", *DELIMITERS, " "):',
-        runs=(),
         tests=FORMS,
     ),
     Mutant(
@@ -543,7 +525,6 @@ LOGS = (
         "_knots",
         "[own.t_s, other.t_s, span]",
         "[own.t_s, span]",
-        runs=(),
         tests=FORMS,
     ),
     Mutant(
@@ -552,7 +533,6 @@ LOGS = (
         "_seen",
         "if not (flat or is_obstacle):",
         "if not is_obstacle:",
-        runs=(),
         tests=ASSOCIATED,
     ),
     Mutant(
@@ -561,7 +541,6 @@ LOGS = (
         "judge",
         "eps = sum(",
         "eps = 0.0 * sum(",
-        runs=(),
         tests=ASSOCIATED,
     ),
     Mutant(
@@ -570,7 +549,6 @@ LOGS = (
         "_Law.add",
         "for each in h.tolist()]",
         "for each in [float(h.mean())] * len(h)]",
-        runs=(),
         tests=ASSOCIATED,
     ),
     Mutant(
@@ -579,7 +557,6 @@ LOGS = (
         "_both",
         "during = (other.t_s >= begin - SMALL) & (other.t_s <= end + SMALL)",
         "during = other.t_s >= begin - SMALL",
-        runs=(),
         tests=("tests/check/test_moving.py::test_a_person_counts_only_while_it_is_there",),
     ),
 )

@@ -1,11 +1,10 @@
-"""A mutant: one edit of one file of the package, and the runs and tests that may catch it."""
+"""A mutant: one edit of one file of the package, and the tests that notice it."""
 
 from __future__ import annotations
 
 import ast
 from collections.abc import Iterator
 from dataclasses import dataclass
-from pathlib import Path
 
 PACKAGE = "airground_drake"
 
@@ -24,8 +23,7 @@ class Mutant:
         function: function, method or class in which the text is looked for, such as `Body.mobility`; '': in the file.
         old: text that is there exactly once.
         new: what takes its place.
-        runs: short runs that are judged, in this order, until one catches it; see `probe.PROBES`.
-        tests: what pytest runs if no run catches it.
+        tests: what pytest runs, in this order, until a test fails.
     """
 
     name: str
@@ -33,8 +31,7 @@ class Mutant:
     function: str
     old: str
     new: str
-    runs: tuple[str, ...] = ("crowd d", "crowd c", "case_b d")
-    tests: tuple[str, ...] = ()
+    tests: tuple[str, ...]
 
     def edited(self, text: str) -> str:
         """The text of the file with the edit.
@@ -52,19 +49,6 @@ class Mutant:
             count = text.count(self.old, begin, end)
             raise DoesNotApplyError(f"{self.name}: {count} times in {self.path}, {self.function}: {self.old!r}")
         return text[:begin] + text[begin:end].replace(self.old, self.new) + text[end:]
-
-    def apply(self, root: Path) -> None:
-        """Edit the copy of the package below `root`.
-
-        Raises:
-            DoesNotApplyError: as `edited`.
-        """
-        file = root / PACKAGE / self.path
-        file.write_text(self.edited(file.read_text(encoding="utf-8")), encoding="utf-8")
-
-    def compiled(self, root: Path) -> bool:
-        """Whether numba compiles functions of the file: its cache of their callers is out of date after an edit."""
-        return "@njit" in (root / PACKAGE / self.path).read_text(encoding="utf-8")
 
 
 def _places(node: ast.AST, text: str, above: str = "") -> Iterator[tuple[str, tuple[int, int]]]:

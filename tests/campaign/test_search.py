@@ -81,7 +81,7 @@ def test_what_does_not_matter_goes() -> None:
         there = candidate["obstacles"].get(matters)
         return there is not None and abs(there["position_m"][0] - needed) < 0.05 and candidate["duration_s"] > 3.0
 
-    small, used = shrink(data, fails, lambda data: None, 300)
+    small, used = shrink(data, fails, 300)
     assert fails(small)
     assert used <= 300
     assert list(small["obstacles"]) == [matters]
@@ -106,7 +106,7 @@ def test_shapes_become_plain_and_the_arena_goes() -> None:
             return False
         return {"wall", "bent"} <= there.keys() and there["wall"].height_m > 0.0
 
-    small, _ = shrink(data, fails, lambda data: None, 300)
+    small, _ = shrink(data, fails, 300)
     wall, bent = small["obstacles"]["wall"], small["obstacles"]["bent"]
     assert (len(wall["polygon_m"]), len(bent["segment_m"]), small["arena_m"]) == (3, 2, [])
     assert (wall["heading_rad"], wall["radius_m"], wall["height_m"]) == (0.0, 0.0, 2.0)
@@ -115,6 +115,6 @@ def test_shapes_become_plain_and_the_arena_goes() -> None:
 def test_a_run_gets_no_shorter_than_a_control_period() -> None:
     data = resolved(load("minimal"))
     period = data["control"]["period_s"]
-    shorter = [each["duration_s"] for each in module._shorter(lambda data: None, data | {"duration_s": 1.5 * period})]
+    shorter = [each["duration_s"] for each in module._shorter(data | {"duration_s": 1.5 * period})]
     assert shorter
     assert min(shorter) >= period

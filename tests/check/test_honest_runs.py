@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -56,6 +57,16 @@ def test_the_checker_agrees_with_a_run_of_one_period() -> None:
 def test_the_checker_agrees_where_bodies_are_apart_from_their_steered_points(number: int) -> None:
     """The second: robots in contact in many periods on bent ways. The checker once did not end within its limit."""
     assert tried(from_data(draw(number), "drawn"))[2] == []
+
+
+@pytest.mark.parametrize("name", "bcd")
+def test_a_crowd(name: str) -> None:
+    """Everything at once: most mutants of `benchmarks/mutation` are noticed here."""
+    scenario = load(str(Path(__file__).parents[1] / "builders/crowd.yaml"))
+    scenario.runs = {name: scenario.runs[name]}
+    trace, _, wrong = tried(scenario)
+    assert wrong == []
+    assert len(trace.proposals)
 
 
 def test_points_are_listed_as_the_controllers_list_them() -> None:

@@ -72,6 +72,20 @@ def test_the_cells_are_made_again_from_the_copies(scenario: Scenario, tmp_path: 
     assert found() == [(DISAGREES, "sha256.turtlebot3_world.pgm")]
 
 
+def test_a_copy_leads_to_no_file_outside_of_the_report(tmp_path: Path) -> None:
+    """The map's file names an image in another folder, which may be gone, or be another one by now."""
+    (tmp_path / "images").mkdir()
+    (tmp_path / "maps").mkdir()
+    image, about = (MAPS / Path(name).name for name in NAMES)
+    text = about.read_text().replace(image.name, f"../images/{image.name}")
+    (tmp_path / "maps" / about.name).write_text(text)
+    (tmp_path / "images" / image.name).write_bytes(image.read_bytes())
+    scenario = from_data(DATA, str(tmp_path / "maps" / "scenario.yaml"))
+    _map_files(cells_of(scenario), tmp_path / "report")
+    (tmp_path / "images" / image.name).write_bytes(b"")
+    assert [line["outcome"] for line in rebuild._map(tmp_path / "report", scenario)] == [AGREES]
+
+
 def test_the_checker_wants_the_files_that_the_scenario_was_made_with(scenario: Scenario, tmp_path: Path) -> None:
     names = _map_files(cells_of(scenario), tmp_path)
     report: dict[str, Any] = {

@@ -180,7 +180,7 @@ def test_events_are_those_of_the_replay(seed: int, zeta: float, share: float, dw
 
 def test_what_is_above_the_threshold_at_the_start_is_intervened_on_at_the_first_tick() -> None:
     """The trigger comes before the planner's first update, not with the first step after it."""
-    scenario = load(pathlib.Path(__file__).parents[2] / "benchmarks/mutation/crowd.yaml")
+    scenario = load(pathlib.Path(__file__).parents[1] / "builders/crowd.yaml")
     proposals = simulate(scenario, "b").proposals
     assert proposals["issued_s"].min() == 0.0
 
