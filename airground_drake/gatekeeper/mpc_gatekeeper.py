@@ -106,6 +106,11 @@ class Gatekeepers(abc.ABC):
         self._world = world
         self._near = world.around(world.select("ugv"))
 
+    @property
+    def judges(self) -> str:
+        """Name of the class that judges proposals, for pictures."""
+        return type(self).__name__
+
     @abc.abstractmethod
     def sample(self, now: Inputs, before: GatekeeperState) -> GatekeeperState:
         """Judge every proposal in force, with the state from the sample before."""
@@ -173,6 +178,11 @@ class PaperGatekeepers(Gatekeepers):
         """As `Gatekeepers`; the route solves (26) over the horizon, and the rules lead to the answer."""
         super().__init__(world, law, presets)
         self._route, self._horizon, self._rules = route, horizon, rules
+
+    @property
+    def judges(self) -> str:
+        """Name of the route's class."""
+        return type(self._route).__name__
 
     def sample(self, now: Inputs, before: GatekeeperState) -> GatekeeperState:
         """Judge every proposal in force by (26)."""

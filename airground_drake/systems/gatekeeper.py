@@ -8,14 +8,15 @@ from pydrake.systems.framework import BasicVector, Context, EventStatus, LeafSys
 from airground_drake.gatekeeper.answer import GatekeeperDecision
 from airground_drake.gatekeeper.mpc_gatekeeper import Gatekeepers, GatekeeperState, Inputs
 from airground_drake.intervention.messages import ACCEPT, SILENT, Report
+from airground_drake.intervention.policy import Proposal
 from airground_drake.systems.lifetime import weakly
 from airground_drake.systems.signals import (
     Answer,
+    Messages,
     UgvGains,
     declare_bodies,
     declare_headings,
     laid_out,
-    no_proposals,
     no_reports,
 )
 from airground_drake.systems.ticks import Ticks
@@ -36,6 +37,7 @@ class Gatekeeper(LeafSystem):
             `headings` (n), rad.
         out `answers` (2n), an `Answer` per UGV, and `reports` (abstract), see `messages`; held.
     State: abstract, a `GatekeeperState`, with all decisions of the run so far.
+    Fixed at construction: horizon and weights of (25), margins, dwell, budget and patience; the gains are inputs.
     Rate: one update per gatekeeper period, from t = 0.
     """
 
@@ -47,7 +49,7 @@ class Gatekeeper(LeafSystem):
         self._bodies, self._headings = declare_bodies(self, world), declare_headings(self, world)
         self._command = self.DeclareVectorInputPort("team_command", 3 * len(world.robots))
         self._gains = self.DeclareVectorInputPort("gains", len(UgvGains.get_fields()))
-        self._proposals = self.DeclareAbstractInputPort("proposals", no_proposals(n))
+        self._proposals = Messages(self, "proposals", n, Proposal)
         state = self.DeclareAbstractState(Value(GatekeeperState.empty(n)))
         self._state = int(state)
         held = {self.abstract_state_ticket(state)}
@@ -61,7 +63,7 @@ class Gatekeeper(LeafSystem):
     @property
     def judges(self) -> str:
         """Name of the class that judges the proposals."""
-        return type(self._gatekeepers).__name__
+        return self._gatekeepers.judges
 
     def decisions(self, context: Context) -> tuple[GatekeeperDecision, ...]:
         """All decisions up to the time of this Context."""
@@ -102,9 +104,9 @@ class DirectAcceptance(LeafSystem):
     def __init__(self, count: int) -> None:
         """Declare ports for `count` UGVs."""
         super().__init__()
-        self._proposals = self.DeclareAbstractInputPort("proposals", no_proposals(count))
+        self._proposals = Messages(self, "proposals", count, Proposal)
         self.DeclareVectorOutputPort(
-            "answers", 2 * count, weakly(self._calc_answers), prerequisites_of_calc={self._proposals.ticket()}
+            "answers", 2 * count, weakly(self._calc_answers), prerequisites_of_calc={self._proposals.port.ticket()}
         )
         self.DeclareAbstractOutputPort(
             "reports",
