@@ -10,10 +10,10 @@ from airground_drake.base.arrays import Array
 from airground_drake.decision.excursion import INTERVENING
 from airground_drake.intervention.database import BehaviourDatabase
 from airground_drake.intervention.halts import NOT_WATCHED, room, standing, watched
-from airground_drake.intervention.messages import sightings
+from airground_drake.intervention.messages import Report, sightings
 from airground_drake.intervention.planner import Planner, PlannerState, sent_after
 from airground_drake.systems.lifetime import weakly
-from airground_drake.systems.signals import FIELDS, components_of, declare_bodies, no_proposals, no_reports
+from airground_drake.systems.signals import FIELDS, Messages, components_of, declare_bodies, no_proposals
 from airground_drake.systems.ticks import Ticks
 from airground_drake.world.world import ROBOTS, World
 
@@ -46,7 +46,7 @@ class InterventionPlanner(LeafSystem):
         self._bodies = declare_bodies(self, world)
         self._status = self.DeclareVectorInputPort("status", FIELDS * n)
         self._answers = self.DeclareVectorInputPort("answers", 2 * n)
-        self._reports = self.DeclareAbstractInputPort("reports", no_reports(n))
+        self._reports = Messages(self, "reports", n, Report)
         held = self.DeclareAbstractState(Value(planner.start()))
         self._memory = int(held)
         self.DeclareAbstractOutputPort(
