@@ -14,7 +14,7 @@ import pytest
 
 import airground_drake
 from airground_drake.geometry.motion import Motion
-from airground_drake.scenarios.load import load, shipped
+from airground_drake.scenarios.load import load, own, shipped
 from airground_drake.systems import DecisionBlock, graphviz
 from airground_drake.systems.components import stack_presets
 from airground_drake.systems.diagram import build_diagram, make_monitor
@@ -94,15 +94,38 @@ def test_the_picture_has_every_block_and_each_input_is_fed_by_the_signal_of_its_
         assert port not in unnamed or source.startswith(signal.partition("_")[0]) or source == "decision_noise"
 
 
-def test_messages_are_dashed_recorded_signals_blue_and_no_wire_moves_a_block_to_the_left() -> None:
+def test_what_is_sent_by_radio_is_dashed_recorded_signals_blue_and_no_wire_moves_a_block_to_the_left() -> None:
     text = graphviz.dot(build_diagram(load("case_a"), "c"))
-    dashed = {start.partition(":")[0] for start in re.findall(r"^(\S+):e -> .*style=dashed", text, re.MULTILINE)}
-    assert dashed == {"intervention_planner", "gatekeeper"}
+    _, wires = drawn(text)
+    lines = re.findall(r"^\w+:\w+:e -> .*$", text, re.MULTILINE)
+    dashed = {wire for wire, line in zip(wires, lines, strict=True) if "style=dashed" in line}
+    assert dashed == {
+        ("intervention_planner.proposals", "ugv_controller.proposals"),
+        ("intervention_planner.proposals", "gatekeeper.proposals"),
+        ("gatekeeper.answers", "intervention_planner.answers"),
+        ("gatekeeper.reports", "intervention_planner.reports"),
+        ("ugv_controller.command", "uav_controller.ugv_command"),
+    }
     blue = set(re.findall(rf'COLOR="{graphviz.RECORDED}">(\w+)<', text))
     assert blue == {"bodies", "team_command", "y0", "decision_variable", "status", "executing"}
     free = re.findall(r"^(\w+):\S+ -> (\w+):\S+ \[(?!.*constraint)", text, re.MULTILINE)
     assert free
     assert all(graphviz.ORDER.index(source) < graphviz.ORDER.index(target) for source, target in free)
+
+
+def test_blocks_say_their_equations_and_who_carries_them_and_no_port_dangles() -> None:
+    scenario = load("case_a")
+    for run, equations in (("c", "(21)-(26)"), ("c_literal", "(27)-(29)")):
+        text = graphviz.dot(build_diagram(own(scenario, run), "c"))
+        said = dict(re.findall(r"^<B>(\w+)</B><BR/>(.*)\n", text, re.MULTILINE))
+        assert equations in said["gatekeeper"]
+        assert said["event_trigger"] == "threshold, (20)<BR/><I>on the UAV</I>"
+        assert said["gatekeeper"].endswith("on the UGVs</I>")
+        assert {name for name, words in said.items() if "<I>" not in words} == {"reference", "vehicles"}
+        wires = re.findall(r"^(\w+:\w+):e -> (\w+:\w+):w", text, re.MULTILINE)
+        named = re.findall(r"^(\w+) \[shape=none, border(.*?)^>\];", text, re.MULTILINE | re.DOTALL)
+        inputs = {f"{block}:{port}" for block, table in named for port in re.findall(r'PORT="(u\d+)"[^>]*>\w', table)}
+        assert inputs == {end for _, end in wires}
 
 
 def test_the_text_does_not_depend_on_what_was_built_before() -> None:
@@ -121,7 +144,7 @@ def test_a_block_of_ones_own_is_drawn_with_what_feeds_it_and_a_monitor() -> None
 
     scenario = load("case_a")
     text = graphviz.dot(build_diagram(scenario, "d", decision_block=Model, monitor=make_monitor(scenario)))
-    assert "<BR/>Model\n" in text
+    assert "<BR/>Model<BR/><I>on the UAV</I>\n" in text
     blocks, wires = drawn(text)
     assert ("uav_controller.command", "decision_variable.uav_command") in wires
     assert "monitor" in blocks

@@ -81,6 +81,7 @@ class GatekeeperDecision:
         tries: acceptances since the last rest, with this decision.
         answer: number of the answer, which counts the answers of all UGVs.
         basis: what the prediction rested on.
+        cpu_s: CPU time of prediction and decision, s, in which identical runs differ.
     """
 
     t: float
@@ -96,6 +97,7 @@ class GatekeeperDecision:
     tries: int = 0
     answer: int = -1
     basis: Basis = field(default_factory=Basis)
+    cpu_s: float = field(default=0.0, compare=False)
 
 
 def in_words(decision: GatekeeperDecision) -> str:

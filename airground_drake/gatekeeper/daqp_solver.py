@@ -118,11 +118,6 @@ class DaqpSolver(SolverInterface):  # type: ignore[misc]
     NAME = "DAQP"
     _ID = SolverId(NAME)
 
-    def __init__(self) -> None:
-        """Keep the layout of the last program: with other coefficients it is solved sooner."""
-        super().__init__()
-        self._shell = _Shell(Layout(MathematicalProgram()))
-
     @classmethod
     def id(cls) -> SolverId:
         """What the options of this solver are stored under."""
@@ -176,16 +171,15 @@ class DaqpSolver(SolverInterface):  # type: ignore[misc]
             raise ValueError(why)
         limits = _limits(prog.solver_options(), solver_options)
         guess = prog.initial_guess() if initial_guess is None else np.asarray(initial_guess, dtype=np.float64)
-        if not self._shell.layout.fits(prog):
-            self._shell = _Shell(Layout(prog))
-        form = StandardForm.of(prog, self._shell.layout)
+        shell = _Shell(Layout(prog))  # nothing is kept: threads may share a solver
+        form = StandardForm.of(prog, shell.layout)
         answer = minimise(form, guess, limits)
         filled = DaqpResult() if result is None else result
         cost = _COSTS.get(answer.ended) or form.cost(answer.x)
         if isinstance(filled, DaqpResult):
-            filled.fill(self._shell, answer, cost)
+            filled.fill(shell, answer, cost)
         else:
-            self._shell.fill(filled, answer, cost)
+            shell.fill(filled, answer, cost)
         return filled if result is None else None
 
 

@@ -49,7 +49,7 @@ class GatekeeperState:
         decisions: those of the last sample that was not idle.
         commitments: under method (d), each UGV's tries and rests.
         sensed: under method (d), which outlines at rest each UGV has sensed and not seen to be gone, (n, m).
-        count: number of answers so far.
+        made: all decisions of the run so far; the number of an answer is the index of its decision.
     """
 
     answers: tuple[float, ...]
@@ -58,7 +58,7 @@ class GatekeeperState:
     decisions: tuple[GatekeeperDecision, ...] = ()
     commitments: tuple[Commitment, ...] = ()
     sensed: npt.NDArray[np.bool_] = field(default_factory=lambda: np.zeros((0, 0), dtype=bool))
-    count: int = 0
+    made: tuple[GatekeeperDecision, ...] = ()
 
     @classmethod
     def empty(cls, count: int) -> GatekeeperState:
@@ -97,7 +97,6 @@ class Gatekeepers(abc.ABC):
 
     Attributes:
         law: their control law, with the scenario's gains.
-        times_s: CPU time of every prediction and decision so far.
     """
 
     def __init__(self, world: World, law: UgvLaw, presets: Sequence[Motion]) -> None:
@@ -106,7 +105,11 @@ class Gatekeepers(abc.ABC):
         self._presets = tuple(presets)
         self._world = world
         self._near = world.around(world.select("ugv"))
-        self.times_s: list[float] = []
+
+    @property
+    def judges(self) -> str:
+        """Name of the class that judges proposals, for pictures."""
+        return type(self).__name__
 
     @abc.abstractmethod
     def sample(self, now: Inputs, before: GatekeeperState) -> GatekeeperState:
@@ -176,6 +179,11 @@ class PaperGatekeepers(Gatekeepers):
         super().__init__(world, law, presets)
         self._route, self._horizon, self._rules = route, horizon, rules
 
+    @property
+    def judges(self) -> str:
+        """Name of the route's class."""
+        return type(self._route).__name__
+
     def sample(self, now: Inputs, before: GatekeeperState) -> GatekeeperState:
         """Judge every proposal in force by (26)."""
         answers: list[float] = []
@@ -190,7 +198,7 @@ class PaperGatekeepers(Gatekeepers):
                 reports.append(Report())
                 continue
             decision = self._decide(now, before, i, proposal, budgets)
-            decision = replace(decision, answer=before.count + len(decisions))
+            decision = replace(decision, answer=len(before.made) + len(decisions))
             decisions.append(decision)
             answer = ACCEPT if decision.accepted else REFUSE
             answers += [answer, proposal.number]
@@ -198,7 +206,7 @@ class PaperGatekeepers(Gatekeepers):
             reports.append(self._report(now, decision))
         return replace(
             before, answers=tuple(answers), since=tuple(since), reports=tuple(reports), decisions=tuple(decisions),
-            count=before.count + len(decisions),
+            made=(*before.made, *decisions),
         )  # fmt: skip
 
     def _decide(
@@ -210,13 +218,14 @@ class PaperGatekeepers(Gatekeepers):
         solution = self._solved(problem, next(budgets))
         if solution.status == "solver_failed":
             solution = after_failure(problem, solution)
-        self.times_s.append(thread_time() - started)
+        cpu_s = thread_time() - started
         standing, stood = answer_to(proposal, before.answers, i), now.t - before.since[i]
         constants = ConstantPlans.of(problem)
         throughout = (constants.accept.objective, constants.refuse.objective) if solution.has_plan else (-1.0, -1.0)
         accepted, reason = settle(solution, throughout, standing, stood, self._rules)
         basis = Basis(tuple(np.flatnonzero(self._in_range(now.t, now.positions[i])).tolist()))
-        return GatekeeperDecision(now.t, i, proposal, accepted, reason, problem, solution, throughout, basis=basis)
+        evidence = (problem, solution, throughout)
+        return GatekeeperDecision(now.t, i, proposal, accepted, reason, *evidence, basis=basis, cpu_s=cpu_s)
 
     def _solved(self, problem: Problem, budget: Budget) -> Solution:
         """The route's solution; the route gets a `Problem` of its own, so that it cannot change what is recorded.

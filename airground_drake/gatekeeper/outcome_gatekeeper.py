@@ -82,19 +82,19 @@ class OutcomeGatekeepers(Gatekeepers):
         for i, proposal in enumerate(now.proposals):
             if proposal is not None:
                 started = thread_time()
-                judged.append(self._decide(now, known, before, i, proposal, said[i], held[i]))
-                self.times_s.append(thread_time() - started)
+                decision = self._decide(now, known, before, i, proposal, said[i], held[i])
+                judged.append(replace(decision, cpu_s=thread_time() - started))
         answers, reports = [SILENT, -1.0] * len(said), [Report()] * len(said)
         decisions: list[GatekeeperDecision] = []
         for decision in _jointly(judged, said):
             i = decision.robot
             held[i] = self._after(held[i], decision, said[i])
-            decisions.append(replace(decision, tries=held[i].tries, answer=before.count + len(decisions)))
+            decisions.append(replace(decision, tries=held[i].tries, answer=len(before.made) + len(decisions)))
             answers[2 * i : 2 * i + 2] = _answer(decision, said[i]), decision.proposal.number
             reports[i] = self._report(now, decisions[-1])
         return replace(
             known, answers=tuple(answers), reports=tuple(reports), decisions=tuple(decisions), commitments=tuple(held),
-            count=before.count + len(decisions),
+            made=(*before.made, *decisions),
         )  # fmt: skip
 
     def _remembered(self, t: float, positions: Array, before: GatekeeperState) -> np.ndarray:

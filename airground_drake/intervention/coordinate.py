@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cache, partial
 from itertools import pairwise
 
@@ -51,6 +52,19 @@ Alone = Callable[[int], Way | None]
 """The way that a UGV, given by its index in the team, would have without other UGVs."""
 
 
+@dataclass(frozen=True)
+class Failures:
+    """What the policy remembers: requests in vain, with the reasons.
+
+    Attributes:
+        shut_in: of UGVs that had no way even alone, by name.
+        in_vain: of groups of UGVs whose plans helped nobody, by their names.
+    """
+
+    shut_in: Mapping[str, tuple[Observation, str]] = field(default_factory=dict)
+    in_vain: Mapping[tuple[str, ...], tuple[Observation, str]] = field(default_factory=dict)
+
+
 class Coordinate(Policy):
     """Bring every triggered UGV back to its preset by motions that are planned together.
 
@@ -92,8 +106,6 @@ class Coordinate(Policy):
         self.clearance = clearance_m
         self.spacing = spacing_m
         self.follow = follow_s
-        self._shut_in: dict[str, tuple[Observation, str]] = {}
-        self._in_vain: dict[tuple[str, ...], tuple[Observation, str]] = {}
         warm_up()
 
     def propose(self, seen: Observation) -> dict[str, Motion] | None:
@@ -101,11 +113,12 @@ class Coordinate(Policy):
         self.reason = ""
         if not seen.team:
             return None
-        if (known := self._shut_in.get(seen.robot)) is not None and _stands_as_before(known[0], seen):
+        failures: Failures = self.remembered or Failures()
+        if (known := failures.shut_in.get(seen.robot)) is not None and _stands_as_before(known[0], seen):
             self.reason = known[1]
             return None
         waiting = tuple(seen.team[i].name for i in self._first_group(seen))
-        if (known := self._in_vain.get(waiting)) is not None and _is_as_before(known[0], seen):
+        if (known := failures.in_vain.get(waiting)) is not None and _is_as_before(known[0], seen):
             self.reason = known[1]
             return None
         own, tried = [mate.name for mate in seen.team].index(seen.robot), []
@@ -119,7 +132,8 @@ class Coordinate(Policy):
         _, group, found = min(tried, key=lambda each: each[0])
         self.reason = _reason(seen, group, found)
         if lost and alone(own) is None:
-            self._shut_in[seen.robot] = seen, self.reason
+            failures = replace(failures, shut_in={**failures.shut_in, seen.robot: (seen, self.reason)})
+            self.remembered = failures
         motions = self._proposals(seen, group, found)
         if motions is None and alone(own) is not None:
             for spacing in NARROWER[1:]:
@@ -127,7 +141,7 @@ class Coordinate(Policy):
                 _, group, found = self._joint(seen, space, cache(partial(self._alone, seen, space)), ONE_BY_ONE)
                 if (motions := self._proposals(seen, group, found)) is not None:
                     return motions
-            self._in_vain[waiting] = seen, self.reason
+            self.remembered = replace(failures, in_vain={**failures.in_vain, waiting: (seen, self.reason)})
         return motions
 
     def _first_group(self, seen: Observation) -> list[int]:

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass, replace
+from threading import Lock
 from typing import Any, Literal, Self, get_args
 
 import numpy as np
@@ -139,6 +140,7 @@ class BehaviourDatabase:
         self.ranking = ranking
         self.budget = budget
         self.joint = joint
+        self._asking = Lock()
 
     def close(self) -> None:
         """End the processes of third-party policies."""
@@ -166,7 +168,9 @@ class BehaviourDatabase:
             cause=held.cause,
         )
 
-    def plan(self, held: Negotiation, seen: Observation) -> tuple[dict[str, Negotiation], list[Asked]]:
+    def plan(
+        self, held: Negotiation, seen: Observation, memories: dict[int, Any] | None = None
+    ) -> tuple[dict[str, Negotiation], list[Asked]]:
         """Ask the policies for the next proposal to a UGV; a joint plan brings proposals to other UGVs, too.
 
         If no policy has a proposal, the UGV rests for `retry`, and twice as long each time in a row.
@@ -174,12 +178,17 @@ class BehaviourDatabase:
         Args:
             held: negotiation with this UGV.
             seen: what the UAV sees.
+            memories: `Policy.remembered` by index of the policy, changed in place; None: nothing is remembered.
 
         Returns:
             The negotiations that change, by UGV, and the policies that were asked.
         """
         seen = replace(seen, refusals=held.refusals)
-        candidates, asked = self._ranked(seen, held.turn) if self.ranking == "predicted" else self._next(seen, held)
+        memories = {} if memories is None else memories
+        if self.ranking == "predicted":
+            candidates, asked = self._ranked(seen, held.turn, memories)
+        else:
+            candidates, asked = self._next(seen, held, memories)
         in_vain = 0 if candidates else held.in_vain + 1
         rest = self.retry * 2.0 ** min(max(0, in_vain - 1), MOST_DOUBLINGS)
         found = {seen.robot: replace(held, in_vain=in_vain, retry_at=seen.t + rest)}
@@ -196,28 +205,38 @@ class BehaviourDatabase:
                 found[robot] = replace(before, proposal=proposal, turn=turn, in_vain=0, cause=cause)
         return found, asked
 
-    def _next(self, seen: Observation, held: Negotiation) -> tuple[list[Candidate], list[Asked]]:
+    def _next(
+        self, seen: Observation, held: Negotiation, memories: dict[int, Any]
+    ) -> tuple[list[Candidate], list[Asked]]:
         """The proposal of the first policy, from the negotiation's turn on, that has one."""
         asked: list[Asked] = []
         for step in range(len(self.policies)):
             turn = (held.turn + step) % len(self.policies)
-            motions = self._ask(turn, seen, asked)
+            motions = self._ask(turn, seen, asked, memories)
             if motions:
                 return [(turn, asked[-1], motions)], asked
         return [], asked
 
-    def _ranked(self, seen: Observation, turn: int) -> tuple[list[Candidate], list[Asked]]:
+    def _ranked(self, seen: Observation, turn: int, memories: dict[int, Any]) -> tuple[list[Candidate], list[Asked]]:
         """All proposals from best to worst, rotated so that the proposal with the index `turn` comes first."""
         asked: list[Asked] = []
-        every = [self._ask(i, seen, asked) for i in range(len(self.policies))]
+        every = [self._ask(i, seen, asked, memories) for i in range(len(self.policies))]
         found = [(each, motions) for each, motions in zip(asked, every, strict=True) if motions]
         found.sort(key=lambda entry: predicted_cost(entry[1], seen))
         ranked = [(i, each, motions) for i, (each, motions) in enumerate(found)]
         first = turn % len(ranked) if ranked else 0
         return ranked[first:] + ranked[:first], asked
 
-    def _ask(self, index: int, seen: Observation, asked: list[Asked]) -> dict[str, Motion]:
-        """What a policy proposes; adds to `asked`."""
+    def _ask(self, index: int, seen: Observation, asked: list[Asked], memories: dict[int, Any]) -> dict[str, Motion]:
+        """What a policy proposes; adds to `asked`, and changes `memories`. Threads ask one after the other."""
+        with self._asking:
+            _, policy = self.policies[index]
+            policy.remembered = memories.get(index)
+            motions = self._proposed(index, seen, asked)
+            memories[index] = policy.remembered
+        return motions
+
+    def _proposed(self, index: int, seen: Observation, asked: list[Asked]) -> dict[str, Motion]:
         (name, policy), motions, what, traceback = self.policies[index], dict[str, Motion](), "", ""
         reason = ""
         try:

@@ -67,6 +67,7 @@ class PlannerState:
         asked: policies that were asked, in order.
         read: answers that were read: their number, and when, s.
         withdrawn: proposals that were withdrawn: their number, and when, s.
+        memories: `Policy.remembered` of the policies.
     """
 
     talks: tuple[Negotiation, ...]
@@ -76,6 +77,7 @@ class PlannerState:
     read: tuple[tuple[int, float], ...] = ()
     withdrawn: tuple[tuple[int, float], ...] = ()
     seen: tuple[tuple[Sighting, float], ...] = ()
+    memories: tuple[Any, ...] = ()
 
     def __deepcopy__(self, memo: dict[int, Any]) -> Self:
         """Immutable: the copy is the object itself."""
@@ -221,6 +223,7 @@ class Planner:
         obstacles = outline.joined(mapped, outline.stacked(learnt)) if learnt else mapped
         talks = self._after_answers(memory.talks, t, positions, intervening, said, reports, learnt=bool(fresh))
         asked = list(memory.asked)
+        memories = dict(enumerate(memory.memories))
         newest = max((number for number, _ in memory.read[-len(self.ugvs) :]), default=-1)
         read = [(report.number, t) for report in heard if report.number > newest]
         for i, robot in enumerate(self.ugvs):
@@ -242,12 +245,12 @@ class Planner:
                 radius=float(self.radii[i]),
                 moving=moving,
             )
-            changed, policies = self.database.plan(talks[i], seen)
+            changed, policies = self.database.plan(talks[i], seen, memories)
             asked += policies
             talks = [changed.get(name, talk) for name, talk in zip(self.ugvs, talks, strict=True)]
         return replace(
             memory, talks=tuple(talks), learnt=learnt, asked=tuple(asked), read=(*memory.read, *read),
-            seen=tuple(latest.values()),
+            seen=tuple(latest.values()), memories=tuple(map(memories.get, range(len(self.database.policies)))),
         )  # fmt: skip
 
     def _moving(

@@ -186,10 +186,13 @@ class Policy(abc.ABC):
         counted: whether counts bound the effort of a proposal. Then `intervention.budget_s` does not stop it, and runs
             are the same on every machine.
         reason: why the last call of `propose` left a UGV without a way, as words for the report; may be empty.
+        remembered: what `propose` remembers for its next call, None at the beginning of a run. The planner keeps it in
+            the Context. Assign another object to it; do not change the object.
     """
 
     counted: ClassVar[bool] = False
     reason: str = ""
+    remembered: Any = None
 
     @abc.abstractmethod
     def propose(self, seen: Observation) -> Motion | Mapping[str, Motion] | None:

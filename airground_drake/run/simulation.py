@@ -138,8 +138,6 @@ class Recorder:
             config.accuracy = OWN_ACCURACY
         ApplySimulatorConfig(config, simulator)
         simulator.set_target_realtime_rate(speed)
-        if self.model.gatekeeper is not None:
-            self.model.gatekeeper.reset_timing()
         if watch is not None:
             simulator.set_monitor(lambda root: watch(root.get_time()))
         with self._reported(context):
@@ -187,11 +185,9 @@ class Recorder:
         t = log.sample_times()
         keep = recording.distinct(t, data["team_command"])
         data = {name: rows[:, keep] for name, rows in data.items()}
-        decided: list[GatekeeperDecision] = []
-        timings: dict[str, Any] = {"wall_s": wall, "decision_times_s": []}
+        decided: Sequence[GatekeeperDecision] = ()
         if (gatekeeper := model.gatekeeper) is not None:
             decided = gatekeeper.decisions(gatekeeper.GetMyContextFromRoot(context))
-            timings["decision_times_s"] = list(gatekeeper.decision_times_s)
         memory = model.planner.memory(model.planner.GetMyContextFromRoot(context))
         meta: dict[str, Any] = {
             "schema": SCHEMA,
@@ -215,7 +211,7 @@ class Recorder:
             states=states,
             samples=samples.assign(**recording.measured(states, samples, self._own_plants)),
             decisions=recording.decisions(decided, ugvs, self._own.gatekeeper.route),
-            timings=timings,
+            timings={"wall_s": wall, "decision_times_s": [each.cpu_s for each in decided]},
             problems=recording.problems(decided),
             proposals=recording.proposals(ugvs, memory.sent),
             plans=recording.plans(memory.asked, memory.sent, ugvs, uav),

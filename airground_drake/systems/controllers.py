@@ -34,7 +34,7 @@ from airground_drake.nsbc.law import AcceptedMotion, UgvLaw
 from airground_drake.nsbc.task import Task
 from airground_drake.nsbc.tasks import FormationTask
 from airground_drake.systems.lifetime import weakly
-from airground_drake.systems.signals import UavGains, UgvGains, declare_bodies, declare_headings, no_proposals
+from airground_drake.systems.signals import Messages, UavGains, UgvGains, declare_bodies, declare_headings
 from airground_drake.world.steering import steer_all
 from airground_drake.world.world import Neighbours, World
 
@@ -42,9 +42,9 @@ from airground_drake.world.world import Neighbours, World
 class _Controller(LeafSystem):
     """A sampled controller whose gains are parameters of its Context."""
 
-    def _declare_gains(self, view: Any, gains: Sequence[float], model: Any) -> None:
+    def _declare_gains(self, view: Any, gains: Sequence[float], model: Any, period_s: float) -> None:
         """Declare the gains, named as in `view`, and a cached value like `model` that `_with_gains` computes."""
-        self._view = view
+        self._view, self._most = view, max(1.0 / period_s, *gains)
         index = NumericParameterIndex(self.DeclareNumericParameter(BasicVector(list(gains))))
         self._gains_ticket = self.numeric_parameter_ticket(index)
         producer = ValueProducer(allocate=lambda: Value(model), calc=weakly(self._calc_in_force))
@@ -58,7 +58,12 @@ class _Controller(LeafSystem):
         raise NotImplementedError
 
     def _calc_in_force(self, context: Context, output: AbstractValue) -> None:
-        output.set_value(self._with_gains(*context.get_numeric_parameter(0).value().tolist()))
+        gains = context.get_numeric_parameter(0).value().tolist()
+        for name, gain in zip(self._view.get_fields(), gains, strict=True):
+            if not 0.0 <= gain <= self._most:
+                wanted = f"allowed: 0 to {self._most:.9g} 1/s, one over the control period"
+                raise ValueError(f"{name} = {gain!r} in the Context of {self.GetSystemPathname()}; {wanted}")
+        output.set_value(self._with_gains(*gains))
 
     def _in_force(self, context: Context) -> Any:
         """What `_with_gains` returns for the gains in force."""
@@ -75,7 +80,8 @@ class UgvController(_Controller):
         out `command` (3n) m/s; `executing` (n), number of the proposal executed, -1 without one; both held.
             With unicycles `command_share` (n), the share that was left of each command, held.
             `gains`, the `UgvGains` in force, for the gatekeeper, which predicts the command.
-    Parameters: `UgvGains`; by default those of the law.
+    Parameters: `UgvGains`; by default those of the law. ValueError if one is negative, or above one over the control
+    period. The sensing range is fixed at construction.
     Rate: one update per control period, from t = 0.
 
     Attributes:
@@ -92,7 +98,7 @@ class UgvController(_Controller):
         self._bodies = declare_bodies(self, world)
         self._headings = declare_headings(self, world)
         self._reference = self.DeclareVectorInputPort("reference", 6 * n)
-        self._proposals = self.DeclareAbstractInputPort("proposals", no_proposals(n))
+        self._proposals = Messages(self, "proposals", n, Proposal)
         self._answers = self.DeclareVectorInputPort("answers", 2 * n)
         command = self.DeclareDiscreteState(3 * n)
         executing = self.DeclareDiscreteState([NOTHING] * n)
@@ -101,7 +107,7 @@ class UgvController(_Controller):
         if self._headings is not None:
             self.DeclareStateOutputPort("command_share", self.DeclareDiscreteState(np.ones(n)))
         gains = law.avoidance.gain, law.motion_gain, law.intervention_gain
-        self._declare_gains(UgvGains, gains, law)
+        self._declare_gains(UgvGains, gains, law, law.avoidance.period)
         given = {self._gains_ticket}
         self.DeclareVectorOutputPort("gains", len(gains), weakly(self._calc_gains), prerequisites_of_calc=given)
         self.DeclarePeriodicDiscreteUpdateEvent(law.avoidance.period, 0.0, weakly(self._update))
@@ -116,7 +122,8 @@ class UgvController(_Controller):
         return self.law.with_gains(*gains)
 
     def _calc_gains(self, context: Context, output: BasicVector) -> None:
-        output.SetFromVector(context.get_numeric_parameter(0).value())
+        law: UgvLaw = self._in_force(context)
+        output.SetFromVector([law.avoidance.gain, law.motion_gain, law.intervention_gain])
 
     def _update(self, context: Context, discrete: DiscreteValues) -> None:
         positions = _finite(self._bodies.Eval(context)).reshape(-1, 3)
@@ -178,7 +185,7 @@ class UavController(_Controller):
     Ports (n UGVs, M bodies that move, world frame):
         in  `bodies` (3M) m; `ugv_command` (3n) m/s, fed forward as the centroid's rate.
         out `command` (3) m/s, held.
-    Parameters: `UavGains`.
+    Parameters: `UavGains`, within the same limits as `UgvGains`.
     Rate: one update per control period, from t = 0.
 
     Attributes:
@@ -215,7 +222,7 @@ class UavController(_Controller):
         self._ugv_command = self.DeclareVectorInputPort("ugv_command", 3 * len(world.names("ugv")))
         command = self.DeclareDiscreteState(3)
         self.DeclareStateOutputPort("command", command)
-        self._declare_gains(UavGains, (avoidance.gain, gain), avoidance)
+        self._declare_gains(UavGains, (avoidance.gain, gain), avoidance, avoidance.period)
         self.DeclarePeriodicDiscreteUpdateEvent(avoidance.period, 0.0, weakly(self._update))
 
     def parameters(self, context: Context) -> dict[str, Any]:

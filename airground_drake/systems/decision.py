@@ -232,14 +232,22 @@ class EventTrigger(LeafSystem):
         out `status` (4n): a `Status` per UGV.
     State: the status; the times at which the step and the run began, s; the number of short steps in a row.
     Parameters: `TriggerLevels`; by default those of the trigger.
-    Rate: one update per step of the simulator.
-    Raises: PluginError if a decision variable is not a number. RuntimeError after `MOST_SHORT` short steps in a row
+    Rate: one update per step of the simulator. No step is longer than the `period` of the constructor.
+    Raises: PluginError if a decision variable is not a number. RuntimeError at the initialisation of a Simulator whose
+    Context has no accuracy, and after `MOST_SHORT` short steps in a row
     without a transition. While an event is isolated, steps become so short that robots far from the origin no longer
     move in them: their coordinates are rounded. Then x never gets to its level.
     """
 
     def __init__(self, count: int, trigger: Trigger, period: float = 1e-3) -> None:
-        """Declare ports, state and events for `count` UGVs; `period` is the shortest of the diagram's, s."""
+        """Declare ports, state and events for `count` UGVs.
+
+        Args:
+            count: n.
+            trigger: has the levels, by default.
+            period: longest step of the simulator, s: the shortest period of the diagram costs no further steps. Without
+                it, and without other sampled systems, a step could be as long as a run.
+        """
         super().__init__()
         self._count, self._short = count, SHORT * period
         self.DeclareNumericParameter(BasicVector([trigger.zeta, trigger.release, trigger.dwell]))
@@ -252,6 +260,7 @@ class EventTrigger(LeafSystem):
         self.DeclareStateOutputPort("status", status)
         self.DeclareInitializationUnrestrictedUpdateEvent(weakly(self._start))
         self.DeclarePerStepDiscreteUpdateEvent(weakly(self.update))
+        self.DeclarePeriodicPublishEvent(period, 0.0, lambda context: EventStatus.DidNothing())  # ends a step
         direction = WitnessFunctionDirection.kPositiveThenNonPositive
         self._witness = self.MakeWitnessFunction("a transition is due", direction, weakly(self.nothing_due))
 
@@ -276,6 +285,8 @@ class EventTrigger(LeafSystem):
         return [self._witness]
 
     def _start(self, context: Context, state: State) -> EventStatus:
+        if context.get_accuracy() is None:
+            raise RuntimeError("the Context has no accuracy, so no event can be isolated; call SetAccuracy(1e-6) on it")
         discrete, t, x = state.get_mutable_discrete_state(), context.get_time(), self._variable.Eval(context)
         before, begun, run_begun = (discrete.value(k) for k in range(3))
         if run_begun[0] < begun[0] <= t:  # another simulator goes on with a run

@@ -2,34 +2,25 @@
 
 from __future__ import annotations
 
-from typing import Any, Self
-
 from pydrake.common.value import AbstractValue, Value
-from pydrake.systems.framework import BasicVector, Context, EventStatus, LeafSystem, State, ValueProducer
+from pydrake.systems.framework import BasicVector, Context, EventStatus, LeafSystem, State
 
 from airground_drake.gatekeeper.answer import GatekeeperDecision
 from airground_drake.gatekeeper.mpc_gatekeeper import Gatekeepers, GatekeeperState, Inputs
 from airground_drake.intervention.messages import ACCEPT, SILENT, Report
+from airground_drake.intervention.policy import Proposal
 from airground_drake.systems.lifetime import weakly
 from airground_drake.systems.signals import (
     Answer,
+    Messages,
     UgvGains,
     declare_bodies,
     declare_headings,
     laid_out,
-    no_proposals,
     no_reports,
 )
 from airground_drake.systems.ticks import Ticks
 from airground_drake.world.world import World
-
-
-class DecisionLog(list[GatekeeperDecision]):
-    """Decisions in the order of time, for the trace."""
-
-    def __deepcopy__(self, memo: dict[int, Any]) -> Self:
-        """A copied Context gets a log of its own with the same decisions."""
-        return type(self)(self)
 
 
 class Gatekeeper(LeafSystem):
@@ -45,9 +36,9 @@ class Gatekeeper(LeafSystem):
             `UgvGains` that the controllers run with; `proposals` abstract, n of Proposal or None. With unicycles
             `headings` (n), rad.
         out `answers` (2n), an `Answer` per UGV, and `reports` (abstract), see `messages`; held.
-    State: abstract, a `GatekeeperState`.
-    Rate: one update per gatekeeper period, from t = 0. Its decisions are published at the end of the simulator's step
-    to a log in the Context, as Drake's loggers do; nothing reads the log during a run.
+    State: abstract, a `GatekeeperState`, with all decisions of the run so far.
+    Fixed at construction: horizon and weights of (25), margins, dwell, budget and patience; the gains are inputs.
+    Rate: one update per gatekeeper period, from t = 0.
     """
 
     def __init__(self, gatekeepers: Gatekeepers, world: World, *, period: float, control: float) -> None:
@@ -58,7 +49,7 @@ class Gatekeeper(LeafSystem):
         self._bodies, self._headings = declare_bodies(self, world), declare_headings(self, world)
         self._command = self.DeclareVectorInputPort("team_command", 3 * len(world.robots))
         self._gains = self.DeclareVectorInputPort("gains", len(UgvGains.get_fields()))
-        self._proposals = self.DeclareAbstractInputPort("proposals", no_proposals(n))
+        self._proposals = Messages(self, "proposals", n, Proposal)
         state = self.DeclareAbstractState(Value(GatekeeperState.empty(n)))
         self._state = int(state)
         held = {self.abstract_state_ticket(state)}
@@ -66,31 +57,17 @@ class Gatekeeper(LeafSystem):
         self.DeclareAbstractOutputPort(
             "reports", lambda: no_reports(n), weakly(self._calc_reports), prerequisites_of_calc=held
         )
-        empty = ValueProducer(allocate=lambda: Value(DecisionLog()), calc=ValueProducer.NoopCalc)
-        self._log = self.DeclareCacheEntry("decisions", empty, {self.nothing_ticket()}).cache_index()
-        self.DeclarePerStepPublishEvent(weakly(self._publish))
         self._ticks = Ticks(period, control)
         self.DeclarePeriodicUnrestrictedUpdateEvent(self._ticks.period, 0.0, weakly(self._update))
 
     @property
     def judges(self) -> str:
         """Name of the class that judges the proposals."""
-        return type(self._gatekeepers).__name__
+        return self._gatekeepers.judges
 
-    @property
-    def decision_times_s(self) -> list[float]:
-        """CPU time of each decision since `reset_timing`, outside the Context: identical runs differ in it."""
-        return self._gatekeepers.times_s
-
-    def reset_timing(self) -> None:
-        """Forget the measured decision times."""
-        self._gatekeepers.times_s = []
-
-    def decisions(self, context: Context) -> DecisionLog:
-        """All decisions published in the simulation of this Context."""
-        entry = self.get_cache_entry(self._log)  # by index: the object would keep the system alive
-        log: DecisionLog = entry.get_mutable_cache_entry_value(context).GetMutableValueOrThrow()
-        return log
+    def decisions(self, context: Context) -> tuple[GatekeeperDecision, ...]:
+        """All decisions up to the time of this Context."""
+        return self._memory(context).made
 
     def _memory(self, context: Context) -> GatekeeperState:
         memory: GatekeeperState = context.get_abstract_state(self._state).get_value()
@@ -101,13 +78,6 @@ class Gatekeeper(LeafSystem):
 
     def _calc_reports(self, context: Context, output: AbstractValue) -> None:
         output.set_value(self._memory(context).reports)
-
-    def _publish(self, context: Context) -> EventStatus:
-        made, log = self._memory(context).decisions, self.decisions(context)
-        if not made or (log and log[-1] is made[-1]):
-            return EventStatus.DidNothing()
-        log.extend(made)
-        return EventStatus.Succeeded()
 
     def _update(self, context: Context, state: State) -> EventStatus:
         if not self._ticks.due(context.get_time()):
@@ -134,9 +104,9 @@ class DirectAcceptance(LeafSystem):
     def __init__(self, count: int) -> None:
         """Declare ports for `count` UGVs."""
         super().__init__()
-        self._proposals = self.DeclareAbstractInputPort("proposals", no_proposals(count))
+        self._proposals = Messages(self, "proposals", count, Proposal)
         self.DeclareVectorOutputPort(
-            "answers", 2 * count, weakly(self._calc_answers), prerequisites_of_calc={self._proposals.ticket()}
+            "answers", 2 * count, weakly(self._calc_answers), prerequisites_of_calc={self._proposals.port.ticket()}
         )
         self.DeclareAbstractOutputPort(
             "reports",

@@ -16,7 +16,7 @@ from contextlib import contextmanager
 from html import escape
 
 import pygraphviz
-from pydrake.systems.framework import Diagram, PortDataType, System
+from pydrake.systems.framework import Diagram, System
 
 from airground_drake.base import files
 
@@ -34,9 +34,11 @@ COLUMNS = (ORDER[:3], ORDER[-2:])
 REALISES = {
     "AffineSystem": "integrated noise",
     "DecisionVariable": "DDM, (15)",
-    "EventTrigger": "threshold, (19), (20)",
+    "EventTrigger": "threshold, (20)",
     "InterventionPlanner": "proposals, (12)-(14)",
-    "PaperGatekeepers": "MPC, (21)-(29)",
+    "MixedIntegerRoute": "MPC, (21)-(26)",
+    "RelaxedRoute": "MPC, relaxed, (27)-(29)",
+    "NonlinearRoute": "MPC, relaxed, (27)-(29)",
     "OutcomeGatekeepers": "by outcomes",
     "DirectAcceptance": "accepts all",
     "UgvController": "NSBC, (5)-(8), (20)",
@@ -47,7 +49,12 @@ REALISES = {
 """What a system does, by the name of its class. The picture shows the class name of any other system."""
 RECORDED, INK, MUTED = "#0060a8", "#1a1a1a", "#666666"
 """Colours of recorded signals, of wires, and of wires from the vehicles, which lead nearly everywhere."""
-LEGEND = "dashed: messages, grey: from the vehicles, blue: recorded"
+ABOARD = {
+    "decision_noise": "UAV", "decision_variable": "UAV", "event_trigger": "UAV", "intervention_planner": "UAV",
+    "uav_controller": "UAV", "gatekeeper": "UGVs", "ugv_controller": "UGVs",
+}  # fmt: skip
+"""Which blocks fly and which drive. A wire between them is a radio link."""
+LEGEND = "dashed: sent between UAV and UGVs, grey: from the vehicles, blue: recorded"
 WIDTH_IN = 10.9
 """Maximum width of a picture: that of a landscape page of A4 with margins of 1 cm."""
 
@@ -90,13 +97,14 @@ def dot(diagram: Diagram) -> str:
     wires = sorted((origin(end), end) for end in feeds if _block(end) in blocks and _block(origin(end)) in blocks)
     outputs = whole.split(maxsplit=2)[1].replace("_", "s") + ":y"
     recorded = {origin(end) for end in feeds if end.startswith(outputs)}
+    fed_unseen = {end for end in feeds if _block(end) in blocks and _block(origin(end)) not in blocks}
     lines = [
         f'digraph "{name}" {{',
         f'graph [rankdir=LR, newrank=true, nodesep=0.15, ranksep=0.3, size="{WIDTH_IN},100", labelloc=t, '
         f"label=<<B>{name}</B><BR/>{LEGEND}>, fontname=Helvetica, fontsize=10]",
         "node [shape=none, margin=0, fontname=Helvetica, fontsize=8]",
         f'edge [arrowsize=0.6, color="{INK}"]',
-        *(_node(n, each, texts[n], recorded) for n, each in blocks.items()),
+        *(_node(n, each, texts[n], recorded, fed_unseen) for n, each in blocks.items()),
     ]
     for layer, color in LAYERS.items():
         look = f'style=filled; color="{color}"; label=<<B>{layer.replace("_", " ").capitalize()}</B>>'
@@ -109,13 +117,17 @@ def _block(port: str) -> str:
     return port.partition(":")[0]
 
 
-def _node(name: str, system: System, text: str, recorded: Set[str]) -> str:
-    """Drake's text of a block, with what it does in place of its class, and without inputs for disturbances."""
+def _node(name: str, system: System, text: str, recorded: Set[str], fed_unseen: Set[str]) -> str:
+    """Drake's text of a block, with what it does and where in place of its class.
+
+    Without inputs for disturbances, and without names of inputs that are fed by a hidden block.
+    """
     kind = str(getattr(system, "judges", type(system).__name__.rstrip("_")))
-    text = _HEAD.sub(f"<B>{name}</B><BR/>{escape(REALISES.get(kind, kind))}", _DISTURBANCE.sub("", text))
-    for port in (port for port in recorded if _block(port) == name):
+    says = escape(REALISES.get(kind, kind)) + (f"<BR/><I>on the {ABOARD[name]}</I>" if name in ABOARD else "")
+    text = _HEAD.sub(f"<B>{name}</B><BR/>{says}", _DISTURBANCE.sub("", text))
+    for port in (port for port in recorded | fed_unseen if _block(port) == name):
         cell = re.compile(rf'(PORT="{port.partition(":")[2]}"[^>]*>)(\w+)')
-        text = cell.sub(rf'\1<FONT COLOR="{RECORDED}">\2</FONT>', text)
+        text = cell.sub(rf'\1<FONT COLOR="{RECORDED}">\2</FONT>' if port in recorded else r"\1", text)
     text = text.replace('COLOR="grey"', "").replace('BORDER="0"', 'BORDER="0" BGCOLOR="white"', 1)
     return f"{name} {text.partition(' ')[2]}".strip()
 
@@ -123,9 +135,8 @@ def _node(name: str, system: System, text: str, recorded: Set[str]) -> str:
 def _edge(start: str, end: str, blocks: Mapping[str, System]) -> str:
     """A wire from an output port of a block to an input port."""
     order = [*ORDER, *blocks]
-    source = blocks[_block(start)].get_output_port(int(start.partition(":y")[2]))
     looks = {
-        "style=dashed": source.get_data_type() == PortDataType.kAbstractValued,
+        "style=dashed": {ABOARD.get(_block(port)) for port in (start, end)} == {"UAV", "UGVs"},
         f'color="{MUTED}"': _block(start) == ORDER[0],
         "constraint=false": order.index(_block(end)) < order.index(_block(start)),
     }

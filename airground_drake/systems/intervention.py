@@ -4,27 +4,29 @@ from __future__ import annotations
 
 import numpy as np
 from pydrake.common.value import AbstractValue, Value
-from pydrake.systems.framework import Context, DiscreteValues, EventStatus, LeafSystem, State
+from pydrake.systems.framework import Context, DiscreteValues, EventStatus, LeafSystem, State, ValueProducer
 
 from airground_drake.base.arrays import Array
 from airground_drake.decision.excursion import INTERVENING
 from airground_drake.intervention.database import BehaviourDatabase
 from airground_drake.intervention.halts import NOT_WATCHED, room, standing, watched
-from airground_drake.intervention.messages import sightings
+from airground_drake.intervention.messages import Report, sightings
 from airground_drake.intervention.planner import Planner, PlannerState, sent_after
 from airground_drake.systems.lifetime import weakly
-from airground_drake.systems.signals import FIELDS, components_of, declare_bodies, no_proposals, no_reports
+from airground_drake.systems.signals import FIELDS, Messages, components_of, declare_bodies, no_proposals
 from airground_drake.systems.ticks import Ticks
 from airground_drake.world.world import ROBOTS, World
 
-_NOT_AHEAD = (-1.0, None)
-"""Nothing has been planned ahead of its update."""
+
+class _Ahead(list[PlannerState | None]):
+    """The result of planning ahead of the update of an instant; empty without one."""
 
 
 class InterventionPlanner(LeafSystem):
     """Supervises every UGV; for those in mode INTERVENING the `Planner` makes proposals, (12)-(14).
 
-    The system numbers the proposals: see `sent_after`.
+    The system numbers the proposals: see `sent_after`. What a policy remembers is in the Context, unless it has a
+    process of its own (`guest.process`) or keeps it in attributes other than `Policy.remembered`.
 
     Ports (n UGVs, M bodies that move):
         in  `bodies` (3M) m; `status` (4n) from EventTrigger; `answers` (2n) and `reports`
@@ -44,8 +46,7 @@ class InterventionPlanner(LeafSystem):
         self._bodies = declare_bodies(self, world)
         self._status = self.DeclareVectorInputPort("status", FIELDS * n)
         self._answers = self.DeclareVectorInputPort("answers", 2 * n)
-        self._reports = self.DeclareAbstractInputPort("reports", no_reports(n))
-        self._ahead: tuple[float, PlannerState | None] = _NOT_AHEAD
+        self._reports = Messages(self, "reports", n, Report)
         held = self.DeclareAbstractState(Value(planner.start()))
         self._memory = int(held)
         self.DeclareAbstractOutputPort(
@@ -54,6 +55,9 @@ class InterventionPlanner(LeafSystem):
             weakly(self._calc_proposals),
             prerequisites_of_calc={self.abstract_state_ticket(held)},
         )
+        # Drake empties this slot of the Context when time, state or an input changes
+        empty = ValueProducer(allocate=lambda: Value(_Ahead()), calc=lambda _, output: output.set_value(_Ahead()))
+        self._ahead = self.DeclareCacheEntry("planned ahead", empty, {self.all_sources_ticket()}).cache_index()
         self._ticks = Ticks(planner.period, control_period)
         self._room = room(planner.max_speed)
         self.DeclareDiscreteState(np.tile([0.0, 0.0, 0.0, NOT_WATCHED], n))
@@ -92,10 +96,8 @@ class InterventionPlanner(LeafSystem):
         return watched(before, context.get_time(), self._bodies.Eval(context)[self._ugvs], self._room)
 
     def _update(self, context: Context, state: State) -> EventStatus:
-        t, (ahead, memory) = context.get_time(), self._ahead
-        self._ahead = _NOT_AHEAD
-        if ahead != t:
-            memory = self._planned(context)
+        ahead: _Ahead = self.get_cache_entry(self._ahead).Eval(context)
+        memory = ahead[0] if ahead else self._planned(context)
         if memory is None:
             return EventStatus.DidNothing()
         state.get_mutable_abstract_state(self._memory).set_value(memory)
@@ -106,7 +108,7 @@ class InterventionPlanner(LeafSystem):
 
         So a step-wise environment sees what the policies are asked. If it is called again, the last result counts.
         """
-        self._ahead = context.get_time(), self._planned(context)
+        self.get_cache_entry(self._ahead).Eval(context)[:] = [self._planned(context)]
 
     def _planned(self, context: Context) -> PlannerState | None:
         """The memory after planning at the context's time; None at another time, or if nothing changes."""

@@ -16,7 +16,7 @@ from airground_drake.intervention.messages import accepted_proposals
 from airground_drake.intervention.policy import Proposal
 from airground_drake.nsbc.avoidance import Avoidance
 from airground_drake.systems.lifetime import weakly
-from airground_drake.systems.signals import declare_bodies, declare_headings, no_proposals
+from airground_drake.systems.signals import Messages, declare_bodies, declare_headings
 from airground_drake.world.steering import steer_all
 from airground_drake.world.world import ROBOTS, World
 
@@ -129,7 +129,7 @@ class Monitor(LeafSystem):
         self._bodies, self._headings = declare_bodies(self, world), declare_headings(self, world)
         self._command = self.DeclareVectorInputPort("team_command", 3 * len(world.robots))
         self._reference = self.DeclareVectorInputPort("reference", 6 * n)
-        self._proposals = self.DeclareAbstractInputPort("proposals", no_proposals(n))
+        self._proposals = Messages(self, "proposals", n, Proposal)
         self._answers = self.DeclareVectorInputPort("answers", 2 * n)
         self._memory = self.DeclareAbstractState(Value(Memory()))
         self.DeclareVectorOutputPort(
@@ -191,7 +191,7 @@ class Monitor(LeafSystem):
         Before the updates of this tick, proposals and answers are still those that the controllers saw at the last one.
         """
         due = commands.copy()
-        ports = (self._reference, self._proposals, self._answers)
+        ports = (self._reference, self._proposals.port, self._answers)
         if sample.reference is not None and all(port.HasValue(context) for port in ports):
             accepted = accepted_proposals(self._proposals.Eval(context), self._answers.Eval(context))
             reference, rate = sample.reference.reshape(2, -1, 3)

@@ -7,10 +7,13 @@ from typing import Any
 import numpy as np
 from pydrake.common.containers import namedview
 from pydrake.common.value import AbstractValue, Value
-from pydrake.systems.framework import InputPort, LeafSystem
+from pydrake.systems.framework import Context, InputPort, LeafSystem
 
 from airground_drake.base.arrays import Array
+from airground_drake.base.errors import PluginError, short
 from airground_drake.intervention.messages import Report
+from airground_drake.intervention.policy import Proposal
+from airground_drake.systems.lifetime import weakly
 from airground_drake.world.world import Kind, World
 
 Status = namedview("Status", ["mode", "triggers", "triggered_at_s", "released_at_s"])
@@ -64,3 +67,42 @@ def no_proposals(count: int) -> AbstractValue:
 def no_reports(count: int) -> AbstractValue:
     """Model value of the port `reports`: a tuple with a `Report` for each of `count` UGVs."""
     return Value((Report(),) * count)
+
+
+class Messages:
+    """An input port for the messages of one kind to or from n UGVs.
+
+    Drake compares the types of values where ports are connected, but in pydrake all Python objects have one type. So
+    the messages themselves are checked: when a simulator is initialised, and whenever they are read.
+
+    Attributes:
+        port: the port.
+    """
+
+    def __init__(self, system: LeafSystem, name: str, count: int, kind: type[Proposal] | type[Report]) -> None:
+        """Declare the port of a system."""
+        self.port = system.DeclareAbstractInputPort(name, no_reports(count) if kind is Report else no_proposals(count))
+        self._count = count
+        self._kinds = (Report,) if kind is Report else (Proposal, type(None))
+        system.DeclareInitializationPublishEvent(weakly(self._check))
+
+    def _check(self, context: Context) -> None:
+        if self.port.HasValue(context):
+            self.Eval(context)
+
+    def Eval(self, context: Context) -> Any:
+        """The messages, one per UGV.
+
+        Raises:
+            PluginError: if they are of another kind: the port is connected with a wrong one.
+        """
+        found = self.port.Eval(context)
+        if (
+            isinstance(found, tuple | list)
+            and len(found) == self._count
+            and all(isinstance(one, self._kinds) for one in found)
+        ):
+            return found
+        wanted = " or ".join("None" if kind is type(None) else kind.__name__ for kind in self._kinds)
+        told = f"port {self.port.get_name()} of {self.port.get_system().GetSystemPathname()}"
+        raise PluginError(f"{told} is given {short(repr(found))}; allowed: {self._count} messages, each {wanted}")

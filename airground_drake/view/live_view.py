@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import math
-
+from pydrake.common.value import Value
 from pydrake.geometry import Meshcat
 from pydrake.math import RigidTransform, RollPitchYaw
-from pydrake.systems.framework import Context, LeafSystem
+from pydrake.systems.framework import Context, LeafSystem, ValueProducer
 
 from airground_drake.base.arrays import Array
 from airground_drake.scenarios.schema import Scenario
@@ -46,8 +45,9 @@ class LiveView(LeafSystem):
         if world.signals:
             self._signals = self.DeclareVectorInputPort("plant_signals", len(world.signals))
         self._names, self._of = world.robots, {name: k for k, name in enumerate(world.signals)}
-        self._shown_s = -math.inf
-        self.DeclareInitializationPublishEvent(weakly(self._begin))
+        nothing = ValueProducer(allocate=lambda: Value([]), calc=ValueProducer.NoopCalc)
+        self._shown = self.DeclareCacheEntry("shown at, s", nothing, {self.nothing_ticket()}).cache_index()
+        self.DeclareInitializationPublishEvent(weakly(self._publish))
         self.DeclarePerStepPublishEvent(weakly(self._publish))
         meshcat.Delete("/robots")
         scene = stage(scenario)
@@ -56,10 +56,6 @@ class LiveView(LeafSystem):
         self._barriers = [
             (k, rows[each.name], each.way_m[0]) for k, each in enumerate(scene.barriers) if len(each.way_m)
         ]
-
-    def _begin(self, context: Context) -> None:
-        self._shown_s = -math.inf
-        self._publish(context)
 
     def _place(self, signals: Array, positions: Array, headings: list[float]) -> None:
         """Put the bodies of robots that are not where the law steers them in place of the steered points."""
@@ -70,10 +66,11 @@ class LiveView(LeafSystem):
                 headings[k] = float(signals[self._of[f"{robot}.heading_rad"]])
 
     def _publish(self, context: Context) -> None:
-        t = context.get_time()
-        if t < self._shown_s + 1.0 / self.FRAMES_PER_S - 1e-9:
+        t, entry = context.get_time(), self.get_cache_entry(self._shown)
+        shown: list[float] = entry.get_mutable_cache_entry_value(context).GetMutableValueOrThrow()
+        if shown and shown[0] <= t < shown[0] + 1.0 / self.FRAMES_PER_S - 1e-9:
             return
-        self._shown_s = t
+        shown[:] = [t]
         positions, headings = self._bodies.Eval(context).reshape(-1, 3).copy(), [0.0] * len(self._names)
         if self._signals is not None:
             self._place(self._signals.Eval(context), positions, headings)

@@ -14,13 +14,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 from properties import examples
 from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorConfig
-from pydrake.systems.framework import DiagramBuilder
+from pydrake.systems.framework import DiagramBuilder, System
 from pydrake.systems.primitives import (
     ConstantVectorSource,
     Integrator,
     LogVectorOutput,
+    Multiplexer,
     PassThrough,
+    Sine,
     TrajectorySource,
+    VectorLogSink,
     ZeroOrderHold,
 )
 from pydrake.trajectories import PiecewisePolynomial
@@ -55,7 +58,7 @@ def run(trigger: Trigger, path: Path, step: float, presets: Sequence[Motion] = (
     builder = DiagramBuilder()
     n = path.noise.shape[1]
     variable = builder.AddNamedSystem("decision_variable", DecisionVariable(world(n), presets))
-    system = builder.AddNamedSystem("event_trigger", EventTrigger(n, trigger))
+    system = builder.AddNamedSystem("event_trigger", EventTrigger(n, trigger, step))
     for port in ("decision_variable", "decision_range"):
         builder.Connect(variable.GetOutputPort(port), system.GetInputPort(port))
     reference = np.zeros((len(path.t), n, 3))
@@ -111,15 +114,39 @@ def test_a_dip_below_the_release_level_within_a_step_is_a_release() -> None:
     assert times(status, 2)[1] == pytest.approx((4.0 + np.sqrt(9.0 - 0.25)) / 8.0, abs=2e-6)
 
 
+def simulator_of(x: System, trigger: Trigger, accuracy: float | None = 1e-6) -> tuple[Simulator, VectorLogSink]:
+    """A trigger whose range is x now, with nothing else in the diagram that is sampled; and a log of its status."""
+    builder = DiagramBuilder()
+    system, span = builder.AddSystem(EventTrigger(1, trigger)), builder.AddSystem(Multiplexer([1, 1]))
+    source = builder.AddSystem(x).get_output_port(0)
+    for port in (span.get_input_port(0), span.get_input_port(1), system.GetInputPort("decision_variable")):
+        builder.Connect(source, port)
+    builder.Connect(span.get_output_port(0), system.GetInputPort("decision_range"))
+    log = LogVectorOutput(system.get_output_port(), builder)
+    simulator = Simulator(builder.Build())
+    simulator.get_mutable_context().SetAccuracy(accuracy)
+    return simulator, log
+
+
 def test_a_decision_variable_that_is_not_a_number_is_an_error() -> None:
     """No comparison with a level would notice it: the trigger would never fire."""
-    builder = DiagramBuilder()
-    system = builder.AddSystem(EventTrigger(1, TRIGGER))
-    for name, count in (("decision_variable", 1), ("decision_range", 2)):
-        source = builder.AddSystem(ConstantVectorSource(np.full(count, np.nan)))
-        builder.Connect(source.get_output_port(), system.GetInputPort(name))
+    simulator, _ = simulator_of(ConstantVectorSource([np.nan]), TRIGGER)
     with pytest.raises(PluginError, match=r"decision_range is not a number, .*: \[nan, nan\]"):
-        Simulator(builder.Build()).AdvanceTo(1.0)
+        simulator.AdvanceTo(1.0)
+
+
+def test_every_crossing_is_found_where_nothing_else_bounds_the_steps() -> None:
+    """x = 4 sin t, which an integrator without states would pass in one step, reaches 3 m four times in 20 s."""
+    simulator, log = simulator_of(Sine(4.0, 1.0, 0.0, 1), TRIGGER)
+    simulator.AdvanceTo(20.0)
+    due = np.arcsin(0.75) + 2.0 * np.pi * np.arange(4)
+    assert times(log.FindLog(simulator.get_context()).data(), 2) == pytest.approx(due, abs=2e-6)
+
+
+def test_a_context_without_an_accuracy_is_refused_before_the_run() -> None:
+    simulator, _ = simulator_of(Sine(4.0, 1.0, 0.0, 1), TRIGGER, accuracy=None)
+    with pytest.raises(RuntimeError, match=r"no accuracy.*call SetAccuracy\(1e-6\)"):
+        simulator.Initialize()
 
 
 def test_a_dip_too_short_to_be_isolated_is_a_release_and_a_trigger_at_once() -> None:

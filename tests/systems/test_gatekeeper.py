@@ -10,21 +10,25 @@ import pytest
 from builders.problems import random_problem
 from gatekeeper.oracles import Enumeration
 from pydrake.common import RandomGenerator
+from pydrake.common.value import Value
 from pydrake.systems.analysis import Simulator
+from pydrake.systems.framework import DiagramBuilder, LeafSystem
 
-from airground_drake.base.errors import SimulationError
+from airground_drake.base.errors import PluginError, SimulationError
 from airground_drake.gatekeeper import mpc_gatekeeper
 from airground_drake.gatekeeper.answer import Rules
 from airground_drake.gatekeeper.budget import Budget
 from airground_drake.gatekeeper.problem import Problem
 from airground_drake.gatekeeper.routes.mixed_integer import MixedIntegerRoute
 from airground_drake.gatekeeper.solution import ConstantPlans, Solution, after_failure
-from airground_drake.registry import ROUTES
+from airground_drake.intervention.messages import Report
+from airground_drake.registry import METHODS, ROUTES
 from airground_drake.report import metrics
 from airground_drake.run.simulation import Recorder, simulate
 from airground_drake.scenarios.load import load
 from airground_drake.scenarios.schema import Scenario
-from airground_drake.systems import components
+from airground_drake.scenarios.world import make_world
+from airground_drake.systems import DirectAcceptance, InterventionPlanner, components
 from airground_drake.systems.diagram import build_model
 from airground_drake.verify.judging import judge
 
@@ -207,6 +211,28 @@ def test_gains_changed_in_a_context_count_in_the_prediction(run: str) -> None:
         assert (one.t, one.reason, one.throughout) == (other.t, other.reason, other.throughout)
         for mine, theirs in ((one.accept, other.accept), (one.refuse, other.refuse)):
             assert mine is None or mine.positions.tolist() == theirs.positions.tolist()
+
+
+@pytest.mark.parametrize(("port", "sent"), [("proposals", (Report(),)), ("reports", (None,)), ("reports", "x")])
+def test_messages_of_another_kind_are_refused_before_the_run(port: str, sent: object) -> None:
+    """pydrake connects these ports: to Drake, all Python objects have one type."""
+    builder = DiagramBuilder()
+    scenario = load("minimal")
+    planner = InterventionPlanner(components.make_planner(scenario, METHODS["d"]), make_world(scenario), 0.05)
+    system = builder.AddNamedSystem("mine", planner if port == "reports" else DirectAcceptance(1))
+    source = builder.AddSystem(Announcing(sent))
+    builder.Connect(source.get_output_port(), system.GetInputPort(port))
+    with pytest.raises(PluginError, match=rf"port {port} of ::.*mine is given .*; allowed: 1 messages, each (Pro|Rep)"):
+        Simulator(builder.Build()).Initialize()
+
+
+class Announcing(LeafSystem):
+    """Sends one object for ever."""
+
+    def __init__(self, sent: object) -> None:
+        super().__init__()
+        model = Value(object())
+        self.DeclareAbstractOutputPort("sent", lambda: model, lambda _, output: output.set_value(sent))
 
 
 @dataclass

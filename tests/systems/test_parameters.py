@@ -33,6 +33,16 @@ def test_a_gain_that_is_changed_in_a_context_acts_there(which: int, gain: str) -
     assert (ends[0] != ends[1]).any()
 
 
+@pytest.mark.parametrize(("which", "gain"), [(0, "intervention_gain_1_s"), (1, "avoidance_gain_1_s")])
+@pytest.mark.parametrize("value", [-0.1, 20.5, float("nan")])
+def test_a_gain_that_is_negative_or_too_high_is_refused_by_name(which: int, gain: str, value: float) -> None:
+    model, context = prepared()
+    controller = model.controllers[which]
+    setattr(controller.mutable_gains(controller.GetMyMutableContextFromRoot(context)), gain, value)
+    with pytest.raises(ValueError, match=rf"{gain} = {value} in the Context of .*; allowed: 0 to 20 1/s"):
+        advanced(model.diagram, context, 0.1)
+
+
 def test_what_the_controllers_ran_with_is_read_from_the_context_and_refutes_safe_hyp() -> None:
     model, context = prepared()
     trace = simulate(SCENARIO, "d")

@@ -62,7 +62,7 @@ class MixedIntegerRoute:
     """
 
     def __init__(self, blocks: int | None = None, solver: str = "daqp") -> None:
-        """Start without any program.
+        """Choose blocks and solver.
 
         Args:
             blocks: binaries, each for a block of stages; they need not divide the stages. None: one per stage.
@@ -75,14 +75,13 @@ class MixedIntegerRoute:
             raise ValueError(f"blocks: {blocks}, allowed: 1 or more")
         self._blocks = blocks
         self._search = Minimiser(solver)
-        self._programs: dict[tuple[int, int], BinaryProgram] = {}
 
     def solve(self, problem: Problem, budget: Budget = Budget()) -> Solution:  # noqa: B008 (immutable)
         """See `Route`."""
         return guarded(problem, budget, self._solve)
 
     def _solve(self, problem: Problem, constants: ConstantPlans, budget: Budget) -> Solution:
-        binary = self._program(problem)
+        binary = BinaryProgram(problem.stages, min(self._blocks or problem.stages, problem.stages))
         known, bound = _known(binary, problem, constants)
         plan = cheap_plan(problem.terms, binary.block, known)
         search = _Searches(self._search, binary, problem, budget)
@@ -108,14 +107,6 @@ class MixedIntegerRoute:
             route_bound=max(proof.bound, unavoidable_cost(problem)),
             normals=proof.normals,
         )
-
-    def _program(self, problem: Problem) -> BinaryProgram:
-        """Built once for a number of stages and blocks; then only its coefficients change."""
-        stages = problem.stages
-        size = stages, min(self._blocks or stages, stages)
-        if size not in self._programs:
-            self._programs[size] = BinaryProgram(*size)
-        return self._programs[size]
 
 
 class _Searches:

@@ -34,10 +34,6 @@ class RelaxedRoute:
     the better constant plan decides.
     """
 
-    def __init__(self) -> None:
-        """Start without any program: one is built for each number of stages, then only its coefficients change."""
-        self._programs: dict[int, BinaryProgram] = {}
-
     def solve(self, problem: Problem, budget: Budget = Budget()) -> Solution:  # noqa: B008 (immutable)
         """See `Route`."""
         return guarded(problem, budget, self._solve)
@@ -45,9 +41,7 @@ class RelaxedRoute:
     def _solve(self, problem: Problem, constants: ConstantPlans, budget: Budget) -> Solution:
         stages = problem.stages
         normals = normals_along(problem, constants.better.positions)
-        if stages not in self._programs:
-            self._programs[stages] = BinaryProgram(stages, stages)
-        program = self._programs[stages]
+        program = BinaryProgram(stages, stages)
         program.update(problem, normals)
         found = relax(program, budget.left_s(), ACTIVE_SETS * budget.iterations)
         if found.omega is None:

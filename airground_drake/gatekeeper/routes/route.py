@@ -13,8 +13,8 @@ from airground_drake.gatekeeper.solution import Solution
 class Route(Protocol):
     """A way to solve (26): any object with this method, whose class can be constructed without arguments.
 
-    A gatekeeper keeps one object for all its UGVs and samples, so that a route may keep programs or workspaces
-    between calls. The contract:
+    A gatekeeper keeps one object for all its UGVs, samples and Contexts. Threads may call it at the same time, and runs
+    may be repeated: nothing that it keeps between calls may change a solution. The contract:
 
     - It never raises, whatever the problem. For data that are not finite, and costs that overflow, it returns
       `Solution(False, "refused_not_finite")`, as `guard.guarded` does.
