@@ -10,9 +10,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from airground_drake.report import document, summary
-from airground_drake.report.outcomes import Document, courses
-from airground_drake.report.phrases import bodies_of, collision
+from airground_drake.report import document, terminal
+from airground_drake.report.facts import RunFacts
+from airground_drake.report.outcomes import Document
+from airground_drake.report.phrases import bodies_of
 from airground_drake.run.events import extract
 from airground_drake.run.simulation import simulate
 from airground_drake.run.trace import Trace
@@ -41,7 +42,7 @@ def trace() -> Trace:
 
 def screen_of(trace: Trace) -> tuple[Document, str]:
     made = document.build(trace.scenario, {"a": trace}, judge(trace), {"package": "0.1.0", "seed": 1, "started": "now"})
-    return made, " ".join(summary.text(made).split())
+    return made, " ".join(terminal.text(made).split())
 
 
 def in_the_map(trace: Trace, place: list[float]) -> float:
@@ -54,13 +55,13 @@ def in_the_map(trace: Trace, place: list[float]) -> float:
 
 def test_a_report_names_the_place_of_the_map_that_was_nearest(trace: Trace) -> None:
     made, screen = screen_of(trace)
-    (near,) = (each for each in courses(made)[0].near if {each.robot, each.other} == {"ugv1", "map"})
+    (near,) = (each for each in RunFacts(made, "a").near if {each.robot, each.other} == {"ugv1", "map"})
     assert near.at_m
     robot = [np.interp(near.t_s, trace.t, trace.column(f"ugv1.{axis}_m")) for axis in "xy"]
     assert math.dist(robot, near.at_m) == pytest.approx(near.value_m, abs=1e-9)
     assert in_the_map(trace, near.at_m) <= 1e-9
     place = f"the map at ({near.at_m[0]:.2f}, {near.at_m[1]:.2f})"
-    assert f"minimum distance 0.100 m (ugv1 to {place})" in screen
+    assert f"ugv1–{place} 0.100 ≥ 0.1 m at" in screen  # noqa: RUF001
     assert place in bodies_of(next(claim for claim in made["claims"] if claim["id"] == "SAFE-TRACE"))
 
 
@@ -68,7 +69,7 @@ def test_a_report_says_where_on_the_map_a_robot_stands(trace: Trace) -> None:
     made, screen = screen_of(trace)
     x, y = made["runs"]["a"]["metrics"]["on_the_way"]["ugv1"]["at_m"]
     assert math.dist((x, y), trace.position("ugv1")[-1][:2]) < 0.11
-    assert f"ugv1 is standing still at the map at ({x:.2f}, {y:.2f})" in screen
+    assert f"ugv1 stopped, held by the map at ({x:.2f}, {y:.2f})" in screen
 
 
 def test_a_report_names_the_place_of_the_map_of_a_collision(trace: Trace) -> None:
@@ -80,4 +81,6 @@ def test_a_report_names_the_place_of_the_map_of_a_collision(trace: Trace) -> Non
     assert math.dist(hit["at_m"], hit["position_m"][:2]) <= 0.02
     assert in_the_map(trace, hit["at_m"]) <= 1e-9
     at = ", ".join(f"{each:.2f}" for each in hit["at_m"])
-    assert collision(hit) == f"ugv1 collides with the map at ({at}) at {hit['t_s']:.2f} s"
+    told = screen_of(through)[1]
+    assert f"ugv1–the map at ({at}) at {hit['t_s']:.2f} s" in told  # noqa: RUF001
+    assert f"collided with the map at ({at})" in told
