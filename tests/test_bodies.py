@@ -258,7 +258,7 @@ def test_the_page_says_that_it_appeared_there() -> None:
     assert metrics["appeared"] is True
     built = document.build(trace.scenario, {"d": trace}, judge(trace), {"package": "", "seed": 1, "started": ""})
     (row,) = (row for row in first_screen(built).rows if row.run == "d")
-    assert row.safe.lines[1] == "ugv1\N{EN DASH}rock 0.800 < 1.25 m at 4.20 s"
+    assert row.safe.lines[1] == "ugv1\N{EN DASH}rock 0.800 < 2 m at 4.20 s"
     gap = gap_m(trace, "ugv1", "rock")
     np.testing.assert_array_equal(np.isnan(gap), np.arange(len(gap)) < trace.there_from("rock"))
     assert stage(trace.scenario).barriers[0].appears_s == 4.2

@@ -49,7 +49,7 @@ class RunFacts:
         self._claims = {each["id"]: each for run in ("", name) for each in claims(document, run=run)}
         self.method, self._plain = str(spec["method"]), spec["composition"] == "augmented"
         obstacles = resolved.get("obstacles", {})
-        self.movers = [each for each, of in obstacles.items() if of.get("moves") or of.get("max_speed_m_s")]
+        self.movers: list[str] = [each for each, of in obstacles.items() if of.get("moves") or of.get("max_speed_m_s")]
         self._off_the_map = {each for each, of in obstacles.items() if not of.get("known_to_uav", True)}
         unique = {frozenset((near.robot, near.other)): near for near in reversed([*pairs(self.run)])}
         self.near = sorted(unique.values())
@@ -167,10 +167,7 @@ class RunFacts:
     def approaches(self) -> Iterator[Near]:
         """The nearest approach after the start, and that of a mover if it is another one; else the least distance."""
         came = self._metrics["came_near"]
-        for one in came:
-            value, required = one["value"], one["safe_distance_m"]
-            about = (value - required, one["first"], one["second"], value, required, one["t_s"])
-            yield Near(*about, moves=bool(one.get("moves")), at_m=one.get("at_m"))
+        yield from map(Near.of, came)
         if not came:
             yield from self.near[:1]
 

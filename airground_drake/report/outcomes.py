@@ -28,6 +28,13 @@ class Near(NamedTuple):
     moves: bool = False
     at_m: Sequence[float] | None = None
 
+    @classmethod
+    def of(cls, entry: Mapping[str, Any]) -> Near:
+        """That of an entry of report.json with `first` and `second`."""
+        value, required = float(entry.get("value", entry.get("min_distance_m"))), float(entry["safe_distance_m"])
+        about = (value - required, entry["first"], entry["second"], value, required, entry["t_s"])
+        return cls(*about, moves=bool(entry.get("moves")), at_m=entry.get("at_m"))
+
     @property
     def whom(self) -> str:
         """The other one in words."""

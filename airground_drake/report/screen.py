@@ -14,7 +14,7 @@ from airground_drake.base.statuses import PASSING
 from airground_drake.gatekeeper.reasons import refusal
 from airground_drake.report import rules
 from airground_drake.report.facts import RunFacts
-from airground_drake.report.outcomes import Document, claims
+from airground_drake.report.outcomes import Document, Near, claims
 from airground_drake.report.sentences import Line, counted, grouped
 
 MOST_ENDINGS, MOST_NAMES, MOST_WARNINGS = 4, 2, 3
@@ -135,7 +135,7 @@ def _headline(rows: Sequence[Row]) -> list[Line]:
 
 def _who(alike: Sequence[Row]) -> str:
     helped = {row.facts.is_helped for row in alike if row.facts}
-    return {(True,): "With the UAV", (False,): "Without the UAV"}.get((*helped,), "With or without the UAV")
+    return "With or without the UAV" if len(helped) != 1 else "With the UAV" if True in helped else "Without the UAV"
 
 
 def _rows(document: Document) -> list[Row]:
@@ -154,7 +154,10 @@ def _rows(document: Document) -> list[Row]:
 
 def _says(spec: Mapping[str, Any]) -> str:
     """What a run is: its method, or the method's identifier and what the run sets differently."""
-    says = [rules.SETTINGS.get((key, str(value)), f"{key} {value}") for key, value in (spec["set"] or {}).items()]
+    says = [
+        rules.SETTINGS.get((key, str(value)), f"{key.split('.')[-1]} {value}")
+        for key, value in (spec["set"] or {}).items()
+    ]
     says += [rules.PRINTED] * (spec["composition"] != "augmented")
     method = str(spec["method"])
     return f"({method}) with {', '.join(says)}" if says else rules.RUNS.get(method, method)
@@ -242,6 +245,14 @@ def _seeds(document: Document) -> Iterator[Check]:
         mark = "no" if kept < count else "partly" if home < count else "yes"
         says = f"{', '.join(names)}: distances kept in {kept} of {count}, all home in {home}"
         yield Check("Other seeds?", mark, says)
+        if kept < count:
+            worst = min(
+                (each for name in names for each in of_runs[name]),
+                key=lambda each: float(each["min_distance_m"] - each["safe_distance_m"]),
+            )
+            yield Check(
+                "Other seeds?", "", f"the worst: {Near.of(worst).line}, run {worst['run']}, seed {worst['seed']}"
+            )
     if of_runs and not any(each > 0.0 for each in noise):
         yield Check("Other seeds?", "none", "without decision noise a seed changes nothing")
 

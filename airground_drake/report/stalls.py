@@ -13,7 +13,7 @@ from airground_drake.base.arrays import Array
 from airground_drake.base.errors import TraceError
 from airground_drake.run.trace import Trace
 from airground_drake.verify.engines.geometry import interpolate
-from airground_drake.verify.runs.control_law import inequalities_of
+from airground_drake.verify.runs.control_law import Inequalities, inequalities_of
 from airground_drake.verify.runs.live_goal import AT_REST_M, AT_REST_S
 from airground_drake.verify.runs.pairs import parts_of
 from airground_drake.verify.runs.proposals import proposal_of
@@ -34,7 +34,11 @@ def stalls(trace: Trace) -> list[dict[str, Any]]:
         stop its wish to move, half way through the stall, or at the end of the run if it lasts until then. Nobody holds
         a UGV that waits as its proposal asks.
     """
-    found = [_stall(trace, ugv, first, last) for ugv in trace.ugvs for first, last in _standing(trace, ugv)]
+    found = list[dict[str, Any]]()
+    for ugv in trace.ugvs:
+        if standing := _standing(trace, ugv):
+            given = inequalities_of(trace, ugv)
+            found += [_stall(trace, ugv, first, last, given) for first, last in standing]
     return sorted(found, key=lambda stall: float(stall["from_s"]))
 
 
@@ -54,20 +58,20 @@ def _standing(trace: Trace, ugv: str) -> list[tuple[int, int]]:
     return [(first, last) for first, last in edges.tolist() if np.linalg.norm(place[last] - target) > tolerance]
 
 
-def _stall(trace: Trace, ugv: str, first: int, last: int) -> dict[str, Any]:
+def _stall(trace: Trace, ugv: str, first: int, last: int, given: Inequalities) -> dict[str, Any]:
     times, to_the_end = trace.sampled("t_s"), last == len(trace.sample_rows) - 1
     return {
         "robot": ugv,
         "from_s": float(times[first]),
         "until_s": float(trace.t[-1]) if to_the_end else float(times[last]),
         "position_m": trace.position(ugv)[trace.sample_rows[last]].tolist(),
-        "held_by": _held_by(trace, ugv, last if to_the_end else (first + last) // 2),
+        "held_by": _held_by(trace, ugv, last if to_the_end else (first + last) // 2, given),
     }
 
 
-def _held_by(trace: Trace, ugv: str, sample: int) -> list[str]:
+def _held_by(trace: Trace, ugv: str, sample: int, given: Inequalities) -> list[str]:
     """The bodies whose avoidance inequalities stop a UGV at a sample: those that its wish pushes against."""
-    given, parts = inequalities_of(trace, ugv), parts_of(trace)
+    parts = parts_of(trace)
     binding = (given.sample == sample) & (given.slack(trace.chosen(ugv)) <= HELD_M_S)
     wish = _wish(trace, ugv, sample)
     speed = float(np.linalg.norm(wish))

@@ -12,7 +12,7 @@ from airground_drake.report.sentences import MARKS, unbroken
 
 WIDTH = 100
 """Characters of a line."""
-COLUMNS, ANSWERS = (21, 31, 24, 18), (18, 80)
+COLUMNS, ANSWERS = (20, 29, 23, 22), (18, 80)
 """Widths of the columns of runs, and of questions and answers; two blanks are between columns."""
 
 
@@ -22,7 +22,7 @@ def text(document: Document) -> str:
     lines = []
     for mark, told in screen.headline:
         lines += wrap(one_line(f"[{MARKS[mark].icon}] {told}"), WIDTH, subsequent_indent="    ")
-    titles = ("Run", "Safe?", f"Arrived? ({screen.within})", "UAV proposals")
+    titles = ("Run", "Safe? (nearest approach)", f"Arrived? ({screen.within})", "UAV proposals")
     runs = [[Cell("", [each]) for each in titles]]
     runs += [[Cell("", [f"{row.run}: {row.says}"]), row.safe, row.arrived, row.uav] for row in screen.rows]
     below = [(check.question, Cell(check.mark, [check.told])) for check in screen.checks]

@@ -305,9 +305,14 @@ def test_threshold() -> None:
 
 
 def test_seeds_and_paper() -> None:
-    rows = [{"run": "d", "kept": kept, "home": True} for kept in (True, True, False)]
+    least = {"first": "r1", "second": "rock", "safe_distance_m": 0.3, "t_s": 4.0}
+    rows = [
+        least | {"run": "d", "kept": seed < 7, "home": True, "seed": seed, "min_distance_m": 0.9 - 0.1 * seed}
+        for seed in (1, 2, 7)
+    ]
     assert checks("Other seeds?", lambda found: found["seeds"].extend(rows)) == [
-        ("no", "d: distances kept in 2 of 3, all home in 3")
+        ("no", "d: distances kept in 2 of 3, all home in 3"),
+        ("", "the worst: r1\N{EN DASH}rock 0.200 < 0.3 m at 4.00 s, run d, seed 7"),
     ]
     statuses = ("reproduced", "calibrated", "calibrated", "not_reproduced")
     (told,) = checks("Paper reproduced?", lambda found: found["reproduction"].extend({"status": s} for s in statuses))
