@@ -24,12 +24,11 @@ from airground_drake.gatekeeper.rollout import View
 from airground_drake.geometry.outline import GAP
 from airground_drake.proofs.export import recorded
 from airground_drake.proofs.too_near import too_near
-from airground_drake.report import attention, document, summary
+from airground_drake.report import attention, document
 from airground_drake.report.figures.draw import draw
 from airground_drake.report.metrics import closest_obstacle, gap_m, of_run
-from airground_drake.report.outcomes import courses
 from airground_drake.report.page import page
-from airground_drake.report.phrases import intrusion
+from airground_drake.report.screen import first_screen
 from airground_drake.run.simulation import simulate
 from airground_drake.run.trace import Trace
 from airground_drake.scenarios.load import load, validated
@@ -119,9 +118,8 @@ def test_a_pair_has_one_distance_wherever_users_see_it(ends_at: float, gap_m: fl
     assert (promised["safe_distance_m"], promised["guarantee_m"] <= gap_m + 1e-6) == (required_m, True)
     words = [item.words for item in attention.items(report) if item.claim == "SAFE-TRACE"]
     assert words[0].startswith(f"ugv1 and rock at {told}, 1.25 m required")
-    first = summary.text(report)
-    assert (f"ugv1 comes within {told} of rock" if gap_m > 0.0 else "ugv1 collides with rock") in first
-    assert gap_m < 0.0 or "required 1.25 m" in first
+    first = first_screen(report).rows[0].safe.lines[1]
+    assert first.startswith("ugv1\N{EN DASH}rock at" if gap_m < 0.0 else f"ugv1\N{EN DASH}rock {gap_m:.3f} < 1.25 m")
     drawn = page(report, draw(given, traces), None)
     assert f"{told.removesuffix(' (overlap)')}, not 1.25 m, from rock at" in drawn
     cells = (f'<td class="n">{gap_m:.4f}</td>', '<td class="n">1.25</td>')
@@ -261,8 +259,8 @@ def test_the_page_says_that_it_appeared_there() -> None:
     metrics = of_run(trace)["min_distance_m"]["ugv1"]["rock"]
     assert metrics["appeared"] is True
     built = document.build(trace.scenario, {"d": trace}, judge(trace), {"package": "", "seed": 1, "started": ""})
-    (course,) = (course for course in courses(built) if course.name == "d")
-    assert intrusion(course) == "rock appears too near to ugv1 (0.800 m, nobody's doing)"
+    (row,) = (row for row in first_screen(built).rows if row.run == "d")
+    assert row.safe.lines[1] == "ugv1\N{EN DASH}rock 0.800 < 2 m at 4.20 s"
     gap = gap_m(trace, "ugv1", "rock")
     np.testing.assert_array_equal(np.isnan(gap), np.arange(len(gap)) < trace.there_from("rock"))
     assert stage(trace.scenario).barriers[0].appears_s == 4.2

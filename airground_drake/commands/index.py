@@ -12,7 +12,7 @@ from urllib.parse import quote
 from airground_drake.base import files
 from airground_drake.base.errors import FolderError, ReportError, TraceError, one_line
 from airground_drake.base.usage import Parser
-from airground_drake.report import compare, folder, summary
+from airground_drake.report import compare, folder, screen
 from airground_drake.report.sentences import Line
 
 PAGE = "index.html"
@@ -73,12 +73,12 @@ def _entry(report: Path, place: Path, prefix: str) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _headline(document: Mapping[str, Any]) -> Line | None:
-    """The report in a sentence; None if it lacks something that only its first screen needs."""
+def _headline(document: Mapping[str, Any]) -> list[Line]:
+    """The report in one or two lines; none if it lacks something that only its first screen needs."""
     try:
-        return summary.headline(document)
+        return screen.headline(document)
     except (LookupError, TypeError, ValueError, AttributeError):
-        return None
+        return []
 
 
 def _thumbnail(report: Path, document: Mapping[str, Any], prefix: str) -> str:

@@ -91,7 +91,7 @@ def _reported(options: argparse.Namespace, command: str) -> int:
     scenario = load(AUDITED if audited else options.scenario, overrides)
     if audited:
         scenario.name, scenario.title, scenario.description = AUDIT, AUDIT_TITLE, AUDIT_DESCRIPTION
-    from airground_drake.report import attention, make, summary  # slow to import: only for a valid scenario
+    from airground_drake.report import attention, make, terminal  # slow to import: only for a valid scenario
     from airground_drake.verify.cache import cache_folder
 
     kept = None if options.no_cache else cache_folder()
@@ -117,8 +117,8 @@ def _reported(options: argparse.Namespace, command: str) -> int:
     if not options.quiet:
         for item in attention.beforehand(report):
             print(f"{item.words}{f', run {item.run}' if item.run else ''}")
-        print(summary.text(report))
-        print(f"{scenario.name}: {overall['status'].replace('_', ' ')}. {summary.as_declared(report).text}")
+        print(terminal.text(report))
+        print(f"{scenario.name}: {overall['status'].replace('_', ' ')}. {overall['why']}")
         print(one_line(str(output)))
     if options.open and "html" in options.format:
         webbrowser.open((output / "report.html").resolve().as_uri())

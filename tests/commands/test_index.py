@@ -39,7 +39,7 @@ def test_every_report_is_there_with_its_verdict_a_link_and_a_picture(
     page = (tmp_path / PAGE).read_text()
     for words, times in (
         ("2 reports in", 1), ('href="plain/report.html"', 1), ('href="a%20b/100%25/report.json"', 1), ("<svg", 1),
-        ("as declared</span>", 2), ("<strong>No method brings everyone home safely. Under (a), ugv1 comes within", 2),
+        ("as declared</span>", 2), ("<strong>With the UAV (c): 1 of 2 arrive, ugv1 and obstacle_1 too close.", 2),
         ("bad/report.json is not a report", 1), ("<script", 0),
     ):  # fmt: skip
         assert page.count(words) == times, words

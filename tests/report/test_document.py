@@ -12,7 +12,7 @@ import pytest
 from report.cases import FINE, GOING_ROUND, STALL, Kept, built, make_trace, verdict
 
 from airground_drake.audit import of_runs
-from airground_drake.report import attention, document, junit, summary
+from airground_drake.report import attention, document, junit, screen
 from airground_drake.run.trace import Trace
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.verify.claim import Verdict
@@ -21,7 +21,7 @@ from airground_drake.verify.finding import Finding
 
 def test_minimum_of_the_schema_in_strict_json(scenario: Scenario, traces: dict[str, Trace]) -> None:
     report = json.loads(json.dumps(built(scenario, traces, FINE), allow_nan=False))
-    assert report["schema"] == "airground_drake.report/3"
+    assert report["schema"] == "airground_drake.report/4"
     run = report["runs"]["c"]
     for found, keys in (
         (report["scenario"], "name sha256 resolved"),
@@ -78,7 +78,7 @@ def test_too_few_interventions_or_messages_are_not_as_declared(scenario: Scenari
     why = "1 of 5 checks differs from what the scenario declares: interventions on run c (0, expected at least 1)."
     assert overall["why"] == why
     assert overall["missing"] == []
-    assert summary.headline(report).text.endswith("1 check is not as declared.")
+    assert screen.declared(report).lines[1] == "c: interventions 0"
     (item,) = (each for each in attention.items(report) if each.run == "c" and each.chip == "not_as_expected")
     assert (item.words, item.about) == ("0 interventions", "expected: at least 1")
     failed = ET.fromstring(junit.render(report)).find("*/*[@name='interventions']/failure")

@@ -133,7 +133,7 @@ def test_links_lead_somewhere_and_the_title_has_the_headline(page: str) -> None:
     parsed = Page(page)
     assert {str(a["href"])[1:] for a in parsed.of("a")} <= {has["id"] for _, has, _ in parsed.tags if "id" in has}
     assert page.index("Do not conclude") < page.index('id="happened"') < page.index('id="claims"')
-    assert "<title>case_a: No method brings everyone home safely." in page
+    assert "<title>case_a: With the UAV (c): " in page
 
 
 def first(text: str) -> str:
@@ -148,7 +148,7 @@ def test_what_fails_is_shown_first_and_what_was_not_tested_apart(
     failed = verdict("c", "refuted", margin=-0.25, unit="m", where={"robot": "ugv1"}, counterexample={"t_s": 4.25})
     text = html.render(built(scenario, traces, [failed, *FINE[1:], verdict("a", exercised=0)]), [])
     assert 'class="headline bad"' in text
-    assert "SAFE-TRACE on run c (refuted, expected holds)" in first(text)
+    assert "c: distances failed" in first(text)
     told = text[text.index("What needs attention") : text.index('id="happened"')]
     assert '<a href="#claim-SAFE-TRACE">ugv1: margin missed by 0.25 m, 4.250 s</a>' in told
     chips = text[text.index('<span class="verdicts">') : text.index('<span class="plain">')]

@@ -10,9 +10,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from airground_drake.report import document, summary
-from airground_drake.report.outcomes import Document, courses
-from airground_drake.report.phrases import bodies_of, collision
+from airground_drake.report import document
+from airground_drake.report.facts import RunFacts
+from airground_drake.report.outcomes import Document
+from airground_drake.report.phrases import bodies_of
+from airground_drake.report.screen import Row, first_screen
 from airground_drake.run.events import extract
 from airground_drake.run.simulation import simulate
 from airground_drake.run.trace import Trace
@@ -39,9 +41,9 @@ def trace() -> Trace:
     return simulate(from_data(data, str(MAPS / "scenario.yaml")), "a")
 
 
-def screen_of(trace: Trace) -> tuple[Document, str]:
+def screen_of(trace: Trace) -> tuple[Document, Row]:
     made = document.build(trace.scenario, {"a": trace}, judge(trace), {"package": "0.1.0", "seed": 1, "started": "now"})
-    return made, " ".join(summary.text(made).split())
+    return made, first_screen(made).rows[0]
 
 
 def in_the_map(trace: Trace, place: list[float]) -> float:
@@ -53,22 +55,22 @@ def in_the_map(trace: Trace, place: list[float]) -> float:
 
 
 def test_a_report_names_the_place_of_the_map_that_was_nearest(trace: Trace) -> None:
-    made, screen = screen_of(trace)
-    (near,) = (each for each in courses(made)[0].near if {each.robot, each.other} == {"ugv1", "map"})
+    made, row = screen_of(trace)
+    (near,) = (each for each in RunFacts(made, "a").near if {each.robot, each.other} == {"ugv1", "map"})
     assert near.at_m
     robot = [np.interp(near.t_s, trace.t, trace.column(f"ugv1.{axis}_m")) for axis in "xy"]
     assert math.dist(robot, near.at_m) == pytest.approx(near.value_m, abs=1e-9)
     assert in_the_map(trace, near.at_m) <= 1e-9
     place = f"the map at ({near.at_m[0]:.2f}, {near.at_m[1]:.2f})"
-    assert f"minimum distance 0.100 m (ugv1 to {place})" in screen
+    assert row.safe.lines[1].startswith(f"ugv1\N{EN DASH}{place} 0.100 ≥ 0.1 m at")
     assert place in bodies_of(next(claim for claim in made["claims"] if claim["id"] == "SAFE-TRACE"))
 
 
 def test_a_report_says_where_on_the_map_a_robot_stands(trace: Trace) -> None:
-    made, screen = screen_of(trace)
+    made, row = screen_of(trace)
     x, y = made["runs"]["a"]["metrics"]["on_the_way"]["ugv1"]["at_m"]
     assert math.dist((x, y), trace.position("ugv1")[-1][:2]) < 0.11
-    assert f"ugv1 is standing still at the map at ({x:.2f}, {y:.2f})" in screen
+    assert row.arrived.lines[1] == f"ugv1 stopped, held by the map at ({x:.2f}, {y:.2f})"
 
 
 def test_a_report_names_the_place_of_the_map_of_a_collision(trace: Trace) -> None:
@@ -80,4 +82,6 @@ def test_a_report_names_the_place_of_the_map_of_a_collision(trace: Trace) -> Non
     assert math.dist(hit["at_m"], hit["position_m"][:2]) <= 0.02
     assert in_the_map(trace, hit["at_m"]) <= 1e-9
     at = ", ".join(f"{each:.2f}" for each in hit["at_m"])
-    assert collision(hit) == f"ugv1 collides with the map at ({at}) at {hit['t_s']:.2f} s"
+    row = screen_of(through)[1]
+    assert row.safe.lines[1] == f"ugv1\N{EN DASH}the map at ({at}) at {hit['t_s']:.2f} s"
+    assert row.arrived.lines[1] == f"ugv1 collided with the map at ({at})"

@@ -1,0 +1,291 @@
+"""What came of the runs of a report, from report.json alone. A fact here holds whatever the other facts are."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from functools import cached_property
+from math import dist
+from typing import Any, NamedTuple
+
+from airground_drake.base.statuses import PASSING
+from airground_drake.registry import METHODS
+from airground_drake.report import rules
+from airground_drake.report.outcomes import Document, Near, claims, named, no_way, pairs
+from airground_drake.run.collisions import first_collisions
+
+UNJUDGED: Mapping[str, Any] = {
+    "status": "", "expected": "", "as_expected": None, "exercised": None, "evidence": {}, "inputs": {},
+}  # fmt: skip
+"""What is known of a claim that was not judged."""
+
+
+class Breach(NamedTuple):
+    """A pair that collided or came too near: the pair, when and how near, and whose doing it was, '' if not known."""
+
+    first: str
+    second: str
+    told: str
+    doing: str = ""
+
+
+class RunFacts:
+    """What came of a run that the scenario names, and that was run.
+
+    Attributes:
+        name: of the run.
+        method: its identifier.
+        run: its entry in report.json.
+        movers: obstacles that may move.
+        near: the least distance of each pair, those of least margin first.
+        hits: the first collision of each robot that collided, an event. What these robots do later does not count.
+    """
+
+    def __init__(self, document: Document, name: str) -> None:
+        """The facts of the run with this name."""
+        resolved = document["scenario"]["resolved"]
+        spec, self.name, self.run = resolved["runs"][name], name, document["runs"][name]
+        self._resolved, self._metrics = resolved, self.run["metrics"]
+        self._claims = {each["id"]: each for run in ("", name) for each in claims(document, run=run)}
+        self.method, self._plain = str(spec["method"]), spec["composition"] == "augmented"
+        obstacles = resolved.get("obstacles", {})
+        self.movers: list[str] = [each for each, of in obstacles.items() if of.get("moves") or of.get("max_speed_m_s")]
+        self._off_the_map = {each for each, of in obstacles.items() if not of.get("known_to_uav", True)}
+        unique = {frozenset((near.robot, near.other)): near for near in reversed([*pairs(self.run)])}
+        self.near = sorted(unique.values())
+        self.hits = first_collisions(self.run["events"])
+
+    def claim(self, name: str) -> Mapping[str, Any]:
+        """The verdict on a claim about this run or about the model."""
+        return self._claims.get(name, UNJUDGED)
+
+    @property
+    def is_helped(self) -> bool:
+        """Whether the UAV intervenes; a method that is not ours may."""
+        return METHODS[self.method].intervenes if self.method in METHODS else True
+
+    @property
+    def _obeys(self) -> bool:
+        return self.method in METHODS and self.is_helped and not METHODS[self.method].gated
+
+    # Safe?
+
+    @property
+    def collided(self) -> bool:
+        """Whether any robot collided."""
+        return bool(self.hits)
+
+    @property
+    def is_broken(self) -> bool:
+        """Whether a distance was not kept."""
+        return any(near.is_short for near in self.near) or self.claim(rules.DISTANCES)["status"] == "refuted"
+
+    @property
+    def distances_pass(self) -> bool:
+        """Whether all distances were checked, and kept."""
+        return self.claim(rules.DISTANCES)["status"] in PASSING
+
+    @property
+    def untested(self) -> bool:
+        """Whether no pair came so near that it had to be kept apart."""
+        return self.claim(rules.DISTANCES)["exercised"] == 0
+
+    @property
+    def is_proved(self) -> bool:
+        """Whether theorems keep the distances from bodies at rest and between robots, and their conditions held."""
+        robots = (*self._resolved["ugvs"].values(), self._resolved["uav"])
+        first_order = all(plant["kind"] == "first_order" for robot in robots for plant in robot.get("plant", ()))
+        needed = (*rules.PROOFS, *[rules.PROOF_OF_PLANTS][: not first_order])
+        met = self.claim(rules.CONDITIONS)["status"] in PASSING
+        return self.method == "d" and self._plain and met and all(self.claim(n)["status"] == "proved" for n in needed)
+
+    @cached_property
+    def breaches(self) -> list[Breach]:
+        """Collisions by time, or else the pairs that came too near, those of least margin first; the robots' own first.
+
+        Empty where the claim alone says that a distance was not kept.
+        """
+        events = {id(hit): hit for hit in self.hits.values()}.values()
+        found = [
+            Breach(
+                hit["robot"], other, f"{hit['robot']}\N{EN DASH}{named(other, hit.get('at_m'))} at {hit['t_s']:.2f} s"
+            )
+            for hit in events
+            if (other := hit.get("other") or hit["obstacle"])
+        ]
+        found = found or [Breach(near.robot, near.other, near.line) for near in self.near if near.is_short]
+        own = self.claim(rules.OWN_DOING)["evidence"]
+        met = {frozenset((one["first"], one["second"])): _doing(one)
+               for one in own.get("encounters", own.get("came_too_near_themselves", ()))}  # fmt: skip
+        found = [breach._replace(doing=met.get(frozenset(breach[:2]), "")) for breach in found]
+        return sorted(found, key=lambda breach: breach.doing not in rules.OURS)
+
+    @property
+    def others_too_close(self) -> int:
+        """How many pairs came too near besides those that collided, before one of them collided."""
+        if not self.hits:
+            return max(0, len(self.breaches) - 1)
+        among = {frozenset(breach[:2]) for breach in self.breaches}
+        ends = {robot: hit["t_s"] for robot, hit in self.hits.items()}
+        return sum(
+            near.is_short and {near.robot, near.other} not in among
+            and near.t_s < min(ends.get(body, near.t_s + 1.0) for body in (near.robot, near.other))
+            for near in self.near
+        )  # fmt: skip
+
+    @property
+    def whose(self) -> str:
+        """Whose doing the breaches were, in words; '' if that is not known of all of them."""
+        doings = [breach.doing for breach in self.breaches]
+        ours = [doing for doing in doings if doing in rules.OURS]
+        if not doings or "" in doings:
+            return ""
+        if not ours:
+            return "not the robots' doing" * (self.claim(rules.OWN_DOING)["status"] in PASSING)
+        if len(ours) < len(doings):
+            return f"{len(ours)} of {len(doings)} the robots' doing"
+        return "the robots' doing" + ", by commands already under way" * ({*ours} == {"under way"})
+
+    @property
+    def contradicts_its_proof(self) -> bool:
+        """Whether a distance was broken that a theorem keeps, though the theorem's conditions held."""
+        kept = [each for each in self.breaches if each.second not in self.movers or each.doing in rules.OURS]
+        return self.is_proved and (bool(kept) or not self.breaches)
+
+    @property
+    def faster(self) -> list[str]:
+        """Obstacles that moved faster than declared."""
+        beside = self.claim(rules.CONDITIONS)["evidence"].get("beside_moving", ())
+        return sorted({each["second"] for each in beside if each["too_fast_s"] is not None})
+
+    @property
+    def unmapped(self) -> list[str]:
+        """Obstacles that a robot met which obeys the UAV, and that are not on the UAV's map."""
+        met = (breach.second for breach in self.breaches if self._obeys)
+        return list(dict.fromkeys(name for name in met if name in self._off_the_map))
+
+    def approaches(self) -> Iterator[Near]:
+        """The nearest approach after the start, and that of a mover if it is another one; else the least distance."""
+        came = self._metrics["came_near"]
+        yield from map(Near.of, came)
+        if not came:
+            yield from self.near[:1]
+
+    # Arrived?
+
+    @cached_property
+    def home(self) -> set[str]:
+        """Robots that ended at their targets, or were there before they collided."""
+        ugvs, uav = self._resolved["ugvs"], self._resolved["uav"]
+        targets = {name: ugv["target_m"] for name, ugv in ugvs.items()} | {uav["name"]: uav["target_m"]}
+        ends, within = self._metrics["final_position_m"], self._resolved["arrival_tolerance_m"]
+        arrived = {robot for robot, at in targets.items() if dist(ends[robot], at) <= within}
+        before = {robot for robot, hit in self.hits.items() if self.arrived_s.get(robot, hit["t_s"]) < hit["t_s"]}
+        return (arrived - self.hits.keys()) | before
+
+    @cached_property
+    def arrived_s(self) -> dict[str, float]:
+        """When each robot arrived first, s."""
+        events = [event for event in self.run["events"] if event["kind"] == "arrival"]
+        return {event["robot"]: event["t_s"] for event in reversed(events)}
+
+    @property
+    def ugvs(self) -> list[str]:
+        """All UGVs."""
+        return [*self._resolved["ugvs"]]
+
+    @property
+    def uav(self) -> str:
+        """The UAV."""
+        return str(self._resolved["uav"]["name"])
+
+    @property
+    def ends_too_early(self) -> bool:
+        """Whether all UGVs that did not arrive were coming nearer to their targets when the run ended."""
+        return all(self.way(ugv).get("left_s") is not None for ugv in self.ugvs if ugv not in self.home)
+
+    @property
+    def there(self) -> int:
+        """How many UGVs arrived."""
+        return len(self.home & {*self.ugvs})
+
+    @property
+    def failed(self) -> set[str]:
+        """UGVs for which a policy failed."""
+        return {fault["robot"] for fault in self.run["faults"]}
+
+    @property
+    def lost(self) -> list[str]:
+        """UGVs that the UAV was called for and found no way for."""
+        return no_way(self.run)
+
+    def way(self, robot: str) -> Mapping[str, Any]:
+        """How far a UGV had come that neither arrived nor collided, see `metrics.on_the_way`."""
+        found: Mapping[str, Any] = self._metrics["on_the_way"].get(robot, {})
+        return found
+
+    def holders(self, robot: str) -> list[str]:
+        """The bodies that hold a UGV at the end of the run, with the place of the map."""
+        ends = (stall for stall in self._metrics["stalls"] if stall["robot"] == robot)
+        last = [stall for stall in ends if stall["until_s"] >= self._metrics["duration_s"]]
+        at_m = self.way(robot).get("at_m")
+        return [named(name, at_m if name == "map" else None) for stall in last for name in stall["held_by"]]
+
+    def refused_all(self, robot: str) -> bool:
+        """Whether a UGV got proposals and refused every one."""
+        return {fate for who, fate in self._fates() if who == robot} == {"refused"}
+
+    def ending(self, robot: str) -> str:
+        """How a UGV ended that did not arrive: its state and, if known, the cause."""
+        if hit := self.hits.get(robot):
+            bodies = (hit["robot"], hit.get("other") or named(hit["obstacle"], hit.get("at_m")))
+            return f"collided with {next(body for body in bodies if body != robot)}"
+        way = self.way(robot)
+        state = "stopped" if way.get("stands") else "hardly moving" if way.get("creeps") else "still driving"
+        known = {"by": way.get("kept_away", {}).get("by"), "left_s": way.get("left_s"),
+                 "held_by": " and ".join(self.holders(robot)[:2])}  # fmt: skip
+        causes = (words.format(**known) for applies, words in rules.CAUSES if applies(self, robot))
+        return ", ".join([state, *list(causes)[:1]])
+
+    # UAV proposals
+
+    def _fates(self) -> Iterator[tuple[str, str]]:
+        """The UGV of each proposal, and the class of what became of it."""
+        for sent in self._metrics["interventions"]:
+            accepted = sent["accepted_s"] is not None
+            fate = rules.CLASSES.get((accepted, sent["ended"]["how"]), rules.OPEN[accepted])
+            yield sent["robot"], rules.OBEYED.get(fate, fate) if self._obeys else fate
+
+    @property
+    def fates(self) -> Counter[str]:
+        """How many proposals are in each class."""
+        return Counter(fate for _, fate in self._fates())
+
+    @property
+    def refusals(self) -> Counter[str]:
+        """How many proposals were refused for each reason."""
+        ends = (sent["ended"] for sent in self._metrics["interventions"] if sent["accepted_s"] is None)
+        return Counter(end["reason"] for end in ends if end["how"] == "refused")
+
+    @property
+    def triggers(self) -> int:
+        """How often the UAV was called."""
+        return sum(event["kind"] == "trigger" for event in self.run["events"])
+
+    @property
+    def messages(self) -> Mapping[str, Any]:
+        """The numbers of messages, see `interventions.messages`; {} without a UAV that intervenes."""
+        return self._metrics["messages"] or {}
+
+    @property
+    def above_at_start(self) -> Sequence[str]:
+        """UGVs whose decision variable was at the threshold or above from the start."""
+        found: Sequence[str] = self._metrics["above_at_start"]
+        return found
+
+
+def _doing(encounter: Mapping[str, Any]) -> str:
+    """Whose doing an encounter was, as it says, or from what earlier evidence has."""
+    if "doing" in encounter:
+        return str(encounter["doing"])
+    return "nobody" if encounter["appeared"] else "robot" if encounter["own_doing"] else "other"

@@ -1,0 +1,102 @@
+"""The rules of a report's first screen, as tables: what is asked of the claims, and the words of each cell.
+
+No other file of the screen names a claim. A cell takes the first row of its table that applies.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, NamedTuple
+
+from airground_drake.base.statuses import PASSING
+
+if TYPE_CHECKING:
+    from airground_drake.report.facts import RunFacts
+
+DISTANCES, CONDITIONS, OWN_DOING, ARRIVAL = "SAFE-TRACE", "SAFE-HYP", "SAFE-OWN", "LIVE-GOAL"
+"""Claims about a run: its distances, the conditions of the proof, what the robots did themselves, where they ended."""
+PROOFS, PROOF_OF_PLANTS = ("SAFE-INV", "SAFE-GATE"), "SAFE-BUDGET"
+"""Claims that prove the distances of method (d); the other one joins them for bodies off their steered points."""
+DWELL, TRIGGER_GAPS = "ZENO-PROOF", "ZENO-TRACE"
+CROSSINGS, TIMING = "THR-TRIG", "THR-QUALITY"
+"""Claims about triggers: that they follow the decision variable, and how they compare with the error without noise."""
+CHOICE = "THR-CHOICE"
+"""The claim that compares the threshold in force with the Bayes optimum."""
+SUBJECTS = {
+    "SAFE-TRACE": "distances", "SAFE-HYP": "conditions of the proof", "SAFE-OWN": "the robots' own doing",
+    "SAFE-INV": "proof of distances", "SAFE-GATE": "proof of distances", "SAFE-BUDGET": "distance for lag and delay",
+    "LIVE-GOAL": "arrival", "ZENO-TRACE": "gaps between triggers", "ZENO-PROOF": "proof of gaps between triggers",
+    "THR-TRIG": "triggers", "THR-QUALITY": "timing of triggers", "THR-CHOICE": "choice of the threshold",
+    "GATE-PLAN": "plans of the gatekeeper",
+}  # fmt: skip
+"""What a claim is about, in words; a claim that is not here goes by its identifier."""
+CAME_OUT = {
+    "refuted": "failed", "inconclusive": "undecided", "error": "could not be checked", "not_run": "not checked",
+    **dict.fromkeys(PASSING, "passed"),
+}  # fmt: skip
+"""Verdicts that are not those declared, in words."""
+
+
+class Rule(NamedTuple):
+    """A row of a table: when it applies, the mark of its cell, a key of `sentences.MARKS`, and the words."""
+
+    applies: Callable[[RunFacts], object]
+    mark: str
+    words: str
+    kept: bool = True
+
+
+SAFE = (
+    Rule(lambda run: run.collided, "no", "collision", kept=False),
+    Rule(lambda run: run.is_broken, "no", "too close", kept=False),
+    Rule(lambda run: not run.distances_pass, "open", "not known", kept=False),
+    Rule(lambda run: run.untested, "none", "nothing came near: untested"),
+    Rule(lambda run: run.is_proved and run.movers, "yes", "distances kept, proved but for what moves"),
+    Rule(lambda run: run.is_proved, "yes", "distances kept, proved"),
+    Rule(lambda run: True, "yes", "distances kept, not proved"),
+)
+"""Whether a run was safe. Only a run whose distances pass gets as far as the words "kept" and "proved"."""
+
+CAUSES: tuple[tuple[Callable[[RunFacts, str], object], str], ...] = (
+    (lambda run, robot: run.way(robot).get("kept_away"), "{by} is at its target"),
+    (lambda run, robot: robot in run.failed, "the policy failed"),
+    (lambda run, robot: robot in run.lost, "no way found"),
+    (lambda run, robot: run.way(robot).get("left_s") is not None, "{left_s:.2g} s to go"),
+    (lambda run, robot: run.holders(robot), "held by {held_by}"),
+    (lambda run, robot: run.refused_all(robot), "refused all proposals"),
+)
+"""Why a UGV did not arrive."""
+
+RUNS = {
+    "a": "alone", "b": "obeys the UAV", "c": "accepts by cost", "d": "avoidance first, accepts by outcome",
+}  # fmt: skip
+"""What a run is, by its method, if it sets nothing differently."""
+PRINTED = "priorities as the paper prints them"
+"""What a run has in place of the package's composition of priorities."""
+SETTINGS = {
+    ("gatekeeper.route", "mixed_integer"): "(26) solved exactly",
+    ("gatekeeper.route", "relaxed"): "(27) with half-planes",
+    ("gatekeeper.route", "nonlinear"): "(27) by multiple shooting",
+    ("gatekeeper.rule", "hysteresis"): "our hysteresis",
+    ("gatekeeper.rule", "first_stage"): "the first stage applied",
+    ("decision.threshold.rule", "printed"): "threshold by (19) as printed",
+    ("decision.threshold.rule", "bayes"): "threshold at the Bayes optimum",
+}
+"""What a run sets differently, in words."""
+THRESHOLDS = {"fixed": "set by hand", "printed": "by (19) as printed", "bayes": "Bayes optimum"}
+"""Where a threshold comes from, by rule."""
+
+OURS = ("robot", "under way")
+"""Values of an encounter's `doing` that are the robots' own."""
+CLASSES: Mapping[tuple[bool, str], str] = {
+    (False, "refused"): "refused", (False, "lost"): "lost", (True, "given up"): "dropped later",
+}  # fmt: skip
+"""What became of a proposal, by whether it was accepted and how it ended; each is in one class."""
+OPEN: Mapping[bool, str] = {True: "accepted", False: "unanswered"}
+"""The class of the others."""
+OBEYED: Mapping[str, str] = {"accepted": "obeyed", "unanswered": "not begun"}
+"""The classes of a method without answers."""
+
+MATCHES = {"reproduced": "without tuning", "calibrated": "after calibration"}
+REST = {"by_construction": "by construction", "ambiguous": "ambiguous", "not_reproduced": "not"}
+"""Statuses of the comparison with the paper: numbers that match, and the others."""

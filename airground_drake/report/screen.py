@@ -1,0 +1,374 @@
+"""The first screen of a report, cell by cell: one form for every scenario, for the page and the terminal.
+
+Each cell is a mark and short lines; each line is one fact and needs no other line. The tables are in `rules`.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+from airground_drake.base.statuses import PASSING
+from airground_drake.gatekeeper.reasons import refusal
+from airground_drake.report import rules
+from airground_drake.report.facts import RunFacts
+from airground_drake.report.outcomes import Document, Near, claims
+from airground_drake.report.sentences import Line, counted, grouped
+
+MOST_ENDINGS, MOST_NAMES, MOST_WARNINGS = 4, 2, 3
+"""Maximum number of endings of UGVs in a cell, of names in a line, and of lines of what not to conclude."""
+Claims = Sequence[Mapping[str, Any]]
+
+
+class Cell(NamedTuple):
+    """A mark, a key of `sentences.MARKS`, '' for none; and lines."""
+
+    mark: str
+    lines: list[str]
+
+
+class Check(NamedTuple):
+    """An answer to a question about all runs, and the section of the page that has more."""
+
+    question: str
+    mark: str
+    told: str
+    section: str = ""
+
+
+@dataclass
+class Row:
+    """A run, and what came of it.
+
+    Attributes:
+        run: its name.
+        says: what it is, in words.
+        safe, arrived, uav: its cells.
+        facts: None if the scenario names the run, but it was not run.
+        plain: whether priorities are composed as the package does it; the others are only compared.
+        bad_seeds: other seeds with which a distance was not kept.
+        kept: whether every distance was kept.
+        what: how the headline says that it was not.
+    """
+
+    run: str
+    says: str
+    plain: bool
+    safe: Cell = field(default_factory=lambda: Cell("open", ["not run"]))
+    arrived: Cell = field(default_factory=lambda: Cell("open", ["not run"]))
+    uav: Cell = field(default_factory=lambda: Cell("", ["\N{EN DASH}"]))
+    facts: RunFacts | None = None
+    bad_seeds: int = 0
+    kept: bool = False
+    what: str = "not run"
+
+    @property
+    def rank(self) -> tuple[int, bool, int, int]:
+        """The best first: kept, not known, too close, collided; not the robots' doing first; then who arrived."""
+        facts = self.facts
+        order = 0 if self.kept else 3 if facts and facts.collided else 2 if facts and facts.is_broken else 1
+        alien = facts is not None and facts.whose.startswith("not")
+        return order, not alien, self.bad_seeds, -facts.there if facts else 0
+
+    @property
+    def clause(self) -> tuple[str, str]:
+        """Its mark and words in the headline."""
+        if self.facts is None:
+            return "open", self.what
+        there, ugvs = self.facts.there, len(self.facts.ugvs)
+        came = f"{there} of {ugvs} arrive" + " before the run ends" * (self.facts.ends_too_early and there < ugvs)
+        if not self.kept:
+            return self.safe.mark, f"{came}, {self.what}"
+        if self.bad_seeds:
+            return "no", f"{came}, distances kept here, but not with every seed"
+        return self.arrived.mark if there < ugvs else "yes", f"{came}, every distance kept"
+
+
+class FirstScreen(NamedTuple):
+    """What the first screen shows.
+
+    Attributes:
+        headline: one or two lines with the marks of their own runs.
+        rows: a row per run.
+        within: how far from its target a robot counts as arrived, in words.
+        checks: seeds, triggers, threshold, and the paper.
+        beware: what a reader might wrongly conclude: clauses that continue "Do not conclude that".
+        declared: whether the verdicts are those that the scenario declares: nothing about safety.
+    """
+
+    headline: list[Line]
+    rows: list[Row]
+    within: str
+    checks: list[Check]
+    beware: list[str]
+    declared: Cell
+
+
+def first_screen(document: Document) -> FirstScreen:
+    """The first screen of a report, from report.json."""
+    rows, resolved = _rows(document), document["scenario"]["resolved"]
+    checks = [*_seeds(document), *_zeno(document), *_threshold(document, rows), *_paper(document)]
+    within = f"within {resolved['arrival_tolerance_m']:g} m"
+    return FirstScreen(_headline(rows), rows, within, checks, _beware(document, rows), declared(document))
+
+
+def headline(document: Document) -> list[Line]:
+    """One or two lines: what came of the best runs, and of the worst of the others."""
+    return _headline(_rows(document))
+
+
+def _headline(rows: Sequence[Row]) -> list[Line]:
+    main = sorted([row for row in rows if row.plain] or rows, key=lambda row: row.rank)
+    if not main:
+        return [Line("open", "Nothing was run.")]
+    collided = [row for row in rows if not row.plain and row.facts and row.facts.collided]
+    rest = sorted((row for row in [*main, *collided] if row.clause != main[0].clause), key=lambda row: row.rank)
+    told = []
+    for row, among in ((main[0], main), *[(rest[-1], rest) for _ in rest[:1]]):
+        mark, says = row.clause
+        alike = [each for each in among if each.clause == row.clause]
+        told.append(Line(mark, f"{_who(alike)} ({', '.join(each.run for each in alike)}): {says}."))
+    return told
+
+
+def _who(alike: Sequence[Row]) -> str:
+    helped = {row.facts.is_helped for row in alike if row.facts}
+    return "With or without the UAV" if len(helped) != 1 else "With the UAV" if True in helped else "Without the UAV"
+
+
+def _rows(document: Document) -> list[Row]:
+    found = []
+    for name, spec in document["scenario"]["resolved"]["runs"].items():
+        row = Row(name, _says(spec), spec["composition"] == "augmented")
+        if name in document["runs"]:
+            row.facts = run = RunFacts(document, name)
+            rule = next(rule for rule in rules.SAFE if rule.applies(run))
+            row.kept, row.what = rule.kept, _what(run)
+            row.safe, row.arrived, row.uav = _safe(run, rule), _arrived(run), _uav(run)
+            row.bad_seeds = sum(each["run"] == name and not each["kept"] for each in document["seeds"])
+        found.append(row)
+    return found
+
+
+def _says(spec: Mapping[str, Any]) -> str:
+    """What a run is: its method, or the method's identifier and what the run sets differently."""
+    says = [
+        rules.SETTINGS.get((key, str(value)), f"{key.split('.')[-1]} {value}")
+        for key, value in (spec["set"] or {}).items()
+    ]
+    says += [rules.PRINTED] * (spec["composition"] != "augmented")
+    method = str(spec["method"])
+    return f"({method}) with {', '.join(says)}" if says else rules.RUNS.get(method, method)
+
+
+def _safe(run: RunFacts, rule: rules.Rule) -> Cell:
+    judged = run.claim(rules.DISTANCES)
+    faster = [f"{each} was faster than declared" for each in run.faster]
+    if rule.kept:
+        near = [each.line for each in run.approaches() if not each.is_short]
+        return Cell(rule.mark, [rule.words, *(near[:MOST_NAMES] or ["nobody else is there"]), *faster])
+    if rule.mark == "open":
+        return Cell(rule.mark, [rule.words, f"the check: {(judged['status'] or 'not made').replace('_', ' ')}"])
+    as_declared = " (as declared)" * (judged["status"] == "refuted" and judged["as_expected"] is True)
+    lines = [rule.words + as_declared, *(breach.told for breach in run.breaches[:1])]
+    lines += [counted(len(run.breaches) - 1, "more collision")] * (run.collided and len(run.breaches) > 1)
+    lines += [f"{counted(run.others_too_close, 'more pair')} too close"] * (run.others_too_close > 0)
+    lines += [run.whose] * bool(run.whose) + faster
+    lines += [f"{each} is not on the UAV's map" for each in run.unmapped[:MOST_NAMES]]
+    return Cell(rule.mark, lines + ["contradicts its proof: please report"] * run.contradicts_its_proof)
+
+
+def _what(run: RunFacts) -> str:
+    """How a run was not safe, in a few words for the headline."""
+    few, many = ("collide", "collisions") if run.collided else ("too close", "pairs too close")
+    if not (run.collided or run.is_broken):
+        return "safety not known"
+    told = f"{len(run.breaches) or 'some'} {many}"
+    if len(run.breaches) == 1:
+        told = f"{run.breaches[0].first} and {run.breaches[0].second} {few}"
+    return told + f" ({run.whose})" * bool(run.whose)
+
+
+def _arrived(run: RunFacts) -> Cell:
+    count = f"{run.there} of {len(run.ugvs)}"
+    away = [ugv for ugv in run.ugvs if ugv not in run.home]
+    if not away:
+        last = max((run.arrived_s.get(ugv, 0.0) for ugv in run.ugvs), default=0.0)
+        uav = ["the UAV did not"] * (run.uav not in run.home)
+        return Cell("partly" if uav else "yes", [f"{count}, by {last:.1f} s", *uav])
+    goal = run.claim(rules.ARRIVAL)
+    as_declared = " (as declared)" * (goal["as_expected"] is True)
+    ends = [*grouped((run.ending(ugv), ugv) for ugv in away).items()]
+    told = [f"{_named(who)} {how}" for how, who in ends]
+    rest = sum(len(who) for _, who in ends[MOST_ENDINGS:])
+    more = [counted(rest, "more UGV")] * (rest > 0)
+    return Cell(
+        "partly" if run.there or run.ends_too_early else "no", [count + as_declared, *told[:MOST_ENDINGS], *more]
+    )
+
+
+def _named(names: Sequence[str]) -> str:
+    """Some names, and how many more."""
+    more = f" and {len(names) - MOST_NAMES} more" * (len(names) > MOST_NAMES)
+    return ", ".join(names[:MOST_NAMES]) + more
+
+
+def _uav(run: RunFacts) -> Cell:
+    if not run.is_helped:
+        return Cell("", ["\N{EN DASH}"])
+    sent = run.fates.total()
+    lines = [f"{sent} sent: {', '.join(f'{count} {fate}' for fate, count in sorted(run.fates.items()))}"]
+    if not sent:
+        lines = [f"called {counted(run.triggers, 'time')}, sent none" if run.triggers else "never called"]
+    if run.refusals:
+        (reason, _), *others = run.refusals.most_common()
+        lines.append(f"{'mostly' if others else 'why'} refused: {refusal(reason)}")
+    if failed := len(run.run["faults"]):
+        lines.append(f"policy failed {counted(failed, 'time')}")
+    took = sum(run.messages.get(kind, 0) for kind in ("proposals", "withdrawals", "answers"))
+    if took:
+        lines.append(f"{counted(took, 'message')} (always-on {sum(run.messages['always_on'].values())})")
+    return Cell("", lines)
+
+
+def _seeds(document: Document) -> Iterator[Check]:
+    resolved, of_runs = document["scenario"]["resolved"], grouped((each["run"], each) for each in document["seeds"])
+    noise = [run["set"].get("decision.noise_m_sqrt_s", resolved["decision"]["noise_m_sqrt_s"])
+             for run in resolved["runs"].values()]  # fmt: skip
+    told = grouped(
+        ((sum(each["kept"] for each in those), sum(each["home"] for each in those), len(those)), run)
+        for run, those in of_runs.items()
+    )
+    for (kept, home, count), names in told.items():
+        mark = "no" if kept < count else "partly" if home < count else "yes"
+        says = f"{', '.join(names)}: distances kept in {kept} of {count}, all home in {home}"
+        yield Check("Other seeds?", mark, says)
+        if kept < count:
+            worst = min(
+                (each for name in names for each in of_runs[name]),
+                key=lambda each: float(each["min_distance_m"] - each["safe_distance_m"]),
+            )
+            yield Check(
+                "Other seeds?", "", f"the worst: {Near.of(worst).line}, run {worst['run']}, seed {worst['seed']}"
+            )
+    if of_runs and not any(each > 0.0 for each in noise):
+        yield Check("Other seeds?", "none", "without decision noise a seed changes nothing")
+
+
+def _zeno(document: Document) -> Iterator[Check]:
+    """A line for each bound on the gaps between triggers, with the runs that have it."""
+    own = {each["run"] for each in claims(document, rules.DWELL)}
+    told = grouped(
+        ((each["status"], each["inputs"].get("dwell_s", 0.0)), name)
+        for each in claims(document, rules.DWELL)
+        for name in ([each["run"]] if each["run"] else [name for name in document["runs"] if name not in own])
+    )
+    for (status, dwell_s), names in told.items():
+        traces = [each for each in claims(document, rules.TRIGGER_GAPS) if each["run"] in names]
+        gaps = [each["evidence"]["smallest_gap"]["gap_s"] for each in traces if "smallest_gap" in each["evidence"]]
+        short = dwell_s < document["scenario"]["resolved"]["control"]["period_s"]
+        says, mark = f"at least {dwell_s:g} s between two triggers, proved", "partly" if short else "yes"
+        says += ": less than a control period" * short
+        if status != "proved":
+            says, mark = "no least time between two triggers is proved", "no" if status == "refuted" else "open"
+        if bad := [each["run"] for each in traces if each["status"] == "refuted"]:
+            says, mark = f"two triggers too close in {', '.join(bad)}", "no"
+        seen = f"; {min(gaps):.3g} s seen" if gaps else ""
+        seen = seen or "; no robot triggered twice" * (_verdict(traces) == "yes")
+        yield Check("Zeno-free?", mark, f"{', '.join(names)}: " * (len(told) > 1) + says + seen, "claims")
+    if not told:
+        yield Check("Zeno-free?", "open", "not checked", "claims")
+
+
+def _threshold(document: Document, rows: Sequence[Row]) -> Iterator[Check]:
+    """A line for each threshold: what came of the triggers of its runs. Its choice has a section of its own."""
+    resolved = document["scenario"]["resolved"]
+    ours = resolved["decision"]["threshold"]["rule"]
+    of = grouped(
+        ((run.run["zeta_m"], resolved["runs"][run.name]["set"].get("decision.threshold.rule", ours)), run)
+        for run in (row.facts for row in rows)
+        if run
+    )
+    for (zeta, rule), runs in of.items():
+        exact, timing = ([run.claim(each) for run in runs] for each in (rules.CROSSINGS, rules.TIMING))
+        found = [each["evidence"] for each in timing if "counts" in each["evidence"]]
+        mark, fired = _verdict([*exact, *timing]), sum(run.triggers for run in runs)
+        says = [f"{counted(fired, 'trigger')} at {zeta:.3g} m ({rules.THRESHOLDS.get(rule, rule)})"]
+        if not fired:
+            most = [ugv["largest_decision_variable_m"] for each in exact for ugv in each["evidence"].get("ugvs", ())]
+            says += [f"{value:.3g} m reached" for value in sorted(most)[-1:]]
+            mark = "none" if mark == "yes" else mark
+        says += [f"{sum(each['counts'][kind] for each in found)} {kind}" for kind in ("false", "missed") if found]
+        off_s = [abs(each[kind]["late_s"]) for each in found for kind in ("latest", "earliest") if each[kind]]
+        says += [f"at most {max(off_s, default=0.0):.2f} s off"] * bool(found and fired)
+        above = list(dict.fromkeys(ugv for run in runs for ugv in run.above_at_start))
+        says += [f"{_named(above)} above it from the start"] * bool(above)
+        wrong = [run.name for run, each in zip(runs, exact, strict=True) if each["status"] == "refuted"]
+        says += [f"{', '.join(wrong)}: not when the decision variable says"] * bool(wrong)
+        says += ["not known whether all are in time"] * (mark == "open")
+        yield Check("Threshold correct?", mark, ", ".join(says), "intervened")
+
+
+def _verdict(those: Iterable[Mapping[str, Any]]) -> str:
+    """The mark of some claims together."""
+    statuses = {each["status"] for each in those}
+    return "no" if "refuted" in statuses else "yes" if statuses and statuses <= {*PASSING} else "open"
+
+
+def _paper(document: Document) -> Iterator[Check]:
+    count = Counter(row["status"] for row in document["reproduction"])
+    match = sum(count[status] for status in rules.MATCHES)
+    told = [f"{count[status]} {says}" for status, says in {**rules.MATCHES, **rules.REST}.items() if count[status]]
+    if not count:
+        yield Check("Paper reproduced?", "none", "not a scenario of the paper")
+        return
+    mark = "yes" if count["reproduced"] == count.total() else "partly" if match else "no"
+    says = f"{match} of {count.total()} numbers match: {', '.join(told)}"
+    yield Check("Paper reproduced?", mark, says, "reproduction")
+
+
+def _beware(document: Document, rows: Sequence[Row]) -> list[str]:
+    """At most `MOST_WARNINGS` clauses, of which the last one always applies."""
+    ran = [(row, row.facts) for row in rows if row.facts]
+    movers = list(dict.fromkeys(name for _, run in ran for name in run.movers))
+    seen = [row.run for row, run in ran if row.plain and row.kept and not run.is_proved]
+    helped = [run for _, run in ran if run.is_helped]
+    warnings = {
+        "what is not known is fine: it was not checked": any(row.safe.mark == "open" for row in rows),
+        "the UAV helps: it was never called": bool(helped) and not any(run.triggers for run in helped),
+        f"robots can keep away from {_named(movers)}: what moves comes as near as it likes": bool(movers),
+        f"distances are kept elsewhere, too ({', '.join(seen)}): this is not proved": bool(seen),
+    }
+    told = [says for says, applies in warnings.items() if applies]
+    return [*told[: MOST_WARNINGS - 1], _real(document)]
+
+
+def _real(document: Document) -> str:
+    """That real robots and other starts may differ; with what a user's plant showed of what it declares."""
+    own = [each for claim in claims(document, rules.CONDITIONS) for each in claim["evidence"].get("own_plants", ())]
+    if not own:
+        return "other starts or real robots end so, too: arrival is only seen, and sensing is perfect here"
+    most = max(own, key=lambda each: float(each["cover_m"]))
+    return (
+        "other starts or real robots end so, too: {robot} showed {drift_m_s:.2g} of {declared_drift_m_s:.3g} m/s drift "
+        "and {cover_m:.3g} of {declared_cover_m:.3g} m cover here"
+    ).format_map(most)
+
+
+def declared(document: Document) -> Cell:
+    """Whether the verdicts are those that the scenario declares: a statement about the scenario, not about safety."""
+    overall, every = document["overall"], document["claims"]
+    refuted = sum(each["status"] == "refuted" and each["as_expected"] is True for each in every)
+    told = [f"{overall['as_expected']} of {counted(overall['checks'], 'check')} came out as the scenario declares"]
+    told[0] += f" (failures among them: {refuted})" * bool(refuted)
+    wrong = [*overall["differs"], *overall["undecided"], *overall["missing"]]
+    names = [f"{each['run'] or 'model'}: {rules.SUBJECTS.get(each['id'], each['id']) or 'run'} "
+             f"{rules.CAME_OUT.get(each.get('status', 'not_run'), each.get('status'))}" for each in wrong]  # fmt: skip
+    names += [f"finding {number} about the paper not demonstrated" for number in overall["undemonstrated"]]
+    told += [f"{', '.join(names[:3])}{f' and {len(names) - 3} more' * (len(names) > 3)}"] * bool(names)
+    more = len(overall["unpromised"])
+    told += [f"about {counted(more, 'more check')} nothing is promised"] * (more > 0)
+    mark = {"as_expected": "yes", "not_as_expected": "no"}.get(overall["status"], "open")
+    return Cell(mark, told)
