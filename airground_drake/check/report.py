@@ -28,7 +28,7 @@ DECIDED: Mapping[str, Callable[[Run], Found | None]] = {
 }
 """The claims that the checker decides by its own formulas, on every run."""
 
-SCHEMA = "airground_drake.report/3"
+SCHEMA = "airground_drake.report/4"
 SHAPE: Mapping[str, type] = {
     **dict.fromkeys(("scenario", "provenance", "overall", "runs", "files"), dict),
     **dict.fromkeys(("claims", "audit", "choices", "seeds"), list),

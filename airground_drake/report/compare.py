@@ -20,7 +20,7 @@ from airground_drake.base.statuses import UNDECIDED, outcome
 from airground_drake.report.folder import PAGES
 
 SCHEMA = "airground_drake.comparison/1"
-REPORT = "airground_drake.report/3"
+REPORT = "airground_drake.report/4"
 
 ORDER = (("proved",), ("holds", "supported"), ("not_exercised",), (*UNDECIDED, "gone"), ("refuted",))
 """Verdicts from the best to the worst, as `statuses.outcome` names them; `gone`: no verdict any more."""

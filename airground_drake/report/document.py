@@ -22,7 +22,7 @@ from airground_drake.scenarios.plugins import OPTION
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.verify.claim import Verdict
 
-SCHEMA = "airground_drake.report/3"
+SCHEMA = "airground_drake.report/4"
 
 MOST_LISTED = 4
 """Maximum number of checks that a sentence names."""

@@ -9,6 +9,7 @@ import numpy as np
 
 from airground_drake.base.arrays import Array
 from airground_drake.base.errors import TraceError
+from airground_drake.gatekeeper.reasons import OVER
 from airground_drake.registry import method_of
 from airground_drake.run.trace import Trace
 from airground_drake.verify.claim import TIME_TOLERANCE_S
@@ -27,9 +28,13 @@ def interventions(trace: Trace) -> list[dict[str, Any]]:
 
     Returns:
         `number`, `robot`, `policy`, `cause` (the UGV whose trigger it was sent for), `sent_s`, `accepted_s` (None: it
-        was never accepted), `begun_s` and `ended_s` (when the UGV began and ceased to execute it; None: never, or not
-        before the end), `why` (it ended, or was never executed) and `tries` (how many the UGV had used; None if it does
-        not count them). [] if the proposals are malformed, which claims report.
+        was never accepted), `begun_s` (when the UGV began to execute it; None: never), `ended` and `tries` (how many
+        the UGV had used; None if it does not count them). [] if the proposals are malformed, which claims report.
+
+        `ended` has `t_s`, `how` and `reason`, that of the UGV's gatekeeper if it refused ('' if not). `how` is, if the
+        UGV executed it, `over` (its motion was), `given up` (the UGV refused it after all), `replaced`, `withdrawn`,
+        `released` (nobody was intervened on any more) or `end of the run`; else `refused`, `lost` (never delivered),
+        `withdrawn first` or `end of the run`.
     """
     try:
         sent = proposals_of(trace)
@@ -57,34 +62,48 @@ def _became(trace: Trace, sent: ProposalRecord, numbers: Array, answers: Any) ->
         "sent_s": sent.issued_s,
         "accepted_s": accepted_s if method_of(trace.meta["method"]).gated else begun_s,
         "begun_s": begun_s,
-        "ended_s": ended_s,
-        "why": _refused(answers, ended_s, begun=begun_s is not None) or _withdrawn(trace, sent, begun_s, ended_s),
+        "ended": _unexecuted(trace, sent, answers) if begun_s is None else _executed(trace, sent, answers, ended_s),
         "tries": tries if tries >= 0 else None,
     }
 
 
-def _refused(answers: Any, ended_s: float | None, *, begun: bool) -> str:
-    """Why a UGV refused a proposal, or gave it back when it ceased to execute it; '' if it did not."""
-    if answers is None or (begun and ended_s is None):
-        return ""
-    refused = answers[answers["decision"] == "refuse"]
-    if begun:
-        refused = refused[(refused["t_s"] - ended_s).abs() <= TIME_TOLERANCE_S]
-    return str(refused["reason"].iloc[0]) if len(refused) else ""
+def _end(how: str, t_s: float, reason: str = "") -> dict[str, Any]:
+    return {"how": how, "t_s": t_s, "reason": reason}
 
 
-def _withdrawn(trace: Trace, sent: ProposalRecord, begun_s: float | None, ended_s: float | None) -> str:
-    """Why a UGV did not execute a proposal, or ceased to, that it did not refuse."""
+def _unexecuted(trace: Trace, sent: ProposalRecord, answers: Any) -> dict[str, Any]:
+    """How a proposal ended that was never executed."""
+    refused = None if answers is None else answers[answers["decision"] == "refuse"]
+    if refused is not None and len(refused):
+        return _end("refused", float(refused["t_s"].iloc[0]), str(refused["reason"].iloc[0]))
+    about = trace.messages[trace.messages["about"] == sent.number]
+    if len(about) and about.loc[about["kind"] == "proposal", "received_s"].isna().all():
+        return _end("lost", sent.issued_s)
+    withdrawn = about.loc[about["kind"] == "withdrawal", "sent_s"]
+    return (
+        _end("withdrawn first", float(withdrawn.min()))
+        if len(withdrawn)
+        else _end("end of the run", float(trace.t[-1]))
+    )
+
+
+def _executed(trace: Trace, sent: ProposalRecord, answers: Any, ended_s: float | None) -> dict[str, Any]:
+    """How a proposal ended that was executed up to a time, s; None: to the end of the run."""
     if ended_s is None:
-        return "not executed" if begun_s is None else "end of the run"
+        return _end("end of the run", float(trace.t[-1]))
+    if answers is not None:
+        refused = answers[(answers["decision"] == "refuse") & ((answers["t_s"] - ended_s).abs() <= TIME_TOLERANCE_S)]
+        reasons = [str(reason) for reason in refused["reason"]]
+        if reasons:
+            return _end("over" if reasons[0] == OVER else "given up", ended_s, reasons[0])
     if ended_s >= sent.times_s[-1] - TIME_TOLERANCE_S:
-        return "over"
+        return _end("over", ended_s)
     later = (one.issued_s for one in proposals_of(trace) if one.ugv == sent.ugv and one.issued_s > sent.issued_s)
     if any(issued_s <= ended_s + TIME_TOLERANCE_S for issued_s in later):
-        return "replaced"
+        return _end("replaced", ended_s)
     row = row_at(trace, ended_s)
     called = any(trace.column(f"{name}.mode")[row] == 1.0 for name in (sent.ugv, sent.cause))
-    return "withdrawn" if called else "released"
+    return _end("withdrawn" if called else "released", ended_s)
 
 
 def messages(trace: Trace) -> dict[str, Any] | None:

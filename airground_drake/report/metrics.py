@@ -11,6 +11,7 @@ import numpy as np
 from airground_drake.base.arrays import Array
 from airground_drake.registry import method_of
 from airground_drake.report.interventions import avoidance, farthest_from_prediction, interventions, messages
+from airground_drake.report.stalls import stalls
 from airground_drake.run.collisions import first_collisions
 from airground_drake.run.trace import Trace
 from airground_drake.scenarios.schema import MAP
@@ -22,6 +23,7 @@ from airground_drake.verify.runs.live_goal import AT_REST_M, AT_REST_S, moved_at
 from airground_drake.verify.runs.pairs import (
     DISTANCE_TOLERANCE_M,
     Gap,
+    Pair,
     apart_of,
     at_appearance,
     gap_over_time,
@@ -63,7 +65,9 @@ def of_run(trace: Trace) -> dict[str, Any]:
         `min_distance_m` (robot -> obstacle -> value, t_s, safe_distance_m; gaps between surfaces, exact in continuous
         time; at most `MOST_OBSTACLES`, those of least margin), `min_robot_distance_m` (the same for the other robot of
         least margin), `final_position_m`, `duration_s`, `wall_s` and `realtime_factor` (None if not measured),
-        `event_counts` (robot -> kind -> count), `gatekeeper` (see `gatekeeper`), `on_the_way` (see `on_the_way`),
+        `came_near` (see `came_near`), `event_counts` (robot -> kind -> count), `gatekeeper` (see `gatekeeper`),
+        `on_the_way` (see `on_the_way`), `stalls` (see `report.stalls`), `above_at_start` (UGVs whose decision variable
+        is at the threshold or above when the run begins),
         `interventions`, `messages` and `avoidance` (see `report.interventions`), `without_proposals` (UGVs that were
         intervened on for long enough and got no proposal), `lost_at_the_end` (UGVs for which the UAV found no way when
         it last looked for one), `no_way_reasons` (why, where the policy says so) and `without_decisions` (those that
@@ -79,6 +83,7 @@ def of_run(trace: Trace) -> dict[str, Any]:
         "min_robot_distance_m": {
             robot: _listed(trace, _least(trace, robot, _others(trace, robot), NEAR_ROBOTS)) for robot in trace.robots
         },
+        "came_near": came_near(trace),
         "final_position_m": {robot: trace.position(robot)[-1].tolist() for robot in trace.robots},
         "duration_s": duration_s,
         "wall_s": wall_s,
@@ -86,6 +91,10 @@ def of_run(trace: Trace) -> dict[str, Any]:
         "event_counts": {robot: dict(sorted(count.items())) for robot, count in counts.items()},
         "gatekeeper": gatekeeper(trace),
         "on_the_way": on_the_way(trace),
+        "stalls": stalls(trace),
+        "above_at_start": [
+            ugv for ugv in trace.ugvs if trace.column(f"{ugv}.decision_variable_m")[0] >= trace.meta["zeta_m"]
+        ],
         "interventions": interventions(trace),
         "messages": messages(trace),
         "avoidance": avoidance(trace),
@@ -94,6 +103,52 @@ def of_run(trace: Trace) -> dict[str, Any]:
         "no_way_reasons": reasons(trace) if method.intervenes else {},
         "without_decisions": without_decisions(trace) if method.gated else [],
     }
+
+
+def came_near(trace: Trace) -> list[dict[str, Any]]:
+    """The pair of least margin among those that came nearer than they were when both were first there.
+
+    Returns:
+        At most two entries: of all pairs; and of those of an obstacle that may move, if that is another pair. `first`,
+        `second`, `value` (the gap, m), `safe_distance_m`, `t_s`, and `at_m` and `moves` as in `min_distance_m`.
+    """
+    pairs, bounds = pairs_of(trace), apart_of(trace) - [pair.safe_m for pair in pairs_of(trace)]
+    order = np.argsort(bounds, kind="stable").tolist()
+    moving = [k for k in order if kind_of(trace.scenario, pairs[k].first, pairs[k].second) == MOVING]
+    found = dict[tuple[str, str], dict[str, Any]]()
+    for among in (order, moving):
+        least: Gap | None = None
+        for k in among:
+            if least is not None and bounds[k] >= least.margin_m:
+                break
+            approach = _approach(trace, pairs[k])
+            if approach is not None and (least is None or approach.margin_m < least.margin_m):
+                least = approach
+        if least is not None:
+            first, second = least.pair.first, least.pair.second
+            about = {"first": first, "second": second}
+            found.setdefault((first, second), about | _listed(trace, {second: least})[second])
+    return [*found.values()]
+
+
+APPROACH_M = 1e-3
+"""A pair comes nearer if its gap shrinks by more than this, m."""
+
+
+def _approach(trace: Trace, pair: Pair) -> Gap | None:
+    """Where a pair was nearest after it had been farther apart; None if it never came nearer.
+
+    Where the gap is smallest when both are first there, a later approach is taken at the rows.
+    """
+    least, gaps = least_gap(trace, pair), gap_over_time(trace, pair)[pair.rows]
+    if least.t_s > trace.t[pair.row] and least.gap_m < gaps[0] - APPROACH_M:
+        return least
+    nearer = np.flatnonzero(gaps < np.maximum.accumulate(gaps) - APPROACH_M)
+    if not len(nearer):
+        return None
+    row = int(nearer[np.argmin(gaps[nearer])])
+    gap_m = float(gaps[row])
+    return Gap(pair, gap_m, gap_m - pair.required_m, float(trace.t[pair.row + row]), pair.row + row)
 
 
 CREEPING = 0.1

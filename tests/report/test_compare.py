@@ -140,7 +140,7 @@ def test_margins_have_their_relative_change_unless_it_is_too_large_for_a_number(
 @pytest.mark.parametrize(
     "text",
     [b"", b"[]", b"{}", b"[" * 10**5, b'{"schema": "airground_drake.report/1"}',
-     b'{"schema": "airground_drake.report/3", "claims": 3}'],
+     b'{"schema": "airground_drake.report/4", "claims": 3}'],
 )  # fmt: skip
 def test_what_is_no_report_is_one_line_and_exit_code_2(
     text: bytes, before: Json, tmp_path: Path, capsys: pytest.CaptureFixture[str]

@@ -21,7 +21,7 @@ from airground_drake.verify.finding import Finding
 
 def test_minimum_of_the_schema_in_strict_json(scenario: Scenario, traces: dict[str, Trace]) -> None:
     report = json.loads(json.dumps(built(scenario, traces, FINE), allow_nan=False))
-    assert report["schema"] == "airground_drake.report/3"
+    assert report["schema"] == "airground_drake.report/4"
     run = report["runs"]["c"]
     for found, keys in (
         (report["scenario"], "name sha256 resolved"),

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 
-import numpy as np
 import pandas as pd
 import pytest
 from builders.runs import run_of
@@ -24,12 +23,11 @@ Run = Callable[[str, str], Trace]
 def test_what_became_of_a_proposal(run: Run) -> None:
     (found,) = interventions(run("case_a", "d"))
     release_s = next(event["t_s"] for event in run("case_a", "d").events if event["kind"] == "release")
-    assert found | {"ended_s": 0.0} == {
+    assert found == {
         "number": 0, "robot": "ugv1", "policy": "detour", "cause": "ugv1", "sent_s": pytest.approx(14.5),
-        "accepted_s": pytest.approx(14.55), "begun_s": pytest.approx(14.55), "ended_s": 0.0, "why": "released",
-        "tries": 1,
+        "accepted_s": pytest.approx(14.55), "begun_s": pytest.approx(14.55),
+        "ended": {"how": "released", "t_s": pytest.approx(release_s, abs=0.05), "reason": ""}, "tries": 1,
     }  # fmt: skip
-    assert 0.0 <= found["ended_s"] - release_s <= 0.05
     (obeyed,) = interventions(run("case_a", "b"))
     assert (obeyed["accepted_s"], obeyed["tries"]) == (pytest.approx(14.5), None)
 
@@ -37,16 +35,31 @@ def test_what_became_of_a_proposal(run: Run) -> None:
 def test_why_proposals_end() -> None:
     trace = simulate(load("case_b", PATIENCE), "d")
     found = interventions(trace)
-    assert {"over", "exhausted", "stalls"} <= {each["why"] for each in found}
-    for each in found:
-        began = each["begun_s"] is not None
-        assert began == (each["why"] in ("over", "released", "end of the run"))
-        assert not began or each["accepted_s"] == each["begun_s"] < (each["ended_s"] or np.inf)
+    ends = [each["ended"] for each in found]
+    assert {"over", "refused"} <= {end["how"] for end in ends}
+    assert {"exhausted", "stalls"} <= {end["reason"] for end in ends if end["how"] == "refused"}
+    for each, end in zip(found, ends, strict=True):
+        assert (each["begun_s"] is not None) == (end["how"] in ("over", "released", "end of the run"))
+        assert each["begun_s"] is None or each["accepted_s"] == each["begun_s"] < end["t_s"]
 
 
 def test_a_refusal_that_is_reversed_at_once_ends_a_proposal_all_the_same(run: Run) -> None:
-    found = interventions(run("case_b", "c_literal"))[-1]
-    assert (found["why"], found["ended_s"]) == ("first_stage", pytest.approx(14.1))
+    end = interventions(run("case_b", "c_literal"))[-1]["ended"]
+    assert end == {"how": "given up", "t_s": pytest.approx(14.1), "reason": "first_stage"}
+
+
+def test_why_a_proposal_was_not_answered(run: Run) -> None:
+    """It was withdrawn before an answer, never delivered, or still open at the end: these are different things."""
+    trace = run("case_a", "d")
+    trace = replace(trace, decisions=trace.decisions.iloc[:0], samples=trace.samples.assign(**{"ugv1.executing": -1}))
+    table = trace.messages
+    (first,) = interventions(trace)
+    assert (first["ended"]["how"], first["accepted_s"]) == ("withdrawn first", None)
+    (still,) = interventions(replace(trace, messages=table[table["kind"] != "withdrawal"]))
+    assert still["ended"] == {"how": "end of the run", "t_s": 30.0, "reason": ""}
+    missed = table.assign(received_s=table["received_s"].where(table["kind"] != "proposal"))
+    (lost,) = interventions(replace(trace, messages=missed))
+    assert (lost["ended"]["how"], lost["ended"]["t_s"]) == ("lost", lost["sent_s"])
 
 
 def test_parts_of_joint_plans_are_sent_for_another_ugv(run: Run) -> None:

@@ -46,7 +46,7 @@ def test_the_files_are_copied_and_belong_to_the_report(scenario: Scenario, tmp_p
     for name in NAMES:
         assert (tmp_path / name).read_bytes() == (MAPS / Path(name).name).read_bytes()
     (tmp_path / "map" / "mine.txt").touch()
-    (tmp_path / "report.json").write_text('{"schema": "airground_drake.report/3"}')
+    (tmp_path / "report.json").write_text('{"schema": "airground_drake.report/4"}')
     folder.prepare(tmp_path)  # a report may be written over it
     folder.clear(tmp_path)
     assert [path.name for path in tmp_path.rglob("*") if path.is_file()] == ["mine.txt"]

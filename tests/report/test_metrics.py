@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from itertools import combinations
 
 import numpy as np
 import pytest
@@ -90,3 +91,49 @@ def test_how_far_a_ugv_has_come_and_how_long_it_would_need(
     assert (found["stands"], found["left_m"]) == (stands, pytest.approx(left_m))
     assert found["left_s"] == (None if left_s is None else pytest.approx(left_s))
     assert found["creeps"] == (0.0 < speed < 0.1)
+
+
+def test_stalls_name_the_bodies_that_hold_and_no_others(run: Callable[[str, str], Trace]) -> None:
+    """In case A ugv1 stands between two discs until the UAV helps, or to the end; a third disc is placed alongside."""
+    (alone,), (helped,) = (metrics.of_run(run("case_a", name))["stalls"] for name in ("a", "d"))
+    for stall in (alone, helped):
+        assert (stall["robot"], {*stall["held_by"]}) == ("ugv1", {"obstacle_1", "obstacle_2"})
+        assert stall["position_m"][:2] == pytest.approx([3.37, 5.10], abs=0.01)
+    assert (alone["until_s"], helped["until_s"]) == (30.0, pytest.approx(14.5, abs=0.15))
+    assert alone["from_s"] == helped["from_s"] == pytest.approx(9.3, abs=0.5)
+
+
+def test_who_waits_as_its_proposal_asks_is_held_by_nobody(run: Callable[[str, str], Trace]) -> None:
+    trace = run("case_a", "a")
+    sent = run("case_a", "d").proposals.iloc[:1].copy()
+    sent["positions_m"] = [np.tile(trace.position("ugv1")[-1], 2)]
+    sent["times_s"] = [np.array([14.5, 30.0])]
+    events = [*trace.events, {"t_s": 14.5, "robot": "ugv1", "kind": "proposal", "policy": "detour"}]
+    waits = replace(
+        trace, proposals=sent, meta=trace.meta | {"events": events},
+        samples=trace.samples.assign(**{"ugv1.executing": np.where(trace.samples["t_s"] > 14.5, 0, -1)}),
+    )  # fmt: skip
+    (stall,) = metrics.of_run(waits)["stalls"]
+    assert stall["held_by"] == []
+
+
+@pytest.mark.parametrize("turns", [(9.0, 7.0), (3.0, 0.5), (12.0, -4.0)])
+def test_the_nearest_approach_is_that_of_all_pairs_after_they_had_been_farther_apart(turns: tuple[float, ...]) -> None:
+    corners = [(0.0, 0.0, 0.5), (10.0, turns[0], 0.5), (20.0, turns[1], 7.0), (30.0, 9.0, 13.0)]
+    trace = make_trace(make_scenario(), "a", corners)
+    least = (np.inf, 0.0)
+    for first, second in combinations([*trace.robots, *trace.scenario.obstacles], 2):
+        if first in trace.robots:
+            gap = metrics.gap_m(trace, first, second)
+            nearer = [k for k in range(len(gap)) if gap[k] < gap[: k + 1].max() - 1e-3]
+            required = 1.0 if "uav" in (first, second) and second in trace.robots else 2.0
+            least = min([least, *((gap[k] - required, trace.t[k]) for k in nearer)])
+    found = metrics.came_near(trace)[0]
+    assert found["value"] - found["safe_distance_m"] == pytest.approx(least[0], abs=0.02)
+    assert found["t_s"] == pytest.approx(least[1], abs=0.2)
+
+
+def test_a_decision_variable_that_begins_above_the_threshold() -> None:
+    assert metrics.of_run(make_trace(make_scenario(), "a"))["above_at_start"] == []
+    above = make_trace(make_scenario(), "a", [(0, 9.3, 0.5), (30, 3.3, 13.0)])
+    assert metrics.of_run(above)["above_at_start"] == ["ugv1"]

@@ -1,0 +1,95 @@
+"""Where UGVs stood in a run short of their targets, and which bodies held them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pandas as pd
+from scipy.optimize import nnls
+
+from airground_drake.base.arrays import Array
+from airground_drake.base.errors import TraceError
+from airground_drake.run.trace import Trace
+from airground_drake.verify.engines.geometry import interpolate
+from airground_drake.verify.runs.control_law import inequalities_of
+from airground_drake.verify.runs.live_goal import AT_REST_M, AT_REST_S
+from airground_drake.verify.runs.pairs import parts_of
+from airground_drake.verify.runs.proposals import proposal_of
+
+PUSH = 1e-3
+"""A body holds a UGV if it takes more than this share of the UGV's wish to move."""
+UNEXPLAINED = 0.1
+"""Nobody is said to hold a UGV if more than this share of its wish to move meets no body."""
+HELD_M_S = AT_REST_M / AT_REST_S
+"""An inequality binds a standing UGV with less to spare, m/s: a retreat at this speed still counts as standing."""
+
+
+def stalls(trace: Trace) -> list[dict[str, Any]]:
+    """Where UGVs stood for `AT_REST_S` or longer short of their targets, by time; before a UGV's first collision.
+
+    Returns:
+        `robot`, `from_s`, `until_s` (at most the end of the run), `position_m` and `held_by`: names of the bodies that
+        stop its wish to move, half way through the stall, or at the end of the run if it lasts until then. Nobody holds
+        a UGV that waits as its proposal asks.
+    """
+    found = [_stall(trace, ugv, first, last) for ugv in trace.ugvs for first, last in _standing(trace, ugv)]
+    return sorted(found, key=lambda stall: float(stall["from_s"]))
+
+
+def _standing(trace: Trace, ugv: str) -> list[tuple[int, int]]:
+    """First and last control sample of each stall of a UGV."""
+    rows = trace.sample_rows[trace.sample_rows < trace.counting_rows(ugv)]
+    place, window = trace.position(ugv)[rows], round(AT_REST_S / trace.scenario.control.period_s)
+    if len(rows) <= window:
+        return []
+    seen = pd.DataFrame(place).rolling(window + 1)
+    ends = np.flatnonzero((seen.max() - seen.min()).max(axis=1, skipna=False) <= AT_REST_M)
+    still = np.zeros(len(rows) + 1, dtype=np.int8)
+    for end in ends.tolist():
+        still[end - window : end + 1] = 1
+    edges = np.flatnonzero(np.diff(still, prepend=0)).reshape(-1, 2) - [0, 1]
+    target, tolerance = trace.scenario.ugvs[ugv].target_m, trace.scenario.arrival_tolerance_m
+    return [(first, last) for first, last in edges.tolist() if np.linalg.norm(place[last] - target) > tolerance]
+
+
+def _stall(trace: Trace, ugv: str, first: int, last: int) -> dict[str, Any]:
+    times, to_the_end = trace.sampled("t_s"), last == len(trace.sample_rows) - 1
+    return {
+        "robot": ugv,
+        "from_s": float(times[first]),
+        "until_s": float(trace.t[-1]) if to_the_end else float(times[last]),
+        "position_m": trace.position(ugv)[trace.sample_rows[last]].tolist(),
+        "held_by": _held_by(trace, ugv, last if to_the_end else (first + last) // 2),
+    }
+
+
+def _held_by(trace: Trace, ugv: str, sample: int) -> list[str]:
+    """The bodies whose avoidance inequalities stop a UGV at a sample: those that its wish pushes against."""
+    given, parts = inequalities_of(trace, ugv), parts_of(trace)
+    binding = (given.sample == sample) & (given.slack(trace.chosen(ugv)) <= HELD_M_S)
+    wish = _wish(trace, ugv, sample)
+    speed = float(np.linalg.norm(wish))
+    if not binding.any() or speed <= HELD_M_S:
+        return []
+    # Least squares: -wish = sum of shares times normals, shares >= 0. A wall that is only alongside gets none.
+    shares, left = nnls(given.normal[binding].T, -wish / speed)
+    if left > UNEXPLAINED:
+        return []
+    columns: npt.NDArray[np.intp] = given.column[binding][shares > PUSH]
+    bodies = [*(parts.names[owner] for owner in parts.owner), *trace.robots]
+    return list(dict.fromkeys(bodies[column] for column in columns.tolist()))
+
+
+def _wish(trace: Trace, ugv: str, sample: int) -> Array:
+    """Where a UGV would go without avoidance, (3,), m/s: its proposal's way if it executes one, else its own task."""
+    place, number = trace.position(ugv)[trace.sample_rows[sample]], int(trace.sampled(f"{ugv}.executing")[sample])
+    gain, t_s = trace.scenario.control.motion_gain_1_s, float(trace.sampled("t_s")[sample])
+    if number >= 0:
+        try:
+            sent = proposal_of(trace, number)
+        except TraceError:  # which claims report
+            return np.zeros(3)
+        return np.asarray(gain * (interpolate(sent.times_s, sent.positions_m, t_s) - place))
+    return np.asarray(trace.reference_rate(ugv)[sample] + gain * (trace.reference(ugv)[sample] - place))
