@@ -57,7 +57,7 @@ SECTIONS = {
     "provenance": "How to run it again",
 }
 """Sections of the page, in order, by their identifiers; an empty section is left out."""
-PLACES = {"distances": "safe", **dict.fromkeys(("decision", "events", "threshold-choice"), "intervened")}
+PLACES = {"distances": "safe", **dict.fromkeys(("timelines", "threshold-choice"), "intervened")}
 """Sections of the figures; the others are maps of what happened."""
 
 CHIPS = {
