@@ -122,16 +122,17 @@ def events(trace: Trace, ugvs: Sequence[str]) -> Figure:
             y, color = _height(label.line), label.color
             axes.plot([label.at] * 2, [0.0, y], transform=across, color=color, linewidth=0.6, clip_on=False)
             axes.text(label.begin, y, label.text, color=color, transform=across, va="bottom", fontsize=8, bbox=BOX)
-        for kind, marker in MARKS.items():
-            times = [event["t_s"] for event in happened[ugv] if event["kind"] == kind]
-            on_line = kind in ("trigger", "release")
-            at = np.interp(times, trace.t, trace.column(f"{ugv}.decision_variable_m"))
+        for event in happened[ugv]:
+            kind, t_s, (low, high) = event["kind"], event["t_s"], axes.get_ylim()
+            share = {"trigger": None, "release": None, "proposal": 0.36}.get(kind, 0.09)
+            x = np.interp(t_s, trace.t, trace.column(f"{ugv}.decision_variable_m"))
             axes.plot(
-                clock.at(times), at if on_line else [0.36 if kind == "proposal" else 0.09] * len(times), marker,
-                transform=axes.transData if on_line else across, color=_COLORS.get(kind, "#0060a8"), markersize=6.5,
-                markeredgecolor="white", markeredgewidth=0.6, zorder=5, clip_on=False,
+                clock.at([t_s]), x if share is None else low + share * (high - low), MARKS[kind], markersize=6.5,
+                color=_COLORS.get(kind, "#0060a8"), markeredgecolor="white", markeredgewidth=0.6, zorder=5,
+                clip_on=False,
             )  # fmt: skip
-        rule(axes, _time(trace, clock) if axes is every[-1] else "", "m", numbers=clock.numbers(0.13))
+        numbers = clock.numbers(0.13 * clock.length)
+        rule(axes, f"time, s{_left_out(trace, clock)}" if axes is every[-1] else "", "m", numbers=numbers)
     return figure
 
 
@@ -140,16 +141,16 @@ def _height(line: int) -> float:
     return 1.0 + (0.05 + _LINE_IN * line) / _ROW_IN
 
 
-def _time(trace: Trace, clock: Clock) -> str:
+def _left_out(trace: Trace, clock: Clock) -> str:
     first_s, last_s = _ends_s(trace)
     left_out_s = last_s - first_s - clock.shown_s
-    return f"time, s (nothing happens in the other {left_out_s:.1f} s)" if left_out_s >= CUT_S else "time, s"
+    return f" (nothing happens in the other {left_out_s:.1f} s)" if left_out_s >= CUT_S else ""
 
 
 def _behind(axes: Axes, trace: Trace, ugv: str, clock: Clock) -> None:
     """What is behind the events of a UGV: its decision variable, both levels, calls of the UAV, and cuts."""
-    rows = np.flatnonzero(clock.shows(trace.t))
-    x, zeta = trace.column(f"{ugv}.decision_variable_m")[rows], float(trace.meta["zeta_m"])
+    t, zeta = np.union1d(trace.t[clock.shows(trace.t)], [clock.begin, clock.end]), float(trace.meta["zeta_m"])
+    x = np.interp(t, trace.t, trace.column(f"{ugv}.decision_variable_m"))
     bottom, top = min(0.0, *x), max(zeta, *x)
     axes.set_ylim(bottom, top + 0.15 * (top - bottom))
     labels = [(zeta, f"threshold {zeta:.3g}", INK)]
@@ -160,19 +161,9 @@ def _behind(axes: Axes, trace: Trace, ugv: str, clock: Clock) -> None:
         labels.append((release, f"release {release:.3g}", INK))
     label_right(axes, labels)
     _bars(axes, trace, clock, trace.column(f"{ugv}.mode") == 1, 1.0, facecolor="#eeeeee", zorder=0.4)
-    _bars(
-        axes,
-        trace,
-        clock,
-        trace.executing(ugv) >= 0,
-        0.18,
-        facecolor="#cfe6dc",
-        edgecolor=MUTED,
-        hatch="////",
-        zorder=0.6,
-    )
-    rows = rows[thin(x)]
-    axes.plot(clock.at(trace.t[rows]), trace.column(f"{ugv}.decision_variable_m")[rows], color=look(0).color)
+    follows = trace.executing(ugv) >= 0
+    _bars(axes, trace, clock, follows, 0.18, facecolor="#cfe6dc", edgecolor=MUTED, hatch="////", zorder=0.6)
+    axes.plot(clock.at(t[thin(x)]), x[thin(x)], color=look(0).color)
     for begin, end in clock.cuts:
         axes.axvspan(begin, end, facecolor="white", edgecolor="none", zorder=3)
         axes.text((begin + end) / 2.0, 0.5, "//", transform=axes.get_xaxis_transform(), ha="center", va="center",
