@@ -27,7 +27,7 @@ MAX_MARKS = 8
 """Maximum number of marks of a run that are told one by one."""
 NEAR = 0.03
 """Marks of a UGV within this share of the map's diagonal share a letter."""
-HIGHEST_IN, LINE_CHARS, _LINE_IN = 4.4, 66, 0.155
+HIGHEST_IN, LINE_CHARS, _LINE_IN = 4.4, 62, 0.16
 """Maximum height of a map, inches; characters in a line below it, and height of a line, inches."""
 LOOKS: dict[str, dict[str, Any]] = {
     "accepted": {"marker": "o", "color": GOOD, "linestyle": (0, (4, 2))},
@@ -78,7 +78,7 @@ def marks_of(trace: Trace, ugvs: Sequence[str]) -> list[Mark]:
 def _stalls(trace: Trace) -> Iterator[Mark]:
     for stall in stalls(trace):
         ugv, begin_s, end_s = stall["robot"], stall["from_s"], stall["until_s"]
-        when = f"{begin_s:.1f} to {end_s:.1f} s" if end_s < trace.t[-1] else f"from {begin_s:.1f} s on"
+        when = f"{begin_s:.1f} to {_s(end_s, 1)}" if end_s < trace.t[-1] else f"from {_s(begin_s, 1)} on"
         held = f", held by {' and '.join(stall['held_by'])}" if stall["held_by"] else ""
         yield Mark(ugv, begin_s, "stall", "stood", when, held, _at(trace, ugv, end_s))
 
@@ -91,20 +91,25 @@ def _answers(trace: Trace) -> Iterator[Mark]:
         if sent["accepted_s"] is not None:
             given_up = end["how"] == "given up"
             kind, t_s = "accepted", sent["accepted_s"]
-            why = f", given up at {end['t_s']:.2f} s: {refusal(end['reason'])}" if given_up else ""
+            why = f", given up at {_s(end['t_s'])}: {refusal(end['reason'])}" if given_up else ""
         elif end["how"] == "refused":
             kind, t_s, why = "refused", end["t_s"], f": {refusal(end['reason'])}"
         obeyed = kind == "accepted" and not method_of(trace.meta["method"]).gated
         way = proposal_of(trace, sent["number"]).positions_m[:, :2]
         what = "obeyed" if obeyed else kind
-        yield Mark(ugv, t_s, kind, what, f"at {t_s:.2f} s", why, _at(trace, ugv, t_s), way)
+        yield Mark(ugv, t_s, kind, what, f"at {_s(t_s)}", why, _at(trace, ugv, t_s), way)
 
 
 def _collisions(trace: Trace) -> Iterator[Mark]:
     for event in (event for ugv in trace.ugvs for event in events_of(trace, ugv, "collision")[:1]):
         other, at = event.get("other") or event.get("obstacle"), np.array(event["position_m"][:2], dtype=np.float64)
         with_ = f" with {other}" if other else ""
-        yield Mark(event["robot"], event["t_s"], "collision", "collided", f"at {event['t_s']:.2f} s", with_, at)
+        yield Mark(event["robot"], event["t_s"], "collision", "collided", f"at {_s(event['t_s'])}", with_, at)
+
+
+def _s(t_s: float, digits: int = 2) -> str:
+    """A time that no line break parts from its unit."""
+    return f"{t_s:.{digits}f}\N{NO-BREAK SPACE}s"
 
 
 def told(marks: Iterable[Mark]) -> str:
@@ -138,7 +143,7 @@ def _of_ugv(trace: Trace, ugv: str, marks: Sequence[Mark]) -> Entry:
     sent = [mark for mark in marks if len(mark.way)]
     others = [mark for mark in marks if not len(mark.way)]
     arrived = events_of(trace, ugv, "arrival")
-    words = [f"arrived at {arrived[-1]['t_s']:.1f} s"] if arrived else [told(others[-1:])] if others else []
+    words = [f"arrived at {_s(arrived[-1]['t_s'], 1)}"] if arrived else [told(others[-1:])] if others else []
     counts = {kind: sum(mark.kind == kind for mark in sent) for kind in LOOKS}
     listed = ", ".join(f"{count} {kind}" for kind, count in counts.items() if count)
     words += [f"{len(sent)} proposals: {listed}, the last {told(sent[-1:])}"] if len(sent) > 1 else []
@@ -177,7 +182,7 @@ def plane(trace: Trace, ugvs: Sequence[str], frame: Frame, key: Sequence[Entry],
     for letter, text in lines_of(key):
         for left_in, part, weight in ((0.1, letter, "bold"), (0.3, text, "normal")):
             at = left_in / WIDE_IN, top_in / figure.get_figheight()
-            figure.text(*at, part, va="top", fontsize=8, weight=weight)
+            figure.text(*at, part, va="top", fontsize=8.5, weight=weight)
         top_in -= _LINE_IN
     return figure
 

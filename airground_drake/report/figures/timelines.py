@@ -38,8 +38,8 @@ MARKS = {"trigger": "^", "release": "v", "proposal": "D", "accept": "o", "refuse
 """Markers of events by kind."""
 WORDS = {"accept": "accepted", "refuse": "refused", "over": "time over"}
 """Names of kinds of events, where they are not those of the trace."""
-MAX_TOLD, TOLD_CHARS = 9, 52
-"""Maximum number of events with labels in a row, more are counted; and of characters in a line."""
+MAX_TOLD, TOLD_CHARS = 8, 52
+"""Maximum number of labels of a row, and of events in a label or a heading, more are counted; characters in a line."""
 TOGETHER_S = 0.2
 """Events that follow each other within this time share a label, s."""
 _LEFT_IN, _RIGHT_IN, _ROW_IN, _LINE_IN, _CHAR_IN = 0.55, 1.05, 0.75, 0.15, 0.066
@@ -108,7 +108,7 @@ def events(trace: Trace, ugvs: Sequence[str]) -> Figure:
     """Decision variables of UGVs and what happened, a row each, without the time in which nothing happened."""
     happened = {ugv: events_of(trace, ugv, *MARKS) for ugv in ugvs}
     clock = Clock.around([event["t_s"] for each in happened.values() for event in each], *_ends_s(trace))
-    labels = {ugv: _labels(each, clock) if len(each) <= MAX_TOLD else [] for ugv, each in happened.items()}
+    labels = {ugv: _labels(each, clock) for ugv, each in happened.items()}
     heads = [short(ugv) if labels[ugv] else fill(f"{short(ugv)}: {told(trace, ugv)}", TOLD_CHARS) for ugv in ugvs]
     lines = [max((label.top for label in labels[ugv]), default=0) for ugv in ugvs]
     above_in = [_LINE_IN * (line + head.count("\n") + 1) + 0.14 for line, head in zip(lines, heads, strict=True)]
@@ -171,14 +171,18 @@ def _behind(axes: Axes, trace: Trace, ugv: str, clock: Clock) -> None:
 
 
 def _labels(happened: Sequence[Mapping[str, Any]], clock: Clock) -> list[_Label]:
-    """Labels of events, from the last one to the first: a line to an event passes no earlier label."""
+    """Labels of events, from the last one to the first: a line to an event passes no earlier label. [] for too many."""
     groups = list[list[Mapping[str, Any]]]()
     for event in happened:
         together = groups and event["t_s"] - groups[-1][-1]["t_s"] < TOGETHER_S
         groups[-1].append(event) if together else groups.append([event])
     labels = list[_Label]()
+    if max(map(len, [groups, *groups])) > MAX_TOLD:
+        return labels
     for group in reversed(groups):
-        text = fill(f"{', '.join(_word(event['kind'], event['t_s']) for event in group)} s", TOLD_CHARS)
+        text = fill(
+            f"{', '.join(_word(event['kind'], event['t_s']) for event in group)}\N{NO-BREAK SPACE}s", TOLD_CHARS
+        )
         s_per_in = clock.length / (WIDE_IN - _LEFT_IN - _RIGHT_IN)
         width = s_per_in * _CHAR_IN * max(map(len, text.split("\n")))
         at = float(clock.at([group[0]["t_s"]])[0])
