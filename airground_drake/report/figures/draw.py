@@ -174,7 +174,7 @@ def _trajectories(chosen: _Selection) -> Figure:
     frame_is += " Dots: ways of obstacles, drawn where they start." if any(len(each.way_m) for each in barriers) else ""
     drawn = {mark.kind for key in keys.values() for entry in key for mark in entry.marks}
     marks = "".join(f", {text}" for kind, text in _MARKS.items() if kind in drawn)
-    last = f" Of more than {maps.MAX_MARKS} marks, only the last proposal of each UGV is drawn."
+    last = f" Where more than {maps.MAX_MARKS} marks would be, only the last proposal of each UGV is drawn."
     marks += "." + last * any(not entry.letter for key in keys.values() for entry in key)
     marks += " Thick: the UGV follows the UAV." * ("accepted" in drawn)
     caption = (
@@ -256,7 +256,7 @@ def _timelines(chosen: _Selection) -> Figure:
     marks = ", ".join(text for kind, text in _EVENTS.items() if kind in drawn)
     more = f" At most {MAX_TEAM} UGVs are drawn, up to {hidden} more are in the trace." * (hidden > 0)
     caption = (
-        f"{_accepted(chosen)} Line: decision variable. Grey: the UAV is called. Hatched bar: the UGV follows the UAV."
+        "Line: decision variable. Grey: the UAV is called. Hatched bar: the UGV follows the UAV."
         f"{marks and f' {marks}.'} // time in which nothing happens is left out.{more}"
     )
     return Figure("timelines", "Decision variables, triggers, proposals, answers", caption, tuple(panels))
@@ -306,19 +306,6 @@ def _team(chosen: _Selection) -> Figure:
         called = sum(bool(events_of(chosen.runs[name], ugv, "trigger")) for ugv in ugvs)
         there.append(f"Run {name}: {len(of)} of {len(ugvs)} UGVs arrive, {called} triggered.")
     return Figure("team", "The whole team", f"{' '.join(there)} Each bar counts UGVs.", tuple(panels))
-
-
-def _accepted(chosen: _Selection) -> str:
-    told = []
-    for name, trace in chosen.runs.items():
-        kinds = [event["kind"] for event in trace.events]
-        counts = [
-            f"{kinds.count(k)} {said}" for k, said in (("accept", "accepted"), ("refuse", "refused")) if k in kinds
-        ]
-        if counts:
-            told.append(f"run {name}: {', '.join(counts)}")
-    text = "; ".join(told) or "no gatekeeper decided"
-    return f"{text[0].upper()}{text[1:]}."
 
 
 def _left_out(chosen: _Selection, drawn: list[str]) -> str:

@@ -177,7 +177,7 @@ def _labels(happened: Sequence[Mapping[str, Any]], clock: Clock) -> list[_Label]
         together = groups and event["t_s"] - groups[-1][-1]["t_s"] < TOGETHER_S
         groups[-1].append(event) if together else groups.append([event])
     labels = list[_Label]()
-    if max(map(len, [groups, *groups])) > MAX_TOLD:
+    if len(groups) > MAX_TOLD or any(len(group) > MAX_TOLD for group in groups):
         return labels
     for group in reversed(groups):
         text = fill(
