@@ -28,8 +28,7 @@ WIDTHS = {"ieee": r"\columnwidth", "thesis": r"0.7\linewidth"}
 SHOWN = {
     "trajectories": ("LIVE-GOAL",),
     "distances": ("SAFE-TRACE", "SAFE-GATE"),
-    "decision": ("THR-TRIG", "THR-CHOICE"),
-    "events": ("LIVE-HYP", "ZENO-TRACE", "ZENO-PROOF"),
+    "timelines": ("THR-TRIG", "THR-CHOICE", "LIVE-HYP", "ZENO-TRACE", "ZENO-PROOF"),
 }
 """Claims that a figure is about, by its identifier."""
 
@@ -83,10 +82,7 @@ def write(
 def _environment(figure: Figure, names: Sequence[str], width: str, report: Mapping[str, Any]) -> str:
     """A figure in LaTeX: its panels, narrow ones side by side, and a caption that says what is established."""
     across, width = ("figure*", r"\textwidth") if figure.look == "wide" else ("figure", width)
-    between = r"\\"
-    if figure.look == "narrow" and len(names) > 1:
-        width, between = r"0.49\linewidth", ""
-    panels = [rf"  \includegraphics[width={width}]{{{name}}}{between}" for name in names]
+    panels = [rf"  \includegraphics[width={width}]{{{name}}}\\" for name in names]
     caption = latex.escaped(" ".join([figure.caption, *_established(SHOWN.get(figure.id, ()), report)]))
     lines = [
         rf"\begin{{{across}}}",

@@ -114,9 +114,8 @@ class RunFacts:
             if (other := hit.get("other") or hit["obstacle"])
         ]
         found = found or [Breach(near.robot, near.other, near.line) for near in self.near if near.is_short]
-        own = self.claim(rules.OWN_DOING)["evidence"]
-        met = {frozenset((one["first"], one["second"])): _doing(one)
-               for one in own.get("encounters", own.get("came_too_near_themselves", ()))}  # fmt: skip
+        met = {frozenset((one["first"], one["second"])): one["doing"]
+               for one in self.claim(rules.DISTANCES)["evidence"].get("encounters", ())}  # fmt: skip
         found = [breach._replace(doing=met.get(frozenset(breach[:2]), "")) for breach in found]
         return sorted(found, key=lambda breach: breach.doing not in rules.OURS)
 
@@ -282,10 +281,3 @@ class RunFacts:
         """UGVs whose decision variable was at the threshold or above from the start."""
         found: Sequence[str] = self._metrics["above_at_start"]
         return found
-
-
-def _doing(encounter: Mapping[str, Any]) -> str:
-    """Whose doing an encounter was, as it says, or from what earlier evidence has."""
-    if "doing" in encounter:
-        return str(encounter["doing"])
-    return "nobody" if encounter["appeared"] else "robot" if encounter["own_doing"] else "other"

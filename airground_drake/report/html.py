@@ -19,10 +19,9 @@ from markupsafe import Markup
 
 from airground_drake.base.statuses import PASSING, outcome
 from airground_drake.gatekeeper.reasons import WORDS
-from airground_drake.report import attention, evidence, rules
+from airground_drake.report import attention, evidence
 from airground_drake.report.figures.panels import Figure, Table
 from airground_drake.report.mathml import mathml
-from airground_drake.report.outcomes import claims as claims_of
 from airground_drake.report.outcomes import pairs
 from airground_drake.report.proved import place
 from airground_drake.report.reproduction import YES_NO
@@ -61,7 +60,7 @@ SECTIONS = {
 """Sections of the page, in order, by their identifiers; an empty section is left out."""
 LINKS = {"claims": "proof", "intervened": "timing, choice", "reproduction": "all numbers"}
 """What the first screen calls the sections that it leads to."""
-PLACES = {"distances": "safe", **dict.fromkeys(("decision", "events", "threshold-choice"), "intervened")}
+PLACES = {"distances": "safe", **dict.fromkeys(("timelines", "threshold-choice"), "intervened")}
 """Sections of the figures; the others are maps of what happened."""
 
 CHIPS = {
@@ -114,13 +113,6 @@ def render(document: Mapping[str, Any], figures: Sequence[Figure], diagram_svg: 
     return environment().get_template("report.html.j2").render(
         report=document,
         first=first_screen(document),
-        thresholds=[each for each in claims_of(document, rules.CHOICE) if "optimal_threshold_m" in each["evidence"]],
-        decided=[
-            (each["run"], ugv, ddm)
-            for each in claims_of(document, rules.TIMING) for ugv, ddm in each["evidence"].get("ddm", {}).items()
-        ],
-        fastest_m_s=max(ugv["max_speed_m_s"] + ugv["preset"]["speed_m_s"]
-                        for ugv in document["scenario"]["resolved"]["ugvs"].values()),
         linked={name: words for name, words in LINKS.items() if sections.get(name, True)},
         sections=[(name, title) for name, title in SECTIONS.items() if sections.get(name, True)],
         plates=plates,
@@ -150,7 +142,7 @@ def environment() -> Environment:
     environment.filters.update(
         num=number, value=value, yaml=as_yaml, together=attention.faults_together, inline=Markup, mathml=mathml,
         evidence=evidence_tables, proof=place, records=partial(evidence.tables, number=number), brief=brief,
-        alike=_alike, unbroken=unbroken,
+        unbroken=unbroken,
     )  # fmt: skip
     environment.globals.update(
         chips=CHIPS, shown=_shown, reasons=WORDS, max_faults=MAX_FAULTS, max_interventions=MAX_INTERVENTIONS,
@@ -196,12 +188,6 @@ def _in_the_dark() -> str:
     )
     text = f"svg text:not([fill]) {{ fill: {DARK['black']}; }}"
     return f"@media screen and (prefers-color-scheme: dark) {{\n{rules}\n{text}\n}}\n"
-
-
-def _alike(rows: Mapping[str, Any]) -> list[tuple[dict[str, Any], list[str]]]:
-    """Equal rows once, with the names of those that have them."""
-    together = grouped((tuple(row.items()), name) for name, row in rows.items())
-    return [(dict(row), [name.replace(" ", ", ") for name in names]) for row, names in together.items()]
 
 
 def evidence_tables(claim: Mapping[str, Any]) -> list[Table]:

@@ -20,8 +20,6 @@ PROOFS, PROOF_OF_PLANTS = ("SAFE-INV", "SAFE-GATE"), "SAFE-BUDGET"
 DWELL, TRIGGER_GAPS = "ZENO-PROOF", "ZENO-TRACE"
 CROSSINGS, TIMING = "THR-TRIG", "THR-QUALITY"
 """Claims about triggers: that they follow the decision variable, and how they compare with the error without noise."""
-CHOICE = "THR-CHOICE"
-"""The claim that compares the threshold in force with the Bayes optimum."""
 SUBJECTS = {
     "SAFE-TRACE": "distances", "SAFE-HYP": "conditions of the proof", "SAFE-OWN": "the robots' own doing",
     "SAFE-INV": "proof of distances", "SAFE-GATE": "proof of distances", "SAFE-BUDGET": "distance for lag and delay",

@@ -22,13 +22,10 @@ MAX_POINTS = 600
 NARROWEST, TINY = 1e-4, 1e-9
 """Smallest width of a histogram, relative and absolute: floating point divides it, and numbers on its axis differ."""
 
-MAP_IN, WIDE_IN, FULL_IN, TALLEST_IN = 3.3, 4.4, 11.6, 8.0
-"""Widths of a narrow map and of panels on half and on the whole page; maximum height of a map; inches."""
+WIDE_IN, FULL_IN, TALLEST_IN = 4.4, 11.6, 8.0
+"""Widths of panels on half and on the whole page; maximum height of a map; inches."""
 
-SCALE = 1.45
-"""CSS pixels per point of a panel on the whole page: its letters are as large as those of the text."""
-
-INK, MUTED, ALARM = "#1a1a1a", "#5a5a5a", "#b00020"
+INK, MUTED, ALARM, GOOD = "#1a1a1a", "#5a5a5a", "#b00020", "#0b5d1e"
 _POINTS_PER_INCH = 72.0
 _FONT_PT = 9.0
 _GRID: Any = {"color": "#dddddd", "linewidth": 0.6, "zorder": 0.5}
@@ -76,7 +73,7 @@ LOOKS = (
 UAV_LOOK = Look("#666666", (0, (3, 2)), "d")
 
 DARK = {
-    INK: "#e8e8e8", MUTED: "#b0b4bb", ALARM: "#ff8a9a",
+    INK: "#e8e8e8", MUTED: "#b0b4bb", ALARM: "#ff8a9a", GOOD: "#8fe3a1",
     "#ffffff": "#16181c", "#f3f3f3": "#22252b", "#eeeeee": "#2a2d34", "#dddddd": "#3a3e46", "#d4d4d4": "#4a4e57",
     "#cfe6dc": "#1f4436",
     "#0060a8": "#6db8ff", "#b34700": "#ff9d5c", "#00705a": "#4fd1b0", "#8b3a8b": "#e08ee0", "#6b5900": "#d9c24d",
@@ -112,6 +109,11 @@ def svg(figure: Figure) -> str:
     buffer = io.StringIO()
     figure.savefig(buffer, format="svg", metadata={"Date": None, "Creator": None, "Format": None, "Type": None})
     return buffer.getvalue()
+
+
+def stretches(active: npt.NDArray[np.bool_]) -> npt.NDArray[np.intp]:
+    """First row and the row after the last one of each stretch in which a signal (T,) is true, (n, 2)."""
+    return np.flatnonzero(np.diff(active.astype(np.int8), prepend=0, append=0)).reshape(-1, 2)
 
 
 def thin(values: Array, limit: int = MAX_POINTS) -> npt.NDArray[np.intp]:
@@ -176,24 +178,26 @@ def spread(places: Sequence[float], gap: float) -> list[float]:
     return result
 
 
-def rule(axes: Axes, x: str, y: str, log: str = "") -> None:
+def rule(axes: Axes, x: str, y: str, log: str = "", numbers: Mapping[float, str] | None = None) -> None:
     """Draw grid lines, numbers and axis labels, once the limits are set; an empty label leaves the numbers out.
 
     Values on the axes named in `log` are logarithms to base 10; the numbers show what they are the logarithms of.
-    These are few artists: matplotlib's own ticks would take nearly half of the drawing time.
+    `numbers`, by their places, replace those across. These are few artists: matplotlib's own ticks would take nearly
+    half of the drawing time.
     """
     width_in, height_in = size_in(axes)
     axes.set_xticks([])
     axes.set_yticks([])
-    columns, across = _ticks(axes.get_xlim(), 6, whole="x" in log), axes.get_xaxis_transform()
-    axes.vlines(columns, 0.0, 1.0, transform=across, **_GRID)
-    for at in columns if x else ():
-        written = _number(at, log="x" in log)
+    if numbers is None:
+        numbers = {at: _number(at, log="x" in log) for at in ticks_of(axes.get_xlim(), 6, whole="x" in log)}
+    across = axes.get_xaxis_transform()
+    axes.vlines(list(numbers), 0.0, 1.0, transform=across, **_GRID)
+    for at, written in numbers.items() if x else ():
         axes.text(at, -0.05 / height_in, written, transform=across, ha="center", va="top", **_NUMBERS)
     axes.text(0.5, -0.22 / height_in, x, transform=axes.transAxes, ha="center", va="top")
     if not y:
         return
-    rows = _ticks(axes.get_ylim(), max(2, min(7, round(3.5 * height_in))), whole="y" in log)
+    rows = ticks_of(axes.get_ylim(), max(2, min(7, round(3.5 * height_in))), whole="y" in log)
     up = axes.get_yaxis_transform()
     axes.hlines(rows, 0.0, 1.0, transform=up, **_GRID)
     for at in rows:
@@ -202,7 +206,8 @@ def rule(axes: Axes, x: str, y: str, log: str = "") -> None:
     axes.text(-0.36 / width_in, 0.5, y, transform=axes.transAxes, ha="right", va="center", rotation=90)
 
 
-def _ticks(limits: tuple[float, float], count: int, *, whole: bool) -> list[float]:
+def ticks_of(limits: tuple[float, float], count: int, *, whole: bool = False) -> list[float]:
+    """Round numbers within limits, about as many as `count`."""
     low, high = limits
     slack = 1e-9 * (high - low)
     ticks = MaxNLocator(count, steps=[1, 2, 5, 10], integer=whole).tick_values(low, high)

@@ -20,7 +20,7 @@ CANDIDATES, FARTHEST = 1200, 0.3
 """Places that are tried for a label, and their greatest distance from its point, as a share of the axes."""
 MARK_PT = 4.0
 """Half the size of the marks that labels leave free, points."""
-_BOX = {"facecolor": "white", "edgecolor": "none", "alpha": 0.7, "pad": 0.5}
+BOX = {"facecolor": "white", "edgecolor": "none", "alpha": 0.7, "pad": 0.5}
 
 
 class Label(NamedTuple):
@@ -56,5 +56,5 @@ def place(axes: Axes, labels: Sequence[Label], lines: Sequence[Array]) -> None:
             scatter_sizes=[np.array(mark)] * len(at),
             min_distance=1.5 * MARK_PT / (72.0 * width_in), max_distance=FARTHEST, nbr_candidates=CANDIDATES,
             textsize=[label.size_pt for label in labels], textcolor=[label.color for label in labels],
-            fontweight=[label.weight for label in labels], linecolor=MUTED, linewidth=0.6, zorder=5, bbox=_BOX,
+            fontweight=[label.weight for label in labels], linecolor=MUTED, linewidth=0.6, zorder=5, bbox=BOX,
         )  # fmt: skip

@@ -72,13 +72,13 @@ def frame_of(scenario: Scenario, ways: Iterable[tuple[str, Array]]) -> Frame:
     return Frame(left, right, bottom - 0.6, top + 0.8)
 
 
-def axes_over(frame: Frame, width_in: float) -> tuple[Figure, Axes]:
-    """A figure with axes over a part of the ground plane."""
-    inner_in = width_in - _BESIDE_IN
+def axes_over(frame: Frame, width_in: float, full_in: float = 0.0, below_in: float = 0.0) -> tuple[Figure, Axes]:
+    """A figure with axes over a part of the ground plane, at least `full_in` wide, with more room below the axes."""
+    inner_in, full_in, below_in = width_in - _BESIDE_IN, max(width_in, full_in), _BELOW_IN + below_in
     inner_height_in = inner_in * (frame.top - frame.bottom) / (frame.right - frame.left)
-    height_in = inner_height_in + _BELOW_IN + _ABOVE_IN
-    figure = Figure(figsize=(width_in, height_in))
-    box = (_LEFT_IN / width_in, _BELOW_IN / height_in, inner_in / width_in, inner_height_in / height_in)
+    height_in = inner_height_in + below_in + _ABOVE_IN
+    figure = Figure(figsize=(full_in, height_in))
+    box = (_LEFT_IN / full_in, below_in / height_in, inner_in / full_in, inner_height_in / height_in)
     axes = figure.add_axes(box)
     frame.show(axes)
     rule(axes, "x, m", "y, m")
@@ -93,7 +93,7 @@ def draw_barriers(axes: Axes, scenario: Scenario, *, moving: bool = True) -> tup
 
     Returns:
         Labels, the names of the barriers, unless they are many, and of phantoms; and lines (K, 2), m, that labels
-        should avoid: the arena, and the edges of walls, unless they are many.
+        should avoid: ways of what moves, the arena, and the edges of walls, unless they are many.
     """
     _draw_arena(axes, arena_of(scenario))
     every = [each for each in barriers_of(scenario) if moving or not len(each.way_m)]
@@ -118,7 +118,8 @@ def draw_barriers(axes: Axes, scenario: Scenario, *, moving: bool = True) -> tup
         labels.append(Label(np.array(at), "(only on the UAV's map)", size_pt=7.5))
     edges = [part for each in walls for part in each.body]
     rings = [*arena_of(scenario), *(edges if len(edges) <= MANY else [])]
-    return labels, [np.concatenate([ring, ring[:1]]) for ring in rings]
+    ways = [each.way_m[:, :2] for each in every if len(each.way_m)]
+    return labels, [*ways, *(np.concatenate([ring, ring[:1]]) for ring in rings)]
 
 
 class _Look(NamedTuple):

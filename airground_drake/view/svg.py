@@ -24,9 +24,7 @@ _FONT = re.compile(r"(?:(\w+) )?([\d.]+px) (.+)")
 _ROUNDED = {"d", "points", "transform", "x", "y", "width", "height", "cx", "cy", "rx", "ry", "r"}
 
 
-def inline(
-    svg: str, prefix: str, title: str, description: str, *, natural_size: bool = False, scale: float = 0.0
-) -> str:
+def inline(svg: str, prefix: str, title: str, description: str, *, natural_size: bool = False) -> str:
     """An SVG document as an element for HTML.
 
     Scripts, style sheets, handlers and references to anything outside the document are removed (a style sheet would
@@ -40,7 +38,6 @@ def inline(
         title: the accessible name.
         description: text for readers who cannot see it.
         natural_size: keep the size of the document; otherwise the page chooses.
-        scale: CSS pixels per unit of the drawing; 0: the page chooses the width.
 
     Raises:
         ValueError: if it is not an SVG document.
@@ -59,8 +56,6 @@ def inline(
         _clean(element, prefix, used)
     for name in ("version", "class") if natural_size else ("version", "class", "width", "height"):
         root.attrib.pop(name, None)
-    if scale:
-        root.set("width", f"{scale * float(root.get('viewBox', '0 0 0 0').split()[2]):.0f}")
     root.set("role", "img" if root.find(f".//{_TAG}a") is None else "group")
     root.set("aria-labelledby", f"{prefix}-title {prefix}-desc")
     for position, (name, text) in enumerate((("title", title), ("desc", description))):

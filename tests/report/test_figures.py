@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import re
 import xml.etree.ElementTree as ET
+from collections.abc import Callable
 from dataclasses import asdict, replace
 from pathlib import Path
+from random import Random
 
 import matplotlib
 import matplotlib.figure
@@ -17,7 +19,7 @@ from hypothesis import strategies as st
 from report.cases import FLIGHT, event, make_scenario, make_trace
 
 from airground_drake.campaign.page import _histogram
-from airground_drake.report.figures import draw, maps
+from airground_drake.report.figures import clock, draw, maps, timelines
 from airground_drake.report.figures.panels import Figure
 from airground_drake.run.trace import Trace
 from airground_drake.scenarios.schema import Run, Scenario
@@ -34,7 +36,7 @@ def test_bytes_do_not_depend_on_the_time_or_the_user(
 
 def test_every_panel_is_named_small_and_has_its_data(drawn: list[Figure]) -> None:
     assert {f.id: len(f.panels) for f in drawn} == {
-        "trajectories": 2, "distances": 2, "decision": 2, "events": 1, "recursion": 1,
+        "trajectories": 2, "distances": 2, "timelines": 2, "recursion": 1,
     }  # fmt: skip
     panels = [panel for figure in drawn for panel in figure.panels]
     for panel in panels:
@@ -113,14 +115,14 @@ def test_every_figure_is_drawn_of_equal_empty_single_and_huge_data(
 
 
 def test_a_small_team_is_drawn_by_name_and_a_large_one_in_histograms_with_who_was_triggered(scenario: Scenario) -> None:
-    trajectories, distances, decision, *_ = draw.draw(*team(scenario, 5))
-    assert all(f">ugv{k}</text>" in f.panels[0].svg for k in range(1, 6) for f in (trajectories, decision))
+    trajectories, distances, timelines, *_ = draw.draw(*team(scenario, 5))
+    assert all(f">ugv{k}</text>" in trajectories.panels[0].svg for k in range(1, 6))
+    assert "nothing happens; largest" in timelines.panels[0].svg
     assert "1 more UGVs are not drawn" in distances.caption
     drawn = {figure.id: figure for figure in draw.draw(*team(scenario, 12, triggered="ugv11"))}
     assert "Run a: 0 of 12 UGVs arrive, 1 triggered." in drawn["team"].caption
     assert drawn["team"].panels[0].table.rows[0][:2] == ("a", "12")
-    assert ">ugv11 ▲ 14.50 s</text>" in drawn["decision"].panels[0].svg
-    assert "ugv12" not in drawn["decision"].panels[0].svg
+    assert re.findall(r">(ugv\d+|trigger 14.50)", drawn["timelines"].panels[0].svg) == ["ugv11", "trigger 14.50"]
     assert "8 more UGVs" in drawn["trajectories"].caption
 
 
@@ -130,9 +132,9 @@ def test_runs_with_identical_paths_share_a_panel(scenario: Scenario, traces: dic
     trajectories, *_ = draw.draw(both, {"a": traces["a"], "b": again, "c": traces["c"]})
     headings = [panel.heading for panel in trajectories.panels]
     assert headings == ["Run a: method (a), no intervention", "Runs b = c: identical paths"]
-    assert trajectories.caption.startswith(
-        "Run a: ugv1 stands still at (3.37, 5.10) m. Run b = c: not all UGVs arrive."
-    )
+    hit = replace(again, meta={**again.meta, "events": [*again.events, event(29.0, "collision")]})
+    trajectories, *_ = draw.draw(both, {"a": traces["a"], "b": hit, "c": traces["c"]})
+    assert len(trajectories.panels) == 3
 
 
 def test_a_run_that_sets_values_is_named_by_them(scenario: Scenario, traces: dict[str, Trace]) -> None:
@@ -154,7 +156,86 @@ def test_a_shortfall_says_from_whom(scenario: Scenario, traces: dict[str, Trace]
 
 
 def test_times_of_events_are_written(drawn: list[Figure]) -> None:
-    assert "trigger 14.50, proposal 14.60, accept 14.65, release" in drawn[3].panels[0].svg
+    text = drawn[2].panels[1].svg.replace("\N{NO-BREAK SPACE}", " ")
+    assert ">trigger 14.50, proposal 14.60, accepted 14.65 s</text>" in text
+    assert ">release 17.00 s</text>" in text
+    assert "nothing happens in the other 26.1 s" in text
+
+
+@given(st.lists(st.floats(0.0, 100.0), max_size=30))
+def test_time_is_left_out_only_where_nothing_happens(times: list[float]) -> None:
+    shown = clock.Clock.around(times, 0.0, 100.0)
+    assert shown.shows(np.array(times)).all()
+    assert len(shown.begin) <= clock.MAX_CUTS + 1
+    assert (shown.begin[1:] - shown.end[:-1] >= clock.CUT_S).all()
+    every = np.sort([*times, *shown.begin, *shown.end])
+    assert (np.diff(shown.at(every)) >= 0.0).all()
+    assert shown.length == pytest.approx(shown.at([100.0])[0])
+    assert shown.shown_s == pytest.approx(100.0) or len(times) > 0
+
+
+@settings(max_examples=10, deadline=None)
+@given(st.lists(st.floats(0.0, 30.0), min_size=1, max_size=2 * timelines.MAX_TOLD), st.randoms())
+def test_labels_of_events_are_inside_the_figure_and_apart(times: list[float], random: Random) -> None:
+    happened = [event(t, random.choice([*timelines.MARKS])) for t in sorted(times)]
+    trace = make_trace(make_scenario(), "c", events=[each for each in happened if each["kind"] != "proposal"])
+    with canvas.style():
+        drawing = timelines.events(trace, ["ugv1"])
+        drawing.draw_without_rendering()
+        texts = [text.get_window_extent() for axes in drawing.axes for text in axes.texts if text.get_bbox_patch()]
+    width, height = drawing.get_size_inches() * drawing.dpi
+    assert all(box.x0 >= 0.0 and box.x1 <= width and box.y0 >= 0.0 and box.y1 <= height for box in texts)
+    assert not any(one.overlaps(other) for k, one in enumerate(texts) for other in texts[:k])
+
+
+def test_many_events_are_counted() -> None:
+    happened = [event(10.0 + k, kind) for k in range(6) for kind in ("trigger", "release")]
+    trace = make_trace(make_scenario(), "a", events=happened)
+    assert (
+        timelines.told(trace, "ugv1")
+        == "6 \N{MULTIPLICATION SIGN} trigger 10.00, 6 \N{MULTIPLICATION SIGN} release 10.00 s (first times)"
+    )
+
+
+def test_a_map_says_where_a_ugv_stood_and_how_it_answered(run: Callable[[str, str], Trace]) -> None:
+    trace = run("case_b", "d")
+    frame = frame_of(trace.scenario, [("ugv1", trace.body("ugv1"))])
+    (entry,) = maps.key_of(trace, trace.ugvs, frame)
+    first, last = (
+        trace.decisions["t_s"].iloc[0],
+        trace.decisions.loc[trace.decisions["decision"] == "accept", "t_s"].iloc[0],
+    )
+    assert re.fullmatch(
+        r"ugv1 stood 6\.\d to 13\.\d s, held by obstacle_1 and obstacle_2; "
+        rf"refused at {first:.2f} s: it would have stalled on the way; accepted at {last:.2f} s",
+        entry.text.replace("\N{NO-BREAK SPACE}", " "),
+    )
+    for mark, when in zip(entry.marks[1:], (first, last), strict=True):
+        row = np.searchsorted(trace.t, when)
+        assert mark.at == pytest.approx(trace.body("ugv1")[row, :2])
+        assert mark.way[0] == pytest.approx(mark.at, abs=0.05)
+    with canvas.style():
+        drawing = maps.plane(trace, trace.ugvs, frame, [entry], 3)
+        drawing.draw_without_rendering()
+    assert [text.get_text() for text in drawing.texts][::2] == [entry.letter, "", ""] == ["A", "", ""]
+    boxes = [text.get_window_extent() for text in drawing.texts]
+    assert all(box.x0 >= 0.0 and box.x1 <= drawing.bbox.x1 and box.y0 >= 0.0 for box in boxes)
+
+
+def test_of_many_marks_a_map_has_a_line_per_ugv(
+    run: Callable[[str, str], Trace], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    trace = run("case_b", "d")
+    monkeypatch.setattr(maps, "MAX_MARKS", 2)
+    (entry,) = maps.key_of(trace, trace.ugvs, frame_of(trace.scenario, [("ugv1", trace.body("ugv1"))]))
+    arrival_s = next(each["t_s"] for each in trace.events if each["kind"] == "arrival" and each["robot"] == "ugv1")
+    accepted_s = next(each["t_s"] for each in trace.events if each["kind"] == "accept")
+    last = f"the last accepted at {accepted_s:.2f} s"
+    assert (
+        entry.text.replace("\N{NO-BREAK SPACE}", " ")
+        == f"ugv1 arrived at {arrival_s:.1f} s; 2 proposals: 1 accepted, 1 refused, {last}"
+    )
+    assert [mark.kind for mark in entry.marks] == ["stall", "accepted"]
 
 
 def test_no_trace_and_a_single_row(scenario: Scenario) -> None:
@@ -165,9 +246,9 @@ def test_no_trace_and_a_single_row(scenario: Scenario) -> None:
 def test_a_path_is_dashed_from_a_collision_on(scenario: Scenario) -> None:
     trace = make_trace(scenario, events=[event(9.0, "collision")])
     frame = frame_of(scenario, ((robot, trace.position(robot)) for robot in trace.robots))
-    (axes,) = maps.plane(trace, ["ugv1"], frame, 4.0).axes
+    (axes,) = maps.plane(trace, ["ugv1"], frame, [], 0).axes
     own = [line for line in axes.lines if line.get_color() == canvas.look(0).color and len(line.get_xdata()) > 1]
-    before, after = own
+    before, after = (line for line in own if line.get_alpha() is None)
     hit = trace.position("ugv1")[trace.counting_rows("ugv1") - 1, :2]
     for line, end in ((before, -1), (after, 0)):
         assert np.column_stack(line.get_data())[end].tolist() == hit.tolist()
@@ -221,7 +302,6 @@ def test_svg_becomes_inert_and_named_and_keeps_its_looks() -> None:
         'font-weight="700"', 'font-size="9px"', 'text-anchor="middle"',
     ):  # fmt: skip
         assert part in text
-    assert 'width="18"' in svg.inline(SOURCE, "n", "T", "D", scale=2.0)
     for source in ("<svg", "<html/>"):
         with pytest.raises(ValueError, match=r"XML|root element"):
             svg.inline(source, "n", "t", "d")

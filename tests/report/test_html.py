@@ -157,6 +157,33 @@ def test_what_fails_is_shown_first_and_what_was_not_tested_apart(
     assert "not tested" not in page
 
 
+def test_the_cost_of_the_threshold_is_told_for_the_assumed_drift_and_for_that_of_each_run(
+    scenario: Scenario, traces: dict[str, Trace]
+) -> None:
+    """By hand: without noise 3 m is reached after 3 / 0.5 = 6 s, and the best threshold is 0."""
+    report = built(scenario, traces, FINE)
+    row = {"drift_m_s": 0.5, "noise_m_sqrt_s": 0.0, "threshold_m": 3.0, "optimum_m": 0.0, "extra_risk": 0.5 * 6.0}
+    choice = {
+        "threshold_in_force_m": 3.0,
+        "optimal_threshold_m": 2.992,
+        "extra_risk": 0.001,
+        "runs": {"c ugv 1.5": row},
+    }
+    ddm = {"error_rate": 0.25, "error_rate_of_18": 0.01, "decision_time_s": None, "decision_time_of_17_s": 5.98}
+    one, assumed = report["claims"][0], {"drift_m_s": 13.0, "noise_m_sqrt_s": 4.0, "c1_1_s": 0.5, "c2": 1.0}
+    report["claims"] += [
+        {**one, "id": "THR-CHOICE", "run": "", "inputs": assumed, "evidence": choice},
+        {**one, "id": "THR-QUALITY", "run": "c", "evidence": {"ddm": {"ugv 1.5": ddm}}},
+        {**one, "id": "THR-QUALITY", "run": "a", "evidence": {}},
+    ]
+    told = html.environment().get_template("threshold.html.j2").render(report=report, scenario=report["scenario"])
+    rows = re.findall(r"<tr><th scope=\"row\">(.*?)</tr>", told, re.DOTALL)
+    assert [re.sub(r"(\s*<[^>]+>\s*)+", "|", each) for each in rows] == [
+        "assumed: 13 m/s, 4 m/√s|2.992 m|0.002 s|",
+        "ugv 1.5 in run c: 0.5 m/s, 0 m/√s|the lower, the better|6 s|25 % (1 %)|\N{EN DASH} s (5.98 s)|",
+    ]
+
+
 def test_sections_that_would_say_nothing_are_absent(scenario: Scenario, traces: dict[str, Trace]) -> None:
     bare = replace(scenario, name="mine", reproduction=[], choices=[], runs={"a": scenario.runs["a"]})
     text = html.render(built(bare, {"a": traces["a"]}, FINE[:1]), [])

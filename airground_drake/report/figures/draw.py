@@ -1,4 +1,4 @@
-"""The figures of a report: maps, distances, decision variables, events; histograms of a large team.
+"""The figures of a report: maps, distances, decision variables with events; histograms of a large team.
 
 Each figure is a row of panels, separate drawings that a page can stack on a phone. Runs with identical paths share a
 panel. Each panel has a table of its data.
@@ -6,7 +6,7 @@ panel. Each panel has a table of its data.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -20,7 +20,6 @@ from airground_drake.report.metrics import Nearby, close_by, events_of, gap_m, r
 from airground_drake.report.outcomes import SLACK_M, distance, named
 from airground_drake.report.phrases import SETTINGS
 from airground_drake.report.reproduction import MEASURES
-from airground_drake.run.collisions import first_collisions
 from airground_drake.run.trace import Trace
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.view import canvas
@@ -33,12 +32,19 @@ ALIKE_M = 1e-9
 """Paths that differ by no more than this are identical but for rounding."""
 FARTHEST, NEAR = 5.0, 3.0
 """Distances are drawn up to this multiple of the largest required one, of bodies that came nearer than that one."""
-LISTED = 3
-"""Number of events that a caption lists for each run."""
 
-_PAPER = {"case_a": (3, 4, 5, 6), "case_b": (7, 8, 9, 10)}
+_PAPER = {"case_a": ("3", "5", "4 and 6"), "case_b": ("7", "9", "8 and 10")}
 """Numbers of the paper's figures, by the beginning of a scenario's name."""
-_NUMBERED = ("trajectories", "decision", "distances", "events")
+_NUMBERED = ("trajectories", "distances", "timelines")
+_MARKS = {
+    "stall": "□ stood still", "accepted": "● accepted proposal (dashed green path)",
+    "refused": "✖ refused proposal (dotted red path)", "unanswered": "◆ proposal without an answer (dash-dotted path)",
+    "collision": "★ collision (short dashes from there: it does not count)",
+}  # fmt: skip
+"""Marks of maps by kind."""
+_EVENTS = {"trigger": "▲ trigger", "release": "▼ release", "proposal": "◆ proposal", "accept": "● accepted",
+           "refuse": "✖ refused", "over": "■ time over"}  # fmt: skip
+"""Marks of events by kind."""
 
 
 @dataclass(frozen=True)
@@ -83,12 +89,14 @@ def draw(scenario: Scenario, traces: Mapping[str, Trace], settings: Mapping[str,
     numbers = next((paper for name, paper in _PAPER.items() if scenario.name.startswith(name)), ())
     with canvas.style(settings):
         chosen = _select(scenario, traces)
-        drawn = [_trajectories(chosen), _distances(chosen), _decision(chosen), _events(chosen)]
+        drawn = [_trajectories(chosen), _distances(chosen), _timelines(chosen)]
         drawn += [_team(chosen)] if len(chosen.first.ugvs) > MAX_TEAM else []
         compared = comparison.draw(scenario, traces)
     counterpart = dict(zip(_NUMBERED, numbers, strict=False))
     return [
-        replace(each, title=f"{each.title} (the paper's Figure {counterpart[each.id]})")
+        replace(
+            each, title=f"{each.title} (the paper's Figure{'s' * (' ' in counterpart[each.id])} {counterpart[each.id]})"
+        )
         if each.id in counterpart
         else each
         for each in [*drawn, compared]
@@ -119,12 +127,17 @@ def _select(scenario: Scenario, traces: Mapping[str, Trace]) -> _Selection:
 
 
 def _alike(one: Trace, other: Trace) -> bool:
-    """Whether all robots take the same paths at the same times."""
+    """Whether all robots take the same paths at the same times, and the same happens to the UGVs."""
     t = np.union1d(one.t, other.t)
-    return bool(one.t[-1] == other.t[-1]) and all(
-        np.abs(np.interp(t, one.t, a) - np.interp(t, other.t, b)).max() <= ALIKE_M
-        for robot in one.robots
-        for a, b in zip(one.body(robot).T, other.body(robot).T, strict=True)
+    first, second = ([mark[:6] for mark in maps.marks_of(trace, trace.ugvs)] for trace in (one, other))
+    return (
+        first == second
+        and bool(one.t[-1] == other.t[-1])
+        and all(
+            np.abs(np.interp(t, one.t, a) - np.interp(t, other.t, b)).max() <= ALIKE_M
+            for robot in one.robots
+            for a, b in zip(one.body(robot).T, other.body(robot).T, strict=True)
+        )
     )
 
 
@@ -145,12 +158,12 @@ def _runs(heading: str) -> str:
 def _trajectories(chosen: _Selection) -> Figure:
     first = chosen.first
     frame = frame_of(
-        first.scenario, ((robot, trace.body(robot)) for trace in chosen.runs.values() for robot in first.robots)
+        first.scenario, ((robot, trace.body(robot)) for trace in chosen.runs.values() for robot in first.ugvs)
     )
     barriers = barriers_of(first.scenario)
+    keys = {heading: maps.key_of(trace, chosen.team, frame) for heading, trace in chosen.shown.items()}
+    lines = max(len(maps.lines_of(key)) for key in keys.values())
     has_walls = not all(each.is_round for each in barriers)
-    roomy = len(first.ugvs) > 2 or has_walls
-    width_in = frame.width_in(canvas.WIDE_IN if roomy else canvas.MAP_IN, canvas.TALLEST_IN)
     true_size = any(radius_m(first, name) > 0.0 for name in first.robots) or any(
         each.is_round and each.radius_m[0] > 0.0 for each in barriers
     )
@@ -162,20 +175,36 @@ def _trajectories(chosen: _Selection) -> Figure:
     thin = f" Thin grey lines, which end in dots: {hidden} more UGVs." if hidden else ""
     frame_is = " Frame: the arena." if first.scenario.arena_m else ""
     frame_is += " Dots: ways of obstacles, drawn where they start." if any(len(each.way_m) for each in barriers) else ""
+    drawn = {mark.kind for key in keys.values() for entry in key for mark in entry.marks}
+    marks = "".join(f", {text}" for kind, text in _MARKS.items() if kind in drawn)
+    last = f" Where more than {maps.MAX_MARKS} marks would be, only the last proposal of each UGV is drawn."
+    marks += "." + last * any(not entry.letter for key in keys.values() for entry in key)
+    marks += " Thick: the UGV follows the UAV." * ("accepted" in drawn)
     caption = (
-        f"{_ends(chosen)}○ start, \N{MULTIPLICATION SIGN} target, ▲ trigger, □ stands still, ✖ collision. "
+        f"○ start, \N{MULTIPLICATION SIGN} target{marks} "
         f"{'. '.join(kinds)} (hollow: not on the UAV's map), {circles}.{frame_is} Thin dashed line: the UAV.{thin}"
     )
     robots = [*chosen.team, *first.uavs]
     panels = []
     for position, (heading, trace) in enumerate(chosen.shown.items()):
-        drawing = maps.plane(trace, chosen.team, frame, width_in)
-        columns = {f"{r} {a}": trace.body(r)[:, k] for r in robots for k, a in enumerate("xy")}
+        drawing = maps.plane(trace, chosen.team, frame, keys[heading], lines)
         finals = ", ".join(f"{r} ({x:.2f}, {y:.2f}) m" for r in robots for x, y, _ in [trace.body(r)[-1]])
-        says = f"Paths of {', '.join(robots)} in the ground plane; final positions: {finals}."
-        table = series(trace, "Positions, m", columns)
+        told = "".join(f" {entry.text}." for entry in keys[heading])
+        says = f"Paths of {', '.join(robots)} in the ground plane.{told} Final positions: {finals}."
+        table = _points(trace, robots, maps.marks_of(trace, chosen.team))
         panels.append(panel(drawing, f"trajectories-{position}", f"Map of {heading}", says, heading, table))
-    return Figure("trajectories", "Maps", caption, tuple(panels), look="" if roomy else "narrow")
+    return Figure("trajectories", "Maps", caption, tuple(panels))
+
+
+def _points(trace: Trace, robots: list[str], marks: Sequence[maps.Mark]) -> Table:
+    """Starts, what happened where, and ends."""
+    starts, ends = (
+        [(r, trace.t[k], word, trace.body(r)[k, :2]) for r in robots] for k, word in ((0, "starts"), (-1, "ends"))
+    )
+    told = [(mark.ugv, mark.t_s, maps.told([mark]), mark.at) for mark in marks[:MAX_TABLE_ROWS]]
+    rows = tuple((r, f"{t:.2f}", what, *(f"{x:.3f}" for x in at)) for r, t, what, at in [*starts, *told, *ends])
+    some = f", the first {MAX_TABLE_ROWS} of {len(marks)} events" * (len(marks) > MAX_TABLE_ROWS)
+    return Table(f"Run {trace.run}: what happened where{some}", ("robot", "t, s", "what", "x, m", "y, m"), rows)
 
 
 def _distances(chosen: _Selection) -> Figure | None:
@@ -215,50 +244,35 @@ def _told(at: Nearby) -> str:
     return f"{distance(at.value, at.required_m)} to {named(at.other, at.at_m)} at {at.t_s:.2f} s"
 
 
-def _decision(chosen: _Selection) -> Figure:
-    columns = {
-        heading: {ugv: trace.column(f"{ugv}.decision_variable_m") for ugv in chosen.team}
-        for heading, trace in chosen.shown.items()
-    }
-    highest = max(float(x.max()) for each in columns.values() for x in each.values())
-    top = 1.08 * max(highest, float(chosen.first.meta["zeta_m"]) * 1.1)
-    panels = []
-    for position, (heading, trace) in enumerate(chosen.shown.items()):
-        largest = ", ".join(f"{ugv} {x.max():.2f} m" for ugv, x in columns[heading].items())
-        drawing = timelines.decision(trace, chosen.team, top)
-        table = series(trace, "Decision variables, m", columns[heading])
-        says = f"Largest values: {largest}; threshold {float(trace.meta['zeta_m']):.3g} m."
-        name = f"decision-{position}"
-        panels.append(panel(drawing, name, f"Decision variables, {heading}", says, _runs(heading), table))
+def _timelines(chosen: _Selection) -> Figure:
+    panels, hidden = [], 0
+    for position, (run, trace) in enumerate(chosen.runs.items()):
+        first = [*chosen.team, *(ugv for ugv in trace.ugvs if ugv not in chosen.team)]
+        having = [ugv for ugv in first if events_of(trace, ugv, *timelines.MARKS)]
+        rows = having[:MAX_TEAM] or [max(trace.ugvs, key=lambda ugv: trace.column(f"{ugv}.decision_variable_m").max())]
+        hidden = max(hidden, len(having) - MAX_TEAM)
+        words = "; ".join(f"{ugv}: {timelines.told(trace, ugv)}" for ugv in rows)
+        says = f"Threshold {float(trace.meta['zeta_m']):.3g} m. {words}."
+        name, heading, drawing = f"timelines-{position}", f"Run {run}", timelines.events(trace, rows)
+        panels.append(panel(drawing, name, f"Events over time, {heading}", says, heading, _happened(trace, rows)))
+    drawn = {event["kind"] for trace in chosen.runs.values() for event in trace.events}
+    marks = ", ".join(text for kind, text in _EVENTS.items() if kind in drawn)
+    more = f" At most {MAX_TEAM} UGVs are drawn, up to {hidden} more are in the trace." * (hidden > 0)
     caption = (
-        f"{_first_triggers(chosen)} A UGV that stands still falls behind its reference and "
-        f"triggers (▲) at the threshold.{_left_out(chosen, chosen.team)}"
+        "Line: decision variable. Grey: the UAV is called. Hatched bar: the UGV follows the UAV."
+        f"{marks and f' {marks}.'} // time in which nothing happens is left out.{more}"
     )
-    return Figure("decision", "Decision variables", caption, tuple(panels))
+    return Figure("timelines", "Decision variables, triggers, proposals, answers", caption, tuple(panels))
 
 
-def _events(chosen: _Selection) -> Figure | None:
-    rows = [
-        (trace, ugv) for trace in chosen.runs.values() for ugv in trace.ugvs if events_of(trace, ugv, *timelines.MARKS)
-    ]
-    if not rows:
-        return None
-    drawn = rows[: timelines.MAX_ROWS]
-    listed = [(trace.run, e) for trace, ugv in rows for e in events_of(trace, ugv, *timelines.MARKS)]
-    cells = tuple(
-        (run, f"{e['t_s']:.3f}", e["robot"], e["kind"], ", ".join(f"{x:.3f}" for x in e["position_m"]))
-        for run, e in listed[:MAX_TABLE_ROWS]
-    )
-    some = "" if len(listed) <= MAX_TABLE_ROWS else f", the first {MAX_TABLE_ROWS} of {len(listed)}"
-    table = Table(f"Events{some}", ("run", "t, s", "robot", "event", "position x, y, z, m"), cells)
-    words = "; ".join(f"run {trace.run}, {ugv}: {timelines.told(trace, ugv)}" for trace, ugv in drawn)
-    row = panel(timelines.events(drawn), "events-0", "Events over time", f"{words}.", "", table, scale=canvas.SCALE)
-    more = f" {len(rows) - len(drawn)} more rows are in the trace." if len(rows) > len(drawn) else ""
-    caption = (
-        f"{_accepted(chosen)} ▲ trigger, ▼ release; grey bar: the UAV is called. "
-        f"◆ proposal, ● accepted, ✖ refused; hatched bar: the UGV follows the UAV.{more}"
-    )
-    return Figure("events", "Triggers, proposals, decisions", caption, (row,), look="wide")
+def _happened(trace: Trace, ugvs: Sequence[str]) -> Table:
+    """Events of UGVs with their decision variables; of a UGV without events its largest one."""
+    x = {ugv: trace.column(f"{ugv}.decision_variable_m") for ugv in ugvs}
+    every = [(e["t_s"], ugv, e["kind"]) for ugv in ugvs for e in events_of(trace, ugv, *timelines.MARKS)]
+    every = sorted(every) or [(float(trace.t[x[ugv].argmax()]), ugv, "largest value") for ugv in ugvs]
+    rows = ((f"{t:.3f}", ugv, what, f"{np.interp(t, trace.t, x[ugv]):.3f}") for t, ugv, what in every[:MAX_TABLE_ROWS])
+    some = f", the first {MAX_TABLE_ROWS} of {len(every)}" * (len(every) > MAX_TABLE_ROWS)
+    return Table(f"Run {trace.run}: events{some}", ("t, s", "UGV", "event", "decision variable, m"), tuple(rows))
 
 
 def _team(chosen: _Selection) -> Figure:
@@ -295,53 +309,6 @@ def _team(chosen: _Selection) -> Figure:
         called = sum(bool(events_of(chosen.runs[name], ugv, "trigger")) for ugv in ugvs)
         there.append(f"Run {name}: {len(of)} of {len(ugvs)} UGVs arrive, {called} triggered.")
     return Figure("team", "The whole team", f"{' '.join(there)} Each bar counts UGVs.", tuple(panels))
-
-
-def _ends(chosen: _Selection) -> str:
-    """The end of each run: collisions, UGVs that stand still, arrivals."""
-    told: dict[str, list[str]] = {}
-    for heading, trace in chosen.shown.items():
-        hits, named_first = first_collisions(trace.events), sorted(trace.ugvs, key=lambda ugv: ugv not in chosen.team)
-        words = [
-            f"{ugv} collides at {hits[ugv]['t_s']:.2f} s (dashed from there: it does not count)"
-            for ugv in named_first
-            if ugv in hits
-        ]
-        words += [
-            f"{ugv} stands still at ({at[0]:.2f}, {at[1]:.2f}) m"
-            for ugv in named_first
-            if (at := MEASURES["stall_position"](trace, ugv))
-        ]
-        if len(words) > LISTED:
-            words = [*words[:LISTED], f"{len(words) - LISTED} more do not arrive"]
-        if not words and all(MEASURES["arrives"](trace, ugv)[0] for ugv in trace.ugvs):
-            words = ["all UGVs arrive"]
-        told.setdefault(", ".join(words) or "not all UGVs arrive", []).append(_runs(heading).partition(" ")[2])
-    return "".join(f"Run{'s' * (len(runs) > 1)} {', '.join(runs)}: {what}. " for what, runs in told.items())
-
-
-def _first_triggers(chosen: _Selection) -> str:
-    """The first triggers of each run."""
-    told: dict[str, list[str]] = {}
-    for name, trace in chosen.runs.items():
-        early = sorted((event["t_s"], event["robot"]) for event in trace.events if event["kind"] == "trigger")[:LISTED]
-        times = {ugv: ", ".join(f"{t:.3f}" for t, other in early if other == ugv) for _, ugv in early}
-        what = ", ".join(f"{ugv} at {listed} s" for ugv, listed in times.items())
-        told.setdefault(f"triggers {what}" if what else "no trigger", []).append(name)
-    return " ".join(f"Run{'s' * (len(names) > 1)} {', '.join(names)}: {what}." for what, names in told.items())
-
-
-def _accepted(chosen: _Selection) -> str:
-    told = []
-    for name, trace in chosen.runs.items():
-        kinds = [event["kind"] for event in trace.events]
-        counts = [
-            f"{kinds.count(k)} {said}" for k, said in (("accept", "accepted"), ("refuse", "refused")) if k in kinds
-        ]
-        if counts:
-            told.append(f"run {name}: {', '.join(counts)}")
-    text = "; ".join(told) or "no gatekeeper decided"
-    return f"{text[0].upper()}{text[1:]}."
 
 
 def _left_out(chosen: _Selection, drawn: list[str]) -> str:

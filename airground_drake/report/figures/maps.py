@@ -2,28 +2,166 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Iterable, Iterator, Sequence
+from textwrap import wrap
+from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from airground_drake.base.arrays import Array
+from airground_drake.gatekeeper.reasons import refusal
+from airground_drake.registry import method_of
+from airground_drake.report.interventions import interventions
 from airground_drake.report.metrics import events_of
-from airground_drake.report.reproduction import MEASURES
+from airground_drake.report.sentences import grouped
+from airground_drake.report.stalls import stalls
 from airground_drake.run.trace import Trace
-from airground_drake.view.canvas import ALARM, INK, MUTED
+from airground_drake.verify.runs.proposals import proposal_of
+from airground_drake.view.canvas import ALARM, GOOD, INK, MUTED, WIDE_IN, short, stretches, thin
 from airground_drake.view.labels import Label, place
 from airground_drake.view.plane import Frame, axes_over, draw_barriers, draw_robot, looks_of
 
+MAX_MARKS = 8
+"""Maximum number of marks of a run that are told one by one."""
+NEAR = 0.03
+"""Marks of a UGV within this share of the map's diagonal share a letter."""
+HIGHEST_IN, LINE_CHARS, _LINE_IN = 4.4, 62, 0.16
+"""Maximum height of a map, inches; characters in a line below it, and height of a line, inches."""
+LOOKS: dict[str, dict[str, Any]] = {
+    "accepted": {"marker": "o", "color": GOOD, "linestyle": (0, (4, 2))},
+    "refused": {"marker": "X", "color": ALARM, "linestyle": (0, (1, 1.3))},
+    "unanswered": {"marker": "D", "color": MUTED, "linestyle": (0, (7, 2, 1, 2))},
+    "stall": {"marker": "s", "color": INK, "markerfacecolor": "none"},
+    "collision": {"marker": "*", "color": ALARM},
+}
+"""Looks of marks by kind, and of proposed paths."""
 
-def plane(trace: Trace, ugvs: Sequence[str], frame: Frame, width_in: float) -> Figure:
-    """The ways of a run in the plane: starts o, targets x, barriers with safe outlines, the UAV dashed.
 
-    UGVs other than `ugvs` are thin lines that end in a dot.
+class Mark(NamedTuple):
+    """What happened to a UGV.
+
+    Attributes:
+        ugv: its name.
+        t_s: when, s.
+        kind: key of LOOKS.
+        what, when, why: in words.
+        at: where, (2,), m.
+        way: corners of the proposed path, (M, 2), m.
     """
-    figure, axes = axes_over(frame, width_in)
+
+    ugv: str
+    t_s: float
+    kind: str
+    what: str
+    when: str
+    why: str
+    at: Array
+    way: Array = np.empty((0, 2))
+
+
+class Entry(NamedTuple):
+    """Text below a map, the letter of its place in the map, '' without one, and the marks that are drawn for it."""
+
+    letter: str
+    text: str
+    marks: list[Mark]
+
+
+def marks_of(trace: Trace, ugvs: Sequence[str]) -> list[Mark]:
+    """What happened to UGVs in a run, by time: stalls, answers to proposals, and first collisions."""
+    every = trace.derived("marks of maps", lambda: [*_stalls(trace), *_answers(trace), *_collisions(trace)])
+    return sorted((mark for mark in every if mark.ugv in ugvs), key=lambda mark: mark.t_s)
+
+
+def _stalls(trace: Trace) -> Iterator[Mark]:
+    for stall in stalls(trace):
+        ugv, begin_s, end_s = stall["robot"], stall["from_s"], stall["until_s"]
+        when = f"{begin_s:.1f} to {_s(end_s, 1)}" if end_s < trace.t[-1] else f"from {_s(begin_s, 1)} on"
+        held = f", held by {' and '.join(stall['held_by'])}" if stall["held_by"] else ""
+        yield Mark(ugv, begin_s, "stall", "stood", when, held, _at(trace, ugv, end_s))
+
+
+def _answers(trace: Trace) -> Iterator[Mark]:
+    """Where UGVs were when they answered proposals; or when a proposal was sent that they never answered."""
+    for sent in interventions(trace):
+        ugv, end = sent["robot"], sent["ended"]
+        kind, t_s, why = "unanswered", sent["sent_s"], f": {end['how']}"
+        if sent["accepted_s"] is not None:
+            given_up = end["how"] == "given up"
+            kind, t_s = "accepted", sent["accepted_s"]
+            why = f", given up at {_s(end['t_s'])}: {refusal(end['reason'])}" if given_up else ""
+        elif end["how"] == "refused":
+            kind, t_s, why = "refused", end["t_s"], f": {refusal(end['reason'])}"
+        obeyed = kind == "accepted" and not method_of(trace.meta["method"]).gated
+        way = proposal_of(trace, sent["number"]).positions_m[:, :2]
+        what = "obeyed" if obeyed else kind
+        yield Mark(ugv, t_s, kind, what, f"at {_s(t_s)}", why, _at(trace, ugv, t_s), way)
+
+
+def _collisions(trace: Trace) -> Iterator[Mark]:
+    for event in (event for ugv in trace.ugvs for event in events_of(trace, ugv, "collision")[:1]):
+        other, at = event.get("other") or event.get("obstacle"), np.array(event["position_m"][:2], dtype=np.float64)
+        with_ = f" with {other}" if other else ""
+        yield Mark(event["robot"], event["t_s"], "collision", "collided", f"at {_s(event['t_s'])}", with_, at)
+
+
+def _s(t_s: float, digits: int = 2) -> str:
+    """A time that no line break parts from its unit."""
+    return f"{t_s:.{digits}f}\N{NO-BREAK SPACE}s"
+
+
+def told(marks: Iterable[Mark]) -> str:
+    """Marks in words; those that differ in their times only together."""
+    alike = grouped(((mark.what, mark.why), mark.when) for mark in marks)
+    return "; ".join(f"{what} {', '.join(times)}{why}" for (what, why), times in alike.items())
+
+
+def _at(trace: Trace, robot: str, t_s: float) -> Array:
+    """Where the body of a robot was, seen from above, (2,), m."""
+    return np.array([np.interp(t_s, trace.t, axis) for axis in trace.body(robot)[:, :2].T])
+
+
+def key_of(trace: Trace, ugvs: Sequence[str], frame: Frame) -> list[Entry]:
+    """The text below a map: an entry per place of a UGV; or per UGV if more happened than can be told one by one."""
+    marks = marks_of(trace, ugvs)
+    if len(marks) > MAX_MARKS:
+        return [_of_ugv(trace, ugv, of) for ugv in ugvs if (of := [mark for mark in marks if mark.ugv == ugv])]
+    near_m = NEAR * np.hypot(frame.right - frame.left, frame.top - frame.bottom)
+    groups = list[list[Mark]]()
+    for mark in marks:
+        known = (group for group in groups if group[0].ugv == mark.ugv and np.hypot(*(group[0].at - mark.at)) < near_m)
+        group = next(known, None)
+        groups.append([mark]) if group is None else group.append(mark)
+    letters = (chr(ord("A") + k) for k in range(MAX_MARKS))
+    return [Entry(letter, f"{short(of[0].ugv)} {told(of)}", of) for letter, of in zip(letters, groups, strict=False)]
+
+
+def _of_ugv(trace: Trace, ugv: str, marks: Sequence[Mark]) -> Entry:
+    """How a UGV ended and how often it answered; its stalls and collisions are drawn, and its last proposal."""
+    sent = [mark for mark in marks if len(mark.way)]
+    others = [mark for mark in marks if not len(mark.way)]
+    arrived = events_of(trace, ugv, "arrival")
+    words = [f"arrived at {_s(arrived[-1]['t_s'], 1)}"] if arrived else [told(others[-1:])] if others else []
+    counts = {kind: sum(mark.kind == kind for mark in sent) for kind in LOOKS}
+    listed = ", ".join(f"{count} {kind}" for kind, count in counts.items() if count)
+    words += [f"{len(sent)} proposals: {listed}, the last {told(sent[-1:])}"] if len(sent) > 1 else []
+    words += [f"proposal {told(sent)}"] if len(sent) == 1 else []
+    return Entry("", f"{short(ugv)} {'; '.join(words)}", [*others, *sent[-1:]])
+
+
+def lines_of(key: Sequence[Entry]) -> list[tuple[str, str]]:
+    """The lines below a map: a letter at the beginning of an entry that has one, and text."""
+    return [(entry.letter * (k == 0), line) for entry in key for k, line in enumerate(wrap(entry.text, LINE_CHARS))]
+
+
+def plane(trace: Trace, ugvs: Sequence[str], frame: Frame, key: Sequence[Entry], lines: int) -> Figure:
+    """The ways of a run in the plane: starts o, targets x, barriers with safe outlines, proposals, the UAV dashed.
+
+    UGVs other than `ugvs` are thin lines that end in a dot. There is room for so many lines of text below the map.
+    """
+    figure, axes = axes_over(frame, frame.width_in(WIDE_IN, HIGHEST_IN), WIDE_IN, _LINE_IN * lines + 0.1 * (lines > 0))
     (of_barriers, edges), labels = draw_barriers(axes, trace.scenario), list[Label]()
     for robot in trace.ugvs:
         if robot not in ugvs:
@@ -33,29 +171,30 @@ def plane(trace: Trace, ugvs: Sequence[str], frame: Frame, width_in: float) -> F
     for robot, appearance in robots.items():
         way, rows = trace.body(robot), trace.counting_rows(robot)
         labels += draw_robot(axes, trace.scenario, robot, way, appearance, rows, trace.heading(robot))
-    for ugv in ugvs:
-        labels += _happenings(axes, trace, ugv)
+        for first, after in stretches(trace.executing(robot) >= 0) if robot in ugvs else ():
+            band = way[max(first - 1, 0) : after, :2]
+            axes.plot(*band[thin(band)].T, color=appearance.color, linewidth=5.0, alpha=0.3, zorder=1.8)
+    for entry in key:
+        _draw(axes, entry.marks)
+        labels += [Label(entry.marks[0].at, entry.letter, weight="bold", size_pt=9.0)] if entry.letter else []
     place(axes, [*labels, *of_barriers], [*(trace.body(robot) for robot in robots), *edges])
+    top_in = _LINE_IN * lines
+    for letter, text in lines_of(key):
+        for left_in, part, weight in ((0.1, letter, "bold"), (0.3, text, "normal")):
+            at = left_in / WIDE_IN, top_in / figure.get_figheight()
+            figure.text(*at, part, va="top", fontsize=8.5, weight=weight)
+        top_in -= _LINE_IN
     return figure
 
 
-def _happenings(axes: Axes, trace: Trace, ugv: str) -> list[Label]:
-    """Mark where a UGV triggered, collided or stands still; the labels of these marks."""
-    found: list[tuple[Array, list[str]]] = []
-
-    def mark(at: Array, text: str, **options: Any) -> None:
-        axes.plot(*at, markersize=10, zorder=6, **options)
-        near = next((lines for known, lines in found if np.linalg.norm(known - at) < 0.3), None)
-        if near is None:
-            found.append((at, [text]))
-        else:
-            near.append(text)
-
-    for event in [*events_of(trace, ugv, "trigger")[:2], *events_of(trace, ugv, "collision")[:1]]:
-        options = {"marker": "^", "color": INK} if event["kind"] == "trigger" else {"marker": "X", "color": ALARM}
-        at = np.asarray(event["position_m"][:2], dtype=np.float64)
-        mark(at, f"{event['kind']} {event['t_s']:.2f} s", markeredgecolor="white", **options)
-    if MEASURES["stall_position"](trace, ugv):
-        at = trace.body(ugv)[-1, :2]
-        mark(at, "stands still", marker="s", markerfacecolor="none", color=INK, markeredgewidth=1.4)
-    return [Label(at, "\n".join(lines)) for at, lines in found]
+def _draw(axes: Axes, marks: Sequence[Mark]) -> None:
+    """Marks where they are, and proposed paths."""
+    for mark in marks:
+        of_mark = dict(LOOKS[mark.kind])
+        dash = of_mark.pop("linestyle", "none")
+        if len(mark.way):
+            way = mark.way[thin(mark.way)]
+            axes.plot(*way.T, color=of_mark["color"], linestyle=dash, linewidth=1.3, zorder=3.5)
+        edge = {"markeredgewidth": 1.6} if mark.kind == "stall" else {"markeredgecolor": "white"}
+        size = {"stall": 10.0, "collision": 12.0}.get(mark.kind, 7.0)
+        axes.plot(*mark.at, linestyle="none", markersize=size, zorder=6, **of_mark, **edge)

@@ -40,7 +40,7 @@ def bayes_risks(inputs: Mapping[str, Any], evidence: Mapping[str, Any]) -> Figur
     )  # fmt: skip
     caption = (
         f"The threshold in force is {places['in force']:.4g} m ({evidence['kind']}). The curve assumes a drift of "
-        f"{constants[0]:g} m/s and a noise of {constants[1]:g} m/√s.{_as_it_was(evidence.get('runs', {}))}"
+        f"{constants[0]:g} m/s and a noise of {constants[1]:g} m/√s."
     )
     with canvas.style():
         return shown.plate("threshold-choice", "", caption)
@@ -72,14 +72,3 @@ def refinement(evidence: Mapping[str, Any]) -> Figure | None:
     )
     with canvas.style():
         return shown.plate("refinement", "", caption, beside="ZENO-REFINE")
-
-
-def _as_it_was(runs: Mapping[str, Any]) -> str:
-    """Drift and noise of the first UGV whose error reached the threshold, and the threshold that is best for them."""
-    for name, row in runs.items():
-        best = f"{row['optimum_m']:.3g} m is best" if row["optimum_m"] else "the lower, the better"
-        return (
-            f" In run {name.replace(' ', ', ')} had a drift of {row['drift_m_s']:.4g} m/s and a noise of "
-            f"{row['noise_m_sqrt_s']:g} m/√s; for these, {best}."
-        )
-    return " In no run did a task error grow to the threshold: the real drift is not known."

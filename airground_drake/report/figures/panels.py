@@ -46,7 +46,7 @@ class Figure:
         caption: what to see.
         panels: its drawings.
         beside: place in the page: a claim's identifier or `audit-<item>`; '' for the section of figures.
-        look: "wide" for a panel on the whole width, "narrow" for panels side by side.
+        look: "wide" for a panel on the whole width.
     """
 
     id: str
@@ -57,20 +57,12 @@ class Figure:
     look: str = ""
 
 
-def panel(
-    drawing: Drawing,
-    name: str,
-    title: str,
-    says: str,
-    heading: str,
-    table: Table,
-    scale: float = 0.0,
-) -> Panel:
+def panel(drawing: Drawing, name: str, title: str, says: str, heading: str, table: Table) -> Panel:
     """A panel of a drawing; call it inside `canvas.style`.
 
     `name` is unique in the page; `title` and `says` are for readers who cannot see it.
     """
-    return Panel(heading, svg.inline(canvas.svg(drawing), name, title, says, scale=scale), table, drawing)
+    return Panel(heading, svg.inline(canvas.svg(drawing), name, title, says), table, drawing)
 
 
 def series(trace: Trace, caption: str, columns: Mapping[str, Array]) -> Table:

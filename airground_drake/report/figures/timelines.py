@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from textwrap import fill
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -12,12 +12,13 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from airground_drake.base.arrays import Array
+from airground_drake.report.figures.clock import CUT_S, Clock
 from airground_drake.report.metrics import Nearby, closest_obstacle, events_of, gap_m
 from airground_drake.report.outcomes import SLACK_M, metres
 from airground_drake.run.trace import Trace
 from airground_drake.view.canvas import (
     ALARM,
-    FULL_IN,
+    GOOD,
     INK,
     MUTED,
     WIDE_IN,
@@ -27,47 +28,34 @@ from airground_drake.view.canvas import (
     look,
     rule,
     short,
-    size_in,
+    stretches,
+    thin,
     time_line,
 )
+from airground_drake.view.labels import BOX
 
 MARKS = {"trigger": "^", "release": "v", "proposal": "D", "accept": "o", "refuse": "X", "over": "s"}
 """Markers of events by kind."""
-MAX_ROWS, MAX_TOLD, TOLD_CHARS = 16, 7, 58
-"""Maximum number of rows of the event figure, of events listed beside a row, and of characters in a line."""
+WORDS = {"accept": "accepted", "refuse": "refused", "over": "time over"}
+"""Names of kinds of events, where they are not those of the trace."""
+MAX_TOLD, TOLD_CHARS = 8, 52
+"""Maximum number of labels of a row, and of events in a label or a heading, more are counted; characters in a line."""
+TOGETHER_S = 0.2
+"""Events that follow each other within this time share a label, s."""
+_LEFT_IN, _RIGHT_IN, _ROW_IN, _LINE_IN, _CHAR_IN = 0.55, 1.05, 0.75, 0.15, 0.066
+"""Margins beside axes, heights of a row and of a line of text above it, width of a character, inches."""
+_COLORS = {"accept": GOOD, "refuse": ALARM, "release": MUTED, "over": MUTED}
 _FORBIDDEN: dict[str, Any] = {
     "facecolor": "#eeeeee", "hatch": "///", "edgecolor": "#d4d4d4", "linewidth": 0.0, "zorder": 0,
 }  # fmt: skip
 """Look of the band below the safe distance."""
 
 
-def decision(trace: Trace, ugvs: Sequence[str], top: float) -> Figure:
-    """Decision variables of a run, the threshold and the release level."""
-    figure, (axes,) = _time_axes(1, 2.5, trace, above_in=0.08)
-    zeta, release = float(trace.meta["zeta_m"]), float(trace.scenario.decision.release_m)
-    labels = [(zeta, f"threshold {zeta:.3g}", INK)]
-    level(axes, zeta, "-")
-    if trace.scenario.decision.trigger == "automaton":
-        level(axes, release, (0, (1, 1.5)))
-        labels.append((release, f"release {release:.3g}", INK))
-    axes.set_ylim(0.0, top)
-    for position, ugv in enumerate(ugvs):
-        x = trace.column(f"{ugv}.decision_variable_m")
-        time_line(axes, trace.t, x, look(position))
-        times = [event["t_s"] for event in events_of(trace, ugv, "trigger")]
-        color = look(position).color
-        axes.plot(times, np.interp(times, trace.t, x), "^", markersize=8, color=color, markeredgecolor="white")
-        labels.append((float(x[-1]), short(ugv, 12) + (f" ▲ {times[0]:.2f} s" if times else ""), color))
-    rule(axes, "time, s", "decision variable, m")
-    label_right(axes, labels)
-    return figure
-
-
 def distances(
     trace: Trace, near: Mapping[str, Sequence[Nearby]], looks: Mapping[str, Mapping[str, int]], top: float
 ) -> Figure:
     """Distances between the surfaces of each UGV and bodies near it, the required ones, and the exact minimum."""
-    figure, every = _time_axes(len(near), 0.5 + 1.75 * len(near), trace)
+    figure, every = _time_axes(1.45, [0.24, *[0.32] * (len(near) - 1)], trace)
     required = sorted({found.required_m for each in near.values() for found in each})
     for axes, (ugv, those) in zip(every, near.items(), strict=True):
         bottom = min(0.0, *(found.value for found in those)) if those else 0.0
@@ -100,42 +88,126 @@ def distances(
     return figure
 
 
-def events(rows: Sequence[tuple[Trace, str]]) -> Figure:
-    """Triggers, proposals and decisions over time: a row per UGV and run, with the times beside it."""
-    longest = max((trace for trace, _ in rows), key=lambda trace: float(trace.t[-1]))
-    figure, (axes,) = _time_axes(1, 0.6 + 0.5 * len(rows), longest, FULL_IN, left_in=1.3, right_in=4.3, above_in=0.05)
-    axes.set_ylim(len(rows) - 0.4, -0.6)
-    rule(axes, "time, s", "")
-    for y, (trace, ugv) in enumerate(rows):
-        across = axes.get_yaxis_transform()
-        name = f"run {short(trace.run, 9)}, {short(ugv, 9)}"
-        axes.text(-0.1 / size_in(axes)[0], y, name, transform=across, ha="right", va="center")
-        axes.text(1.0 + 0.1 / size_in(axes)[0], y, told(trace, ugv), transform=across, va="center", fontsize=8.5)
-        _bars(axes, trace, trace.column(f"{ugv}.mode") == 1, y - 0.17, facecolor="#dddddd")
-        _bars(axes, trace, trace.executing(ugv) >= 0, y + 0.17, facecolor="#cfe6dc", hatch="////")
-        for kind, marker in MARKS.items():
-            times = [event["t_s"] for event in events_of(trace, ugv, kind)]
-            color = {"refuse": ALARM, "release": MUTED, "over": MUTED}.get(kind, "#0060a8")
-            level_y = y + (-0.17 if kind in ("trigger", "release") else 0.17)
-            axes.plot(times, [level_y] * len(times), linestyle="none", marker=marker, markersize=6, color=color)
+class _Label(NamedTuple):
+    """A text above a row: place of its event, begin and end of the text on the axis, s; its lowest line."""
+
+    at: float
+    begin: float
+    end: float
+    line: int
+    text: str
+    color: str
+
+    @property
+    def top(self) -> int:
+        """The line above it."""
+        return self.line + self.text.count("\n") + 1
+
+
+def events(trace: Trace, ugvs: Sequence[str]) -> Figure:
+    """Decision variables of UGVs and what happened, a row each, without the time in which nothing happened."""
+    happened = {ugv: events_of(trace, ugv, *MARKS) for ugv in ugvs}
+    clock = Clock.around([event["t_s"] for each in happened.values() for event in each], *_ends_s(trace))
+    labels = {ugv: _labels(each, clock) for ugv, each in happened.items()}
+    heads = [short(ugv) if labels[ugv] else fill(f"{short(ugv)}: {told(trace, ugv)}", TOLD_CHARS) for ugv in ugvs]
+    lines = [max((label.top for label in labels[ugv]), default=0) for ugv in ugvs]
+    above_in = [_LINE_IN * (line + head.count("\n") + 1) + 0.14 for line, head in zip(lines, heads, strict=True)]
+    figure, every = _time_axes(_ROW_IN, above_in, trace)
+    for axes, ugv, line, head in zip(every, ugvs, lines, heads, strict=True):
+        axes.set_xlim(0.0, clock.length)
+        _behind(axes, trace, ugv, clock)
+        across = axes.get_xaxis_transform()
+        axes.text(0.0, _height(line), head, transform=across, va="bottom", weight="bold" if labels[ugv] else "normal")
+        for label in labels[ugv]:
+            y, color = _height(label.line), label.color
+            axes.plot([label.at] * 2, [0.0, y], transform=across, color=color, linewidth=0.6, clip_on=False)
+            axes.text(label.begin, y, label.text, color=color, transform=across, va="bottom", fontsize=8, bbox=BOX)
+        for event in happened[ugv]:
+            kind, t_s, (low, high) = event["kind"], event["t_s"], axes.get_ylim()
+            share = {"trigger": None, "release": None, "proposal": 0.36}.get(kind, 0.09)
+            x = np.interp(t_s, trace.t, trace.column(f"{ugv}.decision_variable_m"))
+            axes.plot(
+                clock.at([t_s]), x if share is None else low + share * (high - low), MARKS[kind], markersize=6.5,
+                color=_COLORS.get(kind, "#0060a8"), markeredgecolor="white", markeredgewidth=0.6, zorder=5,
+                clip_on=False,
+            )  # fmt: skip
+        numbers = clock.numbers(0.13 * clock.length)
+        rule(axes, f"time, s{_left_out(trace, clock)}" if axes is every[-1] else "", "m", numbers=numbers)
     return figure
 
 
+def _height(line: int) -> float:
+    """Where a line of text above a row is, as a multiple of the row's height."""
+    return 1.0 + (0.05 + _LINE_IN * line) / _ROW_IN
+
+
+def _left_out(trace: Trace, clock: Clock) -> str:
+    first_s, last_s = _ends_s(trace)
+    left_out_s = last_s - first_s - clock.shown_s
+    return f" (nothing happens in the other {left_out_s:.1f} s)" if left_out_s >= CUT_S else ""
+
+
+def _behind(axes: Axes, trace: Trace, ugv: str, clock: Clock) -> None:
+    """What is behind the events of a UGV: its decision variable, both levels, calls of the UAV, and cuts."""
+    t, zeta = np.union1d(trace.t[clock.shows(trace.t)], [clock.begin, clock.end]), float(trace.meta["zeta_m"])
+    x = np.interp(t, trace.t, trace.column(f"{ugv}.decision_variable_m"))
+    bottom, top = min(0.0, *x), max(zeta, *x)
+    axes.set_ylim(bottom, top + 0.15 * (top - bottom))
+    labels = [(zeta, f"threshold {zeta:.3g}", INK)]
+    level(axes, zeta, "-")
+    if trace.scenario.decision.trigger == "automaton":
+        release = float(trace.scenario.decision.release_m)
+        level(axes, release, (0, (1, 1.5)))
+        labels.append((release, f"release {release:.3g}", INK))
+    label_right(axes, labels)
+    _bars(axes, trace, clock, trace.column(f"{ugv}.mode") == 1, 1.0, facecolor="#eeeeee", zorder=0.4)
+    follows = trace.executing(ugv) >= 0
+    _bars(axes, trace, clock, follows, 0.18, facecolor="#cfe6dc", edgecolor=MUTED, hatch="////", zorder=0.6)
+    axes.plot(clock.at(t[thin(x)]), x[thin(x)], color=look(0).color)
+    for begin, end in clock.cuts:
+        axes.axvspan(begin, end, facecolor="white", edgecolor="none", zorder=3)
+        axes.text((begin + end) / 2.0, 0.5, "//", transform=axes.get_xaxis_transform(), ha="center", va="center",
+                  color=MUTED, zorder=4)  # fmt: skip
+
+
+def _labels(happened: Sequence[Mapping[str, Any]], clock: Clock) -> list[_Label]:
+    """Labels of events, from the last one to the first: a line to an event passes no earlier label. [] for too many."""
+    groups = list[list[Mapping[str, Any]]]()
+    for event in happened:
+        together = groups and event["t_s"] - groups[-1][-1]["t_s"] < TOGETHER_S
+        groups[-1].append(event) if together else groups.append([event])
+    labels = list[_Label]()
+    if len(groups) > MAX_TOLD or any(len(group) > MAX_TOLD for group in groups):
+        return labels
+    for group in reversed(groups):
+        text = fill(
+            f"{', '.join(_word(event['kind'], event['t_s']) for event in group)}\N{NO-BREAK SPACE}s", TOLD_CHARS
+        )
+        s_per_in = clock.length / (WIDE_IN - _LEFT_IN - _RIGHT_IN)
+        width = s_per_in * _CHAR_IN * max(map(len, text.split("\n")))
+        at = float(clock.at([group[0]["t_s"]])[0])
+        begin = max(min(at, clock.length + s_per_in * _RIGHT_IN - width), -s_per_in * _LEFT_IN)
+        over = [one.top for one in labels if one.begin < begin + width and begin < one.end]
+        color = next((_COLORS[event["kind"]] for event in group if event["kind"] in ("refuse", "accept")), INK)
+        labels.append(_Label(at, begin, begin + width, max(over, default=0), text, color))
+    return labels
+
+
+def _word(kind: str, t_s: float) -> str:
+    return f"{WORDS.get(kind, kind)} {t_s:.2f}"
+
+
 def told(trace: Trace, ugv: str) -> str:
-    """The events of a UGV with their times; many events are counted by kind."""
+    """The events of a UGV with their times; many events are counted by kind; without any, its largest value."""
     found = events_of(trace, ugv, *MARKS)
+    if not found:
+        x = trace.column(f"{ugv}.decision_variable_m")
+        return f"nothing happens; largest {x.max():.3g} m at {trace.t[x.argmax()]:.2f} s"
     if len(found) <= MAX_TOLD:
-        return _wrapped(f"{event['kind']} {event['t_s']:.2f}" for event in found)
-    counts = {kind: [event["t_s"] for event in found if event["kind"] == kind] for kind in MARKS}
-    return _wrapped(
-        f"{len(t)} \N{MULTIPLICATION SIGN} {kind} from {t[0]:.2f}" if len(t) > 1 else f"{kind} {t[0]:.2f}"
-        for kind, t in counts.items()
-        if t
-    )
-
-
-def _wrapped(words: Iterable[str]) -> str:
-    return fill(f"{', '.join(words)}\N{NO-BREAK SPACE}s", TOLD_CHARS)
+        return f"{', '.join(_word(event['kind'], event['t_s']) for event in found)} s"
+    times = {kind: [event["t_s"] for event in found if event["kind"] == kind] for kind in MARKS}
+    counts = (f"{len(t)} \N{MULTIPLICATION SIGN} " * (len(t) > 1) + _word(kind, t[0]) for kind, t in times.items() if t)
+    return f"{', '.join(counts)} s (first times)"
 
 
 def histogram(quantity: str, of_runs: Mapping[str, Sequence[float]]) -> Figure:
@@ -163,7 +235,7 @@ def compared_distances(runs: Mapping[str, Trace], robot: str) -> Figure:
     first = next(iter(runs.values()))
     minima = {name: closest_obstacle(trace, robot) for name, trace in runs.items()}
     d = max((minimum.required_m for minimum in minima.values() if minimum), default=0.0)
-    figure, (axes,) = _time_axes(1, 3.0 + 0.22 * len(runs), first, right_in=0.65, above_in=0.22 * len(runs))
+    figure, (axes,) = _time_axes(2.58, [0.22 * len(runs)], first)
     gaps = {name: nearest_distance(trace, robot) for name, trace in runs.items()}
     low = min(d, *(float(gap.min()) for gap in gaps.values()))
     bottom = max(min(0.0, low), low - 0.15 * d)
@@ -190,34 +262,33 @@ def nearest_distance(trace: Trace, robot: str) -> Array:
     return nearest
 
 
-def _time_axes(
-    count: int,
-    height_in: float,
-    trace: Trace,
-    width_in: float = WIDE_IN,
-    *,
-    left_in: float = 0.55,
-    right_in: float = 1.05,
-    above_in: float = 0.24,
-) -> tuple[Figure, list[Axes]]:
-    """Axes over time, stacked, with room for labels on the right."""
-    figure = Figure(figsize=(width_in, height_in))
-    below_in, between_in = 0.42, 0.32
-    inner_in = (height_in - below_in - above_in - between_in * (count - 1)) / count
-    every = []
-    for row in range(count):
-        bottom_in = below_in + (count - 1 - row) * (inner_in + between_in)
-        inner_width_in = width_in - left_in - right_in
-        box = (left_in / width_in, bottom_in / height_in, inner_width_in / width_in, inner_in / height_in)
-        axes = figure.add_axes(box)
-        axes.set_xlim(float(trace.t[0]), float(trace.t[-1]) if len(trace.t) > 1 else float(trace.t[0]) + 1.0)
-        every.append(axes)
+def _ends_s(trace: Trace) -> tuple[float, float]:
+    """Begin and end of an axis over the time of a run, s."""
+    return float(trace.t[0]), float(trace.t[-1]) if len(trace.t) > 1 else float(trace.t[0]) + 1.0
+
+
+def _time_axes(inner_in: float, above_in: Sequence[float], trace: Trace) -> tuple[Figure, list[Axes]]:
+    """Axes over time, stacked, of the same height, with room above each, and on the right for labels."""
+    height_in = 0.42 + sum(above_in) + inner_in * len(above_in)
+    figure, every, top_in = Figure(figsize=(WIDE_IN, height_in)), [], height_in
+    for room_in in above_in:
+        top_in -= room_in + inner_in
+        size = (WIDE_IN - _LEFT_IN - _RIGHT_IN) / WIDE_IN, inner_in / height_in
+        every.append(figure.add_axes((_LEFT_IN / WIDE_IN, top_in / height_in, *size)))
+        every[-1].set_xlim(*_ends_s(trace))
     return figure, every
 
 
-def _bars(axes: Axes, trace: Trace, active: npt.NDArray[np.bool_], y: float, **options: Any) -> None:
-    """Bars over the times at which a held signal is true; row k holds its value since row k-1."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], active, [False]]).astype(np.int8)))
-    begins, ends = trace.t[np.maximum(edges[::2] - 1, 0)], trace.t[edges[1::2] - 1]
-    spans = [(float(begin), float(end - begin)) for begin, end in zip(begins, ends, strict=True)]
-    axes.broken_barh(spans, (y - 0.14, 0.28), edgecolor=MUTED, linewidth=0.7, **options)
+def _bars(axes: Axes, trace: Trace, clock: Clock, active: npt.NDArray[np.bool_], share: float, **options: Any) -> None:
+    """Bars over the times at which a held signal is true; row k holds its value since row k-1.
+
+    They start at the bottom of the axes and reach up to a share of them.
+    """
+    begins, ends = clock.at(trace.t[np.maximum(stretches(active) - 1, 0)]).T
+    axes.broken_barh(
+        np.column_stack([begins, ends - begins]).tolist(),
+        (0.0, share),
+        transform=axes.get_xaxis_transform(),
+        linewidth=0.0,
+        **options,
+    )
