@@ -233,7 +233,7 @@ def test_of_many_marks_a_map_has_a_line_per_ugv(
     last = f"the last accepted at {accepted_s:.2f} s"
     assert (
         entry.text.replace("\N{NO-BREAK SPACE}", " ")
-        == f"ugv1 arrived at {arrival_s:.1f} s; 2 proposals: 1 accepted, 1 refused, {last}"
+        == f"ugv1 arrived at {arrival_s:.1f} s; 2 proposals: 1 refused, 1 accepted, {last}"
     )
     assert [mark.kind for mark in entry.marks] == ["stall", "accepted"]
 

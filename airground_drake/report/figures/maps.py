@@ -144,9 +144,13 @@ def _of_ugv(trace: Trace, ugv: str, marks: Sequence[Mark]) -> Entry:
     others = [mark for mark in marks if not len(mark.way)]
     arrived = events_of(trace, ugv, "arrival")
     words = [f"arrived at {_s(arrived[-1]['t_s'], 1)}"] if arrived else [told(others[-1:])] if others else []
-    counts = {kind: sum(mark.kind == kind for mark in sent) for kind in LOOKS}
-    listed = ", ".join(f"{count} {kind}" for kind, count in counts.items() if count)
-    words += [f"{len(sent)} proposals: {listed}, the last {told(sent[-1:])}"] if len(sent) > 1 else []
+    answers = {what: len(of) for what, of in grouped((mark.what, mark) for mark in sent).items()}
+    listed = (
+        ": " + ", ".join(f"{n} {what}" for what, n in answers.items())
+        if len(answers) > 1
+        else ", all " + "".join(answers)
+    )
+    words += [f"{len(sent)} proposals{listed}, the last {told(sent[-1:])}"] if len(sent) > 1 else []
     words += [f"proposal {told(sent)}"] if len(sent) == 1 else []
     return Entry("", f"{short(ugv)} {'; '.join(words)}", [*others, *sent[-1:]])
 
