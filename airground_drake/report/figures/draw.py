@@ -18,8 +18,8 @@ from airground_drake.report.figures import comparison, maps, timelines
 from airground_drake.report.figures.panels import MAX_TABLE_ROWS, Figure, Panel, Table, panel, series
 from airground_drake.report.metrics import Nearby, close_by, events_of, gap_m, radius_m
 from airground_drake.report.outcomes import SLACK_M, distance, named
-from airground_drake.report.phrases import SETTINGS
 from airground_drake.report.reproduction import MEASURES
+from airground_drake.report.rules import SETTINGS
 from airground_drake.run.trace import Trace
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.view import canvas
