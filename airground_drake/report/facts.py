@@ -140,7 +140,7 @@ class RunFacts:
         if not doings or "" in doings:
             return ""
         if not ours:
-            return "not the robots' doing" * (self.claim(rules.OWN_DOING)["status"] in PASSING)
+            return "not the robots' doing" * (self.claim(rules.OWN_DOING)["status"] != "refuted")
         if len(ours) < len(doings):
             return f"{len(ours)} of {len(doings)} the robots' doing"
         return "the robots' doing" + ", by commands already under way" * ({*ours} == {"under way"})

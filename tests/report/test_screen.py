@@ -82,8 +82,8 @@ def gap(value: float, other: str = "rock", t_s: float = 5.0) -> Edit:
 
 
 def met(doing: str, other: str = "man", **more: Any) -> Edit:
-    """SAFE-OWN on an encounter."""
-    return judged("SAFE-OWN", evidence={"encounters": [{"first": "r1", "second": other, "doing": doing, **more}]})
+    """Whose doing an encounter was."""
+    return judged("SAFE-TRACE", evidence={"encounters": [{"first": "r1", "second": other, "doing": doing, **more}]})
 
 
 def away(robot: str = "r1", **way: Any) -> Edit:
@@ -162,7 +162,7 @@ SAFE: list[tuple[list[Edit], str, list[str]]] = [
      ["too close", "r1\N{EN DASH}man 0.100 < 0.3 m at 5.00 s", "not the robots' doing"]),
     ([man, hit("man"), met("under way"), MISSED], "no",
      ["collision", "r1\N{EN DASH}man at 5.00 s", UNDER_WAY]),
-    ([man, hit("man"), met("other"), judged("SAFE-OWN", status="error")], "no",
+    ([man, hit("man"), met("other"), judged("SAFE-OWN", status="refuted")], "no",
      ["collision", "r1\N{EN DASH}man at 5.00 s"]),
     ([man, gap(0.1, "man"), gap(0.2), met("other"), MISSED], "no",
      ["too close", "r1\N{EN DASH}man 0.100 < 0.3 m at 5.00 s", "1 more pair too close"]),  # of the rock it is not known
@@ -372,7 +372,7 @@ def _require_true_row(found: Document, row: Row) -> None:
         assert statuses["SAFE-HYP"] in PASSING
         assert statuses["SAFE-INV"] == statuses["SAFE-GATE"] == "proved"
     if "not the robots' doing" in told:
-        assert statuses["SAFE-OWN"] in PASSING
+        assert statuses["SAFE-OWN"] != "refuted"
 
 
 WORLDS: list[list[Edit]] = [
