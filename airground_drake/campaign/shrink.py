@@ -8,7 +8,7 @@ from __future__ import annotations
 import copy
 import itertools
 from collections.abc import Callable, Iterator
-from functools import partial, reduce
+from functools import partial
 from typing import Any
 
 PARTS = (("intervention", "policies"), ("ugvs",), ("uav", "phantoms_m"), ("obstacles",))
@@ -36,7 +36,8 @@ def shrink(data: Json, fails: Fails, tests: int) -> tuple[Json, int]:
     Returns:
         The smallest scenario found, and the number of tests.
     """
-    steps = (*(partial(_without_entry, path=path) for path in PARTS), _plainer, _shorter, _rounder)
+    steps: list[Callable[[Json], Iterator[Json]]] = [partial(_without_entry, path=path) for path in PARTS]
+    steps += [_plainer, _shorter, _rounder]
     left = tests
 
     def first(candidates: Iterator[Json]) -> Json | None:
@@ -59,13 +60,20 @@ def shrink(data: Json, fails: Fails, tests: int) -> tuple[Json, int]:
 
 def _without_entry(data: Json, path: tuple[str, ...]) -> Iterator[Json]:
     """Leave out an entry of the list or mapping at a path."""
-    entries = reduce(lambda part, key: part[key], path, data)
+    entries = _at(data, path)
     for key in range(len(entries)) if isinstance(entries, list) else entries:
         smaller = copy.deepcopy(data)
-        del reduce(lambda part, key: part[key], path, smaller)[key]
+        del _at(smaller, path)[key]
         for run in smaller["runs"].values():
             run["stalls_m"] = {ugv: place for ugv, place in run["stalls_m"].items() if ugv in smaller["ugvs"]}
         yield smaller
+
+
+def _at(data: Any, path: tuple[str, ...]) -> Any:
+    """What is at a path of nested mappings."""
+    for key in path:
+        data = data[key]
+    return data
 
 
 def _plainer(data: Json) -> Iterator[Json]:
