@@ -16,6 +16,7 @@ from airground_drake.campaign.spec import load_spec
 from airground_drake.commands.falsify import main as falsify
 from airground_drake.report.__main__ import main
 from airground_drake.scenarios.load import load
+from airground_drake.scenarios.shipped import shipped_files
 from airground_drake.systems import graphviz
 
 ROOT = Path(__file__).parent.parent
@@ -45,7 +46,7 @@ def test_links_lead_somewhere_and_lines_are_short(page: Path) -> None:
 
 
 def test_generated_parts_are_current() -> None:
-    shipped = (ROOT / "airground_drake" / "scenarios" / "minimal.yaml").read_text(encoding="utf-8")
+    shipped = shipped_files()["minimal"].read_text(encoding="utf-8")
     assert blocks(ROOT / "README.md", "yaml") == [re.sub(r"^#.*\n", "", shipped, flags=re.MULTILINE)]
     generate = runpy.run_path(str(ROOT / "docs" / "generate.py"))
     gallery = generate["gallery"](["minimal"])
