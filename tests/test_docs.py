@@ -124,6 +124,13 @@ def test_a_sampler_of_ones_own_looks_for_violations(tmp_path: Path, capsys: pyte
     assert "6 tried by my_robots/climb.py:Climb" in capsys.readouterr().out
 
 
+def test_docs_and_examples_import_only_what_is_documented_to_stay() -> None:
+    stays = set(re.findall(r"^::: (\S+)", (ROOT / "docs" / "extending.md").read_text(encoding="utf-8"), re.MULTILINE))
+    for path in (*PAGES, *EXAMPLES.rglob("*.py"), *EXAMPLES.rglob("*.ipynb")):
+        used = set(re.findall(r"(?:from|import) (airground_drake[\w.]*)", path.read_text(encoding="utf-8")))
+        assert used <= {"airground_drake", *stays}, path
+
+
 def test_the_spec_that_is_shown_makes_draws(tmp_path: Path) -> None:
     (text,) = blocks(ROOT / "docs" / "commands.md", "yaml")
     (tmp_path / "speeds.yaml").write_text(text, encoding="utf-8")
