@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     )
     from airground_drake.campaign.sweep import sweep
     from airground_drake.geometry.motion import Motion
-    from airground_drake.intervention.policy import Policy, Proposal
+    from airground_drake.intervention.policy import Observation, Policy, Proposal
     from airground_drake.report.make import write_report
     from airground_drake.run.simulation import simulate
     from airground_drake.run.trace import Trace
@@ -42,6 +42,7 @@ __all__ = [
     "AirgroundError",
     "Finding",
     "Motion",
+    "Observation",
     "PluginError",
     "Policy",
     "Proposal",
@@ -65,6 +66,7 @@ _HOME = {
     "AirgroundError": "base.errors",
     "Finding": "verify.finding",
     "Motion": "geometry.motion",
+    "Observation": "intervention.policy",
     "PluginError": "base.errors",
     "Policy": "intervention.policy",
     "Proposal": "intervention.policy",

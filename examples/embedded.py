@@ -2,8 +2,7 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.primitives import ConstantVectorSource
 
-from airground_drake.scenarios.load import load
-from airground_drake.systems.diagram import build_diagram
+from airground_drake import build_diagram, load
 
 builder = DiagramBuilder()
 team = builder.AddNamedSystem("team", build_diagram(load("minimal"), "d"))

@@ -1,7 +1,6 @@
 import numpy as np
 
-from airground_drake.run.simulation import simulate
-from airground_drake.scenarios.load import load
+from airground_drake import load, simulate
 from airground_drake.systems import DecisionBlock
 
 

@@ -18,9 +18,8 @@ from pathlib import Path
 
 import numpy as np
 
+from airground_drake import Motion, Observation, Policy
 from airground_drake.environments.encoding import Encoding
-from airground_drake.geometry.motion import Motion
-from airground_drake.intervention.policy import Observation, Policy
 
 HERE = Path(__file__).parent
 WEIGHTS = Path(__file__).with_suffix(".json")

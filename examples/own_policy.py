@@ -7,8 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from airground_drake import Motion, Policy, load, simulate
-from airground_drake.intervention.policy import Observation
+from airground_drake import Motion, Observation, Policy, load, simulate
 from airground_drake.registry import POLICIES
 
 

@@ -16,6 +16,7 @@ from airground_drake.campaign.spec import load_spec
 from airground_drake.commands.falsify import main as falsify
 from airground_drake.report.__main__ import main
 from airground_drake.scenarios.load import load
+from airground_drake.scenarios.shipped import shipped_files
 from airground_drake.systems import graphviz
 
 ROOT = Path(__file__).parent.parent
@@ -45,7 +46,7 @@ def test_links_lead_somewhere_and_lines_are_short(page: Path) -> None:
 
 
 def test_generated_parts_are_current() -> None:
-    shipped = (ROOT / "airground_drake" / "scenarios" / "minimal.yaml").read_text(encoding="utf-8")
+    shipped = shipped_files()["minimal"].read_text(encoding="utf-8")
     assert blocks(ROOT / "README.md", "yaml") == [re.sub(r"^#.*\n", "", shipped, flags=re.MULTILINE)]
     generate = runpy.run_path(str(ROOT / "docs" / "generate.py"))
     gallery = generate["gallery"](["minimal"])
@@ -121,6 +122,13 @@ def test_a_sampler_of_ones_own_looks_for_violations(tmp_path: Path, capsys: pyte
     command = [str(EXAMPLES / "pushed.yaml"), "--sampler", "my_robots/climb.py:Climb", "--allow-plugins"]
     assert falsify([*command, "-n", "6", "--jobs", "1", "-o", str(tmp_path / "worst.yaml")]) == 0
     assert "6 tried by my_robots/climb.py:Climb" in capsys.readouterr().out
+
+
+def test_docs_and_examples_import_only_what_is_documented_to_stay() -> None:
+    stays = set(re.findall(r"^::: (\S+)", (ROOT / "docs" / "extending.md").read_text(encoding="utf-8"), re.MULTILINE))
+    for path in (*PAGES, *EXAMPLES.rglob("*.py"), *EXAMPLES.rglob("*.ipynb")):
+        used = set(re.findall(r"(?:from|import) (airground_drake[\w.]*)", path.read_text(encoding="utf-8")))
+        assert used <= {"airground_drake", *stays}, path
 
 
 def test_the_spec_that_is_shown_makes_draws(tmp_path: Path) -> None:

@@ -8,12 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from airground_drake.geometry.motion import Motion
-from airground_drake.intervention.policy import Observation, Policy
-from airground_drake.run.trace import Trace
+from airground_drake import Finding, Motion, Observation, Policy, Trace, TraceClaim
 from airground_drake.testing import ClaimError, assert_holds, assert_proved
-from airground_drake.verify.claim import TraceClaim
-from airground_drake.verify.finding import Finding
 
 DEPOT = Path(__file__).with_name("depot.yaml")
 

@@ -1,7 +1,6 @@
 import numpy as np
 
-from airground_drake.geometry.motion import Motion
-from airground_drake.intervention.policy import Observation, Policy
+from airground_drake import Motion, Observation, Policy
 
 
 class AfterYou(Policy):

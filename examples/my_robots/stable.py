@@ -1,9 +1,8 @@
 from fractions import Fraction
 from typing import Any
 
-from airground_drake.scenarios.schema import Scenario
+from airground_drake import Finding, Scenario
 from airground_drake.verify.claim import ModelClaim
-from airground_drake.verify.finding import Finding
 
 
 class Stable(ModelClaim):

@@ -9,6 +9,7 @@ import pytest
 
 from airground_drake.base.errors import ScenarioError
 from airground_drake.campaign.spec import Spec, load_spec
+from airground_drake.scenarios.shipped import shipped_files
 
 TEXT = """
 scenario: minimal
@@ -36,8 +37,7 @@ def test_a_draw_is_a_validated_scenario_named_by_its_index(tmp_path: Path) -> No
 
 
 def test_a_scenario_beside_the_spec_with_fixed_keys_and_chosen_runs(tmp_path: Path) -> None:
-    own = Path(__file__).parents[2] / "airground_drake/scenarios/minimal.yaml"
-    (tmp_path / "own.yaml").write_bytes(own.read_bytes())
+    (tmp_path / "own.yaml").write_bytes(shipped_files()["minimal"].read_bytes())
     drawn = spec_of(tmp_path, "scenario: own.yaml\nruns: [d]\nset: {duration_s: 3.5}\n").draw(1)
     assert (drawn.duration_s, list(drawn.runs)) == (3.5, ["d"])
 

@@ -9,14 +9,14 @@ import shutil
 import subprocess
 import sys
 from collections.abc import Callable
-from importlib import resources
 from pathlib import Path
 
 import pytest
 from builders.hostile_policies import KINDS
 
-from airground_drake import commands, scenarios
+from airground_drake import commands
 from airground_drake.report.__main__ import main
+from airground_drake.scenarios.shipped import shipped_files
 from airground_drake.verify import __main__ as judge
 
 Report = Callable[[str], Path]
@@ -99,9 +99,7 @@ def test_third_party_code_is_refused_unless_it_is_allowed(
         assert main(["case_a", "-o", str(out), "--set", f"{key}={name}"]) == 2
         assert capsys.readouterr().err == f"error: case_a: {key}: '{name}' is not allowed; {ONLY}\n"
     assert main(["case_a", "-o", str(out), "--set", f"claims={{MINE: '{name}'}}"]) == 2
-    minimal = (
-        resources.files(scenarios).joinpath("minimal.yaml").read_text().replace("runs:", "runs:\n  c: {method: c}")
-    )
+    minimal = shipped_files()["minimal"].read_text().replace("runs:", "runs:\n  c: {method: c}")
     (tmp_path / "mine.yaml").write_text(f"{minimal}\ngatekeeper: {{route: '{name}'}}\n")
     assert commands.main(["diagram", str(tmp_path / "mine.yaml"), "-o", str(out)]) == 2
     assert capsys.readouterr().err.count("--allow-plugins") == 2

@@ -5,17 +5,17 @@ from __future__ import annotations
 import copy
 import functools
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import pytest
 import yaml
 
 from airground_drake.base.errors import ScenarioError
-from airground_drake.scenarios import schema
 from airground_drake.scenarios.load import load
+from airground_drake.scenarios.schema import Scenario
+from airground_drake.scenarios.shipped import shipped_files
 
-CASE_A = Path(schema.__file__).with_name("case_a.yaml")
+CASE_A = shipped_files()["case_a"]
 DATA: dict[str, Any] = yaml.safe_load(CASE_A.read_text(encoding="utf-8"))
 DELETE = object()
 
@@ -64,7 +64,7 @@ def edit(data: dict[str, Any], key: str, value: object) -> dict[str, Any]:
 
 
 @functools.cache
-def case_a() -> tuple[schema.Scenario, str]:
+def case_a() -> tuple[Scenario, str]:
     """The shipped scenario, loaded once; not to be changed."""
     return load("case_a")
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from dataclasses import asdict, fields
-from importlib import resources
 from typing import Any
 
 import pytest
@@ -19,7 +18,7 @@ from airground_drake.scenarios import json_schema, schema
 from airground_drake.scenarios.document import of_data
 from airground_drake.scenarios.filled import filled
 from airground_drake.scenarios.load import load, shipped
-from airground_drake.scenarios.shipped import json_schema_file
+from airground_drake.scenarios.shipped import json_schema_file, shipped_files
 
 SCHEMA = json_schema.scenario_schema(installed=False)
 VALIDATOR = Draft202012Validator(SCHEMA)
@@ -35,7 +34,7 @@ def test_it_is_a_schema_and_its_copy_is_current() -> None:
 
 @pytest.mark.parametrize("name", shipped())
 def test_every_shipped_scenario_names_it_and_is_valid(name: str) -> None:
-    text = (resources.files("airground_drake.scenarios") / f"{name}.yaml").read_text()
+    text = shipped_files()[name].read_text()
     assert text.startswith("# yaml-language-server: $schema=scenario.schema.json\n")
     assert not list(VALIDATOR.iter_errors(yaml.safe_load(text)))  # aliases and merges expanded, as an editor does
     assert not list(VALIDATOR.iter_errors(asdict(load(name))))

@@ -7,20 +7,21 @@ from dataclasses import asdict, replace
 
 import pytest
 import yaml
-from scenarios.cases import CASE_A, SMALL, SMALL_DATA, Write, case_a, edit, message
+from scenarios.cases import SMALL, SMALL_DATA, Write, case_a, edit, message
 
 from airground_drake.base.errors import ScenarioError
 from airground_drake.scenarios import plugins
 from airground_drake.scenarios.document import text_of
 from airground_drake.scenarios.load import load, own, resolved, shipped, validated
 from airground_drake.scenarios.schema import Obstacle, Uav
+from airground_drake.scenarios.shipped import shipped_files
 
 
 @pytest.mark.parametrize("name", shipped())
 def test_shipped_scenarios_load(name: str) -> None:
     scenario = load(name)
     assert scenario.name == name
-    assert scenario.digest == load(str(CASE_A.with_name(f"{name}.yaml"))).digest
+    assert scenario.digest == load(str(shipped_files()[name])).digest
 
 
 @pytest.mark.parametrize(

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import sys
-from importlib import resources
 from pathlib import Path
 from textwrap import dedent
 
@@ -16,6 +15,7 @@ from airground_drake.run.runs import simulate_all
 from airground_drake.scenarios.load import load
 from airground_drake.scenarios.plugins import admitted, plugins, refuse, without
 from airground_drake.scenarios.schema import Policy, Scenario
+from airground_drake.scenarios.shipped import shipped_files
 from airground_drake.systems import graphviz
 from airground_drake.systems.diagram import build_diagram
 from airground_drake.verify import judge
@@ -71,7 +71,7 @@ def test_code_of_others_is_found_beside_the_scenario_file_wherever_it_runs(tmp_p
         (tmp_path / name).parent.mkdir(exist_ok=True)
         (tmp_path / name).write_text(dedent(text))
     file = tmp_path / "mine.yaml"
-    file.write_text(resources.files("airground_drake.scenarios").joinpath("minimal.yaml").read_text())
+    file.write_text(shipped_files()["minimal"].read_text())
     changes = {
         "uav.task": "beside_helper:Task",
         "gatekeeper.route": "beside_helper.py:Route",

@@ -10,6 +10,7 @@ import pytest
 
 from airground_drake.run import simulation
 from airground_drake.scenarios.load import load
+from airground_drake.scenarios.shipped import shipped_files
 from airground_drake.testing.plugin import Simulations
 
 SHORT = {"duration_s": 0.1}
@@ -27,7 +28,7 @@ def test_a_run_is_simulated_once_however_it_is_named(
     first = airground_trace("minimal", "a", set=SHORT)
     monkeypatch.setattr(simulation, "simulate", None)
     file, scenario = tmp_path / "mine.yaml", load("minimal", SHORT)
-    file.write_bytes((Path(simulation.__file__).parents[1] / "scenarios" / "minimal.yaml").read_bytes())
+    file.write_bytes(shipped_files()["minimal"].read_bytes())
     assert airground_trace("minimal", "a", set=["duration_s=0.1"]) is first
     assert airground_trace(file, "a", set=SHORT) is first
     assert airground_trace(scenario, "a") is first
