@@ -53,6 +53,8 @@ _BINARY_CURVATURE = 1e-6
 _PROXIMAL, _PROXIMAL_BRANCHING = -1e-4, -1e-6
 """DAQP's weight of its proximal point method; negative: only where the Hessian is singular. With less, branches end
 more exactly, but other programs may cycle."""
+_TIGHT = 1e-9
+"""DAQP's tolerance of constraints, in the scaled variables."""
 _FEASIBLE = 1e-6
 """Largest violation of a constraint, in its own units, of a guess or a solution."""
 _AGAIN = 1e-7
@@ -60,20 +62,16 @@ _AGAIN = 1e-7
 
 
 class SolverLimits(NamedTuple):
-    """Options of a solution, by the names of DAQP's own settings but for the last.
+    """Options of a solution; the first two are DAQP's own.
 
     Attributes:
         time_limit: s; DAQP looks at the clock every 32 nodes. 0: none.
         iter_limit: iterations of the active-set method, at each node.
-        fval_bound: a cost. Solutions that cost more are not looked for: if all do, the program counts as infeasible.
-        primal_tol: of constraints, in the scaled variables.
         relaxed: 1: binary variables may have any value in [0, 1].
     """
 
     time_limit: float = 0.0
     iter_limit: int = 10_000
-    fval_bound: float = math.inf
-    primal_tol: float = 1e-9
     relaxed: int = 0
 
 
@@ -265,7 +263,7 @@ class _Reduced:
         if len(k):
             model = daqp.Model()
             model.settings = {
-                "presolve": 0, "primal_tol": limits.primal_tol, "iter_limit": int(limits.iter_limit),
+                "presolve": 0, "primal_tol": _TIGHT, "iter_limit": int(limits.iter_limit),
                 "eps_prox": _PROXIMAL_BRANCHING if form.binary[k].any() else _PROXIMAL,
                 "fval_bound": min(known / self.largest, _NO_BOUND),
                 "time_limit": max(limits.time_limit, 1e-6) if 0.0 < limits.time_limit < math.inf else 0.0,
@@ -317,15 +315,12 @@ def _minimise(form: _Form, guess: Array, limits: SolverLimits) -> tuple[Solution
         feasible = _Reduced(form.without_cost()).solve(limits)[0]
         return UNBOUNDED if feasible == FOUND else feasible, *nothing
     cost = form.cost(guess) if guessed else math.inf
-    known = min(limits.fval_bound, cost + _AGAIN * abs(cost))
-    ended, x, details = reduced.solve(limits, known - form.cost(reduced.base))
+    ended, x, details = reduced.solve(limits, cost + _AGAIN * abs(cost) - form.cost(reduced.base))
     if ended == STOPPED and guessed and not form.cost(x) < cost:
         x = guess
     wrong = ended == FOUND and not form.is_met(x)
-    if ended == INFEASIBLE and guessed:
-        wrong = cost <= limits.fval_bound
-    elif ended == INFEASIBLE and limits.fval_bound == math.inf:
-        wrong = _Reduced(form.without_cost()).solve(limits)[0] == FOUND
+    if ended == INFEASIBLE:
+        wrong = guessed or _Reduced(form.without_cost()).solve(limits)[0] == FOUND
     return FAILED if wrong else ended, x, details
 
 
