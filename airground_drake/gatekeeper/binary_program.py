@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from typing import Any
 
 import numpy as np
@@ -9,7 +10,7 @@ import numpy.typing as npt
 from pydrake.solvers import MathematicalProgram
 
 from airground_drake.base.arrays import Array
-from airground_drake.gatekeeper.problem import Problem
+from airground_drake.gatekeeper.problem import Evaluation, Problem
 from airground_drake.gatekeeper.relaxation import offsets, within_reach
 
 AXES = 2  # UGVs move in their plane
@@ -31,10 +32,8 @@ class BinaryProgram:
     over omega and u: n.(rho(omega) - o) >= d - u. As constraints, the positions would make a solver ten times slower.
 
     Attributes:
-        program: (26).
-        relaxation: (27): the same costs and constraints, with shares in place of binary variables.
-        omega: binary variables (24), (26c), of the program, (B,): 1 accepts, and 1 - omega is the other mode.
-        shares: in [0, 1], of the relaxation, (B,).
+        program: (26); with shares in [0, 1] in place of binary values it is (27).
+        omega: binary variables (24), (26c), (B,): 1 accepts, and 1 - omega is the other mode.
         u: slack (26e), (N,), m.
         error: cost of task errors in (25).
         slack: cost of slack in (25).
@@ -58,14 +57,6 @@ class BinaryProgram:
         )
         self.choices = self.program.AddBoundingBoxConstraint(0.0, 1.0, self.omega)  # (26c)
         self.program.AddBoundingBoxConstraint(0.0, np.inf, self.u)  # (26e)
-        self.relaxation = MathematicalProgram()
-        self.shares: Any = self.relaxation.NewContinuousVariables(b, "omega")
-        self.relaxation.AddDecisionVariables(self.u)
-        self.relaxation.AddCost(self.error.evaluator(), self.shares)
-        self.relaxation.AddCost(self.slack.evaluator(), self.u)
-        self.relaxation.AddConstraint(self.half_planes.evaluator(), np.concatenate([self.shares, self.u]))
-        self.relaxation.AddConstraint(self.choices.evaluator(), self.shares)  # (27c)
-        self.relaxation.AddBoundingBoxConstraint(0.0, np.inf, self.u)  # (27e)
         self._live = np.ones(b, dtype=bool)
         self.within = np.zeros((n, 0), dtype=bool)
         self._of_block = np.equal.outer(self.block, np.arange(b)).astype(np.float64)
@@ -113,12 +104,12 @@ class BinaryProgram:
         lower = offsets(problem, normals)[stage, point] - (normal[:, :AXES] * away[stage, :AXES]).sum(axis=1)
         return np.hstack([of_omega, of_u]), lower
 
-    def guess(self, problem: Problem, plan: Array, normals: Array) -> Array:
-        """Values of the program's variables for a plan (N,): a solution that satisfies all constraints, (B + N,)."""
-        away = problem.positions(plan)[:, None] - problem.centres
+    def guess(self, problem: Problem, plan: Evaluation, normals: Array) -> Array:
+        """Values of the program's variables for a plan: a solution that satisfies all constraints, (B + N,)."""
+        away = plan.positions[:, None] - problem.centres
         lacking = problem.distances - np.einsum("kmi,kmi->km", normals, away)
         slack = np.where(self.within, lacking, 0.0).max(axis=1, initial=0.0)
-        return np.concatenate([np.where(self._live, self.blocked(plan), 0.0), slack])
+        return np.concatenate([np.where(self._live, self.blocked(plan.omega), 0.0), slack])
 
     def plan(self, values: Array) -> Array:
         """The value of each stage, (N,), from those of the blocks, (B,).
@@ -135,3 +126,17 @@ class BinaryProgram:
         """The mode that a plan (N,) has in most stages of each block, (B,), 0 or 1; accepting on a tie."""
         share = self._of_block.T @ plan / self._of_block.sum(axis=0)
         return (share >= 0.5).astype(np.float64)
+
+
+class Programs(threading.local):
+    """The programs of one thread by their sizes: to build one takes longer than to put in the data of a problem."""
+
+    def __init__(self) -> None:
+        """Without any program."""
+        self._built: dict[tuple[int, int], BinaryProgram] = {}
+
+    def of(self, stages: int, blocks: int) -> BinaryProgram:
+        """The program of this size, to be updated."""
+        if (stages, blocks) not in self._built:
+            self._built[stages, blocks] = BinaryProgram(stages, blocks)
+        return self._built[stages, blocks]

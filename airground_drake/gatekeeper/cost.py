@@ -61,6 +61,18 @@ def slack_at(centres: Array, distances: Array, k: int, x: float, y: float, z: fl
 
 
 @njit(cache=True)
+def positions_of(terms: Terms, omega: Array) -> Array:
+    """Positions at the ends of the stages, (23): omega (N,) in [0, 1] to (N, 3), m."""
+    positions, (refuse, accept) = np.empty((len(omega), 3)), terms.velocities
+    for a in range(3):
+        total = 0.0
+        for k in range(len(omega)):
+            total += refuse[k, a] + omega[k] * (accept[k, a] - refuse[k, a])
+            positions[k, a] = terms.initial[a] + terms.dt * total
+    return positions
+
+
+@njit(cache=True)
 def plan_cost(terms: Terms, positions: Array) -> tuple[float, float]:
     """(25) by the right-hand rectangle rule through positions (N, 3), m, and the least distance minus d, m.
 

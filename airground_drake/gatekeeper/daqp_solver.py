@@ -5,15 +5,18 @@ It solves convex quadratic and linear programs, also with binary variables, to a
     result = DaqpSolver().Solve(program)
 
 A program may have linear costs, convex quadratic costs, linear constraints, bounds and binary variables. The result
-says whether it is infeasible or unbounded, or whether a limit stopped the search. `active_set` has the method.
+says whether it is infeasible or unbounded, or whether a limit stopped the search. `_Reduced` is what DAQP sees of it.
 """
 
 from __future__ import annotations
 
 import math
-from typing import Any
+import threading
+from typing import Any, NamedTuple
 
+import daqp
 import numpy as np
+import numpy.typing as npt
 from pydrake.solvers import (
     ClpSolver,
     MathematicalProgram,
@@ -27,8 +30,6 @@ from pydrake.solvers import (
 from pydrake.symbolic import Expression, Variable
 
 from airground_drake.base.arrays import Array
-from airground_drake.gatekeeper.active_set import Details, ProgramSolution, SolverLimits, minimise
-from airground_drake.gatekeeper.standard_form import Layout, StandardForm
 
 SUPPORTED = frozenset(
     {
@@ -38,28 +39,289 @@ SUPPORTED = frozenset(
 )  # fmt: skip
 """What a program may have. Visualization callbacks are not called."""
 
+FOUND, INFEASIBLE, UNBOUNDED, STOPPED, INVALID, FAILED = (
+    SolutionResult.kSolutionFound, SolutionResult.kInfeasibleConstraints, SolutionResult.kUnbounded,
+    SolutionResult.kIterationLimit, SolutionResult.kInvalidInput, SolutionResult.kSolverSpecificError,
+)  # fmt: skip
+_ENDED = {1: FOUND, 2: FOUND, 4: FOUND, 5: STOPPED, -4: STOPPED, -7: STOPPED, -1: INFEASIBLE, -3: UNBOUNDED}
+"""What DAQP's flags mean; 4: solved, inexactly; 5: stopped with a solution, -7: without one. Others are failures."""
+_BINARY, _SOFT, _NO_BOUND = 16, 8, 1e30
+_FLAT = 1e-24
+"""A variable counts as linear if its curvature is below this share of the largest."""
+_BINARY_CURVATURE = 1e-6
+"""Curvature that binary variables get, in units of the largest: more makes a search longer, as it weakens bounds."""
+_PROXIMAL, _PROXIMAL_BRANCHING = -1e-4, -1e-6
+"""DAQP's weight of its proximal point method; negative: only where the Hessian is singular. With less, branches end
+more exactly, but other programs may cycle."""
+_TIGHT = 1e-9
+"""DAQP's tolerance of constraints, in the scaled variables."""
+_FEASIBLE = 1e-6
+"""Largest violation of a constraint, in its own units, of a guess or a solution."""
+_AGAIN = 1e-7
+"""A search finds the guess again if nothing is cheaper: its cost may be this much above that of the guess, relative."""
 
-class _Shell:
-    """A program without constraints, by which CLP fills results: Python cannot set their variables, nor their cost.
 
-    It has a continuous variable in place of each binary one, which CLP does not take.
+class SolverLimits(NamedTuple):
+    """Options of a solution; the first two are DAQP's own.
+
+    Attributes:
+        time_limit: s; DAQP looks at the clock every 32 nodes. 0: none.
+        iter_limit: iterations of the active-set method, at each node.
+        relaxed: 1: binary variables may have any value in [0, 1].
     """
 
-    def __init__(self, layout: Layout) -> None:
-        """For programs with these variables."""
-        self.layout = layout
-        self._program, self._solver = MathematicalProgram(), ClpSolver()
-        pairs = zip(layout.variables, layout.binary, strict=True)
-        stand_ins = [Variable(x.get_name()) if binary else x for x, binary in pairs]
-        self._program.AddDecisionVariables(np.array(stand_ins, dtype=object))
-        self._cost = self._program.AddLinearCost(np.zeros(len(layout.index)), self._program.decision_variables())
+    time_limit: float = 0.0
+    iter_limit: int = 10_000
+    relaxed: int = 0
 
-    def fill(self, result: MathematicalProgramResult, answer: ProgramSolution, cost: float) -> None:
-        """Put in an answer and its cost."""
-        self._cost.evaluator().UpdateCoefficients(np.zeros(len(answer.x)), cost)
-        self._solver.Solve(self._program, None, None, result)
-        result.set_x_val(answer.x)
-        result.set_solution_result(answer.ended)
+
+class Details(NamedTuple):
+    """What DAQP says besides the solution.
+
+    Attributes:
+        iterations: of the active-set method, over all nodes.
+        nodes: of branch and bound.
+        multipliers: of the rows of all linear constraints, then of those of all linear equality constraints: the
+            derivative of the optimal cost in the bound that is active, (m,). With binary variables, of the last node.
+    """
+
+    iterations: int = 0
+    nodes: int = 0
+    multipliers: Array = np.zeros(0)
+
+
+class _Layout:
+    """What stays while only coefficients of a program change.
+
+    It includes a program without constraints by which CLP fills results: Python cannot set their variables, nor their
+    cost. CLP takes no binary variables, so continuous ones stand in for them.
+    """
+
+    MOST = 256
+    """Bindings that are remembered."""
+
+    def __init__(self, program: MathematicalProgram) -> None:
+        """Of a program as it is now."""
+        self.index: dict[int, int] = program.decision_variable_index()
+        variables = program.decision_variables()
+        self.binary = np.array([x.get_type() == Variable.Type.BINARY for x in variables], dtype=bool)
+        self._places: dict[Any, npt.NDArray[np.intp] | slice] = {}
+        self._shell, self._clp = MathematicalProgram(), ClpSolver()
+        stand_ins = [Variable(x.get_name()) if of else x for x, of in zip(variables, self.binary, strict=True)]
+        self._shell.AddDecisionVariables(np.array(stand_ins, dtype=object))
+        self._cost = self._shell.AddLinearCost(np.zeros(len(variables)), self._shell.decision_variables())
+
+    def fits(self, program: MathematicalProgram) -> bool:
+        """Whether the program has these variables in this order; a variable never changes its type."""
+        return bool(self.index == program.decision_variable_index())
+
+    def places(self, program: MathematicalProgram, binding: Any) -> npt.NDArray[np.intp] | slice:
+        """Indices of the variables of a cost or constraint, in its order; a slice, which is quicker, if possible."""
+        if binding not in self._places:
+            if len(self._places) >= self.MOST:
+                self._places.clear()
+            found = np.asarray(program.FindDecisionVariableIndices(binding.variables()), dtype=np.intp)
+            follow = len(found) and (np.diff(found) == 1).all()
+            self._places[binding] = slice(int(found[0]), int(found[-1]) + 1) if follow else found
+        return self._places[binding]
+
+    def fill(self, result: MathematicalProgramResult, ended: SolutionResult, x: Array, cost: float) -> None:
+        """Put a solution into a result of Drake."""
+        self._cost.evaluator().UpdateCoefficients(np.zeros(len(x)), cost)
+        self._clp.Solve(self._shell, None, None, result)
+        result.set_x_val(x)
+        result.set_solution_result(ended)
+
+
+class _Form(NamedTuple):
+    """min x' H x / 2 + f' x + constant  so that  lower <= A x <= upper,  least <= x <= most,  x[binary] in {0, 1}.
+
+    H is (n, n), f, least, most and binary are (n,), A is (m, n), lower and upper are (m,); inf: no bound.
+    """
+
+    constant: float
+    hessian: Array
+    gradient: Array
+    rows: Array
+    lower: Array
+    upper: Array
+    least: Array
+    most: Array
+    binary: npt.NDArray[np.bool_]
+
+    @classmethod
+    def of(cls, program: MathematicalProgram, layout: _Layout) -> _Form:
+        """Read the evaluators; pydrake has no bindings for `AggregateQuadraticCosts` and the like."""
+        n = program.num_vars()
+        hessian, gradient, least, most = np.zeros((n, n)), np.zeros(n), np.full(n, -np.inf), np.full(n, np.inf)
+        rows, lower, upper, constant = [np.zeros((0, n))], [np.zeros(0)], [np.zeros(0)], 0.0
+        for binding in program.quadratic_costs():
+            i = layout.places(program, binding)
+            _add(hessian, (i, i) if isinstance(i, slice) else (i[:, None], i), binding.evaluator().Q())
+            _add(gradient, (i,), binding.evaluator().b())
+            constant += binding.evaluator().c()
+        for binding in program.linear_costs():
+            _add(gradient, (layout.places(program, binding),), binding.evaluator().a())
+            constant += binding.evaluator().b()
+        for binding in (*program.linear_constraints(), *program.linear_equality_constraints()):
+            constraint = binding.evaluator()
+            rows.append(np.zeros((constraint.num_constraints(), n)))
+            _add(rows[-1], (slice(None), layout.places(program, binding)), constraint.GetDenseA())
+            lower.append(constraint.lower_bound())
+            upper.append(constraint.upper_bound())
+        for binding in program.bounding_box_constraints():
+            i = layout.places(program, binding)
+            np.maximum.at(least, i, binding.evaluator().lower_bound())
+            np.minimum.at(most, i, binding.evaluator().upper_bound())
+        least = np.where(layout.binary, np.ceil(np.maximum(least, 0.0)), least)
+        most = np.where(layout.binary, np.floor(np.minimum(most, 1.0)), most)
+        bounds = np.concatenate(lower), np.concatenate(upper), least, most
+        return cls(constant, hessian, gradient, np.concatenate(rows), *bounds, layout.binary)
+
+    def fault(self) -> SolutionResult | None:
+        """INVALID or INFEASIBLE, if that shows at sight."""
+        bounds = np.concatenate([self.lower, self.upper, self.least, self.most])
+        if np.isnan(bounds).any() or not all(np.isfinite(one).all() for one in self[:4]):
+            return INVALID
+        crossed = (self.least > self.most).any() or (self.lower > self.upper).any()
+        empty = ~self.rows.any(axis=1)
+        return INFEASIBLE if crossed or ((self.lower > 0.0) | (self.upper < 0.0))[empty].any() else None
+
+    def cost(self, x: Array) -> float:
+        """The cost at x, (n,). By `einsum`, as all here: BLAS would start threads, which cost more than such sizes."""
+        return self.constant + float((self.gradient + 0.5 * np.einsum("ij,j->i", self.hessian, x)) @ x)
+
+    def is_met(self, x: Array) -> bool:
+        """Whether x, (n,), satisfies all constraints, and binary variables are binary."""
+        at, off = np.einsum("ij,j->i", self.rows, x), np.abs(x - x.round())[self.binary]
+        sides = (self.lower - at, at - self.upper, self.least - x, x - self.most, off)
+        return bool(np.isfinite(x).all() and np.concatenate(sides).max(initial=0.0) <= _FEASIBLE)
+
+    def relaxed(self) -> _Form:
+        """With shares in [0, 1] for the binary variables."""
+        return self._replace(binary=np.zeros_like(self.binary))
+
+    def without_cost(self) -> _Form:
+        """The same constraints, with the squared distance from 0 for a cost."""
+        n = len(self.gradient)
+        return self._replace(constant=0.0, hessian=np.eye(n), gradient=np.zeros(n))
+
+
+class _Reduced:
+    """A program as DAQP sees it: without what would make it slow, or what it does not take.
+
+    - *Constants.* A variable whose bounds are equal is one; so is one with a quadratic cost of its own and no row.
+    - *Slack.* A variable with a quadratic cost of its own, whose one row it can always meet, is a soft row for DAQP.
+    - *Scale.* Variables are scaled to a unit diagonal of the Hessian.
+    - *Curvature.* Where the Hessian is singular, DAQP approaches the solution by proximal points. Before that, each
+      binary variable x gets the cost c (x^2 - x) / 2, which is 0 at 0 and at 1.
+    """
+
+    def __init__(self, form: _Form) -> None:
+        """Find constants and slack, and scale."""
+        rows, diagonal, entered = form.rows, form.hessian.diagonal(), form.rows != 0.0
+        uses, curved = entered.sum(axis=0), (form.hessian != 0.0).sum(axis=0)
+        own = (curved == 1) & (diagonal > 0.0) & ~form.binary
+        free = own & (uses == 0)
+        self.base = np.where(form.least == form.most, form.least, 0.0)
+        self.base[free] = np.clip(-form.gradient[free] / diagonal[free], form.least[free], form.most[free])
+        able = np.flatnonzero(own & (uses == 1) & (form.gradient == 0.0) & (form.least <= 0.0) & (form.most == np.inf))
+        row = entered[:, able].argmax(axis=0) if len(able) else able
+        below, above = np.isfinite(form.lower[row]), np.isfinite(form.upper[row])
+        meets = (below != above) & ((rows[row, able] > 0.0) == below) & (form.least[able] < form.most[able])
+        slack = np.full(len(rows), -1)
+        slack[row[meets]] = able[meets]  # of several in one row, one
+        self.is_soft = slack >= 0
+        self.soft, self.slack = np.flatnonzero(self.is_soft), slack[self.is_soft]
+        kept = (form.least < form.most) & ~free
+        kept[self.slack] = False
+        self.form, self.kept = form, np.flatnonzero(kept)
+        self.rows = np.flatnonzero((np.isfinite(form.lower) | np.isfinite(form.upper)) & entered[:, kept].any(axis=1))
+        k = self.kept
+        gradient = form.gradient[k] + np.einsum("ij,j->i", form.hessian, self.base)[k]
+        self.largest = diagonal[k].max(initial=0.0) or np.abs(gradient).max(initial=0.0) or 1.0
+        self.scale = np.sqrt(np.where(diagonal[k] > _FLAT * self.largest, diagonal[k] / self.largest, 1.0))
+        binary = form.binary[k]
+        # whether, besides binary variables, there are directions without curvature, in which the cost may fall for ever
+        self.may_recede = bool(binary.any() and ((curved[k] > 1) | (diagonal[k] <= 0.0))[~binary].any())
+        self.hessian = form.hessian[np.ix_(k, k)] / (self.scale[:, None] * self.scale) / self.largest
+        self.hessian[np.diag_indices(len(k))] += np.where(binary, _BINARY_CURVATURE, 0.0)
+        self.gradient = gradient / self.scale / self.largest - np.where(
+            binary, 0.5 * _BINARY_CURVATURE * self.scale, 0.0
+        )
+
+    def solve(self, limits: SolverLimits, known: float = math.inf) -> tuple[SolutionResult, Array, Details]:
+        """How it ended, x (n,), NaN without a solution, and details; what costs more than `known` is not looked for."""
+        form, k, r, x = self.form, self.kept, self.rows, self.base.copy()
+        fixed = np.einsum("ij,j->i", form.rows, self.base)
+        hard = ~self.is_soft
+        hard[r] = False
+        if ((fixed < form.lower - _FEASIBLE) | (fixed > form.upper + _FEASIBLE))[hard].any():
+            return INFEASIBLE, np.full(len(x), np.nan), Details()
+        at, soft = fixed[r], self.is_soft[r]
+        flag, scaled, info = 1, np.zeros(0), dict[str, Any](lam=np.zeros(len(r)))
+        if len(k):
+            model = daqp.Model()
+            model.settings = {
+                "presolve": 0, "primal_tol": _TIGHT, "iter_limit": int(limits.iter_limit),
+                "eps_prox": _PROXIMAL_BRANCHING if form.binary[k].any() else _PROXIMAL,
+                "fval_bound": min(known / self.largest, _NO_BOUND),
+                "time_limit": max(limits.time_limit, 1e-6) if 0.0 < limits.time_limit < math.inf else 0.0,
+            }  # fmt: skip
+            upper, lower = (
+                np.concatenate([ends[k] * self.scale, sides[r] - at]).clip(-_NO_BOUND, _NO_BOUND)
+                for ends, sides in ((form.most, form.upper), (form.least, form.lower))
+            )
+            sense = np.concatenate([np.where(form.binary[k], _BINARY, 0), np.where(soft, _SOFT, 0)]).astype(np.intc)
+            matrix = form.rows[np.ix_(r, k)] / self.scale
+            flag, _ = model.setup(self.hessian, self.gradient, matrix, upper, lower, sense)
+            if flag >= 0:
+                if soft.any():  # slack that enters its row as c x, at a cost w x^2 / 2, has the reciprocal weight c^2/w
+                    weights, j = np.ones(len(sense)), self.slack
+                    entry = form.rows[self.soft, j]
+                    weights[len(k) :][soft] = self.largest * entry**2 / form.hessian[j, j]
+                    model.soft_weights(rho_l=weights, rho_u=weights)
+                scaled, _, flag, info = model.solve()
+        multipliers = np.zeros(len(form.rows))
+        if flag > 0:
+            x[k] = scaled / self.scale
+            x[form.binary] = x[form.binary].round()
+            x = np.clip(x, form.least, form.most)
+            side, entry = np.einsum("ij,j->i", form.rows[self.soft], x), form.rows[self.soft, self.slack]
+            lacking = np.maximum(0.0, form.lower[self.soft] - side) - np.maximum(0.0, side - form.upper[self.soft])
+            x[self.slack] = lacking / entry
+            multipliers[r] = -self.largest * info["lam"][len(k) :]
+        else:
+            x[:] = np.nan
+        details = Details(int(info.get("iterations", 0)), int(info.get("nodes", 0)), multipliers)
+        return _ENDED.get(flag, FAILED), x, details
+
+
+def _add(total: Array, where: Any, values: Array) -> None:
+    """Add values at indices; indices, but not slices, may repeat."""
+    if all(isinstance(one, slice) for one in where):
+        total[where] += values
+    else:
+        np.add.at(total, where, values)
+
+
+def _minimise(form: _Form, guess: Array, limits: SolverLimits) -> tuple[SolutionResult, Array, Details]:
+    """The optimum, checked: a solver may be wrong. `guess` (n,): where to start; not finite: nowhere."""
+    nothing = np.full(len(guess), np.nan), Details()
+    if (fault := form.fault()) is not None:
+        return fault, *nothing
+    reduced, guessed = _Reduced(form), form.is_met(guess)
+    if reduced.may_recede and _Reduced(form.relaxed()).solve(limits)[0] == UNBOUNDED:
+        feasible = _Reduced(form.without_cost()).solve(limits)[0]
+        return UNBOUNDED if feasible == FOUND else feasible, *nothing
+    cost = form.cost(guess) if guessed else math.inf
+    ended, x, details = reduced.solve(limits, cost + _AGAIN * abs(cost) - form.cost(reduced.base))
+    if ended == STOPPED and guessed and not form.cost(x) < cost:
+        x = guess
+    wrong = ended == FOUND and not form.is_met(x)
+    if ended == INFEASIBLE:
+        wrong = guessed or _Reduced(form.without_cost()).solve(limits)[0] == FOUND
+    return FAILED if wrong else ended, x, details
 
 
 class DaqpResult(MathematicalProgramResult):  # type: ignore[misc]
@@ -68,30 +330,19 @@ class DaqpResult(MathematicalProgramResult):  # type: ignore[misc]
     def __init__(self) -> None:
         """An empty result."""
         super().__init__()
-        self._x, self._index, self._details = np.zeros(0), dict[int, int](), Details()
-
-    def fill(self, shell: _Shell, answer: ProgramSolution, cost: float) -> None:
-        """Put in an answer and its cost."""
-        shell.fill(self, answer, cost)
-        self._x, self._index, self._details = answer.x, shell.layout.index, answer.details
+        self._index, self._details = dict[int, int](), Details()
 
     def GetSolution(self, *what: Any) -> Any:
         """As `MathematicalProgramResult.GetSolution`: all values, or those of a variable, an expression, or arrays."""
         if not what:
-            return super().GetSolution()
-        if not isinstance(what[0], np.ndarray):
-            return self._value(what[0])
-        values = np.array([self._value(one) for one in what[0].ravel()])
-        return values.reshape(what[0].shape)
-
-    def _value(self, what: Any) -> Any:
-        if isinstance(what, Variable) and what.get_id() in self._index:
-            return self._x[self._index[what.get_id()]]
-        if isinstance(what, Expression):
-            for x in what.GetVariables():
-                what = what.Substitute(x, self._value(x))
-            return what
-        return super().GetSolution(what)
+            return self.get_x_val()
+        if isinstance(what[0], np.ndarray):
+            return np.array([self.GetSolution(one) for one in what[0].ravel()]).reshape(what[0].shape)
+        if isinstance(what[0], Variable) and what[0].get_id() in self._index:
+            return self.get_x_val()[self._index[what[0].get_id()]]
+        if isinstance(what[0], Expression):
+            return what[0].EvaluatePartial({x: self.GetSolution(x) for x in what[0].GetVariables()})
+        return super().GetSolution(*what)
 
     def get_solver_id(self) -> SolverId:
         """DAQP."""
@@ -106,7 +357,7 @@ class DaqpSolver(SolverInterface):  # type: ignore[misc]
     """DAQP for any `MathematicalProgram` that is a convex quadratic program, with binary variables or without.
 
     An initial guess that satisfies all constraints bounds the search: more expensive branches are cut. It is the
-    solution if a limit is reached before anything cheaper was found.
+    solution if a limit is reached before anything cheaper was found. Threads may share a solver.
 
     Scale the program: where coefficients differ by a factor of about 1e6, it may fail, or call a program unbounded
     that is not (on random programs of this kind, about once in a thousand).
@@ -117,6 +368,11 @@ class DaqpSolver(SolverInterface):  # type: ignore[misc]
 
     NAME = "DAQP"
     _ID = SolverId(NAME)
+
+    def __init__(self) -> None:
+        """Each thread keeps the layout of its last program: with other coefficients it is solved sooner."""
+        super().__init__()
+        self._of_thread = threading.local()
 
     @classmethod
     def id(cls) -> SolverId:
@@ -171,19 +427,19 @@ class DaqpSolver(SolverInterface):  # type: ignore[misc]
             raise ValueError(why)
         limits = _limits(prog.solver_options(), solver_options)
         guess = prog.initial_guess() if initial_guess is None else np.asarray(initial_guess, dtype=np.float64)
-        shell = _Shell(Layout(prog))  # nothing is kept: threads may share a solver
-        form = StandardForm.of(prog, shell.layout)
-        answer = minimise(form, guess, limits)
+        layout: _Layout | None = getattr(self._of_thread, "layout", None)
+        if layout is None or not layout.fits(prog):
+            layout = self._of_thread.layout = _Layout(prog)
+        form = _Form.of(prog, layout)
+        ended, x, details = _minimise(form.relaxed() if limits.relaxed else form, guess, limits)
         filled = DaqpResult() if result is None else result
-        cost = _COSTS.get(answer.ended) or form.cost(answer.x)
+        layout.fill(filled, ended, x, _COSTS.get(ended) or form.cost(x))
         if isinstance(filled, DaqpResult):
-            filled.fill(shell, answer, cost)
-        else:
-            shell.fill(filled, answer, cost)
+            filled._index, filled._details = layout.index, details
         return filled if result is None else None
 
 
-_COSTS = {SolutionResult.kInfeasibleConstraints: math.inf, SolutionResult.kUnbounded: -math.inf}
+_COSTS = {INFEASIBLE: math.inf, UNBOUNDED: -math.inf}
 
 
 def _limits(*given: SolverOptions | None) -> SolverLimits:

@@ -10,9 +10,8 @@ from typing import Any, Literal
 from pydrake.solvers import CommonSolverOption, GurobiSolver, MosekSolver, SolutionResult, SolverOptions
 
 from airground_drake.base.arrays import Array
-from airground_drake.gatekeeper.active_set import Details
 from airground_drake.gatekeeper.binary_program import BinaryProgram
-from airground_drake.gatekeeper.daqp_solver import DaqpSolver
+from airground_drake.gatekeeper.daqp_solver import DaqpSolver, Details
 
 SOLVERS: dict[str, Any] = {"daqp": DaqpSolver, "gurobi": GurobiSolver, "mosek": MosekSolver}
 """Classes of solvers by the name in `gatekeeper.solver`."""
@@ -88,10 +87,11 @@ _RELAXING = DaqpSolver()
 def relax(binary: BinaryProgram, seconds: float = math.inf, iterations: int = 10_000) -> SolverResult:
     """The optimum of (27), by DAQP, within `iterations` of the active-set method and `seconds` by the clock."""
     options = SolverOptions()
+    options.SetOption(DaqpSolver.id(), "relaxed", 1)
     options.SetOption(DaqpSolver.id(), "iter_limit", iterations)
     if seconds < math.inf:
         options.SetOption(DaqpSolver.id(), "time_limit", max(seconds, 1e-6))
-    return _found(_RELAXING.Solve(binary.relaxation, None, options), len(binary.shares))
+    return _found(_RELAXING.Solve(binary.program, None, options), len(binary.omega))
 
 
 def _found(result: Any, count: int) -> SolverResult:

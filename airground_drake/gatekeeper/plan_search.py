@@ -27,9 +27,14 @@ def cheap_plan(terms: Terms, block: Blocks, known: Sequence[Array]) -> Array:
         block: that each stage belongs to, (N,).
         known: plans (N,), constant on each block.
     """
-    starts = [beam_search(terms, block), *known]
+    starts = distinct([beam_search(terms, block), *known])
     improved = [improve(terms, block, plan, False) for plan in starts]
     return improve(terms, block, min(improved, key=lambda one: one[1])[0], True)[0]
+
+
+def distinct(plans: Sequence[Array]) -> list[Array]:
+    """The plans (N,) without those that came before."""
+    return [plan for i, plan in enumerate(plans) if not any(np.array_equal(plan, other) for other in plans[:i])]
 
 
 @njit(cache=True)

@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from airground_drake.base.arrays import Array, read_only
-from airground_drake.gatekeeper.cost import Terms, half_plane_cost, plan_cost
+from airground_drake.gatekeeper.cost import Terms, half_plane_cost, plan_cost, positions_of
 from airground_drake.gatekeeper.rollout import ACCEPTED, REFUSED, ClosedLoop, View, closed_loop, follow
 from airground_drake.geometry import convex, outline
 from airground_drake.intervention.policy import Proposal
@@ -90,8 +90,8 @@ class Problem:
 
     def positions(self, omega: Array) -> Array:
         """Predicted positions at the ends of the stages, (23): omega (N,) in [0, 1] to (N, 3), m."""
-        velocity = self.refuse + omega[:, None] * (self.accept - self.refuse)
-        return self.initial + self.dt * np.cumsum(velocity, axis=0)
+        positions: Array = positions_of(self.terms, np.ascontiguousarray(omega, dtype=np.float64))
+        return positions
 
     def evaluate(self, omega: Array) -> Evaluation:
         """Cost (25) of a plan, (N,), by the mode velocities of (23), with the exact distances of (26d)."""

@@ -141,8 +141,7 @@ def test_a_run_that_sets_values_is_named_by_them(scenario: Scenario, traces: dic
     run = Run("c", set={"gatekeeper.route": "nonlinear", "gatekeeper.rule": "first_stage", "control.period_s": 0.1})
     trajectories, *_ = draw.draw(replace(scenario, runs={"c": run}), {"c": traces["c"]})
     assert trajectories.panels[0].heading == (
-        "Run c: method (c) with (27) by multiple shooting, the first stage applied, "
-        "control.period_s 0.1"
+        "Run c: method (c) with (27) by multiple shooting, the first stage applied, control.period_s 0.1"
     )
 
 

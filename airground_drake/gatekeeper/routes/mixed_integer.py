@@ -10,11 +10,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from airground_drake.base.arrays import Array
-from airground_drake.gatekeeper.binary_program import BinaryProgram
+from airground_drake.gatekeeper.binary_program import BinaryProgram, Programs
 from airground_drake.gatekeeper.budget import Budget
 from airground_drake.gatekeeper.drake_solvers import Minimiser, relax
-from airground_drake.gatekeeper.plan_search import cheap_plan, improve
-from airground_drake.gatekeeper.problem import Problem
+from airground_drake.gatekeeper.plan_search import cheap_plan, distinct, improve
+from airground_drake.gatekeeper.problem import Evaluation, Problem
 from airground_drake.gatekeeper.relaxation import dual_bound, normals_along, sum_up_rounding, unavoidable_cost
 from airground_drake.gatekeeper.routes.guard import guarded
 from airground_drake.gatekeeper.solution import ConstantPlans, Solution, Status, cheapest
@@ -33,13 +33,13 @@ class _Proof:
         status: 'optimal' if the bound is the optimum.
         bound: lower bound along the half-planes.
         normals: of these, (N, m, 3).
-        optimum: plan, (N,); None without one.
+        optimum: the plan; None without one.
     """
 
     status: Status
     bound: float
     normals: Array
-    optimum: Array | None = None
+    optimum: Evaluation | None = None
 
 
 class MixedIntegerRoute:
@@ -74,35 +74,37 @@ class MixedIntegerRoute:
         if blocks is not None and blocks < 1:
             raise ValueError(f"blocks: {blocks}, allowed: 1 or more")
         self._blocks = blocks
-        self._search = Minimiser(solver)
+        self._search, self._programs = Minimiser(solver), Programs()
 
     def solve(self, problem: Problem, budget: Budget = Budget()) -> Solution:  # noqa: B008 (immutable)
         """See `Route`."""
         return guarded(problem, budget, self._solve)
 
     def _solve(self, problem: Problem, constants: ConstantPlans, budget: Budget) -> Solution:
-        binary = BinaryProgram(problem.stages, min(self._blocks or problem.stages, problem.stages))
-        known, bound = _known(binary, problem, constants)
-        plan = cheap_plan(problem.terms, binary.block, known)
+        binary = self._programs.of(problem.stages, min(self._blocks or problem.stages, problem.stages))
+        normals = normals_along(problem, constants.better.positions)
+        shares, bound = _relaxed(binary, problem, normals)
+        known = _known(binary, problem, shares)
+        plan = problem.evaluate(cheap_plan(problem.terms, binary.block, known))
+        plans = [plan, *map(problem.evaluate, known)]
         search = _Searches(self._search, binary, problem, budget)
-        proof = search.along(constants.better.positions, [plan, *known], bound)
-        plans = [plan, *known]
+        proof = search.along(normals, plans, bound)
         while proof.optimum is not None:
-            if not any(np.array_equal(proof.optimum, one) for one in plans):
-                plans += [proof.optimum, improve(problem.terms, binary.block, proof.optimum, True)[0]]
-            plan = min(plans, key=lambda one: problem.evaluate(one).objective)
-            if problem.evaluate(plan).objective >= proof.bound * (1.0 - _AGREE):
+            optimum = proof.optimum.omega
+            if not any(np.array_equal(optimum, one.omega) for one in plans):
+                plans += [proof.optimum, problem.evaluate(improve(problem.terms, binary.block, optimum, True)[0])]
+            plan = min(plans, key=lambda one: one.objective)
+            if plan.objective >= proof.bound * (1.0 - _AGREE):
                 break
             again = search.again(plan)
             if again is None or again.status != "optimal":
                 proof = replace(proof, status=again.status if again else proof.status)
                 break
             proof = again
-        turned = [np.where(binary.block == 0, 1.0 - plan[0], plan) for plan in plans]
-        evaluated = [problem.evaluate(plan) for plan in (*plans, *turned)]
+        turned = [np.where(binary.block == 0, 1.0 - one.omega[0], one.omega) for one in plans]
         return cheapest(
             problem,
-            (constants.accept, constants.refuse, *evaluated),
+            (constants.accept, constants.refuse, *plans, *map(problem.evaluate, turned)),
             status=proof.status,
             route_bound=max(proof.bound, unavoidable_cost(problem)),
             normals=proof.normals,
@@ -117,13 +119,13 @@ class _Searches:
         self._search, self._binary, self._problem, self._budget = search, binary, problem, budget
         self._iterations, self._until = budget.search_iterations, time.monotonic() + budget.search_s
 
-    def along(self, guide: Array, known: Sequence[Array], relaxed: float) -> _Proof:
-        """Search along half-planes at a trajectory (N, 3), m, from the best of known plans (N,).
+    def along(self, normals: Array, known: Sequence[Evaluation], relaxed: float) -> _Proof:
+        """Search along half-planes with unit normals (N, m, 3), from the best of known plans.
 
         The program has these half-planes; `relaxed` is the lower bound by its relaxation.
         """
-        problem, normals = self._problem, normals_along(self._problem, guide)
-        costs = [problem.evaluate_half_planes(problem.positions(plan), normals) for plan in known]
+        problem = self._problem
+        costs = [problem.evaluate_half_planes(plan.positions, normals) for plan in known]
         best = int(np.argmin(costs))
         seconds = min(self._until - time.monotonic(), self._budget.left_s())
         if seconds <= 0.0:
@@ -133,39 +135,32 @@ class _Searches:
         status: Status = found.ended if self._iterations >= 0 else "budget_spent"
         if found.omega is None or status != "optimal":
             return _Proof(status, relaxed, normals)
-        optimum = self._binary.plan(found.omega.round())
-        cost = problem.evaluate_half_planes(problem.positions(optimum), normals)
+        optimum = problem.evaluate(self._binary.plan(found.omega.round()))
+        cost = problem.evaluate_half_planes(optimum.positions, normals)
         if cost > costs[best] * (1.0 + _AGREE):  # the solver is wrong
             return _Proof("solver_failed", relaxed, normals)
         return _Proof("optimal", min(cost, costs[best]), normals, optimum)
 
-    def again(self, plan: Array) -> _Proof | None:
-        """Search along half-planes at a plan (N,); None if the relaxation shows that this would be long."""
-        guide = self._problem.positions(plan)
-        bound = _relaxed(self._binary, self._problem, guide)[1]
-        if bound < (1.0 - _WORTH) * self._problem.evaluate(plan).objective:
-            return None
-        return self.along(guide, [plan], bound)
+    def again(self, plan: Evaluation) -> _Proof | None:
+        """Search along half-planes at a plan; None if the relaxation shows that this would be long."""
+        normals = normals_along(self._problem, plan.positions)
+        bound = _relaxed(self._binary, self._problem, normals)[1]
+        return None if bound < (1.0 - _WORTH) * plan.objective else self.along(normals, [plan], bound)
 
 
-def _known(binary: BinaryProgram, problem: Problem, constants: ConstantPlans) -> tuple[list[Array], float]:
-    """Plans (N,) that need no search: constant ones, the rest of the previous one, and sum-up rounding; a lower bound.
-
-    Half-planes are at the better constant plan.
-    """
+def _known(binary: BinaryProgram, problem: Problem, shares: Array | None) -> list[Array]:
+    """Plans (N,) that need no search: constant ones, the rest of the previous one, and sum-up rounding of shares."""
     count = len(binary.omega)
     known = [np.ones(count), np.zeros(count)]
     if problem.previous is not None:
         known.append(binary.blocked(problem.previous))
-    shares, bound = _relaxed(binary, problem, constants.better.positions)
     if shares is not None:
         known.append(sum_up_rounding(shares))
-    return [binary.plan(values) for values in known], bound
+    return distinct([binary.plan(values) for values in known])
 
 
-def _relaxed(binary: BinaryProgram, problem: Problem, guide: Array) -> tuple[Array | None, float]:
-    """Shares (B,) of the relaxation along half-planes at a trajectory (N, 3), m, and its lower bound."""
-    normals = normals_along(problem, guide)
+def _relaxed(binary: BinaryProgram, problem: Problem, normals: Array) -> tuple[Array | None, float]:
+    """Shares (B,) of the relaxation along half-planes with unit normals (N, m, 3), and its lower bound."""
     binary.update(problem, normals)
     shares = relax(binary).omega
     if shares is None:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from airground_drake.gatekeeper.binary_program import BinaryProgram
+from airground_drake.gatekeeper.binary_program import Programs
 from airground_drake.gatekeeper.budget import Budget
 from airground_drake.gatekeeper.drake_solvers import relax
 from airground_drake.gatekeeper.problem import Problem
@@ -34,6 +34,10 @@ class RelaxedRoute:
     the better constant plan decides.
     """
 
+    def __init__(self) -> None:
+        """Start without any program."""
+        self._programs = Programs()
+
     def solve(self, problem: Problem, budget: Budget = Budget()) -> Solution:  # noqa: B008 (immutable)
         """See `Route`."""
         return guarded(problem, budget, self._solve)
@@ -41,7 +45,7 @@ class RelaxedRoute:
     def _solve(self, problem: Problem, constants: ConstantPlans, budget: Budget) -> Solution:
         stages = problem.stages
         normals = normals_along(problem, constants.better.positions)
-        program = BinaryProgram(stages, stages)
+        program = self._programs.of(stages, stages)
         program.update(problem, normals)
         found = relax(program, budget.left_s(), ACTIVE_SETS * budget.iterations)
         if found.omega is None:
