@@ -9,7 +9,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scenarios.cases import DEADLOCKS
 from scipy.stats import kstest
 from timeline import kinds, times
 
@@ -52,7 +51,7 @@ def test_ugv1_goes_through_what_the_paper_tells(
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("scenario", sorted(set(shipped()) - set(DEADLOCKS)))
+@pytest.mark.parametrize("scenario", shipped())
 def test_every_run_has_the_verdicts_that_its_scenario_declares(run: Runs, scenario: str) -> None:
     for name in load(scenario).runs:
         for verdict in judge(run(scenario, name)):

@@ -330,7 +330,7 @@ def test_what_is_not_as_declared_and_what_not_to_conclude() -> None:
     shown = first_screen(document(man, lambda found: found["overall"].update(over), methods="abd"))
     assert shown.declared == ("no", [
         "9 of 11 checks came out as the scenario declares", "d: distances failed, d: arrival could not be checked",
-        "about 2 more checks nothing is promised",
+        "2 more checks: nothing is promised",
     ])  # fmt: skip
     assert [told.partition(":")[0] for told in shown.beware] == [
         "the UAV helps", "robots can keep away from man", "other starts or real robots end so, too",

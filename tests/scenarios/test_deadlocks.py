@@ -66,7 +66,7 @@ def test_everybody_can_arrive_with_room_to_spare(name: str) -> None:
 
 @pytest.mark.parametrize("name", ["pocket", "swap", "doorway"])
 def test_under_method_d_everybody_arrives_and_every_claim_holds(name: str) -> None:
-    """Of the smaller ones; `.ci/run` has the reports of all."""
+    """Of the smaller ones; the slow tests judge the runs of all."""
     trace = simulate(load(name), "d")
     for ugv in trace.ugvs:
         assert "arrival" in kinds(trace, ugv)
