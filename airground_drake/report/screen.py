@@ -369,6 +369,6 @@ def declared(document: Document) -> Cell:
     names += [f"finding {number} about the paper not demonstrated" for number in overall["undemonstrated"]]
     told += [f"{', '.join(names[:3])}{f' and {len(names) - 3} more' * (len(names) > 3)}"] * bool(names)
     more = len(overall["unpromised"])
-    told += [f"{counted(more, "more check")}: nothing is promised"] * (more > 0)
+    told += [f"{counted(more, 'more check')}: nothing is promised"] * (more > 0)
     mark = {"as_expected": "yes", "not_as_expected": "no"}.get(overall["status"], "open")
     return Cell(mark, told)
