@@ -24,19 +24,19 @@ if TYPE_CHECKING:
         TraceError,
         UnknownNameError,
     )
-    from airground_drake.campaign.sweep import sweep
-    from airground_drake.geometry.motion import Motion
-    from airground_drake.intervention.policy import Observation, Policy, Proposal
+    from airground_drake.model.geometry.motion import Motion
     from airground_drake.report.make import write_report
-    from airground_drake.run.simulation import simulate
-    from airground_drake.run.trace import Trace
-    from airground_drake.scenarios.load import load
-    from airground_drake.scenarios.schema import Scenario
-    from airground_drake.systems.diagram import build_diagram
+    from airground_drake.report.view.plane import plot
+    from airground_drake.scenario.load import load
+    from airground_drake.scenario.schema import Scenario
+    from airground_drake.sim.diagram import build_diagram
+    from airground_drake.sim.simulation import simulate
+    from airground_drake.sim.trace import Trace
+    from airground_drake.study.campaign.sweep import sweep
+    from airground_drake.uav.policy import Observation, Policy, Proposal
     from airground_drake.verify.claim import TraceClaim
     from airground_drake.verify.finding import Finding
     from airground_drake.verify.judging import judge
-    from airground_drake.view.plane import plot
 
 __all__ = [
     "AirgroundError",
@@ -65,24 +65,24 @@ __all__ = [
 _HOME = {
     "AirgroundError": "base.errors",
     "Finding": "verify.finding",
-    "Motion": "geometry.motion",
-    "Observation": "intervention.policy",
+    "Motion": "model.geometry.motion",
+    "Observation": "uav.policy",
     "PluginError": "base.errors",
-    "Policy": "intervention.policy",
-    "Proposal": "intervention.policy",
-    "Scenario": "scenarios.schema",
+    "Policy": "uav.policy",
+    "Proposal": "uav.policy",
+    "Scenario": "scenario.schema",
     "ScenarioError": "base.errors",
     "SimulationError": "base.errors",
-    "Trace": "run.trace",
+    "Trace": "sim.trace",
     "TraceClaim": "verify.claim",
     "TraceError": "base.errors",
     "UnknownNameError": "base.errors",
-    "build_diagram": "systems.diagram",
+    "build_diagram": "sim.diagram",
     "judge": "verify.judging",
-    "load": "scenarios.load",
-    "plot": "view.plane",
-    "simulate": "run.simulation",
-    "sweep": "campaign.sweep",
+    "load": "scenario.load",
+    "plot": "report.view.plane",
+    "simulate": "sim.simulation",
+    "sweep": "study.campaign.sweep",
     "write_report": "report.make",
 }
 

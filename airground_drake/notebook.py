@@ -14,15 +14,15 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:  # a notebook that shows such an object has imported its module
     from pydrake.systems.framework import Diagram
 
-    from airground_drake.run.trace import Trace
-    from airground_drake.scenarios.schema import Scenario
+    from airground_drake.scenario.schema import Scenario
+    from airground_drake.sim.trace import Trace
     from airground_drake.verify.claim import Verdict
 
 
 def scenario_html(scenario: Scenario) -> str:
     """Title, a map with the preset trajectories, robots and runs."""
-    from airground_drake.registry import METHODS
-    from airground_drake.view.plane import thumbnail
+    from airground_drake.base.registry import METHODS
+    from airground_drake.report.view.plane import thumbnail
 
     ugvs = [
         f"{name} from {_place(ugv.start_m)} to {_place(ugv.target_m)}, at most {ugv.max_speed_m_s:g} m/s"
@@ -52,14 +52,14 @@ def verdict_html(verdict: Verdict) -> str:
 
 def diagram_html(diagram: Diagram) -> str | None:
     """The picture of a scenario's diagram; none of any other diagram of Drake."""
-    from airground_drake.systems import graphviz
+    from airground_drake.sim import graphviz
 
     return _element(graphviz.svg(graphviz.dot(diagram))) if graphviz.has_layers(diagram) else None
 
 
 SHOWN = {
-    "airground_drake.scenarios.schema:Scenario": scenario_html,
-    "airground_drake.run.trace:Trace": trace_html,
+    "airground_drake.scenario.schema:Scenario": scenario_html,
+    "airground_drake.sim.trace:Trace": trace_html,
     "airground_drake.verify.claim:Verdict": verdict_html,
     "pydrake.systems.framework:Diagram": diagram_html,
 }

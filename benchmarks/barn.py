@@ -21,15 +21,15 @@ from typing import Any
 
 import yaml
 
-from airground_drake.geometry import outline
-from airground_drake.geometry.paths import NoPath, shortest_path
+from airground_drake.model.geometry import outline
+from airground_drake.model.geometry.paths import NoPath, shortest_path
 from airground_drake.report.metrics import outcome
-from airground_drake.run.simulation import simulate
-from airground_drake.scenarios.imported import Sizes, barn
-from airground_drake.scenarios.load import from_data
-from airground_drake.scenarios.outlines import outlines_of
-from airground_drake.scenarios.schema import Scenario
-from airground_drake.scenarios.world import make_world
+from airground_drake.scenario.imported import Sizes, barn
+from airground_drake.scenario.load import from_data
+from airground_drake.scenario.outlines import outlines_of
+from airground_drake.scenario.schema import Scenario
+from airground_drake.scenario.world import make_world
+from airground_drake.sim.simulation import simulate
 
 SIZES = Sizes(0.215, 0.1)
 METHODS = ("a", "d")

@@ -19,12 +19,12 @@ os.environ |= dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1")
 
 import numpy as np
 
-from airground_drake.campaign.spec import load_spec
-from airground_drake.environments.encoding import Encoding
-from airground_drake.environments.sources import Source
-from airground_drake.run.simulation import Recorder
-from airground_drake.scenarios.load import load
-from airground_drake.scenarios.schema import Scenario
+from airground_drake.scenario.load import load
+from airground_drake.scenario.schema import Scenario
+from airground_drake.sim.simulation import Recorder
+from airground_drake.study.campaign.spec import load_spec
+from airground_drake.study.environments.encoding import Encoding
+from airground_drake.study.environments.sources import Source
 
 DEFAULT = ("case_a", "case_b", "warehouse", "crossing")
 CAMPAIGN = Path(__file__).parents[1] / "examples" / "learned.yaml"

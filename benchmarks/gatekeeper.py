@@ -24,21 +24,21 @@ from typing import Any
 
 import numpy as np
 
-from airground_drake.gatekeeper.budget import Budget
-from airground_drake.gatekeeper.problem import Horizon, Problem, predicted_problem
-from airground_drake.gatekeeper.rollout import View
-from airground_drake.gatekeeper.routes.relaxed import RelaxedRoute
-from airground_drake.gatekeeper.routes.route import Route
-from airground_drake.gatekeeper.solution import ConstantPlans, Solution
-from airground_drake.geometry.motion import Motion
-from airground_drake.geometry.outline import balls
-from airground_drake.geometry.paths import NoPath, shortest_path
-from airground_drake.intervention.policy import Proposal
-from airground_drake.nsbc.avoidance import Avoidance
-from airground_drake.nsbc.law import UgvLaw
-from airground_drake.registry import ROUTES
-from airground_drake.run.simulation import Recorder
-from airground_drake.scenarios.load import load
+from airground_drake.base.registry import ROUTES
+from airground_drake.model.geometry.motion import Motion
+from airground_drake.model.geometry.outline import balls
+from airground_drake.model.geometry.paths import NoPath, shortest_path
+from airground_drake.model.law.avoidance import Avoidance
+from airground_drake.model.law.ugv_law import UgvLaw
+from airground_drake.scenario.load import load
+from airground_drake.sim.simulation import Recorder
+from airground_drake.uav.policy import Proposal
+from airground_drake.ugv.budget import Budget
+from airground_drake.ugv.problem import Horizon, Problem, predicted_problem
+from airground_drake.ugv.rollout import View
+from airground_drake.ugv.routes.relaxed import RelaxedRoute
+from airground_drake.ugv.routes.route import Route
+from airground_drake.ugv.solution import ConstantPlans, Solution
 
 LAW = UgvLaw(Avoidance(3.0, 0.05, 4.0), 2.0, 1.5, intervention_on_top=False)
 

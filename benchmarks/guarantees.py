@@ -11,9 +11,9 @@ from __future__ import annotations
 
 import argparse
 
-from airground_drake.run.simulation import simulate
-from airground_drake.scenarios.load import load
-from airground_drake.scenarios.shipped import shipped
+from airground_drake.scenario.load import load
+from airground_drake.scenario.shipped import shipped
+from airground_drake.sim.simulation import simulate
 from airground_drake.verify import judge
 from airground_drake.verify.applications import without_news
 

@@ -30,32 +30,32 @@ from unittest import mock
 import numpy as np
 from hostile_uav import CHOICES, LyingPlanner, Tactic, drawn, mutated, shape_at
 
-from airground_drake.audit.companions import Believing
 from airground_drake.base.arrays import Array
-from airground_drake.gatekeeper.outcome_gatekeeper import OutcomeGatekeepers
-from airground_drake.gatekeeper.problem import Horizon, predicted_problem
-from airground_drake.gatekeeper.rollout import View
-from airground_drake.gatekeeper.routes.relaxed import RelaxedRoute
-from airground_drake.geometry import convex, outline
-from airground_drake.geometry.motion import Motion
-from airground_drake.intervention.planner import Planner
-from airground_drake.intervention.policy import Proposal
-from airground_drake.nsbc.avoidance import Avoidance
-from airground_drake.nsbc.law import UgvLaw
-from airground_drake.registry import Method
-from airground_drake.run.simulation import Recorder
-from airground_drake.run.trace import Trace
-from airground_drake.scenarios.load import load, validated
-from airground_drake.scenarios.schema import Moves, Obstacle, Policy, Run, Scenario
-from airground_drake.scenarios.world import make_world
-from airground_drake.systems import components
-from airground_drake.systems.components import make_planner, make_presets
-from airground_drake.systems.controllers import UgvController
+from airground_drake.base.registry import Method
+from airground_drake.model.bodies.world import Body
+from airground_drake.model.geometry import convex, outline
+from airground_drake.model.geometry.motion import Motion
+from airground_drake.model.law.avoidance import Avoidance
+from airground_drake.model.law.ugv_law import UgvLaw
+from airground_drake.model.plants.plant import Scripted
+from airground_drake.report.audit.companions import Believing
+from airground_drake.scenario.load import load, validated
+from airground_drake.scenario.schema import Moves, Obstacle, Policy, Run, Scenario
+from airground_drake.scenario.world import make_world
+from airground_drake.sim import components
+from airground_drake.sim.blocks.controllers import UgvController
+from airground_drake.sim.components import make_planner, make_presets
+from airground_drake.sim.simulation import Recorder
+from airground_drake.sim.trace import Trace
+from airground_drake.uav.planner import Planner
+from airground_drake.uav.policy import Proposal
+from airground_drake.ugv.outcome_gatekeeper import OutcomeGatekeepers
+from airground_drake.ugv.problem import Horizon, predicted_problem
+from airground_drake.ugv.rollout import View
+from airground_drake.ugv.routes.relaxed import RelaxedRoute
+from airground_drake.verify.claims.safe_own import SafeOwn
+from airground_drake.verify.claims.safe_trace import SafeTrace
 from airground_drake.verify.engines.outlines import Cores, closest
-from airground_drake.verify.runs.safe_own import SafeOwn
-from airground_drake.verify.runs.safe_trace import SafeTrace
-from airground_drake.world.plant import Scripted
-from airground_drake.world.world import Body
 
 STEPS = 30
 """Control periods for which a proposal is executed at decision level."""

@@ -13,13 +13,13 @@ from typing import Any
 import numpy as np
 
 from airground_drake.base.arrays import Array
-from airground_drake.geometry import outline
-from airground_drake.geometry.motion import Motion
-from airground_drake.geometry.outline import BASE, COUNT, EXTENT, GAP, MIDDLE, RADIUS
-from airground_drake.intervention.database import Negotiation
-from airground_drake.intervention.messages import ACCEPT, DONE, REFUSE, Reports, Sighting, answer_to
-from airground_drake.intervention.planner import Planner, PlannerState
-from airground_drake.intervention.policy import Proposal
+from airground_drake.model.geometry import outline
+from airground_drake.model.geometry.motion import Motion
+from airground_drake.model.geometry.outline import BASE, COUNT, EXTENT, GAP, MIDDLE, RADIUS
+from airground_drake.uav.database import Negotiation
+from airground_drake.uav.messages import ACCEPT, DONE, REFUSE, Reports, Sighting, answer_to
+from airground_drake.uav.planner import Planner, PlannerState
+from airground_drake.uav.policy import Proposal
 
 CHOICES: dict[str, tuple[Any, ...]] = {
     "mapped": ("true", "moved", "nothing", "phantoms", "on the robot", "ahead", "room", "huge", "no shape"),

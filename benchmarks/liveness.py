@@ -33,10 +33,10 @@ from feasible import joint_plan, shortest_length
 from maps import Array, Course
 
 from airground_drake.base.errors import AirgroundError
-from airground_drake.run.simulation import simulate
-from airground_drake.run.trace import Trace
-from airground_drake.scenarios.load import from_data
-from airground_drake.scenarios.schema import Scenario
+from airground_drake.scenario.load import from_data
+from airground_drake.scenario.schema import Scenario
+from airground_drake.sim.simulation import simulate
+from airground_drake.sim.trace import Trace
 from airground_drake.verify.engines.geometry import closest_approach
 
 METHODS = ("a", "b", "c", "d", "orca")

@@ -15,13 +15,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from airground_drake.geometry import convex, outline
-from airground_drake.nsbc.avoidance import Avoidance
-from airground_drake.nsbc.law import UgvLaw
-from airground_drake.run.simulation import Recorder
-from airground_drake.scenarios.load import load, validated
-from airground_drake.scenarios.schema import Obstacle, Preset, Run, Scenario, Ugv
-from airground_drake.scenarios.world import make_world
+from airground_drake.model.geometry import convex, outline
+from airground_drake.model.law.avoidance import Avoidance
+from airground_drake.model.law.ugv_law import UgvLaw
+from airground_drake.scenario.load import load, validated
+from airground_drake.scenario.schema import Obstacle, Preset, Run, Scenario, Ugv
+from airground_drake.scenario.world import make_world
+from airground_drake.sim.simulation import Recorder
 
 APART_M = 3.0
 

@@ -23,14 +23,14 @@ import orca
 
 from airground_drake.base.arrays import Array
 from airground_drake.base.parallel import run_parallel
-from airground_drake.geometry.motion import Motion
-from airground_drake.run.simulation import simulate
-from airground_drake.run.trace import Trace
-from airground_drake.scenarios.courses import course
-from airground_drake.scenarios.load import load, validated
-from airground_drake.scenarios.schema import Moves, Obstacle, Scenario
+from airground_drake.model.bodies.motion import PeriodMotion
+from airground_drake.model.geometry.motion import Motion
+from airground_drake.scenario.courses import course
+from airground_drake.scenario.load import load, validated
+from airground_drake.scenario.schema import Moves, Obstacle, Scenario
+from airground_drake.sim.simulation import simulate
+from airground_drake.sim.trace import Trace
 from airground_drake.verify import judge
-from airground_drake.world.motion import PeriodMotion
 
 CLAIMS = ("SAFE-TRACE", "SAFE-OWN", "SAFE-HYP")
 HALL_M = (8.0, 5.0)

@@ -23,13 +23,13 @@ from itertools import combinations, pairwise
 import numpy as np
 import numpy.typing as npt
 
-from airground_drake.geometry import outline
-from airground_drake.intervention.coordination.joint import plan
-from airground_drake.intervention.coordination.roadmap import RobotTask, Space
-from airground_drake.intervention.coordination.single import OtherRobot
-from airground_drake.run.simulation import simulate
-from airground_drake.scenarios.load import from_data
-from airground_drake.scenarios.schema import Scenario
+from airground_drake.model.geometry import outline
+from airground_drake.scenario.load import from_data
+from airground_drake.scenario.schema import Scenario
+from airground_drake.sim.simulation import simulate
+from airground_drake.uav.coordination.joint import plan
+from airground_drake.uav.coordination.roadmap import RobotTask, Space
+from airground_drake.uav.coordination.single import OtherRobot
 
 Array = npt.NDArray[np.float64]
 Point = Sequence[float]

@@ -16,17 +16,17 @@ from typing import NamedTuple
 import numpy as np
 
 from airground_drake.base.arrays import Array
-from airground_drake.geometry import convex, outline
-from airground_drake.nsbc.avoidance import Avoidance
-from airground_drake.nsbc.law import UgvLaw
-from airground_drake.registry import method_of
-from airground_drake.run.simulation import simulate
-from airground_drake.scenarios.load import load
-from airground_drake.scenarios.world import make_world
-from airground_drake.systems.components import make_law
-from airground_drake.world.plant import Delay, FirstOrder, Lag, Plant, Unicycle
-from airground_drake.world.steering import steer
-from airground_drake.world.world import Body, World
+from airground_drake.base.registry import method_of
+from airground_drake.model.bodies.world import Body, World
+from airground_drake.model.geometry import convex, outline
+from airground_drake.model.law.avoidance import Avoidance
+from airground_drake.model.law.ugv_law import UgvLaw
+from airground_drake.model.plants.plant import Delay, FirstOrder, Lag, Plant, Unicycle
+from airground_drake.model.plants.steering import steer
+from airground_drake.scenario.load import load
+from airground_drake.scenario.world import make_world
+from airground_drake.sim.components import make_law
+from airground_drake.sim.simulation import simulate
 
 H, GAIN, SPEED, SAFE_M = 0.05, 3.0, 1.0, 0.6
 PERIODS_A_RUN = 100

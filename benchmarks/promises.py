@@ -26,11 +26,11 @@ import numpy as np
 import numpy.typing as npt
 
 from airground_drake.base.errors import ScenarioError
-from airground_drake.run.simulation import simulate
-from airground_drake.run.trace import Trace
-from airground_drake.scenarios.budget import budget
-from airground_drake.scenarios.load import from_data
-from airground_drake.scenarios.schema import Obstacle, Scenario
+from airground_drake.scenario.budget import budget
+from airground_drake.scenario.load import from_data
+from airground_drake.scenario.schema import Obstacle, Scenario
+from airground_drake.sim.simulation import simulate
+from airground_drake.sim.trace import Trace
 from airground_drake.verify import judge
 from airground_drake.verify.runs.encounters import encounters
 from airground_drake.verify.runs.passive import beside

@@ -35,20 +35,20 @@ import yaml
 
 from airground_drake.base import files
 from airground_drake.base.errors import AirgroundError, ScenarioError
+from airground_drake.base.registry import METHODS, ROUTES
 from airground_drake.check.command import LIMIT_S
 from airground_drake.check.line import AGREES, RECORDED
 from airground_drake.check.report import check_report
-from airground_drake.decision.bayes import optimal_threshold
-from airground_drake.proofs.runs import prove, workshop
-from airground_drake.registry import METHODS, ROUTES
+from airground_drake.model.trigger.bayes import optimal_threshold
 from airground_drake.report import document
-from airground_drake.run import trace
-from airground_drake.run.simulation import simulate
-from airground_drake.run.trace import Trace
-from airground_drake.scenarios.load import from_data, resolved
-from airground_drake.scenarios.schema import Scenario
-from airground_drake.scenarios.shapes import convex_parts
+from airground_drake.scenario.load import from_data, resolved
+from airground_drake.scenario.schema import Scenario
+from airground_drake.scenario.shapes import convex_parts
+from airground_drake.sim import trace
+from airground_drake.sim.simulation import simulate
+from airground_drake.sim.trace import Trace
 from airground_drake.verify import Verdict, judge
+from airground_drake.verify.proofs.runs import prove, workshop
 from airground_drake.verify.runs.pairs import DISTANCE_TOLERANCE_M
 
 sys.path.append(str(Path(__file__).parents[1] / "tests"))

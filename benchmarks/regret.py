@@ -17,9 +17,9 @@ from pathlib import Path
 import numpy as np
 
 from airground_drake.base.arrays import Array
-from airground_drake.run.simulation import simulate
-from airground_drake.run.trace import Trace
-from airground_drake.scenarios.load import load
+from airground_drake.scenario.load import load
+from airground_drake.sim.simulation import simulate
+from airground_drake.sim.trace import Trace
 from airground_drake.verify.runs.gate_record import DecisionRecord, rows_of
 
 sys.path.append(str(Path(__file__).parents[1] / "tests"))

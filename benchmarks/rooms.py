@@ -21,11 +21,11 @@ import orca
 
 from airground_drake.base.arrays import Array
 from airground_drake.base.parallel import run_parallel
-from airground_drake.geometry.motion import Motion
+from airground_drake.model.geometry.motion import Motion
 from airground_drake.report.metrics import outcome
-from airground_drake.run.simulation import simulate
-from airground_drake.scenarios.load import from_data
-from airground_drake.scenarios.schema import Scenario
+from airground_drake.scenario.load import from_data
+from airground_drake.scenario.schema import Scenario
+from airground_drake.sim.simulation import simulate
 
 WAYS = ("orca", "a", "b", "d")
 HALF_M, THICK_M, SAFE_M, DURATION_S = (4.2, 3.2), 0.1, 0.1, 120.0

@@ -18,10 +18,10 @@ from typing import Any
 
 import numpy as np
 
-from airground_drake.registry import METHODS
+from airground_drake.base.registry import METHODS
 from airground_drake.report.reproduction import rows
-from airground_drake.run.simulation import Recorder
-from airground_drake.scenarios.load import load
+from airground_drake.scenario.load import load
+from airground_drake.sim.simulation import Recorder
 
 ANSWERS = ("proposal", "accept", "refuse")
 

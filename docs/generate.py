@@ -17,11 +17,8 @@ from pathlib import Path
 from typing import get_args
 
 from airground_drake import load, simulate
-from airground_drake.audit.equations import DEVIATIONS, Kind
 from airground_drake.base import files
-from airground_drake.commands import COMMANDS
-from airground_drake.proofs import THEOREMS
-from airground_drake.registry import (
+from airground_drake.base.registry import (
     METHODS,
     MODEL_CLAIMS,
     POLICIES,
@@ -32,13 +29,16 @@ from airground_drake.registry import (
     Registry,
     parameters,
 )
-from airground_drake.scenarios import json_schema
-from airground_drake.scenarios.keys import sections
-from airground_drake.scenarios.shipped import shipped
-from airground_drake.systems import graphviz
-from airground_drake.systems.diagram import build_diagram, method_drawn
+from airground_drake.commands import COMMANDS
+from airground_drake.report.audit.equations import DEVIATIONS, Kind
+from airground_drake.report.view.plane import thumbnail_of
+from airground_drake.scenario import json_schema
+from airground_drake.scenario.keys import sections
+from airground_drake.scenario.shipped import shipped
+from airground_drake.sim import graphviz
+from airground_drake.sim.diagram import build_diagram, method_drawn
 from airground_drake.verify.claim import Claim
-from airground_drake.view.plane import thumbnail_of
+from airground_drake.verify.proofs import THEOREMS
 
 DOCS = Path(__file__).parent
 EXAMPLES = DOCS.parent / "examples"
@@ -71,7 +71,7 @@ def pages() -> dict[str, str]:
     return {
         "extending.md": extending(),
         "names.md": names(),
-        "../airground_drake/scenarios/scenario.schema.json": schema,
+        "../airground_drake/scenario/shipped/scenario.schema.json": schema,
     }
 
 

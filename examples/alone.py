@@ -2,15 +2,15 @@ import numpy as np
 from pydrake.systems.analysis import Simulator
 
 from airground_drake import Motion, Proposal
-from airground_drake.gatekeeper.outcome import Outlook
-from airground_drake.gatekeeper.outcome_gatekeeper import OutcomeGatekeepers
-from airground_drake.gatekeeper.patience import Patience
-from airground_drake.geometry.outline import balls
-from airground_drake.nsbc.avoidance import Avoidance
-from airground_drake.nsbc.law import UgvLaw
-from airground_drake.systems import Gatekeeper, UgvController
-from airground_drake.world.plant import FirstOrder
-from airground_drake.world.world import Body, World
+from airground_drake.model.bodies.world import Body, World
+from airground_drake.model.geometry.outline import balls
+from airground_drake.model.law.avoidance import Avoidance
+from airground_drake.model.law.ugv_law import UgvLaw
+from airground_drake.model.plants.plant import FirstOrder
+from airground_drake.sim.blocks import Gatekeeper, UgvController
+from airground_drake.ugv.outcome import Outlook
+from airground_drake.ugv.outcome_gatekeeper import OutcomeGatekeepers
+from airground_drake.ugv.patience import Patience
 
 robot = Body("robot", "ugv", np.zeros(3), plant=FirstOrder(), max_speed_m_s=2.0)
 rock = Body("rock", "obstacle", np.array([5.0, 0.0, 0.0]), balls(np.zeros(3), gap=2.0))  # 2 m are kept from it

@@ -1,7 +1,7 @@
 import numpy as np
 
 from airground_drake import load, simulate
-from airground_drake.systems import DecisionBlock
+from airground_drake.sim.blocks import DecisionBlock
 
 
 class LargestCoordinate(DecisionBlock):

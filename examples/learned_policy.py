@@ -19,7 +19,7 @@ from pathlib import Path
 import numpy as np
 
 from airground_drake import Motion, Observation, Policy
-from airground_drake.environments.encoding import Encoding
+from airground_drake.study.environments.encoding import Encoding
 
 HERE = Path(__file__).parent
 WEIGHTS = Path(__file__).with_suffix(".json")
@@ -98,8 +98,8 @@ class Untrained(Learned):
 @cache
 def environment():
     """The environment: one in each process."""
-    from airground_drake.campaign.spec import load_spec
-    from airground_drake.environments.gymnasium_env import InterventionEnv
+    from airground_drake.study.campaign.spec import load_spec
+    from airground_drake.study.environments.gymnasium_env import InterventionEnv
 
     return InterventionEnv(load_spec(HERE / "learned.yaml"), encoding=CODE)
 
@@ -138,8 +138,8 @@ def train(rounds: int = 6, size: int = 12, maps: int = 18, seed: int = 1, jobs: 
 def outcome(number: int) -> dict[str, tuple]:
     """By run of a draw: whether it needed help and arrived, its arrival, s, its proposals, how many were accepted."""
     from airground_drake import judge, simulate
-    from airground_drake.campaign.spec import load_spec
     from airground_drake.report.interventions import interventions
+    from airground_drake.study.campaign.spec import load_spec
 
     scenario, found = load_spec(HERE / "learned.yaml").draw(number), {}
     for run in scenario.runs:

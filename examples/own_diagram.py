@@ -10,8 +10,8 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import BasicVector, Context, DiagramBuilder, DiscreteValues, EventStatus, LeafSystem
 from pydrake.systems.primitives import LogVectorOutput
 
-from airground_drake.decision.trigger import Trigger
-from airground_drake.systems import EventTrigger
+from airground_drake.model.trigger.automaton import Trigger
+from airground_drake.sim.blocks import EventTrigger
 
 
 class SineVariable(LeafSystem):

@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from airground_drake import Motion, Observation, Policy, load, simulate
-from airground_drake.registry import POLICIES
+from airground_drake.base.registry import POLICIES
 
 
 class Aside(Policy):

@@ -1,7 +1,7 @@
 from pydrake.systems.analysis import Simulator
 
 from airground_drake import build_diagram, load
-from airground_drake.systems.diagram import make_monitor
+from airground_drake.sim.diagram import make_monitor
 
 wanted, built = load("case_a"), load("case_a")
 built.control.motion_gain_1_s *= 0.9  # a mistake

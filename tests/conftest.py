@@ -16,17 +16,18 @@ from hypothesis.internal.conjecture import providers
 from sharing import once
 from verify.runs.cases import BLOCKS, EIGHT, SYNTHETIC
 
-from airground_drake.gatekeeper import mpc_gatekeeper, outcome_gatekeeper
 from airground_drake.report.__main__ import main as write_report
-from airground_drake.run.trace import Trace
-from airground_drake.scenarios.load import load
-from airground_drake.scenarios.schema import Scenario
+from airground_drake.scenario.load import load
+from airground_drake.scenario.schema import Scenario
+from airground_drake.sim.trace import Trace
+from airground_drake.ugv import mpc_gatekeeper, outcome_gatekeeper
 
 if TYPE_CHECKING:
-    from airground_drake.testing.plugin import Simulations
+    from airground_drake.study.testing.plugin import Simulations
 
 
-pytest_plugins = ["airground_drake.testing.plugin"]  # also where the package is not installed with its entry points
+# also where the package is not installed with its entry points
+pytest_plugins = ["airground_drake.study.testing.plugin"]
 
 # The first call compiles, and nothing here asserts on time: no deadlines, no complaints of slowness. The default
 # profile draws the same examples each time, so that a green suite stays green; `pytest --hypothesis-profile=fuzz` looks

@@ -6,9 +6,9 @@ from functools import cache
 from typing import Any
 
 import airground_drake as ag
-from airground_drake.run.trace import Trace
-from airground_drake.scenarios.load import from_data
-from airground_drake.scenarios.schema import Scenario
+from airground_drake.scenario.load import from_data
+from airground_drake.scenario.schema import Scenario
+from airground_drake.sim.trace import Trace
 
 H, D, RADII = 0.05, 0.3, 0.45
 """Control period, s; gap to keep; radii of a robot and a person, m."""

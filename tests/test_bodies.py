@@ -17,26 +17,26 @@ from oracles import faults_of
 from report.cases import built
 
 from airground_drake.base.errors import TraceError
-from airground_drake.export import tables
-from airground_drake.gatekeeper.answer import Basis
-from airground_drake.gatekeeper.outcome_gatekeeper import OutcomeGatekeepers
-from airground_drake.gatekeeper.rollout import View
-from airground_drake.geometry.outline import GAP
-from airground_drake.proofs.export import recorded
-from airground_drake.proofs.too_near import too_near
+from airground_drake.model.bodies.world import World
+from airground_drake.model.geometry.outline import GAP
 from airground_drake.report import attention, document
+from airground_drake.report.export import tables
 from airground_drake.report.figures.draw import draw
 from airground_drake.report.metrics import closest_obstacle, gap_m, of_run
 from airground_drake.report.page import page
 from airground_drake.report.screen import first_screen
-from airground_drake.run.simulation import simulate
-from airground_drake.run.trace import Trace
-from airground_drake.scenarios.load import load, validated
-from airground_drake.scenarios.schema import Policy, Run, Scenario
+from airground_drake.report.view.stage import stage
+from airground_drake.scenario.load import load, validated
+from airground_drake.scenario.schema import Policy, Run, Scenario
+from airground_drake.sim.simulation import simulate
+from airground_drake.sim.trace import Trace
+from airground_drake.ugv.answer import Basis
+from airground_drake.ugv.outcome_gatekeeper import OutcomeGatekeepers
+from airground_drake.ugv.rollout import View
 from airground_drake.verify import judge
 from airground_drake.verify.engines.outlines import unpacked
-from airground_drake.view.stage import stage
-from airground_drake.world.world import World
+from airground_drake.verify.proofs.export import recorded
+from airground_drake.verify.proofs.too_near import too_near
 
 ROCK, OWN, FLIER = 0.5, 0.25, 0.25
 """Radii, m, whose sums are exact."""

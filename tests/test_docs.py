@@ -12,12 +12,12 @@ from pathlib import Path
 
 import pytest
 
-from airground_drake.campaign.spec import load_spec
 from airground_drake.commands.falsify import main as falsify
 from airground_drake.report.__main__ import main
-from airground_drake.scenarios.load import load
-from airground_drake.scenarios.shipped import shipped_files
-from airground_drake.systems import graphviz
+from airground_drake.scenario.load import load
+from airground_drake.scenario.shipped import shipped_files
+from airground_drake.sim import graphviz
+from airground_drake.study.campaign.spec import load_spec
 
 ROOT = Path(__file__).parent.parent
 PAGES = sorted(path for folder in (".", "docs", "examples") for path in (ROOT / folder).glob("*.md"))
@@ -78,7 +78,8 @@ def test_the_tutorial_from_an_empty_folder(tmp_path: Path) -> None:
         name = re.match(r"# file: (\S+)\n", text)
         if language != "text":
             script.append(f"cat > {name[1]} <<'END'\n{text}END" if language == "python" and name else text)
-    options = "-p airground_drake.testing.plugin -p no:cacheprovider --hypothesis-profile=ci"  # draws the same again
+    # draws the same again
+    options = "-p airground_drake.study.testing.plugin -p no:cacheprovider --hypothesis-profile=ci"
     environment = {**os.environ, "PYTEST_ADDOPTS": options}
     command = ["bash", "-c", "\n".join(script)]
     done = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, check=False)

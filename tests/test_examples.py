@@ -20,15 +20,15 @@ import pytest
 
 from airground_drake.report.__main__ import main
 from airground_drake.report.screen import first_screen
-from airground_drake.run.simulation import simulate
-from airground_drake.run.trace import load as load_trace
-from airground_drake.scenarios.load import load
+from airground_drake.scenario.load import load
+from airground_drake.sim.simulation import simulate
+from airground_drake.sim.trace import load as load_trace
 from airground_drake.verify.judging import judge
 
 pytestmark = pytest.mark.slow
 
 EXAMPLES = Path(__file__).parent.parent / "examples"
-OPTIONS = ("-p", "airground_drake.testing.plugin", "-p", "no:cacheprovider", "--hypothesis-profile=ci")
+OPTIONS = ("-p", "airground_drake.study.testing.plugin", "-p", "no:cacheprovider", "--hypothesis-profile=ci")
 """Of pytest; the profile draws the same examples each time."""
 
 
@@ -49,7 +49,7 @@ def pytest_in(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]
 
 
 FAILING = """
-from airground_drake.testing import assert_holds
+from airground_drake.study.testing import assert_holds
 
 def test_goal(airground_trace):
     assert_holds(airground_trace("minimal", "a", set={"duration_s": 1.0}), "LIVE-GOAL")

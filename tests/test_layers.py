@@ -1,8 +1,9 @@
-"""Which module may import which."""
+"""Which module may import which: every room says so in its docstring."""
 
 from __future__ import annotations
 
 import ast
+import re
 from collections import defaultdict
 from graphlib import TopologicalSorter
 from pathlib import Path
@@ -10,26 +11,10 @@ from pathlib import Path
 import airground_drake
 
 PACKAGE = Path(airground_drake.__file__).parent
-LAYERS = (
-    ("base", "check"),
-    ("registry",),
-    ("geometry", "maps"),
-    ("world",),
-    ("nsbc",),
-    ("decision", "intervention"),
-    ("gatekeeper",),
-    ("scenarios",),
-    ("systems",),
-    ("run", "view"),
-    ("proofs",),
-    ("verify",),
-    ("testing",),
-    ("report", "replay", "audit"),
-    ("campaign", "export", "logs"),
-    ("environments",),
-    ("commands", "notebook", "__main__"),
-)
-"""Rooms: a module imports from its own layer or from those above it."""
+ROOMS = ("base", "check", "model", "uav", "ugv", "scenario", "sim", "verify", "report", "study", "commands")
+"""From the ground up: a room imports at most those before it."""
+OUTSIDE = {"airground_drake.__main__", "airground_drake.notebook"}
+"""Modules above all rooms."""
 PROGRAMS = {
     f"airground_drake.{name}"
     for name in ("report.__main__", "report.rebuild", "report.simulated", "verify.__main__", "check.__main__")
@@ -41,11 +26,11 @@ def test_gatekeepers_know_of_interventions_only_what_is_sent() -> None:
     """Proposals and messages; neither planner nor policies, and those know no gatekeeper."""
     found = {
         node.module
-        for path in (PACKAGE / "gatekeeper").rglob("*.py")
+        for path in (PACKAGE / "ugv").rglob("*.py")
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
-        if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("airground_drake.intervention")
+        if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("airground_drake.uav")
     }
-    assert found == {"airground_drake.intervention.messages", "airground_drake.intervention.policy"}
+    assert found == {"airground_drake.uav.messages", "airground_drake.uav.policy"}
 
 
 def imported() -> dict[str, set[str]]:
@@ -68,22 +53,38 @@ def imported() -> dict[str, set[str]]:
     return found
 
 
-def room(module: str) -> str:
-    """The room of a module. Programs stand above all rooms: only the command line knows of them."""
-    return "commands" if module in PROGRAMS else module.split(".")[1]
+def declared(room: str) -> set[str]:
+    """The rooms that a room says it may import; it says what enters and what leaves, too."""
+    says = ast.get_docstring(ast.parse((PACKAGE / room / "__init__.py").read_text(encoding="utf-8"))) or ""
+    lines = re.search(r"^Enters: .+\.\nLeaves: .+\.\nMay import: (.+)\.$", says, re.MULTILINE)
+    assert lines, room
+    return set(re.findall(r"`(\w+)`", lines[1]))
 
 
-def test_data_flows_one_way_and_no_modules_and_no_rooms_import_each_other() -> None:
-    rank = {name: i for i, layer in enumerate(LAYERS) for name in layer}
+def test_rooms_import_only_what_they_say_and_nothing_runs_up() -> None:
+    may = {room: declared(room) for room in ROOMS}
+    assert all(may[room] <= set(ROOMS[:i]) for i, room in enumerate(ROOMS)), may
+    for name, others in imported().items():
+        room = name.split(".")[1]
+        allowed = set(ROOMS) if name in OUTSIDE else {room, *may[room]}
+        assert {other.split(".")[1] for other in others} <= allowed, name
+
+
+def test_no_modules_and_no_folders_import_each_other() -> None:
     uses = imported()
-    upwards = [
-        (name, other) for name, others in uses.items() for other in others if rank[room(other)] > rank[room(name)]
-    ]
-    assert not upwards
     TopologicalSorter(uses).prepare()  # raises CycleError, which names a circle
-    rooms: dict[str, set[str]] = defaultdict(set)
+    folders: dict[str, set[str]] = defaultdict(set)
     for name, others in uses.items():
-        rooms[room(name)] |= {room(other) for other in others} - {room(name)}
-    TopologicalSorter(rooms).prepare()
-    known = [(name, other) for name, others in uses.items() for other in others & PROGRAMS if name not in PROGRAMS]
-    assert {room(name) for name, _ in known} <= {"commands"}
+        folders[folder(name)] |= {folder(other) for other in others} - {folder(name)}
+    TopologicalSorter(folders).prepare()
+
+
+def folder(module: str) -> str:
+    """The folder of a module inside its room; the module itself if it stands in the room."""
+    parts = module.split(".")
+    return ".".join(parts[:3]) if PACKAGE.joinpath(*parts[1:3]).is_dir() else module
+
+
+def test_only_the_command_line_knows_programs() -> None:
+    known = [(name, other) for name, uses in imported().items() for other in uses & PROGRAMS if name not in PROGRAMS]
+    assert {name.split(".")[1] for name, _ in known} <= {"commands"}

@@ -8,7 +8,7 @@ from typing import Any
 
 import yaml
 
-from airground_drake.testing import plugin
+from airground_drake.study.testing import plugin
 
 ROOT = Path(__file__).parent.parent
 PROJECT: dict[str, Any] = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]

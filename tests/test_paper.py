@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from airground_drake.audit.equations import DEVIATIONS, PaperDeviation
+from airground_drake.report.audit.equations import DEVIATIONS, PaperDeviation
 
 
 def way_to(place: str) -> list[Any]:

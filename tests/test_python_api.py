@@ -19,11 +19,11 @@ from pydrake.systems.primitives import ConstantVectorSource, Integrator, LinearS
 import airground_drake
 from airground_drake import ScenarioError, UnknownNameError, build_diagram, load, notebook, plot, simulate
 from airground_drake.base.errors import PluginError
-from airground_drake.nsbc.task import Array
-from airground_drake.nsbc.tasks import PositionTask
-from airground_drake.scenarios.load import resolved, validated
-from airground_drake.scenarios.schema import Scenario
-from airground_drake.systems.plant import OwnPlant
+from airground_drake.model.law.task import Array
+from airground_drake.model.law.tasks import PositionTask
+from airground_drake.scenario.load import resolved, validated
+from airground_drake.scenario.schema import Scenario
+from airground_drake.sim.blocks.plant import OwnPlant
 from airground_drake.verify import judge, verdicts_to_pandas
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from airground_drake.run.trace import Trace
+from airground_drake.sim.trace import Trace
 
 
 def kinds(of_run: Trace, robot: str) -> list[str]:

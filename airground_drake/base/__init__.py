@@ -1,4 +1,6 @@
 """Errors, files, interruption, progress, parallel processes and parsers of command lines, for every other room.
 
-Imports no other room.
+Enters: files, arguments, names.
+Leaves: errors, text, data, processes.
+May import: no other room.
 """

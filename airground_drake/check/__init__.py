@@ -1,5 +1,9 @@
 """A small, separately written check of a report: `python -m airground_drake.check DIR`.
 
+Enters: the files of a report.
+Leaves: whether they agree with what the report says.
+May import: no other room.
+
 It reads report.json and, of each run, meta.json, states.parquet and samples.parquet, and judges distances, hypotheses,
 triggers, dwell, arrivals and collisions again by formulas of its own. It uses the standard library, numpy, pandas and
 pyarrow, and nothing else of this package. `airground check DIR` runs it first, then makes the report again from its

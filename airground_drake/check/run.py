@@ -33,8 +33,8 @@ class Run:
         name: of the run in its scenario.
         scenario: as resolved, with the values that the run sets.
         events: by time.
-        states: columns as in airground_drake/run/trace.py.
-        samples: columns as in airground_drake/run/trace.py.
+        states: columns as in airground_drake/sim/trace.py.
+        samples: columns as in airground_drake/sim/trace.py.
     """
 
     name: str

@@ -1,4 +1,9 @@
-"""The command line `airground`, which is also `python -m airground_drake`: a table of commands, imported when used."""
+"""The command line `airground`, which is also `python -m airground_drake`: a table of commands, imported when used.
+
+Enters: a command line.
+Leaves: files, lines of text, an exit code.
+May import: `base`, `check`, `model`, `uav`, `ugv`, `scenario`, `sim`, `verify`, `report`, `study`.
+"""
 
 from __future__ import annotations
 

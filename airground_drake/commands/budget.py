@@ -11,7 +11,7 @@ from airground_drake.base import files
 from airground_drake.base.usage import Parser, output_file, overridable
 
 if TYPE_CHECKING:
-    from airground_drake.scenarios.budget import PairBudget
+    from airground_drake.scenario.budget import PairBudget
 
 MOST_NAMED = 6
 """Bodies that are named in a line at most."""
@@ -34,13 +34,13 @@ def parser() -> argparse.ArgumentParser:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Print the budget, and draw it on request."""
     options = parser().parse_args(arguments)
-    from airground_drake.scenarios.budget import alike, budget
-    from airground_drake.scenarios.load import load
+    from airground_drake.scenario.budget import alike, budget
+    from airground_drake.scenario.load import load
 
     scenario = load(options.scenario, options.set)
     groups = alike(budget(scenario))
     if options.output is not None:
-        from airground_drake.view.budget import drawn
+        from airground_drake.report.view.budget import drawn
 
         files.write_text(options.output, drawn([(_about(group), group[0]) for group in groups]))
     if options.json:

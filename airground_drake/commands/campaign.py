@@ -13,14 +13,14 @@ from airground_drake.base.errors import AirgroundError, one_line
 from airground_drake.base.parallel import one_thread_each, processors
 from airground_drake.base.progress import progress_bar
 from airground_drake.base.usage import EXIT_TOOL, REFUSALS, Parser, output_folder, parallel, positive, refuse, whole
-from airground_drake.campaign.rows import UNFINISHED
-from airground_drake.scenarios import plugins
-from airground_drake.scenarios.estimate import DEFAULT_LIMITS, Limits
-from airground_drake.scenarios.limits import MAX_SEED
-from airground_drake.scenarios.shipped import argument
+from airground_drake.scenario import plugins
+from airground_drake.scenario.estimate import DEFAULT_LIMITS, Limits
+from airground_drake.scenario.limits import MAX_SEED
+from airground_drake.scenario.shipped import argument
+from airground_drake.study.campaign.rows import UNFINISHED
 
 if TYPE_CHECKING:
-    from airground_drake.campaign.spec import Spec
+    from airground_drake.study.campaign.spec import Spec
 
 EXIT_REFUTED, EXIT_UNDECIDED = 1, 3
 
@@ -68,7 +68,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if options.only is not None and (options.resume or options.stop_when or options.number is not None):
         return refuse("--only is one draw alone: -n, --resume and --stop-when do not go with it")
     one_thread_each()
-    from airground_drake.campaign.spec import load_spec
+    from airground_drake.study.campaign.spec import load_spec
 
     try:
         spec = load_spec(options.spec)
@@ -80,9 +80,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _all(spec: Spec, options: argparse.Namespace) -> int:
-    from airground_drake.campaign import pool
-    from airground_drake.campaign.conduct import conduct
-    from airground_drake.campaign.stopping import Stopping
+    from airground_drake.study.campaign import pool
+    from airground_drake.study.campaign.conduct import conduct
+    from airground_drake.study.campaign.stopping import Stopping
 
     stopping = Stopping.parse(options.stop_when, spec.claims) if options.stop_when else None
     folder = options.output or Path("campaigns") / spec.name
@@ -101,11 +101,11 @@ def _all(spec: Spec, options: argparse.Namespace) -> int:
 
 def _only(spec: Spec, options: argparse.Namespace) -> int:
     """One draw alone: its verdicts, and its scenario as a file that `report` takes."""
-    from airground_drake.campaign.evidence import evidence
-    from airground_drake.campaign.store import table_of
-    from airground_drake.campaign.work import rows_of
-    from airground_drake.scenarios.document import text_of
-    from airground_drake.scenarios.load import resolved
+    from airground_drake.scenario.document import text_of
+    from airground_drake.scenario.load import resolved
+    from airground_drake.study.campaign.evidence import evidence
+    from airground_drake.study.campaign.store import table_of
+    from airground_drake.study.campaign.work import rows_of
 
     if not options.allow_plugins:
         spec.refuse_plugins()

@@ -22,7 +22,7 @@ from airground_drake.base.progress import Progress, progress_bar
 from airground_drake.base.usage import refuse
 from airground_drake.check import command as checker
 from airground_drake.check.line import AGREES, DISAGREES, OPEN, CheckLine
-from airground_drake.scenarios import plugins
+from airground_drake.scenario import plugins
 
 if TYPE_CHECKING:
     import argparse

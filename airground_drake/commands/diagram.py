@@ -8,9 +8,9 @@ from pathlib import Path
 
 from airground_drake.base import files
 from airground_drake.base.errors import UnknownNameError, one_line
+from airground_drake.base.registry import METHODS
 from airground_drake.base.usage import Parser, output_folder, overridable
-from airground_drake.registry import METHODS
-from airground_drake.scenarios import plugins
+from airground_drake.scenario import plugins
 
 FORMATS = ("dot", "svg", "pdf", "png")
 
@@ -35,9 +35,9 @@ def parser() -> argparse.ArgumentParser:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Write the pictures, and print their paths."""
     options = parser().parse_args(arguments)
-    from airground_drake.scenarios.load import load
-    from airground_drake.systems import graphviz
-    from airground_drake.systems.diagram import build_diagram, method_drawn
+    from airground_drake.scenario.load import load
+    from airground_drake.sim import graphviz
+    from airground_drake.sim.diagram import build_diagram, method_drawn
 
     scenario = load(options.scenario, options.set)
     with plugins.admitted(scenario, options.scenario, allow=options.allow_plugins):

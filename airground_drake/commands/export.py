@@ -38,7 +38,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _written(report: Path, run: str, kind: str, output: Path) -> Iterator[Path]:
     """Write a run; yield each file."""
-    from airground_drake.export import recording, tables
+    from airground_drake.report.export import recording, tables
 
     saved, scenario = trace_of(report, run)
     if kind == "csv":

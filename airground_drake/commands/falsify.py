@@ -14,19 +14,19 @@ from airground_drake.base import files
 from airground_drake.base.errors import AirgroundError, Fault, PluginError, ScenarioError, UnknownNameError, one_line
 from airground_drake.base.parallel import one_thread_each, processors
 from airground_drake.base.progress import progress_bar
+from airground_drake.base.registry import RUN_CLAIMS, SAMPLERS, is_plugin
 from airground_drake.base.usage import EXIT_TOOL, REFUSALS, Parser, output_file, parallel, positive, refuse, whole
-from airground_drake.campaign.rows import COLUMNS
-from airground_drake.registry import RUN_CLAIMS, SAMPLERS, is_plugin
-from airground_drake.scenarios import plugins
-from airground_drake.scenarios.estimate import DEFAULT_LIMITS
-from airground_drake.scenarios.hints import plugin_path
-from airground_drake.scenarios.shipped import argument
+from airground_drake.scenario import plugins
+from airground_drake.scenario.estimate import DEFAULT_LIMITS
+from airground_drake.scenario.hints import plugin_path
+from airground_drake.scenario.shipped import argument
+from airground_drake.study.campaign.rows import COLUMNS
 
 if TYPE_CHECKING:
-    from airground_drake.campaign.falsification import Best, Search
-    from airground_drake.campaign.objective import Objective
-    from airground_drake.campaign.pool import Pool
-    from airground_drake.campaign.spec import Spec
+    from airground_drake.study.campaign.falsification import Best, Search
+    from airground_drake.study.campaign.objective import Objective
+    from airground_drake.study.campaign.pool import Pool
+    from airground_drake.study.campaign.spec import Spec
 
 EXIT_FOUND, EXIT_UNDECIDED = 1, 3
 TIMES = tuple(name for name in COLUMNS if name.endswith("_s") and name not in ("wall_s", "duration_s"))
@@ -70,7 +70,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if options.limit is not None and options.most is None:
         return refuse("--limit is of a time: name it with --most")
     one_thread_each()
-    from airground_drake.campaign.spec import load_spec
+    from airground_drake.study.campaign.spec import load_spec
 
     try:
         return _run(load_spec(options.spec), options)
@@ -81,11 +81,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _run(spec: Spec, options: argparse.Namespace) -> int:
-    from airground_drake.campaign import pool
-    from airground_drake.campaign.distributions import dimensions
-    from airground_drake.campaign.falsification import Search, falsify
-    from airground_drake.campaign.objective import Margin, Most
-    from airground_drake.campaign.search import Sampler
+    from airground_drake.study.campaign import pool
+    from airground_drake.study.campaign.distributions import dimensions
+    from airground_drake.study.campaign.falsification import Search, falsify
+    from airground_drake.study.campaign.objective import Margin, Most
+    from airground_drake.study.campaign.search import Sampler
 
     limit = math.inf if options.limit is None else options.limit
     objective: Objective = Margin(options.claim) if options.most is None else Most(options.most, limit)
@@ -133,8 +133,8 @@ def _try(search: Search, pool: Pool) -> None:
     Raises:
         ScenarioError: if it does not.
     """
-    from airground_drake.campaign.rows import JUDGED
-    from airground_drake.campaign.work import rows_of
+    from airground_drake.study.campaign.rows import JUDGED
+    from airground_drake.study.campaign.work import rows_of
 
     spec = search.spec
     for _, rows in pool(partial(rows_of, spec, limits=search.limits), [0]):
@@ -149,10 +149,10 @@ def _small(path: Path) -> Path:
 
 def _save(search: Search, best: Best, path: Path, tests: int) -> None:
     """Write the scenario of the best point; beside it a small one, if it is a counterexample."""
-    from airground_drake.campaign.shrink import shrink
-    from airground_drake.scenarios.document import text_of
-    from airground_drake.scenarios.limits import MAX_NAME
-    from airground_drake.scenarios.load import resolved
+    from airground_drake.scenario.document import text_of
+    from airground_drake.scenario.limits import MAX_NAME
+    from airground_drake.scenario.load import resolved
+    from airground_drake.study.campaign.shrink import shrink
 
     def write(to: Path, data: dict[str, Any]) -> None:
         files.write_text(to, text_of(data))

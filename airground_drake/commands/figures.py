@@ -11,7 +11,7 @@ from airground_drake.base.usage import formats_of, output_folder
 from airground_drake.commands.saved import outside_reports, parser_of, runs_of, trace_of
 
 FORMATS, STYLES = ("pdf", "png", "svg"), ("ieee", "thesis")
-"""As in `export.figures`, which takes seconds to import."""
+"""As in `report.export.figures`, which takes seconds to import."""
 
 
 def parser() -> argparse.ArgumentParser:
@@ -35,8 +35,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = parser().parse_args(arguments)
     runs = runs_of(options.folder)
     outside_reports(options.output, "the figures")
-    from airground_drake.export import figures
     from airground_drake.report.compare import read
+    from airground_drake.report.export import figures
 
     saved = {name: trace_of(options.folder, name) for name in runs}
     document = read(options.folder)

@@ -12,11 +12,11 @@ from typing import TYPE_CHECKING
 from airground_drake.base import files
 from airground_drake.base.errors import ScenarioError, one_line
 from airground_drake.base.usage import Parser, between, output_file, refuse, whole
-from airground_drake.scenarios.limits import MAX_NAME, MAX_UGVS
-from airground_drake.scenarios.shipped import argument
+from airground_drake.scenario.limits import MAX_NAME, MAX_UGVS
+from airground_drake.scenario.shipped import argument
 
 if TYPE_CHECKING:
-    from airground_drake.scenarios.imported import Imported
+    from airground_drake.scenario.imported import Imported
 
 FORMATS = {
     "barn": ("radius_m", "distance_m", "ugv", "max_speed_m_s", "height_m"),
@@ -90,7 +90,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if options.ugv and options.ugvs:
         return refuse("--ugvs finds room for UGVs, --ugv names them: use one of the two")
     files.try_to_create(options.output)
-    from airground_drake.scenarios.load import load
+    from airground_drake.scenario.load import load
 
     made = _imported(options)
     for path in made.beside:
@@ -110,7 +110,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _imported(options: argparse.Namespace) -> Imported:
-    from airground_drake.scenarios import imported
+    from airground_drake.scenario import imported
 
     path, folder = options.file, options.output.parent
     name = imported.scenario_name(options.output.stem, options.format.replace("-", "_"))

@@ -83,8 +83,8 @@ def _headline(document: Mapping[str, Any]) -> list[Line]:
 
 def _thumbnail(report: Path, document: Mapping[str, Any], prefix: str) -> str:
     """The last run as a picture; '' if it has no trace that can be used."""
-    from airground_drake.run import trace
-    from airground_drake.view.plane import thumbnail_of
+    from airground_drake.report.view.plane import thumbnail_of
+    from airground_drake.sim import trace
 
     runs = [run for run in document["runs"] if run.isidentifier()]
     try:

@@ -10,9 +10,9 @@ from pathlib import Path
 from airground_drake.base import files
 from airground_drake.base.errors import one_line
 from airground_drake.base.usage import Parser, output_file, refuse, whole
-from airground_drake.scenarios.fleet import fleet
-from airground_drake.scenarios.limits import MAX_NAME, MAX_SEED, MAX_UGVS
-from airground_drake.scenarios.shipped import argument, json_schema_file, shipped_files
+from airground_drake.scenario.fleet import fleet
+from airground_drake.scenario.limits import MAX_NAME, MAX_SEED, MAX_UGVS
+from airground_drake.scenario.shipped import argument, json_schema_file, shipped_files
 
 MOST_OBSTACLES = 2000 - MAX_UGVS
 """With the largest number of UGVs, as many bodies as the checker accepts."""

@@ -99,8 +99,8 @@ def parser() -> argparse.ArgumentParser:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Judge, and print the verdict; the exit codes are in the help."""
     options = parser().parse_args(arguments)
-    from airground_drake.logs import judging, opening, tables, tracks, words
-    from airground_drake.scenarios.load import load, resolved
+    from airground_drake.scenario.load import load, resolved
+    from airground_drake.study.logs import judging, opening, tables, tracks, words
 
     scenario = load(options.scenario, options.set)
     document = resolved(scenario)
@@ -119,7 +119,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     judged = judging.judge(found, document, errors)
     if options.output is not None:
         from airground_drake.commands.saved import outside_reports
-        from airground_drake.logs import page
+        from airground_drake.study.logs import page
 
         outside_reports(options.output, "the page")
         logs = [str(path) for path in options.logs]
@@ -142,7 +142,7 @@ def _named(text: str) -> tuple[str, str]:
 
 
 def _axes(text: str) -> tuple[str, str]:
-    from airground_drake.logs.axes import parsed
+    from airground_drake.study.logs.axes import parsed
 
     name, _, given = text.rpartition("=")
     try:
@@ -154,7 +154,7 @@ def _axes(text: str) -> tuple[str, str]:
 
 
 def _mapped(text: str) -> dict[str, str]:
-    from airground_drake.logs.columns import TARGETS, split_unit
+    from airground_drake.study.logs.columns import TARGETS, split_unit
 
     found = dict[str, str]()
     for part in text.split(","):

@@ -9,8 +9,7 @@ from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 from airground_drake.base.errors import UnknownNameError
-from airground_drake.base.usage import Parser
-from airground_drake.registry import (
+from airground_drake.base.registry import (
     METHODS,
     MODEL_CLAIMS,
     POLICIES,
@@ -21,7 +20,8 @@ from airground_drake.registry import (
     Registry,
     parameters,
 )
-from airground_drake.scenarios.shipped import shipped, title
+from airground_drake.base.usage import Parser
+from airground_drake.scenario.shipped import shipped, title
 
 Lines = Iterator[tuple[str, str]]
 """Names and their descriptions."""
@@ -40,7 +40,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Print the kinds that were asked for."""
     options = parser().parse_args(arguments)
     if options.schema:
-        from airground_drake.scenarios import json_schema
+        from airground_drake.scenario import json_schema
 
         print(json_schema.text(), end="")
         return 0
@@ -81,8 +81,8 @@ def _about(kind: type, name: str) -> list[str]:
 
 def _print_keys(beginning: str) -> int:
     """Print the keys of a scenario whose dotted key, without names, begins so."""
-    from airground_drake.scenarios.json_schema import scenario_schema
-    from airground_drake.scenarios.keys import sections
+    from airground_drake.scenario.json_schema import scenario_schema
+    from airground_drake.scenario.keys import sections
 
     found = [
         (f"{section.path}.{entry.key}".lstrip("."), entry)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from airground_drake.base.usage import Parser, positive, refuse
 
 if TYPE_CHECKING:
-    from airground_drake.proofs.runs import Proved
+    from airground_drake.verify.proofs.runs import Proved
 
 EXIT_UNPROVED = 1
 
@@ -39,7 +39,7 @@ def parser() -> argparse.ArgumentParser:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Check or prove, and print the results; the exit codes are in the help."""
-    from airground_drake.proofs.coq import CoqError
+    from airground_drake.verify.proofs.coq import CoqError
 
     options = parser().parse_args(arguments)
     if options.report and options.record:
@@ -54,8 +54,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _theorems(*, record: bool, limit_s: float) -> int:
     """Check the package's theorems."""
-    from airground_drake.proofs import theories
-    from airground_drake.proofs.theorems import THEOREMS
+    from airground_drake.verify.proofs import theories
+    from airground_drake.verify.proofs.theorems import THEOREMS
 
     found = theories.check(limit_s=limit_s)
     for name, theorem in THEOREMS.items():
@@ -77,8 +77,8 @@ def _theorems(*, record: bool, limit_s: float) -> int:
 
 def _runs(options: argparse.Namespace) -> int:
     """Prove the runs of a report."""
-    from airground_drake.proofs.runs import prove_report
     from airground_drake.report import proved
+    from airground_drake.verify.proofs.runs import prove_report
 
     code = 0
     for found in prove_report(options.report, options.run, options.limit):

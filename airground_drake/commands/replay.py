@@ -39,9 +39,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return refuse("--video needs a RUN")
     if options.speed and not options.video:
         return refuse("--speed needs --video")
-    from airground_drake.replay import live, video
-    from airground_drake.replay.page import page
-    from airground_drake.replay.scene import scene
+    from airground_drake.report.replay import live, video
+    from airground_drake.report.replay.page import page
+    from airground_drake.report.replay.scene import scene
 
     folder, runs = options.folder, runs_of(options.folder, options.run)
     if options.live:

@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING
 
 from airground_drake.base import files
 from airground_drake.base.errors import UnknownNameError
+from airground_drake.base.registry import METHODS
 from airground_drake.base.usage import Parser, output_folder, overridable, positive, refuse
-from airground_drake.registry import METHODS
-from airground_drake.scenarios import plugins
-from airground_drake.scenarios.estimate import estimate
+from airground_drake.scenario import plugins
+from airground_drake.scenario.estimate import estimate
 
 if TYPE_CHECKING:
-    from airground_drake.run.trace import Trace
+    from airground_drake.sim.trace import Trace
 
 SPEED = 1.0
 """Default speed in Meshcat, simulated seconds per second."""
@@ -43,8 +43,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = parser().parse_args(arguments)
     if options.speed and not options.meshcat:
         return refuse("--speed needs --meshcat")
-    from airground_drake.scenarios.load import load
-    from airground_drake.scenarios.notes import notes
+    from airground_drake.scenario.load import load
+    from airground_drake.scenario.notes import notes
 
     overrides = [*options.set, *([] if options.seed is None else [f"seed={options.seed}"])]
     scenario = load(options.scenario, overrides)
@@ -60,16 +60,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f"note: {note}", file=sys.stderr)
     if scenario.map is not None:
         print(scenario.map.cells, file=sys.stderr)
-    from airground_drake.run import trace as traces
-    from airground_drake.run.simulation import simulate
+    from airground_drake.sim import trace as traces
+    from airground_drake.sim.simulation import simulate
 
     with (
         plugins.admitted(scenario, options.scenario, allow=options.allow_plugins),
         plugins.shown(options.show_policy_output),
     ):
         if options.meshcat:
-            from airground_drake.view.draw import served
-            from airground_drake.view.live_view import LiveView
+            from airground_drake.report.view.draw import served
+            from airground_drake.report.view.live_view import LiveView
 
             meshcat = served()
             print(f"{meshcat.web_url()}  (Ctrl-C ends it)", flush=True)

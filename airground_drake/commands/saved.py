@@ -13,8 +13,8 @@ from airground_drake.base.usage import Parser
 from airground_drake.report.folder import is_report
 
 if TYPE_CHECKING:
-    from airground_drake.run.trace import Trace
-    from airground_drake.scenarios.schema import Scenario
+    from airground_drake.scenario.schema import Scenario
+    from airground_drake.sim.trace import Trace
 
 
 def parser_of(name: str, description: str) -> argparse.ArgumentParser:
@@ -61,8 +61,8 @@ def trace_of(folder: Path, run: str) -> tuple[Trace, Scenario]:
         TraceError: if the trace cannot be used, or is of another run.
         ScenarioError: if its scenario cannot be used.
     """
-    from airground_drake.run import trace
-    from airground_drake.scenarios.load import from_data
+    from airground_drake.scenario.load import from_data
+    from airground_drake.sim import trace
 
     saved = trace.load(folder / "trace" / run, run)
     return saved, from_data(saved.meta["scenario"], str(folder / "trace" / run))

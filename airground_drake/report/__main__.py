@@ -37,13 +37,13 @@ from airground_drake.base.usage import (
     whole,
 )
 from airground_drake.report import folder
-from airground_drake.scenarios import plugins
-from airground_drake.scenarios.estimate import DEFAULT_LIMITS, GIB, Limits, estimate
-from airground_drake.scenarios.shipped import AUDIT, shipped
+from airground_drake.scenario import plugins
+from airground_drake.scenario.estimate import DEFAULT_LIMITS, GIB, Limits, estimate
+from airground_drake.scenario.shipped import AUDIT, shipped
 
 if TYPE_CHECKING:  # slow to import
-    from airground_drake.run.trace import Trace
-    from airground_drake.scenarios.schema import Scenario
+    from airground_drake.scenario.schema import Scenario
+    from airground_drake.sim.trace import Trace
     from airground_drake.verify import Verdict
 
 FORMATS = tuple(folder.PAGES)
@@ -83,8 +83,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _reported(options: argparse.Namespace, command: str) -> int:
     """Load the scenario and report on it."""
-    from airground_drake.scenarios.load import load
-    from airground_drake.scenarios.notes import notes
+    from airground_drake.scenario.load import load
+    from airground_drake.scenario.notes import notes
 
     overrides = [*options.set, *([] if options.seed is None else [f"seed={options.seed}"])]
     audited = options.scenario == AUDIT
@@ -134,7 +134,7 @@ def _findings(
     audited: bool,
 ) -> list[dict[str, Any]]:
     """Findings about the paper: those that the runs show and, if it is `audited`, all others."""
-    from airground_drake import audit
+    from airground_drake.report import audit
 
     if not audited:
         return audit.of_runs(scenario, traces)

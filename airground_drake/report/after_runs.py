@@ -18,13 +18,12 @@ from airground_drake.report.figures.draw import draw
 from airground_drake.report.figures.panels import Figure
 from airground_drake.report.folder import PAGES
 from airground_drake.report.page import page
-from airground_drake.run import trace
-from airground_drake.run.runs import simulate_seeds
-from airground_drake.run.trace import Trace
-from airground_drake.scenarios import map_file, plugins
-from airground_drake.scenarios.schema import MapCells, Scenario
-from airground_drake.systems import graphviz
-from airground_drake.systems.diagram import build_diagram, method_drawn
+from airground_drake.scenario import map_file, plugins
+from airground_drake.scenario.schema import MapCells, Scenario
+from airground_drake.sim import graphviz, trace
+from airground_drake.sim.diagram import build_diagram, method_drawn
+from airground_drake.sim.runs import simulate_seeds
+from airground_drake.sim.trace import Trace
 from airground_drake.verify import Verdict, judge_all
 from airground_drake.verify.registry import model_claims
 

@@ -7,11 +7,11 @@ from typing import Any, NamedTuple
 
 from airground_drake.base.errors import one_line
 from airground_drake.base.statuses import UNDECIDED, outcome
-from airground_drake.gatekeeper.reasons import refusal
 from airground_drake.report.outcomes import no_way
 from airground_drake.report.phrases import bodies_of, found_no_way, in_words, place_of
 from airground_drake.report.sentences import MAX_NAMES, counted, grouped
-from airground_drake.scenarios.validate import preset_s
+from airground_drake.scenario.validate import preset_s
+from airground_drake.ugv.reasons import refusal
 
 MAX_FAULT_CHARS = 300
 MAX_FAULTS = 3

@@ -13,14 +13,14 @@ from typing import Any
 import numpy as np
 
 from airground_drake.base.files import sha256
+from airground_drake.base.registry import method_of
 from airground_drake.base.statuses import COUNTS, NOT_EXERCISED, STATUSES, UNDECIDED, outcome
-from airground_drake.registry import method_of
 from airground_drake.report import metrics, reproduction
 from airground_drake.report.sentences import counted
-from airground_drake.run.trace import Trace
-from airground_drake.scenarios.document import place_of
-from airground_drake.scenarios.plugins import OPTION
-from airground_drake.scenarios.schema import Scenario
+from airground_drake.scenario.document import place_of
+from airground_drake.scenario.plugins import OPTION
+from airground_drake.scenario.schema import Scenario
+from airground_drake.sim.trace import Trace
 from airground_drake.verify.claim import Verdict
 
 SCHEMA = "airground_drake.report/4"

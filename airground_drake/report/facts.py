@@ -8,11 +8,11 @@ from functools import cached_property
 from math import dist
 from typing import Any, NamedTuple
 
+from airground_drake.base.registry import METHODS
 from airground_drake.base.statuses import PASSING
-from airground_drake.registry import METHODS
 from airground_drake.report import rules
 from airground_drake.report.outcomes import Document, Near, claims, named, no_way, pairs
-from airground_drake.run.collisions import first_collisions
+from airground_drake.sim.collisions import first_collisions
 
 UNJUDGED: Mapping[str, Any] = {
     "status": "", "expected": "", "as_expected": None, "exercised": None, "evidence": {}, "inputs": {},

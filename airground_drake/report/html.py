@@ -18,7 +18,6 @@ from jinja2 import Environment
 from markupsafe import Markup
 
 from airground_drake.base.statuses import PASSING, outcome
-from airground_drake.gatekeeper.reasons import WORDS
 from airground_drake.report import attention, evidence
 from airground_drake.report.figures.panels import Figure, Table
 from airground_drake.report.mathml import mathml
@@ -28,8 +27,9 @@ from airground_drake.report.reproduction import YES_NO
 from airground_drake.report.screen import first_screen
 from airground_drake.report.sentences import MARKS, grouped, unbroken
 from airground_drake.report.templating import environment_of
-from airground_drake.view import svg
-from airground_drake.view.canvas import DARK
+from airground_drake.report.view import svg
+from airground_drake.report.view.canvas import DARK
+from airground_drake.ugv.reasons import WORDS
 
 STYLE, SCRIPT = "report.css", "report.js"
 """The style sheet and the script of the page, among the templates."""

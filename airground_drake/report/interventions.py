@@ -9,9 +9,9 @@ import numpy as np
 
 from airground_drake.base.arrays import Array
 from airground_drake.base.errors import TraceError
-from airground_drake.gatekeeper.reasons import OVER
-from airground_drake.registry import method_of
-from airground_drake.run.trace import Trace
+from airground_drake.base.registry import method_of
+from airground_drake.sim.trace import Trace
+from airground_drake.ugv.reasons import OVER
 from airground_drake.verify.claim import TIME_TOLERANCE_S
 from airground_drake.verify.engines.geometry import interpolate
 from airground_drake.verify.runs.control_law import inequalities_of

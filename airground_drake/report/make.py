@@ -12,14 +12,14 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 from airground_drake.base import files
 from airground_drake.base.progress import SILENT, Progress
 from airground_drake.report import folder
-from airground_drake.run.runs import simulate_all
-from airground_drake.scenarios.estimate import DEFAULT_LIMITS, Limits, within
-from airground_drake.scenarios.schema import Scenario
+from airground_drake.scenario.estimate import DEFAULT_LIMITS, Limits, within
+from airground_drake.scenario.schema import Scenario
+from airground_drake.sim.runs import simulate_all
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
-    from airground_drake.run.trace import Trace
+    from airground_drake.sim.trace import Trace
     from airground_drake.verify import Verdict
 
 _NEXT = "airground_drake.report.after_runs"

@@ -9,17 +9,17 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from airground_drake.base.arrays import Array
-from airground_drake.registry import method_of
+from airground_drake.base.registry import method_of
 from airground_drake.report.interventions import avoidance, farthest_from_prediction, interventions, messages
 from airground_drake.report.stalls import stalls
-from airground_drake.run.collisions import first_collisions
-from airground_drake.run.trace import Trace
-from airground_drake.scenarios.schema import MAP
+from airground_drake.scenario.schema import MAP
+from airground_drake.sim.collisions import first_collisions
+from airground_drake.sim.trace import Trace
+from airground_drake.verify.claims.live_goal import AT_REST_M, AT_REST_S, moved_at_the_end
 from airground_drake.verify.engines.geometry import interpolate
 from airground_drake.verify.model.pair_kinds import MOVING, kind_of
 from airground_drake.verify.runs.gate_record import without_decisions
 from airground_drake.verify.runs.instants import lost_at_the_end, reasons, without_proposals
-from airground_drake.verify.runs.live_goal import AT_REST_M, AT_REST_S, moved_at_the_end
 from airground_drake.verify.runs.pairs import (
     DISTANCE_TOLERANCE_M,
     Gap,

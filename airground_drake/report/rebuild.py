@@ -22,9 +22,9 @@ import numpy as np
 
 from airground_drake.base import files
 from airground_drake.base.arrays import Array
+from airground_drake.base.registry import MODEL_CLAIMS
 from airground_drake.base.statuses import meets
 from airground_drake.check.line import AGREES, DISAGREES, OPEN, RECORDED
-from airground_drake.registry import MODEL_CLAIMS
 from airground_drake.report.compare import WITHIN
 from airground_drake.report.lines import Line, differences, different, line_of, print_lines, short
 
@@ -55,8 +55,8 @@ def lines(folder: Path, judge: Judge | None = None) -> Iterator[Line]:
     Raises:
         ScenarioError, TraceError, OSError: if a file cannot be used.
     """
-    from airground_drake.run import trace
-    from airground_drake.scenarios.load import from_data, own
+    from airground_drake.scenario.load import from_data, own
+    from airground_drake.sim import trace
     from airground_drake.verify import judge_all
 
     report = json.loads(files.read_text(folder / "report.json"))
@@ -83,9 +83,9 @@ def lines(folder: Path, judge: Judge | None = None) -> Iterator[Line]:
 
 def off_script(trace: Any, scenario: Any) -> Iterator[Line]:
     """A line for each moving obstacle and preset trajectory that is not where the scenario of the run says."""
-    from airground_drake.geometry.motion import Motion
-    from airground_drake.scenarios.world import make_world
-    from airground_drake.world.plant import Scripted
+    from airground_drake.model.geometry.motion import Motion
+    from airground_drake.model.plants.plant import Scripted
+    from airground_drake.scenario.world import make_world
 
     def compared(what: str, t_s: Array, theirs: Array, *allowed: Array) -> Iterator[Line]:
         off = np.min([np.abs(theirs - ours).max(axis=1) for ours in allowed], axis=0) > WITHIN_SCRIPT
@@ -107,16 +107,16 @@ def off_script(trace: Any, scenario: Any) -> Iterator[Line]:
 
 def with_events(trace: Any) -> Any:
     """The trace with the events that follow from its tables."""
-    from airground_drake.run.events import extract
+    from airground_drake.sim.events import extract
 
     return replace(trace, meta=trace.meta | {"events": extract(trace)})
 
 
 def document_again(report: Mapping[str, Any], scenario: Any, traces: Mapping[str, Any], judge: Judge) -> dict[str, Any]:
     """report.json from the traces; what only other runs or third-party code can tell is taken from the recorded one."""
-    from airground_drake.audit import of_runs
     from airground_drake.report import document, metrics
-    from airground_drake.scenarios.load import from_data
+    from airground_drake.report.audit import of_runs
+    from airground_drake.scenario.load import from_data
 
     own = _without_claims(report["scenario"]["resolved"])
     judged = [replace(each, meta=each.meta | {"scenario": own}) for each in traces.values()]
@@ -206,7 +206,7 @@ def _taken(line: Line, why: str, applies: bool) -> Line:
 def _map(folder: Path, scenario: Any) -> Iterator[Line]:
     """The cells of a map, made again from the copies of its files."""
     from airground_drake.report.folder import of_map
-    from airground_drake.scenarios import map_file
+    from airground_drake.scenario import map_file
 
     if scenario.map is None:
         return
@@ -226,10 +226,10 @@ def _map(folder: Path, scenario: Any) -> Iterator[Line]:
 
 def _pages(folder: Path, report: Mapping[str, Any], scenario: Any, traces: Mapping[str, Any]) -> Iterator[Line]:
     """The files that follow from report.json and the traces: pages, and what `airground prove` has added."""
-    from airground_drake.proofs.compare import broken_rules
     from airground_drake.report import junit, proved
     from airground_drake.report.figures.draw import draw
     from airground_drake.report.page import page
+    from airground_drake.verify.proofs.compare import broken_rules
 
     made = {**report, "files": {}}
     found: Any = None

@@ -15,9 +15,9 @@ import numpy as np
 from airground_drake.base.arrays import Array
 from airground_drake.base.errors import TraceError
 from airground_drake.report.metrics import closest_obstacle, events_of, gap_m
-from airground_drake.run.collisions import first_collisions
-from airground_drake.run.trace import Trace
-from airground_drake.scenarios.schema import Reproduction, Scenario
+from airground_drake.scenario.schema import Reproduction, Scenario
+from airground_drake.sim.collisions import first_collisions
+from airground_drake.sim.trace import Trace
 
 Measure = Callable[[Trace, str], list[float]]
 

@@ -11,11 +11,11 @@ from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 from airground_drake.base.statuses import PASSING
-from airground_drake.gatekeeper.reasons import refusal
 from airground_drake.report import rules
 from airground_drake.report.facts import RunFacts
 from airground_drake.report.outcomes import Document, Near, claims
 from airground_drake.report.sentences import Line, counted, grouped
+from airground_drake.ugv.reasons import refusal
 
 MOST_ENDINGS, MOST_NAMES, MOST_WARNINGS = 4, 2, 3
 """Maximum number of endings of UGVs in a cell, of names in a line, and of lines of what not to conclude."""

@@ -22,16 +22,15 @@ from airground_drake.base.progress import SILENT, Progress
 from airground_drake.check.line import AGREES, NOT_HERE
 from airground_drake.report.after_runs import versions, with_seeds
 from airground_drake.report.lines import Line, differences, line_of, print_lines, short
-from airground_drake.run import trace
-from airground_drake.run.runs import simulate_all
-from airground_drake.run.tables import TABLES
-from airground_drake.run.trace import Trace
-from airground_drake.scenarios import plugins
-from airground_drake.scenarios.estimate import DEFAULT_LIMITS, within
-from airground_drake.scenarios.load import from_data
-from airground_drake.scenarios.schema import Scenario
-from airground_drake.systems import graphviz
-from airground_drake.systems.diagram import build_diagram, method_drawn
+from airground_drake.scenario import plugins
+from airground_drake.scenario.estimate import DEFAULT_LIMITS, within
+from airground_drake.scenario.load import from_data
+from airground_drake.scenario.schema import Scenario
+from airground_drake.sim import graphviz, trace
+from airground_drake.sim.diagram import build_diagram, method_drawn
+from airground_drake.sim.runs import simulate_all
+from airground_drake.sim.tables import TABLES
+from airground_drake.sim.trace import Trace
 from airground_drake.verify import judge, judge_model
 from airground_drake.verify.registry import model_claims, run_claims
 

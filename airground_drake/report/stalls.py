@@ -11,10 +11,10 @@ from scipy.optimize import nnls
 
 from airground_drake.base.arrays import Array
 from airground_drake.base.errors import TraceError
-from airground_drake.run.trace import Trace
+from airground_drake.sim.trace import Trace
+from airground_drake.verify.claims.live_goal import AT_REST_M, AT_REST_S
 from airground_drake.verify.engines.geometry import interpolate
 from airground_drake.verify.runs.control_law import Inequalities, inequalities_of
-from airground_drake.verify.runs.live_goal import AT_REST_M, AT_REST_S
 from airground_drake.verify.runs.pairs import parts_of
 from airground_drake.verify.runs.proposals import proposal_of
 

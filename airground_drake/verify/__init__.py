@@ -1,11 +1,16 @@
 """Claims about the model and about runs.
 
+Enters: a Trace, or a Scenario.
+Leaves: findings.
+May import: `base`, `model`, `scenario`, `sim`.
+
 `judge(trace)` judges a run from its trace alone. `judge_model(scenario)` checks the hypotheses of theorems for the
 constants of a scenario, or runs experiments. Claims about a run share no code with the controllers, the simulator and
 the optimiser that they judge.
 
-`claim.py` defines a claim, and `registry.py` lists them. `runs/` has the claims about a trace and `model/` those about
-the model; each file is named after its claim. `engines/` computes for them and imports no claim.
+`claim.py` defines a claim, and `base/registry.py` lists them. `claims/` has the claims, each in the file of its name.
+`runs/` has what those about a trace share, `model/` what those about the model share. `engines/` computes for them and
+imports no claim. `proofs/` and `coq/` have the theorems.
 """
 
 from __future__ import annotations

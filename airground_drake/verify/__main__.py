@@ -18,7 +18,7 @@ from airground_drake.base.errors import AirgroundError, UnknownNameError
 from airground_drake.base.progress import Progress, progress_bar
 from airground_drake.base.statuses import NOT_EXERCISED, outcome
 from airground_drake.base.usage import Parser, refuse
-from airground_drake.scenarios import plugins
+from airground_drake.scenario import plugins
 
 if TYPE_CHECKING:
     from airground_drake.verify.claim import Verdict
@@ -85,8 +85,8 @@ def _judge(target: str, wanted: Sequence[str], progress: Progress, *, allow_plug
         UnknownNameError: if there is no such claim.
         ScenarioError: if third-party code is named that is not allowed.
     """
-    from airground_drake.run import trace
-    from airground_drake.scenarios.load import from_data, load
+    from airground_drake.scenario.load import from_data, load
+    from airground_drake.sim import trace
     from airground_drake.verify import judge, judge_model
     from airground_drake.verify.registry import model_claims, run_claims
 

@@ -12,15 +12,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from airground_drake.run.trace import Trace
+from airground_drake.sim.trace import Trace
+from airground_drake.verify.claims import thr_choice
+from airground_drake.verify.claims.safe_dist import LeastDistances, SafeDist
+from airground_drake.verify.claims.safe_hyp import guarantees
+from airground_drake.verify.claims.thr_quality import drift_of
 from airground_drake.verify.finding import Finding
-from airground_drake.verify.model import thr_choice
-from airground_drake.verify.model.safe_dist import LeastDistances, SafeDist
 from airground_drake.verify.model.theorem import Proof
 from airground_drake.verify.runs.acceptances import Acceptance, acceptances
 from airground_drake.verify.runs.passive import beside
-from airground_drake.verify.runs.safe_hyp import guarantees
-from airground_drake.verify.runs.thr_quality import drift_of
 from airground_drake.verify.runs.triggers import task_error
 
 Count = tuple[int, int]

@@ -14,8 +14,8 @@ import numpy as np
 from airground_drake.base.arrays import Array
 from airground_drake.base.errors import TraceError, described
 from airground_drake.base.statuses import PASSING, STATUSES, Status, meets, outcome
-from airground_drake.run.trace import Trace
-from airground_drake.scenarios.schema import Scenario
+from airground_drake.scenario.schema import Scenario
+from airground_drake.sim.trace import Trace
 from airground_drake.verify.engines.bodies import following_m_s, unicycle_m
 from airground_drake.verify.engines.geometry import MERGE_S, interpolate
 from airground_drake.verify.finding import Evidence, Failure, Finding

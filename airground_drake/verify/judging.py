@@ -12,9 +12,9 @@ import pandas as pd
 
 from airground_drake.base.parallel import run_parallel
 from airground_drake.base.progress import SILENT, Progress
-from airground_drake.run.trace import Trace
-from airground_drake.scenarios.load import own
-from airground_drake.scenarios.schema import Scenario
+from airground_drake.scenario.load import own
+from airground_drake.scenario.schema import Scenario
+from airground_drake.sim.trace import Trace
 from airground_drake.verify.applications import (
     Count,
     Retreats,

@@ -1,7 +1,7 @@
 """The registered claims, made on use.
 
-`airground_drake.registry` lists them in the order of the report: a new claim is one file and one line there. A scenario
-adds its own under `claims`.
+`airground_drake.base.registry` lists them in the order of the report: a new claim is one file and one line there. A
+scenario adds its own under `claims`.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from typing import TypeVar, get_type_hints
 from pydantic import TypeAdapter, ValidationError
 
 from airground_drake.base.errors import PluginError, UnknownNameError, one_line, short
-from airground_drake.registry import MODEL_CLAIMS, RUN_CLAIMS, Registry
+from airground_drake.base.registry import MODEL_CLAIMS, RUN_CLAIMS, Registry
 from airground_drake.verify.claim import Claim, ModelClaim, TraceClaim
 
 C = TypeVar("C", bound=Claim)

@@ -6,21 +6,21 @@ from mutation.mutant import Mutant
 
 WIRING = ("tests/hypotheses/test_wiring.py",)
 CROWD = ("tests/check/test_honest_runs.py::test_a_crowd",)
-BODY = ("tests/test_events.py", "tests/test_bodies.py")
+BODY = ("tests/sim/test_events.py", "tests/test_bodies.py")
 TRIGGER = (
-    "tests/hypotheses/test_transitions.py", "tests/hypotheses/test_isolation.py", "tests/decision",
-    "tests/systems/test_decision.py",
+    "tests/hypotheses/test_transitions.py", "tests/hypotheses/test_isolation.py", "tests/model/trigger",
+    "tests/sim/blocks/test_decision.py",
 )  # fmt: skip
 ATTACKS = ("tests/hypotheses/test_patience_attacks.py",)
-PLANNER = ("tests/intervention",)
-ROUTES = ("tests/gatekeeper/test_relaxation.py", "tests/gatekeeper/routes/test_contract.py")
+PLANNER = ("tests/uav",)
+ROUTES = ("tests/ugv/test_relaxation.py", "tests/ugv/routes/test_contract.py")
 RUNS = "tests/verify/runs"
-ASSOCIATED, FORMS = ("tests/logs/test_association.py",), ("tests/logs/test_forms.py",)
+ASSOCIATED, FORMS = ("tests/study/logs/test_association.py",), ("tests/study/logs/test_forms.py",)
 
 WIRINGS = (
     Mutant(
         "safe distance air/ground at 0.9 of its value",
-        "scenarios/world.py",
+        "scenario/world.py",
         "make_world",
         'frozenset(("ugv", "uav")): safe.air_ground_m',
         'frozenset(("ugv", "uav")): 0.9 * safe.air_ground_m',
@@ -28,23 +28,23 @@ WIRINGS = (
     ),
     Mutant(
         "share 1 for robots",
-        "world/world.py",
+        "model/bodies/world.py",
         "World.around",
         "for body in self.moving]), 0.5, 1.0)",
         "for body in self.moving]), 1.0, 1.0)",
-        tests=("tests/world", *WIRING),
+        tests=("tests/model/bodies", *WIRING),
     ),
     Mutant(
         "UGVs may leave the ground",
-        "world/world.py",
+        "model/bodies/world.py",
         "Body.mobility",
         'if self.kind == "ugv" else',
         "if False else",
-        tests=("tests/world", *WIRING),
+        tests=("tests/model/bodies", *WIRING),
     ),
     Mutant(
         "robots avoid only what the UAV knows",
-        "scenarios/world.py",
+        "scenario/world.py",
         "make_world",
         "for name, each in scenario.barriers.items()",
         "for name, each in scenario.barriers.items() if each.known_to_uav",
@@ -52,7 +52,7 @@ WIRINGS = (
     ),
     Mutant(
         "sensing range cut",
-        "systems/components.py",
+        "sim/components.py",
         "make_avoidance",
         "control.period_s, control.sensing_range_m, composition)",
         "control.period_s, 0.6 * control.sensing_range_m, composition)",
@@ -60,11 +60,11 @@ WIRINGS = (
     ),
     Mutant(
         "the disturbance is subtracted",
-        "systems/plant.py",
+        "sim/blocks/plant.py",
         "VelocityDisturbance._calc",
         "velocity[3 * i : 3 * i + 3] += port.Eval(context)",
         "velocity[3 * i : 3 * i + 3] -= port.Eval(context)",
-        tests=(*WIRING, "tests/test_simulation.py", "tests/test_python_api.py"),
+        tests=(*WIRING, "tests/sim/test_simulation.py", "tests/test_python_api.py"),
     ),
 )
 """Wiring: who keeps what distance, with which share, on which plants."""
@@ -72,7 +72,7 @@ WIRINGS = (
 BODIES = (
     Mutant(
         "obstacles have no radius",
-        "scenarios/outlines.py",
+        "scenario/outlines.py",
         "outlines_of",
         "found = balls(obstacle.position_m or np.zeros(3), obstacle.radius_m, gap)",
         "found = balls(obstacle.position_m or np.zeros(3), 0.0, gap)",
@@ -80,7 +80,7 @@ BODIES = (
     ),
     Mutant(
         "collisions are of centres",
-        "run/events.py",
+        "sim/events.py",
         "_add_collisions",
         "within = collision_m + float(radius)",
         "within = collision_m",
@@ -88,11 +88,11 @@ BODIES = (
     ),
     Mutant(
         "plans take robots for points",
-        "intervention/coordination/single.py",
+        "uav/coordination/single.py",
         "_wished",
         "return space.apart + other.radius + space.spacing",
         "return space.apart + space.spacing",
-        tests=("tests/intervention/coordination",),
+        tests=("tests/uav/coordination",),
     ),
 )
 """Bodies: radii count."""
@@ -100,23 +100,23 @@ BODIES = (
 LAW = (
     Mutant(
         "no scaling back",
-        "nsbc/kernels.py",
+        "model/law/kernels.py",
         "avoid_one",
         "found = _scale_back(found, normal, bound)",
         "found = found",
-        tests=(*WIRING, "tests/nsbc/test_avoidance.py"),
+        tests=(*WIRING, "tests/model/law/test_avoidance.py"),
     ),
     Mutant(
         "contradictions are not looked for",
-        "nsbc/kernels.py",
+        "model/law/kernels.py",
         "_closest_feasible",
         "return velocity if missed == 0.0 else _least_violation(normal, bound + MARGIN_M_S)",
         "return velocity",
-        tests=(*WIRING, "tests/nsbc/test_projection.py"),
+        tests=(*WIRING, "tests/model/law/test_projection.py"),
     ),
     Mutant(
         "interventions not filtered under (d)",
-        "nsbc/law.py",
+        "model/law/ugv_law.py",
         "command",
         "    if law.intervention_on_top:\n        return task\n",
         "    if not law.intervention_on_top:\n        return task\n",
@@ -124,7 +124,7 @@ LAW = (
     ),
     Mutant(
         "own task not filtered",
-        "nsbc/law.py",
+        "model/law/ugv_law.py",
         "command",
         "        return avoid_one(own, normal, bound, composition)\n",
         "        return own\n",
@@ -132,7 +132,7 @@ LAW = (
     ),
     Mutant(
         "UGVs sampled at half the rate",
-        "systems/controllers.py",
+        "sim/blocks/controllers.py",
         "UgvController.__init__",
         "self.DeclarePeriodicDiscreteUpdateEvent(law.avoidance.period, 0.0, weakly(self._update))",
         "self.DeclarePeriodicDiscreteUpdateEvent(2.0 * law.avoidance.period, 0.0, weakly(self._update))",
@@ -140,7 +140,7 @@ LAW = (
     ),
     Mutant(
         "executed whatever the answer, the answer recorded",
-        "systems/controllers.py",
+        "sim/blocks/controllers.py",
         "UgvController._update",
         "reference, rate, proposals, headings, law)",
         "reference, rate, self._proposals.Eval(context), headings, law)",
@@ -148,11 +148,11 @@ LAW = (
     ),
     Mutant(
         "presets end with a jump to the target",
-        "geometry/motion.py",
+        "model/geometry/motion.py",
         "Motion.at",
         "return self.positions[max(k, 0)], np.zeros(3)",
         "return self.positions[-1], np.zeros(3)",
-        tests=("tests/geometry/test_motion.py",),
+        tests=("tests/model/geometry/test_motion.py",),
     ),
 )
 """The avoidance law and the controllers."""
@@ -160,7 +160,7 @@ LAW = (
 TRIGGERS = (
     Mutant(
         "the dwell is 10 % short",
-        "decision/trigger.py",
+        "model/trigger/automaton.py",
         "Trigger.dwell_end",
         "state.triggered_at + self.dwell if",
         "state.triggered_at + 0.9 * self.dwell if",
@@ -168,7 +168,7 @@ TRIGGERS = (
     ),
     Mutant(
         "releases at the threshold",
-        "decision/trigger.py",
+        "model/trigger/automaton.py",
         "Trigger.step",
         "x <= self.release and x < self.zeta:",
         "x <= self.zeta and x < self.zeta:",
@@ -176,7 +176,7 @@ TRIGGERS = (
     ),
     Mutant(
         "events come at the ends of steps",
-        "systems/decision.py",
+        "sim/blocks/decision.py",
         "EventTrigger.nothing_due",
         "return -1.0 if anything_due(",
         "return 1.0 if anything_due(",
@@ -184,7 +184,7 @@ TRIGGERS = (
     ),
     Mutant(
         "corners of presets are not looked at",
-        "systems/decision.py",
+        "sim/blocks/decision.py",
         "DecisionBlock._calc_range",
         "self._corner_times[first] < now[0]:",
         "self._corner_times[first] < begun[0]:",
@@ -192,7 +192,7 @@ TRIGGERS = (
     ),
     Mutant(
         "c1 and c2 of the Bayes risk exchanged",
-        "decision/bayes.py",
+        "model/trigger/bayes.py",
         "optimal_threshold",
         "level = c2 / c1 * drift**2 / noise**2",
         "level = c1 / c2 * drift**2 / noise**2",
@@ -200,11 +200,11 @@ TRIGGERS = (
     ),
     Mutant(
         "the noise is 5 % too strong",
-        "systems/components.py",
+        "sim/components.py",
         "integrated_noise",
         "B=intensity / np.sqrt(period) * eye",
         "B=1.05 * intensity / np.sqrt(period) * eye",
-        tests=("tests/systems/test_decision.py",),
+        tests=("tests/sim/blocks/test_decision.py",),
     ),
 )
 """The trigger: dwell, release, events, threshold, noise."""
@@ -212,7 +212,7 @@ TRIGGERS = (
 PROTOCOL = (
     Mutant(
         "an answer to another proposal counts",
-        "intervention/messages.py",
+        "uav/messages.py",
         "answer_to",
         "if proposal is None or answers[2 * robot + 1] != proposal.number:",
         "if proposal is None:",
@@ -220,7 +220,7 @@ PROTOCOL = (
     ),
     Mutant(
         "answers are decided on and not sent",
-        "systems/gatekeeper.py",
+        "sim/blocks/gatekeeper.py",
         "Gatekeeper._calc_answers",
         "output.SetFromVector(self._memory(context).answers)",
         "pass",
@@ -228,15 +228,15 @@ PROTOCOL = (
     ),
     Mutant(
         "proposals are not withdrawn after a release",
-        "intervention/planner.py",
+        "uav/planner.py",
         "Planner._after_answers",
         "            if called.isdisjoint((name, talk.cause, *party)):\n",
         "            if False:\n",
-        tests=("tests/intervention/test_planner.py", *CROWD),
+        tests=("tests/uav/test_planner.py", *CROWD),
     ),
     Mutant(
         "a part of a joint plan outlives another UGV's refusal",
-        "intervention/planner.py",
+        "uav/planner.py",
         "Planner._after_answers",
         "(party_refused or answer == DONE",
         "(answer == DONE",
@@ -244,7 +244,7 @@ PROTOCOL = (
     ),
     Mutant(
         "detours inside the safe distance",
-        "intervention/detour.py",
+        "uav/detour.py",
         "Detour._in_the_way",
         "reach = np.clip(from_target, least, least + self.clearance)",
         "reach = 0.8 * least",
@@ -252,19 +252,19 @@ PROTOCOL = (
     ),
     Mutant(
         "messages of ticks that differ by rounding come late",
-        "systems/ticks.py",
+        "sim/blocks/ticks.py",
         "Ticks.__init__",
         "exact = Fraction(period) == self._every * Fraction(control)",
         "exact = True",
-        tests=("tests/systems/test_ticks.py",),
+        tests=("tests/sim/blocks/test_ticks.py",),
     ),
     Mutant(
         "the monitor's inequalities are never broken",
-        "systems/monitor.py",
+        "sim/blocks/monitor.py",
         "Monitor._first",
         "if not amount[robot] <= INEQUALITY_TOLERANCE_M_S:",
         "if not amount[robot] <= 10.0:",
-        tests=("tests/systems/test_monitor.py",),
+        tests=("tests/sim/blocks/test_monitor.py",),
     ),
 )
 """Proposals, answers and what becomes of them."""
@@ -272,7 +272,7 @@ PROTOCOL = (
 GATEKEEPER = (
     Mutant(
         "the bound is overstated",
-        "gatekeeper/relaxation.py",
+        "ugv/relaxation.py",
         "_dual_bound",
         "total -= pressure * pressure / (4.0 * ",
         "total -= pressure * pressure / (8.0 * ",
@@ -280,39 +280,39 @@ GATEKEEPER = (
     ),
     Mutant(
         "the prediction has no avoidance",
-        "gatekeeper/rollout.py",
+        "ugv/rollout.py",
         "_command",
         "mode == ACCEPTED, normal[:count], bound[:count], retreat[:count])",
         "mode == ACCEPTED, normal[:0], bound[:0], retreat[:0])",
-        tests=("tests/gatekeeper/test_closed_loop.py", *CROWD),
+        tests=("tests/ugv/test_closed_loop.py", *CROWD),
     ),
     Mutant(
         "a first stage that refuses is accepted",
-        "gatekeeper/answer.py",
+        "ugv/answer.py",
         "_first_answer",
         "    if solution.accept_first:",
         "    if True:",
-        tests=("tests/gatekeeper/test_mpc_gatekeeper.py", *CROWD),
+        tests=("tests/ugv/test_mpc_gatekeeper.py", *CROWD),
     ),
     Mutant(
         "obstacles out of sight are forgotten",
-        "gatekeeper/outcome_gatekeeper.py",
+        "ugv/outcome_gatekeeper.py",
         "OutcomeGatekeepers._remembered",
         "return known | within(still, own, reach, True) if",
         "return within(still, own, reach, True) if",
-        tests=("tests/gatekeeper/test_outcome_gatekeeper.py",),
+        tests=("tests/ugv/test_outcome_gatekeeper.py",),
     ),
     Mutant(
         "what makes no difference is accepted",
-        "gatekeeper/outcome_gatekeeper.py",
+        "ugv/outcome_gatekeeper.py",
         "reason_of",
         "if accept.better_than(refuse):",
         "if not refuse.better_than(accept):",
-        tests=("tests/gatekeeper/test_outcome_gatekeeper.py",),
+        tests=("tests/ugv/test_outcome_gatekeeper.py",),
     ),
     Mutant(
         "a withdrawal is not noticed before the next proposal",
-        "gatekeeper/mpc_gatekeeper.py",
+        "ugv/mpc_gatekeeper.py",
         "Gatekeepers.idle",
         "return not any(proposals) and not any(before.answers[::2])",
         "return not any(proposals)",
@@ -320,7 +320,7 @@ GATEKEEPER = (
     ),
     Mutant(
         "a replaced proposal does not end its try",
-        "gatekeeper/outcome_gatekeeper.py",
+        "ugv/outcome_gatekeeper.py",
         "OutcomeGatekeepers.sample",
         "if held[i].executing and standing != ACCEPT:  # withdrawn",
         "if held[i].executing and proposal is None:  # withdrawn",
@@ -328,7 +328,7 @@ GATEKEEPER = (
     ),
     Mutant(
         "a UGV rests only where nothing is proposed",
-        "gatekeeper/outcome_gatekeeper.py",
+        "ugv/outcome_gatekeeper.py",
         "OutcomeGatekeepers.sample",
         "            held[i] = self._patience.rested(held[i], now.t)\n",
         "            held[i] = held[i] if now.proposals[i] else self._patience.rested(held[i], now.t)\n",
@@ -341,7 +341,7 @@ RULES = "tests/check/test_forgeries.py::test_each_rule_of_the_checker_refuses_wh
 JUDGES = (
     Mutant(
         "SAFE-TRACE allows 5 cm",
-        "verify/runs/safe_trace.py",
+        "verify/claims/safe_trace.py",
         "SafeTrace.check",
         ">= -DISTANCE_TOLERANCE_M",
         ">= -0.05",
@@ -357,7 +357,7 @@ JUDGES = (
     ),
     Mutant(
         "THR-TRIG allows 0.1 s",
-        "verify/runs/thr_trig.py",
+        "verify/claims/thr_trig.py",
         "",
         "EVENT_TOLERANCE_S = 1e-5",
         "EVENT_TOLERANCE_S = 0.1",
@@ -365,7 +365,7 @@ JUDGES = (
     ),
     Mutant(
         "LIVE-HYP takes every reversal for one with news",
-        "verify/runs/live_hyp.py",
+        "verify/claims/live_hyp.py",
         "_wrong",
         "if early and one.end_s not in one.news_s:",
         "if False:",
@@ -401,7 +401,7 @@ JUDGES = (
 LOGS = (
     Mutant(
         "log: times of receipt in place of stamps",
-        "logs/messages.py",
+        "study/logs/messages.py",
         "Gathered.streams",
         "times = [stamp if stamped and stamp is not None else received",
         "times = [received",
@@ -409,7 +409,7 @@ LOGS = (
     ),
     Mutant(
         "log: a body may leap",
-        "logs/tracks.py",
+        "study/logs/tracks.py",
         "Track.is_known",
         "& ~np.isin(self.t_s[1:], self.leaps_s)",
         "",
@@ -417,7 +417,7 @@ LOGS = (
     ),
     Mutant(
         "log: a straight line across a gap",
-        "logs/tracks.py",
+        "study/logs/tracks.py",
         "Track.is_known",
         "<= self.gap_s * (1.0 + 1e-9)",
         "<= 1e9",
@@ -425,7 +425,7 @@ LOGS = (
     ),
     Mutant(
         "log: positions in different frames",
-        "logs/tracks.py",
+        "study/logs/tracks.py",
         "_in_one_frame",
         "if len({*stated.values()}) > 1:",
         "if False:",
@@ -433,7 +433,7 @@ LOGS = (
     ),
     Mutant(
         "log: frames called odom are one",
-        "logs/tracks.py",
+        "study/logs/tracks.py",
         "_in_one_frame",
         "if len(frames) > 1 and",
         "if False and",
@@ -441,7 +441,7 @@ LOGS = (
     ),
     Mutant(
         "log: all robots start at zero",
-        "logs/tracks.py",
+        "study/logs/tracks.py",
         "_apart_at_the_start",
         "if len(there) > 1 and len(starts) > 1:",
         "if False:",
@@ -449,7 +449,7 @@ LOGS = (
     ),
     Mutant(
         "log: the last of two contradicting rows counts",
-        "logs/tracks.py",
+        "study/logs/tracks.py",
         "_track",
         "new = np.append(True, np.diff(ns) > 0)",
         "new = np.append(np.diff(ns) > 0, True)",
@@ -457,7 +457,7 @@ LOGS = (
     ),
     Mutant(
         "log: rows are in the order of the file",
-        "logs/tracks.py",
+        "study/logs/tracks.py",
         "_track",
         'order = np.argsort(ns, kind="stable")',
         "order = np.arange(len(ns))",
@@ -465,7 +465,7 @@ LOGS = (
     ),
     Mutant(
         "log: the first of several streams counts",
-        "logs/tracks.py",
+        "study/logs/tracks.py",
         "_assigned",
         "if len(of_one) > 1:",
         "if False:",
@@ -473,7 +473,7 @@ LOGS = (
     ),
     Mutant(
         "log: a robot's arm is where it is",
-        "logs/tracks.py",
+        "study/logs/tracks.py",
         "_links",
         "if each.frame not in carried",
         "if True",
@@ -481,7 +481,7 @@ LOGS = (
     ),
     Mutant(
         "log: a goal is where a robot is",
-        "logs/names.py",
+        "study/logs/names.py",
         "is_elsewhere",
         "return not ELSEWHERE.isdisjoint(words)",
         "return False",
@@ -489,7 +489,7 @@ LOGS = (
     ),
     Mutant(
         "log: stamps as floating-point numbers",
-        "logs/stream.py",
+        "study/logs/stream.py",
         "Stream.ns",
         "return self.whole * per + self.nano * per // 10**9",
         "return (self.whole * float(per) + self.nano * per // 10**9).astype(np.int64)",
@@ -497,7 +497,7 @@ LOGS = (
     ),
     Mutant(
         "log: milliseconds pass as seconds",
-        "logs/units.py",
+        "study/logs/units.py",
         "_likely",
         'return time or "s", length or "m"',
         'return "s", length or "m"',
@@ -505,7 +505,7 @@ LOGS = (
     ),
     Mutant(
         "log: millimetres pass as metres",
-        "logs/units.py",
+        "study/logs/units.py",
         "_likely",
         'return time or "s", length or "m"',
         'return time or "s", "m"',
@@ -513,7 +513,7 @@ LOGS = (
     ),
     Mutant(
         "log: a decimal comma separates columns",
-        "logs/text.py",
+        "study/logs/text.py",
         "_form",
         'for delimiter in (*DELIMITERS, " "):',
         'for delimiter in (",", *DELIMITERS, " "):',
@@ -521,7 +521,7 @@ LOGS = (
     ),
     Mutant(
         "log: only the robot's own times are looked at",
-        "logs/judging.py",
+        "study/logs/judging.py",
         "_knots",
         "[own.t_s, other.t_s, span]",
         "[own.t_s, span]",
@@ -529,7 +529,7 @@ LOGS = (
     ),
     Mutant(
         "log: markers of robots at different heights",
-        "logs/judging.py",
+        "study/logs/judging.py",
         "_seen",
         "if not (flat or is_obstacle):",
         "if not is_obstacle:",
@@ -537,7 +537,7 @@ LOGS = (
     ),
     Mutant(
         "log: position errors do not count",
-        "logs/judging.py",
+        "study/logs/judging.py",
         "judge",
         "eps = sum(",
         "eps = 0.0 * sum(",
@@ -545,7 +545,7 @@ LOGS = (
     ),
     Mutant(
         "log: the law in intervals of their mean length",
-        "logs/judging.py",
+        "study/logs/judging.py",
         "_Law.add",
         "for each in h.tolist()]",
         "for each in [float(h.mean())] * len(h)]",
@@ -553,7 +553,7 @@ LOGS = (
     ),
     Mutant(
         "log: what is gone is still there",
-        "logs/judging.py",
+        "study/logs/judging.py",
         "_both",
         "during = (other.t_s >= begin - SMALL) & (other.t_s <= end + SMALL)",
         "during = other.t_s >= begin - SMALL",

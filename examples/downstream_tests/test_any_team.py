@@ -7,11 +7,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from airground_drake import simulate
-from airground_drake.testing import assert_holds
-from airground_drake.testing.strategies import policies, scenarios
+from airground_drake.study.testing import assert_holds
+from airground_drake.study.testing.strategies import policies, scenarios
 
 
-@pytest.mark.filterwarnings("ignore::airground_drake.testing.NotExercisedWarning")  # not every draw is dangerous
+@pytest.mark.filterwarnings("ignore::airground_drake.study.testing.NotExercisedWarning")  # not every draw is dangerous
 @settings(max_examples=5, deadline=None)
 @given(
     scenarios(

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from airground_drake import Finding, Motion, Observation, Policy, Trace, TraceClaim
-from airground_drake.testing import ClaimError, assert_holds, assert_proved
+from airground_drake.study.testing import ClaimError, assert_holds, assert_proved
 
 DEPOT = Path(__file__).with_name("depot.yaml")
 

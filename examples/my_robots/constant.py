@@ -1,6 +1,6 @@
-from airground_drake.gatekeeper.budget import Budget
-from airground_drake.gatekeeper.problem import Problem
-from airground_drake.gatekeeper.solution import ConstantPlans, Solution
+from airground_drake.ugv.budget import Budget
+from airground_drake.ugv.problem import Problem
+from airground_drake.ugv.solution import ConstantPlans, Solution
 
 
 class ConstantRoute:

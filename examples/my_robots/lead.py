@@ -1,7 +1,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from airground_drake.nsbc.tasks import PositionTask
+from airground_drake.model.law.tasks import PositionTask
 
 
 class Lead(PositionTask):

@@ -23,12 +23,12 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Context, Diagram, DiagramBuilder, DiscreteValues, LeafSystem
 from pydrake.systems.primitives import LogVectorOutput
 
-from airground_drake.geometry.outline import balls
-from airground_drake.nsbc.avoidance import Avoidance, limit_speed
-from airground_drake.nsbc.task import Task
-from airground_drake.nsbc.tasks import PositionTask
-from airground_drake.systems.plant import first_order_plant
-from airground_drake.world.world import Neighbours
+from airground_drake.model.bodies.world import Neighbours
+from airground_drake.model.geometry.outline import balls
+from airground_drake.model.law.avoidance import Avoidance, limit_speed
+from airground_drake.model.law.task import Task
+from airground_drake.model.law.tasks import PositionTask
+from airground_drake.sim.blocks.plant import first_order_plant
 
 Array = NDArray[np.float64]
 

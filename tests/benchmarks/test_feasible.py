@@ -13,8 +13,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from properties import examples
 
-from airground_drake.geometry.outline import balls
-from airground_drake.geometry.paths import NoPath, shortest_path
+from airground_drake.model.geometry.outline import balls
+from airground_drake.model.geometry.paths import NoPath, shortest_path
 
 NOTHING = np.empty((0, 2))
 START, TARGET = np.array([0.0, 0.0]), np.array([20.0, 0.0])

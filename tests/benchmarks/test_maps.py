@@ -10,8 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from properties import examples
 
-from airground_drake.scenarios.load import from_data
-from airground_drake.scenarios.validate import check
+from airground_drake.scenario.load import from_data
+from airground_drake.scenario.validate import check
 
 POLICIES = [{"name": "detour", "parameters": {"speed_m_s": maps.DETOUR_M_S}}]
 

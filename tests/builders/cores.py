@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from airground_drake.base.arrays import Array
-from airground_drake.geometry import outline
+from airground_drake.model.geometry import outline
 
 Draw = np.random.Generator
 

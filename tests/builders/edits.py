@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from airground_drake.run.tables import PROBLEM_ARRAYS, PROBLEM_SCALARS
-from airground_drake.run.trace import Trace
+from airground_drake.sim.tables import PROBLEM_ARRAYS, PROBLEM_SCALARS
+from airground_drake.sim.trace import Trace
 from builders.layout import decision_table
 from builders.scenarios import changed
 

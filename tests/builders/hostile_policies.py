@@ -19,9 +19,9 @@ from typing import Any, NamedTuple, NoReturn
 
 import numpy as np
 
-from airground_drake.geometry.motion import Motion
-from airground_drake.intervention.guest import worker
-from airground_drake.intervention.policy import Observation, Policy
+from airground_drake.model.geometry.motion import Motion
+from airground_drake.uav.guest import worker
+from airground_drake.uav.policy import Observation, Policy
 
 
 class Hostile(Policy):
@@ -257,7 +257,7 @@ KINDS: dict[str, Kind] = {
     "sends_a_fault_that_is_no_text": wild("its process does not say what went", answer({"fault": {"no": "text"}})),
     "sends_a_fault_of_a_million_characters": wild("y{300}$", answer({"fault": "y" * 10**6})),
     # changes other code, outlives its process, attacks another one
-    "patches_the_avoidance_layer": wild(None, patch("nsbc.avoidance", "Avoidance", "apply")),
+    "patches_the_avoidance_layer": wild(None, patch("model.law.avoidance", "Avoidance", "apply")),
     "patches_the_claims": wild(None, patch("verify.claim", "TraceClaim", "judge")),
     "leaves_a_child_behind": wild(None, lambda seen: fork(lambda: None, forever)),
     **{name: wild("PermissionError", lambda seen, does=does: does(os.getppid())) for name, does in TO_PARENT.items()},

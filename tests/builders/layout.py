@@ -12,9 +12,9 @@ import numpy as np
 import pandas as pd
 
 from airground_drake.base.arrays import Array
-from airground_drake.run.recording import sample_rows
-from airground_drake.run.tables import DECISION_COLUMNS, DECISION_LISTS, MESSAGE_COLUMNS, SCHEMA, typed
-from airground_drake.run.trace import Trace
+from airground_drake.sim.recording import sample_rows
+from airground_drake.sim.tables import DECISION_COLUMNS, DECISION_LISTS, MESSAGE_COLUMNS, SCHEMA, typed
+from airground_drake.sim.trace import Trace
 from airground_drake.verify.engines.outlines import COUNT, MIDDLE
 from airground_drake.verify.runs.demands import OUTLINES, demanded
 
@@ -78,7 +78,7 @@ def rebuilt(trace: Trace) -> Trace:
 
 
 def as_read_back(parameters: dict[str, Any]) -> dict[str, Any]:
-    """Parameters of a controller as `systems.controllers.read_back` writes them."""
+    """Parameters of a controller as `sim.blocks.controllers.read_back` writes them."""
     found = {key: value.tolist() if isinstance(value, np.ndarray) else value for key, value in parameters.items()}
     found |= {key: _with_circles(found[key]) for key in OUTLINES if key in found}
     return found | {key: [[value, 1] for value in found[key]] for key in ("safe_m", "share")}

@@ -16,10 +16,10 @@ import pandas as pd
 import yaml
 
 from airground_drake.base.arrays import Array
-from airground_drake.logs import opening, tracks
-from airground_drake.logs.judging import Judged, judge
-from airground_drake.logs.tables import Wanted
-from airground_drake.logs.tracks import Choice, Tracks
+from airground_drake.study.logs import opening, tracks
+from airground_drake.study.logs.judging import Judged, judge
+from airground_drake.study.logs.tables import Wanted
+from airground_drake.study.logs.tracks import Choice, Tracks
 
 RATE_HZ, LASTS_S = 20.0, 6.0
 EPOCH_NS = 1_700_000_123_456_789_000

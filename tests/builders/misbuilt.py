@@ -9,10 +9,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from airground_drake.nsbc.avoidance import Avoidance
-from airground_drake.nsbc.law import UgvLaw
-from airground_drake.systems import components, controllers
-from airground_drake.world.world import Body, Kind, Neighbours, World
+from airground_drake.model.bodies.world import Body, Kind, Neighbours, World
+from airground_drake.model.law.avoidance import Avoidance
+from airground_drake.model.law.ugv_law import UgvLaw
+from airground_drake.sim import components
+from airground_drake.sim.blocks import controllers
 
 Patch = Callable[[pytest.MonkeyPatch], None]
 
@@ -69,7 +70,7 @@ def unlayered(patch: pytest.MonkeyPatch) -> None:
         def __init__(self, world: World, avoidance: Avoidance, **given: Any) -> None:
             super().__init__(world, replace(avoidance, sensing_range=0.0), **given)
 
-    patch.setattr("airground_drake.systems.diagram.UavController", Blind)
+    patch.setattr("airground_drake.sim.diagram.UavController", Blind)
 
 
 speeding = neighbours(lambda given: given._replace(max_speed=1.5 * given.max_speed))
@@ -85,7 +86,7 @@ def half_rate(patch: pytest.MonkeyPatch) -> None:
             self.avoidance = law.avoidance
             self.law = law
 
-    patch.setattr("airground_drake.systems.diagram.UgvController", Slow)
+    patch.setattr("airground_drake.sim.diagram.UgvController", Slow)
 
 
 MISBUILT: dict[str, tuple[Patch, str]] = {

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from airground_drake.geometry.motion import Motion
-from airground_drake.geometry.outline import balls
-from airground_drake.intervention.policy import Observation, Teammate
+from airground_drake.model.geometry.motion import Motion
+from airground_drake.model.geometry.outline import balls
+from airground_drake.uav.policy import Observation, Teammate
 
 Array = npt.NDArray[np.float64]
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from airground_drake.run.trace import Trace
+from airground_drake.sim.trace import Trace
 from builders.layout import laid_out, reference_at
 
 Corners = Sequence[tuple[float, ...]]

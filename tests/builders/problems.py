@@ -7,13 +7,13 @@ from dataclasses import replace
 import numpy as np
 
 from airground_drake.base.arrays import Array
-from airground_drake.gatekeeper.problem import Horizon, Problem, predicted_problem
-from airground_drake.gatekeeper.rollout import View
-from airground_drake.geometry import outline
-from airground_drake.geometry.motion import Motion
-from airground_drake.intervention.policy import Proposal
-from airground_drake.nsbc.avoidance import Avoidance
-from airground_drake.nsbc.law import UgvLaw
+from airground_drake.model.geometry import outline
+from airground_drake.model.geometry.motion import Motion
+from airground_drake.model.law.avoidance import Avoidance
+from airground_drake.model.law.ugv_law import UgvLaw
+from airground_drake.uav.policy import Proposal
+from airground_drake.ugv.problem import Horizon, Problem, predicted_problem
+from airground_drake.ugv.rollout import View
 
 NOBODY = np.empty((0, 3))
 LAW = UgvLaw(Avoidance(3.0, 0.05, 4.0), 2.0, 1.5, intervention_on_top=False)

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from airground_drake.scenarios.schema import Obstacle, Policy, Preset, Run, SafeDistance, Scenario, Uav, Ugv
-from airground_drake.scenarios.validate import check
+from airground_drake.scenario.schema import Obstacle, Policy, Preset, Run, SafeDistance, Scenario, Uav, Ugv
+from airground_drake.scenario.validate import check
 
 SQUARE = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]]
 NOTCHED = [[-3.0, -3.0], [3.0, -3.0], [3.0, 3.0], [0.5, 3.0], [0.5, -1.0], [-0.5, -1.0], [-0.5, 3.0], [-3.0, 3.0]]

@@ -6,9 +6,9 @@ from functools import cache
 
 import planner
 
-from airground_drake.run import simulation
-from airground_drake.run.trace import Trace
-from airground_drake.scenarios.schema import Decision, Obstacle, Threshold
+from airground_drake.scenario.schema import Decision, Obstacle, Threshold
+from airground_drake.sim import simulation
+from airground_drake.sim.trace import Trace
 from builders.scenarios import STILL, case_a, lone
 from builders.simulation import simulate
 

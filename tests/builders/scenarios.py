@@ -6,7 +6,7 @@ import copy
 from dataclasses import asdict
 from typing import Any
 
-from airground_drake.scenarios.schema import Decision, Obstacle, Preset, Run, Scenario, Uav, Ugv
+from airground_drake.scenario.schema import Decision, Obstacle, Preset, Run, Scenario, Uav, Ugv
 
 AWAY = Uav(start_m=[50.0, 50.0, 2.0], target_m=[50.0, 50.0, 2.0])
 """Far from everything else."""

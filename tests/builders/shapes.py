@@ -7,7 +7,7 @@ import numpy.typing as npt
 from hypothesis import strategies as st
 from scipy.sparse.csgraph import dijkstra
 
-from airground_drake.geometry import outline
+from airground_drake.model.geometry import outline
 
 Array = npt.NDArray[np.float64]
 

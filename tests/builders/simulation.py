@@ -11,10 +11,10 @@ import numpy as np
 from scipy.optimize import brentq
 
 from airground_drake.base.arrays import Array
-from airground_drake.run.trace import Trace
-from airground_drake.scenarios.recorded import of_run
-from airground_drake.scenarios.world import make_world
-from airground_drake.systems.components import make_avoidance
+from airground_drake.scenario.recorded import of_run
+from airground_drake.scenario.world import make_world
+from airground_drake.sim.components import make_avoidance
+from airground_drake.sim.trace import Trace
 from builders.layout import HELD, laid_out, reference_at
 
 Drive = Callable[[float], list[list[float]]]

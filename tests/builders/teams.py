@@ -7,10 +7,10 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from airground_drake.geometry.outline import balls
-from airground_drake.intervention.coordination.joint import Plan
-from airground_drake.intervention.coordination.roadmap import RobotTask, Space
-from airground_drake.intervention.coordination.timed import at_rest
+from airground_drake.model.geometry.outline import balls
+from airground_drake.uav.coordination.joint import Plan
+from airground_drake.uav.coordination.roadmap import RobotTask, Space
+from airground_drake.uav.coordination.timed import at_rest
 
 Array = npt.NDArray[np.float64]
 

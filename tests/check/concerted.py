@@ -55,9 +55,9 @@ from airground_drake.report import junit, proved, rebuild, simulated
 from airground_drake.report.__main__ import main as write_report
 from airground_drake.report.figures.draw import draw
 from airground_drake.report.page import page
-from airground_drake.run.trace import load
-from airground_drake.scenarios.load import from_data
-from airground_drake.scenarios.plugins import OPTION
+from airground_drake.scenario.load import from_data
+from airground_drake.scenario.plugins import OPTION
+from airground_drake.sim.trace import load
 
 POLICIES = [
     {"name": "check.foreign:Fails"},
@@ -178,11 +178,11 @@ def painted_over(folder: Path) -> None:
 
 def crash_called_proved(folder: Path) -> None:
     """What `airground prove` would write of run b, as if Coq had accepted it."""
-    from airground_drake.proofs.export import distances_file, recorded
-    from airground_drake.proofs.readback import compare
-    from airground_drake.proofs.record import ALLOWED_AXIOMS, FOLDER, closure, digest
-    from airground_drake.proofs.runs import CHECKERS
-    from airground_drake.proofs.table import lawful
+    from airground_drake.verify.proofs.export import distances_file, recorded
+    from airground_drake.verify.proofs.readback import compare
+    from airground_drake.verify.proofs.record import ALLOWED_AXIOMS, FOLDER, closure, digest
+    from airground_drake.verify.proofs.runs import CHECKERS
+    from airground_drake.verify.proofs.table import lawful
 
     run = load(trace(folder, "b"))
     exact = recorded(run)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import NoReturn
 
-from airground_drake.intervention.policy import Observation, Policy
-from airground_drake.run.trace import Trace
+from airground_drake.sim.trace import Trace
+from airground_drake.uav.policy import Observation, Policy
 from airground_drake.verify.claim import TraceClaim
 from airground_drake.verify.finding import Finding
 

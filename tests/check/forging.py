@@ -20,8 +20,8 @@ from airground_drake.base.errors import AirgroundError
 from airground_drake.check import command as checker
 from airground_drake.check.line import AGREES, RECORDED, CheckLine
 from airground_drake.report import rebuild
-from airground_drake.run.trace import Trace
-from airground_drake.scenarios.schema import Scenario
+from airground_drake.scenario.schema import Scenario
+from airground_drake.sim.trace import Trace
 from airground_drake.verify import Verdict, judge_all, judging
 
 RUN, UGV = "d", "ugv1"

@@ -10,8 +10,8 @@ import pytest
 from random_scenarios import draw, tried
 
 from airground_drake.base.errors import ScenarioError
-from airground_drake.scenarios.load import from_data, load
-from airground_drake.scenarios.schema import Scenario
+from airground_drake.scenario.load import from_data, load
+from airground_drake.scenario.schema import Scenario
 
 pytestmark = pytest.mark.slow
 
@@ -62,7 +62,7 @@ def test_the_checker_agrees_where_bodies_are_apart_from_their_steered_points(num
 @pytest.mark.parametrize("name", "bcd")
 def test_a_crowd(name: str) -> None:
     """Everything at once: most mutants of `benchmarks/mutation` are noticed here."""
-    scenario = load(str(Path(__file__).parents[1] / "builders/crowd.yaml"))
+    scenario = load(str(Path(__file__).parents[1] / "builders" / "crowd.yaml"))
     scenario.runs = {name: scenario.runs[name]}
     trace, _, wrong = tried(scenario)
     assert wrong == []

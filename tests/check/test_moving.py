@@ -26,15 +26,15 @@ from airground_drake.check.command import LIMIT_S, checked
 from airground_drake.check.line import AGREES, DISAGREES
 from airground_drake.check.rules import SMALL
 from airground_drake.check.scenario import Pair, pairs_of, way_m
-from airground_drake.logs.judging import KEPT
-from airground_drake.logs.judging import judge as judge_log
 from airground_drake.report import document, rebuild
-from airground_drake.run.events import extract
-from airground_drake.run.simulation import simulate
-from airground_drake.run.trace import Trace, save
-from airground_drake.scenarios.courses import course
-from airground_drake.scenarios.load import resolved
-from airground_drake.scenarios.schema import Moves
+from airground_drake.scenario.courses import course
+from airground_drake.scenario.load import resolved
+from airground_drake.scenario.schema import Moves
+from airground_drake.sim.events import extract
+from airground_drake.sim.simulation import simulate
+from airground_drake.sim.trace import Trace, save
+from airground_drake.study.logs.judging import KEPT
+from airground_drake.study.logs.judging import judge as judge_log
 from airground_drake.verify import judge
 
 ROUND = [[-1.0, 1.0], [1.0, 1.0], [1.0, -0.3], [-1.0, -0.3]]

@@ -11,10 +11,10 @@ import pytest
 from airground_drake.check import plants, safety
 from airground_drake.check.rules import Disagreement
 from airground_drake.check.run import Run, _moves_as_commanded
-from airground_drake.run.simulation import simulate
-from airground_drake.run.trace import Trace
-from airground_drake.scenarios.load import load, resolved, validated
-from airground_drake.scenarios.schema import Scenario
+from airground_drake.scenario.load import load, resolved, validated
+from airground_drake.scenario.schema import Scenario
+from airground_drake.sim.simulation import simulate
+from airground_drake.sim.trace import Trace
 from airground_drake.verify import judge
 from airground_drake.verify.engines.bodies import law_m, room_of
 

@@ -20,11 +20,11 @@ from airground_drake.check.rules import NotEstablished
 from airground_drake.check.run import Run
 from airground_drake.check.scenario import Pair, pairs_of
 from airground_drake.check.shapes import POINT, ROWS, Shape, boxes_of, shape_of, split
-from airground_drake.geometry import outline
-from airground_drake.scenarios import shapes
-from airground_drake.scenarios.load import from_data, load, resolved
-from airground_drake.scenarios.outlines import outlines_of
-from airground_drake.scenarios.schema import Obstacle
+from airground_drake.model.geometry import outline
+from airground_drake.scenario import shapes
+from airground_drake.scenario.load import from_data, load, resolved
+from airground_drake.scenario.outlines import outlines_of
+from airground_drake.scenario.schema import Obstacle
 
 Corners = list[list[float]]
 Array = NDArray[np.float64]

@@ -13,8 +13,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from airground_drake.report.simulated import first_difference
-from airground_drake.run.tables import TABLES
-from airground_drake.run.trace import Trace
+from airground_drake.sim.tables import TABLES
+from airground_drake.sim.trace import Trace
 
 TIMES = 0.1 * np.arange(6)
 BOUNDS, PLANS = [1.0, math.nan, *TIMES[2:]], [np.array([k, 0.5]) for k in TIMES]

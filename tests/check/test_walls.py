@@ -18,10 +18,10 @@ from airground_drake.check.command import LIMIT_S, checked
 from airground_drake.check.line import AGREES, CheckLine
 from airground_drake.check.report import DECIDED, SCHEMA, SHAPE
 from airground_drake.check.run import SHARED, read_run
-from airground_drake.logs.judging import KEPT
-from airground_drake.run.simulation import simulate
-from airground_drake.run.trace import save
-from airground_drake.scenarios.load import from_data, resolved
+from airground_drake.scenario.load import from_data, resolved
+from airground_drake.sim.simulation import simulate
+from airground_drake.sim.trace import save
+from airground_drake.study.logs.judging import KEPT
 
 U = [[0.0, 1.0], [2.0, 1.0], [2.0, -1.0], [0.0, -1.0], [0.0, -0.9], [1.8, -0.9], [1.8, 0.9], [0.0, 0.9]]
 TRAP = [[-3, -3], [2, -3], [2, 3], [1.5, 3], [1.5, -2.5], [-1.2, -2.5], [-1.2, 3], [-3, 3]]

@@ -12,11 +12,11 @@ from pathlib import Path
 import pytest
 from report.cases import GOING_ROUND, SUCCESS, make_scenario, make_trace
 
-from airground_drake.campaign import pool
-from airground_drake.campaign.pool import Pool
 from airground_drake.commands import main
-from airground_drake.run import trace
-from airground_drake.scenarios.load import resolved
+from airground_drake.scenario.load import resolved
+from airground_drake.sim import trace
+from airground_drake.study.campaign import pool
+from airground_drake.study.campaign.pool import Pool
 
 Airground = Callable[..., str]
 

@@ -12,8 +12,8 @@ from pathlib import Path
 import pytest
 from commands.conftest import Airground
 
-from airground_drake.campaign.store import JOURNAL, read
-from airground_drake.scenarios.load import load
+from airground_drake.scenario.load import load
+from airground_drake.study.campaign.store import JOURNAL, read
 
 SPEC = """
 name: small

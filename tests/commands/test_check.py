@@ -19,7 +19,7 @@ from commands.conftest import Airground
 from airground_drake.base import progress
 from airground_drake.commands import main
 from airground_drake.report.__main__ import main as report
-from airground_drake.scenarios import plugins
+from airground_drake.scenario import plugins
 
 GONE = {"name": "no_such.module:It", "parameters": {}}
 """A policy that is not there."""

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from commands.conftest import Airground
 
-from airground_drake.run.tables import TABLES
+from airground_drake.sim.tables import TABLES
 
 COMMANDS = ("export DIR c --to csv", "export DIR c --to mcap", "replay DIR c", "figures DIR", "prove DIR")
 """Commands that name files after a run."""

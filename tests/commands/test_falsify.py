@@ -8,8 +8,8 @@ import pytest
 from commands.conftest import Airground
 
 from airground_drake.commands import falsify as module
-from airground_drake.run.simulation import simulate
-from airground_drake.scenarios.load import load
+from airground_drake.scenario.load import load
+from airground_drake.sim.simulation import simulate
 from airground_drake.verify import judge
 
 SPEC = """

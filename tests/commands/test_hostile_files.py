@@ -18,10 +18,10 @@ from report.cases import FINE, GOING_ROUND, SUCCESS, built, make_scenario, make_
 
 from airground_drake.base import files
 from airground_drake.base.errors import FolderError
-from airground_drake.campaign import store
-from airground_drake.proofs.runs import prove_report
-from airground_drake.run import trace
-from airground_drake.scenarios.load import resolved
+from airground_drake.scenario.load import resolved
+from airground_drake.sim import trace
+from airground_drake.study.campaign import store
+from airground_drake.verify.proofs.runs import prove_report
 
 ROWS = 1_000_000
 FILES: dict[str, Callable[[Path], None]] = {

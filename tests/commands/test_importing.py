@@ -12,12 +12,12 @@ import pytest
 from builders import fields
 from commands.conftest import Airground
 
-from airground_drake.geometry import convex, outline
-from airground_drake.scenarios.load import load
-from airground_drake.scenarios.outlines import outlines_of
-from airground_drake.scenarios.schema import Scenario
+from airground_drake.model.geometry import convex, outline
+from airground_drake.scenario.load import load
+from airground_drake.scenario.outlines import outlines_of
+from airground_drake.scenario.schema import Scenario
 
-MAPS = Path(__file__).parents[1] / "maps" / "data"
+MAPS = Path(__file__).parents[1] / "scenario" / "maps" / "data"
 PILLAR = (
     "<model name='{name}'><pose frame=''>9 9 0 0 0 0</pose><link name='link'><collision name='c'><geometry>{shape}"
     "</geometry></collision></link></model>"

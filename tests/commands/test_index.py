@@ -11,7 +11,7 @@ from commands.conftest import Airground
 from report.cases import FINE, built, make_scenario, make_traces
 
 from airground_drake.commands.index import MARK, PAGE
-from airground_drake.run import trace
+from airground_drake.sim import trace
 
 
 @pytest.fixture(scope="module")

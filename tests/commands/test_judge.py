@@ -15,10 +15,10 @@ import yaml
 from builders import logs
 from commands.conftest import Airground
 
-from airground_drake.export import recording, tables
-from airground_drake.run.simulation import simulate
-from airground_drake.run.trace import Trace
-from airground_drake.scenarios.load import load
+from airground_drake.report.export import recording, tables
+from airground_drake.scenario.load import load
+from airground_drake.sim.simulation import simulate
+from airground_drake.sim.trace import Trace
 
 Run = Callable[[str, str], Trace]
 BETWEEN_M = 5e-4

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from commands.conftest import Airground
 
-from airground_drake.run import trace
+from airground_drake.sim import trace
 
 
 def test_events_are_printed_and_the_trace_is_saved(tmp_path: Path, airground: Airground) -> None:

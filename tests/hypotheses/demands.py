@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from airground_drake.base.arrays import Array
-from airground_drake.scenarios.schema import Scenario
+from airground_drake.scenario.schema import Scenario
 
 
 class Inequalities(NamedTuple):

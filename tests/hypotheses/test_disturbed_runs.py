@@ -12,9 +12,9 @@ from builders.worlds import among_points
 from hypotheses.demands import Demands, limited, nearest, unit
 
 from airground_drake.base.arrays import Array
-from airground_drake.nsbc.avoidance import Avoidance, HalfSpaces
-from airground_drake.scenarios.load import load
-from airground_drake.verify.model.safe_dist import SafeDist
+from airground_drake.model.law.avoidance import Avoidance, HalfSpaces
+from airground_drake.scenario.load import load
+from airground_drake.verify.claims.safe_dist import SafeDist
 
 TOLERANCE = 1e-9
 STEPS = 250

@@ -16,21 +16,21 @@ import numpy as np
 import pytest
 from builders.worlds import world
 
-from airground_drake.audit.companions import Believing
 from airground_drake.base.arrays import Array
-from airground_drake.gatekeeper import outcome_gatekeeper
-from airground_drake.gatekeeper.mpc_gatekeeper import Gatekeepers, GatekeeperState, Inputs
-from airground_drake.gatekeeper.outcome import Outcome, Outlook
-from airground_drake.gatekeeper.outcome_gatekeeper import OutcomeGatekeepers
-from airground_drake.gatekeeper.patience import Patience
-from airground_drake.gatekeeper.rollout import View
-from airground_drake.geometry.motion import Motion
-from airground_drake.intervention.messages import ACCEPT, DONE, REFUSE, answer_to
-from airground_drake.intervention.policy import Proposal
-from airground_drake.nsbc.avoidance import Avoidance
-from airground_drake.nsbc.law import UgvLaw
-from airground_drake.scenarios.load import load
-from airground_drake.verify.model.live_wait import LiveWait
+from airground_drake.model.geometry.motion import Motion
+from airground_drake.model.law.avoidance import Avoidance
+from airground_drake.model.law.ugv_law import UgvLaw
+from airground_drake.report.audit.companions import Believing
+from airground_drake.scenario.load import load
+from airground_drake.uav.messages import ACCEPT, DONE, REFUSE, answer_to
+from airground_drake.uav.policy import Proposal
+from airground_drake.ugv import outcome_gatekeeper
+from airground_drake.ugv.mpc_gatekeeper import Gatekeepers, GatekeeperState, Inputs
+from airground_drake.ugv.outcome import Outcome, Outlook
+from airground_drake.ugv.outcome_gatekeeper import OutcomeGatekeepers
+from airground_drake.ugv.patience import Patience
+from airground_drake.ugv.rollout import View
+from airground_drake.verify.claims.live_wait import LiveWait
 
 MOST_SAMPLES = 20_000
 """Of each attack: else as many as all tries with a rest after each take, and a fifth more."""

@@ -5,18 +5,18 @@ from __future__ import annotations
 import numpy as np
 from builders.worlds import world
 
-from airground_drake.gatekeeper.mpc_gatekeeper import GatekeeperState, Inputs
-from airground_drake.gatekeeper.outcome import Outcome, Outlook
-from airground_drake.gatekeeper.outcome_gatekeeper import OutcomeGatekeepers
-from airground_drake.gatekeeper.patience import Commitment, Patience
-from airground_drake.gatekeeper.rollout import View
-from airground_drake.geometry.motion import Motion
-from airground_drake.intervention.messages import ACCEPT
-from airground_drake.intervention.policy import Proposal
-from airground_drake.nsbc.avoidance import Avoidance
-from airground_drake.nsbc.law import UgvLaw
-from airground_drake.scenarios.load import load
-from airground_drake.systems.controllers import UgvController
+from airground_drake.model.geometry.motion import Motion
+from airground_drake.model.law.avoidance import Avoidance
+from airground_drake.model.law.ugv_law import UgvLaw
+from airground_drake.scenario.load import load
+from airground_drake.sim.blocks.controllers import UgvController
+from airground_drake.uav.messages import ACCEPT
+from airground_drake.uav.policy import Proposal
+from airground_drake.ugv.mpc_gatekeeper import GatekeeperState, Inputs
+from airground_drake.ugv.outcome import Outcome, Outlook
+from airground_drake.ugv.outcome_gatekeeper import OutcomeGatekeepers
+from airground_drake.ugv.patience import Commitment, Patience
+from airground_drake.ugv.rollout import View
 
 PUSHED_M = 0.5
 """How far a UGV is pushed aside, about."""

@@ -1,4 +1,4 @@
-"""The running automata make the transitions of the theorems' models (proofs/Trigger.v, Patience.v).
+"""The running automata make the transitions of the theorems' models (verify/coq/Trigger.v, Patience.v).
 
 Both compare times and levels only. So every order of the values, ties and next floats included, is every case.
 """
@@ -12,8 +12,8 @@ from typing import Any
 
 import pytest
 
-from airground_drake.decision.trigger import Mode, Trigger, TriggerState
-from airground_drake.gatekeeper.patience import Commitment, Patience
+from airground_drake.model.trigger.automaton import Mode, Trigger, TriggerState
+from airground_drake.ugv.patience import Commitment, Patience
 
 SUPERVISING, INTERVENING, REFRACTORY = Mode.SUPERVISING, Mode.INTERVENING, Mode.REFRACTORY
 LEVELS = [(3.0, 1.5, 0.5), (3.0, 3.0, 0.0), (3.0, 3.0, 0.5), (1.5, -0.5, 2.0)]

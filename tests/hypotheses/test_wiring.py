@@ -14,14 +14,15 @@ from hypotheses.wiring import differences
 from pydrake.systems.primitives import LinearSystem
 
 from airground_drake.base.arrays import Array
-from airground_drake.geometry.outline import BASE, MIDDLE
-from airground_drake.intervention.policy import Proposal
-from airground_drake.nsbc.avoidance import Avoidance, limit_speed
-from airground_drake.nsbc.law import UgvLaw
-from airground_drake.scenarios.load import load
-from airground_drake.systems import controllers, diagram
-from airground_drake.systems.plant import OwnPlant, declared
-from airground_drake.world.world import Neighbours
+from airground_drake.model.bodies.world import Neighbours
+from airground_drake.model.geometry.outline import BASE, MIDDLE
+from airground_drake.model.law.avoidance import Avoidance, limit_speed
+from airground_drake.model.law.ugv_law import UgvLaw
+from airground_drake.scenario.load import load
+from airground_drake.sim import diagram
+from airground_drake.sim.blocks import controllers
+from airground_drake.sim.blocks.plant import OwnPlant, declared
+from airground_drake.uav.policy import Proposal
 
 
 def uav_among(

@@ -16,10 +16,10 @@ from hypotheses.demands import Demands, limited, unit
 from pydrake.common.value import Value
 
 from airground_drake.base.arrays import Array
-from airground_drake.geometry.motion import Motion
-from airground_drake.intervention.policy import Proposal
-from airground_drake.scenarios.schema import Scenario
-from airground_drake.systems.diagram import build_model
+from airground_drake.model.geometry.motion import Motion
+from airground_drake.scenario.schema import Scenario
+from airground_drake.sim.diagram import build_model
+from airground_drake.uav.policy import Proposal
 
 ANSWERS = {"none": 1.0, "accepted": 1.0, "refused": -1.0, "silent": 0.0, "answered another": 1.0}
 """What may be the matter with a proposal, and the answer that there is."""

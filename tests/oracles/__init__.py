@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from airground_drake.run.trace import Trace
+from airground_drake.sim.trace import Trace
 from oracles.commands import wrong_commands
 from oracles.communication import wrong_messages
 from oracles.decisions import wrong_decisions

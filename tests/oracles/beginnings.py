@@ -8,8 +8,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from airground_drake.base.arrays import Array
-from airground_drake.run.trace import Trace
-from airground_drake.scenarios.courses import course
+from airground_drake.scenario.courses import course
+from airground_drake.sim.trace import Trace
 from airground_drake.verify.claim import TIME_TOLERANCE_S
 from airground_drake.verify.engines.bodies import law_m, room_of
 from airground_drake.verify.engines.geometry import corner_times, interpolate, travelled

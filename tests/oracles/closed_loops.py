@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from airground_drake.base.arrays import Array
-from airground_drake.run.trace import Trace
+from airground_drake.sim.trace import Trace
 from airground_drake.verify.engines.outlines import Cores, away_from
 from airground_drake.verify.runs.control_law import PLANE, least_speeds, retreats
 from oracles.control_law import Asked, Inequalities, commanded, tracking

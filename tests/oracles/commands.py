@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from airground_drake.base.arrays import Array
-from airground_drake.run.trace import Trace
+from airground_drake.sim.trace import Trace
 from airground_drake.verify.claim import TIME_TOLERANCE_S
 from airground_drake.verify.engines.geometry import corner_times, travelled
 from airground_drake.verify.runs.pairs import preset_of

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from airground_drake.base.arrays import Array
-from airground_drake.run.trace import Trace
+from airground_drake.sim.trace import Trace
 from airground_drake.verify.claim import TIME_TOLERANCE_S
 from airground_drake.verify.engines.outlines import CORNERS, COUNT, MIDDLE
 from airground_drake.verify.runs.demands import outlines_of

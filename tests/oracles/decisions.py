@@ -12,14 +12,14 @@ from typing import NamedTuple
 import numpy as np
 
 from airground_drake.base.arrays import Array
-from airground_drake.run.trace import Trace
-from airground_drake.scenarios.schema import Gatekeeper
+from airground_drake.scenario.schema import Gatekeeper
+from airground_drake.sim.trace import Trace
 from airground_drake.verify.claim import TIME_TOLERANCE_S
+from airground_drake.verify.claims.gate_plan import BLOCKS, Bounded, bound, cheapest_of_blocks
 from airground_drake.verify.engines.geometry import interpolate, travelled
 from airground_drake.verify.engines.outlines import Cores, away_from
 from airground_drake.verify.runs.control_law import ON_TOP
 from airground_drake.verify.runs.convex_bounds import Enclosure
-from airground_drake.verify.runs.gate_plan import BLOCKS, Bounded, bound, cheapest_of_blocks
 from airground_drake.verify.runs.gate_record import (
     POSITION_TOLERANCE_M,
     DecisionRecord,

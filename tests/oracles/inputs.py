@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from airground_drake.base.arrays import Array
-from airground_drake.run.trace import Trace
+from airground_drake.sim.trace import Trace
 from airground_drake.verify.claim import TIME_TOLERANCE_S
 from airground_drake.verify.engines.geometry import interpolate
 from airground_drake.verify.engines.outlines import (

@@ -11,17 +11,18 @@ import pytest
 from builders.misbuilt import Patch
 
 from airground_drake.base.arrays import Array
-from airground_drake.gatekeeper.patience import Commitment, Patience
-from airground_drake.gatekeeper.rollout import ClosedLoop
-from airground_drake.geometry.outline import moved
-from airground_drake.intervention import database
-from airground_drake.intervention.messages import accepted_proposals
-from airground_drake.intervention.planner import Planner
-from airground_drake.intervention.policy import Proposal
-from airground_drake.nsbc import law
-from airground_drake.systems import components, controllers, diagram
-from airground_drake.systems.gatekeeper import Gatekeeper
-from airground_drake.world.world import Kind, Neighbours, World
+from airground_drake.model.bodies.world import Kind, Neighbours, World
+from airground_drake.model.geometry.outline import moved
+from airground_drake.model.law import ugv_law as law
+from airground_drake.sim import components, diagram
+from airground_drake.sim.blocks import controllers
+from airground_drake.sim.blocks.gatekeeper import Gatekeeper
+from airground_drake.uav import database
+from airground_drake.uav.messages import accepted_proposals
+from airground_drake.uav.planner import Planner
+from airground_drake.uav.policy import Proposal
+from airground_drake.ugv.patience import Commitment, Patience
+from airground_drake.ugv.rollout import ClosedLoop
 
 PATIENCE = ["gatekeeper.tries=1", "gatekeeper.longest_s=1.0", "gatekeeper.rest_s=3.0", "intervention.retry_s=0.5"]
 """A UGV goes along once, for 1 s, and then not before it has been on its own for 3 s."""

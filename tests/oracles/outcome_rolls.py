@@ -9,8 +9,8 @@ import numpy as np
 import numpy.typing as npt
 
 from airground_drake.base.arrays import Array
-from airground_drake.run.trace import Trace
-from airground_drake.scenarios.schema import Scenario
+from airground_drake.scenario.schema import Scenario
+from airground_drake.sim.trace import Trace
 from oracles.beginnings import Beginning, beginning
 from oracles.closed_loops import NUDGES_M, Scene, in_batches, roll_out, stacked
 from oracles.way_left import bounds_of_way_left

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from airground_drake.base.arrays import Array
-from airground_drake.run.trace import Trace
+from airground_drake.sim.trace import Trace
 from airground_drake.verify.runs.control_law import ON_TOP
 from airground_drake.verify.runs.gate_record import DecisionRecord, rows_of
 from airground_drake.verify.runs.pairs import pairs_beside

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import zip_longest
 
-from airground_drake.run.trace import Trace
+from airground_drake.sim.trace import Trace
 from airground_drake.verify.claim import TIME_TOLERANCE_S
 from airground_drake.verify.runs.acceptances import METHOD
 from airground_drake.verify.runs.gate_record import DecisionRecord, rows_of

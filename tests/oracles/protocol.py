@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from airground_drake.run.trace import Trace
+from airground_drake.sim.trace import Trace
 from airground_drake.verify.claim import TIME_TOLERANCE_S
 from airground_drake.verify.runs.instants import GATED_METHODS, row_at
 from airground_drake.verify.runs.proposals import ProposalRecord, proposals_of

@@ -32,13 +32,13 @@ from verify.runs.cases import (
     swapped,
 )
 
-from airground_drake.gatekeeper.answer import Rules, settle
-from airground_drake.gatekeeper.solution import Solution
-from airground_drake.intervention.messages import ACCEPT, REFUSE, SILENT
-from airground_drake.run.trace import Trace
-from airground_drake.scenarios.schema import Gatekeeper
+from airground_drake.scenario.schema import Gatekeeper
+from airground_drake.sim.trace import Trace
+from airground_drake.uav.messages import ACCEPT, REFUSE, SILENT
+from airground_drake.ugv.answer import Rules, settle
+from airground_drake.ugv.solution import Solution
 from airground_drake.verify.claim import TIME_TOLERANCE_S
-from airground_drake.verify.runs.gate_plan import Bounded, bound
+from airground_drake.verify.claims.gate_plan import Bounded, bound
 from airground_drake.verify.runs.gate_record import POSITION_TOLERANCE_M, DecisionRecord, rows_of
 from oracles.decisions import GAP_TOLERANCE, OVERSTATED, UNDERSTATED, rule, wrong_decisions
 

@@ -9,13 +9,13 @@ import pytest
 from builders.misbuilt import Patch
 from verify.judging import decided
 
-from airground_drake.gatekeeper import outcome, problem
-from airground_drake.gatekeeper.patience import Patience
-from airground_drake.gatekeeper.rollout import ACCEPTED, REFUSED, ClosedLoop, closed_loop
-from airground_drake.geometry.outline import moved
-from airground_drake.run.simulation import simulate
-from airground_drake.scenarios.load import load
-from airground_drake.systems import components
+from airground_drake.model.geometry.outline import moved
+from airground_drake.scenario.load import load
+from airground_drake.sim import components
+from airground_drake.sim.simulation import simulate
+from airground_drake.ugv import outcome, problem
+from airground_drake.ugv.patience import Patience
+from airground_drake.ugv.rollout import ACCEPTED, REFUSED, ClosedLoop, closed_loop
 from oracles import Fault, faults_of
 from oracles.mutants import (
     FAR_UAV,

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from airground_drake.base.arrays import Array
-from airground_drake.nsbc import kernels
+from airground_drake.model.law import kernels
 from oracles.control_law import Inequalities, avoiding
 from oracles.projection import closest, least_violation
 

@@ -31,15 +31,15 @@ from verify.runs.cases import (
 
 from airground_drake.base.arrays import Array
 from airground_drake.base.errors import TraceError
-from airground_drake.geometry import outline
-from airground_drake.registry import method_of
-from airground_drake.run.simulation import simulate
-from airground_drake.run.tables import SEEN_COLUMNS, typed
-from airground_drake.run.trace import Trace
-from airground_drake.scenarios.schema import Obstacle, Scenario
-from airground_drake.scenarios.world import make_world
-from airground_drake.systems import UgvController
-from airground_drake.systems.components import make_law
+from airground_drake.base.registry import method_of
+from airground_drake.model.geometry import outline
+from airground_drake.scenario.schema import Obstacle, Scenario
+from airground_drake.scenario.world import make_world
+from airground_drake.sim.blocks import UgvController
+from airground_drake.sim.components import make_law
+from airground_drake.sim.simulation import simulate
+from airground_drake.sim.tables import SEEN_COLUMNS, typed
+from airground_drake.sim.trace import Trace
 from airground_drake.verify.engines.outlines import RADIUS, unpacked
 from airground_drake.verify.runs.proposals import proposals_of
 from oracles import ORACLES, commands, predictions

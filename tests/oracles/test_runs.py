@@ -15,14 +15,14 @@ from builders.rooms import room
 from random_scenarios import draw
 
 from airground_drake.base.arrays import Array
-from airground_drake.gatekeeper import outcome, outcome_gatekeeper
-from airground_drake.geometry import outline
-from airground_drake.run.simulation import simulate
-from airground_drake.run.trace import Trace
-from airground_drake.scenarios import world
-from airground_drake.scenarios.load import from_data, load, resolved
-from airground_drake.scenarios.schema import Moves, Obstacle, Policy, Preset, Scenario, Ugv
-from airground_drake.scenarios.shipped import shipped
+from airground_drake.model.geometry import outline
+from airground_drake.scenario import world
+from airground_drake.scenario.load import from_data, load, resolved
+from airground_drake.scenario.schema import Moves, Obstacle, Policy, Preset, Scenario, Ugv
+from airground_drake.scenario.shipped import shipped
+from airground_drake.sim.simulation import simulate
+from airground_drake.sim.trace import Trace
+from airground_drake.ugv import outcome, outcome_gatekeeper
 from airground_drake.verify.engines.outlines import Cores
 from oracles import ORACLES, beginnings, control_law, faults_of, inputs, predictions, way_left
 from oracles.mutants import PATIENCE, one_direction
@@ -173,7 +173,7 @@ def test_a_uav_with_another_task_is_not_judged(case_a: Scenario) -> None:
     trace = simulate(case_a, "a")
     altered = with_scenario(trace, uav__altitude_m=3.0)
     assert [fault.robot for fault in ORACLES["commands"](altered)] == ["uav"]
-    assert not ORACLES["commands"](with_scenario(altered, uav__task="airground_drake.nsbc.tasks:FormationTask"))
+    assert not ORACLES["commands"](with_scenario(altered, uav__task="airground_drake.model.law.tasks:FormationTask"))
 
 
 def test_stages_of_several_control_periods() -> None:

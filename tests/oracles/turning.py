@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from airground_drake.base.arrays import Array
-from airground_drake.run.trace import Trace
+from airground_drake.sim.trace import Trace
 
 UNLIMITED = np.array([0.0, np.inf, 0.0, np.inf])
 """The numbers of a robot that is no unicycle: hand point, m, turning limit, rad/s, wheel base, m, wheel speed, m/s."""

@@ -8,11 +8,11 @@ from typing import Any
 
 from builders.paths import Corners, along
 
-from airground_drake.audit import of_runs
 from airground_drake.base.statuses import Status
 from airground_drake.report import document
-from airground_drake.run.trace import Trace
-from airground_drake.scenarios.schema import Choice, Decision, Obstacle, Preset, Reproduction, Run, Scenario, Uav, Ugv
+from airground_drake.report.audit import of_runs
+from airground_drake.scenario.schema import Choice, Decision, Obstacle, Preset, Reproduction, Run, Scenario, Uav, Ugv
+from airground_drake.sim.trace import Trace
 from airground_drake.verify.claim import TraceClaim, Verdict
 from airground_drake.verify.finding import Finding
 

@@ -7,8 +7,8 @@ from report.cases import make_scenario, make_traces
 
 from airground_drake.report.figures import draw
 from airground_drake.report.figures.panels import Figure
-from airground_drake.run.trace import Trace
-from airground_drake.scenarios.schema import Scenario
+from airground_drake.scenario.schema import Scenario
+from airground_drake.sim.trace import Trace
 
 
 @pytest.fixture(scope="session")

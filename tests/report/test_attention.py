@@ -10,10 +10,10 @@ from hypothesis import strategies as st
 from report.cases import FINE, built, verdict
 
 from airground_drake.report import attention, phrases
-from airground_drake.run.simulation import simulate
-from airground_drake.run.trace import Trace
-from airground_drake.scenarios.load import load
-from airground_drake.scenarios.schema import Scenario
+from airground_drake.scenario.load import load
+from airground_drake.scenario.schema import Scenario
+from airground_drake.sim.simulation import simulate
+from airground_drake.sim.trace import Trace
 
 AT = {"first": "ugv1", "second": "obstacle_1", "t_s": 7.717}
 TOO_NEAR = {"min_distance_m": 0.0, "safe_distance_m": 2.0, "margin_m": -2.0}

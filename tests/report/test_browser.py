@@ -15,12 +15,11 @@ from axe_playwright_python.sync_playwright import Axe
 from playwright.sync_api import Browser, Page, sync_playwright
 from report.cases import FINE, built, verdict
 
-from airground_drake import audit
 from airground_drake.commands import index
-from airground_drake.report import document, html
+from airground_drake.report import audit, document, html
 from airground_drake.report.figures import draw
-from airground_drake.run.trace import Trace
-from airground_drake.scenarios.schema import Scenario
+from airground_drake.scenario.schema import Scenario
+from airground_drake.sim.trace import Trace
 
 CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
 NARROW, WIDE, WAIT_MS = 390, 1280, 120_000

@@ -12,9 +12,9 @@ import pytest
 
 from airground_drake.report import make, terminal
 from airground_drake.report.__main__ import main
-from airground_drake.run import trace
-from airground_drake.run.simulation import simulate
-from airground_drake.scenarios.load import load, shipped
+from airground_drake.scenario.load import load, shipped
+from airground_drake.sim import trace
+from airground_drake.sim.simulation import simulate
 from airground_drake.verify import __main__ as judge
 
 ROOT = Path(__file__).parents[2]

@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 from report.cases import FINE, GOING_ROUND, STALL, Kept, built, make_trace, verdict
 
-from airground_drake.audit import of_runs
 from airground_drake.report import attention, document, junit, screen
-from airground_drake.run.trace import Trace
-from airground_drake.scenarios.schema import Scenario
+from airground_drake.report.audit import of_runs
+from airground_drake.scenario.schema import Scenario
+from airground_drake.sim.trace import Trace
 from airground_drake.verify.claim import Verdict
 from airground_drake.verify.finding import Finding
 

@@ -18,13 +18,13 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from report.cases import FLIGHT, event, make_scenario, make_trace
 
-from airground_drake.campaign.page import _histogram
 from airground_drake.report.figures import clock, draw, maps, timelines
 from airground_drake.report.figures.panels import Figure
-from airground_drake.run.trace import Trace
-from airground_drake.scenarios.schema import Run, Scenario
-from airground_drake.view import canvas, labels, svg
-from airground_drake.view.plane import frame_of, thumbnail_of
+from airground_drake.report.view import canvas, labels, svg
+from airground_drake.report.view.plane import frame_of, thumbnail_of
+from airground_drake.scenario.schema import Run, Scenario
+from airground_drake.sim.trace import Trace
+from airground_drake.study.campaign.page import _histogram
 
 
 def test_bytes_do_not_depend_on_the_time_or_the_user(

@@ -7,14 +7,14 @@ import xml.etree.ElementTree as ET
 import numpy as np
 import pytest
 
-from airground_drake.audit.formulas import formula_findings
-from airground_drake.audit.runs import findings as findings_of_runs
-from airground_drake.audit.thresholds import threshold_findings
+from airground_drake.report.audit.formulas import formula_findings
+from airground_drake.report.audit.runs import findings as findings_of_runs
+from airground_drake.report.audit.thresholds import threshold_findings
 from airground_drake.report.figures import findings
 from airground_drake.report.figures.lines import Lines
-from airground_drake.scenarios.load import load
-from airground_drake.testing.plugin import Simulations
-from airground_drake.view import canvas
+from airground_drake.report.view import canvas
+from airground_drake.scenario.load import load
+from airground_drake.study.testing.plugin import Simulations
 
 
 def test_what_is_computed_is_drawn_with_its_marks() -> None:

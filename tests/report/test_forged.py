@@ -11,8 +11,8 @@ import pytest
 from report.cases import FINE, GOING_ROUND, SUCCESS, built, make_scenario, make_trace, make_traces
 
 from airground_drake.commands import main
-from airground_drake.run import trace
-from airground_drake.scenarios.load import resolved
+from airground_drake.scenario.load import resolved
+from airground_drake.sim import trace
 
 HOSTILE = "<script>alert(1)</script>"
 FORGED = dict.fromkeys(("robots", "run", "method", "scenario"), (0, 0, 2, 2)) | {"events": (0,) * 4}

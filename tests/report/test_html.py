@@ -17,8 +17,8 @@ from airground_drake.base.statuses import STATUSES
 from airground_drake.report import attention, document, html
 from airground_drake.report.figures import draw
 from airground_drake.report.figures.panels import Figure
-from airground_drake.run.trace import Trace
-from airground_drake.scenarios.schema import Run, Scenario
+from airground_drake.scenario.schema import Run, Scenario
+from airground_drake.sim.trace import Trace
 from airground_drake.verify.claim import Verdict
 from airground_drake.verify.finding import Finding
 

@@ -13,9 +13,9 @@ from oracles.mutants import PATIENCE
 from airground_drake.report.document import expected_numbers
 from airground_drake.report.interventions import farthest_from_prediction, interventions, messages
 from airground_drake.report.metrics import of_run
-from airground_drake.run.simulation import simulate
-from airground_drake.run.trace import Trace
-from airground_drake.scenarios.load import load
+from airground_drake.scenario.load import load
+from airground_drake.sim.simulation import simulate
+from airground_drake.sim.trace import Trace
 
 Run = Callable[[str, str], Trace]
 

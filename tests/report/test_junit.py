@@ -7,8 +7,8 @@ import xml.etree.ElementTree as ET
 from report.cases import FINE, built, verdict
 
 from airground_drake.report import junit
-from airground_drake.run.trace import Trace
-from airground_drake.scenarios.schema import Scenario
+from airground_drake.scenario.schema import Scenario
+from airground_drake.sim.trace import Trace
 
 
 def test_junit_counts(scenario: Scenario, traces: dict[str, Trace]) -> None:

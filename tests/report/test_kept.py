@@ -9,11 +9,11 @@ from typing import Any
 
 import pytest
 
-from airground_drake.audit import of_runs
 from airground_drake.report import make
-from airground_drake.run.trace import Trace
-from airground_drake.scenarios.load import load
-from airground_drake.scenarios.schema import Scenario
+from airground_drake.report.audit import of_runs
+from airground_drake.scenario.load import load
+from airground_drake.scenario.schema import Scenario
+from airground_drake.sim.trace import Trace
 from airground_drake.verify import Verdict
 
 pytestmark = pytest.mark.slow

@@ -14,10 +14,10 @@ from airground_drake.check.report import check_files
 from airground_drake.check.rules import Disagreement
 from airground_drake.report import folder, rebuild
 from airground_drake.report.after_runs import _map_files
-from airground_drake.scenarios.load import from_data
-from airground_drake.scenarios.schema import MapCells, Scenario
+from airground_drake.scenario.load import from_data
+from airground_drake.scenario.schema import MapCells, Scenario
 
-MAPS = Path(__file__).parents[1] / "maps" / "data"
+MAPS = Path(__file__).parents[1] / "scenario" / "maps" / "data"
 NAMES = ["map/turtlebot3_world.pgm", "map/turtlebot3_world.yaml"]
 START, TARGET = [-2.0, -0.5, 0.0], [0.5, 0.5, 0.0]
 DATA: dict[str, Any] = {

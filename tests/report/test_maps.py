@@ -15,14 +15,14 @@ from airground_drake.report.facts import RunFacts
 from airground_drake.report.outcomes import Document
 from airground_drake.report.phrases import bodies_of
 from airground_drake.report.screen import Row, first_screen
-from airground_drake.run.events import extract
-from airground_drake.run.simulation import simulate
-from airground_drake.run.trace import Trace
-from airground_drake.scenarios.load import from_data
-from airground_drake.scenarios.shapes import corners_of_map
+from airground_drake.scenario.load import from_data
+from airground_drake.scenario.shapes import corners_of_map
+from airground_drake.sim.events import extract
+from airground_drake.sim.simulation import simulate
+from airground_drake.sim.trace import Trace
 from airground_drake.verify import judge
 
-MAPS = Path(__file__).parents[1] / "maps" / "data"
+MAPS = Path(__file__).parents[1] / "scenario" / "maps" / "data"
 
 
 @pytest.fixture(scope="module")

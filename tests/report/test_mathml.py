@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import xml.etree.ElementTree as ET
 
-from airground_drake.audit.typeset import FORMULAS
+from airground_drake.report.audit.typeset import FORMULAS
 from airground_drake.report.mathml import mathml
 from airground_drake.verify.registry import model_claims, run_claims
 

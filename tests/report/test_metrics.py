@@ -14,10 +14,10 @@ from report.cases import GOING_ROUND, event, make_scenario, make_trace
 
 from airground_drake.base.progress import SILENT
 from airground_drake.report import after_runs, metrics
-from airground_drake.run.simulation import simulate
-from airground_drake.run.trace import Trace
-from airground_drake.scenarios.load import load
-from airground_drake.scenarios.schema import Preset
+from airground_drake.scenario.load import load
+from airground_drake.scenario.schema import Preset
+from airground_drake.sim.simulation import simulate
+from airground_drake.sim.trace import Trace
 
 
 def test_metrics_of_robot_pairs_and_events(traces: dict[str, Trace]) -> None:

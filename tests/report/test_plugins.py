@@ -16,7 +16,7 @@ from builders.hostile_policies import KINDS
 
 from airground_drake import commands
 from airground_drake.report.__main__ import main
-from airground_drake.scenarios.shipped import shipped_files
+from airground_drake.scenario.shipped import shipped_files
 from airground_drake.verify import __main__ as judge
 
 Report = Callable[[str], Path]
@@ -33,7 +33,7 @@ EVIL = """
 import os
 if os.environ["JUDGING"] == str(os.getpid()):
     raise AssertionError("imported in the process of the command line")
-from airground_drake.intervention.policy import Policy
+from airground_drake.uav.policy import Policy
 class It(Policy):
     def propose(self, seen): return None
 """
@@ -107,7 +107,7 @@ def test_third_party_code_is_refused_unless_it_is_allowed(
 
 
 CRASHES = """
-from airground_drake.intervention.policy import Policy
+from airground_drake.uav.policy import Policy
 class It(Policy):
     def propose(self, seen):
         print("asked")
@@ -151,7 +151,7 @@ def test_names_of_no_module_are_one_line(name: str, capsys: pytest.CaptureFixtur
     [
         (f"{ROUTE}import os; os._exit(0)", IN_C, 4, "died (exit code 0)"),
         (f"{ROUTE}raise SystemExit(0)", IN_C, 4, "SystemExit: 0"),
-        (f"{ROUTE}return True", IN_C, 4, "route It returned True, of type bool; allowed: airground_drake.gatekeeper."),
+        (f"{ROUTE}return True", IN_C, 4, "route It returned True, of type bool; allowed: airground_drake.ugv."),
         (f"{ROUTE}raise KeyError(7)", IN_C, 4, "route It raised evil_"),
         ("import sys; sys.exit(0)", IN_C, 2, "cannot be imported: SystemExit: 0"),
         ("import os; os._exit(0)", JUDGED, 4, "the process of this command died (exit code 0)"),

@@ -14,9 +14,9 @@ from airground_drake.base.errors import ReportError
 from airground_drake.check.files import names_in
 from airground_drake.check.report import check_files
 from airground_drake.report import document, html, proved
-from airground_drake.run import trace
-from airground_drake.run.trace import Trace
-from airground_drake.scenarios.schema import Scenario
+from airground_drake.scenario.schema import Scenario
+from airground_drake.sim import trace
+from airground_drake.sim.trace import Trace
 
 NEAR = {"first": "ugv1", "second": "uav", "safe_distance_m": 2.0, "least_m": 0.5, "short_m": 1.5, "t_s": 13.0}
 ANSWERS: dict[str, dict[str, Any]] = {

@@ -13,8 +13,8 @@ from report.cases import GOING_ROUND, STALL, STALLING, SUCCESS, event, make_scen
 
 from airground_drake.report import reproduction
 from airground_drake.report.reproduction import MEASURES
-from airground_drake.run.trace import Trace
-from airground_drake.scenarios.schema import Scenario
+from airground_drake.scenario.schema import Scenario
+from airground_drake.sim.trace import Trace
 
 
 def measured(name: str, corners: Corners = STALLING, events: Sequence[dict[str, Any]] = (), **more: Any) -> list[float]:

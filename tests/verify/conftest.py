@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 from verify.judging import Judged
 
-from airground_drake.scenarios.load import load
+from airground_drake.scenario.load import load
 from airground_drake.verify.cache import cache_folder, cached_finding
 from airground_drake.verify.claim import ModelClaim
 from airground_drake.verify.finding import Finding

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any, Protocol
 
-from airground_drake.run.trace import Trace
+from airground_drake.sim.trace import Trace
 from airground_drake.verify import TRACE_CLAIMS, Finding
 from airground_drake.verify.claim import ModelClaim
 

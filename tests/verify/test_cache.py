@@ -13,7 +13,7 @@ import pytest
 
 import airground_drake
 from airground_drake.base import files
-from airground_drake.scenarios.schema import Scenario
+from airground_drake.scenario.schema import Scenario
 from airground_drake.verify import cache
 from airground_drake.verify.claim import ModelClaim
 from airground_drake.verify.finding import Evidence, Finding

@@ -12,11 +12,11 @@ from builders.edits import bumped, dropped, rows, set_nan, with_meta, with_scena
 from builders.runs import passing_by, run_of
 from verify.judging import CLAIMS, GATE, UNRECORDED, decided
 
-from airground_drake.run.trace import Trace, load, save
-from airground_drake.scenarios.schema import Scenario
+from airground_drake.scenario.schema import Scenario
+from airground_drake.sim.trace import Trace, load, save
 from airground_drake.verify import Finding, judge, judge_model
+from airground_drake.verify.claims.safe_budget import SafeBudget
 from airground_drake.verify.finding import Failure
-from airground_drake.verify.model.safe_budget import SafeBudget
 
 
 @pytest.mark.parametrize("method", "abcd")

@@ -15,9 +15,9 @@ from builders.edits import with_meta, with_samples
 from verify.judging import CLAIMS, decided
 
 from airground_drake.base.statuses import NOTHING, declared, meets, outcome
-from airground_drake.run.simulation import simulate
-from airground_drake.run.trace import Trace
-from airground_drake.scenarios.load import load
+from airground_drake.scenario.load import load
+from airground_drake.sim.simulation import simulate
+from airground_drake.sim.trace import Trace
 from airground_drake.verify import Finding, judge
 from airground_drake.verify.__main__ import main
 from airground_drake.verify.claim import Verdict, well_formed

@@ -9,27 +9,42 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import airground_drake
+from airground_drake.base.registry import RUN_CLAIMS
+from airground_drake.verify.claim import TraceClaim
 
 PACKAGE = Path(airground_drake.__file__).parent
+ABOUT_RUNS = {
+    RUN_CLAIMS.load(name, of=TraceClaim).__module__.removeprefix("airground_drake.") for name in RUN_CLAIMS.own
+}
+"""The modules of the claims about a run."""
 ALLOWED: dict[str, set[str]] = {
     "engines": {
-        "base.arrays", "base.interruption", "base.statuses", "scenarios.schema", "verify.engines", "verify.finding",
-        "world.motion",
+        "base.arrays", "base.interruption", "base.statuses", "model.bodies.motion", "scenario.schema",
+        "verify.engines", "verify.finding",
     },
     "runs": {
-        "base.arrays", "base.errors", "base.exact", "run.collisions", "run.tables", "run.trace", "scenarios.plants",
-        "scenarios.schema", "scenarios.shapes", "verify.engines", "verify.runs", "verify.claim", "verify.finding",
-        "verify.model.theorem",
+        "base.arrays", "base.errors", "base.exact", "scenario.plants", "scenario.schema", "scenario.shapes",
+        "sim.collisions", "sim.tables", "sim.trace", "verify.claim", "verify.engines", "verify.finding",
+        "verify.model.theorem", "verify.runs", *ABOUT_RUNS,
     },
 }  # fmt: skip
-"""By folder of verify/, what its modules may import of this package."""
+"""By folder of verify/, what its modules may import of this package; claims about a run stand beside `runs`."""
 JUDGED = {
-    "geometry", "nsbc", "gatekeeper", "systems", "decision", "run.simulation", "intervention", "world.world",
-    "scenarios.world",
+    "model.bodies.world", "model.geometry", "model.law", "model.trigger", "scenario.world", "sim.blocks",
+    "sim.components", "sim.diagram", "sim.simulation", "uav", "ugv",
 }  # fmt: skip
 """Also the pair table of the World: claims read distances and shares from the scenario."""
-DATA = {"geometry.motion"}
+DATA = {"model.geometry.motion"}
 """Types of the data of a scenario, which compute nothing that is judged: the way of an obstacle that moves."""
+
+
+def modules(folder: str) -> Iterator[Path]:
+    """The files of a folder of verify/ with the claims that belong to it: `runs`, `model` or `engines`."""
+    yield from (PACKAGE / "verify" / folder).rglob("*.py")
+    for path in (PACKAGE / "verify" / "claims").rglob("*.py"):
+        about = "runs" if f"verify.claims.{path.stem}" in ABOUT_RUNS else "model"
+        if about == folder:
+            yield path
 
 
 def imported(path: Path) -> Iterator[str]:
@@ -47,15 +62,15 @@ def within(name: str, places: set[str]) -> bool:
 
 def test_a_folder_imports_only_what_it_may() -> None:
     for folder, allowed in ALLOWED.items():
-        for path in (PACKAGE / "verify" / folder).rglob("*.py"):
+        for path in modules(folder):
             assert all(within(name, allowed) for name in imported(path)), path
-    for path in (PACKAGE / "verify" / "model").rglob("*.py"):  # claims about the model look at no run
-        assert not any(within(name, {"verify.runs"}) for name in imported(path)), path
+    for path in modules("model"):  # claims about the model look at no run
+        assert not any(within(name, {"verify.runs", *ABOUT_RUNS}) for name in imported(path)), path
 
 
 def test_what_runs_may_import_loads_nothing_that_is_judged() -> None:
-    """Not even at second hand: neither `runs` nor anything that it imports."""
-    todo, seen = [*(PACKAGE / "verify" / "runs").rglob("*.py")], set[Path]()
+    """Not even at second hand: neither claims about a run nor anything that they import."""
+    todo, seen = [*modules("runs")], set[Path]()
     while todo:
         path = todo.pop()
         seen.add(path)
@@ -64,14 +79,14 @@ def test_what_runs_may_import_loads_nothing_that_is_judged() -> None:
             module = PACKAGE.joinpath(*name.split("."))
             files = module.with_suffix(".py"), module.parent.with_suffix(".py")
             todo += [file for file in files if file.is_file() and file not in seen]
-    assert {"geometry.py", "claim.py", "trace.py"} <= {path.name for path in seen}
+    assert {"geometry.py", "claim.py", "trace.py", "safe_trace.py"} <= {path.name for path in seen}
 
 
 def test_judging_loads_no_drake() -> None:
     """Claims can be judged again where Drake is not installed."""
     code = (
-        "import sys; from airground_drake.scenarios.load import load; from airground_drake.verify import judge_model; "
-        "from airground_drake.registry import MODEL_CLAIMS; "
+        "import sys; from airground_drake.scenario.load import load; from airground_drake.verify import judge_model; "
+        "from airground_drake.base.registry import MODEL_CLAIMS; "
         "from airground_drake.verify.registry import run_claims; run_claims(); "
         "ids = [name for name in MODEL_CLAIMS if name != 'ZENO-REFINE']; "
         "judge_model(load('case_a'), claims=ids); print('pydrake' in sys.modules)"

@@ -13,8 +13,8 @@ from builders.runs import run_of
 
 import airground_drake.verify
 from airground_drake.base.errors import PluginError, UnknownNameError
-from airground_drake.registry import MODEL_CLAIMS, RUN_CLAIMS
-from airground_drake.scenarios.schema import Scenario
+from airground_drake.base.registry import MODEL_CLAIMS, RUN_CLAIMS
+from airground_drake.scenario.schema import Scenario
 from airground_drake.verify import judge, judge_model, registry
 from airground_drake.verify.claim import Claim, ModelClaim, TraceClaim
 
@@ -56,7 +56,11 @@ def test_an_unknown_claim_is_refused_with_what_is_allowed(case_a: Scenario) -> N
 def test_nothing_is_imported_before_use() -> None:
     code = "import sys, airground_drake.verify.registry as r; [*r.RUN_CLAIMS]; print(*sys.modules)"
     loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
-    assert not [name for name in loaded if name.startswith(("pydrake", "cvxpy", "airground_drake.verify.model"))]
+    assert not [
+        name
+        for name in loaded
+        if name.startswith(("pydrake", "cvxpy", "airground_drake.verify.claims", "airground_drake.verify.model"))
+    ]
 
 
 def test_claims_of_one_name_in_files_of_two_folders_are_two(tmp_path: Path) -> None:
@@ -64,7 +68,7 @@ def test_claims_of_one_name_in_files_of_two_folders_are_two(tmp_path: Path) -> N
     for folder in ("one", "two"):
         (tmp_path / folder).mkdir()
         (tmp_path / folder / "claims.py").write_text(
-            "from airground_drake.verify.runs.live_goal import LiveGoal\n"
+            "from airground_drake.verify.claims.live_goal import LiveGoal\n"
             f"class Mine(LiveGoal):\n    id = 'MINE'\n    summary = {folder!r}\n"
         )
         with pytest.MonkeyPatch.context() as patch:

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from airground_drake.base.arrays import Array
-from airground_drake.view.canvas import ticks_of
+from airground_drake.report.view.canvas import ticks_of
 
 AROUND_S, CUT_S, MAX_CUTS = 0.7, 1.0, 5
 """Time shown before and after an event, shortest time that is cut out, s, and maximum number of cuts."""

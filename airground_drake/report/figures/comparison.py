@@ -9,8 +9,8 @@ import numpy as np
 from airground_drake.report.figures import timelines
 from airground_drake.report.figures.panels import Figure, panel, series
 from airground_drake.report.metrics import closest_obstacle
-from airground_drake.run.trace import Trace
-from airground_drake.scenarios.schema import Scenario
+from airground_drake.scenario.schema import Scenario
+from airground_drake.sim.trace import Trace
 
 MAX_RUNS = 6
 

@@ -13,18 +13,18 @@ from typing import Any
 import numpy as np
 
 from airground_drake.base.errors import TraceError, one_line
-from airground_drake.registry import method_of
+from airground_drake.base.registry import method_of
 from airground_drake.report.figures import comparison, maps, timelines
 from airground_drake.report.figures.panels import MAX_TABLE_ROWS, Figure, Panel, Table, panel, series
 from airground_drake.report.metrics import Nearby, close_by, events_of, gap_m, radius_m
 from airground_drake.report.outcomes import SLACK_M, distance, named
 from airground_drake.report.reproduction import MEASURES
 from airground_drake.report.rules import SETTINGS
-from airground_drake.run.trace import Trace
-from airground_drake.scenarios.schema import Scenario
-from airground_drake.view import canvas
-from airground_drake.view.plane import frame_of
-from airground_drake.view.stage import barriers_of
+from airground_drake.report.view import canvas
+from airground_drake.report.view.plane import frame_of
+from airground_drake.report.view.stage import barriers_of
+from airground_drake.scenario.schema import Scenario
+from airground_drake.sim.trace import Trace
 
 MAX_RUNS, MAX_UGVS, MAX_TEAM = 6, 4, 6
 """Maximum numbers of runs, of UGVs in the figure of distances, and of UGVs by name. Larger teams get histograms."""

@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 
 from airground_drake.base.arrays import Array
-from airground_drake.decision.bayes import decision_time, optimal_threshold
+from airground_drake.model.trigger.bayes import decision_time, optimal_threshold
 from airground_drake.report.figures.lines import Lines
 from airground_drake.report.figures.panels import Figure
-from airground_drake.view import canvas
+from airground_drake.report.view import canvas
 
 POINTS = 200
 

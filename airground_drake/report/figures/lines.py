@@ -10,7 +10,7 @@ from matplotlib.figure import Figure as Drawing
 
 from airground_drake.base.arrays import Array
 from airground_drake.report.figures.panels import MAX_TABLE_ROWS, Figure, Table, panel
-from airground_drake.view import canvas
+from airground_drake.report.view import canvas
 
 NAME_CHARS = 24
 """Longest name that fits beside the axes."""

@@ -11,17 +11,17 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from airground_drake.base.arrays import Array
-from airground_drake.gatekeeper.reasons import refusal
-from airground_drake.registry import method_of
+from airground_drake.base.registry import method_of
 from airground_drake.report.interventions import interventions
 from airground_drake.report.metrics import events_of
 from airground_drake.report.sentences import grouped
 from airground_drake.report.stalls import stalls
-from airground_drake.run.trace import Trace
+from airground_drake.report.view.canvas import ALARM, GOOD, INK, MUTED, WIDE_IN, short, stretches, thin
+from airground_drake.report.view.labels import Label, place
+from airground_drake.report.view.plane import Frame, axes_over, draw_barriers, draw_robot, looks_of
+from airground_drake.sim.trace import Trace
+from airground_drake.ugv.reasons import refusal
 from airground_drake.verify.runs.proposals import proposal_of
-from airground_drake.view.canvas import ALARM, GOOD, INK, MUTED, WIDE_IN, short, stretches, thin
-from airground_drake.view.labels import Label, place
-from airground_drake.view.plane import Frame, axes_over, draw_barriers, draw_robot, looks_of
 
 MAX_MARKS = 8
 """Maximum number of marks of a run that are told one by one."""

@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from airground_drake.decision.bayes import bayes_risk
+from airground_drake.model.trigger.bayes import bayes_risk
 from airground_drake.report.figures.lines import Lines
 from airground_drake.report.figures.panels import Figure
-from airground_drake.view import canvas
+from airground_drake.report.view import canvas
 
 POINTS = 200
 BEYOND = 1.6

@@ -9,8 +9,8 @@ import numpy as np
 from matplotlib.figure import Figure as Drawing
 
 from airground_drake.base.arrays import Array
-from airground_drake.run.trace import Trace
-from airground_drake.view import canvas, svg
+from airground_drake.report.view import canvas, svg
+from airground_drake.sim.trace import Trace
 
 MAX_TABLE_ROWS = 31
 """Maximum number of rows of a data table; the trace has all rows."""

@@ -15,8 +15,7 @@ from airground_drake.base.arrays import Array
 from airground_drake.report.figures.clock import CUT_S, Clock
 from airground_drake.report.metrics import Nearby, closest_obstacle, events_of, gap_m
 from airground_drake.report.outcomes import SLACK_M, metres
-from airground_drake.run.trace import Trace
-from airground_drake.view.canvas import (
+from airground_drake.report.view.canvas import (
     ALARM,
     GOOD,
     INK,
@@ -32,7 +31,8 @@ from airground_drake.view.canvas import (
     thin,
     time_line,
 )
-from airground_drake.view.labels import BOX
+from airground_drake.report.view.labels import BOX
+from airground_drake.sim.trace import Trace
 
 MARKS = {"trigger": "^", "release": "v", "proposal": "D", "accept": "o", "refuse": "X", "over": "s"}
 """Markers of events by kind."""

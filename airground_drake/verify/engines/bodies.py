@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from airground_drake.base.arrays import Array
-from airground_drake.scenarios.schema import Control, Uav, Ugv
+from airground_drake.scenario.schema import Control, Uav, Ugv
 
 
 class Room(NamedTuple):
@@ -167,7 +167,7 @@ def unicycle_m(steered: Array, heading: Array, command: Array, since_s: Array, h
     """Axle and heading, (T, 4), of a unicycle under chord steering.
 
     The hand point goes from where the straight line of the command began to where that line is after a period, while
-    the heading turns at a constant rate by 2 beta, tan(beta) = b h / (2 l + a h): see `world.steering`.
+    the heading turns at a constant rate by 2 beta, tan(beta) = b h / (2 l + a h): see `model.plants.steering`.
 
     Args:
         steered: the straight line at the rows, (T, 3), m.

@@ -16,7 +16,7 @@ import numpy.typing as npt
 from scipy.optimize import brentq
 
 from airground_drake.base.arrays import Array
-from airground_drake.world.motion import PeriodMotion
+from airground_drake.model.bodies.motion import PeriodMotion
 
 MERGE_S = 1e-9
 """Rows closer than this are one instant, s: periods that are not binary fractions give simulator steps of

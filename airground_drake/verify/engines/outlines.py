@@ -19,15 +19,15 @@ import numpy as np
 import numpy.typing as npt
 
 from airground_drake.base.arrays import Array
+from airground_drake.model.bodies.motion import PeriodMotion
 from airground_drake.verify.engines.geometry import ROUNDING_M, ROWS, boxes_of
-from airground_drake.world.motion import PeriodMotion
 
 Indices = npt.NDArray[np.intp]
 Flags = npt.NDArray[np.bool_]
 
 GAP, RADIUS, SPEED, BASE, TOP, COUNT, MIDDLE, EXTENT, CORNERS = 0, 1, 2, 3, 4, 5, 6, 8, 9
 """What the numbers of an *outline* in a trace mean: distance to keep, radius of the rounding, speed, heights of the
-core, number of corners, a circle round them, and the corners; `geometry.outline` describes it."""
+core, number of corners, a circle round them, and the corners; `model.geometry.outline` describes it."""
 AT_ONCE = 100_000
 """Places, or pairs of boxes, that are compared together, so that they fit into memory."""
 BATCH = 32

@@ -3,7 +3,7 @@
 The unit of time is the control period: the velocity of a body is the step to its next sample, and the gain is
 a = min(A h, 1). The second body is a point or a core: a wall, a polygon or a prism (`outlines.Cores`). Let D be the
 signed distance of the first body from it, d the distance to keep, and n the unit vector away from the nearest point; in
-a polygon, the normal of the nearest edge. The theorem `budget` (proofs/Budget.v) asks of each sample that either
+a polygon, the normal of the nearest edge. The theorem `budget` (coq/Budget.v) asks of each sample that either
 
     n.step_1 >= q_1 b - e_1 and -n.step_2 >= q_2 b - e_2,    b = a (d - D) where D <= d, else d - D,    q_1 + q_2 = 1,
 

@@ -1,7 +1,7 @@
 """Simulated drift-diffusion paths of the decision variable between two thresholds.
 
 The task error grows at the drift, x = drift t + n: over each noise period x changes by drift * period +
-noise * sqrt(period) * (a normal number). tests/systems compares the variance with that of the running noise.
+noise * sqrt(period) * (a normal number). tests/sim/blocks compares the variance with that of the running noise.
 
 A path is decided at the first sample at or beyond a barrier. That is later, and less often wrong, than for the
 continuous process. So the barrier is moved inwards by 0.5826 noise sqrt(period) (Chernoff 1965, Siegmund 1979); the
@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from airground_drake.decision.bayes import decision_time, error_rate, optimal_threshold
+from airground_drake.model.trigger.bayes import decision_time, error_rate, optimal_threshold
 from airground_drake.verify.model.levels import NUMBERS
 
 SEED = 20061

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from airground_drake.decision.bayes import COMPUTED
-from airground_drake.decision.trigger import Trigger
-from airground_drake.scenarios.schema import Scenario
+from airground_drake.model.trigger.automaton import Trigger
+from airground_drake.model.trigger.bayes import COMPUTED
+from airground_drake.scenario.schema import Scenario
 
 NUMBERS = ("drift_m_s", "noise_m_sqrt_s", "c1_1_s", "c2")
 """The numbers of a threshold rule."""

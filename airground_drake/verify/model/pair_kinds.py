@@ -11,7 +11,7 @@ from itertools import combinations
 from typing import Any, NamedTuple
 
 from airground_drake.base.exact import decimal
-from airground_drake.scenarios.schema import Control, Scenario, Uav, Ugv
+from airground_drake.scenario.schema import Control, Scenario, Uav, Ugv
 from airground_drake.verify.engines.bodies import Room, law_m, room_of
 
 SHARES = {"obstacle": (Fraction(1), Fraction(0)), "uav_ugv": (Fraction(1, 2),) * 2, "ugv_ugv": (Fraction(1, 2),) * 2}

@@ -24,7 +24,7 @@ from typing import Any
 import numpy as np
 
 from airground_drake.base.arrays import Array
-from airground_drake.decision.trigger import Mode, Trigger
+from airground_drake.model.trigger.automaton import Mode, Trigger
 from airground_drake.verify.model.levels import trigger_of
 
 SEED = 5

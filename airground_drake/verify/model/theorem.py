@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Any
 
-from airground_drake.proofs import THEOREMS, standing
 from airground_drake.verify.claim import ModelClaim
 from airground_drake.verify.finding import Evidence, Finding
+from airground_drake.verify.proofs import THEOREMS, standing
 
 
 @dataclass(frozen=True)
@@ -77,7 +77,7 @@ class TheoremClaim(ModelClaim):
     the claim open, unless `counterexample` shows that the claim is false.
 
     Attributes (all of the class):
-        theorems: names in `airground_drake.proofs.THEOREMS`.
+        theorems: names in `airground_drake.verify.proofs.THEOREMS`.
         margin_of: name of the hypothesis whose margin is the claim's.
     """
 

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from airground_drake.base.arrays import Array
-from airground_drake.run.trace import Trace
+from airground_drake.sim.trace import Trace
 from airground_drake.verify.engines.outlines import (
     CORNERS,
     COUNT,
@@ -36,7 +36,7 @@ PLANAR, SPATIAL = (1.0, 1.0, 0.0), (1.0, 1.0, 1.0)
 
 
 def demanded(trace: Trace) -> dict[str, dict[str, Any]]:
-    """The parameters of both controllers by the scenario, as `systems.controllers.read_back` names them; flat arrays.
+    """The parameters of both controllers by the scenario, as `blocks.controllers.read_back` names them; flat arrays.
 
     Outlines are without the circles round their corners.
 

@@ -15,8 +15,8 @@ import numpy as np
 
 from airground_drake.base.arrays import Array
 from airground_drake.base.errors import TraceError
-from airground_drake.run.tables import PROBLEM_ARRAYS, PROBLEM_SCALARS
-from airground_drake.run.trace import Trace
+from airground_drake.sim.tables import PROBLEM_ARRAYS, PROBLEM_SCALARS
+from airground_drake.sim.trace import Trace
 from airground_drake.verify.claim import TraceClaim
 from airground_drake.verify.finding import Finding
 from airground_drake.verify.runs.control_law import ON_TOP

@@ -21,9 +21,9 @@ import numpy as np
 import numpy.typing as npt
 
 from airground_drake.base.arrays import Array
-from airground_drake.run.trace import Trace
-from airground_drake.scenarios.schema import MAP, Obstacle
-from airground_drake.scenarios.shapes import convex_parts
+from airground_drake.scenario.schema import MAP, Obstacle
+from airground_drake.scenario.shapes import convex_parts
+from airground_drake.sim.trace import Trace
 from airground_drake.verify.engines.bodies import arc_m, lagging_m, law_m, on_arc, on_lag, room_of
 from airground_drake.verify.engines.geometry import (
     MERGE_S,

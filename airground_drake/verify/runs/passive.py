@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from airground_drake.base.arrays import Array
-from airground_drake.run.trace import Trace
+from airground_drake.sim.trace import Trace
 from airground_drake.verify.claim import TIME_TOLERANCE_S
 from airground_drake.verify.engines.outlines import Indices, away_from
 from airground_drake.verify.engines.shortfalls import POINT, SCREEN_M, shortfalls

@@ -10,7 +10,7 @@ import numpy as np
 
 from airground_drake.base.arrays import Array
 from airground_drake.base.errors import TraceError
-from airground_drake.run.trace import Trace
+from airground_drake.sim.trace import Trace
 from airground_drake.verify.engines.outlines import unpacked
 
 
@@ -26,7 +26,7 @@ class ProposalRecord:
         times_s: times of the vertices of the motion that it asks for, (M,).
         positions_m: the vertices, (M, 3).
         selection: J_int of (12)-(14), (m, 3).
-        mapped: outlines of the obstacles on the UAV's map, (k, W), see `geometry.outline`.
+        mapped: outlines of the obstacles on the UAV's map, (k, W), see `model.geometry.outline`.
         cause: UGV whose trigger it was sent for: `ugv`, or another UGV that `ugv` is to make way for.
         party: UGVs with a part in the same joint plan; empty: it stands alone.
     """

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from airground_drake.base.arrays import Array
-from airground_drake.run.trace import Trace
+from airground_drake.sim.trace import Trace
 from airground_drake.verify.claim import TIME_TOLERANCE_S
 from airground_drake.verify.engines.geometry import NormSignal, corner_times, interpolate, travelled
 from airground_drake.verify.runs.pairs import preset_of

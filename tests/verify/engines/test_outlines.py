@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from properties import examples
 
 from airground_drake.base.arrays import Array
-from airground_drake.geometry import convex, outline
+from airground_drake.model.geometry import convex, outline
 from airground_drake.verify.engines import outlines
 from airground_drake.verify.engines.geometry import ROWS
 from airground_drake.verify.engines.outlines import (

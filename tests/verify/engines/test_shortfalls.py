@@ -12,8 +12,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from airground_drake.base.arrays import Array
-from airground_drake.geometry import outline
-from airground_drake.nsbc.avoidance import Avoidance
+from airground_drake.model.geometry import outline
+from airground_drake.model.law.avoidance import Avoidance
 from airground_drake.verify.engines import shortfalls as module
 from airground_drake.verify.engines.outlines import Cores
 from airground_drake.verify.engines.shortfalls import shortage, shortfalls

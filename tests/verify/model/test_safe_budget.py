@@ -6,9 +6,9 @@ from typing import Any
 
 import pytest
 
-from airground_drake.scenarios.load import load
+from airground_drake.scenario.load import load
 from airground_drake.verify import judge_model
-from airground_drake.verify.model.safe_budget import SafeBudget
+from airground_drake.verify.claims.safe_budget import SafeBudget
 
 SCENARIOS = ("case_a_unicycle", "lagging", "turtlebots")
 

@@ -7,13 +7,14 @@ from typing import Any
 
 import pytest
 
-from airground_drake.proofs import THEOREMS, Standing
-from airground_drake.registry import MODEL_CLAIMS
-from airground_drake.scenarios.load import load, shipped
+from airground_drake.base.registry import MODEL_CLAIMS
+from airground_drake.scenario.load import load, shipped
 from airground_drake.verify.claim import ModelClaim
-from airground_drake.verify.model import safe_inv, theorem
+from airground_drake.verify.claims import safe_inv
+from airground_drake.verify.claims.thr_trig import TriggerLevels, isolation
+from airground_drake.verify.model import theorem
 from airground_drake.verify.model.theorem import TheoremClaim
-from airground_drake.verify.runs.thr_trig import TriggerLevels, isolation
+from airground_drake.verify.proofs import THEOREMS, Standing
 
 CLAIMS: dict[str, TheoremClaim] = {
     name: claim for name in MODEL_CLAIMS

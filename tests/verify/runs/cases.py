@@ -12,7 +12,7 @@ from builders.decisions import STAGES
 from builders.edits import first_of, with_decision, with_meta, with_samples, with_scenario, with_states
 from builders.runs import beside_a_rock, chattering, dead_end, leaking, refractory, run_of
 
-from airground_drake.run.trace import Trace
+from airground_drake.sim.trace import Trace
 
 Edit = Callable[[Trace], Trace]
 EIGHT = [f"gatekeeper.stages={STAGES}", "gatekeeper.horizon_s=0.4"]

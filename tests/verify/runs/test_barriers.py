@@ -15,13 +15,13 @@ from builders.simulation import simulate
 from verify.judging import decided
 
 from airground_drake.base.arrays import Array
-from airground_drake.geometry import outline
-from airground_drake.run.simulation import simulate as simulated
-from airground_drake.run.trace import Trace
-from airground_drake.scenarios import world
-from airground_drake.scenarios.schema import Obstacle, Policy, SafeDistance
+from airground_drake.model.geometry import outline
+from airground_drake.scenario import world
+from airground_drake.scenario.schema import Obstacle, Policy, SafeDistance
+from airground_drake.sim.simulation import simulate as simulated
+from airground_drake.sim.trace import Trace
+from airground_drake.verify.claims.gate_plan import INSIDE_M
 from airground_drake.verify.model.pair_kinds import constants
-from airground_drake.verify.runs.gate_plan import INSIDE_M
 from airground_drake.verify.runs.pairs import are_too_near, gap_over_time, pair_of
 
 ROOT = 0.5**0.5

@@ -14,8 +14,9 @@ from properties import examples
 from verify.judging import decided
 from verify.runs.cases import B_D, BINARY, LOCAL, RELAXED, SIXTH, Edit, decision, problem
 
-from airground_drake.run.trace import Trace
-from airground_drake.verify.runs import convex_bounds, gate_plan
+from airground_drake.sim.trace import Trace
+from airground_drake.verify.claims import gate_plan
+from airground_drake.verify.runs import convex_bounds
 from airground_drake.verify.runs.convex_bounds import enclose
 from airground_drake.verify.runs.gate_record import DecisionRecord, rows_of
 

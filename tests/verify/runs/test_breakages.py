@@ -38,7 +38,7 @@ from verify.runs.cases import (
     swapped,
 )  # fmt: skip
 
-from airground_drake.run.trace import Trace
+from airground_drake.sim.trace import Trace
 from airground_drake.verify.runs.gate_record import rows_of
 
 # ---------------------------------------------------------------------------------------------------- single edits

@@ -14,7 +14,7 @@ from builders.worlds import among_points
 from verify.judging import decided
 
 from airground_drake.base.arrays import Array
-from airground_drake.nsbc.avoidance import Avoidance
+from airground_drake.model.law.avoidance import Avoidance
 
 
 @pytest.mark.parametrize(

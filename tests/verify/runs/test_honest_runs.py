@@ -14,10 +14,10 @@ from builders.scenarios import STILL, changed, lone
 from builders.simulation import simulate as simulate_synthetic
 from verify.judging import decided
 
-from airground_drake.run.trace import Trace
-from airground_drake.scenarios.schema import Decision, Preset, Threshold
+from airground_drake.scenario.schema import Decision, Preset, Threshold
+from airground_drake.sim.trace import Trace
+from airground_drake.verify.claims.thr_quality import Judge, Watch
 from airground_drake.verify.engines.geometry import NormSignal
-from airground_drake.verify.runs.thr_quality import Judge, Watch
 
 Run = Callable[..., Trace]
 

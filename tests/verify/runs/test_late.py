@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 from promises import judged
 
-from airground_drake.run.simulation import simulate
-from airground_drake.run.trace import Trace
-from airground_drake.scenarios.load import from_data, load
+from airground_drake.scenario.load import from_data, load
+from airground_drake.sim.simulation import simulate
+from airground_drake.sim.trace import Trace
 from airground_drake.verify import judge
+from airground_drake.verify.claims.safe_hyp import SafeHyp
 from airground_drake.verify.engines.bodies import Room, kept_m, law_m
 from airground_drake.verify.runs.pairs import least_gap, pair_of
-from airground_drake.verify.runs.safe_hyp import SafeHyp
 
 LATE = {"kind": "delay", "delay_s": 1.0}
 ROCK = {"position_m": [2.0, 0.0, 0.0], "radius_m": 0.2, "appears_s": 1.5}

@@ -13,10 +13,11 @@ from persons import RADII, D, H
 from verify.judging import decided
 
 from airground_drake.base.arrays import Array
-from airground_drake.run.simulation import simulate
-from airground_drake.run.trace import Trace
+from airground_drake.sim.simulation import simulate
+from airground_drake.sim.trace import Trace
 from airground_drake.verify import TRACE_CLAIMS, judge
 from airground_drake.verify.claim import ModelClaim
+from airground_drake.verify.claims.safe_hyp import DECLARED, PASSIVE
 from airground_drake.verify.judging import judge_all
 from airground_drake.verify.model.pair_kinds import THEOREMS, kind_of
 from airground_drake.verify.runs import encounters as encounters_module
@@ -24,7 +25,6 @@ from airground_drake.verify.runs.control_law import least_speeds, retreats
 from airground_drake.verify.runs.encounters import encounters, steps_of
 from airground_drake.verify.runs.pairs import gap_over_time, least_gap, pair_of
 from airground_drake.verify.runs.passive import periods_of
-from airground_drake.verify.runs.safe_hyp import DECLARED, PASSIVE
 
 
 def of_person(trace: Trace) -> Array:

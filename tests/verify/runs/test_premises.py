@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from airground_drake.run.trace import Trace
+from airground_drake.sim.trace import Trace
 from airground_drake.verify.applications import counts, with_counts, without_news
 from airground_drake.verify.finding import Finding
 from airground_drake.verify.model.theorem import Proof

@@ -10,12 +10,11 @@ import pytest
 from builders.misbuilt import MISBUILT, Patch, distances, neighbours
 from verify.judging import decided
 
-from airground_drake.geometry.outline import moved
-from airground_drake.nsbc.avoidance import Avoidance
-from airground_drake.run import simulation
-from airground_drake.scenarios.load import load
-from airground_drake.systems import components
-from airground_drake.systems.diagram import Model
+from airground_drake.model.geometry.outline import moved
+from airground_drake.model.law.avoidance import Avoidance
+from airground_drake.scenario.load import load
+from airground_drake.sim import components, simulation
+from airground_drake.sim.diagram import Model
 from airground_drake.verify import judge
 
 

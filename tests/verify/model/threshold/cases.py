@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
-from airground_drake.decision.bayes import optimal_threshold
-from airground_drake.scenarios.load import load
+from airground_drake.model.trigger.bayes import optimal_threshold
+from airground_drake.scenario.load import load
+from airground_drake.verify.claims.thr_root import ThrRoot
 from airground_drake.verify.model.levels import NUMBERS
-from airground_drake.verify.model.thr_root import ThrRoot
 
 TABLE_1: dict[str, Any] = ThrRoot().inputs(load("case_a"))
 

@@ -11,7 +11,8 @@ import pytest
 from scipy.special import ndtr
 from verify.model.threshold.cases import INPUTS
 
-from airground_drake.verify.model import first_passages, thr_ddm
+from airground_drake.verify.claims import thr_ddm
+from airground_drake.verify.model import first_passages
 from airground_drake.verify.model.first_passages import PassageExperiment
 
 

@@ -10,14 +10,14 @@ from builders.edits import with_scenario
 from builders.runs import run_of
 from verify.model.threshold.cases import INPUTS, TABLE_1
 
-from airground_drake.decision.bayes import optimal_threshold
+from airground_drake.model.trigger.bayes import optimal_threshold
 from airground_drake.report import html
 from airground_drake.report.figures import model
-from airground_drake.run.trace import Trace
-from airground_drake.scenarios.load import load
+from airground_drake.scenario.load import load
+from airground_drake.sim.trace import Trace
 from airground_drake.verify import judge_all, judge_model
 from airground_drake.verify.applications import measured
-from airground_drake.verify.model.thr_choice import ThrChoice
+from airground_drake.verify.claims.thr_choice import ThrChoice
 
 
 @pytest.mark.parametrize(

@@ -10,8 +10,9 @@ import pytest
 from verify.judging import Judged
 from verify.model.threshold.cases import TABLE_1
 
-from airground_drake.verify.model import first_passages, thr_ddm
-from airground_drake.verify.model.thr_ddm import ThrDdm
+from airground_drake.verify.claims import thr_ddm
+from airground_drake.verify.claims.thr_ddm import ThrDdm
+from airground_drake.verify.model import first_passages
 
 
 def test_formulas_are_supported_and_intervals_can_be_redone_by_hand(judged: Judged) -> None:

@@ -10,12 +10,12 @@ from hypothesis import strategies as st
 from properties import examples
 from verify.model.threshold.cases import INPUTS, TABLE_1
 
-from airground_drake.decision.bayes import bayes_risk, optimal_threshold
-from airground_drake.scenarios.schema import Scenario
-from airground_drake.verify.model import thr_root
+from airground_drake.model.trigger.bayes import bayes_risk, optimal_threshold
+from airground_drake.scenario.schema import Scenario
+from airground_drake.verify.claims import thr_root
+from airground_drake.verify.claims.thr_opt import ThrOpt
+from airground_drake.verify.claims.thr_root import ThrRoot, rule_of
 from airground_drake.verify.model.levels import NUMBERS
-from airground_drake.verify.model.thr_opt import ThrOpt
-from airground_drake.verify.model.thr_root import ThrRoot, rule_of
 
 
 @pytest.mark.parametrize("name", INPUTS)

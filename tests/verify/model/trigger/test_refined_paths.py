@@ -10,8 +10,8 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 from verify.model.trigger.cases import REFINE
 
-from airground_drake.decision.trigger import Trigger
-from airground_drake.systems.components import integrated_noise
+from airground_drake.model.trigger.automaton import Trigger
+from airground_drake.sim.components import integrated_noise
 from airground_drake.verify.engines.geometry import NormSignal
 from airground_drake.verify.model import refined_paths
 from airground_drake.verify.model.refined_paths import experiment

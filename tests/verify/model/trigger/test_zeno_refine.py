@@ -12,11 +12,12 @@ from verify.judging import Judged
 from verify.model.trigger.cases import REFINE
 
 from airground_drake.base.arrays import Array
-from airground_drake.decision.trigger import Trigger, TriggerState
-from airground_drake.scenarios.schema import Scenario
-from airground_drake.verify.model import refined_paths, zeno_refine
+from airground_drake.model.trigger.automaton import Trigger, TriggerState
+from airground_drake.scenario.schema import Scenario
+from airground_drake.verify.claims import zeno_refine
+from airground_drake.verify.claims.zeno_refine import ZenoRefine
+from airground_drake.verify.model import refined_paths
 from airground_drake.verify.model.refined_paths import experiment
-from airground_drake.verify.model.zeno_refine import ZenoRefine
 
 
 def test_the_shipped_trigger_is_supported(judged: Judged, case_a: Scenario) -> None:

@@ -1,7 +1,0 @@
-"""The UAV's side of an intervention: who proposes which motion to which UGV.
-
-`planner` runs once per planning period. For each UGV that needs a proposal it asks the behaviour database (`database`),
-which asks the policies in turn. `policy` is the interface of all policies; `detour`, `coordinate` and `wrong` have
-those of the package, `guest` runs third-party ones. `messages` has the proposals and answers on the channel. `systems`
-wires the planner into the diagram.
-"""

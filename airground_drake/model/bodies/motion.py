@@ -1,0 +1,55 @@
+"""Where a centre is during a period, or during each of several periods."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from airground_drake.base.arrays import Array
+
+SAME_S = 1e-9
+"""Times closer than this are one instant, s."""
+
+
+class PeriodMotion(NamedTuple):
+    """A centre that stays within `off_m` of a point in uniform straight motion; exact if that is 0.
+
+    The leading dimensions (...) are periods. `model.geometry.motion.Motion` is another thing: a plan with times.
+
+    Attributes:
+        start: position at the beginning of the period, (..., 3), m.
+        end: position at its end, (..., 3), m.
+        off_m: largest distance from the straight line, m.
+    """
+
+    start: Array
+    end: Array
+    off_m: float = 0.0
+
+    def seen_from(self, other: PeriodMotion) -> PeriodMotion:
+        """The same motion relative to another centre that moves during the same periods."""
+        return PeriodMotion(self.start - other.start, self.end - other.end, self.off_m + other.off_m)
+
+    @property
+    def box(self) -> tuple[Array, Array]:
+        """Two opposite corners, (3,), m, of a box around the motion of all periods."""
+        places = np.concatenate([self.start.reshape(-1, 3), self.end.reshape(-1, 3)])
+        return places.min(axis=0) - self.off_m, places.max(axis=0) + self.off_m
+
+    def least_distance(self) -> tuple[Array, Array]:
+        """The least distance from the origin.
+
+        The squared distance is a convex parabola of the share s of the period that has passed. It is least at
+        s = clip(-start.w / ||w||^2, 0, 1) with w = end - start.
+
+        Returns:
+            A lower bound of the distance, (...,), m, exact if `off_m` is 0, and the first share of the period, (...,),
+            at which the straight motion is nearest.
+        """
+        change = self.end - self.start
+        squared = np.einsum("...i,...i->...", change, change)
+        along = -np.einsum("...i,...i->...", self.start, change)
+        share = np.clip(np.divide(along, squared, out=np.zeros_like(squared), where=squared > 0.0), 0.0, 1.0)
+        distance = np.linalg.norm(self.start + share[..., None] * change, axis=-1)
+        return (np.maximum(distance - self.off_m, 0.0) if self.off_m else distance), share

@@ -1,0 +1,1 @@
+"""Plants of robots: where the body is between samples, and what that costs in distance."""

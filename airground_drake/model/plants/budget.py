@@ -1,0 +1,136 @@
+"""What distance the law keeps so that the bodies keep the distance promised (the distance budget).
+
+The law steers a point. The theorems of `verify/coq/` (Budget, Plants, Pieces, PassivePlants) say how far a body may be
+from it, and what that costs. For two bodies that keep d, with the bounds of `Bounds` and the gain A of the law,
+
+    d_law = d + b + covers + dips + (drift_i + drift_j) / A,
+
+where b is what delays and lags cost. With V the slower speed limit, V_rel the sum of both, and any tau >= 0,
+
+    delay   d' = d + V |delta_i - delta_j|
+    lag     d' + b = |tau_i - tau| V_i + |tau_j - tau| V_j + sqrt(d'^2 + (tau V_rel)^2).
+
+Beside a set at rest a delay costs nothing and a lag sqrt(d^2 + (tau V)^2) - d. Beside an obstacle that may move the law
+only promises that the robot does not come nearer by itself. There lag and delay count as covers, tau V and delta V.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+
+from airground_drake.base.arrays import Array
+
+
+class Bounds(NamedTuple):
+    """How far a body may be from where the law steers it.
+
+    Attributes:
+        cover_m: of the body from the steered point, m.
+        dip_m: of the steered point from the straight line of its command within a period, m.
+        drift_m_s: by which the steered point may miss its command, m/s; it adds up over periods.
+        lag_s: time constant with which the body's velocity follows the command, s.
+        delay_s: time after which a command takes effect, s.
+        speed_m_s: largest command, m/s.
+        drawn: whether the body is drawn after the steered point, as a trailer: then beside a set at rest a cover l
+            costs sqrt(d^2 + l^2) - d (theorem Plants.forwards).
+    """
+
+    cover_m: float = 0.0
+    dip_m: float = 0.0
+    drift_m_s: float = 0.0
+    lag_s: float = 0.0
+    delay_s: float = 0.0
+    speed_m_s: float = 0.0
+    drawn: bool = False
+
+    @property
+    def exact(self) -> bool:
+        """Whether the body is the steered point and moves as it is told."""
+        return not any(self[:5])
+
+
+AT_REST = Bounds()
+"""Of a set that does not move."""
+
+
+class Cost(NamedTuple):
+    """A term of the budget: what it is of, which of the two bodies has it (0, 1; -1: both), and its metres."""
+
+    term: str
+    of: int
+    metres: float
+
+
+def law_distance(
+    distance: Array | float, one: Bounds, other: Bounds = AT_REST, *, gain: float, passive: bool = False
+) -> Array | float:
+    """Distance that the law keeps between steered points so that the bodies keep `distance`, m: shape of `distance`.
+
+    Args:
+        distance: between centres, or from a convex core at rest, m.
+        one: of a robot.
+        other: of another robot, or `AT_REST`.
+        gain: A of the law, 1/s.
+        passive: beside an obstacle that may move.
+    """
+    if one.exact and other.exact:
+        return distance
+    kept = distance
+    if not passive:
+        kept = kept + _delay(one, other)
+        kept = _lagging(kept, one, other)
+    if _draws(one, other, passive=passive):
+        kept = np.hypot(kept, one.cover_m)
+    return kept + sum(cost.metres for cost in _added(one, other, gain=gain, passive=passive))
+
+
+def costs(distance: float, one: Bounds, other: Bounds = AT_REST, *, gain: float, passive: bool = False) -> list[Cost]:
+    """The terms above 0 of what `law_distance` adds to a distance, m, in the order in which they are added."""
+    found = list(_added(one, other, gain=gain, passive=passive))
+    if not passive:
+        delay = _delay(one, other)
+        lag = float(_lagging(distance + delay, one, other)) - (distance + delay)
+        found += [Cost("delay", -1, delay), Cost("lag", -1, lag)]
+    if _draws(one, other, passive=passive):
+        found.insert(0, Cost("cover", 0, math.hypot(distance, one.cover_m) - distance))
+    return [cost for cost in found if cost.metres > 0.0]
+
+
+def _added(one: Bounds, other: Bounds, *, gain: float, passive: bool) -> Iterator[Cost]:
+    """The terms that are the same for all distances, but for a delay."""
+    for k, bounds in enumerate((one, other)):
+        yield Cost("cover", k, 0.0 if k == 0 and _draws(one, other, passive=passive) else bounds.cover_m)
+        yield Cost("dip", k, bounds.dip_m)
+        yield Cost("drift", k, bounds.drift_m_s / gain if bounds.drift_m_s else 0.0)
+        if passive:
+            yield Cost("lag", k, bounds.lag_s * bounds.speed_m_s)
+            yield Cost("delay", k, bounds.delay_s * bounds.speed_m_s)
+
+
+def _draws(one: Bounds, other: Bounds, *, passive: bool) -> bool:
+    """Whether the first body is drawn after its steered point beside a set at rest."""
+    return one.drawn and other == AT_REST and not passive
+
+
+def _delay(one: Bounds, other: Bounds) -> float:
+    """What different delays cost, m. A set at rest counts as one with the robot's delay, since its speed is 0."""
+    return min(one.speed_m_s, other.speed_m_s) * abs(one.delay_s - other.delay_s)
+
+
+def _lagging(distance: Array | float, one: Bounds, other: Bounds) -> Array | float:
+    """The distance before lags for a distance after them, m: the least over tau = 0, tau_i and tau_j."""
+    if not (one.lag_s or other.lag_s):
+        return distance
+    closing = one.speed_m_s + other.speed_m_s
+    found = [
+        abs(one.lag_s - tau) * one.speed_m_s
+        + abs(other.lag_s - tau) * other.speed_m_s
+        + np.sqrt(np.square(distance) + (tau * closing) ** 2)
+        for tau in (0.0, one.lag_s, other.lag_s)
+    ]
+    least: Array | float = np.minimum.reduce(found)
+    return least

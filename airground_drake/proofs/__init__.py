@@ -1,6 +1,0 @@
-"""General theorems, proved once and checked by Coq (`*.v`); what they need is checked in every report."""
-
-from airground_drake.proofs.record import Standing, standing
-from airground_drake.proofs.theorems import THEOREMS, Theorem
-
-__all__ = ["THEOREMS", "Standing", "Theorem", "standing"]

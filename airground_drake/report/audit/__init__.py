@@ -1,0 +1,40 @@
+"""The audit of the paper: each finding with the paper's formula, ours, and evidence by a run, a proof or a computation.
+
+`of_runs` makes the findings that the runs of a report show. `whole` makes the others, which rest on runs of other
+scenarios or on formulas alone: `python -m airground_drake.report audit`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from airground_drake.report.audit.runs import findings
+from airground_drake.report.audit.typeset import typeset
+from airground_drake.scenario.schema import Scenario
+from airground_drake.sim.trace import Trace
+from airground_drake.verify import Verdict
+
+__all__ = ["of_runs", "whole"]
+
+
+def of_runs(scenario: Scenario, traces: Mapping[str, Trace]) -> list[dict[str, Any]]:
+    """The findings that the runs of a report show."""
+    return typeset(findings(scenario, traces))
+
+
+def whole(scenario: Scenario, verdicts: Sequence[Verdict]) -> list[dict[str, Any]]:
+    """All findings but those of the scenario's own runs.
+
+    Args:
+        scenario: `case_a`, whose constants are the paper's.
+        verdicts: on its model; findings that rest on a proof quote them.
+    """
+    from airground_drake.report.audit.companions import companion_findings  # imports Drake
+    from airground_drake.report.audit.formulas import formula_findings
+    from airground_drake.report.audit.readings import reading_findings
+    from airground_drake.report.audit.thresholds import threshold_findings
+
+    proofs = {verdict.claim.id: verdict for verdict in verdicts if not verdict.run}
+    computed = [*threshold_findings(scenario, proofs), *formula_findings(scenario), *reading_findings(scenario)]
+    return typeset([*computed, *companion_findings()])

@@ -1,0 +1,102 @@
+"""All that a replay shows: positions and states of the robots at each frame, proposals and events, from the trace."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from airground_drake.base.arrays import Array
+from airground_drake.base.registry import method_of
+from airground_drake.report.replay.proposals import Sent, sent
+from airground_drake.report.view.stage import Robot, Stage, stage_of, states
+from airground_drake.scenario.schema import Scenario
+from airground_drake.sim.trace import Trace
+
+FRAMES_PER_S = 30
+"""Frames in a second of simulated time."""
+
+MAX_NAMED_BARRIERS = 8
+"""With more barriers, their names are not shown."""
+
+
+@dataclass(frozen=True)
+class DrawnBody(Robot):
+    """A robot in a run, frame by frame: positions (F, 3), m, headings (F,), rad, and states (F,), indices of STATES.
+
+    Positions are NaN where it was not recorded.
+    """
+
+    positions: Array
+    headings: Array
+    states: npt.NDArray[np.intp]
+
+
+@dataclass(frozen=True)
+class Scene(Stage):
+    """A run. `times_s` (F,) are those of the frames, the last one the end.
+
+    `moved_m` is by how much each barrier that moves has moved at each frame, (F, 3), m, by its number; NaN where it was
+    not recorded. `has_states` says whether the states of UGVs are known, as they are in runs and not in logs.
+    """
+
+    robots: tuple[DrawnBody, ...]
+    scenario: Scenario
+    run: str
+    says: str
+    times_s: Array
+    moved_m: Mapping[int, Array]
+    proposals: tuple[Sent, ...]
+    events: tuple[Mapping[str, Any], ...]
+    has_states: bool = True
+
+
+def scene(trace: Trace, scenario: Scenario) -> Scene:
+    """The scene of a run.
+
+    Args:
+        trace: the run.
+        scenario: of the trace.
+
+    Raises:
+        TraceError: if the trace lacks a column or holds numbers that are not finite.
+        UnknownNameError: if its metadata name an unknown method.
+    """
+    times = frame_times(trace.t)
+    still = stage_of(trace, scenario)
+
+    def positions(name: str) -> Array:
+        return np.column_stack([np.interp(times, trace.t, axis) for axis in trace.body(name).T])
+
+    def headings(name: str) -> Array:
+        recorded = trace.heading(name)
+        return np.zeros(len(times)) if recorded is None else np.interp(times, trace.t, recorded)
+
+    bodies = tuple(
+        DrawnBody(
+            **vars(robot),
+            positions=positions(robot.name),
+            headings=headings(robot.name),
+            states=states(trace, robot.name, times) if robot.kind == "UGV" else np.zeros(len(times), dtype=np.intp),
+        )
+        for robot in still.robots
+    )
+    method = str(trace.meta["method"])
+    return Scene(
+        **{**vars(still), "robots": bodies},
+        scenario=scenario,
+        run=trace.run,
+        says=f"method ({method}), {method_of(method).says}",
+        times_s=times,
+        moved_m={k: positions(each.name) - each.way_m[0] for k, each in enumerate(still.barriers) if len(each.way_m)},
+        proposals=sent(trace),
+        events=tuple(trace.events),
+    )
+
+
+def frame_times(t: Array) -> Array:
+    """Times of the frames, (F,), s, from 0 to the end of a run with rows at times (T,), s."""
+    return np.minimum(np.arange(np.ceil(t[-1] * FRAMES_PER_S - 1e-6) + 1) / FRAMES_PER_S, t[-1])

@@ -1,0 +1,128 @@
+"""The distance budget of a scenario: for each pair the distance promised, that in the law, and what each term costs."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from itertools import combinations
+from typing import NamedTuple
+
+from airground_drake.model.plants.budget import AT_REST, Bounds, costs, law_distance
+from airground_drake.model.plants.plant import Unicycle
+from airground_drake.scenario.outlines import gap_m
+from airground_drake.scenario.plants import plant_of
+from airground_drake.scenario.schema import Scenario
+
+KEYS = {"dip": "dip", "drift": "drift_m_s", "lag": "time_constant_s", "delay": "delay_s"}
+"""By term of a budget, the key that it comes from; a dip follows from several."""
+
+
+class Term(NamedTuple):
+    """A term of a budget: the key of the plant that it comes from, whose plant ('': of both), and its metres."""
+
+    key: str
+    of: str
+    metres: float
+
+
+class PairBudget(NamedTuple):
+    """The budget of a pair of bodies.
+
+    Attributes:
+        first: a robot.
+        second: a robot, an obstacle, the map or a wall of the arena.
+        kind: `ugv`, `air_ground`, `obstacle`, or `moving` for an obstacle that may move.
+        promised_m: gap to be kept between the surfaces, m.
+        radii_m: sum of both radii, m.
+        law_m: distance that the law keeps between steered points, or a steered point and a core, m.
+        terms: what it takes beyond the promise and the radii, in the order of their addition.
+        start: what the promise asks for where the obstacle appears later than at the start; '' if nothing.
+    """
+
+    first: str
+    second: str
+    kind: str
+    promised_m: float
+    radii_m: float
+    law_m: float
+    terms: tuple[Term, ...]
+    start: str = ""
+
+    @property
+    def gap_m(self) -> float:
+        """The distance in the law less the radii, to compare with the promise, m."""
+        return self.law_m - self.radii_m
+
+    @property
+    def largest(self) -> str:
+        """Key of the term that takes most; '' without terms."""
+        sums = dict[str, float]()
+        for term in self.terms:
+            sums[term.key] = sums.get(term.key, 0.0) + term.metres
+        return max(sums, key=lambda key: sums[key]) if sums else ""
+
+    def in_words(self) -> str:
+        """What the terms take: `hand_point_m 0.078 m each, dip 0.001 m`."""
+        told = []
+        for key in dict.fromkeys(term.key for term in self.terms):
+            parts = [term.metres for term in self.terms if term.key == key]
+            each = f"{parts[0]:.3f} m each" if len(parts) == 2 and parts[0] == parts[1] else f"{sum(parts):.3f} m"
+            told.append(f"{key} {each}")
+        return ", ".join(told)
+
+
+def takes_room(scenario: Scenario) -> bool:
+    """Whether any robot is not where the law steers it, so that the law keeps more than the distances promised."""
+    return any(plant.kind != "first_order" for robot in scenario.robots.values() for plant in robot.plant)
+
+
+def budget(scenario: Scenario) -> Iterator[PairBudget]:
+    """The budgets of all pairs that must keep apart, robot by robot."""
+    safe, gain = scenario.safe_distance, scenario.control.avoidance_gain_1_s
+    bounds, cover = dict[str, Bounds](), dict[str, str]()
+    for name, robot in scenario.robots.items():
+        plant = plant_of(robot, scenario.control.period_s)
+        bounds[name] = plant.bounds(robot.max_speed_m_s)
+        cover[name] = "hand_point_m" if isinstance(plant, Unicycle) else "cover_m"
+
+    def of_pair(first: str, second: str, kind: str, promised: float, radii: float) -> PairBudget:
+        both = bounds[first], bounds.get(second, AT_REST)
+        names, passive = (first, second, ""), kind == "moving"
+        terms = [
+            Term(cover[names[each.of]] if each.term == "cover" else KEYS[each.term], names[each.of], each.metres)
+            for each in costs(promised + radii, *both, gain=gain, passive=passive)
+        ]
+        law = float(law_distance(promised + radii, *both, gain=gain, passive=passive))
+        start = _start(bounds[first], promised, law - radii) if kind == "obstacle" and appears.get(second) else ""
+        return PairBudget(first, second, kind, promised, radii, law, tuple(terms), start)
+
+    appears = {name: obstacle.appears_s for name, obstacle in scenario.obstacles.items()}
+    radius = {name: robot.radius_m for name, robot in scenario.robots.items()}
+    for one in scenario.robots:
+        for name, each in scenario.barriers.items():
+            kind = "moving" if each.expected_speed_m_s else "obstacle"
+            yield of_pair(one, name, kind, gap_m(scenario, each), radius[one] + each.radius_m)
+    for one, other in combinations(scenario.robots, 2):
+        with_uav = scenario.uav.name in (one, other)
+        promised = safe.air_ground_m if with_uav else safe.ugv_m
+        yield of_pair(one, other, "air_ground" if with_uav else "ugv", promised, radius[one] + radius[other])
+
+
+def _start(robot: Bounds, promised_m: float, gap_m: float) -> str:
+    """What has to hold of a robot where an obstacle appears, so that its distance is promised from then on."""
+    if robot.exact:
+        return f"{gap_m:.3f} m when it appears"
+    of_point = f"{gap_m:.3f} m of the steered point when it appears"
+    if not (robot.lag_s or robot.delay_s or robot.drawn):
+        return of_point
+    way_m = robot.delay_s * robot.speed_m_s
+    way = f", also on its way of up to {way_m:.3f} m under commands already given" if way_m else ""
+    return f"{of_point}, and {promised_m:.3f} m of the body{way}"
+
+
+def alike(pairs: Iterable[PairBudget]) -> list[list[PairBudget]]:
+    """The pairs with the same numbers together, in the order of the first of each."""
+    groups = dict[object, list[PairBudget]]()
+    for pair in pairs:
+        terms = tuple(sorted((term.key, term.metres) for term in pair.terms))
+        groups.setdefault((pair.kind, pair.promised_m, round(pair.gap_m, 12), terms, pair.start), []).append(pair)
+    return [*groups.values()]

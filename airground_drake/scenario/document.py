@@ -1,0 +1,342 @@
+"""YAML text or data made in Python as plain data with their places of origin; every mistake becomes one line.
+
+Scalars are read by the rules of YAML 1.2 (`1e-3` is a number, `yes` and `1:30` are text). Anchors, merge keys
+(`<<`) and templates under top-level keys that begin with an underscore work as in Drake's own files.
+"""
+
+from __future__ import annotations
+
+import difflib
+import itertools
+import re
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from importlib.resources.abc import Traversable
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import yaml
+
+from airground_drake.base import files
+from airground_drake.base.errors import Fault, ScenarioError, short
+from airground_drake.scenario import hints
+from airground_drake.scenario.shipped import shipped, shipped_files
+
+MAX_BYTES = 2**20
+MAX_VALUES = 50_000  # of a scenario, with every alias and merge expanded
+MAX_DEPTH = 100  # of values within values
+TAG = "tag:yaml.org,2002:"
+_SCALARS: dict[str, tuple[str | None, Callable[[str], object]]] = {  # tag: its plain scalars, conversion
+    "null": (r"~|null|Null|NULL|", lambda _: None),
+    "bool": (r"true|True|TRUE|false|False|FALSE", lambda text: text.lower() == "true"),
+    "int": (r"[-+]?[0-9]+", int),
+    "float": (
+        r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?|[-+]?\.(inf|Inf|INF)|\.(nan|NaN|NAN)",
+        lambda text: float(text.lower().replace(".inf", "inf").replace(".nan", "nan")),
+    ),
+    "str": (None, lambda text: text.encode().decode()),  # refuses lone surrogates
+}
+
+UNKNOWN_KEY = Fault("unknown key")
+
+Children = dict[str, tuple[yaml.Node, yaml.Node]]
+"""Key node (for its line) and value node of each entry."""
+
+Places = dict[tuple[str, ...], tuple[str, str]]
+"""Place of each key and value (file and line, or command-line option), by the names and indices that lead there."""
+
+
+class Document(NamedTuple):
+    """Plain data with their places of origin.
+
+    Attributes:
+        data: dicts, lists and scalars; None where no value is given.
+        source: file, option or other origin of all data.
+        places: places of the entries and items.
+    """
+
+    data: Any
+    source: str
+    places: Places
+
+    def where(self, *at: str, key: bool = False) -> str:
+        """File and line, or option, of an entry; for a missing entry, of the innermost mapping or list around it.
+
+        Args:
+            at: names and indices that lead to the entry.
+            key: whether to name the line of the key, which may be before that of the value.
+        """
+        if at in self.places:
+            return self.places[at][not key]
+        return self.where(*at[:-1], key=key) if at else self.source
+
+
+class _Loader(yaml.BaseLoader):
+    """Composes nodes, tags scalars by the rules of YAML 1.2, and refuses nodes that are too large or too deep."""
+
+    def __init__(self, text: str, source: str) -> None:
+        super().__init__(text)
+        self.name, self.depth = source, 0
+        self.sizes: dict[int, tuple[int, int]] = {}
+        """Numbers of values and of levels in each node, with aliases and merges expanded."""
+
+    def compose_node(self, parent: yaml.Node | None, index: Any) -> yaml.Node:
+        """A node and those within it.
+
+        Raises:
+            ScenarioError: if the node has more than MAX_VALUES values, is deeper than MAX_DEPTH, or contains itself.
+        """
+        event: yaml.Event = self.peek_event()  # type: ignore[no-untyped-call]
+        self.depth += 1
+        if self.depth > MAX_DEPTH:
+            raise _excess(_where(event), deep=True)
+        node: yaml.Node | None = super().compose_node(parent, index)
+        assert node is not None
+        self.depth -= 1
+        if not isinstance(event, yaml.AliasEvent):
+            inner = [self.sizes[id(each)] for each in _within(node)]
+            self.sizes[id(node)] = 1 + sum(n for n, _ in inner), 1 + max((levels for _, levels in inner), default=0)
+        elif id(node) not in self.sizes:  # an alias of a node around it
+            raise _excess(_where(event), deep=True)
+        values, levels = self.sizes[id(node)]
+        if values > MAX_VALUES or self.depth + levels > MAX_DEPTH:
+            raise _excess(_where(node), deep=self.depth + levels > MAX_DEPTH)
+        return node
+
+
+class _Dumper(yaml.SafeDumper):
+    """Quotes text that YAML 1.1 or 1.2 would read as another type."""
+
+
+for _name, (_pattern, _) in _SCALARS.items():
+    if _pattern is not None:
+        for _each in (_Loader, _Dumper):
+            _each.add_implicit_resolver(TAG + _name, re.compile(rf"(?:{_pattern})\Z"), None)
+
+
+def text_of(data: Mapping[str, Any]) -> str:
+    """Nested dicts, lists and scalars as the text of a YAML file."""
+    text: str = yaml.dump(data, Dumper=_Dumper, sort_keys=False, allow_unicode=True)
+    return text
+
+
+def read(name_or_path: str | Path) -> tuple[Document, bytes]:
+    """The document and the bytes of a YAML file or a shipped scenario.
+
+    Raises:
+        ScenarioError: if it cannot be read, is not YAML text, or exceeds the limits.
+    """
+    source, data = _read_bytes(str(name_or_path))
+    try:
+        text = data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = data.count(b"\n", 0, error.start) + 1
+        raise ScenarioError(f"{source}:{line}", "", Fault("not UTF-8 text"), "wanted: a YAML file") from None
+    return parsed(text, source), data
+
+
+def _read_bytes(name_or_path: str) -> tuple[str, bytes]:
+    """Path and content of a scenario; the name of a shipped scenario has precedence over a path."""
+    file: Traversable = shipped_files().get(name_or_path, Path(name_or_path))
+    source = str(file)
+    try:
+        with file.open("rb") if name_or_path in shipped_files() else files.open_pipe(Path(name_or_path)) as stream:
+            data = stream.read(MAX_BYTES + 1)
+    except (FileNotFoundError, NotADirectoryError):
+        close = suggestion(name_or_path, shipped())
+        wanted = f"{close}wanted: the path of a YAML file, or a shipped scenario: {', '.join(shipped())}"
+        raise ScenarioError(name_or_path, "", Fault("no such scenario or file"), wanted) from None
+    except (OSError, ValueError) as error:
+        why = getattr(error, "strerror", None) or "a path has no null character"  # the cause of a ValueError
+        fault = Fault(f"cannot be read ({why})")
+        raise ScenarioError(source, "", fault, "wanted: a readable YAML file") from None
+    if len(data) > MAX_BYTES:
+        raise ScenarioError(source, "", Fault("too large"), f"at most {MAX_BYTES} bytes are allowed")
+    return source, data
+
+
+def parsed(text: str, source: str, at: tuple[str, ...] = ()) -> Document:
+    """The data of YAML text, within the limits.
+
+    Args:
+        text: the text. Top-level keys that begin with an underscore are templates and left out.
+        source: file or command-line option, for messages.
+        at: place in a document for which the data are meant.
+
+    Raises:
+        ScenarioError: if the text is not plain YAML, or exceeds the limits.
+    """
+    root = _composed(text, source)
+    places: Places = {at: (_where(root), _where(root))}
+    return Document(_plain(root, at, places), source, places)
+
+
+def _composed(text: str, source: str) -> yaml.Node:
+    """The root node of a YAML document; the marks of all nodes have the source's name."""
+    try:
+        root: yaml.Node | None = _Loader(text, source).get_single_node()
+    except (yaml.YAMLError, ValueError, OverflowError) as error:
+        if isinstance(error, yaml.MarkedYAMLError) and (found := hints.slip(error, text)):
+            raise ScenarioError(f"{source}:{found.line}", "", Fault(f"not YAML: {found.what}"), found.wanted) from None
+        mark = getattr(error, "problem_mark", None)
+        line = mark.line + 1 if mark else text.count("\n", 0, getattr(error, "position", 0)) + 1
+        problem = getattr(error, "problem", None) or getattr(error, "reason", None)
+        problem = problem or "no such character"  # an escape such as "\U99999999"
+        raise ScenarioError(f"{source}:{line}", "", Fault(f"not YAML: {problem}"), "wanted: YAML text") from None
+    if root is None:
+        raise ScenarioError(source, "", Fault("empty"), "wanted: YAML text")
+    return root
+
+
+def of_data(data: Any, source: str) -> Document:
+    """A document of nested dicts and lists made in Python.
+
+    Raises:
+        ScenarioError: if the data are nested too deeply.
+    """
+    try:
+        return Document(simple(data), source, {})
+    except RecursionError:
+        raise _excess(source, deep=True) from None
+
+
+def simple(value: Any) -> Any:
+    """A copy with plain numbers and lists in place of tuples and of numpy's values."""
+    if isinstance(value, Mapping):
+        return {str(name): simple(each) for name, each in value.items()}
+    if isinstance(value, np.ndarray | np.generic):
+        return simple(value.tolist())
+    return [simple(each) for each in value] if isinstance(value, list | tuple) else value
+
+
+def replace(document: Document, override: str) -> None:
+    """Change a document by an override.
+
+    Args:
+        document: to be changed.
+        override: `dotted.key=value`; items of lists are addressed by index, new names are added.
+
+    Raises:
+        ScenarioError: if the override has another form, its value is not YAML, or the item does not exist.
+    """
+    source = f"--set {short(override)}"
+    key, equals, text = override.partition("=")
+    if not equals or not key.strip():
+        raise ScenarioError(source, "", override, "wanted: dotted.key=value, such as control.period_s=0.05")
+    at = place_of(key)
+    put(document, at, parsed(text, source, at).data, source)
+
+
+def place_of(key: str) -> tuple[str, ...]:
+    """The names and indices of a dotted key."""
+    at = tuple(key.strip().split("."))
+    return at[:3] + (".".join(at[3:]),) * (len(at) > 3) if at[::2][:2] == ("runs", "set") else at  # its keys have dots
+
+
+def put(document: Document, at: tuple[str, ...], new: Any, source: str) -> None:
+    """Change a document: put another value at a place.
+
+    Raises:
+        ScenarioError: if the place is an item that a list does not have.
+    """
+    data = document.data
+    for place in [each for each in document.places if each[: len(at)] == at]:
+        del document.places[place]
+    for depth, name in enumerate(at, start=1):
+        options = [*data] if isinstance(data, dict) else [*map(str, range(len(data if isinstance(data, list) else ())))]
+        if name not in options and not (name and isinstance(data, dict)):
+            raise unknown(source, ".".join(at[:depth]), name, options)
+        index: Any = int(name) if isinstance(data, list) else name
+        if depth == len(at) or name not in options:
+            data[index] = new if depth == len(at) else {}
+            document.places[at[:depth]] = (source, source)
+        data = data[index]
+
+
+def _plain(node: yaml.Node, at: tuple[str, ...], places: Places) -> Any:
+    """The plain value of a node; the places of its entries and items are added to `places`."""
+    key = ".".join(at)
+    if isinstance(node, yaml.ScalarNode):
+        value = _value_of(node)
+        if isinstance(value, Fault):
+            raise ScenarioError(_where(node), key, value, "wanted: plain YAML")
+        return value
+    if node.tag not in (f"{TAG}map", f"{TAG}seq"):
+        raise ScenarioError(_where(node), key, _value_of(node), "wanted: plain YAML")
+    values = {}
+    for name, (name_node, child) in _entries_of(node, key).items():
+        if at or not name.startswith("_"):  # the others are templates
+            places[*at, name] = _where(name_node), _where(child)
+            values[name] = _plain(child, (*at, name), places)
+    return list(values.values()) if isinstance(node, yaml.SequenceNode) else values
+
+
+def _value_of(node: yaml.Node) -> object:
+    """Value of a scalar node (None if it is empty), or a `Fault` that describes a node that has no plain value."""
+    tag = node.tag.removeprefix(TAG)
+    if not isinstance(node, yaml.ScalarNode) or tag not in _SCALARS:
+        return Fault({"map": "a mapping is given", "seq": "a list is given"}.get(tag, f"the tag {tag} is given"))
+    try:
+        return _SCALARS[tag][1](node.value)
+    except ValueError:
+        return Fault("a value is given that cannot be read")
+
+
+def _entries_of(node: yaml.Node, key: str) -> Children:
+    """Entries of a mapping with those it merges, or items of a list by index; empty for a scalar."""
+    if isinstance(node, yaml.SequenceNode):
+        return {str(index): (child, child) for index, child in enumerate(node.value)}
+    entries: Children = {}
+    for name, child in node.value if isinstance(node, yaml.MappingNode) else ():
+        if not isinstance(name, yaml.ScalarNode):
+            raise ScenarioError(_where(name), key, Fault("a list or mapping is given as a key"), "wanted: a name")
+        if name.value in entries:
+            first = _where(entries[name.value][0])
+            raise ScenarioError(_where(name), _dotted(key, name.value), Fault("given twice"), f"first: {first}")
+        entries[name.value] = (name, child)
+    if "<<" in entries:
+        _, template = entries.pop("<<")
+        parts = [entries]  # by precedence
+        for each in template.value if isinstance(template, yaml.SequenceNode) else [template]:
+            if not isinstance(each, yaml.MappingNode):
+                raise ScenarioError(_where(each), _dotted(key, "<<"), _value_of(each), "wanted: mappings to merge")
+            parts.append(_entries_of(each, key))
+        entries = dict(entry for part in reversed(parts) for entry in part.items())
+    return entries
+
+
+def _where(node: yaml.Node | yaml.Event) -> str:
+    """File and line of a node or of the event at its beginning."""
+    mark: Any = node.start_mark
+    return f"{mark.name}:{mark.line + 1}"
+
+
+def _within(node: yaml.Node) -> Iterable[yaml.Node]:
+    """Nodes of the items of a list, or of the keys and values of a mapping."""
+    if isinstance(node, yaml.MappingNode):
+        return itertools.chain.from_iterable(node.value)
+    return node.value if isinstance(node, yaml.SequenceNode) else ()
+
+
+def _excess(source: str, *, deep: bool) -> ScenarioError:
+    if deep:
+        return ScenarioError(source, "", Fault("nested too deeply"), f"at most {MAX_DEPTH} levels are allowed")
+    allowed = f"at most {MAX_VALUES} are allowed, with aliases and merges expanded"
+    return ScenarioError(source, "", Fault("too many values"), allowed)
+
+
+def suggestion(name: str, options: Iterable[str]) -> str:
+    """The beginning of a message: the option that is close to a name, if any."""
+    close = difflib.get_close_matches(name, list(options), n=1)
+    return f"did you mean {close[0]}? " if close else ""
+
+
+def unknown(source: str, key: str, part: str, options: Sequence[str]) -> ScenarioError:
+    """The error of an unknown key; `part` is the last part of the dotted key."""
+    hint = hints.not_modelled(part) or suggestion(part, options)
+    return ScenarioError(source, key, UNKNOWN_KEY, f"{hint}allowed: {', '.join(options) or 'none'}")
+
+
+def _dotted(key: str, part: str) -> str:
+    """Dotted key of a part of the entry with this key ('' for the document itself)."""
+    return f"{key}.{part}" if key else part

@@ -1,0 +1,75 @@
+"""Dataclasses filled with the data of a document by pydantic; every mistake becomes one line."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from pydantic import ValidationError
+from pydantic_core import ErrorDetails
+
+from airground_drake.base.errors import Fault, ScenarioError
+from airground_drake.scenario import json_schema
+from airground_drake.scenario.document import Document, unknown
+from airground_drake.scenario.recorded import adapter
+
+
+def filled(kind: type, document: Document) -> Any:
+    """A dataclass with the data of a document, checked by pydantic.
+
+    Raises:
+        ScenarioError: if a key or value does not fit the dataclass.
+    """
+    try:
+        return adapter(kind).validate_python(document.data)
+    except ValidationError as error:
+        first = min(error.errors(include_url=False), key=_rank)
+        raise _in_words(first, document, json_schema.schema_of(kind)) from None
+
+
+_UNKNOWN = ("unexpected_keyword_argument", "invalid_key")
+
+
+def _rank(error: ErrorDetails) -> int:
+    """Rank of an error; the lowest is shown. An unknown key comes first: it may be a misspelt one that is missing."""
+    return 0 if error["type"] in _UNKNOWN else 1 if error["type"] == "missing" else 2
+
+
+def _in_words(error: ErrorDetails, document: Document, schema: json_schema.Schema) -> ScenarioError:
+    """An error of pydantic as one line: place, key, value, and what is allowed."""
+    kind, given, says = error["type"], error["input"], error.get("ctx", {})
+    loc = [str(part) for part in error["loc"]]
+    at = _as_written(document.data, [part for part in (*loc, *says.get("at", ())) if part != json_schema.NAMES])
+    of_type = kind.endswith(("_type", "missing"))  # the message names the line of the value, not of its key
+    key, source = ".".join(at), document.where(*at, key=not of_type)
+    if kind == "rule":
+        return ScenarioError(source, key, says["value"], says["allowed"])
+    if kind in _UNKNOWN:
+        return unknown(source, key, at[-1], json_schema.keys_at(schema, *at[:-1]))
+    place = loc[:-2] + loc[-1:] if loc[-1:] == [json_schema.NAMES] else at
+    wanted = f"wanted: {json_schema.wanted_at(schema, *place)}"
+    if kind == "missing":
+        new = f", as {'.'.join(at[:-1])} is new" * source.startswith("--set ")
+        return ScenarioError(source, key, Fault("missing"), wanted + new)
+    if given is None:
+        given = Fault("no value is given")
+    elif isinstance(given, dict):
+        given = Fault("a mapping is given" if of_type else f"{len(given)} entries")
+    elif isinstance(given, list) and of_type:
+        given = Fault("a list is given")
+        if "mapping" in wanted and "keys" not in wanted:
+            wanted += "; write NAME: {...} for each entry, without a dash"
+    return ScenarioError(source, key, given, wanted)
+
+
+def _as_written(data: Any, at: list[str]) -> list[str]:
+    """The way to a value without the number 0 of a mapping that stands for a list with one entry."""
+    found = list[str]()
+    for part in at:
+        if isinstance(data, dict):
+            if part == "0" and part not in data:
+                continue
+            data = data.get(part)
+        elif isinstance(data, list):
+            data = data[int(part)] if part.isdecimal() and int(part) < len(data) else None
+        found.append(part)
+    return found

@@ -1,0 +1,157 @@
+"""The JSON Schema (draft 2020-12) of scenario files, made by pydantic from `schema.py`, for editors, messages and docs.
+
+It states types, units, defaults, bounds and allowed names, key by key. `validate.py` checks how values go together: it
+may refuse a file that the schema accepts, never the other way round (with merge keys expanded).
+"""
+
+from __future__ import annotations
+
+import functools
+import json
+from collections.abc import Sequence
+from dataclasses import MISSING, fields
+from typing import Any
+
+from pydantic import TypeAdapter
+
+from airground_drake.base.registry import RUN_CLAIMS, Registry
+from airground_drake.base.statuses import COUNTS, EXPECTATIONS, NOTHING
+from airground_drake.scenario import schema
+from airground_drake.scenario.kinds import CLAIM_PATTERN, EXPECTED, NAME_PATTERN, WANTED, unit_of
+from airground_drake.scenario.limits import MAX_NAME, MAX_SEED, MAX_TEXT
+
+Schema = dict[str, Any]
+
+DIALECT = "https://json-schema.org/draft/2020-12/schema"
+
+NAMES = "[key]"
+"""pydantic's word, in the place of an error, for a name of a mapping."""
+
+_NAMES = {"anyOf": [{"type": "string", "pattern": NAME_PATTERN, "maxLength": MAX_NAME}, {"const": "<<"}]}
+
+
+def text(*, installed: bool = True) -> str:
+    """`scenario_schema` as a file."""
+    return json.dumps(scenario_schema(installed=installed), indent=1) + "\n"
+
+
+def scenario_schema(*, installed: bool = True) -> Schema:
+    """The schema of a scenario file.
+
+    Args:
+        installed: whether to include names that installed packages add through entry points.
+    """
+    made = _adapted(TypeAdapter(schema.Scenario).json_schema(), installed)
+    kinds = {name: _object(getattr(schema, name), made["$defs"][name]) for name in sorted(made["$defs"])}
+    top = _object(schema.Scenario, made)
+    top["patternProperties"] = {"^_": {"description": "A template, for anchors and aliases."}}
+    return {"$schema": DIALECT, "title": "Scenario of airground_drake", **top, "$defs": kinds}
+
+
+def _adapted(part: Any, installed: bool) -> Any:
+    """A part of pydantic's schema with the names of registries, with merge keys among free names, without titles."""
+    if isinstance(part, Registry):
+        return [*part] if installed else [*part.own]
+    if isinstance(part, list):
+        return [_adapted(each, installed) for each in part]
+    if not isinstance(part, dict):
+        return part
+    says = {name: _adapted(each, installed) for name, each in part.items() if name != "title" or isinstance(each, dict)}
+    if entries := says.get("patternProperties", {}).pop(NAME_PATTERN, None):
+        del says["patternProperties"]
+        says |= {"propertyNames": _NAMES, "additionalProperties": entries}
+    if claims := part.get(EXPECTED):
+        del says[EXPECTED]
+        says |= _expectations(claims, installed)
+    return says
+
+
+def _expectations(claims: Registry, installed: bool) -> Schema:
+    """Expected verdicts by claim."""
+    one = "|".join(EXPECTATIONS)
+    verdict = {"anyOf": [{"enum": [*EXPECTATIONS, NOTHING]}, {"type": "string", "pattern": f"^({one})( or ({one}))*$"}]}
+    known: Schema = {name: {"description": claims.says(name), **verdict} for name in _adapted(claims, installed)}
+    if claims is RUN_CLAIMS:
+        number: Schema = {"type": "integer", "minimum": 1, "maximum": MAX_SEED}
+        known |= {name: {"description": says} | number for name, says in COUNTS.items()}
+    return {
+        "properties": {**known, "<<": True},
+        "patternProperties": {CLAIM_PATTERN: verdict},
+        "additionalProperties": False,
+    }
+
+
+def _object(kind: type, made: Schema) -> Schema:
+    """The schema of a dataclass: its keys in order, with descriptions, units and defaults."""
+    properties: Schema = {}
+    for field in fields(kind):
+        says = properties[field.name] = made["properties"][field.name]
+        if unit := unit_of(field.name):
+            says["description"] += f" [{unit}]"
+        if field.default_factory is not MISSING:
+            says["default"] = [] if "array" in (says.get("type"), *_types(says)) else {}
+    return {
+        "type": "object",
+        "description": " ".join(made["description"].split()),
+        "properties": {**properties, "<<": True},
+        "required": made.get("required", []),
+        "additionalProperties": False,
+    }
+
+
+def _types(says: Schema) -> list[str]:
+    """The types among which a value may choose."""
+    return [str(each.get("type")) for each in says.get("anyOf", ())]
+
+
+def keys_at(whole: Schema, *at: str) -> list[str]:
+    """Keys of the mapping at a place in a file with this schema; `at` has the names and indices that lead there."""
+    return [key for key in _at(whole, at)[0]["properties"] if key != "<<"]
+
+
+def wanted_at(whole: Schema, *at: str) -> str:
+    """The values that are allowed at a place in a file with this schema, in words."""
+    says, name = _at(whole, at)
+    kind, unit = says.get("type", "string"), unit_of(name, " in ")
+    if WANTED in says:
+        return str(says[WANTED])
+    if "properties" in says:
+        return f"a mapping with the keys {', '.join(keys_at(whole, *at))}"
+    if kind in ("array", "object"):
+        what, size = ("list", "Items") if kind == "array" else ("mapping", "Properties")
+        least, most = says.get(f"min{size}"), says.get(f"max{size}")
+        if least == most == 3:
+            return f"3 numbers{unit}: [x, y, z]"
+        many = f" of {least} {f'to {most}' if most else 'or more'} entries" if least or most else ""
+        return f"a {what}{many}{unit}"
+    return {
+        "number": "a number{unit} from {minimum:g} to {maximum:g}",
+        "integer": "a whole number from {minimum} to {maximum}",
+        "boolean": "true or false",
+        "string": "a name of at most {maxLength} letters, digits and underscores that does not begin with a digit"
+        if says.get("pattern") == NAME_PATTERN
+        else "text of at most {maxLength} characters (in quotes where it looks like a number)",
+    }[kind].format(unit=unit, **{"maxLength": MAX_TEXT, **says})
+
+
+@functools.cache
+def schema_of(kind: type) -> Schema:
+    """The schema of the files of a dataclass; do not change it."""
+    return scenario_schema() if kind is schema.Scenario else TypeAdapter(kind).json_schema()
+
+
+def _at(whole: Schema, at: Sequence[str]) -> tuple[Schema, str]:
+    """The schema at a place, and the name whose suffix gives the unit."""
+    says, name = whole, ""
+    for part in at:
+        if part.isdecimal() and "properties" in says:  # one entry of a list may stand for the list
+            continue
+        inner = says.get("properties", {}).get(part)
+        if inner is not None or not unit_of(name):
+            name = name if part.isdecimal() else part
+        if part == NAMES:
+            inner = says["propertyNames"]["anyOf"][0]
+        says = inner or says.get("items") or says.get("additionalProperties") or {}
+        says = next((each for each in says.get("anyOf", ()) if "$ref" in each), says)  # else null
+        says = whole["$defs"][says["$ref"].rpartition("/")[2]] if "$ref" in says else says
+    return says, name

@@ -1,0 +1,89 @@
+"""Every key of a scenario file, what is allowed there and what it means, from the JSON Schema."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Iterator
+from typing import Any, NamedTuple
+
+from airground_drake.base.registry import PLUGIN
+from airground_drake.scenario.json_schema import Schema
+
+
+class Entry(NamedTuple):
+    """A key: its name in its section, what may stand there with the default, and its meaning."""
+
+    key: str
+    allowed: str
+    says: str
+
+
+class Section(NamedTuple):
+    """A mapping of the file: its dotted key (NAME for a free name, N for an index), its meaning, and its keys."""
+
+    path: str
+    says: str
+    entries: list[Entry]
+
+
+def sections(schema: Schema) -> Iterator[Section]:
+    """The sections of a file with this schema (see `json_schema.scenario_schema`), those within others after them."""
+    yield from _sections(schema, schema, "")
+
+
+def _sections(schema: Schema, part: Schema, path: str) -> Iterator[Section]:
+    keys = [(key, says) for key, says in part["properties"].items() if key != "<<"]
+    entries = [Entry(key, _allowed(key, part), says["description"]) for key, says in keys]
+    yield Section(path, part["description"], entries)
+    for key, says in keys:
+        for where, below in (
+            ("", _ref(says)),
+            (".NAME", says.get("additionalProperties") or {}),
+            (".N", says.get("items") or {}),
+        ):
+            if "$ref" in below:
+                kind = schema["$defs"][below["$ref"].rpartition("/")[2]]
+                yield from _sections(schema, kind, f"{path}.{key}{where}".lstrip("."))
+
+
+def _allowed(key: str, part: Schema) -> str:
+    """What may stand under a key, and its default."""
+    says = part["properties"][key]
+    words = [_kind(says)]
+    if says.get("type") == "number" and "default" in says:
+        words += ["0 or more"] * (says["minimum"] == 0.0) + ["above 0"] * (says["minimum"] > 0.0)
+    if says.get("type") == "integer":
+        words.append(f"{says['minimum']} to {says['maximum']}")
+    if "default" in says and says["default"] not in ({}, [], "", None):
+        words.append(f"default {json.dumps(says['default'])}")
+    elif key in part["required"]:
+        words.append("needed")
+    return ", ".join(words)
+
+
+def _ref(says: Schema) -> Schema:
+    """The mapping that may stand under a key, also if nothing may stand there, too."""
+    return next((each for each in says.get("anyOf", ()) if "$ref" in each), says)
+
+
+def _kind(says: dict[str, Any]) -> str:
+    says = _ref(says)
+    if "anyOf" in says:
+        return f"{_kind(says['anyOf'][0])}, {PLUGIN}"
+    if "enum" in says:
+        return "one of " + ", ".join(f"`{name}`" for name in says["enum"])
+    if "$ref" in says:
+        return "a mapping, see below"
+    if says["type"] == "array":
+        return "a point, [x, y, z]" if says.get("maxItems") == 3 else f"a list of {_several(_kind(says['items']))}"
+    if says["type"] == "object":
+        return "a mapping by name"
+    return {"number": "a number", "integer": "a whole number", "boolean": "true or false", "string": "text"}[
+        says["type"]
+    ]
+
+
+def _several(kind: str) -> str:
+    """The plural of what `_kind` says."""
+    return re.sub(r"^(?:a |)((?:whole )?\w+)", r"\1s", kind)

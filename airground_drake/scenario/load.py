@@ -1,0 +1,248 @@
+"""From the name or file of a scenario to a validated `Scenario`; every mistake becomes one line.
+
+`document.py` reads YAML text as plain data with line numbers, and replaces values by those of `--set`. `filled.py`
+checks the data against the dataclasses of `schema.py` and builds them. `validate.py` checks how values go together.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import math
+from collections.abc import Mapping, Sequence
+from copy import deepcopy
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from airground_drake.base.errors import Fault, ScenarioError, short
+from airground_drake.base.exact import decimal
+from airground_drake.scenario import map_file, validate
+from airground_drake.scenario.document import Document, of_data, place_of, put, read, replace, simple
+from airground_drake.scenario.filled import filled
+from airground_drake.scenario.schema import SET, Scenario, Vector
+from airground_drake.scenario.shipped import shipped
+
+__all__ = ["from_data", "load", "own", "resolved", "shipped", "validated"]
+
+Overrides = Sequence[str] | Mapping[str, Any]
+"""`dotted.key=value` with the value in YAML, or values by dotted key."""
+
+
+def load(name_or_path: str | Path, overrides: Overrides = ()) -> Scenario:
+    """Load and validate a scenario.
+
+    Args:
+        name_or_path: name of a shipped scenario, or path to a YAML file.
+        overrides: applied in order; list items are addressed by index. A key must be a key of the schema, an existing
+            item of a list, or an old or new entry of a mapping with free names, such as `obstacles`.
+
+    Raises:
+        ScenarioError: if the file cannot be read or an override or the scenario is not valid.
+    """
+    return _build(read(name_or_path)[0], overrides)
+
+
+def validated(scenario: Scenario, overrides: Overrides = ()) -> Scenario:
+    """A scenario made or changed in Python, checked as strictly as a file. It may contain numbers and arrays of numpy.
+
+    Args:
+        scenario: to be checked; it is not changed.
+        overrides: as in `load`.
+
+    Returns:
+        A copy whose values have the types of the schema.
+
+    Raises:
+        ScenarioError: if it is not valid; names the key, its value and what is allowed.
+    """
+    source = f"scenario {getattr(scenario, 'name', None) or type(scenario).__name__!r}"
+    try:
+        return from_data(resolved(scenario), source, overrides)
+    except TypeError as error:
+        raise ScenarioError(source, "", Fault(str(error)), "wanted: a Scenario") from None
+
+
+def from_data(data: Mapping[str, Any], source: str, overrides: Overrides = (), runs: Sequence[str] = ()) -> Scenario:
+    """A scenario from nested dicts and lists, such as `resolved` gives, checked like a file.
+
+    Args:
+        data: with the keys of a scenario file.
+        source: where the data come from, for messages.
+        overrides: as in `load`.
+        runs: to be kept, if the scenario has them all; default: all.
+
+    Raises:
+        ScenarioError: if it is not valid.
+    """
+    return _build(of_data(data, source), overrides, runs)
+
+
+def resolved(scenario: Scenario) -> dict[str, Any]:
+    """The scenario as nested dicts and lists, with all defaults.
+
+    Raises:
+        TypeError: if it is not a Scenario.
+    """
+    if not isinstance(scenario, Scenario):
+        raise TypeError(f"{type(scenario).__name__} is no Scenario")
+    return dataclasses.asdict(scenario)
+
+
+def _build(document: Document, overrides: Overrides, runs: Sequence[str] = ()) -> Scenario:
+    """The scenario of a document with overrides, checked; only with some runs, if it has them."""
+    chosen = _choices(document)
+    if isinstance(overrides, Mapping):
+        for key, value in overrides.items():
+            _put(document, str(key), value)
+    else:
+        for override in overrides:
+            replace(document, override)
+    given = document.data.get("runs") if runs and isinstance(document.data, dict) else None
+    if isinstance(given, dict) and {*runs} <= given.keys():
+        document.data["runs"] = {name: given[name] for name in runs}
+    _mark_set(document, chosen)
+    scenario = _checked(document)
+    for name, run in scenario.runs.items():
+        if run.set:
+            _as_set(document, name, run.set)
+    return scenario
+
+
+class Chosen(NamedTuple):
+    """An entry of `choices`, a copy of it, and the values that its key leads through, to the one that it is about."""
+
+    entry: dict[str, Any]
+    copy: dict[str, Any]
+    way: list[Any]
+
+
+def _choices(document: Document) -> list[Chosen]:
+    listed = document.data.get("choices") if isinstance(document.data, dict) else None
+    entries = [each for each in listed if isinstance(each, dict)] if isinstance(listed, list) else []
+    return [Chosen(each, dict(each), deepcopy(_way(document.data, str(each.get("key"))))) for each in entries]
+
+
+def _way(data: Any, key: str) -> list[Any]:
+    """The values of a document that a dotted key leads through, as far as they are there."""
+    found = []
+    for part in place_of(key):
+        if isinstance(data, list):
+            data = dict(zip(map(str, range(len(data))), data, strict=True))
+        if not isinstance(data, dict) or part not in data:
+            break
+        data = data[part]
+        found.append(data)
+    return found
+
+
+def _mark_set(document: Document, before: Sequence[Chosen]) -> None:
+    """Replace the reasons for values that overrides have changed, and drop choices about what they have removed.
+
+    Entries that overrides have changed or added themselves stay as they are.
+    """
+    for old, now in zip(before, _choices(document), strict=False):
+        if now.entry is not old.entry or now.entry != old.copy:
+            continue
+        depth = len(place_of(str(now.entry.get("key"))))
+        if len(now.way) < len(old.way):
+            document.data["choices"].remove(now.entry)
+        elif len(now.way) == depth and (len(old.way) < depth or old.way[-1] != now.way[-1]):
+            had = old.way[-1] if len(old.way) == depth else None
+            told = f"; the file has {json.dumps(had)}" if isinstance(had, int | float | str) else ""
+            now.entry.update(source=SET, reason=f"set by an override{told}")
+
+
+def own(scenario: Scenario, run: str) -> Scenario:
+    """The scenario with the values that one of its runs sets.
+
+    Args:
+        scenario: validated.
+        run: name of the run.
+    """
+    settings = scenario.runs[run].set
+    return _as_set(of_data(resolved(scenario), scenario.name), run, settings) if settings else scenario
+
+
+def _as_set(document: Document, run: str, settings: Mapping[str, Any]) -> Scenario:
+    """The scenario of a document with the values that a run sets.
+
+    Raises:
+        ScenarioError: if the result is not valid; the message names the run.
+    """
+    changed = Document(simple(document.data), document.source, dict(document.places))
+    try:
+        for key, value in settings.items():
+            put(changed, tuple(key.split(".")), value, document.where("runs", run, "set", key))
+        return _checked(changed)
+    except ScenarioError as error:
+        allowed = f"{error.allowed} (as run {run} sets it)"
+        raise ScenarioError(error.source, error.key, error.value, allowed) from None
+
+
+def _checked(document: Document) -> Scenario:
+    """The scenario of a document, without the values that its runs set."""
+    scenario: Scenario = filled(Scenario, document)
+    _complete(scenario)
+    _read_map(scenario, document)
+    try:
+        validate.check(scenario, document.source)
+    except ScenarioError as error:
+        place = document.where(*error.key.split("."), key=True)
+        raise ScenarioError(place, error.key, error.value, error.allowed) from None
+    return scenario
+
+
+def _complete(scenario: Scenario) -> None:
+    """Fill in the UAV's target if it is left out, and round gains of 1/period down so that gain * period <= 1."""
+    if not scenario.uav.target_m:
+        scenario.uav.target_m = _over_the_targets(scenario)
+    control = scenario.control
+    for name in validate.GAINS:
+        setattr(control, name, _rounded_down(getattr(control, name), control.period_s))
+
+
+def _read_map(scenario: Scenario, document: Document) -> None:
+    """Fill in the cells of the map, unless they are there, in the document, too: its runs then need no file.
+
+    Raises:
+        ScenarioError: if its files cannot be used.
+    """
+    given = scenario.map
+    if given is None or (given.cells and (given.cells.file, given.cells.unknown) == (given.file, given.unknown)):
+        return
+    starts = [robot.start_m for robot in scenario.robots.values()]
+    given.cells = map_file.cells(given, Path(document.source).parent, starts, document.where("map", "file"))
+    cells = dataclasses.fields(given.cells)
+    document.data["map"]["cells"] = {each.name: getattr(given.cells, each.name) for each in cells}
+
+
+def _rounded_down(gain: float, period: float) -> float:
+    """A gain, 1/s, rounded down if it exceeds 1/period by rounding alone.
+
+    Proofs read numbers as the decimals that Python prints: 3.3333333333333335 * 0.3 is 1 in floating point, but more
+    than 1 in decimals. A smaller gain only demands less.
+    """
+    while gain * period == 1.0 < decimal(gain) * decimal(period):
+        gain = math.nextafter(gain, 0.0)
+    return gain
+
+
+def _over_the_targets(scenario: Scenario) -> Vector:
+    """Where the UAV's task (9) leads when every UGV is at its target: over the centroid, [x, y, z], m."""
+    targets = [ugv.target_m for ugv in scenario.ugvs.values()]
+    x, y = (sum(target[axis] for target in targets) / len(targets) for axis in range(2))
+    return [x, y, scenario.uav.altitude_m]
+
+
+def _put(document: Document, key: str, value: Any) -> None:
+    """Change a document: put a value made in Python at a dotted key.
+
+    Raises:
+        ScenarioError: if the value has no text in YAML, or the item does not exist.
+    """
+    new = of_data(value, f"override {key}").data
+    try:
+        text = json.dumps(new, ensure_ascii=False)
+    except (TypeError, ValueError) as error:
+        raise ScenarioError("override", key, Fault(str(error)), "wanted: a number, text, list or dict") from None
+    put(document, place_of(key), new, f"--set {short(f'{key}={text}')}")

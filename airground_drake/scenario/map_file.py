@@ -1,0 +1,162 @@
+"""Maps in the files of ROS's `map_server`: a YAML file and the image that it names."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, ClassVar, NamedTuple
+
+from pydantic import BeforeValidator, ConfigDict
+
+from airground_drake.base import files
+from airground_drake.base.errors import Fault, ScenarioError
+from airground_drake.scenario.document import MAX_BYTES, parsed
+from airground_drake.scenario.filled import filled
+from airground_drake.scenario.kinds import Real, Words, as_float, wanted
+from airground_drake.scenario.limits import MAX_RECTANGLES
+from airground_drake.scenario.maps.grid import Frame, Grid
+from airground_drake.scenario.maps.images import Occupancy, occupancy
+from airground_drake.scenario.maps.rectangles import covering
+from airground_drake.scenario.schema import Map, MapCells
+
+MOST_BYTES = 64_000_000
+"""Most bytes of an image."""
+
+
+_Share = Annotated[float, wanted("a number from 0 to 1", strict=True, ge=0.0, le=1.0), BeforeValidator(as_float)]
+
+
+@dataclass(frozen=True, kw_only=True)
+class MapServer:
+    """The keys of a map_server's file. Others are left to others.
+
+    Attributes:
+        image: path of the image, from the file's folder.
+        resolution: side of a cell, m.
+        origin: outer corner of the cell at the lower left, x and y in m; heading of the image, rad.
+        occupied_thresh: probability above which a cell is occupied.
+        free_thresh: probability below which it is free.
+        negate: 1 if white is occupied, not black.
+        mode: how the image is read.
+    """
+
+    __pydantic_config__: ClassVar = ConfigDict(extra="ignore")
+
+    image: Annotated[Words, wanted("the path of a PGM, PPM, PNG or BMP file", min_length=1)]
+    resolution: Annotated[
+        float, wanted("the side of a cell, 0.001 to 1000 m", strict=True, ge=1e-3, le=1e3), BeforeValidator(as_float)
+    ]
+    origin: Annotated[list[Real], wanted("3 numbers: [x, y, yaw], m and rad", min_length=3, max_length=3)]
+    occupied_thresh: _Share
+    free_thresh: _Share
+    negate: Annotated[int, wanted("0 or 1", ge=0, le=1)]
+    mode: Annotated[str, BeforeValidator(lambda given: str(given).lower()), wanted("trinary", pattern="^trinary$")] = (
+        "trinary"
+    )
+
+
+_contents: dict[str, bytes] = {}
+"""Contents of the files of maps, by SHA-256: reports copy them."""
+
+
+class MapFile(NamedTuple):
+    """A map_server's map.
+
+    Attributes:
+        cells: which are occupied, which unknown, (rows, columns), the lowest row first.
+        frame: where they are.
+        contents: content of the YAML file and of its image, by path.
+    """
+
+    cells: Occupancy
+    frame: Frame
+    contents: dict[Path, bytes]
+
+    def grid(self, *, unknown: bool = True) -> Grid:
+        """The map with the unknown cells occupied, or free if `unknown` is false."""
+        occupied = self.cells.occupied | self.cells.unknown if unknown else self.cells.occupied
+        return Grid(occupied, self.frame)
+
+
+def read(path: Path, where: str = "", *, copied: bool = False) -> MapFile:
+    """The map of a map_server's YAML file.
+
+    Args:
+        path: of the YAML file.
+        where: file and line of the scenario that names the map, if any: for the message if there is no such file.
+        copied: whether both files are copies in one folder: of the image's path only the name counts.
+
+    Raises:
+        ScenarioError: if one of the two files cannot be read or used.
+    """
+    data = _content(path, MAX_BYTES, where or str(path), "map.file" if where else "", "the YAML file of a map")
+    try:
+        document = parsed(data.decode("utf-8-sig"), str(path))
+    except UnicodeDecodeError:
+        raise ScenarioError(str(path), "", Fault("not UTF-8 text"), "wanted: the YAML file of a map") from None
+    about: MapServer = filled(MapServer, document)
+    if about.free_thresh > about.occupied_thresh:
+        allowed = f"at most occupied_thresh = {about.occupied_thresh:g}"
+        raise ScenarioError(document.where("free_thresh"), "free_thresh", about.free_thresh, allowed)
+    image = path.parent / (Path(about.image).name if copied else about.image)
+    content = _content(image, MOST_BYTES, document.where("image"), "image", "a PGM, PPM, PNG or BMP file")
+    try:
+        cells = occupancy(
+            content,
+            occupied_above=about.occupied_thresh,
+            free_below=about.free_thresh,
+            negate=bool(about.negate),
+        )
+    except ValueError as error:
+        fault = Fault(f"{about.image} is {error}")
+        raise ScenarioError(document.where("image"), "image", fault, "wanted: the image of a map") from None
+    x, y, heading = about.origin
+    return MapFile(cells, Frame(about.resolution, (x, y, heading)), {path: data, image: content})
+
+
+def cells(given: Map, folder: Path, starts: Sequence[Sequence[float]], where: str, *, copied: bool = False) -> MapCells:
+    """What the files of a scenario's map say.
+
+    Args:
+        given: the map.
+        folder: of the scenario.
+        starts: of all robots, [x, y, ...], m; what none of them can reach is filled.
+        where: file and line of the scenario that name the map, for messages.
+        copied: as of `read`.
+
+    Raises:
+        ScenarioError: if the files cannot be used, or need too many rectangles.
+    """
+    found = read(folder / given.file, where, copied=copied)
+    grid = found.grid(unknown=given.unknown == "occupied")
+    starts_m = [[*each[:2]] for each in starts]
+    filled = grid.filled(starts_m)
+    rectangles = covering(filled.occupied)
+    if len(rectangles) > MAX_RECTANGLES:
+        fault = Fault(f"{given.file} needs {len(rectangles)} rectangles")
+        raise ScenarioError(where, "map.file", fault, f"at most {MAX_RECTANGLES} are allowed: remove noise, or crop it")
+    digests = {path.name: files.sha256(content) for path, content in found.contents.items()}
+    _contents.update(zip(digests.values(), found.contents.values(), strict=True))
+    rows, columns = grid.occupied.shape
+    return MapCells(
+        file=given.file, unknown=given.unknown, sha256=digests, starts_m=starts_m,
+        cell_m=grid.frame.cell_m, origin=[*grid.frame.origin],
+        rows=rows, columns=columns,
+        occupied=int(found.cells.occupied.sum()), unsure=int(found.cells.unknown.sum()),
+        unreached=int((filled.occupied & ~grid.occupied).sum()),
+        rectangles=rectangles.tolist(),
+    )  # fmt: skip
+
+
+def content(sha256: str) -> bytes | None:
+    """The content of a file of a map that this process has read, by its SHA-256."""
+    return _contents.get(sha256)
+
+
+def _content(path: Path, most: int, source: str, key: str, what: str) -> bytes:
+    try:
+        return files.read_bytes(path, most, links=True)
+    except (OSError, ValueError) as error:  # ValueError: a null character
+        why = getattr(error, "strerror", None) or str(error)
+        raise ScenarioError(source, key, Fault(f"{path} cannot be read ({why})"), f"wanted: {what}") from None

@@ -1,0 +1,31 @@
+"""What a scenario says that is allowed and seldom meant, in words for the person who wrote it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from airground_drake.scenario.hints import fast
+from airground_drake.scenario.schema import SafeDistance, Scenario
+
+SMALL_M, NARROW_M = 0.5, 6.0
+"""Robots with a smaller radius, and worlds with shorter sides, are small for the paper's distances, m."""
+
+
+def notes(scenario: Scenario) -> Iterator[str]:
+    """The notes on a valid scenario, each in one line."""
+    for name, robot in scenario.robots.items():
+        if hint := fast(robot.max_speed_m_s):
+            yield f"{name} has max_speed_m_s = {robot.max_speed_m_s:g}{hint}"
+    radius = max(ugv.radius_m for ugv in scenario.ugvs.values())
+    places = [place[:2] for ugv in scenario.ugvs.values() for place in (ugv.start_m, ugv.target_m)]
+    side = float(np.ptp(places, axis=0).max())
+    defaults = [
+        ("safe_distance.obstacle_m", scenario.safe_distance.obstacle_m, SafeDistance().obstacle_m, scenario.barriers),
+        ("safe_distance.ugv_m", scenario.safe_distance.ugv_m, SafeDistance().ugv_m, len(scenario.ugvs) > 1),
+    ]
+    kept = [f"{key} = {value:g} m" for key, value, default, matters in defaults if matters and value == default]
+    if kept and (0.0 < radius < SMALL_M or side < NARROW_M):
+        small = f"UGVs with a radius of {radius:g} m" if 0.0 < radius < SMALL_M else f"ways within {side:.2g} m"
+        yield f"{', '.join(kept)}: values of the paper, which are large for {small}; set your own"

@@ -1,0 +1,130 @@
+"""Third-party code in a scenario: `module:Class` and `file.py:Class`, imported when used."""
+
+from __future__ import annotations
+
+import importlib
+import os
+import re
+import sys
+from collections.abc import Collection, Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from airground_drake.base.errors import ScenarioError
+from airground_drake.base.files import sha256
+from airground_drake.base.registry import PLANTS, POLICIES, ROUTES, UAV_TASKS, Registry, is_plugin, source_of
+
+if TYPE_CHECKING:  # pydantic, which the schema imports, would delay `report --list`
+    from airground_drake.scenario.schema import Scenario
+
+OPTION = "--allow-plugins"
+HELP = "import and run what is named as module:Class or file.py:Class; looked for beside the scenario or spec, too"
+SHOW = "--show-policy-output"
+SHOW_HELP = "pass on what third-party policies print, to standard error"
+_POLICY = re.compile(r"intervention\.policies\.\d+\.name")
+WANTED = f"third-party code is imported and run only with {OPTION}"
+
+
+def plugins(scenario: Scenario) -> dict[str, str]:
+    """Names of third-party code in a scenario, by key; entry points of installed packages are not among them."""
+    named: list[tuple[str, str, Registry]] = [
+        ("uav.task", scenario.uav.task, UAV_TASKS),
+        ("gatekeeper.route", scenario.gatekeeper.route, ROUTES),
+    ]
+    for name, robot in scenario.robots.items():
+        place = f"{f'ugvs.{name}' if name in scenario.ugvs else 'uav'}.plant"
+        named += [(f"{place}.kind", plant.kind, PLANTS) for plant in robot.plant]
+    for index, policy in enumerate(scenario.intervention.policies):
+        named.append((f"intervention.policies.{index}.name", policy.name, POLICIES))
+    for run, spec in scenario.runs.items():
+        chosen = {key: str(value) for key, value in spec.set.items()}
+        named += [(f"runs.{run}.set.{key}", chosen[key], ROUTES) for key in chosen if key == "gatekeeper.route"]
+        named += [(f"runs.{run}.set.{key}", chosen[key], POLICIES) for key in chosen if _POLICY.fullmatch(key)]
+    found = {key: name for key, name, registry in named if name not in registry and is_plugin(name)}
+    return found | {f"claims.{claim}": place for claim, place in scenario.claims.items()}
+
+
+def digests(scenario: Scenario) -> dict[str, str]:
+    """SHA-256 of the files of third-party code in a scenario, by its name there; nothing is imported."""
+    found = {name: source_of(name) for name in plugins(scenario).values()}
+    return {name: sha256(file.read_bytes()) for name, file in found.items() if file is not None}
+
+
+def refuse(scenario: Scenario, source: str, keys: Collection[str] | None = None) -> None:
+    """Refuse third-party code.
+
+    Args:
+        scenario: validated.
+        source: where it comes from, for the message.
+        keys: keys to check; default: all.
+
+    Raises:
+        ScenarioError: if the scenario names third-party code at such a key; says how to allow it.
+    """
+    for key, name in plugins(scenario).items():
+        if keys is None or key in keys:
+            raise ScenarioError(source, key, name, WANTED)
+
+
+@contextmanager
+def admitted(scenario: Scenario, source: str, *, allow: bool, keys: Collection[str] | None = None) -> Iterator[None]:
+    """In the body, third-party code is also found in the folder of the scenario's file; if not allowed, it is refused.
+
+    The folder comes last on Python's path, so that it cannot hide other modules. Child processes inherit the path.
+
+    Args:
+        scenario: validated.
+        source: name of a shipped scenario or path of a file.
+        allow: whether third-party code may be imported.
+        keys: as in `refuse`.
+
+    Raises:
+        ScenarioError: as `refuse`.
+    """
+    if not allow:
+        refuse(scenario, source, keys)
+    with beside(source, allow=allow):
+        yield
+
+
+@contextmanager
+def shown(show: bool) -> Iterator[None]:
+    """In the body, and in processes that start there, what third-party policies print goes to standard error."""
+    from airground_drake.uav.guest.process import SHOWN
+
+    before = dict(os.environ)
+    os.environ |= {SHOWN: "1"} if show else {}
+    try:
+        yield
+    finally:
+        if SHOWN not in before:
+            os.environ.pop(SHOWN, None)
+
+
+@contextmanager
+def beside(source: str, *, allow: bool) -> Iterator[None]:
+    """In the body, the folder of a file comes last on Python's path, if third-party code is allowed."""
+    before, path = list(sys.path), Path(source)
+    if allow and path.is_file():
+        importlib.invalidate_caches()
+        sys.path.append(str(path.resolve().parent))
+    try:
+        yield
+    finally:
+        sys.path[:] = before
+
+
+def without(scenario: Scenario) -> Scenario:
+    """The scenario with the package's own task, route and plants, without policies; its diagram has the same blocks."""
+    plants = {name: [each for each in robot.plant if not each.is_own] for name, robot in scenario.robots.items()}
+    return replace(
+        scenario,
+        ugvs={name: replace(ugv, plant=plants[name]) for name, ugv in scenario.ugvs.items()},
+        uav=replace(scenario.uav, task="formation", plant=plants[scenario.uav.name]),
+        intervention=replace(scenario.intervention, policies=[]),
+        gatekeeper=replace(scenario.gatekeeper, route="mixed_integer", blocks=0, solver="daqp"),
+        runs={name: replace(run, set={}) for name, run in scenario.runs.items()},
+        choices=[],
+    )

@@ -1,0 +1,645 @@
+"""The scenario file as dataclasses: every key with its unit (in the key's name), its allowed values and its meaning.
+
+pydantic fills them (`load.py`). They are mutable, so that scenarios can be changed in Python; nothing changes them
+after validation (`validate.py`). They have slots: Python refuses an attribute that is not a key. A file must have every
+key without a default. Positions are in the world frame, z up, the ground at z = 0.
+"""
+
+# No `from __future__ import annotations` here: pydantic needs the types themselves, not their names.
+import json
+from dataclasses import asdict, dataclass, field
+from itertools import pairwise
+from typing import Annotated, Any, ClassVar
+
+from pydantic import ConfigDict, Field
+
+from airground_drake.base.files import sha256
+from airground_drake.base.registry import METHODS, MODEL_CLAIMS, PLANTS, POLICIES, ROUTES, RUN_CLAIMS, UAV_TASKS
+from airground_drake.scenario.kinds import (
+    CLAIMS,
+    AirPoint,
+    AirPointOrNone,
+    CellRectangle,
+    Corner,
+    CornersOrNone,
+    Count,
+    CountFromZero,
+    GroundPoint,
+    Name,
+    NotNegative,
+    OneOrList,
+    OneValue,
+    Place,
+    PlaceOrNone,
+    Point,
+    Positive,
+    Real,
+    Share,
+    SizeOrNone,
+    TwoCornersOrNone,
+    Words,
+    YesNo,
+    expected_of,
+    one_of,
+    registered,
+    settings_of,
+)
+from airground_drake.scenario.limits import MAX_CORNERS, MAX_RECTANGLES, MAX_STAGES, MAX_UGVS
+
+Vector = list[float]
+
+ARENA = "arena_"
+"""Begins the names of the arena's walls: arena_south, arena_east, arena_north and arena_west."""
+ENDLESS_M = 1e6
+"""Height of the arena's walls, m."""
+MAP = "map"
+"""Name of the obstacle that the map is."""
+SHAPES = ("polygon_m", "segment_m", "size_m")
+"""Keys that give an obstacle a shape, turned by its heading; `shapes.py` makes convex parts of them."""
+ABOUT = ("size_m",)
+"""Those of them that are about its position, which they need."""
+
+TRIGGERS: tuple[str, ...] = ("automaton", "bare")
+AT_END: tuple[str, ...] = ("stop", "reverse", "loop")
+SET = "set"
+"""Source of a value that an override changed."""
+RULES: tuple[str, ...] = ("hysteresis", "first_stage")
+SETTABLE: tuple[str, ...] = ("decision", "gatekeeper", "intervention")
+"""Sections in which a run may set its own values. All runs share bodies, distances and controllers: a report draws them
+once, and proves safety once."""
+
+
+@dataclass(slots=True)
+class Preset:
+    """Preset trajectory rho_rd of a UGV: a polyline travelled at constant speed from t = 0, then held."""
+
+    waypoints_m: Annotated[list[GroundPoint], Field(min_length=2)]
+    """Its corners, at least two; the last must be at the target if a run expects the UGV there."""
+    speed_m_s: Positive = 1.0
+    """Constant speed along it, at most the UGV's `max_speed_m_s`."""
+
+
+@dataclass(slots=True)
+class Plant:
+    """How a robot moves. The law steers a point of it, and keeps what its body needs on top: see `budget`.
+
+    - first_order: it moves as it is told.
+    - unicycle (UGVs): a differential drive. The law steers a hand point ahead of its axle, which arrives exactly where
+      the law wants it; commands for which it would have to turn or drive too fast are shortened.
+    - lag: its velocity follows the command with a time constant; the law steers p + tau v.
+    - delay: commands take effect later; the law steers where it will be when those under way are carried out.
+    - `module:Class` or `file.py:Class`: the user's own Drake System, with a drift and a cover that are declared. Each
+      run measures both.
+
+    A list combines: a delay, and after it a lag.
+    """
+
+    kind: Annotated[Words, registered(PLANTS)] = "first_order"
+    """Which of these."""
+    hand_point_m: NotNegative = 0.0
+    """Of a unicycle: distance of the hand point ahead of the axle; above 0."""
+    heading_rad: Real = 0.0
+    """Of a unicycle: heading at the start, counter-clockwise from x."""
+    max_turn_rad_s: NotNegative = 0.0
+    """Of a unicycle: turning limit; 0: none."""
+    wheel_base_m: NotNegative = 0.0
+    """Of a unicycle: distance of its wheels."""
+    max_wheel_speed_m_s: NotNegative = 0.0
+    """Of a unicycle: speed limit of a wheel; 0: none."""
+    backwards: YesNo = True
+    """Of a unicycle: whether it may drive backwards. If not, the law keeps less distance from what is at rest; but a
+    robot can stand for ever if its target is straight behind it, or if it would have to turn towards a wall."""
+    time_constant_s: NotNegative = 0.0
+    """Of a lag: time constant; above 0."""
+    delay_s: NotNegative = 0.0
+    """Of a delay: a whole number of control periods."""
+    drift_m_s: NotNegative = 0.0
+    """Of your own plant: how far its steered point misses a command in a period at most, divided by the period."""
+    cover_m: NotNegative = 0.0
+    """Of your own plant: how far the body is at most from the steered point's straight line in a control period."""
+    parameters: dict[Name, Real] = field(default_factory=dict)
+    """Of your own plant: numbers for its class, by name."""
+
+    @property
+    def is_own(self) -> bool:
+        """Whether it is a class of the user's."""
+        return self.kind not in PLANTS.own
+
+
+Plants = Annotated[list[Plant], Field(strict=True, max_length=2), OneOrList()]
+
+
+@dataclass(slots=True)
+class Ugv:
+    """One UGV: a disc of radius `radius_m` on the ground."""
+
+    start_m: GroundPoint
+    """Where its body starts, of a unicycle the axle; z = 0."""
+    target_m: GroundPoint
+    """Its target; z = 0. Preset and target are of the point that the law steers."""
+    preset: Preset
+    """The trajectory that it follows."""
+    max_speed_m_s: Positive = 6.0
+    """Commands are shortened to this speed."""
+    radius_m: NotNegative = 0.0
+    """Radius of its body, added to the safe distances of its pairs; 0: a point."""
+    plant: Plants = field(default_factory=list)
+    """How it moves; by default as it is told (first_order)."""
+
+
+@dataclass(slots=True)
+class Uav:
+    """The UAV, a robot in space whose `task` is to fly over the centroid of the UGVs, eqs (9)-(10).
+
+    Another task is named as `module:Class` or `file.py:Class`. `phantoms_m` are obstacles on its map that are
+    not there, points without a radius. Its own body is a ball of radius `radius_m`.
+    """
+
+    name: Name = "uav"
+    """Its name in traces and reports."""
+    start_m: AirPoint = field(kw_only=True)
+    """Where it starts."""
+    target_m: AirPointOrNone = field(default_factory=list)
+    """Its target; left out or empty: over the centroid of the UGVs' targets, at `altitude_m`."""
+    altitude_m: Positive = 2.0
+    """Height over the centroid of the UGVs; more than `air_ground_m` plus both radii."""
+    task: Annotated[Words, registered(UAV_TASKS)] = "formation"
+    """Its task, with lower priority than obstacle avoidance."""
+    max_speed_m_s: Positive = 10.0
+    """Commands are shortened to this speed."""
+    phantoms_m: list[Point] = field(default_factory=list)
+    """Obstacles on its map that are not there."""
+    radius_m: NotNegative = 0.0
+    """Radius of its body, added to the safe distances of its pairs; 0: a point."""
+    plant: Plants = field(default_factory=list)
+    """How it moves; by default as it is told (first_order)."""
+
+
+@dataclass(slots=True)
+class Moves:
+    """The way of an obstacle that moves, without turning: of the origin of its frame, straight between waypoints.
+
+    Each leg takes a whole number of control periods, so the speed is rounded down. Walls and robots do not stop it.
+    """
+
+    waypoints_m: Annotated[list[Place], Field(min_length=2, max_length=MAX_CORNERS)]
+    """Corners of the way, [x, y] or [x, y, z], at least two."""
+    speed_m_s: Positive
+    """Speed along it."""
+    start_s: NotNegative = 0.0
+    """When it starts; until then it stands at the first waypoint."""
+    at_end: Annotated[Words, one_of(AT_END)] = "stop"
+    """At the last waypoint it stops, goes back the way it came, or goes straight to the first one and on."""
+
+
+@dataclass(slots=True)
+class Obstacle:
+    """An obstacle from which robots keep the safe distance of (7)-(8); by default a ball, or without a radius a point.
+
+    At most one of `polygon_m`, `segment_m` and `size_m` gives it another shape. These are in the frame of the obstacle:
+    its origin is at `position_m`, and it is turned by `heading_rad`. By default that is the world frame.
+    """
+
+    position_m: PlaceOrNone = field(default_factory=list)
+    """Centre of a ball or box, else origin of its frame: [x, y] or [x, y, z]. Needed for a ball."""
+    known_to_uav: YesNo = True
+    """Whether it is on the UAV's map from the beginning."""
+    radius_m: NotNegative = 0.0
+    """Radius of a ball; of another shape, how far it extends round its corners and edges."""
+    polygon_m: CornersOrNone = field(default_factory=list)
+    """Corners [x, y] of a polygon, in order, at least three; edges must not cross."""
+    segment_m: CornersOrNone = field(default_factory=list)
+    """Corners [x, y] of a thin wall, at least two."""
+    size_m: SizeOrNone = field(default_factory=list)
+    """Length and width [x, y] of a box about `position_m`."""
+    heading_rad: Real = 0.0
+    """Turns a polygon, wall or box about `position_m`, counter-clockwise."""
+    height_m: NotNegative = 0.0
+    """It stands from the ground to this height; 0: flat, or a ball. For UGVs all walls are endless."""
+    distance_m: NotNegative = 0.0
+    """Distance to keep from it, in place of `safe_distance.obstacle_m` or `moving_m`; 0: that one."""
+    moves: Moves | None = None
+    """How it moves; then its frame has no `position_m`."""
+    max_speed_m_s: NotNegative = 0.0
+    """Speed at which robots expect it to move at most; 0: that of `moves`, or none. Without `moves` it might move."""
+    known_motion: YesNo = False
+    """Whether predictions know its way, or its present velocity only. No distance rests on it."""
+    appears_s: NotNegative = 0.0
+    """It is there from the first control sample at or after this time on; before that, it is nowhere."""
+    disappears_s: NotNegative = 0.0
+    """It is nowhere from the first control sample at or after this time on; 0: it stays."""
+
+    @property
+    def expected_speed_m_s(self) -> float:
+        """Speed at which robots expect it to move at most, m/s."""
+        return self.max_speed_m_s or (self.moves.speed_m_s if self.moves else 0.0)
+
+
+@dataclass(slots=True)
+class MapCells:
+    """What was read from the files of a map: filled in when a scenario is loaded.
+
+    So the scenario in a report needs no other file. A free cell that no robot can reach from its start counts as
+    occupied.
+    """
+
+    file: Words
+    """The map's `file`."""
+    unknown: Words
+    """The map's `unknown`."""
+    sha256: dict[Words, Words]
+    """SHA-256 of the YAML file and of its image, by name."""
+    starts_m: list[Corner]
+    """Where the robots started."""
+    cell_m: Positive
+    """Side of a cell."""
+    origin: Annotated[list[Real], Field(min_length=3, max_length=3)]
+    """Outer corner of the first cell of the lowest row, x and y in m; heading of the rows in rad."""
+    rows: CountFromZero
+    """Number of rows."""
+    columns: CountFromZero
+    """Number of columns."""
+    occupied: CountFromZero
+    """Number of occupied cells."""
+    unsure: CountFromZero
+    """Number of unknown cells."""
+    unreached: CountFromZero
+    """Number of free cells that no robot can reach from these starts."""
+    rectangles: Annotated[list[CellRectangle], Field(max_length=MAX_RECTANGLES)]
+    """Rectangles of cells whose union is in the way: first row, row after the last, first column, column after the
+    last. They may overlap."""
+
+    def __str__(self) -> str:
+        """One line for people."""
+        cells = f"{self.columns} x {self.rows} cells of {self.cell_m:g} m"
+        counts = f"{self.occupied} occupied, {self.unsure} unknown ({self.unknown}), {self.unreached} out of reach"
+        return f"map {self.file}: {cells}, {counts}; {len(self.rectangles)} rectangles"
+
+
+@dataclass(slots=True)
+class Map:
+    """A map in the files of ROS's map_server (YAML and image): all its cells that are in the way are one obstacle."""
+
+    file: Annotated[Words, Field(min_length=1)]
+    """Path of the YAML file, from the folder of the scenario."""
+    height_m: NotNegative = 0.0
+    """What is in the way stands from the ground to this height; 0: the UAV flies over it. For UGVs it is endless."""
+    distance_m: NotNegative = 0.0
+    """Distance to keep from it, in place of `safe_distance.obstacle_m`; 0: that one."""
+    known_to_uav: YesNo = True
+    """Whether the UAV has the map from the beginning."""
+    unknown: Annotated[Words, one_of(("occupied", "free"))] = "occupied"
+    """What cells count as that are unknown: grey 205, transparent, or between the thresholds."""
+    cells: MapCells | None = None
+    """What was read from the files; filled in."""
+
+
+@dataclass(slots=True)
+class MapObstacle(Obstacle):
+    """The obstacle that a map is; its parts are those of `cells`."""
+
+    cells: MapCells = field(kw_only=True)
+    """The map's cells."""
+
+
+@dataclass(slots=True)
+class SafeDistance:
+    """Safe distances d of (7)-(8), for each kind of pair, and the distance that counts as a collision.
+
+    They are distances between surfaces: the centres of a pair keep d + (radius + radius), and collide at
+    `collision_m` + (radius + radius). All other distances, also `control.sensing_range_m`, are between centres.
+    """
+
+    obstacle_m: Positive = 2.0
+    """Between a robot and an obstacle."""
+    moving_m: NotNegative = 0.0
+    """Between a robot and an obstacle that moves; 0: `obstacle_m`."""
+    ugv_m: Positive = 2.0
+    """Between two UGVs."""
+    air_ground_m: Positive = 1.0
+    """Between the UAV and a UGV."""
+    collision_m: Positive = 0.05
+    """A smaller distance counts as a collision; less than the other distances."""
+
+
+@dataclass(slots=True)
+class Control:
+    """NSBC controllers of all robots: sampled with zero-order hold."""
+
+    period_s: Positive = 0.025
+    """Control period h of all robots."""
+    avoidance_gain_1_s: NotNegative = 3.0
+    """Gain A of obstacle avoidance. Gain times period is at most 1, as for all gains; 1/period is rounded down."""
+    motion_gain_1_s: NotNegative = 2.0
+    """Gain of tracking the preset trajectory, (6)."""
+    formation_gain_1_s: NotNegative = 5.0
+    """Gain of the UAV's task, (10)."""
+    intervention_gain_1_s: NotNegative = 1.5
+    """Gain of tracking an intervention, (14)."""
+    sensing_range_m: Positive = 4.0
+    """Robots sense nothing beyond it; it covers every safe distance, both radii and a period of closing speed."""
+
+
+@dataclass(slots=True)
+class Threshold:
+    """Decision threshold zeta: rule 'fixed' takes zeta_m; 'bayes' minimises the Bayes risk (16)-(18).
+
+    'printed' takes the root of (19) as the paper prints it, for comparison: it does not minimise the risk.
+    """
+
+    rule: Annotated[Words, one_of(("fixed",), "model.trigger.bayes:COMPUTED")] = "fixed"
+    """Where the threshold comes from."""
+    zeta_m: Positive = 3.0
+    """The threshold under the rule 'fixed'."""
+    c1_1_s: Positive = 0.5
+    """Cost of a second until the decision, in the Bayes risk (16)."""
+    c2: Positive = 1.0
+    """Cost of an error, in the Bayes risk (16)."""
+    drift_m_s: Positive = 6.05
+    """Drift in the Bayes risk."""
+    noise_m_sqrt_s: Positive = 10.0
+    """Noise in the Bayes risk."""
+
+
+@dataclass(slots=True)
+class Decision:
+    """DDM (15) and event trigger: 'automaton' (hysteresis, minimum inter-event time) or 'bare' (the paper's)."""
+
+    threshold: Threshold = field(default_factory=Threshold)
+    """The decision threshold zeta."""
+    trigger: Annotated[Words, one_of(TRIGGERS)] = "automaton"
+    """With hysteresis and a minimum inter-event time, or without both, as in the paper."""
+    release_m: Positive = 1.5
+    """An intervention ends when the decision variable falls to it; below the threshold."""
+    min_inter_event_s: NotNegative = 0.5
+    """Minimum inter-event time: no trigger follows another sooner."""
+    noise_m_sqrt_s: NotNegative = 0.0
+    """Noise of the decision variable in the simulation."""
+    leak_1_s: NotNegative = 0.0
+    """Rate at which accumulated noise decays; 0: never."""
+    noise_period_s: Positive = 0.025
+    """How often noise is drawn."""
+
+
+@dataclass(slots=True)
+class Policy:
+    """One entry of the UAV's behaviour database: a policy's name and its numbers."""
+
+    name: Annotated[Words, registered(POLICIES)]
+    """Which policy."""
+    parameters: dict[Name, Real] = field(default_factory=dict)
+    """Its numbers, by name."""
+
+
+@dataclass(slots=True)
+class Intervention:
+    """The UAV's intervention behaviours; how often it plans, and how long it rests after a refusal.
+
+    `ranking` is 'listed' (in the order of the list) or 'predicted' (best predicted outcome on the UAV's map
+    first). A policy that takes longer than `budget_s` for a proposal proposes nothing. A policy that bounds its effort
+    in counts, such as `coordinate`, has no time limit; a third-party one has at least a minute.
+    """
+
+    period_s: Positive = 0.05
+    """How often the UAV plans; a multiple of the control period."""
+    retry_s: NotNegative = 1.0
+    """How long it rests after a refusal; without a proposal of any policy, twice as long each time in a row."""
+    ranking: Annotated[Words, one_of((), "uav.database:RANKINGS")] = "predicted"
+    """Which policy is asked first."""
+    budget_s: Positive = 2.0
+    """Wall-clock time for a policy's proposal."""
+    policies: list[Policy] = field(default_factory=list)
+    """The behaviour database, in order."""
+
+
+@dataclass(slots=True)
+class Gatekeeper:
+    """The accept/refuse decision, eqs (21)-(29).
+
+    Under method (c) a decision on a proposal is reversed only for a plan that is cheaper by the (relative) switching
+    margin, and not before `min_dwell_s` have passed. This rule is ours. The paper's rule, `first_stage`, executes the
+    first stage of each rounded plan, whatever the earlier answers were; with the route `nonlinear` that is by the
+    letter of (27)-(29), with two choices that the paper leaves open: the search starts at the cheaper constant plan,
+    and the velocities of (23) are those along the constant plans. A decision may take `budget_iterations` iterations of
+    the solver of a relaxation and 2,000 iterations of the searches of `mixed_integer`. The budget 'counted' has no
+    other limit: a run is the same on every machine on which these iterations take less than 1 s, ten times the usual.
+    The budget 'wall_clock', for real time, also limits a decision to the share `budget_share` of the sampling period.
+    `terminal_weight_s` is the w of a terminal cost w a ||rho_rd - rho_N||^2 besides (25); the paper has no such cost.
+
+    Method (d) compares outcomes instead, up to `settling_s` past the end of motion and preset trajectory. An accepted
+    proposal is executed for `longest_s` at most. After `tries` accepted proposals a UGV accepts no other until it has
+    been on its own for `rest_s`.
+    """
+
+    route: Annotated[Words, registered(ROUTES)] = "mixed_integer"
+    """How (26) is solved under method (c)."""
+    period_s: Positive = 0.05
+    """How often it decides; a multiple of the control period."""
+    horizon_s: Positive = 3.0
+    """How far (26) looks ahead, and how long other robots are predicted to go on."""
+    stages: Annotated[Count, Field(le=MAX_STAGES)] = 60
+    """Stages of (26): horizon_s / stages is a multiple of the control period."""
+    blocks: CountFromZero = 0
+    """Accept variables of (26), each for a block of stages, for route mixed_integer; 0: one per stage."""
+    solver: Annotated[Words, one_of(("daqp", "gurobi", "mosek"))] = "daqp"
+    """Solver of the route mixed_integer; gurobi and mosek need a Drake that has them, and a licence."""
+    error_weight_1_m2_s: Positive = 1.0
+    """a of (25): weight of the distance to the preset trajectory."""
+    slack_weight_1_m2_s: NotNegative = 1000.0
+    """Weight of the slack of the soft constraints in (25)."""
+    terminal_weight_s: NotNegative = 0.0
+    """Weight w of a terminal cost, which the paper does not have."""
+    rule: Annotated[Words, one_of(RULES)] = "hysteresis"
+    """How a plan becomes the answer under method (c): with margin and dwell, or by its first stage alone."""
+    switching_margin: NotNegative = 0.05
+    """Relative amount by which a plan must be cheaper to reverse a decision of method (c)."""
+    min_dwell_s: NotNegative = 0.2
+    """Shortest time for which a decision of method (c) stands."""
+    budget: Annotated[Words, one_of(("counted", "wall_clock"))] = "counted"
+    """Limits of a decision's effort: counts only, or also the clock."""
+    budget_iterations: Count = 100
+    """Largest number of iterations of the solver of a relaxation."""
+    budget_share: Share = 0.5
+    """Share of the sampling period that a decision may take under 'wall_clock'; at most 1."""
+    longest_s: Positive = 30.0
+    """Longest time for which an accepted proposal is executed."""
+    settling_s: Positive = 10.0
+    """Outcomes are compared up to this time after the end of motion and preset trajectory."""
+    tries: Count = 5
+    """Number of acceptances before a rest."""
+    rest_s: Positive = 5.0
+    """Length of that rest, in which the UGV is on its own."""
+
+
+@dataclass(slots=True)
+class Run:
+    """One simulation: a method (see `airground list methods`) and what is expected of it.
+
+    `stalls_m` names the UGVs that must end (to within `stall_tolerance_m`) at that point short of their
+    target. `expected` maps claim identifiers to the expected verdict; a claim that is not named must hold.
+    `nothing` is for a claim about which the method promises nothing. `exercised` means "holds, and the run tested it".
+    `interventions: 2` in `expected` demands that UGVs begin to execute at least two proposals, `messages: 5` that at
+    least five proposals and answers are delivered.
+    `set: {decision.threshold.zeta_m: 2.0}` gives this run a value of its own, as `--set` does for all runs. Claims
+    about the model that use a changed constant are judged for this run, too; `expected` may name them.
+    """
+
+    method: Annotated[Words, one_of(METHODS)]
+    """How UAV and UGVs are coupled."""
+    composition: Annotated[Words, one_of((), "model.law.avoidance:COMPOSITIONS")] = "augmented"
+    """How avoidance is composed with the tasks below: 'augmented' or a reading of recursion (5)."""
+    set: Annotated[dict[Words, OneValue], settings_of(SETTABLE)] = field(default_factory=dict)
+    """Other values in this run, by dotted key of `decision`, `gatekeeper` or `intervention`."""
+    stalls_m: dict[Name, GroundPoint] = field(default_factory=dict)
+    """Points at which UGVs must end short of their target, by UGV."""
+    expected: Annotated[dict[Words, Any], expected_of(RUN_CLAIMS)] = field(default_factory=dict)
+    """Expected verdicts of claims about this run, by claim; other claims must hold. Least numbers of interventions and
+    messages."""
+
+
+@dataclass(slots=True)
+class Reproduction:
+    """One row of the reproduction table: a measure of a run against the paper's value.
+
+    `calibrated`: a value that the paper leaves open was chosen so that this one comes out. `by_construction`: the
+    scenario itself sets the value, so nothing is reproduced. `ambiguous` states another reading of the paper; the row
+    then counts as neither reproduced nor not reproduced.
+    """
+
+    id: Words
+    """Identifier of the row."""
+    quantity: Words
+    """The compared quantity, in words."""
+    measure: Words
+    """The measure of our value, see `report/reproduction.py`."""
+    run: Words
+    """The run that is measured."""
+    robot: Words
+    """The robot that is measured."""
+    paper: Annotated[list[Real], Field(min_length=1)]
+    """The paper's value, one number for each component."""
+    unit: Words = ""
+    """Its unit."""
+    tolerance: NotNegative = 0.0
+    """Largest allowed difference from the paper's value."""
+    calibrated: YesNo = False
+    """Whether a value that the paper leaves open was chosen so that this one comes out."""
+    why: Words = ""
+    """Why the row is as it is."""
+    ambiguous: Words = ""
+    """Another way to read the paper, in words."""
+    by_construction: YesNo = False
+    """Whether the scenario itself sets the value."""
+
+
+@dataclass(slots=True)
+class Choice:
+    """Origin of a value that is not from the paper.
+
+    `source` is 'calibrated' if it was chosen so that a result matches the paper's, else 'ours'. An override of the
+    value (`--set`) makes it 'set', and takes the place of the reason.
+    """
+
+    key: Words
+    """Dotted key of the value."""
+    source: Annotated[Words, one_of(("calibrated", "ours", SET))]
+    """Its origin."""
+    paper: Words = ""
+    """The paper's value or statement."""
+    reason: Words = field(kw_only=True)
+    """The reason for the value."""
+
+
+@dataclass(slots=True)
+class Scenario:
+    """A scenario file. The order of `ugvs` and `obstacles` is the order of all arrays.
+
+    `expected` maps identifiers of claims about the model (proofs and experiments, the same for all runs) to the
+    expected verdict; one that is not named must be proved, or supported if it is statistical. `claims` adds claims
+    to those of the package: `module:Class` or `file.py:Class` by identifier.
+    """
+
+    __pydantic_config__: ClassVar = ConfigDict(
+        extra="forbid", revalidate_instances="always", use_attribute_docstrings=True
+    )
+
+    name: Name
+    """Its name: letters, digits and underscores."""
+    title: Words = ""
+    """One line."""
+    description: Words = ""
+    """The purpose of the scenario."""
+    seed: CountFromZero = 0
+    """Seed of the decision noise."""
+    duration_s: Positive = 30.0
+    """Simulated time of each run, at least one control period."""
+    arrival_tolerance_m: Positive = 0.1
+    """A robot within this distance of its target has arrived."""
+    stall_tolerance_m: Positive = 0.1
+    """A UGV must end within this distance of its point in `stalls_m`."""
+    ugvs: Annotated[dict[Name, Ugv], Field(min_length=1, max_length=MAX_UGVS)] = field(kw_only=True)
+    """The UGVs, 1 to 100, by name, in the order of all arrays."""
+    uav: Uav = field(kw_only=True)
+    """The UAV."""
+    obstacles: dict[Name, Obstacle] = field(default_factory=dict)
+    """The obstacles, by name."""
+    arena_m: TwoCornersOrNone = field(default_factory=list)
+    """Opposite corners [x, y] of a rectangle whose endless walls keep all robots inside."""
+    map: Map | None = None
+    """A map of ROS."""
+    safe_distance: SafeDistance = field(default_factory=SafeDistance)
+    """Distances to keep."""
+    control: Control = field(default_factory=Control)
+    """The controllers."""
+    decision: Decision = field(default_factory=Decision)
+    """The event trigger."""
+    intervention: Intervention = field(default_factory=Intervention)
+    """The UAV's intervention behaviours."""
+    gatekeeper: Gatekeeper = field(default_factory=Gatekeeper)
+    """The UGVs' decisions about proposals."""
+    runs: Annotated[dict[Name, Run], Field(min_length=1)] = field(kw_only=True)
+    """The simulations, by name."""
+    claims: Annotated[dict[Words, Words], CLAIMS] = field(default_factory=dict)
+    """The user's own claims, by identifier."""
+    expected: Annotated[dict[Words, Words], expected_of(MODEL_CLAIMS)] = field(default_factory=dict)
+    """Expected verdicts of claims about the model, by claim."""
+    reproduction: list[Reproduction] = field(default_factory=list)
+    """The paper's numbers to compare with."""
+    choices: list[Choice] = field(default_factory=list)
+    """Origins of values that are not from the paper."""
+
+    @property
+    def digest(self) -> str:
+        """SHA-256 of the scenario as nested dicts and lists in strict JSON, with all defaults and without spaces."""
+        text = json.dumps(asdict(self), separators=(",", ":"), allow_nan=False)
+        return sha256(text.encode())
+
+    @property
+    def barriers(self) -> dict[str, Obstacle]:
+        """The obstacles, the map and the walls of the arena, by name."""
+        found = dict(self.obstacles)
+        if (given := self.map) is not None and given.cells is not None and given.cells.rectangles:
+            found[MAP] = MapObstacle(
+                known_to_uav=given.known_to_uav, height_m=given.height_m, distance_m=given.distance_m, cells=given.cells
+            )
+        if self.arena_m:
+            (ax, bx), (ay, by) = (sorted(axis) for axis in zip(*self.arena_m, strict=True))
+            corners = [[ax, ay], [bx, ay], [bx, by], [ax, by], [ax, ay]]
+            walls = zip(("south", "east", "north", "west"), pairwise(corners), strict=True)
+            found |= {f"{ARENA}{side}": Obstacle(segment_m=list(wall), height_m=ENDLESS_M) for side, wall in walls}
+        return found
+
+    @property
+    def robots(self) -> dict[str, Ugv | Uav]:
+        """The UGVs and then the UAV, by name."""
+        return {**self.ugvs, self.uav.name: self.uav}
+
+    @property
+    def bodies(self) -> dict[str, Ugv | Uav | Obstacle]:
+        """The robots and then the obstacles, by name."""
+        return {**self.robots, **self.barriers}
+
+    def __repr__(self) -> str:
+        """One line with the numbers of robots and obstacles, and the runs."""
+        things = f"{len(self.ugvs)} UGVs, the UAV, {len(self.obstacles)} obstacles"
+        return f"<Scenario {self.name!r}: {things}, runs {', '.join(self.runs)}>"

@@ -1,0 +1,640 @@
+"""How the values of a scenario must go together: one small function per rule, all in `CHECKS`.
+
+`schema.py` says which values a single key may have. A rule yields its problems as (key, value, allowed); `check` raises
+the first. Plug-ins that a scenario names are not imported here.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import asdict
+from decimal import ROUND_CEILING, ROUND_FLOOR, Context, Decimal
+from fractions import Fraction
+from itertools import pairwise, starmap
+from typing import NamedTuple
+
+import numpy as np
+
+from airground_drake.base.arrays import Array
+from airground_drake.base.errors import Fault, ScenarioError
+from airground_drake.base.exact import decimal
+from airground_drake.base.registry import MODEL_CLAIMS, ROUTES, RUN_CLAIMS
+from airground_drake.base.statuses import COUNTS, NOTHING, alternatives
+from airground_drake.model.geometry import convex, outline
+from airground_drake.model.trigger.bayes import COMPUTED
+from airground_drake.scenario import hints
+from airground_drake.scenario.budget import PairBudget, budget, takes_room
+from airground_drake.scenario.outlines import outlines_of
+from airground_drake.scenario.plants import plant_of
+from airground_drake.scenario.rounding import TOLERANCE_M, Rounding
+from airground_drake.scenario.schema import ABOUT, ARENA, MAP, SHAPES, Obstacle, Plant, Scenario, Uav, Ugv, Vector
+from airground_drake.scenario.shapes import crossing, near_edge
+
+GAINS = ("avoidance_gain_1_s", "motion_gain_1_s", "formation_gain_1_s", "intervention_gain_1_s")
+ARRIVES = "LIVE-GOAL"  # the claim that every UGV ends where it is to end
+TOLERANCE = 1e-9  # m between points; relative between periods
+_SHORT = 1.0 - 1e-5  # of a limit that is printed with six digits, so that what a message allows is allowed
+
+Problems = Iterator[tuple[str, object, str]]
+
+
+def check(scenario: Scenario, source: str) -> None:
+    """Check a scenario whose values have the types of the schema.
+
+    Args:
+        scenario: the scenario.
+        source: where it comes from, for the message.
+
+    Raises:
+        ScenarioError: for the first problem; names the key, its value and what is allowed.
+    """
+    for rule in CHECKS:
+        for key, value, allowed in rule(scenario):
+            raise ScenarioError(source, key, value, allowed)
+
+
+def _one_of(key: str, value: str, allowed: Iterable[str], what: str) -> Problems:
+    options = tuple(allowed)
+    if value not in options:
+        yield key, value, f"{what} {', '.join(options) or '(none)'}"
+
+
+def _names(scenario: Scenario) -> Problems:
+    keys = [*((f"ugvs.{name}", name) for name in scenario.ugvs), ("uav.name", scenario.uav.name)]
+    keys += [(f"obstacles.{name}", name) for name in scenario.obstacles]
+    count = Counter(name for _, name in keys)
+    yield from ((key, name, "a name that no other UGV, obstacle or UAV has") for key, name in keys if count[name] > 1)
+
+
+def _reserved(scenario: Scenario) -> Problems:
+    for name in (*scenario.robots, *scenario.obstacles):
+        key = f"ugvs.{name}" if name in scenario.ugvs else f"obstacles.{name}" if name in scenario.obstacles else "uav"
+        if name.startswith(ARENA):
+            yield key, name, f"a name that does not begin with {ARENA}: these are the walls of arena_m"
+        if name == MAP or name.startswith(f"{MAP}_"):
+            yield key, name, f"a name other than {MAP}, and one that does not begin with {MAP}_: these are of the map"
+
+
+def _map(scenario: Scenario) -> Problems:
+    """The rectangles of a map are in it."""
+    if scenario.map is None or scenario.map.cells is None:
+        return
+    cells = scenario.map.cells
+    for index, (bottom, top, left, right) in enumerate(cells.rectangles):
+        if not (bottom < top <= cells.rows and left < right <= cells.columns):
+            allowed = f"a rectangle of the {cells.rows} rows and {cells.columns} columns"
+            yield f"map.cells.rectangles.{index}", [bottom, top, left, right], allowed
+
+
+def _shapes(scenario: Scenario) -> Problems:
+    """Each obstacle has one shape, whose corners go round it once."""
+    for name, obstacle in scenario.obstacles.items():
+        key = f"obstacles.{name}"
+        given = [shape for shape in SHAPES if getattr(obstacle, shape)]
+        if len(given) > 1:
+            yield f"{key}.{given[1]}", getattr(obstacle, given[1]), f"one shape: {given[0]} is given, too"
+        if not (obstacle.position_m or obstacle.moves) and {*given} <= {*ABOUT}:
+            yield f"{key}.position_m", Fault("missing"), "wanted: [x, y] or [x, y, z] in m, or polygon_m or segment_m"
+        if obstacle.heading_rad and not given:
+            yield f"{key}.heading_rad", obstacle.heading_rad, f"0: only {', '.join(SHAPES)} have a heading"
+        if (given or obstacle.height_m) and obstacle.position_m and obstacle.position_m[2]:
+            yield f"{key}.position_m", obstacle.position_m, "z = 0: it stands on the ground"
+        if obstacle.disappears_s and obstacle.disappears_s <= obstacle.appears_s:
+            yield (
+                f"{key}.disappears_s",
+                obstacle.disappears_s,
+                f"later than appears_s = {obstacle.appears_s:.9g} s, or 0",
+            )
+        yield from _way(key, obstacle, flat=bool(given or obstacle.height_m))
+        yield from _corners(f"{key}.segment_m", obstacle.segment_m, 2, closed=False)
+        yield from _corners(f"{key}.polygon_m", obstacle.polygon_m, 3, closed=True)
+    if scenario.arena_m and any(one == other for one, other in zip(*scenario.arena_m, strict=True)):
+        yield "arena_m", scenario.arena_m, "two opposite corners of a rectangle"
+    elif scenario.arena_m:
+        low, high = np.min(scenario.arena_m, axis=0), np.max(scenario.arena_m, axis=0)
+        for key, robot in (*((f"ugvs.{name}", each) for name, each in scenario.ugvs.items()), ("uav", scenario.uav)):
+            for name in ("start_m", "target_m"):
+                place = np.array(getattr(robot, name)[:2])
+                if not ((low < place) & (place < high)).all():
+                    yield f"{key}.{name}", getattr(robot, name), f"a place within arena_m = {scenario.arena_m}"
+
+
+def _headings(scenario: Scenario) -> Problems:
+    """Headings are at most one turn: greater ones are degrees."""
+    headings = {f"obstacles.{name}": each.heading_rad for name, each in scenario.obstacles.items()}
+    for name, robot in scenario.robots.items():
+        place = f"ugvs.{name}" if name in scenario.ugvs else "uav"
+        several = len(robot.plant) > 1
+        headings |= {f"{place}.plant{f'.{k}' * several}": each.heading_rad for k, each in enumerate(robot.plant)}
+    for key, heading in headings.items():
+        if abs(heading) > math.tau + TOLERANCE:
+            degrees = f"{heading:g} degrees are {math.radians(heading):.6g} rad"
+            yield f"{key}.heading_rad", heading, f"from -{math.tau:.6g} to {math.tau:.6g} rad; {degrees}"
+
+
+def _way(key: str, obstacle: Obstacle, *, flat: bool) -> Problems:
+    """The way of an obstacle that moves."""
+    moves = obstacle.moves
+    if moves is None:
+        if obstacle.known_motion:
+            yield f"{key}.known_motion", True, "false: it has no moves"
+        return
+    if obstacle.position_m:
+        yield f"{key}.position_m", obstacle.position_m, "no position_m: it moves along moves.waypoints_m"
+    yield from _corners(f"{key}.moves.waypoints_m", moves.waypoints_m, 2, closed=False)
+    if moves.at_end == "loop" and math.dist(moves.waypoints_m[0], moves.waypoints_m[-1]) <= TOLERANCE:
+        yield (
+            f"{key}.moves.waypoints_m",
+            moves.waypoints_m,
+            "without the first waypoint at the end: a loop leads back there",
+        )
+    if flat and any(point[2] for point in moves.waypoints_m):
+        yield f"{key}.moves.waypoints_m", moves.waypoints_m, "z = 0: it stands on the ground"
+
+
+def _corners(key: str, corners: Sequence[Vector], least: int, *, closed: bool) -> Problems:
+    """The corners of a wall, or of a polygon whose edges must not touch each other."""
+    if 0 < len(corners) < least:
+        yield key, corners, f"at least {least} corners [x, y] in m"
+        return
+    edges = [(k - 1, k) for k in range(0 if closed else 1, len(corners))]
+    for i, j in edges:
+        if math.dist(corners[i], corners[j]) <= TOLERANCE:
+            yield f"{key}.{j}", corners[j], "a corner other than the one before it"
+    if closed and corners and (met := crossing([(x, y) for x, y in corners])):
+        one, other = (list(corners[k]) for k in met)
+        yield key, corners, f"edges that do not meet: those that end at {one} and at {other} do"
+    elif closed and corners and (thin := near_edge([(x, y) for x, y in corners], TOLERANCE)) is not None:
+        allowed = f"a corner more than {TOLERANCE:g} m from the edges that do not end there (segment_m: a thin wall)"
+        yield f"{key}.{thin}", corners[thin], allowed
+
+
+def _blocks(scenario: Scenario) -> Problems:
+    gatekeeper = scenario.gatekeeper
+    if gatekeeper.blocks > gatekeeper.stages:
+        allowed = "a whole number from 1 to gatekeeper.stages, or 0: one accept variable per stage"
+        yield "gatekeeper.blocks", gatekeeper.blocks, allowed
+    if gatekeeper.route in ROUTES.own and gatekeeper.route != "mixed_integer":
+        if gatekeeper.blocks:
+            yield "gatekeeper.blocks", gatekeeper.blocks, "0: only the route mixed_integer has blocks"
+        if gatekeeper.solver != "daqp":
+            yield "gatekeeper.solver", gatekeeper.solver, "daqp: only the route mixed_integer has other solvers"
+
+
+def _runs(scenario: Scenario) -> Problems:
+    for name, run in scenario.runs.items():
+        for robot in run.stalls_m:
+            yield from _one_of(f"runs.{name}.stalls_m.{robot}", robot, scenario.ugvs, "one of the UGVs")
+        for claim in run.expected:
+            key = f"runs.{name}.expected.{claim}"
+            known = (*RUN_CLAIMS, *COUNTS, *scenario.claims, *(MODEL_CLAIMS if run.set else ()))
+            yield from _one_of(key, claim, known, "one of the claims and numbers")
+    for claim in scenario.expected:
+        known = (*MODEL_CLAIMS, *scenario.claims)
+        yield from _one_of(f"expected.{claim}", claim, known, "one of the claims about the model")
+
+
+def _route(scenario: Scenario) -> Problems:
+    """A third-party route that no run uses is a mistake: only method (c) solves problem (26)."""
+    key, allowed = "gatekeeper.route", ", ".join(ROUTES.own)
+    runs = ", ".join(f"{name} ({run.method})" for name, run in scenario.runs.items())
+    if ROUTES.is_foreign(scenario.gatekeeper.route) and all(run.method != "c" for run in scenario.runs.values()):
+        yield key, scenario.gatekeeper.route, f"no run would use it, of {runs}: add one of method c, or use {allowed}"
+    for name, run in scenario.runs.items():
+        route = str(run.set.get(key, ""))
+        if route and ROUTES.is_foreign(route) and run.method != "c":
+            yield f"runs.{name}.set.{key}", route, f"this run is of method {run.method}: only method c uses a route"
+
+
+KEYS_OF_PLANTS = {
+    "first_order": (),
+    "unicycle": ("hand_point_m", "heading_rad", "max_turn_rad_s", "wheel_base_m", "max_wheel_speed_m_s", "backwards"),
+    "lag": ("time_constant_s",),
+    "delay": ("delay_s",),
+}
+"""The keys of each kind of plant."""
+OWN_KEYS = ("drift_m_s", "cover_m", "parameters")
+"""Those of a user's plant."""
+
+
+def _plants(scenario: Scenario) -> Problems:
+    """Each plant has the keys of its kind, within limits that the theorems need; a list combines what they combine."""
+    for name, robot in scenario.robots.items():
+        place = f"{f'ugvs.{name}' if name in scenario.ugvs else 'uav'}.plant"
+        kinds = [plant.kind for plant in robot.plant]
+        if len(kinds) > 1 and kinds != ["delay", "lag"]:
+            why = "no theorem covers another combination; chord steering needs a body that obeys at once"
+            if any(plant.is_own for plant in robot.plant):
+                why = "a plant of your own does everything itself"
+            yield place, f"[{', '.join(kinds)}]", f"one plant, or a delay and then a lag: {why}"
+        for k, plant in enumerate(robot.plant):
+            key = f"{place}.{k}" if len(kinds) > 1 else place
+            keys = KEYS_OF_PLANTS.get(plant.kind, OWN_KEYS)
+            for other in (each for each in _ALL_KEYS if each not in keys):
+                if getattr(plant, other) != getattr(_DEFAULT, other):
+                    allowed = f"keys of {plant.kind}: {', '.join(keys) or 'none'}"
+                    yield f"{key}.{other}", getattr(plant, other), allowed
+            yield from _numbers_of(scenario, key, robot, plant)
+
+
+_DEFAULT = Plant()
+_ALL_KEYS = tuple(key for keys in (*KEYS_OF_PLANTS.values(), OWN_KEYS) for key in keys)
+
+
+def _numbers_of(scenario: Scenario, key: str, robot: Ugv | Uav, plant: Plant) -> Problems:
+    """The numbers of one plant of a robot."""
+    period = scenario.control.period_s
+    if plant.kind == "lag" and not plant.time_constant_s >= TOLERANCE:
+        yield f"{key}.time_constant_s", plant.time_constant_s, "more than 0 s"
+    if plant.kind == "delay" and not _multiple(plant.delay_s, period):
+        yield f"{key}.delay_s", plant.delay_s, f"a whole multiple of control.period_s = {period:.9g} s, more than 0"
+    if plant.drift_m_s and not scenario.control.avoidance_gain_1_s:
+        yield f"{key}.drift_m_s", plant.drift_m_s, "0: without control.avoidance_gain_1_s nothing makes up for a drift"
+    if plant.kind != "unicycle":
+        return
+    if isinstance(robot, Uav):
+        yield f"{key}.kind", plant.kind, "another kind: a UAV is no unicycle"
+    if plant.hand_point_m < TOLERANCE:
+        yield f"{key}.hand_point_m", plant.hand_point_m, "more than 0 m: the law steers a point ahead of the axle"
+        return
+    if bool(plant.wheel_base_m) != bool(plant.max_wheel_speed_m_s):
+        missing = "max_wheel_speed_m_s" if plant.wheel_base_m else "wheel_base_m"
+        yield f"{key}.{missing}", 0.0, "more than 0: wheel_base_m and max_wheel_speed_m_s go together"
+    limits = [plant.max_turn_rad_s] if plant.max_turn_rad_s else []
+    if plant.wheel_base_m:
+        limits.append(2.0 * plant.max_wheel_speed_m_s / plant.wheel_base_m)
+    least = 0.5 * robot.max_speed_m_s * period
+    if not (plant.hand_point_m >= least or (limits and min(limits) * period < math.pi)):
+        allowed = (
+            f"at least max_speed_m_s * control.period_s / 2 = {least:.9g} m, or a turning limit below pi / period_s = "
+            f"{math.pi / period:.6g} rad/s: else the axle could swing round within a period"
+        )
+        yield f"{key}.hand_point_m", plant.hand_point_m, allowed
+
+
+def _presets(scenario: Scenario) -> Problems:
+    for name, ugv in scenario.ugvs.items():
+        key = f"ugvs.{name}.preset.waypoints_m"
+        for index, (before, after) in enumerate(pairwise(ugv.preset.waypoints_m), start=1):
+            if math.dist(before, after) <= TOLERANCE:
+                yield f"{key}.{index}", after, "a waypoint other than the one before it"
+        if ugv.preset.speed_m_s > ugv.max_speed_m_s:
+            allowed = f"at most the UGV's max_speed_m_s = {ugv.max_speed_m_s:.9g} m/s"
+            yield f"ugvs.{name}.preset.speed_m_s", ugv.preset.speed_m_s, allowed
+
+
+def preset_s(waypoints_m: Sequence[Vector], speed_m_s: float) -> float:
+    """How long a preset trajectory takes, s."""
+    return sum(starmap(math.dist, pairwise(waypoints_m))) / speed_m_s
+
+
+def _ends(scenario: Scenario) -> Problems:
+    """A preset must lead to its target, to within the tolerance, if a run expects the UGV there.
+
+    A scenario that ends before a preset does is cut short on purpose: no arrival is expected.
+    """
+    presets = [ugv.preset for ugv in scenario.ugvs.values()]
+    if max(preset_s(each.waypoints_m, each.speed_m_s) for each in presets) > scenario.duration_s:
+        return
+    for name, ugv in scenario.ugvs.items():
+        away, end = math.dist(ugv.preset.waypoints_m[-1], ugv.target_m), len(ugv.preset.waypoints_m) - 1
+        for run, spec in scenario.runs.items():
+            admitted = alternatives(spec.expected.get(ARRIVES, "holds"))
+            arrives = name not in spec.stalls_m and {"refuted", NOTHING}.isdisjoint(admitted)
+            if arrives and away > scenario.arrival_tolerance_m + TOLERANCE:
+                allowed = (
+                    f"at most arrival_tolerance_m = {scenario.arrival_tolerance_m:.9g} m from {name}'s target_m, where "
+                    f"run {run} expects it, not {away:.9g} m (or runs.{run}.expected.{ARRIVES}: refuted)"
+                )
+                yield f"ugvs.{name}.preset.waypoints_m.{end}", ugv.preset.waypoints_m[end], allowed
+
+
+def _gains(scenario: Scenario) -> Problems:
+    period = scenario.control.period_s
+    for name in GAINS:
+        gain = getattr(scenario.control, name)
+        if decimal(gain) * decimal(period) > 1:  # as the proofs take them
+            most = _shown(1 / decimal(period), ROUND_FLOOR)
+            yield f"control.{name}", gain, f"at most {most} 1/s: gain * control.period_s must not exceed 1"
+
+
+def _periods(scenario: Scenario) -> Problems:
+    control, gatekeeper, noise = scenario.control.period_s, scenario.gatekeeper, scenario.decision.noise_period_s
+    rule = f"must be a whole multiple of control.period_s = {control:.9g} s"
+    if scenario.duration_s < control:
+        yield "duration_s", scenario.duration_s, f"at least one control period, control.period_s = {control} s"
+    for key, period in (("gatekeeper", gatekeeper.period_s), ("intervention", scenario.intervention.period_s)):
+        if not _multiple(period, control):
+            yield f"{key}.period_s", period, rule
+    stage = gatekeeper.horizon_s / gatekeeper.stages
+    if not _multiple(stage, control):
+        fits = f" (gatekeeper.stages: {round(gatekeeper.horizon_s / control)} would do)"
+        problem = f"a stage, horizon_s / stages = {stage:.9g} s, {rule}"
+        yield "gatekeeper.horizon_s", gatekeeper.horizon_s, problem + fits * _multiple(gatekeeper.horizon_s, control)
+    if not (_multiple(noise, control) or _multiple(control, noise)):
+        yield "decision.noise_period_s", noise, f"{rule}, or go into it a whole number of times"
+    step, leak = min(control, noise), scenario.decision.leak_1_s
+    if leak * step > 1.0:
+        most = _shown(1 / decimal(step), ROUND_FLOOR)
+        allowed = f"at most {most} 1/s: leak * {step:.9g} s, a step of the noise, must not exceed 1"
+        yield "decision.leak_1_s", leak, allowed
+
+
+def _multiple(of: float, unit: float) -> bool:
+    ratio = of / unit
+    return round(ratio) >= 1 and abs(ratio - round(ratio)) <= TOLERANCE * ratio
+
+
+def _release(scenario: Scenario) -> Problems:
+    decision, rule = scenario.decision, scenario.decision.threshold
+    zeta = rule.zeta_m
+    if rule.rule in COMPUTED:
+        zeta = COMPUTED[rule.rule](rule.drift_m_s, rule.noise_m_sqrt_s, rule.c1_1_s, rule.c2)
+    if decision.trigger == "automaton" and not decision.release_m < zeta:
+        yield "decision.release_m", decision.release_m, f"less than the {rule.rule} threshold, {zeta:.9g} m"
+
+
+def _distances(scenario: Scenario) -> Problems:
+    safe, altitude = scenario.safe_distance, scenario.uav.altitude_m
+    for name in ("obstacle_m", "ugv_m", "air_ground_m", *(["moving_m"] if safe.moving_m else [])):
+        if not safe.collision_m < getattr(safe, name):
+            allowed = f"less than safe_distance.{name} = {getattr(safe, name):.9g} m"
+            yield "safe_distance.collision_m", safe.collision_m, allowed
+    for name, each in scenario.barriers.items():
+        if each.distance_m and not safe.collision_m < each.distance_m:
+            allowed = f"more than safe_distance.collision_m = {safe.collision_m:.9g} m, or 0"
+            yield f"{_key_of(name)}.distance_m", each.distance_m, allowed
+    radii = scenario.uav.radius_m + max(ugv.radius_m for ugv in scenario.ugvs.values())
+    if not altitude > safe.air_ground_m + radii:
+        least = f"safe_distance.air_ground_m = {safe.air_ground_m:.9g} m{_and(radii)}"
+        yield "uav.altitude_m", altitude, f"more than {least}, for the UAV to fly over a UGV"
+
+
+def _and(radii: float) -> str:
+    """What radii add to a distance, m, in the words of a message."""
+    return f" + radii {radii:.9g} m" if radii else ""
+
+
+class _Body(NamedTuple):
+    """A robot or obstacle: radius plus travel in a control period, m; speed, m/s; radius, m; name."""
+
+    reach: float
+    speed: float
+    radius: float
+    name: str
+
+
+Apart = tuple[str, float]
+"""A safe distance: its key, and its value, m."""
+
+
+def apart_of(scenario: Scenario, name: str) -> Apart:
+    """The distance to keep from an obstacle."""
+    obstacle = scenario.barriers[name]
+    if obstacle.distance_m:
+        return f"{_key_of(name)}.distance_m", obstacle.distance_m
+    moving = obstacle.expected_speed_m_s and scenario.safe_distance.moving_m
+    return _apart(scenario, "moving_m" if moving else "obstacle_m")
+
+
+def _key_of(barrier: str) -> str:
+    """The key of an obstacle or of the map; walls of the arena count as obstacles."""
+    return MAP if barrier == MAP else f"obstacles.{barrier}"
+
+
+def _apart(scenario: Scenario, kind: str) -> Apart:
+    return f"safe_distance.{kind}", getattr(scenario.safe_distance, kind)
+
+
+def _nearest_pairs(scenario: Scenario) -> list[tuple[Apart, _Body, _Body]]:
+    """For each kind of pairs the pair that needs the most room in a period, with its safe distance."""
+    h = scenario.control.period_s
+    *ugvs, uav = (
+        _Body(each.radius_m + each.max_speed_m_s * h, each.max_speed_m_s, each.radius_m, name)
+        for name, each in scenario.robots.items()
+    )
+    ugvs.sort(reverse=True)
+    fixed = [
+        _Body(each.radius_m, each.expected_speed_m_s, each.radius_m, name) for name, each in scenario.barriers.items()
+    ]
+    pairs = [(_apart(scenario, "air_ground_m"), uav, ugvs[0])]
+    pairs += [(_apart(scenario, "ugv_m"), one, other) for one, other in pairwise(ugvs[:2])]
+    return [*pairs, *((apart_of(scenario, each.name), max(uav, ugvs[0]), each) for each in fixed)]
+
+
+def _shown(number: Fraction, rounding: str) -> str:
+    """A number with nine digits, rounded in the direction in which it is allowed."""
+    digits = Context(prec=9, rounding=rounding).divide(Decimal(number.numerator), Decimal(number.denominator))
+    return f"{digits:.9g}"
+
+
+def _sensing(scenario: Scenario) -> Problems:
+    """A body beyond the sensing range must not come within the safe distance in one control period."""
+    period = scenario.control.period_s
+
+    def room(apart: Apart, one: _Body, other: _Body) -> Fraction:
+        closing = (decimal(one.speed) + decimal(other.speed)) * decimal(period)
+        return decimal(apart[1] + (one.radius + other.radius)) + closing
+
+    needed, (kind, least), one, other = max((room(*pair), *pair) for pair in _nearest_pairs(scenario))
+    if decimal(scenario.control.sensing_range_m) < needed:
+        apart = f"{kind} {least:.9g} m{_and(one.radius + other.radius)}"
+        total = f"{apart} + closing {one.speed + other.speed:.9g} m/s * control.period_s {period:.9g} s"
+        allowed = f"at least {_shown(needed, ROUND_CEILING)} m for {one.name} and {other.name}: {total}"
+        allowed += hints.fast(max(one.speed, other.speed))
+        yield "control.sensing_range_m", scenario.control.sensing_range_m, allowed
+
+
+def _extent(scenario: Scenario) -> Problems:
+    """Rounding must not take more from a safe distance than SAFE-TRACE tolerates.
+
+    With the gain A = 0 the law restores no lost distance, and no bound applies; SAFE-HYP says what a run lost.
+    """
+    control, duration = scenario.control, scenario.duration_s
+    if control.avoidance_gain_1_s == 0.0:
+        return
+    speeds = sorted(each.max_speed_m_s for each in scenario.robots.values())
+    speed, closing = speeds[-1], speeds[-2] + speeds[-1]
+    loss = Rounding(control.sensing_range_m, closing, control.period_s, control.avoidance_gain_1_s)
+    points: list[tuple[str, Vector]] = []
+    for name, ugv in scenario.ugvs.items():
+        points += [(f"ugvs.{name}.start_m", ugv.start_m), (f"ugvs.{name}.target_m", ugv.target_m)]
+        points += [(f"ugvs.{name}.preset.waypoints_m.{i}", each) for i, each in enumerate(ugv.preset.waypoints_m)]
+    points.append(("uav.start_m", scenario.uav.start_m))
+    for name, each in scenario.barriers.items():
+        shape = next((key for key in SHAPES if getattr(each, key)), "position_m")
+        corners = outlines_of(scenario, each)[:, outline.CORNERS :].reshape(-1, 2)  # and zeros
+        places = [corners[np.abs(corners).max(axis=1).argmax()].tolist()] + [each.position_m] * bool(each.position_m)
+        if each.moves:
+            shape, places = "moves.waypoints_m", [*places, *each.moves.waypoints_m]
+        key = f"{_key_of(name)}.{'file' if name == MAP else shape}"
+        points += [("arena_m" if name.startswith(ARENA) else key, place) for place in places]
+    key, point = max(points, key=lambda entry: max(map(abs, entry[1])))
+    farthest = max(map(abs, point))
+    allowed = loss.largest_extent(duration) - speed * duration
+    if farthest <= allowed:
+        return
+    why = f"for rounding to take less than {TOLERANCE_M:g} m from a safe distance"
+    longest = loss.longest(farthest, speed)
+    if allowed > 0.0 and farthest > speed * duration:
+        yield (
+            key,
+            point,
+            f"coordinates of at most {allowed * _SHORT:.6g} m in size, {why} within duration_s = {duration:.9g} s"
+            f"{hints.far(farthest)}",
+        )
+    elif longest > 0.0:
+        allowed_s = f"at most {longest * _SHORT:.6g} s at {speed:.9g} m/s, {why}"
+        yield "duration_s", duration, f"{allowed_s}{hints.fast(speed) or hints.far(farthest)}"
+    else:
+        gain = loss.least_gain(farthest + speed * duration, duration)
+        yield "control.avoidance_gain_1_s", control.avoidance_gain_1_s, f"0, or at least {gain / _SHORT:.6g} 1/s, {why}"
+
+
+def _filled(scenario: Scenario) -> str:
+    """Which free or unknown cells of the map count as occupied."""
+    cells = scenario.map.cells if scenario.map else None
+    if cells is None:
+        return ""
+    told = [f"{cells.unsure} unknown ones"] * bool(cells.unsure and cells.unknown == "occupied")
+    told += [f"{cells.unreached} free ones that cannot be reached from any start"] * bool(cells.unreached)
+    return f" (of whose cells {' and '.join(told)} count as occupied)" if told else ""
+
+
+class _Round(NamedTuple):
+    """A robot: its key in the scenario, its name, its place, m, and its radius, m."""
+
+    key: str
+    name: str
+    point: Vector
+    radius: float
+
+
+def _clearances(scenario: Scenario) -> Problems:
+    """No robot may start or end within the safe distance of an obstacle or of another robot."""
+    outlines = {name: outlines_of(scenario, each) for name, each in scenario.barriers.items()}
+    for attribute, verb in (("start_m", "starts"), ("target_m", "would end")):
+        ugvs = [
+            _Round(f"ugvs.{name}", name, getattr(ugv, attribute), ugv.radius_m) for name, ugv in scenario.ugvs.items()
+        ]
+        uav = _Round("uav", scenario.uav.name, getattr(scenario.uav, attribute), scenario.uav.radius_m)
+        for name, rows in outlines.items():
+            if scenario.barriers[name].moves or (scenario.barriers[name].appears_s and attribute == "start_m"):
+                continue  # where robots are when it comes or appears is judged in each run
+            kind, least = apart_of(scenario, name)
+            for robot in (*ugvs, uav):
+                apart = convex.distances(rows, np.array(robot.point), robot is not uav) - rows[:, outline.RADIUS]
+                gap = float(apart.min()) - robot.radius
+                if gap < least - TOLERANCE:
+                    what = f"{verb} {gap:.9g} m from {name}{_filled(scenario) if name == MAP else ''}"
+                    yield _too_near(robot, attribute, what, kind, least)
+        for robots, others, kind in ((ugvs, ugvs, "ugv_m"), ([uav], ugvs, "air_ground_m")):
+            least = getattr(scenario.safe_distance, kind)
+            for robot, other in _within(robots, others, least - TOLERANCE):
+                gap = math.dist(robot.point, other.point) - (robot.radius + other.radius)
+                what = f"{verb} {gap:.9g} m from {other.name}"
+                yield _too_near(robot, attribute, what, f"safe_distance.{kind}", least)
+
+
+def _too_near(robot: _Round, attribute: str, what: str, kind: str, least: float) -> tuple[str, object, str]:
+    message = f"{robot.name} {what}, at least {kind} = {least:.9g} m is needed"
+    message = f"{robot.name} {what}, at least {kind} = {least:.9g} m is needed"
+    return f"{robot.key}.{attribute}", robot.point, message
+
+
+def _within(these: Sequence[_Round], those: Sequence[_Round], distance: float) -> Iterator[tuple[_Round, _Round]]:
+    """Pairs whose surfaces are nearer than a distance, m. If both lists are the same, each pair comes once."""
+    (points, radii), (others, other_radii) = (
+        (np.reshape([each.point for each in group], (-1, 3)), np.array([each.radius for each in group]))
+        for group in (these, those)
+    )
+    apart = np.linalg.norm(points[:, None] - others, axis=2)
+    for i, j in np.argwhere(apart < distance + np.add.outer(radii, other_radii)).tolist():
+        if these is not those or j < i:
+            yield these[i], those[j]
+
+
+def _budget(scenario: Scenario) -> Problems:
+    """The law's distance, which is more than the promise where bodies are not where the law steers them, can be kept.
+
+    The steered points start and end that far from each other, the sensing range covers it, and the UAV flies above it.
+    """
+    period, robots = scenario.control.period_s, scenario.robots
+    if not takes_room(scenario):
+        return
+    start = {
+        name: plant_of(robot, period).steered(np.array(robot.start_m, dtype=np.float64))
+        for name, robot in robots.items()
+    }
+    target = {name: np.array(robot.target_m, dtype=np.float64) for name, robot in robots.items()}
+    outlines = {name: outlines_of(scenario, each) for name, each in scenario.barriers.items()}
+    for pair in budget(scenario):
+        if not pair.terms:
+            continue
+        key = f"ugvs.{pair.first}" if pair.first in scenario.ugvs else "uav"
+        needs = (
+            f"{pair.promised_m:.2f} m between {pair.first} and {pair.second} needs {pair.gap_m:.2f} m in the law "
+            f"({pair.in_words()})"
+        )
+        other = scenario.barriers.get(pair.second)
+        for places, verb in ((start, "start"), (target, "would end")):
+            if other and (other.moves or (other.appears_s and verb == "start")):
+                continue
+            apart = _apart_m(scenario, places, pair, outlines) - pair.radii_m
+            if apart < pair.gap_m - TOLERANCE:
+                yield key, Fault(needs), f"they {verb} {apart:.2f} m apart. Largest term: {pair.largest}"
+        speed = other.expected_speed_m_s if other else robots[pair.second].max_speed_m_s
+        reach = pair.law_m + (robots[pair.first].max_speed_m_s + speed) * period
+        if scenario.control.sensing_range_m < reach:
+            allowed = (
+                f"control.sensing_range_m must be at least {reach + TOLERANCE:.9g} m. Largest term: {pair.largest}"
+            )
+            yield key, Fault(needs), allowed
+        if pair.kind == "air_ground" and not scenario.uav.altitude_m > pair.law_m:
+            yield (
+                key,
+                Fault(needs),
+                f"uav.altitude_m must be more than {pair.law_m:.9g} m. Largest term: {pair.largest}",
+            )
+
+
+def _apart_m(scenario: Scenario, places: dict[str, Array], pair: PairBudget, outlines: dict[str, Array]) -> float:
+    """Distance of a pair when its robots are at some places, as of `PairBudget.law_m`, m."""
+    place = places[pair.first]
+    if pair.second in places:
+        return float(np.linalg.norm(place - places[pair.second]))
+    return float(convex.distances(outlines[pair.second], place, pair.first in scenario.ugvs).min())
+
+
+def _reproduction(scenario: Scenario) -> Problems:
+    count = Counter(row.id for row in scenario.reproduction)
+    for index, row in enumerate(scenario.reproduction):
+        key = f"reproduction.{index}"
+        if not row.id or count[row.id] > 1:
+            yield f"{key}.id", row.id, "an identifier that no other row has"
+        yield from _one_of(f"{key}.run", row.run, scenario.runs, "one of the runs")
+        yield from _one_of(f"{key}.robot", row.robot, (*scenario.ugvs, scenario.uav.name), "one of the robots")
+
+
+def _choices(scenario: Scenario) -> Problems:
+    keys = set(_keys(asdict(scenario))) if scenario.choices else set()
+    for index, choice in enumerate(scenario.choices):
+        if choice.key not in keys:
+            yield f"choices.{index}.key", choice.key, "a key of this scenario, such as control.period_s"
+
+
+def _keys(value: object, above: str = "") -> Iterator[str]:
+    """Dotted keys of all entries of nested dicts and lists."""
+    entries = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
+    for name, inner in entries:
+        yield f"{above}{name}"
+        yield from _keys(inner, f"{above}{name}.")
+
+
+CHECKS: tuple[Callable[[Scenario], Problems], ...] = (
+    _names, _reserved, _shapes, _headings, _map, _blocks, _route, _runs, _plants, _presets, _ends, _gains, _periods,
+    _release, _distances, _sensing, _extent, _clearances, _budget, _reproduction, _choices,
+)  # fmt: skip
+"""Every rule; later ones rely on earlier ones."""

@@ -1,0 +1,47 @@
+"""The world of a scenario."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from airground_drake.model.bodies.world import Body, Kind, World
+from airground_drake.model.geometry import outline
+from airground_drake.model.plants.plant import Scripted
+from airground_drake.scenario.courses import course
+from airground_drake.scenario.outlines import outlines_of
+from airground_drake.scenario.plants import plant_of
+from airground_drake.scenario.schema import Obstacle, Scenario, Uav, Ugv
+
+
+def make_world(scenario: Scenario) -> World:
+    """All bodies of a scenario, and the distances that they keep."""
+    safe = scenario.safe_distance
+    control = scenario.control
+    robots = [_robot(name, "ugv", ugv, control.period_s) for name, ugv in scenario.ugvs.items()]
+    robots += [_robot(scenario.uav.name, "uav", scenario.uav, control.period_s)]
+    obstacles = [_obstacle(scenario, name, each) for name, each in scenario.barriers.items()]
+    obstacles.sort(key=lambda body: body.plant is None)
+    apart: dict[frozenset[Kind], float] = {
+        frozenset(("ugv",)): safe.ugv_m,
+        frozenset(("ugv", "uav")): safe.air_ground_m,
+    }
+    return World((*robots, *obstacles), apart, control.avoidance_gain_1_s)
+
+
+def _obstacle(scenario: Scenario, name: str, given: Obstacle) -> Body:
+    start, plant = np.zeros(3), None
+    if given.moves:
+        way = course(given.moves, scenario.control.period_s, scenario.duration_s)
+        start, plant = way.at(0.0)[0], Scripted(way, given.known_motion)
+    until = given.disappears_s or math.inf
+    return Body(
+        name, "obstacle", start, outlines_of(scenario, given), plant, given.expected_speed_m_s, given.appears_s, until
+    )  # fmt: skip
+
+
+def _robot(name: str, kind: Kind, given: Ugv | Uav, period_s: float) -> Body:
+    plant = plant_of(given, period_s)
+    start = plant.steered(np.array(given.start_m, dtype=np.float64))
+    return Body(name, kind, start, outline.balls(np.zeros(3), given.radius_m), plant, given.max_speed_m_s)

@@ -1,1 +1,0 @@
-"""The scenario file: schema, loading, validation, and the shipped scenarios."""

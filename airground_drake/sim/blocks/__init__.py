@@ -1,0 +1,24 @@
+"""LeafSystems: thin shells that give the pure maths named ports, rates and state."""
+
+from airground_drake.sim.blocks.controllers import UavController, UgvController
+from airground_drake.sim.blocks.decision import DecisionBlock, DecisionVariable, EventTrigger
+from airground_drake.sim.blocks.gatekeeper import DirectAcceptance, Gatekeeper
+from airground_drake.sim.blocks.intervention import InterventionPlanner
+from airground_drake.sim.blocks.monitor import Laws, Monitor, Rule, Violation
+from airground_drake.sim.blocks.plant import VelocityDisturbance
+
+__all__ = [
+    "DecisionBlock",
+    "DecisionVariable",
+    "DirectAcceptance",
+    "EventTrigger",
+    "Gatekeeper",
+    "InterventionPlanner",
+    "Laws",
+    "Monitor",
+    "Rule",
+    "UavController",
+    "UgvController",
+    "VelocityDisturbance",
+    "Violation",
+]

@@ -1,0 +1,341 @@
+"""Sampled NSBC controllers of the UGVs and of the UAV.
+
+Both act on what planner and gatekeeper decide at the same instant: Drake makes all unrestricted updates of an instant
+before the discrete ones. So the controllers' updates must stay discrete, and those of planner and gatekeeper
+unrestricted.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from itertools import groupby
+from typing import Any
+
+import numpy as np
+from pydrake.common.value import AbstractValue, Value
+from pydrake.systems.framework import (
+    BasicVector,
+    Context,
+    DiscreteValues,
+    LeafSystem,
+    NumericParameterIndex,
+    ValueProducer,
+)
+
+from airground_drake.base.arrays import Array, read_only
+from airground_drake.base.errors import PluginError, described, short
+from airground_drake.model.bodies.world import Neighbours, World
+from airground_drake.model.geometry import outline
+from airground_drake.model.law.avoidance import Avoidance
+from airground_drake.model.law.task import Task
+from airground_drake.model.law.tasks import FormationTask
+from airground_drake.model.law.ugv_law import AcceptedMotion, UgvLaw
+from airground_drake.model.plants.steering import steer_all
+from airground_drake.sim.blocks.lifetime import weakly
+from airground_drake.sim.blocks.signals import Messages, UavGains, UgvGains, declare_bodies, declare_headings
+from airground_drake.uav.messages import NOTHING, accepted_proposals
+from airground_drake.uav.policy import Proposal
+
+
+class _Controller(LeafSystem):
+    """A sampled controller whose gains are parameters of its Context."""
+
+    def _declare_gains(self, view: Any, gains: Sequence[float], model: Any, period_s: float) -> None:
+        """Declare the gains, named as in `view`, and a cached value like `model` that `_with_gains` computes."""
+        self._view, self._most = view, max(1.0 / period_s, *gains)
+        index = NumericParameterIndex(self.DeclareNumericParameter(BasicVector(list(gains))))
+        self._gains_ticket = self.numeric_parameter_ticket(index)
+        producer = ValueProducer(allocate=lambda: Value(model), calc=weakly(self._calc_in_force))
+        self._cached = self.DeclareCacheEntry("law in force", producer, {self._gains_ticket}).cache_index()
+
+    def mutable_gains(self, context: Context) -> Any:
+        """The gains in force as a named view; assigning to it changes the gains in this Context."""
+        return self._view(context.get_mutable_numeric_parameter(0).get_mutable_value())
+
+    def _with_gains(self, *gains: float) -> Any:
+        raise NotImplementedError
+
+    def _calc_in_force(self, context: Context, output: AbstractValue) -> None:
+        gains = context.get_numeric_parameter(0).value().tolist()
+        for name, gain in zip(self._view.get_fields(), gains, strict=True):
+            if not 0.0 <= gain <= self._most:
+                wanted = f"allowed: 0 to {self._most:.9g} 1/s, one over the control period"
+                raise ValueError(f"{name} = {gain!r} in the Context of {self.GetSystemPathname()}; {wanted}")
+        output.set_value(self._with_gains(*gains))
+
+    def _in_force(self, context: Context) -> Any:
+        """What `_with_gains` returns for the gains in force."""
+        return self.get_cache_entry(self._cached).Eval(context)
+
+
+class UgvController(_Controller):
+    """NSBC of all UGVs, see `UgvLaw`: avoidance (7)-(8), tracking (6), intervention (14), composed as (5) or (20).
+
+    Ports (n UGVs, M bodies that move, world frame):
+        in  `bodies` (3M) m; `reference` (6n): preset positions m, then velocities m/s;
+            `proposals` abstract, n of Proposal or None; `answers` (2n), see `messages`.
+            With unicycles `headings` (n), rad: their commands are shortened to what they can do, see
+            `model.plants.steering`.
+        out `command` (3n) m/s; `executing` (n), number of the proposal executed, -1 without one; both held.
+            With unicycles `command_share` (n), the share that was left of each command, held.
+            `gains`, the `UgvGains` in force, for the gatekeeper, which predicts the command.
+    Parameters: `UgvGains`; by default those of the law. ValueError if one is negative, or above one over the control
+    period. The sensing range is fixed at construction.
+    Rate: one update per control period, from t = 0.
+
+    Attributes:
+        law: the control law, with the default gains.
+        avoidance: its avoidance layer.
+    """
+
+    def __init__(self, world: World, law: UgvLaw) -> None:
+        """Declare ports, state and the periodic update."""
+        super().__init__()
+        n = len(world.names("ugv"))
+        self.law, self.avoidance, self._world = law, law.avoidance, world
+        self._near = world.around(world.select("ugv"))
+        self._bodies = declare_bodies(self, world)
+        self._headings = declare_headings(self, world)
+        self._reference = self.DeclareVectorInputPort("reference", 6 * n)
+        self._proposals = Messages(self, "proposals", n, Proposal)
+        self._answers = self.DeclareVectorInputPort("answers", 2 * n)
+        command = self.DeclareDiscreteState(3 * n)
+        executing = self.DeclareDiscreteState([NOTHING] * n)
+        self.DeclareStateOutputPort("command", command)
+        self.DeclareStateOutputPort("executing", executing)
+        if self._headings is not None:
+            self.DeclareStateOutputPort("command_share", self.DeclareDiscreteState(np.ones(n)))
+        gains = law.avoidance.gain, law.motion_gain, law.intervention_gain
+        self._declare_gains(UgvGains, gains, law, law.avoidance.period)
+        given = {self._gains_ticket}
+        self.DeclareVectorOutputPort("gains", len(gains), weakly(self._calc_gains), prerequisites_of_calc=given)
+        self.DeclarePeriodicDiscreteUpdateEvent(law.avoidance.period, 0.0, weakly(self._update))
+
+    def parameters(self, context: Context) -> dict[str, Any]:
+        """What it runs with, see `read_back`, and whether it puts interventions on top of avoidance."""
+        law: UgvLaw = self._in_force(context)
+        found = read_back(self, law.avoidance, self._near, len(self._world.robots))
+        return {**found, "composition": law.avoidance.composition, "intervention_on_top": law.intervention_on_top}
+
+    def _with_gains(self, *gains: float) -> UgvLaw:
+        return self.law.with_gains(*gains)
+
+    def _calc_gains(self, context: Context, output: BasicVector) -> None:
+        law: UgvLaw = self._in_force(context)
+        output.SetFromVector([law.avoidance.gain, law.motion_gain, law.intervention_gain])
+
+    def _update(self, context: Context, discrete: DiscreteValues) -> None:
+        positions = _finite(self._bodies.Eval(context)).reshape(-1, 3)
+        reference, rate = self._reference.Eval(context).reshape(2, -1, 3)
+        proposals = accepted_proposals(self._proposals.Eval(context), self._answers.Eval(context))
+        headings = None if self._headings is None else self._headings.Eval(context)
+        law = self._in_force(context)
+        velocity = self.velocity(context.get_time(), positions, reference, rate, proposals, headings, law)
+        if headings is not None:
+            discrete.set_value(2, self.shorten(velocity, headings))
+        discrete.set_value(0, velocity.ravel())
+        discrete.set_value(1, [NOTHING if proposal is None else float(proposal.number) for proposal in proposals])
+
+    def shorten(self, velocity: Array, headings: Array) -> Array:
+        """Shorten commands (n, 3), m/s, in place, to what unicycles with headings (n,), rad, can do.
+
+        Returns:
+            The shares that are left, (n,).
+        """
+        if self._world.steering is None:
+            return np.ones(len(velocity))
+        left: Array = steer_all(velocity, headings, self._world.steering, self.law.avoidance.period)
+        return left
+
+    def velocity(
+        self,
+        t: float,
+        positions: Array,
+        reference: Array,
+        rate: Array,
+        accepted: Sequence[Proposal | None],
+        headings: Array | None = None,
+        law: UgvLaw | None = None,
+    ) -> Array:
+        """Commands of the law, before they are shortened.
+
+        Args:
+            t: time, s.
+            positions: of all bodies that move, (M, 3), m.
+            reference: preset positions, (n, 3), m.
+            rate: preset velocities, (n, 3), m/s.
+            accepted: per UGV, the accepted proposal or None.
+            headings: of the UGVs, (n,), rad, where some are unicycles.
+            law: default: the one with the default gains.
+
+        Returns:
+            Commands, (n, 3), m/s.
+        """
+        law = self.law if law is None else law
+        asked = [None if p is None else AcceptedMotion(*p.motion.at(t), p.chosen) for p in accepted]
+        steering = self._world.steering
+        steered = None if steering is None or headings is None else (headings, steering)
+        return law.velocity(positions, self._world.at(self._near, t), reference, rate, asked, steered)
+
+
+class UavController(_Controller):
+    """NSBC of a UAV: obstacle avoidance (11) above a task, by default to stay over the UGVs' centroid, (9)-(10).
+
+    Ports (n UGVs, M bodies that move, world frame):
+        in  `bodies` (3M) m; `ugv_command` (3n) m/s, fed forward as the centroid's rate.
+        out `command` (3) m/s, held.
+    Parameters: `UavGains`, within the same limits as `UgvGains`.
+    Rate: one update per control period, from t = 0.
+
+    Attributes:
+        avoidance: the set-based layer, with the default gain.
+    """
+
+    def __init__(
+        self,
+        world: World,
+        avoidance: Avoidance,
+        *,
+        gain: float,
+        altitude: float,
+        task: Callable[[Array, Array, float, float], Task] = FormationTask,
+    ) -> None:
+        """Declare ports, state and the periodic update.
+
+        Args:
+            world: with one UAV.
+            avoidance: the set-based layer.
+            gain: of the task, 1/s, by default.
+            altitude: m.
+            task: makes the task of a sample from positions (n, 3), m, and velocities (n, 3), m/s, of the UGVs,
+                altitude and gain; it gives the velocity of one robot, (1, 3), m/s.
+        """
+        super().__init__()
+        self.avoidance = avoidance
+        self._task = task
+        self._gain = gain
+        self._altitude = altitude
+        self._world, self._ugvs, self._own = world, world.select("ugv"), world.select("uav")
+        self._near = world.around(self._own)
+        self._bodies = declare_bodies(self, world)
+        self._ugv_command = self.DeclareVectorInputPort("ugv_command", 3 * len(world.names("ugv")))
+        command = self.DeclareDiscreteState(3)
+        self.DeclareStateOutputPort("command", command)
+        self._declare_gains(UavGains, (avoidance.gain, gain), avoidance, avoidance.period)
+        self.DeclarePeriodicDiscreteUpdateEvent(avoidance.period, 0.0, weakly(self._update))
+
+    def parameters(self, context: Context) -> dict[str, Any]:
+        """What it runs with, see `read_back`."""
+        avoidance, _ = self._in_force(context)
+        return read_back(self, avoidance, self._near, len(self._world.robots))
+
+    def _with_gains(self, *gains: float) -> tuple[Avoidance, float]:
+        return replace(self.avoidance, gain=gains[0]), gains[1]
+
+    def _update(self, context: Context, discrete: DiscreteValues) -> None:
+        positions = _finite(self._bodies.Eval(context)).reshape(-1, 3)
+        commands = self._ugv_command.Eval(context).reshape(-1, 3)
+        discrete.set_value(0, self.velocity(context.get_time(), positions, commands, *self._in_force(context)))
+
+    def velocity(
+        self,
+        t: float,
+        positions: Array,
+        ugv_commands: Array,
+        avoidance: Avoidance | None = None,
+        gain: float | None = None,
+    ) -> Array:
+        """Command of the law, (3,), m/s.
+
+        Args:
+            t: time, s.
+            positions: of all bodies that move, (M, 3), m.
+            ugv_commands: of the UGVs, at the sample before, (n, 3), m/s.
+            avoidance: the set-based layer; default: with the default gain.
+            gain: of the task, 1/s; default: as it was built.
+
+        Raises:
+            PluginError: if the task raises or does not ask for a velocity; names the task.
+        """
+        avoidance = self.avoidance if avoidance is None else avoidance
+        gain = self._gain if gain is None else gain
+        near = self._world.at(self._near, t)
+        velocity: Array = avoidance.command(self._asked(positions, ugv_commands, gain), positions, near)[0]
+        return velocity
+
+    def _asked(self, positions: Array, ugv_commands: Array, gain: float) -> Array:
+        """Velocity that the task asks for, (1, 3), m/s. The answer of a third-party task is checked."""
+        ugvs, own = positions[self._ugvs], positions[self._own]
+        if self._task is FormationTask:
+            return FormationTask(ugvs, ugv_commands, self._altitude, gain).velocity(own)
+        name = getattr(self._task, "__name__", type(self._task).__name__)
+        try:
+            task = self._task(read_only(ugvs), read_only(ugv_commands), self._altitude, gain)
+            asked: object = task.velocity(read_only(own))
+        except (Exception, SystemExit) as error:
+            place = getattr(self._task, "__init__", None)
+            raise PluginError(f"the UAV's task {name} raised {described(error, place)}") from error
+        return _velocity_of(name, asked, own)
+
+
+def read_back(system: LeafSystem, avoidance: Avoidance, near: Neighbours, robots: int) -> dict[str, Any]:
+    """The parameters with which a controller's avoidance runs, in strict JSON, for the trace; `robots`: how many move.
+
+    Returns:
+        For its k robots: `members`, their indices in the order of the world; `outlines` of the m convex parts at rest,
+        without padding, one after the other; `moving_outlines`, those of obstacles that move, about their origins, if
+        there are any; `others`, indices of the bodies of the n parts that each avoids besides what is at rest, (k, n);
+        `safe_m` and `share` beside the parts at rest, then beside the others, (k, m + n); `mobility` (k, 3);
+        `max_speed_m_s` (k,). For the layer: `sampling_s`, period and offset;
+        `gain_1_s`, `period_s`, `sensing_range_m`. Arrays are flat, in C order; `safe_m` and `share` are lists of
+        [value, number of repetitions].
+    """
+    timing = system.GetUniquePeriodicDiscreteUpdateAttribute()
+    moving = [number for row in near.parts[robots:] for number in outline.as_tuple(row)]
+    return ({"moving_outlines": moving} if moving else {}) | {
+        "members": near.members.tolist(),
+        "outlines": [number for row in near.still for number in outline.as_tuple(row)],
+        "others": near.carrier[near.others].ravel().tolist(),
+        "safe_m": _in_runs(near.distance),
+        "share": _in_runs(near.share),
+        "mobility": near.mobility.ravel().tolist(),
+        "max_speed_m_s": near.max_speed.tolist(),
+        "sampling_s": [timing.period_sec(), timing.offset_sec()],
+        "gain_1_s": avoidance.gain,
+        "period_s": avoidance.period,
+        "sensing_range_m": avoidance.sensing_range,
+    }
+
+
+def _in_runs(array: Array) -> list[list[float]]:
+    """Runs of equal values as [value, length]: 100 robots and 1,000 obstacles have 110,000 distances, mostly equal."""
+    return [[value, len(list(alike))] for value, alike in groupby(array.ravel().tolist())]
+
+
+def _finite(positions: Array) -> Array:
+    """The given positions.
+
+    Raises:
+        PluginError: if one is not finite, because no robot could avoid such a body.
+    """
+    if not math.isfinite(positions @ positions) and not np.isfinite(positions).all():  # quickly, then exactly
+        raise PluginError(f"positions are not finite, from a plant or a disturbance: {short(repr(positions.tolist()))}")
+    return positions
+
+
+def _velocity_of(task: str, answer: object, position: Array) -> Array:
+    """What a task of this name asks for, checked.
+
+    Raises:
+        PluginError: if that is not finite numbers of the shape of the position.
+    """
+    try:
+        asked = np.asarray(answer)
+    except ValueError as error:  # rows of different lengths
+        raise PluginError(f"the UAV's task {task} asks for a velocity that is no array: {described(error)}") from error
+    if asked.shape != position.shape or asked.dtype.kind not in "fiu" or not np.isfinite(asked).all():
+        given, wanted = short(repr(asked.tolist())), f"wanted: {position.shape} finite numbers, m/s"
+        raise PluginError(f"the UAV's task {task} asks for {given} as velocity; {wanted}")
+    return asked.astype(np.float64, copy=False)

@@ -1,0 +1,358 @@
+"""The decision layer: the decision variable of (15) and the event trigger (20)."""
+
+from __future__ import annotations
+
+from bisect import bisect_left, bisect_right
+from collections.abc import Sequence
+from contextlib import suppress
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from pydrake.common.value import AbstractValue, Value
+from pydrake.systems.framework import (
+    BasicVector,
+    Context,
+    DiscreteValues,
+    EventStatus,
+    LeafSystem,
+    State,
+    ValueProducer,
+    WitnessFunction,
+    WitnessFunctionDirection,
+)
+
+from airground_drake.base.arrays import Array
+from airground_drake.base.errors import PluginError, short
+from airground_drake.model.bodies.world import World
+from airground_drake.model.geometry.motion import Motion
+from airground_drake.model.trigger.automaton import Mode, Trigger, TriggerState
+from airground_drake.model.trigger.excursion import anything_due, extremes, gathered, spans, transitions_due, variables
+from airground_drake.sim.blocks.lifetime import weakly
+from airground_drake.sim.blocks.signals import (
+    FIELDS,
+    Status,
+    TriggerLevels,
+    components_of,
+    declare_bodies,
+    laid_out,
+)
+
+NOT_BEGUN = -1.0
+"""Stands for the beginning of a run or a step, s, before the first one."""
+
+SHORTEST_S = 1e-9
+"""Events are not isolated within steps shorter than this, s; they happen at the step's end. Ticks of different periods
+can be one unit in the last place apart, and Drake stops when it must isolate an event in such a step."""
+SHORT = 0.01
+"""A shorter step is short, in sampling periods. Isolating an event takes about twenty, each half as long as before."""
+MOST_SHORT = 1000
+"""Largest number of short steps in a row without a transition."""
+
+
+class DecisionBlock(LeafSystem):
+    """Base of blocks that compute the decision variables x of n UGVs.
+
+    Within a step of the simulator, positions, references and noise are linear in time, except at corners of the
+    presets. So the block keeps their values at the beginning of the step and outputs the range of x since then: the
+    trigger needs it to miss nothing between two updates. A subclass defines `value`, and `extremes` if x can be smaller
+    or larger within a straight stretch than at its ends.
+
+    Ports (n UGVs, M bodies that move):
+        in  `bodies` (3M) m; `reference` (6n), positions first; `noise` (n) m.
+        out `decision_variable` (n) m, x now; `decision_range` (2n) m, the smallest x since the step began, then the
+            largest. Both are continuous in time.
+    State (1 + 5n): the time at which the step began, s; then for each UGV its task error (3), noise and x at that time,
+        m.
+    Rate: one update per step of the simulator.
+    """
+
+    def __init__(self, world: World, presets: Sequence[Motion] = ()) -> None:
+        """Declare ports, state and events for the UGVs of a world. References have corners where their presets do."""
+        super().__init__()
+        count = len(world.names("ugv"))
+        self._ugvs = components_of(world, "ugv")
+        self._presets = tuple(presets)
+        self._corners = sorted((t, j) for j, preset in enumerate(self._presets) for t in preset.times.tolist())
+        self._corner_times = [t for t, _ in self._corners]
+        self._bodies = declare_bodies(self, world)
+        self._reference = self.DeclareVectorInputPort("reference", 6 * count)
+        self._noise = self.DeclareVectorInputPort("noise", count)
+        self.DeclareDiscreteState(np.array([NOT_BEGUN, *([0.0] * 5 * count)]))
+        given = {self._bodies.ticket(), self._reference.ticket(), self._noise.ticket(), self.time_ticket()}
+        producer = ValueProducer(allocate=lambda: Value(np.zeros(0)), calc=weakly(self._calc_signals))
+        self._signals = self.DeclareCacheEntry("signals", producer, given).cache_index()
+        self.DeclareVectorOutputPort(
+            "decision_variable", count, weakly(self._calc_variable), prerequisites_of_calc=given
+        )
+        self.DeclareVectorOutputPort(
+            "decision_range", 2 * count, weakly(self._calc_range), prerequisites_of_calc={*given, self.xd_ticket()}
+        )
+        self.DeclareInitializationDiscreteUpdateEvent(weakly(self._begin_step))
+        self.DeclarePerStepDiscreteUpdateEvent(weakly(self._begin_step))
+
+    def value(self, t: float, parts: Array) -> Array | Sequence[float]:
+        """x of every UGV, (n,), m. It may depend on nothing but the arguments.
+
+        Args:
+            t: time, s.
+            parts: task error rho_rd - rho, m, and noise, m, of every UGV, (n, 4).
+        """
+        raise NotImplementedError(f"{type(self).__name__} does not define `value`")
+
+    def extremes(self, begin: float, before: Array, end: float, after: Array, ends: Array) -> Array:
+        """Smallest and largest x, (2, n), m, over a straight stretch; by default those at its ends.
+
+        Args:
+            begin: time, s.
+            before: task error and noise at that time, (n, 4), m.
+            end: time, s.
+            after: task error and noise at that time.
+            ends: x at both times, (2, n), m.
+        """
+        return np.sort(ends, axis=0)
+
+    def _calc_signals(self, context: Context, output: AbstractValue) -> None:
+        """The numbers that the state keeps, at this instant."""
+        position, reference = self._bodies.Eval(context)[self._ugvs], self._reference.Eval(context)
+        signals = gathered(context.get_time(), position, reference, self._noise.Eval(context))
+        output.set_value(self._with_variable(signals))
+
+    def _with_variable(self, signals: Array) -> Array:
+        """Signals whose x of (15) is replaced by that of this block."""
+        rows = signals[1:].reshape(-1, 5)
+        rows[:, 4] = self._valued(signals[0], rows[:, :4].copy())
+        return signals
+
+    def _valued(self, t: float, parts: Array) -> Array:
+        """`value`, checked: with a number that is not finite, the trigger would never see a crossing.
+
+        Raises:
+            PluginError: if it is not n finite numbers.
+        """
+        given: object = self.value(t, parts)
+        with suppress(TypeError, ValueError):
+            x = np.asarray(given, dtype=np.float64)
+            if x.shape == (len(parts),) and np.isfinite(x).all():
+                return x
+        wanted = f"wanted: {len(parts)} finite numbers, m"
+        raise PluginError(f"decision block {type(self).__name__} returned {short(repr(given))} as x; {wanted}")
+
+    def _calc_variable(self, context: Context, output: BasicVector) -> None:
+        output.SetFromVector(self.get_cache_entry(self._signals).Eval(context)[5::5])
+
+    def _calc_range(self, context: Context, output: BasicVector) -> None:
+        begun, now = context.get_discrete_state(0).value(), self.get_cache_entry(self._signals).Eval(context)
+        if begun[0] == NOT_BEGUN:
+            begun = now
+        found = self._spans(begun, now)
+        first = bisect_right(self._corner_times, begun[0])
+        if first < len(self._corners) and self._corner_times[first] < now[0]:
+            corners = self._corners[first : bisect_left(self._corner_times, now[0])]
+            self._look_into_corners(found, corners, begun, now)
+        output.SetFromVector(found.ravel())
+
+    def _spans(self, begun: Array, now: Array) -> Array:
+        """Smallest and largest x over a step without corners, (2, n), m, from the signals at its ends."""
+        before, after = begun[1:].reshape(-1, 5), now[1:].reshape(-1, 5)
+        return self.extremes(begun[0], before[:, :4], now[0], after[:, :4], np.stack([before[:, 4], after[:, 4]]))
+
+    def _look_into_corners(self, found: Array, corners: Sequence[tuple[float, int]], begun: Array, now: Array) -> None:
+        """Replace the smallest and largest x of UGVs whose references have corners within a step.
+
+        Args:
+            found: smallest and largest x, (2, n), m, changed in place.
+            corners: times of the corners, s, and indices of the UGVs.
+            begun: signals at the beginning of the step.
+            now: signals at its end.
+        """
+        bent = {j for _, j in corners}
+        times = np.array([begun[0], *(t for t, _ in corners), now[0]])
+        shares = (times - times[0]) / (times[-1] - times[0])
+        before, after = begun[1:].reshape(-1, 5)[:, :4], now[1:].reshape(-1, 5)[:, :4]
+        parts = before + shares[:, None, None] * (after - before)
+        for j in bent:
+            reference = self._presets[j].sample(times)
+            parts[:, j, :3] += reference - reference[0] - shares[:, None] * (reference[-1] - reference[0])
+        x = [self._valued(t, part) for t, part in zip(times, parts, strict=True)]
+        stretches = pairwise(zip(times, parts, x, strict=True))
+        ranges = np.array(
+            [self.extremes(t0, p0, t1, p1, np.array([x0, x1])) for (t0, p0, x0), (t1, p1, x1) in stretches]
+        )
+        for j in bent:
+            found[:, j] = ranges[:, 0, j].min(), ranges[:, 1, j].max()
+
+    def _begin_step(self, context: Context, discrete: DiscreteValues) -> EventStatus:
+        """Keep the signals of this instant: the end of a step, or the start of a simulator."""
+        discrete.set_value(0, self.get_cache_entry(self._signals).Eval(context))
+        return EventStatus.Succeeded()
+
+
+class DecisionVariable(DecisionBlock):
+    """x_j = ||rho_rd,j - rho_j|| + n_j, the solution of (15) with integrated noise n_j; its range is exact.
+
+    Ports, state and rate: see `DecisionBlock`.
+    """
+
+    def value(self, t: float, parts: Array) -> Array:
+        """The norms of the task errors plus the noise, (n,), m."""
+        return variables(parts)
+
+    def extremes(self, begin: float, before: Array, end: float, after: Array, ends: Array) -> Array:
+        """Exact: see `model.trigger.excursion`."""
+        return extremes(before, after, ends)
+
+    def _with_variable(self, signals: Array) -> Array:
+        """Signals have this x already, unless a subclass defines another."""
+        return signals if type(self).value is DecisionVariable.value else super()._with_variable(signals)
+
+    def _spans(self, begun: Array, now: Array) -> Array:
+        if type(self).extremes is DecisionVariable.extremes:
+            return spans(begun, now)
+        return super()._spans(begun, now)
+
+
+class EventTrigger(LeafSystem):
+    """The automaton of `model.trigger.automaton` for every UGV; a witness function isolates its events.
+
+    The trigger sees decision variables only, whatever block computes them. The witness uses the range of x since the
+    step began, not only x at its end. It changes its sign once a transition has become due anywhere in the step and
+    cannot change it back within the step. So a dip below the release level and back within a step is isolated like any
+    other crossing. At the isolated time the step ends and the per-step update makes the transition; transitions due at
+    the beginning of a run are made at once.
+
+    All per-step updates of a diagram see the signals before any of them: the trigger sees the range of the step that
+    ends while the block that computes it begins another. The Context needs an accuracy (`Context.SetAccuracy`).
+    Without it Drake stops at the first event or, with fixed steps, reports it at the end of a step. A Simulator that is
+    initialised in the middle of a run, such as one for a clone of its Context, continues the run. One that is
+    initialised again before its first step, or for an earlier time, starts a new run.
+
+    Ports (n UGVs):
+        in  `decision_variable` (n) m; `decision_range` (2n) m, the smallest since the step began, then the largest.
+        out `status` (4n): a `Status` per UGV.
+    State: the status; the times at which the step and the run began, s; the number of short steps in a row.
+    Parameters: `TriggerLevels`; by default those of the trigger.
+    Rate: one update per step of the simulator. No step is longer than the `period` of the constructor.
+    Raises: PluginError if a decision variable is not a number. RuntimeError at the initialisation of a Simulator whose
+    Context has no accuracy, and after `MOST_SHORT` short steps in a row
+    without a transition. While an event is isolated, steps become so short that robots far from the origin no longer
+    move in them: their coordinates are rounded. Then x never gets to its level.
+    """
+
+    def __init__(self, count: int, trigger: Trigger, period: float = 1e-3) -> None:
+        """Declare ports, state and events for `count` UGVs.
+
+        Args:
+            count: n.
+            trigger: has the levels, by default.
+            period: longest step of the simulator, s: the shortest period of the diagram costs no further steps. Without
+                it, and without other sampled systems, a step could be as long as a run.
+        """
+        super().__init__()
+        self._count, self._short = count, SHORT * period
+        self.DeclareNumericParameter(BasicVector([trigger.zeta, trigger.release, trigger.dwell]))
+        self._variable = self.DeclareVectorInputPort("decision_variable", count)
+        self._range = self.DeclareVectorInputPort("decision_range", 2 * count)
+        status = self.DeclareDiscreteState(_pack([TriggerState()] * count))
+        self.DeclareDiscreteState([NOT_BEGUN])
+        self.DeclareDiscreteState([NOT_BEGUN])
+        self.DeclareDiscreteState([0.0])
+        self.DeclareStateOutputPort("status", status)
+        self.DeclareInitializationUnrestrictedUpdateEvent(weakly(self._start))
+        self.DeclarePerStepDiscreteUpdateEvent(weakly(self.update))
+        self.DeclarePeriodicPublishEvent(period, 0.0, lambda context: EventStatus.DidNothing())  # ends a step
+        direction = WitnessFunctionDirection.kPositiveThenNonPositive
+        self._witness = self.MakeWitnessFunction("a transition is due", direction, weakly(self.nothing_due))
+
+    def levels(self, context: Context) -> Any:
+        """The levels in force, a `TriggerLevels`."""
+        return TriggerLevels(context.get_numeric_parameter(0).value())
+
+    def mutable_levels(self, context: Context) -> Any:
+        """The same as a view; assigning to it changes the levels in this Context."""
+        return TriggerLevels(context.get_mutable_numeric_parameter(0).get_mutable_value())
+
+    def trigger(self, context: Context) -> Trigger:
+        """The automaton with the levels in force.
+
+        Raises:
+            ValueError: if no automaton can have these levels.
+        """
+        return Trigger(*context.get_numeric_parameter(0).value().tolist())
+
+    def DoGetWitnessFunctions(self, context: Context) -> list[WitnessFunction]:
+        """The one witness."""
+        return [self._witness]
+
+    def _start(self, context: Context, state: State) -> EventStatus:
+        if context.get_accuracy() is None:
+            raise RuntimeError("the Context has no accuracy, so no event can be isolated; call SetAccuracy(1e-6) on it")
+        discrete, t, x = state.get_mutable_discrete_state(), context.get_time(), self._variable.Eval(context)
+        before, begun, run_begun = (discrete.value(k) for k in range(3))
+        if run_begun[0] < begun[0] <= t:  # another simulator goes on with a run
+            discrete.set_value(0, self._after(context, before, x, x, x))
+        else:
+            trigger = self.trigger(context)
+            discrete.set_value(0, _pack([trigger.start(t, each) for each in x.tolist()]))
+            discrete.set_value(2, [t])
+        discrete.set_value(1, [t])
+        return EventStatus.Succeeded()
+
+    def nothing_due(self, context: Context) -> float:
+        """The witness: 1 at the beginning of a step and until a transition is due in it, then -1."""
+        t = context.get_time()
+        if t - context.get_discrete_state(1)[0] < SHORTEST_S:
+            return 1.0
+        status, levels = context.get_discrete_state(0).value(), context.get_numeric_parameter(0).value()
+        return -1.0 if anything_due(status, t, self._range.Eval(context), levels) else 1.0
+
+    def update(self, context: Context, discrete: DiscreteValues) -> EventStatus:
+        """The per-step update: make the transitions that became due in the step that ends, and begin another step."""
+        t, spans = context.get_time(), self._range.Eval(context)
+        before, levels = context.get_discrete_state(0).value(), context.get_numeric_parameter(0).value()
+        if np.isnan(spans).any():  # no comparison with a level would notice it
+            told = "from a decision block, a plant or a disturbance"
+            raise PluginError(f"decision_range is not a number, {told}: {short(repr(spans.tolist()))}")
+        if anything_due(before, t, spans, levels):
+            least, most = spans[: self._count], spans[self._count :]
+            discrete.set_value(0, self._after(context, before, self._variable.Eval(context), least, most))
+            discrete.set_value(3, [0.0])
+        else:
+            self._count_short(t - context.get_discrete_state(1)[0], discrete)
+        discrete.set_value(1, [t])
+        return EventStatus.Succeeded()
+
+    def _count_short(self, lasted: float, discrete: DiscreteValues) -> None:
+        """Count a step without a transition, which lasted so long, s, if it was short."""
+        short = discrete.value(3)[0] + 1.0 if lasted < self._short else 0.0
+        if short > MOST_SHORT:
+            raise RuntimeError(
+                "an event cannot be isolated: coordinates are rounded too coarsely for so slow a motion; wanted: "
+                "coordinates nearer to the origin"
+            )
+        discrete.set_value(3, [short])
+
+    def _after(self, context: Context, before: Array, x: Array, least: Array, most: Array) -> Array:
+        """Status after the transitions that became due in a step."""
+        t, trigger, status = context.get_time(), self.trigger(context), before.reshape(-1, FIELDS).copy()
+        levels = context.get_numeric_parameter(0).value()
+        for j in np.flatnonzero(transitions_due(before, t, least, most, levels)):
+            state = _unpack(before, int(j))
+            status[j] = _pack([_moved(trigger, state, t, float(x[j]), float(least[j]), float(most[j]))])
+        return status.ravel()
+
+
+def _moved(trigger: Trigger, before: TriggerState, t: float, x: float, least: float, most: float) -> TriggerState:
+    """State at the end of a step in which a transition became due, from x now and its range in the step, m."""
+    seen = {Mode.SUPERVISING: most, Mode.INTERVENING: least, Mode.REFRACTORY: x}[before.mode]
+    after = trigger.step(before, t, seen)
+    return after if after.mode is before.mode else trigger.step(after, t, x)  # x may have crossed back already
+
+
+def _pack(states: Sequence[TriggerState]) -> Array:
+    return laid_out(Status, [[s.mode, s.triggers, s.triggered_at, s.released_at] for s in states])
+
+
+def _unpack(status: Array, index: int) -> TriggerState:
+    one = Status(status[FIELDS * index : FIELDS * (index + 1)])
+    return TriggerState(Mode(int(one.mode)), int(one.triggers), float(one.triggered_at_s), float(one.released_at_s))

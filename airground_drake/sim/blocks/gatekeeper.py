@@ -1,0 +1,120 @@
+"""The UGVs' side of an intervention: accept or refuse (methods (c), (d)), or always accept (method (b))."""
+
+from __future__ import annotations
+
+from pydrake.common.value import AbstractValue, Value
+from pydrake.systems.framework import BasicVector, Context, EventStatus, LeafSystem, State
+
+from airground_drake.model.bodies.world import World
+from airground_drake.sim.blocks.lifetime import weakly
+from airground_drake.sim.blocks.signals import (
+    Answer,
+    Messages,
+    UgvGains,
+    declare_bodies,
+    declare_headings,
+    laid_out,
+    no_reports,
+)
+from airground_drake.sim.blocks.ticks import Ticks
+from airground_drake.uav.messages import ACCEPT, SILENT, Report
+from airground_drake.uav.policy import Proposal
+from airground_drake.ugv.answer import GatekeeperDecision
+from airground_drake.ugv.mpc_gatekeeper import Gatekeepers, GatekeeperState, Inputs
+
+
+class Gatekeeper(LeafSystem):
+    """Decides at every sample about the proposal in force for each UGV, (21)-(29).
+
+    Under method (c) each UGV predicts its own closed loop under both choices from what it senses (23), solves (26)
+    through a route and answers by the first stage of the plan: see `ugv.mpc_gatekeeper`. Under (d) it judges the
+    outcome and watches the progress: see `ugv.outcome_gatekeeper`. The answer goes to the UGV's controller and
+    back to the UAV.
+
+    Ports (n UGVs, r robots, M bodies that move):
+        in  `bodies` (3M) m; `team_command` (3r) m/s, for the predicted motion of the other robots; `gains`, the
+            `UgvGains` that the controllers run with; `proposals` abstract, n of Proposal or None. With unicycles
+            `headings` (n), rad.
+        out `answers` (2n), an `Answer` per UGV, and `reports` (abstract), see `messages`; held.
+    State: abstract, a `GatekeeperState`, with all decisions of the run so far.
+    Fixed at construction: horizon and weights of (25), margins, dwell, budget and patience; the gains are inputs.
+    Rate: one update per gatekeeper period, from t = 0.
+    """
+
+    def __init__(self, gatekeepers: Gatekeepers, world: World, *, period: float, control: float) -> None:
+        """Declare ports, state and the update every `period`, s; the controllers' period is `control`, s."""
+        super().__init__()
+        n = len(world.names("ugv"))
+        self._gatekeepers, self._world = gatekeepers, world
+        self._bodies, self._headings = declare_bodies(self, world), declare_headings(self, world)
+        self._command = self.DeclareVectorInputPort("team_command", 3 * len(world.robots))
+        self._gains = self.DeclareVectorInputPort("gains", len(UgvGains.get_fields()))
+        self._proposals = Messages(self, "proposals", n, Proposal)
+        state = self.DeclareAbstractState(Value(GatekeeperState.empty(n)))
+        self._state = int(state)
+        held = {self.abstract_state_ticket(state)}
+        self.DeclareVectorOutputPort("answers", 2 * n, weakly(self._calc_answers), prerequisites_of_calc=held)
+        self.DeclareAbstractOutputPort(
+            "reports", lambda: no_reports(n), weakly(self._calc_reports), prerequisites_of_calc=held
+        )
+        self._ticks = Ticks(period, control)
+        self.DeclarePeriodicUnrestrictedUpdateEvent(self._ticks.period, 0.0, weakly(self._update))
+
+    @property
+    def judges(self) -> str:
+        """Name of the class that judges the proposals."""
+        return self._gatekeepers.judges
+
+    def decisions(self, context: Context) -> tuple[GatekeeperDecision, ...]:
+        """All decisions up to the time of this Context."""
+        return self._memory(context).made
+
+    def _memory(self, context: Context) -> GatekeeperState:
+        memory: GatekeeperState = context.get_abstract_state(self._state).get_value()
+        return memory
+
+    def _calc_answers(self, context: Context, output: BasicVector) -> None:
+        output.SetFromVector(self._memory(context).answers)
+
+    def _calc_reports(self, context: Context, output: AbstractValue) -> None:
+        output.set_value(self._memory(context).reports)
+
+    def _update(self, context: Context, state: State) -> EventStatus:
+        if not self._ticks.due(context.get_time()):
+            return EventStatus.DidNothing()
+        proposals, before = self._proposals.Eval(context), self._memory(context)
+        positions = self._bodies.Eval(context).reshape(-1, 3)
+        if self._gatekeepers.idle(context.get_time(), proposals, positions, before):
+            return EventStatus.DidNothing()
+        velocities = self._world.velocities(context.get_time(), self._command.Eval(context).reshape(-1, 3))
+        law = self._gatekeepers.law.with_gains(*self._gains.Eval(context).tolist())
+        headings = None if self._headings is None else self._headings.Eval(context)
+        now = Inputs(context.get_time(), proposals, positions, velocities, law, headings)
+        state.get_mutable_abstract_state(self._state).set_value(self._gatekeepers.sample(now, before))
+        return EventStatus.Succeeded()
+
+
+class DirectAcceptance(LeafSystem):
+    """Method (b): every proposal is accepted at once.
+
+    Ports (n UGVs): in `proposals` abstract; out `answers` (2n) and `reports` (abstract, always empty), see
+    `messages`.
+    """
+
+    def __init__(self, count: int) -> None:
+        """Declare ports for `count` UGVs."""
+        super().__init__()
+        self._proposals = Messages(self, "proposals", count, Proposal)
+        self.DeclareVectorOutputPort(
+            "answers", 2 * count, weakly(self._calc_answers), prerequisites_of_calc={self._proposals.port.ticket()}
+        )
+        self.DeclareAbstractOutputPort(
+            "reports",
+            lambda: no_reports(count),
+            lambda context, output: output.set_value((Report(),) * count),
+            prerequisites_of_calc={self.nothing_ticket()},
+        )
+
+    def _calc_answers(self, context: Context, output: BasicVector) -> None:
+        answers = [[SILENT, -1.0] if p is None else [ACCEPT, p.number] for p in self._proposals.Eval(context)]
+        output.SetFromVector(laid_out(Answer, answers))

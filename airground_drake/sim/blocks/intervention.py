@@ -1,0 +1,127 @@
+"""The UAV's planner: proposals for the UGVs that the trigger has flagged."""
+
+from __future__ import annotations
+
+import numpy as np
+from pydrake.common.value import AbstractValue, Value
+from pydrake.systems.framework import Context, DiscreteValues, EventStatus, LeafSystem, State, ValueProducer
+
+from airground_drake.base.arrays import Array
+from airground_drake.model.bodies.world import ROBOTS, World
+from airground_drake.model.trigger.excursion import INTERVENING
+from airground_drake.sim.blocks.lifetime import weakly
+from airground_drake.sim.blocks.signals import FIELDS, Messages, components_of, declare_bodies, no_proposals
+from airground_drake.sim.blocks.ticks import Ticks
+from airground_drake.uav.database import BehaviourDatabase
+from airground_drake.uav.halts import NOT_WATCHED, room, standing, watched
+from airground_drake.uav.messages import Report, sightings
+from airground_drake.uav.planner import Planner, PlannerState, sent_after
+
+
+class _Ahead(list[PlannerState | None]):
+    """The result of planning ahead of the update of an instant; empty without one."""
+
+
+class InterventionPlanner(LeafSystem):
+    """Supervises every UGV; for those in mode INTERVENING the `Planner` makes proposals, (12)-(14).
+
+    The system numbers the proposals: see `sent_after`. What a policy remembers is in the Context, unless it has a
+    process of its own (`guest.process`) or keeps it in attributes other than `Policy.remembered`.
+
+    Ports (n UGVs, M bodies that move):
+        in  `bodies` (3M) m; `status` (4n) from EventTrigger; `answers` (2n) and `reports`
+            (abstract), see `messages`.
+        out `proposals` abstract, n of Proposal or None.
+    State: the last resting place of each UGV and since when, see `halts`; abstract, a `PlannerState`.
+    Rate: one update per planning period, from t = 0. A proposal can act one period after it is made.
+    """
+
+    def __init__(self, planner: Planner, world: World, control_period: float) -> None:
+        """Declare ports, state and the periodic update; the controllers' period is in s."""
+        super().__init__()
+        self._planner, self._world = planner, world
+        n = len(planner.ugvs)
+        self._ugvs = components_of(world, "ugv")
+        self._robots = world.select(*ROBOTS)
+        self._bodies = declare_bodies(self, world)
+        self._status = self.DeclareVectorInputPort("status", FIELDS * n)
+        self._answers = self.DeclareVectorInputPort("answers", 2 * n)
+        self._reports = Messages(self, "reports", n, Report)
+        held = self.DeclareAbstractState(Value(planner.start()))
+        self._memory = int(held)
+        self.DeclareAbstractOutputPort(
+            "proposals",
+            lambda: no_proposals(n),
+            weakly(self._calc_proposals),
+            prerequisites_of_calc={self.abstract_state_ticket(held)},
+        )
+        # Drake empties this slot of the Context when time, state or an input changes
+        empty = ValueProducer(allocate=lambda: Value(_Ahead()), calc=lambda _, output: output.set_value(_Ahead()))
+        self._ahead = self.DeclareCacheEntry("planned ahead", empty, {self.all_sources_ticket()}).cache_index()
+        self._ticks = Ticks(planner.period, control_period)
+        self._room = room(planner.max_speed)
+        self.DeclareDiscreteState(np.tile([0.0, 0.0, 0.0, NOT_WATCHED], n))
+        self.DeclarePeriodicDiscreteUpdateEvent(self._ticks.period, 0.0, weakly(self._watch))
+        self.DeclarePeriodicUnrestrictedUpdateEvent(self._ticks.period, 0.0, weakly(self._update))
+
+    def memory(self, context: Context) -> PlannerState:
+        """Proposals sent and faults met, up to the context's time."""
+        memory: PlannerState = context.get_abstract_state(self._memory).get_value()
+        return memory
+
+    @property
+    def database(self) -> BehaviourDatabase:
+        """The policies."""
+        return self._planner.database
+
+    def instant(self, number: int) -> float:
+        """Time of a planning instant, s; the first one, 0, is at 0 s."""
+        return self._ticks.instant(number)
+
+    def close(self) -> None:
+        """End the processes of policies; the next run starts them again."""
+        self._planner.database.close()
+
+    def _calc_proposals(self, context: Context, output: AbstractValue) -> None:
+        output.set_value(self.memory(context).proposals)
+
+    def _watch(self, context: Context, discrete: DiscreteValues) -> EventStatus:
+        if not self._ticks.due(context.get_time()):
+            return EventStatus.DidNothing()
+        discrete.set_value(0, self._halts(context))
+        return EventStatus.Succeeded()
+
+    def _halts(self, context: Context) -> Array:
+        before = context.get_discrete_state(0).value()
+        return watched(before, context.get_time(), self._bodies.Eval(context)[self._ugvs], self._room)
+
+    def _update(self, context: Context, state: State) -> EventStatus:
+        ahead: _Ahead = self.get_cache_entry(self._ahead).Eval(context)
+        memory = ahead[0] if ahead else self._planned(context)
+        if memory is None:
+            return EventStatus.DidNothing()
+        state.get_mutable_abstract_state(self._memory).set_value(memory)
+        return EventStatus.Succeeded()
+
+    def plan_ahead(self, context: Context) -> None:
+        """Plan for the instant of a context, before the update of that instant, which then takes this result.
+
+        So a step-wise environment sees what the policies are asked. If it is called again, the last result counts.
+        """
+        self.get_cache_entry(self._ahead).Eval(context)[:] = [self._planned(context)]
+
+    def _planned(self, context: Context) -> PlannerState | None:
+        """The memory after planning at the context's time; None at another time, or if nothing changes."""
+        t = context.get_time()
+        if not self._ticks.due(t):
+            return None
+        before = self.memory(context)
+        intervening = [mode == INTERVENING for mode in self._status.Eval(context)[::FIELDS].tolist()]
+        if self._planner.idle(before, intervening):
+            return None
+        bodies = self._bodies.Eval(context).reshape(-1, 3)
+        answers, reports = self._answers.Eval(context), self._reports.Eval(context)
+        stands = standing(self._halts(context), t).tolist()  # of this instant: the state is updated after this
+        moving = sightings(self._world, t, bodies)
+        memory = self._planner.plan(before, t, bodies[self._robots], intervening, answers, reports, stands, moving)
+        return sent_after(before, memory, t)

@@ -1,0 +1,108 @@
+"""Named views of vectors in ports and Contexts, and the types of messages."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from pydrake.common.containers import namedview
+from pydrake.common.value import AbstractValue, Value
+from pydrake.systems.framework import Context, InputPort, LeafSystem
+
+from airground_drake.base.arrays import Array
+from airground_drake.base.errors import PluginError, short
+from airground_drake.model.bodies.world import Kind, World
+from airground_drake.sim.blocks.lifetime import weakly
+from airground_drake.uav.messages import Report
+from airground_drake.uav.policy import Proposal
+
+Status = namedview("Status", ["mode", "triggers", "triggered_at_s", "released_at_s"])
+"""Trigger state of one UGV: `automaton.Mode`, number of triggers, times of the last trigger and the last release
+(-1 before the first)."""
+Answer = namedview("Answer", ["answer", "number"])
+"""Answer of one UGV: `messages.ACCEPT`, REFUSE or SILENT, and the number of the proposal."""
+UgvGains = namedview("UgvGains", ["avoidance_gain_1_s", "motion_gain_1_s", "intervention_gain_1_s"])
+"""Parameters of `UgvController`: A of (8), B of (6), Lambda of (14)."""
+UavGains = namedview("UavGains", ["avoidance_gain_1_s", "formation_gain_1_s"])
+"""Parameters of `UavController`: A of (11), C of (10)."""
+TriggerLevels = namedview("TriggerLevels", ["zeta_m", "release_m", "dwell_s"])
+"""Parameters of `EventTrigger`: see `model.trigger.automaton.Trigger`."""
+
+FIELDS = len(Status.get_fields())
+"""Length of a `Status`."""
+
+
+def declare_bodies(system: LeafSystem, world: World) -> InputPort:
+    """Declare the input port `bodies`: positions of all bodies of a world that move, (3 M,), m, in their order.
+
+    Bodies at rest are in the `World` only, so that no tick copies them. `values.reshape(-1, 3)[world.select("ugv")]` is
+    a view of the positions of the UGVs.
+    """
+    return system.DeclareVectorInputPort("bodies", 3 * len(world.moving))
+
+
+def declare_headings(system: LeafSystem, world: World) -> InputPort | None:
+    """Declare the input port `headings` (n), rad, of the UGVs, 0 without a heading; None without unicycles."""
+    if world.steering is None:
+        return None
+    return system.DeclareVectorInputPort("headings", len(world.steering))
+
+
+def components_of(world: World, *kinds: Kind) -> slice:
+    """Slice of the ports `bodies` and `team_command` that belongs to the bodies of some kinds."""
+    rows = world.select(*kinds)
+    return slice(3 * rows.start, 3 * rows.stop)
+
+
+def laid_out(view: Any, rows: list[list[float]]) -> Array:
+    """Named vectors of all UGVs, one row each, flattened for a port."""
+    return np.array(rows, dtype=np.float64).reshape(-1, len(view.get_fields())).ravel()
+
+
+def no_proposals(count: int) -> AbstractValue:
+    """Model value of the port `proposals`: a tuple with a `Proposal` or None for each of `count` UGVs."""
+    return Value((None,) * count)
+
+
+def no_reports(count: int) -> AbstractValue:
+    """Model value of the port `reports`: a tuple with a `Report` for each of `count` UGVs."""
+    return Value((Report(),) * count)
+
+
+class Messages:
+    """An input port for the messages of one kind to or from n UGVs.
+
+    Drake compares the types of values where ports are connected, but in pydrake all Python objects have one type. So
+    the messages themselves are checked: when a simulator is initialised, and whenever they are read.
+
+    Attributes:
+        port: the port.
+    """
+
+    def __init__(self, system: LeafSystem, name: str, count: int, kind: type[Proposal] | type[Report]) -> None:
+        """Declare the port of a system."""
+        self.port = system.DeclareAbstractInputPort(name, no_reports(count) if kind is Report else no_proposals(count))
+        self._count = count
+        self._kinds = (Report,) if kind is Report else (Proposal, type(None))
+        system.DeclareInitializationPublishEvent(weakly(self._check))
+
+    def _check(self, context: Context) -> None:
+        if self.port.HasValue(context):
+            self.Eval(context)
+
+    def Eval(self, context: Context) -> Any:
+        """The messages, one per UGV.
+
+        Raises:
+            PluginError: if they are of another kind: the port is connected with a wrong one.
+        """
+        found = self.port.Eval(context)
+        if (
+            isinstance(found, tuple | list)
+            and len(found) == self._count
+            and all(isinstance(one, self._kinds) for one in found)
+        ):
+            return found
+        wanted = " or ".join("None" if kind is type(None) else kind.__name__ for kind in self._kinds)
+        told = f"port {self.port.get_name()} of {self.port.get_system().GetSystemPathname()}"
+        raise PluginError(f"{told} is given {short(repr(found))}; allowed: {self._count} messages, each {wanted}")

@@ -1,0 +1,374 @@
+"""Builds the Drake Diagram of a scenario: the layers of the paper's Figure 2 and the vehicles, wired by port names.
+
+Data flows through `decision_making` (noise, DDM, trigger), `task_planning` (presets, planner, controllers),
+`optimisation` (gatekeeper) and `vehicles` (commands, disturbances, plants), whose positions are fed back.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from types import MappingProxyType
+
+from pydrake.systems.framework import Diagram, DiagramBuilder, InputPort, OutputPort, System
+from pydrake.systems.primitives import ConstantVectorSource, Demultiplexer, Multiplexer, TrajectorySource
+
+from airground_drake.base.errors import PluginError, UnknownNameError, short
+from airground_drake.base.registry import METHODS, UAV_TASKS, Method, method_of
+from airground_drake.model.bodies.world import ROBOTS, World
+from airground_drake.model.geometry.motion import Motion
+from airground_drake.model.law.avoidance import COMPOSITIONS, Composition
+from airground_drake.model.law.task import Task
+from airground_drake.model.plants.plant import Own
+from airground_drake.scenario.load import validated
+from airground_drake.scenario.schema import Scenario
+from airground_drake.scenario.world import make_world
+from airground_drake.sim import components
+from airground_drake.sim.blocks import (
+    DecisionVariable,
+    DirectAcceptance,
+    EventTrigger,
+    Gatekeeper,
+    InterventionPlanner,
+    Laws,
+    Monitor,
+    UavController,
+    UgvController,
+    VelocityDisturbance,
+)
+from airground_drake.sim.blocks.plant import OwnPlant, declared, plant_system
+
+RECORDED = (
+    "bodies", "team_command", "reference", "noise", "decision_variable", "status", "executing",
+)  # fmt: skip
+"""Exported output ports of the diagram: the signals of a trace."""
+OF_PLANTS = ("plant_signals", "own_headings", "command_share")
+"""The same, of robots that are not where the law steers them, of users' plants that have a heading, and of
+unicycles; only where there are such robots."""
+
+NO_PLANTS: Mapping[str, OwnPlant] = MappingProxyType({})
+
+DecisionFactory = Callable[[World, Sequence[Motion]], System]
+"""Makes the block that computes the decision variables of n UGVs from their world and their presets: a System with the
+output ports `decision_variable` (n), m, and `decision_range` (2n), m, the smallest and the largest since the
+simulator's step began. Its input ports are fed by name. `systems.DecisionBlock` is a base for such blocks."""
+
+
+@dataclass(frozen=True)
+class Model:
+    """A diagram and the systems in it that a simulation reads.
+
+    Attributes:
+        diagram: the whole system; its exported output ports are RECORDED.
+        world: all bodies, in the order of the port `bodies`.
+        decision_block: drives the trigger.
+        trigger: of all UGVs.
+        planner: the UAV's planner.
+        gatekeeper: of methods (c) and (d), else None.
+        controllers: of the UGVs, and of the UAV.
+        signals: names of the columns of `plant_signals` and `own_headings`.
+        recorded: names of the exported output ports that are the signals of a trace.
+    """
+
+    diagram: Diagram
+    world: World
+    decision_block: System
+    trigger: EventTrigger
+    planner: InterventionPlanner
+    gatekeeper: Gatekeeper | None
+    controllers: tuple[UgvController, UavController]
+    signals: tuple[str, ...]
+    recorded: tuple[str, ...]
+
+
+def build_diagram(
+    scenario: Scenario,
+    method: str | None = None,
+    composition: Composition | None = None,
+    plants: Mapping[str, OwnPlant] = NO_PLANTS,
+    monitor: Monitor | None = None,
+    decision_block: DecisionFactory = DecisionVariable,
+) -> Diagram:
+    """The diagram of a scenario, for inspection, simulation or embedding.
+
+    Args:
+        scenario: from a file or made in Python.
+        method: default: that of the scenario's last run.
+        composition: of the UGVs' avoidance tasks; default: 'augmented', or without `method` that of the last run.
+        plants: plants of your own, by robot, in place of those of the scenario.
+        monitor: watches the diagram while it runs; see `make_monitor`.
+        decision_block: makes the block that drives the trigger. The default, `systems.DecisionVariable`, is (15).
+
+    Returns:
+        A Diagram whose default context has every robot at its start. For a simulation its context needs an accuracy:
+        `context.SetAccuracy(1e-6)`. Outputs: RECORDED and, with a monitor, `violation`. Inputs: `disturbance_<robot>`
+        (3), m/s, added to the robot's velocity; 0 if not connected. The scenario's seed is not part of the diagram:
+        `diagram.SetRandomContext(context, RandomGenerator(seed))` gives a context the noise of a seed. pydrake never
+        frees diagrams of Python systems by itself; `sim.blocks.lifetime.untie` allows it.
+
+    Raises:
+        ScenarioError: if the scenario is not valid.
+        UnknownNameError: if there is no such method or composition.
+        PluginError: if a policy, route, task or plant of the scenario cannot be made, or the decision block does not
+            have the ports of one.
+    """
+    return build_model(declared(scenario, plants), method, composition, plants, monitor, decision_block).diagram
+
+
+def build_model(
+    scenario: Scenario,
+    method: str | None = None,
+    composition: Composition | None = None,
+    plants: Mapping[str, OwnPlant] = NO_PLANTS,
+    monitor: Monitor | None = None,
+    decision_block: DecisionFactory = DecisionVariable,
+    *,
+    disturbed: bool = True,
+    make_gatekeepers: components.GatekeepersFactory = components.make_gatekeepers,
+) -> Model:
+    """Build and wire all components of one method of a valid scenario; see `build_diagram`.
+
+    `plants` are those that the scenario declares (`sim.blocks.plant.declared`). Without
+    `disturbed` the diagram has no inputs for disturbances: commands go straight to the plants.
+    `make_gatekeepers` replaces the gatekeepers; claims about decisions are about the default.
+    """
+    chosen, composition = _chosen(scenario, method, composition)
+    world, presets = make_world(scenario), components.make_presets(scenario)
+    n = len(world.names("ugv"))
+    law = components.make_law(scenario, chosen, composition)
+    # first, so that the seed of its noise does not depend on what a plant may draw
+    if not callable(decision_block) or (isinstance(decision_block, type) and not issubclass(decision_block, System)):
+        raise PluginError(f"decision_block is {short(repr(decision_block))}; allowed: a subclass of DecisionBlock")
+    block = _checked_block(n, decision_block(world, presets))
+    shortest = min(scenario.control.period_s, scenario.decision.noise_period_s)
+    trigger = EventTrigger(n, components.make_trigger(scenario, components.threshold(scenario)), shortest)
+    decision = _decision_making(scenario, n, block, trigger)
+    made = {body.name: plant_system(body, scenario.control.period_s, plants) for body in world.moving}
+    signals = (*world.signals, *(f"{name}.heading_rad" for name in _own_headings(world, made)))
+    vehicles = _vehicles(world, made, disturbed=disturbed)
+    planner = InterventionPlanner(components.make_planner(scenario, chosen), world, scenario.control.period_s)
+    gatekeeper = None
+    if chosen.gated:
+        periods = {"period": scenario.gatekeeper.period_s, "control": scenario.control.period_s}
+        gatekeeper = Gatekeeper(make_gatekeepers(scenario, law), world, **periods)
+    answering = DirectAcceptance(n) if gatekeeper is None else gatekeeper
+    answers = {name: answering.GetOutputPort(name) for name in ("answers", "reports")}
+    controllers = UgvController(world, law), _uav_controller(scenario, world)
+    parts = {
+        "decision_making": decision,
+        "task_planning": _task_planning(presets, planner, *controllers),
+        "optimisation": _assembled("optimisation", {"gatekeeper": answering}, answers),
+        "vehicles": vehicles,
+    }
+    if monitor is not None:
+        parts["monitor"] = monitor
+    named = {port.get_name(): port for part in parts.values() for port in _outputs(part)}
+    recorded = (*RECORDED, *(name for name in OF_PLANTS if name in named))
+    exported = [*recorded, *(["violation"] if monitor is not None else [])]
+    diagram = _assembled(f"{scenario.name}_method_{chosen.id}", parts, named, exported)
+    return Model(diagram, world, block, trigger, planner, gatekeeper, controllers, signals, recorded)
+
+
+def method_drawn(scenario: Scenario) -> str:
+    """Identifier of the method that pictures show: (c), the paper's Figure 2, if there is a run of it, else the last.
+
+    The last is that with the most parts among the scenario's runs.
+    """
+    methods = {run.method for run in scenario.runs.values()}
+    return "c" if "c" in methods else max(methods, key=list(METHODS).index)
+
+
+def _chosen(scenario: Scenario, method: str | None, composition: str | None) -> tuple[Method, Composition]:
+    """The requested method and composition; without a method, those of the scenario's last run."""
+    if method is None:
+        last = next(reversed(scenario.runs.values()))
+        method = last.method
+        composition = last.composition if composition is None else composition
+    composition = "augmented" if composition is None else composition
+    if composition not in COMPOSITIONS:
+        raise UnknownNameError("composition", composition, COMPOSITIONS)
+    return method_of(method), composition
+
+
+def _decision_making(scenario: Scenario, n: int, variable: System, events: EventTrigger) -> Diagram:
+    """The decision-making layer of n UGVs: noise, decision variables, trigger."""
+    source, noise = components.make_noise(n, scenario.decision)
+    systems = {
+        "noise_source": source, "decision_noise": noise, "decision_variable": variable, "event_trigger": events,
+    }  # fmt: skip
+    named = {
+        "noise": noise.get_output_port(),
+        "decision_variable": variable.GetOutputPort("decision_variable"),
+        "decision_range": variable.GetOutputPort("decision_range"),
+        "status": events.GetOutputPort("status"),
+    }
+    exported = [name for name in named if name != "decision_range"]
+    return _assembled("decision_making", systems, named, exported, [(source.get_output_port(), noise.get_input_port())])
+
+
+def _task_planning(
+    presets: Sequence[Motion], planner: InterventionPlanner, ugvs: UgvController, uav: UavController
+) -> Diagram:
+    """The task planning layer: preset trajectories, planner, controllers."""
+    reference = TrajectorySource(components.stack_presets(list(presets)), output_derivative_order=1)
+    systems = {
+        "reference": reference, "intervention_planner": planner, "ugv_controller": ugvs, "uav_controller": uav,
+    }  # fmt: skip
+    named = {
+        "reference": reference.get_output_port(),
+        "proposals": planner.GetOutputPort("proposals"),
+        "ugv_command": ugvs.GetOutputPort("command"),
+        "executing": ugvs.GetOutputPort("executing"),
+        **({"command_share": ugvs.GetOutputPort("command_share")} if ugvs.HasOutputPort("command_share") else {}),
+        "gains": ugvs.GetOutputPort("gains"),
+        "uav_command": uav.GetOutputPort("command"),
+    }
+    return _assembled("task_planning", systems, named)
+
+
+def _vehicles(world: World, plants: Mapping[str, System], *, disturbed: bool) -> Diagram:
+    """The vehicles: commands, disturbances, plants, positions."""
+    builder = DiagramBuilder()
+    sizes = [3 * len(world.names(kind)) for kind in ROBOTS]
+    team_command = builder.AddNamedSystem("team_command", Multiplexer(sizes))
+    commanded = team_command.get_output_port()
+    if disturbed:
+        disturbance = builder.AddNamedSystem("velocity_disturbance", VelocityDisturbance(world.robots))
+        builder.Connect(commanded, disturbance.GetInputPort("command"))
+        commanded = disturbance.GetOutputPort("velocity")
+    velocities = builder.AddNamedSystem("team_velocity", Demultiplexer(sum(sizes), 3))
+    for body, plant in plants.items():
+        builder.AddNamedSystem(f"{body}_plant", plant)
+    bodies = builder.AddNamedSystem("bodies", Multiplexer([3] * len(plants)))
+    for i, plant in enumerate(plants.values()):
+        builder.Connect(plant.get_output_port(0), bodies.get_input_port(i))
+        if i < len(world.robots):
+            builder.Connect(velocities.get_output_port(i), plant.get_input_port(0))
+    builder.Connect(commanded, velocities.get_input_port())
+    for i, kind in enumerate(ROBOTS):
+        builder.ExportInput(team_command.get_input_port(i), f"{kind}_command")
+    for robot in world.robots if disturbed else ():
+        builder.ExportInput(disturbance.GetInputPort(f"disturbance_{robot}"), f"disturbance_{robot}")
+    builder.ExportOutput(bodies.get_output_port(), "bodies")
+    builder.ExportOutput(team_command.get_output_port(), "team_command")
+    signals = [port for plant in plants.values() for port in _outputs(plant) if port.get_name() == "signals"]
+    if signals:
+        builder.ExportOutput(_together(builder, "plant_signals", signals), "plant_signals")
+    if own := _own_headings(world, plants):
+        builder.ExportOutput(_together(builder, "own_headings", [*own.values()]), "own_headings")
+    if world.steering is not None:
+        of_ugvs = [{port.get_name(): port for port in _outputs(plants[name])} for name in world.names("ugv")]
+        none = builder.AddNamedSystem("no_heading", ConstantVectorSource([0.0])).get_output_port()
+        headings = [ports.get("heading", none) for ports in of_ugvs]
+        builder.ExportOutput(_together(builder, "headings", headings), "headings")
+    return _built("vehicles", builder)
+
+
+def _together(builder: DiagramBuilder, name: str, ports: Sequence[OutputPort]) -> OutputPort:
+    """One output port with the values of several."""
+    multiplexer = builder.AddNamedSystem(name, Multiplexer([port.size() for port in ports]))
+    for i, port in enumerate(ports):
+        builder.Connect(port, multiplexer.get_input_port(i))
+    return multiplexer.get_output_port()
+
+
+def _assembled(
+    name: str,
+    systems: Mapping[str, System],
+    named: Mapping[str, OutputPort],
+    exported: Iterable[str] | None = None,
+    wires: Iterable[tuple[OutputPort, InputPort]] = (),
+) -> Diagram:
+    """A Diagram of systems by name, in which input ports are fed by name.
+
+    Args:
+        name: of the diagram.
+        systems: its systems, in Drake's order of computation.
+        named: output ports; each feeds all input ports of its name. Input ports of any other name become an input port
+            of the diagram, one for each name.
+        exported: which of `named` become output ports of the diagram; default: all.
+        wires: further connections.
+    """
+    builder = DiagramBuilder()
+    for each, system in systems.items():
+        builder.AddNamedSystem(each, system)
+    for source, target in wires:
+        builder.Connect(source, target)
+    inputs = set()
+    for port in (system.get_input_port(i) for system in systems.values() for i in range(system.num_input_ports())):
+        wanted = port.get_name()
+        if builder.IsConnectedOrExported(port):
+            continue
+        if wanted in named:
+            builder.Connect(named[wanted], port)
+        elif wanted in inputs:
+            builder.ConnectInput(wanted, port)
+        else:
+            builder.ExportInput(port, wanted)
+            inputs.add(wanted)
+    for each in named if exported is None else exported:
+        builder.ExportOutput(named[each], each)
+    return _built(name, builder)
+
+
+def _built(name: str, builder: DiagramBuilder) -> Diagram:
+    diagram = builder.Build()
+    diagram.set_name(name)
+    return diagram
+
+
+def _outputs(system: System) -> list[OutputPort]:
+    return [system.get_output_port(i) for i in range(system.num_output_ports())]
+
+
+def make_monitor(
+    scenario: Scenario, method: str | None = None, composition: Composition | None = None, *, terminate: bool = False
+) -> Monitor:
+    """A monitor of a diagram of the scenario, with laws made separately from it.
+
+    Args:
+        scenario: what must hold; the diagram may have been built from another one.
+        method: default: that of the scenario's last run.
+        composition: of the UGVs' avoidance tasks; default: as in `build_diagram`.
+        terminate: end the simulation at the first violation.
+
+    Raises:
+        ScenarioError, UnknownNameError, PluginError: as `build_diagram`.
+    """
+    scenario = validated(scenario)
+    chosen, composition = _chosen(scenario, method, composition)
+    world = make_world(scenario)
+    ugvs = UgvController(world, components.make_law(scenario, chosen, composition))
+    laws = Laws(ugvs.velocity, _uav_controller(scenario, world).velocity)
+    return Monitor(world, components.make_avoidance(scenario), laws, terminate=terminate)
+
+
+def _uav_controller(scenario: Scenario, world: World) -> UavController:
+    return UavController(
+        world,
+        components.make_avoidance(scenario),
+        task=UAV_TASKS.load(scenario.uav.task, of=Task),
+        gain=scenario.control.formation_gain_1_s,
+        altitude=scenario.uav.altitude_m,
+    )
+
+
+def _own_headings(world: World, plants: Mapping[str, System]) -> dict[str, OutputPort]:
+    """The headings of users' plants that have one, by robot."""
+    own = [body.name for body in world.moving if isinstance(body.plant, Own)]
+    return {name: plants[name].GetOutputPort("heading") for name in own if plants[name].HasOutputPort("heading")}
+
+
+def _checked_block(n: int, block: System) -> System:
+    """The given block.
+
+    Raises:
+        PluginError: if it lacks the output ports of a decision block of n UGVs.
+    """
+    if not isinstance(block, System):
+        raise PluginError(f"decision_block makes {short(repr(block))}; allowed: a System such as a DecisionBlock")
+    sizes = {port.get_name(): port.size() for port in _outputs(block)}
+    wanted = {"decision_variable": n, "decision_range": 2 * n}
+    if any(sizes.get(name) != size for name, size in wanted.items()):
+        raise PluginError(f"the decision block has output ports of sizes {sizes}; they must include {wanted}")
+    return block

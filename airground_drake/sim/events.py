@@ -1,0 +1,132 @@
+"""Events of a run: trigger, release, proposal, accept, refuse, over, arrival, collision.
+
+A UGV that has executed a proposal for as long as it was accepted is on its own again: `over`. It has refused nothing.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from scipy.spatial import cKDTree
+
+from airground_drake.base.arrays import Array
+from airground_drake.model.bodies.motion import PeriodMotion
+from airground_drake.model.bodies.world import ROBOTS, Body
+from airground_drake.model.geometry import convex, outline
+from airground_drake.scenario.schema import MAP
+from airground_drake.scenario.world import make_world
+from airground_drake.sim.collisions import first_collisions
+from airground_drake.sim.trace import Trace
+from airground_drake.ugv.reasons import OVER
+
+
+def extract(trace: Trace) -> list[dict[str, Any]]:
+    """All events of a run in the order of time, from its states, proposals and decisions."""
+    t, order = trace.t, {robot: k for k, robot in enumerate(trace.robots)}
+    found: list[dict[str, Any]] = []
+
+    def add(time_s: float, robot: str, kind: str, **more: Any) -> None:
+        where = [float(np.interp(time_s, t, axis)) for axis in trace.body(robot).T]
+        found.append({"t_s": float(time_s), "robot": robot, "kind": kind, "position_m": where, **more})
+
+    for ugv in trace.ugvs:
+        for kind, name in (("trigger", "triggered_at_s"), ("release", "released_at_s")):
+            for when in np.unique(trace.column(f"{ugv}.{name}")):
+                if when >= 0.0:
+                    add(when, ugv, kind)
+    sent = (trace.proposals[name].tolist() for name in ("robot", "issued_s", "policy"))
+    for ugv, issued, policy in zip(*sent, strict=True):
+        add(issued, ugv, "proposal", policy=policy)
+    previous: dict[int, str] = {}
+    columns = ["t_s", "robot", "policy", "number", "decision", "reason", "status"]
+    for row in trace.decisions[columns].to_dict("records"):
+        if previous.get(row["number"]) != row["decision"]:
+            previous[row["number"]] = row["decision"]
+            kind = OVER if row["reason"] == OVER else row["decision"]
+            add(row["t_s"], row["robot"], kind, policy=row["policy"], status=row["status"])
+    _add_collisions(trace, add)
+    hits = first_collisions(found)
+    for robot in trace.robots:
+        _add_arrival(trace, robot, trace.rows_before(hits[robot]["t_s"] if robot in hits else np.inf), add)
+    return sorted(found, key=lambda event: (event["t_s"], order[event["robot"]]))
+
+
+def _add_arrival(trace: Trace, robot: str, rows: int, add: Any) -> None:
+    """Add the time after which the robot stays within the arrival tolerance of its target during the first rows."""
+    scenario = trace.scenario
+    away = np.linalg.norm(trace.position(robot)[:rows] - np.array(scenario.robots[robot].target_m), axis=1)
+    outside = np.flatnonzero(away > scenario.arrival_tolerance_m)
+    first = int(outside[-1]) + 1 if len(outside) else 0
+    if first < len(away):
+        add(trace.t[first], robot, "arrival")
+
+
+def _add_collisions(trace: Trace, add: Any) -> None:
+    """Add each robot's visits within collision distance of obstacles and of robots later in the list."""
+    world, collision_m = make_world(trace.scenario), trace.scenario.safe_distance.collision_m
+    ways = [_way(trace, body) for body in world.bodies]
+    low, high = (np.array(corners) for corners in zip(*map(_box, ways, world.bodies), strict=True))
+    for i, (own, radius) in enumerate(zip(world.bodies[world.select(*ROBOTS)], world.radius, strict=True)):
+        within = collision_m + float(radius)
+        gap = np.maximum(np.maximum(ways[i].box[0] - high[i + 1 :], low[i + 1 :] - ways[i].box[1]), 0.0)
+        near = i + 1 + np.flatnonzero(np.linalg.norm(gap, axis=1) <= within)
+        for k in sorted(near.tolist(), key=lambda k: world.bodies[k].kind in ROBOTS):
+            body = world.bodies[k]
+            role = "other" if body.kind in ROBOTS else "obstacle"
+            first, last = trace.there_from(body.name), trace.there_until(body.name)
+            apart = ways[i].seen_from(ways[k])
+            apart = apart._replace(start=apart.start[first:last], end=apart.end[first:last])
+            planar = own.mobility[2] == 0.0
+            for row in first + visits(apart, body.shape, within, planar) if first < last else ():
+                at = {"at_m": _nearest(trace, own.name, body, int(row))} if body.name == MAP else {}
+                add(trace.t[row], own.name, "collision", **{role: body.name}, **at)
+
+
+def _nearest(trace: Trace, robot: str, body: Body, row: int) -> list[float]:
+    """The place of a body at rest that is nearest to a robot at a row, [x, y], m."""
+    place = trace.position(robot)[row]
+    apart = convex.distances(body.shape, place, True) - body.shape[:, outline.RADIUS]
+    point: Array = convex.nearest_points(body.shape[[apart.argmin()]], place[None])[0, 0]
+    return point[:2].tolist()
+
+
+def _way(trace: Trace, body: Body) -> PeriodMotion:
+    """Motion of a body's origin between the rows, taken as straight: (T - 1, 3), or (3,) if it never moves."""
+    if body.plant is None:
+        return PeriodMotion(body.start_m, body.start_m)
+    position = trace.body(body.name)
+    return PeriodMotion(position[:-1], position[1:])
+
+
+def _box(way: PeriodMotion, body: Body) -> tuple[Array, Array]:
+    """Two opposite corners, (3,), m, of a box around a body that moves."""
+    (start, end), (low, high) = way.box, outline.box(body.shape)
+    return start + low, end + high
+
+
+def visits(apart: PeriodMotion, shape: Array, within: float, planar: bool) -> npt.NDArray[np.intp]:
+    """Rows, (K,), at which a centre comes within a distance of a shape; between two rows, the first of them.
+
+    Args:
+        apart: motion of the centre relative to the shape's origin, (T - 1, 3), m.
+        shape: outlines of the shape, (k, W), see `model.geometry.outline`.
+        within: the distance from its surface, m.
+        planar: whether the centre stays in its plane.
+    """
+    places = np.concatenate([apart.start, apart.end[-1:]])
+    near, passes = np.zeros(len(places), dtype=bool), np.zeros(len(apart.start), dtype=bool)
+    longest = float(np.linalg.norm(apart.end - apart.start, axis=1).max())
+    far = 1.001 * (within + apart.off_m + longest + shape[:, outline.RADIUS] + shape[:, outline.EXTENT])
+    nearby = cKDTree(places[:, :2]).query_ball_point(shape[:, outline.MIDDLE : outline.EXTENT], far)
+    for row, indices in zip(shape, nearby, strict=True):
+        if not indices:
+            continue
+        some, reach = np.array(indices), within + row[outline.RADIUS]
+        near[some] |= convex.within(row[None], places[some], np.nextafter(reach, -np.inf), planar)[:, 0]
+        some = some[some < len(passes)]
+        least = convex.approaches(row, apart.start[some], apart.end[some], planar)[0]
+        passes[some] |= least < reach + apart.off_m
+    enters = near & ~np.append(False, near[:-1])
+    return np.flatnonzero(enters | np.append(passes & ~near[:-1] & ~near[1:], False))

@@ -1,0 +1,271 @@
+"""The tables of a trace, made from a log of the diagram's outputs and from what planner and gatekeepers remember."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pandas as pd
+
+from airground_drake.base.arrays import Array
+from airground_drake.model.geometry import outline
+from airground_drake.sim.blocks.signals import FIELDS, Status
+from airground_drake.sim.tables import (
+    DECISION_COLUMNS,
+    DECISION_LISTS,
+    MESSAGE_COLUMNS,
+    PLAN_COLUMNS,
+    PROBLEM_ARRAYS,
+    PROBLEM_SCALARS,
+    PROPOSAL_COLUMNS,
+    typed,
+)
+from airground_drake.sim.trace import Trace
+from airground_drake.uav.database import Asked
+from airground_drake.uav.planner import PlannerState
+from airground_drake.uav.policy import Proposal
+from airground_drake.ugv.answer import GatekeeperDecision
+
+MERGE_S = 1e-9
+"""Rows closer than this are merged, s: periods that are not binary fractions give steps of about 1e-17 s."""
+SAME_S = 1e-6
+"""A row this near to a multiple of the control period is at that control sample, s."""
+
+
+def distinct(t: Array, command: Array) -> npt.NDArray[np.intp]:
+    """Indices of rows (T,) at distinct times, for commands (3 r, T) of r robots.
+
+    Among rows within MERGE_S of each other, the last row that has the command of the first is kept: the command that
+    led there.
+    """
+    cluster = np.concatenate([[0], np.cumsum(np.diff(t) > MERGE_S)])
+    first = np.searchsorted(cluster, cluster)
+    led = (command == command[:, first]).all(axis=0)
+    return np.unique(np.maximum.accumulate(np.where(led, np.arange(len(t)), 0))[np.append(np.diff(cluster) > 0, True)])
+
+
+def states(
+    t: Array, logged: Mapping[str, Array], ugvs: Sequence[str], bodies: Sequence[str], signals: Sequence[str] = ()
+) -> pd.DataFrame:
+    """`Trace.states` of rows at times (T,), s; what was logged of M bodies has the shape (3 M, T), of UGVs (n, T).
+
+    `signals` are the names of `plant_signals` and `own_headings`, (k, T).
+    """
+    columns: dict[str, Array] = {"t_s": t}
+    for i, body in enumerate(bodies):
+        columns |= {f"{body}.{axis}_m": logged["bodies"][3 * i + a] for a, axis in enumerate("xyz")}
+    for i, ugv in enumerate(ugvs):
+        columns[f"{ugv}.noise_m"] = logged["noise"][i]
+        columns[f"{ugv}.decision_variable_m"] = logged["decision_variable"][i]
+        columns |= {f"{ugv}.{name}": logged["status"][FIELDS * i + k] for k, name in enumerate(Status.get_fields())}
+    of_plants = [*logged.get("plant_signals", ()), *np.unwrap(logged.get("own_headings", np.empty((0, len(t)))))]
+    columns |= dict(zip(signals, of_plants, strict=True))
+    return pd.DataFrame(columns)
+
+
+def measured(states: pd.DataFrame, samples: pd.DataFrame, robots: Iterable[str]) -> dict[str, Array]:
+    """Drift and cover of robots with users' plants in each control period: columns of `Trace.samples`, (S,)."""
+    rows, found = np.searchsorted(states["t_s"], samples["t_s"]), dict[str, Array]()
+    ends = np.append(rows, len(states) - 1)
+    t = states["t_s"].to_numpy()
+    for robot in robots:
+        place, body = (
+            states[[f"{robot}.{stem}{axis}_m" for axis in "xyz"]].to_numpy(dtype=np.float64) for stem in ("", "body_")
+        )
+        command = samples[[f"{robot}.v{axis}_m_s" for axis in "xyz"]].to_numpy(dtype=np.float64)
+        missed = np.diff(place[ends], axis=0) / np.diff(t[ends])[:, None] - command
+        line = np.stack([np.interp(t, t[ends], axis) for axis in place[ends].T], axis=1)
+        off = np.linalg.norm(body - line, axis=1)
+        found[f"{robot}.drift_m_s"] = np.linalg.norm(missed, axis=1)
+        found[f"{robot}.cover_m"] = np.maximum(np.maximum.reduceat(off, rows), off[ends[1:]])
+    return found
+
+
+def samples(
+    t: Array, period_s: float, logged: Mapping[str, Array], ugvs: Sequence[str], robots: Sequence[str]
+) -> pd.DataFrame:
+    """`Trace.samples`: what was chosen at a control sample is logged from the row after it on."""
+    at = sample_rows(t, period_s)
+    chosen, reference = logged["team_command"][:, at + 1], logged["reference"][:, at]
+    columns: dict[str, Array] = {"t_s": t[at]}
+    for i, robot in enumerate(robots):
+        columns |= {f"{robot}.v{axis}_m_s": chosen[3 * i + a] for a, axis in enumerate("xyz")}
+    for i, ugv in enumerate(ugvs):
+        columns |= {f"{ugv}.ref_{axis}_m": reference[3 * i + a] for a, axis in enumerate("xyz")}
+        columns |= {f"{ugv}.ref_v{axis}_m_s": reference[3 * (len(ugvs) + i) + a] for a, axis in enumerate("xyz")}
+        columns[f"{ugv}.executing"] = logged["executing"][i, at + 1]
+        if "command_share" in logged:
+            columns[f"{ugv}.command_share"] = logged["command_share"][i, at + 1]
+    return pd.DataFrame(columns)
+
+
+def sample_rows(t: Array, period_s: float) -> npt.NDArray[np.intp]:
+    """Rows at the control samples before the last row, (S,): the nearest to each multiple of the period, s."""
+    instants = np.arange(int((t[-1] - MERGE_S) / period_s) + 1) * period_s
+    right = np.searchsorted(t, instants).clip(1, len(t) - 1)
+    nearest = right - (instants - t[right - 1] < t[right] - instants)
+    return np.asarray(nearest[(np.abs(t[nearest] - instants) <= SAME_S) & (nearest < len(t) - 1)])
+
+
+def decisions(decided: Sequence[GatekeeperDecision], ugvs: Sequence[str], route: str) -> pd.DataFrame:
+    """`Trace.decisions`; the route is the name of method (c)'s."""
+    return typed([_decision(made, ugvs[made.robot], route) for made in decided], DECISION_COLUMNS, *DECISION_LISTS)
+
+
+def _decision(decision: GatekeeperDecision, robot: str, route: str) -> dict[str, Any]:
+    """A row of `Trace.decisions`."""
+    row: dict[str, Any] = {name: "" if kind == "str" else -1.0 for name, kind in DECISION_COLUMNS.items()}
+    rested_on = decision.basis
+    row |= {
+        "t_s": decision.t,
+        "robot": robot,
+        "policy": decision.proposal.policy,
+        "number": decision.proposal.number,
+        "answer": decision.answer,
+        "issued_s": decision.proposal.issued,
+        "decision": _word(decision.accepted),
+        "reason": decision.reason,
+        "sensed": list(rested_on.sensed),
+        "known": list(rested_on.known),
+        "new": list(rested_on.new),
+        "told": list(rested_on.told),
+        "asked": [number for number, _ in rested_on.asked],
+        "asked_accepted": [int(accepted) for _, accepted in rested_on.asked],
+    }
+    solution = decision.solution
+    if solution is None:
+        row |= {"tries": decision.tries}
+        for choice, outcome in (("refuse", decision.refuse), ("accept", decision.accept)):
+            if outcome is not None:
+                row |= {
+                    f"{choice}_outcome_m2_s": outcome.cost,
+                    f"{choice}_stalls": float(outcome.stalls),
+                    f"{choice}_left_m": outcome.left,
+                }
+        return row
+    return row | {
+        "status": solution.status,
+        "route": route,
+        "plan_first_stage": _word(solution.accept_first),
+        "relaxed_first_stage": solution.relaxed_first_stage,
+        "rounded_first_stage": "" if solution.rounded is None else _word(bool(solution.rounded[0])),
+        "objective": solution.objective,
+        "route_bound": solution.route_bound,
+        "gap": solution.gap,
+        "objective_accept": solution.objective_accept,
+        "objective_refuse": solution.objective_refuse,
+        "accept_throughout": decision.throughout[0],
+        "refuse_throughout": decision.throughout[1],
+        "rounding_deviation_s": solution.rounding_deviation,
+        "predicted_clearance_m": solution.clearance,
+    }
+
+
+def _word(accepts: bool) -> str:
+    return "accept" if accepts else "refuse"
+
+
+def problems(decided: Sequence[GatekeeperDecision]) -> pd.DataFrame:
+    """`Trace.problems` of the decisions."""
+
+    def flat(array: Array | None) -> list[float]:
+        return [] if array is None else array.ravel().tolist()
+
+    planned = [(r.problem, r.solution) for r in decided if r.problem is not None and r.solution is not None]
+    rows = [
+        (
+            p.dt, p.error_weight, p.slack_weight, p.terminal_weight,
+            *map(flat, (
+                p.initial, p.accept, p.refuse, p.reference, p.centres, p.distances,
+                s.plan, s.positions, s.relaxed, s.rounded, s.normals,
+            )),
+        )
+        for p, s in planned
+    ]  # fmt: skip
+    return pd.DataFrame(rows, columns=[*PROBLEM_SCALARS, *PROBLEM_ARRAYS])
+
+
+def proposals(ugvs: Sequence[str], sent: Sequence[tuple[int, Proposal]]) -> pd.DataFrame:
+    """`Trace.proposals` of the proposals sent, each with the index of its UGV."""
+    rows = [
+        (
+            proposal.number, ugvs[i], proposal.policy, float(proposal.issued), proposal.motion.times.tolist(),
+            proposal.motion.positions.ravel().tolist(),
+            np.asarray(proposal.selection, dtype=np.float64).ravel().tolist(),
+            [number for row in proposal.mapped for number in outline.as_tuple(row)], proposal.cause or ugvs[i],
+            [float(ugvs.index(name)) for name in proposal.party],
+        )
+        for i, proposal in sent
+    ]  # fmt: skip
+    return pd.DataFrame(rows, columns=list(PROPOSAL_COLUMNS))
+
+
+def plans(asked: Sequence[Asked], sent: Sequence[tuple[int, Proposal]], ugvs: Sequence[str], uav: str) -> pd.DataFrame:
+    """`Trace.plans` of the policies that were asked, with the proposals sent."""
+    numbers = {(proposal.issued, ugvs[i]): proposal.number for i, proposal in sent}
+    rows = [
+        {
+            "t_s": each.t, "uav": uav, "ugv": each.robot, "policy": each.policy, "outcome": _outcome(each),
+            "reason": each.reason,
+            "sent": [numbers[each.t, ugv] for ugv in each.party if each.chosen and (each.t, ugv) in numbers],
+        }
+        for each in asked
+    ]  # fmt: skip
+    return typed(rows, PLAN_COLUMNS, "sent")
+
+
+def _outcome(each: Asked) -> str:
+    if each.what:
+        return "failed"
+    return "proposed" if each.chosen else "passed over" if each.party else "nothing"
+
+
+def messages(memory: PlannerState, trace: Trace, uav: str) -> pd.DataFrame:
+    """`Trace.messages` of a run, from what the UAV remembers, and from the decisions and samples of the trace."""
+    rows = sorted(_messages(memory, trace, uav), key=lambda row: (row["sent_s"], _ORDER.index(row["kind"])))
+    return typed(rows, MESSAGE_COLUMNS)
+
+
+_ORDER = ("answer", "withdrawal", "proposal")
+"""Kinds of messages of one instant, in the order of the table."""
+
+
+def _messages(memory: PlannerState, trace: Trace, uav: str) -> Iterator[dict[str, Any]]:
+    """Rows of messages; each is delivered when it is sent."""
+
+    def row(kind: str, number: int, about: int, sent_s: float, read_s: float) -> dict[str, Any]:
+        ugv = trace.ugvs[memory.sent[about][0]]
+        sender, receiver = (ugv, uav) if kind == "answer" else (uav, ugv)
+        return {
+            "kind": kind, "number": number, "copy": 0, "sender": sender, "receiver": receiver, "about": about,
+            "sent_s": sent_s, "received_s": sent_s, "read_s": read_s,
+        }  # fmt: skip
+
+    read, never = dict(memory.read), float("nan")
+    decided = trace.decisions.groupby("number")["t_s"].min().to_dict()
+    for i, proposal in memory.sent:
+        number, issued = proposal.number, proposal.issued
+        if trace.meta["method"] == "b":  # accepted at once
+            executing = trace.sampled(f"{trace.ugvs[i]}.executing") == number
+            begun = trace.sampled("t_s")[executing]
+            yield row("proposal", number, number, issued, float(begun[0]) if len(begun) else never)
+        else:
+            yield row("proposal", number, number, issued, decided.get(number, never))
+    for count, (number, t) in enumerate(memory.withdrawn):
+        yield row("withdrawal", count, number, t, t)
+    for t, answer, number in zip(*(trace.decisions[c].tolist() for c in ("t_s", "answer", "number")), strict=True):
+        yield row("answer", answer, number, t, read.get(answer, never))
+
+
+def faults(asked: Sequence[Asked]) -> list[dict[str, Any]]:
+    """Entries of `Trace.meta["faults"]`; the first fault of each policy has a traceback, if it is known."""
+    told, found = set[str](), []
+    for fault in (each for each in asked if each.what):
+        entry = {"t_s": fault.t, "robot": fault.robot, "policy": fault.policy, "what": fault.what}
+        if fault.traceback and fault.policy not in told:
+            entry["traceback"] = fault.traceback
+            told.add(fault.policy)
+        found.append(entry)
+    return found

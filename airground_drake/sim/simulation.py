@@ -1,0 +1,283 @@
+"""Runs a model with Drake's Simulator and turns its log into a Trace."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
+from functools import cache
+from typing import Any
+
+import numpy as np
+from pydrake.common import RandomGenerator
+from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorConfig
+from pydrake.systems.framework import Context, DiagramBuilder, LeafSystem
+from pydrake.systems.primitives import LogVectorOutput, Multiplexer
+
+from airground_drake.base.errors import SimulationError, UnknownNameError, described
+from airground_drake.model.bodies.world import Body, World
+from airground_drake.model.geometry import convex, outline
+from airground_drake.model.geometry.motion import Motion
+from airground_drake.model.law.avoidance import Avoidance, Composition
+from airground_drake.model.law.ugv_law import UgvLaw
+from airground_drake.model.plants.plant import FirstOrder
+from airground_drake.scenario.load import own, resolved, validated
+from airground_drake.scenario.schema import Scenario
+from airground_drake.sim import recording
+from airground_drake.sim.blocks.decision import DecisionVariable
+from airground_drake.sim.blocks.lifetime import untie
+from airground_drake.sim.blocks.plant import OwnPlant, declared, own_code
+from airground_drake.sim.components import GatekeepersFactory, make_gatekeepers
+from airground_drake.sim.diagram import NO_PLANTS, DecisionFactory, Model, build_model
+from airground_drake.sim.events import extract
+from airground_drake.sim.tables import SCHEMA
+from airground_drake.sim.trace import Trace
+from airground_drake.uav.policy import Proposal
+from airground_drake.ugv.answer import GatekeeperDecision
+from airground_drake.ugv.outcome import Outlook, outcomes
+from airground_drake.ugv.problem import Horizon, predicted_problem
+from airground_drake.ugv.rollout import View
+from airground_drake.ugv.routes.mixed_integer import MixedIntegerRoute
+
+EVENT_ACCURACY = 1e-6
+"""Accuracy of the Context: events are isolated to this, relative to the time scale of 1 s."""
+OWN_ACCURACY = 1e-6
+"""Accuracy of integration where a robot has a user's plant: about this many metres in a step."""
+
+
+class Recorder:
+    """A model in a diagram that logs its outputs at every step, for runs with one or several seeds."""
+
+    def __init__(
+        self,
+        scenario: Scenario,
+        name: str,
+        decision_block: DecisionFactory = DecisionVariable,
+        observers: Sequence[LeafSystem] = (),
+        *,
+        plants: Mapping[str, OwnPlant] = NO_PLANTS,
+        make_gatekeepers: GatekeepersFactory = make_gatekeepers,
+    ) -> None:
+        """Build the model of a run of the scenario and its logger.
+
+        `scenario` is valid and declares the `plants` (`sim.blocks.plant.declared`). `decision_block`, `observers` and
+        `plants` as in `simulate`, `make_gatekeepers` as in `build_model`; raises as `simulate`.
+        """
+        self._scenario, self._name = scenario, name
+        if name not in self._scenario.runs:
+            raise UnknownNameError("run", name, self._scenario.runs)
+        self._run = self._scenario.runs[name]
+        composition: Composition = self._run.composition  # type: ignore[assignment]
+        self._own = own(self._scenario, name)
+        self.model = build_model(
+            self._own,
+            self._run.method,
+            composition,
+            plants,
+            decision_block=decision_block,
+            disturbed=False,
+            make_gatekeepers=make_gatekeepers,
+        )
+        self._own_plants = own_code(self._own, plants)
+        builder = DiagramBuilder()
+        builder.AddSystem(self.model.diagram)
+        ports = [self.model.diagram.GetOutputPort(name) for name in self.model.recorded]
+        together = builder.AddNamedSystem("recorded_signals", Multiplexer([port.size() for port in ports]))
+        for i, port in enumerate(ports):
+            builder.Connect(port, together.get_input_port(i))
+        self._log = LogVectorOutput(together.get_output_port(), builder)  # one for all: a log costs a step 10 us
+        for observer in observers:
+            builder.AddSystem(observer)
+            for port in (observer.get_input_port(i) for i in range(observer.num_input_ports())):
+                builder.Connect(self.model.diagram.GetOutputPort(port.get_name()), port)
+        self._root = builder.Build()
+        self._root.set_name("recorded")
+        untie(self._root)
+        warm_up()
+
+    def simulate(
+        self,
+        seed: int | None = None,
+        duration: float | None = None,
+        watch: Callable[[float], None] | None = None,
+        speed: float = 0.0,
+    ) -> Trace:
+        """One run from the initial state.
+
+        Args:
+            seed: of the decision noise; default: the scenario's.
+            duration: s; default: the scenario's.
+            watch: is told the time, s, at every step.
+            speed: simulated seconds per second at most; 0: no limit.
+
+        Raises:
+            SimulationError: if Drake or a system stops; names the run and the time.
+        """
+        started = time.perf_counter()
+        try:
+            simulator = self.begin(seed, watch, speed)
+            self.advance(simulator, self._scenario.duration_s if duration is None else duration)
+        finally:
+            self.model.planner.close()
+        return self.trace(simulator, seed, time.perf_counter() - started)
+
+    def begin(
+        self, seed: int | None = None, watch: Callable[[float], None] | None = None, speed: float = 0.0
+    ) -> Simulator:
+        """A simulator of the run at its initial state; arguments and errors as of `simulate`."""
+        context = self._root.CreateDefaultContext()
+        self._root.SetRandomContext(context, RandomGenerator(self._scenario.seed if seed is None else seed))
+        context.SetAccuracy(EVENT_ACCURACY)
+        simulator = Simulator(self._root, context)
+        period = self._scenario.control.period_s
+        # velocities are held between samples: Euler's method is exact for the straight motion of steered points
+        config = SimulatorConfig(integration_scheme="explicit_euler", max_step_size=period, use_error_control=False)
+        if self._own_plants:
+            config.integration_scheme, config.use_error_control = "runge_kutta3", True
+            config.accuracy = OWN_ACCURACY
+        ApplySimulatorConfig(config, simulator)
+        simulator.set_target_realtime_rate(speed)
+        if watch is not None:
+            simulator.set_monitor(lambda root: watch(root.get_time()))
+        with self._reported(context):
+            simulator.Initialize()
+        return simulator
+
+    def advance(self, simulator: Simulator, until: float) -> None:
+        """Advance a simulator to a time, s; the updates of that instant are still to be made.
+
+        Raises:
+            SimulationError: if Drake or a system stops; names the run and the time.
+        """
+        with self._reported(simulator.get_context()):
+            simulator.AdvanceTo(until)
+
+    @contextmanager
+    def _reported(self, context: Context) -> Iterator[None]:
+        """Errors of Drake or a system in the body as SimulationError."""
+        try:
+            yield
+        except (Exception, SystemExit) as error:  # Drake raises many kinds
+            raise SimulationError(self._name, context.get_time(), self._what(error)) from error
+
+    def _what(self, error: BaseException) -> str:
+        """An error in words, with the place in the file of a user's plant, and such plants by name."""
+        own = self._own_plants
+        what = max((described(error, each.function) for each in own.values()), key=len, default=described(error))
+        if not own or any(each.name in what for each in own.values()):
+            return what
+        return f"{what} (users' plants: {', '.join(f'{each.name} of {robot}' for robot, each in own.items())})"
+
+    def trace(self, simulator: Simulator, seed: int | None, wall: float = 0.0) -> Trace:
+        """The trace of what a simulator has simulated: of a run that lasts until now.
+
+        Args:
+            simulator: from `begin`, advanced.
+            seed: as given to `begin`.
+            wall: duration by the clock, s.
+        """
+        context, seed = simulator.get_context(), self._scenario.seed if seed is None else seed
+        model, ugvs, robots = self.model, self.model.world.names("ugv"), self.model.world.robots
+        log = self._log.FindLog(context)
+        ends = np.cumsum([model.diagram.GetOutputPort(name).size() for name in model.recorded])
+        data = dict(zip(model.recorded, np.split(log.data(), ends[:-1]), strict=True))
+        t = log.sample_times()
+        keep = recording.distinct(t, data["team_command"])
+        data = {name: rows[:, keep] for name, rows in data.items()}
+        decided: Sequence[GatekeeperDecision] = ()
+        if (gatekeeper := model.gatekeeper) is not None:
+            decided = gatekeeper.decisions(gatekeeper.GetMyContextFromRoot(context))
+        memory = model.planner.memory(model.planner.GetMyContextFromRoot(context))
+        meta: dict[str, Any] = {
+            "schema": SCHEMA,
+            "run": self._name,
+            "method": self._run.method,
+            "composition": self._run.composition,
+            "seed": seed,
+            "robots": list(robots),
+            "ugvs": list(ugvs),
+            "scenario": resolved(self._scenario) | {"duration_s": context.get_time()},
+            "events": [],
+            **read_back(model, context),
+            "decision_block": "" if (kind := type(model.decision_block)) is DecisionVariable else kind.__qualname__,
+            "faults": recording.faults(memory.asked),
+        }
+        uav, t = model.world.names("uav")[0], t[keep]
+        states = recording.states(t, data, ugvs, [body.name for body in model.world.moving], model.signals)
+        samples = recording.samples(t, self._scenario.control.period_s, data, ugvs, robots)
+        trace = Trace(
+            meta,
+            states=states,
+            samples=samples.assign(**recording.measured(states, samples, self._own_plants)),
+            decisions=recording.decisions(decided, ugvs, self._own.gatekeeper.route),
+            timings={"wall_s": wall, "decision_times_s": [each.cpu_s for each in decided]},
+            problems=recording.problems(decided),
+            proposals=recording.proposals(ugvs, memory.sent),
+            plans=recording.plans(memory.asked, memory.sent, ugvs, uav),
+        )
+        trace = replace(trace, messages=recording.messages(memory, trace, uav))
+        meta["events"] = extract(trace)
+        return trace
+
+
+def read_back(model: Model, root: Context) -> dict[str, Any]:
+    """Parameters in force in a Context, for `Trace.meta`: `zeta_m`, and `controllers` (see `controllers.read_back`)."""
+    levels = model.trigger.levels(model.trigger.GetMyContextFromRoot(root))
+    ran = {each.get_name(): each.parameters(each.GetMyContextFromRoot(root)) for each in model.controllers}
+    return {"zeta_m": float(levels.zeta_m), "controllers": ran}
+
+
+@cache
+def warm_up() -> None:
+    """Load the compiled kernels and the solver, once per process, so that no run's time includes loading."""
+    one, motion = np.ones((1, 3)), Motion(np.array([0.0, 1.0]), np.zeros((2, 3)))
+    rows = outline.balls(one)
+    convex.news_within(rows, one, 1.0, True, convex.within(rows, one, 1.0, True))
+    avoidance = Avoidance(gain=1.0, period=0.1)
+    plant = FirstOrder()
+    world = World((Body("a", "ugv", one[0], plant=plant), Body("b", "uav", one[0], plant=plant)), {})
+    near = world.around(slice(0, 1))
+    avoidance.command(one, world.starts, near)
+    seen = View(0.0, one[0], motion, rows, rows, one, one, np.ones(2), np.ones(2), 1.0, (None,))
+    law, horizon = UgvLaw(avoidance, 1.0, 1.0, False), Horizon(2, 1, 1.0, 1.0)
+    law.velocity(world.starts, near, one, one, [None])
+    MixedIntegerRoute().solve(predicted_problem(seen, law, Proposal("", 0.0, motion), horizon))
+    outcomes(seen, law, Proposal("", 0.0, motion), Outlook(longest=1.0))
+
+
+def simulate(
+    scenario: Scenario,
+    run: str,
+    seed: int | None = None,
+    watch: Callable[[float], None] | None = None,
+    decision_block: DecisionFactory = DecisionVariable,
+    observers: Sequence[LeafSystem] = (),
+    speed: float = 0.0,
+    plants: Mapping[str, OwnPlant] = NO_PLANTS,
+) -> Trace:
+    """Simulate one run of a scenario.
+
+    Args:
+        scenario: from a file or made in Python.
+        run: name of one of its runs.
+        seed: of the decision noise, in place of the scenario's.
+        watch: is told the time, s, at every step.
+        decision_block: makes the block that drives the trigger; see `build_diagram`.
+        observers: systems that watch the run, such as `report.view.live_view.LiveView`: their input ports have the
+            names of the model's output ports, and each has a name of its own. The run does not see them.
+        speed: simulated seconds per second at most, for watching; 0: no limit.
+        plants: plants of your own, by robot, in place of those of the scenario: as if the scenario named them
+            (`plant.kind`).
+
+    Raises:
+        ScenarioError: if the scenario, or the seed, is not valid.
+        UnknownNameError: if it has no such run.
+        PluginError: if it names a policy, route, task or plant that cannot be made, or the decision block has other
+            ports.
+        SimulationError: if Drake or a system stops; names the run and the time.
+    """
+    if seed is not None:
+        scenario = validated(scenario, {"seed": seed})
+    valid = declared(scenario, plants)
+    return Recorder(valid, run, decision_block, observers, plants=plants).simulate(watch=watch, speed=speed)

@@ -1,0 +1,113 @@
+"""A campaign from beginning to end: judge the draws that are not finished, store them, write the evidence."""
+
+from __future__ import annotations
+
+from collections import Counter
+from functools import partial
+from importlib.metadata import version
+from itertools import groupby
+from operator import itemgetter
+from pathlib import Path
+from typing import Any
+
+from airground_drake.base import files
+from airground_drake.base.errors import FolderError, LimitError, one_line
+from airground_drake.base.progress import SILENT, Progress
+from airground_drake.base.registry import RUN_CLAIMS
+from airground_drake.scenario.estimate import DEFAULT_LIMITS, MOST_ROWS, Limits
+from airground_drake.study.campaign.evidence import evidence, strict
+from airground_drake.study.campaign.page import page
+from airground_drake.study.campaign.pool import Pool
+from airground_drake.study.campaign.spec import Spec
+from airground_drake.study.campaign.stopping import InOrder, Stopping
+from airground_drake.study.campaign.store import Store
+from airground_drake.study.campaign.swept import by_value, per_run
+from airground_drake.study.campaign.work import died, rows_of
+
+EVIDENCE, PAGE = "evidence.json", "campaign.html"
+
+
+def conduct(
+    spec: Spec,
+    folder: Path,
+    pool: Pool,
+    number: int | None = None,
+    *,
+    resume: bool = False,
+    stopping: Stopping | None = None,
+    limits: Limits = DEFAULT_LIMITS,
+    progress: Progress = SILENT,
+) -> dict[str, Any]:
+    """Finish a campaign, and write the evidence and its page.
+
+    Args:
+        spec: the scenario and its distributions.
+        folder: new or empty; with `resume`, a folder with a part of the same campaign.
+        pool: judges the draws.
+        number: of draws; default: all combinations of the grids.
+        resume: keep the draws that the folder has.
+        stopping: rule to end early.
+        limits: largest scenario, and longest time, of a draw.
+        progress: receives the progress.
+
+    Returns:
+        The evidence, strict JSON.
+
+    Raises:
+        ScenarioError: if third-party code is named that is not allowed.
+        FolderError: if the folder cannot be used, or has draws beyond the number.
+        LimitError: if the rows would be more than `MOST_ROWS`.
+        ValueError: if there is a stopping rule, and draws are not independent.
+        OSError: if the folder cannot be written.
+    """
+    if stopping is not None and spec.dependent:
+        raise ValueError(f"--stop-when needs independent draws; not independent: {', '.join(spec.dependent)}")
+    wanted = range(spec.combinations if number is None else number)
+    asked = wanted.stop * len(spec.runs or spec.base().runs) * len(spec.claims or tuple(RUN_CLAIMS))
+    if asked > MOST_ROWS:
+        allowed = f"{MOST_ROWS:g} rows, one for each draw, run and claim"
+        raise LimitError(spec.name, f"{wanted.stop:.3g} draws ({asked:.3g} rows)", allowed)
+    if not limits.plugins:
+        spec.refuse_plugins()
+    store = Store(folder, _manifest(spec, limits), resume=resume)
+    try:
+        if (last := max(store.finished, default=0)) >= wanted.stop:
+            raise FolderError(one_line(f"{folder} has draw {last}; allowed: -n {last + 1} or more"))
+        rule = InOrder(stopping, wanted) if stopping is not None else None
+        known: Any = groupby(store.table().to_dict("records"), key=itemgetter("index"))
+        met = rule is not None and any(rule.met(index, list(rows)) for index, rows in known)
+        left = [] if met else [index for index in wanted if index not in store.finished]
+        progress.stage(spec.name, len(left), "draws")
+        refuted = Counter[str]()
+        for index, judged in pool(partial(rows_of, spec, limits=limits), left):
+            rows = died(index) if judged is None else judged
+            store.add(rows)
+            refuted.update(row["claim"] for row in rows if row["status"] == "refuted")
+            told = ", ".join(f"{claim} {count}" for claim, count in refuted.most_common(3))
+            progress.advance(1.0, f"refuted: {told or 'nothing'}")
+            if rule is not None and rule.met(index, rows):
+                break
+        table = store.table()
+    finally:
+        store.close()
+    stopped = rule.last if rule is not None else None
+    of: dict[str, Any] = {"name": spec.name, "title": spec.title, "spec": spec.source, "stopped": stopped}
+    if stopped is not None:  # other processes may have finished later draws meanwhile
+        table = table[table["index"] <= stopped]
+    runs = per_run(table)
+    of["swept"] = [{"key": key, "entries": by_value(runs, key)} for key in spec.swept if key in runs]
+    found: dict[str, Any] = strict(evidence(table, spec.marks, spec.dependent)) | of
+    files.write_json(folder / EVIDENCE, found)
+    files.write_text(folder / PAGE, page(found, table))
+    return found
+
+
+def _manifest(spec: Spec, limits: Limits) -> dict[str, Any]:
+    return {
+        "name": spec.name,
+        "spec_sha256": spec.digest,
+        "scenario_sha256": spec.base().digest,
+        "package": version("airground_drake"),
+        "drake": version("drake"),
+        "limits": {name: value for name, value in limits._asdict().items() if name != "plugins"},
+    }

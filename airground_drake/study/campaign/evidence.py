@@ -1,0 +1,213 @@
+"""Conclusions from the rows of a campaign: bounds for each claim, where it fails, the worst runs."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping, Sequence
+from itertools import chain, combinations
+from typing import Any, NamedTuple
+
+import numpy as np
+import pandas as pd
+from pandas.api.types import is_numeric_dtype
+from scipy.stats import chi2_contingency
+
+from airground_drake.base.arrays import Array
+from airground_drake.base.statuses import UNDECIDED
+from airground_drake.study.campaign.rows import JUDGED, TIMES, UNFINISHED, is_tested
+from airground_drake.study.campaign.statistics import CONFIDENCE, clopper_pearson, confidence_sequence
+
+WORST = 5
+"""Runs of least margin that are listed for each claim."""
+BINS = 4
+"""Parts of a key in maps of where a claim fails: quarters of its draws."""
+MOST_VALUES = 12
+"""Most values of a key that is not a number, such as lists of policies, in these maps."""
+UNRELATED = "seed"
+"""A key that explains no failure: neighbouring seeds of the noise have nothing in common."""
+BY_CHANCE = 0.05
+"""A map is shown if chance alone makes such differences with less than this probability."""
+QUANTILES = (0.0, 0.01, 0.05, 0.25, 0.5, 0.75, 0.95, 0.99, 1.0)
+
+Json = dict[str, Any]
+
+
+class Counts(NamedTuple):
+    """Counts of the runs of one claim, over all draws.
+
+    Attributes:
+        tested: runs that could have refuted the claim, and unfinished ones.
+        refuted: violations.
+        undecided: tested runs without a decision; they count as violations in every upper bound.
+        idle: runs that could not have refuted the claim; these are ignored.
+    """
+
+    tested: int
+    refuted: int
+    undecided: int
+    idle: int
+
+    @classmethod
+    def of(cls, rows: pd.DataFrame, unfinished: int) -> Counts:
+        """Count the rows of one claim and run; `unfinished` more runs have no such row."""
+        tested = _tested(rows)
+        status = rows.loc[tested, "status"]
+        refuted, undecided = int((status == "refuted").sum()), int(status.isin(UNDECIDED).sum())
+        return cls(int(tested.sum()) + unfinished, refuted, undecided + unfinished, int((~tested).sum()))
+
+    def interval(self, *, anytime: bool) -> tuple[float, float]:
+        """Bounds of the probability of a violation.
+
+        Undecided runs count as passes in the lower bound and as violations in the upper bound.
+        """
+        bounds = confidence_sequence if anytime else clopper_pearson
+        low = bounds(self.refuted, self.tested).low
+        return low, bounds(self.refuted + self.undecided, self.tested).high
+
+
+def _tested(rows: pd.DataFrame) -> pd.Series:
+    return pd.Series(map(is_tested, rows["status"], rows["exercised"]), rows.index, dtype=bool)
+
+
+def evidence(table: pd.DataFrame, marks: Mapping[str, float] | None = None, dependent: Sequence[str] = ()) -> Json:
+    """All conclusions, for the page of a campaign.
+
+    Args:
+        table: rows of `rows.COLUMNS`.
+        marks: values that are marked in the distributions of `TIMES`, by column.
+        dependent: keys whose values depend on other draws; with any, claims have no intervals.
+    """
+    first = table.drop_duplicates("index")
+    judged = table[table["ended"] == JUDGED]
+    runs = judged.drop_duplicates(["index", "run"])
+    drawn = drawn_keys(first)
+    failed = table[table["ended"] != JUDGED]
+    unfinished = failed.loc[failed["ended"].isin(UNFINISHED), "run"].value_counts()
+    ended = pd.concat([failed, judged]).drop_duplicates("index")["ended"]  # one run that was not judged is enough
+    return {
+        "confidence": CONFIDENCE,
+        "dependent": list(dependent),
+        "draws": len(first),
+        "ended": {str(name): int(count) for name, count in ended.value_counts().items()},
+        "not_judged": failed[["index", "run", "ended", "what"]].head(50).to_dict("records"),
+        "runs": len(runs),
+        "simulated_s": float(runs["duration_s"].sum()),
+        "claims": sorted(
+            (
+                _claim(rows, int(unfinished.get(run, 0) + unfinished.get("", 0)), drawn, bounded=not dependent)
+                for (run, claim), rows in judged.groupby(["run", "claim"])
+                if claim
+            ),
+            key=lambda claim: tuple(not claim[name] for name in ("differs", "refuted", "undecided", "untested")),
+        ),
+        "times": [_times(str(run), rows, marks or {}) for run, rows in runs.groupby("run")],
+        "keys": [str(key) for key in drawn.columns],
+    }
+
+
+def drawn_keys(first: pd.DataFrame) -> pd.DataFrame:
+    """The drawn values by index and key: numbers as they are, an entry of a list as key.0, other values as text."""
+
+    def entries(key: str, value: Any) -> Json:
+        if isinstance(value, list) and all(isinstance(each, int | float) for each in value):
+            return {f"{key}.{i}": each for i, each in enumerate(value)}
+        return {key: value if type(value) in (int, float) else json.dumps(value)}
+
+    found = {}
+    for index, text in zip(first["index"], first["drawn"], strict=True):
+        pairs = (entries(key, value).items() for key, value in json.loads(text).items())
+        found[index] = dict(chain.from_iterable(pairs))
+    return pd.DataFrame.from_dict(found, orient="index")
+
+
+def _claim(rows: pd.DataFrame, unfinished: int, drawn: pd.DataFrame, *, bounded: bool) -> Json:
+    counts = Counts.of(rows, unfinished)
+    tested = rows[_tested(rows)]
+    margins = tested[tested["margin"].notna()]
+    worst = margins.nsmallest(WORST, "margin")
+    violated = tested.set_index("index")["status"] == "refuted"
+    undecided = rows["status"].isin(UNDECIDED)
+    return {
+        **{key: str(rows[key].iloc[0]) for key in ("run", "method", "claim")},
+        **counts._asdict(),
+        "differs": int((~tested["as_expected"] & ~tested["status"].isin(UNDECIDED)).sum()),
+        "untested": not counts.tested and not rows["as_expected"].all(),
+        "fixed": list(counts.interval(anytime=False)) if bounded else None,
+        "anytime": list(counts.interval(anytime=True)) if bounded else None,
+        "unit": str(rows["unit"].iloc[0]),
+        "margins": _quantiles(margins["margin"].to_numpy()),
+        "worst": worst[["index", "margin", "status"]].to_dict("records"),
+        "refuted_draws": tested.loc[tested["status"] == "refuted", "index"].head(WORST).tolist(),
+        "undecided_draws": rows.loc[undecided, "index"].head(WORST).tolist(),
+        "fails_where": _where(violated, drawn) if 0 < violated.sum() < len(violated) else None,
+    }
+
+
+def _times(run: str, rows: pd.DataFrame, marks: Mapping[str, float]) -> Json:
+    sums = {name: int(rows[name].sum()) for name in ("arrived", "ugvs")}
+    found: Json = {"run": run, "runs": len(rows), **sums}
+    for name in TIMES:
+        values = rows[name].dropna().to_numpy()
+        found[name] = {"count": len(values), "quantiles": _quantiles(values)}
+        if name in marks and len(values):
+            found[name]["mark"] = marks[name]
+            found[name]["share_below_mark"] = float((values < marks[name]).mean())
+    return found
+
+
+def _quantiles(values: Array) -> dict[str, float]:
+    return {f"{q:g}": float(np.quantile(values, q)) for q in QUANTILES} if len(values) else {}
+
+
+def _where(violated: pd.Series, drawn: pd.DataFrame) -> Json | None:
+    """Count violations and runs in each pair of quarters of the two keys by which violations differ most.
+
+    None if chance may explain the differences, by the least p-value of all pairs times their number (Bonferroni).
+    """
+    keys = drawn.loc[violated.index].drop(columns=UNRELATED, errors="ignore")
+    parts = {str(key): part for key in keys if (part := _parts(keys[key])) is not None}
+    tables = {
+        pair: pd.crosstab([parts[key] for key in pair], violated.to_numpy())
+        for pair in ([(key,) for key in parts] if len(parts) == 1 else combinations(parts, 2))
+    }
+    if not tables:
+        return None
+    pair = min(tables, key=lambda pair: _by_chance(tables[pair].to_numpy()))
+    chance = len(tables) * _by_chance(tables[pair].to_numpy())
+    if chance >= BY_CHANCE:
+        return None
+    cells = [
+        {"where": dict(zip(pair, at if isinstance(at, tuple) else (at,), strict=True)),
+         "refuted": int(row.get(True, 0)), "runs": int(row.sum())}
+        for at, row in tables[pair].iterrows()
+    ]  # fmt: skip
+    return {"keys": list(pair), "by_chance": chance, "cells": cells}
+
+
+def _by_chance(table: Array) -> float:
+    """Probability of differences as large if the keys have no effect (chi-squared test)."""
+    return float(chi2_contingency(table).pvalue) if min(table.shape) > 1 else 1.0
+
+
+def _parts(values: pd.Series) -> pd.Series | None:
+    """The quarter, or the value, of each draw of a key, as text; None if there is only one, or too many texts."""
+    if not is_numeric_dtype(values) and values.nunique() > MOST_VALUES:
+        return None
+    if not is_numeric_dtype(values) or values.nunique() <= BINS:
+        found = values.astype(str)
+    else:
+        quarters = pd.qcut(values, BINS, duplicates="drop")
+        found = quarters.map(lambda part: f"{part.left:.4g} to {part.right:.4g}").astype(str)
+    return found.reset_index(drop=True) if len(found.unique()) > 1 else None
+
+
+def strict(value: Any) -> Any:
+    """The value as strict JSON: None for numbers that are not finite."""
+    if isinstance(value, dict):
+        return {str(key): strict(each) for key, each in value.items()}
+    if isinstance(value, list | tuple):
+        return [strict(each) for each in value]
+    if isinstance(value, np.generic):
+        value = value.item()
+    return None if isinstance(value, float) and not math.isfinite(value) else value

@@ -1,0 +1,134 @@
+"""Search for a violation: simulate and judge the points of the unit cube that a sampler asks for."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from airground_drake.base.arrays import Array
+from airground_drake.base.errors import PluginError, ScenarioError, described, one_line
+from airground_drake.base.progress import SILENT, Progress
+from airground_drake.scenario.estimate import Limits
+from airground_drake.scenario.load import from_data
+from airground_drake.study.campaign.distributions import dimensions, values_at
+from airground_drake.study.campaign.objective import Objective
+from airground_drake.study.campaign.pool import Pool
+from airground_drake.study.campaign.rows import Row
+from airground_drake.study.campaign.search import Sampler
+from airground_drake.study.campaign.spec import Spec
+from airground_drake.study.campaign.work import rows_at, rows_of_scenario
+
+
+@dataclass(frozen=True)
+class Search:
+    """A search; it is sent to the processes that simulate.
+
+    Attributes:
+        spec: of the scenarios; a course is that of draw 0.
+        objective: is minimised.
+        limits: largest scenario and longest time.
+    """
+
+    spec: Spec
+    objective: Objective
+    limits: Limits
+
+    def values(self, point: Array) -> dict[str, Any]:
+        """By dotted key, at a point of the unit cube."""
+        return values_at(self.spec.drawn, point)
+
+    def at(self, points: Array, k: int) -> tuple[float, bool]:
+        """The objective at one of some points (., n), and whether it is a counterexample."""
+        return self._judge(rows_at(self.spec, self.values(points[k]), 0, self.limits))
+
+    def fails(self, data: dict[str, Any]) -> bool:
+        """Whether a scenario, as nested dicts and lists, is valid and a counterexample."""
+        try:
+            scenario = from_data(data, "smaller scenario")
+        except ScenarioError:
+            return False
+        return self._judge(rows_of_scenario(self.spec, scenario, self.limits))[1]
+
+    def _judge(self, rows: list[Row]) -> tuple[float, bool]:
+        return self.objective.value(rows), self.objective.found(rows)
+
+
+@dataclass(frozen=True)
+class Best:
+    """The result of a search.
+
+    Attributes:
+        tried: number of points.
+        value: least objective; infinite if it was never measured.
+        point: its point, (n,); (0,) if it was never measured.
+        found: whether this is a counterexample.
+    """
+
+    tried: int
+    value: float
+    point: Array
+    found: bool
+
+
+def falsify(search: Search, sampler: Sampler, number: int, pool: Pool, progress: Progress = SILENT) -> Best:
+    """Try points until there is a counterexample, or `number` of them were tried.
+
+    Args:
+        search: judges a point.
+        sampler: chooses points.
+        number: largest number of points; the last batch of the sampler is cut, and the sampler is not told of it.
+        pool: does the work.
+        progress: receives the progress.
+
+    Raises:
+        PluginError: if the sampler raises, ends the process, or returns no points in [0, 1).
+    """
+    best = Best(0, np.inf, np.empty(0), False)
+    while best.tried < number and not best.found:
+        asked = _asked(sampler, dimensions(search.spec.drawn))
+        points = asked[: number - best.tried]
+        values = np.full(len(points), np.inf)
+        found = np.zeros(len(points), dtype=bool)
+        for k, judged in pool(partial(search.at, points), range(len(points))):
+            if judged is not None:
+                values[k], found[k] = judged
+        if len(points) == len(asked):
+            with _guarded(sampler, "tell"):
+                sampler.tell(points.copy(), values.copy())
+        k = int(np.argmin(np.where(found, values, np.inf))) if found.any() else int(values.argmin())
+        tried = best.tried + len(points)
+        if found.any() or values[k] < best.value:
+            best = Best(tried, float(values[k]), points[k], bool(found[k]))
+        else:
+            best = replace(best, tried=tried)
+        progress.advance(len(points), f"least {best.value:.6g}")
+    return best
+
+
+def _asked(sampler: Sampler, n: int) -> Array:
+    """The points (k, n) that a sampler asks for; PluginError if they are not one or more points in [0, 1)."""
+    with _guarded(sampler, "ask"):
+        points = np.array(sampler.ask(), dtype=np.float64)
+    if points.ndim != 2 or points.shape[1] != n or not len(points):
+        raise PluginError(f"ask of sampler {_name(sampler)}: array {points.shape}, wanted (k, {n}), k at least 1")
+    if not ((points >= 0.0) & (points < 1.0)).all():
+        raise PluginError(f"ask of sampler {_name(sampler)}: a point outside [0, 1)")
+    return points
+
+
+@contextmanager
+def _guarded(sampler: Sampler, what: str) -> Iterator[None]:
+    """Turn an exception of a sampler's method into a `PluginError` that names the method."""
+    try:
+        yield
+    except (Exception, SystemExit) as error:
+        raise PluginError(f"{what} of sampler {_name(sampler)}: {described(error)}") from error
+
+
+def _name(sampler: Sampler) -> str:
+    return one_line(type(sampler).__name__)

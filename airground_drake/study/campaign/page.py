@@ -1,0 +1,166 @@
+"""campaign.html: an offline page with the evidence of a campaign; no JavaScript."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import cache
+from typing import Any, NamedTuple
+
+import numpy as np
+import pandas as pd
+from jinja2 import Environment
+from markupsafe import Markup
+from matplotlib.figure import Figure
+
+from airground_drake.base.arrays import Array
+from airground_drake.report.html import number
+from airground_drake.report.sentences import MARKS, Line
+from airground_drake.report.templating import environment_of
+from airground_drake.report.view import canvas, svg
+from airground_drake.study.campaign import swept
+from airground_drake.study.campaign.rows import JUDGED
+
+BARS = 40
+MOST_TOLD = 8
+"""Sentences about claims on the first screen; the others are folded."""
+SHOWN = ("SAFE-TRACE", "SAFE-HYP", "LIVE-GOAL")
+"""Claims whose margins are drawn."""
+
+
+class Drawing(NamedTuple):
+    """A figure and its title."""
+
+    title: str
+    svg: Markup
+
+
+def page(found: dict[str, Any], table: pd.DataFrame) -> str:
+    """Render the page.
+
+    Args:
+        found: from `evidence.evidence`, with name, title, spec and stopped (the last draw that counts, or None).
+        table: the rows.
+    """
+    template = _environment().get_template("campaign.html.j2")
+    return template.render(
+        found=found, told=told(found), separated=_separated(found), figures=_figures(found, table),
+        sweeps=[
+            (each["key"], each["entries"], swept.drawing(each["entries"], each["key"], f"swept{k}"))
+            for k, each in enumerate(found.get("swept", ())) if each["entries"]
+        ],
+    )  # fmt: skip
+
+
+def told(found: Mapping[str, Any]) -> list[Line]:
+    """A sentence for each claim, with its bound: violations first, then open claims."""
+    lines = []
+    for claim in found["claims"]:
+        what = f"{claim['claim']} in run {claim['run']}"
+        bounds, confidence = claim["anytime"], f"confidence {found.get('confidence', 0.0):g}"
+        if claim["untested"]:
+            lines.append(Line("open", f"{what}: the scenario expects a test, but no run tested it."))
+        elif claim["refuted"]:
+            bound = f"; probability {number(bounds[0], 2)} to {number(bounds[1], 2)} ({confidence})" if bounds else ""
+            admitted = "" if claim["differs"] else ", which the scenario admits"
+            lines.append(
+                Line("no", f"{what}: refuted in {claim['refuted']} of {claim['tested']} runs{admitted}{bound}.")
+            )
+        elif claim["undecided"]:
+            lines.append(Line("open", f"{what}: undecided in {claim['undecided']} runs."))
+        elif claim["tested"]:
+            bound = f"; probability of a violation at most {number(bounds[1], 2)} ({confidence})" if bounds else ""
+            lines.append(Line("yes", f"{what}: never refuted in {claim['tested']} runs{bound}."))
+        else:
+            lines.append(Line("none", f"{what}: not tested."))
+    return sorted(lines, key=lambda line: ("no", "open", "yes", "none").index(line.mark))
+
+
+class Separation(NamedTuple):
+    """What separates failures from passes, in words and as a figure."""
+
+    words: str
+    drawing: Drawing
+
+
+def _separated(found: Mapping[str, Any]) -> list[Separation]:
+    """One for each claim with violations that depend on a drawn key."""
+    separations = list[Separation]()
+    for claim in found["claims"]:
+        if where := claim["fails_where"]:
+            cells = sorted(where["cells"], key=lambda cell: cell["refuted"] / cell["runs"])
+            most, least = (f"in {c['refuted']} of {c['runs']} runs with {_cell(c)}" for c in (cells[-1], cells[0]))
+            words = f"{claim['claim']} in run {claim['run']} fails {most}, and {least}."
+            title = f"Share of runs in which {claim['claim']} is refuted, run {claim['run']}"
+            text = svg.inline(_shares(cells), f"separated{len(separations)}", title, words)
+            separations.append(Separation(words, Drawing(title, Markup(text))))
+    return separations
+
+
+def _cell(cell: Mapping[str, Any]) -> str:
+    return ", ".join(f"{key} {value}" for key, value in cell["where"].items())
+
+
+def _shares(cells: Sequence[Mapping[str, Any]]) -> str:
+    """A bar for each combination of values: the share of runs that fail, with the counts beside it."""
+    with canvas.style():
+        height_in = 0.6 + 0.22 * len(cells)
+        figure = Figure(figsize=(canvas.FULL_IN, height_in))
+        axes = figure.add_axes((0.5, 0.45 / height_in, 0.4, (height_in - 0.5) / height_in))
+        axes.set_xlim(0.0, 1.0)
+        axes.set_ylim(-0.6, len(cells) - 0.4)
+        for k, cell in enumerate(cells):
+            share = cell["refuted"] / cell["runs"]
+            axes.barh(k, share, color=canvas.ALARM, height=0.6)
+            axes.text(-0.01, k, canvas.short(_cell(cell), 70), ha="right", va="center", fontsize=8.5)
+            axes.text(share + 0.01, k, f"{cell['refuted']} of {cell['runs']}", va="center", fontsize=8.5)
+        canvas.rule(axes, "share of runs refuted", "")
+        return canvas.svg(figure)
+
+
+def _figures(found: dict[str, Any], table: pd.DataFrame) -> list[Drawing]:
+    judged = table[table["ended"] == JUDGED]
+    drawn = []
+    for (run, claim), rows in judged[judged["claim"].isin(SHOWN)].groupby(["run", "claim"]):
+        values = rows["margin"].dropna().to_numpy()
+        if len(values):
+            drawn.append(
+                _histogram(values, f"{claim} in run {run}: margin", "margin, " + str(rows["unit"].iloc[0]), 0.0)
+            )
+    runs = judged.drop_duplicates(["index", "run"])
+    marks = {each["run"]: each["first_trigger_s"].get("mark") for each in found["times"]}
+    for run, rows in runs.groupby("run"):
+        values = rows["first_trigger_s"].dropna().to_numpy()
+        if len(values):
+            drawn.append(_histogram(values, "Run " + str(run) + ": first trigger", "time, s", marks.get(str(run))))
+    return [
+        Drawing(title, Markup(svg.inline(text, f"figure{i}", title, title))) for i, (title, text) in enumerate(drawn)
+    ]
+
+
+def _histogram(values: Array, title: str, label: str, mark: float | None) -> tuple[str, str]:
+    """A histogram, with its title; a dashed line at the mark, if there is one."""
+    with canvas.style():
+        figure = Figure(figsize=(canvas.WIDE_IN, 2.2))
+        axes = figure.add_axes((0.16, 0.26, 0.8, 0.6))
+        low, high = canvas.interval(values)
+        span = high - low
+        counts, edges = np.histogram(values, bins=BARS, range=(low - 0.01 * span, high + 0.01 * span))
+        axes.stairs(counts, edges, fill=True, color="#9db8d2", edgecolor=canvas.INK, linewidth=0.6)
+        ends = [edges[0], edges[-1], *([] if mark is None else [mark])]
+        reach = 0.03 * (max(ends) - min(ends))
+        axes.set_xlim(min(ends) - reach, max(ends) + reach)
+        axes.set_ylim(0.0, 1.08 * max(1, counts.max()))
+        if mark is not None:
+            axes.axvline(mark, color=canvas.ALARM, linestyle=(0, (4, 2)), linewidth=1.2)
+            above = axes.get_xaxis_transform()
+            axes.text(mark, 1.0, f" {mark:g}", color=canvas.ALARM, transform=above, va="bottom", ha="center")
+        canvas.rule(axes, label, "runs")
+        return title, canvas.svg(figure)
+
+
+@cache
+def _environment() -> Environment:
+    environment = environment_of("airground_drake.study.campaign", "airground_drake.report")
+    environment.filters["num"] = number
+    environment.globals.update(marks=MARKS, most_told=MOST_TOLD)
+    return environment

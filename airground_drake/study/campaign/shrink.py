@@ -1,0 +1,115 @@
+"""Make a counterexample small: fewer policies, robots and obstacles, plainer shapes, less time, rounder numbers.
+
+Greedy: each change is kept if the scenario is still valid and still fails, until no change is left.
+"""
+
+from __future__ import annotations
+
+import copy
+import itertools
+from collections.abc import Callable, Iterator
+from functools import partial
+from typing import Any
+
+PARTS = (("intervention", "policies"), ("ugvs",), ("uav", "phantoms_m"), ("obstacles",))
+"""Lists and mappings whose entries may be left out."""
+SHARES = (0.25, 0.5, 0.75, 0.9)
+"""Shares of the duration that may be left."""
+DIGITS = (0, 1, 2, 3)
+"""Decimals that numbers are rounded to, the fewest first."""
+ROUNDED = ("ugvs", "obstacles", "arena_m", "uav", "control", "decision", "duration_s")
+"""Keys with numbers that are rounded."""
+
+Json = dict[str, Any]
+Fails = Callable[[Json], bool]
+"""Whether a scenario is valid and fails, as before."""
+
+
+def shrink(data: Json, fails: Fails, tests: int) -> tuple[Json, int]:
+    """Find a smaller scenario that fails, too.
+
+    Args:
+        data: a scenario that fails, as `scenario.load.resolved` returns it, with one run.
+        fails: the test.
+        tests: how often `fails` may be called.
+
+    Returns:
+        The smallest scenario found, and the number of tests.
+    """
+    steps: list[Callable[[Json], Iterator[Json]]] = [partial(_without_entry, path=path) for path in PARTS]
+    steps += [_plainer, _shorter, _rounder]
+    left = tests
+
+    def first(candidates: Iterator[Json]) -> Json | None:
+        """The first candidate that fails, while tests are left."""
+        nonlocal left
+        for candidate in itertools.islice(candidates, left):
+            left -= 1
+            if fails(candidate):
+                return candidate
+        return None
+
+    changed = True
+    while changed:
+        changed = False
+        for smaller in steps:
+            while (found := first(smaller(data))) is not None:
+                data, changed = found, True
+    return data, tests - left
+
+
+def _without_entry(data: Json, path: tuple[str, ...]) -> Iterator[Json]:
+    """Leave out an entry of the list or mapping at a path."""
+    entries = _at(data, path)
+    for key in range(len(entries)) if isinstance(entries, list) else entries:
+        smaller = copy.deepcopy(data)
+        del _at(smaller, path)[key]
+        for run in smaller["runs"].values():
+            run["stalls_m"] = {ugv: place for ugv, place in run["stalls_m"].items() if ugv in smaller["ugvs"]}
+        yield smaller
+
+
+def _at(data: Any, path: tuple[str, ...]) -> Any:
+    """What is at a path of nested mappings."""
+    for key in path:
+        data = data[key]
+    return data
+
+
+def _plainer(data: Json) -> Iterator[Json]:
+    """Leave out the arena, or an obstacle's corner, heading, radius, height or own distance."""
+    if data["arena_m"]:
+        yield copy.deepcopy(data) | {"arena_m": []}
+    for name, obstacle in data["obstacles"].items():
+        for key in ("heading_rad", "radius_m", "height_m", "distance_m"):
+            if obstacle[key]:
+                smaller = copy.deepcopy(data)
+                smaller["obstacles"][name][key] = 0.0
+                yield smaller
+        for key in ("polygon_m", "segment_m"):
+            yield from _without_entry(data, ("obstacles", name, key))
+
+
+def _shorter(data: Json) -> Iterator[Json]:
+    """End earlier by a share; at least one control period is left."""
+    for end in (share * data["duration_s"] for share in SHARES):
+        if end >= data["control"]["period_s"]:
+            yield copy.deepcopy(data) | {"duration_s": end}
+
+
+def _rounder(data: Json) -> Iterator[Json]:
+    """Round all numbers at once, then the numbers under each key."""
+    groups = [ROUNDED, *((key,) for key in ROUNDED)]
+    for digits in DIGITS:
+        for group in groups:
+            rounded = {key: _round(data[key], digits) for key in group}
+            if any(rounded[key] != data[key] for key in group):
+                yield copy.deepcopy(data) | rounded
+
+
+def _round(value: Any, digits: int) -> Any:
+    if isinstance(value, dict):
+        return {key: _round(each, digits) for key, each in value.items()}
+    if isinstance(value, list):
+        return [_round(each, digits) for each in value]
+    return round(value, digits) + 0.0 if isinstance(value, float) else value

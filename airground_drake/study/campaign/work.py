@@ -1,0 +1,149 @@
+"""One draw of a campaign: simulate its scenario, judge its runs, turn the verdicts into rows."""
+
+from __future__ import annotations
+
+import gc
+import json
+import math
+import time
+from collections.abc import Collection, Iterator, Mapping
+from contextlib import contextmanager
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+from airground_drake.base.errors import AirgroundError, ScenarioError, described, one_line
+from airground_drake.scenario import plugins
+from airground_drake.scenario.estimate import Limits, within
+from airground_drake.scenario.schema import Scenario
+from airground_drake.sim.simulation import simulate
+from airground_drake.sim.trace import Trace
+from airground_drake.study.campaign.rows import DIED, INVALID, JUDGED, STOPPED, Row, blank
+from airground_drake.study.campaign.spec import Spec
+from airground_drake.uav.guest.time_limit import time_limit
+from airground_drake.verify import Verdict, judge
+
+
+class DrawOutOfTime(BaseException):
+    """A draw took too long. An Exception or an OutOfTime would count as a fault of a policy, so it is neither."""
+
+
+def rows_of(spec: Spec, index: int, limits: Limits) -> list[Row]:
+    """Simulate and judge one draw.
+
+    Args:
+        spec: of the campaign.
+        index: of the draw.
+        limits: a larger scenario is `invalid`, a draw that takes longer is `stopped`.
+
+    Returns:
+        A row for each run and claim, with the columns of `rows.COLUMNS`.
+    """
+    return rows_at(spec, spec.values(index), index, limits)
+
+
+@cache
+def _keep_what_is_loaded() -> None:
+    """Exempt loaded libraries and compiled code from garbage collection."""
+    gc.collect()
+    gc.freeze()
+
+
+def rows_at(spec: Spec, values: Mapping[str, Any], index: int, limits: Limits) -> list[Row]:
+    """Simulate and judge any values by dotted key, on the course of a draw."""
+    common = blank() | {"index": index, "drawn": json.dumps(_strict(dict(values)), allow_nan=False)}
+    try:
+        scenario = spec.scenario_of(values, index)
+    except ScenarioError as error:
+        return [common | {"ended": INVALID, "what": one_line(str(error))}]
+    return rows_of_scenario(spec, scenario, limits, common)
+
+
+def _strict(value: Any) -> Any:
+    """Drawn values as strict JSON; numbers that are not finite as text."""
+    if isinstance(value, dict):
+        return {name: _strict(each) for name, each in value.items()}
+    if isinstance(value, list):
+        return [_strict(each) for each in value]
+    return str(value) if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def rows_of_scenario(spec: Spec, scenario: Scenario, limits: Limits, common: Row | None = None) -> list[Row]:
+    """Simulate a scenario and judge it by the claims of a campaign; every row begins with `common`."""
+    common = blank() if common is None else common
+    try:
+        with _within(spec, scenario, limits):
+            return [row for run in scenario.runs for row in _rows_of_run(scenario, run, spec.claims, common)]
+    except AirgroundError as error:
+        return [common | {"ended": INVALID, "what": one_line(str(error))}]
+    except DrawOutOfTime as error:
+        return [common | {"ended": STOPPED, "what": str(error)}]
+    finally:
+        _keep_what_is_loaded()
+        gc.collect()  # Python does not see the size of a diagram, and would wait for hundreds
+
+
+@contextmanager
+def _within(spec: Spec, scenario: Scenario, limits: Limits) -> Iterator[None]:
+    """Find or refuse third-party code; limit the time of the body.
+
+    Raises:
+        AirgroundError: if the scenario is too large.
+        DrawOutOfTime: in the body, if it takes too long.
+    """
+    within(scenario, limits)
+    with (
+        plugins.admitted(scenario, spec.scenario, allow=limits.plugins),
+        plugins.beside(spec.source, allow=limits.plugins),
+        time_limit(limits.time, DrawOutOfTime),
+    ):
+        yield
+
+
+def _rows_of_run(scenario: Scenario, run: str, claims: Collection[str], common: Row) -> list[Row]:
+    common = common | {"run": run, "method": scenario.runs[run].method, "duration_s": scenario.duration_s}
+    started = time.perf_counter()
+    try:
+        trace = simulate(scenario, run)
+        verdicts = judge(trace, claims=claims or None)
+    except (Exception, SystemExit) as error:
+        return [common | {"ended": STOPPED, "what": described(error)}]
+    common |= {"ended": JUDGED, "wall_s": time.perf_counter() - started, **_happened(trace)}
+    return [common | _of_claim(verdict) for verdict in verdicts] or [common | {"what": "no claim is about this run"}]
+
+
+def died(index: int) -> list[Row]:
+    """The row of a draw whose process died each time."""
+    return [blank() | {"index": index, "ended": DIED, "what": "the process that simulated it died", "drawn": "{}"}]
+
+
+def _of_claim(verdict: Verdict) -> Row:
+    finding = verdict
+    return {
+        "claim": verdict.claim.id,
+        "status": finding.status,
+        "as_expected": verdict.as_expected is not False,
+        "margin": float("nan") if finding.margin is None else float(finding.margin),
+        "unit": finding.unit,
+        "exercised": float("nan") if finding.exercised is None else float(finding.exercised),
+    }
+
+
+def _happened(trace: Trace) -> Row:
+    """Triggers, arrivals of UGVs, and decisions of a run."""
+    triggers = [event["t_s"] for event in trace.events if event["kind"] == "trigger"]
+    arrivals = [event["t_s"] for event in trace.events if event["kind"] == "arrival" and event["robot"] in trace.ugvs]
+    # Each row has the state of the interval before it.
+    intervened_s = [float(np.diff(trace.t) @ (trace.executing(ugv)[1:] >= 0)) for ugv in trace.ugvs]
+    return {
+        "ugvs": len(trace.ugvs),
+        "triggers": len(triggers),
+        "first_trigger_s": min(triggers, default=float("nan")),
+        "arrived": len(arrivals),
+        "arrival_s": max(arrivals, default=float("nan")),
+        "decisions": len(trace.decisions),
+        "accepted": int((trace.decisions["decision"] == "accept").sum()),
+        "faults": len(trace.meta["faults"]),
+        "intervened_s": max(intervened_s, default=0.0),
+    }

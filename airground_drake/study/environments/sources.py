@@ -1,0 +1,171 @@
+"""Where the episodes of an environment come from: one scenario, or the draws of a campaign; the present episode."""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from numbers import Integral
+from typing import Any, NoReturn
+
+import numpy as np
+
+from airground_drake.base.errors import ScenarioError, UnknownNameError
+from airground_drake.base.registry import METHODS
+from airground_drake.scenario.limits import MAX_SEED
+from airground_drake.scenario.load import load, validated
+from airground_drake.scenario.schema import Scenario
+from airground_drake.sim.trace import Trace
+from airground_drake.study.campaign.spec import Spec
+from airground_drake.study.environments.encoding import Encoding
+from airground_drake.study.environments.episode import Episode, Stage, with_agent
+
+DEFAULT = "minimal"
+MOST_STAGES = 64
+"""Models that are kept; one takes about 0.5 MB."""
+
+
+class Source:
+    """Makes episodes by number: with a scenario the number is the seed of the noise, with a campaign that of the draw.
+
+    Attributes:
+        ugvs: names of all UGVs that an episode may have.
+        numbers: of the episodes that are drawn.
+    """
+
+    def __init__(self, given: Scenario | Spec, run: str | None = None, numbers: Sequence[int] | None = None) -> None:
+        """Choose a run.
+
+        Args:
+            given: a scenario, or a campaign, whose draws have courses.
+            run: default: the last one in which the UAV intervenes.
+            numbers: default: all seeds or draws.
+
+        Raises:
+            ScenarioError: if the scenario is not valid, or no run of it has interventions.
+            UnknownNameError: if it has no such run.
+        """
+        self._given = given if isinstance(given, Spec) else validated(given)
+        self.numbers = range(MAX_SEED) if numbers is None else numbers
+        first = self._given.draw(self.numbers[0]) if isinstance(self._given, Spec) else self._given
+        self._run = _chosen(first, run)
+        if isinstance(self._given, Spec):
+            self._given = replace(self._given, runs=(self._run,))
+        self.ugvs = tuple(first.ugvs)
+        if isinstance(given, Spec) and given.course is not None:
+            self.ugvs = given.course.names
+        self._stages = OrderedDict[int, Stage]()
+
+    def drawn(self, rng: np.random.Generator) -> int:
+        """The number of an episode, drawn."""
+        return int(self.numbers[int(rng.integers(len(self.numbers)))])
+
+    def episode(self, number: int) -> Episode:
+        """Begin an episode.
+
+        Raises:
+            ScenarioError: if the draw is not a valid scenario.
+            SimulationError: if Drake or a system stops.
+        """
+        if not isinstance(self._given, Spec):
+            return Episode(self._stage(0, self._given), number)
+        stage = self._stages.get(number) or self._stage(number, self._given.draw(number))
+        return Episode(stage)
+
+    def _stage(self, key: int, scenario: Scenario) -> Stage:
+        """The model of a scenario, built if it is not there."""
+        if key not in self._stages:
+            self._stages[key] = Stage(with_agent(scenario, self._run), self._run)
+        self._stages.move_to_end(key)
+        if len(self._stages) > MOST_STAGES:
+            self._stages.popitem(last=False)
+        return self._stages[key]
+
+
+class Episodes:
+    """What both environments have in common: the present episode, and where it comes from.
+
+    Attributes:
+        encoding: of observations and actions.
+    """
+
+    _ignored: tuple[str, ...] = ()
+    """Options of `reset` that are neither used nor refused."""
+
+    def __init__(
+        self,
+        given: Scenario | Spec | None = None,
+        run: str | None = None,
+        numbers: Sequence[int] | None = None,
+        encoding: Encoding | None = None,
+    ) -> None:
+        """Arguments and errors as of `Source`; the encoding is that of observations and actions.
+
+        Without a scenario, it is the shipped one called `DEFAULT`.
+        """
+        self.encoding = Encoding() if encoding is None else encoding
+        self._source = Source(load(DEFAULT) if given is None else given, run, numbers)
+        self._episode: Episode | None = None
+        self._over = False
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> NoReturn:
+        """Refuse, and say why.
+
+        Raises:
+            TypeError: always.
+        """
+        wanted = "make a second environment and reset it with the same number: its episodes are the same"
+        raise TypeError(f"{type(self).__name__} cannot be copied: its model is a Drake diagram; {wanted}")
+
+    def trace(self) -> Trace:
+        """What the episode has recorded until now, for `judge`.
+
+        Raises:
+            RuntimeError: before `reset`.
+        """
+        return self._begun().trace()
+
+    def _begin(self, rng: np.random.Generator, options: Mapping[str, Any] | None) -> Episode:
+        """Begin the episode with the number in the options, or a drawn one.
+
+        Raises:
+            ValueError: if the number is not a whole number from 0, or there are other options.
+        """
+        if unknown := [repr(name) for name in options or {} if name not in ("number", *self._ignored)]:
+            raise ValueError(f"unknown options of reset: {', '.join(unknown)}; allowed: 'number'")
+        number = (options or {}).get("number")
+        if number is None:
+            number = self._source.drawn(rng)
+        if not isinstance(number, Integral) or int(number) not in range(MAX_SEED + 1):
+            raise ValueError(f"number of the episode: {number!r}; allowed: a whole number from 0 to {MAX_SEED}")
+        self._number = int(number)
+        self._episode, self._over = self._source.episode(self._number), False
+        return self._episode
+
+    def _begun(self) -> Episode:
+        if self._episode is None:
+            raise RuntimeError("call reset first")
+        return self._episode
+
+    def _going_on(self) -> Episode:
+        """The episode of a step.
+
+        Raises:
+            RuntimeError: if there is none, or it is over.
+        """
+        episode = self._begun()
+        if self._over:
+            raise RuntimeError("the episode is over: call reset")
+        return episode
+
+
+def _chosen(scenario: Scenario, run: str | None) -> str:
+    """The run, which must have interventions."""
+    having = [name for name, each in scenario.runs.items() if METHODS[each.method].intervenes]
+    if run is None and having:
+        return having[-1]
+    if run is None:
+        raise ScenarioError(scenario.name, "runs", list(scenario.runs), "wanted: a run of method b, c or d")
+    if run not in having:
+        raise UnknownNameError("run with interventions", run, having)
+    return run

@@ -1,0 +1,142 @@
+"""Axes of a log. A scenario's x and y are in the plane, and z is up; other axes are recognised, or asked for."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Collection, Iterable, Mapping
+from pathlib import Path
+
+import numpy as np
+
+from airground_drake.base.arrays import Array
+from airground_drake.base.errors import LogError, one_line
+from airground_drake.check.files import Json
+from airground_drake.check.scenario import robots_of
+from airground_drake.study.logs.stream import PER_M, Stream
+
+PLAIN, NED = "x,y,z", "y,x,-z"
+"""Axes of a log along x, y and z of the scenario: as they are; and of one with x north, y east, z down."""
+OTHERS = {
+    NED: "x is north, y east and z down", "x,-y,-z": "z is down", "x,-z,y": "y is up", "z,x,y": "y is up",
+    "-x,z,y": "y is up", "-z,-x,y": "y is up", "x,z,y": "y is up, as in Unity",
+}  # fmt: skip
+"""Axes that other programs have."""
+NEAR_M, APART_M = 0.1, 0.5
+"""A body begins where the scenario has it if it is so near; starts so far from (0, 0) tell axes apart, m."""
+LEVEL_M, WIDE_M = 0.1, 0.5
+"""Heights of what drives on the ground vary by less, and its ways are wider, m."""
+BELOW_M = 0.2
+"""What flies is below the ground if it is lower than this, m."""
+_IS_NED = re.compile(r"(?<![a-z])ned(?![a-z])|vehicle_local_position", re.IGNORECASE)
+"""In names of files, topics and frames: the axes of PX4 and MAVLink."""
+
+
+def parsed(text: str) -> list[tuple[int, float]]:
+    """The column and sign of each axis: `x,-z,y`; ValueError for anything else."""
+    found = [("xyz".index(part[-1:]), -1.0 if part[0] == "-" else 1.0) for part in text.split(",") if _is_axis(part)]
+    if len(found) != len(text.split(",")) or sorted(axis for axis, _ in found) != [0, 1, 2]:
+        raise ValueError(text)
+    return found
+
+
+def _is_axis(part: str) -> bool:
+    return re.fullmatch(r"[+-]?[xyz]", part) is not None
+
+
+def chosen(streams: Mapping[str, Stream], choice: Mapping[str, str]) -> None:
+    """Turn positions as the command line says, by body; '' is for all others.
+
+    Raises:
+        LogError: if there are no heights, where these are a way in the plane.
+    """
+    for name, stream in streams.items():
+        _turn(stream, choice.get(name, choice.get("", PLAIN)))
+
+
+def _turn(stream: Stream, axes: str) -> None:
+    places = _turned(stream.places, axes)
+    if not np.isfinite(places[:, :2]).all():
+        raise LogError(one_line(f"{stream.label} has rows without z, and --axes {axes} needs them"))
+    stream.places = places
+
+
+def _turned(places: Array, axes: str) -> Array:
+    return np.stack([sign * places[:, axis] + 0.0 for axis, sign in parsed(axes)], axis=1)
+
+
+def recognised(streams: Mapping[str, Stream], scenario: Json, without: Collection[str]) -> list[str]:
+    """Turn positions that are named as NED and then begin where the scenario has them; remarks.
+
+    Args:
+        streams: by body, with their units.
+        scenario: as resolved.
+        without: bodies for which the command line has chosen the axes.
+
+    Raises:
+        LogError: if the axes seem to be others than the scenario's; says which may be meant.
+    """
+    robots = {name: each for name, each in streams.items() if name in robots_of(scenario) and name not in without}
+    robots = {name: each for name, each in robots.items() if len(each.whole)}
+    if not robots or _fits(robots, scenario, PLAIN):
+        _ask(robots, scenario, _below(robots, scenario), [NED, "x,-y,-z"])
+        return []
+    named = {name: each for name, each in robots.items() if _is_named_ned(each)}
+    if named and _fits(named, scenario, NED):
+        for each in named.values():
+            _turn(each, NED)
+        names = ", ".join(named)
+        return [f"positions of {names} are taken as NED, as the log calls them: x is north, y east, z down"]
+    down, up = [NED, "x,-y,-z"], [axes for axes, says in OTHERS.items() if says.startswith("y is up")]
+    _ask(robots, scenario, _below(robots, scenario), down)
+    if named:
+        _ask(robots, scenario, f"positions of {', '.join(named)} are called NED in the log", down)
+    _ask(robots, scenario, _level(robots, scenario), up)
+    if fitting := [axes for axes in OTHERS if _fits(robots, scenario, axes)]:
+        where = f"{', '.join(robots)} begin where the scenario has them only if {OTHERS[fitting[0]]}"
+        _ask(robots, scenario, where, fitting)
+    return []
+
+
+def _ask(robots: Mapping[str, Stream], scenario: Json, why: str, likely: Iterable[str]) -> None:
+    """Raise LogError if there is a reason to ask; the axes with which the robots begin at their starts come first."""
+    if why:
+        first = sorted(likely, key=lambda axes: not _fits(robots, scenario, axes))[0]
+        begins = ", with which they begin at their starts," if _fits(robots, scenario, first) else ""
+        option = f"--axes={first}" if first[0] == "-" else f"--axes {first}"
+        wanted = f"wanted: {option}{begins} if {OTHERS[first]}, or --axes {PLAIN} if they are as in the scenario"
+        raise LogError(one_line(f"the axes of the log are not clear: {why}; {wanted}"))
+
+
+def _is_named_ned(stream: Stream) -> bool:
+    return any(map(_IS_NED.search, (stream.name, stream.frame, stream.child, Path(stream.source).name)))
+
+
+def _fits(robots: Mapping[str, Stream], scenario: Json, axes: str) -> bool:
+    """Whether robots begin where the scenario has them, some of them far enough from (0, 0) to tell axes apart."""
+    starts = {name: np.array(robots_of(scenario)[name]["start_m"][:2], dtype=np.float64) for name in robots}
+    if max((float(np.linalg.norm(each)) for each in starts.values()), default=0.0) < APART_M:
+        return False
+    first = {name: _turned(each.places[:1], axes)[0, :2] / PER_M[each.length_unit] for name, each in robots.items()}
+    return all(float(np.linalg.norm(place - starts[name])) <= NEAR_M for name, place in first.items())
+
+
+def _below(robots: Mapping[str, Stream], scenario: Json) -> str:
+    """What flies below the ground, in words; '' if nothing does."""
+    for name, each in robots.items():
+        heights = each.places[:, 2] / PER_M[each.length_unit]
+        if name not in scenario["ugvs"] and np.isfinite(heights).any() and np.nanmedian(heights) < -BELOW_M:
+            return f"{name} is at a height of {float(np.nanmedian(heights)):.3g} m, below the ground"
+    return ""
+
+
+def _level(robots: Mapping[str, Stream], scenario: Json) -> str:
+    """Why y may be the height of what drives on the ground, in words; '' if it is not."""
+    ugvs = [each.places[:, 1:] / PER_M[each.length_unit] for name, each in robots.items() if name in scenario["ugvs"]]
+    if not ugvs or not all(np.isfinite(each).all() for each in ugvs):
+        return ""
+    inner = [np.percentile(each, (2.0, 98.0), axis=0) for each in ugvs]  # a body that is lost is far away
+    varies = max(float(each[1, 0] - each[0, 0]) for each in inner)
+    spans = float(max(each[1, 1] for each in inner) - min(each[0, 1] for each in inner))
+    if varies > LEVEL_M or spans < WIDE_M:
+        return ""
+    return f"y of what drives on the ground varies by {varies:.2g} m, and z spans {spans:.3g} m"

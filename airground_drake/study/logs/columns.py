@@ -1,0 +1,257 @@
+"""What the columns of a table mean: time, body, frame, and the places of one or more bodies."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Collection, Mapping, Sequence
+from typing import NamedTuple
+
+from airground_drake.base.errors import LogError
+from airground_drake.study.logs.names import is_elsewhere, segments
+from airground_drake.study.logs.stream import PER_M, PER_S
+
+WORDS = {
+    "meter": "m", "meters": "m", "metre": "m", "metres": "m", "millimeter": "mm", "millimeters": "mm",
+    "millimetre": "mm", "millimetres": "mm", "centimeter": "cm", "centimeters": "cm", "centimetre": "cm",
+    "centimetres": "cm", "sec": "s", "secs": "s", "second": "s", "seconds": "s", "msec": "ms", "milliseconds": "ms",
+    "usec": "us", "microseconds": "us", "\u00b5s": "us", "\u03bcs": "us", "nsec": "ns", "nanosec": "ns",
+    "nanoseconds": "ns",
+}  # fmt: skip
+"""Other words for units."""
+BODIES = (
+    "body", "robot", "robot_name", "robot_id", "name", "agent", "agent_id", "vehicle", "model", "model_name", "object",
+    "entity", "id", "label", "child_frame_id", "namespace", "who",
+)  # fmt: skip
+"""Names of a column that says whose row it is."""
+FRAMES = ("frame", "frame_id", "reference_frame")
+STAMPS = (
+    "t", "time", "stamp", "timestamp", "timestamps", "times", "sim_time", "simtime", "elapsed", "elapsed_time", "clock",
+    "ros_time", "unix_time", "epoch_time", "epoch", "header_stamp", "seconds", "secs", "sec", "date", "datetime",
+    "__time",
+)  # fmt: skip
+RECEIPT = ("%time", "receive_time", "received", "recv_time", "log_time", "receipt", "rosbagtimestamp")
+"""Names of a column with the times at which messages were received."""
+COUNTERS = (
+    "frame", "frames", "frame_id", "frameid", "frame_number", "framenumber", "frame_no", "frame_nr", "frame_num",
+    "frame_index", "frame_idx", "step", "tick", "sample",
+)  # fmt: skip
+"""Names of a column with the numbers of frames, which are no times."""
+TARGETS = ("t", "body", "frame", "x", "y", "z")
+"""What `--map-columns` can give a name to."""
+_BRACKETS = re.compile(r"(.*?)\s*[\[(]\s*([^\])]*?)\s*[\])]")
+_SUFFIX = re.compile(r"(.+?)\s*[_/]\s*(mm|cm|m|s|ms|us|ns|secs?|seconds|msec|usec|nsec)", re.IGNORECASE)
+_AXIS = re.compile(r"(?:(.*?)[/._\s:|-])?(?:(?:t|p|pos|position|pose|translation)_?)?([xyz])", re.IGNORECASE)
+_AXIS_FIRST = re.compile(r"(?:pos_?)?([xyz])[/._\s-](.+)", re.IGNORECASE)
+_POSITIONS = ("", "p", "pos", "position", "pose", "place", "point", "location", "translation", "xyz")
+"""Last words of names of places, but for those of bodies; '' is that of plain x and y."""
+_WHOLE = re.compile(r"(.*?)[/._]?(?:secs?|seconds)", re.IGNORECASE)
+_REST = ["nsec", "nsecs", "nanosec", "nanosecs", "nanoseconds"]
+
+
+class Time(NamedTuple):
+    """A column of stamps; `rest` is that of nanoseconds, if `whole` has seconds.
+
+    `owner` is the beginning of the names of the places that it belongs to; '' for all.
+    """
+
+    whole: int
+    rest: int | None
+    unit: str
+    rank: int
+    owner: str
+
+    def is_of(self, place: Place) -> bool:
+        """Whether it may be the clock of a place."""
+        after = place.name[len(self.owner) :]
+        return not self.owner or (place.name.startswith(self.owner) and not after[:1].isalnum())
+
+
+class Place(NamedTuple):
+    """The columns of a body's coordinates, and their units; z is None without such a column."""
+
+    name: str
+    x: int
+    y: int
+    z: int | None
+    units: Sequence[str]
+
+    @property
+    def is_position(self) -> bool:
+        """Whether its name says so, or nothing else."""
+        return re.split(r"[^a-z]+", self.name.lower())[-1] in _POSITIONS
+
+
+class Columns(NamedTuple):
+    """Columns by number: stamps in the order of preference, the body of a row, frames, and places.
+
+    `chosen` has what `--map-columns` says of a column.
+    """
+
+    times: list[Time]
+    body: int | None
+    frame: int | None
+    places: list[Place]
+    chosen: dict[int, str]
+
+    def refuse_unused(self, used: Collection[int | None]) -> None:
+        """Raise LogError for what `--map-columns` says if it has no effect: `used` are the columns that are used."""
+        by_choice: dict[str, list[int]] = {}
+        for k, said in self.chosen.items():
+            by_choice.setdefault(said, []).append(k)
+        for said, those in by_choice.items():
+            if not any(k in used for k in those):
+                raise LogError(
+                    f"--map-columns {said} has no effect on this table; wanted: only columns that are needed"
+                )
+
+
+def columns(labels: Sequence[str], chosen: Mapping[str, str], bodies: Collection[str]) -> Columns:
+    """The meaning of each column.
+
+    Args:
+        labels: of the columns.
+        chosen: names of columns by what they are, see `TARGETS`, with `{body}` for the name of a body; a unit may
+            follow what they are: `x_mm`.
+        bodies: of the scenario.
+
+    Raises:
+        LogError: if a chosen column is missing, or two columns have one meaning.
+    """
+    labels, mapped = _mapped(labels, chosen)
+    given = {split_unit(target)[0] for target, name in chosen.items() if "{body}" not in name}
+    axes: dict[str, dict[str, tuple[int, str]]] = {}
+    for k, label in enumerate(labels):
+        base, unit = split_unit(label)
+        name, axis = _axis(base, bodies)
+        if not axis or (unit and unit not in PER_M) or is_elsewhere(name, bodies):
+            continue
+        if axis in given and not name and k not in mapped:
+            continue
+        if axis in axes.setdefault(name, {}):
+            raise LogError(f"two columns are called {label!r}; wanted: one, or --map-columns {axis}=NAME")
+        axes[name][axis] = k, unit
+    places = [
+        Place(
+            name,
+            each["x"][0],
+            each["y"][0],
+            each["z"][0] if "z" in each else None,
+            [each[axis][1] for axis in "xyz" if axis in each],
+        )
+        for name, each in axes.items()
+        if {"x", "y"} <= each.keys()
+    ]
+    times = [each for each in _times(labels, {*axes, *bodies}) if "t" not in given or each.whole in mapped]
+    body, frame = (
+        _named([label if target not in given or k in mapped else "" for k, label in enumerate(labels)], names)
+        for target, names in (("body", BODIES), ("frame", FRAMES))
+    )
+    return Columns(times, body, frame, places, mapped)
+
+
+def clock_of(place: Place, times: Sequence[Time], labels: Sequence[str]) -> Time:
+    """The stamps of a place: its own; of several columns with one name, the last before it.
+
+    Raises:
+        LogError: if all columns of stamps are those of other places.
+    """
+    own = next((each for each in times if each.is_of(place) or not place.name), None)
+    if own is None:
+        named = listed([labels[each.whole] for each in times])
+        raise LogError(f"{place.name} has no times of its own: there are {named}; wanted: --map-columns t=NAME")
+    alike = [each for each in times if labels[each.whole] == labels[own.whole] and each.whole < place.x]
+    return max(alike, key=lambda each: each.whole, default=own)
+
+
+def _axis(base: str, bodies: Collection[str]) -> tuple[str, str]:
+    """Name and axis of a column without its unit: `tb1.x`, `tb1_pos_x`, also `x_tb1` of a body; else ''."""
+    if (found := _AXIS_FIRST.fullmatch(base)) and found[2] in bodies:
+        return found[2], found[1].lower()
+    if found and found[2].lower() in _POSITIONS:
+        return found[2], found[1].lower()
+    found = _AXIS.fullmatch(base)
+    return ((found[1] or "").strip(), found[2].lower()) if found else ("", "")
+
+
+def split_unit(label: str) -> tuple[str, str]:
+    """A label without its unit, and the unit: `x_mm`, `x [mm]`, `Time (Seconds)`; '' if it names none."""
+    if found := _BRACKETS.fullmatch(label):
+        return found[1].rstrip("/"), WORDS.get(found[2].lower(), found[2].lower()) or "none"
+    if (found := _SUFFIX.fullmatch(label)) and not _AXIS.fullmatch(label):
+        return found[1], WORDS.get(found[2].lower(), found[2].lower())
+    return label, ""
+
+
+def counts_frames(label: str) -> bool:
+    """Whether a column has the numbers of frames, by its name."""
+    return re.sub(r"[\s_-]+", "_", label.split("/")[-1].strip().lower()) in COUNTERS
+
+
+def _mapped(labels: Sequence[str], chosen: Mapping[str, str]) -> tuple[list[str], dict[int, str]]:
+    """The labels, with the usual ones where `--map-columns` names them, and what it says of these, by number."""
+    found, mapped = list(labels), dict[int, str]()
+    for target, pattern in chosen.items():
+        names = [re.escape(each) for each in pattern.split("{body}")]
+        matching = re.compile(r"(?P<body>.+)".join(names[:2]) if len(names) > 1 else names[0])
+        hits = [(k, hit) for k, label in enumerate(labels) if (hit := matching.fullmatch(label))]
+        if not hits:
+            raise LogError(f"--map-columns {target}={pattern}: there is no such column; there are {listed(labels)}")
+        for k, hit in hits:
+            found[k] = f"{hit['body']}.{target}" if len(names) > 1 else target
+            mapped[k] = f"{target}={pattern}"
+    return found, mapped
+
+
+def listed(names: Sequence[str], most: int = 12) -> str:
+    """Some names in a line."""
+    more = f" and {len(names) - most} more" if len(names) > most else ""
+    return ", ".join(names[:most]) + more
+
+
+def _last(label: str) -> str:
+    return (segments(split_unit(label)[0]) or [""])[-1].lower()
+
+
+def _named(labels: Sequence[str], names: Sequence[str]) -> int | None:
+    """The first column with the first of some names."""
+    last = [_last(label) for label in labels]
+    return next((last.index(name) for name in names if name in last), None)
+
+
+def _times(labels: Sequence[str], names: Collection[str]) -> list[Time]:
+    """Stamps of headers, then others, dates, and times of receipt; `names` are those of places and bodies."""
+    found, rests = [], set[int]()
+    low = [label.lower() for label in labels]
+    for k, label in enumerate(low):
+        base, unit = split_unit(label)
+        owner, last = _owner(labels[k], names)
+        whole = _WHOLE.fullmatch(label)
+        if whole and (rest := [low.index(f"{whole[1]}{mark}{each}") for each in _REST for mark in ("", ".", "/", "_")
+                               if f"{whole[1]}{mark}{each}" in low]):  # fmt: skip
+            of_header = "header" in segments(whole[1]) or whole[1].endswith("stamp")
+            found.append(Time(k, rest[0], "s", 0 if of_header else 1, owner))
+            rests.add(rest[0])
+        elif last in STAMPS and (not unit or unit in PER_S):
+            of_header = segments(base)[-2:] == ["header", "stamp"] or last in ("stamp", "header_stamp")
+            rank = 0 if of_header else 2 if last in ("__time", "date") else 1
+            found.append(Time(k, None, unit, rank, owner))
+        elif base in RECEIPT or last in RECEIPT:
+            found.append(Time(k, None, unit, 3, ""))
+    used = (each for each in found if each.whole not in rests)
+    return sorted(used, key=lambda each: (each.rank, -len(each.owner)))
+
+
+def _owner(label: str, names: Collection[str]) -> tuple[str, str]:
+    """The beginning of the columns that a column of stamps belongs to, '' for all, and its own name in small letters.
+
+    That is what stands before `header`, or before the last part if places or bodies have that name: `a.t`, `a_t`.
+    """
+    base = split_unit(label)[0]
+    if re.search(r"header[/._]", label):
+        return re.split(r"[/._]?header[/._]", label, maxsplit=1)[0], _last(label)
+    found = re.fullmatch(r"(.*)([/._\s:|-])(.*)", base)
+    if found and found[3].lower() in STAMPS:
+        before = found[1]
+        if any(name == before or name.startswith(f"{before}{found[2]}") for name in names):
+            return before, found[3].lower()
+    return "", _last(label)

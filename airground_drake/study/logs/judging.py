@@ -1,0 +1,500 @@
+"""Tracks judged by a scenario: the distances that were kept, and the avoidance law, interval by interval.
+
+Between two samples motion is taken as straight; in the gaps of a track nothing is claimed. An interval is the time
+between two instants at which one of a pair was sampled. The law is asked for in steps instead of velocities, so that
+each interval counts with its own length h: n.(own step - other's step) >= A h (d - D) if D <= d, else >= d - D. Where
+it lacks e_k, the deficit below d obeys deficit <= (1 - A h) deficit + e_k, by the induction of the safety theorem.
+"""
+
+from __future__ import annotations
+
+import copy
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+from fractions import Fraction
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from airground_drake.base.arrays import Array
+from airground_drake.base.errors import LogError, one_line
+from airground_drake.check.files import Json
+from airground_drake.check.rules import SMALL
+from airground_drake.check.safety import shortfalls_m
+from airground_drake.check.scenario import (
+    Pair,
+    barriers_of,
+    expected_m_s,
+    pairs_of,
+    places_of,
+    robots_of,
+    written,
+)
+from airground_drake.check.shapes import Shape
+from airground_drake.study.logs.tracks import Span, Track, Tracks, height_m
+
+KEPT, BROKEN, OPEN = "kept", "NOT KEPT", "open"
+"""Whether a distance was kept where the log covers it; open: the position error decides."""
+LAST_S = 1.0
+"""Who approached whom is told of this time before the least distance, s."""
+STEPS = 100
+"""Parts of that time, in which the two motions are told apart."""
+STAMP_S = 2e-9
+"""The time between two stamps is known to this."""
+HALVINGS = 60
+"""Halvings of an interval in the search for a time."""
+MOST_SPARE = 0.05
+"""Share of a scenario's duration that a log may lack to cover all of it: two intervals, but no more than this."""
+NOT_JUDGED = (
+    "motion between two samples: it is taken as straight",
+    "places of obstacles at rest, walls and maps: the scenario's are taken",
+    "triggers, proposals, decisions, commands and arrivals",
+)
+
+
+class JudgedPair(NamedTuple):
+    """What was found about a pair; distances are between surfaces, below 0 they overlap.
+
+    Attributes:
+        first: a robot.
+        second: an obstacle, or another robot.
+        safe_m: distance to be kept.
+        least_m: least distance of the positions in the log, at all times that are covered.
+        at_s: when.
+        error_m: sum of both position errors: true distances differ from those of the log by no more.
+        below_s: stretches in which the log's distance is below `safe_m`.
+        covered_s: time for which both were recorded.
+        gaps_s: stretches within the log in which one of them was not.
+        intervals: number of intervals in which the law was judged.
+        lacking: number of those in which it lacks something.
+        missed_m: e, the most that it lacks in an interval, m.
+        missed_at_s: when that interval begins.
+        missed_for_s: its length.
+        missed_by_m: what each robot lacks of its share in that interval, m.
+        starts_m: least distance at the beginning of a stretch: of the log, after a gap, or when an obstacle appears.
+        starts_s: when that stretch begins.
+        theorem: "Safety" or, beside what may move, "Passive", which promises that a robot does nothing wrong itself.
+        too_fast_m_s: largest speed of an obstacle above the declared one; 0 if it kept that.
+        promised_m: distance of the true bodies that follows from the theorem; None if not above 0, or for Passive.
+        law_m: distance that a law on positions so wrong has to keep, so that the true bodies keep `safe_m`: the theorem
+            of the distance budget, eps + sqrt(d^2 + eps^2) between centres, for A h = 1.
+        came_m: by how much each came nearer to the other in the last second before the least distance.
+    """
+
+    first: str
+    second: str
+    safe_m: float
+    least_m: float
+    at_s: float
+    error_m: float
+    below_s: list[Span]
+    covered_s: float
+    gaps_s: list[Span]
+    intervals: int
+    lacking: int
+    missed_m: float
+    missed_at_s: float
+    missed_for_s: float
+    missed_by_m: dict[str, float]
+    starts_m: float
+    starts_s: float
+    theorem: str
+    too_fast_m_s: float
+    promised_m: float | None
+    law_m: float
+    came_m: dict[str, float]
+
+    @property
+    def status(self) -> str:
+        """One of KEPT, BROKEN and OPEN; to 1e-9 m."""
+        if self.least_m - self.error_m >= self.safe_m - SMALL:
+            return KEPT
+        return BROKEN if self.least_m + self.error_m < self.safe_m - SMALL else OPEN
+
+    @property
+    def margin_m(self) -> float:
+        """By how much the least distance is above the one required."""
+        return self.least_m - self.safe_m
+
+    @property
+    def hypotheses(self) -> dict[str, bool]:
+        """Those of the theorem, and whether they held."""
+        found = {"starts at the distance or farther": self.starts_m >= self.safe_m - SMALL} if not self.passive else {}
+        found["obeys the avoidance law in every interval"] = self.missed_m <= SMALL
+        if self.passive:
+            found["the obstacle keeps its declared speed"] = self.too_fast_m_s == 0.0
+        return found
+
+    @property
+    def passive(self) -> bool:
+        """Whether the other may move by itself."""
+        return self.theorem == "Passive"
+
+
+class Judged(NamedTuple):
+    """What was found about a log.
+
+    Attributes:
+        pairs: the least margin first.
+        begin_s: first time in the log.
+        end_s: last one.
+        duration_s: of the scenario.
+        longest_s: longest interval in which motion was taken as straight.
+        usual_s: longest of the bodies' usual times between two samples.
+        stray_m: how far a robot can be from that straight line at its speed limit.
+        speeds_m_s: largest speed of each robot in the log, and its limit.
+        away_m: how far each robot starts from where the scenario has it.
+    """
+
+    pairs: list[JudgedPair]
+    begin_s: float
+    end_s: float
+    duration_s: float
+    longest_s: float
+    usual_s: float
+    stray_m: float
+    speeds_m_s: dict[str, tuple[float, float]]
+    away_m: dict[str, float]
+
+    @property
+    def status(self) -> str:
+        """The worst of the pairs."""
+        found = {pair.status for pair in self.pairs}
+        return next((each for each in (BROKEN, OPEN) if each in found), KEPT)
+
+    @property
+    def covers_all(self) -> bool:
+        """Whether no pair has a gap, and the log is as long as the scenario, but for one interval at either end."""
+        spare_s = min(2.0 * self.usual_s, MOST_SPARE * self.duration_s)
+        lasts = self.end_s - self.begin_s >= self.duration_s - spare_s - SMALL
+        return lasts and not any(pair.gaps_s for pair in self.pairs)
+
+
+def judge(tracks: Tracks, scenario: Json, errors_m: Mapping[str, float] | None = None) -> Judged:
+    """Judge tracks.
+
+    Args:
+        tracks: see there.
+        scenario: as resolved; says which distances are to be kept, and the gain of the law.
+        errors_m: by how much a body's recorded position may be wrong, by its name.
+
+    Raises:
+        LogError: if a pair is never recorded at the same time, or the log has one instant only.
+    """
+    bodies = tracks.bodies
+    errors = {name: each for name, each in (errors_m or {}).items() if name in bodies}
+    resting, barriers = places_of(scenario, np.zeros(1)), barriers_of(scenario)
+    begin = min(float(each.t_s[0]) for each in bodies.values())
+    end = max(float(each.t_s[-1]) for each in bodies.values())
+    if begin == end:
+        raise LogError(f"the log has positions at {begin:.6g} s only; wanted: at two times at least")
+    found = []
+    for pair in _pairs(scenario, bodies):
+        own, other = _both(pair, bodies, scenario, resting, barriers, Span(begin, end))
+        if (one := _judged(pair, own, other, scenario, errors, Span(begin, end))) is not None:
+            found.append(one)
+    robots = {name: robot for name, robot in robots_of(scenario).items() if name in bodies}
+    speeds = {name: (_speed(bodies[name]), float(robot["max_speed_m_s"])) for name, robot in robots.items()}
+    away = {
+        name: float(np.linalg.norm((bodies[name].places_m[0] - np.array(robot["start_m"]))[:2]))
+        for name, robot in robots.items()
+    }
+    longest = {name: _longest(each) for name, each in bodies.items()}
+    stray = max((0.5 * limit * longest[name] for name, (_, limit) in speeds.items()), default=0.0)
+    pairs = sorted(found, key=lambda one: one.margin_m)
+    lasts = float(scenario["duration_s"])
+    if not pairs:
+        raise LogError(f"no distance is left to judge: of {', '.join(bodies)} nothing else is in the log or scenario")
+    usual = max(each.usual_s for each in bodies.values())
+    return Judged(pairs, begin, end, lasts, max(longest.values()), usual, stray, speeds, away)
+
+
+def courses(tracks: Tracks, scenario: Json) -> dict[tuple[str, str], list[tuple[Array, Array]]]:
+    """Distances over time of each pair, between surfaces: times (m,), s, and distances (m,), m, of each stretch."""
+    bodies, found = tracks.bodies, {}
+    resting, barriers = places_of(scenario, np.zeros(1)), barriers_of(scenario)
+    begin = min(float(each.t_s[0]) for each in bodies.values())
+    end = max(float(each.t_s[-1]) for each in bodies.values())
+    for pair in _pairs(scenario, bodies):
+        own, other = _both(pair, bodies, scenario, resting, barriers, Span(begin, end))
+        times = [_knots(own, other, span) for span in _common(own, other)] if len(other.t_s) else []
+        found[pair.robot, pair.other] = [
+            (t_s, _signed(pair.shape, own.at(t_s) - other.at(t_s)) - pair.radii_m) for t_s in times
+        ]
+    return found
+
+
+def _both(
+    pair: Pair, bodies: Mapping[str, Track], scenario: Json, resting: Mapping[str, Array], barriers: Mapping[str, Json],
+    whole: Span,
+) -> tuple[Track, Track]:  # fmt: skip
+    """The tracks of a pair."""
+    own = _seen(bodies[pair.robot], pair.robot, pair, scenario)
+    if pair.other in bodies:
+        other = _seen(bodies[pair.other], pair.other, pair, scenario)
+        if pair.other in barriers:
+            begin, end = _there(barriers[pair.other], whole)
+            during = (other.t_s >= begin - SMALL) & (other.t_s <= end + SMALL)
+            other = replace(other, t_s=other.t_s[during], places_m=other.places_m[during])
+        return own, other
+    return own, _standing(resting[pair.other], barriers[pair.other], whole)
+
+
+def _pairs(scenario: Json, bodies: Mapping[str, Track]) -> list[Pair]:
+    """The pairs of bodies that are in the log; further UAVs are as the scenario's own one."""
+    uav = scenario["uav"]["name"]
+    found = pairs_of(scenario)
+    for name in bodies:
+        if name not in robots_of(scenario) and name not in scenario["obstacles"]:
+            alike = copy.deepcopy(scenario)
+            alike["uav"]["name"] = name
+            found += [pair for pair in pairs_of(alike) if name in (pair.robot, pair.other)]
+    must_be = {*robots_of(scenario), uav, *bodies, *(n for n, each in scenario["obstacles"].items() if each["moves"])}
+    return [pair for pair in found if all(each in bodies or each not in must_be for each in (pair.robot, pair.other))]
+
+
+def _seen(track: Track, name: str, pair: Pair, scenario: Json) -> Track:
+    """A track as a pair is judged: UGVs among themselves and obstacles are in the plane, at the scenario's heights."""
+    flat = pair.robot in scenario["ugvs"] and (pair.other in scenario["ugvs"] or pair.other in barriers_of(scenario))
+    is_obstacle = name in scenario["obstacles"]
+    if not (flat or is_obstacle):
+        return track
+    places = track.places_m.copy()
+    places[:, 2] = height_m(scenario, name)
+    if is_obstacle and not scenario["obstacles"][name]["moves"]:
+        places[:, :2] -= np.array(scenario["obstacles"][name]["position_m"] or [0.0, 0.0])[:2]
+    return replace(track, places_m=places)
+
+
+def _standing(place: Array, body: Json, whole: Span) -> Track:
+    """The track of what stands, while it is there."""
+    there = _there(body, whole)
+    t_s = np.array([*there] if there.end >= there.begin else [])
+    return Track(t_s, np.repeat(place, len(t_s), axis=0), np.inf)
+
+
+def _there(body: Json, whole: Span) -> Span:
+    """When an obstacle is there, in a log that begins with the scenario."""
+    return Span(max(whole.begin, float(body["appears_s"])), min(whole.end, float(body["disappears_s"]) or np.inf))
+
+
+def _common(own: Track, other: Track) -> list[Span]:
+    """Stretches in which both were recorded."""
+    both = (Span(max(one.begin, two.begin), min(one.end, two.end)) for one in own.spans for two in other.spans)
+    return [each for each in both if each.end >= each.begin]
+
+
+def _knots(own: Track, other: Track, span: Span) -> Array:
+    t_s = np.unique(np.concatenate([own.t_s, other.t_s, span]))
+    return t_s[(t_s >= span.begin) & (t_s <= span.end)]
+
+
+def _judged(
+    pair: Pair, own: Track, other: Track, scenario: Json, errors_m: Mapping[str, float], whole: Span
+) -> JudgedPair | None:
+    """What is found about a pair; None beside an obstacle that is absent during the whole log."""
+    if not len(other.t_s):
+        return None
+    eps = errors_m.get(pair.robot, 0.0) + errors_m.get(pair.other, 0.0)  # that of what is not in the log is 0
+    spans = _common(own, other)
+    if not spans:
+        times = (f"{n} {t.t_s[0]:.6g} to {t.t_s[-1]:.6g} s" for n, t in ((pair.robot, own), (pair.other, other)))
+        wanted = f"wanted: logs of the same time, or --without {pair.robot}"
+        raise LogError(one_line(f"{' and '.join(times)} are never recorded at the same time; {wanted}"))
+    least, at, below, law = np.inf, 0.0, list[Span](), _Law(pair, scenario)
+    stretch = spans[0]
+    for span in spans:
+        t_s = _knots(own, other, span)
+        own_m, other_m = own.at(t_s), other.at(t_s)
+        apart = own_m - other_m
+        value, when = _least(pair.shape, apart, t_s)
+        if value < least:
+            least, at, stretch = value, when, span
+        below += _below(pair.shape, apart, t_s, pair.safe_m - SMALL)
+        law.add(t_s, own_m, other_m)
+    body = barriers_of(scenario).get(pair.other)
+    gaps = _gaps(spans, _there(body, whole) if body else whole, own, other)
+    too_fast = _too_fast(other, scenario, pair, errors_m.get(pair.other, 0.0))
+    promised = pair.gap_m - law.deficit - eps
+    return JudgedPair(
+        pair.robot, pair.other, pair.gap_m, least - pair.radii_m, at, eps, below,
+        sum(each.end - each.begin for each in spans), gaps, law.intervals, law.lacking, law.missed, law.missed_at,
+        law.missed_for, law.missed_by, law.starts - pair.radii_m, law.starts_s,
+        "Passive" if pair.moves_m_s else "Safety", too_fast,
+        promised if promised > 0.0 and not pair.moves_m_s else None,
+        eps + math.hypot(pair.safe_m, eps) - pair.radii_m,
+        _came(pair, own, other, Span(max(stretch.begin, at - LAST_S), at)),
+    )  # fmt: skip
+
+
+class _Law:
+    """The avoidance law of a pair, stretch by stretch."""
+
+    def __init__(self, pair: Pair, scenario: Json) -> None:
+        self.pair, self.gain = pair, written(scenario["control"]["avoidance_gain_1_s"])
+        self.intervals = self.lacking = 0
+        self.missed = self.missed_at = self.missed_for = self.deficit = 0.0
+        self.missed_by: dict[str, float] = {}
+        self.starts, self.starts_s = np.inf, 0.0
+
+    def add(self, t_s: Array, own_m: Array, other_m: Array) -> None:
+        """Judge the intervals of a stretch; beside what may move, d + V h stands for d, without a gain."""
+        pair, h = self.pair, np.diff(t_s)
+        moves = pair.moves_m_s > 0.0
+        start = pair.shape.least_m(own_m[:1] - other_m[:1])
+        if start < self.starts:
+            self.starts, self.starts_s = start, float(t_s[0])
+        deficit = max(0.0, pair.safe_m - start)
+        self.deficit = max(self.deficit, deficit)
+        if not len(h):
+            return
+        gains = [Fraction() if moves else min(self.gain * Fraction(each), Fraction(1)) for each in h.tolist()]
+        safe = (pair.safe_m + pair.moves_m_s * h).tolist()
+        found = shortfalls_m(own_m, other_m, pair, safe, gains)
+        self.intervals += len(h)
+        for k, gain in enumerate(gains):
+            lacks = float(found[k].both) if k in found else 0.0
+            deficit = (1.0 - float(gain)) * deficit + lacks
+            self.deficit = max(self.deficit, deficit)
+            self.lacking += lacks > SMALL
+            if lacks > self.missed:
+                self.missed, self.missed_at, self.missed_for = lacks, float(t_s[k]), float(h[k])
+                self.missed_by = {pair.robot: float(found[k].own)}
+                if pair.share < 1.0:
+                    self.missed_by[pair.other] = float(found[k].other)
+
+
+def _signed(shape: Shape, apart: Array) -> Array:
+    """Signed distances, (K,), m."""
+    return np.min([part.signed_m(apart) for part in shape.parts], axis=0)
+
+
+def _least(shape: Shape, apart: Array, t_s: Array) -> tuple[float, float]:
+    """Least distance along the straight steps from place to place, m, and when, s."""
+    least = shape.least_m(apart)
+    if len(apart) == 1:
+        return least, float(t_s[0])
+    _, steps = shape.held_m(apart[:-1], apart[:-1], apart[1:], least + SMALL)
+    k = int(steps.argmin())
+    return least, float(t_s[k] + _lowest(shape, apart[k], apart[k + 1]) * (t_s[k + 1] - t_s[k]))
+
+
+def _lowest(shape: Shape, start: Array, end: Array) -> float:
+    """The share of a step at which it is nearest."""
+    low, high = 0.0, 1.0
+    for _ in range(HALVINGS):
+        one, two = (2.0 * low + high) / 3.0, (low + 2.0 * high) / 3.0
+        first, second = _signed(shape, start + np.array([[one], [two]]) * (end - start))
+        low, high = (low, two) if first < second else (one, high)
+    ends = np.array([low, 0.0, 1.0])
+    return float(ends[_signed(shape, start + ends[:, None] * (end - start)).argmin()])
+
+
+def _below(shape: Shape, apart: Array, t_s: Array, need_m: float) -> list[Span]:
+    """Stretches in which a distance is below a required one."""
+    there, passes = shape.within(apart, need_m)
+    found: list[Span] = []
+    for k in np.flatnonzero(passes).tolist():
+        lowest = _lowest(shape, apart[k], apart[k + 1])
+
+        def crossing(above: float, k: int = k, below: float = lowest) -> float:
+            for _ in range(HALVINGS):
+                middle = 0.5 * (above + below)
+                is_below = _signed(shape, (apart[k] + middle * (apart[k + 1] - apart[k]))[None])[0] < need_m
+                above, below = (above, middle) if is_below else (middle, below)
+            return below
+
+        begin = t_s[k] + (0.0 if there[k] else crossing(0.0)) * (t_s[k + 1] - t_s[k])
+        end = t_s[k] + (1.0 if there[k + 1] else crossing(1.0)) * (t_s[k + 1] - t_s[k])
+        if found and there[k] and found[-1].end >= begin:
+            found[-1] = Span(found[-1].begin, float(end))
+        else:
+            found.append(Span(float(begin), float(end)))
+    if len(apart) == 1 and there[0]:
+        found.append(Span(float(t_s[0]), float(t_s[0])))
+    return found
+
+
+def _gaps(spans: list[Span], whole: Span, own: Track, other: Track) -> list[Span]:
+    """Stretches between those in which both were recorded; at the ends only where one lacks more than is usual."""
+    edges = [whole.begin, *(edge for span in spans for edge in span), whole.end]
+    found = [Span(*both) for both in zip(edges[::2], edges[1::2], strict=True)]
+    inner = [each for each in found[1:-1] if each.end > each.begin]
+    late = max(each.t_s[0] - whole.begin - each.gap_s * (1.0 + 1e-9) for each in (own, other))
+    early = max(whole.end - each.t_s[-1] - each.gap_s * (1.0 + 1e-9) for each in (own, other))
+    return sorted([*inner, *(gap for gap, lacks in ((found[0], late), (found[-1], early)) if lacks > 0.0)])
+
+
+def _came(pair: Pair, own: Track, other: Track, span: Span) -> dict[str, float]:
+    """By how much each of a pair came nearer to the other: the change of the distance, told apart by who moved."""
+    t_s = np.linspace(span.begin, span.end, STEPS + 1)
+    one, two = own.at(t_s), other.at(t_s)
+    mixed = {(i, j): _signed(pair.shape, one[i : len(one) - 1 + i] - two[j : len(two) - 1 + j])
+             for i in (0, 1) for j in (0, 1)}  # fmt: skip
+    by_own = 0.5 * (mixed[0, 0] - mixed[1, 0] + mixed[0, 1] - mixed[1, 1]).sum()
+    by_other = 0.5 * (mixed[0, 0] - mixed[0, 1] + mixed[1, 0] - mixed[1, 1]).sum()
+    return {pair.robot: float(by_own), pair.other: float(by_other)}
+
+
+def _too_fast(other: Track, scenario: Json, pair: Pair, error_m: float) -> float:
+    """Largest speed of an obstacle, if it is above the declared one for certain, m/s; else 0."""
+    if pair.other not in scenario["obstacles"]:
+        return 0.0
+    moved, lasts = _moved(other)
+    declared = expected_m_s(scenario["obstacles"][pair.other])
+    over = moved > declared * (lasts + STAMP_S) + 2.0 * error_m + SMALL
+    return float((moved[over] / lasts[over]).max(initial=0.0))
+
+
+def _speed(track: Track) -> float:
+    """Largest speed without a gap, m/s."""
+    moved, lasts = _moved(track)
+    return float((moved / lasts).max(initial=0.0))
+
+
+def _moved(track: Track) -> tuple[Array, Array]:
+    """How far a body is from each sample at a later one, m, and how much later that is, s; not across a gap.
+
+    That is half the usual time at least: of samples that are nanoseconds apart, rounding makes up any speed.
+    """
+    t_s, n = track.t_s, len(track.t_s)
+    later = np.searchsorted(t_s, t_s + 0.5 * track.usual_s, side="left")
+    later = np.maximum(later, np.arange(n) + 1)
+    first = np.flatnonzero(later < n)
+    gaps = np.append(0, np.cumsum(~track.is_known))
+    first = first[gaps[first] == gaps[later[first]]]
+    moved = np.linalg.norm(track.places_m[later[first]] - track.places_m[first], axis=1)
+    return moved, t_s[later[first]] - t_s[first]
+
+
+def _longest(track: Track) -> float:
+    """Longest time between samples without a gap, s; 0 for what stands."""
+    return float(np.diff(track.t_s)[track.is_known].max(initial=0.0)) if np.isfinite(track.gap_s) else 0.0
+
+
+def as_json(judged: Judged, tracks: Tracks) -> dict[str, Any]:
+    """All of it as strict JSON."""
+    pairs = [
+        {
+            **one._asdict(), "status": one.status, "margin_m": one.margin_m, "hypotheses": one.hypotheses,
+            "below_s": [list(each) for each in one.below_s], "gaps_s": [list(each) for each in one.gaps_s],
+        }
+        for one in judged.pairs
+    ]  # fmt: skip
+    bodies = {
+        name: {
+            **track.told, "samples": len(track.t_s), "first_s": float(track.t_s[0]), "last_s": float(track.t_s[-1]),
+            "gap_s": track.gap_s, "recorded_s": [list(each) for each in track.spans],
+        }
+        for name, track in tracks.bodies.items()
+    }  # fmt: skip
+    covered = {
+        "begin_s": judged.begin_s, "end_s": judged.end_s, "duration_s": judged.duration_s, "origin": tracks.origin,
+        "longest_interval_s": judged.longest_s, "stray_m": judged.stray_m, "all": judged.covers_all,
+    }  # fmt: skip
+    return {
+        "status": judged.status, "covered": covered, "pairs": pairs, "bodies": bodies,
+        "speeds_m_s": {name: list(both) for name, both in judged.speeds_m_s.items()}, "starts_away_m": judged.away_m,
+        "said": tracks.said, "not_used": tracks.ignored, "not_judged": list(NOT_JUDGED),
+    }  # fmt: skip

@@ -1,0 +1,93 @@
+"""What a file of a log is, by its content; its streams."""
+
+from __future__ import annotations
+
+import stat
+from collections.abc import Sequence
+from pathlib import Path
+
+from airground_drake.base import files
+from airground_drake.base.errors import LogError, one_line
+from airground_drake.study.logs import bags, tables
+from airground_drake.study.logs.stream import Log
+from airground_drake.study.logs.tables import Wanted
+
+GZIP = b"\x1f\x8b"
+"""How files of this kind begin."""
+ABOUT, RECORDINGS = "metadata.yaml", (".mcap", ".db3", ".zstd", ".zst")
+"""A folder with it is a ROS 2 bag, of recordings with these endings."""
+MOST_FILES = 1_000
+"""Of a log."""
+
+
+def opened(paths: Sequence[Path], wanted: Wanted) -> Log:
+    """The streams of the files and folders of a log. A folder may have other files, too: these are named as not used.
+
+    Raises:
+        LogError: if a file cannot be used, or no file of the folders; names it.
+        OSError: if one cannot be opened.
+    """
+    log = Log()
+    for outer in paths:
+        for path in _files(outer, log):
+            try:
+                log.add(_read(path, wanted))
+            except LogError as error:
+                told = one_line(f"{path}: {error}")
+                if not outer.is_dir():
+                    raise LogError(told) from None
+                log.unusable.append(told)
+    if log.unusable and not log.streams:
+        raise LogError(log.unusable[0])
+    log.ignored += log.unusable
+    return log
+
+
+def _files(path: Path, log: Log) -> list[Path]:
+    """A file, or the regular files in a folder: a link may lead to somebody else's file, and a pipe may never end."""
+    if not path.is_dir():
+        return [path]
+    inside = sorted(each for each in path.iterdir() if not each.name.startswith("."))
+    regular = [each for each in inside if stat.S_ISREG(each.lstat().st_mode)]
+    others = [each for each in inside if each not in regular and (each.is_symlink() or not each.is_dir())]
+    if any(each.name == ABOUT for each in regular):
+        recordings = [each for each in regular if each.suffix in RECORDINGS]
+        regular = recordings or [each for each in regular if each.name != ABOUT]
+    log.ignored += [f"{each.name}: {'a link' if each.is_symlink() else 'no regular file'}" for each in others]
+    if not regular:
+        why = "; folders in it are not read" if inside else ""
+        why = f": {', '.join(log.ignored[-len(others) :][:3])}; wanted: regular files" if others else why
+        raise LogError(one_line(f"{path}: the folder has no files{why}"))
+    if len(regular) > MOST_FILES:
+        raise LogError(one_line(f"{path}: the folder has {len(regular)} files; allowed: {MOST_FILES}"))
+    return regular
+
+
+def _read(path: Path, wanted: Wanted) -> Log:
+    with open(files.open_regular(path, links=True), "rb") as file:
+        start = file.read(64)
+    if start.startswith(bags.ZSTD):
+        return _unpacked(path, wanted)
+    if wanted.columns and start.startswith((bags.MCAP, bags.ROS1, bags.SQLITE)):
+        raise LogError("--map-columns is for tables, and this is a recording of messages")
+    if start.startswith(bags.MCAP):
+        return bags.read_mcap(path, wanted.bodies)
+    if start.startswith((bags.ROS1, bags.SQLITE)):
+        return bags.read_ros(path, wanted.bodies, is_ros1=start.startswith(bags.ROS1))
+    if start.startswith(GZIP):
+        raise LogError("it is compressed; wanted: unpack it first (gunzip)")
+    if not start:
+        raise LogError("it is empty")
+    return tables.read(path, files.read_bytes(path, links=True), wanted)
+
+
+def _unpacked(path: Path, wanted: Wanted) -> Log:
+    """The streams of a file that zstd has packed, as ROS 2 does with whole recordings; packed twice, it is refused."""
+    with files.temporary_folder() as folder:
+        inner = folder / path.stem
+        with inner.open("wb") as out:
+            bags.unpack(path, out)
+        with inner.open("rb") as file:
+            if file.read(len(bags.ZSTD)) == bags.ZSTD:
+                raise LogError("it is compressed twice; wanted: unpack it first (unzstd)")
+        return _read(inner, wanted)

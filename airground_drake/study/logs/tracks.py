@@ -1,0 +1,462 @@
+"""Streams joined to one track per body: in one frame, in the order of time, split where a body was not recorded."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import combinations, pairwise
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from airground_drake.base.arrays import Array
+from airground_drake.base.errors import LogError, one_line
+from airground_drake.check.files import Json
+from airground_drake.check.limits import LARGEST
+from airground_drake.check.scenario import expected_m_s, robots_of
+from airground_drake.study.logs import axes, names, units
+from airground_drake.study.logs.stream import OF_MESSAGES, PER_M, RECEIPT, Log, Stream, Whole
+
+GAP = 2.5
+"""A body was not recorded where two of its samples are farther apart than this multiple of the usual time between."""
+SINCE_1970_NS = 10**17
+"""From here on, stamps are since 1970; times are then from the first sample."""
+OF_BODY = ".body"
+"""What a table of this package writes after a robot's name if the law steers another point than its body."""
+SAME_M = 1e-9
+"""Positions of one body at one time that differ by less are one."""
+CONTRADICTORY = 0.1
+"""Share of a body's rows that may contradict others: with more, stamps are too coarse, or recordings are mixed."""
+LOST_M, LOST = 0.05, 5.0
+"""A body leaps if it goes farther than this from one row to the next, and this many times faster than it can. Tracking
+systems do so where they lose a body: they write (0, 0), another number, or the last place again."""
+ORIGIN_M = 1e-3
+"""Robots that start so close to (0, 0) start there."""
+MOST_PASSES = 100
+"""Of a search for rows that are lost."""
+MOST_RECORDINGS, FEW = 20, 5
+"""Stretches in the order of time that are compared with each other, and rows of one at least."""
+
+
+class Span(NamedTuple):
+    """A stretch of time, s."""
+
+    begin: float
+    end: float
+
+
+@dataclass(eq=False)
+class Track:
+    """Where one body was; n samples, strictly increasing in time.
+
+    Attributes:
+        t_s: times, (n,).
+        places_m: (n, 3); z is nan if the log lacks it.
+        gap_s: motion between two samples that are farther apart is unknown.
+        told: where it is from: stream, frame and clock.
+        leaps_s: times of samples to which the body cannot have come from the one before.
+        usual_s: usual time between two samples.
+    """
+
+    t_s: Array
+    places_m: Array
+    gap_s: float
+    told: dict[str, str] = field(default_factory=dict)
+    leaps_s: tuple[float, ...] = ()
+    usual_s: float = 0.0
+
+    @property
+    def is_known(self) -> npt.NDArray[np.bool_]:
+        """In which intervals between two samples the motion is known, (n - 1,)."""
+        return (np.diff(self.t_s) <= self.gap_s * (1.0 + 1e-9)) & ~np.isin(self.t_s[1:], self.leaps_s)
+
+    @property
+    def spans(self) -> list[Span]:
+        """Stretches without a gap; one sample alone is a stretch of length 0."""
+        cut = np.flatnonzero(~self.is_known)
+        begins, ends = self.t_s[np.append(0, cut + 1)], self.t_s[np.append(cut, len(self.t_s) - 1)]
+        return [Span(*both) for both in zip(begins.tolist(), ends.tolist(), strict=True)]
+
+    def at(self, t_s: Array) -> Array:
+        """Places at times (m,), with straight motion between samples: (m, 3), m."""
+        return np.column_stack([np.interp(t_s, self.t_s, axis) for axis in self.places_m.T])
+
+
+@dataclass(eq=False)
+class Tracks:
+    """The bodies of a log.
+
+    Attributes:
+        bodies: tracks by name.
+        said: what a reader must know of how they were read.
+        ignored: what was not used.
+        origin: what time 0 is: '' if the log's own clock.
+    """
+
+    bodies: dict[str, Track]
+    said: list[str]
+    ignored: list[str]
+    origin: str = ""
+
+
+class Choice(NamedTuple):
+    """What the command line chooses.
+
+    Attributes:
+        rename: bodies by names in the log.
+        frames: positions in other frames are not used, and these count as one; none: all that are there.
+        without: bodies of the scenario that are not judged.
+        uavs: further UAVs.
+        gap_s: see `Track`; 0 for `GAP` times the usual time between two samples.
+        time_unit: of stamps without one; '' to find out.
+        length_unit: of positions without one; '' to find out.
+        rate_hz: frames per second of stamps that are numbers of frames; 0 for other stamps.
+        axes: of the log along x, y and z of the scenario, by body, '' for all others: "x,-z,y"; none to find out.
+    """
+
+    rename: Mapping[str, str] = {}
+    frames: Sequence[str] = ()
+    without: Collection[str] = ()
+    uavs: Sequence[str] = ()
+    gap_s: float = 0.0
+    time_unit: str = ""
+    length_unit: str = ""
+    rate_hz: float = 0.0
+    axes: Mapping[str, str] = {}
+
+
+def bodies_of(scenario: Json, uavs: Sequence[str] = ()) -> list[str]:
+    """Names of the bodies that a log may have: robots, further UAVs, and obstacles that move or might."""
+    return [*robots_of(scenario), *uavs, *(name for name, each in scenario["obstacles"].items() if expected_m_s(each))]
+
+
+def known(scenario: Json, choice: Choice, others: Sequence[str] = ()) -> None:
+    """Refuse names that the scenario does not have, and further UAVs that it has; LogError names them."""
+    there = bodies_of(scenario, choice.uavs)
+    for name in (*choice.without, *others):
+        if name not in there:
+            raise LogError(one_line(f"the scenario has no {name}; it has {', '.join(there)}"))
+    if taken := [name for name in choice.uavs if name in bodies_of(scenario) or name in scenario["obstacles"]]:
+        raise LogError(one_line(f"--uav {taken[0]}: the scenario has it already"))
+
+
+def joined(log: Log, scenario: Json, choice: Choice) -> Tracks:
+    """The tracks of the bodies of a scenario.
+
+    Args:
+        log: its streams.
+        scenario: as resolved.
+        choice: see there.
+
+    Raises:
+        LogError: if a UGV or an obstacle that moves is missing, a body is in several streams, or in several frames.
+    """
+    bodies = [name for name in bodies_of(scenario, choice.uavs) if name not in choice.without]
+    found, ignored = _assigned(log, bodies, choice)
+    _in_one_frame({name: each.frame for name, each in found.items()}, choice.frames)
+    for name, stream in found.items():
+        if not (np.abs(np.nan_to_num(stream.places)) <= LARGEST * max(PER_M.values())).all():
+            raise LogError(one_line(f"{name} has a value beyond {LARGEST:g}; wanted: seconds and metres"))
+    axes.chosen(found, choice.axes)
+    said = units.settle(found, scenario, choice.time_unit, choice.length_unit, choice.rate_hz)
+    said += [f"axes{f' of {name}' * bool(name)}: {each} are x, y, z, as chosen" for name, each in choice.axes.items()]
+    said += axes.recognised(found, scenario, found if "" in choice.axes else choice.axes)
+    for name in (*scenario["ugvs"], *choice.uavs, *(n for n, each in scenario["obstacles"].items() if each["moves"])):
+        if name not in found and name not in choice.without:
+            for stream in log.streams:
+                if stream.skipped and not len(stream.whole) and _body_of(stream, bodies, choice.rename)[0] == name:
+                    raise LogError(one_line(f"{name} has no usable rows: {_skipped(stream)}; wanted: {_USABLE}"))
+            raise LogError(_not_there(name, log, choice))
+    if len(clocks := {each.clock for each in found.values() if each.clock in OF_MESSAGES}) > 1:
+        late = ", ".join(name for name, each in found.items() if each.clock == RECEIPT)
+        said.append(f"clocks differ: {late} by {RECEIPT}, others by {(clocks - {RECEIPT}).pop()}")
+    stamps = {name: each.ns(each.time_unit) for name, each in found.items()}
+    first = min(int(each.min()) for each in stamps.values())
+    zero = first if first >= SINCE_1970_NS else 0
+    tracks = {}
+    for name, stream in ((body, found[body]) for body in bodies if body in found):
+        ns, flat = stamps[name] - zero, np.isnan(stream.places[:, 2])
+        if flat.any() and name not in scenario["ugvs"] and name not in scenario["obstacles"]:
+            if flat.all():
+                said.append(f"{name} has no height in the log: its distances are not judged")
+                continue
+            stream.skipped["no height"] += int(flat.sum())
+            stream.places, ns = stream.places[~flat], ns[~flat]
+        tracks[name] = _track(name, stream, ns, choice.gap_s, _fastest(name, scenario), _start(name, scenario), said)
+    uav = scenario["uav"]["name"]
+    if uav not in found and uav not in choice.without:
+        said.append(f"{uav} is not in the log: its distances are not judged")
+    if choice.uavs:
+        said.append("distances between UAVs are not judged: the scenario promises none")
+    for name in tracks:
+        if plants := [each["kind"] for each in robots_of(scenario).get(name, {}).get("plant", ())]:
+            told = f"{name} is no point that goes where it is told ({', '.join(plants)})"
+            said.append(f"{told}: what its body lacks of the law need be no fault of its controller")
+    if not tracks:
+        raise LogError("no body is left to judge")
+    _apart_at_the_start(tracks, scenario)
+    _heights(tracks, scenario, said)
+    return Tracks(tracks, said, [*log.ignored, *ignored], f"{first / 1e9:.6f} s since 1970" if zero else "")
+
+
+def _not_there(name: str, log: Log, choice: Choice) -> str:
+    """What is said where a body is missing."""
+    frames = sorted({each.frame for each in log.streams if each.frame})
+    if choice.frames and frames and not {*frames} & {*choice.frames}:
+        return one_line(f"--frame {choice.frames[0]}: the log has no such frame; it has {', '.join(frames)[:300]}")
+    there = ", ".join(dict.fromkeys(each.label for each in log.streams))
+    there = f"names there: {there[:300]}" if there else "no positions are there"
+    likely = [each for each in log.unusable if name in each] or log.unusable or (log.ignored if not log.streams else [])
+    lacks = f"; not usable: {', '.join(likely[:3])[:300]}" if likely else ""
+    return one_line(f"{name} is not in the log; {there}{lacks}; wanted: --rename NAME={name}, or --without {name}")
+
+
+def _assigned(log: Log, bodies: Collection[str], choice: Choice) -> tuple[dict[str, Stream], list[str]]:
+    """The stream of each body, and what is said of the others."""
+    _exist(choice.rename, log, bodies)
+    candidates: dict[str, dict[int, list[Stream]]] = {}
+    ignored = list[str]()
+    for stream in log.streams:
+        body, rank = _body_of(stream, bodies, choice.rename)
+        if not len(stream.whole):
+            ignored.append(f"{stream.label}: no usable rows")
+        elif not body:
+            ignored.append(f"{stream.label}: names no body of the scenario")
+        elif choice.frames and stream.frame and stream.frame not in choice.frames:
+            ignored.append(f"{stream.label}: in frame {stream.frame}")
+        else:
+            candidates.setdefault(body, {}).setdefault(rank, []).append(stream)
+    found = {}
+    for body, by_rank in candidates.items():
+        best = _links(by_rank.pop(min(by_rank)))
+        ignored += [f"{each.label}: {body} has a nearer name" for others in by_rank.values() for each in others]
+        of_one = {(each.name, each.child, each.frame): each for each in best}
+        if len(of_one) > 1:
+            several = ", ".join(f"{each.label}{f' in frame {each.frame}' * bool(each.frame)}" for each in best)
+            name = best[0].name if len({each.name for each in best}) > 1 else best[0].child
+            frame = "--frame FRAME" if len({each.frame for each in best}) > 1 else ""
+            wanted = ", or ".join(filter(None, [f"--rename {name}={body}" if name else "", frame]))
+            raise LogError(one_line(f"{body} is in the log more than once: {several[:400]}; wanted: {wanted}"))
+        found[body] = _merged(best)
+    return found, list(dict.fromkeys(ignored))
+
+
+def _exist(rename: Mapping[str, str], log: Log, bodies: Collection[str]) -> None:
+    known = {name.strip("/") for each in log.streams for name in (each.name, each.child, each.label) if name}
+    for name, body in rename.items():
+        if body not in bodies:
+            raise LogError(one_line(f"--rename {name}={body}: the scenario has no {body}; it has {', '.join(bodies)}"))
+        if name.strip("/") not in known:
+            there = ", ".join(sorted(known))[:300]
+            raise LogError(one_line(f"--rename {name}={body}: the log has no {name}; it has {there}"))
+
+
+def _body_of(stream: Stream, bodies: Collection[str], rename: Mapping[str, str]) -> tuple[str, int]:
+    """The body of a stream, or '', and how near its name is: 0 renamed, 1 `OF_BODY`, 2 equal, 3 part of it."""
+    if body := names.renamed((stream.name, stream.child, stream.label), rename):
+        return body, 0
+    for name in filter(None, (stream.name, stream.child)):
+        for rank, plain in ((1, name.removesuffix(OF_BODY)), (2, name.strip("/"))):
+            if plain in bodies and (rank == 2 or plain != name):
+                return plain, rank
+        if names.is_elsewhere(name, bodies):
+            break
+        if body := names.body_of(name, bodies, is_file=stream.is_file):
+            return body, 3
+    return "", 3
+
+
+def _links(streams: list[Stream]) -> list[Stream]:
+    """Streams without those of a robot's own parts: their frame is one that the robot carries."""
+    carried = {each.child for each in streams if each.child}
+    return [each for each in streams if each.frame not in carried or each.frame == each.child] or streams
+
+
+def _merged(streams: list[Stream]) -> Stream:
+    """One stream of several files."""
+    first = streams[0]
+    for other in streams[1:]:
+        if (other.time_unit, other.length_unit, other.clock) != (first.time_unit, first.length_unit, first.clock):
+            raise LogError(
+                one_line(f"{first.label} has other units or clocks in {first.source} than in {other.source}")
+            )
+        first.whole, first.nano = np.append(first.whole, other.whole), np.append(first.nano, other.nano)
+        first.places = np.concatenate([first.places, other.places])
+        first.skipped += other.skipped
+        first.first_skipped = {**other.first_skipped, **first.first_skipped}
+    return first
+
+
+def _in_one_frame(frames: Mapping[str, str], allowed: Collection[str]) -> None:
+    """Refuse positions in different frames, and frames of odometry, which begin where each robot stood."""
+    stated = {name: frame for name, frame in frames.items() if frame}
+    several = ", ".join(f"{name} in {frame or 'no named frame'}" for name, frame in frames.items())
+    if allowed:
+        return
+    if len({*stated.values()}) > 1:
+        wanted = "wanted: positions in one frame, such as map or world; or --frame for each name of that one frame"
+        raise LogError(one_line(f"positions are in different frames: {several}; {wanted}"))
+    if len(frames) > 1 and stated and names.segments(next(iter(stated.values())))[-1] == "odom":
+        wanted = "wanted: positions in one frame, such as map or world; or --frame odom if this is one for all"
+        raise LogError(one_line(f"odometry is in a frame of each robot's own, though both may be called odom: "
+                                f"{several}; {wanted}"))  # fmt: skip
+
+
+def _skipped(stream: Stream) -> str:
+    """Rows of a stream that cannot be used, in words."""
+    first = stream.first_skipped
+    return ", ".join(
+        f"{count} with {reason}{f', first in {first[reason]}' * bool(first.get(reason))}"
+        for reason, count in stream.skipped.items()
+    )
+
+
+_USABLE = "seconds, or dates such as 2026-05-04T10:00:00.050Z, and numbers for x and y"
+
+
+def _fastest(name: str, scenario: Json) -> float:
+    """A speed that a body does not exceed by far: its limit; of an obstacle, that of the fastest body, m/s."""
+    limits = {each: float(robot["max_speed_m_s"]) for each, robot in robots_of(scenario).items()}
+    expected = expected_m_s(scenario["obstacles"][name]) if name in scenario["obstacles"] else 0.0
+    return limits.get(name, max(expected, *limits.values()))
+
+
+def _start(name: str, scenario: Json) -> Array | None:
+    """Where a robot of the scenario starts, (2,), m."""
+    robots = robots_of(scenario)
+    return np.array(robots[name]["start_m"][:2], dtype=np.float64) if name in robots else None
+
+
+def _track(
+    name: str, stream: Stream, ns: Whole, gap_s: float, fastest_m_s: float, start: Array | None, said: list[str]
+) -> Track:
+    """The track of a stream, whose stamps are ns after time 0: sorted, each time once."""
+    places = stream.places / PER_M[stream.length_unit]
+    if not (np.abs(np.nan_to_num(places)) <= LARGEST).all():
+        raise LogError(one_line(f"{name} has a value beyond {LARGEST:g}; wanted: seconds and metres"))
+    for reason, count in stream.skipped.items():
+        where = f", first in {at}" if (at := stream.first_skipped.get(reason)) else ""
+        said.append(f"{name}: {count} rows skipped, {reason}{where}")
+    _of_one_recording(name, ns, places, fastest_m_s)
+    if disorder := int((np.diff(ns) < 0).sum()):
+        said.append(f"{name}: rows are not in the order of time in {disorder} places; they were sorted")
+    order = np.argsort(ns, kind="stable")
+    ns, places = ns[order], places[order]
+    new = np.append(True, np.diff(ns) > 0)
+    first = np.flatnonzero(new)[np.cumsum(new) - 1]
+    apart = np.linalg.norm(np.nan_to_num(places - places[first]), axis=1)
+    same, other = (~new) & (apart <= SAME_M), (~new) & (apart > SAME_M)
+    if same.any():
+        said.append(f"{name}: {int(same.sum())} rows come twice; each counts once")
+    if other.sum() > CONTRADICTORY * len(ns):
+        raise LogError(
+            one_line(f"{name}: {int(other.sum())} of {len(ns)} rows are elsewhere at the same time as another row; "
+                     "wanted: stamps as fine as the rows, of one recording")
+        )  # fmt: skip
+    if other.any():
+        k = int(np.argmax(np.where(other, apart, -1.0)))
+        said.append(
+            f"{name}: {int(other.sum())} rows contradict an earlier one of the same time, at {ns[k] / 1e9:.6g} s by "
+            f"{apart[k]:.3g} m; the earlier one counts"
+        )
+    t_s, places = ns[new] / 1e9, places[new]
+    lost = _lost(t_s, places, fastest_m_s, start)
+    if lost.any():
+        said.append(
+            f"{name}: {int(lost.sum())} rows skipped, where it cannot have been: taken as lost, first at "
+            f"{t_s[lost][0]:.6g} s"
+        )
+    t_s, places = t_s[~lost], places[~lost]
+    leaps = t_s[1:][_leaps(t_s, places, fastest_m_s)]
+    if len(leaps):
+        said.append(
+            f"{name}: {len(leaps)} steps that are more than {LOST:g} times faster than {fastest_m_s:g} m/s, first to "
+            f"{leaps[0]:.6g} s: nothing is claimed of them"
+        )
+    usual = float(np.median(np.diff(t_s))) if len(t_s) > 1 else 0.0
+    told = {"stream": stream.label, "frame": stream.frame, "clock": stream.clock, "source": stream.source}
+    return Track(t_s, places, gap_s or GAP * usual, told, tuple(leaps.tolist()), usual)
+
+
+def _of_one_recording(name: str, ns: Whole, places: Array, fastest_m_s: float) -> None:
+    """Refuse rows of two recordings of the same time that contradict each other."""
+    ends = [0, *(np.flatnonzero(np.diff(ns) < 0) + 1).tolist(), len(ns)]
+    longest = sorted(pairwise(ends), key=lambda each: each[0] - each[1])[:MOST_RECORDINGS]
+    for one, other in combinations([slice(*each) for each in longest if each[1] - each[0] >= FEW], 2):
+        t, t_other = ns[one], ns[other]
+        there = (t_other >= t[0]) & (t_other <= t[-1])
+        if there.sum() < FEW:
+            continue
+        between = [np.interp(t_other[there], t, axis) for axis in places[one, :2].T]
+        apart = np.hypot(*(places[other, :2][there].T - between))
+        step_s = float(np.median(np.diff(t))) / 1e9
+        if np.median(apart) > LOST_M + step_s * fastest_m_s:
+            raise LogError(
+                one_line(f"{name}: rows of two recordings of the same time, {float(np.median(apart)):.3g} m apart; "
+                         "wanted: one recording")
+            )  # fmt: skip
+
+
+def _leaps(t_s: Array, places: Array, fastest_m_s: float) -> npt.NDArray[np.bool_]:
+    """In which intervals a body leaps, (n - 1,)."""
+    steps = np.hypot(*np.diff(places[:, :2], axis=0).T)
+    return np.asarray((steps > LOST_M) & (steps > LOST * fastest_m_s * np.diff(t_s)))
+
+
+def _lost(t_s: Array, places: Array, fastest_m_s: float, start: Array | None) -> npt.NDArray[np.bool_]:
+    """Which rows are where the body cannot have been, (n,).
+
+    They are between two leaps, fewer than the rows on either side or as few and at (0, 0), and the body can have gone
+    from one side to the other. At either end of the log they are at (0, 0), unless the body starts there.
+    """
+    kept = np.arange(len(t_s))
+    starts_there = start is not None and float(np.hypot(*start)) <= LOST_M
+    for _ in range(MOST_PASSES):
+        cuts = np.flatnonzero(_leaps(t_s[kept], places[kept], fastest_m_s)) + 1
+        if not len(cuts):
+            break
+        begins, ends = np.append(0, cuts), np.append(cuts, len(kept))
+        rows, at_origin = ends - begins, np.logical_and.reduceat((places[kept, :2] == 0.0).all(axis=1), begins)
+        gone = at_origin & np.isin(np.arange(len(rows)), (0, len(rows) - 1))
+        gone[0] &= not starts_there
+        before, after = kept[ends[:-2] - 1], kept[begins[2:]]  # of all but the first and the last
+        way = np.hypot(*(places[after, :2] - places[before, :2]).T)
+        possible = (way <= LOST_M) | (way <= LOST * fastest_m_s * (t_s[after] - t_s[before]))
+        gone[1:-1] = (rows[1:-1] < np.minimum(rows[:-2], rows[2:]) + at_origin[1:-1]) & possible
+        gone[1:] &= ~gone[:-1]  # neighbours one after the other
+        if not gone.any():
+            break
+        kept = kept[~np.repeat(gone, rows)]
+    return ~np.isin(np.arange(len(t_s)), kept)
+
+
+def _apart_at_the_start(tracks: Mapping[str, Track], scenario: Json) -> None:
+    """Refuse robots that all start at (0, 0), where the scenario has them start apart."""
+    ugvs = scenario["ugvs"]
+    there = [name for name in ugvs if name in tracks and np.abs(tracks[name].places_m[0, :2]).max() <= ORIGIN_M]
+    starts = {tuple(ugvs[name]["start_m"][:2]) for name in there}
+    if len(there) > 1 and len(starts) > 1:
+        raise LogError(
+            one_line(f"{', '.join(there)} all start at (0, 0): each is in a frame of its own, as odometry is; "
+                     "wanted: positions in one frame, such as map or world")
+        )  # fmt: skip
+
+
+def _heights(tracks: Mapping[str, Track], scenario: Json, said: list[str]) -> None:
+    """Give UGVs and obstacles without a height that of the scenario."""
+    flat = []
+    for name, track in tracks.items():
+        if np.isnan(track.places_m[:, 2]).any():
+            track.places_m[:, 2] = height_m(scenario, name)
+            flat.append(name)
+    if flat:
+        said.append(f"no height in the log: {', '.join(flat)}; taken from the scenario")
+
+
+def height_m(scenario: Json, name: str) -> float:
+    """Height of a UGV, or of the origin of an obstacle's frame, by the scenario, m."""
+    if name in scenario["ugvs"]:
+        return float(scenario["ugvs"][name]["start_m"][2])
+    moves = scenario["obstacles"][name]["moves"]
+    return float([*moves["waypoints_m"][0], 0.0, 0.0][2]) if moves else 0.0

@@ -1,0 +1,244 @@
+"""Units that a log leaves open, from what it says: stamps since 1970, and motion that the scenario makes impossible."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import numpy as np
+
+from airground_drake.base.errors import LogError, one_line
+from airground_drake.check.files import Json
+from airground_drake.check.scenario import robots_of
+from airground_drake.study.logs.stream import OF_MESSAGES, PER_M, PER_S, Stream, unit_since_1970
+
+TOO_LONG = 100.0
+"""Stamps that would make a log so many times longer than the scenario are not since 1970: they are of a finer unit."""
+NEAR_M = 0.1
+"""A log that begins so close to where a body starts begins there, m."""
+LONG, SELDOM_S = 2.0, 4.0
+"""Times so far apart, in a log so much longer than the scenario, are milliseconds if no robot is too fast then."""
+SLOW, FAST = 0.2, 2.0
+"""Whole numbers by which robots would be slower or faster than these shares of their limits may count frames."""
+IMPOSSIBLE = 20.0
+"""So many times the speed limits, the duration or the size of a scenario are taken as a sign of another unit."""
+NAMES = {
+    "ms": "milliseconds", "us": "microseconds", "ns": "nanoseconds", "s": "seconds",
+    "mm": "millimetres", "cm": "centimetres", "m": "metres",
+}  # fmt: skip
+
+
+class _Motion(NamedTuple):
+    """A log in units of time and length, as shares of what the scenario says; and what is farthest from that."""
+
+    lasting: float
+    speed: float
+    away: float
+    lasts_s: float
+    fastest: tuple[float, str] = (0.0, "")
+    farthest: tuple[float, str] = (0.0, "")
+
+    @property
+    def is_possible(self) -> bool:
+        """Whether a log can last so long, and robots can be so fast."""
+        return max(self.lasting, self.speed) <= IMPOSSIBLE
+
+    @property
+    def oddness(self) -> float:
+        """How far it is from the scenario."""
+        speed = abs(math.log(self.speed)) if self.speed else 0.0
+        return abs(math.log(max(self.lasting, 1e-12))) + speed + self.away
+
+
+def settle(
+    streams: Mapping[str, Stream], scenario: Json, time_unit: str = "", length_unit: str = "", rate_hz: float = 0.0
+) -> list[str]:
+    """Give every stream its units, and say which ones were not seconds and metres.
+
+    Args:
+        streams: by body.
+        scenario: as resolved.
+        time_unit: of streams that do not say theirs; '' to find out.
+        length_unit: of streams that do not say theirs; '' to find out.
+        rate_hz: frames per second of streams whose times are numbers of frames; 0 without such streams.
+
+    Returns:
+        Remarks.
+
+    Raises:
+        LogError: if units that are not stated differ between bodies, or times may be numbers of frames.
+    """
+    said = dict[str, None]()
+    if rate_hz:
+        _of_frames(streams, rate_hz)
+        said[f"times are numbers of frames, {rate_hz:g} per second: as chosen"] = None
+    for stream in streams.values():
+        stated = stream.time_unit, stream.length_unit
+        for unit, stamps, what in ((stated[0], stream.clock, "times"), (stated[1], "", "lengths")):
+            if unit not in ("", "s", "m") and not (unit == "ns" and stamps in OF_MESSAGES) and not rate_hz:
+                said[f"{what} are in {NAMES[unit]}, as the file says"] = None
+        if stream.counts_frames and not (stated[0] or time_unit):
+            raise LogError(one_line(f"the times of {stream.label} are numbers of frames ({stream.clock}); {_WANTED}"))
+        stream.time_unit = stream.time_unit or time_unit or _since_1970(stream, float(scenario["duration_s"]))
+        stream.length_unit = stream.length_unit or length_unit
+        if stream.time_unit in ("ms", "us", "ns") and not stated[0]:
+            why = "as chosen" if time_unit else "by their size, stamps since 1970"
+            said[f"times are in {NAMES[stream.time_unit]}: {why}"] = None
+    open_time = [each for each in streams.values() if not each.time_unit]
+    open_length = [each for each in streams.values() if not each.length_unit]
+    if open_time or open_length:
+        judged = {name: each for name, each in streams.items() if name in robots_of(scenario) and len(each.whole) > 1}
+        time, length, whys = _likely(judged, scenario)
+        said |= dict.fromkeys(whys)
+        _alike({name: each for name, each in judged.items() if not each.length_unit}, length, scenario)
+        for each in open_time:
+            each.time_unit = time
+        for each in open_length:
+            each.length_unit = length
+    return list(said)
+
+
+_WANTED = "wanted: --rate-hz with the frames per second, such as --rate-hz 25"
+
+
+def _of_frames(streams: Mapping[str, Stream], rate_hz: float) -> None:
+    """Turn numbers of frames into nanoseconds."""
+    counted = [each for each in streams.values() if not each.time_unit and not each.nano.any()]
+    if not counted:
+        raise LogError("--rate-hz is for times that are numbers of frames: those of the log are none")
+    for each in counted:
+        if float(np.abs(each.whole / rate_hz).max(initial=0.0)) > 9e9:
+            raise LogError(one_line(f"{each.label} has numbers of frames beyond 9e9 s; wanted: another --rate-hz"))
+        each.whole, each.time_unit = np.round(each.whole * (1e9 / rate_hz)).astype(np.int64), "ns"
+
+
+def _alike(streams: Mapping[str, Stream], length: str, scenario: Json) -> None:
+    """Refuse a stream that begins where its body starts if it is in metres, where all are taken as in another unit."""
+    for name, each in streams.items():
+        start = np.array(robots_of(scenario)[name]["start_m"][:2])
+        off = {unit: float(np.linalg.norm(each.places[0, :2] / PER_M[unit] - start)) for unit in ("m", length)}
+        if off["m"] <= NEAR_M and off[length] > 5.0 * NEAR_M:
+            raise LogError(
+                one_line(f"lengths of {each.label} fit {name}'s start in metres, others only fit in {NAMES[length]}; "
+                         "wanted: one unit for all, or units in the names of columns (x_mm)")
+            )  # fmt: skip
+
+
+def _since_1970(stream: Stream, duration_s: float) -> str:
+    if not len(stream.whole):
+        return ""
+    unit = unit_since_1970(float(stream.whole.min()), float(stream.whole.max()))
+    return unit if unit and float(stream.elapsed_s(unit).max()) <= TOO_LONG * duration_s else ""
+
+
+def _is_seldom(streams: Mapping[str, Stream], lasting: float) -> bool:
+    """Whether a log in seconds would be much longer than the scenario, with its samples seconds apart."""
+    steps = [np.diff(each.elapsed_s("s")) for each in streams.values() if not each.time_unit]
+    return lasting > LONG and min(float(np.median(each)) for each in steps) >= SELDOM_S
+
+
+def _likely(streams: Mapping[str, Stream], scenario: Json) -> tuple[str, str, list[str]]:
+    """The units of time and length that are still open, and why they are not seconds and metres.
+
+    Metres stand unless they are impossible: then robots would be too fast, whatever the unit of time, or far from the
+    scenario, and in another unit they start where the scenario has them, or move among what is in it.
+    """
+    times = [""] if all(each.time_unit for each in streams.values()) else [*PER_S]
+    lengths = [""] if all(each.length_unit for each in streams.values()) else [*PER_M]
+    usual = times[0] or "s", lengths[0] or "m"
+    if not streams:
+        return *usual, []
+    moving = {(time, length): _motion(streams, scenario, time, length) for time in times for length in lengths}
+    time, length = _chosen(streams, scenario, moving, times, lengths)
+    asked = moving[time, length]
+    if times[0] and not any(each.nano.any() for each in streams.values() if not each.time_unit):
+        long, slow = moving["s", length].lasting > LONG, asked.speed < SLOW
+        if not asked.is_possible or (time == "s" and long and slow) or (time != "s" and asked.speed > FAST):
+            whole = next(each for each in streams.values() if not each.time_unit)
+            raise LogError(
+                one_line(f"the times of {whole.label} ({whole.clock}) are whole numbers that fit no unit: as seconds, "
+                         f"the log would last {moving['s', length].lasts_s:.6g} s; {_WANTED}, if they are numbers of "
+                         "frames, or --time-unit")
+            )  # fmt: skip
+    whys = []
+    if time not in ("", "s"):
+        lasts = f"the log would last {moving['s', length].lasts_s:.6g} s, and the scenario {scenario['duration_s']:g} s"
+        whys.append(f"times are taken as {NAMES[time]}: as seconds, {lasts}")
+    if length not in ("", "m"):
+        metres = moving[time, "m"]
+        (speed, fast), (off, far) = metres.fastest, metres.farthest
+        why = f"{far} would start {off:.3g} m from where the scenario has it"
+        if metres.speed > IMPOSSIBLE:
+            why = f"{fast} would move at {speed:.3g} m/s"
+        whys.append(f"lengths are taken as {NAMES[length]}: as metres, {why}")
+    return time or "s", length or "m", whys
+
+
+def _chosen(
+    streams: Mapping[str, Stream], scenario: Json, moving: Mapping[tuple[str, str], _Motion], times: list[str],
+    lengths: list[str],
+) -> tuple[str, str]:  # fmt: skip
+    """The units, of those that are still open; '' for what is not."""
+    usual = lengths[0]
+    fitting = _fitting(streams, scenario, lengths) if usual else []
+    if usual in fitting:
+        lengths, fitting = [usual], []
+    if fitting:
+        possible = [time for time in times if moving[time, fitting[0]].is_possible]
+        return _time(possible or times, fitting[0], streams, moving), fitting[0]
+    possible = [time for time in times if moving[time, usual].is_possible]
+    is_far = moving[times[0], usual].away > IMPOSSIBLE
+    others = [
+        (time, length) for (time, length), motion in moving.items()
+        if length in lengths[1:] and motion.is_possible and motion.away <= IMPOSSIBLE
+        and (time == times[0] or (is_far and moving[times[0], usual].lasting > IMPOSSIBLE))  # else one unit is enough
+        and (motion.speed * IMPOSSIBLE >= 1.0 or not possible)  # else it is one who drives slowly in another frame
+    ]  # fmt: skip
+    if others and (is_far or not possible):
+        length = min(others, key=lambda both: moving[both].oddness)[1]
+        return _time([time for time, each in others if each == length], length, streams, moving), length
+    return _time(possible or times[:1], usual, streams, moving), usual
+
+
+def _time(
+    possible: list[str], length: str, streams: Mapping[str, Stream], moving: Mapping[tuple[str, str], _Motion]
+) -> str:
+    """The unit of time: seconds if they are possible, and the log is not one of milliseconds that fits better."""
+    if possible[0] == "s":
+        seldom = _is_seldom(streams, moving["s", length].lasting) and moving["ms", length].speed <= 1.0
+        return "ms" if seldom else "s"
+    return min(possible, key=lambda time: moving[time, length].oddness)
+
+
+def _fitting(streams: Mapping[str, Stream], scenario: Json, lengths: list[str]) -> list[str]:
+    """The units in which all robots begin where the scenario has them; none if it has them all near (0, 0)."""
+    starts = {name: np.array(robots_of(scenario)[name]["start_m"][:2]) for name in streams}
+    if max(float(np.linalg.norm(each)) for each in starts.values()) < 5.0 * NEAR_M:
+        return []
+    return [
+        unit for unit in lengths
+        if all(float(np.linalg.norm(each.places[0, :2] / PER_M[each.length_unit or unit] - starts[name])) <= NEAR_M
+               for name, each in streams.items())
+    ]  # fmt: skip
+
+
+def _motion(streams: Mapping[str, Stream], scenario: Json, time: str, length: str) -> _Motion:
+    """The motion of robots, if what they leave open is in these units."""
+    robots = robots_of(scenario)
+    starts = {name: np.array(robots[name]["start_m"][:2], dtype=np.float64) for name in streams}
+    goals = [np.array(each["target_m"][:2], dtype=np.float64) for each in scenario["ugvs"].values()]
+    size_m = max(1.0, float(np.ptp([*goals, *starts.values()], axis=0).max()))
+    lasts = speed = 0.0
+    fastest, farthest = (0.0, ""), (0.0, "")
+    for name, each in streams.items():
+        t = each.elapsed_s(each.time_unit or time)
+        places = each.places[:, :2] / PER_M[each.length_unit or length]
+        step_s, moved = np.diff(t), np.hypot(*np.diff(places, axis=0).T)
+        moves = (step_s > 0.0) & (moved > 0.0)  # in a long log most robots stand most of the time
+        lasts = max(lasts, float(np.ptp(t)))
+        if moves.any():
+            usual = float(np.percentile(moved[moves] / step_s[moves], 90.0))
+            fastest, speed = max(fastest, (usual, name)), max(speed, usual / float(robots[name]["max_speed_m_s"]))
+        farthest = max(farthest, (float(np.linalg.norm(places[0] - starts[name])), name))
+    return _Motion(lasts / float(scenario["duration_s"]), speed, farthest[0] / size_m, lasts, fastest, farthest)

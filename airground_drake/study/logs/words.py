@@ -1,0 +1,160 @@
+"""What is said of a judged log, as lines: the verdict first, then what it rests on."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+from airground_drake.check.rules import SMALL
+from airground_drake.study.logs.judging import BROKEN, KEPT, NOT_JUDGED, OPEN, Judged, JudgedPair
+from airground_drake.study.logs.tracks import Span, Tracks
+
+LEAST_TOLD_M = 0.0005
+"""Smaller approaches do not count, m."""
+ELSEWHERE_M = 0.05
+"""A robot that starts farther away from its start in the scenario, and from its safe distance, is named, m."""
+FASTER = 1.01
+"""A robot that moves at more than this multiple of its limit is named; less may be the noise of positions."""
+LONGER = 1.01
+"""A log that is longer than a scenario by more than this says so."""
+MOST_NAMED, MOST_PAIRS, MOST_SPANS, MOST_SAID = 3, 20, 4, 12
+"""Broken pairs, all pairs, stretches of one pair, and remarks that are printed; `--json` and the page have all."""
+
+
+def headline(judged: Judged) -> str:
+    """The verdict in a line."""
+    broken = [pair for pair in judged.pairs if pair.status == BROKEN]
+    unsure = [pair for pair in judged.pairs if pair.status == OPEN]
+    if broken:
+        names = "; ".join(f"{pair.first}, {pair.second}" for pair in broken[:MOST_NAMED])
+        more = f" and {len(broken) - MOST_NAMED} more" if len(broken) > MOST_NAMED else ""
+        return f"NOT KEPT ({names}{more}): {least(broken[0])}"
+    if unsure:
+        pair = unsure[0]
+        return f"NOT ESTABLISHED ({pair.first}, {pair.second}): {least(pair)}; the position error decides"
+    if not judged.covers_all:
+        return "No distance was broken where the log covers it."
+    return "Every distance was kept, with straight motion between samples."
+
+
+def coverage(judged: Judged) -> str:
+    """How much of the time is covered, in a sentence."""
+    lasts = judged.end_s - judged.begin_s
+    text = f"The log has {min(lasts, judged.duration_s):.6g} of the scenario's {judged.duration_s:g} s"
+    if lasts > LONGER * judged.duration_s:
+        text = f"The log lasts {lasts:.6g} s, longer than the scenario's {judged.duration_s:g} s"
+    gappy = [pair for pair in judged.pairs if pair.gaps_s]
+    if not gappy:
+        return f"{text}, without gaps."
+    worst = gappy[0]
+    many = f"; {len(gappy)} of {len(judged.pairs)} pairs have gaps" if len(gappy) > 1 else ""
+    return f"{text}; {worst.first}, {worst.second} are not covered from {spans(worst.gaps_s)}{many}."
+
+
+def least(pair: JudgedPair) -> str:
+    """The least distance of a pair, and when."""
+    below = f", below it {spans(pair.below_s)}" if pair.below_s else ""
+    error = f" ± {pair.error_m:g} m" if pair.error_m else ""
+    what = "overlap by " if pair.least_m < 0.0 else ""
+    return f"{what}{abs(pair.least_m):.4f} m{error} at {pair.at_s:.3f} s, required {pair.safe_m:g} m{below}"
+
+
+def spans(those: Sequence[Span]) -> str:
+    """Stretches of time."""
+    told = [f"{each.begin:.3f} to {each.end:.3f} s" for each in those[:MOST_SPANS]]
+    more = f" and {len(those) - MOST_SPANS} more" if len(those) > MOST_SPANS else ""
+    return ", ".join(told) + more
+
+
+def doing(pair: JudgedPair) -> str:
+    """Who approached whom before the least distance."""
+    told = []
+    for name, came in sorted(pair.came_m.items(), key=lambda item: -item[1]):
+        if came >= LEAST_TOLD_M:
+            told.append(f"{name} came {came:.3f} m nearer")
+        elif came <= -LEAST_TOLD_M:
+            told.append(f"{name} moved {-came:.3f} m away")
+        else:
+            told.append(f"{name} did neither")
+    return f"in the second before, {', '.join(told)}"
+
+
+def law(pair: JudgedPair) -> str:
+    """What the theorem says of a pair."""
+    if pair.missed_m <= SMALL:
+        held = f"the law held in all {pair.intervals} intervals"
+    else:
+        who = ", ".join(f"{name} {each:.3g} m" for name, each in pair.missed_by_m.items() if each > SMALL)
+        by = f" ({who})" if len(pair.missed_by_m) > 1 and who else ""
+        held = (
+            f"the law was missed in {pair.lacking} of {pair.intervals} intervals, by up to e = {pair.missed_m:.3g} m, "
+            f"in the {pair.missed_for_s:.4g} s from {pair.missed_at_s:.3f} s{by}"
+        )
+    if pair.passive:
+        did = "never brought itself" if pair.missed_m <= SMALL else "brought itself"
+        fast = f"; {pair.second} moved at {pair.too_fast_m_s:.3g} m/s, above its declared speed"
+        return f"{held}: {pair.first} {did} too near{fast if pair.too_fast_m_s else ''}"
+    promise = f"promises {pair.promised_m:.4g} m" if pair.promised_m is not None else "promises no distance"
+    late = f", and what was recorded from {pair.starts_s:.3f} s on starts nearer than required"
+    late = "" if pair.starts_m >= pair.safe_m - SMALL else late
+    wrong = f"; a law on positions so wrong would have to keep {pair.law_m:.4g} m" if pair.error_m else ""
+    return f"{held}{late}: the safety theorem {promise}{wrong}"
+
+
+def remarks(judged: Judged) -> Iterator[str]:
+    """What does not fit the scenario, although it does not decide about a distance."""
+    for name, (speed, limit) in judged.speeds_m_s.items():
+        if speed > FASTER * limit:
+            yield f"{name} moves at up to {speed:.3g} m/s, above its limit of {limit:g} m/s"
+    near = min((pair.safe_m for pair in judged.pairs), default=0.0)
+    if off := {name: away for name, away in judged.away_m.items() if away > max(near, ELSEWHERE_M)}:
+        told = ", ".join(f"{name} by {away:.3g} m" for name, away in off.items())
+        yield (
+            f"robots start elsewhere than in the scenario: {told}; if the log is in another frame, its distances from "
+            "obstacles mean nothing"
+        )
+
+
+def source(name: str, tracks: Tracks) -> str:
+    """Where the positions of a body are from."""
+    track = tracks.bodies[name]
+    frame = f" in frame {track.told['frame']}" if track.told.get("frame") else ""
+    clock = f", by {track.told['clock']}" if track.told.get("clock") else ""
+    lasts = float(track.t_s[-1] - track.t_s[0])
+    rate = f", {(len(track.t_s) - 1) / lasts:.3g} per second" if lasts else ""
+    return f"{len(track.t_s)} positions{rate}, of {track.told.get('stream', name)}{frame}{clock}"
+
+
+def not_judged(judged: Judged) -> Iterator[str]:
+    """What the verdict does not say."""
+    first, *others = NOT_JUDGED
+    longest = f"the longest interval is {judged.longest_s:.3g} s, in which a robot"
+    yield f"{first}; {longest} at its speed limit can leave the line by {judged.stray_m:.2g} m"
+    yield from others
+
+
+def lines(judged: Judged, tracks: Tracks) -> Iterator[str]:
+    """All that is printed."""
+    yield headline(judged)
+    for pair in [pair for pair in judged.pairs if pair.status == BROKEN][:MOST_NAMED]:
+        yield f"  {pair.first}, {pair.second}: {doing(pair)}"
+    kept = sum(pair.status == KEPT for pair in judged.pairs)
+    where = "" if judged.covers_all else " where the log covers them"
+    yield f"{kept} of {len(judged.pairs)} distances were kept{where}. {coverage(judged)}"
+    yield from (f"{name}: {source(name, tracks)}" for name in tracks.bodies)
+    if tracks.origin:
+        yield f"Time 0 is {tracks.origin}."
+    told = [*tracks.said, *remarks(judged)]
+    yield from (f"Note: {each}" for each in told[:MOST_SAID])
+    if len(told) > MOST_SAID:
+        yield f"Note: {len(told) - MOST_SAID} more; --json has all"
+    if tracks.ignored:
+        more = f"; and {len(tracks.ignored) - MOST_SAID} more" if len(tracks.ignored) > MOST_SAID else ""
+        yield f"Not used: {'; '.join(tracks.ignored[:MOST_SAID])}{more}"
+    yield "Least margins first, distances between surfaces:"
+    for pair in judged.pairs[:MOST_PAIRS]:
+        part = f"; covered {pair.covered_s:.6g} s" if pair.gaps_s else ""
+        part += ", nearest at the edge of a gap" if any(pair.at_s in each for each in pair.gaps_s) else ""
+        yield f"  {pair.first}, {pair.second}: {pair.status}, {least(pair)}{part}; {law(pair)}"
+    if len(judged.pairs) > MOST_PAIRS:
+        yield f"  and {len(judged.pairs) - MOST_PAIRS} more pairs; --json has all"
+    yield from (f"Not judged: {each}." for each in not_judged(judged))

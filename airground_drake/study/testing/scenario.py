@@ -1,0 +1,26 @@
+"""The scenario that a test names."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+
+from airground_drake.base import files
+from airground_drake.scenario.load import Overrides, load, resolved, validated
+from airground_drake.scenario.schema import Scenario
+
+
+def chosen(scenario: str | Path | Scenario, overrides: Overrides = ()) -> Scenario:
+    """A scenario by name or path, or a copy of the given one, with overrides.
+
+    Raises:
+        ScenarioError: if the scenario or an override is not valid.
+    """
+    return validated(scenario, overrides) if isinstance(scenario, Scenario) else load(scenario, overrides)
+
+
+def digest(scenario: Scenario, run: str) -> str:
+    """Name of a folder for a run: readable names, and a digest of all that the simulation depends on."""
+    told = re.sub(r"[^\w-]", "_", f"{scenario.name}-{run}", flags=re.ASCII)[:80]
+    return f"{told}-{files.sha256(json.dumps([resolved(scenario), run]).encode())[:16]}"

@@ -1,0 +1,278 @@
+"""A coarse roadmap for joint plans: few nodes, one robot's width or so apart, and the ways of the roadmap between them.
+
+The nodes are drawn from the roadmap so that no two are nearer to each other than a given width, if nothing is in
+between. Every node of the roadmap belongs to the nearest of them by way. Two nodes whose regions touch are joined by
+the shortest way through the common border. So two nodes are connected in the coarse roadmap exactly where they are in
+the roadmap.
+
+Robots of several sizes share the nodes. The regions are drawn for each size, with the ways that this size can go.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from heapq import heappop, heappush
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import dijkstra
+
+from airground_drake.base.arrays import Array
+from airground_drake.base.compiling import njit
+from airground_drake.uav.coordination.intervals import Indices
+from airground_drake.uav.coordination.roadmap import Space
+from airground_drake.uav.coordination.single import Mover
+from airground_drake.uav.coordination.timed import without_repeats
+
+FROM_START = 2.0
+"""A robot can go from its start to the nodes within so many widths, by way. They are more than one region's neighbours:
+robots that have met have little room for their first move."""
+NO_LONGER = 1.05
+"""A smaller robot uses the edge of a larger one between the same nodes, unless its own is shorter by this factor."""
+
+AS_LATTICE = 1.09
+"""Ways along the lattice are at most this much longer than straight ones."""
+
+
+class CoarseGraph(NamedTuple):
+    """A coarse roadmap. An edge is a polyline that is travelled at constant speed; the first of each node is to stay.
+
+    Attributes:
+        places: of the nodes, (N, 2), m.
+        first: first edge of each node, (N + 1,).
+        heads: node at the end of each edge, (E,).
+        lengths: of the edges, (E,), m.
+        begins: first row of each edge in `rows`, (E + 1,).
+        rows: share of the edge and place, m, (P, 3): a timed motion from 0 to 1.
+        circles: middle, m, and radius, m, of a circle round each edge, (E, 3).
+    """
+
+    places: Array
+    first: Indices
+    heads: Indices
+    lengths: Array
+    begins: Indices
+    rows: Array
+    circles: Array
+
+
+class Coarse(NamedTuple):
+    """A coarse roadmap for some robots.
+
+    Attributes:
+        graph: all nodes and edges.
+        starts: node of each robot's start, (n,); no edge leads to it.
+        targets: node of each robot's target, (n,).
+        usable: which edges each robot can use, (n, E).
+        sizes: index of each robot's size, (n,); robots of one size keep the same distances.
+    """
+
+    graph: CoarseGraph
+    starts: Indices
+    targets: Indices
+    usable: npt.NDArray[np.bool_]
+    sizes: Indices
+
+
+class _Edge(NamedTuple):
+    """An edge before it has a number; `size` is the largest size of robot, as an index, that can use it."""
+
+    tail: int
+    head: int
+    size: int
+    line: Array
+
+
+def coarsened(movers: Sequence[Mover], width: float) -> Coarse:
+    """The coarse roadmap of some robots with nodes at least `width`, m, apart by way; targets may be nearer.
+
+    Starts have edges that lead away only. As ordinary nodes they would make corridors look wider than they are.
+
+    Args:
+        movers: the robots; every target keeps its distances from obstacles.
+        width: m.
+    """
+    spaces = sorted({mover.space.apart: mover.space for mover in movers}.values(), key=lambda each: -each.apart)
+    index = {space.apart: k for k, space in enumerate(spaces)}
+    sizes = np.array([index[mover.space.apart] for mover in movers], dtype=np.int64)
+    starts = np.array([mover.own.start for mover in movers], dtype=np.int64)
+    targets = np.array([mover.own.target for mover in movers], dtype=np.int64)
+    places = movers[0].roadmap.nodes
+    graphs = [_ways(movers, sizes, size, space) for size, space in enumerate(spaces)]
+    seeds = _nodes(graphs, places, targets, sizes, width)
+    number = np.full(len(places), -1, dtype=np.int64)
+    number[seeds] = np.arange(len(seeds))
+    edges: dict[tuple[int, ...], _Edge] = {}
+    leaving: list[_Edge] = []
+    for size, (ways, space) in enumerate(zip(graphs, spaces, strict=True)):
+        _add_borders(edges, ways, space, places, seeds, size)
+        own = np.flatnonzero(sizes == size)
+        leaving += _from_starts(ways, space, places, seeds, own, starts, size, width)
+    every = [each for edge in edges.values() for each in (edge, _reversed(edge))]
+    every += [each._replace(tail=len(seeds) + each.tail) for each in leaving]
+    graph, largest = _graph(np.concatenate([places[seeds], places[starts]]), every, len(spaces))
+    usable = largest[None, :] <= sizes[:, None]
+    return Coarse(graph, len(seeds) + np.arange(len(movers)), number[targets], usable, sizes)
+
+
+def _ways(movers: Sequence[Mover], sizes: Indices, size: int, space: Space) -> csr_array:
+    """The roadmap for robots of one size: free nodes, and edges from their starts, which may be too near to things."""
+    roadmap = min(movers, key=lambda each: each.space.apart).roadmap
+    nodes, heads, lengths = roadmap.nodes, roadmap.heads, roadmap.lengths
+    tails = np.repeat(np.arange(len(nodes)), np.diff(roadmap.first_edge))
+    free = space.points_are_free(nodes, 0.0)
+    begins = free.copy()
+    begins[[mover.own.start for mover, own in zip(movers, sizes, strict=True) if own == size]] = True
+    kept = begins[tails] & free[heads]
+    if size < int(sizes.max()):
+        kept[kept] = space.segments_are_free(nodes[tails[kept]], nodes[heads[kept]])
+    return csr_array((lengths[kept], (tails[kept], heads[kept])), shape=(len(nodes), len(nodes)))
+
+
+def _nodes(graphs: Sequence[csr_array], places: Array, targets: Indices, sizes: Indices, width: float) -> Indices:
+    """Nodes of the roadmap for the coarse one: the targets, then every node that is `width`, m, from all before it."""
+    found = np.zeros(0, dtype=np.int64)
+    for size, ways in enumerate(graphs):
+        wanted = np.unique(targets[sizes == size])
+        always = np.concatenate([found, wanted[~np.isin(wanted, found)]])
+        free = np.diff(ways.indptr) > 0
+        found = _packed(places, ways.indptr, ways.indices, ways.data, always, free, width)
+    return found
+
+
+@njit(cache=True)
+def _packed(
+    places: Array,
+    first: npt.NDArray[np.int32],
+    heads: npt.NDArray[np.int32],
+    lengths: Array,
+    always: Indices,
+    wanted: npt.NDArray[np.bool_],
+    width: float,
+) -> Indices:
+    """The nodes `always`, and of the `wanted` nodes, in order, those that are `width`, m, from all chosen before.
+
+    Nodes behind a wall do not count: only those to which a way leads that is hardly longer than the lattice makes it.
+    """
+    count = len(first) - 1
+    covered, way_to = np.zeros(count, np.bool_), np.full(count, np.inf)
+    chosen, many = np.empty(count + len(always), np.int64), 0
+    for k in range(len(always) + count):
+        seed = always[k] if k < len(always) else k - len(always)
+        if k >= len(always) and (covered[seed] or not wanted[seed]):
+            continue
+        chosen[many] = seed
+        many += 1
+        way_to[seed] = 0.0
+        reached, heap = [seed], [(0.0, seed)]
+        while len(heap) > 0:
+            way, here = heappop(heap)
+            if way > way_to[here]:
+                continue
+            if np.hypot(places[here, 0] - places[seed, 0], places[here, 1] - places[seed, 1]) < width:
+                covered[here] = True
+            for e in range(first[here], first[here + 1]):
+                there, further = np.int64(heads[e]), way + lengths[e]
+                if further < AS_LATTICE * width and further < way_to[there]:
+                    way_to[there] = further
+                    reached.append(there)
+                    heappush(heap, (further, there))
+        for node in reached:
+            way_to[node] = np.inf
+    return chosen[:many]
+
+
+def _add_borders(
+    edges: dict[tuple[int, ...], _Edge], ways: csr_array, space: Space, places: Array, seeds: Indices, size: int
+) -> None:
+    """Join nodes whose regions touch, for one size of robots; adds to `edges`."""
+    far, before, nearest = dijkstra(ways, indices=seeds, min_only=True, return_predecessors=True)
+    tails = np.repeat(np.arange(len(places)), np.diff(ways.indptr))
+    heads = ways.indices.astype(np.int64)
+    border = (nearest[tails] != nearest[heads]) & (nearest[tails] >= 0) & (nearest[heads] >= 0)
+    tails, heads = tails[border], heads[border]
+    length = far[tails] + ways.data[border] + far[heads]
+    one, other = np.minimum(nearest[tails], nearest[heads]), np.maximum(nearest[tails], nearest[heads])
+    order = np.lexsort((length, other, one))
+    one, other, tails, heads, length = one[order], other[order], tails[order], heads[order], length[order]
+    new = np.append(True, (np.diff(one) != 0) | (np.diff(other) != 0))[: len(one)]
+    number = np.full(len(places), -1, dtype=np.int64)
+    number[seeds] = np.arange(len(seeds))
+    straight = space.segments_are_free(places[one[new]], places[other[new]])
+    for a, b, u, v, is_free in zip(
+        one[new].tolist(), other[new].tolist(), tails[new].tolist(), heads[new].tolist(), straight.tolist(), strict=True
+    ):
+        if is_free:
+            line = places[[a, b]]
+        else:
+            u, v = (u, v) if nearest[u] == a else (v, u)
+            line = places[[*_back(before, u)[::-1], *_back(before, v)]]
+        pair = (int(number[a]), int(number[b]))
+        before_it = edges.get(pair)
+        if before_it is None:
+            edges[pair] = _Edge(*pair, size, line)
+        elif NO_LONGER * _length(line) < _length(before_it.line):
+            edges[*pair, size] = _Edge(*pair, size, line)
+
+
+def _from_starts(
+    ways: csr_array, space: Space, places: Array, seeds: Indices, own: Indices, starts: Indices, size: int, width: float
+) -> list[_Edge]:
+    """Edges from the starts of robots, given by their indices `own`; the tails are these indices."""
+    far, before = dijkstra(ways, indices=starts[own], return_predecessors=True, limit=FROM_START * width)
+    found = []
+    for k, i in enumerate(own.tolist()):
+        near = np.flatnonzero(np.isfinite(far[k, seeds]))
+        straight = space.segments_are_free(np.repeat(places[starts[i]][None], len(near), axis=0), places[seeds[near]])
+        for s, is_free in zip(near.tolist(), straight.tolist(), strict=True):
+            seed = int(seeds[s])
+            line = places[[starts[i], seed]] if is_free else places[_back(before[k], seed)[::-1]]
+            found.append(_Edge(i, s, size, line))
+    return found
+
+
+def _back(before: npt.NDArray[np.int32], node: int) -> list[int]:
+    """The nodes on the way back from a node to where a search began."""
+    found = [node]
+    while before[found[-1]] >= 0:
+        found.append(int(before[found[-1]]))
+    return found
+
+
+def _reversed(edge: _Edge) -> _Edge:
+    return edge._replace(tail=edge.head, head=edge.tail, line=edge.line[::-1])
+
+
+def _length(line: Array) -> float:
+    return float(np.hypot(*np.diff(line, axis=0).T).sum())
+
+
+def _graph(places: Array, edges: Sequence[_Edge], sizes: int) -> tuple[CoarseGraph, Indices]:
+    """The graph with these nodes and edges, and the largest size that can use each edge, (E,)."""
+    stays = [_Edge(k, k, 0, place[None]) for k, place in enumerate(places)]
+    every = sorted([*stays, *edges], key=lambda edge: (edge.tail, len(edge.line) > 1, edge.head, edge.size))
+    first = np.searchsorted([edge.tail for edge in every], np.arange(len(places) + 1)).astype(np.int64)
+    heads = np.array([edge.head for edge in every], dtype=np.int64)
+    lines = [_as_motion(edge.line) for edge in every]
+    begins = np.append(0, np.cumsum([len(line) for line in lines])).astype(np.int64)
+    rows = np.concatenate(lines)
+    lows, highs = (each.reduceat(rows[:, 1:], begins[:-1]) for each in (np.minimum, np.maximum))
+    circles = np.column_stack([0.5 * (lows + highs), 0.5 * np.hypot(*(highs - lows).T)])
+    legs = np.append(0.0, np.cumsum(np.hypot(*np.diff(rows[:, 1:], axis=0).T)))
+    lengths = legs[begins[1:] - 1] - legs[begins[:-1]]
+    graph = CoarseGraph(places, first, heads, lengths, begins, rows, circles)
+    return graph, np.array([edge.size for edge in every], dtype=np.int64)
+
+
+def _as_motion(line: Array) -> Array:
+    """A polyline (K, 2), m, as a motion from 0 to 1 at constant speed; one row for a single place."""
+    if len(line) == 2 and (line[0] != line[1]).any():
+        found = np.empty((2, 3))
+        found[:, 0], found[:, 1:] = (0.0, 1.0), line
+        return found
+    along = np.append(0.0, np.cumsum(np.hypot(*np.diff(line, axis=0).T)))
+    if along[-1] == 0.0:
+        return np.append(0.0, line[-1])[None]
+    return without_repeats(np.column_stack([along / along[-1], line]))

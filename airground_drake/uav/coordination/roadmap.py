@@ -1,0 +1,356 @@
+"""The graph on which robots move: a lattice between obstacles, with the robots' starts, presets and shortest paths."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import dijkstra
+from scipy.spatial import cKDTree
+
+from airground_drake.base.arrays import Array
+from airground_drake.model.geometry import convex, outline
+from airground_drake.model.geometry.paths import NoPath, Path, shortest_path
+from airground_drake.uav.coordination.intervals import Grid, Indices
+
+PITCH = 0.2
+"""Spacing of the lattice as a share of the distance that robots keep."""
+REACH = 1.75
+"""Nodes outside the lattice are connected to all nodes within this many spacings."""
+FAR = 0.95
+"""Edges from starts and to targets are no longer than this share of the length that `single.find` allows."""
+RINGS, RAYS = 3, 16
+"""Rings of extra nodes round a start, and nodes per ring: robots that block each other have little room."""
+MOST_NODES = 30_000
+"""Largest number of nodes of the lattice; a larger area gets a wider spacing."""
+MOST_PATH_NODES = 2_000
+"""Largest number of nodes of a preset or shortest path; a longer path gets wider gaps, which the lattice connects."""
+CHORDS = 0.5
+"""Share of the clearance that edges keep. Chords of the arcs of shortest paths come nearer to discs than the arcs."""
+ARCS = 0.75
+"""Share of the clearance that shortest paths keep."""
+ROUNDING_M = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class Space:
+    """Obstacles and distances that a robot has to keep. `Space.of` makes the space of a robot with a body.
+
+    Attributes:
+        rows: outlines of the obstacles, (m, W), see `model.geometry.outline`.
+        keep: distances to keep from their cores, (m,), m.
+        clearance: extra distance from obstacles, m. Nodes of the lattice keep all of it, edges half of it.
+        apart: distance between the robot's centre and the surfaces of other robots, m.
+        spacing: extra distance from other robots where possible, m; not 0.
+        height: of the robot's plane, m.
+    """
+
+    rows: Array
+    keep: Array
+    clearance: float
+    apart: float
+    spacing: float
+    height: float = 0.0
+
+    def of(self, body: float) -> Space:
+        """This space for the centre of a robot whose body has this radius, m, with obstacles cut by its plane."""
+        rows, keep = outline.sections(self.rows, self.keep + body, self.height)
+        return Space(rows, keep, self.clearance, self.apart + body, self.spacing)
+
+    def wide(self, longest: float, body: float = 0.0) -> float:
+        """How far another robot must be from both ends of an edge to be `apart + spacing` from the whole edge, m.
+
+        Let s be the share of the edge up to a point, and L its length. The squared distance to that point is the
+        weighted mean of the squared distances to the ends, less s (1 - s) L^2.
+
+        Args:
+            longest: length of the longest edge, m.
+            body: radius of the other robot, m.
+        """
+        return math.sqrt((self.apart + body + self.spacing) ** 2 + longest**2 / 4.0)
+
+    @property
+    def along(self) -> Array:
+        """Distances that edges keep from the cores, (m,), m."""
+        found: Array = self.keep + CHORDS * self.clearance
+        return found
+
+    def segments_are_free(self, begin: Array, end: Array) -> npt.NDArray[np.bool_]:
+        """Which segments, from begin (K, 2), m, to end (K, 2), m, keep the distance from every obstacle.
+
+        A segment that begins or ends too near to an obstacle is free if it comes no nearer in between.
+        """
+        return convex.segments_are_free(begin, end, self.rows, self.along, ROUNDING_M)
+
+    def points_are_free(self, points: Array, clearance: float) -> npt.NDArray[np.bool_]:
+        """Which points (K, 2), m, keep every distance and this clearance, m."""
+        return convex.points_are_free(points, self.rows, self.keep + (clearance - ROUNDING_M))
+
+
+@dataclass(frozen=True, eq=False)
+class RobotNodes:
+    """The nodes of one robot.
+
+    Attributes:
+        start: node of its start.
+        target: node of its target.
+        preset: nodes along the rest of its preset, (K,); the last is the target.
+        preset_times: times at these nodes, (K,), s.
+        usable: which of these nodes keep every distance, (K,); no edge leads to the others.
+    """
+
+    start: int
+    target: int
+    preset: Indices
+    preset_times: Array
+    usable: npt.NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False)
+class Roadmap:
+    """A graph in the plane, with a grid to find nodes by place. It has every edge in both directions.
+
+    Attributes:
+        grid: of the nodes.
+        first_edge: first edge of each node, (N + 1,).
+        heads: node at the end of each edge, (E,).
+        lengths: of the edges, (E,), m.
+        longest: upper bound of the lengths, except those of edges at starts and targets, m.
+        robots: one entry per robot.
+    """
+
+    grid: Grid
+    first_edge: Indices
+    heads: Indices
+    lengths: Array
+    longest: float
+    robots: tuple[RobotNodes, ...]
+
+    @property
+    def nodes(self) -> Array:
+        """Places of the nodes, (N, 2), m."""
+        return self.grid.nodes
+
+    def distances_to(self, targets: Indices) -> Array:
+        """Length of the shortest way from every node to the nearest target node, (N,), m; infinite without a way."""
+        graph = csr_array((self.lengths, self.heads, self.first_edge), shape=(len(self.nodes),) * 2)
+        found: Array = dijkstra(graph, indices=targets, min_only=True)
+        return found
+
+    def within(self, space: Space, own: RobotNodes) -> Roadmap:
+        """This roadmap with only those edges that a larger robot can use."""
+        tails = np.repeat(np.arange(len(self.nodes)), np.diff(self.first_edge))
+        free = space.points_are_free(self.nodes, CHORDS * space.clearance)
+        free[np.append(own.preset[own.usable], own.start)] = True
+        kept = free[tails] & free[self.heads] & space.segments_are_free(self.nodes[tails], self.nodes[self.heads])
+        first = np.append(0, np.cumsum(kept))[self.first_edge].astype(np.int64)
+        return replace(self, first_edge=first, heads=self.heads[kept], lengths=self.lengths[kept])
+
+
+@dataclass(frozen=True, eq=False)
+class RobotTask:
+    """Where a robot is, and where it must go.
+
+    Attributes:
+        start: its place, (2,), m.
+        preset: the rest of its preset, a timed motion (M, 3) from t = 0 on, which ends at its target.
+        body: radius of the robot, m.
+    """
+
+    start: Array
+    preset: Array
+    body: float = 0.0
+
+
+def build_roadmap(spaces: Sequence[Space], tasks: Sequence[RobotTask], others: Sequence[Array] = ()) -> Roadmap:
+    """The roadmap of some robots. Its edges are free for the smallest robot; `Roadmap.within` removes some for others.
+
+    Args:
+        spaces: one per robot.
+        tasks: one per robot.
+        others: places of other robots, (2,) each, m; the lattice reaches beyond them.
+    """
+    by_size = sorted(spaces, key=lambda each: each.apart)
+    space = by_size[0]
+    paths = [_shortest(own, task) for own, task in zip(spaces, tasks, strict=True)]
+    low, high = _area(by_size[-1], tasks, others, paths)
+    pitch = max(PITCH * space.apart, math.sqrt(float(np.prod(high - low)) / MOST_NODES))
+    reach = REACH * pitch
+    far = FAR * math.sqrt(space.wide(reach) ** 2 - space.apart**2)
+    lattice, pairs = _lattice(space, low, high, pitch)
+    nodes, robots = [lattice], []
+    for own, task, path in zip(spaces, tasks, paths, strict=True):
+        found, robot = _robot_nodes(own, task, path, sum(map(len, nodes)), pitch, far)
+        nodes.append(found)
+        robots.append(robot)
+    points = np.concatenate(nodes)
+    radii = np.full(len(points) - len(lattice), reach)
+    radii[np.array([[each.start, each.target] for each in robots]) - len(lattice)] = max(far, reach)
+    pairs = np.concatenate([pairs, _other_edges(points, radii)])
+    pairs = pairs[~_is_short_cut(points, pairs, robots)]
+    shut = np.concatenate([each.preset[~each.usable] for each in robots])
+    pairs = pairs[~np.isin(pairs, shut).any(axis=1)]
+    pairs = pairs[space.segments_are_free(points[pairs[:, 0]], points[pairs[:, 1]])]
+    return Roadmap(_grid(points, low, reach), *_in_rows(points, pairs), reach, tuple(robots))
+
+
+def _lattice(space: Space, low: Array, high: Array, pitch: float) -> tuple[Array, Indices]:
+    """Free nodes of a square lattice in a box, (N, 2), m, and pairs of neighbours, (E, 2)."""
+    columns, rows = (math.ceil(length / pitch) + 1 for length in high - low)
+    x, y = np.meshgrid(np.arange(columns), np.arange(rows), indexing="ij")
+    points = low + pitch * np.column_stack([x.ravel(), y.ravel()])
+    free = space.points_are_free(points, space.clearance)
+    return points[free], _lattice_edges(np.where(free, np.cumsum(free) - 1, -1).reshape(columns, rows))
+
+
+def _robot_nodes(
+    space: Space, task: RobotTask, path: Path | None, first: int, pitch: float, far: float
+) -> tuple[Array, RobotNodes]:
+    """Places and numbers of a robot's nodes: start, preset, shortest path to the target, and a fan round the start.
+
+    Args:
+        space: of the robot.
+        task: of the robot.
+        path: its shortest path.
+        first: number of its first node.
+        pitch: gap between nodes, m.
+        far: radius of the fan, m.
+    """
+    preset, times = _preset_nodes(task.preset, pitch)
+    along_path = np.zeros((0, 2)) if path is None else _path_nodes(space, path, pitch)
+    points = np.concatenate([task.start[None], preset, along_path, _fan(space, task.start, far)])
+    along = np.arange(first + 1, first + 1 + len(preset))
+    return points, RobotNodes(first, int(along[-1]), along, times, space.points_are_free(preset, 0.0))
+
+
+def _shortest(space: Space, task: RobotTask) -> Path | None:
+    """The shortest path of a robot to its target; None without one."""
+    try:
+        return shortest_path(task.start, task.preset[-1, 1:], space.rows, space.keep + ARCS * space.clearance)
+    except NoPath:
+        return None
+
+
+def _area(
+    space: Space, tasks: Sequence[RobotTask], others: Sequence[Array], paths: Sequence[Path | None]
+) -> tuple[Array, Array]:
+    """Corners of a box round all robots, presets and nearby discs, with room to go round these.
+
+    Walls may be long. So among walls it is shortest paths that say how far the box reaches, and a wall or polygon makes
+    it larger by `room` at most.
+    """
+    points = np.concatenate(
+        [*(task.start[None] for task in tasks), *(task.preset[:, 1:] for task in tasks),
+         np.array(others).reshape(-1, 2)]
+    )  # fmt: skip
+    widest = float(max(space.apart, *space.keep, 0.0)) if len(space.keep) else space.apart
+    room = 3.0 * (widest + space.spacing)
+    low, high = points.min(axis=0) - room, points.max(axis=0) + room
+    middles, extent = space.rows[:, outline.MIDDLE : outline.EXTENT], space.rows[:, outline.EXTENT, None]
+    walls = space.rows[:, outline.COUNT] > 1.0
+    if walls.any():
+        ends = [path.pieces[:, :2] for path in paths if path is not None]
+        low = np.concatenate([low[None], *(each - room for each in ends)]).min(axis=0)
+        high = np.concatenate([high[None], *(each + room for each in ends)]).max(axis=0)
+    near = ~walls & ((middles > low - extent) & (middles < high + extent)).all(axis=1)
+    beyond = (space.keep[near] + space.clearance + space.apart + space.spacing)[:, None] + extent[near]
+    boxes = [(low, high), *((middle - far, middle + far) for middle, far in zip(middles[near], beyond, strict=True))]
+    for row, keep in zip(space.rows[walls], space.keep[walls].tolist(), strict=True):
+        corners, far = outline.corners_of(row), keep + space.clearance + space.apart + space.spacing
+        lowest, highest = corners.min(axis=0), corners.max(axis=0)
+        if (lowest < high).all() and (highest > low).all():
+            boxes.append((np.maximum(lowest - far, low - room), np.minimum(highest + far, high + room)))
+    lows, highs = zip(*boxes, strict=True)
+    return np.min(lows, axis=0), np.max(highs, axis=0)
+
+
+def _preset_nodes(preset: Array, pitch: float) -> tuple[Array, Array]:
+    """Places along a timed motion, (K, 2), m, about `pitch`, m, apart, and the times there, (K,), s."""
+    legs = np.hypot(*np.diff(preset[:, 1:], axis=0).T)
+    gap = max(pitch, float(legs.sum()) / MOST_PATH_NODES)
+    pieces = np.maximum(1, np.ceil(legs / gap)).astype(int)
+    times = _spread(preset[:, 0], pieces)
+    places = np.column_stack([np.interp(times, preset[:, 0], axis) for axis in preset[:, 1:].T])
+    return places, times
+
+
+def _spread(times: Array, pieces: Indices) -> Array:
+    """Times (K,) with each gap between neighbours divided into equal pieces, `pieces` (K - 1,)."""
+    parts = [np.linspace(times[k], times[k + 1], int(n), endpoint=False) for k, n in enumerate(pieces)]
+    return np.concatenate([*parts, times[-1:]])
+
+
+def _path_nodes(space: Space, path: Path, pitch: float) -> Array:
+    """Places along a robot's shortest path, (K, 2), m, among them the ends of its pieces."""
+    sagitta = (ARCS - CHORDS) * space.clearance
+    flat = 0.9 * math.sqrt(8.0 * sagitta * float(space.keep.min(initial=1.0)))
+    gap = max(min(pitch, flat), path.length_m / MOST_PATH_NODES)
+    ends = np.concatenate([[0.0], np.cumsum(path.pieces[:, 5])])
+    along = _spread(ends, np.maximum(1, np.ceil(np.diff(ends) / gap)).astype(np.int64))
+    return np.array([path.at(s)[0] for s in along[1:]]).reshape(-1, 2)
+
+
+def _lattice_edges(number: npt.NDArray[np.intp]) -> Indices:
+    """Pairs of neighbours, (E, 2), in a lattice of node numbers; -1 marks a place without a node."""
+    found = []
+    for dx, dy in ((1, 0), (0, 1), (1, 1), (1, -1)):
+        tail = number[: len(number) - dx, max(0, -dy) : number.shape[1] - max(0, dy)]
+        head = number[dx:, max(0, dy) : number.shape[1] - max(0, -dy)]
+        both = (tail >= 0) & (head >= 0)
+        found.append(np.column_stack([tail[both], head[both]]))
+    return np.concatenate(found).astype(np.int64)
+
+
+def _other_edges(points: Array, radii: Array) -> Indices:
+    """Pairs of a node outside the lattice and any node within its radius, each pair once, (E, 2).
+
+    Args:
+        points: all nodes, (N, 2), m; the nodes outside the lattice are the last R.
+        radii: of the nodes outside the lattice, (R,), m.
+    """
+    others = np.arange(len(points) - len(radii), len(points))
+    near = cKDTree(points).query_ball_point(points[others], radii, return_sorted=True)
+    tails = np.concatenate([np.zeros(0, dtype=np.int64), *(np.array(found, dtype=np.int64) for found in near)])
+    heads = np.repeat(others, [len(found) for found in near])
+    keys = (np.minimum(tails, heads) * len(points) + np.maximum(tails, heads))[tails != heads]
+    return np.column_stack(np.divmod(np.unique(keys), len(points)))
+
+
+def _is_short_cut(points: Array, pairs: Indices, robots: Sequence[RobotNodes]) -> npt.NDArray[np.bool_]:
+    """Which edges lead from a robot's start straight to its target. Other robots may be too near at both ends."""
+    found = np.zeros(len(pairs), dtype=bool)
+    for own in robots:
+        if np.hypot(*(points[own.start] - points[own.target])) > ROUNDING_M:
+            found |= np.isin(pairs, [own.start, own.target]).all(axis=1)
+    return found
+
+
+def _fan(space: Space, start: Array, far: float) -> Array:
+    """Free places on rings round a start, (K, 2), m; the largest ring has the radius `far`, m."""
+    angles = 2.0 * np.pi * np.arange(RAYS) / RAYS
+    rays = np.column_stack([np.cos(angles), np.sin(angles)])
+    places = np.concatenate([start + far * (ring + 1.0) / RINGS * rays for ring in range(RINGS)])
+    return np.asarray(places[space.points_are_free(places, CHORDS * space.clearance)])
+
+
+def _in_rows(points: Array, pairs: Indices) -> tuple[Indices, Indices, Array]:
+    """Edges in both directions, sorted by tail and head: first edge of each node, heads, lengths."""
+    tails, heads = np.concatenate([pairs, pairs[:, ::-1]]).T
+    tails, heads = np.divmod(np.sort(tails * len(points) + heads), len(points))
+    first = np.searchsorted(tails, np.arange(len(points) + 1)).astype(np.int64)
+    lengths = np.maximum(np.linalg.norm(points[heads] - points[tails], axis=1), ROUNDING_M)
+    return first, np.ascontiguousarray(heads), lengths
+
+
+def _grid(points: Array, low: Array, size: float) -> Grid:
+    """A grid over the nodes (N, 2), m, with its lowest corner, (2,), m, and the size of a cell, m."""
+    at = np.maximum(np.floor((points - low) / size).astype(np.int64), 0)
+    shape = at.max(axis=0) + 1
+    cell = at[:, 0] * shape[1] + at[:, 1]
+    members = np.argsort(cell, kind="stable").astype(np.int64)
+    first = np.searchsorted(cell[members], np.arange(int(np.prod(shape)) + 1)).astype(np.int64)
+    return Grid(points, first, members, low, size, shape)

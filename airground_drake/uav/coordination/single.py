@@ -1,0 +1,176 @@
+"""Plan one robot's way among robots with fixed motions: a safe-interval search to its preset, then along it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from airground_drake.base.arrays import Array
+from airground_drake.uav.coordination import intervals
+from airground_drake.uav.coordination.intervals import Indices
+from airground_drake.uav.coordination.roadmap import Roadmap, RobotNodes, RobotTask, Space
+from airground_drake.uav.coordination.timed import distance, free_pieces, timed, without_repeats
+
+ROUNDING_M = 1e-9
+"""Distances between robots may fall short by this, m."""
+
+
+class OtherRobot(NamedTuple):
+    """Another robot.
+
+    Attributes:
+        motion: timed, (M, 3).
+        radius: of its body, m.
+        until: the robot counts as an obstacle up to this time, s.
+    """
+
+    motion: Array
+    radius: float = 0.0
+    until: float = math.inf
+
+
+@dataclass(frozen=True, eq=False)
+class Way:
+    """The plan for one robot.
+
+    Attributes:
+        motion: timed, (M, 3), from t = 0 to the end of its preset.
+        joined: time at which it is back on its preset, s.
+        rows: number of rows of the motion up to that time.
+    """
+
+    motion: Array
+    joined: float
+    rows: int
+
+
+def sum_of_times(ways: Sequence[Way | None]) -> float:
+    """Sum of the times at which robots are back on their presets, s: what plans are compared by."""
+    return math.fsum(way.joined for way in ways if way is not None)
+
+
+@dataclass(frozen=True, eq=False)
+class Mover:
+    """One robot on a roadmap.
+
+    Attributes:
+        task: where it is, and where it must go.
+        speed: m/s.
+        own: its nodes.
+        roadmap: the part that it can use.
+        space: discs and distances that it has to keep.
+        to_go: lower bound of the time from every node to its preset, (N,), s.
+        clear: which pieces of its preset between neighbouring nodes are free of discs, (K - 1,).
+    """
+
+    task: RobotTask
+    speed: float
+    own: RobotNodes
+    roadmap: Roadmap
+    space: Space
+    to_go: Array
+    clear: npt.NDArray[np.bool_]
+
+    @classmethod
+    def on(cls, roadmap: Roadmap, space: Space, task: RobotTask, speed: float, own: RobotNodes) -> Mover:
+        """Put a robot with a speed, m/s, on a roadmap."""
+        places = roadmap.nodes[own.preset]
+        clear = own.usable[:-1] & own.usable[1:] & space.segments_are_free(places[:-1], places[1:])
+        to_go = roadmap.distances_to(own.preset[own.usable]) / speed
+        return cls(task, speed, own, roadmap, space, to_go, clear)
+
+
+def find(
+    mover: Mover, fixed: Sequence[OtherRobot], follow: float, budget: int, brief: Sequence[OtherRobot] = ()
+) -> tuple[Way | None, int]:
+    """Find the way on which a robot is back on its preset as early as possible.
+
+    The robot is back when it has joined its preset and nothing blocks it for the time `follow`, or to its end.
+
+    Why robots keep their distance d + spacing also along an edge: let R^2 = (d + spacing)^2 + L^2/4, where L is the
+    length of the longest edge. Another robot blocks a node while its distance from the node is below R. The squared
+    distance to a point of the edge is a weighted mean of the squared distances to the ends, less s (1 - s) L^2. So it
+    is at least R^2 - L^2/4. Only at start and target may the other robot be nearer: at d, or at the distance that it
+    has there in the beginning or in the end. Edges at these nodes are shorter than sqrt(R^2 - d^2), so the distance
+    grows along them from the first.
+
+    Args:
+        mover: the robot.
+        fixed: the other robots.
+        follow: how long the preset must be free, s.
+        budget: largest number of expanded intervals.
+        brief: other robots at places that they need for a time only.
+
+    Returns:
+        The way, or None if no way is found within the budget; and the number of expanded intervals.
+    """
+    own, roadmap = mover.own, mover.roadmap
+    blocked = [_blocked_times(mover, other) for other in [*fixed, *brief]]
+    nodes = np.concatenate([np.zeros(0, np.int64), *(nodes for nodes, _ in blocked)])
+    times = np.concatenate([np.zeros((0, 2)), *(times for _, times in blocked)])
+    free = intervals.safe_intervals(len(roadmap.nodes), nodes, times)
+    edges = intervals.Edges(roadmap.first_edge, roadmap.heads, roadmap.lengths / mover.speed)
+    joins = _joins(mover, fixed, follow)
+    route, arrivals, joined, spent = intervals.search(edges, free, own.start, joins, mover.to_go, budget)
+    return (_way(roadmap, mover, route, arrivals, joined) if len(route) else None), int(spent)
+
+
+def _blocked_times(mover: Mover, other: OtherRobot) -> tuple[Indices, Array]:
+    """Nodes (B,) that another robot blocks, and when, (B, 2), s. Start and target have smaller radii, see `find`."""
+    roadmap, space = mover.roadmap, mover.space
+    start, target = roadmap.nodes[mover.own.start], roadmap.nodes[mover.own.target]
+    at_first = float(np.hypot(*(start - other.motion[0, 1:])))
+    at_last = float(np.hypot(*(target - other.motion[-1, 1:])))
+    near = np.minimum([at_first, at_last], space.apart + other.radius) - ROUNDING_M
+    radii = np.full(len(roadmap.nodes), space.wide(roadmap.longest, other.radius))
+    np.minimum.at(radii, [mover.own.start, mover.own.target], near)
+    nodes, times = intervals.blocked_times(other.motion, roadmap.grid, radii)
+    return nodes, np.minimum(times, other.until)
+
+
+def _joins(mover: Mover, fixed: Sequence[OtherRobot], follow: float) -> Array:
+    """First and last time at which the preset can be joined at each node, (N, 2), s; see `intervals.join_time`."""
+    own, roadmap, space = mover.own, mover.roadmap, mover.space
+    times, places = own.preset_times, roadmap.nodes[own.preset]
+    preset, clear = timed(times, places), mover.clear.copy()
+    for other in fixed:
+        clear &= free_pieces(preset, other.motion, _wished(space, other) - ROUNDING_M)
+    stays = preset[-1:]
+    in_the_end = np.array([np.hypot(*(places[-1] - other.motion[-1, 1:])) for other in fixed])
+    held = all(
+        distance(stays, other.motion, float(times[-1])) >= min(_wished(space, other), end) - ROUNDING_M
+        for other, end in zip(fixed, in_the_end.tolist(), strict=True)
+    )
+    # the next time at which the preset is blocked, for each of its nodes
+    blocked = np.append(np.where(clear, np.inf, times[:-1]), np.inf if held else times[-1])
+    blocked = np.minimum.accumulate(blocked[::-1])[::-1]
+    joins = np.tile([np.inf, -np.inf], (len(roadmap.nodes), 1))
+    usable = own.usable & (blocked >= np.minimum(times + follow, times[-1]))
+    joins[own.preset[usable]] = times[usable, None]
+    joins[own.target] = times[-1], np.inf
+    return joins
+
+
+def _wished(space: Space, other: OtherRobot) -> float:
+    """Distance that a robot keeps from another one where possible, m."""
+    return space.apart + other.radius + space.spacing
+
+
+def _way(roadmap: Roadmap, mover: Mover, route: Indices, arrivals: Array, joined: float) -> Way:
+    """The motion along a route with its waits, then along the preset from the time `joined`, s, on."""
+    places = roadmap.nodes[route]
+    lengths = np.hypot(*np.diff(places, axis=0).T)
+    leaves = arrivals[1:] - np.maximum(lengths, ROUNDING_M) / mover.speed
+    rows = [np.array([[arrivals[0], *places[0]]])]
+    for k, leave in enumerate(leaves.tolist()):
+        rows.append(np.array([[leave, *places[k]], [arrivals[k + 1], *places[k + 1]]]))
+    rows.append(np.array([[joined, *places[-1]]]))
+    before = without_repeats(np.concatenate(rows))
+    preset = mover.task.preset
+    after = preset[preset[:, 0] > joined + 1e-9]
+    return Way(np.concatenate([before, after]), joined, len(before))

@@ -1,0 +1,280 @@
+"""The UAV's behaviour database: it asks the policies for a proposal, in turn or by rank, and records their failures.
+
+The planner calls `plan` for a UGV that needs a proposal, and `after_refusal` when a UGV has refused one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from contextlib import nullcontext
+from dataclasses import dataclass, replace
+from threading import Lock
+from typing import Any, Literal, Self, get_args
+
+import numpy as np
+
+from airground_drake.base.errors import PolicyError, described, traceback_of
+from airground_drake.base.registry import POLICIES
+from airground_drake.model.geometry import convex
+from airground_drake.model.geometry.motion import Motion
+from airground_drake.uav.guest.process import GuestPolicy
+from airground_drake.uav.guest.time_limit import OutOfTime, time_limit
+from airground_drake.uav.policy import Observation, Policy, Proposal, motions_of
+
+Ranking = Literal["listed", "predicted"]
+RANKINGS: tuple[Ranking, ...] = get_args(Ranking)
+
+MOST_DOUBLINGS = 10
+"""The rest doubles at most this often while no policy proposes anything; it is then longer than any run."""
+PREDICTION_S = 3.0
+INTRUSION = 1000.0
+"""Weight of squared intrusion against squared task error; the gatekeeper's default is the same."""
+
+
+def make_policy(name: str, parameters: Mapping[str, float], budget: float = 2.0) -> Policy:
+    """Build a policy: in this process if it comes with the package or was added here, else in a process of its own.
+
+    Args:
+        name: of the policy.
+        parameters: of the policy.
+        budget: wall-clock time for a proposal of a policy in a process of its own, s.
+
+    Raises:
+        UnknownNameError: if the name is neither registered nor the place of a plug-in.
+        PluginError: if it cannot be imported, is no Policy, or does not take these parameters.
+    """
+    if POLICIES.accepts(name) and POLICIES.is_foreign(name):
+        return GuestPolicy(name, parameters, budget)
+    return POLICIES.make(name, of=Policy, **parameters)
+
+
+@dataclass(frozen=True)
+class Negotiation:
+    """What the UAV remembers of its exchange with one UGV.
+
+    Attributes:
+        proposal: the proposal in force, or None.
+        turn: index of the policy that made the proposal, or that is asked next.
+        refusals: number of refused proposals since the trigger.
+        too_fast: number of motions since then that the UGV could not follow, see `Teammate`.
+        in_vain: how many times in a row no policy had a proposal.
+        retry_at: earliest time for a new proposal, s.
+        cause: name of the UGV whose trigger led to the last proposal; empty before the first.
+    """
+
+    proposal: Proposal | None = None
+    turn: int = 0
+    refusals: int = 0
+    too_fast: int = 0
+    in_vain: int = 0
+    retry_at: float = -1.0
+    cause: str = ""
+
+    def is_due(self, t: float) -> bool:
+        """Whether the UGV has no proposal in force at time t, s, and its rest is over."""
+        return self.proposal is None and t >= self.retry_at
+
+    def refused_lately(self, t: float) -> bool:
+        """Whether the UGV rests at time t, s, because it has refused. Then it gets no part of a joint plan either."""
+        return self.proposal is None and t < self.retry_at and not self.in_vain
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> Self:
+        """Immutable: the copy is the object itself."""
+        return self
+
+
+@dataclass(frozen=True)
+class Asked:
+    """A policy that was asked for a plan for a UGV.
+
+    Attributes:
+        t: time, s.
+        robot: name of the UGV.
+        policy: name of the policy.
+        party: UGVs for which it proposed motions.
+        chosen: whether the plan was sent.
+        what: what went wrong; empty if nothing did. A failure counts as no intervention.
+        traceback: of the failure.
+        reason: why it left a UGV without a way, if it says so.
+    """
+
+    t: float
+    robot: str
+    policy: str
+    party: tuple[str, ...] = ()
+    chosen: bool = False
+    what: str = ""
+    traceback: str = ""
+    reason: str = ""
+
+
+Candidate = tuple[int, Asked, dict[str, Motion]]
+"""A plan: its turn, the policy that was asked, and motions by UGV."""
+
+
+class BehaviourDatabase:
+    """Policies and the order in which the UAV tries them.
+
+    Attributes:
+        policies: (name, policy) pairs; without any the UAV only supervises.
+        retry: rest after a refusal, or when no policy has a proposal, s. It doubles each time in a row without a
+            proposal.
+        ranking: 'listed' asks the policies in turn. 'predicted' asks all and takes the proposal with the best predicted
+            outcome on the UAV's map; after a refusal it takes the next best.
+        budget: wall-clock time for a policy's proposal, s, unless the policy counts its effort.
+        joint: whether a joint plan takes effect only as a whole. If not, each part is a proposal of its own.
+    """
+
+    def __init__(
+        self,
+        policies: Sequence[tuple[str, Policy]],
+        *,
+        retry: float = 0.0,
+        ranking: Ranking = "listed",
+        budget: float = 2.0,
+        joint: bool = True,
+    ) -> None:
+        """See the attributes."""
+        self.policies = tuple(policies)
+        self.retry = retry
+        self.ranking = ranking
+        self.budget = budget
+        self.joint = joint
+        self._asking = Lock()
+
+    def close(self) -> None:
+        """End the processes of third-party policies."""
+        for _, policy in self.policies:
+            if isinstance(policy, GuestPolicy):
+                policy.close()
+
+    def after_refusal(
+        self, held: Negotiation, t: float, *, learnt: bool = False, too_fast: bool = False
+    ) -> Negotiation:
+        """The negotiation after the UGV has refused its proposal: after a rest it is the next policy's turn.
+
+        Args:
+            held: negotiation with the refused proposal.
+            t: time, s.
+            learnt: whether the UAV has learnt of an obstacle with the refusal; then a ranking starts again at the best.
+            too_fast: whether the UGV refused because it would have come to rest short of its goal.
+        """
+        turn = 0 if learnt and self.ranking == "predicted" else held.turn + 1
+        return Negotiation(
+            turn=turn,
+            refusals=held.refusals + 1,
+            too_fast=held.too_fast + too_fast,
+            retry_at=t + self.retry,
+            cause=held.cause,
+        )
+
+    def plan(
+        self, held: Negotiation, seen: Observation, memories: dict[int, Any] | None = None
+    ) -> tuple[dict[str, Negotiation], list[Asked]]:
+        """Ask the policies for the next proposal to a UGV; a joint plan brings proposals to other UGVs, too.
+
+        If no policy has a proposal, the UGV rests for `retry`, and twice as long each time in a row.
+
+        Args:
+            held: negotiation with this UGV.
+            seen: what the UAV sees.
+            memories: `Policy.remembered` by index of the policy, changed in place; None: nothing is remembered.
+
+        Returns:
+            The negotiations that change, by UGV, and the policies that were asked.
+        """
+        seen = replace(seen, refusals=held.refusals)
+        memories = {} if memories is None else memories
+        if self.ranking == "predicted":
+            candidates, asked = self._ranked(seen, held.turn, memories)
+        else:
+            candidates, asked = self._next(seen, held, memories)
+        in_vain = 0 if candidates else held.in_vain + 1
+        rest = self.retry * 2.0 ** min(max(0, in_vain - 1), MOST_DOUBLINGS)
+        found = {seen.robot: replace(held, in_vain=in_vain, retry_at=seen.t + rest)}
+        for turn, chosen, motions in candidates[:1]:
+            asked = [replace(each, chosen=True) if each is chosen else each for each in asked]
+            party = tuple(sorted(motions)) if self.joint and len(motions) > 1 else ()
+            for robot, motion in motions.items():
+                mate = None if robot == seen.robot else next(each for each in seen.team if each.name == robot)
+                before = held if mate is None else Negotiation(refusals=mate.refusals, too_fast=mate.too_fast)
+                cause = robot if mate is None or mate.triggered else seen.robot
+                proposal = Proposal(
+                    chosen.policy, seen.t, motion, cause=cause, mapped=seen.obstacles, party=party
+                )  # fmt: skip
+                found[robot] = replace(before, proposal=proposal, turn=turn, in_vain=0, cause=cause)
+        return found, asked
+
+    def _next(
+        self, seen: Observation, held: Negotiation, memories: dict[int, Any]
+    ) -> tuple[list[Candidate], list[Asked]]:
+        """The proposal of the first policy, from the negotiation's turn on, that has one."""
+        asked: list[Asked] = []
+        for step in range(len(self.policies)):
+            turn = (held.turn + step) % len(self.policies)
+            motions = self._ask(turn, seen, asked, memories)
+            if motions:
+                return [(turn, asked[-1], motions)], asked
+        return [], asked
+
+    def _ranked(self, seen: Observation, turn: int, memories: dict[int, Any]) -> tuple[list[Candidate], list[Asked]]:
+        """All proposals from best to worst, rotated so that the proposal with the index `turn` comes first."""
+        asked: list[Asked] = []
+        every = [self._ask(i, seen, asked, memories) for i in range(len(self.policies))]
+        found = [(each, motions) for each, motions in zip(asked, every, strict=True) if motions]
+        found.sort(key=lambda entry: predicted_cost(entry[1], seen))
+        ranked = [(i, each, motions) for i, (each, motions) in enumerate(found)]
+        first = turn % len(ranked) if ranked else 0
+        return ranked[first:] + ranked[:first], asked
+
+    def _ask(self, index: int, seen: Observation, asked: list[Asked], memories: dict[int, Any]) -> dict[str, Motion]:
+        """What a policy proposes; adds to `asked`, and changes `memories`. Threads ask one after the other."""
+        with self._asking:
+            _, policy = self.policies[index]
+            policy.remembered = memories.get(index)
+            motions = self._proposed(index, seen, asked)
+            memories[index] = policy.remembered
+        return motions
+
+    def _proposed(self, index: int, seen: Observation, asked: list[Asked]) -> dict[str, Motion]:
+        (name, policy), motions, what, traceback = self.policies[index], dict[str, Motion](), "", ""
+        reason = ""
+        try:
+            with nullcontext() if policy.counted else time_limit(self.budget):
+                motions = motions_of(policy.propose(seen if isinstance(policy, GuestPolicy) else seen.fresh()), seen)
+                reason = str(policy.reason)
+        except PolicyError as fault:
+            what, traceback = str(fault), fault.traceback
+        except (Exception, OutOfTime, SystemExit) as error:  # no failure of a policy may stop the UAV
+            what, traceback = described(error, type(policy).propose), traceback_of(error)
+        asked.append(Asked(seen.t, seen.robot, name, tuple(motions), what=what, traceback=traceback, reason=reason))
+        return motions
+
+
+def predicted_cost(motions: Mapping[str, Motion], seen: Observation) -> float:
+    """Cost (25) of a proposal over PREDICTION_S, as the UAV predicts it with the obstacles that it knows.
+
+    The UGV is assumed to follow its motion exactly, or to stand without one. The cost is its squared distance to the
+    preset trajectory, plus INTRUSION times its squared intrusion into safe distances. These are the distances to
+    obstacles, and to UGVs that stand, have accepted a motion, or get one with this proposal.
+    """
+    t = seen.start + np.arange(0.0, PREDICTION_S, 0.05)
+    own = motions.get(seen.robot)
+    positions = own.sample(t) if own is not None else np.tile(seen.position, (len(t), 1))
+    cost = np.square(positions - seen.preset.sample(t)).sum()
+    if len(seen.obstacles):
+        apart = np.array([convex.distances(seen.obstacles, position, True) for position in positions])
+        lacking = (seen.obstacle_distances - apart).max(axis=1)
+        cost += INTRUSION * np.square(np.maximum(0.0, lacking)).sum()
+    for each in seen.moving:
+        offsets = positions - each.motion.sample(t)
+        apart = np.array([convex.distances(each.outlines, offset, True) for offset in offsets])
+        lacking = (each.distances(seen.radius) - apart).max(axis=1)
+        cost += INTRUSION * np.square(np.maximum(0.0, lacking)).sum()
+    for mate in seen.team:
+        motion = motions.get(mate.name, mate.proposal.motion if mate.proposal and mate.answered == "accepted" else None)
+        if mate.name == seen.robot or (motion is None and not mate.standing):
+            continue
+        distance = np.linalg.norm(positions - (mate.position if motion is None else motion.sample(t)), axis=1)
+        cost += INTRUSION * np.square(np.maximum(0.0, seen.distance_to(mate) - distance)).sum()
+    return float(0.05 * cost)

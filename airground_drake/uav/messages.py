@@ -1,0 +1,96 @@
+"""The channel between UAV and UGVs: the UAV sends proposals, each UGV answers with a verdict and a report.
+
+An answer is two numbers per UGV: ACCEPT, REFUSE, DONE or SILENT, and the number of the proposal that it answers. DONE
+means that the UGV has executed the motion to its end. The UAV ignores an answer unless it names the proposal in force.
+The report lists the obstacles that the UGV sensed when it decided, and the reason for its answer.
+
+A joint plan takes effect only while all its parts in force are accepted: see `accepted_proposals`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Literal, NamedTuple
+
+from airground_drake.base.arrays import Array
+from airground_drake.model.bodies.world import World
+from airground_drake.model.plants.plant import Scripted
+from airground_drake.uav.policy import Proposal
+
+ACCEPT, SILENT, REFUSE, DONE = 1.0, 0.0, -1.0, 2.0
+NOTHING = -1.0
+"""Number of the proposal that a UGV executes if it executes none."""
+JOINT_REFUSED: Literal["joint_refused"] = "joint_refused"
+"""Reason of a UGV that would accept its part of a joint plan, and refuses it because another UGV refuses its own."""
+STALLS: Literal["stalls"] = "stalls"
+"""Reason of a UGV that would come to rest short of its goal with the proposal, no nearer than without."""
+
+Point = tuple[float, float, float]
+"""A place, m, world frame."""
+
+Outline = tuple[float, ...]
+"""A convex part of an obstacle, without padding: see `model.geometry.outline`."""
+
+
+class Sighting(NamedTuple):
+    """An obstacle that moves, as it was seen: its name, the place of its origin, m, and its velocity, m/s."""
+
+    name: str
+    place: Point
+    velocity: Point
+
+
+class Report(NamedTuple):
+    """A UGV's report, sent with its answer.
+
+    Attributes:
+        number: of the answer, which counts the answers of all UGVs; -1: no answer.
+        sensed: obstacles at rest that the UGV sensed when it decided.
+        reason: why it answers so, see `ugv.answer.Reason`; empty before it has decided.
+        words: the reason as a sentence.
+        seen: obstacles that move and that the UGV sensed when it decided.
+    """
+
+    number: int = -1
+    sensed: tuple[Outline, ...] = ()
+    reason: str = ""
+    words: str = ""
+    seen: tuple[Sighting, ...] = ()
+
+
+Reports = tuple[Report, ...]
+"""One entry per UGV."""
+
+Proposals = tuple[Proposal | None, ...]
+"""One entry per UGV."""
+
+
+def sightings(world: World, t: float, positions: Array) -> list[Sighting]:
+    """The obstacles that move and are there at time t, s, with all bodies that move at positions (M, 3), m."""
+    found = []
+    for body, place in zip(world.moving, positions, strict=True):
+        if isinstance(body.plant, Scripted) and world.there(t, [body])[0]:
+            velocity = body.plant.script.at(t)[1]
+            found.append(Sighting(body.name, (*place.tolist(),), (*velocity.tolist(),)))
+    return found
+
+
+def answer_to(proposal: Proposal | None, answers: Sequence[float] | Array, robot: int) -> float:
+    """A UGV's answer to this proposal: ACCEPT, REFUSE, DONE, or SILENT if it answers another one; `answers` (2n,)."""
+    if proposal is None or answers[2 * robot + 1] != proposal.number:
+        return SILENT
+    return float(answers[2 * robot])
+
+
+def accepted_proposals(proposals: Sequence[Proposal | None], answers: Array) -> list[Proposal | None]:
+    """The proposals that UGVs execute, one entry per UGV: the proposal in force if it has taken effect, else None.
+
+    A proposal takes effect when its UGV accepts it. A part of a joint plan takes effect when, besides, every other part
+    in force is accepted or done.
+    """
+    said = [answer_to(proposal, answers, i) for i, proposal in enumerate(proposals)]
+    stopped = {p.joint for p, answer in zip(proposals, said, strict=True) if p and answer not in (ACCEPT, DONE)}
+    return [
+        p if p is not None and answer == ACCEPT and (not p.party or p.joint not in stopped) else None
+        for p, answer in zip(proposals, said, strict=True)
+    ]

@@ -1,0 +1,343 @@
+"""The UAV's planner, run once per planning period.
+
+It first reads the UGVs' answers: it learns obstacles from their reports, and withdraws proposals that are refused, done
+or no longer needed. Then it asks the behaviour database for a proposal to every triggered UGV that needs one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any, NamedTuple, Self
+
+import numpy as np
+import numpy.typing as npt
+
+from airground_drake.base.arrays import Array
+from airground_drake.model.bodies.motion import SAME_S
+from airground_drake.model.geometry import outline
+from airground_drake.model.geometry.motion import Motion
+from airground_drake.uav.database import Asked, BehaviourDatabase, Negotiation
+from airground_drake.uav.messages import (
+    ACCEPT,
+    DONE,
+    JOINT_REFUSED,
+    REFUSE,
+    SILENT,
+    STALLS,
+    Outline,
+    Proposals,
+    Reports,
+    Sighting,
+    answer_to,
+)
+from airground_drake.uav.policy import Answered, MovingObstacle, Observation, Proposal, Teammate
+
+BEHIND_S = 1.0
+"""A motion has left a UGV behind if from its end the UGV is farther than it could go in this time."""
+_WORDS: dict[float, Answered] = {ACCEPT: "accepted", REFUSE: "refused"}
+
+
+class Mover(NamedTuple):
+    """An obstacle that moves.
+
+    Attributes:
+        name: of the obstacle.
+        outlines: of its parts about its origin, (k, W), see `model.geometry.outline`.
+        known: whether the UAV sees it; else it knows what a UGV last reported.
+        script: its way, if predictions know it.
+    """
+
+    name: str
+    outlines: Array
+    known: bool
+    script: Motion | None
+
+
+@dataclass(frozen=True)
+class PlannerState:
+    """What the UAV remembers between planning periods.
+
+    Attributes:
+        talks: negotiations, one per UGV.
+        learnt: obstacles at rest from UGVs' reports that are not on the map.
+        seen: obstacles that move, as UGVs last reported them, with the time of the report, s, by name.
+        sent: all proposals with the index of their UGV, in order of sending.
+        asked: policies that were asked, in order.
+        read: answers that were read: their number, and when, s.
+        withdrawn: proposals that were withdrawn: their number, and when, s.
+        memories: `Policy.remembered` of the policies.
+    """
+
+    talks: tuple[Negotiation, ...]
+    learnt: tuple[Outline, ...] = ()
+    sent: tuple[tuple[int, Proposal], ...] = ()
+    asked: tuple[Asked, ...] = ()
+    read: tuple[tuple[int, float], ...] = ()
+    withdrawn: tuple[tuple[int, float], ...] = ()
+    seen: tuple[tuple[Sighting, float], ...] = ()
+    memories: tuple[Any, ...] = ()
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> Self:
+        """Immutable: the copy is the object itself."""
+        return self
+
+    @property
+    def faults(self) -> list[Asked]:
+        """Failures of policies, in order."""
+        return [each for each in self.asked if each.what]
+
+    @property
+    def proposals(self) -> Proposals:
+        """The proposals in force, one entry per UGV."""
+        return tuple(talk.proposal for talk in self.talks)
+
+
+def sent_after(before: PlannerState, after: PlannerState, t: float) -> PlannerState:
+    """Number the new proposals of a planning instant, and note what was sent and withdrawn.
+
+    Every new proposal gets the next number and the time t, even if the planner has set others. So no planner can send
+    another motion under a number that a UGV has already answered.
+
+    Args:
+        before: memory before the instant.
+        after: memory as the planner returns it.
+        t: time, s.
+    """
+    sent, talks, withdrawn = list(before.sent), list(after.talks), list(before.withdrawn)
+    for i, (old, talk) in enumerate(zip(before.talks, after.talks, strict=True)):
+        if talk.proposal is old.proposal:
+            continue
+        if old.proposal is not None:
+            withdrawn.append((old.proposal.number, t))
+        if talk.proposal is not None:
+            proposal = replace(talk.proposal, number=len(sent), issued=t)
+            talks[i] = replace(talk, proposal=proposal)
+            sent.append((i, proposal))
+    return replace(after, talks=tuple(talks), sent=tuple(sent), withdrawn=tuple(withdrawn))
+
+
+@dataclass(frozen=True, eq=False)
+class Planner:
+    """The UAV's planner. It plans on the UAV's own map, which may miss obstacles.
+
+    The policies are asked for each triggered UGV. They may also propose that other UGVs make way for it; such a joint
+    plan stays in force as long as one of its UGVs is triggered. A refusal withdraws the proposal and all other
+    parts of its joint plan; after a rest the next policy is asked. UGVs report the obstacles that they sense with every
+    answer, and the UAV adds these to its map. See docs/design.md.
+
+    Attributes:
+        ugvs: names of the UGVs.
+        database: policies, in the order in which they are tried.
+        period: planning period, s; a proposal can act one period after it is made.
+        presets: preset trajectories of the UGVs.
+        targets: targets of the UGVs, (n, 3), m.
+        mapped: outlines of the obstacles on the UAV's map, (m, W), see `model.geometry.outline`.
+        robot_distance: d between UGVs, m.
+        max_speed: speed limits of the UGVs, (n,), m/s.
+        radius: radii of the UGVs' bodies, (n,), m, or one for all.
+        mapped_from: when each of `mapped` appears, (m,), s, or one time for all.
+        mapped_until: when each disappears, in the same order.
+        movers: obstacles that move.
+        coasting: time for which an obstacle that moves is predicted to keep its velocity; then it stands, s.
+        trails: per UGV, whether its plant may fall behind a motion within its speed limit; default: none does.
+    """
+
+    ugvs: tuple[str, ...]
+    database: BehaviourDatabase
+    period: float
+    presets: tuple[Motion, ...]
+    targets: Array
+    mapped: Array
+    robot_distance: float
+    max_speed: Array
+    radius: Array | float = 0.0
+    mapped_from: Array | float = 0.0
+    mapped_until: Array | float = np.inf
+    movers: tuple[Mover, ...] = ()
+    coasting: float = 3.0
+    trails: tuple[bool, ...] = ()
+
+    @property
+    def radii(self) -> Array:
+        """Radii of the UGVs' bodies, (n,), m."""
+        return np.broadcast_to(self.radius, len(self.ugvs))
+
+    @cached_property
+    def _rows(self) -> dict[Outline, list[int]]:
+        """Rows of each outline on the map."""
+        found: dict[Outline, list[int]] = {}
+        for k, row in enumerate(self.mapped):
+            found.setdefault(outline.as_tuple(row), []).append(k)
+        return found
+
+    def _is_on_map(self, given: Outline, there: npt.NDArray[np.bool_]) -> bool:
+        """Whether an outline is one of those on the map that are there, (m,)."""
+        return any(there[k] for k in self._rows.get(given, ()))
+
+    def start(self) -> PlannerState:
+        """The memory at the beginning of a run."""
+        return PlannerState((Negotiation(),) * len(self.ugvs))
+
+    def idle(self, memory: PlannerState, intervening: Sequence[bool]) -> bool:
+        """Whether a planning instant changes nothing: no UGV is triggered, and no negotiation is open."""
+        return not any(intervening) and memory.talks == self.start().talks
+
+    def plan(
+        self,
+        memory: PlannerState,
+        t: float,
+        positions: Array,
+        intervening: Sequence[bool],
+        answers: Array,
+        reports: Reports,
+        standing: Sequence[bool] = (),
+        sightings: Sequence[Sighting] = (),
+    ) -> PlannerState:
+        """The memory after one planning period.
+
+        Args:
+            memory: of the UAV before.
+            t: time, s.
+            positions: of all robots, (n + 1, 3), m, world frame.
+            intervening: per UGV, whether its trigger is in mode INTERVENING.
+            answers: of the UGVs, (2n,), see `messages`.
+            reports: of the UGVs, see `messages`.
+            standing: per UGV, whether it stands, see `halts`; default: no UGV stands.
+            sightings: the obstacles that move and are there.
+        """
+        said = [answer_to(talk.proposal, answers, i) for i, talk in enumerate(memory.talks)]
+        heard = [report for report, answer in zip(reports, said, strict=True) if answer != SILENT]
+        reported = {outline for report in heard for outline in report.sensed}
+        there = (np.less_equal(self.mapped_from, t + SAME_S)) & np.less(t + SAME_S, self.mapped_until)
+        there = np.broadcast_to(there, len(self.mapped))
+        mapped = self.mapped[there]
+        latest = {each.name: (each, when) for each, when in memory.seen} | {
+            each.name: (each, t) for report in heard for each in report.seen
+        }
+        moving = self._moving(t, {each.name: each for each in sightings}, latest)
+        unknown = reported - set(memory.learnt)
+        fresh = tuple(sorted((each for each in unknown if not self._is_on_map(each, there)), key=_place))
+        learnt = memory.learnt + fresh
+        obstacles = outline.joined(mapped, outline.stacked(learnt)) if learnt else mapped
+        talks = self._after_answers(memory.talks, t, positions, intervening, said, reports, learnt=bool(fresh))
+        asked = list(memory.asked)
+        memories = dict(enumerate(memory.memories))
+        newest = max((number for number, _ in memory.read[-len(self.ugvs) :]), default=-1)
+        read = [(report.number, t) for report in heard if report.number > newest]
+        for i, robot in enumerate(self.ugvs):
+            if not (intervening[i] and talks[i].is_due(t)):
+                continue
+            seen = Observation(
+                t=t,
+                start=t + self.period,
+                robot=robot,
+                position=positions[i],
+                target=self.targets[i],
+                preset=self.presets[i],
+                obstacles=obstacles,
+                mapped=mapped,
+                others=np.delete(positions, i, axis=0),
+                refusals=talks[i].refusals,
+                team=self._team(t, positions, intervening, answers, talks, standing),
+                robot_distance=self.robot_distance,
+                radius=float(self.radii[i]),
+                moving=moving,
+            )
+            changed, policies = self.database.plan(talks[i], seen, memories)
+            asked += policies
+            talks = [changed.get(name, talk) for name, talk in zip(self.ugvs, talks, strict=True)]
+        return replace(
+            memory, talks=tuple(talks), learnt=learnt, asked=tuple(asked), read=(*memory.read, *read),
+            seen=tuple(latest.values()), memories=tuple(map(memories.get, range(len(self.database.policies)))),
+        )  # fmt: skip
+
+    def _moving(
+        self, t: float, now: Mapping[str, Sighting], latest: Mapping[str, tuple[Sighting, float]]
+    ) -> tuple[MovingObstacle, ...]:
+        """The obstacles that move, as the UAV sees them at time t, s, or as UGVs last reported them."""
+        found = []
+        for mover in self.movers:
+            sighting, when = (now.get(mover.name), t) if mover.known else latest.get(mover.name, (None, t))
+            if sighting is None:
+                continue
+            place, velocity = np.array(sighting.place), np.array(sighting.velocity)
+            coasts = Motion(np.array([when, when + self.coasting]), np.array([place, place + self.coasting * velocity]))
+            found.append(MovingObstacle(mover.name, mover.outlines, place, velocity, mover.script or coasts))
+        return tuple(found)
+
+    def _after_answers(
+        self,
+        talks: Sequence[Negotiation],
+        t: float,
+        positions: Array,
+        intervening: Sequence[bool],
+        said: Sequence[float],
+        reports: Reports,
+        *,
+        learnt: bool,
+    ) -> list[Negotiation]:
+        """Negotiations after the UGVs' answers.
+
+        A proposal is withdrawn if any part of its plan is refused, if its motion is over, or if neither its UGV, nor
+        its cause, nor any party of its joint plan is triggered any more. So a UGV whose part leads it past its preset
+        trajectory goes on: the others' ways were planned with it. A UGV that refuses only because another one does is
+        asked again at once. If a UGV that
+        may fall behind would have stalled, or was left behind, its motion was too fast.
+        """
+        called = {name for name, one in zip(self.ugvs, intervening, strict=True) if one}
+        own = [a == REFUSE and each.reason != JOINT_REFUSED for a, each in zip(said, reports, strict=True)]
+        refused = {talk.proposal.joint for talk, no in zip(talks, own, strict=True) if talk.proposal and no}
+        found = []
+        for i, (name, talk, answer, refuses) in enumerate(zip(self.ugvs, talks, said, own, strict=True)):
+            proposal, trails = talk.proposal, bool(self.trails and self.trails[i])
+            party_refused = proposal is not None and bool(proposal.party) and proposal.joint in refused
+            party = proposal.party if proposal else ()
+            if called.isdisjoint((name, talk.cause, *party)):
+                talk = Negotiation()
+            elif refuses or (answer == REFUSE and not party_refused):
+                talk = self.database.after_refusal(
+                    talk, t, learnt=learnt, too_fast=trails and reports[i].reason == STALLS
+                )
+            elif proposal is not None and (party_refused or answer == DONE or t >= proposal.motion.end):
+                off = np.linalg.norm(positions[i] - proposal.motion.positions[-1]) if t >= proposal.motion.end else 0.0
+                behind = trails and bool(off > BEHIND_S * self.max_speed[i])
+                talk = replace(talk, proposal=None, too_fast=talk.too_fast + behind)
+            found.append(talk)
+        return found
+
+    def _team(
+        self,
+        t: float,
+        positions: Array,
+        intervening: Sequence[bool],
+        answers: Array,
+        talks: Sequence[Negotiation],
+        standing: Sequence[bool],
+    ) -> tuple[Teammate, ...]:
+        """All UGVs as the UAV sees them at time t, s."""
+        return tuple(
+            Teammate(
+                name=name,
+                position=positions[i],
+                target=self.targets[i],
+                preset=self.presets[i],
+                max_speed=float(self.max_speed[i]),
+                triggered=bool(intervening[i]),
+                standing=standing[i] if standing else False,
+                proposal=talks[i].proposal,
+                answered=_WORDS.get(answer_to(talks[i].proposal, answers, i), "silent"),
+                refusals=talks[i].refusals,
+                too_fast=talks[i].too_fast,
+                resting=talks[i].refused_lately(t),
+                radius=float(self.radii[i]),
+            )
+            for i, name in enumerate(self.ugvs)
+        )
+
+
+def _place(given: Outline) -> Outline:
+    """Sorts outlines by place, then by radius."""
+    middle = given[outline.MIDDLE : outline.EXTENT]
+    return (*middle, given[outline.BASE], given[outline.RADIUS], *given)

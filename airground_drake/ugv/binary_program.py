@@ -1,0 +1,142 @@
+"""(26) of one UGV as a mixed-integer quadratic program, positions eliminated; with shares of accepting it is (27)."""
+
+from __future__ import annotations
+
+import threading
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from pydrake.solvers import MathematicalProgram
+
+from airground_drake.base.arrays import Array
+from airground_drake.ugv.problem import Evaluation, Problem
+from airground_drake.ugv.relaxation import offsets, within_reach
+
+AXES = 2  # UGVs move in their plane
+_IDLE = 1e-7
+"""A block whose choice moves the later positions by less than this share of the largest move is idle."""
+
+
+def block_of_stage(stages: int, blocks: int) -> npt.NDArray[np.int64]:
+    """Block (N,) that each stage belongs to: lengths differ by one stage at most, none is empty."""
+    used = min(blocks, stages)
+    block: npt.NDArray[np.int64] = np.arange(stages, dtype=np.int64) * used // stages
+    return block
+
+
+class BinaryProgram:
+    """(21)-(26) with half-planes for (26d), in the accept variables and the slack alone.
+
+    By (23) the positions are affine in omega. So (25) is a quadratic cost in omega, and (26d) as half-planes are rows
+    over omega and u: n.(rho(omega) - o) >= d - u. As constraints, the positions would make a solver ten times slower.
+
+    Attributes:
+        program: (26); with shares in [0, 1] in place of binary values it is (27).
+        omega: binary variables (24), (26c), (B,): 1 accepts, and 1 - omega is the other mode.
+        u: slack (26e), (N,), m.
+        error: cost of task errors in (25).
+        slack: cost of slack in (25).
+        half_planes: (26d), one row per half-plane that some plan can violate, over (omega, u).
+        choices: 0 and 1 are allowed where the choice moves the UGV, else 0 only, so that no solver need try both.
+        within: which half-planes these are, (N, m).
+        block: of each stage, (N,).
+    """
+
+    def __init__(self, stages: int, blocks: int) -> None:
+        """A program without any problem's data, for N stages and B <= N accept variables, one per block of stages."""
+        n, b = stages, blocks
+        self.program = MathematicalProgram()
+        self.block = block_of_stage(n, b)
+        self.omega: Any = self.program.NewBinaryVariables(b, "omega")
+        self.u: Any = self.program.NewContinuousVariables(n, "u")
+        self.error = self.program.AddQuadraticCost(np.zeros((b, b)), np.zeros(b), self.omega, is_convex=True)
+        self.slack = self.program.AddQuadraticCost(np.zeros((n, n)), np.zeros(n), self.u, is_convex=True)
+        self.half_planes = self.program.AddLinearConstraint(
+            np.zeros((1, b + n)), np.full(1, -np.inf), np.full(1, np.inf), np.concatenate([self.omega, self.u])
+        )
+        self.choices = self.program.AddBoundingBoxConstraint(0.0, 1.0, self.omega)  # (26c)
+        self.program.AddBoundingBoxConstraint(0.0, np.inf, self.u)  # (26e)
+        self._live = np.ones(b, dtype=bool)
+        self.within = np.zeros((n, 0), dtype=bool)
+        self._of_block = np.equal.outer(self.block, np.arange(b)).astype(np.float64)
+
+    def update(self, problem: Problem, normals: Array) -> None:
+        """Put in the data of a problem of this size, with half-planes along unit normals (N, m, 3)."""
+        n = problem.stages
+        steps = (problem.dt * (problem.accept - problem.refuse))[:, :AXES]
+        refused = problem.positions(np.zeros(n))
+        away = (refused - problem.reference)[:, :AXES]
+        weights = 2.0 * problem.dt * problem.terms.error_weights
+        # a stage's choice moves all later ends: column j of d rho_k / d omega_j is steps[j] for k >= j
+        remaining = np.cumsum(weights[::-1])[::-1]
+        later = np.maximum.outer(np.arange(n), np.arange(n))
+        hessian = self._of_block.T @ (steps @ steps.T * remaining[later]) @ self._of_block
+        force = np.cumsum((weights[:, None] * away)[::-1], axis=0)[::-1]
+        gradient = self._of_block.T @ (steps * force).sum(axis=1)
+        height = refused[:, 2] - problem.reference[:, 2]  # no choice changes it
+        constant = 0.5 * float(weights @ (np.square(away).sum(axis=1) + np.square(height)))
+        self._live = hessian.diagonal() > _IDLE**2 * hessian.diagonal().max()
+        self.choices.evaluator().UpdateUpperBound(self._live.astype(np.float64))
+        self.error.evaluator().UpdateCoefficients(hessian, gradient, constant, is_convex=True)
+        of_slack = np.full(n, 2.0 * problem.dt * problem.slack_weight)
+        self.slack.evaluator().UpdateCoefficients(np.diag(of_slack), np.zeros(n), is_convex=True)
+        self.within = within_reach(problem) & (problem.slack_weight > 0.0)
+        rows, lower = self._rows(problem, normals, steps, refused - problem.reference)
+        self.half_planes.evaluator().UpdateCoefficients(rows, lower, np.full(len(lower), np.inf))
+
+    def _rows(
+        self, problem: Problem, normals: Array, steps: Array, away: Array
+    ) -> tuple[Array, npt.NDArray[np.float64]]:
+        """Coefficients (rows, B + N) and lower bounds of the half-planes along normals (N, m, 3).
+
+        Without half-planes: one empty row. `steps` is what accepting at a stage adds to the position, (N, 2), m, and
+        `away` are the task errors of refusing throughout, (N, 3), m.
+        """
+        n, b = problem.stages, self._of_block.shape[1]
+        stage, point = np.nonzero(self.within)
+        if len(stage) == 0:
+            return np.zeros((1, b + n)), np.full(1, -np.inf)
+        normal = normals[stage, point]
+        before = np.arange(n) <= stage[:, None]
+        of_omega = (normal[:, :AXES] @ steps.T * before) @ self._of_block
+        of_u = np.equal.outer(stage, np.arange(n)).astype(np.float64)
+        lower = offsets(problem, normals)[stage, point] - (normal[:, :AXES] * away[stage, :AXES]).sum(axis=1)
+        return np.hstack([of_omega, of_u]), lower
+
+    def guess(self, problem: Problem, plan: Evaluation, normals: Array) -> Array:
+        """Values of the program's variables for a plan: a solution that satisfies all constraints, (B + N,)."""
+        away = plan.positions[:, None] - problem.centres
+        lacking = problem.distances - np.einsum("kmi,kmi->km", normals, away)
+        slack = np.where(self.within, lacking, 0.0).max(axis=1, initial=0.0)
+        return np.concatenate([np.where(self._live, self.blocked(plan.omega), 0.0), slack])
+
+    def plan(self, values: Array) -> Array:
+        """The value of each stage, (N,), from those of the blocks, (B,).
+
+        Idle blocks get the value of the next one that is not, or of the last, so that they are no switch.
+        """
+        live = np.flatnonzero(self._live)
+        if len(live) == 0:
+            return np.take(values, self.block)
+        following = np.minimum(np.searchsorted(live, np.arange(len(values))), len(live) - 1)
+        return values[live[following]][self.block]
+
+    def blocked(self, plan: Array) -> Array:
+        """The mode that a plan (N,) has in most stages of each block, (B,), 0 or 1; accepting on a tie."""
+        share = self._of_block.T @ plan / self._of_block.sum(axis=0)
+        return (share >= 0.5).astype(np.float64)
+
+
+class Programs(threading.local):
+    """The programs of one thread by their sizes: to build one takes longer than to put in the data of a problem."""
+
+    def __init__(self) -> None:
+        """Without any program."""
+        self._built: dict[tuple[int, int], BinaryProgram] = {}
+
+    def of(self, stages: int, blocks: int) -> BinaryProgram:
+        """The program of this size, to be updated."""
+        if (stages, blocks) not in self._built:
+            self._built[stages, blocks] = BinaryProgram(stages, blocks)
+        return self._built[stages, blocks]

@@ -1,0 +1,257 @@
+"""One sample of the UGVs' gatekeepers: sense, predict, decide, answer; under method (c) by problem (26)."""
+
+from __future__ import annotations
+
+import abc
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from time import thread_time
+from typing import Any, Self
+
+import numpy as np
+import numpy.typing as npt
+
+from airground_drake.base.arrays import Array
+from airground_drake.base.errors import PluginError, described, one_line, short
+from airground_drake.model.bodies.world import World
+from airground_drake.model.geometry import convex, outline
+from airground_drake.model.geometry.motion import Motion
+from airground_drake.model.law.ugv_law import UgvLaw
+from airground_drake.uav.messages import (
+    ACCEPT,
+    REFUSE,
+    SILENT,
+    Proposals,
+    Report,
+    Reports,
+    Sighting,
+    answer_to,
+    sightings,
+)
+from airground_drake.uav.policy import Proposal
+from airground_drake.ugv.answer import Basis, GatekeeperDecision, Rules, in_words, settle
+from airground_drake.ugv.budget import Budget
+from airground_drake.ugv.patience import Commitment
+from airground_drake.ugv.problem import Horizon, Problem, predicted_problem
+from airground_drake.ugv.rollout import View
+from airground_drake.ugv.routes.route import Route
+from airground_drake.ugv.solution import ConstantPlans, Solution, after_failure
+
+
+@dataclass(frozen=True, eq=False)
+class GatekeeperState:
+    """The memory of the gatekeepers of n UGVs between samples.
+
+    Attributes:
+        answers: in force, (2n,), see `messages`.
+        since: when each UGV's answer became what it is, (n,), s.
+        reports: what came with them.
+        decisions: those of the last sample that was not idle.
+        commitments: under method (d), each UGV's tries and rests.
+        sensed: under method (d), which outlines at rest each UGV has sensed and not seen to be gone, (n, m).
+        made: all decisions of the run so far; the number of an answer is the index of its decision.
+    """
+
+    answers: tuple[float, ...]
+    since: tuple[float, ...]
+    reports: Reports
+    decisions: tuple[GatekeeperDecision, ...] = ()
+    commitments: tuple[Commitment, ...] = ()
+    sensed: npt.NDArray[np.bool_] = field(default_factory=lambda: np.zeros((0, 0), dtype=bool))
+    made: tuple[GatekeeperDecision, ...] = ()
+
+    @classmethod
+    def empty(cls, count: int) -> GatekeeperState:
+        """Of `count` UGVs that have answered nothing yet."""
+        held = (Commitment(),) * count
+        return cls((SILENT, -1.0) * count, (0.0,) * count, (Report(),) * count, commitments=held)
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> Self:
+        """Immutable: the copy is the object itself."""
+        return self
+
+
+@dataclass(frozen=True, eq=False)
+class Inputs:
+    """The inputs at a sample.
+
+    Attributes:
+        t: time, s.
+        proposals: in force, one entry per UGV.
+        positions: of all bodies that move, (M, 3), m.
+        velocities: of these, (M, 3), m/s.
+        law: the UGVs' control law, with the gains in force.
+        headings: of the UGVs, (n,), rad; None if no UGV is a unicycle.
+    """
+
+    t: float
+    proposals: Proposals
+    positions: Array
+    velocities: Array
+    law: UgvLaw
+    headings: Array | None = None
+
+
+class Gatekeepers(abc.ABC):
+    """The UGVs of a team, as they judge proposals.
+
+    Attributes:
+        law: their control law, with the scenario's gains.
+    """
+
+    def __init__(self, world: World, law: UgvLaw, presets: Sequence[Motion]) -> None:
+        """Of the UGVs of a world, with their control law and preset trajectories."""
+        self.law = law
+        self._presets = tuple(presets)
+        self._world = world
+        self._near = world.around(world.select("ugv"))
+
+    @property
+    def judges(self) -> str:
+        """Name of the class that judges proposals, for pictures."""
+        return type(self).__name__
+
+    @abc.abstractmethod
+    def sample(self, now: Inputs, before: GatekeeperState) -> GatekeeperState:
+        """Judge every proposal in force, with the state from the sample before."""
+
+    def idle(self, t: float, proposals: Proposals, positions: Array, before: GatekeeperState) -> bool:
+        """Whether a sample at t, s, changes nothing: no proposal, no answer to take back, nothing new to remember."""
+        return not any(proposals) and not any(before.answers[::2])
+
+    def _in_range(self, t: float, position: Array) -> npt.NDArray[np.bool_]:
+        """Which outlines at rest are there at time t, s, and within sensing range, (m,)."""
+        still, reach = self._world.at(self._near, t).still, self.law.avoidance.sensing_range
+        found: npt.NDArray[np.bool_] = convex.within(still, position[None], reach, True)[0]
+        return found
+
+    def _beside(self, now: Inputs, i: int) -> npt.NDArray[np.intp]:
+        """Parts that move around a UGV: of all robots, and of obstacles within sensing range; rows of `parts`."""
+        near, others = self._world.at(self._near, now.t), self._near.others[i]
+        if len(self._world.moving) == len(self._world.robots):
+            return others
+        own, reach = now.positions[i], self.law.avoidance.sensing_range
+        return np.array([
+            part for part in others
+            if near.carrier[part] < len(self._world.robots)
+            or convex.distances(near.parts[part, None], own - now.positions[near.carrier[part]], True)[0] <= reach
+        ], dtype=np.intp)  # fmt: skip
+
+    def _report(self, now: Inputs, decision: GatekeeperDecision) -> Report:
+        """The report with an answer: the obstacles within sensing range, and the reason."""
+        i = decision.robot
+        near = self._near.still[self._in_range(decision.t, now.positions[i])]
+        seen: tuple[Sighting, ...] = ()
+        if len(self._world.moving) > len(self._world.robots):
+            beside = {self._world.moving[body].name for body in self._near.carrier[self._beside(now, i)]}
+            seen = tuple(each for each in sightings(self._world, now.t, now.positions) if each.name in beside)
+        return Report(decision.answer, tuple(map(outline.as_tuple, near)), decision.reason, in_words(decision), seen)
+
+    def _view(self, now: Inputs, i: int) -> View:
+        """All obstacles at rest and robots around a UGV, and the obstacles that move within sensing range."""
+        near, beside, m = self._world.at(self._near, now.t), self._beside(now, i), len(self._near.still)
+        shown = np.append(np.ones(m, dtype=bool), np.isin(near.others[i], beside))
+        turning: dict[str, Any] = {}
+        if now.headings is not None and self._world.steering is not None:
+            turning = {"heading": float(now.headings[i]), "steering": self._world.steering[i]}
+        return View(
+            t=now.t,
+            position=now.positions[i].copy(),
+            preset=self._presets[i],
+            still=near.still,
+            parts=near.parts[beside],
+            places=now.positions[near.carrier[beside]],
+            velocities=now.velocities[near.carrier[beside]],
+            distances=near.distance[i][shown],
+            shares=near.share[i][shown],
+            max_speed=float(near.max_speed[i]),
+            **turning,
+        )
+
+
+class PaperGatekeepers(Gatekeepers):
+    """Method (c): problem (26) at every sample, and the first stage of its plan is the answer."""
+
+    def __init__(
+        self, world: World, law: UgvLaw, presets: Sequence[Motion], route: Route, horizon: Horizon, rules: Rules
+    ) -> None:
+        """As `Gatekeepers`; the route solves (26) over the horizon, and the rules lead to the answer."""
+        super().__init__(world, law, presets)
+        self._route, self._horizon, self._rules = route, horizon, rules
+
+    @property
+    def judges(self) -> str:
+        """Name of the route's class."""
+        return type(self._route).__name__
+
+    def sample(self, now: Inputs, before: GatekeeperState) -> GatekeeperState:
+        """Judge every proposal in force by (26)."""
+        answers: list[float] = []
+        since: list[float] = []
+        reports: list[Report] = []
+        decisions: list[GatekeeperDecision] = []
+        budgets = self._rules.budgets(sum(p is not None for p in now.proposals))
+        for i, proposal in enumerate(now.proposals):
+            if proposal is None:
+                answers += [SILENT, -1.0]
+                since.append(now.t)
+                reports.append(Report())
+                continue
+            decision = self._decide(now, before, i, proposal, budgets)
+            decision = replace(decision, answer=len(before.made) + len(decisions))
+            decisions.append(decision)
+            answer = ACCEPT if decision.accepted else REFUSE
+            answers += [answer, proposal.number]
+            since.append(before.since[i] if answer == answer_to(proposal, before.answers, i) else now.t)
+            reports.append(self._report(now, decision))
+        return replace(
+            before, answers=tuple(answers), since=tuple(since), reports=tuple(reports), decisions=tuple(decisions),
+            made=(*before.made, *decisions),
+        )  # fmt: skip
+
+    def _decide(
+        self, now: Inputs, before: GatekeeperState, i: int, proposal: Proposal, budgets: Iterator[Budget]
+    ) -> GatekeeperDecision:
+        started = thread_time()
+        problem = predicted_problem(self._view(now, i), now.law, proposal, self._horizon)
+        problem = replace(problem, previous=_rest_of_plan(before, now.t, i, proposal))
+        solution = self._solved(problem, next(budgets))
+        if solution.status == "solver_failed":
+            solution = after_failure(problem, solution)
+        cpu_s = thread_time() - started
+        standing, stood = answer_to(proposal, before.answers, i), now.t - before.since[i]
+        constants = ConstantPlans.of(problem)
+        throughout = (constants.accept.objective, constants.refuse.objective) if solution.has_plan else (-1.0, -1.0)
+        accepted, reason = settle(solution, throughout, standing, stood, self._rules)
+        basis = Basis(tuple(np.flatnonzero(self._in_range(now.t, now.positions[i])).tolist()))
+        evidence = (problem, solution, throughout)
+        return GatekeeperDecision(now.t, i, proposal, accepted, reason, *evidence, basis=basis, cpu_s=cpu_s)
+
+    def _solved(self, problem: Problem, budget: Budget) -> Solution:
+        """The route's solution; the route gets a `Problem` of its own, so that it cannot change what is recorded.
+
+        Raises:
+            PluginError: if the route breaks its contract: it raises, or returns anything but a `Solution`.
+        """
+        kind = type(self._route)
+        try:
+            found: object = self._route.solve(replace(problem), budget)
+        except (Exception, SystemExit) as error:
+            raise PluginError(f"route {kind.__qualname__} raised {described(error, kind.solve)}") from error
+        if not isinstance(found, Solution):
+            returned = f"{short(repr(found))}, of type {type(found).__qualname__}"
+            allowed = f"{Solution.__module__}.{Solution.__qualname__}"
+            raise PluginError(one_line(f"route {kind.__qualname__} returned {returned}; allowed: {allowed}"))
+        return found
+
+
+def _rest_of_plan(before: GatekeeperState, t: float, i: int, proposal: Proposal) -> Array | None:
+    """The rest of the last sample's plan from time t, s, on, (N,), its last choice repeated; None without a plan."""
+    for decision in before.decisions:
+        if decision.robot == i and decision.proposal is proposal and decision.problem and decision.solution:
+            plan = decision.solution.plan
+            if plan is None:
+                return None
+            passed = round((t - decision.t) / decision.problem.dt)
+            return plan[np.minimum(np.arange(len(plan)) + passed, len(plan) - 1)]
+    return None

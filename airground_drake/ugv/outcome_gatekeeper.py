@@ -1,0 +1,242 @@
+"""Method (d)'s gatekeeper: proposals are judged by their outcome, once.
+
+At the first sample at which a UGV sees a proposal it rolls out both outcomes (`outcome`): accepting it now, and
+refusing it for ever. It takes the better one. A refusal stands for good. An acceptance stands until the proposal is
+withdrawn, its motion is over, or it has been executed for as long as it may be. Neither is reversed because waiting
+or the other choice looks cheaper. There is one exception: when the UGV senses an obstacle that it did not know at the
+acceptance, it compares both outcomes again. That is no new try: `patience` bounds how often a UGV goes along.
+
+If a UGV refuses its part of a joint plan, those that judge their parts at the same sample refuse them, too. So a plan
+that nobody executes costs nobody a try.
+
+Safety does not rest on this: an accepted motion is executed below the avoidance inequalities.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from time import thread_time
+
+import numpy as np
+import numpy.typing as npt
+
+from airground_drake.base.arrays import Array
+from airground_drake.model.bodies.world import World
+from airground_drake.model.geometry import convex, outline
+from airground_drake.model.geometry.convex import news_within, within
+from airground_drake.model.geometry.motion import Motion
+from airground_drake.model.law.ugv_law import UgvLaw
+from airground_drake.model.plants.plant import Scripted
+from airground_drake.uav.messages import (
+    ACCEPT,
+    DONE,
+    JOINT_REFUSED,
+    REFUSE,
+    SILENT,
+    Proposals,
+    Report,
+    answer_to,
+)
+from airground_drake.uav.policy import Proposal
+from airground_drake.ugv.answer import Basis, GatekeeperDecision
+from airground_drake.ugv.mpc_gatekeeper import Gatekeepers, GatekeeperState, Inputs
+from airground_drake.ugv.outcome import Outcome, Outlook, outcomes
+from airground_drake.ugv.patience import Commitment, Patience
+from airground_drake.ugv.reasons import Reason
+from airground_drake.ugv.rollout import View
+
+ACCEPTING: tuple[Reason, ...] = ("cheaper", "makes_way")
+"""Reasons for which a proposal is accepted."""
+MOST_CLAIMED = 64
+"""Obstacles of the UAV's map that a UGV takes into account."""
+
+
+class OutcomeGatekeepers(Gatekeepers):
+    """The UGVs of a team under method (d)."""
+
+    def __init__(
+        self, world: World, law: UgvLaw, presets: Sequence[Motion], outlook: Outlook, patience: Patience
+    ) -> None:
+        """Of the UGVs of a world: their law, their preset trajectories, how far they look and how long they wait."""
+        super().__init__(world, law, presets)
+        self._outlook, self._patience = outlook, patience
+        self._ugvs = world.names("ugv")
+
+    def idle(self, t: float, proposals: Proposals, positions: Array, before: GatekeeperState) -> bool:
+        """Whether a sample changes nothing."""
+        nothing = super().idle(t, proposals, positions, before)
+        return nothing and before.sensed is self._remembered(t, positions, before)
+
+    def sample(self, now: Inputs, before: GatekeeperState) -> GatekeeperState:
+        """Judge every new proposal by its outcome; keep to the answer to every other."""
+        sensed = self._remembered(now.t, now.positions, before)
+        known = replace(before, sensed=sensed)
+        said = [answer_to(proposal, before.answers, i) for i, proposal in enumerate(now.proposals)]
+        held = list(before.commitments)
+        for i, standing in enumerate(said):
+            if held[i].executing and standing != ACCEPT:  # withdrawn
+                held[i] = self._patience.stop(held[i], now.t)
+            held[i] = self._patience.rested(held[i], now.t)
+        judged: list[GatekeeperDecision] = []
+        for i, proposal in enumerate(now.proposals):
+            if proposal is not None:
+                started = thread_time()
+                decision = self._decide(now, known, before, i, proposal, said[i], held[i])
+                judged.append(replace(decision, cpu_s=thread_time() - started))
+        answers, reports = [SILENT, -1.0] * len(said), [Report()] * len(said)
+        decisions: list[GatekeeperDecision] = []
+        for decision in _jointly(judged, said):
+            i = decision.robot
+            held[i] = self._after(held[i], decision, said[i])
+            decisions.append(replace(decision, tries=held[i].tries, answer=len(before.made) + len(decisions)))
+            answers[2 * i : 2 * i + 2] = _answer(decision, said[i]), decision.proposal.number
+            reports[i] = self._report(now, decisions[-1])
+        return replace(
+            known, answers=tuple(answers), reports=tuple(reports), decisions=tuple(decisions), commitments=tuple(held),
+            made=(*before.made, *decisions),
+        )  # fmt: skip
+
+    def _remembered(self, t: float, positions: Array, before: GatekeeperState) -> np.ndarray:
+        """Which outlines each UGV has sensed up to time t, s, (n, m), and has not seen to be gone since.
+
+        The very same array if nothing changes.
+        """
+        still, own = self._world.at(self._near, t).still, positions[self._near.members]
+        reach, known = self.law.avoidance.sensing_range, before.sensed
+        if known.shape != (len(own), len(still)):
+            return within(still, own, reach, True)
+        gone = known.any(axis=0) & ~self._world.there(t, self._world.resting)[self._world.owner]
+        if gone.any():
+            seen = np.zeros(known.shape, dtype=bool)
+            seen[:, gone] = within(self._near.still[gone], own, reach, True)
+            known = known & ~seen if (known & seen).any() else known
+        return known | within(still, own, reach, True) if news_within(still, own, reach, True, known) else known
+
+    def _discovered(
+        self, sensed: npt.NDArray[np.bool_], before: GatekeeperState, i: int, proposal: Proposal
+    ) -> tuple[int, ...]:
+        """Outlines that a UGV senses for the first time and that are not on the proposal's map."""
+        if sensed is before.sensed or before.sensed.shape != sensed.shape:
+            return ()
+        new = np.flatnonzero(sensed[i] & ~before.sensed[i])
+        return tuple(new[~outline.is_among(self._near.still[new], proposal.mapped)].tolist())
+
+    def _decide(
+        self,
+        now: Inputs,
+        known: GatekeeperState,
+        before: GatekeeperState,
+        i: int,
+        proposal: Proposal,
+        standing: float,
+        held: Commitment,
+    ) -> GatekeeperDecision:
+        """Judge a new proposal, watch over an accepted one, keep to a refusal."""
+        reason: Reason = "kept"
+        refuse = accept = None
+        basis, new = Basis(), self._discovered(known.sensed, before, i, proposal)
+        if standing == ACCEPT and self._patience.over(held, now.t):
+            reason = "over"
+        elif standing == SILENT and self._patience.exhausted(held):
+            reason = "exhausted"
+        elif standing == SILENT or (standing == ACCEPT and new):
+            seen, basis = self._view_of(now, known, i, proposal)
+            basis = basis._replace(new=new)
+            refuse, accept = self.foresee(seen, now.law, proposal)
+            favour = proposal.cause in self._ugvs and proposal.cause != self._ugvs[i]
+            reason = reason_of(refuse, accept, favour=favour)
+        accepted = reason in ACCEPTING or (reason == "kept" and standing == ACCEPT)
+        return GatekeeperDecision(now.t, i, proposal, accepted, reason, refuse=refuse, accept=accept, basis=basis)
+
+    def _after(self, held: Commitment, decision: GatekeeperDecision, standing: float) -> Commitment:
+        """A UGV's commitment after a decision, when its answer so far is `standing`."""
+        if decision.accepted and standing == SILENT:
+            return self._patience.accept(held, decision.t, decision.proposal.motion.end)
+        if standing == ACCEPT and not decision.accepted:
+            return self._patience.stop(held, decision.t)
+        return held
+
+    def foresee(self, seen: View, law: UgvLaw, proposal: Proposal) -> tuple[Outcome, Outcome]:
+        """The outcomes of refusing and of accepting, from what a UGV knows."""
+        return outcomes(seen, law, proposal, self._outlook)
+
+    def _view_of(self, now: Inputs, known: GatekeeperState, i: int, proposal: Proposal) -> tuple[View, Basis]:
+        """A UGV's knowledge: obstacles sensed or told of, other bodies that move and the motions asked of them."""
+        around, m = self._view(now, i), len(self._near.still)
+        told = self._believed(now.positions[i], known.sensed[i], proposal)
+        still = outline.joined(self._near.still[known.sensed[i]], proposal.mapped[told])
+        asked: list[tuple[Motion, bool] | None] = []
+        numbers = list[tuple[int, bool]]()
+        for j in self._near.carrier[self._beside(now, i)].tolist():
+            plant = self._world.moving[j].plant
+            if isinstance(plant, Scripted):
+                asked.append((plant.script, True) if plant.announced else None)
+                continue
+            other = now.proposals[j] if j < len(now.proposals) else None
+            answer = answer_to(other, known.answers, j)
+            if other and answer in (ACCEPT, SILENT):
+                numbers.append((other.number, answer == ACCEPT))
+                asked.append((other.motion, answer == ACCEPT))
+            else:
+                asked.append(None)
+        sensed = np.flatnonzero(self._in_range(now.t, now.positions[i])).tolist()
+        remembered = np.flatnonzero(known.sensed[i]).tolist()
+        basis = Basis(tuple(sensed), tuple(remembered), (), tuple(told.tolist()), tuple(numbers))
+        seen = replace(
+            around,
+            still=still,
+            distances=np.concatenate([self._world.keep(i, still), around.distances[m:]]),
+            shares=np.concatenate([np.ones(len(still)), around.shares[m:]]),
+            asked=tuple(asked),
+        )
+        return seen, basis
+
+    def _believed(self, position: Array, sensed: npt.NDArray[np.bool_], proposal: Proposal) -> npt.NDArray[np.intp]:
+        """Rows of the UAV's map that are out of a UGV's sight and that it has not sensed itself.
+
+        Only the `MOST_CLAIMED` of these that are nearest count, so that no map makes a decision take long. Rows that
+        are no outlines are left out.
+        """
+        claimed = proposal.mapped
+        apart = np.full(len(claimed), -np.inf)
+        sound = outline.are_outlines(claimed)
+        apart[sound] = convex.distances(claimed[sound], position, True)
+        known = outline.is_among(claimed, self._near.still[sensed])
+        new = np.flatnonzero((apart > self.law.avoidance.sensing_range) & ~known)
+        nearest = np.argsort(apart[new], kind="stable")[:MOST_CLAIMED]
+        return new[np.sort(nearest)]
+
+
+def _jointly(judged: Sequence[GatekeeperDecision], said: Sequence[float]) -> list[GatekeeperDecision]:
+    """The decisions of a sample. Where a part of a joint plan is refused, no other part of it is newly accepted."""
+    refused = {each.proposal.joint for each in judged if _answer(each, said[each.robot]) == REFUSE}
+    return [
+        replace(each, accepted=False, reason=JOINT_REFUSED)
+        if each.accepted and said[each.robot] == SILENT and each.proposal.party and each.proposal.joint in refused
+        else each
+        for each in judged
+    ]
+
+
+def _answer(decision: GatekeeperDecision, standing: float) -> float:
+    """The answer that follows from a decision; DONE stays DONE."""
+    if decision.accepted:
+        return ACCEPT
+    done = decision.reason == "over" and decision.t >= decision.proposal.motion.end
+    return DONE if done or standing == DONE else REFUSE
+
+
+def reason_of(refuse: Outcome, accept: Outcome, *, favour: bool) -> Reason:
+    """Why to accept (one of ACCEPTING) or why not, given both outcomes.
+
+    A UGV that makes way for another UGV (a `favour`) has nothing to gain: it accepts unless it would come to rest short
+    of its own goal. It cannot know whether the other UGV's trigger is on; `patience` bounds the cost of a lie.
+    """
+    if not (np.isfinite(accept.cost) and np.isfinite(refuse.cost)):
+        return "no_plan"
+    if accept.better_than(refuse):
+        return "cheaper"
+    if accept.stalls:
+        return "stalls"
+    return "makes_way" if favour else "not_cheaper"

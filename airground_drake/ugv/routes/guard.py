@@ -1,0 +1,38 @@
+"""What every route does before and after its own work."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from airground_drake.base.arrays import Array
+from airground_drake.ugv.budget import Budget
+from airground_drake.ugv.problem import Problem
+from airground_drake.ugv.relaxation import unavoidable_cost
+from airground_drake.ugv.solution import ConstantPlans, Solution, Status, cut_short
+
+Search = Callable[[Problem, ConstantPlans, Budget], Solution]
+"""A route's own work on a finite problem, with its constant plans, while there is budget left."""
+
+
+def guarded(problem: Problem, budget: Budget, search: Search) -> Solution:
+    """Search, unless the problem or its costs are not finite, or the budget is spent once constant plans are known."""
+    if not problem.is_finite():
+        return Solution(False, "refused_not_finite")
+    constants = ConstantPlans.of(problem)
+    if not constants.are_finite():
+        return Solution(False, "refused_not_finite")
+    if budget.spent():
+        return cut_short(problem, constants.both, unavoidable_cost(problem))
+    return search(problem, constants, budget)
+
+
+def without_optimum(
+    problem: Problem,
+    constants: ConstantPlans,
+    budget: Budget,
+    normals: Array | None = None,
+    ended: Status = "solver_failed",
+) -> Solution:
+    """The better constant plan, when a solver gave no solution; whatever it says, a spent budget is the reason."""
+    status: Status = "budget_spent" if budget.spent() else ended
+    return cut_short(problem, constants.both, unavoidable_cost(problem), status, normals=normals)

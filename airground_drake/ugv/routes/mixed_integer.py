@@ -1,0 +1,169 @@
+"""(26) with its binary variables: a proven optimum along half-planes, and a search by its own cost."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from airground_drake.base.arrays import Array
+from airground_drake.ugv.binary_program import BinaryProgram, Programs
+from airground_drake.ugv.budget import Budget
+from airground_drake.ugv.drake_solvers import Minimiser, relax
+from airground_drake.ugv.plan_search import cheap_plan, distinct, improve
+from airground_drake.ugv.problem import Evaluation, Problem
+from airground_drake.ugv.relaxation import dual_bound, normals_along, sum_up_rounding, unavoidable_cost
+from airground_drake.ugv.routes.guard import guarded
+from airground_drake.ugv.solution import ConstantPlans, Solution, Status, cheapest
+
+_AGREE = 1e-6
+"""Costs that differ by less than this, relative, are equal: the solver's tolerances and ours."""
+_WORTH = 0.02
+"""Another search is made only if the relaxation comes nearer to the plan than this, relative: it is long otherwise."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Proof:
+    """The outcome of a search along half-planes.
+
+    Attributes:
+        status: 'optimal' if the bound is the optimum.
+        bound: lower bound along the half-planes.
+        normals: of these, (N, m, 3).
+        optimum: the plan; None without one.
+    """
+
+    status: Status
+    bound: float
+    normals: Array
+    optimum: Evaluation | None = None
+
+
+class MixedIntegerRoute:
+    """Mixed-integer quadratic programs with one binary per stage, or per block of stages, and a proof of optimality.
+
+    With half-planes for the exact distances, (26) is convex but for its binary variables. A solver finds the optimum
+    along half-planes at the better constant plan. That need not be the optimum of (26): it may cost several times as
+    much. So the route also looks for plans by (26) itself. `plan_search` takes the best of a beam, sum-up rounding, the
+    constant plans, the rest of the previous plan and the solver's optimum, and changes one or two choices while that
+    makes it cheaper. If the result is cheaper than the optimum along the half-planes, there are better half-planes: at
+    that plan, which along these costs what it costs by (26). The route solves again along these, improves what it
+    finds, and goes on until nothing becomes cheaper, unless the relaxation shows that the search would be long.
+
+    The plan returned is the cheapest by (26) of all these and of the same with the other first choice. `route_bound`
+    is the optimum along the half-planes of the last search that ended; the gap is 0.
+
+    Budget: only the clock can stop DAQP during a search, but it says how many iterations it took. If all searches
+    together take more than `search_iterations`, or the time `search_s` is up, or the solver fails, the best plan so far
+    decides. It does not depend on the clock. If no search ended, its bound is that of the relaxation.
+    """
+
+    def __init__(self, blocks: int | None = None, solver: str = "daqp") -> None:
+        """Choose blocks and solver.
+
+        Args:
+            blocks: binaries, each for a block of stages; they need not divide the stages. None: one per stage.
+            solver: of the search; one of `drake_solvers.SOLVERS`. Relaxations are DAQP's.
+
+        Raises:
+            ValueError: if there is less than one block, or the solver cannot be used here.
+        """
+        if blocks is not None and blocks < 1:
+            raise ValueError(f"blocks: {blocks}, allowed: 1 or more")
+        self._blocks = blocks
+        self._search, self._programs = Minimiser(solver), Programs()
+
+    def solve(self, problem: Problem, budget: Budget = Budget()) -> Solution:  # noqa: B008 (immutable)
+        """See `Route`."""
+        return guarded(problem, budget, self._solve)
+
+    def _solve(self, problem: Problem, constants: ConstantPlans, budget: Budget) -> Solution:
+        binary = self._programs.of(problem.stages, min(self._blocks or problem.stages, problem.stages))
+        normals = normals_along(problem, constants.better.positions)
+        shares, bound = _relaxed(binary, problem, normals)
+        known = _known(binary, problem, shares)
+        plan = problem.evaluate(cheap_plan(problem.terms, binary.block, known))
+        plans = [plan, *map(problem.evaluate, known)]
+        search = _Searches(self._search, binary, problem, budget)
+        proof = search.along(normals, plans, bound)
+        while proof.optimum is not None:
+            optimum = proof.optimum.omega
+            if not any(np.array_equal(optimum, one.omega) for one in plans):
+                plans += [proof.optimum, problem.evaluate(improve(problem.terms, binary.block, optimum, True)[0])]
+            plan = min(plans, key=lambda one: one.objective)
+            if plan.objective >= proof.bound * (1.0 - _AGREE):
+                break
+            again = search.again(plan)
+            if again is None or again.status != "optimal":
+                proof = replace(proof, status=again.status if again else proof.status)
+                break
+            proof = again
+        turned = [np.where(binary.block == 0, 1.0 - one.omega[0], one.omega) for one in plans]
+        return cheapest(
+            problem,
+            (constants.accept, constants.refuse, *plans, *map(problem.evaluate, turned)),
+            status=proof.status,
+            route_bound=max(proof.bound, unavoidable_cost(problem)),
+            normals=proof.normals,
+        )
+
+
+class _Searches:
+    """Searches for the optimum of one problem along several half-planes, which share a budget."""
+
+    def __init__(self, search: Minimiser, binary: BinaryProgram, problem: Problem, budget: Budget) -> None:
+        """With all of the budget left."""
+        self._search, self._binary, self._problem, self._budget = search, binary, problem, budget
+        self._iterations, self._until = budget.search_iterations, time.monotonic() + budget.search_s
+
+    def along(self, normals: Array, known: Sequence[Evaluation], relaxed: float) -> _Proof:
+        """Search along half-planes with unit normals (N, m, 3), from the best of known plans.
+
+        The program has these half-planes; `relaxed` is the lower bound by its relaxation.
+        """
+        problem = self._problem
+        costs = [problem.evaluate_half_planes(plan.positions, normals) for plan in known]
+        best = int(np.argmin(costs))
+        seconds = min(self._until - time.monotonic(), self._budget.left_s())
+        if seconds <= 0.0:
+            return _Proof("budget_spent", relaxed, normals)
+        found = self._search.minimise(self._binary, self._binary.guess(problem, known[best], normals), seconds)
+        self._iterations -= found.iterations
+        status: Status = found.ended if self._iterations >= 0 else "budget_spent"
+        if found.omega is None or status != "optimal":
+            return _Proof(status, relaxed, normals)
+        optimum = problem.evaluate(self._binary.plan(found.omega.round()))
+        cost = problem.evaluate_half_planes(optimum.positions, normals)
+        if cost > costs[best] * (1.0 + _AGREE):  # the solver is wrong
+            return _Proof("solver_failed", relaxed, normals)
+        return _Proof("optimal", min(cost, costs[best]), normals, optimum)
+
+    def again(self, plan: Evaluation) -> _Proof | None:
+        """Search along half-planes at a plan; None if the relaxation shows that this would be long."""
+        normals = normals_along(self._problem, plan.positions)
+        bound = _relaxed(self._binary, self._problem, normals)[1]
+        return None if bound < (1.0 - _WORTH) * plan.objective else self.along(normals, [plan], bound)
+
+
+def _known(binary: BinaryProgram, problem: Problem, shares: Array | None) -> list[Array]:
+    """Plans (N,) that need no search: constant ones, the rest of the previous one, and sum-up rounding of shares."""
+    count = len(binary.omega)
+    known = [np.ones(count), np.zeros(count)]
+    if problem.previous is not None:
+        known.append(binary.blocked(problem.previous))
+    if shares is not None:
+        known.append(sum_up_rounding(shares))
+    return distinct([binary.plan(values) for values in known])
+
+
+def _relaxed(binary: BinaryProgram, problem: Problem, normals: Array) -> tuple[Array | None, float]:
+    """Shares (B,) of the relaxation along half-planes with unit normals (N, m, 3), and its lower bound."""
+    binary.update(problem, normals)
+    shares = relax(binary).omega
+    if shares is None:
+        return None, -math.inf
+    shares = shares.clip(0.0, 1.0)
+    return shares, dual_bound(problem, normals, binary.plan(shares))

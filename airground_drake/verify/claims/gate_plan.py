@@ -1,0 +1,379 @@
+"""GATE-PLAN: every plan of a run is feasible at the cost that was recorded, and how far it is from the optimum.
+
+A decision's problem is convex once its plan is relaxed and its distances are measured along recorded unit normals,
+and convexity gives bounds that need no trust in any solver: see `convex_bounds.enclose`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from airground_drake.base.arrays import Array
+from airground_drake.sim.trace import Trace
+from airground_drake.verify.claim import TIME_TOLERANCE_S
+from airground_drake.verify.engines.geometry import interpolate
+from airground_drake.verify.finding import Finding
+from airground_drake.verify.runs.control_law import ON_TOP
+from airground_drake.verify.runs.convex_bounds import Enclosure, enclose
+from airground_drake.verify.runs.gate_record import (
+    LEAST_COST,
+    POSITION_TOLERANCE_M,
+    DecisionRecord,
+    Deviation,
+    GateClaim,
+    conclude,
+    cost_tolerance,
+    reasons_of,
+)
+from airground_drake.verify.runs.pairs import are_too_near
+from airground_drake.verify.runs.proposals import proposal_of
+from airground_drake.verify.runs.sum_up_rounding import compare_rounding, integrated_error_s, is_rounded
+
+SPEED_TOLERANCE = 1e-4
+"""A step may be longer than the speed limit allows by this, relative."""
+INSIDE_M = 1e-6
+"""Closer than the safe distance by more than this, m, the avoidance inequalities may ask for more speed than that:
+they ask for less than 1e-5 m/s per point before, at gains up to 10 1/s."""
+LONGER = 1e-6
+"""Of two ways left, one is longer if it is by more than this, relative."""
+WIDEST = 1e-5
+"""Width of an enclosure of the optimum, relative to the cheaper constant plan's cost, up to which a gap is known."""
+BLOCKS = 10
+"""All plans of at most so many choices are evaluated by exact distances, too."""
+MOST_BLOCKS = 12
+"""All plans of so many blocks can be evaluated along half-planes; they enclose the optimum of the route's problem."""
+JOINT_REFUSED = "joint_refused"
+"""Reason of a refusal that follows from another UGV's refusal, and not from the UGV's own two outcomes."""
+NO_PROBLEM = "method (d) compares two predicted outcomes and solves no problem (26)"
+
+
+@dataclass(frozen=True)
+class Choices:
+    """The evidence about decisions.
+
+    Attributes:
+        decisions: their number.
+        reasons: how many were made for each reason.
+        comparisons: numbers compared.
+        wrong: of these.
+        optimum: whether the optimum of every problem is known, and if not, why.
+        enumerated: decisions for which all plans were evaluated: at most `BLOCKS` choices, under (d) both outcomes.
+        largest_gap_to_enumeration: of such a plan to the best of all, relative to the best.
+    """
+
+    decisions: int
+    reasons: dict[str, int]
+    comparisons: int
+    wrong: int
+    optimum: str
+    enumerated: int
+    largest_gap_to_enumeration: float | None
+
+
+@dataclass(frozen=True)
+class Plans(Choices):
+    """The evidence where problems (26) were solved; gaps and enclosures are relative to the cheaper constant plan.
+
+    Attributes:
+        without_a_plan: refusals because there was no plan.
+        largest_slack_m: how far a plan leads inside a safe distance at most.
+        plans_with_slack: how many do.
+        rounded_plans: decisions with a relaxed plan.
+        largest_rounding_error_s: of sum-up rounding.
+        largest_gaps: the five largest, with robot and time; below 0: cheaper by exact distances.
+        median_gap: see above.
+        widest_enclosure: width of the bounds of an optimum.
+        first_stage_certified: plans whose first stage every plan with the other one costs more than.
+    """
+
+    without_a_plan: list[str]
+    largest_slack_m: float
+    plans_with_slack: int
+    rounded_plans: int
+    largest_rounding_error_s: float
+    largest_gaps: list[dict[str, Any]]
+    median_gap: float | None
+    widest_enclosure: float
+    first_stage_certified: int
+
+
+class GatePlan(GateClaim):
+    """GATE-PLAN."""
+
+    id = "GATE-PLAN"
+    summary = "Every decision rests on a plan that is feasible and costs what was recorded."
+    statement = (
+        "Under method (c) the plan of every decision satisfies (26b)-(26e) at its recorded cost, no step of it is "
+        "faster than the UGV may be, and relaxed plans were rounded by sum-up rounding, with an integrated error of at "
+        "most half a stage. Under method (d) a plan is one of two choices for good: no decision chose to stop short of "
+        "the goal where the other choice would not, or would stop nearer to it. The exception is a UGV that refuses "
+        "its part of a joint plan because another UGV refuses its own: then the other refusal must be recorded. The "
+        "margin is no condition: it is the largest gap between the cost of a plan and the optimum of the half-plane "
+        "problem, where that is known."
+    )
+    latex = (
+        r"\rho_k = \rho_{k-1} + \Delta t (\omega_k a_k + (1 - \omega_k) b_k), \quad \rho_0 = p(t), \quad "
+        r"\omega_k \in \{0, 1\}",
+        r"u_k = \max(0, \max_j (d_j - \lVert \rho_k - o_{jk} \rVert))",
+        r"J = \Delta t \sum_k (a \lVert \rho_{rd} - \rho_k \rVert^2 + b u_k^2) + w a \lVert \rho_{rd} - "
+        r"\rho_N \rVert^2, \quad w = 0 \text{ unless the scenario says so}",
+        r"\bar\omega_k = \begin{cases} 1 & D_k \ge 1 - D_k \\ 0 & \text{otherwise} \end{cases}, \quad "
+        r"D_k = \sum_{r \le k} \tilde\omega_r - \sum_{r < k} \bar\omega_r",
+        r"\max_k \left| \Delta t \sum_{r \le k} (\tilde\omega_r - \bar\omega_r) \right| \le \frac{\Delta t}{2}",
+        r"\text{gap} = \frac{J(\omega_{\text{plan}}) - L}{C}, \quad L \le \min_\omega J_n(\omega), \quad "
+        r"C = \min(J(0), J(1))",
+    )
+    method = (
+        "All numbers are computed again in numpy from the recorded problem. No step of a constant plan is longer than "
+        "the speed limit allows, unless it begins more than 1e-6 m inside a safe distance, where avoidance may demand "
+        "more. A stage of another plan is held to that only if the constant plan of its mode keeps clear there. "
+        "Rounding is judged stage by stage, by running sums of the recorded relaxed and rounded plans; after a deficit "
+        "within 1e-9 of 1/2 either mode may follow. For the gap, the half-plane problems of all decisions are stacked "
+        "into one convex program and solved by cvxpy and Clarabel. The solver is not trusted: its multipliers give the "
+        "lower bound L by weak duality, evaluated in numpy, whatever their quality; with up to 12 blocks of stages all "
+        "plans are evaluated instead. The gap is unknown if a plan has no half-planes (the route 'nonlinear' records "
+        "none) or if the bounds of an optimum are more than 1e-5 apart. Problems of at most 10 choices are also solved "
+        "by evaluating all plans with the exact distances of (26d)."
+    )
+    equations = "(22)-(29)"
+    assumptions = (
+        "The problem of each decision is the recorded one: mode velocities, reference, other bodies, weights and unit "
+        "normals. A half-plane is part of it only where some plan can come nearer than d: elsewhere (26d) asks for "
+        "nothing.",
+        "The cost of the choice that lost is the recorded one.",
+        "The recorded relaxed plan was rounded, and no other.",
+        "Under method (d), the recorded outcomes of both choices.",
+    )
+    does_not_establish = (
+        "That the prediction is right, or that the run went as predicted. (26d) is soft: a feasible plan may lead "
+        "inside a safe distance, at the cost of its slack (SAFE-TRACE is about safety). A wide gap refutes nothing: "
+        "half-planes are conservative, and the best plan by exact distances may cost less than their optimum. The "
+        "gatekeeper takes the cheapest plan it knows, which need not be the rounded one. Refusals without a plan "
+        "are only listed."
+    )
+
+    exercised_by = "decisions that rest on a plan or on predicted outcomes"
+
+    def judge_rows(self, trace: Trace, rows: list[DecisionRecord]) -> Finding:
+        """Judge every plan; the margin is the largest gap."""
+        if trace.meta["method"] not in ON_TOP:
+            return _judge_outcomes(trace, rows)
+        planned, rounded = [row for row in rows if row.planned], [row for row in rows if is_rounded(row)]
+        compared = [one for row in rows for one in compare_plan(trace, row)]
+        compared += [one for row in rounded for one in compare_rounding(row)]
+        blocks = int(trace.scenario.gatekeeper.blocks)
+        bounded = bound([row for row in planned if row.unit_normals], blocks)
+        evidence = _plans(trace, rows, bounded, compared, blocks)
+        known = evidence.optimum == "known"
+        worst = evidence.largest_gaps[0] if known else {}
+        finding = Finding(
+            "holds",
+            margin=max(0.0, worst["gap"]) if known else None,
+            unit="of the cheaper constant plan's cost",
+            quantity="largest gap of a plan to the half-plane optimum",
+            where={name: worst[name] for name in ("robot", "t_s") if known},
+            evidence=asdict(evidence),
+            exercised=len(planned),
+        )
+        return conclude(finding, compared)
+
+
+def _plans(
+    trace: Trace, rows: Sequence[DecisionRecord], bounded: Sequence[Bounded], compared: Sequence[Deviation], blocks: int
+) -> Plans:
+    planned, rounded = [row for row in rows if row.planned], [row for row in rows if is_rounded(row)]
+    gaps, widest = [each.gap for each in bounded], max((each.width for each in bounded), default=0.0)
+    slack = [float(np.maximum(0.0, -row.clearance(row["positions_m"])).max()) for row in planned]
+    beside_all = [above_the_best(row, blocks) for row in planned if min(blocks or row.stages, row.stages) <= BLOCKS]
+    optimum = "known" if planned else "unknown: no decision rests on a plan"
+    if len(bounded) < len(planned):
+        optimum = f"unknown: {len(planned) - len(bounded)} of {len(planned)} plans have no half-planes"
+    elif widest > WIDEST:
+        optimum = f"unknown: the bounds of an optimum are {widest:.2g} apart"
+    return Plans(
+        decisions=len(rows),
+        reasons=reasons_of(trace),
+        comparisons=len(compared),
+        wrong=sum(one.wrong for one in compared),
+        optimum=optimum,
+        enumerated=len(beside_all),
+        largest_gap_to_enumeration=max(beside_all, default=None),
+        without_a_plan=[row.label for row in rows if not row.planned],
+        largest_slack_m=max(slack, default=0.0),
+        plans_with_slack=sum(value > 0.0 for value in slack),
+        rounded_plans=len(rounded),
+        largest_rounding_error_s=max(map(integrated_error_s, rounded), default=0.0),
+        largest_gaps=[
+            {"t_s": each.row.t_s, "robot": each.row.robot, "gap": each.gap}
+            for each in sorted(bounded, key=lambda each: -each.gap)[:5]
+        ],
+        median_gap=float(np.median(gaps)) if gaps else None,
+        widest_enclosure=widest,
+        first_stage_certified=sum(each.first_stage_certified for each in bounded),
+    )
+
+
+def compare_plan(trace: Trace, row: DecisionRecord) -> Iterator[Deviation]:
+    """(26b)-(26e), (25) and what was recorded about the plan."""
+    limit = trace.scenario.ugvs[row.robot].max_speed_m_s
+    period = trace.scenario.control.period_s
+    begins = row["initial_m"] - interpolate(trace.t, trace.position(row.robot), row.t_s)
+    yield Deviation(row, "initial position, m", begins, POSITION_TOLERANCE_M)
+    refusing, accepting = row.constant
+    clear_refusing, clear_accepting = (_clear(trace, row, each, period) for each in (refusing, accepting))
+    ways = [("refusing throughout", refusing, clear_refusing), ("accepting throughout", accepting, clear_accepting)]
+    if row.planned:
+        plan = row["plan"]
+        positions = row["positions_m"]
+        given = row.given
+        yield Deviation(row, "omega is not binary", np.minimum(np.abs(plan), np.abs(plan - 1.0)), 0.0)
+        away = positions - row.positions(plan)
+        yield Deviation(row, "positions are not those of (23), m", away, POSITION_TOLERANCE_M)
+        # by (23) a mode's velocity is that of its own way, wherever the plan is
+        ways.append(("the plan", positions, np.where(plan == 1.0, clear_accepting, clear_refusing)))
+        cost = float(row.cost(positions))
+        clearance = min(float(row.clearance(positions).min()), 1e9)
+        first = "accept" if plan[0] == 1.0 else "refuse"
+        tolerance = cost_tolerance(cost)
+        yield Deviation(
+            row, "objective", given["objective"] - cost, tolerance, recomputed=cost, recorded=given["objective"]
+        )
+        yield Deviation(
+            row, "objective of its first stage", given[f"objective_{first}"] - cost, tolerance, recomputed=cost
+        )
+        other = min(given["objective_accept"], given["objective_refuse"])
+        for name, trajectory in zip(("refuse", "accept"), row.constant, strict=True):
+            thus = float(row.cost(trajectory))
+            shift = given[f"{name}_throughout"] - thus
+            yield Deviation(row, f"{name} throughout", shift, cost_tolerance(thus), recomputed=thus)
+        yield Deviation(row, "the other choice is cheaper", max(0.0, given["objective"] - other), tolerance)
+        yield Deviation(row, "first stage", float(given["plan_first_stage"] != first), 0.0, plan=first)
+        shift = given["predicted_clearance_m"] - clearance
+        yield Deviation(row, "predicted clearance, m", shift, POSITION_TOLERANCE_M, recomputed_m=clearance)
+    for name, positions, clear in ways:
+        step = np.linalg.norm(np.diff(positions, axis=0, prepend=row["initial_m"][None]), axis=1)
+        over = (step / (limit * row.dt) - 1.0)[clear]
+        yield Deviation(row, f"{name}: faster than the speed limit", np.maximum(0.0, over), SPEED_TOLERANCE)
+
+
+def _clear(trace: Trace, row: DecisionRecord, positions: Array, period: float) -> npt.NDArray[np.bool_]:
+    """Stages (N,) in which no control sample (every `period`, s) is within a safe distance by more than rounding.
+
+    Neither the points of the problem nor the barriers themselves may be so near: of a wall the problem has but points.
+    """
+    centres = row["centres_m"]
+    before = centres[0] - (centres[min(1, len(centres) - 1)] - centres[0])
+    start = (np.linalg.norm(row["initial_m"] - before, axis=1) - row["distances_m"]).min(initial=np.inf)
+    inside = np.concatenate([[start], row.clearance(positions)]) < -INSIDE_M
+    inside |= are_too_near(trace, row.robot, np.concatenate([row["initial_m"][None], positions]), row.t_s, INSIDE_M)
+    several = row.dt > period + TIME_TOLERANCE_S  # samples within the stage: what they see is not recorded
+    return ~(inside[:-1] | (inside[1:] & several))
+
+
+def _judge_outcomes(trace: Trace, rows: Sequence[DecisionRecord]) -> Finding:
+    """Method (d): the choice of every decision for which both outcomes were predicted, and that was the UGV's own."""
+    own = [row for row in rows if row.given["reason"] != JOINT_REFUSED]
+    looked = [row for row in own if row.given["accept_stalls"] >= 0.0]
+    compared = [one for row in looked for one in _compare_choice(trace, row)]
+    refused = {_part(trace, row) for row in own if row.given["decision"] == "refuse"}
+    for row in rows:
+        if row.given["reason"] == JOINT_REFUSED:
+            alone = row.given["decision"] != "refuse" or _part(trace, row) not in refused
+            compared.append(Deviation(row, "no other UGV refuses its part of the joint plan", float(alone), 0.0))
+    gaps = [_above_the_other(row) for row in looked]
+    evidence = Choices(
+        decisions=len(rows),
+        reasons=reasons_of(trace),
+        comparisons=len(compared),
+        wrong=sum(one.wrong for one in compared),
+        optimum=f"unknown: {NO_PROBLEM}",
+        enumerated=len(looked),
+        largest_gap_to_enumeration=max(gaps, default=None),
+    )
+    return conclude(Finding("holds", evidence=asdict(evidence), exercised=len(looked)), compared)
+
+
+def _part(trace: Trace, row: DecisionRecord) -> tuple[float, float, Sequence[str]]:
+    """When a decision was made, s, and the joint plan that it is about: when it was sent, s, and its parties."""
+    on = proposal_of(trace, row.number)
+    return row.t_s, on.issued_s, on.party or (on.ugv,)
+
+
+def _compare_choice(trace: Trace, row: DecisionRecord) -> Iterator[Deviation]:
+    """A choice that stops short of the goal, beside the other one; and what such a stop costs."""
+    given, speed = row.given, trace.scenario.ugvs[row.robot].preset.speed_m_s
+    chosen, other = ("accept", "refuse") if given["decision"] == "accept" else ("refuse", "accept")
+    worse = given[f"{chosen}_stalls"] - given[f"{other}_stalls"]
+    yield Deviation(row, f"{chosen} stops short of the goal, {other} does not", max(0.0, worse), 0.0)
+    if given["accept_stalls"] == given["refuse_stalls"] == 1.0:
+        longer = given[f"{chosen}_left_m"] / max(given[f"{other}_left_m"], LEAST_COST) - 1.0
+        yield Deviation(row, f"{chosen} stops farther from the goal than {other}", max(0.0, longer), LONGER)
+    for choice in (chosen, other):
+        cost, ahead = given[f"{choice}_outcome_m2_s"], given[f"{choice}_left_m"] ** 3 / (3.0 * max(speed, 1e-9))
+        off = cost - ahead if given[f"{choice}_stalls"] == 1.0 else min(0.0, cost - ahead)
+        yield Deviation(row, f"cost of the way left, {choice}", off, cost_tolerance(ahead), recomputed=ahead)
+
+
+def _above_the_other(row: DecisionRecord) -> float:
+    """How much the choice costs more than the better one, relative to that; 0 if only the other one stops short."""
+    cost = {choice: row.given[f"{choice}_outcome_m2_s"] for choice in ("accept", "refuse")}
+    if row.given["accept_stalls"] != row.given["refuse_stalls"]:
+        return 0.0
+    best = min(cost.values())
+    return float(cost["accept" if row.given["decision"] == "accept" else "refuse"] - best) / max(best, LEAST_COST)
+
+
+@dataclass(frozen=True)
+class Bounded:
+    """A decision with a plan, and bounds of the optimum of the problem that its route solves."""
+
+    row: DecisionRecord
+    optimum: Enclosure
+
+    @cached_property
+    def gap(self) -> float:
+        """Cost of the plan by exact distances above the lower bound, in units of the row's scale."""
+        return (float(self.row.cost(self.row["positions_m"])) - self.optimum.lower) / self.row.scale
+
+    @property
+    def width(self) -> float:
+        """Width of the enclosure, in the same units."""
+        return (self.optimum.upper - self.optimum.lower) / self.row.scale
+
+    @property
+    def first_stage_certified(self) -> bool:
+        """Whether no plan with the other first stage can be as cheap as this one."""
+        return self.optimum.other_first > self.optimum.lower + self.gap * self.row.scale
+
+
+def bound(rows: Sequence[DecisionRecord], blocks: int) -> list[Bounded]:
+    """Bounds for each decision: of the relaxation, or of all plans if `blocks` are few (0: one per stage)."""
+    optima = [cheapest_of_blocks(row, blocks) for row in rows] if 0 < blocks <= MOST_BLOCKS else enclose(rows)
+    return [Bounded(*one) for one in zip(rows, optima, strict=True)]
+
+
+def cheapest_of_blocks(row: DecisionRecord, blocks: int) -> Enclosure:
+    """The cheapest along the half-planes of all plans that are constant on blocks, by evaluating each."""
+    omega = plans_of_blocks(row.stages, blocks)
+    cost = row.cost(row.positions(omega), row.half_planes)
+    least = float(cost.min())
+    return Enclosure(least, least, float(cost[omega[:, 0] != row["plan"][0]].min()))
+
+
+def above_the_best(row: DecisionRecord, blocks: int) -> float:
+    """How much the plan costs more than the best of all plans, by exact distances, relative to the best."""
+    best = float(row.cost(row.positions(plans_of_blocks(row.stages, blocks or row.stages))).min())
+    return (float(row.cost(row["positions_m"])) - best) / max(best, LEAST_COST)
+
+
+def plans_of_blocks(stages: int, blocks: int) -> Array:
+    """All plans of so many stages that are constant on blocks, (2^B, N)."""
+    blocks = min(blocks, stages)
+    modes = (np.arange(2**blocks)[:, None] >> np.arange(blocks)) % 2
+    return modes[:, np.arange(stages) * blocks // stages].astype(np.float64)

@@ -1,0 +1,55 @@
+"""LIVE-GATE: an accepted intervention is not reversed without news, and ends in time (coq/Patience.v)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from airground_drake.verify.claims.live_wait import LiveWait
+from airground_drake.verify.model.theorem import Proof
+
+
+@dataclass(frozen=True, kw_only=True)
+class LatestEnd(Proof):
+    """After how long an accepted intervention is over at the latest, s."""
+
+    over_after_s: float
+
+
+class LiveGate(LiveWait):
+    """LIVE-GATE; its hypotheses are those of LIVE-WAIT."""
+
+    id = "LIVE-GATE"
+    summary = "An accepted intervention is carried through to its end, unless a new obstacle is sensed."
+    statement = (
+        "Under method (d) an accepted intervention is never reversed as long as no obstacle is sensed that was not "
+        "known at its acceptance, and is over when its motion is, or when it has lasted as long as it may."
+    )
+    latex = (
+        r"\text{accepted}(t) \text{ for } t_0 \le t < \min(t_{\text{motion}}, t_0 + \tau_{\text{longest}})",
+        r"t_{\text{over}} \le \min(t_{\text{motion}}, t_0 + \tau_{\text{longest}}) + h, \quad "
+        r"h \text{ the period of the gatekeeper}",
+    )
+    method = (
+        "Theorems in Coq about the transitions of a commitment. Tests compare those of the running `Patience` with the "
+        "theorem's, and disturb the running gatekeeper and control law. LIVE-HYP checks the hypotheses on every run "
+        "under (d). The report counts the acceptances during which no obstacle was new and none in range may move."
+    )
+    equations = "(20)"
+    assumptions = (
+        "No obstacle is sensed that the UGV did not know at its acceptance. Obstacles in range stand still: an "
+        "intervention beside one that may move is not counted.",
+        "The UAV does not withdraw the proposal. It withdraws all parts of a joint plan when one UGV refuses its part; "
+        "a part is executed only while the others are accepted or done.",
+        "The gatekeeper is sampled every period. Rounding of times is not counted.",
+    )
+    does_not_establish = (
+        "That a proposal is accepted, or that the UGV is where it was predicted to be: that depends on the other "
+        "robots. LIVE-WAIT bounds the time."
+    )
+
+    theorems = ("Patience.kept", "Patience.over_in_time")
+
+    def evidence(self, inputs: dict[str, Any], **proof: Any) -> Proof:
+        """Add the longest that an accepted intervention may last."""
+        return LatestEnd(over_after_s=float(inputs["longest_s"] + inputs["period_s"]), **proof)

@@ -1,0 +1,126 @@
+"""LIVE-GOAL: where the robots of a run ended. For a robot that collides, the run ends there."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from airground_drake.base.arrays import Array
+from airground_drake.base.errors import TraceError
+from airground_drake.sim.collisions import first_collisions
+from airground_drake.sim.trace import Trace
+from airground_drake.verify.claim import TraceClaim
+from airground_drake.verify.engines.geometry import interpolate
+from airground_drake.verify.finding import Finding
+
+AT_REST_S = 1.0
+"""A stalled UGV must have stood still for this long at the end of the run, s."""
+
+AT_REST_M = 1e-3
+"""Standing still: no farther than this from the final position, m (the paper's figures resolve about 0.1 m)."""
+
+
+class LiveGoal(TraceClaim):
+    """LIVE-GOAL."""
+
+    id = "LIVE-GOAL"
+    summary = "Every robot ended where it must: at its target, or where the scenario says that it stalls."
+    statement = (
+        "Every robot ended the run at its target, or standing where the scenario declares that it stalls. For a robot "
+        "that collided, its motion before the first collision counts."
+    )
+    latex = (
+        r"\lVert p_i(T) - \text{target}_i \rVert \le \varepsilon_{\text{arrival}}",
+        r"\text{declared stall: } \lVert p_i(T) - s_i \rVert \le \varepsilon_{\text{stall}}, \quad \lVert "
+        r"p_i(T) - \text{target}_i \rVert > \varepsilon_{\text{arrival}}",
+        r"\text{and } \lVert p_i(t) - p_i(T) \rVert \le 10^{-3} \text{ m for } t \ge T - 1 \text{ s}",
+    )
+    method = (
+        "The last row of the trace, or the last one before the robot's first collision; for stalls the rows of the "
+        "last second before it (straight motion in between)."
+    )
+    equations = "(6), (9)-(10)"
+    assumptions = ("The scenario's duration is long enough to judge: the run is not continued.",)
+    does_not_establish = (
+        "Arrival from other starts, without bound on time, or that a stalled UGV would stay for ever; nor that robots "
+        "tracked their preset on the way. Without potential or navigation function no convergence proof exists."
+    )
+
+    exercised_by = "robots that had a way to go to where they must end"
+
+    def check(self, trace: Trace) -> Finding:
+        """Compare each robot's end with what its scenario declares; the least margin is reported."""
+        stalls = trace.scenario.runs[trace.run].stalls_m
+        if unknown := set(stalls) - set(trace.ugvs):
+            raise TraceError(f"stalls_m names {sorted(unknown)}, which are not UGVs of the trace")
+        judged = list(_conditions(trace, stalls))
+        hits = first_collisions(trace.events)
+        for entry in (one.entry for one in judged if one.entry["robot"] in hits):
+            entry["collided_s"] = hits[entry["robot"]]["t_s"]
+        conditions, had_a_way = [one.entry for one in judged], [one.entry["robot"] for one in judged if one.had_a_way]
+        worst = min(conditions, key=lambda one: (one["margin_m"] >= 0.0, "collided_s" not in one, one["margin_m"]))
+        live = all(one["margin_m"] >= 0.0 for one in conditions)
+        return Finding(
+            "holds" if live else "refuted",
+            margin=worst["margin_m"],
+            unit="m",
+            quantity="tolerance left about where a robot must end",
+            where={key: worst[key] for key in ("robot", "condition", "collided_s") if key in worst},
+            counterexample=None if live else worst,
+            evidence={"conditions": conditions, "had_a_way_to_go": had_a_way} | ({"kind": "stuck"} if stalls else {}),
+            exercised=len(had_a_way),
+        )
+
+
+class Condition(NamedTuple):
+    """A condition on a robot's end, as evidence, and whether the robot did not begin where it has to end."""
+
+    entry: dict[str, Any]
+    had_a_way: bool = False
+
+
+def _conditions(trace: Trace, stalls: Mapping[str, Sequence[float]]) -> Iterator[Condition]:
+    """What the scenario declares of each robot's end, with the margins, m; `stalls` has the stall points of UGVs, m."""
+    scenario, uav, arrival = trace.scenario, trace.scenario.uav, float(trace.scenario.arrival_tolerance_m)
+    for ugv in trace.ugvs:
+        target = scenario.ugvs[ugv].target_m
+        if ugv not in stalls:
+            yield _within(trace, ugv, "at its target", target, arrival)
+            continue
+        yield _within(trace, ugv, "at its stall point", stalls[ugv], scenario.stall_tolerance_m)
+        moved = moved_at_the_end(trace, ugv)
+        yield Condition({"robot": ugv, "condition": "stands", "moved_m": moved, "margin_m": AT_REST_M - moved})
+        away = float(np.linalg.norm(_end(trace, ugv) - target))
+        yield Condition({"robot": ugv, "condition": "short of its target", "margin_m": away - arrival})
+    if stalls:
+        centroid = np.mean([trace.position(ugv)[-1] for ugv in trace.ugvs], axis=0)
+        over = centroid + np.array([0.0, 0.0, uav.altitude_m])
+        yield _within(trace, uav.name, "over the centroid of the UGVs", over, arrival)
+    else:
+        yield _within(trace, uav.name, "at its target", uav.target_m, arrival)
+
+
+def _within(trace: Trace, robot: str, condition: str, point: Array | Sequence[float], tolerance_m: float) -> Condition:
+    """That a robot ends no farther from a point, (3,), m, than a tolerance."""
+    there = np.asarray(point, dtype=np.float64)
+    begin, end = trace.position(robot)[0], _end(trace, robot)
+    before, after = (float(np.linalg.norm(place - there)) for place in (begin, end))
+    at = {"robot": robot, "condition": condition, "point_m": there.tolist(), "final_m": end.tolist()}
+    return Condition({**at, "distance_m": after, "margin_m": tolerance_m - after}, before > tolerance_m)
+
+
+def _end(trace: Trace, robot: str) -> Array:
+    """Where a robot is at the end of the run, or at the last row before its first collision, (3,), m."""
+    end: Array = trace.position(robot)[trace.counting_rows(robot) - 1]
+    return end
+
+
+def moved_at_the_end(trace: Trace, robot: str) -> float:
+    """Largest distance from the place of `_end` during the last `AT_REST_S` before it, m; convex between rows."""
+    rows = trace.counting_rows(robot)
+    t, position = trace.t[:rows], trace.position(robot)[:rows]
+    begin = max(t[-1] - AT_REST_S, t[0])
+    path = np.vstack([interpolate(t, position, begin), position[t >= begin]])
+    return float(np.linalg.norm(path - position[-1], axis=1).max())

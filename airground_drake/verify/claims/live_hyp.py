@@ -1,0 +1,121 @@
+"""LIVE-HYP: a run meets the hypotheses of LIVE-WAIT and LIVE-GATE (coq/Patience.v)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from airground_drake.sim.trace import Trace
+from airground_drake.verify.claim import TIME_TOLERANCE_S
+from airground_drake.verify.finding import Finding
+from airground_drake.verify.runs.acceptances import METHOD, Acceptance, acceptances
+from airground_drake.verify.runs.gate_record import DecisionRecord, GateClaim
+
+
+@dataclass(frozen=True)
+class Followed:
+    """The evidence: acceptances, and the most of them and the longest time executed between two rests of a UGV."""
+
+    acceptances: int
+    given_back: int
+    most_tries: int
+    longest_between_rests_s: float
+
+
+class LiveHyp(GateClaim):
+    """LIVE-HYP."""
+
+    id = "LIVE-HYP"
+    summary = "No UGV followed the UAV more often or longer than it may, or changed its mind without a new obstacle."
+    statement = (
+        "Between two rests, no UGV accepted more proposals than it may, and none executed proposals for longer than "
+        "LIVE-WAIT allows. Every acceptance was over in time. No UGV gave back a proposal earlier, unless it sensed an "
+        "obstacle for the first time that was not on the proposal's map."
+    )
+    formula = (
+        "between two rests of rest_s on its own: acceptances <= tries, time executed <= tries (longest_s + h); "
+        "end <= until + h, until = min(end of motion, t0 + longest_s); given back before until only with news; h the "
+        "period of the gatekeeper"
+    )
+    latex = (
+        r"\text{between two rests: acceptances} \le N, \quad \text{time executed} \le N (\tau_{\text{longest}} + h)",
+        r"t_{\text{end}} \le \min(t_{\text{motion}}, t_0 + \tau_{\text{longest}}) + h",
+    )
+    method = (
+        "Intervals of acceptance follow from the decisions of each UGV. What it executed is recorded at each control "
+        "sample. Which obstacles were new to it is recorded with its decisions."
+    )
+    equations = "(20)"
+    assumptions = ("A proposal without a decision at a sample of the gatekeeper is no longer in force.",)
+    does_not_establish = (
+        "That accepted proposals were useful, or that UGVs arrive (LIVE-GOAL). Why proposals were accepted or refused."
+    )
+
+    exercised_by = "acceptances"
+
+    def applies(self, trace: Trace) -> bool:
+        """Only method (d) has tries and rests."""
+        return trace.meta.get("method") == METHOD
+
+    def judge_rows(self, trace: Trace, rows: list[DecisionRecord]) -> Finding:
+        """Go through all acceptances; the margin is what is left of the time that LIVE-WAIT allows."""
+        gate, found = trace.scenario.gatekeeper, acceptances(trace)
+        allowed_s = gate.tries * (gate.longest_s + gate.period_s)
+        most, longest_s, where = 0, 0.0, dict[str, Any]()
+        wrong = [fault for each in found.values() for fault in _wrong(trace, each)]
+        for ugv, each in found.items():
+            begins = _after_rests(each, gate.rest_s)
+            tries = np.diff(np.searchsorted([one.t_s for one in each], [*begins, np.inf]))
+            executed_s = _executed_s(trace, ugv, begins)
+            k = int(np.argmax(executed_s))
+            most = max(most, int(tries.max()))
+            if executed_s[k] >= longest_s:
+                longest_s, where = float(executed_s[k]), {"robot": ugv, "t_s": begins[k]}
+            over = {"what": "more acceptances between two rests than allowed", "allowed": gate.tries}
+            wrong += [
+                {"robot": ugv, "t_s": begin, "found": int(count), **over}
+                for begin, count in zip(begins, tries, strict=True)
+                if count > gate.tries
+            ]
+        if longest_s > allowed_s + TIME_TOLERANCE_S:
+            wrong.append({**where, "what": "longer from its own task than allowed, s", "found": longest_s})
+        total = [one for each in found.values() for one in each]
+        return Finding(
+            "refuted" if wrong else "holds",
+            margin=allowed_s - longest_s if not wrong or longest_s > allowed_s else None,
+            unit="s",
+            quantity="time that LIVE-WAIT allows between two rests, less the longest that was executed",
+            where=where,
+            counterexample=min(wrong, key=lambda fault: float(fault["t_s"]), default=None),
+            evidence=asdict(Followed(len(total), sum(one.given_back for one in total), most, longest_s)),
+            exercised=len(total),
+        )
+
+
+def _wrong(trace: Trace, of_ugv: list[Acceptance]) -> Iterator[dict[str, Any]]:
+    """Acceptances that were over too late, or given back too early without news."""
+    period_s = trace.scenario.gatekeeper.period_s
+    for one in of_ugv:
+        at = {"robot": one.on.ugv, "t_s": one.end_s, "number": one.on.number, "until_s": one.until_s}
+        if one.end_s > one.until_s + period_s + TIME_TOLERANCE_S:
+            yield {**at, "what": "an acceptance was over too late"}
+        early = one.given_back and one.end_s < one.until_s - TIME_TOLERANCE_S
+        if early and one.end_s not in one.news_s:
+            yield {**at, "what": "an acceptance was reversed without news"}
+
+
+def _after_rests(of_ugv: list[Acceptance], rest_s: float) -> list[float]:
+    """When tries begin to count anew, s: at the start of the run, and at each acceptance after a rest."""
+    ends = [0.0, *(one.end_s for one in of_ugv)]
+    rested = (one.t_s for one, end_s in zip(of_ugv, ends, strict=False) if one.t_s - end_s >= rest_s - TIME_TOLERANCE_S)
+    return [0.0, *(t_s for t_s in rested if t_s > 0.0)]
+
+
+def _executed_s(trace: Trace, ugv: str, begins: list[float]) -> list[float]:
+    """For how long a UGV executed proposals between such instants, s."""
+    followed = np.append(trace.sampled(f"{ugv}.executing") >= 0, False).astype(np.int64)
+    cuts = np.searchsorted(trace.sampled("t_s"), np.array(begins) - TIME_TOLERANCE_S)
+    return [float(count) * trace.scenario.control.period_s for count in np.add.reduceat(followed, cuts)]

@@ -1,0 +1,72 @@
+"""LIVE-WAIT: no UAV keeps a UGV from its own task for longer than a bound (coq/Patience.v)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from airground_drake.base.exact import decimal
+from airground_drake.scenario.schema import Scenario
+from airground_drake.verify.model.theorem import Hypothesis, Proof, TheoremClaim
+
+
+@dataclass(frozen=True, kw_only=True)
+class Bound(Proof):
+    """How long a UAV can keep a UGV from its own task between two rests, s."""
+
+    bound_s: float
+
+
+class LiveWait(TheoremClaim):
+    """LIVE-WAIT."""
+
+    id = "LIVE-WAIT"
+    summary = "No UAV can keep a UGV from its own task for ever."
+    statement = (
+        "Under method (d) no UAV keeps a UGV from its own task for longer than a bound, whatever it proposes, "
+        "withdraws, says of its map or names as its cause: after so long the UGV is on its own until it has rested."
+    )
+    latex: tuple[str, ...] = (
+        r"\text{time executed between two rests} \le N (\tau_{\text{longest}} + h), \quad N \text{ tries}, \; "
+        r"h \text{ the period of the gatekeeper}",
+    )
+    method = (
+        "Theorems in Coq, by induction over any messages at any samples; the bounds follow from the scenario. Tests "
+        "compare the transitions of the running `Patience` with the theorem's, and attack running gatekeepers that "
+        "believe every prediction. LIVE-HYP checks tries and times on every run under (d)."
+    )
+    equations = "(20)"
+    assumptions: tuple[str, ...] = (
+        "The gatekeeper is sampled every period, and the controller executes what it accepts at its next sample.",
+        "Rounding of times, 1e-15 s, is not counted.",
+    )
+    does_not_establish = (
+        "That an accepted intervention is useful, that the UGV gets anywhere on its own, or that refused proposals "
+        "cost only messages. Safety is SAFE-GATE."
+    )
+
+    theorems: tuple[str, ...] = ("Patience.bounded",)
+    margin_of = "longest intervention allowed"
+
+    def inputs(self, scenario: Scenario) -> dict[str, Any]:
+        """The numbers of a UGV's patience, and the period of the gatekeeper, s."""
+        gate = scenario.gatekeeper
+        return {
+            "tries": int(gate.tries),
+            "rest_s": float(gate.rest_s),
+            "longest_s": float(gate.longest_s),
+            "period_s": float(gate.period_s),
+        }
+
+    def hypotheses(self, inputs: dict[str, Any]) -> list[Hypothesis]:
+        """Times are positive."""
+        longest, period = decimal(inputs["longest_s"]), decimal(inputs["period_s"])
+        return [
+            Hypothesis.of(self.margin_of, "the longest intervention takes more than 0 s", longest, "s", strict=True),
+            Hypothesis.of("gatekeeper's period", "the gatekeeper's period is above 0", period, "s", strict=True),
+        ]
+
+    def evidence(self, inputs: dict[str, Any], **proof: Any) -> Proof:
+        """Add the bound."""
+        bound = inputs["tries"] * (decimal(inputs["longest_s"]) + decimal(inputs["period_s"]))
+        return Bound(bound_s=float(bound), **proof)

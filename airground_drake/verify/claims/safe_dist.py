@@ -1,0 +1,129 @@
+"""SAFE-DIST: the distance that remains when velocities are disturbed (coq/Budget.v, Gate.v).
+
+Every robot moves with v + e(t), ||e(t)|| <= w, instead of v; W is what the disturbances of a pair add up to: w beside
+an obstacle, 2 w between robots. Other symbols are those of `safe_inv.py`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from fractions import Fraction
+from math import inf
+from typing import Any
+
+from airground_drake.base.exact import decimal
+from airground_drake.scenario.schema import Scenario
+from airground_drake.verify.claims.safe_inv import stable
+from airground_drake.verify.model.pair_kinds import PairKind, constants, kinds_of
+from airground_drake.verify.model.theorem import Hypothesis, Proof, TheoremClaim
+
+
+@dataclass(frozen=True, kw_only=True)
+class LeastDistances(Proof):
+    """The least distances of a centre from the other's core, m, by kind of pair; none without a gain.
+
+    Of all runs of a report the periods in which a robot was too near to an obstacle that may move: with `w_h_once` it
+    retreats at w or more, and with `kept` at w + V or more.
+    """
+
+    least_distances_m: dict[str, float] | None = None
+    passive_periods: int | None = None
+    passive_periods_w_h_once: int | None = None
+    passive_periods_kept: int | None = None
+
+
+class SafeDist(TheoremClaim):
+    """SAFE-DIST."""
+
+    id = "SAFE-DIST"
+    summary = "Bounded velocity errors cost a bounded distance."
+    statement = (
+        "If velocities are disturbed by at most w and A h <= 1, no distance falls below d - w/A (obstacle) or "
+        "d - 2 w/A (two disturbed robots), as long as its own inequality is met at every sample. After N periods "
+        "inside in a row the distance is at least d - (1 - (1 - A h)^N) W/A if it was d before, W = w or 2 w. "
+        "A robot whose turning or wheel limit leaves the share s of a command meets it with the gain s A: all this "
+        "then holds with s A for A, s the least share of the run. "
+        "With several points, each with D >= d - W/A, all inequalities can be met at once if there is a unit vector g "
+        "with n.g >= m > 0 for every point with D < d + h W/m; then all these bounds are kept together. All this is "
+        "about robots and bodies at rest. Beside an obstacle that may move with V the passive inequality restores "
+        "nothing: w costs w h in each period. With a retreat n.v >= w it costs w h once, and with n.v >= w + V nothing "
+        "is lost."
+    )
+    latex = (
+        r"A h \le 1, \; \lVert e \rVert \le w, \; D(0) \ge d - \frac{W}{A} \; \Rightarrow \; D(t) \ge d - "
+        r"\frac{W}{A} \text{ for all } t",
+        r"W = w \text{ (obstacle)}, \quad W = 2 w \text{ (two disturbed robots)}",
+    )
+    method = (
+        "Theorems in Coq: a pair whose radial speed falls short by at most W keeps d - W/A. The hypotheses are checked "
+        "here in exact arithmetic. Tests drive the running layer through disturbed runs."
+    )
+    equations = "(7)-(8), (11) in the inequality form of the package (set-based avoidance)"
+    assumptions = (
+        "The disturbance may change at any time, but is bounded by w in every direction (for a UGV: in its plane).",
+        "An obstacle at rest is a convex set, or several, each counted as one point in what follows. Inside a safe "
+        "distance v = 0 is not feasible, and the inequalities of several points can contradict each other; the layer "
+        "then takes the least violation. So: one violated inequality at a time, or a common direction g as in the "
+        "statement. A UGV straight under the UAV has no such direction; there its disturbance does not count either, "
+        "and the UAV's half suffices (`Gate.overhead`).",
+        "w is 10 % of the largest speed limit, but at most A/4 times the smallest safe distance, so that at least half "
+        "of that distance is left. It is a choice, not a property of a robot.",
+        "Positions are measured exactly and without delay.",
+        "While a pair is out of sensing range, its robots command no more than their speed limits, and w comes on top. "
+        "The layer itself may ask for more within a safe distance of something else.",
+    )
+    does_not_establish = (
+        "That the disturbance of a real robot stays below w; nor any distance from an obstacle that may move: the "
+        "report counts the periods in which a robot that was too near to one retreated fast enough; nor anything where "
+        "inequalities contradict each other: a disturbed robot can press another, whose half of the pair's inequality "
+        "has no room, into an obstacle, as far as contact. It does not bound how long a robot stays inside the safe "
+        "distance, nor how fast it recovers: the layer's velocities there are not limited."
+    )
+
+    theorems = (
+        "Budget.budget_always",
+        "Turning.shortened_gain",
+        "Gate.deficit_closed_form",
+        "Gate.common_direction",
+        "Gate.overhead",
+        "Passive.restored",
+        "Passive.loss_is_real",
+    )
+    margin_of = "distance from centre to core that is left, d - W/A"
+
+    def inputs(self, scenario: Scenario) -> dict[str, Any]:
+        """The constants of SAFE-INV, and the bound on the disturbance, m/s."""
+        given = constants(scenario)
+        least = float(min(each.safe_m for each in kinds_of(given)))
+        fastest = max(robot.max_speed_m_s for robot in scenario.robots.values())
+        return {**given, "disturbance_m_s": min(0.1 * fastest, given["avoidance_gain_1_s"] * least / 4.0)}
+
+    def hypotheses(self, inputs: dict[str, Any]) -> list[Hypothesis]:
+        """A is positive, A h at most 1; robots stay apart, so that the normals are defined."""
+        gain, h = decimal(inputs["avoidance_gain_1_s"]), decimal(inputs["period_s"])
+        found = [
+            *stable(gain, h),
+            Hypothesis.of("A", "the gain A is above 0: it restores a distance", gain, "1/s", strict=True),
+        ]
+        if gain <= 0:
+            return found
+        return found + [
+            Hypothesis.of(self.margin_of, f"{each.kind}: d - W/A is above 0", left_m(inputs, each), "m", strict=True)
+            for each in kinds_of(inputs)
+        ]
+
+    def evidence(self, inputs: dict[str, Any], **proof: Any) -> LeastDistances:
+        """Add the least distances."""
+        if not inputs["avoidance_gain_1_s"] > 0.0:
+            return LeastDistances(**proof)
+        least = dict[str, float]()
+        for pair in kinds_of(inputs):
+            least[pair.kind] = min(float(left_m(inputs, pair)), least.get(pair.kind, inf))
+        return LeastDistances(least_distances_m=least, **proof)
+
+
+def left_m(inputs: dict[str, Any], pair: PairKind) -> Fraction:
+    """d - W/A, m."""
+    disturbed = 1 if pair.kind == "obstacle" else 2
+    pushed = disturbed * decimal(inputs["disturbance_m_s"])
+    return pair.safe_m - pushed / decimal(inputs["avoidance_gain_1_s"])

@@ -1,0 +1,57 @@
+"""SAFE-GATE: under method (d) no intervention, accepted or not, leaves the safe set (coq/Gate.v, Safety.v)."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from typing import Any
+
+from airground_drake.base.registry import METHODS
+from airground_drake.scenario.schema import Scenario
+from airground_drake.verify.claims.safe_inv import SafeInv
+from airground_drake.verify.model.theorem import Hypothesis
+
+
+class SafeGate(SafeInv):
+    """SAFE-GATE; its hypotheses are those of SAFE-INV and one more."""
+
+    id = "SAFE-GATE"
+    summary = "Under method (d) nothing that the UAV asks for makes a robot bring itself closer than the safe distance."
+    statement = (
+        "Under method (d) no intervention, accepted or not, leaves the safe set. The avoidance layer comes last, and "
+        "from a safe state any command, scaled back far enough, meets every inequality; SAFE-INV does the rest. "
+        "Neither the optimiser nor its horizon, nor the UAV as an adviser is trusted; as a robot the UAV must keep its "
+        "own share of each inequality. This is about robots and bodies at rest. Beside an obstacle that may move, "
+        "nothing that the UAV asks for makes a robot bring itself too near: v = 0 meets the passive inequality, too."
+    )
+    latex = (
+        r"b_k \le 0, \; 0 \le c \le \frac{b_k}{n_k^\top u} \text{ wherever } n_k^\top u < b_k \; \Rightarrow \; "
+        r"n_k^\top (c u) \ge b_k \text{ for all } k",
+    )
+    method = (
+        "A theorem in Coq: the last step of the layer scales a command back, towards 0, and a factor c as in the "
+        "formula exists wherever standing still is allowed. The hypotheses of SAFE-INV are checked again, and that "
+        "method (d) has avoidance above the intervention. Tests drive the running layer and the controllers of a built "
+        "diagram by hostile inputs."
+    )
+    equations = "(20) against the priorities of method (d); (5), (7)-(8), (14)"
+    assumptions = (
+        "SAFE-INV and its assumptions; the state is safe at the start.",
+        "The UAV flies by its own avoidance layer: it takes half of each inequality, straight above a UGV all of it.",
+    )
+    does_not_establish = (
+        "That an intervention is useful, or that the robots get anywhere, or that an obstacle that moves stays away. "
+        "Nothing is said of methods (b) and (c), which put interventions on top. That the built controllers have these "
+        "priorities and limits is for SAFE-HYP to compare, run by run."
+    )
+
+    theorems = ("Gate.scaled_back", "Safety.standing", "Safety.safe_always", "Passive.own_doing")
+
+    def inputs(self, scenario: Scenario) -> dict[str, Any]:
+        """Those of SAFE-INV, and whether method (d) puts an intervention above avoidance."""
+        return {**super().inputs(scenario), "intervention_on_top": METHODS["d"].intervention_on_top}
+
+    def hypotheses(self, inputs: dict[str, Any]) -> list[Hypothesis]:
+        """Those of SAFE-INV, and the order of priorities."""
+        on_top = Fraction(inputs["intervention_on_top"])
+        order = Hypothesis.of("order of priorities", "method (d) has avoidance above the intervention", -on_top)
+        return [*super().hypotheses(inputs), order]

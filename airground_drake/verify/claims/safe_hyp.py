@@ -1,0 +1,517 @@
+"""SAFE-HYP: the hypotheses of the safety theorems along a run, recomputed from its positions.
+
+Exact arithmetic (`engines.shortfalls`) finds how far each step misses the avoidance inequalities, and the distance that
+follows. The parameters of the controllers are compared with the scenario (`demands`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, dataclass
+from fractions import Fraction
+from functools import cache
+from itertools import groupby
+from math import inf, isfinite, nextafter
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from airground_drake.base.arrays import Array
+from airground_drake.base.exact import decimal
+from airground_drake.sim.trace import Trace
+from airground_drake.verify.claim import TIME_TOLERANCE_S, TraceClaim
+from airground_drake.verify.engines.bodies import kept_m, room_of
+from airground_drake.verify.engines.geometry import interpolate
+from airground_drake.verify.engines.outlines import Cores, apart_by_blocks
+from airground_drake.verify.engines.shortfalls import POINT, SCREEN_M, rounded_up, shortage, shortfalls
+from airground_drake.verify.finding import Finding
+from airground_drake.verify.runs.control_law import inequalities_of
+from airground_drake.verify.runs.demands import differences
+from airground_drake.verify.runs.pairs import (
+    DISTANCE_TOLERANCE_M,
+    Pair,
+    apart_of,
+    cores_of,
+    distances_when_there,
+    is_planar,
+    pairs_of,
+    parts_of,
+    snapshot,
+    start_margin,
+)
+from airground_drake.verify.runs.passive import beside, beside_moving, last_period, period_ends, speeds
+
+VELOCITY_TOLERANCE_M_S = 1e-9
+"""A speed may be above its limit by this much, m/s: a command that is shortened to its limit errs by 1e-15 m/s, and in
+one period of 25 ms this moves a robot by 2.5e-11 m."""
+BINDING_M_S = 1e-9
+"""An avoidance inequality binds where a command has no more than this to spare, m/s."""
+MOST_LISTED = 300
+"""Pairs that the evidence lists at most: those with the least guarantee."""
+AVOIDANCE = "avoidance"
+"""The hypothesis that the steps met the inequalities."""
+PASSIVE = "avoidance beside an obstacle that may move"
+"""The hypothesis that the steps met the passive law."""
+DECLARED = "declared speed"
+"""The hypothesis that an obstacle moved no faster than it was expected to."""
+FORWARDS = "never backwards"
+"""The hypothesis that a unicycle that must not drive backwards does not."""
+START, BODIES = "safe start", "safe start of the bodies"
+"""The hypotheses that a pair begins apart: the points that the law steers, and the bodies that lag or come late."""
+DRIFT, COVER = "declared drift", "declared cover"
+"""The hypotheses that a user's plant has the drift and the cover that it declares."""
+BUILT = "controller parameters"
+"""The hypothesis that the controllers were built with what the scenario demands."""
+
+
+@dataclass(frozen=True)
+class _Hypothesis:
+    """One hypothesis over K instants or pairs: margins (K,); it is broken where one is below -`slop`.
+
+    `about` names its robot or pair. With `others`, the k-th margin is about the pair with `others[k]`.
+    """
+
+    name: str
+    unit: str
+    t: Array
+    margin: Array
+    slop: float
+    about: dict[str, Any]
+    others: Sequence[str] = ()
+
+    def broken(self) -> npt.NDArray[np.intp]:
+        """Instants at which it does not hold, also those with a margin that is not a number."""
+        return np.flatnonzero(~(self.margin >= -self.slop))
+
+    def at(self, k: int) -> dict[str, Any]:
+        """What is needed to redo the evaluation at instant k by hand."""
+        other = {"second": self.others[k]} if self.others else {}
+        described = {"hypothesis": self.name, **self.about, **other, "t_s": float(self.t[k])}
+        return {**described, "margin": float(self.margin[k]), "unit": self.unit}
+
+
+class Guarantee(NamedTuple):
+    """The distance that is promised for a pair of bodies: their gap is `gap_m` or more at all times of the run.
+
+    Attributes:
+        pair: the two bodies.
+        missed_m: how far each sample misses the inequalities, e_i + e_j, (K,), m per control period; 0: both are met.
+        short_m: how much too close the steered points started, or were when the obstacle appeared, m.
+        gap_m: what the bodies keep where their steered points keep m - max(e / a - w / A, short_m). There m is the
+            distance in the law, e the largest of `missed_m`, a = min(A h, 1), and w the drift that users' plants
+            declare. Without a gain nothing is restored, and the points keep m - K e - short_m. -inf: nothing is
+            promised.
+        why: the reason if nothing is promised.
+    """
+
+    pair: Pair
+    missed_m: Array
+    short_m: float
+    gap_m: float
+    why: str = ""
+
+    @property
+    def margin_m(self) -> float:
+        """The distance promised less the safe one; not positive."""
+        return self.gap_m - self.pair.required_m
+
+
+@dataclass(frozen=True)
+class Hypotheses:
+    """The evidence: the largest shortfall, the least distance promised, and details.
+
+    `guarantee_m` is None if no pair came within reach, or nothing is promised for one that did. `pairs` are those with
+    the least guarantee, `worst` is the least margin of each other hypothesis.
+    """
+
+    e_m: float
+    guarantee_m: float | None
+    pairs: list[dict[str, Any]]
+    pairs_in_reach: int
+    different_parameters: list[dict[str, Any]]
+    worst: list[dict[str, Any]]
+    inequalities_in_range: int
+    inequalities_that_bind: dict[str, int]
+    tolerance_m: float = DISTANCE_TOLERANCE_M
+
+
+class SafeHyp(TraceClaim):
+    """SAFE-HYP."""
+
+    id = "SAFE-HYP"
+    summary = "Every step of the run met the conditions under which the safety theorem (SAFE-INV) holds."
+    statement = (
+        "At every control sample of the run the hypotheses of the safety theorem held, up to e per pair of bodies: so "
+        "each pair of robots and bodies at rest kept d - e / (A h) at all times of the run. Beside an obstacle that "
+        "may move the passive law held, and it moved no faster than declared: so d was kept in every period that "
+        "began at d + V h or more. The controllers were built with what the scenario says."
+    )
+    latex = (
+        r"n^\top (p_i^{k+1} - p_i^k) \ge q\, b - e_i, \quad b = \begin{cases} A h (d - D) & D \le d \\ d - D & D > d "
+        r"\end{cases}",
+        r"\text{or} \quad D \ge d + \lVert p_i^{k+1} - p_i^k \rVert + \lVert p_j^{k+1} - p_j^k \rVert; \quad q = 1 "
+        r"\text{ (obstacle)}, \; q = 1/2 \text{ (robot)}",
+        r"e = \max_k (e_i + e_j) \quad \Rightarrow \quad D \ge d - \frac{e}{A h}, \quad \frac{e}{A h} \le 10^{-9} "
+        r"\text{ m}",
+        r"n^\top (p_i^{k+1} - p_i^k) \ge \min(0, \, d + V h - D) - e_i, \quad \lVert \dot{o}_j \rVert \le V \quad "
+        r"\text{(obstacle that may move)}",
+        r"D(0) \ge d, \quad A h \le 1, \quad \lVert v \rVert \le v_{\max}, \quad v_z = 0 \text{ (UGV)}, \quad "
+        r"R \ge d + c h",
+    )
+    method = (
+        "Exact arithmetic on the recorded positions at the control samples and on the corners of obstacles, which are "
+        "rational numbers; square roots are enclosed. Pairs and samples are left out if floats find them far apart, or "
+        "an inequality met by more than 1e-9 m. D and d are distances of a robot's centre from another centre, or from "
+        "a convex core: a point, a wall, a polygon or a prism; n is the unit vector away from its nearest point, "
+        "inside a polygon the normal of its nearest edge. A barrier of several parts has an inequality for each of "
+        "them, and keeps what all of them keep. The distances promised are listed less the radii. The parameters of "
+        "the controllers were read back from the diagram and are compared with the scenario. Rows less than 1e-9 s "
+        "apart count as one instant."
+    )
+    equations = "(7)-(8), (11) in the inequality form of the package (set-based avoidance)"
+    assumptions = (
+        "The command of a row is the velocity applied since the row before (the trace's convention).",
+        "The points that the law steers move straight from row to row. Of robots that turn, lag or get their commands "
+        "late, D and d are those of these points: d_law of SAFE-BUDGET.",
+        "Beside an obstacle with `appears_s` the hypotheses are those from the first control sample at or after that "
+        "time on, and the safe start is that D >= d at that sample. The bodies of robots that lag, get their commands "
+        "late or never drive backwards must be clear then, too, and so must their ways under commands already given, "
+        "for the time of the delay. If they are not, nothing is promised for the pair.",
+        "No safe start is asked beside an obstacle that may move: where it is near, the robot is passive.",
+    )
+    does_not_establish = (
+        "The theorem (SAFE-INV) and the outcome (SAFE-TRACE). Broken hypotheses do not mean that the distance was "
+        "violated, only that no more than d - e / (A h) is promised: inside several safe distances at once the "
+        "inequalities can contradict each other. Nothing is said about other runs, and of the periods in which a robot "
+        "was passive only that it did not bring itself nearer (SAFE-OWN)."
+    )
+
+    exercised_by = "avoidance inequalities that bound a command at a control sample"
+
+    def check(self, trace: Trace) -> Finding:
+        """Evaluate all hypotheses; the first violation in time is the counterexample."""
+        kept = sorted(guarantees(trace), key=lambda one: one.margin_m)
+        others = [*_static(trace), *_sampled(trace), *_of_plants(trace), *_beside_moving(trace)]
+        moving, shares, own = beside_moving(trace), least_shares(trace), own_plants(trace)
+        different = list(differences(trace))
+        broken = [h.at(int(k)) for h in [*others, *_avoidance(trace, kept)] for k in h.broken()[:1]]
+        broken += [{"hypothesis": BUILT, "t_s": float(trace.t[0]), **each} for each in different[:1]]
+        first = min(broken, key=lambda entry: float(entry["t_s"]), default=None)
+        worst, listed = _worst(others), [_listed(trace, one) for one in kept[:MOST_LISTED]]
+        shown = _shown(first, worst, listed, kept)
+        name = shown["hypothesis"]
+        in_range, binding = _binding(trace)
+        return Finding(
+            "refuted" if first else "holds",
+            margin=shown.get("margin"),
+            unit=shown.get("unit", ""),
+            quantity="distance promised less the safe one" if name == AVOIDANCE else f"least slack of {name!r}",
+            where={key: shown[key] for key in shown if key not in ("margin", "unit")},
+            counterexample=_against(trace, first, broken) if first else None,
+            evidence=asdict(
+                Hypotheses(
+                    float(max((one.missed_m.max() for one in kept), default=0.0)),
+                    _finite(kept[0].gap_m) if kept else None,
+                    listed,
+                    len(kept),
+                    different,
+                    worst,
+                    in_range,
+                    binding,
+                )
+            )
+            | ({"beside_moving": [asdict(each) for each in moving]} if moving else {})
+            | ({"least_shares": [asdict(each) for each in shares]} if shares else {})
+            | ({"own_plants": [asdict(each) for each in own]} if own else {}),
+            exercised=sum(binding.values()),
+        )
+
+
+def _against(trace: Trace, first: dict[str, Any], broken: Sequence[dict[str, Any]]) -> dict[str, Any]:
+    """The hypothesis broken first, with what is needed to redo it by hand."""
+    found = first | snapshot(trace, map(str, first.values()), first["t_s"])
+    if first["hypothesis"] != DECLARED:
+        return found
+    declared = trace.scenario.barriers[first["other"]].expected_speed_m_s
+    told = f"{first['other']} moved at {declared - first['margin']:.2f} m/s at {first['t_s']:.2f} s"
+    more = sorted({str(each["hypothesis"]) for each in broken} - {DECLARED})
+    return found | {"why": f"{told}, declared {declared:.2f}", "also_broken": more}
+
+
+def _worst(hypotheses: Sequence[_Hypothesis]) -> list[dict[str, Any]]:
+    """Where each hypothesis has its least margin, for each robot or pair that it is about."""
+    found: dict[tuple[str, str], dict[str, Any]] = {}
+    for h in hypotheses:
+        entry = h.at(int(np.argmin(h.margin)))
+        key = h.name, str(next(iter(h.about.values()), ""))
+        if entry["margin"] <= found.get(key, entry)["margin"]:
+            found[key] = entry
+    return list(found.values())
+
+
+def _shown(
+    first: dict[str, Any] | None, worst: Sequence[dict[str, Any]], listed: Sequence[Any], kept: Sequence[Guarantee]
+) -> dict[str, Any]:
+    """The entry with the finding's margin: that of the hypothesis broken first, or else of the inequalities."""
+    if first and first["hypothesis"] == BUILT:
+        return first
+    name = first["hypothesis"] if first else AVOIDANCE
+    least: dict[str, Any] = {
+        "margin": _finite(kept[0].margin_m) if kept else 0.0, "unit": "m", "hypothesis": AVOIDANCE
+    }  # fmt: skip
+    least |= {key: listed[0][key] for key in ("first", "second")} if kept else {}
+    return min((one for one in worst if one["hypothesis"] == name), key=lambda one: float(one["margin"]), default=least)
+
+
+def _listed(trace: Trace, one: Guarantee) -> dict[str, Any]:
+    """A row of the evidence, with the sample at which the most was missed, if anything was."""
+    e, k = float(one.missed_m.max()), int(np.argmax(one.missed_m))
+    described = {"first": one.pair.first, "second": one.pair.second, "safe_distance_m": one.pair.required_m}
+    t = float(trace.t[trace.sample_rows[k]]) if e > 0.0 else None
+    return {**described, "guarantee_m": _finite(one.gap_m), "e_m": e, "t_s": t, **({"why": one.why} if one.why else {})}
+
+
+def _finite(metres: float) -> float | None:
+    return metres if isfinite(metres) else None
+
+
+def _gain(trace: Trace) -> Fraction:
+    """a = min(A h, 1), of the numbers as they are written."""
+    control = trace.scenario.control
+    return min(decimal(control.avoidance_gain_1_s) * decimal(control.period_s), Fraction(1))
+
+
+def guarantees(trace: Trace) -> list[Guarantee]:
+    """The distance that is promised for each pair that comes near.
+
+    Other pairs stay so far apart that the longest steps of both could not break their distance.
+    """
+    return trace.derived("guarantees", lambda: list(_guarantees(trace)))
+
+
+def _guarantees(trace: Trace) -> Iterator[Guarantee]:
+    samples, last = period_ends(trace), last_period(trace)
+    places = {name: trace.position(name)[samples] for name in trace.robots}
+    longest = {name: _longest(each, float(last)) for name, each in places.items()}
+    pairs, gain = pairs_of(trace), _gain(trace)
+    reach = np.array([pair.law_m + longest[pair.first] + longest.get(pair.second, 0.0) for pair in pairs])
+    beyond = SCREEN_M + np.array([pair.cover_m for pair in pairs])  # of the bodies from the points that are steered
+    for k in np.flatnonzero(apart_of(trace) <= reach + beyond).tolist():
+        pair = pairs[k]
+        if pair.speed_m_s > 0.0:  # see `passive`
+            continue
+        begin = int(np.searchsorted(samples, pair.row))
+        end = len(samples) if pair.last is None else int(np.searchsorted(samples, pair.last)) + 1
+        there, planar = slice(begin, end), is_planar(trace, pair.first)
+        first, beside = places[pair.first][there], _beside(trace, pair, places, there, float(reach[k]))
+        asked = Fraction(pair.share), gain, last if end == len(samples) else Fraction(1)
+        missed = [shortfalls(first, place, pair.law_m, *asked, core, planar=planar) for place, core in beside]
+        begun = [shortage(first[0], place.reshape(-1, 3)[0], pair.law_m, core, planar=planar) for place, core in beside]
+        most = np.max([np.zeros(len(first) - 1), *missed], axis=0)
+        e, short = Fraction(float(most.max())), max(begun, default=Fraction(0))
+        lost = max(e / gain - Fraction(pair.drift_m), short) if gain else (len(samples) - 1) * e + short
+        missed_m = np.concatenate([np.zeros(begin), most, np.zeros(len(samples) - end)])
+        gap, why = -rounded_up(lost - Fraction(pair.required_m)), ""
+        if pair.under_way_s is not None:
+            start = start_margin(trace, pair)
+            if not start >= -DISTANCE_TOLERANCE_M:
+                gap, why = -inf, f"{BODIES} missed by {-start:.3g} m"
+            elif lost > 0:  # it comes off what the points keep, from which follows what the bodies keep
+                room = {name: room_of(trace.scenario.robots[name], trace.scenario.control)
+                        for name in (pair.first, pair.second) if name in trace.robots}  # fmt: skip
+                points = nextafter(pair.law_m - rounded_up(lost), -inf)
+                kept = kept_m(points, room[pair.first], room.get(pair.second)) - pair.radii_m
+                gap, why = min(gap, kept), "" if isfinite(kept) else "the steered points came too near"
+        yield Guarantee(pair, missed_m, rounded_up(short), gap, why)
+
+
+def _beside(
+    trace: Trace, pair: Pair, places: dict[str, Array], there: slice, reach: float
+) -> list[tuple[Array, Cores]]:
+    """What the first body of a pair keeps away from: places of the second and its core, or each part of a barrier.
+
+    Parts that stay beyond reach of the way of the first are left out. A point is given by its place.
+    """
+    if pair.second in places:
+        return [(places[pair.second][there], POINT)]
+    cores = cores_of(trace)[pair.second]
+    if cores.are_points:
+        return [(place, POINT) for place in cores.points]
+    bounds = apart_by_blocks(cores, places[pair.first][there])
+    near = np.flatnonzero((bounds <= reach + SCREEN_M).any(axis=1)).tolist()
+    return [(np.zeros(3), cores.take(k)) for k in near]
+
+
+def _longest(places: Array, last: float) -> float:
+    """The longest step between samples, m."""
+    steps = np.linalg.norm(np.diff(places, axis=0), axis=1)
+    steps[-1] /= last
+    return float(steps.max())
+
+
+def _avoidance(trace: Trace, kept: Sequence[Guarantee]) -> Iterator[_Hypothesis]:
+    """The distance that is lost, m, because a sample misses the inequalities."""
+    t, gain = trace.sampled("t_s"), float(_gain(trace))
+    for one in kept:
+        lost = np.maximum(one.missed_m / gain - one.pair.drift_m, 0.0) if gain else one.missed_m * len(t)
+        about = {"first": one.pair.first, "second": one.pair.second}
+        yield _Hypothesis(AVOIDANCE, "m", t, 0.0 - lost, DISTANCE_TOLERANCE_M, about)
+
+
+def _beside_moving(trace: Trace) -> Iterator[_Hypothesis]:
+    """Beside obstacles that may move: the passive law, and that they move no faster than declared."""
+    period_s, ends = trace.scenario.control.period_s, period_ends(trace)
+    for one in beside(trace):
+        about = {"first": one.pair.first, "second": one.pair.second}
+        yield _Hypothesis(PASSIVE, "m", trace.t[one.row], 0.0 - one.missed_m, DISTANCE_TOLERANCE_M, about)
+    for name, speed in speeds(trace).items():
+        spare = trace.scenario.barriers[name].expected_speed_m_s - speed
+        yield _Hypothesis(DECLARED, "m/s", trace.t[ends[:-1]], spare, DISTANCE_TOLERANCE_M / period_s, {"other": name})
+        place = trace.position(name)
+        off = np.linalg.norm(place - interpolate(trace.t[ends], place[ends], trace.t), axis=1)
+        yield _Hypothesis("straight motion", "m", trace.t, 0.0 - off, DISTANCE_TOLERANCE_M, {"other": name})
+
+
+def _binding(trace: Trace) -> tuple[int, dict[str, int]]:
+    """How many avoidance inequalities were in range of a robot, and how many bound a command, by who avoided whom."""
+    count = {"ugv beside obstacle": 0, "uav beside obstacle": 0}
+    count |= {"ugv beside ugv": 0, "ugv beside uav": 0, "uav beside ugv": 0}
+    beside = ["obstacle" for _ in parts_of(trace).owner] + ["ugv" for _ in trace.ugvs] + ["uav"]
+    in_range = 0
+    for robot in trace.robots:
+        given = inequalities_of(trace, robot)
+        in_range += len(given.bound)
+        kind = "ugv" if robot in trace.ugvs else "uav"
+        for column in given.column[given.slack(trace.chosen(robot)) <= BINDING_M_S].tolist():
+            count[f"{kind} beside {beside[column]}"] += 1
+    return in_range, count
+
+
+def _static(trace: Trace) -> Iterator[_Hypothesis]:
+    """Hypotheses on the scenario and the start: gain, sensing range, distances at t = 0."""
+    control = trace.scenario.control
+    limit = {name: robot.max_speed_m_s for name, robot in trace.scenario.robots.items()}
+    period, reach = decimal(control.period_s), decimal(control.sensing_range_m)
+    stable = np.array([float(1 - decimal(control.avoidance_gain_1_s) * period)])
+    yield _Hypothesis("gain: A h <= 1", "1", trace.t[:1], stable, 0.0, {})
+
+    @cache
+    def room(safe: float, *speeds: float) -> float:
+        return float(reach - decimal(safe) - sum(map(decimal, speeds)) * period)
+
+    order = {robot: k for k, robot in enumerate(trace.robots)}
+    pairs = sorted(pairs_of(trace), key=lambda pair: order[pair.first])
+    for robot, own in groupby(pairs, key=lambda pair: pair.first):
+        beside = list(own)
+        others = [pair.second for pair in beside]
+        rows = [pair.row for pair in beside]
+        away = trace.position(robot)[0] - np.stack([trace.position(name)[0] for name in trace.robots])
+        apart = dict(zip(trace.robots, np.linalg.norm(away, axis=1).tolist(), strict=True))
+        apart |= distances_when_there(trace, robot)
+        start, about = trace.t[rows], {"first": robot}
+        excess = np.array([np.inf if pair.speed_m_s else apart[pair.second] - pair.law_m for pair in beside])
+        of_bodies = np.array([start_margin(trace, pair) for pair in beside])
+        for name, margins in ((START, excess), (BODIES, of_bodies)):
+            if np.isfinite(margins).any():
+                yield _Hypothesis(name, "m", start, margins, DISTANCE_TOLERANCE_M, about, others)
+        left = [room(pair.law_m, limit[robot], limit.get(pair.second, pair.speed_m_s)) for pair in beside]
+        yield _Hypothesis("sensing range", "m", start, np.array(left), 0.0, about, others)
+
+
+def _sampled(trace: Trace) -> Iterator[_Hypothesis]:
+    """Hypotheses at the control samples: their spacing, straight motion between them, speed limits, planar motion."""
+    period, robots, t, samples = trace.scenario.control.period_s, trace.scenario.robots, trace.t, trace.sample_rows
+    own = {name for name, robot in robots.items() if any(plant.is_own for plant in robot.plant)}
+    spacing = np.diff(np.append(t[samples], t[-1]))
+    yield _Hypothesis("sampling", "s", t[samples], period - spacing, TIME_TOLERANCE_S, {})
+    ends = np.append(samples, len(t) - 1)
+    for robot in trace.robots:
+        place, about = trace.position(robot), {"robot": robot}
+        off = np.linalg.norm(place - interpolate(t[ends], place[ends], t), axis=1)
+        if robot not in own:  # whose cover is from the straight line
+            yield _Hypothesis("straight motion", "m", t, 0.0 - off, DISTANCE_TOLERANCE_M, about)
+        spare = robots[robot].max_speed_m_s - np.linalg.norm(trace.command(robot)[1:], axis=1)
+        yield _Hypothesis("speed limit", "m/s", t[:-1], spare, VELOCITY_TOLERANCE_M_S, about)
+        if robot in trace.ugvs:
+            yield _Hypothesis("planar motion", "m", t, 0.0 - np.abs(place[:, 2] - place[0, 2]), 0.0, about)
+
+
+@dataclass(frozen=True)
+class LeastShare:
+    """The least share s that was left of a command of a unicycle in a run, and the gain s A of its recoveries, 1/s."""
+
+    robot: str
+    share: float
+    gain_1_s: float
+
+
+def least_shares(trace: Trace) -> list[LeastShare]:
+    """Of each unicycle; a command in full has the share 1."""
+    gain = trace.scenario.control.avoidance_gain_1_s
+    names = [ugv for ugv, each in trace.scenario.ugvs.items() if any(plant.kind == "unicycle" for plant in each.plant)]
+    shares = [float(trace.sampled(f"{name}.command_share").min()) for name in names]
+    return [LeastShare(name, share, share * gain) for name, share in zip(names, shares, strict=True)]
+
+
+@dataclass(frozen=True)
+class OwnPlant:
+    """The largest drift, m/s, and cover, m, of a robot with a user's plant in a run, and what is declared."""
+
+    robot: str
+    plant: str
+    drift_m_s: float
+    declared_drift_m_s: float
+    cover_m: float
+    declared_cover_m: float
+
+
+def own_plants(trace: Trace) -> list[OwnPlant]:
+    """All robots with users' plants."""
+    given = [(name, each) for name, robot in trace.scenario.robots.items() for each in robot.plant if each.is_own]
+    most = {
+        name: [float(trace.sampled(f"{name}.{key}").max()) for key in ("drift_m_s", "cover_m")] for name, _ in given
+    }
+    return [
+        OwnPlant(name, each.kind, most[name][0], each.drift_m_s, most[name][1], each.cover_m) for name, each in given
+    ]
+
+
+def _of_plants(trace: Trace) -> Iterator[_Hypothesis]:
+    """Hypotheses of the theorems about plants: limits of turns, wheels and dips, and speeds of bodies that lag."""
+    period, ends = trace.scenario.control.period_s, period_ends(trace)
+    whole = np.flatnonzero(np.diff(trace.t[ends]) > 0.5 * period)
+    first, last = ends[whole], ends[whole + 1]
+    t, lasting = trace.t[first], trace.t[last] - trace.t[first]
+    for name, robot in trace.scenario.robots.items():
+        about = {"robot": name}
+        for plant in robot.plant:
+            if plant.kind == "unicycle":
+                heading, axle = trace.column(f"{name}.heading_rad"), trace.body(name)
+                turned = heading[last] - heading[first]
+                rate, half = np.abs(turned) / lasting, 0.5 * turned
+                chord = np.linalg.norm(axle[last] - axle[first], axis=1)
+                speed = chord / lasting / np.sinc(half / np.pi)
+                if not plant.backwards:
+                    middle = 0.5 * (heading[first] + heading[last])
+                    ahead = np.column_stack([np.cos(middle), np.sin(middle)])
+                    gone = np.einsum("ka,ka->k", (axle[last] - axle[first])[:, :2], ahead)
+                    yield _Hypothesis(FORWARDS, "m/s", t, gone / lasting, VELOCITY_TOLERANCE_M_S, about)
+                if plant.max_turn_rad_s:
+                    spare = plant.max_turn_rad_s - rate
+                    yield _Hypothesis("turning limit", "rad/s", t, spare, VELOCITY_TOLERANCE_M_S, about)
+                if plant.wheel_base_m:
+                    spare = plant.max_wheel_speed_m_s - speed - 0.5 * plant.wheel_base_m * rate
+                    yield _Hypothesis("wheel speeds", "m/s", t, spare, VELOCITY_TOLERANCE_M_S, about)
+                dips = rate * np.hypot(speed, plant.hand_point_m * rate) * lasting**2 / 8.0
+                most = room_of(robot, trace.scenario.control).body_m - plant.hand_point_m
+                yield _Hypothesis("dip of the hand point", "m", t, most - dips, DISTANCE_TOLERANCE_M, about)
+            elif plant.kind == "lag":
+                spare = robot.max_speed_m_s - np.linalg.norm(trace.body_velocity(name), axis=1)
+                yield _Hypothesis("speed of the body", "m/s", trace.t, spare, VELOCITY_TOLERANCE_M_S, about)
+            elif plant.is_own:
+                samples = trace.sampled("t_s")
+                spare = plant.drift_m_s - trace.sampled(f"{name}.drift_m_s")
+                yield _Hypothesis(DRIFT, "m/s", samples, spare, VELOCITY_TOLERANCE_M_S, about)
+                spare = plant.cover_m - trace.sampled(f"{name}.cover_m")
+                yield _Hypothesis(COVER, "m", samples, spare, DISTANCE_TOLERANCE_M, about)

@@ -1,0 +1,123 @@
+"""THR-CHOICE: whether the threshold in force is the right one for the scenario's own numbers, and for its runs."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from airground_drake.base.statuses import Status
+from airground_drake.model.trigger.bayes import bayes_risk, optimal_threshold, printed_threshold
+from airground_drake.scenario.schema import Scenario, Threshold
+from airground_drake.verify.claim import ModelClaim
+from airground_drake.verify.claims.thr_root import ThrRoot, rule_of
+from airground_drake.verify.finding import Evidence, Finding
+from airground_drake.verify.model.levels import NUMBERS
+
+EQUAL = 1e-6
+"""A threshold is the optimum if it differs by this share at most: it then costs less than 1e-11 of the risk."""
+
+DIGITS = 12
+"""Decimals of a difference of risks: it is rounded in floating point."""
+
+
+@dataclass(frozen=True)
+class Measured(Evidence):
+    """Drift and noise of a UGV whose task error reached the threshold in a run, and what they say of the threshold.
+
+    The optimum, m, is that for this drift and this noise, 0 without noise. The extra risk is that of the threshold in
+    force, m, against this optimum, with the scenario's c1 and c2.
+    """
+
+    drift_m_s: float
+    noise_m_sqrt_s: float
+    threshold_m: float
+    optimum_m: float
+    extra_risk: float
+
+
+@dataclass(frozen=True)
+class ThresholdChoice(Evidence):
+    """Thresholds, m, their Bayes risks, and what was measured in the runs of a report, by `run UGV`."""
+
+    kind: str
+    rule: str
+    threshold_in_force_m: float
+    optimal_threshold_m: float
+    threshold_as_printed_in_19_m: float
+    risk_in_force: float
+    least_risk: float
+    extra_risk: float
+    runs: dict[str, Measured] | None = None
+
+
+class ThrChoice(ModelClaim):
+    """THR-CHOICE."""
+
+    id = "THR-CHOICE"
+    summary = "The threshold in force is the best one for the scenario's own numbers, or it is declared by the user."
+    statement = (
+        "The threshold in force minimises the Bayes risk for the scenario's own c1, c2, drift and noise, or somebody "
+        "declared it: the rule `fixed` takes a number, the rule `printed` takes (19) as the paper prints it."
+    )
+    latex = (
+        r"\text{rule bayes: } B(\zeta) = \min_z B(z), \quad \text{otherwise } B(\zeta) - \min_z B(z) \text{ is shown}",
+    )
+    method = (
+        "The optimum is the root of (19) with c2/c1, enclosed by two signs in ball arithmetic (THR-ROOT, THR-OPT). The "
+        "threshold in force equals it to 1e-6 (relative), or it is declared. A declared threshold cannot be refuted, "
+        "so it counts as not exercised. Each run then shows the drift that the task error had in the last second "
+        "before it first reached the threshold, the noise, the optimum for both, and what the threshold costs."
+    )
+    equations = "(16)-(20), Table 1"
+    assumptions = ("Drift and noise of the rule are those that the user assumes; (16)-(18) without initial deviation.",)
+    does_not_establish = (
+        "That the assumed drift and noise are those of the runs: compare the rows of the runs. A declared threshold "
+        "need not be optimal. The risk says nothing about what an intervention brings."
+    )
+    expected: Status = "holds"
+    exercised_by = "thresholds that are, or must be, the optimum"
+
+    def inputs(self, scenario: Scenario) -> dict[str, Any]:
+        """As THR-ROOT."""
+        return ThrRoot().inputs(scenario)
+
+    def check(self, inputs: dict[str, Any]) -> Finding:
+        """Compare the threshold in force with the optimum, and their risks."""
+        numbers = [inputs[name] for name in NUMBERS]
+        rule, zeta = rule_of(inputs), float(inputs["zeta_m"])
+        optimum = float(rule.zeta(rule.root.low))
+        least, risk = (float(bayes_risk(each, *numbers)) for each in (optimum, zeta))
+        off = abs(zeta - optimum)
+        optimal = off <= EQUAL * optimum
+        evidence = ThresholdChoice(
+            "optimal" if optimal else "declared",
+            inputs["rule"],
+            zeta,
+            optimum,
+            float(printed_threshold(*numbers)),
+            risk_in_force=risk,
+            least_risk=least,
+            extra_risk=max(round(risk - least, DIGITS), 0.0),
+        )
+        shown = {key: value for key, value in asdict(evidence).items() if value is not None}
+        if not optimal and inputs["rule"] != "bayes":
+            return Finding("holds", evidence=evidence, exercised=0)
+        return Finding(
+            "holds" if optimal else "refuted",
+            margin=EQUAL * optimum - off,
+            unit="m",
+            quantity="tolerance left between threshold and optimum",
+            counterexample=None if optimal else shown,
+            evidence=evidence,
+            exercised=1,
+        )
+
+
+def measured(zeta: float, drift: float, noise: float, rule: Threshold) -> Measured:
+    """What a drift, m/s, positive, and a noise, m/sqrt(s), say of a threshold, m, with the costs of a rule."""
+    optimum, extra = 0.0, rule.c1_1_s * zeta / drift  # without noise: decided after zeta / drift, never wrongly
+    if noise > 0.0:
+        numbers = drift, noise, rule.c1_1_s, rule.c2
+        optimum = optimal_threshold(*numbers)
+        extra = max(round(float(bayes_risk(zeta, *numbers) - bayes_risk(optimum, *numbers)), DIGITS), 0.0)
+    return Measured(drift, noise, zeta, optimum, extra)

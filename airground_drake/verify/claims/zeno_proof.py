@@ -1,0 +1,97 @@
+"""ZENO-PROOF: two triggers are never closer than the minimum inter-event time (coq/Trigger.v)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from airground_drake.base.exact import decimal
+from airground_drake.scenario.schema import Scenario
+from airground_drake.verify.model.levels import levels_of, trigger_of
+from airground_drake.verify.model.theorem import Hypothesis, Proof, TheoremClaim
+
+SHORTEST_S = 1e-3
+"""The bound to refute if the scenario declares 0 s, s. Any number would do: the counterexample scales with it."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Dwell(Proof):
+    """The least time between two triggers, s, and how many a run can have at most; None without a dwell."""
+
+    bound_s: float
+    most_triggers: int | None
+
+
+class ZenoProof(TheoremClaim):
+    """ZENO-PROOF."""
+
+    id = "ZENO-PROOF"
+    summary = "Triggers never pile up: two are at least the minimum inter-event time apart, whatever the noise."
+    statement = (
+        "Triggers i < j of a UGV are at least (j - i) times the minimum inter-event time apart, whatever the decision "
+        "variable does, so that there are at most floor(T/dwell) + 1 in a time T and no run is Zeno."
+    )
+    latex = (
+        r"x : [0, \infty) \to \mathbb{R} \text{ arbitrary} \; \Rightarrow \; t_j - t_i \ge (j - i) \tau_{\min}",
+        r"N(T) \le \lfloor T / \tau_{\min} \rfloor + 1",
+    )
+    method = (
+        "Theorems in Coq about the automaton, by induction over any events at any times. Checked here: the dwell in "
+        "force is the minimum inter-event time, and above 0. Tests read the transitions off the running `Trigger` and "
+        "compare them with the theorem's. A bare threshold is refuted by a run of the automaton."
+    )
+    equations = "(20)"
+    assumptions = (
+        "Time never runs backwards.",
+        "x is any number at any time: no bound on the noise or its rate is used.",
+        "Triggers are the times at which the automaton enters INTERVENING. The simulator's event isolation, 1e-6 s, "
+        "delays them against the crossings of x; it brings no two of them closer than the dwell, because guards and "
+        "triggered_at use the time of the event itself.",
+    )
+    does_not_establish = (
+        "That a trigger comes when it should (THR-TRIG), or that the bare threshold is Zeno (ZENO-REFINE shows how its "
+        "events multiply). The end of a dwell is rounded, by about 1e-15 s: ZENO-TRACE measures gaps to 1e-9 s."
+    )
+
+    theorems = ("Trigger.dwell_apart", "Trigger.at_most")
+    margin_of = "dwell in force"
+
+    def inputs(self, scenario: Scenario) -> dict[str, Any]:
+        """The trigger's levels, m, and dwell, s; the bound claimed, s; the duration, s."""
+        return {
+            **levels_of(scenario),
+            "min_inter_event_s": float(scenario.decision.min_inter_event_s),
+            "duration_s": float(scenario.duration_s),
+        }
+
+    def hypotheses(self, inputs: dict[str, Any]) -> list[Hypothesis]:
+        """The dwell is in force and positive; the release level is not above the threshold."""
+        dwell, zeta, release = (decimal(inputs[name]) for name in ("dwell_s", "zeta_m", "released_below_m"))
+        bound = decimal(inputs["min_inter_event_s"])
+        return [
+            Hypothesis.of(
+                "dwell less the bound", "the dwell is the minimum inter-event time at least", dwell - bound, "s"
+            ),
+            Hypothesis.of(self.margin_of, "the dwell in force is above 0", dwell, "s", strict=True),
+            Hypothesis.of("threshold less release", "the release level is at most the threshold", zeta - release, "m"),
+        ]
+
+    def evidence(self, inputs: dict[str, Any], **proof: Any) -> Dwell:
+        """Add the bound, and how many triggers the run can have at most."""
+        dwell = decimal(inputs["dwell_s"])
+        most = int(decimal(inputs["duration_s"]) // dwell) + 1 if dwell > 0 else None
+        return Dwell(bound_s=inputs["min_inter_event_s"] or SHORTEST_S, most_triggers=most, **proof)
+
+    def counterexample(self, inputs: dict[str, Any], broken: Hypothesis) -> dict[str, Any] | None:
+        """Two triggers closer than the bound, on a run of the automaton: up, down and up again."""
+        trigger, bound = trigger_of(inputs), inputs["min_inter_event_s"] or SHORTEST_S
+        gap = max(trigger.dwell, bound / 2.0)
+        if not gap < bound:
+            return None
+        state, run = trigger.start(0.0, trigger.zeta), list[dict[str, Any]]()
+        for t, x in ((0.0, trigger.zeta), (gap / 2.0, trigger.release - trigger.zeta), (gap, trigger.zeta)):
+            before = state.triggers if run else 0
+            state = trigger.step(state, t, x) if run else state
+            run.append({"t_s": t, "x_m": x, "mode": state.mode.name, "trigger": state.triggers > before})
+        times = [row["t_s"] for row in run if row["trigger"]]
+        return {"run": run, "gap_s": times[1] - times[0], "bound_s": bound} if len(times) > 1 else None

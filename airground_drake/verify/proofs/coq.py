@@ -1,0 +1,180 @@
+"""Run the proof checker Coq: compile theories, list the axioms of theorems, check compiled files with `coqchk`."""
+
+from __future__ import annotations
+
+import re
+import shutil
+import subprocess
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+
+from airground_drake.base.errors import AirgroundError, one_line
+from airground_drake.verify.proofs.record import ALLOWED_AXIOMS, FOLDER, closure
+
+LIMIT_S = 600.0
+"""Wall-clock time for one call of Coq, s. The longest, `coqchk`, takes some 30 s."""
+UNSOUND = re.compile(
+    r"\b(Admitted|admit|give_up|Axioms?|Parameters?|Conjecture|Declare\s+ML\s+Module|bypass_check|Unset\s+\w+\s+Checking"
+    r"|Type\s+In\s+Type|Load|Extract\s+\w+|Drop)\b"
+)
+"""Words with which a file could assume what it should prove, or turn off Coq's own checks."""
+
+
+class CoqError(AirgroundError):
+    """Coq does not accept a file, or a theorem rests on more than is allowed.
+
+    Attributes:
+        line: of the file, from 1; 0 if unknown.
+    """
+
+    def __init__(self, message: str, line: int = 0) -> None:
+        """Keep the message in one line."""
+        super().__init__(one_line(message))
+        self.line = line
+
+
+class NoCoqError(AirgroundError):
+    """Coq is not installed, or does not run."""
+
+
+def version() -> str:
+    """The version of the installed Coq, such as "8.16.1".
+
+    Raises:
+        NoCoqError: if Coq is not installed.
+    """
+    for tool in ("coqc", "coqchk"):
+        if shutil.which(tool) is None:
+            raise NoCoqError(f"{tool} is not on the PATH: install Coq (Debian, Ubuntu: apt-get install coq)")
+    said = _run(["coqc", "--print-version"], Path.cwd(), 60.0)
+    if said.returncode or not said.stdout.split():
+        raise NoCoqError(one_line(f"coqc does not run: {said.stderr.strip() or said.returncode}"))
+    return said.stdout.split()[0]
+
+
+def screen(text: str, name: str) -> None:
+    """Refuse a file that assumes something, or turns off a check of Coq.
+
+    Raises:
+        CoqError: with the first such word.
+    """
+    found = UNSOUND.search(without_comments(text))
+    if found:
+        raise CoqError(f"{name} has the word {found[0]!r}: a theory may assume nothing")
+
+
+def without_comments(text: str) -> str:
+    """The text of a Coq file without its comments, which may be nested."""
+    depth, kept = 0, []
+    for part in re.split(r"(\(\*|\*\))", text):
+        if part == "(*":
+            depth += 1
+        elif part == "*)":
+            depth -= 1
+        elif depth == 0:
+            kept.append(part)
+    return " ".join(kept)
+
+
+def install(names: Iterable[str], folder: Path, source: Path = FOLDER, limit_s: float = LIMIT_S) -> list[str]:
+    """Copy theories, and those that they require, to a folder, and compile them there.
+
+    Returns:
+        The files, in the order in which they were compiled.
+
+    Raises:
+        CoqError: if one is not accepted.
+        OSError: if one cannot be read.
+    """
+    order = closure(names, source)
+    for name in order:
+        shutil.copyfile(source / name, folder / name)
+        compile_file(folder / name, limit_s)
+    return order
+
+
+def compile_file(file: Path, limit_s: float = LIMIT_S) -> str:
+    """Screen a file and compile it, in its folder; what it requires must be compiled there.
+
+    Returns:
+        What Coq prints.
+
+    Raises:
+        CoqError: if Coq does not accept it; has the line.
+        OSError: if it cannot be read.
+    """
+    screen(file.read_text(encoding="utf-8"), file.name)
+    said = _run(["coqc", "-q", file.name], file.parent, limit_s)
+    if said.returncode:
+        where = re.search(r"line (\d+)", said.stderr)
+        why = " ".join(said.stderr.partition("Error:")[2].split()) or said.stderr or f"exit code {said.returncode}"
+        line = int(where[1]) if where else 0
+        raise CoqError(f"Coq does not accept {file.name}, line {line}: {why[:300]}", line)
+    return said.stdout
+
+
+def axioms_of(theorems: Sequence[str], folder: Path, limit_s: float = LIMIT_S) -> dict[str, list[str]]:
+    """The axioms of each theorem ("File.name"), from compiled files in a folder.
+
+    Raises:
+        CoqError: if there is no such theorem, or it rests on an axiom outside ALLOWED_AXIOMS.
+    """
+    modules = dict.fromkeys(theorem.partition(".")[0] for theorem in theorems)
+    lines = [f"Require {' '.join(modules)}.", *(f"Print Assumptions {theorem}." for theorem in theorems)]
+    file = folder / "Assumptions_of_theorems.v"
+    file.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    said = compile_file(file, limit_s)
+    answers = re.split(r"^(?=Axioms:|Closed under)", said, flags=re.MULTILINE)[1:]
+    return {theorem: listed(theorem, answer) for theorem, answer in zip(theorems, answers, strict=True)}
+
+
+def listed(theorem: str, answer: str) -> list[str]:
+    """The axioms in an answer of `Print Assumptions`: each begins a line, and its type is indented.
+
+    Raises:
+        CoqError: if one is outside ALLOWED_AXIOMS.
+    """
+    if answer.startswith("Closed under"):
+        return []
+    names = [re.split(r"[\s:]", line, maxsplit=1)[0] for line in answer.splitlines()[1:] if line[:1].strip()]
+    other = sorted(set(names) - ALLOWED_AXIOMS)
+    if other or not names:
+        raise CoqError(f"{theorem} rests on {other[0] if other else 'something unknown'}, which is not allowed")
+    return sorted(set(names))
+
+
+def check_again(modules: Sequence[str], folder: Path, limit_s: float = LIMIT_S) -> None:
+    """Have `coqchk` check compiled files and everything that they require.
+
+    Raises:
+        CoqError: if it does not accept them, or finds an axiom outside ALLOWED_AXIOMS or a check turned off.
+    """
+    said = _run(["coqchk", "-silent", "-o", "-R", ".", "", *modules], folder, limit_s)
+    if said.returncode:
+        raise CoqError(f"coqchk does not accept the theories: {(said.stderr or said.stdout)[-300:]}")
+    summary = (said.stdout + said.stderr).partition("CONTEXT SUMMARY")[2]
+    parts = dict(re.findall(r"^\* ([^:]+):\s*(.*?)\s*(?=^\*|\Z)", summary, re.MULTILINE | re.DOTALL))
+    axioms = parts.pop("Axioms", None)
+    if axioms is None or parts.pop("Theory", "") != "Set is predicative" or len(parts) != 3:
+        raise CoqError("coqchk does not say what the theories rest on")
+    for part, found in parts.items():
+        if found != "<none>":
+            raise CoqError(f"coqchk: {part}: {found}")
+    for axiom in [] if axioms == "<none>" else axioms.split():
+        if not any(axiom.endswith("." + allowed) for allowed in ALLOWED_AXIOMS):
+            raise CoqError(f"coqchk finds the axiom {axiom}, which is not allowed")
+
+
+def _run(command: list[str], folder: Path, limit_s: float) -> subprocess.CompletedProcess[str]:
+    """Run a tool of Coq.
+
+    Raises:
+        CoqError: if it takes too long.
+        NoCoqError: if it cannot be started.
+    """
+    try:
+        return subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=limit_s, check=False)
+    except subprocess.TimeoutExpired:
+        raise CoqError(f"{command[0]} {command[-1]} took longer than {limit_s:g} s") from None
+    except OSError as error:
+        raise NoCoqError(one_line(f"{command[0]} does not start: {error.strerror}")) from None

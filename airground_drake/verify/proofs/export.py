@@ -1,0 +1,488 @@
+"""A recorded run as Coq files: its positions as integers, and theorems about them that Coq decides by computing."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import MISSING, dataclass, field, fields
+from fractions import Fraction
+from functools import cache, cached_property
+from itertools import chain, combinations, groupby, pairwise, product
+from math import isqrt, lcm
+from typing import NamedTuple
+
+from airground_drake.base.errors import TraceError
+from airground_drake.base.exact import decimal
+from airground_drake.scenario.schema import SHAPES, Obstacle, Scenario
+from airground_drake.scenario.shapes import convex_parts
+from airground_drake.sim.trace import Trace
+from airground_drake.verify.proofs import slack
+from airground_drake.verify.proofs.coq import without_comments
+from airground_drake.verify.proofs.record import FOLDER
+from airground_drake.verify.proofs.separating import Prism, Vector, separating
+
+PARTS = 2**60
+"""Positions are rounded to 1/PARTS m: some coordinates are as small as 1e-100 m. At a metre binary64 is coarser."""
+
+Place = tuple[Fraction, Fraction, Fraction]
+
+
+class ConvexSet(NamedTuple):
+    """All between two heights that is over a convex outline, m from where its body is.
+
+    Attributes:
+        outline: corners, counter-clockwise; two of a wall, one of a post.
+        base: lowest z.
+        top: highest z; the base if the set is flat.
+    """
+
+    outline: tuple[tuple[Fraction, Fraction], ...]
+    base: Fraction = Fraction(0)
+    top: Fraction = Fraction(0)
+
+    def in_parts(self, unit: int) -> Prism:
+        """The same in whole numbers of metres / unit."""
+        outline = tuple((int(x * unit), int(y * unit)) for x, y in self.outline)
+        return Prism(outline, int(self.base * unit), int(self.top * unit))
+
+
+class Demand(NamedTuple):
+    """Two bodies, by name, and the distance that they are to keep.
+
+    Attributes:
+        first: a robot.
+        second: the other body.
+        required_m: distance of their surfaces, m.
+        radii_m: sum of their radii, m.
+        core: what the second body is without its radius: "" for a point, "ground" for flat convex sets, "solid" for
+            prisms.
+        passive: whether the second body is an obstacle that may move, beside which robots follow the passive law.
+        room_m: how far the two bodies may be off the recorded straight lines in all, m; or, where the law's points are
+            recorded, what the law adds to the distance.
+        late: whether one of the two is a robot with a lag or a delay.
+        called: what the scenario calls the two, where `first` and `second` are names for Coq.
+    """
+
+    first: str
+    second: str
+    required_m: Fraction
+    radii_m: Fraction
+    core: str = ""
+    passive: bool = False
+    room_m: Fraction = Fraction(0)
+    late: bool = False
+    called: tuple[str, str] = ("", "")
+
+    @property
+    def body_m(self) -> Fraction:
+        """Distance of the centres of the bodies, or of a centre from convex sets, m."""
+        return self.required_m + self.radii_m
+
+    @property
+    def safe_m(self) -> Fraction:
+        """The same with room for what is off the recorded straight lines, m: that of the lines."""
+        return self.body_m + self.room_m
+
+    @property
+    def lemma(self) -> str:
+        """Name of the lemma about it."""
+        return f"{self.first}_and_{self.second}"
+
+    @property
+    def sets(self) -> str:
+        """Name of the convex sets that are the second body."""
+        return f"{self.second}_{self.core}"
+
+
+@dataclass(frozen=True)
+class Recorded:
+    """A run in exact numbers.
+
+    Attributes:
+        name: of the run in Coq.
+        times: of the rows, s.
+        places: of each body, m: one per row, or a single one of a body at rest. In the order of their numbers.
+        demands: pairs and distances.
+        gain: A h, the product of gain and control period, at most 1 (see `capped` in Safety.v).
+        off_m: how far bodies may be off the straight lines between these places, m; 0 of those that are not named.
+        sets: the convex sets of demands, by name, from where their body is.
+    """
+
+    name: str
+    times: tuple[Fraction, ...]
+    places: Mapping[str, tuple[Place, ...]]
+    demands: tuple[Demand, ...]
+    gain: Fraction
+    off_m: Mapping[str, Fraction]
+    sets: Mapping[str, tuple[ConvexSet, ...]] = field(default_factory=dict)
+
+    @cached_property
+    def unit(self) -> int:
+        """Common denominator of all numbers, in parts of a metre and of a second."""
+        numbers: Iterable[Fraction] = (
+            *self.times,
+            *(demand.safe_m for demand in self.demands),
+            *(axis for places in self.places.values() for place in places for axis in place),
+            *(axis for each in chain(*self.sets.values()) for axis in (each.base, each.top, *chain(*each.outline))),
+        )
+        return lcm(*(number.denominator for number in numbers))
+
+    @cached_property
+    def rows(self) -> Mapping[str, Sequence[Vector]]:
+        """Where each body is at each row, in whole numbers of metres / unit."""
+        unit, count = self.unit, len(self.times)
+        found = {
+            name: [(int(x * unit), int(y * unit), int(z * unit)) for x, y, z in places]
+            for name, places in self.places.items()
+        }
+        return {name: rows * count if len(rows) == 1 else rows for name, rows in found.items()}
+
+    def way(self, demand: Demand) -> list[Vector]:
+        """Where the first body of a pair is at each row as seen from the second one, in metres / unit."""
+        both = zip(self.rows[demand.first], self.rows[demand.second], strict=True)
+        return [(p[0] - q[0], p[1] - q[1], p[2] - q[2]) for p, q in both]
+
+    def prisms(self, demand: Demand) -> list[Prism]:
+        """The sets that are the second body of a pair, in metres / unit; for a ball its centre."""
+        return [each.in_parts(self.unit) for each in self.sets[demand.sets]] if demand.core else [Prism(((0, 0),))]
+
+
+def recorded(trace: Trace, *, steered: bool = False) -> Recorded:
+    """A run with its positions rounded to 1/PARTS m; nothing else is rounded.
+
+    Args:
+        trace: the run.
+        steered: whether it is the record of the points that the law steers, in place of the bodies.
+
+    Raises:
+        TraceError: if a column is missing or not finite, or no theorem is about a body of the scenario.
+    """
+    refuse_unknown(trace)
+    scenario, control = trace.scenario, trace.scenario.control
+    barriers = scenario.barriers
+    places: dict[str, tuple[Place, ...]] = {name: (_centre(obstacle),) for name, obstacle in barriers.items()}
+    moving = [name for name, obstacle in barriers.items() if obstacle.moves]
+    of = trace.position if steered else trace.body
+    places |= {name: tuple(map(_rounded, of(name).tolist())) for name in (*moving, *trace.robots)}
+    spelled = _spelled(list(places))
+    asked = demands_of(trace, steered=steered)
+    wanted = [
+        each._replace(first=spelled[each.first], second=spelled[each.second], called=(each.first, each.second))
+        for each in asked
+    ]
+    return Recorded(
+        name=f"run_{trace.run}{'_steered' if steered else ''}",
+        times=tuple(map(Fraction, trace.t.tolist())),
+        places={spelled[name]: place for name, place in places.items()},
+        demands=tuple(wanted),
+        gain=min(decimal(control.avoidance_gain_1_s) * decimal(control.period_s), Fraction(1)),
+        off_m={spelled[name]: off for name, off in off_m(trace, steered=steered).items()},
+        sets={each.sets: _sets(barriers[each.called[1]], each.core) for each in wanted if each.core},
+    )
+
+
+COVERED = frozenset(
+    {"start_m", "target_m", "preset", "max_speed_m_s", "radius_m", "name", "altitude_m", "task", "phantoms_m"}
+    | {"position_m", "known_to_uav", *SHAPES, "heading_rad", "height_m", "distance_m"}
+    | {"moves", "known_motion", "cells", "plant"}
+)
+"""Keys of bodies that theorems take into account, or need not."""
+PLANTS = frozenset({"first_order", "unicycle", "lag", "delay"})
+"""Kinds of plants that `slack` knows."""
+
+
+def refuse_unknown(trace: Trace) -> None:
+    """Refuse a run with a body that no theorem is about.
+
+    Raises:
+        TraceError: with the first such body, and the key of the scenario that makes it so.
+    """
+    for name, body in trace.scenario.bodies.items():
+        for key in fields(body):
+            given, default = getattr(body, key.name), key.default
+            default = default if key.default_factory is MISSING else key.default_factory()
+            if key.name not in COVERED and given != default:
+                raise TraceError(f"run {trace.run}: {name} has {key.name}; no theorem is about such a body")
+        for plant in getattr(body, "plant", ()):
+            if plant.kind not in PLANTS:
+                why = "SAFE-BUDGET says what is proved of it" if plant.is_own else "no theorem is about such a body"
+                raise TraceError(f"run {trace.run}: {name} has the plant {plant.kind}; {why}")
+
+
+def _centre(obstacle: Obstacle) -> Place:
+    """The centre of a ball; corners of other shapes are given in the frame of the world, or that of what moves."""
+    return _rounded(obstacle.position_m if convex_parts(obstacle) is None and obstacle.position_m else (0.0, 0.0, 0.0))
+
+
+def _sets(obstacle: Obstacle, core: str) -> tuple[ConvexSet, ...]:
+    """The convex parts of an obstacle: for UGVs all walls are endless, so their outlines on the ground are enough."""
+    top = _round(obstacle.height_m if core == "solid" else 0.0)
+    parts = convex_parts(obstacle) or []
+    return tuple(ConvexSet(tuple((_round(x), _round(y)) for x, y in part), top=top) for part in parts)
+
+
+def off_m(trace: Trace, *, steered: bool = False) -> dict[str, Fraction]:
+    """How far the bodies of robots may be off the straight lines between recorded places, m, if they may be."""
+    of = slack.off_steered_m if steered else slack.off_lines_m
+    return {name: of(trace, name) for name in trace.robots if trace.is_apart(name)}
+
+
+def demands_of(trace: Trace, *, steered: bool = False) -> list[Demand]:
+    """The demands on a run, with room for what its bodies may be off, or for what the law adds."""
+    lines = off_m(trace)
+    found = []
+    for each in demands(trace.scenario):
+        names = [name for name in (each.first, each.second) if name in lines]
+        if steered:
+            room = slack.law_m(trace, each.body_m, each.first, each.second) - each.body_m
+        else:
+            room = sum((lines[name] for name in names), Fraction(0))
+        found.append(each._replace(room_m=room, late=any(slack.is_late(trace, name) for name in names)))
+    return found
+
+
+def demands(scenario: Scenario) -> list[Demand]:
+    """Who is to keep which distance from whom: each robot from each obstacle, and each two robots."""
+    safe, uav = scenario.safe_distance, scenario.uav.name
+    radius = {name: decimal(robot.radius_m) for name, robot in scenario.robots.items()}
+    balls = {name for name, obstacle in scenario.barriers.items() if convex_parts(obstacle) is None}
+    found = []
+    for (robot, own), (name, obstacle) in product(radius.items(), scenario.barriers.items()):
+        moves = obstacle.expected_speed_m_s > 0.0
+        gap = decimal(obstacle.distance_m or (moves and safe.moving_m) or safe.obstacle_m)
+        core = "" if name in balls else "solid" if robot == uav else "ground"
+        found.append(Demand(robot, name, gap, own + decimal(obstacle.radius_m), core, moves))
+    for one, other in combinations(radius, 2):
+        apart = decimal(safe.air_ground_m if uav in (one, other) else safe.ugv_m)
+        found.append(Demand(one, other, apart, radius[one] + radius[other]))
+    return found
+
+
+def _rounded(place: Sequence[float]) -> Place:
+    x, y, z = map(_round, place)
+    return x, y, z
+
+
+def _round(axis: float) -> Fraction:
+    return Fraction(round(Fraction(axis) * PARTS), PARTS)
+
+
+def _spelled(names: list[str]) -> dict[str, str]:
+    """Names for Coq: as they are if that is a free identifier, else by number."""
+    plain = re.compile(r"(?!run_|body_number_|entry_)(?!\w*(_and_|_(places|ground|solid)\b))[A-Za-z]\w*", re.ASCII)
+    return {
+        name: name if plain.fullmatch(name) and name not in _taken() else f"body_number_{k}"
+        for k, name in enumerate(names)
+    }
+
+
+@cache
+def _taken() -> frozenset[str]:
+    """Words that mean something in the theories or in an exported file."""
+    theories = "".join(file.read_text(encoding="utf-8") for file in sorted(FOLDER.glob("*.v")))
+    words = re.findall(r"\w+", without_comments(theories))
+    own = {*re.findall(r"\w+", _DISTANCES), "is_well_formed", "decide_entry"}
+    return frozenset({*words, *own, "exists", "fun", "let", "Set", "Prop", "Type"})
+
+
+_DISTANCES = """\
+Local Open Scope R_scope.
+
+Lemma during t : {interval} -> begins {run} <= t <= ends {run}.
+Proof.
+  intros H; apply (covers_sound {run} {start} {end}).
+  - exact is_well_formed.
+  - vm_cast_no_check (eq_refl true).
+  - lra.
+Qed.
+
+(** Coq computes [keeps], and [sound] turns the answer into a statement about all times. *)
+Ltac decide_distance a b :=
+  intros t T; apply (Rle_trans _ (IZR a / IZR b)); [lra |];
+  apply sound; [exact is_well_formed | vm_cast_no_check (eq_refl true) | exact (during t T)].
+
+(** The same for convex sets, with vectors that separate: each with the number of periods for which it does. *)
+Ltac decide_clear a b vectors :=
+  intros t T; apply (clear_less _ _ _ _ (IZR a / IZR b)); [lra |];
+  apply (sets_sound _ _ _ _ a b vectors); [exact is_well_formed | vm_cast_no_check (eq_refl true) | exact (during t T)].
+
+"""
+
+
+def distances_file(run: Recorded, *, vectors: bool = True) -> str:
+    """The run, and the theorem that every pair keeps its distance at all times; Coq needs the `vectors`."""
+    interval = f"{real(run.times[0])} <= t <= {real(run.times[-1])}"
+    claims = [_claim(run, demand) for demand in run.demands]
+    lemmas = [
+        f"{_vectors(run, demand) if vectors and demand.core else ''}"
+        f"Lemma {demand.lemma} : forall t, {interval} ->\n  {claim}.\nProof. {_tactic(demand)}. Qed.\n\n"
+        for demand, claim in zip(run.demands, claims, strict=True)
+    ]
+    checks = _DISTANCES.format(
+        run=run.name, interval=interval, start=ratio(run.times[0]), end=ratio(run.times[-1])
+    )  # fmt: skip
+    together = _theorem(f"{run.name}_keeps_its_distances", f"forall t, {interval} ->", _grouped(run.demands, claims))
+    proofs = _grouped(run.demands, [f"({each.lemma} t T)" for each in run.demands])
+    proof = all_of([all_of(group) for group in proofs])
+    bodies, theorem = "", f"{run.name}_keeps_its_distances"
+    if run.off_m:
+        bodies, theorem = _bodies(run, interval), f"{run.name}_bodies_keep_their_distances"
+    return (
+        f"(** That {run.name} keeps its distances. Written by `airground prove`, from the positions in trace/. *)\n"
+        "Require Import Reals Lra ZArith List.\nRequire Import Safety Convex Run DistanceChecker.\n"
+        f"Import ListNotations.\nLocal Open Scope Z_scope.\n\n{data(run)}{checks}{''.join(lemmas)}"
+        "(** All pairs: distances of centres, which are the safe distance and both radii, in m; times in s. *)\n"
+        f"{together}Proof. intros t T; exact {proof}. Qed.\n\n{bodies}"
+        f"Print Assumptions {theorem}.\n"
+    )
+
+
+def offs(run: Recorded) -> str:
+    """How far bodies may be off the straight lines, by their numbers."""
+    listed = "; ".join(real(run.off_m.get(name, Fraction(0))) for name in run.places)
+    value = f"nth i [{listed}] 0" if run.off_m else "0"
+    return (
+        "(** By how much bodies may be off the straight lines between the rows, m. *)\n"
+        f"Definition {run.name}_off (i : nat) : R := {value}.\n\n"
+    )
+
+
+_BODIES = """\
+(** The bodies themselves. *)
+Section Bodies.
+
+Variable x : nat -> R -> vec.
+Hypothesis near_lines : forall i t, norm (sub (x i t) (position {run} i t)) <= {run}_off i.
+
+Ltac decide_bodies i j keeps :=
+  intros t T; pose proof (keeps t T) as K; pose proof (near_lines i t) as I; pose proof (near_lines j t) as J;
+  unfold {run}_off, i, j in I, J; cbn [nth] in I, J;
+  match type of K with
+  | _ <= norm (sub ?u ?v) => pose proof (nearby u v (x i t) (x j t) _ _ _ I J K); lra
+  | clear _ _ _ _ ?d t => intros corners c Hin Hc; specialize (K corners c Hin Hc);
+      pose proof (nearby _ _ (x i t) (add (x j t) c) _ _ _ I
+        ltac:(replace (sub (add (x j t) c) (add (position {run} j t) c)) with (sub (x j t) (position {run} j t))
+          by (apply vec_eq; vectors; ring); exact J) K); lra
+  end.
+
+"""
+
+
+def _bodies(run: Recorded, interval: str) -> str:
+    """The theorem that the bodies keep their distances, wherever they are near the straight lines."""
+    claims = [_body_claim(run, demand) for demand in run.demands]
+    lemmas = "".join(
+        f"Lemma bodies_{demand.lemma} : forall t, {interval} ->\n  {claim}.\n"
+        f"Proof. decide_bodies {demand.first} {demand.second} {demand.lemma}. Qed.\n\n"
+        for demand, claim in zip(run.demands, claims, strict=True)
+    )
+    proofs = _grouped(run.demands, [f"(bodies_{each.lemma} t T)" for each in run.demands])
+    together = _theorem(
+        f"{run.name}_bodies_keep_their_distances", f"forall t, {interval} ->", _grouped(run.demands, claims)
+    )
+    proof = all_of([all_of(group) for group in proofs])
+    return (
+        f"{offs(run)}{_BODIES.format(run=run.name)}{lemmas}{together}"
+        f"Proof. intros t T; exact {proof}. Qed.\n\nEnd Bodies.\n\n"
+    )
+
+
+def _body_claim(run: Recorded, demand: Demand) -> str:
+    first, second, safe = f"(x {demand.first} t)", f"(x {demand.second} t)", real(demand.body_m)
+    if not demand.core:
+        return f"{safe} <= norm (sub {first} {second})"
+    sets = f"forall corners c, In corners {demand.sets} -> hull (map (place_in {run.name}) corners) c ->"
+    return f"({sets} {safe} <= norm (sub {first} (add {second} c)))"
+
+
+def _claim(run: Recorded, demand: Demand) -> str:
+    if demand.core:
+        return f"clear {run.name} {demand.first} {demand.second} {demand.sets} {real(demand.safe_m)} t"
+    positions = (f"(position {run.name} {name} t)" for name in (demand.first, demand.second))
+    return f"{real(demand.safe_m)} <= norm (sub {' '.join(positions)})"
+
+
+def _tactic(demand: Demand) -> str:
+    """Has Coq decide a claim."""
+    if not demand.core:
+        return f"decide_distance {ratio(demand.safe_m)}"
+    return f"decide_clear {ratio(demand.safe_m)} {demand.lemma}_vectors"
+
+
+def _vectors(run: Recorded, demand: Demand) -> str:
+    """For each convex set of the second body, vectors that separate the first one from it, with their periods."""
+    way, safe = run.way(demand), int(demand.safe_m * run.unit)
+    listed = ";\n".join(
+        f"[{'; '.join(f'({periods}, {_point(vector)})' for periods, vector in stretches)}]"
+        for stretches in separating(run.prisms(demand), way, safe)
+    )
+    return f"Definition {demand.lemma}_vectors := ([\n{listed}])%Z.\n"
+
+
+def without_vectors(text: str) -> str:
+    """An exported file without its separating vectors: others, found on another machine, may prove the same."""
+    return re.sub(r"^Definition \w+_vectors := \(\[[][\s();,P\da-fx-]*\]\)%Z\.\n", "", text, flags=re.MULTILINE)
+
+
+def _grouped(demands: Sequence[Demand], texts: Sequence[str]) -> list[list[str]]:
+    """One text per pair, by the first body: Coq takes a time quadratic in the length of each conjunction."""
+    pairs = groupby(zip(demands, texts, strict=True), key=lambda each: each[0].first)
+    return [[text for _, text in group] for _, group in pairs]
+
+
+def _theorem(name: str, quantifier: str, groups: Sequence[Sequence[str]]) -> str:
+    together = " /\\\n  ".join("(" + " /\\\n   ".join(group) + ")" for group in groups)
+    return f"Theorem {name} : {quantifier}\n  {together}.\n"
+
+
+def all_of(proofs: Sequence[str]) -> str:
+    """A proof of a conjunction from proofs of its parts."""
+    return "".join(f"(conj {proof}\n  " for proof in proofs[:-1]) + proofs[-1] + ")" * (len(proofs) - 1)
+
+
+def data(run: Recorded) -> str:
+    """The integers: bodies, their numbers, convex sets, times; and that they make a run."""
+    unit = run.unit
+    out = [f"(** Positions at the rows, in parts: {unit} parts are 1 m. *)\n"]
+    for name, rows in run.rows.items():
+        if len(run.places[name]) == 1:
+            out.append(f"Definition {name}_places := at_rest {len(rows)} ({_point(rows[0])}).\n")
+        else:
+            listed = ";\n".join(map(_point, rows))
+            out.append(f"Definition {name}_places := Track {stride(rows):#x} [\n{listed}].\n")
+    out += [f"Definition {name} := {k}%nat.\n" for k, name in enumerate(run.places)]
+    for name, sets in run.sets.items():
+        corners = ("; ".join(map(_point, each.in_parts(unit).corners)) for each in sets)
+        listed = ";\n".join(f"[{each}]" for each in corners)
+        out.append(f"(** Corners of convex sets, from where their body is. *)\nDefinition {name} := [\n{listed}].\n")
+    times = ";\n".join(_whole(int(time * unit)) for time in run.times)
+    bodies = "; ".join(f"{name}_places" for name in run.places)
+    out.append(f"Definition {run.name} := Run {unit:#x} [\n{times}] [\n{bodies}].\n\n")
+    checked = "Proof. vm_cast_no_check (eq_refl true). Qed."
+    out.append(f"Lemma is_well_formed : well_formed {run.name} = true.\n{checked}\n\n")
+    return "".join(out)
+
+
+def _whole(number: int) -> str:
+    return f"-{-number:#x}" if number < 0 else f"{number:#x}"
+
+
+def _point(place: Vector) -> str:
+    return "P " + " ".join(f"({text})" if text.startswith("-") else text for text in map(_whole, place))
+
+
+def stride(rows: Sequence[Vector]) -> int:
+    """The longest step, parts, rounded up."""
+    square = max(sum((b - a) ** 2 for a, b in zip(p, q, strict=True)) for p, q in pairwise(rows))
+    root = isqrt(square)
+    return root + (root * root < square)
+
+
+def real(number: Fraction) -> str:
+    """A real number in Coq."""
+    return str(number.numerator) if number.denominator == 1 else f"({number.numerator} / {number.denominator})"
+
+
+def ratio(number: Fraction) -> str:
+    """Two arguments, numerator and denominator."""
+    return f"{number.numerator}%Z {number.denominator}%Z"

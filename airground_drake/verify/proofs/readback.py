@@ -1,0 +1,181 @@
+"""Reads an exported Coq file back and compares it with the run.
+
+Coq cannot see whether the numbers in the file are the recorded ones. This module takes the file apart by its own
+patterns. From the exporter it uses only `demands`: who keeps which distance from whom. Corners are compared with the
+shapes of the scenario.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from fractions import Fraction
+from itertools import chain
+from typing import NamedTuple
+
+from airground_drake.base.errors import AirgroundError
+from airground_drake.scenario.shapes import convex_parts
+from airground_drake.sim.trace import Trace
+from airground_drake.verify.proofs.export import PARTS, Demand, demands, demands_of, off_m
+
+
+class ReadbackError(AirgroundError):
+    """An exported file does not say what the trace says."""
+
+
+class RereadError(NamedTuple):
+    """How many coordinates differ from the recorded ones, and by how much at most, m."""
+
+    coordinates: int
+    most_m: float
+
+
+def compare(text: str, trace: Trace) -> RereadError:
+    """Compare the file about distances with the run that it should be about.
+
+    Raises:
+        ReadbackError: at the first difference.
+        TraceError: if a column of the trace is missing or not finite.
+    """
+    spelled, error = _compare_positions(text, trace)
+    named = [each._replace(first=spelled[each.first], second=spelled[each.second]) for each in demands_of(trace)]
+    wanted = [(each.first, each.second, each.sets if each.core else "", each.safe_m) for each in named]
+    _compare_statement(f"run_{trace.run}", text, trace, wanted)
+    if any(trace.is_apart(name) for name in trace.robots):
+        _compare_bodies(f"run_{trace.run}", text, trace, named)
+    return error
+
+
+def compare_positions(text: str, trace: Trace, *, steered: bool = False) -> RereadError:
+    """Compare the positions in an exported file with those of the run that it should be about.
+
+    Args:
+        text: the file.
+        trace: the run.
+        steered: whether the positions are those of the points that the law steers.
+
+    Raises:
+        ReadbackError: at the first difference.
+        TraceError: if a column of the trace is missing or not finite.
+    """
+    return _compare_positions(text, trace, steered=steered)[1]
+
+
+def _compare_positions(text: str, trace: Trace, *, steered: bool = False) -> tuple[dict[str, str], RereadError]:
+    """The names of bodies in the file, by their names in the trace, and by how much coordinates differ."""
+    run = f"run_{trace.run}{'_steered' if steered else ''}"
+    unit, times, listed = _parts(rf"^Definition {run} := Run (\w+) \[\n(.*?)\] \[\n(.*?)\]\.$", text)
+    if [Fraction(int(t, 0), int(unit, 0)) for t in times.split(";\n")] != [Fraction(t) for t in trace.t.tolist()]:
+        raise ReadbackError(f"{run}: the times are not those of the trace")
+    shapes = {name: convex_parts(obstacle) for name, obstacle in trace.scenario.barriers.items()}
+    recorded = {
+        name: [obstacle.position_m if shapes[name] is None else [0.0] * 3]
+        for name, obstacle in trace.scenario.barriers.items()
+    }
+    moving = [name for name, obstacle in trace.scenario.barriers.items() if obstacle.moves]
+    place = trace.position if steered else trace.body
+    recorded |= {name: place(name).tolist() for name in (*moving, *trace.robots)}
+    bodies = [name.removesuffix("_places") for name in listed.split("; ")]
+    numbers = re.findall(r"^Definition (\w+) := (\d+)%nat\.$", text, re.MULTILINE)
+    if numbers != [(name, str(k)) for k, name in enumerate(bodies)] or len(bodies) != len(recorded):
+        raise ReadbackError(f"{run}: the bodies are not numbered in their order")
+    off = list[Fraction]()
+    for body, places in zip(bodies, recorded.values(), strict=True):
+        said = _coordinates(body, text, len(trace.t), int(unit, 0), len(places))
+        off += [abs(one - Fraction(axis)) for one, axis in zip(said, chain(*places), strict=True)]
+    spelled = dict(zip(recorded, bodies, strict=True))
+    asked = demands(trace.scenario)
+    for name, core in dict.fromkeys((each.second, each.core) for each in asked if each.core):
+        top = trace.scenario.barriers[name].height_m if core == "solid" else 0.0
+        parts = [[(*corner, z) for z in dict.fromkeys((0.0, top)) for corner in part] for part in shapes[name] or []]
+        off += _off_corners(f"{spelled[name]}_{core}", text, int(unit, 0), parts)
+    if max(off) > Fraction(1, 2 * PARTS):
+        raise ReadbackError(f"{run}: a position differs from the trace by {float(max(off)):.3g} m")
+    room = off_m(trace, steered=steered)
+    if room and f"Definition {run}_off (i : nat) : R := nth i" in text:
+        [listed_m] = _parts(rf"^Definition {run}_off \(i : nat\) : R := nth i \[(.*?)\] 0\.$", text)
+        if [_value(each) for each in listed_m.split("; ")] != [room.get(name, Fraction(0)) for name in recorded]:
+            raise ReadbackError(f"{run}: bodies may be off the straight lines by other lengths than their plants say")
+    elif room:
+        raise ReadbackError(f"{run}: how far bodies may be off the straight lines is missing")
+    return spelled, RereadError(sum(each > 0 for each in off), float(max(off)))
+
+
+def _coordinates(body: str, text: str, rows: int, unit: int, places: int) -> list[Fraction]:
+    """All coordinates of a body in the file, m."""
+    [what] = _parts(rf"^Definition {body}_places := (.*?)\.$", text)
+    points = _points(what, unit)
+    if len(points) != places or not what.startswith("Track " if places > 1 else f"at_rest {rows} "):
+        raise ReadbackError(f"{body}: {len(points)} places in the file, {places} in the trace")
+    return [*chain(*points)]
+
+
+def _off_corners(sets: str, text: str, unit: int, parts: Sequence[Sequence[Sequence[float]]]) -> list[Fraction]:
+    """By how much the corners of convex sets in the file differ from those of the scenario, m."""
+    [what] = _parts(rf"^Definition {sets} := \[\n(.*?)\]\.$", text)
+    said = [_points(each, unit) for each in what.split(";\n")]
+    if [len(each) for each in said] != [len(part) for part in parts]:
+        raise ReadbackError(f"{sets}: the sets in the file have other corners than the shape in the scenario")
+    pairs = zip(chain(*chain(*said)), chain(*chain(*parts)), strict=True)
+    return [abs(one - Fraction(axis)) for one, axis in pairs]
+
+
+def _points(text: str, unit: int) -> list[list[Fraction]]:
+    """All points in a part of the file, m."""
+    points = re.findall(r"\bP (\(?-?\w+\)?) (\(?-?\w+\)?) (\(?-?\w+\)?)", text)
+    return [[Fraction(int(axis.strip("()"), 0), unit) for axis in point] for point in points]
+
+
+def _compare_statement(run: str, text: str, trace: Trace, wanted: Sequence[tuple[str, str, str, Fraction]]) -> None:
+    """The theorem at the end is about all of the run's time and every pair, with its full distance."""
+    number = r"(\d+|\(\d+ / \d+\))"
+    start, end, body = _parts(
+        rf"^Theorem {run}_keeps_its_distances : forall t, {number} <= t <= {number} ->\n(.*?)\.\nProof\.", text
+    )
+    if [_value(start), _value(end)] != [Fraction(trace.t[0]), Fraction(trace.t[-1])]:
+        raise ReadbackError(f"{run}: the theorem is not about all of the run's time")
+    balls = rf"{number} <= norm \(sub \(position {run} (\w+) t\) \(position {run} (\w+) t\)\)"
+    claim = re.compile(rf"{balls}|clear {run} (\w+) (\w+) (\w+) {number} t")
+    claims = [
+        (one or first, other or second, sets, _value(apart or safe))
+        for apart, one, other, first, second, sets, safe in claim.findall(body)
+    ]
+    between = claim.sub("", body)  # has to be conjunctions and their parentheses alone
+    if claims != list(wanted) or re.sub(r"[\s()]", "", between) != "/\\" * (len(claims) - 1):
+        raise ReadbackError(f"{run}: the theorem does not claim the scenario's distance of every pair")
+
+
+def _compare_bodies(run: str, text: str, trace: Trace, wanted: Sequence[Demand]) -> None:
+    """The theorem about the bodies is about every pair and its distance, and about all that are near their lines."""
+    start, end, body = _parts(
+        rf"^Theorem {run}_bodies_keep_their_distances : forall t, (.*?) <= t <= (.*?) ->\n(.*?)\.\nProof\.", text
+    )
+    number = r"(\d+|\(\d+ / \d+\))"
+    balls = rf"{number} <= norm \(sub \(x (\w+) t\) \(x (\w+) t\)\)"
+    sets = (
+        rf"forall corners c, In corners (\w+) -> hull \(map \(place_in {run}\) corners\) c -> "
+        rf"{number} <= norm \(sub \(x (\w+) t\) \(add \(x (\w+) t\) c\)\)"
+    )
+    claim = re.compile(rf"{sets}|{balls}")
+    claims = [
+        (one or first, other or second, of, _value(least or apart))
+        for of, least, one, other, apart, first, second in claim.findall(body)
+    ]
+    expected = [(each.first, each.second, each.sets if each.core else "", each.body_m) for each in wanted]
+    between = re.sub(r"[\s()]", "", claim.sub("", body))
+    whole = [_value(start), _value(end)] == [Fraction(trace.t[0]), Fraction(trace.t[-1])]
+    near = f"Hypothesis near_lines : forall i t, norm (sub (x i t) (position {run} i t)) <= {run}_off i."
+    if claims != expected or between != "/\\" * (len(claims) - 1) or not whole or near not in text:
+        raise ReadbackError(f"{run}: the theorem about bodies does not claim the scenario's distance of every pair")
+
+
+def _value(text: str) -> Fraction:
+    return Fraction(text.strip("()").replace(" ", ""))
+
+
+def _parts(pattern: str, text: str) -> tuple[str, ...]:
+    """The groups of the one place that a pattern matches."""
+    found = list(re.finditer(pattern, text, re.MULTILINE | re.DOTALL))
+    if len(found) != 1:
+        raise ReadbackError(f"{pattern.split(' :')[0].lstrip('^')} is in the file {len(found)} times; wanted: once")
+    return found[0].groups()

@@ -1,0 +1,300 @@
+"""The runs of a report as theorems: one Coq file each, which Coq decides."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+from airground_drake.base import files
+from airground_drake.base.errors import TraceError, UnknownNameError, one_line
+from airground_drake.base.statuses import NOTHING, declared
+from airground_drake.sim import trace
+from airground_drake.sim.trace import Trace
+from airground_drake.verify.proofs import coq, readback
+from airground_drake.verify.proofs.export import (
+    Demand,
+    Recorded,
+    demands_of,
+    distances_file,
+    recorded,
+    refuse_unknown,
+)
+from airground_drake.verify.proofs.record import FOLDER, digest
+from airground_drake.verify.proofs.table import Entry, Missed, entries, law_file, lawful, missed
+from airground_drake.verify.proofs.too_near import TooNear, too_near
+
+SCHEMA = "airground_drake.proofs/1"
+PLACE = "proofs"
+"""Folder of a report for what is proved about it."""
+FOUND = "proofs.json"
+"""File in that folder with the results."""
+COMPUTED = "is expected to have type"
+"""Part of Coq's message if a checker has computed `false` where the proof says `true`."""
+CHECKERS = ("DistanceChecker.v", "LawChecker.v")
+
+
+@dataclass(frozen=True)
+class CoqReply:
+    """Coq's answer about one theorem.
+
+    Attributes:
+        proved: whether it accepts it.
+        theorem: its name.
+        file: its file.
+        why: the reason if it is not proved.
+        refused: the first pair that Coq refuses.
+        too_near: pairs that do not keep their distance.
+        axioms: of the proof.
+        seconds: how long Coq took, s.
+        entries: of the run's table that it accepts; 0 in an answer about distances.
+        missed: pairs with periods that no entry is about.
+    """
+
+    proved: bool
+    theorem: str
+    file: str
+    why: str = ""
+    refused: Demand | None = None
+    too_near: Sequence[TooNear] = ()
+    axioms: Sequence[str] = ()
+    seconds: float = 0.0
+    entries: int = 0
+    missed: Sequence[Missed] = ()
+
+
+@dataclass(frozen=True)
+class Proved:
+    """The result for one run.
+
+    Attributes:
+        run: its identifier.
+        expected: whether the scenario expects its distances to be kept.
+        pairs: number of pairs.
+        rows: of the trace.
+        lawful: number of pairs whose law is judged.
+        distances: every pair keeps its full distance at all times.
+        law: those pairs obey the avoidance law, without error.
+        rounded: coordinates that were rounded, and by how much at most, m.
+        meta_sha256: of the run's trace/<run>/meta.json.
+    """
+
+    run: str
+    expected: bool
+    pairs: int
+    lawful: int
+    rows: int
+    distances: CoqReply
+    law: CoqReply
+    rounded: readback.RereadError
+    meta_sha256: str
+
+
+@dataclass(frozen=True)
+class Workshop:
+    """A folder in which the checkers are compiled.
+
+    Attributes:
+        folder: temporary.
+        coq: version of Coq.
+        theory: SHA-256 of each theory used.
+    """
+
+    folder: Path
+    coq: str
+    theory: Mapping[str, str] = field(default_factory=dict)
+
+
+@contextmanager
+def workshop(limit_s: float = coq.LIMIT_S) -> Iterator[Workshop]:
+    """Compile the theories that the files of runs require, in a temporary folder.
+
+    Raises:
+        CoqError: if a theory is not accepted.
+        NoCoqError: if Coq is not installed.
+    """
+    version = coq.version()
+    with files.temporary_folder() as folder:
+        used = coq.install(CHECKERS, folder, limit_s=limit_s)
+        yield Workshop(folder, version, {name: digest(FOLDER / name) for name in used})
+
+
+def prove(place: Workshop, run: Trace, limit_s: float = coq.LIMIT_S) -> tuple[CoqReply, CoqReply, readback.RereadError]:
+    """Have Coq decide whether a run keeps its distances, and when it obeys the law.
+
+    The exported files stay in the workshop.
+
+    Raises:
+        ReadbackError: if the exported file differs from the trace.
+        TraceError: if the trace lacks something.
+    """
+    with _usable(run):
+        exact = recorded(run)
+        text = distances_file(exact)
+    rounded = readback.compare(text, run)
+    distances = decide(place, exact, f"{exact.name}.v", text, f"{exact.name}_keeps_its_distances", limit_s)
+    if distances.refused and (found := too_near(exact)):
+        words = f"Coq refuses {_pair(distances.refused)}. In exact arithmetic {'; '.join(map(str, found))}"
+        distances = replace(distances, why=words, too_near=found)
+    lawfully = recorded(run, steered=True) if exact.off_m else exact
+    table = entries(lawfully)
+    alone = not distances.proved or lawfully is not exact
+    text = law_file(lawfully, table, alone=alone) if table else ""
+    if table and alone:
+        readback.compare_positions(text, run, steered=lawfully is not exact)
+    return distances, _decide_law(place, lawfully, table, text, limit_s), rounded
+
+
+def _decide_law(place: Workshop, run: Recorded, table: Sequence[Entry], text: str, limit_s: float) -> CoqReply:
+    """Have Coq prove the table of a run, from its file; it is wanted of all pairs and periods."""
+    theorem, name, gaps = f"{run.name}_obeys_the_law", f"{run.name}_law.v", missed(run, table)
+    if not table:
+        why = "no pair obeys it in any period" if gaps else "its table has no pair: see docs/verification.md"
+        return CoqReply(False, theorem, name, why, missed=gaps)
+    law = decide(place, run, name, text, theorem, limit_s)
+    if not law.proved:
+        return replace(law, missed=gaps)
+    law = replace(law, entries=len(table), missed=gaps)
+    return replace(law, proved=False, why=_missing(gaps, len(table))) if gaps else law
+
+
+def _missing(gaps: Sequence[Missed], many: int) -> str:
+    """Which pairs miss the law, and when."""
+    pairs = (f"{' and '.join(gap.demand.called)}, {gap.begin_s:.6g} to {gap.end_s:.6g} s" for gap in gaps)
+    return f"{'; '.join(pairs)}. Proved of the other periods, in {many} entries"
+
+
+@contextmanager
+def _usable(run: Trace) -> Iterator[None]:
+    """Refuse a scenario that was damaged in meta.json.
+
+    Raises:
+        TraceError: in place of what Python says.
+    """
+    try:
+        yield
+    except (KeyError, TypeError, ValueError, AttributeError) as error:
+        raise TraceError(one_line(f"run {run.run}: the scenario in meta.json cannot be used: {error!r}")) from None
+
+
+def decide(place: Workshop, run: Recorded, name: str, text: str, theorem: str, limit_s: float) -> CoqReply:
+    """Have Coq decide one exported file."""
+    files.write_text(place.folder / name, text)
+    started = time.perf_counter()
+    try:
+        axioms = coq.listed(theorem, coq.compile_file(place.folder / name, limit_s))
+    except coq.CoqError as error:
+        refused = _about(run, text, error.line) if COMPUTED in str(error) else None
+        why = f"Coq refuses {_pair(refused)}; later pairs were not tried" if refused else str(error)
+        return CoqReply(False, theorem, name, why, refused)
+    return CoqReply(True, theorem, name, axioms=axioms, seconds=time.perf_counter() - started)
+
+
+def _pair(demand: Demand) -> str:
+    return f"{' and '.join(demand.called)}, {float(demand.required_m):g} m"
+
+
+def _about(run: Recorded, text: str, line: int) -> Demand | None:
+    """The pair whose lemma is at a line of an exported file."""
+    before = "\n".join(text.splitlines()[:line])
+    lemma = before.rpartition("\nLemma ")[2].partition(" ")[0]
+    return next((demand for demand in run.demands if demand.lemma == lemma), None)
+
+
+def prove_report(report: Path, names: Sequence[str] = (), limit_s: float = coq.LIMIT_S) -> Iterator[Proved]:
+    """Prove the runs of a report, one after the other, and write the results to its folder `proofs`.
+
+    Args:
+        report: its folder.
+        names: of the runs; default: all.
+        limit_s: wall-clock time for one call of Coq, s.
+
+    Raises:
+        FolderError: if one of its folders is a link.
+        UnknownNameError: if the report has no run with a name in `names`.
+        TraceError: if a trace cannot be read or is of another run, or no theorem is about a body of its scenario.
+        CoqError: if a theory is not accepted.
+        NoCoqError: if Coq is not installed.
+        OSError: if the folder cannot be written.
+    """
+    files.refuse_links(report)
+    there = sorted(path.parent.name for path in report.glob("trace/*/meta.json"))
+    for name in names:
+        if name not in there:
+            raise UnknownNameError(f"run of {report}", name, there)
+    if not there:
+        raise TraceError(f"{report} has no trace/*/meta.json; wanted: the folder of a report")
+    runs = {name: trace.load(report / "trace" / name, name) for name in names or there}
+    for run in runs.values():
+        with _usable(run):
+            refuse_unknown(run)
+    found: list[Proved] = []
+    with workshop(limit_s) as place:
+        for name, run in runs.items():
+            distances, law, rounded = prove(place, run, limit_s)
+            for answer in (distances, law):
+                (report / PLACE / answer.file).unlink(missing_ok=True)
+                if (place.folder / answer.file).exists():
+                    files.write_bytes(report / PLACE / answer.file, (place.folder / answer.file).read_bytes())
+            meta = files.sha256(files.read_bytes(report / "trace" / name / "meta.json"))
+            asked = demands_of(run)
+            counts = len(asked), len(lawful(asked)), len(run.t)
+            found.append(Proved(name, expects_kept(run), *counts, distances, law, rounded, meta))
+            yield found[-1]
+        files.write_json(report / PLACE / FOUND, document(place, found))
+
+
+def expects_kept(run: Trace) -> bool:
+    """Whether the scenario expects that the run keeps its distances: SAFE-TRACE is promised, and not to be refuted."""
+    expected = run.scenario.runs[run.run].expected.get("SAFE-TRACE", "holds")
+    return declared(expected) != NOTHING and "refuted" not in expected
+
+
+def document(place: Workshop, found: Sequence[Proved]) -> dict[str, Any]:
+    """What was found, as strict JSON."""
+    return {
+        "schema": SCHEMA,
+        "coq": place.coq,
+        "theory": dict(place.theory),
+        "runs": {
+            proved.run: {
+                "expected": proved.expected,
+                "meta_sha256": proved.meta_sha256,
+                "rows": proved.rows,
+                "pairs": proved.pairs,
+                "lawful_pairs": proved.lawful,
+                "rounded_coordinates": proved.rounded.coordinates,
+                "rounded_by_m": proved.rounded.most_m,
+                "distances": _entry(proved.distances),
+                "law": _entry(proved.law),
+            }
+            for proved in found
+        },
+    }
+
+
+def _entry(answer: CoqReply) -> dict[str, Any]:
+    entry: dict[str, Any] = {"proved": answer.proved, "theorem": answer.theorem, "file": answer.file}
+    if answer.entries:
+        entry["entries"] = answer.entries
+    if answer.missed:
+        entry["missed"] = listed(answer.missed)
+    if answer.proved:
+        return entry | {"axioms": list(answer.axioms), "seconds": round(answer.seconds, 3)}
+    near = [
+        {"first": one.demand.called[0], "second": one.demand.called[1], "safe_distance_m": float(one.demand.required_m)}
+        | {"least_m": one.least_m, "short_m": one.short_m, "t_s": one.t_s}
+        for one in answer.too_near
+    ]
+    return entry | {"why": answer.why} | ({"too_near": near} if near else {})
+
+
+def listed(gaps: Iterable[Missed]) -> list[dict[str, Any]]:
+    """Pairs with periods that no entry is about, as strict JSON."""
+    return [
+        {"first": gap.demand.called[0], "second": gap.demand.called[1], "begin_s": gap.begin_s, "end_s": gap.end_s}
+        for gap in gaps
+    ]

@@ -1,0 +1,58 @@
+"""Figures as files, and the captions that go with them."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import pytest
+from report.cases import GOING_ROUND, SUCCESS, make_scenario, make_trace
+
+from airground_drake.commands.figures import FORMATS, STYLES
+from airground_drake.report.export import figures
+
+REPORT: dict[str, Any] = {
+    "runs": {"c": {}},
+    "claims": [
+        {"id": "SAFE-TRACE", "run": "c", "status": "holds", "exercised": 7},
+        {"id": "SAFE-GATE", "run": "", "status": "proved", "exercised": None},
+        {"id": "LIVE-GOAL", "run": "c", "status": "holds", "exercised": 0},
+    ],
+    "reproduction": [],
+}
+
+
+def written(folder: Path, style: str, formats: Sequence[str]) -> dict[str, bytes]:
+    """The files by name."""
+    trace = make_trace(make_scenario(), "c", GOING_ROUND, SUCCESS)
+    folder.mkdir()
+    paths = list(figures.write(REPORT, make_scenario(), {"c": trace}, folder, style, formats))
+    assert sorted(paths) == sorted(folder.iterdir())
+    return {path.name: path.read_bytes() for path in paths}
+
+
+@pytest.mark.slow
+def test_each_figure_in_each_format_twice_the_same(tmp_path: Path) -> None:
+    first, again = (written(tmp_path / name, "ieee", FORMATS) for name in ("one", "two"))
+    assert first == again
+    assert {name for name in first if name.startswith("trajectories")} == {f"trajectories.{kind}" for kind in FORMATS}
+    assert all(content.startswith(b"%PDF") for name, content in first.items() if name.endswith(".pdf"))
+
+
+def test_captions_say_what_was_seen_and_what_is_established(tmp_path: Path) -> None:
+    files = written(tmp_path / "out", "thesis", ["svg"])
+    text = files["figures.tex"].decode()
+    caption = re.search(r"caption\{(.*)\}\n  \\label\{fig:distances\}", text)
+    assert caption is not None
+    assert caption[1].endswith("SAFE-TRACE holds in run c. SAFE-GATE is proved.")
+    assert "LIVE-GOAL" not in text  # nothing tested it
+    shown = re.findall(r"includegraphics\[width=0.7\\linewidth\]\{(.*?)\}", text)
+    assert all(f"{name}.svg" in files for name in shown)
+    assert "reproduction.tex" not in files
+    assert "SAFE-GATE & proved" in files["verdicts.tex"].decode()
+
+
+def test_the_command_knows_the_styles_and_formats() -> None:
+    assert (figures.FORMATS, tuple(figures.STYLES)) == (FORMATS, STYLES)

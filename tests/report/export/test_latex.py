@@ -1,0 +1,54 @@
+"""Tables in LaTeX."""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from airground_drake.report.export import latex
+
+REPORT: dict[str, Any] = {
+    "runs": {"a": {}, "d_2": {}},
+    "claims": [
+        {"id": "SAFE-INV", "run": "", "status": "proved", "exercised": None},
+        {"id": "ZENO-TRACE", "run": "a", "status": "holds", "exercised": 0},
+        {"id": "ZENO-TRACE", "run": "d_2", "status": "holds", "exercised": 3},
+        {"id": "SAFE-TRACE", "run": "a", "status": "refuted", "exercised": 4},
+    ],
+    "reproduction": [
+        {"id": "A1", "quantity": "stall & 5 %", "paper": [3.3, 5.1], "ours": [3.36889, 5.10219], "unit": "m",
+         "status": "not_reproduced"},
+        {"id": "A3", "quantity": "grows", "paper": 1.0, "ours": 0.0, "unit": "yes/no", "status": "calibrated"},
+        {"id": "A5", "quantity": "trigger", "paper": 14.45, "ours": None, "unit": "s", "status": "not_reproduced"},
+    ],
+}  # fmt: skip
+
+
+def rows(table: str) -> list[list[str]]:
+    """Cells of the rows below the head."""
+    body = table.split("\\midrule\n")[1].split("\\bottomrule")[0]
+    return [[cell.strip() for cell in re.split(r"(?<!\\)&", line.removesuffix(" \\\\"))] for line in body.splitlines()]
+
+
+def test_a_row_per_claim_and_per_result_of_the_paper() -> None:
+    table = latex.verdicts(REPORT)
+    assert "claim & model & a & d\\_2 \\\\" in table
+    assert rows(table) == [
+        ["SAFE-INV", "proved", "", ""],
+        ["ZENO-TRACE", "", "not tested", "holds"],
+        ["SAFE-TRACE", "", "refuted", ""],
+    ]
+    assert rows(latex.reproduction(REPORT)) == [
+        ["A1", r"stall \& 5 \%", "(3.3, 5.1) m", "(3.369, 5.102) m", "not reproduced"],
+        ["A3", "grows", "yes", "no", "calibrated"],
+        ["A5", "trigger", "14.45 s", "none", "not reproduced"],
+    ]
+
+
+@given(st.text())
+def test_no_special_character_is_left(text: str) -> None:
+    plain = re.sub(r"\\(text[a-z]+\{\}|ldots\{\}|[&%$#_{}])|\$\\[a-z]+\$", "", latex.escaped(text))
+    assert not re.search(r"[\\~^<>|&%$#_{}\n]", plain)

@@ -1,0 +1,42 @@
+"""Notes on what is allowed and seldom meant."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from airground_drake.scenario.load import load
+from airground_drake.scenario.notes import notes
+from airground_drake.scenario.shipped import shipped
+
+SMALL = (
+    "safe_distance.obstacle_m = 2 m: values of the paper, which are large for UGVs with a radius of 0.2 m; set your own"
+)
+NARROW = {
+    "ugvs.ugv1.target_m": [4, 0, 0], "ugvs.ugv1.preset.waypoints_m": [[0, 0, 0], [4, 0, 0]],
+    "obstacles.rock.position_m": [2, 3, 0],
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({}, []),
+        ({"ugvs.ugv1.radius_m": 0.2}, [SMALL]),
+        ({"ugvs.ugv1.radius_m": 0.2, "safe_distance.obstacle_m": 0.3}, []),
+        (NARROW, [SMALL.replace("UGVs with a radius of 0.2 m", "ways within 4 m")]),
+        (
+            {"ugvs.ugv1.max_speed_m_s": 60, "control.sensing_range_m": 20},
+            ["ugv1 has max_speed_m_s = 60; speeds are in m/s: this is 216 km/h"],
+        ),
+    ],
+)
+def test_small_robots_and_worlds_with_the_papers_distances_and_great_speeds_are_noted(
+    changes: dict[str, Any], said: list[str]
+) -> None:
+    assert [*notes(load("minimal", changes))] == said
+
+
+def test_shipped_scenarios_have_no_notes_but_the_one_that_is_small() -> None:
+    assert {name for name in shipped() for _ in notes(load(name))} == {"dwell"}

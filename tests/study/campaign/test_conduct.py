@@ -1,0 +1,55 @@
+"""Which draws of a folder count."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from airground_drake.study.campaign.conduct import EVIDENCE, conduct
+from airground_drake.study.campaign.rows import JUDGED, Row, blank
+from airground_drake.study.campaign.spec import Spec, load_spec
+from airground_drake.study.campaign.statistics import confidence_sequence
+from airground_drake.study.campaign.stopping import Stopping
+from airground_drake.study.campaign.store import read
+
+
+def spec(folder: Path, drawn: str = "seed: {integer: [0, 1000]}") -> Spec:
+    path = folder / "x.yaml"
+    path.write_text(f"scenario: minimal\ndraw: {{{drawn}}}\n", encoding="utf-8")
+    return load_spec(path)
+
+
+def row(index: int) -> Row:
+    judged = {"ended": JUDGED, "claim": "SAFE-TRACE", "status": "holds", "as_expected": True, "exercised": 1.0}
+    return blank() | judged | {"index": index, "run": "d", "method": "d", "drawn": "{}"}
+
+
+def draw_50_first(work: Callable[[int], Any], items: Iterable[int]) -> Iterator[tuple[int, Any]]:
+    """A pool in which draw 50 and those after it end before the first."""
+    for index in sorted(items, key=lambda index: (index < 50, index)):
+        yield index, [row(index)]
+
+
+def test_after_a_rule_has_stopped_a_campaign_only_draws_up_to_the_stop_count(tmp_path: Path) -> None:
+    rule, out = Stopping.parse("SAFE-TRACE < 0.2"), tmp_path / "out"
+    last = next(n for n in range(100) if confidence_sequence(0, n).high < 0.2) - 1
+    assert last < 49
+    for resume in (False, True):
+        found = conduct(spec(tmp_path), out, draw_50_first, 100, resume=resume, stopping=rule)
+        assert (found["draws"], found["claims"][0]["tested"], found["stopped"]) == (last + 1, last + 1, last)
+        assert json.loads((out / EVIDENCE).read_text()) == found
+        assert len(read(out)[1]) == 50 + last + 1  # the others are kept
+        rule = Stopping.parse("SAFE-TRACE < 0.2")
+
+
+@pytest.mark.parametrize("drawn", ["duration_s: {halton: [1.0, 2.0]}", "duration_s: {grid: [1.0, 2.0]}"])
+def test_a_rule_needs_independent_draws(drawn: str, tmp_path: Path) -> None:
+    rule = Stopping.parse("SAFE-TRACE < 0.2")
+    with pytest.raises(ValueError, match=r"--stop-when needs independent draws; not independent: duration_s$"):
+        conduct(spec(tmp_path, drawn), tmp_path / "out", draw_50_first, 100, stopping=rule)
+    found = conduct(spec(tmp_path, drawn), tmp_path / "out", draw_50_first, 100)
+    assert (found["dependent"], found["claims"][0]["anytime"]) == (["duration_s"], None)

@@ -1,0 +1,232 @@
+"""Conclusions, on rows that were made up."""
+
+from __future__ import annotations
+
+import json
+import re
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from airground_drake.base.errors import UnknownNameError
+from airground_drake.commands.campaign import _code, _summary
+from airground_drake.study.campaign.evidence import evidence, strict
+from airground_drake.study.campaign.page import page, told
+from airground_drake.study.campaign.rows import COLUMNS, INVALID, JUDGED, STOPPED, Row, blank
+from airground_drake.study.campaign.statistics import clopper_pearson, confidence_sequence
+from airground_drake.study.campaign.stopping import InOrder, Stopping
+from airground_drake.study.campaign.work import died
+
+NAN = float("nan")
+
+
+def row(index: int, status: str = "holds", **more: Any) -> Row:
+    drawn = json.dumps(more.pop("drawn", {"gain": index, "start": [0.0, float(index % 7)]}))
+    common = {"index": index, "run": "d", "method": "d", "ended": JUDGED, "claim": "SAFE-TRACE", "status": status}
+    filled = {"as_expected": status == "holds", "exercised": 1.0, "margin": 0.1 * index, "unit": "m", "ugvs": 1}
+    return blank() | common | filled | {"drawn": drawn} | more
+
+
+def stopped(index: int, run: str, ended: str = STOPPED) -> Row:
+    return blank() | {"index": index, "run": run, "ended": ended, "drawn": "{}"}
+
+
+def table(rows: list[Row]) -> pd.DataFrame:
+    return pd.DataFrame(rows, columns=list(COLUMNS)).astype(COLUMNS)
+
+
+def conclude(rows: list[Row], **more: Any) -> dict[str, Any]:
+    found = strict(evidence(table(rows), **more)) | {"name": "x", "title": "", "spec": "x.yaml", "stopped": None}
+    json.dumps(found, allow_nan=False)
+    return dict(found)
+
+
+def counts(claim: dict[str, Any]) -> list[int]:
+    return [claim[name] for name in ("tested", "refuted", "undecided", "idle")]
+
+
+def shown(found: dict[str, Any]) -> str:
+    """The page, without its figures."""
+    return page(found, pd.DataFrame(columns=list(COLUMNS)))
+
+
+def word(found: dict[str, Any]) -> tuple[str, str]:
+    """How the banner of the page looks, and what it says."""
+    banner = re.search(r'<p class="headline (\w+)">(.*?)</p>', shown(found), re.DOTALL)
+    assert banner is not None
+    return banner[1], " ".join(re.sub(r"<[^>]*>", " ", banner[2]).split())
+
+
+def test_untested_runs_are_ignored_and_undecided_ones_count_against_the_claim() -> None:
+    rows = [row(i) for i in range(90)]
+    rows += [row(90, "refuted"), row(91, "inconclusive"), row(92, exercised=0.0, margin=NAN)]
+    (claim,) = conclude(rows)["claims"]
+    assert counts(claim) == [92, 1, 1, 1]
+    assert claim["fixed"] == pytest.approx([clopper_pearson(1, 92).low, clopper_pearson(2, 92).high])
+    assert claim["anytime"] == pytest.approx([confidence_sequence(1, 92).low, confidence_sequence(2, 92).high])
+    assert (claim["differs"], claim["undecided_draws"]) == (1, [91])
+    assert [each["index"] for each in claim["worst"]] == [0, 1, 2, 3, 4]
+
+
+def test_an_unfinished_run_is_undecided() -> None:
+    """A run that was stopped, and a draw whose process died; not a draw without a valid scenario."""
+    rows = [*(row(i) for i in range(90)), stopped(90, "d"), *died(91)]
+    (claim,) = conclude([*rows, stopped(92, "c"), stopped(93, "", INVALID)])["claims"]
+    assert counts(claim) == [92, 0, 2, 0]
+    assert claim["fixed"] == pytest.approx([0.0, clopper_pearson(2, 92).high])
+    value = confidence_sequence(2, 92).high
+    assert [Stopping("SAFE-TRACE", True, value * share).met(rows) for share in (0.999, 1.001)] == [False, True]
+
+
+def test_a_draw_with_one_unfinished_run_is_not_judged_and_meets_no_rule() -> None:
+    rows = [each for i in range(200) for each in (row(i, run="b"), stopped(i, "c"))]
+    found = conclude(rows)
+    assert (found["ended"], found["not_judged"][1]["index"]) == ({STOPPED: 200}, 1)
+    assert [claim["run"] for claim in found["claims"]] == ["b"]
+    assert word(found) == ("open", "? 200 of 200 draws were not finished")
+    rule = Stopping.parse("SAFE-TRACE < 0.1")
+    assert not any(rule.met(rows[2 * i : 2 * i + 2]) for i in range(200))
+
+
+@pytest.mark.parametrize(
+    ("rows", "looks"),
+    [
+        ([row(0)], ("good", "✓ Every claim as declared")),
+        ([row(0, exercised=0.0, as_expected=False)], ("open", "? 1 of 1 claims never tested")),
+        ([row(0), row(1, exercised=0.0, as_expected=False)], ("good", "✓ Every claim as declared")),
+        ([row(0, "refuted")], ("bad", "✗ 1 of 1 claims not as declared")),
+        ([row(0, "refuted", as_expected=True)], ("tuned", "≈ 1 of 1 claims refuted, as the scenario admits")),
+        ([row(0, "inconclusive")], ("open", "? 1 of 1 claims undecided in some draws")),
+        (died(0), ("open", "? 1 of 1 draws were not finished")),
+        ([row(0), *died(1)], ("open", "? 1 of 1 claims undecided in some draws")),
+        ([row(0, claim="", status="")], ("open", "? Nothing was judged")),
+    ],
+)
+def test_page_exit_code_and_text_agree(rows: list[Row], looks: tuple[str, str]) -> None:
+    found = conclude(rows)
+    assert word(found) == looks
+    assert _code(found) == {"good": 0, "tuned": 0, "bad": 1, "open": 3}[looks[0]]
+    assert ("  undecided: " in _summary(found, looked=False)) == (looks[0] == "open")
+
+
+@pytest.mark.parametrize(
+    ("status", "exercised", "tested"),
+    [
+        ("holds", 1.0, True), ("holds", 0.0, False), ("holds", NAN, True), ("proved", 0.0, False),
+        ("supported", 0.0, False), ("refuted", 0.0, True), ("inconclusive", 0.0, True), ("error", NAN, True),
+    ],
+)  # fmt: skip
+def test_evidence_and_stopping_rules_agree_on_what_was_tested(status: str, exercised: float, tested: bool) -> None:
+    rows = [row(i, status, exercised=exercised) for i in range(3)]
+    (claim,) = conclude(rows)["claims"]
+    rule = Stopping.parse("SAFE-TRACE < 0.1")
+    rule.met(rows)
+    assert [claim[name] for name in ("refuted", "undecided", "tested")] == rule._counts.get("d", [0, 0, 0])
+    assert claim["tested"] == 3 * tested
+    assert tested or claim["anytime"] == [0.0, 1.0]
+
+
+def test_it_finds_the_keys_by_which_a_claim_fails() -> None:
+    """By quarters of a number, or by values unless there are too many; never by a seed or by chance."""
+    rng = np.random.default_rng(0)
+    policies = [[], [{"name": "hostile"}], [{"name": "towards"}], [{"name": "noisy"}], None, True]
+    by_number, by_value, by_chance = [], [], []
+    for i in range(400):
+        gain, noise, other = rng.random(3).tolist()
+        bad, drawn = gain > 0.75 and noise > 0.5, {"gain": gain, "other": other, "noise": noise}
+        by_number.append(row(i, "refuted" if bad else "holds", drawn=drawn))
+        drawn = {"policies": policies[i % 6], "gain": gain, "label": f"draw {i}"}
+        by_value.append(row(i, "refuted" if i % 6 == 1 else "holds", drawn=drawn))
+        drawn = {"seed": i, **{f"key{k}": value for k, value in enumerate(rng.random(12).tolist())}}
+        by_chance.append(row(i, "refuted" if i > 200 else "holds", drawn=drawn))
+    (claim,) = conclude(by_number)["claims"]
+    where = claim["fails_where"]
+    assert (set(where["keys"]), where["by_chance"] < 1e-6) == ({"gain", "noise"}, True)
+    assert sum(cell["runs"] for cell in where["cells"]) == 400
+    assert sum(cell["refuted"] for cell in where["cells"]) == claim["refuted"]
+    where = conclude(by_value)["claims"][0]["fails_where"]
+    bad_cells = [cell for cell in where["cells"] if cell["refuted"]]
+    assert {cell["where"]["policies"] for cell in bad_cells} == {'[{"name": "hostile"}]'}
+    assert conclude(by_chance)["claims"][0]["fails_where"] is None
+
+
+def test_the_page_says_first_what_was_found_and_what_separates_failures() -> None:
+    rows = [
+        row(i, "refuted" if i % 4 == 1 else "holds", drawn={"gain": i % 4, "<script>": "<img src=x>"})
+        for i in range(80)
+    ]
+    rows += [row(i, run="b", drawn={}) for i in range(80)]
+    found = conclude(rows) | {"name": "<b>"}
+    says = [tuple(line) for line in told(found)]
+    assert [mark for mark, _ in says] == ["no", "yes"]
+    assert says[0][1].startswith("SAFE-TRACE in run d: refuted in 20 of 80 runs; probability 0.1")
+    assert says[1][1].startswith("SAFE-TRACE in run b: never refuted in 80 runs; probability of a violation at most 0.")
+    text = page(found, table(rows))
+    assert "SAFE-TRACE in run d fails in 20 of 20 runs with gain 1, and in 0 of 20 runs with gain" in text
+    assert text.index("refuted in 20 of") < text.index("What separates failures") < text.index("How likely a violation")
+    assert not re.search(r'<script|<img|<b>|(?:src|href)="(?!#)', text)
+
+
+def test_without_independent_draws_there_is_no_interval() -> None:
+    found = conclude([row(i) for i in range(9)], dependent=["ugvs.u.start_m"])
+    (claim,) = found["claims"]
+    assert (claim["tested"], claim["fixed"], claim["anytime"]) == (9, None, None)
+    assert "come from a Halton sequence or a grid:\n<code>ugvs.u.start_m</code>.</p>" in shown(found)
+    assert _summary(found, looked=False).endswith("no intervals: draws are not independent (ugvs.u.start_m)")
+
+
+def test_the_summary_says_what_is_undecided_and_gives_anytime_bounds_after_a_look() -> None:
+    rows = [row(0), row(7, "inconclusive"), row(1, claim="LIVE-HYP", exercised=0.0, as_expected=False), *died(2)]
+    said = [line for line in _summary(conclude(rows), looked=False).splitlines() if "undecided" in line]
+    assert said == ["  undecided: 1 of 4 draws died",
+                    "  undecided: SAFE-TRACE in run d: 2 of 3 runs, such as draw 7"]  # fmt: skip
+    said = _summary(conclude(rows[2:3]), looked=False).splitlines()
+    assert said[-1] == "  undecided: LIVE-HYP in run d: the scenario expects it to be tested, and no draw did"
+    found = conclude([row(i) for i in range(50)])
+    for looked, bound in ((False, clopper_pearson(0, 50)), (True, confidence_sequence(0, 50))):
+        assert f"violation 0 to {bound.high:.2g}" in _summary(found, looked=looked)
+
+
+def test_marks_are_found_in_distributions_and_no_draw_is_no_error() -> None:
+    rows = [row(i, first_trigger_s=float(i)) for i in range(10)] + [row(10, first_trigger_s=NAN)]
+    (times,) = conclude(rows, marks={"first_trigger_s": 7.5})["times"]
+    assert (times["first_trigger_s"]["share_below_mark"], times["first_trigger_s"]["count"]) == (0.8, 10)
+    assert conclude([])["claims"] == []
+
+
+def test_a_rule_is_met_when_the_bound_is_low_or_high_enough() -> None:
+    rule = Stopping.parse("SAFE-TRACE < 0.1")
+    met = [rule.met([row(i)]) for i in range(100)]
+    first = met.index(True)
+    assert all(met[first:])
+    assert confidence_sequence(0, first + 1).high < 0.1 <= confidence_sequence(0, first).high
+    for untested in ([row(0, exercised=0.0)], [row(0, run="b"), row(0, run="c", exercised=0.0)]):
+        rule = Stopping.parse("SAFE-TRACE < 0.1")
+        assert not any(rule.met(untested) for _ in range(200))
+    rule = Stopping.parse("SAFE-TRACE > 0.5")
+    assert [rule.met([row(i, "refuted")]) for i in range(50)][-1]
+
+
+def test_a_bad_rule_is_refused() -> None:
+    for text in ("SAFE-TRACE", "SAFE-TRACE = 0.1", "SAFE-TRACE < 2", "SAFE-TRACE < e"):
+        with pytest.raises(ValueError, match="wanted: CLAIM < PROBABILITY"):
+            Stopping.parse(text)
+    for text, claims in (("SAFE-INV < 0.1", ()), ("LIVE-HYP < 0.1", ["SAFE-TRACE"])):
+        with pytest.raises(UnknownNameError, match="allowed: SAFE-TRACE"):
+            Stopping.parse(text, claims)
+
+
+def test_a_rule_is_given_draws_in_their_order_however_they_end() -> None:
+    """Otherwise short draws would decide, and slow failures would come too late."""
+    seen = list[int]()
+
+    class Rule(Stopping):
+        def met(self, rows: list[Row]) -> bool:
+            seen.append(rows[0]["index"])
+            return rows[0]["index"] == 3
+
+    in_order = InOrder(Rule("SAFE-TRACE", below=True, value=0.1), [0, 1, 3, 4])
+    met = [in_order.met(index, [row(index)]) for index in (4, 1, 3, 0)]
+    assert (met, seen) == ([False, False, False, True], [0, 1, 3])

@@ -1,0 +1,103 @@
+"""The rows of one draw, whatever becomes of it."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from airground_drake.base.errors import SimulationError
+from airground_drake.scenario.estimate import DEFAULT_LIMITS, Limits
+from airground_drake.study.campaign import work
+from airground_drake.study.campaign.rows import COLUMNS, INVALID, JUDGED, STOPPED
+from airground_drake.study.campaign.spec import Spec, load_spec
+
+TEXT = """
+scenario: minimal
+set: {duration_s: 2.0}
+draw: {seed: {integer: [0, 1000]}}
+claims: [SAFE-TRACE, ZENO-TRACE]
+"""
+SLOW = """
+class Route:
+    def solve(self, problem, budget):
+        while True:
+            pass
+"""
+IDLE = """
+from airground_drake.uav import policy
+
+class Policy(policy.Policy):
+    def propose(self, seen):
+        return None
+"""
+
+
+@pytest.fixture
+def spec(tmp_path: Path) -> Spec:
+    for name, text in (("mine.yaml", TEXT), ("slow.py", SLOW), ("idle.py", IDLE)):
+        (tmp_path / name).write_text(text, encoding="utf-8")
+    return load_spec(tmp_path / "mine.yaml")
+
+
+def test_a_row_for_each_run_and_claim(spec: Spec) -> None:
+    rows = work.rows_of(spec, 5, DEFAULT_LIMITS)
+    assert {row["claim"] for row in rows} == {"SAFE-TRACE", "ZENO-TRACE"}
+    for row in rows:
+        assert row.keys() == COLUMNS.keys()
+        assert (row["ended"], row["index"], row["status"]) == (JUDGED, 5, "holds")
+        assert (json.loads(row["drawn"]), row["wall_s"] > 0.0) == (spec.values(5), True)
+    safe = next(row for row in rows if row["claim"] == "SAFE-TRACE")
+    assert safe["margin"] >= 0.0
+    assert math.isnan(safe["first_trigger_s"])
+
+
+@pytest.mark.parametrize(
+    ("changes", "values", "limits", "what"),
+    [
+        ({"fixed": {"duration_s": -1.0}}, {}, DEFAULT_LIMITS, "duration_s"),
+        ({}, {}, Limits(work=1.0), "asks for"),
+        ({}, {"decision.noise_m_sqrt_s": float("nan")}, DEFAULT_LIMITS, "decision.noise_m_sqrt_s"),
+        ({"runs": ("d",)}, {"runs": {"b": {"method": "b"}}}, DEFAULT_LIMITS, "runs: 'd' is not allowed"),
+        ({"fixed": {"intervention.policies": [{"name": "idle.py:Policy"}]}}, {}, DEFAULT_LIMITS, "third-party code"),
+    ],
+)
+def test_a_draw_without_a_usable_scenario_is_invalid(
+    changes: dict[str, Any], values: dict[str, Any], limits: Limits, what: str, spec: Spec
+) -> None:
+    (row,) = work.rows_at(replace(spec, **changes), values, 5, limits)
+    assert (row["ended"], row["claim"], what in row["what"]) == (INVALID, "", True)
+    assert "NaN" not in row["drawn"]
+
+
+def test_a_run_that_stops_is_a_row(spec: Spec, monkeypatch: pytest.MonkeyPatch) -> None:
+    def stop(*_: object) -> None:
+        raise SimulationError("d", 1.5, "t0 < ti")
+
+    monkeypatch.setattr(work, "simulate", stop)
+    rows = work.rows_of(spec, 5, DEFAULT_LIMITS)
+    assert [row["ended"] for row in rows] == [STOPPED] * len(spec.draw(5).runs)
+    assert "t0 < ti" in rows[0]["what"]
+
+
+def test_a_draw_that_never_ends_is_stopped(spec: Spec) -> None:
+    """By third-party code that is found beside the spec."""
+    changes = {
+        "gatekeeper.route": "slow.py:Route",
+        "runs": {"c": {"method": "c"}},
+        "decision.threshold.zeta_m": 0.5,
+        "decision.release_m": 0.2,
+    }
+    hangs = replace(spec, fixed=changes)
+    (row,) = work.rows_of(hangs, 0, Limits(time=0.5, plugins=True))
+    assert (row["ended"], row["what"]) == (STOPPED, "not done after 0.5 s")
+
+
+def test_a_scenario_that_is_made_small_is_simulated_with_code_beside_the_spec(spec: Spec) -> None:
+    own = replace(spec, fixed={"intervention.policies": [{"name": "idle.py:Policy"}]})
+    rows = (work.rows_of_scenario(own, own.draw(0), limits) for limits in (Limits(plugins=True), DEFAULT_LIMITS))
+    assert [{row["ended"] for row in each} for each in rows] == [{JUDGED}, {INVALID}]
