@@ -57,13 +57,13 @@ def diagram_html(diagram: Diagram) -> str | None:
     return _element(graphviz.svg(graphviz.dot(diagram))) if graphviz.has_layers(diagram) else None
 
 
+# What is shown of objects, by the module and the name of their class.
 SHOWN = {
     "airground_drake.scenario.schema:Scenario": scenario_html,
     "airground_drake.sim.trace:Trace": trace_html,
     "airground_drake.verify.claim:Verdict": verdict_html,
     "pydrake.systems.framework:Diagram": diagram_html,
 }
-"""What is shown of objects, by the module and the name of their class."""
 
 
 def register() -> None:

@@ -5,19 +5,15 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-Array = npt.NDArray[np.float64]
-"""Numbers in binary64; every docstring gives the shape and the unit."""
+Array = npt.NDArray[np.float64]  # numbers in binary64; docstrings and comments give shapes and units
 
+# Largest size of a scenario's numbers and of a proposal's times and coordinates: their products stay finite.
 LARGEST = 1e9
-"""Largest size of a scenario's numbers and of a proposal's times and coordinates: their products stay finite."""
-ROUNDOFF = 2.0**-53
-"""Unit roundoff u of binary64: every operation returns its exact result times 1 + e, |e| <= u."""
+ROUNDOFF = 2.0**-53  # unit roundoff u of binary64: every operation returns its exact result times 1 + e, |e| <= u
 
 
 def read_only(values: npt.ArrayLike) -> Array:
-    """A copy of the values that cannot be written to, in C order.
-
-    Its memory is that of `bytes`, so that `setflags(write=True)` fails, too.
-    """
+    """A copy of the values that cannot be written to, in C order."""
+    # Its memory is that of `bytes`, so that `setflags(write=True)` fails, too.
     array = np.asarray(values, dtype=np.float64)
     return np.ndarray(array.shape, np.float64, buffer=array.tobytes())

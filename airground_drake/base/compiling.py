@@ -17,7 +17,7 @@ NOTE = (
 
 
 def njit(*, cache: bool) -> Callable[[Callable[..., Any]], Any]:
-    """As `numba.njit`; where numba finds no folder for its cache, it is said once, and nothing is kept."""
+    """`numba.njit`; where numba finds no folder for its cache, it is said once, and nothing is kept."""
 
     def compiled(function: Callable[..., Any]) -> Any:
         try:

@@ -23,41 +23,23 @@ from airground_drake.base.errors import FolderError, one_line
 if TYPE_CHECKING:
     import pandas as pd
 
+# Name of a temporary file, with the process that writes it.
 _PARTIAL = re.compile(r"\..*\.(?P<pid>\d+)\.[a-z0-9_]+\.partial")
-"""Name of a temporary file, with the process that writes it."""
 
-_TEMPORARY = "airground_drake."
-"""Prefix of the names of temporary folders."""
+_TEMPORARY = "airground_drake."  # prefix of the names of temporary folders
 
-_open: set[str] = set()
-"""Temporary files and folders of this process."""
+_open: set[str] = set()  # temporary files and folders of this process
 
 
-LARGEST_FILE = 256_000_000
-"""Most bytes of a file that is read: a run of an hour with ten robots has fewer."""
-LARGEST_TEXT = 64_000_000
-"""Most bytes of a text that is read, such as JSON."""
-MOST_CELLS = 50_000_000
-"""Most cells of a table that is read, or numbers in its lists."""
-MOST_UNPACKED = 1_000_000_000
-"""Most bytes of an unpacked table, or of its texts."""
+LARGEST_FILE = 256_000_000  # most bytes of a file that is read: a run of an hour with ten robots has fewer
+LARGEST_TEXT = 64_000_000  # most bytes of a text that is read, such as JSON
+MOST_CELLS = 50_000_000  # most cells of a table that is read, or numbers in its lists
+MOST_UNPACKED = 1_000_000_000  # most bytes of an unpacked table, or of its texts
 
 
 def open_regular(path: Path, flags: int = os.O_RDONLY, *, links: bool = False) -> int:
-    """Open a regular file of a folder that may be hostile: not through a link, and without waiting.
-
-    Args:
-        path: of the file.
-        flags: as of `os.open`.
-        links: whether the path may be a link to a regular file: for paths that the user names.
-
-    Returns:
-        The descriptor.
-
-    Raises:
-        OSError: if it cannot be opened, or is something else: reading a pipe may hang, a device may never end, and
-            a link may lead to a file of somebody else.
-    """
+    """Open a regular file of a folder that may be hostile: not through a link, and without waiting."""
+    # links: whether the path may be a link to a regular file: for paths that the user names.
     with suppress(FileNotFoundError):  # the flags may create it
         # asked before it is opened, too: opening a device may have effects
         _be_regular(os.stat(path, follow_symlinks=links), path)
@@ -77,13 +59,8 @@ def _be_regular(about: os.stat_result, path: Path) -> None:
 
 
 def refuse_links(folder: Path) -> None:
-    """Refuse a folder of a stranger if folders in it are links: other files would be read or written through them.
-
-    That is asked of a report or saved run before its files are opened; `open_regular` follows no link to a file.
-
-    Raises:
-        FolderError: if a folder in it, or in one of its folders, is a link; names it.
-    """
+    """Refuse a folder of a stranger if folders in it are links: other files would be read or written through them."""
+    # That is asked of a report or saved run before its files are opened; `open_regular` follows no link to a file.
     for path in chain(folder.glob("*"), folder.glob("*/*")):
         if path.is_symlink() and path.is_dir():
             raise FolderError(one_line(f"{path} is a link; wanted: a folder"))
@@ -97,11 +74,7 @@ def open_pipe(path: Path) -> BinaryIO:
 
 
 def read_bytes(path: Path, most: int = LARGEST_FILE, *, links: bool = False) -> bytes:
-    """The content of a regular file that may be hostile; `links` as of `open_regular`.
-
-    Raises:
-        OSError: as `open_regular`, or if it has more than `most` bytes.
-    """
+    """The content of a regular file that may be hostile; `links` as of `open_regular`."""
     with open(open_regular(path, links=links), "rb") as file:
         size = os.fstat(file.fileno()).st_size
         if size > most:
@@ -110,27 +83,17 @@ def read_bytes(path: Path, most: int = LARGEST_FILE, *, links: bool = False) -> 
 
 
 def read_text(path: Path) -> str:
-    """The UTF-8 text of a regular file.
-
-    Raises:
-        OSError: as `read_bytes`.
-        UnicodeDecodeError: if it is not such text.
-    """
+    """The UTF-8 text of a regular file."""
     return read_bytes(path, LARGEST_TEXT).decode()
 
 
 def read_table(content: bytes, *, others: bool = False) -> pd.DataFrame:
-    """The table in a Parquet file that may be hostile: numbers, texts and lists of numbers.
-
-    With `others`, as programs other than this one write them, also times and categories of texts; an index that was
-    kept becomes the first columns.
-
-    The declared types and sizes are checked before the file is unpacked. A few bytes may stand for a long text in a
-    million rows, so texts are counted before they are copied into their rows.
-
-    Raises:
-        ValueError: if it cannot be read, has values of other types, or exceeds the limits.
-    """
+    """The table in a Parquet file that may be hostile: numbers, texts and lists of numbers."""
+    # With `others`, as programs other than this one write them, also times and categories of texts; an index that was
+    # kept becomes the first columns.
+    #
+    # The declared types and sizes are checked before the file is unpacked. A few bytes may stand for a long text in a
+    # million rows, so texts are counted before they are copied into their rows.
     import pandas as pd
     import pyarrow as pa
     import pyarrow.compute as pc
@@ -167,11 +130,8 @@ def _within(what: str, count: int, most: int) -> None:
 
 
 def write_bytes(path: Path, data: bytes) -> None:
-    """Write a file atomically: a temporary file beside it is synced to the disk, then renamed. Creates parent folders.
-
-    Raises:
-        OSError: from the system, with the path; an old file is then unchanged.
-    """
+    """Write a file atomically: a temporary file beside it is synced to the disk, then renamed."""
+    # Creates parent folders.
     try:
         if path.exists() and not path.is_file():  # the system would replace a device, too
             raise OSError(errno.EINVAL, "not a regular file")

@@ -29,20 +29,19 @@ from airground_drake.base import files
 from airground_drake.base.usage import EXIT_TOOL, refuse
 
 STOPPING = (signal.SIGINT, signal.SIGTERM)
+# How long killed descendants are waited for, s: on a busy machine they end later than they are killed.
 PATIENCE_S = 10.0
-"""How long killed descendants are waited for, s: on a busy machine they end later than they are killed."""
 
+# Environment in which nothing in the current folder is executed: child interpreters do not import from there, and
+# numba's configuration file there cannot choose a cache, which numba would unpickle. The user's own settings stay.
 CURRENT_FOLDER = {"PYTHONSAFEPATH": "1", "NUMBA_CACHE_DIR": "", "NUMBA_CACHE_LOCATOR_CLASSES": ""}
-"""Environment in which nothing in the current folder is executed: child interpreters do not import from there, and
-numba's configuration file there cannot choose a cache, which numba would unpickle. The user's own settings stay.
-"""
+# Added for a user without a home: numba would keep its cache in a folder named ~ in the current folder.
 NO_HOME = {"XDG_CACHE_HOME": os.devnull}
-"""Added for a user without a home: numba would keep its cache in a folder named ~ in the current folder."""
 
 _PR_SET_PDEATHSIG, _PR_SET_CHILD_SUBREAPER = 1, 36
 
+# Writing end of a pipe to the waiting parent, which accepts only an exit code that is also written there.
 _exit_code: int | None = None
-"""Writing end of a pipe to the waiting parent, which accepts only an exit code that is also written there."""
 
 
 def begin() -> None:
@@ -60,10 +59,8 @@ def begin() -> None:
 
 
 def _go_on_in_a_child() -> None:
-    """Return in a child process. The parent waits for it, cleans up after it, and leaves with its exit code.
-
-    The parent adopts orphans among the child's descendants, and so finds all of them if the child is killed.
-    """
+    """Return in a child process. The parent waits for it, cleans up after it, and leaves with its exit code."""
+    # The parent adopts orphans among the child's descendants, and so finds all of them if the child is killed.
     global _exit_code
     told, _exit_code = os.pipe()
     parent = os.getpid()
@@ -140,10 +137,7 @@ def _open_standard_streams() -> None:
 
 
 def run(main: Callable[[], int]) -> NoReturn:
-    """Run a command and exit with its code; with 141 and no message if the output pipe is closed.
-
-    An unexpected exception is a fault of the tool and shown with its traceback.
-    """
+    """Run a command and exit with its code; with 141 and no message if the output pipe is closed."""
     try:
         code = main()
         sys.stdout.flush()
@@ -177,10 +171,8 @@ def _line(number: int, *, clear: bool) -> bytes:
 
 
 def end_descendants() -> None:
-    """Kill every process below this one, until /proc shows none: one that is killed may have begun another.
-
-    A process keeps its locks until it has ended. Temporary folders are removed by these locks.
-    """
+    """Kill every process below this one, until /proc shows none: one that is killed may have begun another."""
+    # A process keeps its locks until it has ended. Temporary folders are removed by these locks.
     until = time.monotonic() + PATIENCE_S
     while (found := _descendants()) and time.monotonic() < until:
         for pid in found:
@@ -217,13 +209,8 @@ def _prctl(option: int, value: int) -> None:
 
 
 def end_with_pipe(reader: int) -> None:
-    """Have Linux kill this process when the last writer of a pipe has closed it.
-
-    Unlike in `end_with_parent`, the pipe belongs to a process, not to one of its threads.
-
-    Args:
-        reader: descriptor of the reading end of a pipe that nobody writes to.
-    """
+    """Have Linux kill this process when the last writer of a pipe has closed it."""
+    # Unlike in `end_with_parent`, the pipe belongs to a process, not to one of its threads.
     if sys.platform == "linux":
         fcntl.fcntl(reader, fcntl.F_SETOWN, os.getpid())
         fcntl.fcntl(reader, fcntl.F_SETSIG, signal.SIGKILL)

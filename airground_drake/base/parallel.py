@@ -24,8 +24,8 @@ from airground_drake.base.progress import SILENT, Progress
 
 T = TypeVar("T")
 
+# The current work. Forked processes inherit it, so that it is not pickled.
 _pieces: Sequence[Callable[[], object]] = ()
-"""The current work. Forked processes inherit it, so that it is not pickled."""
 
 
 def forks() -> bool:
@@ -46,11 +46,9 @@ def processors() -> int:
 
 @contextmanager
 def processes(jobs: int) -> Iterator[ProcessPoolExecutor]:
-    """A pool of `jobs` processes. Processes that still work at the end of the block are killed.
-
-    The first call forks them, and they see everything that exists then. Where forking is not safe, they start empty.
-    Calls and results are pickled.
-    """
+    """A pool of `jobs` processes. Processes that still work at the end of the block are killed."""
+    # The first call forks them, and they see everything that exists then. Where forking is not safe, they start empty.
+    # Calls and results are pickled.
     before = set(multiprocessing.active_children())
     context = multiprocessing.get_context("fork" if forks() else "spawn")
     pool = ProcessPoolExecutor(jobs, context, initializer=_begin)
@@ -71,19 +69,10 @@ def run_parallel(
     names: Sequence[str] = (),
     progress: Progress = SILENT,
 ) -> list[T]:
-    """Do all pieces, and return their results in the same order.
-
-    Args:
-        pieces: their results are pickled. The longest should come first.
-        jobs: processes at a time; default: one for each processor. With one job, one piece or no fork, the pieces are
-            done in this process.
-        names: of the pieces, for `progress`.
-        progress: receives each finished piece.
-
-    Raises:
-        AirgroundError: if a process dies.
-        Exception: the first exception of a piece.
-    """
+    """Do all pieces, and return their results in the same order."""
+    # pieces: their results are pickled. The longest should come first.
+    # jobs: processes at a time; default: one for each processor. With one job, one piece or no fork, the pieces are
+    # done in this process.
     global _pieces
     called = names or [""] * len(pieces)
     most = min(len(pieces), processors() if jobs is None else jobs)
@@ -103,10 +92,8 @@ def run_parallel(
 
 
 def start_in_process(work: Callable[[], T]) -> Callable[[], T]:
-    """Start work in its own process; returns a function that waits for the result, to be called once.
-
-    With one processor, or without fork, that function does the work. It raises an AirgroundError if the process dies.
-    """
+    """Start work in its own process; returns a function that waits for the result, to be called once."""
+    # With one processor, or without fork, that function does the work. It raises an AirgroundError if the process dies.
     if not forks() or processors() == 1:
         return work
     context = multiprocessing.get_context("fork")

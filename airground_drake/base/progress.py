@@ -9,12 +9,10 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
-SHOWN_S = 0.01
-"""Shorter parts get no line, s."""
+SHOWN_S = 0.01  # shorter parts get no line, s
 _FORMAT = "{desc} {percentage:3.0f}% |{bar}| {n:.4g}/{total:.4g} {unit}, {elapsed}, {remaining} left{postfix}"
 _WITHOUT_AMOUNT = "{desc} {elapsed}{postfix}"
-TOLD_S = 3.0
-"""Where standard error is no terminal, a stage that lasts longer gets one line, s."""
+TOLD_S = 3.0  # where standard error is no terminal, a stage that lasts longer gets one line, s
 
 
 class Progress:
@@ -99,11 +97,9 @@ class ProgressBar(Progress):
 
 @contextmanager
 def progress_bar(*, quiet: bool = False, verbose: bool = False) -> Iterator[Progress]:
-    """Progress on standard error.
-
-    On a terminal it is a bar, elsewhere one line for each stage that lasts longer than `TOLD_S`; with `quiet` neither.
-    With `verbose` it is a line for each part, beside the bar.
-    """
+    """Progress on standard error."""
+    # On a terminal it is a bar, elsewhere one line for each stage that lasts longer than `TOLD_S`; with `quiet`
+    # neither. With `verbose` it is a line for each part, beside the bar.
     terminal = sys.stderr.isatty()
     progress = ProgressBar(bar=terminal and not quiet, lines=verbose, stages=not (terminal or quiet or verbose))
     try:

@@ -31,11 +31,9 @@ from airground_drake.base.files import sha256
 
 T = TypeVar("T")
 
-PLUGIN = "module:Class or file.py:Class"
-"""Form of the name of a class that is not registered."""
+PLUGIN = "module:Class or file.py:Class"  # form of the name of a class that is not registered
 _WORD = r"[^\W\d]\w*"
-PLUGIN_PATTERN = rf"^({_WORD}(\.{_WORD})*|([\w-]+/)*[\w-]+\.py):{_WORD}$"
-"""This form as a regular expression."""
+PLUGIN_PATTERN = rf"^({_WORD}(\.{_WORD})*|([\w-]+/)*[\w-]+\.py):{_WORD}$"  # this form as a regular expression
 
 
 class Registry:
@@ -176,10 +174,7 @@ def is_plugin(name: str) -> bool:
 
 
 def source_of(place: str) -> Path | None:
-    """The file of a class named as `module:Class` or `file.py:Class`, in a folder of Python's path; None without one.
-
-    Nothing is imported.
-    """
+    """The file of a class named as `module:Class` or `file.py:Class`, in a folder of Python's path, or None."""
     module = place.partition(":")[0]
     if module.endswith(".py"):
         return _found(module)
@@ -189,12 +184,7 @@ def source_of(place: str) -> Path | None:
 
 
 def _imported(module: str) -> ModuleType:
-    """Import a module by its name, or by a file in a folder of Python's path (the last folder is searched first).
-
-    Raises:
-        ModuleNotFoundError: if it does not exist.
-        BaseException: any exception of the module.
-    """
+    """Import a module by its name, or by a file in a folder of Python's path (the last folder is searched first)."""
     if not module.endswith(".py"):
         return importlib.import_module(module)
     if (path := _found(module)) is None:
@@ -256,6 +246,7 @@ class Method:
     intervention_on_top: bool
 
 
+# The methods that are compared, by identifier: (a) to (c) are the paper's.
 METHODS: dict[str, Method] = {
     method.id: method
     for method in (
@@ -265,20 +256,16 @@ METHODS: dict[str, Method] = {
         Method("d", "avoidance on top, outcome gatekeeper", intervenes=True, gated=True, intervention_on_top=False),
     )
 }
-"""The methods that are compared, by identifier: (a) to (c) are the paper's."""
 
 
 def method_of(name: str) -> Method:
-    """A method by its identifier.
-
-    Raises:
-        UnknownNameError: if there is no such method.
-    """
+    """A method by its identifier."""
     if name not in METHODS:
         raise UnknownNameError("method", name, METHODS)
     return METHODS[name]
 
 
+# Intervention policies: subclasses of `uav.policy.Policy`.
 POLICIES = Registry(
     "policy",
     "policies",
@@ -292,8 +279,8 @@ POLICIES = Registry(
         "agent": "airground_drake.uav.agent:Agent",
     },
 )
-"""Intervention policies: subclasses of `uav.policy.Policy`."""
 
+# Ways to solve the gatekeeper's problem (26).
 ROUTES = Registry(
     "route",
     "routes",
@@ -303,11 +290,11 @@ ROUTES = Registry(
         "nonlinear": "airground_drake.ugv.routes.nonlinear:NonlinearRoute",
     },
 )
-"""Ways to solve the gatekeeper's problem (26)."""
 
+# Tasks of the UAV below obstacle avoidance: subclasses of `model.law.task.Task`.
 UAV_TASKS = Registry("task", "uav_tasks", {"formation": "airground_drake.model.law.tasks:FormationTask"})
-"""Tasks of the UAV below obstacle avoidance: subclasses of `model.law.task.Task`."""
 
+# Plants of robots: those of `model.plants.plant`, and subclasses of Drake's System.
 PLANTS = Registry(
     "plant",
     "plants",
@@ -318,8 +305,8 @@ PLANTS = Registry(
         "delay": "airground_drake.model.plants.plant:Delay",
     },
 )
-"""Plants of robots: those of `model.plants.plant`, and subclasses of Drake's System."""
 
+# Samplers of points in the search for violations: classes that meet `study.campaign.search.Sampler`.
 SAMPLERS = Registry(
     "sampler",
     "samplers",
@@ -329,8 +316,8 @@ SAMPLERS = Registry(
         "random": "airground_drake.study.campaign.search:Uniform",
     },
 )
-"""Samplers of points in the search for violations: classes that meet `study.campaign.search.Sampler`."""
 
+# Claims about one run, in the order of the report: subclasses of `verify.claim.TraceClaim`.
 RUN_CLAIMS = Registry(
     "claim",
     "run_claims",
@@ -346,8 +333,8 @@ RUN_CLAIMS = Registry(
         "LIVE-GOAL": "airground_drake.verify.claims.live_goal:LiveGoal",
     },
 )
-"""Claims about one run, in the order of the report: subclasses of `verify.claim.TraceClaim`."""
 
+# Claims about the model, in the order of the report: subclasses of `verify.claim.ModelClaim`.
 MODEL_CLAIMS = Registry(
     "claim",
     "model_claims",
@@ -366,4 +353,3 @@ MODEL_CLAIMS = Registry(
         "THR-DDM": "airground_drake.verify.claims.thr_ddm:ThrDdm",
     },
 )
-"""Claims about the model, in the order of the report: subclasses of `verify.claim.ModelClaim`."""

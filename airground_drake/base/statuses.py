@@ -4,28 +4,23 @@ from __future__ import annotations
 
 from typing import Literal, get_args
 
-Status = Literal["proved", "holds", "supported", "refuted", "inconclusive", "error", "not_run"]
-"""Verdict of a claim."""
+Status = Literal["proved", "holds", "supported", "refuted", "inconclusive", "error", "not_run"]  # verdict of a claim
 STATUSES: tuple[Status, ...] = get_args(Status)
-PASSING: tuple[Status, ...] = ("proved", "holds", "supported")
-"""Statuses in which the claim is established."""
-UNDECIDED: tuple[Status, ...] = ("inconclusive", "error", "not_run")
-"""Statuses without a decision."""
+PASSING: tuple[Status, ...] = ("proved", "holds", "supported")  # statuses in which the claim is established
+UNDECIDED: tuple[Status, ...] = ("inconclusive", "error", "not_run")  # statuses without a decision
 
+# A further expectation: a status of `PASSING`, and something in the run could have refuted the claim.
 EXERCISED = "exercised"
-"""A further expectation: a status of `PASSING`, and something in the run could have refuted the claim."""
-NOT_EXERCISED = "not_exercised"
-"""Outcome of a claim that passed because nothing could have refuted it."""
-EXPECTATIONS: tuple[str, ...] = (*STATUSES, EXERCISED)
-"""Allowed alternatives of an expectation."""
+NOT_EXERCISED = "not_exercised"  # outcome of a claim that passed because nothing could have refuted it
+EXPECTATIONS: tuple[str, ...] = (*STATUSES, EXERCISED)  # allowed alternatives of an expectation
+# What a scenario may expect of a run besides verdicts, as numbers: a run in which nothing happened tests nothing.
 COUNTS = {
     "interventions": "At least so many proposals that UGVs began to execute.",
     "messages": "At least so many proposals and answers that were delivered.",
 }
-"""What a scenario may expect of a run besides verdicts, as numbers: a run in which nothing happened tests nothing."""
+# The expectation of a claim about which the method promises nothing: whether it holds does not count, but a claim that
+# could not be judged does.
 NOTHING = "nothing"
-"""The expectation of a claim about which the method promises nothing: whether it holds does not count, but a claim that
-could not be judged does."""
 
 
 def alternatives(expected: str) -> tuple[str, ...]:
@@ -41,20 +36,14 @@ def declared(expected: str) -> str:
 
 
 def outcome(status: str, exercised: float | None) -> str:
-    """The status of a verdict, or `NOT_EXERCISED` if it passes and nothing could have refuted it.
-
-    Args:
-        status: the verdict.
-        exercised: how often the claim was tested; None: it was not counted.
-    """
+    """The status of a verdict, or `NOT_EXERCISED` if it passes and nothing could have refuted it."""
+    # exercised: how often the claim was tested; None: it was not counted.
     return NOT_EXERCISED if status in PASSING and exercised == 0 else status
 
 
 def meets(expected: str, status: str, exercised: int | None) -> bool | None:
-    """Whether an expectation admits a verdict; None if nothing is expected and the claim was judged.
-
-    An expected status ignores how often the claim was tested.
-    """
+    """Whether an expectation admits a verdict; None if nothing is expected and the claim was judged."""
+    # An expected status ignores how often the claim was tested.
     if expected == NOTHING:
         return False if status in ("error", "not_run") else None
     put_to_the_test = status in PASSING and bool(exercised)

@@ -15,12 +15,10 @@ from typing import NoReturn
 from airground_drake.base.errors import FolderError, LimitError, ScenarioError, UnknownNameError, one_line
 
 EXIT_USAGE, EXIT_TOOL = 2, 4
+# Mistakes of the user. Where a command does long work, other errors are faults of the tool.
 REFUSALS = (ScenarioError, LimitError, FolderError, UnknownNameError)
-"""Mistakes of the user. Where a command does long work, other errors are faults of the tool."""
-MOST = 1e15
-"""Largest number that an option takes."""
-MOST_JOBS = 1000
-"""Most processes that a command starts at once."""
+MOST = 1e15  # largest number that an option takes
+MOST_JOBS = 1000  # most processes that a command starts at once
 
 
 def refuse(why: object, code: int = EXIT_USAGE) -> int:

@@ -17,13 +17,11 @@ from typing import Any, NoReturn
 from .line import DISAGREES, NOT_HERE, OPEN, CheckLine
 
 SCHEMA = "airground_drake.check/3"
+# What the checker alone takes as recorded: a forger may change it in all its places, unnoticed.
 ALONE = ("policies, seeds and faults", "every part of the report that no line above names")
-"""What the checker alone takes as recorded: a forger may change it in all its places, unnoticed."""
 CODES = "Exit codes: 0 all agree; 1 not all; 2 usage, or no report; 4 a fault of the checker."
-LIMIT_S = 300.0
-"""CPU time that a check may take, s. Checks of a run of minutes take seconds."""
-MOST_S = 1e6
-"""Largest limit of the CPU time, s: far more does not fit a timer."""
+LIMIT_S = 300.0  # CPU time that a check may take, s. Checks of a run of minutes take seconds.
+MOST_S = 1e6  # largest limit of the CPU time, s: far more does not fit a timer
 
 
 class UsageError(Exception):
@@ -57,14 +55,8 @@ def _limit_s(text: str) -> float:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Check a report and print what was found.
-
-    Args:
-        arguments: of the command line; default: those of the process.
-
-    Returns:
-        The exit code: 0 all agree, 1 not all, 2 usage or no report.
-    """
+    """Check a report and print what was found. Returns the exit code: 0 all agree, 1 not all, 2 usage or no report."""
+    # arguments: of the command line; default: those of the process.
     says = "Judge distances, hypotheses, triggers, dwell, arrivals and collisions of a report again, from its files."
     try:
         options = parser("python -m airground_drake.check", says, CODES).parse_args(arguments)
@@ -80,11 +72,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def checked(folder: Path, limit_s: float, told: Callable[[CheckLine], object] = bool) -> list[CheckLine]:
-    """All checks of a report, without warnings of numpy; `told` is called with each when it is done.
-
-    Raises:
-        UsageError: if the folder is not a report.
-    """
+    """All checks of a report, without warnings of numpy; `told` is called with each when it is done."""
     import numpy as np
 
     from .report import check_report

@@ -23,14 +23,7 @@ class Event(NamedTuple):
 
 
 def check_events(run: Run) -> str:
-    """Compare the recorded arrivals and collisions, and the places of all events, with the positions.
-
-    Returns:
-        What was found, in words.
-
-    Raises:
-        Disagreement: if they differ.
-    """
+    """Compare the recorded arrivals and collisions, and the places of all events, with the positions."""
     recorded = [
         Event(**{name: value for name, value in each.items() if name not in ("position_m", "at_m")})
         for each in run.events
@@ -50,10 +43,8 @@ def check_events(run: Run) -> str:
 
 
 def _arrivals(run: Run, hits: Sequence[Event]) -> Iterator[Event]:
-    """A robot arrives at the first row from which on it stays within the arrival tolerance of its target.
-
-    What it does from its first collision on does not count, except for where it starts.
-    """
+    """A robot arrives at the first row from which on it stays within the arrival tolerance of its target."""
+    # What it does from its first collision on does not count, except for where it starts.
     for robot, spec in run.robots.items():
         end_s = min((hit.t_s for hit in hits if robot in (hit.robot, hit.other)), default=np.inf)
         before = (run.t_s < end_s) | (np.arange(len(run.t_s)) == 0)
@@ -65,11 +56,9 @@ def _arrivals(run: Run, hits: Sequence[Event]) -> Iterator[Event]:
 
 
 def _collisions(run: Run) -> Iterator[Event]:
-    """Two bodies collide when their surfaces come closer than the collision distance.
-
-    A collision has the time of the first row inside that distance. If a robot passes between two rows outside it, the
-    collision has the time of the earlier of them.
-    """
+    """Two bodies collide when their surfaces come closer than the collision distance."""
+    # A collision has the time of the first row inside that distance. If a robot passes between two rows outside it, the
+    # collision has the time of the earlier of them.
     for pair in run.pairs:
         within = float(run.scenario["safe_distance"]["collision_m"]) + pair.radii_m
         if run.apart_m[pair.robot, pair.other] >= within:

@@ -20,20 +20,13 @@ from .rules import Disagreement, NotEstablished
 
 Json = dict[str, Any]
 
-LARGEST_FILE = 256_000_000
-"""Bytes of a file: a run of an hour with ten robots has fewer."""
-LARGEST_JSON = 64_000_000
-"""Bytes of a JSON file."""
-DEEPEST = 60
-"""Levels of nesting in JSON."""
-LONGEST_NUMBER = 300
-"""Characters of a number in JSON: a longer integer is beyond all floating-point numbers."""
-MOST_CELLS = 50_000_000
-"""Rows times columns of a table, and numbers in its lists."""
-MOST_FILES = 100_000
-"""In the folder of a report."""
-THRIFT = 10_000_000
-"""Bytes of a text, and entries of a list, in the metadata of a table."""
+LARGEST_FILE = 256_000_000  # bytes of a file: a run of an hour with ten robots has fewer
+LARGEST_JSON = 64_000_000  # bytes of a JSON file
+DEEPEST = 60  # levels of nesting in JSON
+LONGEST_NUMBER = 300  # characters of a number in JSON: a longer integer is beyond all floating-point numbers
+MOST_CELLS = 50_000_000  # rows times columns of a table, and numbers in its lists
+MOST_FILES = 100_000  # in the folder of a report
+THRIFT = 10_000_000  # bytes of a text, and entries of a list, in the metadata of a table
 
 
 def is_plain(name: Any) -> bool:
@@ -42,11 +35,7 @@ def is_plain(name: Any) -> bool:
 
 
 def names_in(folder: Path) -> list[str]:
-    """The relative paths of all files in a folder, sorted.
-
-    Raises:
-        NotEstablished: if one is not a regular file, or there are too many.
-    """
+    """The relative paths of all files in a folder, sorted."""
     found: list[str] = []
     for place, folders, files in os.walk(folder):
         for name in (*folders, *files):
@@ -62,11 +51,7 @@ def names_in(folder: Path) -> list[str]:
 
 
 def read_bytes(path: Path) -> bytes:
-    """The content of a regular file.
-
-    Raises:
-        NotEstablished: if it cannot be read, is not a regular file, or is too large.
-    """
+    """The content of a regular file."""
     try:
         handle = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_NOFOLLOW", 0))
         with os.fdopen(handle, "rb") as file:
@@ -87,12 +72,7 @@ def sha256(content: bytes) -> str:
 
 
 def read_json(path: Path) -> Any:
-    """Strict JSON: no NaN, no infinity, no key twice.
-
-    Raises:
-        NotEstablished: if the file cannot be read, is not JSON, or is too large or too deep.
-        Disagreement: if it is JSON that is not strict.
-    """
+    """Strict JSON: no NaN, no infinity, no key twice."""
     content, name = read_bytes(path), path.name
 
     def unique(found: list[tuple[str, Any]]) -> Json:
@@ -137,14 +117,9 @@ def _is_deep(value: Any) -> bool:
 
 
 def parse_table(content: bytes, name: str) -> pd.DataFrame:
-    """The table in a Parquet file, rows numbered from 0: numbers, texts and lists of numbers.
-
-    Sizes and types in the header of the file are checked before the data are unpacked. Texts are read as dictionaries:
-    a text that is repeated a million times is stored once.
-
-    Raises:
-        NotEstablished: if it is not a table, or too large.
-    """
+    """The table in a Parquet file, rows numbered from 0: numbers, texts and lists of numbers."""
+    # Sizes and types in the header of the file are checked before the data are unpacked. Texts are read as
+    # dictionaries: a text that is repeated a million times is stored once.
     try:
         limits = {"thrift_string_size_limit": THRIFT, "thrift_container_size_limit": THRIFT}
         file = pq.ParquetFile(io.BytesIO(content), **limits)

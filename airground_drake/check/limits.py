@@ -14,25 +14,18 @@ from typing import Any
 from .files import Json
 from .rules import NotEstablished
 
-LARGEST = 1e12
-"""Size of a number in a scenario."""
+LARGEST = 1e12  # size of a number in a scenario
+# Counts that follow from a scenario.
 MOST = {
     "samples": 10_000_000,
     "stages": 10_000,
     "robots and obstacles": 2_000,
     "numbers of a shape": 5_000,
 }
-"""Counts that follow from a scenario."""
 
 
 def is_of_a_size(scenario: Json) -> None:
-    """Refuse a scenario whose numbers would make the check endless.
-
-    The rules that use a value find out whether it is missing or of another type.
-
-    Raises:
-        NotEstablished: if a number or a count is too large.
-    """
+    """Refuse a scenario whose numbers would make the check endless."""
     numbers = dict(_numbers(scenario))
     for path, value in numbers.items():
         if not abs(value) <= LARGEST:
@@ -64,11 +57,7 @@ def _numbers(value: Any, path: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str
 
 @contextmanager
 def at_most_s(limit_s: float) -> Iterator[None]:
-    """Stop a block after so much CPU time; this works in the main thread, and not on Windows.
-
-    Raises:
-        NotEstablished: if the block takes longer.
-    """
+    """Stop a block after so much CPU time; this works in the main thread, and not on Windows."""
 
     def over(_signal: int, _frame: FrameType | None) -> None:
         raise NotEstablished("the check comes to an end", f"not within {limit_s:g} s")

@@ -6,34 +6,21 @@ from dataclasses import dataclass
 from typing import Any
 
 AGREES, DISAGREES, OPEN = "agrees", "DISAGREES", "cannot be checked"
+# Outcomes; the last two are those of `airground check`: nothing to compare with, and another run when simulated.
 RECORDED, NOT_HERE = "as recorded", "not reproduced here"
-"""Outcomes; the last two are those of `airground check`: nothing to compare with, and another run when simulated."""
 
 
 @dataclass(frozen=True)
 class CheckLine:
-    """One check.
+    """One check."""
 
-    Attributes:
-        claim: identifier of the claim, or what else was checked: report, files, trace, events.
-        run: on which run; '' for the report and the model.
-        outcome: see above.
-        text: what was found, or why nothing was.
-        rule: the rule that is broken or cannot be applied; '' if all agrees.
-        about: the robot, pair, event, decision or file.
-        t_s: when in the run; None where there is no time.
-        recorded: what the files say, if a rule is broken.
-        recomputed: what follows from them.
-        by: who checked: "checker", "made again", "simulated again" or "Coq".
-    """
-
-    claim: str
-    run: str
-    outcome: str
-    text: str
-    rule: str = ""
-    about: str = ""
-    t_s: float | None = None
-    recorded: Any = None
-    recomputed: Any = None
-    by: str = "checker"
+    claim: str  # identifier of the claim, or what else was checked: report, files, trace, events
+    run: str  # on which run; '' for the report and the model
+    outcome: str  # see above
+    text: str  # what was found, or why nothing was
+    rule: str = ""  # the rule that is broken or cannot be applied; '' if all agrees
+    about: str = ""  # the robot, pair, event, decision or file
+    t_s: float | None = None  # when in the run; None where there is no time
+    recorded: Any = None  # what the files say, if a rule is broken
+    recomputed: Any = None  # what follows from them
+    by: str = "checker"  # who checked: "checker", "made again", "simulated again" or "Coq"

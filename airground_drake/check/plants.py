@@ -23,19 +23,16 @@ from .rules import SMALL, Array, close
 
 Rows = npt.NDArray[np.intp]
 
-KINDS = ("first_order", "unicycle", "lag", "delay")
-"""Kinds of plants; any other is the name of a class."""
-STRAIGHT_M = 1e-10
-"""Parts of a way that count as straight leave the line by no more, m."""
+KINDS = ("first_order", "unicycle", "lag", "delay")  # kinds of plants; any other is the name of a class
+STRAIGHT_M = 1e-10  # parts of a way that count as straight leave the line by no more, m
 MOST_PARTS = 5000
 
 
 class Taken(NamedTuple):
-    """What the plant of a robot takes: of length, m; lag and delay, s; and the limit of its commands, m/s.
+    """What the plant of a robot takes: of length, m; lag and delay, s; and the limit of its commands, m/s."""
 
-    A drift takes `drift_m` of a distance, and `slip_m` in one period. `drawn_m` is the part of `body_m` by which a
-    robot that never drives backwards is behind its steered point.
-    """
+    # A drift takes `drift_m` of a distance, and `slip_m` in one period. `drawn_m` is the part of `body_m` by which a
+    # robot that never drives backwards is behind its steered point.
 
     body_m: float
     lag_s: float
@@ -156,19 +153,8 @@ class Way(NamedTuple):
 
 
 def moves_as_its_plant(robot: str, spec: Json, way: Way, steered: Array, command: Array, period_s: float) -> None:
-    """Check a recorded body against its plant.
-
-    Args:
-        robot: its name.
-        spec: its entry in the scenario.
-        way: of the body.
-        steered: the steered point at the rows, (T, 3), m.
-        command: in force up to each row, (T, 3), m/s; 0 at the first.
-        period_s: control period.
-
-    Raises:
-        Disagreement: if it differs.
-    """
+    """Check a recorded body against its plant; `steered` (T, 3), m."""
+    # command: in force up to each row, (T, 3), m/s; 0 at the first.
     t_s, point, rate = way.t_s, steered, command
     for plant in plants_of(spec):
         if plant["kind"] == "delay":
@@ -191,19 +177,9 @@ def moves_as_its_plant(robot: str, spec: Json, way: Way, steered: Array, command
 def misses_as_recorded(
     robot: str, way: Way, steered: Array, command: Array, rows: Rows, recorded: tuple[Array, Array]
 ) -> None:
-    """Check what is recorded of a user's plant, period by period.
-
-    Args:
-        robot: its name.
-        way: of the body.
-        steered: the steered point at the rows, (T, 3), m.
-        command: at the samples, (S, 3), m/s.
-        rows: of the samples, and the last one, (S + 1,).
-        recorded: drift, m/s, and cover, m, (S,) each.
-
-    Raises:
-        Disagreement: if they are not those of the places.
-    """
+    """Check what is recorded of a user's plant, period by period."""
+    # steered: (T, 3), m; command: (S, 3), m/s; rows: (S + 1,)
+    # recorded: drift, m/s, and cover, m, (S,) each.
     lasting, t_s = np.diff(way.t_s[rows]), way.t_s[rows[:-1]]
     missed = np.linalg.norm(np.diff(steered[rows], axis=0) - lasting[:, None] * command, axis=1)
     close("drift of a plant", recorded[0] * lasting, missed, within=SMALL, about=robot, t_s=t_s)

@@ -18,6 +18,7 @@ from .run import Run, read_run
 from .safety import safe_hyp, safe_own, safe_trace
 from .triggers import thr_quality, thr_trig, zeno_trace
 
+# The claims that the checker decides by its own formulas, on every run.
 DECIDED: Mapping[str, Callable[[Run], Found | None]] = {
     "SAFE-TRACE": safe_trace,
     "SAFE-OWN": safe_own,
@@ -26,37 +27,23 @@ DECIDED: Mapping[str, Callable[[Run], Found | None]] = {
     "THR-TRIG": thr_trig,
     "THR-QUALITY": thr_quality,
 }
-"""The claims that the checker decides by its own formulas, on every run."""
 
 SCHEMA = "airground_drake.report/4"
+# Type of each part of report.json that is read; lists have objects.
 SHAPE: Mapping[str, type] = {
     **dict.fromkeys(("scenario", "provenance", "overall", "runs", "files"), dict),
     **dict.fromkeys(("claims", "audit", "choices", "seeds"), list),
 }
-"""Type of each part of report.json that is read; lists have objects."""
+# Files that a report may have; the third group is a run.
 OF_A_REPORT = re.compile(
     r"report\.json|report\.html|junit\.xml|diagram\.(dot|svg)|proofs/(proofs\.json|run_\w+\.v)"
     r"|trace/([^/]+)/((meta|timings)\.json|\w+\.parquet)|map/[^/]+\.(ya?ml|p[bgp]m|png|bmp)"
 )
-"""Files that a report may have; the third group is a run."""
-OF_THE_MAP = "map/"
-"""Folder of the files of the map."""
-ADDED_LATER = "proofs/"
-"""Folder of the files that `airground prove` adds to a report."""
+OF_THE_MAP = "map/"  # folder of the files of the map
+ADDED_LATER = "proofs/"  # folder of the files that `airground prove` adds to a report
 
 
 def check_report(folder: Path, limit_s: float, told: Callable[[CheckLine], object] = bool) -> list[CheckLine]:
-    """All checks of a report.
-
-    Args:
-        folder: with report.json and trace/.
-        limit_s: CPU time for each check; one that takes longer is not established.
-        told: is called with each check when it is done.
-
-    Raises:
-        Disagreement, NotEstablished: if report.json is not strict JSON, or is not of the shape of a report, or there
-            is anything but regular files in the folder.
-    """
     report = read_json(folder / "report.json")
     _is_shaped_like_a_report(report)
     is_of_a_size(report["scenario"]["resolved"])
@@ -122,11 +109,7 @@ def check_digest(scenario: Json) -> str:
 
 
 def check_files(folder: Path, there: Sequence[str], report: Json) -> str:
-    """Require the files that report.json names, and no others, with their SHA-256.
-
-    Raises:
-        Disagreement, NotEstablished: if one is missing, has other content or none of a report, or cannot be read.
-    """
+    """Require the files that report.json names, and no others, with their SHA-256."""
     for name in there:
         known = OF_A_REPORT.fullmatch(name)
         held = known is not None and (known[3] is None or known[3] in report["runs"])

@@ -15,16 +15,15 @@ import numpy.typing as npt
 Array = npt.NDArray[np.float64]
 Flags = npt.NDArray[np.bool_]
 
+# Tolerance of the claims on times (s), lengths (m) and velocities (m/s): thousands of roundings err by less.
 SMALL = 1e-9
-"""Tolerance of the claims on times (s), lengths (m) and velocities (m/s): thousands of roundings err by less."""
 
 
 @dataclass(eq=False)
 class Disagreement(Exception):  # noqa: N818 - what the program looks for, not an error of the program
-    """The files break a rule: they say `recorded`, where `recomputed` follows from them.
+    """The files break a rule: they say `recorded`, where `recomputed` follows from them."""
 
-    `about` is the robot, pair, event, decision or file; `t_s` is the time in the run, s, if there is one.
-    """
+    # `about` is the robot, pair, event, decision or file; `t_s` is the time in the run, s, if there is one.
 
     rule: str
     recorded: Any
@@ -44,27 +43,17 @@ class NotEstablished(Exception):  # noqa: N818
 
 @dataclass(frozen=True)
 class Found:
-    """What the checker's own formula gives for a claim.
+    """What the checker's own formula gives for a claim."""
 
-    Attributes:
-        status: the verdict.
-        margin: distance from refutation; None where the claim has no number.
-        exercised: how often the claim was tested, at least and at most; they differ where rounding decides.
-        because: the broken rule that refutes the claim; None if its margin decides.
-    """
-
-    status: str
-    margin: float | None = None
+    status: str  # the verdict
+    margin: float | None = None  # distance from refutation; None where the claim has no number
+    # How often the claim was tested, at least and at most; they differ where rounding decides.
     exercised: tuple[int, int] | None = None
-    because: Disagreement | None = None
+    because: Disagreement | None = None  # the broken rule that refutes the claim; None if its margin decides
 
 
 def same(rule: str, recorded: Any, recomputed: Any, *, about: str = "", t_s: float | None = None) -> None:
-    """Compare two values exactly; the first part of nested values that differs is named.
-
-    Raises:
-        Disagreement: if they differ.
-    """
+    """Compare two values exactly; the first part of nested values that differs is named."""
 
     def descend(theirs: Any, ours: Any, path: Any) -> None:
         same(rule, theirs, ours, about=f"{about}.{path}".strip("."), t_s=t_s)
@@ -88,13 +77,8 @@ def _are_numbers(*values: Any) -> bool:
 def close(
     rule: str, recorded: Any, recomputed: Any, *, within: Any, about: str = "", t_s: float | Array | None = None
 ) -> None:
-    """Compare two arrays of one shape, to an absolute tolerance `within`; a nan differs from everything.
-
-    `t_s` is one time, or one for each entry along the first axis; likewise below.
-
-    Raises:
-        Disagreement: with the first entry along the first axis that differs.
-    """
+    """Compare two arrays of one shape, to an absolute tolerance `within`; a nan differs from everything."""
+    # `t_s` is one time, or one for each entry along the first axis; likewise below.
     theirs, ours = np.asarray(recorded, dtype=np.float64), np.asarray(recomputed, dtype=np.float64)
     if theirs.shape != ours.shape:
         raise Disagreement(f"{rule}: number of values", list(theirs.shape), list(ours.shape), about)
@@ -104,13 +88,8 @@ def close(
 def holds(
     rule: str, held: Any, recorded: Any, recomputed: Any, *, about: str = "", t_s: float | Array | None = None
 ) -> None:
-    """Require a condition `held`, (), (K,) or (K, ...).
-
-    `recorded` has that shape; `recomputed` has it too, or is one text.
-
-    Raises:
-        Disagreement: with the first entry along the first axis for which the condition does not hold.
-    """
+    """Require a condition `held`, (), (K,) or (K, ...)."""
+    # `recorded` has that shape; `recomputed` has it too, or is one text.
     wrong = ~np.asarray(held)
     if not wrong.any():
         return

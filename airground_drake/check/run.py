@@ -17,31 +17,23 @@ from .scenario import Levels, Pair, Preset, as_run, levels_of, moving_of, pairs_
 from .shapes import boxes_of
 
 SCHEMA = "airground_drake.trace/9"
+# The tables that are read: positions, noise and triggers; commands and references at the control samples.
 TABLES = ("states.parquet", "samples.parquet")
-"""The tables that are read: positions, noise and triggers; commands and references at the control samples."""
+# Keys that meta.json and the run's entry in report.json share.
 SHARED = ("method", "composition", "seed", "zeta_m", "events", "faults")
-"""Keys that meta.json and the run's entry in report.json share."""
+# Keys of an obstacle that say while it is there, and what 0 means.
 LIFETIME = (("appears_s", 0.0), ("disappears_s", math.inf))
-"""Keys of an obstacle that say while it is there, and what 0 means."""
 
 
 @dataclass(frozen=True, eq=False)
 class Run:
-    """One run; T rows. The points that the law steers move straight from row to row.
+    """One run; T rows. The points that the law steers move straight from row to row."""
 
-    Attributes:
-        name: of the run in its scenario.
-        scenario: as resolved, with the values that the run sets.
-        events: by time.
-        states: columns as in airground_drake/sim/trace.py.
-        samples: columns as in airground_drake/sim/trace.py.
-    """
-
-    name: str
-    scenario: Json
-    events: list[Json]
-    states: pd.DataFrame
-    samples: pd.DataFrame
+    name: str  # of the run in its scenario
+    scenario: Json  # as resolved, with the values that the run sets
+    events: list[Json]  # by time
+    states: pd.DataFrame  # columns as in airground_drake/sim/trace.py
+    samples: pd.DataFrame  # columns as in airground_drake/sim/trace.py
 
     @cached_property
     def ugvs(self) -> list[str]:
@@ -135,7 +127,7 @@ class Run:
         return (self.body_m[pair.robot] - self.body_m[pair.other])[self.there(pair.other)]
 
     def steered_apart(self, pair: Pair) -> Array:
-        """The same of the points that the law steers."""
+        """Places of the steered point of a pair's robot relative to the other's while both are there, (K, 3), m."""
         return (self.position_m[pair.robot] - self.position_m[pair.other])[self.there(pair.other)]
 
     def fine(self, name: str, row: int, parts: int) -> Array:
@@ -144,10 +136,8 @@ class Run:
         return way.within(row, parts)
 
     def there(self, name: str) -> slice:
-        """Rows in which a body is there; they start at the number of rows if it is not there for a control period.
-
-        It is there from the first control sample at or after its `appears_s` to that at or after its `disappears_s`.
-        """
+        """Rows in which a body is there; they start at the number of rows if it is not there for a control period."""
+        # It is there from the first control sample at or after its `appears_s` to that at or after its `disappears_s`.
         body = self.scenario["obstacles"].get(name, {})
         first, last = (self._row_at(float(body.get(key) or never)) for key, never in LIFETIME)
         return slice(first if first < last else len(self.t_s), last + 1)
@@ -188,12 +178,6 @@ class Run:
 
 
 def column_of(table: pd.DataFrame, name: str) -> Array:
-    """A column of a table.
-
-    Raises:
-        NotEstablished: if it is missing.
-        Disagreement: if a number is not finite.
-    """
     if name not in table:
         raise NotEstablished("columns of a table", f"there is no {name}", " or ".join(TABLES))
     values = table[name].to_numpy(dtype=np.float64)
@@ -202,17 +186,7 @@ def column_of(table: pd.DataFrame, name: str) -> Array:
 
 
 def read_run(folder: Path, name: str, report: Json) -> Run:
-    """Read a trace, and check the rules that all claims about it rest on.
-
-    Args:
-        folder: of the trace.
-        name: of the run.
-        report: report.json.
-
-    Raises:
-        Disagreement: if a rule is broken.
-        NotEstablished: if a file cannot be read.
-    """
+    """Read a trace, and check the rules that all claims about it rest on."""
     scenario, meta = report["scenario"]["resolved"], read_json(folder / "meta.json")
     content = {table: read_bytes(folder / table) for table in TABLES}
     for table in TABLES:
@@ -258,10 +232,8 @@ def _rows_cover_the_run(run: Run) -> None:
 
 
 def _moves_as_commanded(run: Run, robot: str) -> None:
-    """position[k] = position[k-1] + (t[k] - t[k-1]) * command, from the declared start; samples hold their command.
-
-    A user's plant begins there, too, and misses its commands by as much as is recorded.
-    """
+    """position[k] = position[k-1] + (t[k] - t[k-1]) * command, from the declared start; samples hold their command."""
+    # A user's plant begins there, too, and misses its commands by as much as is recorded.
     place, chosen = run.position_m[robot], run.sampled(robot, "v", "m_s")
     command = chosen[np.searchsorted(run.sample_row, np.arange(len(place) - 1), side="right") - 1]
     close("start of a robot", run.body_m[robot][0], run.robots[robot]["start_m"], within=SMALL, about=robot)

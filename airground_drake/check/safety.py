@@ -21,16 +21,13 @@ from .run import Run, column_of
 from .scenario import Pair, expected_m_s, written
 from .shapes import Away
 
-FAR_M = 1e-6
-"""Largest error of a distance in floating point, m; pairs that are farther apart need no exact arithmetic."""
+FAR_M = 1e-6  # largest error of a distance in floating point, m; pairs that are farther apart need no exact arithmetic
 
 
 def safe_trace(run: Run) -> Found:
-    """SAFE-TRACE: the distance of each pair is at least the safe one at every time; of several parts, the least.
-
-    A pair tests the claim if it comes so near that one period at the speed limits could break it, or what the law keeps
-    between the points that it steers.
-    """
+    """SAFE-TRACE: the distance of each pair is at least the safe one at every time; of several parts, the least."""
+    # A pair tests the claim if it comes so near that one period at the speed limits could break it, or what the law
+    # keeps between the points that it steers.
     margin, least, most = np.inf, 0, 0
     for pair in run.pairs:
         closing, room = pair.closing_m_s * run.scenario["control"]["period_s"], pair.cover_m + pair.more_m
@@ -71,15 +68,12 @@ def _parts(bent_m: float) -> int:
 
 
 def safe_own(run: Run) -> Found | None:
-    """SAFE-OWN: in each period no robot comes nearer than min(D, d + V h) to the other body, held as at the sample.
-
-    With plants that take room it is min(D, d_law + V h) less that room, D the distance of the steered points; bodies
-    that are nearer already may stay so. In segments in which the bodies are nearer than d at an end, it is at least
-    min(D, d), D the distance of the bodies, once they have been d apart.
-    It is asked from row to row, where the robot's way from the sample could lead nearer than d + V h. A period beside
-    an obstacle that may move tests the claim if one at the speed limits could. None: nothing may move, and SAFE-TRACE
-    says the same.
-    """
+    """SAFE-OWN: in each period no robot comes nearer than min(D, d + V h) to the other body, held as at the sample."""
+    # With plants that take room it is min(D, d_law + V h) less that room, D the distance of the steered points; bodies
+    # that are nearer already may stay so. In segments in which the bodies are nearer than d at an end, it is at least
+    # min(D, d), D the distance of the bodies, once they have been d apart. It is asked from row to row, where the
+    # robot's way from the sample could lead nearer than d + V h. A period beside an obstacle that may move tests the
+    # claim if one at the speed limits could. None: nothing may move, and SAFE-TRACE says the same.
     if not any(map(expected_m_s, run.scenario["obstacles"].values())):
         return None
     period, margin, least, most = run.scenario["control"]["period_s"], np.inf, 0, 0
@@ -135,16 +129,8 @@ def _root(square: Fraction) -> tuple[Fraction, Fraction]:
 def _missed_m(
     away: Away, step: list[Fraction], safe: Fraction, share: Fraction, gain: Fraction, point: bool
 ) -> Fraction:
-    """Upper bound of what a step lacks of its share of the avoidance inequality, m; at least 0.
-
-    Args:
-        away: from what is avoided to the robot.
-        step: of the robot to the next sample, m.
-        safe: distance to be kept, m.
-        share: of the inequality.
-        gain: A h, at most 1.
-        point: whether what is avoided is a point.
-    """
+    """Upper bound of what a step lacks of its share of the avoidance inequality, m; at least 0."""
+    # gain: A h, at most 1.
     least, most = _root(sum((c * c for c in away.vector), Fraction()))
     if not least:  # the law may take either side of a wall, and beside a point any unit vector
         return share * gain * safe + (_root(sum((c * c for c in step), Fraction()))[1] if point else 0)
@@ -172,15 +158,10 @@ class Shortfall(NamedTuple):
 
 
 def shortfall_m(own_m: Array, other_m: Array, pair: Pair, gain: Fraction, last: Fraction = Fraction(1)) -> Fraction:
-    """The largest sum of what a pair's inequalities lack at one sample, m per period, in exact arithmetic.
-
-    Args:
-        own_m: places of the robot at the control samples and at the end, (K + 1, 3).
-        other_m: places of what it avoids, (K + 1, 3).
-        pair: safe distance, share, and shape of what it avoids.
-        gain: A h.
-        last: length of the last period, in periods; its step is extended to a whole one.
-    """
+    """The largest sum of what a pair's inequalities lack at one sample, m per period, in exact arithmetic."""
+    # own_m, other_m: (K + 1, 3)
+    # gain: A h.
+    # last: length of the last period, in periods; its step is extended to a whole one.
     periods = len(own_m) - 1
     lasts = [Fraction(1)] * (periods - 1) + [last]
     found = shortfalls_m(own_m, other_m, pair, [pair.safe_m] * periods, [gain] * periods, lasts)
@@ -191,19 +172,11 @@ def shortfalls_m(
     own_m: Array, other_m: Array, pair: Pair, safe_m: Sequence[float], gain: Sequence[Fraction],
     lasts: Sequence[Fraction] = (),
 ) -> dict[int, Shortfall]:  # fmt: skip
-    """What a pair's inequalities lack in each of K periods, by the period's number, where they lack something.
-
-    There is an inequality for each convex part of what is avoided; the largest shortfall counts. Samples at which the
-    two cannot meet within a period, whatever their direction, need none.
-
-    Args:
-        own_m: places of the robot at the samples, (K + 1, 3).
-        other_m: places of what it avoids, (K + 1, 3).
-        pair: share, and shape of what it avoids.
-        safe_m: distance to be kept in each period, (K,).
-        gain: A h of each period, (K,).
-        lasts: divisors of the steps of each period, (K,); by default 1.
-    """
+    """What a pair's inequalities lack in each of K periods, by the period's number, where they lack something."""
+    # There is an inequality for each convex part of what is avoided; the largest shortfall counts. Samples at which the
+    # two cannot meet within a period, whatever their direction, need none.
+    # own_m, other_m: (K + 1, 3); safe_m, gain: (K,)
+    # lasts: divisors of the steps of each period, (K,); by default 1.
     reach = np.linalg.norm(np.diff(own_m, axis=0), axis=1) + np.linalg.norm(np.diff(other_m, axis=0), axis=1)
     lasts = lasts or [Fraction(1)] * len(reach)
     reach /= np.array([float(each) for each in lasts])

@@ -16,44 +16,28 @@ from .plants import Taken, law_m, taken
 from .rules import Array
 from .shapes import POINT, Shape, shape_of
 
-ENDLESS_M = 1e6
-"""Height of the walls of an arena, m."""
-PERIODS = 1e-9
-"""Share of a time in control periods that counts as rounding."""
+ENDLESS_M = 1e6  # height of the walls of an arena, m
+PERIODS = 1e-9  # share of a time in control periods that counts as rounding
 
 
 class Pair(NamedTuple):
-    """A robot, and an obstacle or another robot.
+    """A robot, and an obstacle or another robot."""
 
-    Attributes:
-        robot: name.
-        other: name.
-        gap_m: distance of the surfaces to be kept: d of the kind of pair.
-        radii_m: sum of both radii.
-        closing_m_s: largest speed at which they are expected to approach each other.
-        share: part of the inequality that each robot takes: 1 beside an obstacle, 1/2 beside a robot.
-        shape: of the other; for a UGV walls are endless in height.
-        moves_m_s: V, the speed at which an obstacle is expected to move at most; above 0 the passive law is in force.
-        more_m: distance that the law keeps beyond the safe one, between the points that it steers.
-        cover_m: how far both bodies may be from these points after a period, together.
-        drift_m: the part of `more_m` that makes up for missed commands.
-        slip_m: how much of its command the robot may miss in a period.
-        start_s: for how long from the start on the bodies have to be clear by themselves, since commands given before
-            lead them; None where their steered points say enough.
-    """
-
-    robot: str
-    other: str
-    gap_m: float
-    radii_m: float
-    closing_m_s: float
-    share: float
-    shape: Shape = POINT
+    robot: str  # name
+    other: str  # name
+    gap_m: float  # distance of the surfaces to be kept: d of the kind of pair
+    radii_m: float  # sum of both radii
+    closing_m_s: float  # largest speed at which they are expected to approach each other
+    share: float  # part of the inequality that each robot takes: 1 beside an obstacle, 1/2 beside a robot
+    shape: Shape = POINT  # of the other; for a UGV walls are endless in height
+    # V, the speed at which an obstacle is expected to move at most; above 0 the passive law is in force.
     moves_m_s: float = 0.0
-    more_m: float = 0.0
-    cover_m: float = 0.0
-    drift_m: float = 0.0
-    slip_m: float = 0.0
+    more_m: float = 0.0  # distance that the law keeps beyond the safe one, between the points that it steers
+    cover_m: float = 0.0  # how far both bodies may be from these points after a period, together
+    drift_m: float = 0.0  # the part of `more_m` that makes up for missed commands
+    slip_m: float = 0.0  # how much of its command the robot may miss in a period
+    # For how long from the start on the bodies have to be clear by themselves, since commands given before lead them;
+    # None where their steered points say enough.
     start_s: float | None = None
 
     @property
@@ -63,11 +47,11 @@ class Pair(NamedTuple):
 
     @property
     def in_the_law(self) -> Pair:
-        """The same with the distance that the law keeps in place of d."""
+        """This pair with the distance that the law keeps in place of d."""
         return self._replace(gap_m=self.gap_m + self.more_m) if self.more_m else self
 
     def passive(self, period_s: float) -> Pair:
-        """The same with d + V h in place of d."""
+        """This pair with d + V h in place of d."""
         return self._replace(gap_m=self.gap_m + self.moves_m_s * period_s)
 
 
@@ -81,17 +65,11 @@ class Levels(NamedTuple):
 
 @dataclass(frozen=True)
 class Preset:
-    """Preset trajectory: a polyline travelled at constant speed from t = 0, then held.
-
-    Attributes:
-        corners_m: (m, 3).
-        length_m: of the way to each corner, (m,).
-        speed_m_s: constant.
-    """
+    """Preset trajectory: a polyline travelled at constant speed from t = 0, then held."""
 
     corners_m: Array
-    length_m: Array
-    speed_m_s: float
+    length_m: Array  # of the way to each corner, (m,)
+    speed_m_s: float  # constant
 
     @property
     def corner_s(self) -> Array:

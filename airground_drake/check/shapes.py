@@ -22,18 +22,14 @@ from .rules import Array, Flags, NotEstablished
 
 T = TypeVar("T")
 Corner = tuple[float, float]
-DIGITS = 12
-"""Corners that are turned or moved are rounded to so many digits after the point, m."""
-ROWS = 50
-"""Steps of a slice of a run; a slice is left out as a whole if it is far away."""
-ROUNDING_M = 1e-6
-"""Bounds of distances are lowered by this, because of rounding."""
-THIRDS = 64
-"""How often a third of a step is left out in the search for the least distance: 5e-12 of it is left."""
+DIGITS = 12  # corners that are turned or moved are rounded to so many digits after the point, m
+ROWS = 50  # steps of a slice of a run; a slice is left out as a whole if it is far away
+ROUNDING_M = 1e-6  # bounds of distances are lowered by this, because of rounding
+THIRDS = 64  # how often a third of a step is left out in the search for the least distance: 5e-12 of it is left
 
 
+# Faces whose distances differ by less than this count as equally near: a robot takes one of them by rounding.
 TIE_M = 1e-12
-"""Faces whose distances differ by less than this count as equally near: a robot takes one of them by rounding."""
 
 
 class Away(NamedTuple):
@@ -65,14 +61,8 @@ class Part:
         return np.where(inside, np.maximum(side, rise), np.hypot(flat, np.maximum(rise, 0.0)))
 
     def between_m(self, start: Array, end: Array, at_m: tuple[Array, Array], reach_m: float) -> Array:
-        """Least signed distances on straight steps from `start` to `end`, (K, 3), where below `reach_m`: (K,), m.
-
-        Args:
-            start: places at the beginning of each step, m.
-            end: places at the end of each step, m.
-            at_m: signed distances of both, (K,), m.
-            reach_m: of a step that stays beyond it, the result may be too large.
-        """
+        """Least signed distances on straight steps from `start` to `end`, (K, 3), where below `reach_m`: (K,), m."""
+        # reach_m: of a step that stays beyond it, the result may be too large.
         step, found = end - start, np.minimum(*at_m)
         bound = 0.5 * (at_m[0] + at_m[1] - np.linalg.norm(step, axis=1)) - ROUNDING_M
         k = np.flatnonzero(~(bound >= reach_m))
@@ -85,7 +75,7 @@ class Part:
         return found
 
     def along_m(self, places: Array, at_m: Array, reach_m: float) -> Array:
-        """The same on the steps from place to place, (K - 1,); `at_m` has the distances of all, (K,)."""
+        """Least signed distances on the steps from place to place, (K - 1,); `at_m` has those of all places, (K,)."""
         return self.between_m(places[:-1], places[1:], (at_m[:-1], at_m[1:]), reach_m)
 
     def away(self, place: Sequence[Fraction]) -> list[Away]:
@@ -109,27 +99,18 @@ class Part:
 
 
 class Shape:
-    """One or more convex parts; places as in `Part`.
-
-    Attributes:
-        parts: m of them.
-        low: a corner of a box round each, (m, 3), m.
-        high: the opposite corner.
-    """
+    """One or more convex parts; places as in `Part`."""
 
     def __init__(self, parts: Sequence[Part]) -> None:
         """Make a shape from its parts."""
-        self.parts = parts
+        self.parts = parts  # m of them
+        # A corner of a box round each, (m, 3), m.
         self.low = np.array([[*part.begin.min(axis=0), part.base_m] for part in parts])
-        self.high = np.array([[*part.begin.max(axis=0), part.top_m] for part in parts])
+        self.high = np.array([[*part.begin.max(axis=0), part.top_m] for part in parts])  # the opposite corner
 
     def bounds_m(self, low: Array, high: Array) -> Array:
-        """Lower bounds of the distances of all in S boxes from each part, (S, m); -inf where they may meet.
-
-        Args:
-            low: a corner of each box, (S, 3), m.
-            high: the opposite corner.
-        """
+        """Lower bounds of the distances of all in S boxes from each part, (S, m); -inf where they may meet."""
+        # low: (S, 3), m
         gap = np.maximum(low[:, None] - self.high, self.low - high[:, None])
         apart = np.linalg.norm(np.maximum(gap, 0.0), axis=2) - ROUNDING_M
         return np.where(apart > 0.0, apart, -np.inf)
@@ -152,10 +133,8 @@ class Shape:
         return reach_m
 
     def held_m(self, places: Array, start: Array, end: Array, reach_m: float) -> tuple[Array, Array]:
-        """Signed distances of places, and the least on straight steps from `start` to `end`, (K, 3): (K,) each, m.
-
-        Of parts that a step stays more than `reach_m` away from nothing is said.
-        """
+        """Signed distances of places, and the least on straight steps from `start` to `end`, (K, 3): (K,) each, m."""
+        # Of parts that a step stays more than `reach_m` away from nothing is said.
         at_m, least_m = np.full((2, len(start)), np.inf)
         longest = float(np.linalg.norm(end - start, axis=1).max(initial=0.0))
         for bound, part, rows in self.near(start):
@@ -191,15 +170,8 @@ def boxes_of(places: Array, steps: int = ROWS) -> tuple[Array, Array]:
 
 
 def shape_of(body: Json, *, endless: bool) -> Shape:
-    """The shape of an obstacle, by its entry in a scenario.
-
-    Args:
-        body: the entry.
-        endless: in height, as walls are for UGVs; balls are not.
-
-    Raises:
-        NotEstablished: if it is a polygon that cannot be split into convex parts.
-    """
+    """The shape of an obstacle, by its entry in a scenario."""
+    # endless: in height, as walls are for UGVs; balls are not.
     parts: Sequence[Sequence[Corner]]
     if "cells" in body:
         parts = _of_map(body["cells"])
@@ -236,15 +208,10 @@ def _placed(body: Json, corners: Sequence[Sequence[float]]) -> list[Corner]:
 
 
 def split(corners: Sequence[Corner]) -> list[list[Corner]]:
-    """Convex parts of a polygon: ears are cut off, the first one each time, and parts joined while they stay convex.
-
-    The law has an inequality for each part, so the parts must be those of the controllers. They cover the polygon: all
-    ears are counter-clockwise, and their edges are those of the polygon and pairs of opposite ones, so their winding
-    numbers add up to its own.
-
-    Raises:
-        NotEstablished: if there is no ear.
-    """
+    """Convex parts of a polygon: ears are cut off, the first one each time, and parts joined while they stay convex."""
+    # The law has an inequality for each part, so the parts must be those of the controllers. They cover the polygon:
+    # all ears are counter-clockwise, and their edges are those of the polygon and pairs of opposite ones, so their
+    # winding numbers add up to its own.
     around = [*corners] if sum(a[0] * b[1] - a[1] * b[0] for a, b in edges_of(corners)) > 0.0 else [*corners][::-1]
     parts = [around] if _is_convex(around) else _ears(around)
     k = 0

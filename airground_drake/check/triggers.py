@@ -16,14 +16,12 @@ from .rules import SMALL, Array, Disagreement, Found, close, holds
 from .run import Run
 from .scenario import Levels
 
+# Recorded and recomputed events may differ by this: ten times the accuracy of the simulator's event isolation.
 EVENT_S = 1e-5
-"""Recorded and recomputed events may differ by this: ten times the accuracy of the simulator's event isolation."""
+# Recorded and recomputed decision variables may differ by this: x moves less within the event isolation.
 VARIABLE_M = 1e-6
-"""Recorded and recomputed decision variables may differ by this: x moves less within the event isolation."""
-NOISE_M = 1e-8
-"""Noise moves by less within 1e-9 s, and rows closer than that are one."""
-LARGEST_SAMPLE = 9.0
-"""Largest noise sample, in standard deviations: one in 1e19 normal samples is larger."""
+NOISE_M = 1e-8  # noise moves by less within 1e-9 s, and rows closer than that are one
+LARGEST_SAMPLE = 9.0  # largest noise sample, in standard deviations: one in 1e19 normal samples is larger
 SUPERVISING, INTERVENING, REFRACTORY = 0.0, 1.0, 2.0
 
 
@@ -37,17 +35,11 @@ class Step(NamedTuple):
 
 @dataclass(frozen=True)
 class Variable:
-    """x(t) = ||rho_rd(t) - rho(t)|| + n(t), where both are linear in time between knots; x is monotone there.
+    """x(t) = ||rho_rd(t) - rho(t)|| + n(t), where both are linear in time between knots; x is monotone there."""
 
-    Attributes:
-        t_s: knots, (K,).
-        parts_m: rho_rd - rho and n at the knots, (K, 4).
-        x_m: x at the knots, (K,).
-    """
-
-    t_s: Array
-    parts_m: Array
-    x_m: Array
+    t_s: Array  # knots, (K,)
+    parts_m: Array  # rho_rd - rho and n at the knots, (K, 4)
+    x_m: Array  # x at the knots, (K,)
 
     def at(self, t_s: float) -> float:
         """Value of x at a time, m."""
@@ -89,12 +81,10 @@ def _interpolated(t_s: Array, values: Array, at_s: Array) -> Array:
 
 
 def _turning_points_s(t_s: Array, parts_m: Array) -> Array:
-    """Times at which x has a minimum within a segment.
-
-    On a segment x(u) = ||r + u w|| + n + u m, 0 <= u <= 1. With L = ||w||, the point u0 = -r.w / L^2 of least norm c,
-    and v = L (u - u0): ||r + u w|| = sqrt(c^2 + v^2). So x' = L v / sqrt(c^2 + v^2) + m is 0 at
-    v = -m c / sqrt(L^2 - m^2) if |m| < L, and nowhere else.
-    """
+    """Times at which x has a minimum within a segment."""
+    # On a segment x(u) = ||r + u w|| + n + u m, 0 <= u <= 1. With L = ||w||, the point u0 = -r.w / L^2 of least norm c,
+    # and v = L (u - u0): ||r + u w|| = sqrt(c^2 + v^2). So x' = L v / sqrt(c^2 + v^2) + m is 0 at v = -m c / sqrt(L^2 -
+    # m^2) if |m| < L, and nowhere else.
     step = np.diff(parts_m, axis=0)
     turns = np.linalg.norm(step[:, :3], axis=1) > np.abs(step[:, 3])
     r, w, m = parts_m[:-1][turns, :3], step[turns, :3], step[turns, 3]
@@ -107,12 +97,10 @@ def _turning_points_s(t_s: Array, parts_m: Array) -> Array:
 
 
 def automaton(x: Variable, levels: Levels) -> list[Step]:
-    """Run the trigger on x.
-
-    It triggers when x reaches zeta while supervising, also at t = 0; it releases when x falls below the release level.
-    A release before the dwell after the trigger is over leads to a rest until then, and a trigger at its end if x is
-    still at zeta or above.
-    """
+    """Run the trigger on x."""
+    # It triggers when x reaches zeta while supervising, also at t = 0; it releases when x falls below the release
+    # level. A release before the dwell after the trigger is over leads to a rest until then, and a trigger at its end
+    # if x is still at zeta or above.
     found: list[Step] = []
     trigger = float(x.t_s[0]) if x.x_m[0] >= levels.zeta_m else x.reaches(levels.zeta_m, float(x.t_s[0]), above=True)
     while trigger is not None:
@@ -221,10 +209,8 @@ def zeno_trace(run: Run) -> Found:
 
 
 def thr_quality(run: Run) -> Found:
-    """THR-QUALITY: at triggers, and where none comes, the error without noise is within w of the threshold.
-
-    w is the width of the hysteresis; half the threshold for the bare trigger.
-    """
+    """THR-QUALITY: at triggers, and where none comes, the error without noise is within w of the threshold."""
+    # w is the width of the hysteresis; half the threshold for the bare trigger.
     zeta, release = run.levels.zeta_m, run.levels.release_m
     tolerance = zeta - release if release < zeta else zeta / 2.0
     off: list[float] = []

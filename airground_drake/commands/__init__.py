@@ -21,18 +21,16 @@ from airground_drake.base.usage import EXIT_TOOL, EXIT_USAGE, Parser, refuse
 
 
 class Command(NamedTuple):
-    """What `airground NAME ...` does.
+    """What `airground NAME ...` does."""
 
-    The module has `main`, which takes the arguments and returns the exit code, and `parser`, which makes the parser of
-    the arguments. Slow imports are inside `main`. An error that `main` raises becomes one line, see `main` below.
-    """
+    # The module has `main`, which takes the arguments and returns the exit code, and `parser`, which makes the parser
+    # of the arguments. Slow imports are inside `main`. An error that `main` raises becomes one line, see `main` below.
 
     module: str
     says: str
 
 
-GONE = {"proofs": "airground prove"}
-"""Commands of earlier versions, and the commands that replace them."""
+GONE = {"proofs": "airground prove"}  # commands of earlier versions, and the commands that replace them
 
 COMMANDS: dict[str, Command] = {
     "report": Command("airground_drake.report.__main__", "simulate a scenario, check its claims, write the report"),
@@ -57,11 +55,8 @@ COMMANDS: dict[str, Command] = {
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run a command.
-
-    Returns:
-        The command's exit code; 2 if the command is unknown or refuses, 4 if a simulation stops.
-    """
+    """Run a command."""
+    # Returns the command's exit code; 2 if the command is unknown or refuses, 4 if a simulation stops.
     given = list(sys.argv[1:] if arguments is None else arguments)
     options, unknown = _parser().parse_known_args(given[:1])
     name = "".join(unknown) or options.command

@@ -13,8 +13,7 @@ from airground_drake.base.usage import Parser, output_file, overridable
 if TYPE_CHECKING:
     from airground_drake.scenario.budget import PairBudget
 
-MOST_NAMED = 6
-"""Bodies that are named in a line at most."""
+MOST_NAMED = 6  # bodies that are named in a line at most
 
 
 def parser() -> argparse.ArgumentParser:

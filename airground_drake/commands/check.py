@@ -27,17 +27,16 @@ from airground_drake.scenario import plugins
 if TYPE_CHECKING:
     import argparse
 
+# Checks that must agree before a report is made again: otherwise the files do not belong to the report.
 NEEDED = ("files", "trace")
-"""Checks that must agree before a report is made again: otherwise the files do not belong to the report."""
-EXIT_UNUSABLE = 2
-"""Exit code of `airground prove` without Coq, or with a report that it cannot read."""
+EXIT_UNUSABLE = 2  # exit code of `airground prove` without Coq, or with a report that it cannot read
+# What is taken as recorded: a forger may change it in all its places, unnoticed.
 ALWAYS = (
     "what the scenario asks for and expects; number of seeds; provenance, measured times; "
     "metadata of tables; Coq's version and words; findings of `report audit` that rest on other runs"
 )
-"""What is taken as recorded: a forger may change it in all its places, unnoticed."""
+# What is taken as recorded without `--simulate`.
 NOT_SIMULATED = "policies, seeds and faults; messages and decisions; other seeds, third-party claims, block diagram"
-"""The same without `--simulate`."""
 EPILOG = f"""\
 Each line says what was checked, on which run, and by whom:
   (checker)           a separate program: distances, hypotheses, triggers, dwell, arrivals, collisions, digests
@@ -70,11 +69,8 @@ def parser() -> argparse.ArgumentParser:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Check, and print a line for each check.
-
-    Returns:
-        Exit code: 0 all agree, 1 not all, 2 usage or no report, 3 not reproduced here, 4 a fault of the checker.
-    """
+    """Check, and print a line for each check."""
+    # Exit code: 0 all agree, 1 not all, 2 usage or no report, 3 not reproduced here, 4 a fault of the checker.
     try:
         options = parser().parse_args(arguments)
         with progress_bar(quiet=options.quiet) as progress:
@@ -100,17 +96,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def made_again(
     folder: Path, lines: Sequence[CheckLine], limit_s: float, progress: Progress, by: str, module: str, *options: str
 ) -> Iterator[CheckLine]:
-    """The lines of a program that makes parts of the report again, in a process of its own.
-
-    Args:
-        folder: of the report.
-        lines: results of the checker.
-        limit_s: CPU time for each process, s.
-        progress: is told of each part.
-        by: what the lines say who checked.
-        module: of the program.
-        options: of the program.
-    """
+    """The lines of a program that makes parts of the report again, in a process of its own."""
     from airground_drake.report.lines import JUDGED
 
     line = partial(CheckLine, by=by)

@@ -15,8 +15,7 @@ from airground_drake.report import compare
 
 EXIT_WORSE = 1
 PARTS = ("inputs", "overall", "verdicts", "margins", "exercised", "expectations", "reproduction", "audit", "events")
-MOST_LINES, MOST_ROWS = 20, 200
-"""Changes of one part that are shown, in the terminal and on the page; `--json` has all."""
+MOST_LINES, MOST_ROWS = 20, 200  # changes of one part that are shown, in the terminal and on the page; `--json` has all
 _ABOUT = ("claim", "id", "run", "robot", "kind", "n")
 
 

@@ -128,11 +128,7 @@ def _run(spec: Spec, options: argparse.Namespace) -> int:
 
 
 def _try(search: Search, pool: Pool) -> None:
-    """Judge the first draw, to see that the claim says something about its runs.
-
-    Raises:
-        ScenarioError: if it does not.
-    """
+    """Judge the first draw, to see that the claim says something about its runs."""
     from airground_drake.study.campaign.rows import JUDGED
     from airground_drake.study.campaign.work import rows_of
 

@@ -10,8 +10,8 @@ from airground_drake.base.errors import one_line
 from airground_drake.base.usage import formats_of, output_folder
 from airground_drake.commands.saved import outside_reports, parser_of, runs_of, trace_of
 
+# Copies of those of `export.figures`, which takes seconds to import.
 FORMATS, STYLES = ("pdf", "png", "svg"), ("ieee", "thesis")
-"""As in `report.export.figures`, which takes seconds to import."""
 
 
 def parser() -> argparse.ArgumentParser:

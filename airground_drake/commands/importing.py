@@ -18,19 +18,16 @@ from airground_drake.scenario.shipped import argument
 if TYPE_CHECKING:
     from airground_drake.scenario.imported import Imported
 
+# What can be imported, and the options for it.
 FORMATS = {
     "barn": ("radius_m", "distance_m", "ugv", "max_speed_m_s", "height_m"),
     "ros-map": ("radius_m", "distance_m", "ugv", "max_speed_m_s", "ugvs"),
     "mapf": ("agents", "map", "cell_m", "max_speed_m_s"),
 }
-"""What can be imported, and the options for it."""
-RADII_M = {"barn": 0.215, "ros-map": 0.15}
-"""Default radius of a UGV: half the width of BARN's Jackal; a TurtleBot."""
+RADII_M = {"barn": 0.215, "ros-map": 0.15}  # default radius of a UGV: half the width of BARN's Jackal; a TurtleBot
 DISTANCE_M, UGVS, AGENTS, CELL_M = 0.1, 3, 4, 1.0
-HEIGHT_M = 1.0
-"""Default height of UGVs, m: robots of this kind are lower, with what they carry."""
-SIZES = (0.001, 100.0)
-"""Least and greatest radius and distance, m."""
+HEIGHT_M = 1.0  # default height of UGVs, m: robots of this kind are lower, with what they carry
+SIZES = (0.001, 100.0)  # least and greatest radius and distance, m
 
 
 def parser() -> argparse.ArgumentParser:

@@ -16,8 +16,7 @@ from airground_drake.report import compare, folder, screen
 from airground_drake.report.sentences import Line
 
 PAGE = "index.html"
-MARK = "airground_drake index"
-"""Text in every page that this command has written."""
+MARK = "airground_drake index"  # text in every page that this command has written
 
 
 def parser() -> argparse.ArgumentParser:

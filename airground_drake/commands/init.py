@@ -14,10 +14,8 @@ from airground_drake.scenario.fleet import fleet
 from airground_drake.scenario.limits import MAX_NAME, MAX_SEED, MAX_UGVS
 from airground_drake.scenario.shipped import argument, json_schema_file, shipped_files
 
-MOST_OBSTACLES = 2000 - MAX_UGVS
-"""With the largest number of UGVs, as many bodies as the checker accepts."""
-MODEL = "minimal"
-"""The shipped scenario that is copied by default."""
+MOST_OBSTACLES = 2000 - MAX_UGVS  # with the largest number of UGVs, as many bodies as the checker accepts
+MODEL = "minimal"  # the shipped scenario that is copied by default
 
 
 def parser() -> argparse.ArgumentParser:

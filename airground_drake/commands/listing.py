@@ -23,8 +23,7 @@ from airground_drake.base.registry import (
 from airground_drake.base.usage import Parser
 from airground_drake.scenario.shipped import shipped, title
 
-Lines = Iterator[tuple[str, str]]
-"""Names and their descriptions."""
+Lines = Iterator[tuple[str, str]]  # names and their descriptions
 
 
 def parser() -> argparse.ArgumentParser:

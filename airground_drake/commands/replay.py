@@ -11,8 +11,7 @@ from airground_drake.base.errors import FolderError, one_line
 from airground_drake.base.usage import between, output_file, output_folder, refuse
 from airground_drake.commands.saved import outside_reports, parser_of, runs_of, trace_of
 
-SLOWEST, SPEED, FASTEST = 0.1, 4.0, 100.0
-"""Limits and default of a video's speed."""
+SLOWEST, SPEED, FASTEST = 0.1, 4.0, 100.0  # limits and default of a video's speed
 
 
 def parser() -> argparse.ArgumentParser:
@@ -63,11 +62,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _paths(output: Path, runs: Sequence[str]) -> dict[str, Path]:
-    """Map each run to the file of its page: `output` itself if it is the name of a page, else a file below it.
-
-    Raises:
-        FolderError: if there is one file for several runs.
-    """
+    """Map each run to the file of its page: `output` itself if it is the name of a page, else a file below it."""
     if output.suffix != ".html":
         return {name: output / f"replay_{name}.html" for name in runs}
     if len(runs) > 1:

@@ -19,8 +19,7 @@ from airground_drake.scenario.estimate import estimate
 if TYPE_CHECKING:
     from airground_drake.sim.trace import Trace
 
-SPEED = 1.0
-"""Default speed in Meshcat, simulated seconds per second."""
+SPEED = 1.0  # default speed in Meshcat, simulated seconds per second
 
 
 def parser() -> argparse.ArgumentParser:

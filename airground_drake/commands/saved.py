@@ -25,12 +25,7 @@ def parser_of(name: str, description: str) -> argparse.ArgumentParser:
 
 
 def runs_of(folder: Path, run: str | None = None) -> Sequence[str]:
-    """Return the runs of a report that have left a trace, or only the named run.
-
-    Raises:
-        FolderError: if it is not a report, one without runs, or one with links in the place of folders.
-        UnknownNameError: if it has no such run.
-    """
+    """Return the runs of a report that have left a trace, or only the named run."""
     if not is_report(folder):
         raise FolderError(one_line(f"{folder} is not a report; allowed: a folder that `airground report` has written"))
     files.refuse_links(folder)
@@ -43,11 +38,7 @@ def runs_of(folder: Path, run: str | None = None) -> Sequence[str]:
 
 
 def outside_reports(folder: Path, what: str) -> None:
-    """Create a folder for `what`. Reports are left as they are: the checker refuses files that are not theirs.
-
-    Raises:
-        FolderError: if the folder is one of a report, or cannot be written.
-    """
+    """Create a folder for `what`. Reports are left as they are: the checker refuses files that are not theirs."""
     for each in (folder.resolve(), *folder.resolve().parents):
         if is_report(each):
             raise FolderError(one_line(f"{folder} is in the report {each}, which is complete; name another, with -o"))
@@ -55,12 +46,7 @@ def outside_reports(folder: Path, what: str) -> None:
 
 
 def trace_of(folder: Path, run: str) -> tuple[Trace, Scenario]:
-    """Load the trace of a run, and the scenario that it was simulated with.
-
-    Raises:
-        TraceError: if the trace cannot be used, or is of another run.
-        ScenarioError: if its scenario cannot be used.
-    """
+    """Load the trace of a run, and the scenario that it was simulated with."""
     from airground_drake.scenario.load import from_data
     from airground_drake.sim import trace
 

@@ -47,8 +47,7 @@ if TYPE_CHECKING:  # slow to import
     from airground_drake.verify import Verdict
 
 FORMATS = tuple(folder.PAGES)
-AUDITED = "case_a"
-"""`report audit` reports on this scenario, with every finding about the paper."""
+AUDITED = "case_a"  # `report audit` reports on this scenario, with every finding about the paper
 AUDIT_TITLE = "The paper's formulas and numbers, audited"
 AUDIT_DESCRIPTION = (
     "Case A with all its runs and proofs, and every finding about the paper: its formula, ours, and evidence made by a "
@@ -57,11 +56,8 @@ AUDIT_DESCRIPTION = (
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command line.
-
-    Returns:
-        Exit code: 0 all claims as expected, 1 a claim differs, 2 usage or bad scenario, 3 inconclusive, 4 tool error.
-    """
+    """Run the command line."""
+    # Exit code: 0 all claims as expected, 1 a claim differs, 2 usage or bad scenario, 3 inconclusive, 4 tool error.
     options = parser().parse_args(arguments)
     if options.scenario is None and not options.list:
         parser().error("a scenario is needed (see --list)")

@@ -50,21 +50,7 @@ def judge(
     seeds: int,
     audit: Callable[[Scenario, Mapping[str, Trace], Sequence[Verdict]], Sequence[Mapping[str, Any]]] | None,
 ) -> JudgedRuns:
-    """Judge the runs and the model and, if asked for, the paper and other seeds; draw the runs at the same time.
-
-    Args:
-        scenario: of the runs.
-        traces: its runs by name.
-        progress: is told what is done.
-        drawn: whether to draw figures.
-        kept: as in `make.Wanted`.
-        seeds: as in `make.Wanted`.
-        audit: as in `make.Wanted`.
-
-    Raises:
-        PluginError: if a claim of the scenario cannot be made.
-        AirgroundError: if a process dies.
-    """
+    """Judge the runs and the model and, if asked for, the paper and other seeds; draw the runs at the same time."""
     of_seeds = with_seeds(scenario, traces, seeds, progress) if seeds else ()
     figures = start_in_process(partial(draw, scenario, traces)) if drawn else list
     verdicts = judge_all(scenario, traces.values(), kept=kept, progress=progress)
@@ -73,10 +59,7 @@ def judge(
 
 
 def with_seeds(scenario: Scenario, own: Mapping[str, Trace], number: int, progress: Progress) -> list[dict[str, Any]]:
-    """The outcome of every run with each of the seeds 1 to `number`, by run, then by seed; see `metrics.outcome`.
-
-    Of the runs with the scenario's own seed, the traces `own` are taken.
-    """
+    """The outcome of every run with each of the seeds 1 to `number`, by run, then by seed; see `metrics.outcome`."""
     others = [seed for seed in range(1, number + 1) if seed != scenario.seed]
     found = [metrics.outcome(trace) for trace in simulate_seeds(scenario, others, progress=progress)]
     found += [metrics.outcome(trace) for trace in own.values() if 1 <= scenario.seed <= number]
@@ -93,11 +76,7 @@ def write(
     *,
     audited: bool,
 ) -> dict[str, Any]:
-    """Write the folder, and return the document; arguments as of `make.write_report` and `document.build`.
-
-    Raises:
-        OSError: if something cannot be written.
-    """
+    """Write the folder, and return the document; arguments as of `make.write_report` and `document.build`."""
     dot = graphviz.dot(build_diagram(plugins.without(scenario), method_drawn(scenario)))
     pages = {"diagram.dot": dot, "diagram.svg": graphviz.svg(dot)}
     required = [claim.id for claim in model_claims(added=scenario.claims) if claim.may_apply(scenario)]

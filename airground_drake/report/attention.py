@@ -14,28 +14,18 @@ from airground_drake.scenario.validate import preset_s
 from airground_drake.ugv.reasons import refusal
 
 MAX_FAULT_CHARS = 300
-MAX_FAULTS = 3
-"""Maximum number of kinds of faults listed per run; its section of the page has more."""
+MAX_FAULTS = 3  # maximum number of kinds of faults listed per run; its section of the page has more
 
 
 class Item(NamedTuple):
-    """One thing that needs attention.
+    """One thing that needs attention."""
 
-    Attributes:
-        chip: the status to show.
-        words: what happened, in one line.
-        claim: the claim that it is about, '' if none.
-        run: in which run, '' if none.
-        about: what was expected, in words.
-        anchor: where in the page there is more about it.
-    """
-
-    chip: str
-    words: str
-    claim: str = ""
-    run: str = ""
-    about: str = ""
-    anchor: str = "claims"
+    chip: str  # the status to show
+    words: str  # what happened, in one line
+    claim: str = ""  # the claim that it is about, '' if none
+    run: str = ""  # in which run, '' if none
+    about: str = ""  # what was expected, in words
+    anchor: str = "claims"  # where in the page there is more about it
 
 
 def items(document: Mapping[str, Any]) -> list[Item]:

@@ -22,32 +22,23 @@ from airground_drake.report.folder import PAGES
 SCHEMA = "airground_drake.comparison/1"
 REPORT = "airground_drake.report/4"
 
+# Verdicts from the best to the worst, as `statuses.outcome` names them; `gone`: no verdict any more.
 ORDER = (("proved",), ("holds", "supported"), ("not_exercised",), (*UNDECIDED, "gone"), ("refuted",))
-"""Verdicts from the best to the worst, as `statuses.outcome` names them; `gone`: no verdict any more."""
+# Statuses of rows of the reproduction table, from the best to the worst.
 ROWS = (("reproduced",), ("calibrated",), ("by_construction",), ("ambiguous",), ("not_reproduced", "gone"))
-"""Statuses of rows of the reproduction table, from the best to the worst."""
-OVERALL = (("as_expected",), ("inconclusive",), ("not_as_expected",))
-"""Overall statuses, from the best to the worst."""
-WITHIN = 1e-8
-"""Numbers agree to this times 1 plus their size: versions of numpy, scipy and solvers round differently."""
-LONGEST_INTEGER = 18
-"""Maximum number of digits of an integer."""
+OVERALL = (("as_expected",), ("inconclusive",), ("not_as_expected",))  # overall statuses, from the best to the worst
+WITHIN = 1e-8  # numbers agree to this times 1 plus their size: versions of numpy, scipy and solvers round differently
+LONGEST_INTEGER = 18  # maximum number of digits of an integer
 
-VERSIONS = ("package", "drake", "python", "packages", "git")
-"""What the provenance says about the code."""
-NO_INPUTS = ("title", "description")
-"""Keys of a scenario that nothing depends on."""
+VERSIONS = ("package", "drake", "python", "packages", "git")  # what the provenance says about the code
+NO_INPUTS = ("title", "description")  # keys of a scenario that nothing depends on
 
 Document = Mapping[str, Any]
 Change = dict[str, Any]
 
 
 def read(folder: Path) -> Document:
-    """The report.json of a folder.
-
-    Raises:
-        ReportError: if no report can be read there.
-    """
+    """The report.json of a folder."""
     path = folder / PAGES["json"]
     try:
         text = files.read_text(path)
@@ -66,11 +57,7 @@ _CLAIM = {"margin": (int, float, type(None)), "exercised": (int, type(None)), "e
 
 
 def _require_usable(document: Document) -> None:
-    """Refuse a report in which a value that the comparison reads is of another kind.
-
-    Raises:
-        ValueError, TypeError, KeyError, AttributeError: if there is one.
-    """
+    """Refuse a report in which a value that the comparison reads is of another kind."""
     compared(document, document)
     overall, claims, runs = document["overall"], document["claims"], document["runs"]
     entries: list[tuple[Mapping[str, Any], Mapping[str, Any]]] = [
@@ -93,14 +80,11 @@ def _require_usable(document: Document) -> None:
 
 
 def compared(before: Document, after: Document) -> dict[str, Any]:
-    """What differs.
-
-    Returns:
-        Strict JSON: `regressions`, a count; lists of changes `inputs`, `overall` (one at most), `verdicts`, `margins`,
-        `exercised`, `expectations`, `reproduction`, `audit`, `events`. A change has `before` and `after` (None if
-        missing), whether it is `worse`, and what it is about: `claim` and `run`; `id`; or `run`, `robot`,
-        `kind` and `n`, the number of the event among those of its kind, from 1. Margins have their `relative` change.
-    """
+    """What differs."""
+    # Returns strict JSON: `regressions`, a count; lists of changes `inputs`, `overall` (one at most), `verdicts`,
+    # `margins`, `exercised`, `expectations`, `reproduction`, `audit`, `events`. A change has `before` and `after` (None
+    # if missing), whether it is `worse`, and what it is about: `claim` and `run`; `id`; or `run`, `robot`, `kind` and
+    # `n`, the number of the event among those of its kind, from 1. Margins have their `relative` change.
     found: dict[str, Any] = {
         "inputs": list(_inputs(before, after)),
         "overall": list(_overall(before, after)),

@@ -25,8 +25,7 @@ from airground_drake.verify.claim import Verdict
 
 SCHEMA = "airground_drake.report/4"
 
-MOST_LISTED = 4
-"""Maximum number of checks that a sentence names."""
+MOST_LISTED = 4  # maximum number of checks that a sentence names
 EXIT_CODES = {"as_expected": 0, "not_as_expected": 1, "inconclusive": 3}
 
 
@@ -41,21 +40,10 @@ def build(
     required: Iterable[str] = (),
     seeds: Sequence[Mapping[str, Any]] = (),
 ) -> dict[str, Any]:
-    """The document.
-
-    Args:
-        scenario: as resolved (after command-line settings).
-        traces: by run, in the order of the scenario; a run without a trace makes the report inconclusive.
-        verdicts: all of them; a claim that the scenario expects and that is missing makes it inconclusive.
-        provenance: versions, seed, time, `command` and the like.
-        audit: findings about the paper.
-        audited: whether these are all findings: then each must be demonstrated.
-        required: claims about the model that must have a verdict.
-        seeds: outcomes of the runs with several seeds, see `metrics.outcome`.
-
-    Returns:
-        Strict JSON; numbers that are not finite have become None.
-    """
+    """The document. Returns strict JSON; numbers that are not finite have become None."""
+    # traces: by run, in the order of the scenario; a run without a trace makes the report inconclusive.
+    # audited: whether these are all findings: then each must be demonstrated.
+    # required: claims about the model that must have a verdict.
     of_all = [name for name in traces if not scenario.runs[name].set]
     some_run = next(iter(of_all or traces), "")
     claims = [
@@ -89,16 +77,7 @@ def build(
 
 
 def sealed(document: Mapping[str, Any], folder: Path, names: Iterable[str]) -> dict[str, Any]:
-    """The document with the SHA-256 of every other file of the report under `files`: an exchanged file is noticed.
-
-    Args:
-        document: of `build`.
-        folder: of the report.
-        names: paths of its files in there, with slashes.
-
-    Raises:
-        OSError: if one cannot be read.
-    """
+    """The document with the SHA-256 of every other file of the report under `files`: an exchanged file is noticed."""
     return {**document, "files": {name: sha256((folder / name).read_bytes()) for name in sorted(names)}}
 
 
@@ -108,14 +87,11 @@ def overall(
     items: Sequence[Mapping[str, Any]] = (),
     numbers: Sequence[Mapping[str, Any]] = (),
 ) -> dict[str, Any]:
-    """The verdict over all claims, over the findings about the paper `items`, and over expected `numbers`.
-
-    Returns:
-        `status`, `exit_code`, `why`, counts, and lists of what differs, is undecided or is missing. `counts` has a
-        claim that nothing put to the test under `not_exercised`, never under its status; the list of that name says
-        which these are. `checks` counts claims about which something is expected, and `numbers`; `unpromised` lists
-        the other claims. A finding that was not demonstrated differs, too, and so does a number that is too small.
-    """
+    """The verdict over all claims, over the findings about the paper `items`, and over expected `numbers`."""
+    # Returns `status`, `exit_code`, `why`, counts, and lists of what differs, is undecided or is missing. `counts` has
+    # a claim that nothing put to the test under `not_exercised`, never under its status; the list of that name says
+    # which these are. `checks` counts claims about which something is expected, and `numbers`; `unpromised` lists the
+    # other claims. A finding that was not demonstrated differs, too, and so does a number that is too small.
     undemonstrated = [item["id"] for item in items if not item["demonstrated"]]
     keys = ("id", "run", "status", "expected", "exercised")
     unexpected = [{key: claim[key] for key in keys} for claim in claims if claim["as_expected"] is False]
@@ -160,12 +136,7 @@ def overall(
 
 
 def expected_numbers(scenario: Scenario, runs: Mapping[str, Mapping[str, Any]]) -> list[dict[str, Any]]:
-    """The numbers that a scenario expects of its runs: `id`, `run`, `found`, `least`, `as_expected`.
-
-    Args:
-        scenario: the scenario.
-        runs: entries of report.json.
-    """
+    """The numbers that a scenario expects of its runs: `id`, `run`, `found`, `least`, `as_expected`."""
     listed = []
     for name, run in runs.items():
         sent = run["metrics"]["messages"] or {"proposals": 0, "answers": 0}

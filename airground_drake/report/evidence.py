@@ -7,13 +7,12 @@ from typing import Any
 
 from airground_drake.report.figures.panels import Table
 
-MAX_ROWS, MAX_COLUMNS, MAX_CELL_CHARS = 40, 10, 200
-"""Maximum size of a table; report.json has all of it."""
+MAX_ROWS, MAX_COLUMNS, MAX_CELL_CHARS = 40, 10, 200  # maximum size of a table; report.json has all of it
+# Units with which the names of quantities end, and how they are written; the longest first.
 UNITS = {
     "1_m2_s": "1/(m²s)", "1_m_s": "1/(m s)", "m_sqrt_s": "m/√s", "m2_s": "m²s", "m_s": "m/s", "1_s": "1/s",
     "1_m": "1/m", "m": "m", "s": "s",
 }  # fmt: skip
-"""Units with which the names of quantities end, and how they are written; the longest first."""
 
 
 def split(key: str) -> tuple[str, str]:
@@ -25,18 +24,12 @@ def split(key: str) -> tuple[str, str]:
 
 
 def in_words(key: str) -> str:
-    """The same in one: "min distance, m"."""
+    """The name and the unit in a key, in one text: "min distance, m"."""
     return ", ".join(filter(None, split(key)))
 
 
 def tables(evidence: Mapping[str, Any], caption: str, number: Callable[[Any], str]) -> list[Table]:
-    """The evidence: first one table of single values, then one for each key that holds several records.
-
-    Args:
-        evidence: strict JSON.
-        caption: of the first table, and the beginning of the others'.
-        number: how a number is written.
-    """
+    """The evidence: first one table of single values, then one for each key that holds several records."""
     single = {key: value for key, value in evidence.items() if not _records(value)}
     rows = tuple((in_words(key), _cell(value, number)) for key, value in single.items())
     found = [Table(caption, ("quantity", "value"), rows[:MAX_ROWS])] if rows else []

@@ -14,10 +14,10 @@ from airground_drake.report import rules
 from airground_drake.report.outcomes import Document, Near, claims, named, no_way, pairs
 from airground_drake.sim.collisions import first_collisions
 
+# What is known of a claim that was not judged.
 UNJUDGED: Mapping[str, Any] = {
     "status": "", "expected": "", "as_expected": None, "exercised": None, "evidence": {}, "inputs": {},
 }  # fmt: skip
-"""What is known of a claim that was not judged."""
 
 
 class Breach(NamedTuple):
@@ -30,29 +30,25 @@ class Breach(NamedTuple):
 
 
 class RunFacts:
-    """What came of a run that the scenario names, and that was run.
-
-    Attributes:
-        name: of the run.
-        method: its identifier.
-        run: its entry in report.json.
-        movers: obstacles that may move.
-        near: the least distance of each pair, those of least margin first.
-        hits: the first collision of each robot that collided, an event. What these robots do later does not count.
-    """
+    """What came of a run that the scenario names, and that was run."""
 
     def __init__(self, document: Document, name: str) -> None:
         """The facts of the run with this name."""
         resolved = document["scenario"]["resolved"]
+        # name: of the run.
+        # run: its entry in report.json.
         spec, self.name, self.run = resolved["runs"][name], name, document["runs"][name]
         self._resolved, self._metrics = resolved, self.run["metrics"]
         self._claims = {each["id"]: each for run in ("", name) for each in claims(document, run=run)}
+        # method: its identifier.
         self.method, self._plain = str(spec["method"]), spec["composition"] == "augmented"
         obstacles = resolved.get("obstacles", {})
+        # Obstacles that may move.
         self.movers: list[str] = [each for each, of in obstacles.items() if of.get("moves") or of.get("max_speed_m_s")]
         self._off_the_map = {each for each, of in obstacles.items() if not of.get("known_to_uav", True)}
         unique = {frozenset((near.robot, near.other)): near for near in reversed([*pairs(self.run)])}
-        self.near = sorted(unique.values())
+        self.near = sorted(unique.values())  # the least distance of each pair, those of least margin first
+        # The first collision of each robot that collided, an event. What these robots do later does not count.
         self.hits = first_collisions(self.run["events"])
 
     def claim(self, name: str) -> Mapping[str, Any]:
@@ -101,10 +97,8 @@ class RunFacts:
 
     @cached_property
     def breaches(self) -> list[Breach]:
-        """Collisions by time, or else the pairs that came too near, those of least margin first; the robots' own first.
-
-        Empty where the claim alone says that a distance was not kept.
-        """
+        """Collisions by time, or else pairs that came too near, those of least margin first; the robots' own first."""
+        # Empty where the claim alone says that a distance was not kept.
         events = {id(hit): hit for hit in self.hits.values()}.values()
         found = [
             Breach(
@@ -147,10 +141,8 @@ class RunFacts:
 
     @property
     def contradicts_its_proof(self) -> bool:
-        """Whether a distance was broken that a theorem keeps, though the theorem's conditions held.
-
-        Beside what moves, a robot only keeps from bringing itself too near by commands that were not under way.
-        """
+        """Whether a distance was broken that a theorem keeps, though the theorem's conditions held."""
+        # Beside what moves, a robot only keeps from bringing itself too near by commands that were not under way.
         kept = [each for each in self.breaches if each.second not in self.movers or each.doing == "robot"]
         return self.is_proved and (bool(kept) or not self.breaches)
 
@@ -193,12 +185,10 @@ class RunFacts:
 
     @property
     def ugvs(self) -> list[str]:
-        """All UGVs."""
         return [*self._resolved["ugvs"]]
 
     @property
     def uav(self) -> str:
-        """The UAV."""
         return str(self._resolved["uav"]["name"])
 
     @property

@@ -15,8 +15,8 @@ from pathlib import Path
 from airground_drake.base import files
 from airground_drake.base.errors import FolderError, one_line
 
+# The formats of a report, and the file of each.
 PAGES = {"html": "report.html", "json": "report.json", "junit": "junit.xml"}
-"""The formats of a report, and the file of each."""
 RULE = "allowed: a folder that is new or empty, has a report.json of ours, or nothing but files of a report"
 
 _FILES = re.compile(
@@ -30,11 +30,7 @@ _OURS = re.compile(rb'\s*\{\s*"schema":\s*"airground_drake\.report/')
 
 @contextmanager
 def held(folder: Path) -> Iterator[None]:
-    """Prepare the folder, and keep other reports out of it by a lock that ends with this process.
-
-    Raises:
-        FolderError: as `prepare`, and if another report is being written to it.
-    """
+    """Prepare the folder, and keep other reports out of it by a lock that ends with this process."""
     with files.wanted(folder, "a folder for the report"):
         folder.mkdir(parents=True, exist_ok=True)
         handle = os.open(folder, os.O_RDONLY)
@@ -54,11 +50,7 @@ def held(folder: Path) -> Iterator[None]:
 
 
 def prepare(folder: Path) -> None:
-    """Create the folder if need be, see that a report may be written there, and remove what killed runs have left.
-
-    Raises:
-        FolderError: if it holds something that is not a report, or cannot be created or written.
-    """
+    """Create the folder if need be, see that a report may be written there, and remove what killed runs have left."""
     with files.wanted(folder, "a folder for the report"):
         folder.mkdir(parents=True, exist_ok=True)
         if why := _refused(folder):
@@ -69,11 +61,7 @@ def prepare(folder: Path) -> None:
 
 
 def clear(folder: Path) -> None:
-    """Remove an earlier report: the pages first, so that none is ever beside other traces.
-
-    Raises:
-        OSError: if something cannot be removed.
-    """
+    """Remove an earlier report: the pages first, so that none is ever beside other traces."""
     for name in PAGES.values():
         (folder / name).unlink(missing_ok=True)
     for path in list(_within(folder)):

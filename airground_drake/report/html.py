@@ -31,21 +31,18 @@ from airground_drake.report.view import svg
 from airground_drake.report.view.canvas import DARK
 from airground_drake.ugv.reasons import WORDS
 
-STYLE, SCRIPT = "report.css", "report.js"
-"""The style sheet and the script of the page, among the templates."""
-NOTHING = "'none'"
-"""In a content security policy: no source at all."""
+STYLE, SCRIPT = "report.css", "report.js"  # the style sheet and the script of the page, among the templates
+NOTHING = "'none'"  # in a content security policy: no source at all
 MAX_DIAGRAM_CHARS = 500_000
 MAX_SCENARIO_CHARS = 20_000
 LINE_CHARS = 110
+# Kinds of evidence shown instead of a passing verdict, so that it does not look like more than it is.
 KINDS = ("declared", "stuck")
-"""Kinds of evidence shown instead of a passing verdict, so that it does not look like more than it is."""
 MAX_DISTANCE_ROWS = 120
-MAX_INTERVENTIONS = 40
-"""Maximum number of proposals listed per run."""
-MAX_FAULTS = 40
-"""Maximum number of kinds of faults listed per run."""
+MAX_INTERVENTIONS = 40  # maximum number of proposals listed per run
+MAX_FAULTS = 40  # maximum number of kinds of faults listed per run
 
+# Sections of the page, in order, by their identifiers; an empty section is left out.
 SECTIONS = {
     "happened": "What happened",
     "safe": "Is it safe?",
@@ -57,12 +54,12 @@ SECTIONS = {
     "claims": "All checks",
     "provenance": "How to run it again",
 }
-"""Sections of the page, in order, by their identifiers; an empty section is left out."""
+# What the first screen calls the sections that it leads to.
 LINKS = {"claims": "proof", "intervened": "timing, choice", "reproduction": "all numbers"}
-"""What the first screen calls the sections that it leads to."""
+# Sections of the figures; the others are maps of what happened.
 PLACES = {"distances": "safe", **dict.fromkeys(("timelines", "threshold-choice"), "intervened")}
-"""Sections of the figures; the others are maps of what happened."""
 
+# How a status is shown: icon, word, class (which sets the colour): never by colour alone.
 CHIPS = {
     "as_expected": ("✓", "as declared", "good"),
     "not_as_expected": ("✗", "not as declared", "bad"),
@@ -85,17 +82,12 @@ CHIPS = {
     "demonstrated": ("✓", "demonstrated", "good"),
     "not_demonstrated": ("✗", "not demonstrated", "bad"),
 }
-"""How a status is shown: icon, word, class (which sets the colour): never by colour alone."""
 
 
 def render(document: Mapping[str, Any], figures: Sequence[Figure], diagram_svg: str | None = None) -> str:
-    """The page.
-
-    Args:
-        document: report.json, as built by `document.build`.
-        figures: as drawn by `figures.draw` and the like, in the order of the page.
-        diagram_svg: the block diagram; left out if it is no SVG or too large to inline.
-    """
+    """The page."""
+    # figures: as drawn by `figures.draw` and the like, in the order of the page.
+    # diagram_svg: the block diagram; left out if it is no SVG or too large to inline.
     runs, claims = document["runs"], document["claims"]
     distances = [(name, pair) for name, run in runs.items() for pair in pairs(run)]
     distances.sort(key=lambda found: found[1].margin_m)

@@ -19,8 +19,7 @@ from airground_drake.verify.runs.gate_record import DecisionRecord, rows_of
 from airground_drake.verify.runs.instants import row_at
 from airground_drake.verify.runs.proposals import ProposalRecord, proposals_of
 
-BINDING_M_S = 1e-9
-"""An avoidance inequality binds where a command has less to spare, m/s."""
+BINDING_M_S = 1e-9  # an avoidance inequality binds where a command has less to spare, m/s
 
 
 def interventions(trace: Trace) -> list[dict[str, Any]]:
@@ -107,13 +106,10 @@ def _executed(trace: Trace, sent: ProposalRecord, answers: Any, ended_s: float |
 
 
 def messages(trace: Trace) -> dict[str, Any] | None:
-    """How many messages a run took, and how many an always-on scheme takes; None without a UAV that intervenes.
-
-    Returns:
-        `proposals`, `withdrawals` of proposals, `answers` (each is a decision of the gatekeeper), as often as they were
-        delivered, `always_on` (proposals and answers, if every UGV got a proposal in every planning period and decided
-        in every period of the gatekeeper), `robots` (the three by UGV).
-    """
+    """How many messages a run took, and how many an always-on scheme takes; None without a UAV that intervenes."""
+    # Returns `proposals`, `withdrawals` of proposals, `answers` (each is a decision of the gatekeeper), as often as
+    # they were delivered, `always_on` (proposals and answers, if every UGV got a proposal in every planning period and
+    # decided in every period of the gatekeeper), `robots` (the three by UGV).
     method, scenario, ugvs = method_of(trace.meta["method"]), trace.scenario, trace.ugvs
     if not method.intervenes:
         return None
@@ -146,11 +142,8 @@ def avoidance(trace: Trace) -> dict[str, dict[str, int]]:
 
 
 def farthest_from_prediction(trace: Trace) -> dict[str, Any] | None:
-    """Where a UGV was farthest from its gatekeeper's prediction while the answer stood; None where none is recorded.
-
-    Returns:
-        `robot`, `t_s` (of the decision), `decision`, `away_m`, `after_s`.
-    """
+    """Where a UGV was farthest from its gatekeeper's prediction while the answer stood; None where none is recorded."""
+    # Returns `robot`, `t_s` (of the decision), `decision`, `away_m`, `after_s`.
     if not len(trace.problems):
         return None
     try:

@@ -10,20 +10,15 @@ from typing import Any
 
 from airground_drake.base.statuses import NOT_EXERCISED, outcome
 
+# Characters that XML 1.0 cannot hold, not even escaped.
 _NOT_XML = re.compile("[^\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
-"""Characters that XML 1.0 cannot hold, not even escaped."""
 
 
 def render(document: Mapping[str, Any]) -> str:
-    """JUnit XML of report.json: a suite per run, with a case per claim and per expected number.
-
-    A claim whose status is the expected one passes; it is skipped, with the reason, if nothing put it to the test.
-    Otherwise it fails; an `error` is an error and a `not_run` is skipped. A run without a trace and a claim that nobody
-    checked are errors.
-
-    Args:
-        document: as built by `document.build`.
-    """
+    """JUnit XML of report.json: a suite per run, with a case per claim and per expected number."""
+    # A claim whose status is the expected one passes; it is skipped, with the reason, if nothing put it to the test.
+    # Otherwise it fails; an `error` is an error and a `not_run` is skipped. A run without a trace and a claim that
+    # nobody checked are errors.
     name = document["scenario"]["name"]
     root = ET.Element("testsuites", {"name": _text(f"airground_drake.{name}")})
     missing = document["overall"]["missing"]

@@ -14,10 +14,9 @@ from airground_drake.base.progress import Progress
 from airground_drake.check.line import DISAGREES
 from airground_drake.report.compare import WITHIN
 
-JUDGED = "judged"
-"""Key of a line about progress."""
+JUDGED = "judged"  # key of a line about progress
+# Keys `claim`, `run`, `outcome` and `text`; a difference has `rule`, `about`, `recorded` and `recomputed` besides.
 Line = dict[str, Any]
-"""Keys `claim`, `run`, `outcome` and `text`; a difference has `rule`, `about`, `recorded` and `recomputed` besides."""
 
 
 def line_of(claim: str, run: str, outcome: str, text: str, rule: str = "") -> Line:
@@ -63,17 +62,10 @@ def short(value: Any, most: int = 120) -> str:
 
 
 def print_lines(found: Callable[[Progress], Iterator[Line]], limit_s: str) -> int:
-    """Print lines, one JSON object each; before them, one with the key `JUDGED` for each step of the progress.
-
-    What other code prints meanwhile goes to standard error, so that it is not taken for a line.
-
-    Args:
-        found: makes the lines, and tells the progress.
-        limit_s: CPU time that this process and each of its children may take, s.
-
-    Returns:
-        Exit code: 0, or 2 if a file cannot be used.
-    """
+    """Print lines, one JSON object each; before them, one with the key `JUDGED` for each step of the progress."""
+    # What other code prints meanwhile goes to standard error, so that it is not taken for a line.
+    # limit_s: CPU time that this process and each of its children may take, s.
+    # Exit code: 0, or 2 if a file cannot be used.
     own = os.fdopen(os.dup(sys.stdout.fileno()), "w", encoding="utf-8")
     os.dup2(sys.stderr.fileno(), sys.stdout.fileno())
 

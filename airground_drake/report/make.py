@@ -22,12 +22,12 @@ if TYPE_CHECKING:
     from airground_drake.sim.trace import Trace
     from airground_drake.verify import Verdict
 
+# Slow to import, and needed after the simulation: it is imported while the runs are simulated.
 _NEXT = "airground_drake.report.after_runs"
-"""Slow to import, and needed after the simulation: it is imported while the runs are simulated."""
 
 
+# Makes findings about the paper from a scenario, its runs and the verdicts on them.
 Audit: TypeAlias = "Callable[[Scenario, Mapping[str, Trace], Sequence[Verdict]], Sequence[Mapping[str, Any]]]"
-"""Makes findings about the paper from a scenario, its runs and the verdicts on them."""
 
 
 class Wanted(NamedTuple):

@@ -12,13 +12,9 @@ from markupsafe import Markup, escape
 
 @cache
 def mathml(latex: str) -> Markup:
-    """A formula as a block of MathML; a formula that the library cannot typeset is shown as it is written.
-
-    The library does not escape text, and a third-party claim may contain anything: `ET` writes the elements.
-
-    Args:
-        latex: one row, without delimiters; a formula of several rows is given as several.
-    """
+    """A formula as a block of MathML; a formula that the library cannot typeset is shown as it is written."""
+    # The library does not escape text, and a third-party claim may contain anything: `ET` writes the elements.
+    # latex: one row, without delimiters; a formula of several rows is given as several.
     try:
         root = convert_to_element(latex, display="block")
     except Exception:  # the library has an exception for each mistake, without a common base

@@ -5,18 +5,16 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
-SLACK_M = 1e-9
-"""A distance counts as kept if it falls short of the required one by less, as in SAFE-TRACE."""
+SLACK_M = 1e-9  # a distance counts as kept if it falls short of the required one by less, as in SAFE-TRACE
 
 Document = Mapping[str, Any]
 
 
 class Near(NamedTuple):
-    """The smallest distance of a pair: the gap between the surfaces, below 0 if they overlap.
+    """The smallest distance of a pair: the gap between the surfaces, below 0 if they overlap."""
 
-    `appeared`: at the instant at which the other one appeared. `moves`: the other one may move, and no theorem keeps
-    its distance. `at_m`: the place of the map that was nearest, m, if the other one is the map.
-    """
+    # `appeared`: at the instant at which the other one appeared. `moves`: the other one may move, and no theorem keeps
+    # its distance. `at_m`: the place of the map that was nearest, m, if the other one is the map.
 
     margin_m: float
     robot: str

@@ -10,18 +10,10 @@ from airground_drake.report import html
 from airground_drake.report.figures import findings, model
 from airground_drake.report.figures.panels import Figure
 
-BESIDE = 9
-"""Finding about the paper beside which the figure of ZENO-REFINE is shown, if it is in the report."""
+BESIDE = 9  # finding about the paper beside which the figure of ZENO-REFINE is shown, if it is in the report
 
 
 def page(report: Mapping[str, Any], figures: Sequence[Figure], diagram_svg: str | None) -> str:
-    """The page.
-
-    Args:
-        report: report.json, as built by `document.build`.
-        figures: of the runs, see `figures.draw`.
-        diagram_svg: the drawing of the block diagram.
-    """
     claims = {claim["id"]: claim for claim in report["claims"] if not claim["run"]}
     plates = [*figures]
     if "ZENO-REFINE" in claims and (refined := model.refinement(claims["ZENO-REFINE"]["evidence"])):

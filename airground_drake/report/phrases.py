@@ -9,8 +9,7 @@ from airground_drake.base.statuses import PASSING
 from airground_drake.report.outcomes import distance, named
 from airground_drake.report.sentences import MAX_NAMES, joined
 
-ROLES = ("first", "second", "robot", "other")
-"""Keys that hold the name of a body in the place of a claim."""
+ROLES = ("first", "second", "robot", "other")  # keys that hold the name of a body in the place of a claim
 
 
 def found_no_way(names: Sequence[str]) -> str:

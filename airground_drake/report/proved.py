@@ -18,8 +18,7 @@ from airground_drake.base.errors import ReportError, one_line
 from airground_drake.report.folder import PAGES
 from airground_drake.report.outcomes import distance
 
-CLAIM = "SAFE-TRACE"
-"""The claim that Coq proves of a run: every pair keeps its distance at all times."""
+CLAIM = "SAFE-TRACE"  # the claim that Coq proves of a run: every pair keeps its distance at all times
 _PLACE = "<!--Coq on {run}-->{line}<!--end-->"
 _PLACES = re.compile(r"<!--Coq on (\w+)-->.*?<!--end-->", re.DOTALL)
 
@@ -30,15 +29,9 @@ def place(claim: Mapping[str, Any], line: str = "") -> Markup:
 
 
 def write(folder: Path) -> bool:
-    """Bring the page of a report up to date with proofs/proofs.json, and report.json with the page.
-
-    Returns:
-        Whether there is a page; without report.json or without report.html nothing is done.
-
-    Raises:
-        ReportError: if the page or a proved trace differs from the one that report.json names; nothing is changed.
-        OSError: if a file cannot be read or written.
-    """
+    """Bring the page of a report up to date with proofs/proofs.json, and report.json with the page."""
+    # Returns whether there is a page; without report.json or without report.html nothing is done.
+    # ReportError if the page or a proved trace differs from the one that report.json names; nothing is changed.
     page, record = folder / PAGES["html"], folder / PAGES["json"]
     if not (page.exists() and record.exists()):
         return False

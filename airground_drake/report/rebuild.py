@@ -28,33 +28,23 @@ from airground_drake.check.line import AGREES, DISAGREES, OPEN, RECORDED
 from airground_drake.report.compare import WITHIN
 from airground_drake.report.lines import Line, differences, different, line_of, print_lines, short
 
-WITHIN_PX = 0.02
-"""Coordinates in drawings agree to this: they are rounded to 0.01."""
+WITHIN_PX = 0.02  # coordinates in drawings agree to this: they are rounded to 0.01
 
+# Places (m) and velocities (m/s) that a scenario prescribes agree to this: thousands of roundings err by less.
 WITHIN_SCRIPT = 1e-9
-"""Places (m) and velocities (m/s) that a scenario prescribes agree to this: thousands of roundings err by less."""
-CORNER_S = 1e-9
-"""A velocity so near to a corner of its preset, s, may be that of either side."""
+CORNER_S = 1e-9  # a velocity so near to a corner of its preset, s, may be that of either side
 
 _DRAWING = re.compile(r"(<svg\b.*?</svg>)", re.DOTALL)
 _TEXT = re.compile(r">\s*([^<>\s][^<>]*)<")
+# Attributes in which numbers may differ by rounding. A scale of 0.01 may not become 0.
 _GEOMETRY = re.compile(r'(\s(?:d|points|[xyr]|[cr][xy]|[xy][12]|width|height|viewBox|transform)="(?![^"]*scale)[^"]*")')
-"""Attributes in which numbers may differ by rounding. A scale of 0.01 may not become 0."""
 _NUMBER = re.compile(r"(-?[0-9]+(?:\.[0-9]+)?)")
-Judge = Callable[[Any, Sequence[Any]], Sequence[Any]]
-"""From a scenario and its traces to verdicts, like `judge_all`."""
+Judge = Callable[[Any, Sequence[Any]], Sequence[Any]]  # from a scenario and its traces to verdicts, like `judge_all`
 
 
 def lines(folder: Path, judge: Judge | None = None) -> Iterator[Line]:
-    """Make a report again and compare it: a line for each claim and each other part.
-
-    Args:
-        folder: of a report whose files are those that it names.
-        judge: judges the claims; default: `judge_all`, without its cache.
-
-    Raises:
-        ScenarioError, TraceError, OSError: if a file cannot be used.
-    """
+    """Make a report again and compare it: a line for each claim and each other part."""
+    # judge: judges the claims; default: `judge_all`, without its cache.
     from airground_drake.scenario.load import from_data, own
     from airground_drake.sim import trace
     from airground_drake.verify import judge_all
@@ -253,10 +243,7 @@ def _pages(folder: Path, report: Mapping[str, Any], scenario: Any, traces: Mappi
 
 
 def _same_text(name: str, folder: Path, rebuilt: str, *, other_drawings: bool = False) -> Line:
-    """Compare a file with the text that it should have: exactly, except for drawings.
-
-    With `other_drawings`, another version of matplotlib made the drawings: see `_is_same_drawing`.
-    """
+    """Compare a file with the text that it should have: exactly, except for drawings."""
     recorded = files.read_text(folder / name)
     for k, (theirs, ours) in enumerate(zip_longest(_DRAWING.split(recorded), _DRAWING.split(rebuilt))):
         drawings = bool(k % 2) and theirs is not None and ours is not None
@@ -273,11 +260,9 @@ def _same_text(name: str, folder: Path, rebuilt: str, *, other_drawings: bool = 
 
 
 def _is_same_drawing(theirs: str, ours: str, *, shapes: bool) -> bool:
-    """Whether two drawings have the same texts and, with `shapes`, are equal except for rounded coordinates.
-
-    Without `shapes`, theirs has no other kinds of elements and attributes than ours: so nothing is painted outside of
-    the drawing, is active, or leads to another page.
-    """
+    """Whether two drawings have the same texts and, with `shapes`, are equal except for rounded coordinates."""
+    # Without `shapes`, theirs has no other kinds of elements and attributes than ours: so nothing is painted outside of
+    # the drawing, is active, or leads to another page.
     if _TEXT.findall(theirs) != _TEXT.findall(ours):
         return False
     if not shapes:

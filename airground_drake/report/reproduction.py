@@ -21,20 +21,16 @@ from airground_drake.sim.trace import Trace
 
 Measure = Callable[[Trace, str], list[float]]
 
-STILL_M = 1e-3
-"""A robot stands still if it moved less than this during the last STILL_S of a run."""
+STILL_M = 1e-3  # a robot stands still if it moved less than this during the last STILL_S of a run
 STILL_S = 1.0
+# A trigger counts as at the threshold if the decision variable is at most this much below: event isolation.
 TRIGGER_TOLERANCE_M = 1e-5
-"""A trigger counts as at the threshold if the decision variable is at most this much below: event isolation."""
-SHIFTED_M = 0.1
-"""A path that leaves its straight line by this is shifted."""
-YES_NO = "yes/no"
-"""Unit of a row that is compared exactly."""
+SHIFTED_M = 0.1  # a path that leaves its straight line by this is shifted
+YES_NO = "yes/no"  # unit of a row that is compared exactly
 
-MEASURES: dict[str, Measure] = {}
-"""Measures by name; `@measure` adds one."""
+MEASURES: dict[str, Measure] = {}  # measures by name; `@measure` adds one
+# By measure, what the reason of a row tells of the run at hand; `@detail_of` adds one.
 DETAILS: dict[str, Callable[[Trace, str], list[str]]] = {}
-"""By measure, what the reason of a row tells of the run at hand; `@detail_of` adds one."""
 
 
 def measure(function: Measure) -> Measure:
@@ -77,10 +73,8 @@ def distances_while_stalled(trace: Trace, robot: str) -> list[float]:
 
 @measure
 def grows_past_threshold(trace: Trace, robot: str) -> list[float]:
-    """1 if the decision variable ends above the threshold and grew from its crossing to the reference's end.
-
-    A run in which the robot's intervention was released does not count: there it came back by itself.
-    """
+    """1 if the decision variable ends above the threshold and grew from its crossing to the reference's end."""
+    # A run in which the robot's intervention was released does not count: there it came back by itself.
     x, zeta = _decision_variable(trace, robot)
     above = np.flatnonzero(x >= zeta)
     if not above.size or _times(trace, robot, "release"):
@@ -92,10 +86,8 @@ def grows_past_threshold(trace: Trace, robot: str) -> list[float]:
 
 @measure
 def grows_until_acceptance(trace: Trace, robot: str) -> list[float]:
-    """1 if the decision variable grew from first trigger to first acceptance, and later fell below the threshold.
-
-    Empty without an acceptance.
-    """
+    """1 if the decision variable grew from first trigger to first acceptance, and later fell below the threshold."""
+    # Empty without an acceptance.
     triggers, accepted = (_times(trace, robot, kind)[:1] for kind in ("trigger", "accept"))
     if not triggers or not accepted:
         return []
@@ -130,11 +122,9 @@ def trigger_time(trace: Trace, robot: str) -> list[float]:
 
 @measure
 def recovery_duration(trace: Trace, robot: str) -> list[float]:
-    """Time from the first trigger until the decision variable first falls below the threshold, s.
-
-    The row of the trigger may be slightly below the threshold (accuracy of event isolation), so a fall starts from a
-    row at or above it. Rows are interpolated linearly.
-    """
+    """Time from the first trigger until the decision variable first falls below the threshold, s."""
+    # The row of the trigger may be slightly below the threshold (accuracy of event isolation), so a fall starts from a
+    # row at or above it. Rows are interpolated linearly.
     triggers = _times(trace, robot, "trigger")
     if not triggers:
         return []
@@ -231,17 +221,10 @@ def collision_position(trace: Trace, robot: str) -> list[float]:
 
 
 def rows(scenario: Scenario, traces: Mapping[str, Trace]) -> list[dict[str, Any]]:
-    """The reproduction table, in the scenario's order: one JSON object per row.
-
-    Args:
-        scenario: its `reproduction` rows are evaluated.
-        traces: by run.
-
-    Returns:
-        For each row `id`, `quantity`, `measure`, `run`, `robot`, `paper` and `ours` (scalars if of one component;
-        `ours` is None without a value), `difference` (largest over the components), `unit`, `tolerance`,
-        `status` (reproduced, calibrated, by_construction, ambiguous or not_reproduced) and `why`.
-    """
+    """The reproduction table, in the scenario's order: one JSON object per row."""
+    # Returns for each row `id`, `quantity`, `measure`, `run`, `robot`, `paper` and `ours` (scalars if of one component;
+    # `ours` is None without a value), `difference` (largest over the components), `unit`, `tolerance`, `status`
+    # (reproduced, calibrated, by_construction, ambiguous or not_reproduced) and `why`.
     return [_row(row, traces) for row in scenario.reproduction]
 
 

@@ -13,13 +13,14 @@ from airground_drake.base.statuses import PASSING
 if TYPE_CHECKING:
     from airground_drake.report.facts import RunFacts
 
+# Claims about a run: its distances, the conditions of the proof, what the robots did themselves, where they ended.
 DISTANCES, CONDITIONS, OWN_DOING, ARRIVAL = "SAFE-TRACE", "SAFE-HYP", "SAFE-OWN", "LIVE-GOAL"
-"""Claims about a run: its distances, the conditions of the proof, what the robots did themselves, where they ended."""
+# Claims that prove the distances of method (d); the other one joins them for bodies off their steered points.
 PROOFS, PROOF_OF_PLANTS = ("SAFE-INV", "SAFE-GATE"), "SAFE-BUDGET"
-"""Claims that prove the distances of method (d); the other one joins them for bodies off their steered points."""
 DWELL, TRIGGER_GAPS = "ZENO-PROOF", "ZENO-TRACE"
+# Claims about triggers: that they follow the decision variable, and how they compare with the error without noise.
 CROSSINGS, TIMING = "THR-TRIG", "THR-QUALITY"
-"""Claims about triggers: that they follow the decision variable, and how they compare with the error without noise."""
+# What a claim is about, in words; a claim that is not here goes by its identifier.
 SUBJECTS = {
     "SAFE-TRACE": "distances", "SAFE-HYP": "conditions of the proof", "SAFE-OWN": "the robots' own doing",
     "SAFE-INV": "proof of distances", "SAFE-GATE": "proof of distances", "SAFE-BUDGET": "distance for lag and delay",
@@ -27,12 +28,11 @@ SUBJECTS = {
     "THR-TRIG": "triggers", "THR-QUALITY": "timing of triggers", "THR-CHOICE": "choice of the threshold",
     "GATE-PLAN": "plans of the gatekeeper",
 }  # fmt: skip
-"""What a claim is about, in words; a claim that is not here goes by its identifier."""
+# Verdicts that are not those declared, in words.
 CAME_OUT = {
     "refuted": "failed", "inconclusive": "undecided", "error": "could not be checked", "not_run": "not checked",
     **dict.fromkeys(PASSING, "passed"),
 }  # fmt: skip
-"""Verdicts that are not those declared, in words."""
 
 
 class Rule(NamedTuple):
@@ -44,6 +44,7 @@ class Rule(NamedTuple):
     kept: bool = True
 
 
+# Whether a run was safe. Only a run whose distances pass gets as far as the words "kept" and "proved".
 SAFE = (
     Rule(lambda run: run.collided, "no", "collision", kept=False),
     Rule(lambda run: run.is_broken, "no", "too close", kept=False),
@@ -53,8 +54,8 @@ SAFE = (
     Rule(lambda run: run.is_proved, "yes", "distances kept, proved"),
     Rule(lambda run: True, "yes", "distances kept, not proved"),
 )
-"""Whether a run was safe. Only a run whose distances pass gets as far as the words "kept" and "proved"."""
 
+# Why a UGV did not arrive.
 CAUSES: tuple[tuple[Callable[[RunFacts, str], object], str], ...] = (
     (lambda run, robot: run.way(robot).get("kept_away"), "{by} is at its target"),
     (lambda run, robot: robot in run.failed, "the policy failed"),
@@ -63,14 +64,13 @@ CAUSES: tuple[tuple[Callable[[RunFacts, str], object], str], ...] = (
     (lambda run, robot: run.holders(robot), "held by {held_by}"),
     (lambda run, robot: run.refused_all(robot), "refused all proposals"),
 )
-"""Why a UGV did not arrive."""
 
+# What a run is, by its method, if it sets nothing differently.
 RUNS = {
     "a": "alone", "b": "obeys the UAV", "c": "accepts by cost", "d": "avoidance first, accepts by outcome",
 }  # fmt: skip
-"""What a run is, by its method, if it sets nothing differently."""
-PRINTED = "priorities as the paper prints them"
-"""What a run has in place of the package's composition of priorities."""
+PRINTED = "priorities as the paper prints them"  # what a run has in place of the package's composition of priorities
+# What a run sets differently, in words.
 SETTINGS = {
     ("gatekeeper.route", "mixed_integer"): "(26) solved exactly",
     ("gatekeeper.route", "relaxed"): "(27) with half-planes",
@@ -80,21 +80,17 @@ SETTINGS = {
     ("decision.threshold.rule", "printed"): "threshold by (19) as printed",
     ("decision.threshold.rule", "bayes"): "threshold at the Bayes optimum",
 }
-"""What a run sets differently, in words."""
+# Where a threshold comes from, by rule.
 THRESHOLDS = {"fixed": "set by hand", "printed": "by (19) as printed", "bayes": "Bayes optimum"}
-"""Where a threshold comes from, by rule."""
 
-OURS = ("robot", "under way")
-"""Values of an encounter's `doing` that are the robots' own."""
+OURS = ("robot", "under way")  # values of an encounter's `doing` that are the robots' own
+# What became of a proposal, by whether it was accepted and how it ended; each is in one class.
 CLASSES: Mapping[tuple[bool, str], str] = {
     (False, "refused"): "refused", (False, "lost"): "lost", (True, "given up"): "dropped later",
 }  # fmt: skip
-"""What became of a proposal, by whether it was accepted and how it ended; each is in one class."""
-OPEN: Mapping[bool, str] = {True: "accepted", False: "unanswered"}
-"""The class of the others."""
-OBEYED: Mapping[str, str] = {"accepted": "obeyed", "unanswered": "not begun"}
-"""The classes of a method without answers."""
+OPEN: Mapping[bool, str] = {True: "accepted", False: "unanswered"}  # the class of the others
+OBEYED: Mapping[str, str] = {"accepted": "obeyed", "unanswered": "not begun"}  # the classes of a method without answers
 
 MATCHES = {"reproduced": "without tuning", "calibrated": "after calibration"}
+# Statuses of the comparison with the paper: numbers that match, and the others.
 REST = {"by_construction": "by construction", "ambiguous": "ambiguous", "not_reproduced": "not"}
-"""Statuses of the comparison with the paper: numbers that match, and the others."""

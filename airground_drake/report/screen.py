@@ -17,8 +17,8 @@ from airground_drake.report.outcomes import Document, Near, claims
 from airground_drake.report.sentences import Line, counted, grouped
 from airground_drake.ugv.reasons import refusal
 
+# Maximum number of endings of UGVs in a cell, of names in a line, and of lines of what not to conclude.
 MOST_ENDINGS, MOST_NAMES, MOST_WARNINGS = 4, 2, 3
-"""Maximum number of endings of UGVs in a cell, of names in a line, and of lines of what not to conclude."""
 Claims = Sequence[Mapping[str, Any]]
 
 
@@ -40,29 +40,19 @@ class Check(NamedTuple):
 
 @dataclass
 class Row:
-    """A run, and what came of it.
+    """A run, and what came of it."""
 
-    Attributes:
-        run: its name.
-        says: what it is, in words.
-        safe, arrived, uav: its cells.
-        facts: None if the scenario names the run, but it was not run.
-        plain: whether priorities are composed as the package does it; the others are only compared.
-        bad_seeds: other seeds with which a distance was not kept.
-        kept: whether every distance was kept.
-        what: how the headline says that it was not.
-    """
-
-    run: str
-    says: str
-    plain: bool
+    run: str  # its name
+    says: str  # what it is, in words
+    plain: bool  # whether priorities are composed as the package does it; the others are only compared
+    # safe, arrived, uav: its cells.
     safe: Cell = field(default_factory=lambda: Cell("open", ["not run"]))
     arrived: Cell = field(default_factory=lambda: Cell("open", ["not run"]))
     uav: Cell = field(default_factory=lambda: Cell("", ["\N{EN DASH}"]))
-    facts: RunFacts | None = None
-    bad_seeds: int = 0
-    kept: bool = False
-    what: str = "not run"
+    facts: RunFacts | None = None  # none if the scenario names the run, but it was not run
+    bad_seeds: int = 0  # other seeds with which a distance was not kept
+    kept: bool = False  # whether every distance was kept
+    what: str = "not run"  # how the headline says that it was not
 
     @property
     def rank(self) -> tuple[int, bool, int, int]:
@@ -87,23 +77,14 @@ class Row:
 
 
 class FirstScreen(NamedTuple):
-    """What the first screen shows.
+    """What the first screen shows."""
 
-    Attributes:
-        headline: one or two lines with the marks of their own runs.
-        rows: a row per run.
-        within: how far from its target a robot counts as arrived, in words.
-        checks: seeds, triggers, threshold, and the paper.
-        beware: what a reader might wrongly conclude: clauses that continue "Do not conclude that".
-        declared: whether the verdicts are those that the scenario declares: nothing about safety.
-    """
-
-    headline: list[Line]
-    rows: list[Row]
-    within: str
-    checks: list[Check]
-    beware: list[str]
-    declared: Cell
+    headline: list[Line]  # one or two lines with the marks of their own runs
+    rows: list[Row]  # a row per run
+    within: str  # how far from its target a robot counts as arrived, in words
+    checks: list[Check]  # seeds, triggers, threshold, and the paper
+    beware: list[str]  # what a reader might wrongly conclude: clauses that continue "Do not conclude that"
+    declared: Cell  # whether the verdicts are those that the scenario declares: nothing about safety
 
 
 def first_screen(document: Document) -> FirstScreen:

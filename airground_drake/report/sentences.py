@@ -25,6 +25,7 @@ class Mark(NamedTuple):
     look: str
 
 
+# Marks of lines, never by colour alone; '' continues the line before.
 MARKS = {
     "yes": Mark("✓", "yes", "good"),
     "partly": Mark("≈", "in part", "tuned"),
@@ -33,9 +34,7 @@ MARKS = {
     "none": Mark("\N{EN DASH}", "neither good nor bad", "idle"),
     "": Mark(" ", "", ""),
 }
-"""Marks of lines, never by colour alone; '' continues the line before."""
-MAX_NAMES = 3
-"""Maximum number of robots that a line names."""
+MAX_NAMES = 3  # maximum number of robots that a line names
 
 
 def unbroken(text: str) -> str:

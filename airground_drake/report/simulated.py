@@ -34,23 +34,12 @@ from airground_drake.sim.trace import Trace
 from airground_drake.verify import judge, judge_model
 from airground_drake.verify.registry import model_claims, run_claims
 
-Difference = tuple[str, Any, Any]
-"""Where two things differ, what is recorded, and what was made here."""
+Difference = tuple[str, Any, Any]  # where two things differ, what is recorded, and what was made here
 
 
 def lines(folder: Path, *, allow_plugins: bool = False, progress: Progress = SILENT) -> Iterator[Line]:
-    """Simulate every run of a report again: a line for each run, and for each other part that takes execution.
-
-    Args:
-        folder: of a report whose files are those that it names.
-        allow_plugins: whether third-party code that the report names may be imported and run.
-        progress: is told what is done.
-
-    Raises:
-        LimitError: if simulating again takes more than the limits of `airground report`.
-        ScenarioError: if third-party code is named and not allowed.
-        AirgroundError, OSError: if a file cannot be used, or a run stops.
-    """
+    """Simulate every run of a report again: a line for each run, and for each other part that takes execution."""
+    # allow_plugins: whether third-party code that the report names may be imported and run.
     report = json.loads(files.read_text(folder / "report.json"))
     scenario = from_data(report["scenario"]["resolved"], str(folder))
     seeds = max((row["seed"] for row in report["seeds"]), default=0)
@@ -91,10 +80,8 @@ def _line(claim: str, run: str, found: Difference | None, exactly: str, note: st
 
 
 def first_difference(recorded: Trace, made: Trace) -> Difference | None:
-    """The first value in which two traces differ, of the earliest row of a table; None if they are equal.
-
-    Numbers are compared exactly; times by the clock are not compared.
-    """
+    """The first value in which two traces differ, of the earliest row of a table; None if they are equal."""
+    # Numbers are compared exactly; times by the clock are not compared.
     for name in TABLES:
         found = _first_cell(name, getattr(recorded, name), getattr(made, name))
         if found is not None:

@@ -18,22 +18,17 @@ from airground_drake.verify.runs.control_law import Inequalities, inequalities_o
 from airground_drake.verify.runs.pairs import parts_of
 from airground_drake.verify.runs.proposals import proposal_of
 
-PUSH = 1e-3
-"""A body holds a UGV if it takes more than this share of the UGV's wish to move."""
-UNEXPLAINED = 0.1
-"""Nobody is said to hold a UGV if more than this share of its wish to move meets no body."""
+PUSH = 1e-3  # a body holds a UGV if it takes more than this share of the UGV's wish to move
+UNEXPLAINED = 0.1  # nobody is said to hold a UGV if more than this share of its wish to move meets no body
+# An inequality binds a standing UGV with less to spare, m/s: a retreat at this speed still counts as standing.
 HELD_M_S = AT_REST_M / AT_REST_S
-"""An inequality binds a standing UGV with less to spare, m/s: a retreat at this speed still counts as standing."""
 
 
 def stalls(trace: Trace) -> list[dict[str, Any]]:
-    """Where UGVs stood for `AT_REST_S` or longer short of their targets, by time; before a UGV's first collision.
-
-    Returns:
-        `robot`, `from_s`, `until_s` (at most the end of the run), `position_m` and `held_by`: names of the bodies that
-        stop its wish to move, half way through the stall, or at the end of the run if it lasts until then. Nobody holds
-        a UGV that waits as its proposal asks.
-    """
+    """Where UGVs stood for `AT_REST_S` or longer short of their targets, by time; before a UGV's first collision."""
+    # Returns `robot`, `from_s`, `until_s` (at most the end of the run), `position_m` and `held_by`: names of the bodies
+    # that stop its wish to move, half way through the stall, or at the end of the run if it lasts until then. Nobody
+    # holds a UGV that waits as its proposal asks.
     found = list[dict[str, Any]]()
     for ugv in trace.ugvs:
         if standing := _standing(trace, ugv):

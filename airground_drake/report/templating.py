@@ -6,11 +6,7 @@ from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined
 
 
 def environment_of(*packages: str) -> Environment:
-    """An environment for the templates of these packages: it escapes every value and refuses undefined names.
-
-    Args:
-        packages: whose folders `templates` are searched, in this order.
-    """
+    """An environment for the templates of these packages: it escapes every value and refuses undefined names."""
     return Environment(
         loader=ChoiceLoader([PackageLoader(package) for package in packages]),
         autoescape=True,

@@ -10,10 +10,9 @@ from airground_drake.report.outcomes import Document
 from airground_drake.report.screen import Cell, first_screen
 from airground_drake.report.sentences import MARKS, unbroken
 
-WIDTH = 100
-"""Characters of a line."""
+WIDTH = 100  # characters of a line
+# Widths of the columns of runs, and of questions and answers; two blanks are between columns.
 COLUMNS, ANSWERS = (20, 29, 23, 22), (18, 80)
-"""Widths of the columns of runs, and of questions and answers; two blanks are between columns."""
 
 
 def text(document: Document) -> str:

@@ -12,8 +12,8 @@ from airground_drake.scenario.outlines import gap_m
 from airground_drake.scenario.plants import plant_of
 from airground_drake.scenario.schema import Scenario
 
+# By term of a budget, the key that it comes from; a dip follows from several.
 KEYS = {"dip": "dip", "drift": "drift_m_s", "lag": "time_constant_s", "delay": "delay_s"}
-"""By term of a budget, the key that it comes from; a dip follows from several."""
 
 
 class Term(NamedTuple):
@@ -25,27 +25,16 @@ class Term(NamedTuple):
 
 
 class PairBudget(NamedTuple):
-    """The budget of a pair of bodies.
+    """The budget of a pair of bodies."""
 
-    Attributes:
-        first: a robot.
-        second: a robot, an obstacle, the map or a wall of the arena.
-        kind: `ugv`, `air_ground`, `obstacle`, or `moving` for an obstacle that may move.
-        promised_m: gap to be kept between the surfaces, m.
-        radii_m: sum of both radii, m.
-        law_m: distance that the law keeps between steered points, or a steered point and a core, m.
-        terms: what it takes beyond the promise and the radii, in the order of their addition.
-        start: what the promise asks for where the obstacle appears later than at the start; '' if nothing.
-    """
-
-    first: str
-    second: str
-    kind: str
-    promised_m: float
-    radii_m: float
-    law_m: float
-    terms: tuple[Term, ...]
-    start: str = ""
+    first: str  # a robot
+    second: str  # a robot, an obstacle, the map or a wall of the arena
+    kind: str  # `ugv`, `air_ground`, `obstacle`, or `moving` for an obstacle that may move
+    promised_m: float  # gap to be kept between the surfaces, m
+    radii_m: float  # sum of both radii, m
+    law_m: float  # distance that the law keeps between steered points, or a steered point and a core, m
+    terms: tuple[Term, ...]  # what it takes beyond the promise and the radii, in the order of their addition
+    start: str = ""  # what the promise asks for where the obstacle appears later than at the start; '' if nothing
 
     @property
     def gap_m(self) -> float:

@@ -10,15 +10,12 @@ import numpy as np
 from airground_drake.model.geometry.motion import Motion
 from airground_drake.scenario.schema import Moves
 
-PERIODS = 1e-9
-"""Share of a control period that counts as rounding."""
+PERIODS = 1e-9  # share of a control period that counts as rounding
 
 
 def course(moves: Moves, period_s: float, until_s: float) -> Motion:
-    """Where the origin of the obstacle's frame is, up to a time, s; then it rests.
-
-    Every leg takes a whole number of control periods, so that the motion is straight between control samples.
-    """
+    """Where the origin of the obstacle's frame is, up to a time, s; then it rests."""
+    # Every leg takes a whole number of control periods, so that the motion is straight between control samples.
     corners = [np.array(each) for each in moves.waypoints_m]
     ahead = list(pairwise(corners))
     back = {"stop": [], "reverse": list(pairwise(corners[::-1])), "loop": [(corners[-1], corners[0])]}[moves.at_end]

@@ -39,33 +39,22 @@ _SCALARS: dict[str, tuple[str | None, Callable[[str], object]]] = {  # tag: its 
 
 UNKNOWN_KEY = Fault("unknown key")
 
-Children = dict[str, tuple[yaml.Node, yaml.Node]]
-"""Key node (for its line) and value node of each entry."""
+Children = dict[str, tuple[yaml.Node, yaml.Node]]  # key node (for its line) and value node of each entry
 
+# Place of each key and value (file and line, or command-line option), by the names and indices that lead there.
 Places = dict[tuple[str, ...], tuple[str, str]]
-"""Place of each key and value (file and line, or command-line option), by the names and indices that lead there."""
 
 
 class Document(NamedTuple):
-    """Plain data with their places of origin.
+    """Plain data with their places of origin."""
 
-    Attributes:
-        data: dicts, lists and scalars; None where no value is given.
-        source: file, option or other origin of all data.
-        places: places of the entries and items.
-    """
-
-    data: Any
-    source: str
-    places: Places
+    data: Any  # dicts, lists and scalars; None where no value is given
+    source: str  # file, option or other origin of all data
+    places: Places  # places of the entries and items
 
     def where(self, *at: str, key: bool = False) -> str:
-        """File and line, or option, of an entry; for a missing entry, of the innermost mapping or list around it.
-
-        Args:
-            at: names and indices that lead to the entry.
-            key: whether to name the line of the key, which may be before that of the value.
-        """
+        """File and line, or option, of an entry; for a missing entry, of the innermost mapping or list around it."""
+        # key: whether to name the line of the key, which may be before that of the value.
         if at in self.places:
             return self.places[at][not key]
         return self.where(*at[:-1], key=key) if at else self.source
@@ -77,15 +66,11 @@ class _Loader(yaml.BaseLoader):
     def __init__(self, text: str, source: str) -> None:
         super().__init__(text)
         self.name, self.depth = source, 0
+        # Numbers of values and of levels in each node, with aliases and merges expanded.
         self.sizes: dict[int, tuple[int, int]] = {}
-        """Numbers of values and of levels in each node, with aliases and merges expanded."""
 
     def compose_node(self, parent: yaml.Node | None, index: Any) -> yaml.Node:
-        """A node and those within it.
-
-        Raises:
-            ScenarioError: if the node has more than MAX_VALUES values, is deeper than MAX_DEPTH, or contains itself.
-        """
+        """A node and those within it."""
         event: yaml.Event = self.peek_event()  # type: ignore[no-untyped-call]
         self.depth += 1
         if self.depth > MAX_DEPTH:
@@ -121,11 +106,7 @@ def text_of(data: Mapping[str, Any]) -> str:
 
 
 def read(name_or_path: str | Path) -> tuple[Document, bytes]:
-    """The document and the bytes of a YAML file or a shipped scenario.
-
-    Raises:
-        ScenarioError: if it cannot be read, is not YAML text, or exceeds the limits.
-    """
+    """The document and the bytes of a YAML file or a shipped scenario."""
     source, data = _read_bytes(str(name_or_path))
     try:
         text = data.decode("utf-8-sig")
@@ -156,16 +137,8 @@ def _read_bytes(name_or_path: str) -> tuple[str, bytes]:
 
 
 def parsed(text: str, source: str, at: tuple[str, ...] = ()) -> Document:
-    """The data of YAML text, within the limits.
-
-    Args:
-        text: the text. Top-level keys that begin with an underscore are templates and left out.
-        source: file or command-line option, for messages.
-        at: place in a document for which the data are meant.
-
-    Raises:
-        ScenarioError: if the text is not plain YAML, or exceeds the limits.
-    """
+    """The data of YAML text, within the limits."""
+    # text: the text. Top-level keys that begin with an underscore are templates and left out.
     root = _composed(text, source)
     places: Places = {at: (_where(root), _where(root))}
     return Document(_plain(root, at, places), source, places)
@@ -189,11 +162,7 @@ def _composed(text: str, source: str) -> yaml.Node:
 
 
 def of_data(data: Any, source: str) -> Document:
-    """A document of nested dicts and lists made in Python.
-
-    Raises:
-        ScenarioError: if the data are nested too deeply.
-    """
+    """A document of nested dicts and lists made in Python."""
     try:
         return Document(simple(data), source, {})
     except RecursionError:
@@ -210,15 +179,7 @@ def simple(value: Any) -> Any:
 
 
 def replace(document: Document, override: str) -> None:
-    """Change a document by an override.
-
-    Args:
-        document: to be changed.
-        override: `dotted.key=value`; items of lists are addressed by index, new names are added.
-
-    Raises:
-        ScenarioError: if the override has another form, its value is not YAML, or the item does not exist.
-    """
+    """Change a document by an override."""
     source = f"--set {short(override)}"
     key, equals, text = override.partition("=")
     if not equals or not key.strip():
@@ -234,11 +195,7 @@ def place_of(key: str) -> tuple[str, ...]:
 
 
 def put(document: Document, at: tuple[str, ...], new: Any, source: str) -> None:
-    """Change a document: put another value at a place.
-
-    Raises:
-        ScenarioError: if the place is an item that a list does not have.
-    """
+    """Change a document: put another value at a place."""
     data = document.data
     for place in [each for each in document.places if each[: len(at)] == at]:
         del document.places[place]

@@ -27,15 +27,13 @@ from airground_drake.ugv.budget import Budget
 if TYPE_CHECKING:  # pydantic, which the schema imports, would delay `report --list`
     from airground_drake.scenario.schema import Run, Scenario
 
+# Work to predict one period of one UGV beside one point (30 ns, compiled), in simulated steps (0.2 ms).
 PREDICTED = 2e-4
-"""Work to predict one period of one UGV beside one point (30 ns, compiled), in simulated steps (0.2 ms)."""
 
+# Work to look for a plan of 60 stages (5 ms), and more for each point in sight (1 ms), in simulated steps.
 SEARCHED, SEARCHED_POINT = 25.0, 5.0
-"""Work to look for a plan of 60 stages (5 ms), and more for each point in sight (1 ms), in simulated steps."""
-STEP_S = 2e-4
-"""What a simulated step takes, s, roughly: on slow machines it is several times as much."""
-LONG_S = 60.0
-"""Searches that take longer than this together are announced."""
+STEP_S = 2e-4  # what a simulated step takes, s, roughly: on slow machines it is several times as much
+LONG_S = 60.0  # searches that take longer than this together are announced
 
 GIB = 2**30
 FLOAT = 8  # bytes of a number
@@ -44,8 +42,8 @@ OF_A_DECISION = 2048  # bytes, without its arrays: a row of a table and some obj
 OF_A_TANGENT = 320  # bytes of a tangent of two discs: complex numbers and copies of them
 PROGRAM = GIB // 2  # bytes of the program with its libraries
 
+# Largest number of rows of a campaign, one per draw, run and claim; a row takes up to 1.7 kB of memory (measured).
 MOST_ROWS = 4_000_000
-"""Largest number of rows of a campaign, one per draw, run and claim; a row takes up to 1.7 kB of memory (measured)."""
 
 
 class Limits(NamedTuple):
@@ -68,23 +66,14 @@ DEFAULT_LIMITS = Limits()
 
 
 class Estimate(NamedTuple):
-    """The work that all runs of a scenario ask for.
+    """The work that all runs of a scenario ask for."""
 
-    Attributes:
-        rows: rows of the traces' signals.
-        steps: robots moved by one step.
-        decisions: largest number of gatekeepers' decisions.
-        predicted: largest number of predicted periods of a UGV, times the points that it keeps away from.
-        searched: largest work of all searches for plans, in steps.
-        memory: bytes.
-    """
-
-    rows: float
-    steps: float
-    decisions: float
-    predicted: float
-    searched: float
-    memory: float
+    rows: float  # rows of the traces' signals
+    steps: float  # robots moved by one step
+    decisions: float  # largest number of gatekeepers' decisions
+    predicted: float  # largest number of predicted periods of a UGV, times the points that it keeps away from
+    searched: float  # largest work of all searches for plans, in steps
+    memory: float  # bytes
 
     @property
     def work(self) -> float:
@@ -120,16 +109,8 @@ def estimate(scenario: Scenario) -> Estimate:
 
 
 def within(scenario: Scenario, limits: Limits, times: int = 1) -> Estimate:
-    """The estimate of a validated scenario that keeps to the limits.
-
-    Args:
-        scenario: what is simulated.
-        limits: what it may ask for.
-        times: how often each run is simulated, with one trace at a time in memory.
-
-    Raises:
-        LimitError: if the scenario asks for more; says how much it asks for and how much is allowed.
-    """
+    """The estimate of a validated scenario that keeps to the limits."""
+    # limits: what it may ask for.
     once = estimate(scenario)
     found = Estimate._make([*(times * count for count in once[:-1]), once.memory])
     if not (found.work <= limits.work and found.memory <= limits.memory):

@@ -10,12 +10,10 @@ import math
 import random
 
 CELL_M = 5.0
+# Largest offset from the middle of a cell along either axis, m. Neighbours are over two safe distances apart.
 OFF_M = 1.4
-"""Largest offset from the middle of a cell along either axis, m. Neighbours are over two safe distances apart."""
-BLOCKED = 3
-"""One in so many UGVs has an obstacle in the middle of its way."""
-ROOMY = 1.5
-"""Number of cells per occupied cell."""
+BLOCKED = 3  # one in so many UGVs has an obstacle in the middle of its way
+ROOMY = 1.5  # number of cells per occupied cell
 
 SIDES = ((1, 0), (-1, 0), (0, 1), (0, -1))
 
@@ -58,14 +56,7 @@ runs:
 
 
 def fleet(ugvs: int, obstacles: int, seed: int = 1, name: str = "fleet") -> str:
-    """The text of a scenario file, without a comment at its head.
-
-    Args:
-        ugvs: number of UGVs, at least 1.
-        obstacles: number of obstacles.
-        seed: of the random field.
-        name: of the scenario.
-    """
+    """The text of a scenario file, without a comment at its head."""
     side = math.ceil(math.sqrt(ROOMY * (3 * ugvs + obstacles)))
     while True:
         ways, rocks = _field(random.Random(seed), ugvs, obstacles, side)

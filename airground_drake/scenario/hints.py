@@ -9,6 +9,7 @@ import yaml
 
 LIMITS = 'see "Known limits" in docs/verification.md'
 
+# What keys with such names would be about, and why the model lacks it.
 NOT_MODELLED = {
     r"accel|decel|jerk|brak": "acceleration limits are not modelled",
     r"mass|inertia|torque|force|friction|slip|grip": "forces are not modelled: robots have the velocities that are "
@@ -20,7 +21,6 @@ NOT_MODELLED = {
     r"batter|energy|fuel|power": "energy is not modelled",
     r"wind|weather|slope|terrain": "the ground is flat, and there is no wind",
 }  # fmt: skip
-"""What keys with such names would be about, and why the model lacks it."""
 
 
 def not_modelled(name: str) -> str:
@@ -31,8 +31,7 @@ def not_modelled(name: str) -> str:
     return ""
 
 
-FAST_M_S, FAR_M = 50.0, 1000.0
-"""Greater speeds and coordinates may be in another unit."""
+FAST_M_S, FAR_M = 50.0, 1000.0  # greater speeds and coordinates may be in another unit
 
 
 def fast(speed_m_s: float) -> str:
@@ -60,18 +59,12 @@ class Slip(NamedTuple):
     wanted: str
 
 
-_NO_SPACE = re.compile(r"\s*(- )?[\w.-]+:[^\s/]")
-"""A key without a space after its colon; `scheme://` does not count."""
+_NO_SPACE = re.compile(r"\s*(- )?[\w.-]+:[^\s/]")  # a key without a space after its colon; `scheme://` does not count
 _QUOTES = "wanted: quotes around a text with ': ' or ' #' in it"
 
 
 def slip(error: yaml.MarkedYAMLError, text: str) -> Slip | None:
-    """A frequent mistake in plain words; None for others.
-
-    Args:
-        error: of PyYAML.
-        text: the text that it could not read.
-    """
+    """A frequent mistake in plain words; None for others."""
     mark, problem = error.problem_mark, error.problem or ""
     if mark is None:
         return None

@@ -22,19 +22,16 @@ from airground_drake.scenario.maps.rectangles import Cells
 from airground_drake.scenario.rounding import Rounding
 from airground_drake.scenario.schema import Control
 
-MOST_BYTES = 16_000_000
-"""Most bytes of a world, a map or an imported scenario."""
+MOST_BYTES = 16_000_000  # most bytes of a world, a map or an imported scenario
 MAX_SPEED_M_S, UAV_MAX_SPEED_M_S = 1.5, 10.0
-RESERVE = 1.5
-"""The largest speed of UGVs is this many times that of their presets."""
-FAITH = 1.5
-"""A run lasts this many times as long as the longest way at the speed of presets, and `PATIENCE_S` longer."""
+RESERVE = 1.5  # the largest speed of UGVs is this many times that of their presets
+FAITH = 1.5  # a run lasts this many times as long as the longest way at the speed of presets, and `PATIENCE_S` longer
 PATIENCE_S = 20.0
 PERIOD_S = 0.05
+# Start and goal of the BARN challenge in its worlds 0 to 299 (`run.py` of its repository), m.
 BARN = ((-2.25, 3.0), (-2.25, 13.0))
-"""Start and goal of the BARN challenge in its worlds 0 to 299 (`run.py` of its repository), m."""
+# The UAV flies at least so far above the highest shape, and keeps as much from UGVs if it flies high enough.
 CLEARANCE_M = 1.0
-"""The UAV flies at least so far above the highest shape, and keeps as much from UGVs if it flies high enough."""
 
 Point = tuple[float, float]
 
@@ -48,41 +45,25 @@ class Robot(NamedTuple):
 
 
 class Sizes(NamedTuple):
-    """Sizes and speeds of UGVs.
+    """Sizes and speeds of UGVs."""
 
-    Attributes:
-        radius_m: radius of each UGV.
-        distance_m: what UGVs keep from obstacles and from one another, between surfaces.
-        max_speed_m_s: largest speed; None: `MAX_SPEED_M_S`, or less where radius and distance are below 0.1 m together.
-    """
-
-    radius_m: float
-    distance_m: float
+    radius_m: float  # radius of each UGV
+    distance_m: float  # what UGVs keep from obstacles and from one another, between surfaces
+    # Largest speed; None: `MAX_SPEED_M_S`, or less where radius and distance are below 0.1 m together.
     max_speed_m_s: float | None
 
 
 class Imported(NamedTuple):
-    """A scenario to be written.
+    """A scenario to be written."""
 
-    Attributes:
-        text: of the scenario's file.
-        beside: content of further files, by path.
-        says: what was read and chosen, in words.
-    """
-
-    text: str
-    beside: dict[Path, bytes]
-    says: list[str]
+    text: str  # of the scenario's file
+    beside: dict[Path, bytes]  # content of further files, by path
+    says: list[str]  # what was read and chosen, in words
 
 
 def barn(path: Path, name: str, robots: Sequence[Robot], sizes: Sizes, height_m: float) -> Imported:
-    """The scenario of a Gazebo world; without robots, one goes where the BARN challenge asks it to go.
-
-    What begins above the height of UGVs is no obstacle of theirs: it is left out, and the UAV flies over it.
-
-    Raises:
-        ScenarioError: if the file cannot be used.
-    """
+    """The scenario of a Gazebo world; without robots, one goes where the BARN challenge asks it to go."""
+    # What begins above the height of UGVs is no obstacle of theirs: it is left out, and the UAV flies over it.
     world = gazebo.world(_text(path), str(path))
     left_out = [f"left out: {each}" for each in world.left_out]
     if not world.solids:
@@ -112,19 +93,9 @@ def barn(path: Path, name: str, robots: Sequence[Robot], sizes: Sizes, height_m:
 
 
 def ros_map(path: Path, name: str, folder: Path, robots: Sequence[Robot], count: int, sizes: Sizes) -> Imported:
-    """The scenario of a map_server's map; without robots, some are put where they have room and a way.
-
-    Args:
-        path: of the map's YAML file.
-        name: of the scenario.
-        folder: in which the scenario will be; the map is named from there.
-        robots: the UGVs; may be empty.
-        count: number of UGVs if none is given.
-        sizes: of robots and distances.
-
-    Raises:
-        ScenarioError: if the files cannot be used, or there is no room for the robots.
-    """
+    """The scenario of a map_server's map; without robots, some are put where they have room and a way."""
+    # folder: in which the scenario will be; the map is named from there.
+    # robots: the UGVs; may be empty.
     found = map_file.read(path)
     grid = found.grid()
     rows, columns = grid.occupied.shape
@@ -156,23 +127,10 @@ def ros_map(path: Path, name: str, folder: Path, robots: Sequence[Robot], count:
 def mapf(
     path: Path, map_path: Path | None, name: str, folder: Path, agents: int, cell_m: float, max_speed_m_s: float | None
 ) -> Imported:
-    """The scenario of a benchmark of MovingAI: its map as a map_server's, its first agents as UGVs.
-
-    A UGV's radius is a fifth of a cell. It keeps a tenth of a cell from others and from obstacles, so it fits through
-    gaps of one cell.
-
-    Args:
-        path: of the `.scen` file.
-        map_path: of the `.map` file; None: where the scenario says, beside it.
-        name: of the scenario, and of the map's files.
-        folder: in which they will be.
-        agents: number of agents.
-        cell_m: side of a cell, m.
-        max_speed_m_s: as of `Sizes`.
-
-    Raises:
-        ScenarioError: if the files cannot be used, or have fewer agents.
-    """
+    """The scenario of a benchmark of MovingAI: its map as a map_server's, its first agents as UGVs."""
+    # A UGV's radius is a fifth of a cell. It keeps a tenth of a cell from others and from obstacles, so it fits through
+    # gaps of one cell.
+    # map_path: of the `.map` file; None: where the scenario says, beside it.
     text = _text(path)
     if not (named := movingai.map_name(text)):
         raise ScenarioError(str(path), "", Fault("no agent is in it"), "wanted: a scenario of MovingAI")
@@ -207,43 +165,27 @@ def mapf(
 
 
 class _Space(NamedTuple):
-    """Where robots are.
+    """Where robots are."""
 
-    Attributes:
-        longest: a length that no robot's way should exceed, m.
-        extent: largest coordinate of an obstacle or of the map, m.
-        top: height of the highest shape, m.
-    """
-
-    longest: float
-    extent: float
-    top: float = 0.0
+    longest: float  # a length that no robot's way should exceed, m
+    extent: float  # largest coordinate of an obstacle or of the map, m
+    top: float = 0.0  # height of the highest shape, m
 
 
 class _Pace(NamedTuple):
-    """How fast robots are, and for how long.
+    """How fast robots are, and for how long."""
 
-    Attributes:
-        ugv: largest speed of a UGV, m/s.
-        uav: largest speed of the UAV, m/s.
-        sensing: sensing range, m; it covers what closes in a period.
-        needed: what the longest way needs, s.
-        duration: of a run, s.
-    """
-
-    ugv: float
-    uav: float
-    sensing: float
-    needed: float
-    duration: float
+    ugv: float  # largest speed of a UGV, m/s
+    uav: float  # largest speed of the UAV, m/s
+    sensing: float  # sensing range, m; it covers what closes in a period
+    needed: float  # what the longest way needs, s
+    duration: float  # of a run, s
 
 
 def _pace(sizes: Sizes, space: _Space, air_ground_m: float) -> _Pace:
-    """How fast robots are, and for how long.
-
-    Rounding limits how far robots may go (`rounding.py`). For long ways the UAV is slower; if that does not suffice,
-    the run is shorter than needed.
-    """
+    """How fast robots are, and for how long."""
+    # Rounding limits how far robots may go (`rounding.py`). For long ways the UAV is slower; if that does not suffice,
+    # the run is shorter than needed.
     radius, distance = sizes.radius_m, sizes.distance_m
     ugv = sizes.max_speed_m_s or min(MAX_SPEED_M_S, RESERVE * 10.0 * (radius + distance))
     needed = math.ceil((FAITH * RESERVE * space.longest / ugv + PATIENCE_S) / 10.0) * 10.0
@@ -269,18 +211,6 @@ def _scenario(
     space: _Space,
     beside: Mapping[Path, bytes] = MappingProxyType({}),
 ) -> Imported:
-    """The scenario of robots in a world.
-
-    Args:
-        path: of the file that it is made of.
-        name: of the scenario.
-        robots: the UGVs.
-        sizes: of robots and distances.
-        says: what was read and chosen; becomes comments.
-        world: lines with the obstacles or the map.
-        space: where robots are.
-        beside: content of further files, by path.
-    """
     radius, distance = sizes.radius_m, sizes.distance_m
     altitude = max(2.0, space.top + max(CLEARANCE_M, 2.0 * distance), 2.0 * (radius + distance))
     air_ground = min(0.5 * altitude - radius, max(CLEARANCE_M, distance))

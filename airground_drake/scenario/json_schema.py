@@ -24,8 +24,7 @@ Schema = dict[str, Any]
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 
-NAMES = "[key]"
-"""pydantic's word, in the place of an error, for a name of a mapping."""
+NAMES = "[key]"  # pydantic's word, in the place of an error, for a name of a mapping
 
 _NAMES = {"anyOf": [{"type": "string", "pattern": NAME_PATTERN, "maxLength": MAX_NAME}, {"const": "<<"}]}
 
@@ -36,11 +35,7 @@ def text(*, installed: bool = True) -> str:
 
 
 def scenario_schema(*, installed: bool = True) -> Schema:
-    """The schema of a scenario file.
-
-    Args:
-        installed: whether to include names that installed packages add through entry points.
-    """
+    """The schema of a scenario file."""
     made = _adapted(TypeAdapter(schema.Scenario).json_schema(), installed)
     kinds = {name: _object(getattr(schema, name), made["$defs"][name]) for name in sorted(made["$defs"])}
     top = _object(schema.Scenario, made)

@@ -30,12 +30,11 @@ NAME_PATTERN = "^[A-Za-z_][A-Za-z0-9_]*$"  # of a UGV, an obstacle, a run, a par
 CLAIM_PATTERN = f"^[A-Z][A-Z0-9-]{{0,{MAX_NAME - 1}}}$"
 
 PLUG_IN = {"type": "string", "pattern": PLUGIN_PATTERN}
+# Key for a registry of claims; `json_schema.py` replaces it by the claims and their expected verdicts.
 EXPECTED = "x-expected"
-"""Key for a registry of claims; `json_schema.py` replaces it by the claims and their expected verdicts."""
-RECORDED = "recorded"
-"""pydantic's context for the scenario in a run's metadata: its rules are not checked again."""
+RECORDED = "recorded"  # pydantic's context for the scenario in a run's metadata: its rules are not checked again
+# Key for the words in which messages describe an allowed value, where its type and bounds do not say it.
 WANTED = "x-wanted"
-"""Key for the words in which messages describe an allowed value, where its type and bounds do not say it."""
 
 # Unit by the suffix of a key, the longest suffix first.
 _UNITS = {"rad": "rad", "rad_s": "rad/s", "m_sqrt_s": "m/sqrt(s)", "1_m2_s": "1/(m^2 s)", "m_s": "m/s", "1_s": "1/s",
@@ -136,10 +135,8 @@ class ValueRule:
     says: Callable[[], dict[str, Any]]
 
     def __get_pydantic_core_schema__(self, source: object, handler: GetCoreSchemaHandler) -> CoreSchema:
-        """Check a value after the annotations before this one, except in the metadata of a run.
-
-        A run may be judged on a machine without its plug-ins.
-        """
+        """Check a value after the annotations before this one, except in the metadata of a run."""
+        # A run may be judged on a machine without its plug-ins.
 
         def checked(value: Any, info: ValidationInfo) -> Any:
             return value if info.context == RECORDED else self.check(value)
@@ -212,10 +209,8 @@ def registered(registry: Registry) -> ValueRule:
 
 
 def expected_of(claims: Registry) -> ValueRule:
-    """Expected verdicts by claim, and of runs also numbers; `validate.py` checks the names, as a scenario adds claims.
-
-    Claims about the model have no numbers beside them.
-    """
+    """Expected verdicts by claim, of runs also numbers; `validate.py` checks the names, as a scenario adds claims."""
+    # Claims about the model have no numbers beside them.
     counts = COUNTS if claims is RUN_CLAIMS else {}
 
     def check(value: dict[str, Any]) -> dict[str, Any]:

@@ -24,8 +24,7 @@ from airground_drake.scenario.shipped import shipped
 
 __all__ = ["from_data", "load", "own", "resolved", "shipped", "validated"]
 
-Overrides = Sequence[str] | Mapping[str, Any]
-"""`dotted.key=value` with the value in YAML, or values by dotted key."""
+Overrides = Sequence[str] | Mapping[str, Any]  # `dotted.key=value` with the value in YAML, or values by dotted key
 
 
 def load(name_or_path: str | Path, overrides: Overrides = ()) -> Scenario:
@@ -136,10 +135,7 @@ def _way(data: Any, key: str) -> list[Any]:
 
 
 def _mark_set(document: Document, before: Sequence[Chosen]) -> None:
-    """Replace the reasons for values that overrides have changed, and drop choices about what they have removed.
-
-    Entries that overrides have changed or added themselves stay as they are.
-    """
+    """Replace the reasons for values that overrides have changed, and drop choices about what they have removed."""
     for old, now in zip(before, _choices(document), strict=False):
         if now.entry is not old.entry or now.entry != old.copy:
             continue
@@ -153,22 +149,13 @@ def _mark_set(document: Document, before: Sequence[Chosen]) -> None:
 
 
 def own(scenario: Scenario, run: str) -> Scenario:
-    """The scenario with the values that one of its runs sets.
-
-    Args:
-        scenario: validated.
-        run: name of the run.
-    """
+    """The scenario with the values that one of its runs sets."""
     settings = scenario.runs[run].set
     return _as_set(of_data(resolved(scenario), scenario.name), run, settings) if settings else scenario
 
 
 def _as_set(document: Document, run: str, settings: Mapping[str, Any]) -> Scenario:
-    """The scenario of a document with the values that a run sets.
-
-    Raises:
-        ScenarioError: if the result is not valid; the message names the run.
-    """
+    """The scenario of a document with the values that a run sets."""
     changed = Document(simple(document.data), document.source, dict(document.places))
     try:
         for key, value in settings.items():
@@ -202,11 +189,7 @@ def _complete(scenario: Scenario) -> None:
 
 
 def _read_map(scenario: Scenario, document: Document) -> None:
-    """Fill in the cells of the map, unless they are there, in the document, too: its runs then need no file.
-
-    Raises:
-        ScenarioError: if its files cannot be used.
-    """
+    """Fill in the cells of the map, unless they are there, in the document, too: its runs then need no file."""
     given = scenario.map
     if given is None or (given.cells and (given.cells.file, given.cells.unknown) == (given.file, given.unknown)):
         return
@@ -217,11 +200,9 @@ def _read_map(scenario: Scenario, document: Document) -> None:
 
 
 def _rounded_down(gain: float, period: float) -> float:
-    """A gain, 1/s, rounded down if it exceeds 1/period by rounding alone.
-
-    Proofs read numbers as the decimals that Python prints: 3.3333333333333335 * 0.3 is 1 in floating point, but more
-    than 1 in decimals. A smaller gain only demands less.
-    """
+    """A gain, 1/s, rounded down if it exceeds 1/period by rounding alone."""
+    # Proofs read numbers as the decimals that Python prints: 3.3333333333333335 * 0.3 is 1 in floating point, but more
+    # than 1 in decimals. A smaller gain only demands less.
     while gain * period == 1.0 < decimal(gain) * decimal(period):
         gain = math.nextafter(gain, 0.0)
     return gain
@@ -235,11 +216,7 @@ def _over_the_targets(scenario: Scenario) -> Vector:
 
 
 def _put(document: Document, key: str, value: Any) -> None:
-    """Change a document: put a value made in Python at a dotted key.
-
-    Raises:
-        ScenarioError: if the value has no text in YAML, or the item does not exist.
-    """
+    """Change a document: put a value made in Python at a dotted key."""
     new = of_data(value, f"override {key}").data
     try:
         text = json.dumps(new, ensure_ascii=False)

@@ -20,8 +20,7 @@ from airground_drake.scenario.maps.images import Occupancy, occupancy
 from airground_drake.scenario.maps.rectangles import covering
 from airground_drake.scenario.schema import Map, MapCells
 
-MOST_BYTES = 64_000_000
-"""Most bytes of an image."""
+MOST_BYTES = 64_000_000  # most bytes of an image
 
 
 _Share = Annotated[float, wanted("a number from 0 to 1", strict=True, ge=0.0, le=1.0), BeforeValidator(as_float)]
@@ -56,8 +55,7 @@ class MapServer:
     )
 
 
-_contents: dict[str, bytes] = {}
-"""Contents of the files of maps, by SHA-256: reports copy them."""
+_contents: dict[str, bytes] = {}  # contents of the files of maps, by SHA-256: reports copy them
 
 
 class MapFile(NamedTuple):
@@ -80,16 +78,7 @@ class MapFile(NamedTuple):
 
 
 def read(path: Path, where: str = "", *, copied: bool = False) -> MapFile:
-    """The map of a map_server's YAML file.
-
-    Args:
-        path: of the YAML file.
-        where: file and line of the scenario that names the map, if any: for the message if there is no such file.
-        copied: whether both files are copies in one folder: of the image's path only the name counts.
-
-    Raises:
-        ScenarioError: if one of the two files cannot be read or used.
-    """
+    """The map of a map_server's YAML file."""
     data = _content(path, MAX_BYTES, where or str(path), "map.file" if where else "", "the YAML file of a map")
     try:
         document = parsed(data.decode("utf-8-sig"), str(path))
@@ -116,18 +105,8 @@ def read(path: Path, where: str = "", *, copied: bool = False) -> MapFile:
 
 
 def cells(given: Map, folder: Path, starts: Sequence[Sequence[float]], where: str, *, copied: bool = False) -> MapCells:
-    """What the files of a scenario's map say.
-
-    Args:
-        given: the map.
-        folder: of the scenario.
-        starts: of all robots, [x, y, ...], m; what none of them can reach is filled.
-        where: file and line of the scenario that name the map, for messages.
-        copied: as of `read`.
-
-    Raises:
-        ScenarioError: if the files cannot be used, or need too many rectangles.
-    """
+    """What the files of a scenario's map say."""
+    # starts: of all robots, [x, y, ...], m; what none of them can reach is filled.
     found = read(folder / given.file, where, copied=copied)
     grid = found.grid(unknown=given.unknown == "occupied")
     starts_m = [[*each[:2]] for each in starts]

@@ -9,8 +9,8 @@ import numpy as np
 from airground_drake.scenario.hints import fast
 from airground_drake.scenario.schema import SafeDistance, Scenario
 
+# Robots with a smaller radius, and worlds with shorter sides, are small for the paper's distances, m.
 SMALL_M, NARROW_M = 0.5, 6.0
-"""Robots with a smaller radius, and worlds with shorter sides, are small for the paper's distances, m."""
 
 
 def notes(scenario: Scenario) -> Iterator[str]:

@@ -11,10 +11,8 @@ from airground_drake.scenario.shapes import convex_parts, corners_of_map
 
 
 def outlines_of(scenario: Scenario, obstacle: Obstacle) -> Array:
-    """The outlines of an obstacle's convex parts, (k, W), with the distance that robots keep, m, and its speed, m/s.
-
-    They are in the world frame; those of an obstacle that moves are about the origin of its frame.
-    """
+    """The outlines of an obstacle's convex parts, (k, W), with the distance that robots keep, m, and its speed, m/s."""
+    # They are in the world frame; those of an obstacle that moves are about the origin of its frame.
     gap = gap_m(scenario, obstacle)
     if isinstance(obstacle, MapObstacle):
         return prisms(corners_of_map(obstacle.cells), top=obstacle.height_m, gap=gap)

@@ -53,16 +53,8 @@ def digests(scenario: Scenario) -> dict[str, str]:
 
 
 def refuse(scenario: Scenario, source: str, keys: Collection[str] | None = None) -> None:
-    """Refuse third-party code.
-
-    Args:
-        scenario: validated.
-        source: where it comes from, for the message.
-        keys: keys to check; default: all.
-
-    Raises:
-        ScenarioError: if the scenario names third-party code at such a key; says how to allow it.
-    """
+    """Refuse third-party code."""
+    # keys: keys to check; default: all.
     for key, name in plugins(scenario).items():
         if keys is None or key in keys:
             raise ScenarioError(source, key, name, WANTED)
@@ -70,19 +62,9 @@ def refuse(scenario: Scenario, source: str, keys: Collection[str] | None = None)
 
 @contextmanager
 def admitted(scenario: Scenario, source: str, *, allow: bool, keys: Collection[str] | None = None) -> Iterator[None]:
-    """In the body, third-party code is also found in the folder of the scenario's file; if not allowed, it is refused.
-
-    The folder comes last on Python's path, so that it cannot hide other modules. Child processes inherit the path.
-
-    Args:
-        scenario: validated.
-        source: name of a shipped scenario or path of a file.
-        allow: whether third-party code may be imported.
-        keys: as in `refuse`.
-
-    Raises:
-        ScenarioError: as `refuse`.
-    """
+    """In the body, third-party code is found in the folder of the scenario's file, too; or it is refused."""
+    # The folder comes last on Python's path, so that it cannot hide other modules. Child processes inherit the path.
+    # allow: whether third-party code may be imported.
     if not allow:
         refuse(scenario, source, keys)
     with beside(source, allow=allow):

@@ -13,15 +13,8 @@ from airground_drake.scenario.schema import Scenario
 
 
 def of_run(data: Mapping[str, Any], run: str) -> Scenario:
-    """The scenario of a run, with the values that the run sets.
-
-    Args:
-        data: nested dicts and lists with the keys of the schema, with all defaults.
-        run: name of the run.
-
-    Raises:
-        TraceError: if the data are not a scenario; names the first key and what is wrong there.
-    """
+    """The scenario of a run, with the values that the run sets."""
+    # data: nested dicts and lists with the keys of the schema, with all defaults.
     try:
         scenario: Scenario = adapter(Scenario).validate_python(data, context=RECORDED)
         if run in scenario.runs and scenario.runs[run].set:

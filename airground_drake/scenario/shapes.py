@@ -12,19 +12,17 @@ from airground_drake.base.arrays import Array
 from airground_drake.scenario.maps.grid import Frame
 from airground_drake.scenario.schema import MapCells, MapObstacle, Obstacle
 
+# Corners that are turned or moved are rounded to this many digits after the point, m: they are then the same on every
+# machine, and short as decimals.
 DIGITS = 12
-"""Corners that are turned or moved are rounded to this many digits after the point, m: they are then the same on every
-machine, and short as decimals."""
 
 Corner = tuple[float, float]
 
 
 def convex_parts(obstacle: Obstacle) -> list[list[Corner]] | None:
-    """Corners of the convex parts of an obstacle's core in the world frame, m; None: it is a ball.
-
-    A wall has a part per segment, a map one per rectangle. A post has one corner. A polygon that is not convex is
-    split.
-    """
+    """Corners of the convex parts of an obstacle's core in the world frame, m; None: it is a ball."""
+    # A wall has a part per segment, a map one per rectangle. A post has one corner. A polygon that is not convex is
+    # split.
     if isinstance(obstacle, MapObstacle):
         return [[(x, y) for x, y in corners] for corners in corners_of_map(obstacle.cells).tolist()]
     if obstacle.segment_m:
@@ -102,21 +100,17 @@ def near_edge(corners: Sequence[Corner], least: float) -> int | None:
 
 
 def split(corners: Sequence[Corner]) -> list[list[Corner]]:
-    """Convex polygons that together are a polygon without crossings; corners counter-clockwise.
-
-    Ears are cut off until only triangles are left, and triangles are joined again while the result is convex (Hertel
-    and Mehlhorn 1983): at most four times as many parts as possible.
-    """
+    """Convex polygons that together are a polygon without crossings; corners counter-clockwise."""
+    # Ears are cut off until only triangles are left, and triangles are joined again while the result is convex (Hertel
+    # and Mehlhorn 1983): at most four times as many parts as possible.
     around = list(corners) if area(corners) > 0.0 else list(corners)[::-1]
     parts = [list(each) for each in _triangles(around)] if not _is_convex(around) else [around]
     return [_without_straight_corners(part) for part in _joined(parts)]
 
 
 def _joined(parts: list[list[Corner]]) -> list[list[Corner]]:
-    """Convex polygons that cover the same. Each takes in later ones, the first first, while it stays convex.
-
-    All corners are on the outline: at a corner where a union turns too far, it does so whatever joins it later.
-    """
+    """Convex polygons that cover the same. Each takes in later ones, the first first, while it stays convex."""
+    # All corners are on the outline: at a corner where a union turns too far, it does so whatever joins it later.
     there = dict(enumerate(parts))
     at = {edge: i for i, part in there.items() for edge in _edges(part)}
     for i in range(len(parts)):

@@ -41,15 +41,7 @@ Problems = Iterator[tuple[str, object, str]]
 
 
 def check(scenario: Scenario, source: str) -> None:
-    """Check a scenario whose values have the types of the schema.
-
-    Args:
-        scenario: the scenario.
-        source: where it comes from, for the message.
-
-    Raises:
-        ScenarioError: for the first problem; names the key, its value and what is allowed.
-    """
+    """Check a scenario whose values have the types of the schema."""
     for rule in CHECKS:
         for key, value, allowed in rule(scenario):
             raise ScenarioError(source, key, value, allowed)
@@ -208,15 +200,14 @@ def _route(scenario: Scenario) -> Problems:
             yield f"runs.{name}.set.{key}", route, f"this run is of method {run.method}: only method c uses a route"
 
 
+# The keys of each kind of plant.
 KEYS_OF_PLANTS = {
     "first_order": (),
     "unicycle": ("hand_point_m", "heading_rad", "max_turn_rad_s", "wheel_base_m", "max_wheel_speed_m_s", "backwards"),
     "lag": ("time_constant_s",),
     "delay": ("delay_s",),
 }
-"""The keys of each kind of plant."""
-OWN_KEYS = ("drift_m_s", "cover_m", "parameters")
-"""Those of a user's plant."""
+OWN_KEYS = ("drift_m_s", "cover_m", "parameters")  # those of a user's plant
 
 
 def _plants(scenario: Scenario) -> Problems:
@@ -244,7 +235,6 @@ _ALL_KEYS = tuple(key for keys in (*KEYS_OF_PLANTS.values(), OWN_KEYS) for key i
 
 
 def _numbers_of(scenario: Scenario, key: str, robot: Ugv | Uav, plant: Plant) -> Problems:
-    """The numbers of one plant of a robot."""
     period = scenario.control.period_s
     if plant.kind == "lag" and not plant.time_constant_s >= TOLERANCE:
         yield f"{key}.time_constant_s", plant.time_constant_s, "more than 0 s"
@@ -291,10 +281,8 @@ def preset_s(waypoints_m: Sequence[Vector], speed_m_s: float) -> float:
 
 
 def _ends(scenario: Scenario) -> Problems:
-    """A preset must lead to its target, to within the tolerance, if a run expects the UGV there.
-
-    A scenario that ends before a preset does is cut short on purpose: no arrival is expected.
-    """
+    """A preset must lead to its target, to within the tolerance, if a run expects the UGV there."""
+    # A scenario that ends before a preset does is cut short on purpose: no arrival is expected.
     presets = [ugv.preset for ugv in scenario.ugvs.values()]
     if max(preset_s(each.waypoints_m, each.speed_m_s) for each in presets) > scenario.duration_s:
         return
@@ -386,8 +374,7 @@ class _Body(NamedTuple):
     name: str
 
 
-Apart = tuple[str, float]
-"""A safe distance: its key, and its value, m."""
+Apart = tuple[str, float]  # a safe distance: its key, and its value, m
 
 
 def apart_of(scenario: Scenario, name: str) -> Apart:
@@ -448,10 +435,8 @@ def _sensing(scenario: Scenario) -> Problems:
 
 
 def _extent(scenario: Scenario) -> Problems:
-    """Rounding must not take more from a safe distance than SAFE-TRACE tolerates.
-
-    With the gain A = 0 the law restores no lost distance, and no bound applies; SAFE-HYP says what a run lost.
-    """
+    """Rounding must not take more from a safe distance than SAFE-TRACE tolerates."""
+    # With the gain A = 0 the law restores no lost distance, and no bound applies; SAFE-HYP says what a run lost.
     control, duration = scenario.control, scenario.duration_s
     if control.avoidance_gain_1_s == 0.0:
         return
@@ -557,10 +542,9 @@ def _within(these: Sequence[_Round], those: Sequence[_Round], distance: float) -
 
 
 def _budget(scenario: Scenario) -> Problems:
-    """The law's distance, which is more than the promise where bodies are not where the law steers them, can be kept.
-
-    The steered points start and end that far from each other, the sensing range covers it, and the UAV flies above it.
-    """
+    """The law's distance, more than the promise where bodies are not where the law steers them, can be kept."""
+    # The steered points start and end that far from each other, the sensing range covers it, and the UAV flies above
+    # it.
     period, robots = scenario.control.period_s, scenario.robots
     if not takes_room(scenario):
         return
@@ -633,8 +617,8 @@ def _keys(value: object, above: str = "") -> Iterator[str]:
         yield from _keys(inner, f"{above}{name}.")
 
 
+# Every rule; later ones rely on earlier ones.
 CHECKS: tuple[Callable[[Scenario], Problems], ...] = (
     _names, _reserved, _shapes, _headings, _map, _blocks, _route, _runs, _plants, _presets, _ends, _gains, _periods,
     _release, _distances, _sensing, _extent, _clearances, _budget, _reproduction, _choices,
 )  # fmt: skip
-"""Every rule; later ones rely on earlier ones."""

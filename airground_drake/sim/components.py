@@ -36,8 +36,8 @@ from airground_drake.ugv.patience import Patience
 from airground_drake.ugv.problem import Horizon
 from airground_drake.ugv.routes.route import Route
 
+# Times of vertices that are this close (s, or relative) are equal but for rounding: they are sums of quotients.
 SAME_TIME = 1e-12
-"""Times of vertices that are this close (s, or relative) are equal but for rounding: they are sums of quotients."""
 
 
 def make_avoidance(scenario: Scenario, composition: Composition = "augmented") -> Avoidance:
@@ -53,11 +53,7 @@ def make_law(scenario: Scenario, method: Method, composition: Composition = "aug
 
 
 def make_planner(scenario: Scenario, method: Method) -> Planner:
-    """The UAV's planner with its policies (none under a method without interventions) and its map.
-
-    Raises:
-        UnknownNameError, PluginError: if the scenario names a policy that cannot be made.
-    """
+    """The UAV's planner with its policies (none under a method without interventions) and its map."""
     mapped, appears, disappears = make_map(scenario)
     given = scenario.intervention
     policies = given.policies if method.intervenes else []
@@ -95,10 +91,8 @@ def _trails(speed_m_s: float, plant: Plant) -> bool:
 
 
 def _planned_apart(scenario: Scenario) -> tuple[Array, float]:
-    """Radii of the UGVs, (n,), and distance between them, m, with which plans keep the distances of the law.
-
-    A UGV whose plant takes room is planned for as a larger disc.
-    """
+    """Radii of the UGVs, (n,), and distance between them, m, with which plans keep the distances of the law."""
+    # A UGV whose plant takes room is planned for as a larger disc.
     more, between = dict.fromkeys(scenario.ugvs, 0.0), 0.0
     every = budget(scenario) if takes_room(scenario) else ()
     pairs = [each for each in every if each.terms and each.first in more]
@@ -113,11 +107,8 @@ def _planned_apart(scenario: Scenario) -> tuple[Array, float]:
 
 
 def make_map(scenario: Scenario) -> tuple[Array, Array, Array]:
-    """The UAV's map: obstacles at rest that it knows, and phantoms, which exist on the map only and have no radius.
-
-    Returns:
-        Outlines, (m, W), see `model.geometry.outline`, and when each appears and disappears, (m,), s.
-    """
+    """The UAV's map: obstacles at rest that it knows, and phantoms, which exist on the map only and have no radius."""
+    # Returns outlines, (m, W), see `model.geometry.outline`, and when each appears and disappears, (m,), s.
     known = [each for each in scenario.barriers.values() if each.known_to_uav and not each.moves]
     parts = [outlines_of(scenario, obstacle) for obstacle in known]
     phantoms = outline.balls(scenario.uav.phantoms_m, gap=scenario.safe_distance.obstacle_m)
@@ -141,12 +132,7 @@ def make_movers(scenario: Scenario) -> tuple[Mover, ...]:
 
 
 def make_route(scenario: Scenario) -> Route:
-    """The solver route of the gatekeeper's problem (26).
-
-    Raises:
-        UnknownNameError, PluginError: if the scenario names a route that cannot be made.
-        ScenarioError: if it names a solver that cannot be used here.
-    """
+    """The solver route of the gatekeeper's problem (26)."""
     gate = scenario.gatekeeper
     chosen: dict[str, Any] = {"blocks": gate.blocks} if gate.blocks else {}
     if gate.solver != "daqp":
@@ -194,16 +180,12 @@ def make_patience(scenario: Scenario) -> Patience:
     return Patience(gate.tries, gate.rest_s, gate.longest_s)
 
 
+# Makes the gatekeepers from a scenario and the law of its UGVs.
 GatekeepersFactory = Callable[[Scenario, UgvLaw], Gatekeepers]
-"""Makes the gatekeepers from a scenario and the law of its UGVs."""
 
 
 def make_gatekeepers(scenario: Scenario, law: UgvLaw) -> Gatekeepers:
-    """Gatekeepers by problem (26) where interventions have priority over avoidance, else by outcomes.
-
-    Raises:
-        UnknownNameError, PluginError: if the scenario names a route that cannot be made.
-    """
+    """Gatekeepers by problem (26) where interventions have priority over avoidance, else by outcomes."""
     world, presets = make_world(scenario), make_presets(scenario)
     if not law.intervention_on_top:
         return OutcomeGatekeepers(world, law, presets, make_outlook(scenario), make_patience(scenario))
@@ -231,10 +213,8 @@ def positions(rows: Sequence[Sequence[float]]) -> Array:
 
 
 def stack_presets(presets: list[Motion]) -> PiecewisePolynomial:
-    """All presets as one trajectory of 3n components over the union of their vertices.
-
-    Vertices that only rounding keeps apart are merged: a velocity over so short a time would be a rounding error.
-    """
+    """All presets as one trajectory of 3n components over the union of their vertices."""
+    # Vertices that only rounding keeps apart are merged: a velocity over so short a time would be a rounding error.
     times = np.unique(np.concatenate([preset.times for preset in presets]))
     kept = np.append(np.diff(times) > SAME_TIME * np.maximum(1.0, times[1:]), True)
     kept[0] = True

@@ -38,47 +38,35 @@ from airground_drake.sim.blocks import (
 )
 from airground_drake.sim.blocks.plant import OwnPlant, declared, plant_system
 
+# Exported output ports of the diagram: the signals of a trace.
 RECORDED = (
     "bodies", "team_command", "reference", "noise", "decision_variable", "status", "executing",
 )  # fmt: skip
-"""Exported output ports of the diagram: the signals of a trace."""
+# Further exported output ports: of robots that are not where the law steers them, of users' plants that have a heading,
+# and of unicycles.
 OF_PLANTS = ("plant_signals", "own_headings", "command_share")
-"""The same, of robots that are not where the law steers them, of users' plants that have a heading, and of
-unicycles; only where there are such robots."""
 
 NO_PLANTS: Mapping[str, OwnPlant] = MappingProxyType({})
 
+# Makes the block that computes the decision variables of n UGVs from their world and their presets: a System with the
+# output ports `decision_variable` (n), m, and `decision_range` (2n), m, the smallest and the largest since the
+# simulator's step began. Its input ports are fed by name. `systems.DecisionBlock` is a base for such blocks.
 DecisionFactory = Callable[[World, Sequence[Motion]], System]
-"""Makes the block that computes the decision variables of n UGVs from their world and their presets: a System with the
-output ports `decision_variable` (n), m, and `decision_range` (2n), m, the smallest and the largest since the
-simulator's step began. Its input ports are fed by name. `systems.DecisionBlock` is a base for such blocks."""
 
 
 @dataclass(frozen=True)
 class Model:
-    """A diagram and the systems in it that a simulation reads.
+    """A diagram and the systems in it that a simulation reads."""
 
-    Attributes:
-        diagram: the whole system; its exported output ports are RECORDED.
-        world: all bodies, in the order of the port `bodies`.
-        decision_block: drives the trigger.
-        trigger: of all UGVs.
-        planner: the UAV's planner.
-        gatekeeper: of methods (c) and (d), else None.
-        controllers: of the UGVs, and of the UAV.
-        signals: names of the columns of `plant_signals` and `own_headings`.
-        recorded: names of the exported output ports that are the signals of a trace.
-    """
-
-    diagram: Diagram
-    world: World
-    decision_block: System
-    trigger: EventTrigger
-    planner: InterventionPlanner
-    gatekeeper: Gatekeeper | None
-    controllers: tuple[UgvController, UavController]
-    signals: tuple[str, ...]
-    recorded: tuple[str, ...]
+    diagram: Diagram  # the whole system; its exported output ports are RECORDED
+    world: World  # all bodies, in the order of the port `bodies`
+    decision_block: System  # drives the trigger
+    trigger: EventTrigger  # of all UGVs
+    planner: InterventionPlanner  # the UAV's planner
+    gatekeeper: Gatekeeper | None  # of methods (c) and (d), else None
+    controllers: tuple[UgvController, UavController]  # of the UGVs, and of the UAV
+    signals: tuple[str, ...]  # names of the columns of `plant_signals` and `own_headings`
+    recorded: tuple[str, ...]  # names of the exported output ports that are the signals of a trace
 
 
 def build_diagram(
@@ -126,12 +114,10 @@ def build_model(
     disturbed: bool = True,
     make_gatekeepers: components.GatekeepersFactory = components.make_gatekeepers,
 ) -> Model:
-    """Build and wire all components of one method of a valid scenario; see `build_diagram`.
-
-    `plants` are those that the scenario declares (`sim.blocks.plant.declared`). Without
-    `disturbed` the diagram has no inputs for disturbances: commands go straight to the plants.
-    `make_gatekeepers` replaces the gatekeepers; claims about decisions are about the default.
-    """
+    """Build and wire all components of one method of a valid scenario; see `build_diagram`."""
+    # `plants` are those that the scenario declares (`sim.blocks.plant.declared`). Without `disturbed` the diagram has
+    # no inputs for disturbances: commands go straight to the plants. `make_gatekeepers` replaces the gatekeepers;
+    # claims about decisions are about the default.
     chosen, composition = _chosen(scenario, method, composition)
     world, presets = make_world(scenario), components.make_presets(scenario)
     n = len(world.names("ugv"))
@@ -170,10 +156,8 @@ def build_model(
 
 
 def method_drawn(scenario: Scenario) -> str:
-    """Identifier of the method that pictures show: (c), the paper's Figure 2, if there is a run of it, else the last.
-
-    The last is that with the most parts among the scenario's runs.
-    """
+    """Identifier of the method that pictures show: (c), the paper's Figure 2, if a run has it, else the last."""
+    # The last is that with the most parts among the scenario's runs.
     methods = {run.method for run in scenario.runs.values()}
     return "c" if "c" in methods else max(methods, key=list(METHODS).index)
 
@@ -279,16 +263,8 @@ def _assembled(
     exported: Iterable[str] | None = None,
     wires: Iterable[tuple[OutputPort, InputPort]] = (),
 ) -> Diagram:
-    """A Diagram of systems by name, in which input ports are fed by name.
-
-    Args:
-        name: of the diagram.
-        systems: its systems, in Drake's order of computation.
-        named: output ports; each feeds all input ports of its name. Input ports of any other name become an input port
-            of the diagram, one for each name.
-        exported: which of `named` become output ports of the diagram; default: all.
-        wires: further connections.
-    """
+    """A Diagram of systems by name, in which input ports are fed by name."""
+    # exported: which of `named` become output ports of the diagram; default: all.
     builder = DiagramBuilder()
     for each, system in systems.items():
         builder.AddNamedSystem(each, system)
@@ -360,11 +336,7 @@ def _own_headings(world: World, plants: Mapping[str, System]) -> dict[str, Outpu
 
 
 def _checked_block(n: int, block: System) -> System:
-    """The given block.
-
-    Raises:
-        PluginError: if it lacks the output ports of a decision block of n UGVs.
-    """
+    """The given block."""
     if not isinstance(block, System):
         raise PluginError(f"decision_block makes {short(repr(block))}; allowed: a System such as a DecisionBlock")
     sizes = {port.get_name(): port.size() for port in _outputs(block)}

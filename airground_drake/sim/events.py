@@ -107,14 +107,8 @@ def _box(way: PeriodMotion, body: Body) -> tuple[Array, Array]:
 
 
 def visits(apart: PeriodMotion, shape: Array, within: float, planar: bool) -> npt.NDArray[np.intp]:
-    """Rows, (K,), at which a centre comes within a distance of a shape; between two rows, the first of them.
-
-    Args:
-        apart: motion of the centre relative to the shape's origin, (T - 1, 3), m.
-        shape: outlines of the shape, (k, W), see `model.geometry.outline`.
-        within: the distance from its surface, m.
-        planar: whether the centre stays in its plane.
-    """
+    """Rows, (K,), at which a centre comes within a distance of a shape; between two rows, the first of them."""
+    # apart: (T - 1, 3), m; shape: (k, W); within: m
     places = np.concatenate([apart.start, apart.end[-1:]])
     near, passes = np.zeros(len(places), dtype=bool), np.zeros(len(apart.start), dtype=bool)
     longest = float(np.linalg.norm(apart.end - apart.start, axis=1).max())

@@ -20,17 +20,16 @@ from pydrake.systems.framework import Diagram, System
 
 from airground_drake.base import files
 
+# The layers that are shown with their blocks, and their colours. Any other part of the diagram is one block.
 LAYERS = {"decision_making": "#e1ebf6", "task_planning": "#e7f1e1", "optimisation": "#fbefdc"}
-"""The layers that are shown with their blocks, and their colours. Any other part of the diagram is one block."""
-HIDDEN = "noise_source"
-"""A block without inputs that would take a column of its own."""
+HIDDEN = "noise_source"  # a block without inputs that would take a column of its own
+# Blocks from left to right. A wire to the left is drawn after its ends have their places.
 ORDER = (
     "vehicles", "reference", "decision_noise", "decision_variable", "event_trigger", "intervention_planner",
     "gatekeeper", "ugv_controller", "uav_controller",
 )  # fmt: skip
-"""Blocks from left to right. A wire to the left is drawn after its ends have their places."""
-COLUMNS = (ORDER[:3], ORDER[-2:])
-"""Blocks that stand below each other."""
+COLUMNS = (ORDER[:3], ORDER[-2:])  # blocks that stand below each other
+# What a system does, by the name of its class. The picture shows the class name of any other system.
 REALISES = {
     "AffineSystem": "integrated noise",
     "DecisionVariable": "DDM, (15)",
@@ -46,17 +45,15 @@ REALISES = {
     "TrajectorySource": "preset trajectories",
     "Diagram": "plants, disturbances",
 }
-"""What a system does, by the name of its class. The picture shows the class name of any other system."""
+# Colours of recorded signals, of wires, and of wires from the vehicles, which lead nearly everywhere.
 RECORDED, INK, MUTED = "#0060a8", "#1a1a1a", "#666666"
-"""Colours of recorded signals, of wires, and of wires from the vehicles, which lead nearly everywhere."""
+# Which blocks fly and which drive. A wire between them is a radio link.
 ABOARD = {
     "decision_noise": "UAV", "decision_variable": "UAV", "event_trigger": "UAV", "intervention_planner": "UAV",
     "uav_controller": "UAV", "gatekeeper": "UGVs", "ugv_controller": "UGVs",
 }  # fmt: skip
-"""Which blocks fly and which drive. A wire between them is a radio link."""
 LEGEND = "dashed: sent between UAV and UGVs, grey: from the vehicles, blue: recorded"
-WIDTH_IN = 10.9
-"""Maximum width of a picture: that of a landscape page of A4 with margins of 1 cm."""
+WIDTH_IN = 10.9  # maximum width of a picture: that of a landscape page of A4 with margins of 1 cm
 
 _WIRE = re.compile(r"^(\w+:\w+):e -> (\w+:\w+):w", re.MULTILINE)
 _HEAD = re.compile(r"<B>.*?</B><BR/>\nname=\w+")
@@ -71,10 +68,8 @@ def has_layers(diagram: Diagram) -> bool:
 
 
 def dot(diagram: Diagram) -> str:
-    """Graphviz text: layers and blocks for a scenario's diagram, Drake's own text for any other diagram.
-
-    The text of a scenario's diagram depends on the scenario and the method only.
-    """
+    """Graphviz text: layers and blocks for a scenario's diagram, Drake's own text for any other diagram."""
+    # The text of a scenario's diagram depends on the scenario and the method only.
     whole, name = str(diagram.GetGraphvizString(max_depth=1)), diagram.get_name()
     if not has_layers(diagram):
         return whole
@@ -118,10 +113,8 @@ def _block(port: str) -> str:
 
 
 def _node(name: str, system: System, text: str, recorded: Set[str], fed_unseen: Set[str]) -> str:
-    """Drake's text of a block, with what it does and where in place of its class.
-
-    Without inputs for disturbances, and without names of inputs that are fed by a hidden block.
-    """
+    """Drake's text of a block, with what it does and where in place of its class."""
+    # Without inputs for disturbances, and without names of inputs that are fed by a hidden block.
     kind = str(getattr(system, "judges", type(system).__name__.rstrip("_")))
     says = escape(REALISES.get(kind, kind)) + (f"<BR/><I>on the {ABOARD[name]}</I>" if name in ABOARD else "")
     text = _HEAD.sub(f"<B>{name}</B><BR/>{says}", _DISTURBANCE.sub("", text))
@@ -144,11 +137,9 @@ def _edge(start: str, end: str, blocks: Mapping[str, System]) -> str:
 
 
 def svg(dot_text: str) -> str:
-    """Lay out Graphviz text as SVG.
-
-    The same text gives the same bytes on the same machine; box sizes depend on its fonts. The picture holds the digest
-    of its text for `is_current`.
-    """
+    """Lay out Graphviz text as SVG."""
+    # The same text gives the same bytes on the same machine; box sizes depend on its fonts. The picture holds the
+    # digest of its text for `is_current`.
     found = _PICTURE.search(re.sub(r"<!--.*?-->\n?", "", _laid_out(dot_text, "svg").decode(), flags=re.DOTALL))
     if found is None:
         raise ValueError("this version of Graphviz writes SVG of another form")

@@ -28,18 +28,14 @@ from airground_drake.uav.planner import PlannerState
 from airground_drake.uav.policy import Proposal
 from airground_drake.ugv.answer import GatekeeperDecision
 
-MERGE_S = 1e-9
-"""Rows closer than this are merged, s: periods that are not binary fractions give steps of about 1e-17 s."""
-SAME_S = 1e-6
-"""A row this near to a multiple of the control period is at that control sample, s."""
+MERGE_S = 1e-9  # rows closer than this are merged, s: periods that are not binary fractions give steps of about 1e-17 s
+SAME_S = 1e-6  # a row this near to a multiple of the control period is at that control sample, s
 
 
 def distinct(t: Array, command: Array) -> npt.NDArray[np.intp]:
-    """Indices of rows (T,) at distinct times, for commands (3 r, T) of r robots.
-
-    Among rows within MERGE_S of each other, the last row that has the command of the first is kept: the command that
-    led there.
-    """
+    """Indices of rows (T,) at distinct times, for commands (3 r, T) of r robots."""
+    # Among rows within MERGE_S of each other, the last row that has the command of the first is kept: the command that
+    # led there.
     cluster = np.concatenate([[0], np.cumsum(np.diff(t) > MERGE_S)])
     first = np.searchsorted(cluster, cluster)
     led = (command == command[:, first]).all(axis=0)
@@ -49,10 +45,8 @@ def distinct(t: Array, command: Array) -> npt.NDArray[np.intp]:
 def states(
     t: Array, logged: Mapping[str, Array], ugvs: Sequence[str], bodies: Sequence[str], signals: Sequence[str] = ()
 ) -> pd.DataFrame:
-    """`Trace.states` of rows at times (T,), s; what was logged of M bodies has the shape (3 M, T), of UGVs (n, T).
-
-    `signals` are the names of `plant_signals` and `own_headings`, (k, T).
-    """
+    """`Trace.states` of rows at times (T,), s; what was logged of M bodies has the shape (3 M, T), of UGVs (n, T)."""
+    # `signals` are the names of `plant_signals` and `own_headings`, (k, T).
     columns: dict[str, Array] = {"t_s": t}
     for i, body in enumerate(bodies):
         columns |= {f"{body}.{axis}_m": logged["bodies"][3 * i + a] for a, axis in enumerate("xyz")}
@@ -228,8 +222,7 @@ def messages(memory: PlannerState, trace: Trace, uav: str) -> pd.DataFrame:
     return typed(rows, MESSAGE_COLUMNS)
 
 
-_ORDER = ("answer", "withdrawal", "proposal")
-"""Kinds of messages of one instant, in the order of the table."""
+_ORDER = ("answer", "withdrawal", "proposal")  # kinds of messages of one instant, in the order of the table
 
 
 def _messages(memory: PlannerState, trace: Trace, uav: str) -> Iterator[dict[str, Any]]:

@@ -35,11 +35,10 @@ from airground_drake.sim.trace import Trace
 from airground_drake.uav.guest.process import end_all
 
 FAILURE = "failure.json"
-TOLD_S = 0.2
-"""Period of progress messages, s."""
+TOLD_S = 0.2  # period of progress messages, s
+# A run is ended when its simulated time has stood still for so long by the clock, s. Only third-party code can hang:
+# each step of the package has a bound on its work.
 STANDSTILL_S = 600.0
-"""A run is ended when its simulated time has stood still for so long by the clock, s. Only third-party code can hang:
-each step of the package has a bound on its work."""
 
 
 class _Process:
@@ -55,11 +54,7 @@ class _Process:
         self.process.start()
 
     def advanced(self) -> float:
-        """Simulated time since the last call, s.
-
-        Raises:
-            SimulationError: if it has stood still for too long.
-        """
+        """Simulated time since the last call, s."""
         by = self._clock.value - self._before
         self._before += by
         if by > 0.0:
@@ -69,13 +64,7 @@ class _Process:
         return by
 
     def trace(self) -> Trace:
-        """The trace of a run whose process has ended.
-
-        Raises:
-            PluginError, SimulationError: as the process has noted.
-            AirgroundError: if it has noted something else, or died.
-            TraceError: if the trace cannot be used.
-        """
+        """The trace of a run whose process has ended."""
         self.process.join()
         code = self.process.exitcode or 0
         self.process.close()
@@ -116,10 +105,7 @@ def simulate_all(
 def simulate_seeds(
     scenario: Scenario, seeds: Iterable[int], jobs: int | None = None, progress: Progress = SILENT
 ) -> Iterator[Trace]:
-    """Simulate every run of a scenario with each of some seeds, and yield each trace when it is there.
-
-    Arguments and errors as of `simulate_all`.
-    """
+    """Simulate every run of a scenario with each of some seeds, and yield each trace when it is there."""
     several = [validated(replace(scenario, seed=seed)) for seed in seeds]
     work = [(each, name) for each in several for name in each.runs]
     return _simulated(work, f"{len(several)} more seeds", jobs, progress)
@@ -184,7 +170,6 @@ def _end(*_: object) -> None:
 
 
 def _noted(note: bytes, what: str) -> AirgroundError:
-    """The error in a note."""
     try:
         failure = json.loads(note)
         if failure["stopped"] is None:

@@ -40,10 +40,8 @@ from airground_drake.ugv.problem import Horizon, predicted_problem
 from airground_drake.ugv.rollout import View
 from airground_drake.ugv.routes.mixed_integer import MixedIntegerRoute
 
-EVENT_ACCURACY = 1e-6
-"""Accuracy of the Context: events are isolated to this, relative to the time scale of 1 s."""
-OWN_ACCURACY = 1e-6
-"""Accuracy of integration where a robot has a user's plant: about this many metres in a step."""
+EVENT_ACCURACY = 1e-6  # accuracy of the Context: events are isolated to this, relative to the time scale of 1 s
+OWN_ACCURACY = 1e-6  # accuracy of integration where a robot has a user's plant: about this many metres in a step
 
 
 class Recorder:

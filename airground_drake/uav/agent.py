@@ -7,8 +7,7 @@ from collections.abc import Mapping
 from airground_drake.model.geometry.motion import Motion
 from airground_drake.uav.policy import Observation, Policy
 
-Proposed = Motion | Mapping[str, Motion] | None
-"""What a policy returns."""
+Proposed = Motion | Mapping[str, Motion] | None  # what a policy returns
 
 
 class Agent(Policy):

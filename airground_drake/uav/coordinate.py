@@ -19,49 +19,37 @@ from airground_drake.uav.coordination.single import OtherRobot, Way
 from airground_drake.uav.coordination.timed import at_rest, distance, speed, timed, without_repeats
 from airground_drake.uav.policy import MovingObstacle, Observation, Policy, Teammate
 
-SHARE = 0.8
-"""A plan uses this share of a UGV's speed limit; the rest is for catching up."""
-MOST_HALVINGS = 3
-"""The speed is halved no more often than this."""
-MOST_PLANS = 4
-"""Largest number of joint plans that are tried for one proposal, each with more UGVs."""
+SHARE = 0.8  # a plan uses this share of a UGV's speed limit; the rest is for catching up
+MOST_HALVINGS = 3  # the speed is halved no more often than this
+MOST_PLANS = 4  # largest number of joint plans that are tried for one proposal, each with more UGVs
+# Shares of the clearance, and of the spacing. The next share of the clearance is tried if the UGV has no way even
+# alone, or all joint steps on the roadmaps are exhausted: a gap, or the place where one waits for another, may be too
+# narrow for the full clearance. The next share of the spacing is tried if a joint plan helps nobody: UGVs that have met
+# stand nearer to each other than the full spacing.
 NARROWER = (1.0, 0.1, 0.01)
-"""Shares of the clearance, and of the spacing. The next share of the clearance is tried if the UGV has no way even
-alone, or all joint steps on the roadmaps are exhausted: a gap, or the place where one waits for another, may be too
-narrow for the full clearance. The next share of the spacing is tried if a joint plan helps nobody: UGVs that have met
-stand nearer to each other than the full spacing."""
-ON_PRESET_M = 0.5
-"""A motion that ends this near to the preset, m, is predicted to go on along the preset."""
-BLEND_S = 1.0
-"""A UGV without a proposal is predicted to approach its preset with this time constant, s."""
+ON_PRESET_M = 0.5  # a motion that ends this near to the preset, m, is predicted to go on along the preset
+BLEND_S = 1.0  # a UGV without a proposal is predicted to approach its preset with this time constant, s
 
-QUICK = Effort(candidates=300_000)
-"""First effort for a group of UGVs: more UGVs may be what it takes."""
-ONE_BY_ONE = Effort(candidates=0)
-"""Without a search over joint steps, which does not depend on the spacing."""
+QUICK = Effort(candidates=300_000)  # first effort for a group of UGVs: more UGVs may be what it takes
+ONE_BY_ONE = Effort(candidates=0)  # without a search over joint steps, which does not depend on the spacing
+# Why there is no plan, by outcome.
 REASONS: dict[Outcome, str] = {
     "complete": "",
     "exhausted": "no plan on the roadmaps searched, all of them exhausted",
     "effort spent": "no plan found within the effort",
 }
-"""Why there is no plan, by outcome."""
-SAME_PLACE_M = 1e-3
-"""A UGV that has moved no farther than this counts as unmoved, m."""
+SAME_PLACE_M = 1e-3  # a UGV that has moved no farther than this counts as unmoved, m
 
-Alone = Callable[[int], Way | None]
-"""The way that a UGV, given by its index in the team, would have without other UGVs."""
+Alone = Callable[[int], Way | None]  # the way that a UGV, given by its index in the team, would have without other UGVs
 
 
 @dataclass(frozen=True)
 class Failures:
-    """What the policy remembers: requests in vain, with the reasons.
+    """What the policy remembers: requests in vain, with the reasons."""
 
-    Attributes:
-        shut_in: of UGVs that had no way even alone, by name.
-        in_vain: of groups of UGVs whose plans helped nobody, by their names.
-    """
-
+    # Of UGVs that had no way even alone, by name.
     shut_in: Mapping[str, tuple[Observation, str]] = field(default_factory=dict)
+    # Of groups of UGVs whose plans helped nobody, by their names.
     in_vain: Mapping[tuple[str, ...], tuple[Observation, str]] = field(default_factory=dict)
 
 
@@ -92,11 +80,7 @@ class Coordinate(Policy):
     def __init__(
         self, *, speed_m_s: float = math.inf, clearance_m: float = 0.1, spacing_m: float = 0.2, follow_s: float = 8.0
     ) -> None:
-        """Set the parameters; all have defaults.
-
-        Raises:
-            ValueError: if a parameter is not positive, or `follow_s` is negative.
-        """
+        """Set the parameters; all have defaults."""
         if not (speed_m_s > 0.0 and clearance_m > 0.0 and spacing_m > 0.0 and follow_s >= 0.0):
             raise ValueError(
                 f"coordinate needs speed_m_s, clearance_m, spacing_m > 0 and follow_s >= 0, "
@@ -151,14 +135,8 @@ class Coordinate(Policy):
     def _joint(
         self, seen: Observation, space: Space, alone: Alone, effort: Effort = QUICK
     ) -> tuple[tuple[float, ...], list[int], Plan]:
-        """The best joint plan: its cost, the indices of its UGVs, and the plan.
-
-        Args:
-            seen: what the UAV sees.
-            space: obstacles and distances.
-            alone: ways of the UGVs without each other.
-            effort: of each plan; with `QUICK`, the last group gets the full effort if that was not enough.
-        """
+        """The best joint plan: its cost, the indices of its UGVs, and the plan."""
+        # effort: of each plan; with `QUICK`, the last group gets the full effort if that was not enough.
         group = self._first_group(seen)
         best: tuple[list[int], Plan] | None = None
         least: tuple[float, ...] = ()
@@ -191,11 +169,9 @@ class Coordinate(Policy):
     def _in_the_way(
         self, seen: Observation, space: Space, group: Sequence[int], found: Plan, alone: Alone
     ) -> list[int]:
-        """Willing UGVs outside the group that are in the way of its triggered UGVs without a way.
-
-        A UGV is in the way if it comes near the way that such a UGV would have alone. Without any near one, all willing
-        UGVs are returned. If no such UGV has a way even alone, nobody can help: the list is empty.
-        """
+        """Willing UGVs outside the group that are in the way of its triggered UGVs without a way."""
+        # A UGV is in the way if it comes near the way that such a UGV would have alone. Without any near one, all
+        # willing UGVs are returned. If no such UGV has a way even alone, nobody can help: the list is empty.
         lost = [i for i, way in zip(group, found.ways, strict=True) if way is None and seen.team[i].triggered]
         ways = [(seen.team[i], way) for i in lost if (way := alone(i)) is not None]
         if not ways:
@@ -215,10 +191,7 @@ class Coordinate(Policy):
         return plan(space, [task_of(mate, seen.start)], [self._pace(mate)], follow=self.follow).ways[0]
 
     def _pace(self, mate: Teammate) -> float:
-        """The speed at which a UGV is planned for, m/s: half of it after each motion that was too fast for it.
-
-        A robot that falls behind a motion cuts its corners.
-        """
+        """The speed at which a UGV is planned for, m/s: half of it after each motion that was too fast for it."""
         return min(self.speed, SHARE * mate.max_speed) / 2.0 ** min(mate.too_fast, MOST_HALVINGS)
 
     def _proposals(self, seen: Observation, group: Sequence[int], found: Plan) -> dict[str, Motion] | None:
@@ -245,10 +218,8 @@ def _has_the_map_of(before: Observation, seen: Observation) -> bool:
 
 
 def _stands_as_before(before: Observation, seen: Observation) -> bool:
-    """Whether a UGV stands where it stood, on the same map. If it had no way even alone, it still has no way.
-
-    Waiting cannot open a way: with time there are fewer places at which the preset can be joined.
-    """
+    """Whether a UGV stands where it stood, on the same map. If it had no way even alone, it still has no way."""
+    # Waiting cannot open a way: with time there are fewer places at which the preset can be joined.
     return math.dist(before.position, seen.position) <= SAME_PLACE_M and _has_the_map_of(before, seen)
 
 
@@ -286,11 +257,9 @@ def task_of(mate: Teammate, start: float) -> RobotTask:
 
 
 def predicted(mate: Teammate, start: float) -> Array:
-    """Predicted motion of a UGV from time `start`, s, on: timed, (M, 3), from t = 0.
-
-    A UGV with a proposal in force that it has not refused follows the proposal, and then its preset if the proposal
-    ends near it. Any other UGV stays where it is if it stands or is triggered, and returns to its preset if not.
-    """
+    """Predicted motion of a UGV from time `start`, s, on: timed, (M, 3), from t = 0."""
+    # A UGV with a proposal in force that it has not refused follows the proposal, and then its preset if the proposal
+    # ends near it. Any other UGV stays where it is if it stands or is triggered, and returns to its preset if not.
     here, proposal = mate.position[:2], mate.proposal
     if proposal is not None and mate.answered != "refused":
         motion = proposal.motion

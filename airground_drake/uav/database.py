@@ -24,25 +24,15 @@ from airground_drake.uav.policy import Observation, Policy, Proposal, motions_of
 Ranking = Literal["listed", "predicted"]
 RANKINGS: tuple[Ranking, ...] = get_args(Ranking)
 
+# The rest doubles at most this often while no policy proposes anything; it is then longer than any run.
 MOST_DOUBLINGS = 10
-"""The rest doubles at most this often while no policy proposes anything; it is then longer than any run."""
 PREDICTION_S = 3.0
-INTRUSION = 1000.0
-"""Weight of squared intrusion against squared task error; the gatekeeper's default is the same."""
+INTRUSION = 1000.0  # weight of squared intrusion against squared task error; the gatekeeper's default is the same
 
 
 def make_policy(name: str, parameters: Mapping[str, float], budget: float = 2.0) -> Policy:
-    """Build a policy: in this process if it comes with the package or was added here, else in a process of its own.
-
-    Args:
-        name: of the policy.
-        parameters: of the policy.
-        budget: wall-clock time for a proposal of a policy in a process of its own, s.
-
-    Raises:
-        UnknownNameError: if the name is neither registered nor the place of a plug-in.
-        PluginError: if it cannot be imported, is no Policy, or does not take these parameters.
-    """
+    """Build a policy: in this process if it comes with the package or was added here, else in a process of its own."""
+    # budget: s
     if POLICIES.accepts(name) and POLICIES.is_foreign(name):
         return GuestPolicy(name, parameters, budget)
     return POLICIES.make(name, of=Policy, **parameters)
@@ -50,25 +40,15 @@ def make_policy(name: str, parameters: Mapping[str, float], budget: float = 2.0)
 
 @dataclass(frozen=True)
 class Negotiation:
-    """What the UAV remembers of its exchange with one UGV.
+    """What the UAV remembers of its exchange with one UGV."""
 
-    Attributes:
-        proposal: the proposal in force, or None.
-        turn: index of the policy that made the proposal, or that is asked next.
-        refusals: number of refused proposals since the trigger.
-        too_fast: number of motions since then that the UGV could not follow, see `Teammate`.
-        in_vain: how many times in a row no policy had a proposal.
-        retry_at: earliest time for a new proposal, s.
-        cause: name of the UGV whose trigger led to the last proposal; empty before the first.
-    """
-
-    proposal: Proposal | None = None
-    turn: int = 0
-    refusals: int = 0
-    too_fast: int = 0
-    in_vain: int = 0
-    retry_at: float = -1.0
-    cause: str = ""
+    proposal: Proposal | None = None  # the proposal in force, or None
+    turn: int = 0  # index of the policy that made the proposal, or that is asked next
+    refusals: int = 0  # number of refused proposals since the trigger
+    too_fast: int = 0  # number of motions since then that the UGV could not follow, see `Teammate`
+    in_vain: int = 0  # how many times in a row no policy had a proposal
+    retry_at: float = -1.0  # earliest time for a new proposal, s
+    cause: str = ""  # name of the UGV whose trigger led to the last proposal; empty before the first
 
     def is_due(self, t: float) -> bool:
         """Whether the UGV has no proposal in force at time t, s, and its rest is over."""
@@ -85,31 +65,19 @@ class Negotiation:
 
 @dataclass(frozen=True)
 class Asked:
-    """A policy that was asked for a plan for a UGV.
+    """A policy that was asked for a plan for a UGV."""
 
-    Attributes:
-        t: time, s.
-        robot: name of the UGV.
-        policy: name of the policy.
-        party: UGVs for which it proposed motions.
-        chosen: whether the plan was sent.
-        what: what went wrong; empty if nothing did. A failure counts as no intervention.
-        traceback: of the failure.
-        reason: why it left a UGV without a way, if it says so.
-    """
-
-    t: float
-    robot: str
-    policy: str
-    party: tuple[str, ...] = ()
-    chosen: bool = False
-    what: str = ""
-    traceback: str = ""
-    reason: str = ""
+    t: float  # time, s
+    robot: str  # name of the UGV
+    policy: str  # name of the policy
+    party: tuple[str, ...] = ()  # UGVs for which it proposed motions
+    chosen: bool = False  # whether the plan was sent
+    what: str = ""  # what went wrong; empty if nothing did. A failure counts as no intervention.
+    traceback: str = ""  # of the failure
+    reason: str = ""  # why it left a UGV without a way, if it says so
 
 
-Candidate = tuple[int, Asked, dict[str, Motion]]
-"""A plan: its turn, the policy that was asked, and motions by UGV."""
+Candidate = tuple[int, Asked, dict[str, Motion]]  # a plan: its turn, the policy that was asked, and motions by UGV
 
 
 class BehaviourDatabase:
@@ -134,7 +102,6 @@ class BehaviourDatabase:
         budget: float = 2.0,
         joint: bool = True,
     ) -> None:
-        """See the attributes."""
         self.policies = tuple(policies)
         self.retry = retry
         self.ranking = ranking
@@ -151,14 +118,10 @@ class BehaviourDatabase:
     def after_refusal(
         self, held: Negotiation, t: float, *, learnt: bool = False, too_fast: bool = False
     ) -> Negotiation:
-        """The negotiation after the UGV has refused its proposal: after a rest it is the next policy's turn.
-
-        Args:
-            held: negotiation with the refused proposal.
-            t: time, s.
-            learnt: whether the UAV has learnt of an obstacle with the refusal; then a ranking starts again at the best.
-            too_fast: whether the UGV refused because it would have come to rest short of its goal.
-        """
+        """The negotiation after the UGV has refused its proposal: after a rest it is the next policy's turn."""
+        # t: s
+        # learnt: whether the UAV has learnt of an obstacle with the refusal; then a ranking starts again at the best.
+        # too_fast: whether the UGV refused because it would have come to rest short of its goal.
         turn = 0 if learnt and self.ranking == "predicted" else held.turn + 1
         return Negotiation(
             turn=turn,
@@ -171,18 +134,10 @@ class BehaviourDatabase:
     def plan(
         self, held: Negotiation, seen: Observation, memories: dict[int, Any] | None = None
     ) -> tuple[dict[str, Negotiation], list[Asked]]:
-        """Ask the policies for the next proposal to a UGV; a joint plan brings proposals to other UGVs, too.
-
-        If no policy has a proposal, the UGV rests for `retry`, and twice as long each time in a row.
-
-        Args:
-            held: negotiation with this UGV.
-            seen: what the UAV sees.
-            memories: `Policy.remembered` by index of the policy, changed in place; None: nothing is remembered.
-
-        Returns:
-            The negotiations that change, by UGV, and the policies that were asked.
-        """
+        """Ask the policies for the next proposal to a UGV; a joint plan brings proposals to other UGVs, too."""
+        # If no policy has a proposal, the UGV rests for `retry`, and twice as long each time in a row.
+        # memories: `Policy.remembered` by index of the policy, changed in place; None: nothing is remembered.
+        # Returns the negotiations that change, by UGV, and the policies that were asked.
         seen = replace(seen, refusals=held.refusals)
         memories = {} if memories is None else memories
         if self.ranking == "predicted":
@@ -252,12 +207,10 @@ class BehaviourDatabase:
 
 
 def predicted_cost(motions: Mapping[str, Motion], seen: Observation) -> float:
-    """Cost (25) of a proposal over PREDICTION_S, as the UAV predicts it with the obstacles that it knows.
-
-    The UGV is assumed to follow its motion exactly, or to stand without one. The cost is its squared distance to the
-    preset trajectory, plus INTRUSION times its squared intrusion into safe distances. These are the distances to
-    obstacles, and to UGVs that stand, have accepted a motion, or get one with this proposal.
-    """
+    """Cost (25) of a proposal over PREDICTION_S, as the UAV predicts it with the obstacles that it knows."""
+    # The UGV is assumed to follow its motion exactly, or to stand without one. The cost is its squared distance to the
+    # preset trajectory, plus INTRUSION times its squared intrusion into safe distances. These are the distances to
+    # obstacles, and to UGVs that stand, have accepted a motion, or get one with this proposal.
     t = seen.start + np.arange(0.0, PREDICTION_S, 0.05)
     own = motions.get(seen.robot)
     positions = own.sample(t) if own is not None else np.tile(seen.position, (len(t), 1))

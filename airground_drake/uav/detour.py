@@ -12,16 +12,13 @@ from airground_drake.model.geometry.motion import Motion
 from airground_drake.model.geometry.paths import NoPath, Path, shortest_path
 from airground_drake.uav.policy import Observation, Policy, Teammate
 
-SAMPLE_S = 0.05
-"""Spacing of the vertices of the motion, s."""
+SAMPLE_S = 0.05  # spacing of the vertices of the motion, s
 
 RENDEZVOUS_TOLERANCE_S = 1e-3
 
-CHASED = 16
-"""After so many steps without a rendezvous the steps are doubled: the preset moves away."""
+CHASED = 16  # after so many steps without a rendezvous the steps are doubled: the preset moves away
 
-LONGEST_FOLLOW_S = 600.0
-"""Longest time for which a proposal follows the preset, s."""
+LONGEST_FOLLOW_S = 600.0  # longest time for which a proposal follows the preset, s
 
 
 class Detour(Policy):
@@ -67,12 +64,10 @@ class Detour(Policy):
         return _then_follow(times, legs, seen.preset, self.follow, height)
 
     def _rendezvous(self, seen: Observation, rows: Array, reach: Array) -> tuple[float, Path] | None:
-        """Time to a rendezvous, s, and the path to it; None if the preset is blocked up to its end.
-
-        The tried duration only grows: by a sample where the preset is blocked, otherwise to the travel time. So the
-        search finds every rendezvous that lasts longer than a sample. If the preset moves away nearly as fast as the
-        UGV, the steps double and the last step is bisected. That finds a rendezvous, perhaps not the earliest.
-        """
+        """Time to a rendezvous, s, and the path to it; None if the preset is blocked up to its end."""
+        # The tried duration only grows: by a sample where the preset is blocked, otherwise to the travel time. So the
+        # search finds every rendezvous that lasts longer than a sample. If the preset moves away nearly as fast as the
+        # UGV, the steps double and the last step is bisected. That finds a rendezvous, perhaps not the earliest.
         gap = np.linalg.norm(seen.preset.at(seen.start)[0][:2] - seen.position[:2])
         duration = float(gap) / (self.speed + seen.preset.max_speed)  # no rendezvous can be earlier
         missed, strides = duration, 0

@@ -8,14 +8,10 @@ import numpy.typing as npt
 from airground_drake.base.arrays import Array
 from airground_drake.base.compiling import njit
 
-STANDS_S = 1.0
-"""A UGV stands once it has stayed at one place for this long, s."""
-STANDS_M = 0.1
-"""Radius of one place, m; it is smaller for slow UGVs."""
-STANDS_SHARE = 0.1
-"""Largest radius of one place, as a share of the distance that a UGV can travel in `STANDS_S`."""
-NOT_WATCHED = -1.0
-"""Time of the halt, s, before the first instant."""
+STANDS_S = 1.0  # a UGV stands once it has stayed at one place for this long, s
+STANDS_M = 0.1  # radius of one place, m; it is smaller for slow UGVs
+STANDS_SHARE = 0.1  # largest radius of one place, as a share of the distance that a UGV can travel in `STANDS_S`
+NOT_WATCHED = -1.0  # time of the halt, s, before the first instant
 
 
 def room(max_speed: Array) -> Array:
@@ -25,14 +21,8 @@ def room(max_speed: Array) -> Array:
 
 @njit(cache=True)
 def watched(halts: Array, t: float, positions: Array, room: Array) -> Array:
-    """Halts of n UGVs at time t, s, (4n,).
-
-    Args:
-        halts: place, m, world frame, and time, s, of each UGV's halt as noted before, (4n,).
-        t: time, s.
-        positions: of the UGVs first, (3n + ...,), m, world frame.
-        room: see `room`, (n,), m.
-    """
+    """Halts of n UGVs at time t, s, (4n,); `positions` (3n + ...,), m; `room` (n,), m."""
+    # halts: place, m, world frame, and time, s, of each UGV's halt as noted before, (4n,).
     found = halts.copy()
     for i in range(len(room)):
         away = 0.0

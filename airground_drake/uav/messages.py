@@ -18,18 +18,15 @@ from airground_drake.model.plants.plant import Scripted
 from airground_drake.uav.policy import Proposal
 
 ACCEPT, SILENT, REFUSE, DONE = 1.0, 0.0, -1.0, 2.0
-NOTHING = -1.0
-"""Number of the proposal that a UGV executes if it executes none."""
+NOTHING = -1.0  # number of the proposal that a UGV executes if it executes none
+# Reason of a UGV that would accept its part of a joint plan, and refuses it because another UGV refuses its own.
 JOINT_REFUSED: Literal["joint_refused"] = "joint_refused"
-"""Reason of a UGV that would accept its part of a joint plan, and refuses it because another UGV refuses its own."""
+# Reason of a UGV that would come to rest short of its goal with the proposal, no nearer than without.
 STALLS: Literal["stalls"] = "stalls"
-"""Reason of a UGV that would come to rest short of its goal with the proposal, no nearer than without."""
 
-Point = tuple[float, float, float]
-"""A place, m, world frame."""
+Point = tuple[float, float, float]  # a place, m, world frame
 
-Outline = tuple[float, ...]
-"""A convex part of an obstacle, without padding: see `model.geometry.outline`."""
+Outline = tuple[float, ...]  # a convex part of an obstacle, without padding: see `model.geometry.outline`
 
 
 class Sighting(NamedTuple):
@@ -58,11 +55,9 @@ class Report(NamedTuple):
     seen: tuple[Sighting, ...] = ()
 
 
-Reports = tuple[Report, ...]
-"""One entry per UGV."""
+Reports = tuple[Report, ...]  # one entry per UGV
 
-Proposals = tuple[Proposal | None, ...]
-"""One entry per UGV."""
+Proposals = tuple[Proposal | None, ...]  # one entry per UGV
 
 
 def sightings(world: World, t: float, positions: Array) -> list[Sighting]:
@@ -83,11 +78,9 @@ def answer_to(proposal: Proposal | None, answers: Sequence[float] | Array, robot
 
 
 def accepted_proposals(proposals: Sequence[Proposal | None], answers: Array) -> list[Proposal | None]:
-    """The proposals that UGVs execute, one entry per UGV: the proposal in force if it has taken effect, else None.
-
-    A proposal takes effect when its UGV accepts it. A part of a joint plan takes effect when, besides, every other part
-    in force is accepted or done.
-    """
+    """The proposals that UGVs execute, one entry per UGV: the proposal in force if it has taken effect, else None."""
+    # A proposal takes effect when its UGV accepts it. A part of a joint plan takes effect when, besides, every other
+    # part in force is accepted or done.
     said = [answer_to(proposal, answers, i) for i, proposal in enumerate(proposals)]
     stopped = {p.joint for p, answer in zip(proposals, said, strict=True) if p and answer not in (ACCEPT, DONE)}
     return [

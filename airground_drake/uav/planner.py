@@ -34,50 +34,32 @@ from airground_drake.uav.messages import (
 )
 from airground_drake.uav.policy import Answered, MovingObstacle, Observation, Proposal, Teammate
 
-BEHIND_S = 1.0
-"""A motion has left a UGV behind if from its end the UGV is farther than it could go in this time."""
+BEHIND_S = 1.0  # a motion has left a UGV behind if from its end the UGV is farther than it could go in this time
 _WORDS: dict[float, Answered] = {ACCEPT: "accepted", REFUSE: "refused"}
 
 
 class Mover(NamedTuple):
-    """An obstacle that moves.
+    """An obstacle that moves."""
 
-    Attributes:
-        name: of the obstacle.
-        outlines: of its parts about its origin, (k, W), see `model.geometry.outline`.
-        known: whether the UAV sees it; else it knows what a UGV last reported.
-        script: its way, if predictions know it.
-    """
-
-    name: str
-    outlines: Array
-    known: bool
-    script: Motion | None
+    name: str  # of the obstacle
+    outlines: Array  # of its parts about its origin, (k, W), see `model.geometry.outline`
+    known: bool  # whether the UAV sees it; else it knows what a UGV last reported
+    script: Motion | None  # its way, if predictions know it
 
 
 @dataclass(frozen=True)
 class PlannerState:
-    """What the UAV remembers between planning periods.
+    """What the UAV remembers between planning periods."""
 
-    Attributes:
-        talks: negotiations, one per UGV.
-        learnt: obstacles at rest from UGVs' reports that are not on the map.
-        seen: obstacles that move, as UGVs last reported them, with the time of the report, s, by name.
-        sent: all proposals with the index of their UGV, in order of sending.
-        asked: policies that were asked, in order.
-        read: answers that were read: their number, and when, s.
-        withdrawn: proposals that were withdrawn: their number, and when, s.
-        memories: `Policy.remembered` of the policies.
-    """
-
-    talks: tuple[Negotiation, ...]
-    learnt: tuple[Outline, ...] = ()
-    sent: tuple[tuple[int, Proposal], ...] = ()
-    asked: tuple[Asked, ...] = ()
-    read: tuple[tuple[int, float], ...] = ()
-    withdrawn: tuple[tuple[int, float], ...] = ()
+    talks: tuple[Negotiation, ...]  # negotiations, one per UGV
+    learnt: tuple[Outline, ...] = ()  # obstacles at rest from UGVs' reports that are not on the map
+    sent: tuple[tuple[int, Proposal], ...] = ()  # all proposals with the index of their UGV, in order of sending
+    asked: tuple[Asked, ...] = ()  # policies that were asked, in order
+    read: tuple[tuple[int, float], ...] = ()  # answers that were read: their number, and when, s
+    withdrawn: tuple[tuple[int, float], ...] = ()  # proposals that were withdrawn: their number, and when, s
+    # Obstacles that move, as UGVs last reported them, with the time of the report, s, by name.
     seen: tuple[tuple[Sighting, float], ...] = ()
-    memories: tuple[Any, ...] = ()
+    memories: tuple[Any, ...] = ()  # `Policy.remembered` of the policies
 
     def __deepcopy__(self, memo: dict[int, Any]) -> Self:
         """Immutable: the copy is the object itself."""
@@ -95,16 +77,9 @@ class PlannerState:
 
 
 def sent_after(before: PlannerState, after: PlannerState, t: float) -> PlannerState:
-    """Number the new proposals of a planning instant, and note what was sent and withdrawn.
-
-    Every new proposal gets the next number and the time t, even if the planner has set others. So no planner can send
-    another motion under a number that a UGV has already answered.
-
-    Args:
-        before: memory before the instant.
-        after: memory as the planner returns it.
-        t: time, s.
-    """
+    """Number the new proposals of a planning instant, and note what was sent and withdrawn; `t` in s."""
+    # Every new proposal gets the next number and the time t, even if the planner has set others. So no planner can send
+    # another motion under a number that a UGV has already answered.
     sent, talks, withdrawn = list(before.sent), list(after.talks), list(before.withdrawn)
     for i, (old, talk) in enumerate(zip(before.talks, after.talks, strict=True)):
         if talk.proposal is old.proposal:
@@ -120,43 +95,27 @@ def sent_after(before: PlannerState, after: PlannerState, t: float) -> PlannerSt
 
 @dataclass(frozen=True, eq=False)
 class Planner:
-    """The UAV's planner. It plans on the UAV's own map, which may miss obstacles.
+    """The UAV's planner. It plans on the UAV's own map, which may miss obstacles."""
 
-    The policies are asked for each triggered UGV. They may also propose that other UGVs make way for it; such a joint
-    plan stays in force as long as one of its UGVs is triggered. A refusal withdraws the proposal and all other
-    parts of its joint plan; after a rest the next policy is asked. UGVs report the obstacles that they sense with every
-    answer, and the UAV adds these to its map. See docs/design.md.
+    # The policies are asked for each triggered UGV. They may also propose that other UGVs make way for it; such a joint
+    # plan stays in force as long as one of its UGVs is triggered. A refusal withdraws the proposal and all other parts
+    # of its joint plan; after a rest the next policy is asked. UGVs report the obstacles that they sense with every
+    # answer, and the UAV adds these to its map. See docs/design.md.
 
-    Attributes:
-        ugvs: names of the UGVs.
-        database: policies, in the order in which they are tried.
-        period: planning period, s; a proposal can act one period after it is made.
-        presets: preset trajectories of the UGVs.
-        targets: targets of the UGVs, (n, 3), m.
-        mapped: outlines of the obstacles on the UAV's map, (m, W), see `model.geometry.outline`.
-        robot_distance: d between UGVs, m.
-        max_speed: speed limits of the UGVs, (n,), m/s.
-        radius: radii of the UGVs' bodies, (n,), m, or one for all.
-        mapped_from: when each of `mapped` appears, (m,), s, or one time for all.
-        mapped_until: when each disappears, in the same order.
-        movers: obstacles that move.
-        coasting: time for which an obstacle that moves is predicted to keep its velocity; then it stands, s.
-        trails: per UGV, whether its plant may fall behind a motion within its speed limit; default: none does.
-    """
-
-    ugvs: tuple[str, ...]
-    database: BehaviourDatabase
-    period: float
-    presets: tuple[Motion, ...]
-    targets: Array
-    mapped: Array
-    robot_distance: float
-    max_speed: Array
-    radius: Array | float = 0.0
-    mapped_from: Array | float = 0.0
-    mapped_until: Array | float = np.inf
-    movers: tuple[Mover, ...] = ()
-    coasting: float = 3.0
+    ugvs: tuple[str, ...]  # names of the UGVs
+    database: BehaviourDatabase  # policies, in the order in which they are tried
+    period: float  # planning period, s; a proposal can act one period after it is made
+    presets: tuple[Motion, ...]  # preset trajectories of the UGVs
+    targets: Array  # targets of the UGVs, (n, 3), m
+    mapped: Array  # outlines of the obstacles on the UAV's map, (m, W), see `model.geometry.outline`
+    robot_distance: float  # d between UGVs, m
+    max_speed: Array  # speed limits of the UGVs, (n,), m/s
+    radius: Array | float = 0.0  # radii of the UGVs' bodies, (n,), m, or one for all
+    mapped_from: Array | float = 0.0  # when each of `mapped` appears, (m,), s, or one time for all
+    mapped_until: Array | float = np.inf  # when each disappears, in the same order
+    movers: tuple[Mover, ...] = ()  # obstacles that move
+    coasting: float = 3.0  # time for which an obstacle that moves is predicted to keep its velocity; then it stands, s
+    # Per UGV, whether its plant may fall behind a motion within its speed limit; default: none does.
     trails: tuple[bool, ...] = ()
 
     @property
@@ -195,18 +154,8 @@ class Planner:
         standing: Sequence[bool] = (),
         sightings: Sequence[Sighting] = (),
     ) -> PlannerState:
-        """The memory after one planning period.
-
-        Args:
-            memory: of the UAV before.
-            t: time, s.
-            positions: of all robots, (n + 1, 3), m, world frame.
-            intervening: per UGV, whether its trigger is in mode INTERVENING.
-            answers: of the UGVs, (2n,), see `messages`.
-            reports: of the UGVs, see `messages`.
-            standing: per UGV, whether it stands, see `halts`; default: no UGV stands.
-            sightings: the obstacles that move and are there.
-        """
+        """The memory after one planning period; `t` in s; `positions` (n + 1, 3), m; `answers` (2n,)."""
+        # standing: per UGV, whether it stands, see `halts`; default: no UGV stands.
         said = [answer_to(talk.proposal, answers, i) for i, talk in enumerate(memory.talks)]
         heard = [report for report, answer in zip(reports, said, strict=True) if answer != SILENT]
         reported = {outline for report in heard for outline in report.sensed}
@@ -278,14 +227,12 @@ class Planner:
         *,
         learnt: bool,
     ) -> list[Negotiation]:
-        """Negotiations after the UGVs' answers.
-
-        A proposal is withdrawn if any part of its plan is refused, if its motion is over, or if neither its UGV, nor
-        its cause, nor any party of its joint plan is triggered any more. So a UGV whose part leads it past its preset
-        trajectory goes on: the others' ways were planned with it. A UGV that refuses only because another one does is
-        asked again at once. If a UGV that
-        may fall behind would have stalled, or was left behind, its motion was too fast.
-        """
+        """Negotiations after the UGVs' answers."""
+        # A proposal is withdrawn if any part of its plan is refused, if its motion is over, or if neither its UGV, nor
+        # its cause, nor any party of its joint plan is triggered any more. So a UGV whose part leads it past its preset
+        # trajectory goes on: the others' ways were planned with it. A UGV that refuses only because another one does is
+        # asked again at once. If a UGV that may fall behind would have stalled, or was left behind, its motion was too
+        # fast.
         called = {name for name, one in zip(self.ugvs, intervening, strict=True) if one}
         own = [a == REFUSE and each.reason != JOINT_REFUSED for a, each in zip(said, reports, strict=True)]
         refused = {talk.proposal.joint for talk, no in zip(talks, own, strict=True) if talk.proposal and no}

@@ -40,7 +40,7 @@ class Noisy(Detour):
     def __init__(
         self, *, speed_m_s: float, noise_m: float, seed: float = 0.0, clearance_m: float = 0.05, follow_s: float = 5.0
     ) -> None:
-        """As Detour, with the noise's standard deviation, m, and the seed of its sequence."""
+        """`noise_m`: standard deviation; `seed`: of the sequence of the noise. Detour has the other parameters."""
         super().__init__(speed_m_s=speed_m_s, clearance_m=clearance_m, follow_s=follow_s)
         if not noise_m >= 0.0:
             raise ValueError(f"noisy needs noise_m >= 0, got {noise_m!r}")
@@ -84,8 +84,7 @@ def _straight(seen: Observation, goal: Array, speed: float) -> Motion:
     return Motion(np.array([seen.start, arrival, arrival + HOLD_S]), np.array([seen.position, goal, goal]))
 
 
-HOLD_S = 1e4
-"""A wrong intervention holds its goal for this time, s: in effect, until it is refused."""
+HOLD_S = 1e4  # a wrong intervention holds its goal for this time, s: in effect, until it is refused
 
 
 def _positive(policy: str, speed: float) -> float:

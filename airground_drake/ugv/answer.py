@@ -17,20 +17,14 @@ from airground_drake.ugv.solution import Solution
 
 @dataclass(frozen=True)
 class Rules:
-    """How a solution becomes an answer, and the effort that solving may take.
+    """How a solution becomes an answer, and the effort that solving may take."""
 
-    Attributes:
-        switching_margin: relative gain that a reversal needs over keeping the answer throughout.
-        min_dwell: least time between opposite answers to a proposal, s.
-        first_stage: the paper's own rule: the first stage of every rounded plan is the answer, whatever stands.
-        budget: of one solution, in counts.
-        allowance_s: time by the budget's clock that all solutions of a sample may take, s; None: no limit.
-    """
-
-    switching_margin: float = 0.0
-    min_dwell: float = 0.0
+    switching_margin: float = 0.0  # relative gain that a reversal needs over keeping the answer throughout
+    min_dwell: float = 0.0  # least time between opposite answers to a proposal, s
+    # The paper's own rule: the first stage of every rounded plan is the answer, whatever stands.
     first_stage: bool = False
-    budget: Budget = field(default_factory=Budget)
+    budget: Budget = field(default_factory=Budget)  # of one solution, in counts
+    # Time by the budget's clock that all solutions of a sample may take, s; None: no limit.
     allowance_s: float | None = None
 
     def budgets(self, count: int) -> Iterator[Budget]:
@@ -115,25 +109,16 @@ def in_words(decision: GatekeeperDecision) -> str:
 def settle(
     solution: Solution, throughout: tuple[float, float], standing: float, stood: float, rules: Rules
 ) -> tuple[bool, Reason]:
-    """Whether the proposal is accepted, and why.
-
-    Without a plan (the data are not finite) it is refused, whatever stands. By the rule `first_stage` the answer is, at
-    every sample, the first stage of the rounded plan, or of the optimum if the route rounds nothing.
-
-    Otherwise there is hysteresis. A new proposal is accepted if the best plan starts by accepting it, unless it makes
-    no difference. It is refused if that plan accepts it later, even if accepting throughout costs less than refusing
-    throughout: so a UGV may wait for ever. A standing answer is reversed only if the best plan starts with the other
-    choice and is cheaper, by the switching margin, than to keep the answer throughout, and not before the dwell is
-    over. (It would decide nothing to compare with the best plan that keeps the answer for one more stage: that plan
-    costs nearly the same as changing now.)
-
-    Args:
-        solution: the route's.
-        throughout: costs (25) of accepting and of refusing throughout the horizon.
-        standing: the answer now, ACCEPT, REFUSE or SILENT.
-        stood: for how long it has stood, s.
-        rules: margins and limits.
-    """
+    """Whether the proposal is accepted, and why; `stood` in s."""
+    # Without a plan (the data are not finite) it is refused, whatever stands. By the rule `first_stage` the answer is,
+    # at every sample, the first stage of the rounded plan, or of the optimum if the route rounds nothing.
+    #
+    # Otherwise there is hysteresis. A new proposal is accepted if the best plan starts by accepting it, unless it makes
+    # no difference. It is refused if that plan accepts it later, even if accepting throughout costs less than refusing
+    # throughout: so a UGV may wait for ever. A standing answer is reversed only if the best plan starts with the other
+    # choice and is cheaper, by the switching margin, than to keep the answer throughout, and not before the dwell is
+    # over. (It would decide nothing to compare with the best plan that keeps the answer for one more stage: that plan
+    # costs nearly the same as changing now.)
     if not solution.has_plan:
         return False, "no_plan"
     if rules.first_stage:

@@ -14,8 +14,7 @@ from airground_drake.ugv.problem import Evaluation, Problem
 from airground_drake.ugv.relaxation import offsets, within_reach
 
 AXES = 2  # UGVs move in their plane
-_IDLE = 1e-7
-"""A block whose choice moves the later positions by less than this share of the largest move is idle."""
+_IDLE = 1e-7  # a block whose choice moves the later positions by less than this share of the largest move is idle
 
 
 def block_of_stage(stages: int, blocks: int) -> npt.NDArray[np.int64]:
@@ -88,11 +87,9 @@ class BinaryProgram:
     def _rows(
         self, problem: Problem, normals: Array, steps: Array, away: Array
     ) -> tuple[Array, npt.NDArray[np.float64]]:
-        """Coefficients (rows, B + N) and lower bounds of the half-planes along normals (N, m, 3).
-
-        Without half-planes: one empty row. `steps` is what accepting at a stage adds to the position, (N, 2), m, and
-        `away` are the task errors of refusing throughout, (N, 3), m.
-        """
+        """Coefficients (rows, B + N) and lower bounds of the half-planes along normals (N, m, 3)."""
+        # Without half-planes: one empty row. `steps` is what accepting at a stage adds to the position, (N, 2), m, and
+        # `away` are the task errors of refusing throughout, (N, 3), m.
         n, b = problem.stages, self._of_block.shape[1]
         stage, point = np.nonzero(self.within)
         if len(stage) == 0:
@@ -112,10 +109,8 @@ class BinaryProgram:
         return np.concatenate([np.where(self._live, self.blocked(plan.omega), 0.0), slack])
 
     def plan(self, values: Array) -> Array:
-        """The value of each stage, (N,), from those of the blocks, (B,).
-
-        Idle blocks get the value of the next one that is not, or of the last, so that they are no switch.
-        """
+        """The value of each stage, (N,), from those of the blocks, (B,)."""
+        # Idle blocks get the value of the next one that is not, or of the last, so that they are no switch.
         live = np.flatnonzero(self._live)
         if len(live) == 0:
             return np.take(values, self.block)

@@ -7,8 +7,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-Clock = Callable[[], float]
-"""Gives a time in s that never runs backwards."""
+Clock = Callable[[], float]  # gives a time in s that never runs backwards
 
 
 @dataclass(frozen=True)

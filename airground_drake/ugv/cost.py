@@ -38,10 +38,8 @@ def add_stage(
     total: float, error_weights: Array, slack_weight: float, reference: Array, k: int,
     x: float, y: float, z: float, slack: float,
 ) -> float:  # fmt: skip
-    """`total` plus the integrand of (25), 1/s, at the end of stage k in (x, y, z), m, with slack u of (26e), m.
-
-    It takes the arrays of `Terms` one by one, as `slack_at` does: in a loop that is five times as fast.
-    """
+    """`total` plus the integrand of (25), 1/s, at the end of stage k in (x, y, z), m, with slack u of (26e), m."""
+    # It takes the arrays of `Terms` one by one, as `slack_at` does: in a loop that is five times as fast.
     total += slack_weight * slack * slack
     total += error_weights[k] * (reference[k, 0] - x) ** 2
     total += error_weights[k] * (reference[k, 1] - y) ** 2

@@ -91,14 +91,12 @@ class Details(NamedTuple):
 
 
 class _Layout:
-    """What stays while only coefficients of a program change.
+    """What stays while only coefficients of a program change."""
 
-    It includes a program without constraints by which CLP fills results: Python cannot set their variables, nor their
-    cost. CLP takes no binary variables, so continuous ones stand in for them.
-    """
+    # It includes a program without constraints by which CLP fills results: Python cannot set their variables, nor their
+    # cost. CLP takes no binary variables, so continuous ones stand in for them.
 
-    MOST = 256
-    """Bindings that are remembered."""
+    MOST = 256  # bindings that are remembered
 
     def __init__(self, program: MathematicalProgram) -> None:
         """Of a program as it is now."""
@@ -134,10 +132,9 @@ class _Layout:
 
 
 class _Form(NamedTuple):
-    """min x' H x / 2 + f' x + constant  so that  lower <= A x <= upper,  least <= x <= most,  x[binary] in {0, 1}.
+    """min x' H x / 2 + f' x + constant  so that  lower <= A x <= upper,  least <= x <= most,  x[binary] in {0, 1}."""
 
-    H is (n, n), f, least, most and binary are (n,), A is (m, n), lower and upper are (m,); inf: no bound.
-    """
+    # H is (n, n), f, least, most and binary are (n,), A is (m, n), lower and upper are (m,); inf: no bound.
 
     constant: float
     hessian: Array
@@ -208,14 +205,13 @@ class _Form(NamedTuple):
 
 
 class _Reduced:
-    """A program as DAQP sees it: without what would make it slow, or what it does not take.
+    """A program as DAQP sees it: without what would make it slow, or what it does not take."""
 
-    - *Constants.* A variable whose bounds are equal is one; so is one with a quadratic cost of its own and no row.
-    - *Slack.* A variable with a quadratic cost of its own, whose one row it can always meet, is a soft row for DAQP.
-    - *Scale.* Variables are scaled to a unit diagonal of the Hessian.
-    - *Curvature.* Where the Hessian is singular, DAQP approaches the solution by proximal points. Before that, each
-      binary variable x gets the cost c (x^2 - x) / 2, which is 0 at 0 and at 1.
-    """
+    # - *Constants.* A variable whose bounds are equal is one; so is one with a quadratic cost of its own and no row.
+    # - *Slack.* A variable with a quadratic cost of its own, whose one row it can always meet, is a soft row for DAQP.
+    # - *Scale.* Variables are scaled to a unit diagonal of the Hessian.
+    # - *Curvature.* Where the Hessian is singular, DAQP approaches the solution by proximal points. Before that, each
+    #   binary variable x gets the cost c (x^2 - x) / 2, which is 0 at 0 and at 1.
 
     def __init__(self, form: _Form) -> None:
         """Find constants and slack, and scale."""
@@ -443,11 +439,7 @@ _COSTS = {INFEASIBLE: math.inf, UNBOUNDED: -math.inf}
 
 
 def _limits(*given: SolverOptions | None) -> SolverLimits:
-    """From options of Drake, the later ones counting more.
-
-    Raises:
-        ValueError: if there is an option that DAQP does not have.
-    """
+    """From options of Drake, the later ones counting more."""
     chosen = {name: value for one in given if one for name, value in one.options.get(DaqpSolver.NAME, {}).items()}
     if unknown := sorted(set(chosen) - set(SolverLimits._fields)):
         raise ValueError(

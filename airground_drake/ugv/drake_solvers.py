@@ -13,15 +13,15 @@ from airground_drake.base.arrays import Array
 from airground_drake.ugv.binary_program import BinaryProgram
 from airground_drake.ugv.daqp_solver import DaqpSolver, Details
 
+# Classes of solvers by the name in `gatekeeper.solver`.
 SOLVERS: dict[str, Any] = {"daqp": DaqpSolver, "gurobi": GurobiSolver, "mosek": MosekSolver}
-"""Classes of solvers by the name in `gatekeeper.solver`."""
 
+# Their options for a limit in time, s, and for a proven optimum: Gurobi and Mosek stop at a gap by default.
 OPTIONS: dict[str, tuple[str, dict[str, float]]] = {
     "daqp": ("time_limit", {}),
     "gurobi": ("TimeLimit", {"MIPGap": 0.0, "MIPGapAbs": 0.0}),
     "mosek": ("MSK_DPAR_MIO_MAX_TIME", {"MSK_DPAR_MIO_TOL_REL_GAP": 0.0, "MSK_DPAR_MIO_TOL_ABS_GAP": 0.0}),
 }
-"""Their options for a limit in time, s, and for a proven optimum: Gurobi and Mosek stop at a gap by default."""
 
 
 def lacking(name: str) -> str:
@@ -34,33 +34,19 @@ def lacking(name: str) -> str:
 
 @dataclass(frozen=True, eq=False)
 class SolverResult:
-    """A solver's result.
+    """A solver's result."""
 
-    Attributes:
-        omega: values of the accept variables, or shares, (B,); None without a solution.
-        ended: 'optimal' only with a proof.
-        iterations: of the active-set method over all nodes; 0 if the solver does not say.
-        multipliers: of the half-planes, 1/m, one per row; none if the solver does not say.
-    """
-
-    omega: Array | None
-    ended: Literal["optimal", "budget_spent", "solver_failed"]
-    iterations: int = 0
-    multipliers: Array | None = None
+    omega: Array | None  # values of the accept variables, or shares, (B,); None without a solution
+    ended: Literal["optimal", "budget_spent", "solver_failed"]  # 'optimal' only with a proof
+    iterations: int = 0  # of the active-set method over all nodes; 0 if the solver does not say
+    multipliers: Array | None = None  # of the half-planes, 1/m, one per row; none if the solver does not say
 
 
 class Minimiser:
     """The search for the optimum by one solver, with one thread; it holds the licence, if the solver needs one."""
 
     def __init__(self, name: str) -> None:
-        """Take the licence.
-
-        Args:
-            name: of `SOLVERS`.
-
-        Raises:
-            ValueError: if the solver cannot be used here; says why.
-        """
+        """Take the licence."""
         if why := lacking(name):
             raise ValueError(why)
         self._solver = SOLVERS[name]()

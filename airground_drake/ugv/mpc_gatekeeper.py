@@ -175,7 +175,7 @@ class PaperGatekeepers(Gatekeepers):
     def __init__(
         self, world: World, law: UgvLaw, presets: Sequence[Motion], route: Route, horizon: Horizon, rules: Rules
     ) -> None:
-        """As `Gatekeepers`; the route solves (26) over the horizon, and the rules lead to the answer."""
+        """The route solves (26) over the horizon, and the rules lead to the answer."""
         super().__init__(world, law, presets)
         self._route, self._horizon, self._rules = route, horizon, rules
 
@@ -228,11 +228,7 @@ class PaperGatekeepers(Gatekeepers):
         return GatekeeperDecision(now.t, i, proposal, accepted, reason, *evidence, basis=basis, cpu_s=cpu_s)
 
     def _solved(self, problem: Problem, budget: Budget) -> Solution:
-        """The route's solution; the route gets a `Problem` of its own, so that it cannot change what is recorded.
-
-        Raises:
-            PluginError: if the route breaks its contract: it raises, or returns anything but a `Solution`.
-        """
+        """The route's solution; the route gets a `Problem` of its own, so that it cannot change what is recorded."""
         kind = type(self._route)
         try:
             found: object = self._route.solve(replace(problem), budget)

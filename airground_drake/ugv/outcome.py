@@ -28,12 +28,9 @@ from airground_drake.model.law.ugv_law import UgvLaw
 from airground_drake.uav.policy import Proposal
 from airground_drake.ugv.rollout import ACCEPTED, REFUSED, ClosedLoop, View, advance, closed_loop, workspace
 
-USELESS = 1e-6
-"""Relative gain below which an intervention makes no difference."""
-STILL_SHARE = 0.1
-"""Largest `Outlook.still` as a share of the way that the UGV can do in a second."""
-MOST_CORNERS = 64
-"""Corners among which the shortest way is looked for; it takes 20 ms."""
+USELESS = 1e-6  # relative gain below which an intervention makes no difference
+STILL_SHARE = 0.1  # largest `Outlook.still` as a share of the way that the UGV can do in a second
+MOST_CORNERS = 64  # corners among which the shortest way is looked for; it takes 20 ms
 
 
 @dataclass(frozen=True)
@@ -84,14 +81,8 @@ class Outcome:
 
 
 def outcomes(seen: View, law: UgvLaw, proposal: Proposal, look: Outlook) -> tuple[Outcome, Outcome]:
-    """The outcomes of refusing and of accepting.
-
-    Args:
-        seen: what the UGV knows; obstacles stand still, whatever their velocities.
-        law: the UGV's control law.
-        proposal: in question.
-        look: how far to look.
-    """
+    """The outcomes of refusing and of accepting."""
+    # seen: what the UGV knows; obstacles stand still, whatever their velocities.
     h, t, m = law.avoidance.period, seen.t, len(seen.still)
     look = replace(look, still=min(look.still, STILL_SHARE * seen.max_speed))
     until = min(proposal.motion.end, t + look.longest)
@@ -111,13 +102,11 @@ def outcomes(seen: View, law: UgvLaw, proposal: Proposal, look: Outlook) -> tupl
 
 
 def robot_at(seen: View, robot: int, after: Array, coasting: float, *, together: bool) -> Array:
-    """Where one of the other bodies is predicted to be at times `after` from now, (S + 1,) s: (S + 1, 3), m.
-
-    A robot that is asked to make a motion tracks it: its distance from the motion decays with a time constant of 1 s.
-    Any other robot keeps its velocity for `coasting`, s, then stands. A motion that it has not accepted yet counts only
-    where this UGV accepts, too (`together`): otherwise each would refuse its part of a joint plan because the other
-    parts free its way.
-    """
+    """Where one of the other bodies is predicted to be at times `after` from now, (S + 1,) s: (S + 1, 3), m."""
+    # A robot that is asked to make a motion tracks it: its distance from the motion decays with a time constant of 1 s.
+    # Any other robot keeps its velocity for `coasting`, s, then stands. A motion that it has not accepted yet counts
+    # only where this UGV accepts, too (`together`): otherwise each would refuse its part of a joint plan because the
+    # other parts free its way.
     place, asked = seen.places[robot], seen.asked[robot]
     if asked is None or not (together or asked[1]):
         return place + np.minimum(after, coasting)[:, None] * seen.velocities[robot]
@@ -140,11 +129,9 @@ def _outcome(
 
 
 def way_left(place: Array, goal: Array, rows: Array, distances: Array) -> float:
-    """Length of the shortest way to the goal that keeps distances (m,), m, from cores (m, W), m; straight without one.
-
-    Among cores with more than `MOST_CORNERS` the length is that of a way on a lattice (`distance_field`), a little
-    longer: no map makes it take long.
-    """
+    """Length of the shortest way to the goal that keeps distances (m,), m, from cores (m, W), m; without, straight."""
+    # Among cores with more than `MOST_CORNERS` the length is that of a way on a lattice (`distance_field`), a little
+    # longer: no map makes it take long.
     rows, distances = outline.sections(rows, distances, float(place[2]))
     start, end = (np.append(each[:2], 0.0) for each in (place, goal))
     leg = end - start
@@ -165,11 +152,9 @@ def way_left(place: Array, goal: Array, rows: Array, distances: Array) -> float:
 def _rolled_out(
     loop: ClosedLoop, accepted: int, goal: Array, settled: int, near: float, still: float
 ) -> tuple[Array, float]:
-    """Positions at the control samples (k + 1, 3), m, and (25) with weight 1, when `accepted` periods are accepted.
-
-    It ends after `settled` periods, when the preset and all predicted motions are over, as soon as the UGV is at the
-    goal or has been at rest for a second.
-    """
+    """Positions at the control samples (k + 1, 3), m, and (25) with weight 1, when `accepted` periods are accepted."""
+    # It ends after `settled` periods, when the preset and all predicted motions are over, as soon as the UGV is at the
+    # goal or has been at rest for a second.
     steps = len(loop.preset) - 1
     second = max(1, round(1.0 / loop.law.layer.period))
     positions = np.empty((steps + 1, 3))

@@ -46,10 +46,8 @@ from airground_drake.ugv.patience import Commitment, Patience
 from airground_drake.ugv.reasons import Reason
 from airground_drake.ugv.rollout import View
 
-ACCEPTING: tuple[Reason, ...] = ("cheaper", "makes_way")
-"""Reasons for which a proposal is accepted."""
-MOST_CLAIMED = 64
-"""Obstacles of the UAV's map that a UGV takes into account."""
+ACCEPTING: tuple[Reason, ...] = ("cheaper", "makes_way")  # reasons for which a proposal is accepted
+MOST_CLAIMED = 64  # obstacles of the UAV's map that a UGV takes into account
 
 
 class OutcomeGatekeepers(Gatekeepers):
@@ -98,10 +96,8 @@ class OutcomeGatekeepers(Gatekeepers):
         )  # fmt: skip
 
     def _remembered(self, t: float, positions: Array, before: GatekeeperState) -> np.ndarray:
-        """Which outlines each UGV has sensed up to time t, s, (n, m), and has not seen to be gone since.
-
-        The very same array if nothing changes.
-        """
+        """Which outlines each UGV has sensed up to time t, s, (n, m), and has not seen to be gone since."""
+        # The very same array if nothing changes.
         still, own = self._world.at(self._near, t).still, positions[self._near.members]
         reach, known = self.law.avoidance.sensing_range, before.sensed
         if known.shape != (len(own), len(still)):
@@ -193,11 +189,9 @@ class OutcomeGatekeepers(Gatekeepers):
         return seen, basis
 
     def _believed(self, position: Array, sensed: npt.NDArray[np.bool_], proposal: Proposal) -> npt.NDArray[np.intp]:
-        """Rows of the UAV's map that are out of a UGV's sight and that it has not sensed itself.
-
-        Only the `MOST_CLAIMED` of these that are nearest count, so that no map makes a decision take long. Rows that
-        are no outlines are left out.
-        """
+        """Rows of the UAV's map that are out of a UGV's sight and that it has not sensed itself."""
+        # Only the `MOST_CLAIMED` of these that are nearest count, so that no map makes a decision take long. Rows that
+        # are no outlines are left out.
         claimed = proposal.mapped
         apart = np.full(len(claimed), -np.inf)
         sound = outline.are_outlines(claimed)
@@ -228,11 +222,9 @@ def _answer(decision: GatekeeperDecision, standing: float) -> float:
 
 
 def reason_of(refuse: Outcome, accept: Outcome, *, favour: bool) -> Reason:
-    """Why to accept (one of ACCEPTING) or why not, given both outcomes.
-
-    A UGV that makes way for another UGV (a `favour`) has nothing to gain: it accepts unless it would come to rest short
-    of its own goal. It cannot know whether the other UGV's trigger is on; `patience` bounds the cost of a lie.
-    """
+    """Why to accept (one of ACCEPTING) or why not, given both outcomes."""
+    # A UGV that makes way for another UGV (a `favour`) has nothing to gain: it accepts unless it would come to rest
+    # short of its own goal. It cannot know whether the other UGV's trigger is on; `patience` bounds the cost of a lie.
     if not (np.isfinite(accept.cost) and np.isfinite(refuse.cost)):
         return "no_plan"
     if accept.better_than(refuse):

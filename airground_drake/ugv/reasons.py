@@ -4,26 +4,20 @@ from __future__ import annotations
 
 from typing import Literal, NamedTuple
 
+# Reasons of answers: see `answer.settle` for method (c), `outcome_gatekeeper` for method (d).
 Reason = Literal[
     "cheaper", "not_cheaper", "waits", "no_difference", "kept", "dwell", "reversed", "no_plan",
     "first_stage",
     "stalls", "makes_way", "exhausted", "over", "joint_refused",
 ]  # fmt: skip
-"""Reasons of answers: see `answer.settle` for method (c), `outcome_gatekeeper` for method (d)."""
-OVER: Reason = "over"
-"""No refusal: the proposal was executed for as long as it was accepted."""
+OVER: Reason = "over"  # no refusal: the proposal was executed for as long as it was accepted
 
 
 class Words(NamedTuple):
-    """A reason in words.
+    """A reason in words."""
 
-    Attributes:
-        sentence: what the UAV is told.
-        refused: why a proposal was refused, in a few words, for a report's first screen; '' if the name of the
-            reason does.
-    """
-
-    sentence: str
+    sentence: str  # what the UAV is told
+    # Why a proposal was refused, in a few words, for a report's first screen; '' if the name of the reason does.
     refused: str = ""
 
 

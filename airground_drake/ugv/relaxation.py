@@ -45,11 +45,9 @@ def unavoidable_cost(problem: Problem) -> float:
 
 
 def normals_along(problem: Problem, positions: Array) -> Array:
-    """Unit vectors (N, m, 3) from the points to a guiding trajectory (N, 3).
-
-    Where no plan can come near, (26d) demands nothing. There the vectors point to the nearest place that any plan could
-    reach, so that no plan violates the half-plane.
-    """
+    """Unit vectors (N, m, 3) from the points to a guiding trajectory (N, 3)."""
+    # Where no plan can come near, (26d) demands nothing. There the vectors point to the nearest place that any plan
+    # could reach, so that no plan violates the half-plane.
     guide = np.where(within_reach(problem)[:, :, None], positions[:, None, :], nearest_in_reach(problem))
     offset = guide - problem.centres
     norm = np.sqrt(np.einsum("kmi,kmi->km", offset, offset))[:, :, None]
@@ -66,19 +64,13 @@ def offsets(problem: Problem, normals: Array) -> Array:
 
 
 def dual_bound(problem: Problem, normals: Array, omega: Array, multipliers: Array | None = None) -> float:
-    """Lower bound of (25), with distances along half-planes, by weak duality; valid for any arguments.
-
-    For multipliers l >= 0 of the half-planes, (25) is at least the Lagrangian. Its minimum over u >= 0 has a closed
-    form. Its task error is convex in omega, hence at least its linearisation at any omega, and the minimum of that over
-    [0, 1]^N has a closed form, too. At an optimum of the relaxation, with its multipliers, the bound is the optimum. A
-    solver's tolerances cost tightness only, never validity.
-
-    Args:
-        problem: data of (26).
-        normals: unit vectors, (N, m, 3).
-        omega: where to linearise, (N,).
-        multipliers: of the half-planes, (N, m), 1/m; negative ones count as 0. None: those of an optimum at omega.
-    """
+    """Lower bound of (25), with distances along half-planes, by weak duality; valid for any arguments."""
+    # For multipliers l >= 0 of the half-planes, (25) is at least the Lagrangian. Its minimum over u >= 0 has a closed
+    # form. Its task error is convex in omega, hence at least its linearisation at any omega, and the minimum of that
+    # over [0, 1]^N has a closed form, too. At an optimum of the relaxation, with its multipliers, the bound is the
+    # optimum. A solver's tolerances cost tightness only, never validity.
+    # normals: (N, m, 3); omega: (N,)
+    # multipliers: of the half-planes, (N, m), 1/m; negative ones count as 0. None: those of an optimum at omega.
     at = problem.positions(omega)
     if multipliers is None:
         multipliers = _multipliers(problem.terms, normals, at)
@@ -113,11 +105,9 @@ def _dual_bound(terms: Terms, normals: Array, omega: Array, positions: Array, mu
 
 @njit(cache=True)
 def _multipliers(terms: Terms, normals: Array, positions: Array) -> Array:
-    """Multipliers of the half-planes, (N, m), 1/m, at an optimum with these positions and no ties.
-
-    The derivative of b u^2 dt on the half-plane that is violated most at each stage. Where two are violated equally,
-    an optimum may share it between them: ask the solver there.
-    """
+    """Multipliers of the half-planes, (N, m), 1/m, at an optimum with these positions and no ties."""
+    # The derivative of b u^2 dt on the half-plane that is violated most at each stage. Where two are violated equally,
+    # an optimum may share it between them: ask the solver there.
     result = np.zeros(normals.shape[:2])
     for k in range(len(positions)):
         most, which = 0.0, -1

@@ -17,8 +17,7 @@ from airground_drake.model.law.ugv_law import AcceptedMotion, Numbers, Tracking,
 from airground_drake.model.plants.steering import HAND, NUMBERS, ahead, steer
 from airground_drake.uav.policy import Proposal
 
-REFUSED, ACCEPTED = 0, 1
-"""Modes of a control period: whether the proposal is in force."""
+REFUSED, ACCEPTED = 0, 1  # modes of a control period: whether the proposal is in force
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,11 +113,9 @@ class ClosedLoop(NamedTuple):
 def closed_loop(
     seen: View, law: UgvLaw, proposal: Proposal, after: Array, places: Array, substeps: int = 1
 ) -> ClosedLoop:
-    """The UGV's closed loop among bodies that move in any way, with `substeps` control periods per stage.
-
-    `after` are control samples from now on, (S + 1,), s, and `places` where these bodies are then, (S + 1, n, 3), m.
-    The `places` and `velocities` of the view do not count.
-    """
+    """The UGV's closed loop among bodies that move in any way, with `substeps` control periods per stage."""
+    # `after` are control samples from now on, (S + 1,), s, and `places` where these bodies are then, (S + 1, n, 3), m.
+    # The `places` and `velocities` of the view do not count.
     t = seen.t + after
     return ClosedLoop(
         law=law.numbers,
@@ -140,11 +137,10 @@ def closed_loop(
 
 
 class Workspace(NamedTuple):
-    """Arrays that one control period writes to, and the UGV's mobility.
+    """Arrays that one control period writes to, and the UGV's mobility."""
 
-    See `fill_half_spaces` for `which`, `normal`, `bound` and `retreat`; `rate` and `asked` are the velocities of the
-    preset trajectory and of the proposed motion, (3,), m/s; `heading` is that of a unicycle now, (1,), rad.
-    """
+    # See `fill_half_spaces` for `which`, `normal`, `bound` and `retreat`; `rate` and `asked` are the velocities of the
+    # preset trajectory and of the proposed motion, (3,), m/s; `heading` is that of a unicycle now, (1,), rad.
 
     mobility: Array
     which: npt.NDArray[np.intp]
@@ -175,13 +171,11 @@ def workspace(loop: ClosedLoop) -> Workspace:
 
 @njit(cache=True)
 def advance(loop: ClosedLoop, mode: int, k: int, position: Array, work: Workspace) -> Array:
-    """Move the UGV through control period k, and return its mean velocity in it, (3,), m/s.
-
-    Only here do predictions assume a plant. The steered point of every plant of `model.plants.plant` gets from sample
-    to sample as its command says; that of a unicycle may be shortened, which turns on its heading.
-
-    `mode` is REFUSED or ACCEPTED. `position`, (3,), m, is that at the beginning of the period, then that at its end.
-    """
+    """Move the UGV through control period k, and return its mean velocity in it, (3,), m/s."""
+    # Only here do predictions assume a plant. The steered point of every plant of `model.plants.plant` gets from sample
+    # to sample as its command says; that of a unicycle may be shortened, which turns on its heading.
+    #
+    # `mode` is REFUSED or ACCEPTED. `position`, (3,), m, is that at the beginning of the period, then that at its end.
     velocity = _command(loop, mode, k, position, work)
     if loop.steering[HAND] > 0.0:
         turning = steer(velocity, work.heading[0], loop.steering, loop.law.layer.period)[1]
@@ -213,11 +207,8 @@ def _command(loop: ClosedLoop, mode: int, k: int, position: Array, work: Workspa
 
 @njit(cache=True)
 def follow(loop: ClosedLoop, answers: npt.NDArray[np.int64]) -> tuple[Array, Array]:
-    """Roll out under an answer per stage, (N,), REFUSED or ACCEPTED.
-
-    Returns:
-        Positions at the ends of the stages, (N, 3), m, and mean velocities of the stages, (N, 3), m/s.
-    """
+    """Roll out under an answer per stage, (N,), REFUSED or ACCEPTED."""
+    # Returns positions at the ends of the stages, (N, 3), m, and mean velocities of the stages, (N, 3), m/s.
     stages = len(answers)
     positions, mean = np.empty((stages, 3)), np.zeros((stages, 3))
     position, work = loop.start.copy(), workspace(loop)

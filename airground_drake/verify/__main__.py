@@ -43,11 +43,8 @@ def parser() -> argparse.ArgumentParser:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command line.
-
-    Returns:
-        Exit code: 0 all as the scenario expects, 1 a claim differs, 2 usage, or a run or scenario that cannot be used.
-    """
+    """Run the command line."""
+    # Exit code: 0 all as the scenario expects, 1 a claim differs, 2 usage, or a run or scenario that cannot be used.
     options = parser().parse_args(arguments)
     try:
         with progress_bar(verbose=options.verbose) as progress:
@@ -64,7 +61,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _line(verdict: Verdict) -> str:
-    """A verdict in one line."""
     finding = verdict
     name = f"{verdict.claim.id} {verdict.run}" if verdict.run else verdict.claim.id
     margin = "" if finding.margin is None else f", margin {finding.margin:.6g} {finding.unit}".rstrip()
@@ -77,14 +73,8 @@ def _line(verdict: Verdict) -> str:
 
 
 def _judge(target: str, wanted: Sequence[str], progress: Progress, *, allow_plugins: bool) -> list[Verdict]:
-    """Verdicts on the claims wanted (none: all) that apply to the target.
-
-    Third-party claims that a saved run names are imported only if they are wanted, and only if that is allowed.
-
-    Raises:
-        UnknownNameError: if there is no such claim.
-        ScenarioError: if third-party code is named that is not allowed.
-    """
+    """Verdicts on the claims wanted (none: all) that apply to the target."""
+    # Third-party claims that a saved run names are imported only if they are wanted, and only if that is allowed.
     from airground_drake.scenario.load import from_data, load
     from airground_drake.sim import trace
     from airground_drake.verify import judge, judge_model

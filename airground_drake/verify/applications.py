@@ -23,8 +23,7 @@ from airground_drake.verify.runs.acceptances import Acceptance, acceptances
 from airground_drake.verify.runs.passive import beside
 from airground_drake.verify.runs.triggers import task_error
 
-Count = tuple[int, int]
-"""How often a premise was met, and how many times it could have been."""
+Count = tuple[int, int]  # how often a premise was met, and how many times it could have been
 
 
 class Retreats(NamedTuple):
@@ -81,13 +80,13 @@ def _retreats(trace: Trace) -> Retreats:
     return Retreats(*(sum(column) for column in zip(*counted, strict=True))) if counted else Retreats()
 
 
+# How a run counts the cases of a theorem, by claim about the model.
 COUNTED: dict[str, Callable[[Trace], Count]] = {
     "SAFE-INV": safe_pairs,
     "SAFE-GATE": below_avoidance,
     "LIVE-GATE": without_news,
     "LIVE-WAIT": below_avoidance,
 }
-"""How a run counts the cases of a theorem, by claim about the model."""
 
 
 def counts(trace: Trace) -> dict[str, Count]:
@@ -111,10 +110,8 @@ def with_counts(claim: str, finding: Finding, of_runs: Iterable[dict[str, Count]
 
 
 def measured(trace: Trace) -> dict[str, thr_choice.Measured]:
-    """What THR-CHOICE shows of a run, by `run UGV`; {} where records are missing or wrong, as in `counts`.
-
-    A UGV whose task error did not grow to the threshold is left out.
-    """
+    """What THR-CHOICE shows of a run, by `run UGV`; {} where records are missing or wrong, as in `counts`."""
+    # A UGV whose task error did not grow to the threshold is left out.
     found, decision = {}, trace.scenario.decision
     try:
         zeta = float(trace.meta["zeta_m"])

@@ -26,22 +26,13 @@ from airground_drake.verify.claim import ModelClaim
 from airground_drake.verify.finding import Finding
 
 SCHEMA = "airground_drake.finding/2"
-LARGEST_BYTES = 16_000_000
-"""A larger entry is not read."""
-KEPT = ("ZENO-REFINE", "THR-DDM")
-"""The claims whose findings are kept: experiments that take seconds."""
-ENGINES = ("numpy", "scipy", "numba")
-"""Packages whose versions are part of a finding's key."""
+LARGEST_BYTES = 16_000_000  # a larger entry is not read
+KEPT = ("ZENO-REFINE", "THR-DDM")  # the claims whose findings are kept: experiments that take seconds
+ENGINES = ("numpy", "scipy", "numba")  # packages whose versions are part of a finding's key
 
 
 def cached_finding(claim: ModelClaim, inputs: dict[str, Any], folder: Path | None = None) -> Finding:
-    """The finding of a claim for its inputs.
-
-    Args:
-        claim: the claim.
-        inputs: its constants, strict JSON.
-        folder: where findings of `KEPT` are kept; None: computed anew and not kept.
-    """
+    # folder: where findings of `KEPT` are kept; None: computed anew and not kept.
     if folder is None or claim.id not in KEPT:
         return claim.judge(inputs)
     path = folder / f"{key(claim, inputs)}.json"

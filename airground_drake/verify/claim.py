@@ -30,15 +30,15 @@ __all__ = [
     "require_whole_run",
 ]
 
+# A row may differ by this from the position that its command leads to, m. Integrating one step in floating point errs
+# by 1e-15 m.
 MOTION_TOLERANCE_M = 1e-9
-"""A row may differ by this from the position that its command leads to, m. Integrating one step in floating point errs
-by 1e-15 m."""
 
+# Two instants that differ by less are the same, s: rounding of multiples of a period errs by 1e-14 s.
 TIME_TOLERANCE_S = 1e-9
-"""Two instants that differ by less are the same, s: rounding of multiples of a period errs by 1e-14 s."""
 
+# A claim may hold with a margin that is this much below 0, in its unit: claims allow for rounding.
 MARGIN_ROUNDING = 1e-6
-"""A claim may hold with a margin that is this much below 0, in its unit: claims allow for rounding."""
 
 
 class Claim(abc.ABC):
@@ -217,13 +217,7 @@ class Verdict(Finding):
 
 
 def well_formed(claim: Claim, finding: Finding) -> Finding:
-    """The finding, its count as an `int`, once it is checked that it does not contradict itself.
-
-    Raises:
-        ValueError: if the status is unknown, if a margin is not a finite number, if a claim holds or is proved with a
-            negative margin (beyond `MARGIN_ROUNDING`), if a claim with `exercised_by` passes without a count, or if the
-            count is not a whole number from 0.
-    """
+    """The finding, its count as an `int`, once it is checked that it does not contradict itself."""
     if finding.status not in STATUSES:
         raise ValueError(f"{claim.id} found {finding.status!r}; allowed: {', '.join(STATUSES)}")
     margin: Any = finding.margin  # of third-party code, whatever its type
@@ -244,14 +238,7 @@ def well_formed(claim: Claim, finding: Finding) -> Finding:
 
 
 def require_motion(trace: Trace) -> None:
-    """Check that each position follows from the one before and the command by the robot's plant, as the trace says.
-
-    Of a user's plant, that its drift and cover are those of the recorded positions.
-
-    Raises:
-        TraceError: if time runs backwards, the run or the robots are not those of the scenario, or a step does
-            not agree with its command to within `MOTION_TOLERANCE_M`.
-    """
+    """Check that each position follows from the one before and the command by the robot's plant, as the trace says."""
     scenario, t = trace.scenario, trace.t
     if trace.run not in scenario.runs or scenario.runs[trace.run].method != trace.meta["method"]:
         raise TraceError(f"the scenario declares no run {trace.run!r} of method {trace.meta['method']!r}")
@@ -272,11 +259,7 @@ def require_motion(trace: Trace) -> None:
 
 
 def require_measured(trace: Trace, robot: str) -> None:
-    """Check the recorded drift and cover of a user's plant against the recorded positions, and where it begins.
-
-    Raises:
-        TraceError: if they differ by more than `MOTION_TOLERANCE_M`, per period for the drift.
-    """
+    """Check the recorded drift and cover of a user's plant against the recorded positions, and where it begins."""
     t, samples, place, body = trace.t, trace.sample_rows, trace.position(robot), trace.body(robot)
     for name, row, end in zip(range(len(samples)), samples, [*samples[1:], len(t) - 1], strict=True):
         lasting, way = t[end] - t[row], place[end] - place[row]
@@ -295,11 +278,7 @@ def require_measured(trace: Trace, robot: str) -> None:
 
 
 def require_body(trace: Trace, robot: str) -> None:
-    """Check that the recorded body of a robot follows from the steered point and the commands, by the robot's plant.
-
-    Raises:
-        TraceError: if it does not, to within `MOTION_TOLERANCE_M`, or does not begin where the scenario says.
-    """
+    """Check that the recorded body of a robot follows from the steered point and the commands, by the robot's plant."""
     given, period, t = trace.scenario.robots[robot], trace.scenario.control.period_s, trace.t
     if not any(plant.kind != "first_order" for plant in given.plant):
         return
@@ -343,11 +322,7 @@ def _agree(robot: str, t: Array, found: Array, due: Array, what: str) -> None:
 
 
 def require_whole_run(trace: Trace) -> None:
-    """Check that the rows cover the run, t = 0 to its duration, with no control period left out.
-
-    Raises:
-        TraceError: if they do not.
-    """
+    """Check that the rows cover the run, t = 0 to its duration, with no control period left out."""
     t = trace.t
     duration = trace.scenario.duration_s
     period = trace.scenario.control.period_s

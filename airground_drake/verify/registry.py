@@ -20,17 +20,9 @@ C = TypeVar("C", bound=Claim)
 
 
 def model_claims(ids: Collection[str] | None = None, added: Mapping[str, str] | None = None) -> list[ModelClaim]:
-    """The claims about the model, or those with these identifiers.
-
-    Args:
-        ids: default: all.
-        added: claims of a scenario, `module:Class` by identifier. Those about runs are left out.
-
-    Raises:
-        UnknownNameError: if an identifier is not that of a claim about the model.
-        PluginError: if a claim cannot be imported, lacks an attribute of `Claim`, or has another identifier than its
-            name.
-    """
+    """The claims about the model, or those with these identifiers."""
+    # ids: default: all.
+    # added: claims of a scenario, `module:Class` by identifier. Those about runs are left out.
     return _made(MODEL_CLAIMS, ModelClaim, ids, added or {})
 
 

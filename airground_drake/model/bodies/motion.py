@@ -8,27 +8,18 @@ import numpy as np
 
 from airground_drake.base.arrays import Array
 
-SAME_S = 1e-9
-"""Times closer than this are one instant, s."""
+SAME_S = 1e-9  # times closer than this are one instant, s
 
 
 class PeriodMotion(NamedTuple):
-    """A centre that stays within `off_m` of a point in uniform straight motion; exact if that is 0.
+    """A centre that stays within `off_m` of a point in uniform straight motion; exact if that is 0."""
 
-    The leading dimensions (...) are periods. `model.geometry.motion.Motion` is another thing: a plan with times.
-
-    Attributes:
-        start: position at the beginning of the period, (..., 3), m.
-        end: position at its end, (..., 3), m.
-        off_m: largest distance from the straight line, m.
-    """
-
-    start: Array
-    end: Array
-    off_m: float = 0.0
+    start: Array  # position at the beginning of the period, (..., 3), m
+    end: Array  # position at its end, (..., 3), m
+    off_m: float = 0.0  # largest distance from the straight line, m
 
     def seen_from(self, other: PeriodMotion) -> PeriodMotion:
-        """The same motion relative to another centre that moves during the same periods."""
+        """This motion relative to another centre that moves during the same periods."""
         return PeriodMotion(self.start - other.start, self.end - other.end, self.off_m + other.off_m)
 
     @property
@@ -38,15 +29,11 @@ class PeriodMotion(NamedTuple):
         return places.min(axis=0) - self.off_m, places.max(axis=0) + self.off_m
 
     def least_distance(self) -> tuple[Array, Array]:
-        """The least distance from the origin.
-
-        The squared distance is a convex parabola of the share s of the period that has passed. It is least at
-        s = clip(-start.w / ||w||^2, 0, 1) with w = end - start.
-
-        Returns:
-            A lower bound of the distance, (...,), m, exact if `off_m` is 0, and the first share of the period, (...,),
-            at which the straight motion is nearest.
-        """
+        """The least distance from the origin."""
+        # The squared distance is a convex parabola of the share s of the period that has passed. It is least at s =
+        # clip(-start.w / ||w||^2, 0, 1) with w = end - start.
+        # Returns a lower bound of the distance, (...,), m, exact if `off_m` is 0, and the first share of the period,
+        # (...,), at which the straight motion is nearest.
         change = self.end - self.start
         squared = np.einsum("...i,...i->...", change, change)
         along = -np.einsum("...i,...i->...", self.start, change)

@@ -19,8 +19,7 @@ from airground_drake.model.plants.steering import NUMBERS
 
 Kind = Literal["ugv", "uav", "obstacle"]
 KINDS: tuple[Kind, ...] = get_args(Kind)
-ROBOTS: tuple[Kind, ...] = ("ugv", "uav")
-"""Kinds of bodies that are commanded."""
+ROBOTS: tuple[Kind, ...] = ("ugv", "uav")  # kinds of bodies that are commanded
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,11 +49,7 @@ class Body:
     disappears_s: float = np.inf
 
     def __post_init__(self) -> None:
-        """Check the kind and the speed limit.
-
-        Raises:
-            ValueError: if there is no such kind, or the limit is not a number from 0.
-        """
+        """Check the kind and the speed limit."""
         if self.kind not in KINDS:
             raise ValueError(f"body {self.name!r} is of kind {self.kind!r}; allowed: {', '.join(KINDS)}")
         if not self.max_speed_m_s >= 0.0:
@@ -134,11 +129,7 @@ class World:
     gain_1_s: float = 0.0
 
     def __post_init__(self) -> None:
-        """Check the order.
-
-        Raises:
-            ValueError: if bodies are not in the order above, a robot cannot move, or two have the same name.
-        """
+        """Check the order."""
         if any(body.plant is None for body in self.bodies if body.kind in ROBOTS):
             raise ValueError("a robot needs a plant")
         order = [(KINDS.index(body.kind), body.plant is None) for body in self.bodies]
@@ -271,7 +262,7 @@ class World:
         )
 
     def _beside(self, robot: Body, radius: float) -> Array:
-        """The same for the parts that move, of obstacles and of other robots, (P,), m."""
+        """Distances that the law keeps from the parts that move, of obstacles and of other robots, (P,), m."""
         return np.concatenate([
             law_distance(
                 self.apart(robot.kind, body.kind) + (radius + body.shape[:, outline.RADIUS]), robot.bounds, body.bounds,

@@ -14,30 +14,19 @@ from airground_drake.base.arrays import Array
 from airground_drake.base.compiling import njit
 from airground_drake.model.geometry.outline import BASE, CORNERS, COUNT, EXTENT, MIDDLE, TOP
 
-FAR = 1.0 + 1e-12
-"""Squares of distances that exceed a limit by this factor do so whatever the rounding."""
-PER_CELL = 4.0
-"""Points to a cell, on average, where points near an outline are looked for."""
-WIDEST_PIECE = 1.0
-"""Widest piece of an arc that may be covered at once, rad."""
-FINER = 6
-"""Such pieces are halved at most so often."""
+FAR = 1.0 + 1e-12  # squares of distances that exceed a limit by this factor do so whatever the rounding
+PER_CELL = 4.0  # points to a cell, on average, where points near an outline are looked for
+WIDEST_PIECE = 1.0  # widest piece of an arc that may be covered at once, rad
+FINER = 6  # such pieces are halved at most so often
 
 
 @njit(cache=True)
 def nearest(row: Array, x: float, y: float, z: float, planar: bool, away: Array, beyond: float) -> float:
-    """Signed distance of a point from a core, m; writes the unit vector away from the core into `away`, (3,).
-
-    Args:
-        row: an outline.
-        x: of the point, m.
-        y: of the point, m.
-        z: of the point, m.
-        planar: whether the point stays in its plane: then no way leads out of a core through its top.
-        away: the result; 0 in the only corner of a core, where no direction leads away.
-        beyond: if the distance exceeds this, m, a lower bound of it that exceeds it, too, may be returned, and `away`
-            means nothing.
-    """
+    """Signed distance of a point from a core, m; writes the unit vector away from the core into `away`, (3,)."""
+    # planar: whether the point stays in its plane: then no way leads out of a core through its top.
+    # away: the result; 0 in the only corner of a core, where no direction leads away.
+    # beyond: if the distance exceeds this, m, a lower bound of it that exceeds it, too, may be returned, and `away`
+    # means nothing.
     count = int(row[COUNT])
     dz = z - min(max(z, row[BASE]), row[TOP])
     if count == 1:
@@ -109,10 +98,8 @@ def distances(rows: Array, position: Array, planar: bool) -> Array:
 
 @njit(cache=True)
 def nearest_points(rows: Array, positions: Array) -> Array:
-    """The points of cores (m, W) that are nearest to positions (N, 3) in the plane z = 0, m: (N, m, 3), m.
-
-    Inside a core it is the nearest point of its boundary.
-    """
+    """The points of cores (m, W) that are nearest to positions (N, 3) in the plane z = 0, m: (N, m, 3), m."""
+    # Inside a core it is the nearest point of its boundary.
     found, away = np.empty((len(positions), len(rows), 3)), np.empty(3)
     for k in range(len(rows)):
         row = rows[k]
@@ -172,17 +159,10 @@ def news_within(rows: Array, positions: Array, reach: float, planar: bool, known
 
 @njit(cache=True)
 def approach(row: Array, start: Array, end: Array, planar: bool) -> tuple[float, float]:
-    """Least signed distance of a point in straight motion from a core, m, and the share of the motion where that is.
-
-    Outside of the core the squared distance is a parabola between two of `_breaks`: three values give its least one.
-    Inside, the signed distance is convex, and the least one is found by thirds.
-
-    Args:
-        row: an outline.
-        start: first place of the point, (3,), m.
-        end: last place, (3,), m.
-        planar: as in `nearest`.
-    """
+    """Least signed distance of a point in straight motion from a core, m, and the share of the motion where that is."""
+    # Outside of the core the squared distance is a parabola between two of `_breaks`: three values give its least one.
+    # Inside, the signed distance is convex, and the least one is found by thirds.
+    # start, end: (3,), m
     vx, vy, vz = end[0] - start[0], end[1] - start[1], end[2] - start[2]
     shares = _breaks(row, start, vx, vy, vz)
     least, at, before, first = np.inf, 0.0, 0.0, 0.0
@@ -274,15 +254,9 @@ def points_are_free(points: Array, rows: Array, keep: Array) -> npt.NDArray[np.b
 
 @njit(cache=True)
 def segments_are_free(begin: Array, end: Array, rows: Array, keep: Array, slack: float) -> npt.NDArray[np.bool_]:
-    """Which segments in the plane z = 0 keep out. One with an end too near to a core must come no nearer than that end.
-
-    Args:
-        begin: (K, 2), m.
-        end: (K, 2), m.
-        rows: outlines, (m, W).
-        keep: distances from their cores, (m,), m.
-        slack: tolerance of the distances, m.
-    """
+    """Which segments in the plane z = 0 keep out."""
+    # One with an end too near to a core must come no nearer than that end.
+    # begin, end: (K, 2), m; rows: (m, W); keep: (m,), m; slack: m
     free = np.ones(len(begin), np.bool_)
     cells, half = _cells_of(0.5 * (begin + end)), 0.0
     for k in range(len(begin)):
@@ -302,19 +276,13 @@ def segments_are_free(begin: Array, end: Array, rows: Array, keep: Array, slack:
 
 
 class _Cells(NamedTuple):
-    """Points in square cells, to find those near an outline.
+    """Points in square cells, to find those near an outline."""
 
-    Attributes:
-        first: index of the first member of each cell of each column, and the index after the last, (columns, rows + 1).
-        members: numbers of the points, sorted by cell, (K,).
-        corner: lowest corner, (2,), m.
-        size: of a cell, m.
-    """
-
+    # Index of the first member of each cell of each column, and the index after the last, (columns, rows + 1).
     first: npt.NDArray[np.int64]
-    members: npt.NDArray[np.int64]
-    corner: Array
-    size: float
+    members: npt.NDArray[np.int64]  # numbers of the points, sorted by cell, (K,)
+    corner: Array  # lowest corner, (2,), m
+    size: float  # of a cell, m
 
 
 @njit(cache=True)
@@ -394,10 +362,8 @@ def passes(row: Array, keep: float, ax: float, ay: float, bx: float, by: float, 
 
 @njit(cache=True)
 def clears(row: Array, reach: float, ax: float, ay: float, bx: float, by: float) -> bool:
-    """Whether a segment from (ax, ay) to (bx, by), m, in the plane z = 0 is everywhere `reach`, m, from a core.
-
-    Of a segment and a core that do not meet, either an end of the segment or a corner of the core is nearest.
-    """
+    """Whether a segment from (ax, ay) to (bx, by), m, in the plane z = 0 is everywhere `reach`, m, from a core."""
+    # Of a segment and a core that do not meet, either an end of the segment or a corner of the core is nearest.
     sx, sy, count = bx - ax, by - ay, int(row[COUNT])
     far = reach + row[EXTENT]
     mx, my = row[MIDDLE], row[MIDDLE + 1]
@@ -457,19 +423,11 @@ def in_the_way(begin: Array, end: Array, more: Array, rows: Array, reach: Array)
 def arcs_are_covered(
     centres: Array, radii: Array, begin: Array, sweep: Array, rows: Array, reach: Array
 ) -> npt.NDArray[np.bool_]:
-    """Which arcs have every point nearer than `reach` (m,), m, to one of the cores (m, W): (K,).
-
-    An arc is divided into pieces. A piece is covered if its ends and the point where the tangents at its ends meet are
-    near to the same core: all that is near to a core is convex. So an arc may be covered and not found to be.
-
-    Args:
-        centres: of the circles, (K, 2), m.
-        radii: of the circles, (K,), m.
-        begin: heading of the first point of each arc from its centre, (K,), rad.
-        sweep: angle of each arc, counter-clockwise, (K,), rad.
-        rows: outlines, (m, W).
-        reach: distances from their cores, (m,), m.
-    """
+    """Which arcs have every point nearer than `reach` (m,), m, to one of the cores (m, W): (K,)."""
+    # An arc is divided into pieces. A piece is covered if its ends and the point where the tangents at its ends meet
+    # are near to the same core: all that is near to a core is convex. So an arc may be covered and not found to be.
+    # centres: (K, 2), m; radii: (K,), m; begin: (K,), rad
+    # sweep: angle of each arc, counter-clockwise, (K,), rad.
     count, widest = np.zeros(len(centres) + 1, np.int64), 0.0
     for k in range(len(radii)):
         widest = max(widest, radii[k])

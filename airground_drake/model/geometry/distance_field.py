@@ -22,14 +22,10 @@ from airground_drake.base.arrays import Array
 from airground_drake.base.compiling import njit
 from airground_drake.model.geometry import convex, outline
 
-MOST_NODES = 60_000
-"""Number of nodes of a lattice; a larger area gets a wider spacing."""
-FINEST = 0.1
-"""Least spacing as a share of the least distance to keep."""
-MOST_SQUARES = 6
-"""Number of squares in which a way is looked for, so that no obstacle far away makes it take long."""
-MOST_FIELDS = 8
-"""Fields that are remembered; each takes 3 MB at most."""
+MOST_NODES = 60_000  # number of nodes of a lattice; a larger area gets a wider spacing
+FINEST = 0.1  # least spacing as a share of the least distance to keep
+MOST_SQUARES = 6  # number of squares in which a way is looked for, so that no obstacle far away makes it take long
+MOST_FIELDS = 8  # fields that are remembered; each takes 3 MB at most
 ROUNDING_M = 1e-9
 
 Indices = npt.NDArray[np.int64]
@@ -37,37 +33,21 @@ Indices = npt.NDArray[np.int64]
 
 @dataclass(frozen=True, eq=False)
 class DistanceField:
-    """Ways to one place that keep distances from obstacles in the plane z = 0.
+    """Ways to one place that keep distances from obstacles in the plane z = 0."""
 
-    The nodes keep at least 0.71 of their spacing from all cores, so no way leads through a thin wall. In exchange, a
-    gap may be closed that is narrower than that.
+    # The nodes keep at least 0.71 of their spacing from all cores, so no way leads through a thin wall. In exchange, a
+    # gap may be closed that is narrower than that.
 
-    Attributes:
-        rows: outlines of the obstacles, (m, W), see `convex`.
-        keep: distances from their cores, (m,), m.
-        nodes: places of the free nodes, (N, 2), m.
-        corners: the corner of its way that each sees next, (N, 2), m.
-        beyond: length of the way from there to the goal, (N,), m; infinite at a node without a way.
-    """
-
-    rows: Array
-    keep: Array
-    nodes: Array
-    corners: Array
-    beyond: Array
+    rows: Array  # outlines of the obstacles, (m, W), see `convex`
+    keep: Array  # distances from their cores, (m,), m
+    nodes: Array  # places of the free nodes, (N, 2), m
+    corners: Array  # the corner of its way that each sees next, (N, 2), m
+    beyond: Array  # length of the way from there to the goal, (N,), m; infinite at a node without a way
 
     @classmethod
     def to(cls, goal: Array, rows: Array, keep: Array, half: float) -> DistanceField:
-        """The field of a goal in a square about it.
-
-        If the goal is too near to an obstacle, the nearest free nodes see it all the same.
-
-        Args:
-            goal: (2,), m.
-            rows: outlines of the obstacles, (m, W), m >= 1.
-            keep: distances from their cores, (m,), m.
-            half: half the side of the square, m. Nodes are inside it and near obstacles only.
-        """
+        """The field of a goal in a square about it; `goal` (2,), m; `rows` (m, W); `keep` (m,), m; `half` in m."""
+        # If the goal is too near to an obstacle, the nearest free nodes see it all the same.
         low, high = outline.box(rows)
         room = float(keep.max())
         low = np.maximum(np.minimum(low[:2], goal) - room, goal - half)
@@ -88,10 +68,8 @@ class DistanceField:
         return cls(rows, keep, places[known], corners, beyond)
 
     def length(self, place: Array) -> float:
-        """Length of the way from a place (2,), m; infinite without a way.
-
-        A place too near to an obstacle may be left by any straight way that comes no nearer.
-        """
+        """Length of the way from a place (2,), m; infinite without a way."""
+        # A place too near to an obstacle may be left by any straight way that comes no nearer.
         apart = np.hypot(*(self.nodes - place).T)
         nearest = int(np.argmin(apart))
         if np.isinf(self.beyond[nearest]):
@@ -109,17 +87,10 @@ def _remembered(goal: tuple[float, ...], half: float, width: int, rows: bytes, k
 
 
 def length_among(place: Array, goal: Array, rows: Array, keep: Array) -> float:
-    """Length of a short way from a place (2,) to a goal (2,), m, among very many obstacles; infinite without a way.
-
-    It is looked for in a square about the goal, and in one of twice the size as long as a shorter way might lead out of
-    the square. The fields are remembered.
-
-    Args:
-        place: where the way begins, m.
-        goal: where it ends, m.
-        rows: outlines in the plane z = 0, (m, W), see `convex`.
-        keep: distances from their cores, (m,), m.
-    """
+    """Length of a short way from a place (2,) to a goal (2,), m, among very many obstacles; infinite without a way."""
+    # It is looked for in a square about the goal, and in one of twice the size as long as a shorter way might lead out
+    # of the square. The fields are remembered.
+    # rows: (m, W); keep: (m,), m
     straight = float(np.hypot(*(place - goal)))
     half = 2.0 ** (1.0 + np.ceil(np.log2(max(straight, float(keep.max()), ROUNDING_M))))
     best = float("inf")
@@ -138,13 +109,8 @@ def length_among(place: Array, goal: Array, rows: Array, keep: Array) -> float:
 
 @njit(cache=True)
 def _settled(free: npt.NDArray[np.bool_], gx: float, gy: float) -> tuple[Array, Indices]:
-    """Lengths from all nodes to a goal in units of the spacing, (N,), infinite without a way, and their next corners.
-
-    Args:
-        free: which nodes are free, (columns, lines).
-        gx: place of the goal in units of the spacing.
-        gy: the same.
-    """
+    """Lengths from all nodes to a goal in units of the spacing, (N,), infinite without a way; next corners."""
+    # free: (columns, lines)
     lines, count = free.shape[1], free.size
     length, corner = np.full(count, np.inf), np.full(count, -1, np.int64)
     settled, seen = np.zeros(count, np.bool_), np.zeros(count, np.bool_)

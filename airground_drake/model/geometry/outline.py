@@ -31,10 +31,8 @@ from numpy.typing import ArrayLike
 from airground_drake.base.arrays import Array
 
 GAP, RADIUS, SPEED, BASE, TOP, COUNT, MIDDLE, EXTENT, CORNERS = 0, 1, 2, 3, 4, 5, 6, 8, 9
-SAME_M = 1e-9
-"""Outlines whose numbers differ by no more than this are one, m."""
-NOWHERE_M = 1e150
-"""Coordinates of an obstacle that is not there: beyond any range, and its square is still finite."""
+SAME_M = 1e-9  # outlines whose numbers differ by no more than this are one, m
+NOWHERE_M = 1e150  # coordinates of an obstacle that is not there: beyond any range, and its square is still finite
 
 
 def balls(centres: ArrayLike, radii: ArrayLike = 0.0, gap: float = 0.0) -> Array:
@@ -48,15 +46,8 @@ def balls(centres: ArrayLike, radii: ArrayLike = 0.0, gap: float = 0.0) -> Array
 
 
 def prism(corners: ArrayLike, *, base: float = 0.0, top: float = 0.0, radius: float = 0.0, gap: float = 0.0) -> Array:
-    """The outline of the convex hull of corners (n, 2), m, from one height to another, m.
-
-    Args:
-        corners: of a convex polygon, in order and counter-clockwise; two for a wall, one for a post.
-        base: height at which it begins, m.
-        top: height at which it ends, m.
-        radius: of the rounding, m.
-        gap: distance to keep from it, m.
-    """
+    """The outline of the convex hull of corners (n, 2), m, from one height to another, m."""
+    # corners: of a convex polygon, in order and counter-clockwise; two for a wall, one for a post.
     places = np.asarray(corners, dtype=np.float64).reshape(1, -1, 2)
     found: Array = prisms(places, base=base, top=top, radius=radius, gap=gap)[0]
     return found
@@ -182,11 +173,8 @@ def where(there: npt.NDArray[np.bool_], rows: Array) -> Array:
 
 
 def sections(rows: Array, distance: Array | float, height: float) -> tuple[Array, Array]:
-    """Where a plane at a height, m, cuts the sets within a distance, (m,), m, of the cores of outlines (m, W).
-
-    Returns:
-        The outlines that it cuts, in the plane z = 0, (k, W), and the distances from their cores there, (k,), m.
-    """
+    """Where a plane at a height, m, cuts the sets within a distance, (m,), m, of the cores of outlines (m, W)."""
+    # Returns the outlines that it cuts, in the plane z = 0, (k, W), and the distances from their cores there, (k,), m.
     above = np.maximum(np.maximum(rows[:, BASE] - height, height - rows[:, TOP]), 0.0)
     reach = np.broadcast_to(distance, len(rows))
     squared = np.square(reach) - np.square(above)

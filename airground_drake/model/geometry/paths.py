@@ -33,28 +33,24 @@ from airground_drake.model.geometry.separation import are_separated
 
 Points = NDArray[np.complex128]
 
+# Tolerance, m. A start or goal up to TOL inside an obstacle counts as on its boundary; a disc of radius up to TOL is
+# ignored, and from walls and polygons at least twice as much is kept. It is meant for coordinates and radii up to
+# 1e4 m, where rounding (2e-12 m) stays well below.
 TOL = 1e-9
-"""Tolerance, m. A start or goal up to TOL inside an obstacle counts as on its boundary; a disc of radius up to TOL is
-ignored, and from walls and polygons at least twice as much is kept. It is meant for coordinates and radii up to 1e4 m,
-where rounding (2e-12 m) stays well below."""
+# Room for rounding, m: legs may dip so far into an obstacle, a disc that sticks out of another by less is dropped,
+# shorter pieces are left out of the path.
 _EPS = TOL / 10
-"""Room for rounding, m: legs may dip so far into an obstacle, a disc that sticks out of another by less is dropped,
-shorter pieces are left out of the path."""
 
-FEW = 64
-"""Up to this number of circles all obstacles enter the graph; beyond it only those that a path runs into."""
+FEW = 64  # up to this number of circles all obstacles enter the graph; beyond it only those that a path runs into
 
-SEARCHES = 12
-"""After so many searches more obstacles enter the graph than the path runs into: a quarter as many again."""
+SEARCHES = 12  # after so many searches more obstacles enter the graph than the path runs into: a quarter as many again
 
-AT_ONCE = 1_000_000
-"""Largest number of pairs of a segment and a disc that are tested together, to limit memory."""
+AT_ONCE = 1_000_000  # largest number of pairs of a segment and a disc that are tested together, to limit memory
 
-SLACK = 1e-3
-"""By so much more than the arc round a corner has to be covered at both ends, rad."""
+SLACK = 1e-3  # by so much more than the arc round a corner has to be covered at both ends, rad
 
+# Largest angle of the chords that stand for an arc where obstacles are looked for that a path runs into, rad.
 CHORD = 0.1
-"""Largest angle of the chords that stand for an arc where obstacles are looked for that a path runs into, rad."""
 
 
 class NoPath(ValueError):  # noqa: N818
@@ -149,19 +145,12 @@ def shortest_path(start: ArrayLike, goal: ArrayLike, rows: Array, keep: ArrayLik
 
 @dataclass(frozen=True, eq=False)
 class _Obstacles:
-    """What a path keeps out of.
+    """What a path keeps out of."""
 
-    Attributes:
-        c: centres of discs, (m,).
-        r: their radii, (m,), m.
-        rows: outlines of walls and polygons, (k, W), at height 0.
-        keep: distances from their cores, (k,), m.
-    """
-
-    c: Points
-    r: Array
-    rows: Array
-    keep: Array
+    c: Points  # centres of discs, (m,)
+    r: Array  # their radii, (m,), m
+    rows: Array  # outlines of walls and polygons, (k, W), at height 0
+    keep: Array  # distances from their cores, (k,), m
 
     @classmethod
     def of(cls, rows: Array, keep: Array) -> Self:
@@ -206,10 +195,7 @@ class _Obstacles:
 
     @cached_property
     def circles(self) -> tuple[Points, Array, Points]:
-        """Centres and radii of discs and of the circles round corners, (n,), and the ways to the next corners, (2, n).
-
-        Of equal circles round corners there is one.
-        """
+        """Centres and radii of discs and of circles round corners, (n,), and the ways to the next corners, (2, n)."""
         discs = np.zeros((2, len(self.c)), dtype=complex)
         if not len(self.rows):
             return self.c, self.r, discs
@@ -225,11 +211,9 @@ class _Obstacles:
 
     @cached_property
     def touchable(self) -> NDArray[np.bool_]:
-        """Which circles have a point that no obstacle covers, (n,); no free path touches another one.
-
-        On a map that is one in eight: obstacles overlap. Of a corner's circle, only the arc between its two edges is on
-        the boundary of its own polygon. Of that arc a little more is looked at, for rounding.
-        """
+        """Which circles have a point that no obstacle covers, (n,); no free path touches another one."""
+        # On a map that is one in eight: obstacles overlap. Of a corner's circle, only the arc between its two edges is
+        # on the boundary of its own polygon. Of that arc a little more is looked at, for rounding.
         c, r, (before, after) = self.circles
         of_corner = before != 0.0
         begin = np.where(of_corner, np.angle(1j * before) - SLACK, 0.0)
@@ -255,7 +239,7 @@ class _Obstacles:
         return convex.distances(self.rows, np.array((point.real, point.imag, 0.0)), True)
 
     def shrunk(self, point: complex) -> Self:
-        """The same with a point that is up to TOL inside on the boundary."""
+        """These obstacles, but with a point that is up to TOL inside on the boundary."""
         r, keep = np.minimum(self.r, abs(self.c - point)), np.minimum(self.keep, self.distances(point))
         return replace(self, r=r, keep=keep)
 
@@ -396,7 +380,7 @@ def _escape(p: complex, around: _Obstacles) -> complex:
 
 
 def _exit(p: complex, around: _Obstacles) -> complex:
-    """As `_escape`, with all places where boundaries cross."""
+    """The nearest point to p of the boundary of the union, tried at all places where boundaries cross."""
     c, r, _ = around.circles
     begin, end = around.edges
     e = np.where(abs(p - c) > _EPS, p - c, 1.0)  # along +x from a centre
@@ -414,11 +398,9 @@ def _exit(p: complex, around: _Obstacles) -> complex:
 
 
 def _tangents(c: Points, r: Array, ways: Points) -> tuple[Points, Points, NDArray[np.intp]]:
-    """Both ends of all common tangents, (n,), and the circles they touch, (2, n); 0, 1 are points.
-
-    A tangent that cuts the polygon about whose corner the circle is, is left out: the ways to the next corners, (2, m),
-    lead to its other side.
-    """
+    """Both ends of all common tangents, (n,), and the circles they touch, (2, n); 0, 1 are points."""
+    # A tangent that cuts the polygon about whose corner the circle is, is left out: the ways to the next corners,
+    # (2, m), lead to its other side.
     i, j = np.triu_indices(len(r), 1)
     apart = abs(c[j] - c[i])
     found = []
@@ -446,7 +428,7 @@ def _rows(begin: Points, heading: Points, curvature: Array, length: Array) -> Ar
 
 
 def _route_among(p: complex, q: complex, around: _Obstacles) -> Array | None:
-    """As `_route`, also among many: a shortest path among some that runs into none of the others is shortest."""
+    """The pieces of the shortest path; a shortest path among some that runs into none of the others is shortest."""
     if len(around.circles[1]) <= FEW:
         return _route(p, q, around)
     some = around.entered(_rows(np.array([p]), np.array([q - p]), np.zeros(1), np.array([abs(q - p)])))

@@ -19,14 +19,8 @@ from airground_drake.model.geometry.outline import CORNERS, COUNT, EXTENT, MIDDL
 
 @njit(cache=True)
 def are_separated(p: Array, q: Array, rows: Array, keep: Array) -> bool:
-    """Whether every way in the plane z = 0 between two free places comes too near to a core.
-
-    Args:
-        p: a place that is far enough from all cores, (2,), m.
-        q: another one, (2,), m.
-        rows: outlines, (m, W), see `model.geometry.outline`.
-        keep: distances from their cores, (m,), m.
-    """
+    """Whether every way in the plane z = 0 between two free places comes too near to a core."""
+    # p, q: (2,), m; rows: (m, W); keep: (m,), m
     parent, odd = np.arange(len(rows)), np.zeros(len(rows), np.bool_)
     inner = _inner_points(rows)
     boxes = np.empty((len(rows), 4))

@@ -17,20 +17,19 @@ from airground_drake.model.bodies.world import Neighbours
 from airground_drake.model.geometry.convex import may_be_within, nearest
 from airground_drake.model.geometry.outline import SPEED
 
+# Added to every bound in the projection, m/s. The bound of a robot in contact is 0. Without the margin rounding would
+# miss it every other time, and `_scale_back` would stop a robot that should slide along.
 MARGIN_M_S = 1e-12
-"""Added to every bound in the projection, m/s. The bound of a robot in contact is 0. Without the margin rounding would
-miss it every other time, and `_scale_back` would stop a robot that should slide along."""
+# Constraints contradict each other if one is missed by more than this where the others are met, m/s.
 CONTRADICTION_M_S = 1e-9
-"""Constraints contradict each other if one is missed by more than this where the others are met, m/s."""
+# Violations that exceed the least one by no more than this share count as least: no speed is spent on rounding.
 ABOVE_LEAST = 1e-9
-"""Violations that exceed the least one by no more than this share count as least: no speed is spent on rounding."""
+# So do violations that exceed it by this, m/s. Between two points in opposite directions but for rounding, a fast
+# velocity along both boundaries would otherwise win by its rounding error.
 ABOVE_LEAST_M_S = 1e-11
-"""So do violations that exceed it by this, m/s. Between two points in opposite directions but for rounding, a fast
-velocity along both boundaries would otherwise win by its rounding error."""
+# Normals within 1e-10 rad of linear dependence count as dependent: the square of the sine of that angle.
 DEPENDENT = 1e-20
-"""Normals within 1e-10 rad of linear dependence count as dependent: the square of the sine of that angle."""
-ROUNDING = 1e-15
-"""Relative rounding error up to which a constraint counts as met."""
+ROUNDING = 1e-15  # relative rounding error up to which a constraint counts as met
 
 AUGMENTED, RECURSION_NEAREST, RECURSION_LISTED = 0, 1, 2
 
@@ -224,12 +223,10 @@ def _closest_feasible(lower: Array, normal: Array, bound: Array) -> Array:
 
 @njit(cache=True)
 def _least_violation(normal: Array, bound: Array) -> Array:
-    """Slowest velocity whose largest violation is least, up to `ABOVE_LEAST` and `ABOVE_LEAST_M_S`.
-
-    Constraints contradict each other only where a robot is inside several safe distances at once. The wishes of lower
-    priorities then have no say: they might be hostile. The least violation is found from below: each contradiction
-    proves that every velocity misses some constraint by a certain amount, and the bounds are lowered by that.
-    """
+    """Slowest velocity whose largest violation is least, up to `ABOVE_LEAST` and `ABOVE_LEAST_M_S`."""
+    # Constraints contradict each other only where a robot is inside several safe distances at once. The wishes of lower
+    # priorities then have no say: they might be hostile. The least violation is found from below: each contradiction
+    # proves that every velocity misses some constraint by a certain amount, and the bounds are lowered by that.
     still = np.zeros(normal.shape[1])
     least, more = 0.0, np.inf
     while more > 1e-14 * least:
@@ -240,16 +237,14 @@ def _least_violation(normal: Array, bound: Array) -> Array:
 
 @njit(cache=True)
 def _closest(lower: Array, normal: Array, bound: Array, contradiction: float) -> tuple[Array, float]:
-    """Closest velocity to `lower` (d,) with normal (K, d) . v >= bound (K,), and the violation that is certain, m/s.
-
-    The dual active-set method of Goldfarb and Idnani (Mathematical Programming 27, 1983) in d dimensions. The velocity
-    is always the closest one under the active constraints; each of these pushes with a force >= 0. The constraint that
-    is missed most joins them; a constraint whose force falls to 0 on the way leaves.
-
-    A constraint that the active ones contradict is left out if it is missed by no more than `contradiction`, m/s.
-    Otherwise the certain violation is above 0: every velocity misses some constraint by at least that much, and the
-    velocity returned means nothing.
-    """
+    """Closest velocity to `lower` (d,) with normal (K, d) . v >= bound (K,), and the violation that is certain, m/s."""
+    # The dual active-set method of Goldfarb and Idnani (Mathematical Programming 27, 1983) in d dimensions. The
+    # velocity is always the closest one under the active constraints; each of these pushes with a force >= 0. The
+    # constraint that is missed most joins them; a constraint whose force falls to 0 on the way leaves.
+    #
+    # A constraint that the active ones contradict is left out if it is missed by no more than `contradiction`, m/s.
+    # Otherwise the certain violation is above 0: every velocity misses some constraint by at least that much, and the
+    # velocity returned means nothing.
     count, d = normal.shape
     velocity, settled = lower.copy(), np.zeros(count, dtype=np.bool_)  # active or left out
     active, force, pull = np.empty(d, dtype=np.int64), np.empty(d + 1), np.empty(d)
@@ -323,11 +318,9 @@ def _most_missed(velocity: Array, normal: Array, bound: Array, settled: npt.NDAr
 
 @njit(cache=True)
 def _first_release(force: Array, share: Array, pull: Array, size: int) -> tuple[float, int]:
-    """How far the velocity can move before the force of an active constraint falls to 0, and which one that is.
-
-    Writes into `pull` the weights of the active normals in the new one, which is across[size] + sum of pull * normal.
-    Without such a constraint: inf and -1.
-    """
+    """How far the velocity can move before the force of an active constraint falls to 0, and which one that is."""
+    # Writes into `pull` the weights of the active normals in the new one, which is across[size] + sum of pull * normal.
+    # Without such a constraint: inf and -1.
     step, leaving = np.inf, -1
     for m in range(size):
         pull[m] = share[size, m]
@@ -363,10 +356,8 @@ def _remove(
 
 @njit(cache=True)
 def _split(vector: Array, across: Array, share: Array, k: int) -> None:
-    """Write the part of a vector that is orthogonal to across[:k] into across[k], and into share[k, :k] its shares.
-
-    Gram-Schmidt, twice: of nearly parallel vectors, one pass leaves a part along the others as large as the rest.
-    """
+    """Write the part of a vector that is orthogonal to across[:k] into across[k], and into share[k, :k] its shares."""
+    # Gram-Schmidt, twice: of nearly parallel vectors, one pass leaves a part along the others as large as the rest.
     across[k] = vector
     share[k, :k] = 0.0
     for _ in range(2):
@@ -382,11 +373,9 @@ def _split(vector: Array, across: Array, share: Array, k: int) -> None:
 
 @njit(cache=True)
 def _meet(velocity: Array, normal: Array, bound: Array, active: npt.NDArray[np.int64], across: Array) -> None:
-    """Take a velocity, in place, the shortest way to where the active constraints hold with equality.
-
-    Twice: with nearly parallel normals the first pass misses by the rounding error over the sine of their angle, which
-    is too much. The second pass starts beside the goal and misses by the rounding error only.
-    """
+    """Take a velocity, in place, the shortest way to where the active constraints hold with equality."""
+    # Twice: with nearly parallel normals the first pass misses by the rounding error over the sine of their angle,
+    # which is too much. The second pass starts beside the goal and misses by the rounding error only.
     for _ in range(2):
         for m in range(len(active)):
             missed, along = bound[active[m]], 0.0
@@ -399,10 +388,8 @@ def _meet(velocity: Array, normal: Array, bound: Array, active: npt.NDArray[np.i
 
 @njit(cache=True)
 def _scale_back(velocity: Array, normal: Array, bound: Array) -> Array:
-    """Shorten a velocity, in place, until every constraint that v = 0 satisfies holds in floating point.
-
-    A robot that is inside the safe distance by rounding only counts as being at it.
-    """
+    """Shorten a velocity, in place, until every constraint that v = 0 satisfies holds in floating point."""
+    # A robot that is inside the safe distance by rounding only counts as being at it.
     while True:
         scale = 1.0
         for k in range(len(bound)):

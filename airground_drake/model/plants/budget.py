@@ -53,8 +53,7 @@ class Bounds(NamedTuple):
         return not any(self[:5])
 
 
-AT_REST = Bounds()
-"""Of a set that does not move."""
+AT_REST = Bounds()  # of a set that does not move
 
 
 class Cost(NamedTuple):
@@ -68,15 +67,9 @@ class Cost(NamedTuple):
 def law_distance(
     distance: Array | float, one: Bounds, other: Bounds = AT_REST, *, gain: float, passive: bool = False
 ) -> Array | float:
-    """Distance that the law keeps between steered points so that the bodies keep `distance`, m: shape of `distance`.
-
-    Args:
-        distance: between centres, or from a convex core at rest, m.
-        one: of a robot.
-        other: of another robot, or `AT_REST`.
-        gain: A of the law, 1/s.
-        passive: beside an obstacle that may move.
-    """
+    """Distance that the law keeps between steered points so that the bodies keep `distance`, m: shape of `distance`."""
+    # gain: 1/s
+    # passive: beside an obstacle that may move.
     if one.exact and other.exact:
         return distance
     kept = distance

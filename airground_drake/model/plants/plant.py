@@ -23,8 +23,8 @@ from airground_drake.model.plants.steering import FORWARD, HALF_BASE, HAND, NUMB
 if TYPE_CHECKING:
     from airground_drake.model.geometry.motion import Motion
 
+# Signals of a body that is not where the law steers it: its position, world frame.
 PLACE = ("body_x_m", "body_y_m", "body_z_m")
-"""Signals of a body that is not where the law steers it: its position, world frame."""
 
 
 class Plant(Protocol):
@@ -151,10 +151,8 @@ class Unicycle(_Straight):
         return start + self.hand_m * ahead
 
     def bounds(self, speed_m_s: float) -> Bounds:
-        """Cover l. The hand point runs through an arc with a chord of at most V h: dip omega V h^2 / (8 sinc).
-
-        An axle that never goes backwards is drawn after the hand point.
-        """
+        """Cover l. The hand point runs through an arc with a chord of at most V h: dip omega V h^2 / (8 sinc)."""
+        # An axle that never goes backwards is drawn after the hand point.
         half = 0.5 * self.turning_rad_s(speed_m_s) * self.period_s
         sinc = math.sin(half) / half if half else 1.0
         dip = 0.25 * half * speed_m_s * self.period_s / sinc
@@ -261,24 +259,18 @@ class Delay(_Straight):
 
 @dataclass(frozen=True)
 class Own(_Straight):
-    """A Drake System of the user's, whose motion is not known here: `sim.blocks.plant` makes it and looks at its ports.
+    """A Drake System of the user's, whose motion is not known here."""
 
-    Its steered point gets to within `drift_m_s` times the control period of where its command leads in each period, and
-    its body stays within `cover_m` of the straight line between the places of that point at the period's ends. A run
-    measures both. Predictions go where the command leads.
-
-    Attributes:
-        name: of its class, `module:Class` or `file.py:Class`.
-        drift_m_s: declared.
-        cover_m: declared.
-        parameters: of its class.
-    """
+    # `sim.blocks.plant` makes it and looks at its ports.
+    # Its steered point gets to within `drift_m_s` times the control period of where its command leads in each period,
+    # and its body stays within `cover_m` of the straight line between the places of that point at the period's ends. A
+    # run measures both. Predictions go where the command leads.
 
     kind: ClassVar[str] = "own"
-    name: str
-    drift_m_s: float
-    cover_m: float
-    parameters: Mapping[str, float] = field(default_factory=dict)
+    name: str  # of its class, `module:Class` or `file.py:Class`
+    drift_m_s: float  # declared
+    cover_m: float  # declared
+    parameters: Mapping[str, float] = field(default_factory=dict)  # of its class
 
     @property
     def signals(self) -> tuple[str, ...]:
@@ -292,13 +284,8 @@ class Own(_Straight):
 
 @dataclass(frozen=True, eq=False)
 class Scripted(_Straight):
-    """A motion that is given: nobody commands it.
-
-    Attributes:
-        script: where it is, straight between its vertices, which are at control samples.
-        announced: whether the robots' predictions know that.
-    """
+    """A motion that is given: nobody commands it."""
 
     kind: ClassVar[str] = "scripted"
-    script: Motion
-    announced: bool = False
+    script: Motion  # where it is, straight between its vertices, which are at control samples
+    announced: bool = False  # whether the robots' predictions know that

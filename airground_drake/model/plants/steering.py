@@ -26,24 +26,18 @@ import numpy as np
 from airground_drake.base.arrays import Array
 from airground_drake.base.compiling import njit
 
+# Entries of the numbers of a steering, (5,): hand point l, m (0: no unicycle); largest turning rate, rad/s; half the
+# wheel base, m; largest speed of a wheel, m/s; 1 if it never drives backwards, else 0. inf: no limit.
 HAND, TURN, HALF_BASE, WHEEL, FORWARD = 0, 1, 2, 3, 4
-"""Entries of the numbers of a steering, (5,): hand point l, m (0: no unicycle); largest turning rate, rad/s; half the
-wheel base, m; largest speed of a wheel, m/s; 1 if it never drives backwards, else 0. inf: no limit."""
 NUMBERS = 5
-BISECTIONS = 50
-"""Halvings in the search for a share that the wheels can do; the result always can be done."""
+BISECTIONS = 50  # halvings in the search for a share that the wheels can do; the result always can be done
 
 
 @njit(cache=True)
 def chord(a: float, b: float, hand: float, period: float) -> tuple[float, float]:
-    """Speed v, m/s, and turning rate omega, rad/s, for a command (a, b), m/s, in the frame of the body.
-
-    Args:
-        a: ahead.
-        b: to the left.
-        hand: l, m.
-        period: h, s.
-    """
+    """Speed v, m/s, and turning rate omega, rad/s, for a command (a, b), m/s, in the frame of the body."""
+    # hand: l, m.
+    # period: h, s.
     if b == 0.0:
         return a, 0.0
     beta = math.atan2(b * period, 2.0 * hand + a * period)
@@ -80,11 +74,8 @@ def _wheels(a: float, b: float, steering: Array, period: float) -> float:
 
 @njit(cache=True)
 def steer(velocity: Array, heading: float, steering: Array, period: float) -> tuple[float, float]:
-    """Shorten a command (3,), m/s, world frame, in place, for a unicycle with a heading, rad.
-
-    Returns:
-        The share s that is left of the command, 0 if it stands, and the turning rate, rad/s.
-    """
+    """Shorten a command (3,), m/s, world frame, in place, for a unicycle with a heading, rad."""
+    # Returns the share s that is left of the command, 0 if it stands, and the turning rate, rad/s.
     cos, sin = math.cos(heading), math.sin(heading)
     if steering[FORWARD] > 0.0 and velocity[0] * cos + velocity[1] * sin < 0.0:
         velocity[:] = 0.0
@@ -99,11 +90,8 @@ def steer(velocity: Array, heading: float, steering: Array, period: float) -> tu
 
 @njit(cache=True)
 def steer_all(velocity: Array, headings: Array, steering: Array, period: float) -> Array:
-    """Shorten the commands (n, 3), m/s, of UGVs with headings (n,), rad, in place; `steering` is (n, 5).
-
-    Returns:
-        The shares that are left, (n,); 1 for a UGV that is no unicycle.
-    """
+    """Shorten the commands (n, 3), m/s, of UGVs with headings (n,), rad, in place; `steering` is (n, 5)."""
+    # Returns the shares that are left, (n,); 1 for a UGV that is no unicycle.
     left = np.ones(len(velocity))
     for i in range(len(velocity)):
         if steering[i, HAND] > 0.0:
@@ -122,16 +110,11 @@ def ahead(heading: float, steering: Array, direction: Array) -> bool:
 
 @njit(cache=True)
 def along(base: Array, velocity: Array, heading: float, elapsed: float, hand: float, period: float) -> Array:
-    """Axle (3,), m, and heading, rad, of a unicycle within a period: (4,).
-
-    Args:
-        base: where a first-order robot would be that started from the hand point, (3,), m, world frame.
-        velocity: the command, (3,), m/s.
-        heading: at the beginning of the period, rad.
-        elapsed: time since then, s.
-        hand: l, m.
-        period: h, s.
-    """
+    """Axle (3,), m, and heading, rad, of a unicycle within a period: (4,); `velocity` (3,), m/s."""
+    # base: where a first-order robot would be that started from the hand point, (3,), m, world frame.
+    # elapsed: time since then, s.
+    # hand: l, m.
+    # period: h, s.
     cos, sin = math.cos(heading), math.sin(heading)
     v, omega = chord(velocity[0] * cos + velocity[1] * sin, velocity[1] * cos - velocity[0] * sin, hand, period)
     half = 0.5 * omega * elapsed

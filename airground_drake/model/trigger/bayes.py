@@ -68,8 +68,8 @@ def printed_threshold(drift: float, noise: float, c1: float, c2: float) -> float
     return optimal_threshold(drift, noise, c2, c1)
 
 
+# Rules that compute the threshold from drift, noise, c1 and c2.
 COMPUTED = {"bayes": optimal_threshold, "printed": printed_threshold}
-"""Rules that compute the threshold from drift, noise, c1 and c2."""
 
 
 def _bias(zeta: float, drift: float, noise: float, deviation: float) -> float:

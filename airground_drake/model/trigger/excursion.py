@@ -19,19 +19,13 @@ import numpy.typing as npt
 from airground_drake.base.arrays import Array
 from airground_drake.base.compiling import njit
 
-SUPERVISING, INTERVENING = 0, 1
-"""Modes of `model.trigger.automaton.Mode`, as numba takes them; the third is REFRACTORY."""
+SUPERVISING, INTERVENING = 0, 1  # modes of `model.trigger.automaton.Mode`, as numba takes them; the third is REFRACTORY
 
 
 @njit(cache=True)
 def extremes(before: Array, after: Array, ends: Array) -> Array:
-    """Least and largest x over a step, (2, n), m.
-
-    Args:
-        before: task error, m, and noise, m, of n UGVs at the beginning of the step, (n, 4).
-        after: the same at its end, (n, 4); both are linear in between.
-        ends: x at the beginning and at the end, (2, n), m.
-    """
+    """Least and largest x over a step, (2, n), m; `before` (n, 4), m."""
+    # after: the same at its end, (n, 4); both are linear in between.
     found = np.empty((2, len(before)))
     for j in range(len(before)):
         x, y, z, n = before[j]
@@ -89,10 +83,8 @@ def variables(parts: Array) -> Array:
 
 @njit(cache=True)
 def gathered(t: float, position: Array, reference: Array, noise: Array) -> Array:
-    """Time, s, then task error, m, noise, m, and x of (15), m, of each of n UGVs: (1 + 5n,).
-
-    `position` and `reference` begin with those of the UGVs, (3n + ...,), m; `noise` is (n,), m.
-    """
+    """Time, s, then task error, m, noise, m, and x of (15), m, of each of n UGVs: (1 + 5n,)."""
+    # `position` and `reference` begin with those of the UGVs, (3n + ...,), m; `noise` is (n,), m.
     signals = np.empty(1 + 5 * len(noise))
     signals[0] = t
     for j in range(len(noise)):
@@ -114,15 +106,8 @@ def spans(begun: Array, now: Array) -> Array:
 
 @njit(cache=True)
 def transitions_due(status: Array, t: float, least: Array, most: Array, levels: Array) -> npt.NDArray[np.bool_]:
-    """For which UGVs a transition of the trigger is due, (n,).
-
-    Args:
-        status: mode, number of triggers, times of the last trigger and of the last release, s, per UGV: (4n,).
-        t: time, s.
-        least: smallest x in this step, (n,), m.
-        most: largest, (n,), m.
-        levels: zeta, m, release, m, and dwell, s, of the trigger, (3,).
-    """
+    """For which UGVs a transition of the trigger is due, (n,); `status` (4n,), s; `t` in s; `least`, `most` (n,), m."""
+    # levels: zeta, m, release, m, and dwell, s, of the trigger, (3,).
     zeta, release, dwell = levels[0], levels[1], levels[2]
     due = np.zeros(len(least), dtype=np.bool_)
     for j in range(len(least)):

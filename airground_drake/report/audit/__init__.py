@@ -24,12 +24,7 @@ def of_runs(scenario: Scenario, traces: Mapping[str, Trace]) -> list[dict[str, A
 
 
 def whole(scenario: Scenario, verdicts: Sequence[Verdict]) -> list[dict[str, Any]]:
-    """All findings but those of the scenario's own runs.
-
-    Args:
-        scenario: `case_a`, whose constants are the paper's.
-        verdicts: on its model; findings that rest on a proof quote them.
-    """
+    """All findings but those of the scenario's own runs."""
     from airground_drake.report.audit.companions import companion_findings  # imports Drake
     from airground_drake.report.audit.formulas import formula_findings
     from airground_drake.report.audit.readings import reading_findings

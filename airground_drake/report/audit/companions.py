@@ -27,10 +27,9 @@ from airground_drake.ugv.outcome import Outcome
 from airground_drake.ugv.outcome_gatekeeper import OutcomeGatekeepers
 from airground_drake.ugv.rollout import View
 
+# Relaxation (27), with half-planes, and rounding (28)-(29), whatever the default of a scenario.
 PAPERS_ROUTE = "gatekeeper.route=relaxed"
-"""Relaxation (27), with half-planes, and rounding (28)-(29), whatever the default of a scenario."""
-WAY_POINTS = 120
-"""Points of a line that a finding keeps for its figure."""
+WAY_POINTS = 120  # points of a line that a finding keeps for its figure
 EVERYTHING = "d, all accepted"
 LIGHT = "c, error weight 1"
 

@@ -12,29 +12,20 @@ Kind = Literal["faithful", "changed", "not realised"]
 
 
 class PaperDeviation(NamedTuple):
-    """One equation, table, figure or remark of the paper, and how the package realises it.
+    """One equation, table, figure or remark of the paper, and how the package realises it."""
 
-    Attributes:
-        place: where in the paper, such as "(6)" or "Table 1".
-        says: what it is about, in words.
-        realised_in: the code, `module:name` below the package; empty if it is not realised.
-        kind: faithful, changed or not realised.
-        here: what the code does, where it differs from the paper or the paper leaves it open.
-        why: the reason for a difference; '' for what is faithful.
-        findings: findings of the audit about this place, by number.
-    """
-
-    place: str
-    says: str
-    realised_in: tuple[str, ...]
-    kind: Kind
-    here: str = ""
-    why: str = ""
-    findings: tuple[int, ...] = ()
+    place: str  # where in the paper, such as "(6)" or "Table 1"
+    says: str  # what it is about, in words
+    realised_in: tuple[str, ...]  # the code, `module:name` below the package; empty if it is not realised
+    kind: Kind  # faithful, changed or not realised
+    here: str = ""  # what the code does, where it differs from the paper or the paper leaves it open
+    why: str = ""  # the reason for a difference; '' for what is faithful
+    findings: tuple[int, ...] = ()  # findings of the audit about this place, by number
 
 
 _PROGRAM = ("ugv.problem:Problem", "ugv.binary_program:BinaryProgram")
 
+# Every place of the paper that a model can realise, in the paper's order.
 DEVIATIONS: tuple[PaperDeviation, ...] = (
     PaperDeviation(
         "(1)", "task value sigma = f(rho)",
@@ -267,4 +258,3 @@ DEVIATIONS: tuple[PaperDeviation, ...] = (
         "A minimum inter-event time excludes it.", "As (20).", (9,),
     ),
 )  # fmt: skip
-"""Every place of the paper that a model can realise, in the paper's order."""

@@ -9,6 +9,7 @@ from airground_drake.verify import Finding
 
 Item = dict[str, Any]
 
+# Findings, by number, that a fault in our text conversion of the paper could explain, and how.
 CONVERSION = {
     6: "The table's '1t' may have lost something.",
     7: "A minus sign is easily lost.",
@@ -16,7 +17,6 @@ CONVERSION = {
     12: "The subscripts m and md, j and d are easily mistaken for each other.",
     22: "Some of the indices may have been other letters: n and N, j and r.",
 }
-"""Findings, by number, that a fault in our text conversion of the paper could explain, and how."""
 
 
 def item(

@@ -29,12 +29,10 @@ from airground_drake.ugv.rollout import ACCEPTED, REFUSED, ClosedLoop, advance, 
 from airground_drake.ugv.routes.nonlinear import NonlinearRoute
 from airground_drake.ugv.solution import ConstantPlans
 
-AS_RUN, OTHER_START, AT_THE_PLAN = "as run", "other start", "velocities at the plan"
-"""Variants of (27): see `variants`."""
-ITERATIONS = 200
-"""Of the search with velocities at the plan: enough for it to end by itself."""
+AS_RUN, OTHER_START, AT_THE_PLAN = "as run", "other start", "velocities at the plan"  # variants of (27): see `variants`
+ITERATIONS = 200  # of the search with velocities at the plan: enough for it to end by itself
+# How long the runs of finding 25 last: past the acceptance that is taken back.
 DURATIONS_S = {"case_a": 18.0, "case_b": 16.0}
-"""How long the runs of finding 25 last: past the acceptance that is taken back."""
 
 
 class Prediction(NamedTuple):
@@ -49,7 +47,6 @@ class Remembering(PaperGatekeepers):
     """Gatekeepers of method (c) who keep what they predicted."""
 
     def __init__(self, *parts: Any) -> None:
-        """As `PaperGatekeepers`, without any prediction yet."""
         super().__init__(*parts)
         self.predictions: list[Prediction] = []
 
@@ -150,12 +147,10 @@ def _changes(predictions: Sequence[Prediction]) -> list[Prediction]:
 
 
 def variants(problem: Problem, loop: ClosedLoop) -> dict[str, dict[str, Any]]:
-    """Local optima of (27), by what the paper leaves open: first share, answer by (28)-(29), and cost (25).
-
-    - `as run`: the velocities of (23) are those along the two constant plans; the search starts at the cheaper one.
-    - `other start`: the search starts at the dearer one.
-    - `velocities at the plan`: those of the closed loop where the plan leads; the search starts as in the run.
-    """
+    """Local optima of (27), by what the paper leaves open: first share, answer by (28)-(29), and cost (25)."""
+    # - `as run`: the velocities of (23) are those along the two constant plans; the search starts at the cheaper one.
+    # - `other start`: the search starts at the dearer one.
+    # - `velocities at the plan`: those of the closed loop where the plan leads; the search starts as in the run.
     plans, route = ConstantPlans.of(problem), NonlinearRoute()
     dearer = plans.refuse if plans.better is plans.accept else plans.accept
     found: dict[str, dict[str, Any]] = {}
@@ -174,10 +169,7 @@ def _told(omega: Array, cost: float) -> dict[str, Any]:
 
 
 def at_the_plan(problem: Problem, loop: ClosedLoop, start: Array) -> Array:
-    """A local optimum (N,) of (27) with the velocities of (23) where the plan leads.
-
-    By sequential quadratic programming over omega alone: positions and slacks follow from it.
-    """
+    """A local optimum (N,) of (27) with the velocities of (23) where the plan leads."""
     found = minimize(
         lambda omega: cost_at_the_plan(problem, loop, omega), start, method="SLSQP",
         bounds=[(0.0, 1.0)] * len(start), options={"maxiter": ITERATIONS},
@@ -192,10 +184,8 @@ def cost_at_the_plan(problem: Problem, loop: ClosedLoop, omega: Array) -> float:
 
 @njit(cache=True)
 def positions_at_the_plan(loop: ClosedLoop, omega: Array) -> Array:
-    """Positions (N, 3), m, at the ends of the stages if a UGV mixes both velocities of (23) by omega (N,).
-
-    For constant plans they are those of `rollout.follow`. It is no unicycle.
-    """
+    """Positions (N, 3), m, at the ends of the stages if a UGV mixes both velocities of (23) by omega (N,)."""
+    # For constant plans they are those of `rollout.follow`. It is no unicycle.
     positions, position, work = np.empty((len(omega), 3)), loop.start.copy(), workspace(loop)
     for stage in range(len(omega)):
         for k in range(stage * loop.substeps, (stage + 1) * loop.substeps):

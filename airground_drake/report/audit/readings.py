@@ -63,10 +63,8 @@ def _stall(scenario: Scenario) -> Item:
 
 
 def between_obstacles(scenario: Scenario) -> tuple[list[Array], Array]:
-    """The two obstacles between which UGV1 stalls, and the point at the safe distance from both, [x, y], m.
-
-    Of the two such points it is the one at which UGV1 arrives first.
-    """
+    """The two obstacles between which UGV1 stalls, and the point at the safe distance from both, [x, y], m."""
+    # Of the two such points it is the one at which UGV1 arrives first.
     d = scenario.safe_distance.obstacle_m
     centres = [np.array(scenario.obstacles[name].position_m[:2]) for name in ("obstacle_1", "obstacle_2")]
     middle, between = (centres[0] + centres[1]) / 2.0, centres[1] - centres[0]

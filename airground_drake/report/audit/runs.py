@@ -16,10 +16,8 @@ from airground_drake.report.reproduction import MEASURES
 from airground_drake.scenario.schema import Preset, Reproduction, Scenario
 from airground_drake.sim.trace import Trace
 
-PRINTED_SPEED_M_S = 1.0
-"""Reference speed of Table 1, [3.3, 1t, 0]."""
-REFERENCE_POINTS = 121
-"""Points of the reference's way that a finding keeps for its figure."""
+PRINTED_SPEED_M_S = 1.0  # reference speed of Table 1, [3.3, 1t, 0]
+REFERENCE_POINTS = 121  # points of the reference's way that a finding keeps for its figure
 
 
 def findings(scenario: Scenario, traces: Mapping[str, Trace]) -> list[Item]:
@@ -117,11 +115,9 @@ def _timing(scenario: Scenario, traces: Mapping[str, Trace]) -> Item | None:
 
 
 def leaves_ball(preset: Preset, centre: list[float], radius: float) -> float | None:
-    """Distance travelled along a preset trajectory when it last leaves the ball, m; None if it never does.
-
-    On each leg p + u e (e a unit vector, u in m) the crossings solve ||p + u e - centre|| = radius; the larger
-    root is where the ball is left.
-    """
+    """Distance travelled along a preset trajectory when it last leaves the ball, m; None if it never does."""
+    # On each leg p + u e (e a unit vector, u in m) the crossings solve ||p + u e - centre|| = radius; the larger root
+    # is where the ball is left.
     left, begin = None, 0.0
     points = np.array(preset.waypoints_m)[:, :2]
     for p, q in pairwise(points):

@@ -7,6 +7,7 @@ from typing import Any
 
 from airground_drake.report.audit.item import CONVERSION, Item
 
+# By number of the finding; findings about numbers alone are left out.
 FORMULAS: dict[int, tuple[tuple[str, ...], tuple[str, ...]]] = {
     1: (
         (r"v = v_1 + (I - J_1^+ J_1) (v_2 + (I - J_2^+ J_2) v_3)",),
@@ -103,7 +104,6 @@ FORMULAS: dict[int, tuple[tuple[str, ...], tuple[str, ...]]] = {
         (r"v_{int} = J^+ (\dot\sigma_d + \Lambda (\sigma_d - \sigma))",),
     ),
 }
-"""By number of the finding; findings about numbers alone are left out."""
 
 
 def typeset(items: Iterable[Item]) -> list[dict[str, Any]]:

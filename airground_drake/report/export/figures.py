@@ -17,23 +17,22 @@ from airground_drake.scenario.schema import Scenario
 from airground_drake.sim.trace import Trace
 
 FORMATS = ("pdf", "png", "svg")
+# Settings of matplotlib by style: serif type for two columns, sans serif for one.
 STYLES: dict[str, dict[str, Any]] = {
     "ieee": {"font.family": "serif", "font.serif": ["STIXGeneral", "Times"], "mathtext.fontset": "stix"},
     "thesis": {"font.family": "sans-serif", "font.sans-serif": ["DejaVu Sans"]},
 }
-"""Settings of matplotlib by style: serif type for two columns, sans serif for one."""
-WIDTHS = {"ieee": r"\columnwidth", "thesis": r"0.7\linewidth"}
-"""Width of a figure in the text."""
+WIDTHS = {"ieee": r"\columnwidth", "thesis": r"0.7\linewidth"}  # width of a figure in the text
 
+# Claims that a figure is about, by its identifier.
 SHOWN = {
     "trajectories": ("LIVE-GOAL",),
     "distances": ("SAFE-TRACE", "SAFE-GATE"),
     "timelines": ("THR-TRIG", "THR-CHOICE", "LIVE-HYP", "ZENO-TRACE", "ZENO-PROOF"),
 }
-"""Claims that a figure is about, by its identifier."""
 
+# Metadata without a date, by format, so that the same run gives the same file.
 UNDATED: dict[str, dict[str, None]] = {"pdf": {"CreationDate": None}, "svg": {"Date": None}}
-"""Metadata without a date, by format, so that the same run gives the same file."""
 _COMMON = {"savefig.dpi": 300, "pdf.fonttype": 42}
 
 
@@ -45,20 +44,8 @@ def write(
     style: str = "ieee",
     formats: Sequence[str] = ("pdf",),
 ) -> Iterator[Path]:
-    """Write the figures of a report, `figures.tex` with their captions, `verdicts.tex` and `reproduction.tex`.
-
-    Args:
-        report: content of report.json.
-        scenario: of the report.
-        traces: its runs by name.
-        folder: where the files go; it must exist.
-        style: one of STYLES.
-        formats: of the figures, from FORMATS.
-
-    Raises:
-        TraceError: if a trace lacks a column or holds numbers that are not finite.
-        OSError: if a file cannot be written.
-    """
+    """Write the figures of a report, `figures.tex` with their captions, `verdicts.tex` and `reproduction.tex`."""
+    # folder: where the files go; it must exist.
     texts, settings = [], {**_COMMON, **STYLES[style]}
     for figure in draw.draw(scenario, traces, settings):
         names = []

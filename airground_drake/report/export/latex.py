@@ -21,13 +21,8 @@ def escaped(text: str) -> str:
 
 
 def verdicts(report: Mapping[str, Any]) -> str:
-    """A table with a row per claim: its verdict about the model, or about each run.
-
-    "not tested" stands for a verdict that nothing could have refuted.
-
-    Args:
-        report: content of report.json.
-    """
+    """A table with a row per claim: its verdict about the model, or about each run."""
+    # "not tested" stands for a verdict that nothing could have refuted.
     found: dict[str, dict[str, str]] = {}
     for claim in report["claims"]:
         status = outcome(claim["status"], claim["exercised"])
@@ -38,11 +33,7 @@ def verdicts(report: Mapping[str, Any]) -> str:
 
 
 def reproduction(report: Mapping[str, Any]) -> str:
-    """A table with a row per result of the paper: its value there, here, and whether it was reproduced.
-
-    Args:
-        report: content of report.json.
-    """
+    """A table with a row per result of the paper: its value there, here, and whether it was reproduced."""
     rows = [
         [row["id"], row["quantity"], _value(row, "paper"), _value(row, "ours"), row["status"].replace("_", " ")]
         for row in report["reproduction"]

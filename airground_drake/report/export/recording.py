@@ -19,8 +19,8 @@ if TYPE_CHECKING:
     from mcap.writer import Writer
 
 FRAME = "world"
+# Levels of `foxglove.Log` by kind of event: 4 is an error, 3 a warning; all other kinds are information, 2.
 LEVELS = {"collision": 4, "refuse": 3}
-"""Levels of `foxglove.Log` by kind of event: 4 is an error, 3 a warning; all other kinds are information, 2."""
 
 _NUMBER, _TEXT = {"type": "number"}, {"type": "string"}
 
@@ -66,19 +66,13 @@ class Message(NamedTuple):
     data: Mapping[str, Any]
 
 
+# JSON Schemas by name; the first two are those of Foxglove, with the fields that are used here.
 SCHEMAS = {"foxglove.SceneUpdate": _SCENE, "foxglove.Log": _LOG, "airground_drake.Signals": _SIGNALS}
-"""JSON Schemas by name; the first two are those of Foxglove, with the fields that are used here."""
 
 
 def recorded(trace: Trace, scenario: Scenario) -> bytes:
-    """The MCAP file of a run of a scenario: the topics `/scene`, `/events`, `/robots/NAME` and `/obstacles/NAME`.
-
-    The last one is there for obstacles that move: the origin of the frame.
-
-    Raises:
-        ExportError: if the package mcap is not installed.
-        TraceError: if the trace lacks a column or holds numbers that are not finite.
-    """
+    """The MCAP file of a run of a scenario: the topics `/scene`, `/events`, `/robots/NAME` and `/obstacles/NAME`."""
+    # The last one is there for obstacles that move: the origin of the frame.
     try:
         from mcap.writer import Writer
     except ImportError as error:

@@ -15,20 +15,13 @@ from airground_drake.sim.tables import TABLES
 from airground_drake.sim.trace import Trace
 from airground_drake.verify.runs.pairs import least_gap, pairs_of
 
+# Columns under the names that say what they are, by their names in a trace.
 TOLD = {"distances_m": "distances_of_centres_m"}
-"""Columns under the names that say what they are, by their names in a trace."""
 
 
 def write(trace: Trace, folder: Path) -> Iterator[Path]:
-    """Write the tables, the events and the smallest distances of a run, `RUN_TABLE.csv`.
-
-    Distances are between surfaces, below 0 as an overlap. Numbers are written so that they read back equal.
-
-    A cell that holds several numbers is a JSON list.
-
-    Raises:
-        OSError: if a file cannot be written.
-    """
+    """Write the tables, the events and the smallest distances of a run, `RUN_TABLE.csv`."""
+    # Distances are between surfaces, below 0 as an overlap. Numbers are written so that they read back equal.
     tables: dict[str, pd.DataFrame] = {name: getattr(trace, name) for name in TABLES}
     tables["events"] = pd.DataFrame(trace.events)
     tables["distances"] = pd.DataFrame(_distances(trace))

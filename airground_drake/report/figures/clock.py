@@ -11,23 +11,18 @@ import numpy.typing as npt
 from airground_drake.base.arrays import Array
 from airground_drake.report.view.canvas import ticks_of
 
+# Time shown before and after an event, shortest time that is cut out, s, and maximum number of cuts.
 AROUND_S, CUT_S, MAX_CUTS = 0.7, 1.0, 5
-"""Time shown before and after an event, shortest time that is cut out, s, and maximum number of cuts."""
-CUT_SHARE = 0.05
-"""Width of a cut on the axis, as a share of the time shown."""
+CUT_SHARE = 0.05  # width of a cut on the axis, as a share of the time shown
 
 
 class Clock(NamedTuple):
-    """The stretches of time that are shown.
+    """The stretches of time that are shown."""
 
-    Attributes:
-        begin, end: of the stretches, (n,), s.
-        place: of their begins on the axis, (n,), s.
-    """
-
+    # begin, end: of the stretches, (n,), s.
     begin: Array
     end: Array
-    place: Array
+    place: Array  # of their begins on the axis, (n,), s
 
     @classmethod
     def around(cls, times_s: Sequence[float], first_s: float, last_s: float) -> Clock:

@@ -26,42 +26,34 @@ from airground_drake.report.view.stage import barriers_of
 from airground_drake.scenario.schema import Scenario
 from airground_drake.sim.trace import Trace
 
+# Maximum numbers of runs, of UGVs in the figure of distances, and of UGVs by name. Larger teams get histograms.
 MAX_RUNS, MAX_UGVS, MAX_TEAM = 6, 4, 6
-"""Maximum numbers of runs, of UGVs in the figure of distances, and of UGVs by name. Larger teams get histograms."""
-ALIKE_M = 1e-9
-"""Paths that differ by no more than this are identical but for rounding."""
+ALIKE_M = 1e-9  # paths that differ by no more than this are identical but for rounding
+# Distances are drawn up to this multiple of the largest required one, of bodies that came nearer than that one.
 FARTHEST, NEAR = 5.0, 3.0
-"""Distances are drawn up to this multiple of the largest required one, of bodies that came nearer than that one."""
 
+# Numbers of the paper's figures, by the beginning of a scenario's name.
 _PAPER = {"case_a": ("3", "5", "4 and 6"), "case_b": ("7", "9", "8 and 10")}
-"""Numbers of the paper's figures, by the beginning of a scenario's name."""
 _NUMBERED = ("trajectories", "distances", "timelines")
+# Marks of maps by kind.
 _MARKS = {
     "stall": "□ stood still", "accepted": "● accepted proposal (dashed green path)",
     "refused": "✖ refused proposal (dotted red path)", "unanswered": "◆ proposal without an answer (dash-dotted path)",
     "collision": "★ collision (short dashes from there: it does not count)",
 }  # fmt: skip
-"""Marks of maps by kind."""
+# Marks of events by kind.
 _EVENTS = {"trigger": "▲ trigger", "release": "▼ release", "proposal": "◆ proposal", "accept": "● accepted",
            "refuse": "✖ refused", "over": "■ time over"}  # fmt: skip
-"""Marks of events by kind."""
 
 
 @dataclass(frozen=True)
 class _Selection:
-    """The runs and UGVs that the figures show.
-
-    Attributes:
-        runs: all runs.
-        shown: one run for each set of identical paths, by the heading of its panels.
-        team: UGVs with names and looks.
-        ugvs: UGVs of the team with distances of their own.
-    """
+    """The runs and UGVs that the figures show."""
 
     runs: dict[str, Trace]
-    shown: dict[str, Trace]
-    team: list[str]
-    ugvs: list[str]
+    shown: dict[str, Trace]  # one run for each set of identical paths, by the heading of its panels
+    team: list[str]  # UGVs with names and looks
+    ugvs: list[str]  # UGVs of the team with distances of their own
 
     @property
     def first(self) -> Trace:
@@ -69,17 +61,8 @@ class _Selection:
 
 
 def draw(scenario: Scenario, traces: Mapping[str, Trace], settings: Mapping[str, Any] | None = None) -> list[Figure]:
-    """All figures of a report; none without traces.
-
-    Args:
-        scenario: names the runs.
-        traces: by run.
-        settings: of matplotlib (rcParams), in place of a report's.
-
-    Raises:
-        TraceError: if a trace lacks a column, holds numbers that are not finite, or has other robots than its scenario.
-        UnknownNameError: if its metadata name an unknown method.
-    """
+    """All figures of a report; none without traces."""
+    # settings: of matplotlib (rcParams), in place of a report's.
     if not traces:
         return []
     for trace in traces.values():

@@ -143,7 +143,7 @@ def _curve(value: Callable[[float], float], x: Array) -> tuple[Array, Array]:
     return x, np.array([value(each) for each in x])
 
 
+# By number of the finding. Those of 1, 2 and 9 are drawn from runs, from THR-CHOICE and from ZENO-REFINE.
 PICTURES: dict[int, Callable[[Mapping[str, Any]], Lines]] = {
     3: time, 4: optimum, 5: first_passage, 6: due, 7: sides, 10: intrusion, 11: task_error, 17: speeds, 18: one_or_two,
 }  # fmt: skip
-"""By number of the finding. Those of 1, 2 and 9 are drawn from runs, from THR-CHOICE and from ZENO-REFINE."""

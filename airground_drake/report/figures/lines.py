@@ -12,28 +12,20 @@ from airground_drake.base.arrays import Array
 from airground_drake.report.figures.panels import MAX_TABLE_ROWS, Figure, Table, panel
 from airground_drake.report.view import canvas
 
-NAME_CHARS = 24
-"""Longest name that fits beside the axes."""
+NAME_CHARS = 24  # longest name that fits beside the axes
 MARKERS = "os^Dv"
 
 
 class Lines(NamedTuple):
-    """What is drawn.
+    """What is drawn."""
 
-    Attributes:
-        title: of the picture.
-        x, y: names of the axes, with units.
-        lines: (T,) across and (T,) up by name.
-        marks: points by name.
-        log: the axes that are logarithmic, among "xy".
-    """
-
-    title: str
+    title: str  # of the picture
+    # x, y: names of the axes, with units.
     x: str
     y: str
-    lines: Mapping[str, tuple[Array, Array]]
-    marks: Mapping[str, tuple[float, float]] = {}
-    log: str = ""
+    lines: Mapping[str, tuple[Array, Array]]  # (T,) across and (T,) up by name
+    marks: Mapping[str, tuple[float, float]] = {}  # points by name
+    log: str = ""  # the axes that are logarithmic, among "xy"
 
     def figure(self, number: int) -> Figure:
         """The figure beside finding `number`; call it inside `canvas.style`."""

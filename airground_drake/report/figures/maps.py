@@ -23,12 +23,11 @@ from airground_drake.sim.trace import Trace
 from airground_drake.ugv.reasons import refusal
 from airground_drake.verify.runs.proposals import proposal_of
 
-MAX_MARKS = 8
-"""Maximum number of marks of a run that are told one by one."""
-NEAR = 0.03
-"""Marks of a UGV within this share of the map's diagonal share a letter."""
+MAX_MARKS = 8  # maximum number of marks of a run that are told one by one
+NEAR = 0.03  # marks of a UGV within this share of the map's diagonal share a letter
+# Maximum height of a map, inches; characters in a line below it, and height of a line, inches.
 HIGHEST_IN, LINE_CHARS, _LINE_IN = 4.4, 62, 0.16
-"""Maximum height of a map, inches; characters in a line below it, and height of a line, inches."""
+# Looks of marks by kind, and of proposed paths.
 LOOKS: dict[str, dict[str, Any]] = {
     "accepted": {"marker": "o", "color": GOOD, "linestyle": (0, (4, 2))},
     "refused": {"marker": "X", "color": ALARM, "linestyle": (0, (1, 1.3))},
@@ -36,29 +35,20 @@ LOOKS: dict[str, dict[str, Any]] = {
     "stall": {"marker": "s", "color": INK, "markerfacecolor": "none"},
     "collision": {"marker": "*", "color": ALARM},
 }
-"""Looks of marks by kind, and of proposed paths."""
 
 
 class Mark(NamedTuple):
-    """What happened to a UGV.
+    """What happened to a UGV."""
 
-    Attributes:
-        ugv: its name.
-        t_s: when, s.
-        kind: key of LOOKS.
-        what, when, why: in words.
-        at: where, (2,), m.
-        way: corners of the proposed path, (M, 2), m.
-    """
-
-    ugv: str
-    t_s: float
-    kind: str
+    ugv: str  # its name
+    t_s: float  # when, s
+    kind: str  # key of LOOKS
+    # what, when, why: in words.
     what: str
     when: str
     why: str
-    at: Array
-    way: Array = np.empty((0, 2))
+    at: Array  # where, (2,), m
+    way: Array = np.empty((0, 2))  # corners of the proposed path, (M, 2), m
 
 
 class Entry(NamedTuple):

@@ -13,17 +13,13 @@ from airground_drake.report.figures.panels import Figure
 from airground_drake.report.view import canvas
 
 POINTS = 200
-BEYOND = 1.6
-"""Length of the axis, relative to the largest mark."""
-FEWEST = 0.05
-"""Smaller mean counts are drawn as this one: the axis is logarithmic."""
+BEYOND = 1.6  # length of the axis, relative to the largest mark
+FEWEST = 0.05  # smaller mean counts are drawn as this one: the axis is logarithmic
 
 
 def bayes_risks(inputs: Mapping[str, Any], evidence: Mapping[str, Any]) -> Figure | None:
-    """THR-CHOICE: the Bayes risk over the threshold; threshold in force, optimal, and by (19) as printed.
-
-    None without evidence.
-    """
+    """THR-CHOICE: the Bayes risk over the threshold; threshold in force, optimal, and by (19) as printed."""
+    # None without evidence.
     if "optimal_threshold_m" not in evidence:
         return None
     constants = inputs["drift_m_s"], inputs["noise_m_sqrt_s"], inputs["c1_1_s"], inputs["c2"]

@@ -12,8 +12,7 @@ from airground_drake.base.arrays import Array
 from airground_drake.report.view import canvas, svg
 from airground_drake.sim.trace import Trace
 
-MAX_TABLE_ROWS = 31
-"""Maximum number of rows of a data table; the trace has all rows."""
+MAX_TABLE_ROWS = 31  # maximum number of rows of a data table; the trace has all rows
 
 
 @dataclass(frozen=True)
@@ -32,36 +31,24 @@ class Panel:
     heading: str
     svg: str
     table: Table
-    drawing: Drawing = field(compare=False, repr=False)
-    """Source of the SVG, for files of other formats."""
+    drawing: Drawing = field(compare=False, repr=False)  # source of the SVG, for files of other formats
 
 
 @dataclass(frozen=True)
 class Figure:
-    """A figure.
+    """A figure."""
 
-    Attributes:
-        id: unique in the page.
-        title: its heading.
-        caption: what to see.
-        panels: its drawings.
-        beside: place in the page: a claim's identifier or `audit-<item>`; '' for the section of figures.
-        look: "wide" for a panel on the whole width.
-    """
-
-    id: str
-    title: str
-    caption: str
-    panels: tuple[Panel, ...]
-    beside: str = ""
-    look: str = ""
+    id: str  # unique in the page
+    title: str  # its heading
+    caption: str  # what to see
+    panels: tuple[Panel, ...]  # its drawings
+    beside: str = ""  # place in the page: a claim's identifier or `audit-<item>`; '' for the section of figures
+    look: str = ""  # "wide" for a panel on the whole width
 
 
 def panel(drawing: Drawing, name: str, title: str, says: str, heading: str, table: Table) -> Panel:
-    """A panel of a drawing; call it inside `canvas.style`.
-
-    `name` is unique in the page; `title` and `says` are for readers who cannot see it.
-    """
+    """A panel of a drawing; call it inside `canvas.style`."""
+    # `name` is unique in the page; `title` and `says` are for readers who cannot see it.
     return Panel(heading, svg.inline(canvas.svg(drawing), name, title, says), table, drawing)
 
 

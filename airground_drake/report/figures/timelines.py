@@ -34,21 +34,20 @@ from airground_drake.report.view.canvas import (
 from airground_drake.report.view.labels import BOX
 from airground_drake.sim.trace import Trace
 
+# Markers of events by kind.
 MARKS = {"trigger": "^", "release": "v", "proposal": "D", "accept": "o", "refuse": "X", "over": "s"}
-"""Markers of events by kind."""
+# Names of kinds of events, where they are not those of the trace.
 WORDS = {"accept": "accepted", "refuse": "refused", "over": "time over"}
-"""Names of kinds of events, where they are not those of the trace."""
+# Maximum number of labels of a row, and of events in a label or a heading, more are counted; characters in a line.
 MAX_TOLD, TOLD_CHARS = 8, 52
-"""Maximum number of labels of a row, and of events in a label or a heading, more are counted; characters in a line."""
-TOGETHER_S = 0.2
-"""Events that follow each other within this time share a label, s."""
+TOGETHER_S = 0.2  # events that follow each other within this time share a label, s
+# Margins beside axes, heights of a row and of a line of text above it, width of a character, inches.
 _LEFT_IN, _RIGHT_IN, _ROW_IN, _LINE_IN, _CHAR_IN = 0.55, 1.05, 0.75, 0.15, 0.066
-"""Margins beside axes, heights of a row and of a line of text above it, width of a character, inches."""
 _COLORS = {"accept": GOOD, "refuse": ALARM, "release": MUTED, "over": MUTED}
+# Look of the band below the safe distance.
 _FORBIDDEN: dict[str, Any] = {
     "facecolor": "#eeeeee", "hatch": "///", "edgecolor": "#d4d4d4", "linewidth": 0.0, "zorder": 0,
 }  # fmt: skip
-"""Look of the band below the safe distance."""
 
 
 def distances(
@@ -280,10 +279,8 @@ def _time_axes(inner_in: float, above_in: Sequence[float], trace: Trace) -> tupl
 
 
 def _bars(axes: Axes, trace: Trace, clock: Clock, active: npt.NDArray[np.bool_], share: float, **options: Any) -> None:
-    """Bars over the times at which a held signal is true; row k holds its value since row k-1.
-
-    They start at the bottom of the axes and reach up to a share of them.
-    """
+    """Bars over the times at which a held signal is true; row k holds its value since row k-1."""
+    # They start at the bottom of the axes and reach up to a share of them.
     begins, ends = clock.at(trace.t[np.maximum(stretches(active) - 1, 0)]).T
     axes.broken_barh(
         np.column_stack([begins, ends - begins]).tolist(),

@@ -12,11 +12,7 @@ from airground_drake.base.errors import AirgroundError
 
 
 def serve(runs: Sequence[str], page: Callable[[str], str]) -> None:
-    """Serve the pages of runs until the process is interrupted, and print the address.
-
-    Raises:
-        OSError: if no port is available.
-    """
+    """Serve the pages of runs until the process is interrupted, and print the address."""
     with server(runs, page) as running:
         print(f"http://localhost:{running.server_port}/  (Ctrl-C ends it)", flush=True)
         running.serve_forever()

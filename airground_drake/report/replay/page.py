@@ -24,16 +24,11 @@ from airground_drake.report.view.looks import (
 )
 from airground_drake.report.view.stage import STATES
 
-MAX_EVENTS = 300
-"""Events that are listed."""
+MAX_EVENTS = 300  # events that are listed
 
 
 def page(scene: Scene) -> str:
-    """The page of a run.
-
-    Raises:
-        ReplayError: if no port is available for Meshcat, or its page is not as expected.
-    """
+    """The page of a run."""
     html = str(recorded(scene).StaticHtml())
     if html.count("</body>") != 1 or "<head>" not in html:
         raise ReplayError("the page of this version of Drake's Meshcat has no place for the time slider")
@@ -44,11 +39,11 @@ def page(scene: Scene) -> str:
 
 
 _SCRIPT = re.compile(r"<script[^>]*>(.*?)</script>", re.DOTALL)
+# No network, and no scripts but those of the page; Meshcat makes its styles and its buffers as it runs.
 _POLICY = (
     "default-src 'none'; style-src 'unsafe-inline'; img-src data: blob:; connect-src data:; worker-src blob:; "
     "base-uri 'none'; form-action 'none'; script-src"
 )
-"""No network, and no scripts but those of the page; Meshcat makes its styles and its buffers as it runs."""
 
 
 _LOOKS = {

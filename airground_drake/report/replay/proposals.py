@@ -13,8 +13,7 @@ from airground_drake.ugv.reasons import OVER
 
 Outcome = Literal["asked", "accepted", "refused"]
 
-LINGER_S = 1.0
-"""Time for which a refused or unanswered proposal is shown, s."""
+LINGER_S = 1.0  # time for which a refused or unanswered proposal is shown, s
 
 _ANSWERS: dict[str, Outcome] = {"accept": "accepted", "refuse": "refused"}
 
@@ -37,12 +36,10 @@ class Sent(NamedTuple):
 
 
 def sent(trace: Trace) -> tuple[Sent, ...]:
-    """All proposals of a run, in the order of the trace.
-
-    A gatekeeper's latest decision on a proposal counts, up to its last one, or until it says that the proposal is over.
-    Without a gatekeeper (method (b)), a proposal is accepted while the UGV executes it. The next proposal to the same
-    UGV replaces it.
-    """
+    """All proposals of a run, in the order of the trace."""
+    # A gatekeeper's latest decision on a proposal counts, up to its last one, or until it says that the proposal is
+    # over. Without a gatekeeper (method (b)), a proposal is accepted while the UGV executes it. The next proposal to
+    # the same UGV replaces it.
     return tuple(
         Sent(str(row["robot"]), str(row["policy"]), np.reshape(row["positions_m"], (-1, 3)), tuple(_spans(trace, row)))
         for row in trace.proposals.to_dict("records")

@@ -15,16 +15,11 @@ from airground_drake.report.view.geometry import ribbon
 from airground_drake.report.view.looks import OUTCOME_COLORS, PATH_COLOR
 from airground_drake.report.view.stage import STATES
 
+# A frame so close to the middle of its neighbours is left out: over an hour, the errors add up to millimetres.
 STRAIGHT_M = 1e-9
-"""A frame so close to the middle of its neighbours is left out: over an hour, the errors add up to millimetres."""
 
 
 def recorded(scene: Scene) -> Meshcat:
-    """A Meshcat with the scene and its recording.
-
-    Raises:
-        ReplayError: if no port is available.
-    """
     meshcat = served()
     draw(meshcat, scene)
     animation = MeshcatAnimation(FRAMES_PER_S)

@@ -16,19 +16,16 @@ from airground_drake.report.view.stage import Robot, Stage, stage_of, states
 from airground_drake.scenario.schema import Scenario
 from airground_drake.sim.trace import Trace
 
-FRAMES_PER_S = 30
-"""Frames in a second of simulated time."""
+FRAMES_PER_S = 30  # frames in a second of simulated time
 
-MAX_NAMED_BARRIERS = 8
-"""With more barriers, their names are not shown."""
+MAX_NAMED_BARRIERS = 8  # with more barriers, their names are not shown
 
 
 @dataclass(frozen=True)
 class DrawnBody(Robot):
-    """A robot in a run, frame by frame: positions (F, 3), m, headings (F,), rad, and states (F,), indices of STATES.
+    """A robot in a run, frame by frame: positions (F, 3), m, headings (F,), rad, and states (F,), indices of STATES."""
 
-    Positions are NaN where it was not recorded.
-    """
+    # Positions are NaN where it was not recorded.
 
     positions: Array
     headings: Array
@@ -37,11 +34,10 @@ class DrawnBody(Robot):
 
 @dataclass(frozen=True)
 class Scene(Stage):
-    """A run. `times_s` (F,) are those of the frames, the last one the end.
+    """A run. `times_s` (F,) are those of the frames, the last one the end."""
 
-    `moved_m` is by how much each barrier that moves has moved at each frame, (F, 3), m, by its number; NaN where it was
-    not recorded. `has_states` says whether the states of UGVs are known, as they are in runs and not in logs.
-    """
+    # `moved_m` is by how much each barrier that moves has moved at each frame, (F, 3), m, by its number; NaN where it
+    # was not recorded. `has_states` says whether the states of UGVs are known, as they are in runs and not in logs.
 
     robots: tuple[DrawnBody, ...]
     scenario: Scenario
@@ -55,16 +51,7 @@ class Scene(Stage):
 
 
 def scene(trace: Trace, scenario: Scenario) -> Scene:
-    """The scene of a run.
-
-    Args:
-        trace: the run.
-        scenario: of the trace.
-
-    Raises:
-        TraceError: if the trace lacks a column or holds numbers that are not finite.
-        UnknownNameError: if its metadata name an unknown method.
-    """
+    """The scene of a run."""
     times = frame_times(trace.t)
     still = stage_of(trace, scenario)
 

@@ -25,27 +25,19 @@ from airground_drake.report.view.plane import draw_barriers, draw_robot
 from airground_drake.report.view.stage import Barrier
 from airground_drake.scenario.schema import Scenario
 
-PICTURES_PER_S = 15
-"""Pictures in a second of the video."""
-MOST_PICTURES = 600
-"""Pictures of a video at most: the encoder of WebP keeps all in memory, 1.6 MB each."""
+PICTURES_PER_S = 15  # pictures in a second of the video
+MOST_PICTURES = 600  # pictures of a video at most: the encoder of WebP keeps all in memory, 1.6 MB each
 WIDTH_PX, DPI, MOST_PX = 640, 100, 1000
 SUFFIXES = (".webp", ".mp4")
 
 _WAY = canvas.Look(PATH_COLOR, "-", "")
 _BOX = {"facecolor": "white", "edgecolor": "none", "alpha": 0.7, "pad": 1.0}
 
-Update = Callable[[int], None]
-"""Sets a part of the picture to a frame of the scene, by its index."""
+Update = Callable[[int], None]  # sets a part of the picture to a frame of the scene, by its index
 
 
 def write(scene: Scene, path: Path, speed: float) -> None:
-    """Write the video of a run, `speed` times as fast as the run.
-
-    Raises:
-        ReplayError: if no encoder is available for this suffix, or the video would be too long.
-        OSError: if it cannot be written.
-    """
+    """Write the video of a run, `speed` times as fast as the run."""
     shown = np.arange(0.0, scene.times_s[-1], speed / PICTURES_PER_S)
     if len(shown) > MOST_PICTURES:
         least = np.ceil(scene.times_s[-1] * PICTURES_PER_S / MOST_PICTURES)

@@ -14,10 +14,8 @@ if TYPE_CHECKING:
     from airground_drake.scenario.budget import PairBudget
 
 WIDTH_IN, BAR_IN, HEAD_IN = 7.5, 0.5, 1.0
-PROMISED = "#c4ccd4"
-"""Colour of the distance promised."""
-CHARACTERS = 34
-"""Characters in a line beside a bar."""
+PROMISED = "#c4ccd4"  # colour of the distance promised
+CHARACTERS = 34  # characters in a line beside a bar
 
 
 def drawn(rows: Sequence[tuple[str, PairBudget]]) -> str:

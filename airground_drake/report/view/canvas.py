@@ -16,14 +16,13 @@ from matplotlib.ticker import MaxNLocator
 
 from airground_drake.base.arrays import Array
 
-MAX_POINTS = 600
-"""Maximum number of points of a line: two per pixel of a panel."""
+MAX_POINTS = 600  # maximum number of points of a line: two per pixel of a panel
 
+# Smallest width of a histogram, relative and absolute: floating point divides it, and numbers on its axis differ.
 NARROWEST, TINY = 1e-4, 1e-9
-"""Smallest width of a histogram, relative and absolute: floating point divides it, and numbers on its axis differ."""
 
+# Widths of panels on half and on the whole page; maximum height of a map; inches.
 WIDE_IN, FULL_IN, TALLEST_IN = 4.4, 11.6, 8.0
-"""Widths of panels on half and on the whole page; maximum height of a map; inches."""
 
 INK, MUTED, ALARM, GOOD = "#1a1a1a", "#5a5a5a", "#b00020", "#0b5d1e"
 _POINTS_PER_INCH = 72.0
@@ -61,6 +60,7 @@ class Look(NamedTuple):
     marker: str
 
 
+# Six looks, distinct in greyscale and for colour-blind readers by dash and marker; reused in turn.
 LOOKS = (
     Look("#0060a8", "-", "o"),
     Look("#b34700", (0, (6, 2)), "s"),
@@ -69,9 +69,9 @@ LOOKS = (
     Look("#6b5900", (0, (9, 2, 1, 2, 1, 2)), "v"),
     Look("#303030", (0, (3, 3)), "P"),
 )
-"""Six looks, distinct in greyscale and for colour-blind readers by dash and marker; reused in turn."""
 UAV_LOOK = Look("#666666", (0, (3, 2)), "d")
 
+# Colours of the figures and the block diagram on a dark page.
 DARK = {
     INK: "#e8e8e8", MUTED: "#b0b4bb", ALARM: "#ff8a9a", GOOD: "#8fe3a1",
     "#ffffff": "#16181c", "#f3f3f3": "#22252b", "#eeeeee": "#2a2d34", "#dddddd": "#3a3e46", "#d4d4d4": "#4a4e57",
@@ -81,7 +81,6 @@ DARK = {
     "black": "#e8e8e8", "white": "#16181c",
     "#e1ebf6": "#1c2c3e", "#e7f1e1": "#1f3323", "#fbefdc": "#3d3020",
 }  # fmt: skip
-"""Colours of the figures and the block diagram on a dark page."""
 
 
 def look(position: int) -> Look:
@@ -179,12 +178,10 @@ def spread(places: Sequence[float], gap: float) -> list[float]:
 
 
 def rule(axes: Axes, x: str, y: str, log: str = "", numbers: Mapping[float, str] | None = None) -> None:
-    """Draw grid lines, numbers and axis labels, once the limits are set; an empty label leaves the numbers out.
-
-    Values on the axes named in `log` are logarithms to base 10; the numbers show what they are the logarithms of.
-    `numbers`, by their places, replace those across. These are few artists: matplotlib's own ticks would take nearly
-    half of the drawing time.
-    """
+    """Draw grid lines, numbers and axis labels, once the limits are set; an empty label leaves the numbers out."""
+    # Values on the axes named in `log` are logarithms to base 10; the numbers show what they are the logarithms of.
+    # `numbers`, by their places, replace those across. These are few artists: matplotlib's own ticks would take nearly
+    # half of the drawing time.
     width_in, height_in = size_in(axes)
     axes.set_xticks([])
     axes.set_yticks([])

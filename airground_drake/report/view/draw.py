@@ -23,18 +23,14 @@ from airground_drake.report.view.looks import (
 from airground_drake.report.view.stage import FINE, STATES, TRIGGERED, Barrier, Robot, Stage
 
 ELEVATION = np.radians(58.0)
+# Tops of safe zones that overlap differ by up to this share of their height: the higher one hides the lower one.
 LOWER = 0.05
-"""Tops of safe zones that overlap differ by up to this share of their height: the higher one hides the lower one."""
+# Opening angle of the camera, and the part of it that the panels of the page may cover.
 OPENING_DEG, MARGIN_DEG = 46.0, 7.0
-"""Opening angle of the camera, and the part of it that the panels of the page may cover."""
 
 
 def served() -> Meshcat:
-    """A new Meshcat, which listens on a port of this machine as long as it exists.
-
-    Raises:
-        ReplayError: if no port is available.
-    """
+    """A new Meshcat, which listens on a port of this machine as long as it exists."""
     logging.getLogger("drake").setLevel(logging.WARNING)  # Meshcat logs its address, which nobody needs for a file
     try:
         return Meshcat(MeshcatParams(host="localhost", show_stats_plot=False))
@@ -57,10 +53,8 @@ def draw(meshcat: Meshcat, stage: Stage) -> None:
 
 
 def robot_path(k: int) -> str:
-    """Place of robot k in Meshcat's tree; below it is one child per state.
-
-    The tree has numbers instead of names: its nodes are JavaScript objects, which reserve names such as `__proto__`.
-    """
+    """Place of robot k in Meshcat's tree; below it is one child per state."""
+    # The tree has numbers instead of names: its nodes are JavaScript objects, which reserve names such as `__proto__`.
     return f"/robots/{k}"
 
 
@@ -159,10 +153,7 @@ def _robot(meshcat: Meshcat, k: int, robot: Robot) -> None:
 
 
 def _ugv(meshcat: Meshcat, path: str, r: float, state: int, *, nose: bool) -> None:
-    """A low cylinder in the colour of its state, with a cone above it if triggered, a ring if intervened.
-
-    A robot with a heading, which is along x here, has a nose.
-    """
+    """A low cylinder in the colour of its state, with a cone above it if triggered, a ring if intervened."""
     color = STATE_COLORS[state]
     _cylinder(meshcat, f"{path}/body", r, r, np.zeros(3), color)
     if nose:

@@ -12,10 +12,8 @@ import numpy.typing as npt
 
 from airground_drake.base.arrays import Array
 
-MOST_DASHES = 1000
-"""Most dashes of a line."""
-MOST_LINES = 30
-"""About the most lines of a grid, per side."""
+MOST_DASHES = 1000  # most dashes of a line
+MOST_LINES = 30  # about the most lines of a grid, per side
 
 
 class Mesh(NamedTuple):
@@ -51,11 +49,9 @@ def ribbon(path: Array, width_m: float, dash_m: float | None = None) -> Mesh:
 
 
 def prisms(outlines: Sequence[Array], height: float, *, lower: float = 0.0) -> Mesh:
-    """Prisms of a height, m, over convex polygons (K, 2), m, counter-clockwise; without their bottoms.
-
-    Their tops come first, each lower than the one before it by `lower`, m. So what is transparent is drawn once where
-    several overlap, seen from above.
-    """
+    """Prisms of a height, m, over convex polygons (K, 2), m, counter-clockwise; without their bottoms."""
+    # Their tops come first, each lower than the one before it by `lower`, m. So what is transparent is drawn once where
+    # several overlap, seen from above.
     vertices, tops, walls, first = list[Array](), list[Array](), list[Array](), 0
     for k, outline in enumerate(outlines):
         n = len(outline)
@@ -68,13 +64,8 @@ def prisms(outlines: Sequence[Array], height: float, *, lower: float = 0.0) -> M
 
 
 def outer_edges(outlines: Sequence[Array], inside: Callable[[Array], npt.NDArray[np.bool_]], piece: float) -> Array:
-    """The edges of polygons (K, 2), m, that are not inside of another one: ends of short segments, (2, S, 2), m.
-
-    Args:
-        outlines: the polygons.
-        inside: whether points (S, 2), m, are inside of one of them, not at its edge.
-        piece: greatest length of a segment, m.
-    """
+    """The edges of polygons (K, 2), m, that are not inside of another one: ends of short segments, (2, S, 2), m."""
+    # inside: (S, 2), m
     found = list[Array]()
     for outline in outlines:
         closed = np.concatenate([outline, outline[:1]])
@@ -87,10 +78,7 @@ def outer_edges(outlines: Sequence[Array], inside: Callable[[Array], npt.NDArray
 
 
 def grid(low: Array, high: Array) -> tuple[Array, Array]:
-    """Ends of the lines of a grid on the ground, (3, N) each, m, which covers a rectangle with corners (2,), m.
-
-    The spacing is 1, 2 or 5 times a power of ten: the smallest, from 1 m on, with at most MOST_LINES per side.
-    """
+    """Ends of the lines of a grid on the ground, (3, N) each, m, which covers a rectangle with corners (2,), m."""
     spacing = next(
         step * 10.0**power for power in range(300) for step in (1, 2, 5)
         if (high - low).max() <= MOST_LINES * step * 10.0**power
@@ -103,14 +91,8 @@ def grid(low: Array, high: Array) -> tuple[Array, Array]:
 
 
 def camera(low: Array, high: Array, elevation: float, opening: float) -> tuple[Array, Array]:
-    """Place of a camera, and the point that it looks at, (3,) each, m, so that it sees a box with corners (3,), m.
-
-    Args:
-        low: the corner with the least coordinates.
-        high: the opposite one.
-        elevation: angle above the ground under which it looks along +y, rad.
-        opening: angle between the left and the right, the upper and the lower edge of the picture, rad.
-    """
+    """Place of a camera, and the point that it looks at, (3,) each, m, so that it sees a box with corners (3,), m."""
+    # elevation, opening: rad
     centre = (low + high) / 2.0
     back = np.array([0.0, -np.cos(elevation), np.sin(elevation)])
     up = np.array([0.0, np.sin(elevation), np.cos(elevation)])

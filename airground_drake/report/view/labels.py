@@ -14,12 +14,10 @@ from matplotlib.axes import Axes
 from airground_drake.base.arrays import Array
 from airground_drake.report.view.canvas import INK, MUTED, size_in, thin
 
-MAX_LINE_POINTS = 80
-"""Number of points of a line that labels avoid."""
+MAX_LINE_POINTS = 80  # number of points of a line that labels avoid
+# Places that are tried for a label, and their greatest distance from its point, as a share of the axes.
 CANDIDATES, FARTHEST = 1200, 0.3
-"""Places that are tried for a label, and their greatest distance from its point, as a share of the axes."""
-MARK_PT = 4.0
-"""Half the size of the marks that labels leave free, points."""
+MARK_PT = 4.0  # half the size of the marks that labels leave free, points
 BOX = {"facecolor": "white", "edgecolor": "none", "alpha": 0.7, "pad": 0.5}
 
 
@@ -34,13 +32,9 @@ class Label(NamedTuple):
 
 
 def place(axes: Axes, labels: Sequence[Label], lines: Sequence[Array]) -> None:
-    """Write the labels, the first ones nearest to their points; a thin line leads to a label that had to move.
-
-    Args:
-        axes: with their final limits.
-        labels: labels of points outside the axes are left out.
-        lines: (T, 2) each, in the coordinates of the axes.
-    """
+    """Write the labels, the first ones nearest to their points; a thin line leads to a label that had to move."""
+    # lines: (T, 2)
+    # labels: labels of points outside the axes are left out.
     (left, right), (bottom, top) = axes.get_xlim(), axes.get_ylim()
     labels = [label for label in labels if left < label.at[0] < right and bottom < label.at[1] < top]
     if not labels:

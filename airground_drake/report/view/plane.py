@@ -24,13 +24,12 @@ from airground_drake.scenario.schema import MAP, Scenario
 from airground_drake.sim.trace import Trace
 
 MAX_NAMED_BARRIERS = 12
-THUMBNAIL_IN = (2.5, 1.9)
-"""Width and height of a small picture, inches."""
+THUMBNAIL_IN = (2.5, 1.9)  # width and height of a small picture, inches
 MAX_THUMBNAIL_UGVS, MAX_THUMBNAIL_POINTS = 20, 200
+# Least size of the wedge of a robot with a heading, as a share of the picture, and number of wedges on its way.
 WEDGE, WEDGES = 0.008, 9
-"""Least size of the wedge of a robot with a heading, as a share of the picture, and number of wedges on its way."""
+# Margin left of a map, both side margins together, margins below and above it, inches.
 _LEFT_IN, _BESIDE_IN, _BELOW_IN, _ABOVE_IN = 0.5, 0.65, 0.42, 0.1
-"""Margin left of a map, both side margins together, margins below and above it, inches."""
 _VOID_DASH, _WAY_DOTS = (0, (1.5, 2.5)), (0, (1.0, 1.5))
 
 
@@ -52,10 +51,7 @@ class Frame(NamedTuple):
 
 
 def frame_of(scenario: Scenario, ways: Iterable[tuple[str, Array]]) -> Frame:
-    """The rectangle around the ways (T, 3), m, of robots, by name, their targets, the arena, and safe outlines.
-
-    Of a map, it holds as much on each side of ways and targets as these extend.
-    """
+    """The rectangle around the ways (T, 3), m, of robots, by name, their targets, the arena, and safe outlines."""
     points = list[Array]()
     for name, way in ways:
         points += [way[:, :2] + side * scenario.robots[name].radius_m for side in (-1.0, 1.0)]
@@ -86,15 +82,11 @@ def axes_over(frame: Frame, width_in: float, full_in: float = 0.0, below_in: flo
 
 
 def draw_barriers(axes: Axes, scenario: Scenario, *, moving: bool = True) -> tuple[list[Label], list[Array]]:
-    """Draw all that stands about within the outlines that robots' surfaces keep to, the arena, and phantoms.
-
-    What the UAV does not know is hollow. Points and balls have a hexagon in the middle. What moves is drawn where it
-    starts, with its way in dots, unless `moving` is False.
-
-    Returns:
-        Labels, the names of the barriers, unless they are many, and of phantoms; and lines (K, 2), m, that labels
-        should avoid: ways of what moves, the arena, and the edges of walls, unless they are many.
-    """
+    """Draw all that stands about within the outlines that robots' surfaces keep to, the arena, and phantoms."""
+    # What the UAV does not know is hollow. Points and balls have a hexagon in the middle. What moves is drawn where it
+    # starts, with its way in dots, unless `moving` is False.
+    # Returns labels, the names of the barriers, unless they are many, and of phantoms; and lines (K, 2), m, that labels
+    # should avoid: ways of what moves, the arena, and the edges of walls, unless they are many.
     _draw_arena(axes, arena_of(scenario))
     every = [each for each in barriers_of(scenario) if moving or not len(each.way_m)]
     for each in every:
@@ -123,35 +115,24 @@ def draw_barriers(axes: Axes, scenario: Scenario, *, moving: bool = True) -> tup
 
 
 class _Look(NamedTuple):
-    """How polygons are drawn as one.
+    """How polygons are drawn as one."""
 
-    Attributes:
-        fill: colour of what fills them.
-        edge: colour of their edges.
-        width: of the edges that are seen, points.
-        core: width of a line in the colour of the filling, points; it hides seams, and makes thin walls hollow.
-        many: colours of filling and edges if the polygons are many.
-        dash: of the edges.
-    """
-
-    fill: str
-    edge: str
-    width: float
-    core: float
-    many: tuple[str, str]
-    dash: Any = "-"
+    fill: str  # colour of what fills them
+    edge: str  # colour of their edges
+    width: float  # of the edges that are seen, points
+    core: float  # width of a line in the colour of the filling, points; it hides seams, and makes thin walls hollow
+    many: tuple[str, str]  # colours of filling and edges if the polygons are many
+    dash: Any = "-"  # of the edges
 
 
 _SAFE = _Look("#f3f3f3", MUTED, 1.0, 0.0, ("#dddddd", "none"), (0, (1, 1)))
+# Of walls that the UAV knows, and of others.
 _KNOWN, _UNKNOWN = _Look(MUTED, INK, 1.6, 1.0, (MUTED, MUTED)), _Look("white", INK, 1.5, 1.2, ("white", INK))
-"""Of walls that the UAV knows, and of others."""
 
 
 def _fill(axes: Axes, parts: Sequence[Array], appearance: _Look, zorder: float) -> None:
-    """Draw polygons (K, 2): what fills them covers the inner half of their edges, and edges in other polygons.
-
-    Many polygons are drawn once, without their outline: they would take most of the bytes of a page.
-    """
+    """Draw polygons (K, 2): what fills them covers the inner half of their edges, and edges in other polygons."""
+    # Many polygons are drawn once, without their outline: they would take most of the bytes of a page.
     fill, edge, width, core, many, dash = appearance
     if len(parts) > MANY:
         axes.add_collection(PolyCollection(parts, facecolor=many[0], edgecolor=many[1], linewidth=0.5, zorder=zorder))
@@ -189,21 +170,10 @@ def draw_robot(
     headings: Array | None = None,
     **options: Any,
 ) -> list[Label]:
-    """Draw the way (T, 2) or (T, 3), m, of a robot: its start o, a UGV's target x, its size at both ends.
-
-    Args:
-        axes: where to draw.
-        scenario: has the robot.
-        name: of the robot.
-        way: its positions.
-        appearance: of the line.
-        rows: number of positions that count, by default all; the others are drawn in short dashes.
-        headings: (T,), rad, of a robot that has them: it is drawn as a wedge at some of its positions.
-        options: of the line.
-
-    Returns:
-        Labels: its name at both ends.
-    """
+    """Draw the way (T, 2) or (T, 3), m, of a robot: its start o, a UGV's target x, its size at both ends."""
+    # headings: (T,), rad
+    # rows: number of positions that count, by default all; the others are drawn in short dashes.
+    # Returns labels: its name at both ends.
     rows = len(way) if rows is None else rows
     options = {"linewidth": 1.9 if name in scenario.ugvs else 1.1, **options}
     parts = [(way[:rows, :2], appearance.dash, options), (way[rows - 1 :, :2], _VOID_DASH, {"linewidth": 0.9})]
@@ -267,12 +237,8 @@ def plot(trace: Trace, axes: Axes | None = None) -> Axes:
 
 
 def thumbnail(scenario: Scenario, ways: Mapping[str, Array] | None = None) -> str:
-    """A small picture as an SVG document.
-
-    Args:
-        scenario: has the obstacles and targets.
-        ways: positions (T, 3), m, by UGV; default: the preset trajectories. Those of the first UGVs are drawn.
-    """
+    """A small picture as an SVG document."""
+    # ways: positions (T, 3), m, by UGV; default: the preset trajectories. Those of the first UGVs are drawn.
     if ways is None:
         ways = {name: np.array(ugv.preset.waypoints_m) for name, ugv in scenario.ugvs.items()}
     drawn: Sequence[tuple[str, Array]] = [*ways.items()][:MAX_THUMBNAIL_UGVS]

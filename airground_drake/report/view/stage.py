@@ -16,22 +16,20 @@ from airground_drake.scenario.outlines import outlines_of
 from airground_drake.scenario.schema import ARENA, Scenario
 from airground_drake.sim.trace import Trace
 
+# A robot follows its own task, follows it while its trigger is set, or executes a proposal.
 STATES = ("own task", "triggered", "intervened")
-"""A robot follows its own task, follows it while its trigger is set, or executes a proposal."""
 OWN, TRIGGERED, INTERVENED = range(3)
 
+# Smallest and largest radius with which a point is drawn, as shares of the larger side of the scene.
 SMALLEST, LARGEST = 0.006, 0.018
-"""Smallest and largest radius with which a point is drawn, as shares of the larger side of the scene."""
+# Radius of a point as a share of the least safe distance on the ground: points that keep it are drawn apart.
 OF_SAFE_DISTANCE = 0.4
-"""Radius of a point as a share of the least safe distance on the ground: points that keep it are drawn apart."""
-OF_MARK = 0.3
-"""Half of the thickness of a thin wall as a share of the radius of a point."""
+OF_MARK = 0.3  # half of the thickness of a thin wall as a share of the radius of a point
+# Up to so many parts of barriers have fine rims: numbers of corners for half a circle, fine and coarse.
 MANY, FINE, COARSE = 100, 16, 4
-"""Up to so many parts of barriers have fine rims: numbers of corners for half a circle, fine and coarse."""
+# What is this share of a distance away from a core is inside of the polygon about it, also between two corners.
 INWARD = 0.99
-"""What is this share of a distance away from a core is inside of the polygon about it, also between two corners."""
-HIGHEST = 2.0
-"""Walls are drawn up to this multiple of the largest height of a robot: others may be endless."""
+HIGHEST = 2.0  # walls are drawn up to this multiple of the largest height of a robot: others may be endless
 
 
 @dataclass(frozen=True)
@@ -47,27 +45,17 @@ class Robot:
 
 @dataclass(frozen=True)
 class Barrier:
-    """An obstacle, or anything else that stands about, except the walls of the arena.
+    """An obstacle, or anything else that stands about, except the walls of the arena."""
 
-    Attributes:
-        name: of the scenario.
-        parts: outlines of its convex parts at the start, (k, W), world frame; see `model.geometry.outline`.
-        known_to_uav: whether it is on the UAV's map.
-        appears_s: time from which on it is there, s.
-        disappears_s: time from which on it is gone, s; infinite if it stays.
-        way_m: corners of the way of its frame's origin, (n, 3), m; n is 0 if it does not move.
-        mark_m: least radius with which points and thin walls are drawn, m.
-        rays: number of corners for half a circle.
-    """
-
-    name: str
-    parts: Array
-    known_to_uav: bool
-    appears_s: float = 0.0
-    disappears_s: float = np.inf
+    name: str  # of the scenario
+    parts: Array  # outlines of its convex parts at the start, (k, W), world frame; see `model.geometry.outline`
+    known_to_uav: bool  # whether it is on the UAV's map
+    appears_s: float = 0.0  # time from which on it is there, s
+    disappears_s: float = np.inf  # time from which on it is gone, s; infinite if it stays
+    # Corners of the way of its frame's origin, (n, 3), m; n is 0 if it does not move.
     way_m: Array = field(default_factory=lambda: np.empty((0, 3)))
-    mark_m: float = 0.0
-    rays: int = FINE
+    mark_m: float = 0.0  # least radius with which points and thin walls are drawn, m
+    rays: int = FINE  # number of corners for half a circle
 
     @property
     def color(self) -> str:
@@ -140,11 +128,10 @@ class Barrier:
 
 @dataclass(frozen=True)
 class Stage:
-    """A scenario before anything moves.
+    """A scenario before anything moves."""
 
-    `low_m` and `high_m` (3,) bound what is shown. `mark_m` is the radius with which a point is drawn. `phantoms_m`
-    (P, 3) are the obstacles that only the UAV's map has. `arena` is as `arena_of` gives it.
-    """
+    # `low_m` and `high_m` (3,) bound what is shown. `mark_m` is the radius with which a point is drawn. `phantoms_m`
+    # (P, 3) are the obstacles that only the UAV's map has. `arena` is as `arena_of` gives it.
 
     robots: tuple[Robot, ...]
     barriers: tuple[Barrier, ...]

@@ -19,29 +19,19 @@ _DROPPED = {
 _REFERENCE = re.compile(r"url\(\s*['\"]?#([^'\")\s]+)['\"]?\s*\)")
 _LONG_NUMBER = re.compile(r"-?\d+\.\d{3,}")
 _STYLED = re.compile(r"(?:fill|stroke|font|opacity|text-anchor|dominant-baseline)[a-z-]*")
-_FONT = re.compile(r"(?:(\w+) )?([\d.]+px) (.+)")
-"""The shorthand `font` of matplotlib 3.10: weight, size, families."""
+_FONT = re.compile(r"(?:(\w+) )?([\d.]+px) (.+)")  # the shorthand `font` of matplotlib 3.10: weight, size, families
 _ROUNDED = {"d", "points", "transform", "x", "y", "width", "height", "cx", "cy", "rx", "ry", "r"}
 
 
 def inline(svg: str, prefix: str, title: str, description: str, *, natural_size: bool = False) -> str:
-    """An SVG document as an element for HTML.
-
-    Scripts, style sheets, handlers and references to anything outside the document are removed (a style sheet would
-    apply to the whole page), and attributes with which it could leave its place. Inline styles become attributes. Ids
-    get a prefix, so that several drawings can share a page; unused ids are removed. Coordinates are rounded to 0.01
-    units.
-
-    Args:
-        svg: the document; `viewBox` must be set.
-        prefix: unique in the page; letters, digits, '-' and '_'.
-        title: the accessible name.
-        description: text for readers who cannot see it.
-        natural_size: keep the size of the document; otherwise the page chooses.
-
-    Raises:
-        ValueError: if it is not an SVG document.
-    """
+    """An SVG document as an element for HTML."""
+    # Scripts, style sheets, handlers and references to anything outside the document are removed (a style sheet would
+    # apply to the whole page), and attributes with which it could leave its place. Inline styles become attributes. Ids
+    # get a prefix, so that several drawings can share a page; unused ids are removed. Coordinates are rounded to 0.01
+    # units.
+    # svg: the document; `viewBox` must be set.
+    # description: text for readers who cannot see it.
+    # natural_size: keep the size of the document; otherwise the page chooses.
     try:
         root = ET.fromstring(svg)
     except ET.ParseError as error:

@@ -10,14 +10,12 @@ from xml.parsers import expat
 
 from airground_drake.base.errors import Fault, ScenarioError, short
 
-LINE = "line"
-"""Attribute in which each element has its line in the file."""
+LINE = "line"  # attribute in which each element has its line in the file
 MOST_ELEMENTS = 1_000_000
-TILTED = 1e-6
-"""Roll or pitch above which something does not stand upright, rad."""
+TILTED = 1e-6  # roll or pitch above which something does not stand upright, rad
 SHAPES = ("box", "cylinder", "sphere")
-EMPTY = "empty"
-"""The geometry of nothing."""
+EMPTY = "empty"  # the geometry of nothing
+# Elements that are in nobody's way, by the element around them. Other elements are read, or named as left out.
 NO_BODIES = {
     "sdf": {"light"},
     "world": {
@@ -29,7 +27,6 @@ NO_BODIES = {
         "allow_auto_disable", "enable_wind", "frame", "gripper", "joint", "plugin", "pose", "self_collide", "static",
     },
 }  # fmt: skip
-"""Elements that are in nobody's way, by the element around them. Other elements are read, or named as left out."""
 
 
 class Pose(NamedTuple):
@@ -48,21 +45,13 @@ class Pose(NamedTuple):
 
 
 class Solid(NamedTuple):
-    """Something in the way of robots.
+    """Something in the way of robots."""
 
-    Attributes:
-        name: of its model.
-        pose: of its middle.
-        size: length and width of a box, m; the radius alone, m, for cylinders and balls.
-        bottom: height of its lower edge over the ground, m.
-        top: height of its upper edge over the ground, m.
-    """
-
-    name: str
-    pose: Pose
-    size: tuple[float, ...]
-    bottom: float
-    top: float
+    name: str  # of its model
+    pose: Pose  # of its middle
+    size: tuple[float, ...]  # length and width of a box, m; the radius alone, m, for cylinders and balls
+    bottom: float  # height of its lower edge over the ground, m
+    top: float  # height of its upper edge over the ground, m
 
 
 class Gazebo(NamedTuple):
@@ -73,19 +62,10 @@ class Gazebo(NamedTuple):
 
 
 def world(text: str, source: str) -> Gazebo:
-    """The obstacles in a world file that may be hostile.
-
-    A model is where `<state>` says, if it is in there; else where the model says. Left out are models that a plug-in
-    moves, models within models, included models, actors, populations, shapes other than `SHAPES`, and what does not
-    stand out of the ground.
-
-    Args:
-        text: of the file.
-        source: its path, for messages.
-
-    Raises:
-        ScenarioError: if it is not such a world, or has shapes that do not stand upright.
-    """
+    """The obstacles in a world file that may be hostile."""
+    # A model is where `<state>` says, if it is in there; else where the model says. Left out are models that a plug-in
+    # moves, models within models, included models, actors, populations, shapes other than `SHAPES`, and what does not
+    # stand out of the ground.
     root = _parsed(text, source)
     found = root.find("world") if root.tag == "sdf" else root if root.tag == "world" else None
     if found is None:

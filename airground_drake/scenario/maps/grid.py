@@ -12,19 +12,16 @@ from numpy.typing import NDArray
 from airground_drake.base.arrays import Array
 from airground_drake.scenario.maps.rectangles import Cells, Rectangles
 
-DIGITS = 12
-"""Corners are rounded to this many digits after the point, m: they are then the same on every machine."""
+DIGITS = 12  # corners are rounded to this many digits after the point, m: they are then the same on every machine
 
 
 class Frame(NamedTuple):
-    """Where a map's cells are in the world. Places are given in cells, (column, row), from the corner of cell (0, 0).
+    """Where a map's cells are in the world."""
 
-    Attributes:
-        cell_m: side of a cell, m.
-        origin: outer corner of the cell (0, 0) in the world, x and y in m; heading of the rows, rad.
-    """
+    # Places are given in cells, (column, row), from the corner of cell (0, 0).
 
-    cell_m: float
+    cell_m: float  # side of a cell, m
+    # Outer corner of the cell (0, 0) in the world, x and y in m; heading of the rows, rad.
     origin: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
     def points(self, places: Array) -> Array:
@@ -49,29 +46,19 @@ class Frame(NamedTuple):
 
 
 class Grid(NamedTuple):
-    """Square cells. Row 0 has the lowest y in the map's frame, column 0 the lowest x.
+    """Square cells. Row 0 has the lowest y in the map's frame, column 0 the lowest x."""
 
-    Attributes:
-        occupied: which cells are occupied, (rows, columns).
-        frame: where they are.
-    """
-
-    occupied: Cells
-    frame: Frame
+    occupied: Cells  # which cells are occupied, (rows, columns)
+    frame: Frame  # where they are
 
     def cells(self, points: Array) -> NDArray[np.int64]:
         """Row and column of the cell at each point, (n, 2) for (n, 2), m. They may be outside of the map."""
         return np.floor(self.frame.places(points))[:, ::-1].astype(np.int64)
 
     def filled(self, robots: Sequence[Sequence[float]]) -> Grid:
-        """The map with all free cells occupied that no robot can reach.
-
-        Robots go from a cell to one that shares a side with it, and leave the map where its edge is free. If no robot
-        is at a free cell, nothing is filled.
-
-        Args:
-            robots: where they are, [x, y], m.
-        """
+        """The map with all free cells occupied that no robot can reach; `robots` in m."""
+        # Robots go from a cell to one that shares a side with it, and leave the map where its edge is free. If no robot
+        # is at a free cell, nothing is filled.
         from scipy import ndimage  # takes long to import, and most scenarios have no map
 
         free = np.pad(~self.occupied, 1, constant_values=True)  # a way round the map
@@ -83,10 +70,8 @@ class Grid(NamedTuple):
         return self._replace(occupied=~np.isin(regions, theirs[theirs > 0])[1:-1, 1:-1])
 
     def clearance(self) -> Array:
-        """Distance of each free cell's middle from the nearest occupied cell's middle, less half its diagonal, m.
-
-        It is at most the distance from the cell. Where nothing is occupied, it is infinite.
-        """
+        """Distance of each free cell's middle from the nearest occupied cell's middle, less half its diagonal, m."""
+        # It is at most the distance from the cell. Where nothing is occupied, it is infinite.
         from scipy import ndimage
 
         if not self.occupied.any():

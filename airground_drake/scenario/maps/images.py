@@ -15,8 +15,8 @@ from airground_drake.scenario.maps.rectangles import MOST_CELLS, Cells
 
 FORMATS = ("PPM", "PNG", "BMP")  # Pillow counts PGM to PPM
 WHITE = 3 * 255
+# Brightness of cells that `map_saver` leaves unknown. With its own free_thresh of 0.25 they would count as free.
 UNKNOWN = 3 * 205
-"""Brightness of cells that `map_saver` leaves unknown. With its own free_thresh of 0.25 they would count as free."""
 _DEEP = ("I", "I;16", "I;16B", "I;16L", "I;16N")  # Pillow's modes of images with 16 bits per cell
 
 
@@ -28,21 +28,11 @@ class Occupancy(NamedTuple):
 
 
 def occupancy(data: bytes, *, occupied_above: float, free_below: float, negate: bool = False) -> Occupancy:
-    """The cells in an image by ROS's mode "trinary".
-
-    The probability p that a cell is occupied is (255 - x) / 255 for its brightness x, the mean of red, green and blue;
-    with `negate`, x / 255. A cell that is transparent in the least, or of grey 205, is unknown whatever p is. With
-    `negate` so is grey 50, which has the p that grey 205 has without.
-
-    Args:
-        data: content of a PGM, PPM, PNG or BMP file.
-        occupied_above: a cell with a greater p is occupied.
-        free_below: a cell with a smaller p is free; those between are unknown.
-        negate: whether white is occupied, not black.
-
-    Raises:
-        ValueError: if the image cannot be read, or has more than `MOST_CELLS` cells; says what it is instead.
-    """
+    """The cells in an image by ROS's mode "trinary"."""
+    # The probability p that a cell is occupied is (255 - x) / 255 for its brightness x, the mean of red, green and
+    # blue; with `negate`, x / 255. A cell that is transparent in the least, or of grey 205, is unknown whatever p is.
+    # With `negate` so is grey 50, which has the p that grey 205 has without.
+    # free_below: a cell with a smaller p is free; those between are unknown.
     brightness, opaque = _decoded(data)
     weights = np.arange(WHITE + 1) if negate else WHITE - np.arange(WHITE + 1)  # p of each brightness, times WHITE
     is_occupied = weights > occupied_above * WHITE
@@ -53,10 +43,8 @@ def occupancy(data: bytes, *, occupied_above: float, free_below: float, negate: 
 
 
 def _decoded(data: bytes) -> tuple[NDArray[np.uint16], Cells]:
-    """Sum of red, green and blue of each cell, 0 to WHITE, and whether it is opaque; the lowest row first.
-
-    Of 16 bits per cell, the lower eight are lost.
-    """
+    """Sum of red, green and blue of each cell, 0 to WHITE, and whether it is opaque; the lowest row first."""
+    # Of 16 bits per cell, the lower eight are lost.
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", Image.DecompressionBombWarning)  # counted here

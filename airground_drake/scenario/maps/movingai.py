@@ -9,16 +9,15 @@ import numpy as np
 from airground_drake.base.errors import Fault, ScenarioError
 from airground_drake.scenario.maps.rectangles import MOST_CELLS, Cells
 
+# Whether a cell with this character is in the way: out of bounds, trees and water are.
 TERRAIN = {**dict.fromkeys(".GS", False), **dict.fromkeys("@OTW", True)}
-"""Whether a cell with this character is in the way: out of bounds, trees and water are."""
 HEADER = ("type", "height", "width", "map")
 
 
 class Agent(NamedTuple):
-    """One line of a scenario: cells (column, row) of start and goal, and the line's number in the file.
+    """One line of a scenario: cells (column, row) of start and goal, and the line's number in the file."""
 
-    In the file, rows are counted from the top; here, from the bottom.
-    """
+    # In the file, rows are counted from the top; here, from the bottom.
 
     start: tuple[int, int]
     goal: tuple[int, int]
@@ -26,11 +25,7 @@ class Agent(NamedTuple):
 
 
 def cells(text: str, source: str) -> Cells:
-    """Which cells of a `.map` file are in the way, (rows, columns), the lowest row first.
-
-    Raises:
-        ScenarioError: if it is not such a map.
-    """
+    """Which cells of a `.map` file are in the way, (rows, columns), the lowest row first."""
     lines = text.splitlines()
     sizes = {}
     for number, (key, line) in enumerate(zip(HEADER, [*lines, "", "", "", ""], strict=False), 1):
@@ -57,11 +52,7 @@ def cells(text: str, source: str) -> Cells:
 
 
 def agents(text: str, source: str, in_the_way: Cells) -> list[Agent]:
-    """The agents of a `.scen` file, on the map whose cells are given.
-
-    Raises:
-        ScenarioError: if it is not such a scenario, or one on another map.
-    """
+    """The agents of a `.scen` file, on the map whose cells are given."""
     height, width = in_the_way.shape
     first, *lines = text.splitlines() or [""]
     if first.split()[:1] != ["version"]:

@@ -5,25 +5,18 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-MOST_CELLS = 16_000_000
-"""Most cells of a map."""
+MOST_CELLS = 16_000_000  # most cells of a map
 
-Cells = NDArray[np.bool_]
-"""A value for each cell, (rows, columns)."""
+Cells = NDArray[np.bool_]  # a value for each cell, (rows, columns)
+# First row, last row + 1, first column, last column + 1 of each rectangle of cells, (n, 4).
 Rectangles = NDArray[np.int64]
-"""First row, last row + 1, first column, last column + 1 of each rectangle of cells, (n, 4)."""
 
 
 def covering(occupied: Cells) -> Rectangles:
-    """Rectangles whose union is the set of occupied cells.
-
-    Equal runs of occupied cells in consecutive rows are merged. Each rectangle is then extended up and down as far as
-    all its cells are occupied, and those whose cells lie in others are left out. On maps of buildings that gives about
-    85 % of the merged runs.
-
-    Args:
-        occupied: which cells are occupied, (rows, columns).
-    """
+    """Rectangles whose union is the set of occupied cells; `occupied` (rows, columns)."""
+    # Equal runs of occupied cells in consecutive rows are merged. Each rectangle is then extended up and down as far as
+    # all its cells are occupied, and those whose cells lie in others are left out. On maps of buildings that gives
+    # about 85 % of the merged runs.
     sums = _sums(occupied)
     rectangles = np.unique(_extended(_merged_runs(occupied), sums), axis=0)
     return _needed(rectangles, occupied.shape)
@@ -56,10 +49,7 @@ def _counts(sums: NDArray[np.int32], rectangles: Rectangles) -> NDArray[np.int32
 
 
 def _extended(rectangles: Rectangles, sums: NDArray[np.int32]) -> Rectangles:
-    """Each rectangle of occupied cells, with all rows above and below it through which it can be extended.
-
-    How far it reaches is found by bisection, for all rectangles at once.
-    """
+    """Each rectangle of occupied cells, with all rows above and below it through which it can be extended."""
     for side, farthest in ((0, 0), (1, len(sums) - 1)):
         good, bad = rectangles.copy(), rectangles.copy()
         bad[:, side] = farthest + (1 if side else -1)

@@ -12,26 +12,15 @@ from airground_drake.base.arrays import Array
 from airground_drake.scenario.maps.grid import Grid
 from airground_drake.scenario.maps.rectangles import Cells
 
+# A site is the cell farthest from obstacles in a square of this side, m, as long as there are such cells.
 AROUND_M = 1.0
-"""A site is the cell farthest from obstacles in a square of this side, m, as long as there are such cells."""
 
 
 def ways(grid: Grid, clearance_m: float, count: int) -> tuple[Array, float]:
-    """Starts and targets for some robots.
-
-    Each next site is the one with the longest way from all sites before it; a start and its target are far apart.
-
-    Args:
-        grid: the map.
-        clearance_m: least distance from obstacles on the way, m.
-        count: number of robots.
-
-    Returns:
-        Start and target of each robot, (count, 2, 2), m, and a length, m, that none of their shortest ways exceeds.
-
-    Raises:
-        ValueError: if there is no room for them; says how many fit.
-    """
+    """Starts and targets for some robots."""
+    # Each next site is the one with the longest way from all sites before it; a start and its target are far apart.
+    # Returns start and target of each robot, (count, 2, 2), m, and a length, m, that none of their shortest ways
+    # exceeds.
     clear = grid.clearance()
     open_ = (clear > clearance_m) & ~grid.occupied
     regions, number = ndimage.label(open_)

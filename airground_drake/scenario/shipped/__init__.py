@@ -11,8 +11,7 @@ import yaml
 
 from airground_drake.base.errors import one_line
 
-AUDIT = "audit"
-"""The argument of `airground report` that is neither a scenario nor a file."""
+AUDIT = "audit"  # the argument of `airground report` that is neither a scenario nor a file
 
 
 def shipped() -> list[str]:

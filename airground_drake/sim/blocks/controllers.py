@@ -139,11 +139,7 @@ class UgvController(_Controller):
         discrete.set_value(1, [NOTHING if proposal is None else float(proposal.number) for proposal in proposals])
 
     def shorten(self, velocity: Array, headings: Array) -> Array:
-        """Shorten commands (n, 3), m/s, in place, to what unicycles with headings (n,), rad, can do.
-
-        Returns:
-            The shares that are left, (n,).
-        """
+        """Shorten commands (n, 3), m/s, in place, to what unicycles with headings (n,), rad, can do."""
         if self._world.steering is None:
             return np.ones(len(velocity))
         left: Array = steer_all(velocity, headings, self._world.steering, self.law.avoidance.period)
@@ -159,20 +155,9 @@ class UgvController(_Controller):
         headings: Array | None = None,
         law: UgvLaw | None = None,
     ) -> Array:
-        """Commands of the law, before they are shortened.
-
-        Args:
-            t: time, s.
-            positions: of all bodies that move, (M, 3), m.
-            reference: preset positions, (n, 3), m.
-            rate: preset velocities, (n, 3), m/s.
-            accepted: per UGV, the accepted proposal or None.
-            headings: of the UGVs, (n,), rad, where some are unicycles.
-            law: default: the one with the default gains.
-
-        Returns:
-            Commands, (n, 3), m/s.
-        """
+        """Commands of the law, before they are shortened. Returns commands, (n, 3), m/s."""
+        # t: s; positions: (M, 3), m; reference: (n, 3), m; rate: (n, 3), m/s; headings: (n,), rad
+        # law: default: the one with the default gains.
         law = self.law if law is None else law
         asked = [None if p is None else AcceptedMotion(*p.motion.at(t), p.chosen) for p in accepted]
         steering = self._world.steering
@@ -247,18 +232,9 @@ class UavController(_Controller):
         avoidance: Avoidance | None = None,
         gain: float | None = None,
     ) -> Array:
-        """Command of the law, (3,), m/s.
-
-        Args:
-            t: time, s.
-            positions: of all bodies that move, (M, 3), m.
-            ugv_commands: of the UGVs, at the sample before, (n, 3), m/s.
-            avoidance: the set-based layer; default: with the default gain.
-            gain: of the task, 1/s; default: as it was built.
-
-        Raises:
-            PluginError: if the task raises or does not ask for a velocity; names the task.
-        """
+        """Command of the law, (3,), m/s; `t` in s; `positions` (M, 3), m; `ugv_commands` (n, 3), m/s."""
+        # avoidance: the set-based layer; default: with the default gain.
+        # gain: of the task, 1/s; default: as it was built.
         avoidance = self.avoidance if avoidance is None else avoidance
         gain = self._gain if gain is None else gain
         near = self._world.at(self._near, t)
@@ -281,17 +257,13 @@ class UavController(_Controller):
 
 
 def read_back(system: LeafSystem, avoidance: Avoidance, near: Neighbours, robots: int) -> dict[str, Any]:
-    """The parameters with which a controller's avoidance runs, in strict JSON, for the trace; `robots`: how many move.
-
-    Returns:
-        For its k robots: `members`, their indices in the order of the world; `outlines` of the m convex parts at rest,
-        without padding, one after the other; `moving_outlines`, those of obstacles that move, about their origins, if
-        there are any; `others`, indices of the bodies of the n parts that each avoids besides what is at rest, (k, n);
-        `safe_m` and `share` beside the parts at rest, then beside the others, (k, m + n); `mobility` (k, 3);
-        `max_speed_m_s` (k,). For the layer: `sampling_s`, period and offset;
-        `gain_1_s`, `period_s`, `sensing_range_m`. Arrays are flat, in C order; `safe_m` and `share` are lists of
-        [value, number of repetitions].
-    """
+    """The parameters with which a controller's avoidance runs, strict JSON, for the trace; `robots` move."""
+    # Returns for its k robots: `members`, their indices in the order of the world; `outlines` of the m convex parts at
+    # rest, without padding, one after the other; `moving_outlines`, those of obstacles that move, about their origins,
+    # if there are any; `others`, indices of the bodies of the n parts that each avoids besides what is at rest, (k, n);
+    # `safe_m` and `share` beside the parts at rest, then beside the others, (k, m + n); `mobility` (k, 3);
+    # `max_speed_m_s` (k,). For the layer: `sampling_s`, period and offset; `gain_1_s`, `period_s`, `sensing_range_m`.
+    # Arrays are flat, in C order; `safe_m` and `share` are lists of [value, number of repetitions].
     timing = system.GetUniquePeriodicDiscreteUpdateAttribute()
     moving = [number for row in near.parts[robots:] for number in outline.as_tuple(row)]
     return ({"moving_outlines": moving} if moving else {}) | {
@@ -315,22 +287,15 @@ def _in_runs(array: Array) -> list[list[float]]:
 
 
 def _finite(positions: Array) -> Array:
-    """The given positions.
-
-    Raises:
-        PluginError: if one is not finite, because no robot could avoid such a body.
-    """
+    """The given positions."""
+    # PluginError if one is not finite, because no robot could avoid such a body.
     if not math.isfinite(positions @ positions) and not np.isfinite(positions).all():  # quickly, then exactly
         raise PluginError(f"positions are not finite, from a plant or a disturbance: {short(repr(positions.tolist()))}")
     return positions
 
 
 def _velocity_of(task: str, answer: object, position: Array) -> Array:
-    """What a task of this name asks for, checked.
-
-    Raises:
-        PluginError: if that is not finite numbers of the shape of the position.
-    """
+    """What a task of this name asks for, checked."""
     try:
         asked = np.asarray(answer)
     except ValueError as error:  # rows of different lengths

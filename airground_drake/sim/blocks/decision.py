@@ -38,16 +38,14 @@ from airground_drake.sim.blocks.signals import (
     laid_out,
 )
 
-NOT_BEGUN = -1.0
-"""Stands for the beginning of a run or a step, s, before the first one."""
+NOT_BEGUN = -1.0  # stands for the beginning of a run or a step, s, before the first one
 
+# Events are not isolated within steps shorter than this, s; they happen at the step's end. Ticks of different periods
+# can be one unit in the last place apart, and Drake stops when it must isolate an event in such a step.
 SHORTEST_S = 1e-9
-"""Events are not isolated within steps shorter than this, s; they happen at the step's end. Ticks of different periods
-can be one unit in the last place apart, and Drake stops when it must isolate an event in such a step."""
+# A shorter step is short, in sampling periods. Isolating an event takes about twenty, each half as long as before.
 SHORT = 0.01
-"""A shorter step is short, in sampling periods. Isolating an event takes about twenty, each half as long as before."""
-MOST_SHORT = 1000
-"""Largest number of short steps in a row without a transition."""
+MOST_SHORT = 1000  # largest number of short steps in a row without a transition
 
 
 class DecisionBlock(LeafSystem):
@@ -92,24 +90,12 @@ class DecisionBlock(LeafSystem):
         self.DeclarePerStepDiscreteUpdateEvent(weakly(self._begin_step))
 
     def value(self, t: float, parts: Array) -> Array | Sequence[float]:
-        """x of every UGV, (n,), m. It may depend on nothing but the arguments.
-
-        Args:
-            t: time, s.
-            parts: task error rho_rd - rho, m, and noise, m, of every UGV, (n, 4).
-        """
+        """x of every UGV, (n,), m. It may depend on nothing but the arguments; `t` in s; `parts` (n, 4), m."""
         raise NotImplementedError(f"{type(self).__name__} does not define `value`")
 
     def extremes(self, begin: float, before: Array, end: float, after: Array, ends: Array) -> Array:
-        """Smallest and largest x, (2, n), m, over a straight stretch; by default those at its ends.
-
-        Args:
-            begin: time, s.
-            before: task error and noise at that time, (n, 4), m.
-            end: time, s.
-            after: task error and noise at that time.
-            ends: x at both times, (2, n), m.
-        """
+        """Smallest and largest x, (2, n), m, over a straight stretch; by default those at its ends."""
+        # begin, end: s; before: (n, 4), m
         return np.sort(ends, axis=0)
 
     def _calc_signals(self, context: Context, output: AbstractValue) -> None:
@@ -125,11 +111,7 @@ class DecisionBlock(LeafSystem):
         return signals
 
     def _valued(self, t: float, parts: Array) -> Array:
-        """`value`, checked: with a number that is not finite, the trigger would never see a crossing.
-
-        Raises:
-            PluginError: if it is not n finite numbers.
-        """
+        """`value`, checked: with a number that is not finite, the trigger would never see a crossing."""
         given: object = self.value(t, parts)
         with suppress(TypeError, ValueError):
             x = np.asarray(given, dtype=np.float64)
@@ -158,14 +140,8 @@ class DecisionBlock(LeafSystem):
         return self.extremes(begun[0], before[:, :4], now[0], after[:, :4], np.stack([before[:, 4], after[:, 4]]))
 
     def _look_into_corners(self, found: Array, corners: Sequence[tuple[float, int]], begun: Array, now: Array) -> None:
-        """Replace the smallest and largest x of UGVs whose references have corners within a step.
-
-        Args:
-            found: smallest and largest x, (2, n), m, changed in place.
-            corners: times of the corners, s, and indices of the UGVs.
-            begun: signals at the beginning of the step.
-            now: signals at its end.
-        """
+        """Replace the smallest and largest x of UGVs whose references have corners within a step; `corners` in s."""
+        # found: smallest and largest x, (2, n), m, changed in place.
         bent = {j for _, j in corners}
         times = np.array([begun[0], *(t for t, _ in corners), now[0]])
         shares = (times - times[0]) / (times[-1] - times[0])
@@ -269,19 +245,14 @@ class EventTrigger(LeafSystem):
         return TriggerLevels(context.get_numeric_parameter(0).value())
 
     def mutable_levels(self, context: Context) -> Any:
-        """The same as a view; assigning to it changes the levels in this Context."""
+        """A view of the levels in force; assigning to it changes them in this Context."""
         return TriggerLevels(context.get_mutable_numeric_parameter(0).get_mutable_value())
 
     def trigger(self, context: Context) -> Trigger:
-        """The automaton with the levels in force.
-
-        Raises:
-            ValueError: if no automaton can have these levels.
-        """
+        """The automaton with the levels in force."""
         return Trigger(*context.get_numeric_parameter(0).value().tolist())
 
     def DoGetWitnessFunctions(self, context: Context) -> list[WitnessFunction]:
-        """The one witness."""
         return [self._witness]
 
     def _start(self, context: Context, state: State) -> EventStatus:

@@ -104,10 +104,8 @@ class InterventionPlanner(LeafSystem):
         return EventStatus.Succeeded()
 
     def plan_ahead(self, context: Context) -> None:
-        """Plan for the instant of a context, before the update of that instant, which then takes this result.
-
-        So a step-wise environment sees what the policies are asked. If it is called again, the last result counts.
-        """
+        """Plan for the instant of a context, before the update of that instant, which then takes this result."""
+        # So a step-wise environment sees what the policies are asked. If it is called again, the last result counts.
         self.get_cache_entry(self._ahead).Eval(context)[:] = [self._planned(context)]
 
     def _planned(self, context: Context) -> PlannerState | None:

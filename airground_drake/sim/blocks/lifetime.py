@@ -13,8 +13,8 @@ from weakref import ref
 
 from pydrake.systems.framework import Diagram, DiagramBuilder, InputPort, OutputPort
 
+# Attribute in which pydrake keeps these references. Under another name `untie` would free nothing.
 PEERS = "_pydrake_internal_ref_cycle_peers"
-"""Attribute in which pydrake keeps these references. Under another name `untie` would free nothing."""
 
 
 def weakly(method: Any) -> Callable[..., Any]:
@@ -24,11 +24,9 @@ def weakly(method: Any) -> Callable[..., Any]:
 
 
 def untie(diagram: Diagram) -> None:
-    """Let a diagram be freed with the last reference to it.
-
-    It still keeps its systems, but they no longer keep it: code that uses one of its systems or ports must keep the
-    diagram, too.
-    """
+    """Let a diagram be freed with the last reference to it."""
+    # It still keeps its systems, but they no longer keep it: code that uses one of its systems or ports must keep the
+    # diagram, too.
     for system in diagram.GetSystems():
         if isinstance(system, Diagram):
             untie(system)

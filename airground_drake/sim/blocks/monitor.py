@@ -186,10 +186,9 @@ class Monitor(LeafSystem):
         return Violation(sample.t, robot, Rule.LAW, float(away[robot])) if away[robot] > LAW_TOLERANCE_M_S else None
 
     def _by_the_laws(self, context: Context, sample: Sample, laws: Laws, commands: Array) -> Array:
-        """Commands by the laws, (r, 3), m/s; for UGVs the given ones if their inputs are not connected.
-
-        Before the updates of this tick, proposals and answers are still those that the controllers saw at the last one.
-        """
+        """Commands by the laws, (r, 3), m/s; for UGVs the given ones if their inputs are not connected."""
+        # Before the updates of this tick, proposals and answers are still those that the controllers saw at the last
+        # one.
         due = commands.copy()
         ports = (self._reference, self._proposals.port, self._answers)
         if sample.reference is not None and all(port.HasValue(context) for port in ports):

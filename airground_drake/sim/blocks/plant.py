@@ -38,8 +38,7 @@ from airground_drake.scenario.schema import Plant as Given
 from airground_drake.scenario.schema import Scenario
 from airground_drake.sim.blocks.lifetime import weakly
 
-START_M = 1e-9
-"""A body may begin this far from its start, m: forward kinematics err by less."""
+START_M = 1e-9  # a body may begin this far from its start, m: forward kinematics err by less
 
 
 def first_order_plant(robot: str, start: Array) -> LinearSystem:
@@ -104,10 +103,8 @@ class SteeredBody(LeafSystem):
 
 
 def steered_plant(body: Body, period_s: float) -> Diagram:
-    """A robot whose body is not where the law steers it: the base, a `first_order_plant`, and a `SteeredBody`.
-
-    Its input is `velocity` (3), m/s; its outputs are `position` (3), m, that of the base, and those of the body.
-    """
+    """A robot whose body is not where the law steers it: the base, a `first_order_plant`, and a `SteeredBody`."""
+    # Its input is `velocity` (3), m/s; its outputs are `position` (3), m, that of the base, and those of the body.
     assert body.plant is not None
     builder = DiagramBuilder()
     base = builder.AddNamedSystem("base", first_order_plant(body.name, body.start_m))
@@ -147,13 +144,7 @@ class OwnPlant(NamedTuple):
 
 
 def declared(scenario: Scenario, plants: Mapping[str, OwnPlant]) -> Scenario:
-    """A valid scenario in which some robots have users' plants, by name.
-
-    Raises:
-        UnknownNameError: if there is no such robot.
-        PluginError: if something else than an `OwnPlant` is given.
-        ScenarioError: if the scenario is not valid with them.
-    """
+    """A valid scenario in which some robots have users' plants, by name."""
     changed = copy.deepcopy(scenario)
     for robot, each in plants.items():
         if robot not in changed.robots:
@@ -177,11 +168,7 @@ class OwnCode(NamedTuple):
 
 
 def own_code(scenario: Scenario, plants: Mapping[str, OwnPlant]) -> dict[str, OwnCode]:
-    """All users' plants in a scenario, by robot; `plants` are those of `declared`.
-
-    Raises:
-        UnknownNameError, PluginError: if a class cannot be imported or is no Drake System.
-    """
+    """All users' plants in a scenario, by robot; `plants` are those of `declared`."""
     named = {robot: each.kind for robot, given in scenario.robots.items() for each in given.plant if each.is_own}
     found = {}
     for robot, name in named.items():
@@ -191,8 +178,7 @@ def own_code(scenario: Scenario, plants: Mapping[str, OwnPlant]) -> dict[str, Ow
     return found
 
 
-GROUND_M = 1e-6
-"""By so much a UGV's plant may be off the ground, by rounding, m: walls have no end in height for UGVs."""
+GROUND_M = 1e-6  # by so much a UGV's plant may be off the ground, by rounding, m: walls have no end in height for UGVs
 
 
 class OwnBody(LeafSystem):
@@ -280,20 +266,13 @@ def _steps(system: System) -> Iterator[float]:
         yield timing.period_sec()
 
 
+# Output ports of a user's plant, and their sizes; only the first is needed, and may have another name.
 OUTPUTS = {"position": 3, "body": 3, "heading": 1}
-"""Output ports of a user's plant, and their sizes; only the first is needed, and may have another name."""
 
 
 def own_plant(body: Body, make: Callable[..., System] | None) -> Diagram:
-    """A user's plant behind an `OwnBody`.
-
-    Args:
-        body: whose plant it is.
-        make: in place of the class that the plant names.
-
-    Raises:
-        UnknownNameError, PluginError: if it cannot be made, lacks a port, or does not begin at the start of the body.
-    """
+    """A user's plant behind an `OwnBody`."""
+    # make: in place of the class that the plant names.
     assert isinstance(body.plant, Own)
     name, parameters = body.plant.name, {**body.plant.parameters, "start": body.start_m.copy()}
     about = f"plant {name!r} of {body.name}"
@@ -359,16 +338,7 @@ def _begins_at(diagram: Diagram, start_m: Array, about: str) -> None:
 
 
 def plant_system(body: Body, period_s: float, own: Mapping[str, OwnPlant] = MappingProxyType({})) -> System:
-    """The Drake system of a body that moves.
-
-    Args:
-        body: with its plant.
-        period_s: control period.
-        own: plants that were made in Python, by robot.
-
-    Raises:
-        UnknownNameError, PluginError: as `own_plant`.
-    """
+    """The Drake system of a body that moves."""
     if isinstance(body.plant, Own):
         return own_plant(body, own[body.name].make if body.name in own else None)
     if isinstance(body.plant, FirstOrder):

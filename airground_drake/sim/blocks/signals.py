@@ -16,28 +16,25 @@ from airground_drake.sim.blocks.lifetime import weakly
 from airground_drake.uav.messages import Report
 from airground_drake.uav.policy import Proposal
 
+# Trigger state of one UGV: `automaton.Mode`, number of triggers, times of the last trigger and the last release (-1
+# before the first).
 Status = namedview("Status", ["mode", "triggers", "triggered_at_s", "released_at_s"])
-"""Trigger state of one UGV: `automaton.Mode`, number of triggers, times of the last trigger and the last release
-(-1 before the first)."""
+# Answer of one UGV: `messages.ACCEPT`, REFUSE or SILENT, and the number of the proposal.
 Answer = namedview("Answer", ["answer", "number"])
-"""Answer of one UGV: `messages.ACCEPT`, REFUSE or SILENT, and the number of the proposal."""
+# Parameters of `UgvController`: A of (8), B of (6), Lambda of (14).
 UgvGains = namedview("UgvGains", ["avoidance_gain_1_s", "motion_gain_1_s", "intervention_gain_1_s"])
-"""Parameters of `UgvController`: A of (8), B of (6), Lambda of (14)."""
+# Parameters of `UavController`: A of (11), C of (10).
 UavGains = namedview("UavGains", ["avoidance_gain_1_s", "formation_gain_1_s"])
-"""Parameters of `UavController`: A of (11), C of (10)."""
+# Parameters of `EventTrigger`: see `model.trigger.automaton.Trigger`.
 TriggerLevels = namedview("TriggerLevels", ["zeta_m", "release_m", "dwell_s"])
-"""Parameters of `EventTrigger`: see `model.trigger.automaton.Trigger`."""
 
-FIELDS = len(Status.get_fields())
-"""Length of a `Status`."""
+FIELDS = len(Status.get_fields())  # length of a `Status`
 
 
 def declare_bodies(system: LeafSystem, world: World) -> InputPort:
-    """Declare the input port `bodies`: positions of all bodies of a world that move, (3 M,), m, in their order.
-
-    Bodies at rest are in the `World` only, so that no tick copies them. `values.reshape(-1, 3)[world.select("ugv")]` is
-    a view of the positions of the UGVs.
-    """
+    """Declare the input port `bodies`: positions of all bodies of a world that move, (3 M,), m, in their order."""
+    # Bodies at rest are in the `World` only, so that no tick copies them. `values.reshape(-1, 3)[world.select("ugv")]`
+    # is a view of the positions of the UGVs.
     return system.DeclareVectorInputPort("bodies", 3 * len(world.moving))
 
 
@@ -70,14 +67,10 @@ def no_reports(count: int) -> AbstractValue:
 
 
 class Messages:
-    """An input port for the messages of one kind to or from n UGVs.
+    """An input port for the messages of one kind to or from n UGVs."""
 
-    Drake compares the types of values where ports are connected, but in pydrake all Python objects have one type. So
-    the messages themselves are checked: when a simulator is initialised, and whenever they are read.
-
-    Attributes:
-        port: the port.
-    """
+    # Drake compares the types of values where ports are connected, but in pydrake all Python objects have one type. So
+    # the messages themselves are checked: when a simulator is initialised, and whenever they are read.
 
     def __init__(self, system: LeafSystem, name: str, count: int, kind: type[Proposal] | type[Report]) -> None:
         """Declare the port of a system."""
@@ -91,11 +84,7 @@ class Messages:
             self.Eval(context)
 
     def Eval(self, context: Context) -> Any:
-        """The messages, one per UGV.
-
-        Raises:
-            PluginError: if they are of another kind: the port is connected with a wrong one.
-        """
+        """The messages, one per UGV."""
         found = self.port.Eval(context)
         if (
             isinstance(found, tuple | list)

@@ -38,28 +38,9 @@ def conduct(
     limits: Limits = DEFAULT_LIMITS,
     progress: Progress = SILENT,
 ) -> dict[str, Any]:
-    """Finish a campaign, and write the evidence and its page.
-
-    Args:
-        spec: the scenario and its distributions.
-        folder: new or empty; with `resume`, a folder with a part of the same campaign.
-        pool: judges the draws.
-        number: of draws; default: all combinations of the grids.
-        resume: keep the draws that the folder has.
-        stopping: rule to end early.
-        limits: largest scenario, and longest time, of a draw.
-        progress: receives the progress.
-
-    Returns:
-        The evidence, strict JSON.
-
-    Raises:
-        ScenarioError: if third-party code is named that is not allowed.
-        FolderError: if the folder cannot be used, or has draws beyond the number.
-        LimitError: if the rows would be more than `MOST_ROWS`.
-        ValueError: if there is a stopping rule, and draws are not independent.
-        OSError: if the folder cannot be written.
-    """
+    """Finish a campaign, and write the evidence and its page."""
+    # folder: new or empty; with `resume`, a folder with a part of the same campaign.
+    # number: of draws; default: all combinations of the grids.
     if stopping is not None and spec.dependent:
         raise ValueError(f"--stop-when needs independent draws; not independent: {', '.join(spec.dependent)}")
     wanted = range(spec.combinations if number is None else number)

@@ -16,16 +16,12 @@ from airground_drake.scenario.limits import MAX_UGVS
 from airground_drake.scenario.schema import Obstacle
 from airground_drake.scenario.shapes import convex_parts
 
-TRIES = 10_000
-"""Places that are tried before a field counts as full."""
+TRIES = 10_000  # places that are tried before a field counts as full
 MOST_OBSTACLES = 10_000
-BEYOND_M = 0.3
-"""Margin of starts and targets beyond the safe distance, m."""
-LEAST_M, MOST_M = 1e-3, 1e3
-"""Smallest and largest size of walls and boxes, m."""
+BEYOND_M = 0.3  # margin of starts and targets beyond the safe distance, m
+LEAST_M, MOST_M = 1e-3, 1e3  # smallest and largest size of walls and boxes, m
 
-REPLACES = ("ugvs", "obstacles", "uav.start_m", "uav.target_m")
-"""Keys of a scenario, dotted, that a course draws."""
+REPLACES = ("ugvs", "obstacles", "uav.start_m", "uav.target_m")  # keys of a scenario, dotted, that a course draws
 
 
 def _range(least: int, most: int) -> Callable[[object], tuple[int, int]]:

@@ -14,22 +14,17 @@ from scipy.stats import qmc, truncnorm
 from airground_drake.base.arrays import Array
 from airground_drake.scenario.limits import MAX_SEED
 
+# Kinds with values that depend on the number of the draw, so that draws are not independent.
 HALTON, GRID = "halton", "grid"
-"""Kinds with values that depend on the number of the draw, so that draws are not independent."""
 
 
 class Kind(NamedTuple):
-    """A kind of distribution.
+    """A kind of distribution."""
 
-    Attributes:
-        wanted: its parameters, in words.
-        allows: whether these parameters can be used; may raise ValueError, TypeError or OverflowError.
-        at: the value at shares (size,), for these parameters.
-    """
-
-    wanted: str
+    wanted: str  # its parameters, in words
+    # Whether these parameters can be used; may raise ValueError, TypeError or OverflowError.
     allows: Callable[..., bool]
-    at: Callable[..., Any]
+    at: Callable[..., Any]  # the value at shares (size,), for these parameters
 
 
 def _is_box(low: Any, high: Any) -> bool:
@@ -107,12 +102,7 @@ class Key:
 
 
 def made(kind: str, given: Any) -> Key:
-    """Make a key from the name of a kind and parameters.
-
-    Raises:
-        KeyError: if the name is unknown.
-        ValueError: if the parameters are not what `KINDS` wants.
-    """
+    """Make a key from the name of a kind and parameters."""
     try:
         if isinstance(given, list) and KINDS[kind].allows(*given):
             return Key(kind, given)
@@ -122,16 +112,9 @@ def made(kind: str, given: Any) -> Key:
 
 
 def values_of(drawn: Mapping[str, Key], seed: int, index: int) -> dict[str, Any]:
-    """The values of one draw by key, in the order of the keys: a function of the seed and the index.
-
-    The random numbers of a key depend on the seed, the key and the index only, so a further key changes none of them.
-    Grids are gone through in all combinations.
-
-    Args:
-        drawn: by dotted key.
-        seed: of the campaign.
-        index: number of the draw, from 0.
-    """
+    """The values of one draw by key, in the order of the keys: a function of the seed and the index."""
+    # The random numbers of a key depend on the seed, the key and the index only, so a further key changes none of them.
+    # Grids are gone through in all combinations.
     values: dict[str, Any] = {}
     place = index
     even = _halton(sum(key.size for key in drawn.values() if key.kind == HALTON), seed, index)

@@ -18,35 +18,23 @@ from airground_drake.base.statuses import UNDECIDED
 from airground_drake.study.campaign.rows import JUDGED, TIMES, UNFINISHED, is_tested
 from airground_drake.study.campaign.statistics import CONFIDENCE, clopper_pearson, confidence_sequence
 
-WORST = 5
-"""Runs of least margin that are listed for each claim."""
-BINS = 4
-"""Parts of a key in maps of where a claim fails: quarters of its draws."""
-MOST_VALUES = 12
-"""Most values of a key that is not a number, such as lists of policies, in these maps."""
-UNRELATED = "seed"
-"""A key that explains no failure: neighbouring seeds of the noise have nothing in common."""
-BY_CHANCE = 0.05
-"""A map is shown if chance alone makes such differences with less than this probability."""
+WORST = 5  # runs of least margin that are listed for each claim
+BINS = 4  # parts of a key in maps of where a claim fails: quarters of its draws
+MOST_VALUES = 12  # most values of a key that is not a number, such as lists of policies, in these maps
+UNRELATED = "seed"  # a key that explains no failure: neighbouring seeds of the noise have nothing in common
+BY_CHANCE = 0.05  # a map is shown if chance alone makes such differences with less than this probability
 QUANTILES = (0.0, 0.01, 0.05, 0.25, 0.5, 0.75, 0.95, 0.99, 1.0)
 
 Json = dict[str, Any]
 
 
 class Counts(NamedTuple):
-    """Counts of the runs of one claim, over all draws.
+    """Counts of the runs of one claim, over all draws."""
 
-    Attributes:
-        tested: runs that could have refuted the claim, and unfinished ones.
-        refuted: violations.
-        undecided: tested runs without a decision; they count as violations in every upper bound.
-        idle: runs that could not have refuted the claim; these are ignored.
-    """
-
-    tested: int
-    refuted: int
-    undecided: int
-    idle: int
+    tested: int  # runs that could have refuted the claim, and unfinished ones
+    refuted: int  # violations
+    undecided: int  # tested runs without a decision; they count as violations in every upper bound
+    idle: int  # runs that could not have refuted the claim; these are ignored
 
     @classmethod
     def of(cls, rows: pd.DataFrame, unfinished: int) -> Counts:
@@ -57,10 +45,8 @@ class Counts(NamedTuple):
         return cls(int(tested.sum()) + unfinished, refuted, undecided + unfinished, int((~tested).sum()))
 
     def interval(self, *, anytime: bool) -> tuple[float, float]:
-        """Bounds of the probability of a violation.
-
-        Undecided runs count as passes in the lower bound and as violations in the upper bound.
-        """
+        """Bounds of the probability of a violation."""
+        # Undecided runs count as passes in the lower bound and as violations in the upper bound.
         bounds = confidence_sequence if anytime else clopper_pearson
         low = bounds(self.refuted, self.tested).low
         return low, bounds(self.refuted + self.undecided, self.tested).high
@@ -71,13 +57,8 @@ def _tested(rows: pd.DataFrame) -> pd.Series:
 
 
 def evidence(table: pd.DataFrame, marks: Mapping[str, float] | None = None, dependent: Sequence[str] = ()) -> Json:
-    """All conclusions, for the page of a campaign.
-
-    Args:
-        table: rows of `rows.COLUMNS`.
-        marks: values that are marked in the distributions of `TIMES`, by column.
-        dependent: keys whose values depend on other draws; with any, claims have no intervals.
-    """
+    """All conclusions, for the page of a campaign."""
+    # dependent: keys whose values depend on other draws; with any, claims have no intervals.
     first = table.drop_duplicates("index")
     judged = table[table["ended"] == JUDGED]
     runs = judged.drop_duplicates(["index", "run"])
@@ -161,10 +142,8 @@ def _quantiles(values: Array) -> dict[str, float]:
 
 
 def _where(violated: pd.Series, drawn: pd.DataFrame) -> Json | None:
-    """Count violations and runs in each pair of quarters of the two keys by which violations differ most.
-
-    None if chance may explain the differences, by the least p-value of all pairs times their number (Bonferroni).
-    """
+    """Count violations and runs in each pair of quarters of the two keys by which violations differ most."""
+    # None if chance may explain the differences, by the least p-value of all pairs times their number (Bonferroni).
     keys = drawn.loc[violated.index].drop(columns=UNRELATED, errors="ignore")
     parts = {str(key): part for key in keys if (part := _parts(keys[key])) is not None}
     tables = {

@@ -26,17 +26,11 @@ from airground_drake.study.campaign.work import rows_at, rows_of_scenario
 
 @dataclass(frozen=True)
 class Search:
-    """A search; it is sent to the processes that simulate.
+    """A search; it is sent to the processes that simulate."""
 
-    Attributes:
-        spec: of the scenarios; a course is that of draw 0.
-        objective: is minimised.
-        limits: largest scenario and longest time.
-    """
-
-    spec: Spec
-    objective: Objective
-    limits: Limits
+    spec: Spec  # of the scenarios; a course is that of draw 0
+    objective: Objective  # is minimised
+    limits: Limits  # largest scenario and longest time
 
     def values(self, point: Array) -> dict[str, Any]:
         """By dotted key, at a point of the unit cube."""
@@ -60,34 +54,17 @@ class Search:
 
 @dataclass(frozen=True)
 class Best:
-    """The result of a search.
+    """The result of a search."""
 
-    Attributes:
-        tried: number of points.
-        value: least objective; infinite if it was never measured.
-        point: its point, (n,); (0,) if it was never measured.
-        found: whether this is a counterexample.
-    """
-
-    tried: int
-    value: float
-    point: Array
-    found: bool
+    tried: int  # number of points
+    value: float  # least objective; infinite if it was never measured
+    point: Array  # its point, (n,); (0,) if it was never measured
+    found: bool  # whether this is a counterexample
 
 
 def falsify(search: Search, sampler: Sampler, number: int, pool: Pool, progress: Progress = SILENT) -> Best:
-    """Try points until there is a counterexample, or `number` of them were tried.
-
-    Args:
-        search: judges a point.
-        sampler: chooses points.
-        number: largest number of points; the last batch of the sampler is cut, and the sampler is not told of it.
-        pool: does the work.
-        progress: receives the progress.
-
-    Raises:
-        PluginError: if the sampler raises, ends the process, or returns no points in [0, 1).
-    """
+    """Try points until there is a counterexample, or `number` of them were tried."""
+    # number: largest number of points; the last batch of the sampler is cut, and the sampler is not told of it.
     best = Best(0, np.inf, np.empty(0), False)
     while best.tried < number and not best.found:
         asked = _asked(sampler, dimensions(search.spec.drawn))

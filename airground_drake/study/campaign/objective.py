@@ -8,8 +8,7 @@ from dataclasses import dataclass
 
 from airground_drake.study.campaign.rows import JUDGED, Row
 
-FAILED = -1.0
-"""Value of a violation that has no margin."""
+FAILED = -1.0  # value of a violation that has no margin
 
 
 @dataclass(frozen=True)
@@ -56,5 +55,4 @@ class Most:
 
 Objective = Margin | Most
 
-LATEST_S = 1e9
-"""Time of an arrival that never happens, s; infinity would mean that nothing was measured."""
+LATEST_S = 1e9  # time of an arrival that never happens, s; infinity would mean that nothing was measured

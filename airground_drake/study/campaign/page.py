@@ -21,10 +21,8 @@ from airground_drake.study.campaign import swept
 from airground_drake.study.campaign.rows import JUDGED
 
 BARS = 40
-MOST_TOLD = 8
-"""Sentences about claims on the first screen; the others are folded."""
-SHOWN = ("SAFE-TRACE", "SAFE-HYP", "LIVE-GOAL")
-"""Claims whose margins are drawn."""
+MOST_TOLD = 8  # sentences about claims on the first screen; the others are folded
+SHOWN = ("SAFE-TRACE", "SAFE-HYP", "LIVE-GOAL")  # claims whose margins are drawn
 
 
 class Drawing(NamedTuple):
@@ -35,12 +33,7 @@ class Drawing(NamedTuple):
 
 
 def page(found: dict[str, Any], table: pd.DataFrame) -> str:
-    """Render the page.
-
-    Args:
-        found: from `evidence.evidence`, with name, title, spec and stopped (the last draw that counts, or None).
-        table: the rows.
-    """
+    """Render the page."""
     template = _environment().get_template("campaign.html.j2")
     return template.render(
         found=found, told=told(found), separated=_separated(found), figures=_figures(found, table),

@@ -15,10 +15,8 @@ from typing import Any, Protocol, TypeVar
 from airground_drake.base.errors import AirgroundError, one_line
 from airground_drake.base.parallel import processes
 
-DEATHS = 2
-"""An item is given up after this many of its processes have died."""
-AHEAD = 4
-"""Items for each process that are handed out in advance."""
+DEATHS = 2  # an item is given up after this many of its processes have died
+AHEAD = 4  # items for each process that are handed out in advance
 
 T = TypeVar("T")
 
@@ -27,21 +25,15 @@ class Pool(Protocol):
     """Does the same work for many items."""
 
     def __call__(self, work: Callable[[int], T], items: Iterable[int]) -> Iterator[tuple[int, T | None]]:
-        """Yield each item with its result when it is finished; None if its process died each time.
-
-        Args:
-            work: does one item; it is pickled.
-            items: different numbers.
-        """
+        """Yield each item with its result when it is finished; None if its process died each time."""
+        # work: does one item; it is pickled.
 
 
 @contextmanager
 def local(jobs: int) -> Iterator[Pool]:
-    """A pool of `jobs` processes on this machine, which are kept between calls.
-
-    When a process dies, its pool ends the others, too. Items that were handed out are then done again, each in its own
-    process, and new items go to a new pool.
-    """
+    """A pool of `jobs` processes on this machine, which are kept between calls."""
+    # When a process dies, its pool ends the others, too. Items that were handed out are then done again, each in its
+    # own process, and new items go to a new pool.
     with ExitStack() as alive:
         pool = alive.enter_context(processes(jobs))
 
@@ -79,13 +71,8 @@ def _result_of(future: Future[T], call: Callable[[], T]) -> T | None:
 
 @contextmanager
 def cluster(scheduler: str, timeout_s: float = 10.0) -> Iterator[Pool]:
-    """A pool of the workers of a Dask cluster. Each worker needs this package.
-
-    Dask replaces workers that die, and gives up an item after several deaths.
-
-    Raises:
-        AirgroundError: if the scheduler cannot be reached, or Dask is not installed.
-    """
+    """A pool of the workers of a Dask cluster. Each worker needs this package."""
+    # Dask replaces workers that die, and gives up an item after several deaths.
     try:
         import distributed
     except ImportError:
@@ -103,11 +90,7 @@ def cluster(scheduler: str, timeout_s: float = 10.0) -> Iterator[Pool]:
 def _on_cluster(
     dask: Any, client: Any, work: Callable[[int], T], items: Iterable[int]
 ) -> Iterator[tuple[int, T | None]]:
-    """See `Pool`. Names of items are unique to this client. Workers may join at any time.
-
-    Raises:
-        AirgroundError: if the scheduler is lost.
-    """
+    """The work of `Pool` on a cluster. Names of items are unique to this client; workers may join at any time."""
     waiting, ours = iter(items), uuid.uuid4().hex
 
     def submit(under_way: int) -> list[Any]:

@@ -6,6 +6,11 @@ from typing import Any
 
 from airground_drake.base.statuses import NOT_EXERCISED, outcome
 
+# Columns of the dataset and their types; a number that does not exist is NaN.
+#
+# `ended` is `judged`, or the reason why not, explained in `what`: `invalid` (no valid scenario), `stopped` (the
+# simulation), `died` (its process). Such a row has no claim, and neither has the row of a run without claims. `drawn`
+# is strict JSON: values by key. `digest` is the digest of all rows of a draw (see `store`).
 COLUMNS: dict[str, str] = {
     "index": "int64", "run": "str", "method": "str", "ended": "str", "what": "str", "claim": "str", "status": "str",
     "as_expected": "bool", "margin": "float64", "unit": "str", "exercised": "float64", "ugvs": "int64",
@@ -14,18 +19,11 @@ COLUMNS: dict[str, str] = {
     "intervened_s": "float64", "wall_s": "float64",
     "drawn": "str", "digest": "str",
 }  # fmt: skip
-"""Columns of the dataset and their types; a number that does not exist is NaN.
-
-`ended` is `judged`, or the reason why not, explained in `what`: `invalid` (no valid scenario), `stopped` (the
-simulation), `died` (its process). Such a row has no claim, and neither has the row of a run without claims. `drawn` is
-strict JSON: values by key. `digest` is the digest of all rows of a draw (see `store`)."""
 
 JUDGED, INVALID, STOPPED, DIED = "judged", "invalid", "stopped", "died"
-UNFINISHED = (STOPPED, DIED)
-"""Every claim of such a run is undecided; if the row names no run, every claim of the draw."""
+UNFINISHED = (STOPPED, DIED)  # every claim of such a run is undecided; if the row names no run, every claim of the draw
 
-TIMES = ("first_trigger_s", "arrival_s", "intervened_s", "wall_s")
-"""Columns whose distributions are shown, s."""
+TIMES = ("first_trigger_s", "arrival_s", "intervened_s", "wall_s")  # columns whose distributions are shown, s
 
 Row = dict[str, Any]
 

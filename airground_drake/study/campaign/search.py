@@ -11,10 +11,8 @@ from scipy.stats import qmc
 
 from airground_drake.base.arrays import Array
 
-BATCH = 16
-"""Points at a time, for samplers that do not learn."""
-WORTHLESS = 1e6
-"""Value of points without a measurement, for CMA-ES, which needs finite values."""
+BATCH = 16  # points at a time, for samplers that do not learn
+WORTHLESS = 1e6  # value of points without a measurement, for CMA-ES, which needs finite values
 
 
 @runtime_checkable
@@ -36,7 +34,6 @@ class Uniform:
         self._rng, self._dimensions = np.random.default_rng(seed), dimensions
 
     def ask(self) -> Array:
-        """See `Sampler`."""
         return self._rng.random((BATCH, self._dimensions))
 
     def tell(self, points: Array, values: Array) -> None:
@@ -51,7 +48,6 @@ class Halton(Uniform):
         self._sequence = qmc.Halton(dimensions, rng=np.random.default_rng(seed))
 
     def ask(self) -> Array:
-        """See `Sampler`."""
         return np.asarray(self._sequence.random(BATCH))
 
 
@@ -64,12 +60,11 @@ class CmaEs:
         self._begin()
 
     def ask(self) -> Array:
-        """See `Sampler`. The strategy needs two dimensions: if there is only one, a second has no effect."""
+        """Its next candidates. The strategy needs two dimensions: if there is only one, a second has no effect."""
         self._asked = self._strategy.ask()
         return np.clip(np.array(self._asked)[:, : self._dimensions], 0.0, np.nextafter(1.0, 0.0))
 
     def tell(self, points: Array, values: Array) -> None:
-        """See `Sampler`."""
         self._strategy.tell(self._asked, np.nan_to_num(values, nan=WORTHLESS, posinf=WORTHLESS).tolist())
         if self._strategy.stop():
             self._begin()

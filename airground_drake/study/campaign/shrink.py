@@ -11,31 +11,20 @@ from collections.abc import Callable, Iterator
 from functools import partial
 from typing import Any
 
+# Lists and mappings whose entries may be left out.
 PARTS = (("intervention", "policies"), ("ugvs",), ("uav", "phantoms_m"), ("obstacles",))
-"""Lists and mappings whose entries may be left out."""
-SHARES = (0.25, 0.5, 0.75, 0.9)
-"""Shares of the duration that may be left."""
-DIGITS = (0, 1, 2, 3)
-"""Decimals that numbers are rounded to, the fewest first."""
+SHARES = (0.25, 0.5, 0.75, 0.9)  # shares of the duration that may be left
+DIGITS = (0, 1, 2, 3)  # decimals that numbers are rounded to, the fewest first
+# Keys with numbers that are rounded.
 ROUNDED = ("ugvs", "obstacles", "arena_m", "uav", "control", "decision", "duration_s")
-"""Keys with numbers that are rounded."""
 
 Json = dict[str, Any]
-Fails = Callable[[Json], bool]
-"""Whether a scenario is valid and fails, as before."""
+Fails = Callable[[Json], bool]  # whether a scenario is valid and fails, as before
 
 
 def shrink(data: Json, fails: Fails, tests: int) -> tuple[Json, int]:
-    """Find a smaller scenario that fails, too.
-
-    Args:
-        data: a scenario that fails, as `scenario.load.resolved` returns it, with one run.
-        fails: the test.
-        tests: how often `fails` may be called.
-
-    Returns:
-        The smallest scenario found, and the number of tests.
-    """
+    """Find a smaller scenario that fails, too. Returns the smallest scenario found, and the number of tests."""
+    # tests: how often `fails` may be called.
     steps: list[Callable[[Json], Iterator[Json]]] = [partial(_without_entry, path=path) for path in PARTS]
     steps += [_plainer, _shorter, _rounder]
     left = tests

@@ -38,10 +38,9 @@ from airground_drake.study.campaign.distributions import GRID, HALTON, KINDS, Ke
 from airground_drake.study.campaign.rows import TIMES
 from airground_drake.verify.finding import PLAIN_NAME
 
-COURSE = "course"
-"""Name of the random numbers that maps and teams are drawn from."""
+COURSE = "course"  # name of the random numbers that maps and teams are drawn from
+# Keys about the paper's numbers, which say nothing about a drawn scenario.
 NOT_JUDGED: dict[str, Any] = {"reproduction": [], "choices": []}
-"""Keys about the paper's numbers, which say nothing about a drawn scenario."""
 
 
 def _key(given: object) -> Key:

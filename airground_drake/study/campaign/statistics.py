@@ -34,12 +34,10 @@ def clopper_pearson(k: int, n: int, confidence: float = CONFIDENCE) -> Interval:
 
 
 def confidence_sequence(k: int, n: int, confidence: float = CONFIDENCE) -> Interval:
-    """The anytime-valid interval of the uniform mixture (Robbins 1970): p with M_n(p) < 1/(1 - confidence).
-
-    M_n(p) = B(k + 1, n - k + 1) / (p^k (1 - p)^(n - k)), the likelihood ratio of a uniform prior against p, is a
-    non-negative martingale with mean 1 under p; by Ville's inequality it ever reaches 1/alpha with probability alpha at
-    most. It is convex in the log-odds, least at k/n.
-    """
+    """The anytime-valid interval of the uniform mixture (Robbins 1970): p with M_n(p) < 1/(1 - confidence)."""
+    # M_n(p) = B(k + 1, n - k + 1) / (p^k (1 - p)^(n - k)), the likelihood ratio of a uniform prior against p, is a
+    # non-negative martingale with mean 1 under p; by Ville's inequality it ever reaches 1/alpha with probability alpha
+    # at most. It is convex in the log-odds, least at k/n.
     if n == 0:
         return Interval(0.0, 1.0)
     wealth, most, at = betaln(k + 1, n - k + 1), -math.log(1.0 - confidence), k / n

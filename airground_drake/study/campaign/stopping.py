@@ -18,17 +18,11 @@ _RULE = re.compile(r"\s*(?P<claim>[A-Za-z0-9_.-]+)\s*(?P<sign>[<>])\s*(?P<value>
 
 @dataclass
 class Stopping:
-    """Stop when the probability of a violation is known to be below, or above, a value.
+    """Stop when the probability of a violation is known to be below, or above, a value."""
 
-    Attributes:
-        claim: identifier.
-        below: whether the upper bound must be below `value`; otherwise the lower bound must be above it.
-        value: a probability.
-    """
-
-    claim: str
-    below: bool
-    value: float
+    claim: str  # identifier
+    below: bool  # whether the upper bound must be below `value`; otherwise the lower bound must be above it
+    value: float  # a probability
 
     def __post_init__(self) -> None:
         self._counts: dict[str, list[int]] = {}
@@ -36,16 +30,8 @@ class Stopping:
 
     @classmethod
     def parse(cls, text: str, claims: Collection[str] = ()) -> Stopping:
-        """Parse a rule.
-
-        Args:
-            text: such as 'SAFE-TRACE < 1e-4'.
-            claims: identifiers of the claims that are judged; empty: all about runs.
-
-        Raises:
-            ValueError: if the text is no rule.
-            UnknownNameError: if no such claim is judged.
-        """
+        """Parse a rule."""
+        # claims: identifiers of the claims that are judged; empty: all about runs.
         found = _RULE.fullmatch(text)
         try:
             value = float(found["value"]) if found else 0.0
@@ -86,8 +72,7 @@ class InOrder:
         self._rule, self._wanted = rule, iter(wanted)
         self._next = next(self._wanted, None)
         self._waiting: dict[int, list[Row]] = {}
-        self.last: int | None = None
-        """The draw that met the rule."""
+        self.last: int | None = None  # the draw that met the rule
 
     def met(self, index: int, rows: list[Row]) -> bool:
         """Take one more finished draw; return whether the draws without a gap before them meet the rule."""

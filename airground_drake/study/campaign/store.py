@@ -37,17 +37,8 @@ class Store:
     """The open folder of a campaign. One command at a time can open it."""
 
     def __init__(self, folder: Path, manifest: dict[str, Any], *, resume: bool) -> None:
-        """Open the folder, and read the finished draws.
-
-        Args:
-            folder: new or empty; with `resume`, a folder of the same campaign.
-            manifest: identifies the campaign, strict JSON.
-            resume: keep the draws that the folder has.
-
-        Raises:
-            FolderError: if the folder cannot be written, has another campaign or something else, is open in another
-                command, has rows that were changed, or links or pipes in the place of files.
-        """
+        """Open the folder, and read the finished draws."""
+        # folder: new or empty; with `resume`, a folder of the same campaign.
         files.make_folder(folder, "the campaign")
         self.folder = folder
         self._manifest = manifest = {"schema": SCHEMA, **manifest}
@@ -77,11 +68,7 @@ class Store:
         self.finished = {*there_already["index"].tolist(), *self._lately}
 
     def add(self, rows: Sequence[Row]) -> None:
-        """Store the rows of a draw, which is then finished.
-
-        Raises:
-            OSError: if they cannot be written, with the path; the draw is then not finished.
-        """
+        """Store the rows of a draw, which is then finished."""
         (index,) = {row["index"] for row in rows}
         if index in self.finished:
             return
@@ -124,11 +111,7 @@ class Store:
 
 
 def read(folder: Path) -> tuple[dict[str, Any], pd.DataFrame]:
-    """The manifest of a campaign and all rows of its finished draws, also while it runs.
-
-    Raises:
-        FolderError: if the folder has no campaign, or rows that were changed.
-    """
+    """The manifest of a campaign and all rows of its finished draws, also while it runs."""
     manifest = _manifest(folder)
     if manifest is None:
         raise FolderError(one_line(f"{folder} has no campaign: no {MANIFEST} of ours"))

@@ -16,15 +16,14 @@ from airground_drake.base.statuses import NOT_EXERCISED, UNDECIDED, outcome
 from airground_drake.report.view import canvas, svg
 from airground_drake.study.campaign.rows import JUDGED
 
+# Columns about a run, besides its claims.
 OF_A_RUN = ("ended", "what", "ugvs", "arrived", "arrival_s", "triggers", "first_trigger_s", "intervened_s")
-"""Columns about a run, besides its claims."""
 MARGIN = " margin"
+# Claims whose margins are drawn, if they were judged: the first of them.
 DRAWN = ("SAFE-TRACE", "SAFE-OWN", "LIVE-GOAL")
-"""Claims whose margins are drawn, if they were judged: the first of them."""
 MOST_RUNS = len(canvas.LOOKS)
 SHARE = "share of UGVs that arrived"
-SAME = 1e-6
-"""Relative difference of values that are drawn as one."""
+SAME = 1e-6  # relative difference of values that are drawn as one
 
 Json = dict[str, Any]
 
@@ -93,13 +92,7 @@ def _number(value: float) -> float | None:
 
 
 def drawing(entries: Sequence[Json], key: str, name: str) -> Markup:
-    """Margin, share that arrived, and time of arrival by the value of a key, as inline SVG.
-
-    Args:
-        entries: from `by_value`.
-        key: as there.
-        name: identifier of the figure on its page.
-    """
+    """Margin, share that arrived, and time of arrival by the value of a key, as inline SVG."""
     runs = list(dict.fromkeys(entry["run"] for entry in entries))[:MOST_RUNS]
     values = list(dict.fromkeys(entry["value"] for entry in entries))
     numbers = all(isinstance(value, int | float) for value in values)

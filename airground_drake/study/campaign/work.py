@@ -30,16 +30,7 @@ class DrawOutOfTime(BaseException):
 
 
 def rows_of(spec: Spec, index: int, limits: Limits) -> list[Row]:
-    """Simulate and judge one draw.
-
-    Args:
-        spec: of the campaign.
-        index: of the draw.
-        limits: a larger scenario is `invalid`, a draw that takes longer is `stopped`.
-
-    Returns:
-        A row for each run and claim, with the columns of `rows.COLUMNS`.
-    """
+    """Simulate and judge one draw. Returns a row for each run and claim, with the columns of `rows.COLUMNS`."""
     return rows_at(spec, spec.values(index), index, limits)
 
 
@@ -86,12 +77,7 @@ def rows_of_scenario(spec: Spec, scenario: Scenario, limits: Limits, common: Row
 
 @contextmanager
 def _within(spec: Spec, scenario: Scenario, limits: Limits) -> Iterator[None]:
-    """Find or refuse third-party code; limit the time of the body.
-
-    Raises:
-        AirgroundError: if the scenario is too large.
-        DrawOutOfTime: in the body, if it takes too long.
-    """
+    """Find or refuse third-party code; limit the time of the body."""
     within(scenario, limits)
     with (
         plugins.admitted(scenario, spec.scenario, allow=limits.plugins),

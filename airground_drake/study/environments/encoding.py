@@ -13,15 +13,12 @@ from airground_drake.model.geometry import convex
 from airground_drake.model.geometry.motion import Motion
 from airground_drake.uav.policy import Observation
 
-Numbers = npt.NDArray[np.float32]
-"""An observation or an action."""
+Numbers = npt.NDArray[np.float32]  # an observation or an action
 
+# Bounds of entries of observations; greater values are clipped.
 LONGEST_S, MOST_REFUSALS, FASTEST_M_S = 3600.0, 100.0, 100.0
-"""Bounds of entries of observations; greater values are clipped."""
-TOUCHING_M = 0.02
-"""A way that leads towards an obstacle is blocked if the distance left to it is at most this, m."""
-APART_M = 0.01
-"""Waypoints that are nearer to the one before are left out, m."""
+TOUCHING_M = 0.02  # a way that leads towards an obstacle is blocked if the distance left to it is at most this, m
+APART_M = 0.01  # waypoints that are nearer to the one before are left out, m
 
 
 @dataclass(frozen=True)
@@ -133,15 +130,8 @@ def frame(seen: Observation) -> tuple[Array, float]:
 
 
 def free_ways(rows: Array, keep: Array, position: Array, headings: Array, reach: float) -> Array:
-    """How far a straight way keeps the distances from cores, (R,), m.
-
-    Args:
-        rows: outlines of the obstacles, (m, W), see `model.geometry.outline`.
-        keep: distances to keep from their cores, (m,), m.
-        position: where the way begins, (3,), m.
-        headings: unit vectors, (R, 2).
-        reach: longest way, m.
-    """
+    """How far a straight way keeps the distances from cores, (R,), m."""
+    # rows: (m, W); keep: (m,), m; position: (3,), m; headings: (R, 2)
     if not len(rows):
         return np.full(len(headings), reach)
     away = position[:2] - convex.nearest_points(rows, position[None])[0, :, :2]

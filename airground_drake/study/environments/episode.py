@@ -15,21 +15,13 @@ from airground_drake.sim.trace import Trace
 from airground_drake.uav.agent import Agent, Proposed
 from airground_drake.uav.policy import Observation
 
-AGENT = "agent"
-"""Name of the policy that asks the agent of an environment."""
-SETTLED_S = 1.0
-"""A run ends early when all robots have been at their targets for this long, s."""
-ROUNDING = 1e-12
-"""Relative difference by which an instant may miss the end of a run through rounding."""
+AGENT = "agent"  # name of the policy that asks the agent of an environment
+SETTLED_S = 1.0  # a run ends early when all robots have been at their targets for this long, s
+ROUNDING = 1e-12  # relative difference by which an instant may miss the end of a run through rounding
 
 
 def with_agent(scenario: Scenario, run: str) -> Scenario:
-    """A scenario of one run whose policies include `agent`; if they do not, it replaces them.
-
-    Args:
-        scenario: validated.
-        run: name of the run.
-    """
+    """A scenario of one run whose policies include `agent`; if they do not, it replaces them."""
     own_keys = own(scenario, run)
     policies = own_keys.intervention.policies
     if AGENT not in (each.name for each in policies):

@@ -19,8 +19,8 @@ from airground_drake.study.environments.rewards import Rewards
 from airground_drake.study.environments.sources import Episodes
 from airground_drake.uav.policy import Observation
 
+# For `gymnasium.make` and `make_vec`, once this module is imported; arguments as of `InterventionEnv`.
 ID = "AirgroundDrake/Intervention-v0"
-"""For `gymnasium.make` and `make_vec`, once this module is imported; arguments as of `InterventionEnv`."""
 
 
 class InterventionEnv(Episodes, gymnasium.Env[Numbers, Numbers]):

@@ -21,8 +21,7 @@ from airground_drake.study.environments.encoding import Encoding
 from airground_drake.study.environments.episode import Episode, Stage, with_agent
 
 DEFAULT = "minimal"
-MOST_STAGES = 64
-"""Models that are kept; one takes about 0.5 MB."""
+MOST_STAGES = 64  # models that are kept; one takes about 0.5 MB
 
 
 class Source:
@@ -89,8 +88,7 @@ class Episodes:
         encoding: of observations and actions.
     """
 
-    _ignored: tuple[str, ...] = ()
-    """Options of `reset` that are neither used nor refused."""
+    _ignored: tuple[str, ...] = ()  # options of `reset` that are neither used nor refused
 
     def __init__(
         self,
@@ -109,11 +107,7 @@ class Episodes:
         self._over = False
 
     def __deepcopy__(self, memo: dict[int, Any]) -> NoReturn:
-        """Refuse, and say why.
-
-        Raises:
-            TypeError: always.
-        """
+        """Refuse, and say why."""
         wanted = "make a second environment and reset it with the same number: its episodes are the same"
         raise TypeError(f"{type(self).__name__} cannot be copied: its model is a Drake diagram; {wanted}")
 
@@ -126,11 +120,7 @@ class Episodes:
         return self._begun().trace()
 
     def _begin(self, rng: np.random.Generator, options: Mapping[str, Any] | None) -> Episode:
-        """Begin the episode with the number in the options, or a drawn one.
-
-        Raises:
-            ValueError: if the number is not a whole number from 0, or there are other options.
-        """
+        """Begin the episode with the number in the options, or a drawn one."""
         if unknown := [repr(name) for name in options or {} if name not in ("number", *self._ignored)]:
             raise ValueError(f"unknown options of reset: {', '.join(unknown)}; allowed: 'number'")
         number = (options or {}).get("number")
@@ -148,11 +138,7 @@ class Episodes:
         return self._episode
 
     def _going_on(self) -> Episode:
-        """The episode of a step.
-
-        Raises:
-            RuntimeError: if there is none, or it is over.
-        """
+        """The episode of a step."""
         episode = self._begun()
         if self._over:
             raise RuntimeError("the episode is over: call reset")

@@ -14,21 +14,19 @@ from airground_drake.check.files import Json
 from airground_drake.check.scenario import robots_of
 from airground_drake.study.logs.stream import PER_M, Stream
 
+# Axes of a log along x, y and z of the scenario: as they are; and of one with x north, y east, z down.
 PLAIN, NED = "x,y,z", "y,x,-z"
-"""Axes of a log along x, y and z of the scenario: as they are; and of one with x north, y east, z down."""
+# Axes that other programs have.
 OTHERS = {
     NED: "x is north, y east and z down", "x,-y,-z": "z is down", "x,-z,y": "y is up", "z,x,y": "y is up",
     "-x,z,y": "y is up", "-z,-x,y": "y is up", "x,z,y": "y is up, as in Unity",
 }  # fmt: skip
-"""Axes that other programs have."""
+# A body begins where the scenario has it if it is so near; starts so far from (0, 0) tell axes apart, m.
 NEAR_M, APART_M = 0.1, 0.5
-"""A body begins where the scenario has it if it is so near; starts so far from (0, 0) tell axes apart, m."""
-LEVEL_M, WIDE_M = 0.1, 0.5
-"""Heights of what drives on the ground vary by less, and its ways are wider, m."""
-BELOW_M = 0.2
-"""What flies is below the ground if it is lower than this, m."""
+LEVEL_M, WIDE_M = 0.1, 0.5  # heights of what drives on the ground vary by less, and its ways are wider, m
+BELOW_M = 0.2  # what flies is below the ground if it is lower than this, m
+# In names of files, topics and frames: the axes of PX4 and MAVLink.
 _IS_NED = re.compile(r"(?<![a-z])ned(?![a-z])|vehicle_local_position", re.IGNORECASE)
-"""In names of files, topics and frames: the axes of PX4 and MAVLink."""
 
 
 def parsed(text: str) -> list[tuple[int, float]]:
@@ -44,11 +42,7 @@ def _is_axis(part: str) -> bool:
 
 
 def chosen(streams: Mapping[str, Stream], choice: Mapping[str, str]) -> None:
-    """Turn positions as the command line says, by body; '' is for all others.
-
-    Raises:
-        LogError: if there are no heights, where these are a way in the plane.
-    """
+    """Turn positions as the command line says, by body; '' is for all others."""
     for name, stream in streams.items():
         _turn(stream, choice.get(name, choice.get("", PLAIN)))
 
@@ -65,16 +59,7 @@ def _turned(places: Array, axes: str) -> Array:
 
 
 def recognised(streams: Mapping[str, Stream], scenario: Json, without: Collection[str]) -> list[str]:
-    """Turn positions that are named as NED and then begin where the scenario has them; remarks.
-
-    Args:
-        streams: by body, with their units.
-        scenario: as resolved.
-        without: bodies for which the command line has chosen the axes.
-
-    Raises:
-        LogError: if the axes seem to be others than the scenario's; says which may be meant.
-    """
+    """Turn positions that are named as NED and then begin where the scenario has them; remarks."""
     robots = {name: each for name, each in streams.items() if name in robots_of(scenario) and name not in without}
     robots = {name: each for name, each in robots.items() if len(each.whole)}
     if not robots or _fits(robots, scenario, PLAIN):

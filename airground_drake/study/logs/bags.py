@@ -21,16 +21,12 @@ from airground_drake.study.logs.messages import Gathered
 from airground_drake.study.logs.stream import Log
 
 HINT = "pip install 'airground_drake[logs]'"
-MCAP = b"\x89MCAP0\r\n"
-"""How an MCAP file begins and ends."""
+MCAP = b"\x89MCAP0\r\n"  # how an MCAP file begins and ends
+# How a ROS 1 bag, the file of a ROS 2 bag, and what zstd has packed begin.
 ROS1, SQLITE, ZSTD = b"#ROSBAG V2.0", b"SQLite format 3\0", b"\x28\xb5\x2f\xfd"
-"""How a ROS 1 bag, the file of a ROS 2 bag, and what zstd has packed begin."""
-LONGEST_MESSAGE = 50_000_000
-"""Bytes of a message that is decoded."""
-DENSEST = 20
-"""All parts of a file may unpack to so many times its size, if that is more than `files.MOST_UNPACKED`."""
-BLOCK = 1_000_000
-"""Bytes that are unpacked at once."""
+LONGEST_MESSAGE = 50_000_000  # bytes of a message that is decoded
+DENSEST = 20  # all parts of a file may unpack to so many times its size, if that is more than `files.MOST_UNPACKED`
+BLOCK = 1_000_000  # bytes that are unpacked at once
 Decode = Callable[[bytes], Any]
 
 
@@ -44,8 +40,7 @@ class Channel(NamedTuple):
     definition: bytes
 
 
-Message = tuple[Channel, int, bytes]
-"""Its channel, when it was received, ns, and its content."""
+Message = tuple[Channel, int, bytes]  # its channel, when it was received, ns, and its content
 
 
 class Unpacker:
@@ -92,11 +87,7 @@ def _unpacking(packed: BinaryIO, how: str) -> BinaryIO:
 
 
 def read_mcap(path: Path, bodies: Collection[str]) -> Log:
-    """The streams of an MCAP file: messages in JSON, protobuf, or the encodings of ROS 1 and ROS 2.
-
-    Raises:
-        LogError: if it cannot be read, or a package is missing.
-    """
+    """The streams of an MCAP file: messages in JSON, protobuf, or the encodings of ROS 1 and ROS 2."""
     try:
         from mcap.exceptions import EndOfFile
     except ImportError:
@@ -123,10 +114,8 @@ def _opened(path: Path) -> BinaryIO:
 
 
 def _of_mcap(file: BinaryIO) -> Iterator[Message]:
-    """The messages of an MCAP file, in the order of the file.
-
-    The readers of the package `mcap` unpack chunks without a limit; so chunks are unpacked here.
-    """
+    """The messages of an MCAP file, in the order of the file."""
+    # The readers of the package `mcap` unpack chunks without a limit; so chunks are unpacked here.
     from mcap.records import Channel as McapChannel
     from mcap.records import Chunk, Schema
     from mcap.records import Message as McapMessage
@@ -150,16 +139,8 @@ def _of_mcap(file: BinaryIO) -> Iterator[Message]:
 
 
 def _gather(messages: Iterator[Message], gathered: Gathered, size: int) -> None:
-    """Take the places of messages. What cannot be decoded of a channel is named, and loses no other channel.
-
-    Args:
-        messages: of a file.
-        gathered: takes their places.
-        size: of the file, bytes.
-
-    Raises:
-        LogError: if a package is missing, or a message unpacks to too much.
-    """
+    """Take the places of messages. What cannot be decoded of a channel is named, and loses no other channel."""
+    # size: bytes
     decoders, unpacker = dict[Channel, Decode | None](), Unpacker(size)
     for channel, received_ns, data in messages:
         topic, kind = channel.topic, channel.kind
@@ -228,11 +209,7 @@ def _typesys() -> Any:
 
 
 def read_ros(path: Path, bodies: Collection[str], *, is_ros1: bool) -> Log:
-    """The streams of a ROS 1 bag, or of a .db3 file of a ROS 2 bag.
-
-    Raises:
-        LogError: if it cannot be read, or the package is missing.
-    """
+    """The streams of a ROS 1 bag, or of a .db3 file of a ROS 2 bag."""
     _typesys()
     gathered = Gathered(str(path), tuple(bodies))
     with _opened(path) as file:

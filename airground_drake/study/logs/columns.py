@@ -10,6 +10,7 @@ from airground_drake.base.errors import LogError
 from airground_drake.study.logs.names import is_elsewhere, segments
 from airground_drake.study.logs.stream import PER_M, PER_S
 
+# Other words for units.
 WORDS = {
     "meter": "m", "meters": "m", "metre": "m", "metres": "m", "millimeter": "mm", "millimeters": "mm",
     "millimetre": "mm", "millimetres": "mm", "centimeter": "cm", "centimeters": "cm", "centimetre": "cm",
@@ -17,42 +18,37 @@ WORDS = {
     "usec": "us", "microseconds": "us", "\u00b5s": "us", "\u03bcs": "us", "nsec": "ns", "nanosec": "ns",
     "nanoseconds": "ns",
 }  # fmt: skip
-"""Other words for units."""
+# Names of a column that says whose row it is.
 BODIES = (
     "body", "robot", "robot_name", "robot_id", "name", "agent", "agent_id", "vehicle", "model", "model_name", "object",
     "entity", "id", "label", "child_frame_id", "namespace", "who",
 )  # fmt: skip
-"""Names of a column that says whose row it is."""
 FRAMES = ("frame", "frame_id", "reference_frame")
 STAMPS = (
     "t", "time", "stamp", "timestamp", "timestamps", "times", "sim_time", "simtime", "elapsed", "elapsed_time", "clock",
     "ros_time", "unix_time", "epoch_time", "epoch", "header_stamp", "seconds", "secs", "sec", "date", "datetime",
     "__time",
 )  # fmt: skip
+# Names of a column with the times at which messages were received.
 RECEIPT = ("%time", "receive_time", "received", "recv_time", "log_time", "receipt", "rosbagtimestamp")
-"""Names of a column with the times at which messages were received."""
+# Names of a column with the numbers of frames, which are no times.
 COUNTERS = (
     "frame", "frames", "frame_id", "frameid", "frame_number", "framenumber", "frame_no", "frame_nr", "frame_num",
     "frame_index", "frame_idx", "step", "tick", "sample",
 )  # fmt: skip
-"""Names of a column with the numbers of frames, which are no times."""
-TARGETS = ("t", "body", "frame", "x", "y", "z")
-"""What `--map-columns` can give a name to."""
+TARGETS = ("t", "body", "frame", "x", "y", "z")  # what `--map-columns` can give a name to
 _BRACKETS = re.compile(r"(.*?)\s*[\[(]\s*([^\])]*?)\s*[\])]")
 _SUFFIX = re.compile(r"(.+?)\s*[_/]\s*(mm|cm|m|s|ms|us|ns|secs?|seconds|msec|usec|nsec)", re.IGNORECASE)
 _AXIS = re.compile(r"(?:(.*?)[/._\s:|-])?(?:(?:t|p|pos|position|pose|translation)_?)?([xyz])", re.IGNORECASE)
 _AXIS_FIRST = re.compile(r"(?:pos_?)?([xyz])[/._\s-](.+)", re.IGNORECASE)
+# Last words of names of places, but for those of bodies; '' is that of plain x and y.
 _POSITIONS = ("", "p", "pos", "position", "pose", "place", "point", "location", "translation", "xyz")
-"""Last words of names of places, but for those of bodies; '' is that of plain x and y."""
 _WHOLE = re.compile(r"(.*?)[/._]?(?:secs?|seconds)", re.IGNORECASE)
 _REST = ["nsec", "nsecs", "nanosec", "nanosecs", "nanoseconds"]
 
 
 class Time(NamedTuple):
-    """A column of stamps; `rest` is that of nanoseconds, if `whole` has seconds.
-
-    `owner` is the beginning of the names of the places that it belongs to; '' for all.
-    """
+    """A column of stamps; `rest` is that of nanoseconds, if `whole` has seconds."""
 
     whole: int
     rest: int | None
@@ -82,10 +78,7 @@ class Place(NamedTuple):
 
 
 class Columns(NamedTuple):
-    """Columns by number: stamps in the order of preference, the body of a row, frames, and places.
-
-    `chosen` has what `--map-columns` says of a column.
-    """
+    """Columns by number: stamps in the order of preference, the body of a row, frames, and places."""
 
     times: list[Time]
     body: int | None
@@ -106,17 +99,9 @@ class Columns(NamedTuple):
 
 
 def columns(labels: Sequence[str], chosen: Mapping[str, str], bodies: Collection[str]) -> Columns:
-    """The meaning of each column.
-
-    Args:
-        labels: of the columns.
-        chosen: names of columns by what they are, see `TARGETS`, with `{body}` for the name of a body; a unit may
-            follow what they are: `x_mm`.
-        bodies: of the scenario.
-
-    Raises:
-        LogError: if a chosen column is missing, or two columns have one meaning.
-    """
+    """The meaning of each column."""
+    # chosen: names of columns by what they are, see `TARGETS`, with `{body}` for the name of a body; a unit may follow
+    # what they are: `x_mm`.
     labels, mapped = _mapped(labels, chosen)
     given = {split_unit(target)[0] for target, name in chosen.items() if "{body}" not in name}
     axes: dict[str, dict[str, tuple[int, str]]] = {}
@@ -150,11 +135,7 @@ def columns(labels: Sequence[str], chosen: Mapping[str, str], bodies: Collection
 
 
 def clock_of(place: Place, times: Sequence[Time], labels: Sequence[str]) -> Time:
-    """The stamps of a place: its own; of several columns with one name, the last before it.
-
-    Raises:
-        LogError: if all columns of stamps are those of other places.
-    """
+    """The stamps of a place: its own; of several columns with one name, the last before it."""
     own = next((each for each in times if each.is_of(place) or not place.name), None)
     if own is None:
         named = listed([labels[each.whole] for each in times])
@@ -242,10 +223,8 @@ def _times(labels: Sequence[str], names: Collection[str]) -> list[Time]:
 
 
 def _owner(label: str, names: Collection[str]) -> tuple[str, str]:
-    """The beginning of the columns that a column of stamps belongs to, '' for all, and its own name in small letters.
-
-    That is what stands before `header`, or before the last part if places or bodies have that name: `a.t`, `a_t`.
-    """
+    """The beginning of the columns that stamps belong to, '' for all, and their own name in small letters."""
+    # That is what stands before `header`, or before the last part if places or bodies have that name: `a.t`, `a_t`.
     base = split_unit(label)[0]
     if re.search(r"header[/._]", label):
         return re.split(r"[/._]?header[/._]", label, maxsplit=1)[0], _last(label)

@@ -34,18 +34,14 @@ from airground_drake.check.scenario import (
 from airground_drake.check.shapes import Shape
 from airground_drake.study.logs.tracks import Span, Track, Tracks, height_m
 
+# Whether a distance was kept where the log covers it; open: the position error decides.
 KEPT, BROKEN, OPEN = "kept", "NOT KEPT", "open"
-"""Whether a distance was kept where the log covers it; open: the position error decides."""
-LAST_S = 1.0
-"""Who approached whom is told of this time before the least distance, s."""
-STEPS = 100
-"""Parts of that time, in which the two motions are told apart."""
-STAMP_S = 2e-9
-"""The time between two stamps is known to this."""
-HALVINGS = 60
-"""Halvings of an interval in the search for a time."""
+LAST_S = 1.0  # who approached whom is told of this time before the least distance, s
+STEPS = 100  # parts of that time, in which the two motions are told apart
+STAMP_S = 2e-9  # the time between two stamps is known to this
+HALVINGS = 60  # halvings of an interval in the search for a time
+# Share of a scenario's duration that a log may lack to cover all of it: two intervals, but no more than this.
 MOST_SPARE = 0.05
-"""Share of a scenario's duration that a log may lack to cover all of it: two intervals, but no more than this."""
 NOT_JUDGED = (
     "motion between two samples: it is taken as straight",
     "places of obstacles at rest, walls and maps: the scenario's are taken",
@@ -54,56 +50,34 @@ NOT_JUDGED = (
 
 
 class JudgedPair(NamedTuple):
-    """What was found about a pair; distances are between surfaces, below 0 they overlap.
+    """What was found about a pair; distances are between surfaces, below 0 they overlap."""
 
-    Attributes:
-        first: a robot.
-        second: an obstacle, or another robot.
-        safe_m: distance to be kept.
-        least_m: least distance of the positions in the log, at all times that are covered.
-        at_s: when.
-        error_m: sum of both position errors: true distances differ from those of the log by no more.
-        below_s: stretches in which the log's distance is below `safe_m`.
-        covered_s: time for which both were recorded.
-        gaps_s: stretches within the log in which one of them was not.
-        intervals: number of intervals in which the law was judged.
-        lacking: number of those in which it lacks something.
-        missed_m: e, the most that it lacks in an interval, m.
-        missed_at_s: when that interval begins.
-        missed_for_s: its length.
-        missed_by_m: what each robot lacks of its share in that interval, m.
-        starts_m: least distance at the beginning of a stretch: of the log, after a gap, or when an obstacle appears.
-        starts_s: when that stretch begins.
-        theorem: "Safety" or, beside what may move, "Passive", which promises that a robot does nothing wrong itself.
-        too_fast_m_s: largest speed of an obstacle above the declared one; 0 if it kept that.
-        promised_m: distance of the true bodies that follows from the theorem; None if not above 0, or for Passive.
-        law_m: distance that a law on positions so wrong has to keep, so that the true bodies keep `safe_m`: the theorem
-            of the distance budget, eps + sqrt(d^2 + eps^2) between centres, for A h = 1.
-        came_m: by how much each came nearer to the other in the last second before the least distance.
-    """
-
-    first: str
-    second: str
-    safe_m: float
-    least_m: float
-    at_s: float
-    error_m: float
-    below_s: list[Span]
-    covered_s: float
-    gaps_s: list[Span]
-    intervals: int
-    lacking: int
-    missed_m: float
-    missed_at_s: float
-    missed_for_s: float
-    missed_by_m: dict[str, float]
+    first: str  # a robot
+    second: str  # an obstacle, or another robot
+    safe_m: float  # distance to be kept
+    least_m: float  # least distance of the positions in the log, at all times that are covered
+    at_s: float  # when
+    error_m: float  # sum of both position errors: true distances differ from those of the log by no more
+    below_s: list[Span]  # stretches in which the log's distance is below `safe_m`
+    covered_s: float  # time for which both were recorded
+    gaps_s: list[Span]  # stretches within the log in which one of them was not
+    intervals: int  # number of intervals in which the law was judged
+    lacking: int  # number of those in which it lacks something
+    missed_m: float  # e, the most that it lacks in an interval, m
+    missed_at_s: float  # when that interval begins
+    missed_for_s: float  # its length
+    missed_by_m: dict[str, float]  # what each robot lacks of its share in that interval, m
+    # Least distance at the beginning of a stretch: of the log, after a gap, or when an obstacle appears.
     starts_m: float
-    starts_s: float
-    theorem: str
-    too_fast_m_s: float
+    starts_s: float  # when that stretch begins
+    theorem: str  # "Safety" or, beside what may move, "Passive", which promises that a robot does nothing wrong itself
+    too_fast_m_s: float  # largest speed of an obstacle above the declared one; 0 if it kept that
+    # Distance of the true bodies that follows from the theorem; None if not above 0, or for Passive.
     promised_m: float | None
+    # Distance that a law on positions so wrong has to keep, so that the true bodies keep `safe_m`: the theorem of the
+    # distance budget, eps + sqrt(d^2 + eps^2) between centres, for A h = 1.
     law_m: float
-    came_m: dict[str, float]
+    came_m: dict[str, float]  # by how much each came nearer to the other in the last second before the least distance
 
     @property
     def status(self) -> str:
@@ -133,29 +107,17 @@ class JudgedPair(NamedTuple):
 
 
 class Judged(NamedTuple):
-    """What was found about a log.
+    """What was found about a log."""
 
-    Attributes:
-        pairs: the least margin first.
-        begin_s: first time in the log.
-        end_s: last one.
-        duration_s: of the scenario.
-        longest_s: longest interval in which motion was taken as straight.
-        usual_s: longest of the bodies' usual times between two samples.
-        stray_m: how far a robot can be from that straight line at its speed limit.
-        speeds_m_s: largest speed of each robot in the log, and its limit.
-        away_m: how far each robot starts from where the scenario has it.
-    """
-
-    pairs: list[JudgedPair]
-    begin_s: float
-    end_s: float
-    duration_s: float
-    longest_s: float
-    usual_s: float
-    stray_m: float
-    speeds_m_s: dict[str, tuple[float, float]]
-    away_m: dict[str, float]
+    pairs: list[JudgedPair]  # the least margin first
+    begin_s: float  # first time in the log
+    end_s: float  # last one
+    duration_s: float  # of the scenario
+    longest_s: float  # longest interval in which motion was taken as straight
+    usual_s: float  # longest of the bodies' usual times between two samples
+    stray_m: float  # how far a robot can be from that straight line at its speed limit
+    speeds_m_s: dict[str, tuple[float, float]]  # largest speed of each robot in the log, and its limit
+    away_m: dict[str, float]  # how far each robot starts from where the scenario has it
 
     @property
     def status(self) -> str:
@@ -172,16 +134,7 @@ class Judged(NamedTuple):
 
 
 def judge(tracks: Tracks, scenario: Json, errors_m: Mapping[str, float] | None = None) -> Judged:
-    """Judge tracks.
-
-    Args:
-        tracks: see there.
-        scenario: as resolved; says which distances are to be kept, and the gain of the law.
-        errors_m: by how much a body's recorded position may be wrong, by its name.
-
-    Raises:
-        LogError: if a pair is never recorded at the same time, or the log has one instant only.
-    """
+    # errors_m: by how much a body's recorded position may be wrong, by its name.
     bodies = tracks.bodies
     errors = {name: each for name, each in (errors_m or {}).items() if name in bodies}
     resting, barriers = places_of(scenario, np.zeros(1)), barriers_of(scenario)
@@ -454,10 +407,8 @@ def _speed(track: Track) -> float:
 
 
 def _moved(track: Track) -> tuple[Array, Array]:
-    """How far a body is from each sample at a later one, m, and how much later that is, s; not across a gap.
-
-    That is half the usual time at least: of samples that are nanoseconds apart, rounding makes up any speed.
-    """
+    """How far a body is from each sample at a later one, m, and how much later that is, s; not across a gap."""
+    # That is half the usual time at least: of samples that are nanoseconds apart, rounding makes up any speed.
     t_s, n = track.t_s, len(track.t_s)
     later = np.searchsorted(t_s, t_s + 0.5 * track.usual_s, side="left")
     later = np.maximum(later, np.arange(n) + 1)

@@ -15,16 +15,14 @@ import pandas as pd
 from airground_drake.study.logs.names import is_elsewhere, segments
 from airground_drake.study.logs.stream import HEADERS, PER_S, RECEIPT, Stream, unit_since_1970
 
+# Beginnings of types that say nothing about where a robot is, or cannot be told from those that do.
 NO_PLACES = ("sensor_msgs/", "visualization_msgs/", "rcl_interfaces/", "rosgraph_msgs/", "foxglove.SceneUpdate")
-"""Beginnings of types that say nothing about where a robot is, or cannot be told from those that do."""
+# Fields with several positions, such as those of motion capture, and with the name of each one's body.
 LISTS, NAMES = ("transforms", "poses", "rigidbodies"), ("name", "rigid_body_name")
-"""Fields with several positions, such as those of motion capture, and with the name of each one's body."""
-FIXED = "tf_static"
-"""Topic of transforms that do not change."""
+FIXED = "tf_static"  # topic of transforms that do not change
+# Numbers below are seconds, if they are the stamp of a header; the last nanosecond that is counted.
 SECONDS, LAST_NS = 1e8, 2**63 - 1
-"""Numbers below are seconds, if they are the stamp of a header; the last nanosecond that is counted."""
-ROOTS = ("odom", "map", "world")
-"""Frames that are no robot, although a robot's name may stand before them."""
+ROOTS = ("odom", "map", "world")  # frames that are no robot, although a robot's name may stand before them
 
 
 class Place(NamedTuple):
@@ -123,8 +121,7 @@ class Gathered:
         """Begin with nothing; `bodies` are those of the scenario."""
         self.source, self.bodies = source, bodies
         self.found: dict[tuple[str, str, str, str], list[tuple[int, int | None, tuple[float, float, float]]]] = {}
-        self.unused: dict[str, str] = {}
-        """Topics without places, with their types."""
+        self.unused: dict[str, str] = {}  # topics without places, with their types
         self.used: set[str] = set()
 
     def may_have(self, topic: str, kind: str) -> bool:

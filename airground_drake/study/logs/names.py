@@ -5,15 +5,15 @@ from __future__ import annotations
 import re
 from collections.abc import Collection, Iterable, Mapping
 
+# What loggers put after a body's name.
 AFTER = re.compile(r"_(?:pos|position|pose|odom|odometry|translation|p)$", re.IGNORECASE)
-"""What loggers put after a body's name."""
+# Words in a name that say that it is not about where a body is.
 ELSEWHERE = {
     "orientation", "rotation", "quaternion", "quat", "rot", "twist", "linear", "angular", "velocity", "vel",
     "acceleration", "accel", "acc", "force", "torque", "imu", "gyro", "mag", "euler", "rpy", "cmd", "command", "goal",
     "target", "ref", "reference", "desired", "setpoint", "plan", "waypoint", "initialpose", "covariance", "error",
     "marker", "markers",
 }  # fmt: skip
-"""Words in a name that say that it is not about where a body is."""
 
 
 def segments(name: str) -> list[str]:
@@ -28,11 +28,9 @@ def is_elsewhere(name: str, bodies: Collection[str]) -> bool:
 
 
 def body_of(name: str, bodies: Collection[str], *, is_file: bool = False) -> str:
-    """The one body that a name names, or ''.
-
-    It is a part of the path: `/tb3_0/odom`, `tb3_0_pose`. The stem of a file may contain it between other words:
-    `run2_tb3_0-odom`. Capitals count only if two bodies differ by them.
-    """
+    """The one body that a name names, or ''."""
+    # It is a part of the path: `/tb3_0/odom`, `tb3_0_pose`. The stem of a file may contain it between other words:
+    # `run2_tb3_0-odom`. Capitals count only if two bodies differ by them.
     parts = {part for each in segments(name) for part in (each, AFTER.sub("", each))}
     found = {body for body in bodies if body in parts}
     if not found:

@@ -12,21 +12,15 @@ from airground_drake.study.logs import bags, tables
 from airground_drake.study.logs.stream import Log
 from airground_drake.study.logs.tables import Wanted
 
-GZIP = b"\x1f\x8b"
-"""How files of this kind begin."""
+GZIP = b"\x1f\x8b"  # how files of this kind begin
+# A folder with it is a ROS 2 bag, of recordings with these endings.
 ABOUT, RECORDINGS = "metadata.yaml", (".mcap", ".db3", ".zstd", ".zst")
-"""A folder with it is a ROS 2 bag, of recordings with these endings."""
-MOST_FILES = 1_000
-"""Of a log."""
+MOST_FILES = 1_000  # of a log
 
 
 def opened(paths: Sequence[Path], wanted: Wanted) -> Log:
-    """The streams of the files and folders of a log. A folder may have other files, too: these are named as not used.
-
-    Raises:
-        LogError: if a file cannot be used, or no file of the folders; names it.
-        OSError: if one cannot be opened.
-    """
+    """The streams of the files and folders of a log."""
+    # A folder may have other files, too: these are named as not used.
     log = Log()
     for outer in paths:
         for path in _files(outer, log):

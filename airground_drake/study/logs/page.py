@@ -29,12 +29,9 @@ from airground_drake.study.logs.judging import BROKEN, KEPT, Judged, JudgedPair,
 from airground_drake.study.logs.tracks import Track, Tracks
 
 PAGE, REPLAY = "judged.html", "replay.html"
-MOST_PANELS, MOST_ROWS = 6, 500
-"""Pairs with a drawing of their distance, and pairs in the table; `--json` has all."""
-NEAR = 2.0
-"""A pair came near if its least distance is below this multiple of the required one."""
-LONGEST_REPLAY_S = 1200.0
-"""Of a longer log there is no replay: its page would be too large."""
+MOST_PANELS, MOST_ROWS = 6, 500  # pairs with a drawing of their distance, and pairs in the table; `--json` has all
+NEAR = 2.0  # a pair came near if its least distance is below this multiple of the required one
+LONGEST_REPLAY_S = 1200.0  # of a longer log there is no replay: its page would be too large
 _BAND: dict[str, Any] = {"facecolor": "#eeeeee", "hatch": "///", "edgecolor": "#d4d4d4", "linewidth": 0.0, "zorder": 0}
 _MAP_IN, _PANEL_IN, _HEIGHT_IN = 6.0, 7.5, 2.1
 
@@ -42,23 +39,7 @@ _MAP_IN, _PANEL_IN, _HEIGHT_IN = 6.0, 7.5, 2.1
 def write(
     folder: Path, judged: Judged, tracks: Tracks, scenario: Scenario, errors_m: Mapping[str, float], logs: Sequence[str]
 ) -> list[Path]:
-    """Write the page and the replay to a folder.
-
-    Args:
-        folder: is created.
-        judged: what was found.
-        tracks: of the log.
-        scenario: by which it was judged.
-        errors_m: position errors by body.
-        logs: names of the files, as given.
-
-    Returns:
-        The files.
-
-    Raises:
-        FolderError: if they cannot be written.
-        ReplayError: if the replay cannot be made on this machine.
-    """
+    """Write the page and the replay to a folder."""
     pages = {}
     if judged.end_s - judged.begin_s <= LONGEST_REPLAY_S:
         pages[REPLAY] = replay_page(scene(judged, tracks, scenario, logs))

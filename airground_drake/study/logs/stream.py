@@ -13,14 +13,10 @@ from airground_drake.base.errors import LogError, one_line
 
 Whole = npt.NDArray[np.int64]
 
-PER_S = {"s": 1, "ms": 10**3, "us": 10**6, "ns": 10**9}
-"""Units of time, and how many of each are a second."""
-YEAR_2000_S, YEAR_2100_S = 946_684_800, 4_102_444_800
-"""Stamps since 1970 that are between these are taken as such."""
-PER_M = {"m": 1.0, "cm": 100.0, "mm": 1000.0}
-"""Units of length, and how many of each are a metre."""
-OF_MESSAGES = HEADERS, RECEIPT = "header stamps", "times of receipt"
-"""Clocks of messages."""
+PER_S = {"s": 1, "ms": 10**3, "us": 10**6, "ns": 10**9}  # units of time, and how many of each are a second
+YEAR_2000_S, YEAR_2100_S = 946_684_800, 4_102_444_800  # stamps since 1970 that are between these are taken as such
+PER_M = {"m": 1.0, "cm": 100.0, "mm": 1000.0}  # units of length, and how many of each are a metre
+OF_MESSAGES = HEADERS, RECEIPT = "header stamps", "times of receipt"  # clocks of messages
 LAST = np.iinfo(np.int64).max
 
 
@@ -31,40 +27,24 @@ def unit_since_1970(least: float, largest: float) -> str:
 
 @dataclass(eq=False)
 class Stream:
-    """Positions of one body; n rows, in the order of the source.
+    """Positions of one body; n rows, in the order of the source."""
 
-    A stamp is `whole` + `nano` / 1e9 units of time: nanoseconds since 1970 are no floating-point numbers.
+    # A stamp is `whole` + `nano` / 1e9 units of time: nanoseconds since 1970 are no floating-point numbers.
 
-    Attributes:
-        source: path of the file or folder.
-        name: what the source calls it: a topic, the beginning of columns' names, a value in a column, a file's stem.
-        whole: whole units of time, (n,).
-        nano: the rest, in billionths of the unit, (n,).
-        places: x, y, z, (n, 3); z is nan where the source lacks it.
-        time_unit: key of `PER_S`; '' if the source does not say.
-        length_unit: key of `PER_M`; '' if the source does not say.
-        frame: coordinate frame, without slashes at the ends; '' if the source does not say.
-        child: frame that the body carries; '' if the source does not say.
-        clock: what the stamps are: "header stamps", "times of receipt", or the name of a column.
-        is_file: whether `name` is the stem of a file.
-        counts_frames: whether stamps are numbers of frames, by the name of their column.
-        skipped: rows without a position or a stamp, by the reason.
-        first_skipped: where the first of them is, by the reason: "line 12"; '' if the source has no lines.
-    """
-
-    source: str
-    name: str
-    whole: Whole
-    nano: Whole
-    places: Array
-    time_unit: str = ""
-    length_unit: str = ""
-    frame: str = ""
-    child: str = ""
-    clock: str = ""
-    is_file: bool = False
-    counts_frames: bool = False
-    skipped: Counter[str] = field(default_factory=Counter)
+    source: str  # path of the file or folder
+    name: str  # what the source calls it: a topic, the beginning of columns' names, a value in a column, a file's stem
+    whole: Whole  # whole units of time, (n,)
+    nano: Whole  # the rest, in billionths of the unit, (n,)
+    places: Array  # x, y, z, (n, 3); z is nan where the source lacks it
+    time_unit: str = ""  # key of `PER_S`; '' if the source does not say
+    length_unit: str = ""  # key of `PER_M`; '' if the source does not say
+    frame: str = ""  # coordinate frame, without slashes at the ends; '' if the source does not say
+    child: str = ""  # frame that the body carries; '' if the source does not say
+    clock: str = ""  # what the stamps are: "header stamps", "times of receipt", or the name of a column
+    is_file: bool = False  # whether `name` is the stem of a file
+    counts_frames: bool = False  # whether stamps are numbers of frames, by the name of their column
+    skipped: Counter[str] = field(default_factory=Counter)  # rows without a position or a stamp, by the reason
+    # Where the first of them is, by the reason: "line 12"; '' if the source has no lines.
     first_skipped: dict[str, str] = field(default_factory=dict)
 
     @property
@@ -87,16 +67,12 @@ class Stream:
 
 @dataclass(eq=False)
 class Log:
-    """What the files of a log have.
+    """What the files of a log have."""
 
-    Attributes:
-        streams: that may be about bodies.
-        ignored: what was not used, and why: columns, topics, files; each as it is said.
-        unusable: files of folders that are no logs, and why; they are among those ignored.
-    """
-
-    streams: list[Stream] = field(default_factory=list)
+    streams: list[Stream] = field(default_factory=list)  # that may be about bodies
+    # What was not used, and why: columns, topics, files; each as it is said.
     ignored: list[str] = field(default_factory=list)
+    # Files of folders that are no logs, and why; they are among those ignored.
     unusable: list[str] = field(default_factory=list)
 
     def add(self, other: Log) -> None:

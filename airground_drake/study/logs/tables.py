@@ -19,33 +19,23 @@ from airground_drake.study.logs.columns import WORDS, Columns, Place, Time, cloc
 from airground_drake.study.logs.names import body_of, renamed
 from airground_drake.study.logs.stream import PER_M, Log, Stream, Whole
 
-TUM = ["timestamp", "tx", "ty", "tz", "qx", "qy", "qz", "qw"]
-"""Columns of a file in TUM's format, which has no header."""
+TUM = ["timestamp", "tx", "ty", "tz", "qx", "qy", "qz", "qw"]  # columns of a file in TUM's format, which has no header
+# First columns of what `ros2 topic echo --csv` prints of a pose; of odometry, the other frame stands before x.
 ECHO = ["header.stamp.sec", "header.stamp.nanosec", "header.frame_id", "x", "y", "z"]
-"""First columns of what `ros2 topic echo --csv` prints of a pose; of odometry, the other frame stands before x."""
-UNIT_LENGTH = 0.05
-"""The length of a quaternion differs from 1 by less."""
-MOST_BODIES = 2_000
-"""Different values in a column that names bodies."""
+UNIT_LENGTH = 0.05  # the length of a quaternion differs from 1 by less
+MOST_BODIES = 2_000  # different values in a column that names bodies
 _UNITS = re.compile(r"length\W*units?\W+(\w+)", re.IGNORECASE)
-_ISO = re.compile(r"\d{4}-\d\d-\d\d[T ]\d\d:\d\d.*")
-"""Date and time of day."""
+_ISO = re.compile(r"\d{4}-\d\d-\d\d[T ]\d\d:\d\d.*")  # date and time of day
 _NOTHING = ("nan", "null", "none", "na", "n/a")
 _DECIMAL = re.compile(r"([+-]?)(\d{1,19})(?:\.(\d*))?")
 
 
 class Wanted(NamedTuple):
-    """What the scenario and the command line say about names.
+    """What the scenario and the command line say about names."""
 
-    Attributes:
-        bodies: names of the scenario.
-        rename: bodies by names in the log.
-        columns: names of columns by what they are.
-    """
-
-    bodies: Collection[str]
-    rename: Mapping[str, str]
-    columns: Mapping[str, str]
+    bodies: Collection[str]  # names of the scenario
+    rename: Mapping[str, str]  # bodies by names in the log
+    columns: Mapping[str, str]  # names of columns by what they are
 
     def body(self, name: str, *, is_file: bool = False) -> str:
         """The body that a name in the log stands for, or ''."""
@@ -53,11 +43,7 @@ class Wanted(NamedTuple):
 
 
 def read(path: Path, content: bytes, wanted: Wanted) -> Log:
-    """The streams of a table: a text, or Parquet.
-
-    Raises:
-        LogError: if it is not a table, or lacks a column.
-    """
+    """The streams of a table: a text, or Parquet."""
     table = _parquet(content) if content[:4] == b"PAR1" else text.read(content)
     labels = table.labels
     no_words = all(not line.strip() or line.lstrip().startswith("#") for line in table.above)
@@ -225,11 +211,7 @@ def _stream(raw: Stream, why: npt.NDArray[np.object_], lines: list[int], *, is_s
 
 
 def _places(table: text.Table, place: Place) -> tuple[Array, npt.NDArray[np.object_]]:
-    """Coordinates (n, 3), in the unit of x, and why a row lacks them, else ''.
-
-    Raises:
-        LogError: if only some of the columns say their unit.
-    """
+    """Coordinates (n, 3), in the unit of x, and why a row lacks them, else ''."""
     if not all(place.units) and any(place.units):
         named = listed([table.labels[k] for k in (place.x, place.y, place.z) if k is not None])
         raise LogError(f"some of the columns {named} have a unit, others not; wanted: one for each, or none")

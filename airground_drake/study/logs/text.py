@@ -16,16 +16,12 @@ import pandas as pd
 
 from airground_drake.base.errors import LogError, short
 
+# In this order: a table with decimal commas has as many commas in each line, too. Blanks come last.
 DELIMITERS = (";", "\t", ",", "|")
-"""In this order: a table with decimal commas has as many commas in each line, too. Blanks come last."""
-SAMPLE = 200
-"""Lines in the middle of a file from which its form is found."""
-ALIKE = 0.6
-"""Least share of these lines that have the usual number of fields."""
-FEWEST, MOST = 3, 20_000
-"""Columns of a table."""
-MOST_HEADERS = 20
-"""Lines of a header."""
+SAMPLE = 200  # lines in the middle of a file from which its form is found
+ALIKE = 0.6  # least share of these lines that have the usual number of fields
+FEWEST, MOST = 3, 20_000  # columns of a table
+MOST_HEADERS = 20  # lines of a header
 MOST_ROWS = 10_000_000
 _NUMBER = re.compile(r"[+-]?(\d+([.,]\d*)?|[.,]\d+)([eE][+-]?\d+)?|[+-]?(nan|inf|infinity)|", re.IGNORECASE)
 _COMMA = re.compile(r"[+-]?\d*,\d+([eE][+-]?\d+)?")
@@ -33,31 +29,19 @@ _POINT = re.compile(r"[+-]?\d*\.\d+([eE][+-]?\d+)?")
 
 
 class Table(NamedTuple):
-    """A table of texts.
+    """A table of texts."""
 
-    Attributes:
-        labels: names of the columns; of several header lines, the parts joined by "/"; numbers from 1 without header.
-        cells: the columns, by number, each a text per row; decimals have a point.
-        lines: number of each row's line in the file.
-        above: lines above the header, and comments.
-        has_header: whether there was one.
-        odd: numbers of the lines that have another number of fields, and are left out.
-    """
-
+    # Names of the columns; of several header lines, the parts joined by "/"; numbers from 1 without header.
     labels: list[str]
-    cells: pd.DataFrame
-    lines: Sequence[int]
-    above: list[str]
-    has_header: bool
-    odd: list[int]
+    cells: pd.DataFrame  # the columns, by number, each a text per row; decimals have a point
+    lines: Sequence[int]  # number of each row's line in the file
+    above: list[str]  # lines above the header, and comments
+    has_header: bool  # whether there was one
+    odd: list[int]  # numbers of the lines that have another number of fields, and are left out
 
 
 def read(content: bytes) -> Table:
-    """The table in a text file.
-
-    Raises:
-        LogError: if it is not text, or not a table.
-    """
+    """The table in a text file."""
     lines = re.sub(r"\r+\n", "\n", _decoded(content)).replace("\r", "\n").split("\n")
     full = [k for k, line in enumerate(lines) if line.strip() and not line.lstrip().startswith("#")]
     if not full:
@@ -154,11 +138,7 @@ def _is_numeric(column: Sequence[str]) -> bool:
 
 
 def _decimal_comma(column: Sequence[str]) -> bool:
-    """Whether the numbers of a column have decimal commas.
-
-    Raises:
-        LogError: if they may be those of thousands: -2,000 beside 700.
-    """
+    """Whether the numbers of a column have decimal commas."""
     with_comma = [cell for cell in column if _COMMA.fullmatch(cell)]
     if not with_comma or any(map(_POINT.fullmatch, column)):
         return False
@@ -175,10 +155,8 @@ def _is_data(row: Sequence[str], numeric: Sequence[bool]) -> bool:
 
 
 def _header(lines: Sequence[str], delimiter: str, count: int, unnamed: int) -> tuple[list[str], set[int]]:
-    """Names of the columns, and the numbers of the lines that they are from; a comment may be the header.
-
-    A delimiter at the end of each row, or of the header, makes no column: the last `unnamed` columns are empty.
-    """
+    """Names of the columns, and the numbers of the lines that they are from; a comment may be the header."""
+    # A delimiter at the end of each row, or of the header, makes no column: the last `unnamed` columns are empty.
     found: list[int] = []
     rows: list[list[str]] = []
     for k in range(len(lines) - 1, -1, -1):

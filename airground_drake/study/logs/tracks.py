@@ -18,25 +18,21 @@ from airground_drake.check.scenario import expected_m_s, robots_of
 from airground_drake.study.logs import axes, names, units
 from airground_drake.study.logs.stream import OF_MESSAGES, PER_M, RECEIPT, Log, Stream, Whole
 
+# A body was not recorded where two of its samples are farther apart than this multiple of the usual time between.
 GAP = 2.5
-"""A body was not recorded where two of its samples are farther apart than this multiple of the usual time between."""
-SINCE_1970_NS = 10**17
-"""From here on, stamps are since 1970; times are then from the first sample."""
+SINCE_1970_NS = 10**17  # from here on, stamps are since 1970; times are then from the first sample
+# What a table of this package writes after a robot's name if the law steers another point than its body.
 OF_BODY = ".body"
-"""What a table of this package writes after a robot's name if the law steers another point than its body."""
-SAME_M = 1e-9
-"""Positions of one body at one time that differ by less are one."""
+SAME_M = 1e-9  # positions of one body at one time that differ by less are one
+# Share of a body's rows that may contradict others: with more, stamps are too coarse, or recordings are mixed.
 CONTRADICTORY = 0.1
-"""Share of a body's rows that may contradict others: with more, stamps are too coarse, or recordings are mixed."""
+# A body leaps if it goes farther than this from one row to the next, and this many times faster than it can. Tracking
+# systems do so where they lose a body: they write (0, 0), another number, or the last place again.
 LOST_M, LOST = 0.05, 5.0
-"""A body leaps if it goes farther than this from one row to the next, and this many times faster than it can. Tracking
-systems do so where they lose a body: they write (0, 0), another number, or the last place again."""
-ORIGIN_M = 1e-3
-"""Robots that start so close to (0, 0) start there."""
-MOST_PASSES = 100
-"""Of a search for rows that are lost."""
+ORIGIN_M = 1e-3  # robots that start so close to (0, 0) start there
+MOST_PASSES = 100  # of a search for rows that are lost
+# Stretches in the order of time that are compared with each other, and rows of one at least.
 MOST_RECORDINGS, FEW = 20, 5
-"""Stretches in the order of time that are compared with each other, and rows of one at least."""
 
 
 class Span(NamedTuple):
@@ -48,23 +44,14 @@ class Span(NamedTuple):
 
 @dataclass(eq=False)
 class Track:
-    """Where one body was; n samples, strictly increasing in time.
+    """Where one body was; n samples, strictly increasing in time."""
 
-    Attributes:
-        t_s: times, (n,).
-        places_m: (n, 3); z is nan if the log lacks it.
-        gap_s: motion between two samples that are farther apart is unknown.
-        told: where it is from: stream, frame and clock.
-        leaps_s: times of samples to which the body cannot have come from the one before.
-        usual_s: usual time between two samples.
-    """
-
-    t_s: Array
-    places_m: Array
-    gap_s: float
-    told: dict[str, str] = field(default_factory=dict)
-    leaps_s: tuple[float, ...] = ()
-    usual_s: float = 0.0
+    t_s: Array  # times, (n,)
+    places_m: Array  # (n, 3); z is nan if the log lacks it
+    gap_s: float  # motion between two samples that are farther apart is unknown
+    told: dict[str, str] = field(default_factory=dict)  # where it is from: stream, frame and clock
+    leaps_s: tuple[float, ...] = ()  # times of samples to which the body cannot have come from the one before
+    usual_s: float = 0.0  # usual time between two samples
 
     @property
     def is_known(self) -> npt.NDArray[np.bool_]:
@@ -85,44 +72,27 @@ class Track:
 
 @dataclass(eq=False)
 class Tracks:
-    """The bodies of a log.
+    """The bodies of a log."""
 
-    Attributes:
-        bodies: tracks by name.
-        said: what a reader must know of how they were read.
-        ignored: what was not used.
-        origin: what time 0 is: '' if the log's own clock.
-    """
-
-    bodies: dict[str, Track]
-    said: list[str]
-    ignored: list[str]
-    origin: str = ""
+    bodies: dict[str, Track]  # tracks by name
+    said: list[str]  # what a reader must know of how they were read
+    ignored: list[str]  # what was not used
+    origin: str = ""  # what time 0 is: '' if the log's own clock
 
 
 class Choice(NamedTuple):
-    """What the command line chooses.
+    """What the command line chooses."""
 
-    Attributes:
-        rename: bodies by names in the log.
-        frames: positions in other frames are not used, and these count as one; none: all that are there.
-        without: bodies of the scenario that are not judged.
-        uavs: further UAVs.
-        gap_s: see `Track`; 0 for `GAP` times the usual time between two samples.
-        time_unit: of stamps without one; '' to find out.
-        length_unit: of positions without one; '' to find out.
-        rate_hz: frames per second of stamps that are numbers of frames; 0 for other stamps.
-        axes: of the log along x, y and z of the scenario, by body, '' for all others: "x,-z,y"; none to find out.
-    """
-
-    rename: Mapping[str, str] = {}
+    rename: Mapping[str, str] = {}  # bodies by names in the log
+    # Positions in other frames are not used, and these count as one; none: all that are there.
     frames: Sequence[str] = ()
-    without: Collection[str] = ()
-    uavs: Sequence[str] = ()
-    gap_s: float = 0.0
-    time_unit: str = ""
-    length_unit: str = ""
-    rate_hz: float = 0.0
+    without: Collection[str] = ()  # bodies of the scenario that are not judged
+    uavs: Sequence[str] = ()  # further UAVs
+    gap_s: float = 0.0  # see `Track`; 0 for `GAP` times the usual time between two samples
+    time_unit: str = ""  # of stamps without one; '' to find out
+    length_unit: str = ""  # of positions without one; '' to find out
+    rate_hz: float = 0.0  # frames per second of stamps that are numbers of frames; 0 for other stamps
+    # Of the log along x, y and z of the scenario, by body, '' for all others: "x,-z,y"; none to find out.
     axes: Mapping[str, str] = {}
 
 
@@ -142,16 +112,7 @@ def known(scenario: Json, choice: Choice, others: Sequence[str] = ()) -> None:
 
 
 def joined(log: Log, scenario: Json, choice: Choice) -> Tracks:
-    """The tracks of the bodies of a scenario.
-
-    Args:
-        log: its streams.
-        scenario: as resolved.
-        choice: see there.
-
-    Raises:
-        LogError: if a UGV or an obstacle that moves is missing, a body is in several streams, or in several frames.
-    """
+    """The tracks of the bodies of a scenario."""
     bodies = [name for name in bodies_of(scenario, choice.uavs) if name not in choice.without]
     found, ignored = _assigned(log, bodies, choice)
     _in_one_frame({name: each.frame for name, each in found.items()}, choice.frames)
@@ -405,11 +366,9 @@ def _leaps(t_s: Array, places: Array, fastest_m_s: float) -> npt.NDArray[np.bool
 
 
 def _lost(t_s: Array, places: Array, fastest_m_s: float, start: Array | None) -> npt.NDArray[np.bool_]:
-    """Which rows are where the body cannot have been, (n,).
-
-    They are between two leaps, fewer than the rows on either side or as few and at (0, 0), and the body can have gone
-    from one side to the other. At either end of the log they are at (0, 0), unless the body starts there.
-    """
+    """Which rows are where the body cannot have been, (n,)."""
+    # They are between two leaps, fewer than the rows on either side or as few and at (0, 0), and the body can have gone
+    # from one side to the other. At either end of the log they are at (0, 0), unless the body starts there.
     kept = np.arange(len(t_s))
     starts_there = start is not None and float(np.hypot(*start)) <= LOST_M
     for _ in range(MOST_PASSES):

@@ -13,16 +13,15 @@ from airground_drake.check.files import Json
 from airground_drake.check.scenario import robots_of
 from airground_drake.study.logs.stream import OF_MESSAGES, PER_M, PER_S, Stream, unit_since_1970
 
+# Stamps that would make a log so many times longer than the scenario are not since 1970: they are of a finer unit.
 TOO_LONG = 100.0
-"""Stamps that would make a log so many times longer than the scenario are not since 1970: they are of a finer unit."""
-NEAR_M = 0.1
-"""A log that begins so close to where a body starts begins there, m."""
+NEAR_M = 0.1  # a log that begins so close to where a body starts begins there, m
+# Times so far apart, in a log so much longer than the scenario, are milliseconds if no robot is too fast then.
 LONG, SELDOM_S = 2.0, 4.0
-"""Times so far apart, in a log so much longer than the scenario, are milliseconds if no robot is too fast then."""
+# Whole numbers by which robots would be slower or faster than these shares of their limits may count frames.
 SLOW, FAST = 0.2, 2.0
-"""Whole numbers by which robots would be slower or faster than these shares of their limits may count frames."""
+# So many times the speed limits, the duration or the size of a scenario are taken as a sign of another unit.
 IMPOSSIBLE = 20.0
-"""So many times the speed limits, the duration or the size of a scenario are taken as a sign of another unit."""
 NAMES = {
     "ms": "milliseconds", "us": "microseconds", "ns": "nanoseconds", "s": "seconds",
     "mm": "millimetres", "cm": "centimetres", "m": "metres",
@@ -54,21 +53,10 @@ class _Motion(NamedTuple):
 def settle(
     streams: Mapping[str, Stream], scenario: Json, time_unit: str = "", length_unit: str = "", rate_hz: float = 0.0
 ) -> list[str]:
-    """Give every stream its units, and say which ones were not seconds and metres.
-
-    Args:
-        streams: by body.
-        scenario: as resolved.
-        time_unit: of streams that do not say theirs; '' to find out.
-        length_unit: of streams that do not say theirs; '' to find out.
-        rate_hz: frames per second of streams whose times are numbers of frames; 0 without such streams.
-
-    Returns:
-        Remarks.
-
-    Raises:
-        LogError: if units that are not stated differ between bodies, or times may be numbers of frames.
-    """
+    """Give every stream its units, and say which ones were not seconds and metres."""
+    # time_unit: of streams that do not say theirs; '' to find out.
+    # length_unit: of streams that do not say theirs; '' to find out.
+    # rate_hz: frames per second of streams whose times are numbers of frames; 0 without such streams.
     said = dict[str, None]()
     if rate_hz:
         _of_frames(streams, rate_hz)
@@ -139,11 +127,9 @@ def _is_seldom(streams: Mapping[str, Stream], lasting: float) -> bool:
 
 
 def _likely(streams: Mapping[str, Stream], scenario: Json) -> tuple[str, str, list[str]]:
-    """The units of time and length that are still open, and why they are not seconds and metres.
-
-    Metres stand unless they are impossible: then robots would be too fast, whatever the unit of time, or far from the
-    scenario, and in another unit they start where the scenario has them, or move among what is in it.
-    """
+    """The units of time and length that are still open, and why they are not seconds and metres."""
+    # Metres stand unless they are impossible: then robots would be too fast, whatever the unit of time, or far from the
+    # scenario, and in another unit they start where the scenario has them, or move among what is in it.
     times = [""] if all(each.time_unit for each in streams.values()) else [*PER_S]
     lengths = [""] if all(each.length_unit for each in streams.values()) else [*PER_M]
     usual = times[0] or "s", lengths[0] or "m"

@@ -12,11 +12,7 @@ from airground_drake.scenario.schema import Scenario
 
 
 def chosen(scenario: str | Path | Scenario, overrides: Overrides = ()) -> Scenario:
-    """A scenario by name or path, or a copy of the given one, with overrides.
-
-    Raises:
-        ScenarioError: if the scenario or an override is not valid.
-    """
+    """A scenario by name or path, or a copy of the given one, with overrides."""
     return validated(scenario, overrides) if isinstance(scenario, Scenario) else load(scenario, overrides)
 
 

@@ -50,32 +50,21 @@ from airground_drake.scenario.schema import (
 
 T = TypeVar("T")
 
-SPEEDS = (1.0, 0.5, 2.0)
-"""Speeds of preset trajectories and of proposals, m/s."""
-DISTANCES = (2.0, 1.0, 0.5, 3.0)
-"""Safe distances, m, the default first."""
-RADII = (0.0, 0.5, 0.1)
-"""Radii of robots and obstacles, m."""
-PERIODS = (0.025, 0.05, 0.1)
-"""Control periods, s."""
-JITTER = (0.0, 0.25, -0.25, 0.5, -0.5)
-"""Offsets of a place from the middle of its cell, along an axis, m."""
-KINDS = ("ball", "box", "wall", "polygon", "post")
-"""Shapes of obstacles."""
-SIZES = (1.0, 2.0)
-"""How far shapes extend from their places at most, before they are rounded, m."""
-OWN_DISTANCES = (0.0, 0.5, 3.0)
-"""Distances that an obstacle may have instead of the scenario's, m; 0: none."""
+SPEEDS = (1.0, 0.5, 2.0)  # speeds of preset trajectories and of proposals, m/s
+DISTANCES = (2.0, 1.0, 0.5, 3.0)  # safe distances, m, the default first
+RADII = (0.0, 0.5, 0.1)  # radii of robots and obstacles, m
+PERIODS = (0.025, 0.05, 0.1)  # control periods, s
+JITTER = (0.0, 0.25, -0.25, 0.5, -0.5)  # offsets of a place from the middle of its cell, along an axis, m
+KINDS = ("ball", "box", "wall", "polygon", "post")  # shapes of obstacles
+SIZES = (1.0, 2.0)  # how far shapes extend from their places at most, before they are rounded, m
+OWN_DISTANCES = (0.0, 0.5, 3.0)  # distances that an obstacle may have instead of the scenario's, m; 0: none
 HEADINGS = (0.0, 0.5, 1.5707963, -2.0)
 HEIGHTS = (0.0, 1.0, 50.0)
-APPEARANCES = (0.0, 1.5, 30.0)
-"""Headings, rad, heights, m, and times of appearance, s, of obstacles."""
-OBSTACLE_SPEEDS = (1.0, 0.5, 1.7)
-"""Speeds of obstacles that move, m/s."""
+APPEARANCES = (0.0, 1.5, 30.0)  # headings, rad, heights, m, and times of appearance, s, of obstacles
+OBSTACLE_SPEEDS = (1.0, 0.5, 1.7)  # speeds of obstacles that move, m/s
+# Speeds at which obstacles promise to move at most, as shares of the true one; 0: no promise of their own.
 PROMISES = (1.0, 0.0, 0.5, 1.5)
-"""Speeds at which obstacles promise to move at most, as shares of the true one; 0: no promise of their own."""
-BAYES = (Threshold("bayes"), Threshold("bayes", drift_m_s=0.5, noise_m_sqrt_s=1.0))
-"""Thresholds by the Bayes risk."""
+BAYES = (Threshold("bayes"), Threshold("bayes", drift_m_s=0.5, noise_m_sqrt_s=1.0))  # thresholds by the Bayes risk
 
 
 @lru_cache(maxsize=None, typed=True)
@@ -84,11 +73,11 @@ def first_of(*values: T) -> SearchStrategy[T]:
     return st.sampled_from(values)
 
 
+# Parameters of the package's policies, besides their speed.
 PARAMETERS: dict[str, dict[str, float]] = {
     "coordinate": {}, "detour": {}, "towards": {"x_m": 0.0, "y_m": 0.0}, "stale_map": {}, "noisy": {"noise_m": 0.5},
     "hostile": {},
 }  # fmt: skip
-"""Parameters of the package's policies, besides their speed."""
 
 
 @st.composite
@@ -108,8 +97,7 @@ def policies(draw: DrawFn, names: Sequence[str] = tuple(PARAMETERS), *, at_most:
     ]
 
 
-DATABASES = policies()
-"""Made once, because making strategies takes time."""
+DATABASES = policies()  # made once, because making strategies takes time
 
 
 @st.composite
@@ -191,8 +179,7 @@ def _farthest(safe: SafeDistance, own: float) -> float:
     return max(safe.obstacle_m, safe.moving_m, safe.ugv_m, safe.air_ground_m, own)
 
 
-Cell = tuple[int, int]
-"""Column and row in the grid of a map."""
+Cell = tuple[int, int]  # column and row in the grid of a map
 
 
 @st.composite
@@ -206,20 +193,9 @@ def _maps(
     shapes: SearchStrategy[str],
     moving: SearchStrategy[bool],
 ) -> tuple[dict[str, Ugv], Uav, dict[str, Obstacle], list[Vector]]:
-    """UGVs, UAV and obstacles on a grid, in an arena or without one.
-
-    Each start has its own cell, and so has each target and each obstacle.
-
-    Args:
-        draw: given by Hypothesis.
-        count: number of UGVs.
-        others: number of obstacles.
-        safe: distances that starts and targets keep.
-        largest: the largest radius, m.
-        own: distance that some obstacles have instead of the scenario's, m; 0: none.
-        shapes: of the obstacles.
-        moving: whether they move.
-    """
+    """UGVs, UAV and obstacles on a grid, in an arena or without one; `largest` in m."""
+    # Each start has its own cell, and so has each target and each obstacle.
+    # own: distance that some obstacles have instead of the scenario's, m; 0: none.
     kinds = [draw(shapes) for _ in range(others)]
     size = draw(first_of(*SIZES)) if {*kinds} - {"ball", "post"} else 0.0
     pitch = _farthest(safe, own) + 2.0 * (max(JITTER) + largest) + size

@@ -10,8 +10,8 @@ from airground_drake.scenario.kinds import unit_of
 from airground_drake.verify.claim import Verdict
 from airground_drake.verify.finding import Finding
 
+# Keys of evidence whose values are names of robots and obstacles.
 WHO = ("robot", "first", "second", "other", "ugv", "obstacle")
-"""Keys of evidence whose values are names of robots and obstacles."""
 
 _FOUND = {
     "refuted": "is refuted",
@@ -22,10 +22,7 @@ _FOUND = {
 
 
 def told(verdict: Verdict, place: str) -> str:
-    """A verdict in several lines: what was claimed, which robots, when, what was found and needed.
-
-    `place` is a phrase such as "on run d of case_a".
-    """
+    """A verdict in several lines: what was claimed, which robots, when, what was found and needed."""
     claim, finding = verdict.claim, verdict
     lines = [f"{claim.id} {_found(verdict)}, {place}", f"  claim: {claim.statement}"]
     seen = finding.counterexample or finding.where

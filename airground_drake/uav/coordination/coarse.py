@@ -26,54 +26,35 @@ from airground_drake.uav.coordination.roadmap import Space
 from airground_drake.uav.coordination.single import Mover
 from airground_drake.uav.coordination.timed import without_repeats
 
+# A robot can go from its start to the nodes within so many widths, by way. They are more than one region's neighbours:
+# robots that have met have little room for their first move.
 FROM_START = 2.0
-"""A robot can go from its start to the nodes within so many widths, by way. They are more than one region's neighbours:
-robots that have met have little room for their first move."""
+# A smaller robot uses the edge of a larger one between the same nodes, unless its own is shorter by this factor.
 NO_LONGER = 1.05
-"""A smaller robot uses the edge of a larger one between the same nodes, unless its own is shorter by this factor."""
 
-AS_LATTICE = 1.09
-"""Ways along the lattice are at most this much longer than straight ones."""
+AS_LATTICE = 1.09  # ways along the lattice are at most this much longer than straight ones
 
 
 class CoarseGraph(NamedTuple):
-    """A coarse roadmap. An edge is a polyline that is travelled at constant speed; the first of each node is to stay.
+    """A coarse roadmap. Edges are polylines that are travelled at constant speed; the first of each node is to stay."""
 
-    Attributes:
-        places: of the nodes, (N, 2), m.
-        first: first edge of each node, (N + 1,).
-        heads: node at the end of each edge, (E,).
-        lengths: of the edges, (E,), m.
-        begins: first row of each edge in `rows`, (E + 1,).
-        rows: share of the edge and place, m, (P, 3): a timed motion from 0 to 1.
-        circles: middle, m, and radius, m, of a circle round each edge, (E, 3).
-    """
-
-    places: Array
-    first: Indices
-    heads: Indices
-    lengths: Array
-    begins: Indices
-    rows: Array
-    circles: Array
+    places: Array  # of the nodes, (N, 2), m
+    first: Indices  # first edge of each node, (N + 1,)
+    heads: Indices  # node at the end of each edge, (E,)
+    lengths: Array  # of the edges, (E,), m
+    begins: Indices  # first row of each edge in `rows`, (E + 1,)
+    rows: Array  # share of the edge and place, m, (P, 3): a timed motion from 0 to 1
+    circles: Array  # middle, m, and radius, m, of a circle round each edge, (E, 3)
 
 
 class Coarse(NamedTuple):
-    """A coarse roadmap for some robots.
+    """A coarse roadmap for some robots."""
 
-    Attributes:
-        graph: all nodes and edges.
-        starts: node of each robot's start, (n,); no edge leads to it.
-        targets: node of each robot's target, (n,).
-        usable: which edges each robot can use, (n, E).
-        sizes: index of each robot's size, (n,); robots of one size keep the same distances.
-    """
-
-    graph: CoarseGraph
-    starts: Indices
-    targets: Indices
-    usable: npt.NDArray[np.bool_]
-    sizes: Indices
+    graph: CoarseGraph  # all nodes and edges
+    starts: Indices  # node of each robot's start, (n,); no edge leads to it
+    targets: Indices  # node of each robot's target, (n,)
+    usable: npt.NDArray[np.bool_]  # which edges each robot can use, (n, E)
+    sizes: Indices  # index of each robot's size, (n,); robots of one size keep the same distances
 
 
 class _Edge(NamedTuple):
@@ -86,14 +67,9 @@ class _Edge(NamedTuple):
 
 
 def coarsened(movers: Sequence[Mover], width: float) -> Coarse:
-    """The coarse roadmap of some robots with nodes at least `width`, m, apart by way; targets may be nearer.
-
-    Starts have edges that lead away only. As ordinary nodes they would make corridors look wider than they are.
-
-    Args:
-        movers: the robots; every target keeps its distances from obstacles.
-        width: m.
-    """
+    """The coarse roadmap of some robots with nodes at least `width`, m, apart by way; targets may be nearer."""
+    # Starts have edges that lead away only. As ordinary nodes they would make corridors look wider than they are.
+    # width: m.
     spaces = sorted({mover.space.apart: mover.space for mover in movers}.values(), key=lambda each: -each.apart)
     index = {space.apart: k for k, space in enumerate(spaces)}
     sizes = np.array([index[mover.space.apart] for mover in movers], dtype=np.int64)
@@ -152,10 +128,8 @@ def _packed(
     wanted: npt.NDArray[np.bool_],
     width: float,
 ) -> Indices:
-    """The nodes `always`, and of the `wanted` nodes, in order, those that are `width`, m, from all chosen before.
-
-    Nodes behind a wall do not count: only those to which a way leads that is hardly longer than the lattice makes it.
-    """
+    """The nodes `always`, and of the `wanted` nodes, in order, those that are `width`, m, from all chosen before."""
+    # Nodes behind a wall do not count: only those to which a way leads that is hardly longer than the lattice makes it.
     count = len(first) - 1
     covered, way_to = np.zeros(count, np.bool_), np.full(count, np.inf)
     chosen, many = np.empty(count + len(always), np.int64), 0

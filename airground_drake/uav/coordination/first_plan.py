@@ -26,52 +26,38 @@ from airground_drake.uav.coordination.pibt import Team
 from airground_drake.uav.coordination.single import ROUNDING_M, Mover, OtherRobot, Way, sum_of_times
 from airground_drake.uav.coordination.timed import closest, distance, without_repeats
 
+# Distances of coarse nodes, as shares of the distance that robots keep. With the first, a robot can follow another one
+# round a right angle; with the second it stands on the next node.
 WIDTHS = (1.45, 1.02, 0.7, 0.5)
-"""Distances of coarse nodes, as shares of the distance that robots keep. With the first, a robot can follow another one
-round a right angle; with the second it stands on the next node."""
+# The swap rule is used on roadmaps of at least this width: on narrower ones robots cover several nodes.
 SWAPS_FROM = 1.0
-"""The swap rule is used on roadmaps of at least this width: on narrower ones robots cover several nodes."""
-FIRST = 400
-"""Candidates for each robot in the first round; every further round gets twice as many on each roadmap."""
+FIRST = 400  # candidates for each robot in the first round; every further round gets twice as many on each roadmap
+# How much moves are shuffled in each round, in widths, in turn. Some orders of moves lead into a long search, others of
+# the same robots straight to a plan: beginning anew is worth more than going on.
 NOISES = (0.05, 0.3, 1.0)
-"""How much moves are shuffled in each round, in widths, in turn. Some orders of moves lead into a long search, others
-of the same robots straight to a plan: beginning anew is worth more than going on."""
+# Number of further plans with shuffled moves, once one is found: on the roadmap that has it, and on the widest two.
 AGAIN = 96
-"""Number of further plans with shuffled moves, once one is found: on the roadmap that has it, and on the widest two."""
+# A further plan may cost this many times as much as the first one; all of them, a third of the candidates.
 AGAIN_AT_MOST, AGAIN_SHARE = 2.0, 3
-"""A further plan may cost this many times as much as the first one; all of them, a third of the candidates."""
-WAITING = 0.5
-"""What it costs to wait for a step while others with known motions are under way, in widths."""
+WAITING = 0.5  # what it costs to wait for a step while others with known motions are under way, in widths
+# Known motions are followed for so many steps, and for fewer if the ways to the targets in all steps would be more
+# values than this. In the last step, all that is left of a known motion counts as being in the way.
 MOST_LAYERS, MOST_VALUES = 400, 10_000_000
-"""Known motions are followed for so many steps, and for fewer if the ways to the targets in all steps would be more
-values than this. In the last step, all that is left of a known motion counts as being in the way."""
 
 Outcome = Literal["found", "exhausted", "effort spent"]
 
 
 @dataclass(frozen=True, eq=False)
 class FirstPlan:
-    """The result of `first_plan`.
+    """The result of `first_plan`."""
 
-    Attributes:
-        outcome: whether a plan was found; if not, whether every coarse roadmap was searched to the end.
-        ways: one per robot; empty without a plan.
-        candidates: the effort.
-    """
-
-    outcome: Outcome
-    ways: tuple[Way, ...]
-    candidates: int
+    outcome: Outcome  # whether a plan was found; if not, whether every coarse roadmap was searched to the end
+    ways: tuple[Way, ...]  # one per robot; empty without a plan
+    candidates: int  # the effort
 
 
 def first_plan(movers: Sequence[Mover], fixed: Sequence[OtherRobot], candidates: int) -> FirstPlan:
-    """Ways of all robots to their targets, where they wait for the end of their presets.
-
-    Args:
-        movers: the robots; each has a way to its target, which keeps its distances from obstacles.
-        fixed: other robots with their motions.
-        candidates: limit of the effort.
-    """
+    """Ways of all robots to their targets, where they wait for the end of their presets."""
     least = min(mover.space.apart for mover in movers)
     searches = [_Search(movers, fixed, share, share * least) for share in WIDTHS]
     spent, budget, turn = 0, FIRST * len(movers), 0
@@ -186,15 +172,9 @@ def _shut(coarse: Coarse, movers: Sequence[Mover], fixed: Sequence[OtherRobot], 
 
 @njit(cache=True)
 def _shut_by(graph: CoarseGraph, motion: Array, apart: float, step: float, shut: npt.NDArray[np.bool_]) -> None:
-    """Mark the edges that a robot cannot travel in each step, as it would come too near to a known motion.
-
-    Args:
-        graph: the coarse roadmap.
-        motion: timed, (M, 3).
-        apart: distance to keep, m; who begins a step nearer comes no nearer.
-        step: duration of a step, s.
-        shut: the result, (L, E).
-    """
+    """Mark the edges that a robot cannot travel in each step, as it would come too near to a known motion."""
+    # motion: (M, 3); step: s
+    # shut: the result, (L, E).
     circles, rows, begins = graph.circles, graph.rows, graph.begins
     layers, edges = shut.shape
     for k in range(layers):
@@ -221,13 +201,8 @@ def _shut_by(graph: CoarseGraph, motion: Array, apart: float, step: float, shut:
 
 
 def _to_go(coarse: Coarse, shut: npt.NDArray[np.bool_], waiting: float) -> Array:
-    """Ways to the targets, see `Team.to_go`; in all steps but the last ones, waiting counts as a way, too.
-
-    Args:
-        coarse: the coarse roadmap.
-        shut: see `Team.shut`.
-        waiting: what it costs to wait for a step, m.
-    """
+    """Ways to the targets, see `Team.to_go`; in all steps but the last ones, waiting counts as a way, too."""
+    # waiting: m
     graph = coarse.graph
     count, layers = len(graph.places), shut.shape[1]
     tails = np.repeat(np.arange(count), np.diff(graph.first))

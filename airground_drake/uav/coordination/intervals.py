@@ -18,66 +18,37 @@ Indices = npt.NDArray[np.int64]
 
 
 class Grid(NamedTuple):
-    """Nodes of a roadmap in square cells, to find the nodes near a place.
+    """Nodes of a roadmap in square cells, to find the nodes near a place."""
 
-    Attributes:
-        nodes: (N, 2), m.
-        first: index of the first member of each cell, column by column, (cells + 1,).
-        members: nodes sorted by cell, (N,).
-        corner: lowest corner of the grid, (2,), m.
-        size: of a cell, m.
-        shape: number of columns and rows, (2,).
-    """
-
-    nodes: Array
-    first: Indices
-    members: Indices
-    corner: Array
-    size: float
-    shape: Indices
+    nodes: Array  # (N, 2), m
+    first: Indices  # index of the first member of each cell, column by column, (cells + 1,)
+    members: Indices  # nodes sorted by cell, (N,)
+    corner: Array  # lowest corner of the grid, (2,), m
+    size: float  # of a cell, m
+    shape: Indices  # number of columns and rows, (2,)
 
 
 class Edges(NamedTuple):
-    """Edges of a roadmap for one robot, each in both directions.
+    """Edges of a roadmap for one robot, each in both directions."""
 
-    Attributes:
-        first: first edge of each node, (N + 1,).
-        heads: node at the end of each edge, (E,).
-        durations: travel times, (E,), s.
-    """
-
-    first: Indices
-    heads: Indices
-    durations: Array
+    first: Indices  # first edge of each node, (N + 1,)
+    heads: Indices  # node at the end of each edge, (E,)
+    durations: Array  # travel times, (E,), s
 
 
 class Intervals(NamedTuple):
-    """Safe intervals: times at which no other robot is too near to a node.
+    """Safe intervals: times at which no other robot is too near to a node."""
 
-    Attributes:
-        first: first interval of each node, (N + 1,).
-        times: begin and end of each interval, (K, 2), s; the end may be infinite.
-    """
-
-    first: Indices
-    times: Array
+    first: Indices  # first interval of each node, (N + 1,)
+    times: Array  # begin and end of each interval, (K, 2), s; the end may be infinite
 
 
 @njit(cache=True)
 def time_within(x: float, y: float, vx: float, vy: float, radius: float, duration: float) -> tuple[float, float]:
-    """When a point that moves straight is nearer to the origin than a radius.
-
-    Args:
-        x: place at t = 0, m.
-        y: place at t = 0, m.
-        vx: velocity, m/s.
-        vy: velocity, m/s.
-        radius: m.
-        duration: of the motion, s; may be infinite.
-
-    Returns:
-        Begin and end of that time, s. The end is not after the begin if the point is never so near.
-    """
+    """When a point that moves straight is nearer to the origin than a radius; `x`, `y` in m; `vx`, `vy` in m/s."""
+    # radius: m.
+    # duration: of the motion, s; may be infinite.
+    # Returns begin and end of that time, s. The end is not after the begin if the point is never so near.
     c = x * x + y * y - radius * radius
     squared = vx * vx + vy * vy
     if squared == 0.0:
@@ -92,15 +63,8 @@ def time_within(x: float, y: float, vx: float, vy: float, radius: float, duratio
 
 @njit(cache=True)
 def cells_between(low: float, high: float, corner: float, size: float, count: int) -> tuple[int, int]:
-    """First cell in a row that an interval meets, and the cell after the last one.
-
-    Args:
-        low: begin of the interval, m.
-        high: its end, m.
-        corner: begin of the row, m.
-        size: of a cell, m.
-        count: of cells.
-    """
+    """First cell in a row that an interval meets, and the cell after the last one."""
+    # low, high, corner, size: m
     first = min(max(int(np.floor((low - corner) / size)), 0), count)
     return first, max(min(int(np.floor((high - corner) / size)) + 1, count), first)
 
@@ -114,16 +78,8 @@ def nodes_near(grid: Grid, column: int, low: float, high: float) -> Indices:
 
 @njit(cache=True)
 def blocked_times(motion: Array, grid: Grid, radii: Array) -> tuple[Indices, Array]:
-    """When a timed motion is nearer to nodes than their radii.
-
-    Args:
-        motion: (M, 3).
-        grid: the nodes.
-        radii: of the nodes, (N,), m.
-
-    Returns:
-        Nodes (B,) and begin and end of each blocked time, (B, 2), s.
-    """
+    """When a timed motion is nearer to nodes than their radii; `motion` (M, 3); `radii` (N,), m."""
+    # Returns nodes (B,) and begin and end of each blocked time, (B, 2), s.
     found, times, count = np.empty(1024, np.int64), np.empty((1024, 2)), 0
     reach = radii.max()
     for k in range(len(motion)):
@@ -147,16 +103,8 @@ def blocked_times(motion: Array, grid: Grid, radii: Array) -> tuple[Indices, Arr
 
 @njit(cache=True)
 def times_by_node(count: int, nodes: Indices, times: Array) -> tuple[Indices, Array]:
-    """Sort blocked times by node, and the times of each node by their begin.
-
-    Args:
-        count: of nodes, N.
-        nodes: (B,).
-        times: begin and end of each blocked time, (B, 2), s.
-
-    Returns:
-        Index of the first time of each node, (N + 1,), and the sorted times, (B, 2), s.
-    """
+    """Sort blocked times by node, and the times of each node by their begin; `nodes` (B,); `times` (B, 2), s."""
+    # Returns index of the first time of each node, (N + 1,), and the sorted times, (B, 2), s.
     first = np.zeros(count + 1, np.int64)
     for n in nodes:
         first[n + 1] += 1
@@ -175,13 +123,7 @@ def times_by_node(count: int, nodes: Indices, times: Array) -> tuple[Indices, Ar
 
 @njit(cache=True)
 def safe_intervals(count: int, nodes: Indices, times: Array) -> Intervals:
-    """Times at which nodes are free, from t = 0 on.
-
-    Args:
-        count: of nodes, N.
-        nodes: blocked ones, (B,).
-        times: begin and end of each blocked time, (B, 2), s.
-    """
+    """Times at which nodes are free, from t = 0 on; `nodes` (B,); `times` (B, 2), s."""
     first_blocked, blocked = times_by_node(count, nodes, times)
     first = np.zeros(count + 1, np.int64)
     intervals = np.empty((count + len(blocked), 2))
@@ -203,14 +145,8 @@ def safe_intervals(count: int, nodes: Indices, times: Array) -> Intervals:
 
 @njit(cache=True)
 def join_time(arrival: float, end: float, first: float, last: float) -> float:
-    """Earliest time at which a robot that waits at a node can join its preset there, s; infinite: never.
-
-    Args:
-        arrival: of the robot at the node, s.
-        end: of the safe interval in which it waits, s.
-        first: earliest time at which the node allows a join, s.
-        last: latest such time, s. Infinite: the robot then stays at the node, so the interval must have no end.
-    """
+    """Earliest time at which a robot that waits at a node can join its preset there, s; infinite: never."""
+    # last: latest such time, s. Infinite: the robot then stays at the node, so the interval must have no end.
     joined = max(arrival, first)
     if joined > min(last, end) or (last == np.inf and end < np.inf):
         return np.inf
@@ -221,22 +157,11 @@ def join_time(arrival: float, end: float, first: float, last: float) -> float:
 def search(
     edges: Edges, intervals: Intervals, start: int, joins: Array, to_go: Array, budget: int
 ) -> tuple[Indices, Array, float, int]:
-    """Safe-interval search (A*): the way from a node to the earliest join.
-
-    The robot may wait at a node during a safe interval of the node. It travels an edge only while both ends are safe.
-
-    Args:
-        edges: of the roadmap.
-        intervals: safe intervals of its nodes.
-        start: node at t = 0.
-        joins: first and last time at which the preset can be joined at each node, (N, 2), s; see `join_time`.
-        to_go: lower bound of the time from a node to any join, (N,), s.
-        budget: largest number of expanded intervals.
-
-    Returns:
-        Nodes (L,) in order, arrival at each (L,), s, time of the join, s, and number of expanded intervals. If no join
-        is found, L = 0 and its time is infinite.
-    """
+    """Safe-interval search (A*): the way from a node to the earliest join; `to_go` (N,), s."""
+    # The robot may wait at a node during a safe interval of the node. It travels an edge only while both ends are safe.
+    # joins: first and last time at which the preset can be joined at each node, (N, 2), s; see `join_time`.
+    # Returns nodes (L,) in order, arrival at each (L,), s, time of the join, s, and number of expanded intervals. If no
+    # join is found, L = 0 and its time is infinite.
     first, times = intervals
     arrival, before = np.full(len(times), np.inf), np.full(len(times), -1, np.int64)
     closed, node_of = np.zeros(len(times), np.bool_), np.empty(len(times), np.int64)
@@ -276,18 +201,11 @@ def reach_neighbours(
     before: Indices,
     heap: list[tuple[float, int]],
 ) -> None:
-    """Note earlier arrivals at the neighbours of a node, and put their intervals on the heap.
-
-    Args:
-        edges: see `search`.
-        intervals: see `search`.
-        node: where the robot is.
-        i: safe interval of the node in which the robot may wait.
-        to_go: see `search`.
-        arrival: earliest arrival found in each interval, (K,), s; written to.
-        before: interval from which each is reached, (K,); written to.
-        heap: pairs of a lower bound of the join time, s, and an interval; written to.
-    """
+    """Note earlier arrivals at the neighbours of a node, and put their intervals on the heap."""
+    # i: safe interval of the node in which the robot may wait.
+    # arrival: earliest arrival found in each interval, (K,), s; written to.
+    # before: interval from which each is reached, (K,); written to.
+    # heap: pairs of a lower bound of the join time, s, and an interval; written to.
     first, times = intervals
     end = times[i, 1]
     for e in range(edges.first[node], edges.first[node + 1]):

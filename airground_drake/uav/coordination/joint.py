@@ -15,59 +15,47 @@ from airground_drake.uav.coordination.single import Mover, OtherRobot, Way, find
 from airground_drake.uav.coordination.smoothing import smooth
 from airground_drake.uav.coordination.timed import at_rest, speed
 
+# No further order of the robots begins after so many searches for single robots, or one part in ten of the effort.
+# Where another order of few robots succeeds, its plan is better than one from joint steps.
 REORDERED, REORDERED_SHARE = 40, 10
-"""No further order of the robots begins after so many searches for single robots, or one part in ten of the effort.
-Where another order of few robots succeeds, its plan is better than one from joint steps."""
+# If a plan by an order takes this many times as long as the robots would alone, a plan by joint steps is made, too,
+# within one part in thirty of the candidates; the better one is taken. Not among known motions: there robots that go in
+# steps of one duration lose more time than an order does.
 LATE, LATE_SHARE = 1.4, 30
-"""If a plan by an order takes this many times as long as the robots would alone, a plan by joint steps is made, too,
-within one part in thirty of the candidates; the better one is taken. Not among known motions: there robots that go in
-steps of one duration lose more time than an order does."""
+# A plan by joint steps is improved beside one by an order only if it does not take longer than this many times that
+# one: improving it takes most of the time.
 WORTH = 1.1
-"""A plan by joint steps is improved beside one by an order only if it does not take longer than this many times that
-one: improving it takes most of the time."""
+# A plan by joint steps may be improved with so many times the expansions of a whole plan. That of 64 robots in a jam
+# lasted 73 s, and lasts 51 s improved; the orders tried before had left nothing of the effort.
 IMPROVING = 2
-"""A plan by joint steps may be improved with so many times the expansions of a whole plan. That of 64 robots in a jam
-lasted 73 s, and lasts 51 s improved; the orders tried before had left nothing of the effort."""
+# A robot leaves its place within the time in which it travels this many times the distance that robots keep.
 LEAVING = 2.0
-"""A robot leaves its place within the time in which it travels this many times the distance that robots keep."""
 
+# A plan for all; none exists; none on the roadmaps, all searched to the end; none within the effort.
 Outcome = Literal["complete", "no plan exists", "exhausted", "effort spent"]
-"""A plan for all; none exists; none on the roadmaps, all searched to the end; none within the effort."""
 
 
 @dataclass(frozen=True)
 class Effort:
-    """Limits of the work on a plan, in counts, so that the plan is the same on every machine.
+    """Limits of the work on a plan, in counts, so that the plan is the same on every machine."""
 
-    Attributes:
-        expansions: expanded intervals in all searches for single robots, times the number of robots by 20 if there are
-            more; a quarter is reserved for a partial plan. Twice as many may improve a plan by joint steps.
-        candidates: moves that the search over joint steps considers; 0: no such search.
-        searches: searches for single robots that improve a complete plan, times the number of robots, at least 20.
-    """
-
+    # Expanded intervals in all searches for single robots, times the number of robots by 20 if there are more; a
+    # quarter is reserved for a partial plan. Twice as many may improve a plan by joint steps.
     expansions: int = 400_000
-    candidates: int = 3_000_000
+    candidates: int = 3_000_000  # moves that the search over joint steps considers; 0: no such search
+    # Searches for single robots that improve a complete plan, times the number of robots, at least 20.
     searches: int = 4
 
 
 @dataclass(frozen=True, eq=False)
 class Plan:
-    """A joint plan.
+    """A joint plan."""
 
-    Attributes:
-        ways: one per robot; None: it stays where it is.
-        outcome: whether every robot has a way; if not, why.
-        separated: robots whose starts and targets lie in different components of their free space.
-        expansions: number of expanded intervals.
-        candidates: moves that the search over joint steps considered.
-    """
-
-    ways: tuple[Way | None, ...]
-    outcome: Outcome
-    separated: tuple[int, ...] = ()
-    expansions: int = 0
-    candidates: int = 0
+    ways: tuple[Way | None, ...]  # one per robot; None: it stays where it is
+    outcome: Outcome  # whether every robot has a way; if not, why
+    separated: tuple[int, ...] = ()  # robots whose starts and targets lie in different components of their free space
+    expansions: int = 0  # number of expanded intervals
+    candidates: int = 0  # moves that the search over joint steps considered
 
     @property
     def complete(self) -> bool:
@@ -84,25 +72,17 @@ def plan(
     follow: float = math.inf,
     effort: Effort | None = None,
 ) -> Plan:
-    """Plan ways for some robots, which keep their distances from discs, from each other and from fixed motions.
-
-    1. The robots are planned for in turn, the longest way first, each among the ways of those before it. If a robot
-       finds no way, every robot keeps clear of the starts of later robots until these can have left.
-    2. If that fails, robots without a way even alone are left where they are, and the others are planned for again.
-    3. If that fails too, further orders are tried for a short while: who found no way comes first in the next one.
-    4. If these fail, joint steps of the robots are searched on coarse roadmaps (`first_plan`).
-    5. A plan for all of them is improved (`neighbourhoods`). If it is by an order and takes much longer than the robots
-       would alone, joint steps are searched for a short while, too, and the better plan is taken.
-    6. Without one, robots that find no way stay where they are, and the others go round them.
-
-    Args:
-        space: discs and distances for a robot without a body.
-        tasks: one per robot.
-        speeds: m/s, one per robot.
-        fixed: other robots, with their motions from t = 0 on.
-        follow: how long a robot must be able to follow its preset after it has joined it, s.
-        effort: limits of the work; default: `Effort()`.
-    """
+    """Plan ways for some robots, which keep their distances from discs, from each other and from fixed motions."""
+    # 1. The robots are planned for in turn, the longest way first, each among the ways of those before it. If a robot
+    #    finds no way, every robot keeps clear of the starts of later robots until these can have left.
+    # 2. If that fails, robots without a way even alone are left where they are, and the others are planned for again.
+    # 3. If that fails too, further orders are tried for a short while: who found no way comes first in the next one.
+    # 4. If these fail, joint steps of the robots are searched on coarse roadmaps (`first_plan`).
+    # 5. A plan for all of them is improved (`neighbourhoods`). If it is by an order and takes much longer than the
+    #    robots would alone, joint steps are searched for a short while, too, and the better plan is taken.
+    # 6. Without one, robots that find no way stay where they are, and the others go round them.
+    # follow: how long a robot must be able to follow its preset after it has joined it, s.
+    # effort: limits of the work; default: `Effort()`.
     effort = effort or Effort()
     spaces = [space.of(task.body) for task in tasks]
     roadmap = build_roadmap(spaces, tasks, [other.motion[0, 1:] for other in fixed])
@@ -247,13 +227,7 @@ class _Search:
     def _in_order(
         self, order: Sequence[int], staying: Sequence[int], *, considerate: bool = False
     ) -> tuple[list[Way | None], int | None]:
-        """Ways of the robots in this order, and the first robot without a way, or None.
-
-        Args:
-            order: of the robots.
-            staying: robots that stay where they are.
-            considerate: whether robots keep clear of the starts of later robots until these can have left.
-        """
+        """Ways of the robots in this order, and the first robot without a way, or None."""
         ways: list[Way | None] = [None] * len(self._movers)
         taken = [*self._fixed, *(_resting(self._movers[i].task) for i in staying)]
         for k, i in enumerate(order):

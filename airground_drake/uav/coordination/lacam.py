@@ -20,41 +20,24 @@ from airground_drake.uav.coordination.coarse import CoarseGraph
 from airground_drake.uav.coordination.intervals import Indices
 from airground_drake.uav.coordination.pibt import Step, Team, fits, give, mixed, must_go
 
-MOST_CONFIGURATIONS = 60_000
-"""Largest number of configurations in a search."""
-FOR_STEP, FOR_ROBOT = 200, 40
-"""A step may cost so many candidates, and so many more for each robot."""
+MOST_CONFIGURATIONS = 60_000  # largest number of configurations in a search
+FOR_STEP, FOR_ROBOT = 200, 40  # a step may cost so many candidates, and so many more for each robot
 
 Status = Literal["found", "exhausted", "effort spent"]
 _STATUS: tuple[Status, ...] = ("found", "exhausted", "effort spent")
 
 
 class Steps(NamedTuple):
-    """The result of a search.
+    """The result of a search."""
 
-    Attributes:
-        status: whether steps were found, and if not, whether all configurations were tried.
-        moves: edge of each robot in each step, (T, n); T = 0 without a plan.
-        candidates: what it cost.
-        successors: how many joint steps were asked for.
-    """
-
-    status: Status
-    moves: Indices
-    candidates: int
-    successors: int
+    status: Status  # whether steps were found, and if not, whether all configurations were tried
+    moves: Indices  # edge of each robot in each step, (T, n); T = 0 without a plan
+    candidates: int  # what it cost
+    successors: int  # how many joint steps were asked for
 
 
 def search(graph: CoarseGraph, team: Team, starts: Indices, candidates: int, turn: int = 0) -> Steps:
-    """Look for joint steps from the nodes `starts` (n,) to the targets.
-
-    Args:
-        graph: the coarse roadmap.
-        team: the robots on it.
-        starts: node of each robot, (n,).
-        candidates: largest number of candidates.
-        turn: another number shuffles moves in another way.
-    """
+    """Look for joint steps from the nodes `starts` (n,) to the targets."""
     most = int(min(MOST_CONFIGURATIONS, candidates // len(starts) + 2))
     status, moves, spent, successors = _search(graph, team, starts, candidates, most, turn)
     return Steps(_STATUS[status], moves, int(spent), int(successors))
@@ -83,11 +66,8 @@ def _looked_up(table: Indices, nodes: Indices, layers: Indices, wanted: Indices,
 
 @njit(cache=True)
 def _next_constraint(digits: Indices, choices: Indices) -> bool:
-    """Count on: `digits` (n + 1,) has the number of robots whose moves are prescribed, then their moves.
-
-    Returns:
-        False when all moves of all robots have been prescribed.
-    """
+    """Count on: `digits` (n + 1,) has the number of robots whose moves are prescribed, then their moves."""
+    # Returns False when all moves of all robots have been prescribed.
     depth = digits[0]
     for k in range(depth, 0, -1):
         digits[k] += 1
@@ -151,7 +131,7 @@ def _successor(graph: CoarseGraph, team: Team, step: Step, order: Indices, digit
 def _search(
     graph: CoarseGraph, team: Team, starts: Indices, budget: int, most: int, turn: int
 ) -> tuple[int, Indices, int, int]:
-    """See `search`; returns the index of the status, moves, candidates and successors."""
+    """The compiled part of `search`; returns the index of the status, moves, candidates and successors."""
     count, last_layer = len(starts), len(team.to_go) - 1
     first, heads, targets, to_go = graph.first, graph.heads, team.targets, team.to_go
     nodes, moves = np.empty((most, count), np.int64), np.empty((most, count), np.int64)

@@ -14,22 +14,13 @@ import numpy as np
 from airground_drake.uav.coordination.single import Mover, OtherRobot, Way, find
 from airground_drake.uav.coordination.timed import distance
 
-GAIN_S = 1e-3
-"""A change must lower the sum of times by more than this, s."""
-DRAWN = 3
-"""Number of drawn orders in which all robots are planned for anew."""
-MOST_IN_THE_WAY = 6
-"""Largest number of robots in the way of a late one that are planned for anew with it."""
+GAIN_S = 1e-3  # a change must lower the sum of times by more than this, s
+DRAWN = 3  # number of drawn orders in which all robots are planned for anew
+MOST_IN_THE_WAY = 6  # largest number of robots in the way of a late one that are planned for anew with it
 
 
 class Refinement:
-    """Large neighbourhood search on one plan.
-
-    Attributes:
-        ways: one per robot; no robot is without a way.
-        searches: searches for single robots so far.
-        expansions: expanded intervals so far.
-    """
+    """Large neighbourhood search on one plan."""
 
     def __init__(
         self,
@@ -39,17 +30,12 @@ class Refinement:
         fixed: Sequence[OtherRobot],
         follow: float,
     ) -> None:
-        """Begin with a plan. Nothing is searched yet.
-
-        Args:
-            movers: the robots.
-            ways: the plan.
-            alone: the ways that the robots would have without each other.
-            fixed: other robots with their motions.
-            follow: see `joint.plan`.
-        """
+        """Begin with a plan. Nothing is searched yet."""
+        # alone: the ways that the robots would have without each other.
         self._movers, self._alone, self._fixed, self._follow = movers, tuple(alone), tuple(fixed), follow
-        self.ways = list(ways)
+        self.ways = list(ways)  # one per robot; no robot is without a way
+        # searches: searches for single robots so far.
+        # expansions: expanded intervals so far.
         self.searches, self.expansions = 0, 0
 
     def run(self, searches: int, expansions: int) -> None:

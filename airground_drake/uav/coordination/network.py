@@ -23,8 +23,7 @@ from airground_drake.uav.coordination.intervals import Indices
 from airground_drake.uav.coordination.pibt import ROUNDING_M, Team, conflicts
 from airground_drake.uav.coordination.timed import without_repeats
 
-SHORTEST_S = 1e-6
-"""Shortest duration of a move, s."""
+SHORTEST_S = 1e-6  # shortest duration of a move, s
 
 
 def without_loops(graph: CoarseGraph, team: Team, moves: Indices) -> Indices:

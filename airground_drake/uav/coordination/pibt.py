@@ -27,54 +27,35 @@ from airground_drake.uav.coordination.coarse import CoarseGraph
 from airground_drake.uav.coordination.intervals import Indices
 
 ROUNDING_M = 1e-9
-LONGEST_CHAIN = 1000
-"""Largest number of nodes of a corridor that the swap rule follows."""
+LONGEST_CHAIN = 1000  # largest number of nodes of a corridor that the swap rule follows
 
 
 class Team(NamedTuple):
-    """Robots on a coarse roadmap with N nodes and E edges.
+    """Robots on a coarse roadmap with N nodes and E edges."""
 
-    Attributes:
-        targets: node of each robot's target, (n,).
-        usable: which edges each robot can use, (n, E).
-        sizes: index of each robot's size, (n,).
-        shut: edges that robots of each size cannot use in each layer, as robots with known motions are near, (S, L, E).
-            Layer k is the step with this number; the last layer is of all later steps.
-        apart: distances to keep between robots, (n, n), m.
-        to_go: way from each node to the target, (L, n, N), m; infinite: none.
-        swaps: whether the swap rule is used.
-        noise: how much moves are shuffled, m.
-    """
-
-    targets: Indices
-    usable: npt.NDArray[np.bool_]
-    sizes: Indices
+    targets: Indices  # node of each robot's target, (n,)
+    usable: npt.NDArray[np.bool_]  # which edges each robot can use, (n, E)
+    sizes: Indices  # index of each robot's size, (n,)
+    # Edges that robots of each size cannot use in each layer, as robots with known motions are near, (S, L, E). Layer k
+    # is the step with this number; the last layer is of all later steps.
     shut: npt.NDArray[np.bool_]
-    apart: Array
-    to_go: Array
-    swaps: bool
-    noise: float
+    apart: Array  # distances to keep between robots, (n, n), m
+    to_go: Array  # way from each node to the target, (L, n, N), m; infinite: none
+    swaps: bool  # whether the swap rule is used
+    noise: float  # how much moves are shuffled, m
 
 
 class Step(NamedTuple):
-    """A joint step that is being put together.
+    """A joint step that is being put together."""
 
-    Attributes:
-        at: node of each robot, (n,).
-        moves: edge of each robot, (n,); -1: not chosen yet.
-        given: robots in the order in which they got their moves, (n,).
-        counts: candidates so far, largest number of candidates, robots with moves, layer, number of the step, (5,).
-        frames: see `give`, (n, 6).
-        lists: moves of the robots in the frames, best first, (n, largest number of edges at a node).
-        failed: robots that could not make way for another one, (n,); they are not asked again in this step.
-    """
-
-    at: Indices
-    moves: Indices
-    given: Indices
+    at: Indices  # node of each robot, (n,)
+    moves: Indices  # edge of each robot, (n,); -1: not chosen yet
+    given: Indices  # robots in the order in which they got their moves, (n,)
+    # Candidates so far, largest number of candidates, robots with moves, layer, number of the step, (5,).
     counts: Indices
-    frames: Indices
-    lists: Indices
+    frames: Indices  # see `give`, (n, 6)
+    lists: Indices  # moves of the robots in the frames, best first, (n, largest number of edges at a node)
+    # Robots that could not make way for another one, (n,); they are not asked again in this step.
     failed: npt.NDArray[np.bool_]
 
 
@@ -91,15 +72,8 @@ def mixed(a: int, b: int, c: int) -> float:
 
 @njit(cache=True)
 def conflicts(graph: CoarseGraph, one: int, other: int, apart: float, both_arrive: bool) -> bool:
-    """Whether two robots that travel two edges in the same step come too near to each other.
-
-    Args:
-        graph: the coarse roadmap.
-        one: edge.
-        other: edge.
-        apart: distance to keep, m. Robots that begin nearer come no nearer.
-        both_arrive: whether both reach their targets, which may be nearer, too.
-    """
+    """Whether two robots that travel two edges in the same step come too near to each other; `apart` in m."""
+    # both_arrive: whether both reach their targets, which may be nearer, too.
     circles = graph.circles
     dx, dy = circles[one, 0] - circles[other, 0], circles[one, 1] - circles[other, 1]
     reach = apart + circles[one, 2] + circles[other, 2]
@@ -165,11 +139,9 @@ def fits(graph: CoarseGraph, team: Team, step: Step, i: int, edge: int) -> bool:
 
 @njit(cache=True)
 def give(graph: CoarseGraph, team: Team, step: Step, root: int) -> bool:
-    """Give a robot a move, and moves to all robots in the way of it; False, and nothing is changed, if that fails.
-
-    The robots that are being given moves are a stack of frames: robot, number of its moves, index of the move
-    tried, robot to change places with, number of robots with moves before it, and next robot to look at.
-    """
+    """Give a robot a move, and moves to all robots in the way of it; False, and nothing is changed, if that fails."""
+    # The robots that are being given moves are a stack of frames: robot, number of its moves, index of the move tried,
+    # robot to change places with, number of robots with moves before it, and next robot to look at.
     at, moves, counts, frames, lists = step.at, step.moves, step.counts, step.frames, step.lists
     depth, entered = 0, root
     while True:
@@ -253,14 +225,9 @@ def must_go(graph: CoarseGraph, team: Team, step: Step, i: int, j: int) -> bool:
 
 @njit(cache=True)
 def turn_back(graph: CoarseGraph, team: Team, step: Step, i: int, partner: int, found: Indices) -> int:
-    """Sort the moves of robot i so that those come first that its partner can follow, and that lead farthest away.
-
-    Moves that lead nearer to the target come last. If the partner already pushes robot i, they are left out: the
-    partner has to wait.
-
-    Returns:
-        The number of moves.
-    """
+    """Sort the moves of robot i so that those come first that its partner can follow, and that lead farthest away."""
+    # Moves that lead nearer to the target come last. If the partner already pushes robot i, they are left out: the
+    # partner has to wait.
     first, heads, at, apart, to_go = graph.first, graph.heads, step.at, team.apart, team.to_go[-1]
     behind = -1
     for edge in range(first[at[partner]], first[at[partner] + 1]):
@@ -329,18 +296,9 @@ def sort_moves(graph: CoarseGraph, team: Team, step: Step, i: int, found: Indice
 
 @njit(cache=True)
 def swap_partner(graph: CoarseGraph, team: Team, step: Step, i: int, best: int) -> int:
-    """The robot with which robot i has to change places, and can if it goes back; else -1.
-
-    Either it stands where robot i wants to go. Or it stands behind: robot i is at or near its target in a corridor, and
-    must come out again to let the other one in.
-
-    Args:
-        graph: the coarse roadmap.
-        team: the robots.
-        step: the step so far.
-        i: the robot.
-        best: edge that it wants to travel.
-    """
+    """The robot with which robot i has to change places, and can if it goes back; else -1."""
+    # Either it stands where robot i wants to go. Or it stands behind: robot i is at or near its target in a corridor,
+    # and must come out again to let the other one in.
     places, first, heads = graph.places, graph.first, graph.heads
     at, apart = step.at, team.apart
     here, there = at[i], heads[best]
@@ -382,12 +340,9 @@ def standing_at(graph: CoarseGraph, team: Team, step: Step, i: int, node: int) -
 
 @njit(cache=True)
 def onward(graph: CoarseGraph, team: Team, i: int, before: int, here: int, apart: float) -> tuple[int, int]:
-    """Where a corridor leads on from a node for a robot that came from the node `before`.
-
-    Returns:
-        0, 1 or 2: it ends, goes on, or has a junction, from which two robots that are `apart`, m, can go on; and the
-        next node.
-    """
+    """Where a corridor leads on from a node for a robot that came from the node `before`."""
+    # Returns 0, 1 or 2: it ends, goes on, or has a junction, from which two robots that are `apart`, m, can go on; and
+    # the next node.
     places, first, heads = graph.places, graph.first, graph.heads
     chosen, most, other = -1, 0.0, -1
     for edge in range(first[here] + 1, first[here + 1]):
@@ -414,11 +369,9 @@ def onward(graph: CoarseGraph, team: Team, i: int, before: int, here: int, apart
 
 @njit(cache=True)
 def must_swap(graph: CoarseGraph, team: Team, i: int, j: int, here: int, there: int) -> bool:
-    """Whether robot i, at the node `here`, must change places with robot j, at `there`, to come to its target.
-
-    Robot i is taken to push robot j ahead along the corridor. They must swap if j finds no junction on the way and has
-    to come back.
-    """
+    """Whether robot i, at the node `here`, must change places with robot j, at `there`, to come to its target."""
+    # Robot i is taken to push robot j ahead along the corridor. They must swap if j finds no junction on the way and
+    # has to come back.
     to_go, apart = team.to_go[-1], team.apart[i, j]
     behind, ahead = here, there
     for _ in range(LONGEST_CHAIN):

@@ -17,44 +17,30 @@ from airground_drake.model.geometry import convex, outline
 from airground_drake.model.geometry.paths import NoPath, Path, shortest_path
 from airground_drake.uav.coordination.intervals import Grid, Indices
 
-PITCH = 0.2
-"""Spacing of the lattice as a share of the distance that robots keep."""
-REACH = 1.75
-"""Nodes outside the lattice are connected to all nodes within this many spacings."""
-FAR = 0.95
-"""Edges from starts and to targets are no longer than this share of the length that `single.find` allows."""
+PITCH = 0.2  # spacing of the lattice as a share of the distance that robots keep
+REACH = 1.75  # nodes outside the lattice are connected to all nodes within this many spacings
+FAR = 0.95  # edges from starts and to targets are no longer than this share of the length that `single.find` allows
+# Rings of extra nodes round a start, and nodes per ring: robots that block each other have little room.
 RINGS, RAYS = 3, 16
-"""Rings of extra nodes round a start, and nodes per ring: robots that block each other have little room."""
-MOST_NODES = 30_000
-"""Largest number of nodes of the lattice; a larger area gets a wider spacing."""
+MOST_NODES = 30_000  # largest number of nodes of the lattice; a larger area gets a wider spacing
+# Largest number of nodes of a preset or shortest path; a longer path gets wider gaps, which the lattice connects.
 MOST_PATH_NODES = 2_000
-"""Largest number of nodes of a preset or shortest path; a longer path gets wider gaps, which the lattice connects."""
+# Share of the clearance that edges keep. Chords of the arcs of shortest paths come nearer to discs than the arcs.
 CHORDS = 0.5
-"""Share of the clearance that edges keep. Chords of the arcs of shortest paths come nearer to discs than the arcs."""
-ARCS = 0.75
-"""Share of the clearance that shortest paths keep."""
+ARCS = 0.75  # share of the clearance that shortest paths keep
 ROUNDING_M = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
 class Space:
-    """Obstacles and distances that a robot has to keep. `Space.of` makes the space of a robot with a body.
+    """Obstacles and distances that a robot has to keep. `Space.of` makes the space of a robot with a body."""
 
-    Attributes:
-        rows: outlines of the obstacles, (m, W), see `model.geometry.outline`.
-        keep: distances to keep from their cores, (m,), m.
-        clearance: extra distance from obstacles, m. Nodes of the lattice keep all of it, edges half of it.
-        apart: distance between the robot's centre and the surfaces of other robots, m.
-        spacing: extra distance from other robots where possible, m; not 0.
-        height: of the robot's plane, m.
-    """
-
-    rows: Array
-    keep: Array
-    clearance: float
-    apart: float
-    spacing: float
-    height: float = 0.0
+    rows: Array  # outlines of the obstacles, (m, W), see `model.geometry.outline`
+    keep: Array  # distances to keep from their cores, (m,), m
+    clearance: float  # extra distance from obstacles, m. Nodes of the lattice keep all of it, edges half of it.
+    apart: float  # distance between the robot's centre and the surfaces of other robots, m
+    spacing: float  # extra distance from other robots where possible, m; not 0
+    height: float = 0.0  # of the robot's plane, m
 
     def of(self, body: float) -> Space:
         """This space for the centre of a robot whose body has this radius, m, with obstacles cut by its plane."""
@@ -62,15 +48,9 @@ class Space:
         return Space(rows, keep, self.clearance, self.apart + body, self.spacing)
 
     def wide(self, longest: float, body: float = 0.0) -> float:
-        """How far another robot must be from both ends of an edge to be `apart + spacing` from the whole edge, m.
-
-        Let s be the share of the edge up to a point, and L its length. The squared distance to that point is the
-        weighted mean of the squared distances to the ends, less s (1 - s) L^2.
-
-        Args:
-            longest: length of the longest edge, m.
-            body: radius of the other robot, m.
-        """
+        """How far another robot must be from both ends of an edge to be `apart + spacing` from the whole edge, m."""
+        # Let s be the share of the edge up to a point, and L its length. The squared distance to that point is the
+        # weighted mean of the squared distances to the ends, less s (1 - s) L^2.
         return math.sqrt((self.apart + body + self.spacing) ** 2 + longest**2 / 4.0)
 
     @property
@@ -80,10 +60,8 @@ class Space:
         return found
 
     def segments_are_free(self, begin: Array, end: Array) -> npt.NDArray[np.bool_]:
-        """Which segments, from begin (K, 2), m, to end (K, 2), m, keep the distance from every obstacle.
-
-        A segment that begins or ends too near to an obstacle is free if it comes no nearer in between.
-        """
+        """Which segments, from begin (K, 2), m, to end (K, 2), m, keep the distance from every obstacle."""
+        # A segment that begins or ends too near to an obstacle is free if it comes no nearer in between.
         return convex.segments_are_free(begin, end, self.rows, self.along, ROUNDING_M)
 
     def points_are_free(self, points: Array, clearance: float) -> npt.NDArray[np.bool_]:
@@ -93,42 +71,25 @@ class Space:
 
 @dataclass(frozen=True, eq=False)
 class RobotNodes:
-    """The nodes of one robot.
+    """The nodes of one robot."""
 
-    Attributes:
-        start: node of its start.
-        target: node of its target.
-        preset: nodes along the rest of its preset, (K,); the last is the target.
-        preset_times: times at these nodes, (K,), s.
-        usable: which of these nodes keep every distance, (K,); no edge leads to the others.
-    """
-
-    start: int
-    target: int
-    preset: Indices
-    preset_times: Array
-    usable: npt.NDArray[np.bool_]
+    start: int  # node of its start
+    target: int  # node of its target
+    preset: Indices  # nodes along the rest of its preset, (K,); the last is the target
+    preset_times: Array  # times at these nodes, (K,), s
+    usable: npt.NDArray[np.bool_]  # which of these nodes keep every distance, (K,); no edge leads to the others
 
 
 @dataclass(frozen=True, eq=False)
 class Roadmap:
-    """A graph in the plane, with a grid to find nodes by place. It has every edge in both directions.
+    """A graph in the plane, with a grid to find nodes by place. It has every edge in both directions."""
 
-    Attributes:
-        grid: of the nodes.
-        first_edge: first edge of each node, (N + 1,).
-        heads: node at the end of each edge, (E,).
-        lengths: of the edges, (E,), m.
-        longest: upper bound of the lengths, except those of edges at starts and targets, m.
-        robots: one entry per robot.
-    """
-
-    grid: Grid
-    first_edge: Indices
-    heads: Indices
-    lengths: Array
-    longest: float
-    robots: tuple[RobotNodes, ...]
+    grid: Grid  # of the nodes
+    first_edge: Indices  # first edge of each node, (N + 1,)
+    heads: Indices  # node at the end of each edge, (E,)
+    lengths: Array  # of the edges, (E,), m
+    longest: float  # upper bound of the lengths, except those of edges at starts and targets, m
+    robots: tuple[RobotNodes, ...]  # one entry per robot
 
     @property
     def nodes(self) -> Array:
@@ -153,27 +114,16 @@ class Roadmap:
 
 @dataclass(frozen=True, eq=False)
 class RobotTask:
-    """Where a robot is, and where it must go.
+    """Where a robot is, and where it must go."""
 
-    Attributes:
-        start: its place, (2,), m.
-        preset: the rest of its preset, a timed motion (M, 3) from t = 0 on, which ends at its target.
-        body: radius of the robot, m.
-    """
-
-    start: Array
-    preset: Array
-    body: float = 0.0
+    start: Array  # its place, (2,), m
+    preset: Array  # the rest of its preset, a timed motion (M, 3) from t = 0 on, which ends at its target
+    body: float = 0.0  # radius of the robot, m
 
 
 def build_roadmap(spaces: Sequence[Space], tasks: Sequence[RobotTask], others: Sequence[Array] = ()) -> Roadmap:
-    """The roadmap of some robots. Its edges are free for the smallest robot; `Roadmap.within` removes some for others.
-
-    Args:
-        spaces: one per robot.
-        tasks: one per robot.
-        others: places of other robots, (2,) each, m; the lattice reaches beyond them.
-    """
+    """The roadmap of robots. Its edges are free for the smallest robot; `Roadmap.within` removes some for others."""
+    # others: places of other robots, (2,) each, m; the lattice reaches beyond them.
     by_size = sorted(spaces, key=lambda each: each.apart)
     space = by_size[0]
     paths = [_shortest(own, task) for own, task in zip(spaces, tasks, strict=True)]
@@ -210,16 +160,8 @@ def _lattice(space: Space, low: Array, high: Array, pitch: float) -> tuple[Array
 def _robot_nodes(
     space: Space, task: RobotTask, path: Path | None, first: int, pitch: float, far: float
 ) -> tuple[Array, RobotNodes]:
-    """Places and numbers of a robot's nodes: start, preset, shortest path to the target, and a fan round the start.
-
-    Args:
-        space: of the robot.
-        task: of the robot.
-        path: its shortest path.
-        first: number of its first node.
-        pitch: gap between nodes, m.
-        far: radius of the fan, m.
-    """
+    """Places and numbers of a robot's nodes: start, preset, shortest path to the target, and a fan round the start."""
+    # pitch, far: m
     preset, times = _preset_nodes(task.preset, pitch)
     along_path = np.zeros((0, 2)) if path is None else _path_nodes(space, path, pitch)
     points = np.concatenate([task.start[None], preset, along_path, _fan(space, task.start, far)])
@@ -238,11 +180,9 @@ def _shortest(space: Space, task: RobotTask) -> Path | None:
 def _area(
     space: Space, tasks: Sequence[RobotTask], others: Sequence[Array], paths: Sequence[Path | None]
 ) -> tuple[Array, Array]:
-    """Corners of a box round all robots, presets and nearby discs, with room to go round these.
-
-    Walls may be long. So among walls it is shortest paths that say how far the box reaches, and a wall or polygon makes
-    it larger by `room` at most.
-    """
+    """Corners of a box round all robots, presets and nearby discs, with room to go round these."""
+    # Walls may be long. So among walls it is shortest paths that say how far the box reaches, and a wall or polygon
+    # makes it larger by `room` at most.
     points = np.concatenate(
         [*(task.start[None] for task in tasks), *(task.preset[:, 1:] for task in tasks),
          np.array(others).reshape(-1, 2)]
@@ -306,12 +246,7 @@ def _lattice_edges(number: npt.NDArray[np.intp]) -> Indices:
 
 
 def _other_edges(points: Array, radii: Array) -> Indices:
-    """Pairs of a node outside the lattice and any node within its radius, each pair once, (E, 2).
-
-    Args:
-        points: all nodes, (N, 2), m; the nodes outside the lattice are the last R.
-        radii: of the nodes outside the lattice, (R,), m.
-    """
+    """Pairs of a node outside the lattice and any node within its radius, each pair once, (E, 2); `radii` (R,), m."""
     others = np.arange(len(points) - len(radii), len(points))
     near = cKDTree(points).query_ball_point(points[others], radii, return_sorted=True)
     tails = np.concatenate([np.zeros(0, dtype=np.int64), *(np.array(found, dtype=np.int64) for found in near)])

@@ -16,37 +16,24 @@ from airground_drake.uav.coordination.intervals import Indices
 from airground_drake.uav.coordination.roadmap import Roadmap, RobotNodes, RobotTask, Space
 from airground_drake.uav.coordination.timed import distance, free_pieces, timed, without_repeats
 
-ROUNDING_M = 1e-9
-"""Distances between robots may fall short by this, m."""
+ROUNDING_M = 1e-9  # distances between robots may fall short by this, m
 
 
 class OtherRobot(NamedTuple):
-    """Another robot.
+    """Another robot."""
 
-    Attributes:
-        motion: timed, (M, 3).
-        radius: of its body, m.
-        until: the robot counts as an obstacle up to this time, s.
-    """
-
-    motion: Array
-    radius: float = 0.0
-    until: float = math.inf
+    motion: Array  # timed, (M, 3)
+    radius: float = 0.0  # of its body, m
+    until: float = math.inf  # the robot counts as an obstacle up to this time, s
 
 
 @dataclass(frozen=True, eq=False)
 class Way:
-    """The plan for one robot.
+    """The plan for one robot."""
 
-    Attributes:
-        motion: timed, (M, 3), from t = 0 to the end of its preset.
-        joined: time at which it is back on its preset, s.
-        rows: number of rows of the motion up to that time.
-    """
-
-    motion: Array
-    joined: float
-    rows: int
+    motion: Array  # timed, (M, 3), from t = 0 to the end of its preset
+    joined: float  # time at which it is back on its preset, s
+    rows: int  # number of rows of the motion up to that time
 
 
 def sum_of_times(ways: Sequence[Way | None]) -> float:
@@ -56,25 +43,15 @@ def sum_of_times(ways: Sequence[Way | None]) -> float:
 
 @dataclass(frozen=True, eq=False)
 class Mover:
-    """One robot on a roadmap.
+    """One robot on a roadmap."""
 
-    Attributes:
-        task: where it is, and where it must go.
-        speed: m/s.
-        own: its nodes.
-        roadmap: the part that it can use.
-        space: discs and distances that it has to keep.
-        to_go: lower bound of the time from every node to its preset, (N,), s.
-        clear: which pieces of its preset between neighbouring nodes are free of discs, (K - 1,).
-    """
-
-    task: RobotTask
-    speed: float
-    own: RobotNodes
-    roadmap: Roadmap
-    space: Space
-    to_go: Array
-    clear: npt.NDArray[np.bool_]
+    task: RobotTask  # where it is, and where it must go
+    speed: float  # m/s
+    own: RobotNodes  # its nodes
+    roadmap: Roadmap  # the part that it can use
+    space: Space  # discs and distances that it has to keep
+    to_go: Array  # lower bound of the time from every node to its preset, (N,), s
+    clear: npt.NDArray[np.bool_]  # which pieces of its preset between neighbouring nodes are free of discs, (K - 1,)
 
     @classmethod
     def on(cls, roadmap: Roadmap, space: Space, task: RobotTask, speed: float, own: RobotNodes) -> Mover:
@@ -88,27 +65,17 @@ class Mover:
 def find(
     mover: Mover, fixed: Sequence[OtherRobot], follow: float, budget: int, brief: Sequence[OtherRobot] = ()
 ) -> tuple[Way | None, int]:
-    """Find the way on which a robot is back on its preset as early as possible.
-
-    The robot is back when it has joined its preset and nothing blocks it for the time `follow`, or to its end.
-
-    Why robots keep their distance d + spacing also along an edge: let R^2 = (d + spacing)^2 + L^2/4, where L is the
-    length of the longest edge. Another robot blocks a node while its distance from the node is below R. The squared
-    distance to a point of the edge is a weighted mean of the squared distances to the ends, less s (1 - s) L^2. So it
-    is at least R^2 - L^2/4. Only at start and target may the other robot be nearer: at d, or at the distance that it
-    has there in the beginning or in the end. Edges at these nodes are shorter than sqrt(R^2 - d^2), so the distance
-    grows along them from the first.
-
-    Args:
-        mover: the robot.
-        fixed: the other robots.
-        follow: how long the preset must be free, s.
-        budget: largest number of expanded intervals.
-        brief: other robots at places that they need for a time only.
-
-    Returns:
-        The way, or None if no way is found within the budget; and the number of expanded intervals.
-    """
+    """Find the way on which a robot is back on its preset as early as possible."""
+    # The robot is back when it has joined its preset and nothing blocks it for the time `follow`, or to its end.
+    #
+    # Why robots keep their distance d + spacing also along an edge: let R^2 = (d + spacing)^2 + L^2/4, where L is the
+    # length of the longest edge. Another robot blocks a node while its distance from the node is below R. The squared
+    # distance to a point of the edge is a weighted mean of the squared distances to the ends, less s (1 - s) L^2. So it
+    # is at least R^2 - L^2/4. Only at start and target may the other robot be nearer: at d, or at the distance that it
+    # has there in the beginning or in the end. Edges at these nodes are shorter than sqrt(R^2 - d^2), so the distance
+    # grows along them from the first.
+    # follow: how long the preset must be free, s.
+    # Returns the way, or None if no way is found within the budget; and the number of expanded intervals.
     own, roadmap = mover.own, mover.roadmap
     blocked = [_blocked_times(mover, other) for other in [*fixed, *brief]]
     nodes = np.concatenate([np.zeros(0, np.int64), *(nodes for nodes, _ in blocked)])

@@ -10,21 +10,15 @@ from airground_drake.uav.coordination.roadmap import Space
 from airground_drake.uav.coordination.single import OtherRobot, Way
 from airground_drake.uav.coordination.timed import straightened
 
-ROUNDS = 2
-"""How often every way is straightened among the others."""
+ROUNDS = 2  # how often every way is straightened among the others
 
 
 def smooth(
     spaces: Sequence[Space], ways: Sequence[Way | None], rests: Sequence[OtherRobot], fixed: Sequence[OtherRobot]
 ) -> list[Way | None]:
-    """The ways with straight pieces where these are free. The times at which robots join their presets do not change.
-
-    Args:
-        spaces: one per robot.
-        ways: one per robot; None: the robot stays where it is.
-        rests: the robots at rest, one per robot.
-        fixed: other robots with their motions.
-    """
+    """The ways with straight pieces where these are free."""
+    # The times at which robots join their presets do not change.
+    # ways: one per robot; None: the robot stays where it is.
     found = list(ways)
     for _ in range(ROUNDS):
         for i, way in enumerate(found):

@@ -107,20 +107,9 @@ def free_pieces(preset: Array, other: Array, apart: float) -> npt.NDArray[np.boo
 def straight_is_free(
     motion: Array, i: int, j: int, rows: Array, keep: Array, others: Array, begins: npt.NDArray[np.int64], apart: Array
 ) -> bool:
-    """Whether a timed motion may go straight from row i to row j.
-
-    It keeps the allowed distances. Where one of the two rows is nearer, it comes no nearer than that row.
-
-    Args:
-        motion: (M, 3).
-        i: row at which the straight piece begins.
-        j: row at which it ends.
-        rows: outlines of obstacles, (m, W), see `model.geometry.outline`.
-        keep: distances from their cores, (m,), m.
-        others: other timed motions, stacked, (R, 3).
-        begins: first row of each of the others, and R, (B + 1,).
-        apart: distances to keep from the others, (B,), m.
-    """
+    """Whether a timed motion may go straight from row i to row j."""
+    # It keeps the allowed distances. Where one of the two rows is nearer, it comes no nearer than that row.
+    # motion: (M, 3); rows: (m, W); keep: (m,), m; others: (R, 3); begins: (B + 1,); apart: (B,), m
     t, x, y = motion[i, 0], motion[i, 1], motion[i, 2]
     until, u, v = motion[j, 0], motion[j, 1], motion[j, 2]
     for k in range(len(rows)):
@@ -143,12 +132,10 @@ def straight_is_free(
 def straightened(
     motion: Array, upto: int, rows: Array, keep: Array, others: Array, begins: npt.NDArray[np.int64], apart: Array
 ) -> Array:
-    """The timed motion without needless detours between its first `upto` rows.
-
-    From each row that is kept the motion goes straight, at constant speed, to a later row. The function tries the
-    farthest row, then the row at three quarters of the way there, and so on, until `straight_is_free` allows one. Rows
-    keep their times. The other arguments are those of `straight_is_free`.
-    """
+    """The timed motion without needless detours between its first `upto` rows."""
+    # From each row that is kept the motion goes straight, at constant speed, to a later row. The function tries the
+    # farthest row, then the row at three quarters of the way there, and so on, until `straight_is_free` allows one.
+    # Rows keep their times. The other arguments are those of `straight_is_free`.
     kept = np.empty(len(motion), np.int64)
     kept[0], count, i = 0, 1, 0
     while i + 1 < upto:

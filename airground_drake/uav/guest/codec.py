@@ -15,10 +15,9 @@ import numpy as np
 from airground_drake.model.geometry.motion import Motion
 from airground_drake.uav.policy import MovingObstacle, Observation, Proposal, Teammate
 
+# Classes whose objects a message may contain.
 KINDS: tuple[type, ...] = (Observation, Teammate, Proposal, MovingObstacle, Motion)
-"""Classes whose objects a message may contain."""
-LONGEST = 4 * 2**20
-"""Largest answer of a policy, bytes: some 90,000 vertices."""
+LONGEST = 4 * 2**20  # largest answer of a policy, bytes: some 90,000 vertices
 
 
 def encoded(message: object) -> bytes:
@@ -34,15 +33,8 @@ def _as_json(value: Any) -> dict[str, Any]:
 
 
 def decoded(data: bytes, kinds: tuple[type, ...]) -> Any:
-    """The message that was encoded. Its arrays are read-only.
-
-    Args:
-        data: the bytes.
-        kinds: classes whose objects may be made. The data cannot name any other code.
-
-    Raises:
-        Exception: of any kind, if the data are malformed.
-    """
+    """The message that was encoded. Its arrays are read-only."""
+    # kinds: classes whose objects may be made. The data cannot name any other code.
     named = {kind.__name__: kind for kind in kinds}
 
     def made(values: dict[str, Any]) -> Any:

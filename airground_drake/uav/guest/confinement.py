@@ -22,23 +22,19 @@ from airground_drake.base import interruption
 PR_SET_NO_NEW_PRIVS, PR_SET_SECCOMP, SECCOMP_MODE_FILTER = 38, 22, 2
 LANDLOCK_CREATE_RULESET, LANDLOCK_ADD_RULE, LANDLOCK_RESTRICT_SELF = 444, 445, 446
 LANDLOCK_RULE_PATH_BENEATH, LANDLOCK_WRITE_FILE = 1, 0b10
-LANDLOCK_SCOPES = 0b11
-"""Abstract Unix sockets and signals."""
+LANDLOCK_SCOPES = 0b11  # abstract Unix sockets and signals
+# `struct landlock_ruleset_attr`: writing to files and the scopes are restricted, no port is.
 RULESET = struct.pack("=QQQ", LANDLOCK_WRITE_FILE, 0, LANDLOCK_SCOPES)
-"""`struct landlock_ruleset_attr`: writing to files and the scopes are restricted, no port is."""
-KERNEL_FILES = ("proc", "sys")
-"""Folders of / with files of the kernel."""
+KERNEL_FILES = ("proc", "sys")  # folders of / with files of the kernel
 
+# Instructions of the filter (classic BPF): load a word of the call, compare it, decide.
 _LOAD, _EQUAL, _AT_LEAST, _RETURN = 0x20, 0x15, 0x35, 0x06
-"""Instructions of the filter (classic BPF): load a word of the call, compare it, decide."""
+# Where the call's number, architecture and first argument are; arguments have 8 bytes, the low ones first.
 _NUMBER, _ARCHITECTURE, _ARGUMENTS = 0, 4, 16
-"""Where the call's number, architecture and first argument are; arguments have 8 bytes, the low ones first."""
-_ALLOW, _FORBID = 0x7FFF0000, 0x00050001
-"""Decisions; a forbidden call fails with EPERM."""
-_X32 = 0x40000000
-"""Calls with larger numbers are of another convention, which nothing needs."""
-SELF = {0: 0}
-"""Allowed values of arguments, by position, so that a call is about the process itself."""
+_ALLOW, _FORBID = 0x7FFF0000, 0x00050001  # decisions; a forbidden call fails with EPERM
+_X32 = 0x40000000  # calls with larger numbers are of another convention, which nothing needs
+SELF = {0: 0}  # allowed values of arguments, by position, so that a call is about the process itself
+# Calls that change other processes: what is allowed, and their numbers on x86-64 and on ARM64.
 OTHERS: dict[str, tuple[dict[int, int], int, int]] = {
     "setpriority": ({0: 0, 1: 0}, 141, 140),  # PRIO_PROCESS, this one
     "ioprio_set": ({0: 1, 1: 0}, 251, 30),  # IOPRIO_WHO_PROCESS, this one
@@ -50,18 +46,13 @@ OTHERS: dict[str, tuple[dict[int, int], int, int]] = {
     "migrate_pages": (SELF, 256, 238),
     "move_pages": (SELF, 279, 239),
 }
-"""Calls that change other processes: what is allowed, and their numbers on x86-64 and on ARM64."""
+# By machine: the architecture of its calls, and the column of `OTHERS` with their numbers.
 ARCHITECTURES = {"x86_64": (0xC000003E, 1), "aarch64": (0xC00000B7, 2)}
-"""By machine: the architecture of its calls, and the column of `OTHERS` with their numbers."""
 
 
 def confine(alive: int, memory: int) -> None:
-    """Set all limits. Call this before any import that may start a thread.
-
-    Args:
-        alive: descriptor of a pipe's reading end; this process is killed when the pipe has no writer left.
-        memory: limit of the address space, bytes.
-    """
+    """Set all limits. Call this before any import that may start a thread; `memory` in bytes."""
+    # alive: descriptor of a pipe's reading end; this process is killed when the pipe has no writer left.
     interruption.end_with_pipe(alive)
     limit_memory(memory)
     restrict_access()
@@ -78,11 +69,8 @@ def limit_memory(bytes_: int) -> None:
 
 
 def restrict_access() -> bool:
-    """Give up for good the rights to signal processes that this one has not started, and to write to kernel files.
-
-    Returns:
-        Whether the kernel supports it (Landlock, ABI 6).
-    """
+    """Give up for good the rights to signal processes that this one has not started, and to write to kernel files."""
+    # Returns whether the kernel supports it (Landlock, ABI 6).
     if sys.platform != "linux":
         return False
     libc = ctypes.CDLL(None, use_errno=True)
@@ -104,11 +92,7 @@ def restrict_access() -> bool:
 
 
 def filter_calls() -> bool:
-    """Give up for good the system calls that change other processes, see `OTHERS`.
-
-    Returns:
-        Whether the system supports it.
-    """
+    """Give up for good the system calls that change other processes, see `OTHERS`."""
     if sys.platform != "linux" or platform.machine() not in ARCHITECTURES:
         return False
     program = b"".join(struct.pack("=HBBI", *each) for each in _instructions(*ARCHITECTURES[platform.machine()]))

@@ -26,49 +26,36 @@ from airground_drake.model.geometry.motion import Motion
 from airground_drake.uav.guest.codec import LONGEST, decoded, encoded
 from airground_drake.uav.policy import Observation, Policy
 
+# Time limit for the interpreter, the policy's imports and its construction, s. A policy that is silent for so long
+# hangs: it is not asked again in this run.
 START_S = 30.0
-"""Time limit for the interpreter, the policy's imports and its construction, s. A policy that is silent for so long
-hangs: it is not asked again in this run."""
-COUNTED_S = 60.0
-"""Time limit for a proposal of a policy that bounds its effort by counts, s; at least its budget."""
-LIVES = 3
-"""A policy's process is started at most this many times in a run; then the policy is not asked again."""
+COUNTED_S = 60.0  # time limit for a proposal of a policy that bounds its effort by counts, s; at least its budget
+LIVES = 3  # a policy's process is started at most this many times in a run; then the policy is not asked again
+# Environment variable: if it is set, what a policy prints goes to the standard error of this process.
 SHOWN = "AIRGROUND_SHOW_POLICY_OUTPUT"
-"""Environment variable: if it is set, what a policy prints goes to the standard error of this process."""
 STDERR = 2
-MEMORY = 4 * 2**30
-"""Address space of the process, bytes."""
+MEMORY = 4 * 2**30  # address space of the process, bytes
 
 _PROGRAM = (
     "import json, sys; sys.path[:] = json.loads(sys.argv[1]); "
     "from airground_drake.uav.guest.confinement import confine; confine(int(sys.argv[3]), int(sys.argv[4])); "
     "from airground_drake.uav.guest.worker import main; main(int(sys.argv[2]))"
 )
+# With a fixed hash seed, a proposal that depends on the order of a set is the same in every run. Without threads,
+# numerical libraries need less memory.
 _ENVIRONMENT = {"PYTHONHASHSEED": "0", "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
-"""With a fixed hash seed, a proposal that depends on the order of a set is the same in every run. Without threads,
-numerical libraries need less memory."""
 
 
 class GuestPolicy(Policy):
-    """Stands in for a policy that runs in a process of its own.
+    """Stands in for a policy that runs in a process of its own."""
 
-    A fault of the policy is raised as `PolicyError`. If its process ends or is killed, the next question starts a new
-    one, which remembers nothing. After a hang, and after `LIVES` processes, the policy proposes nothing any more.
-    """
+    # A fault of the policy is raised as `PolicyError`. If its process ends or is killed, the next question starts a new
+    # one, which remembers nothing. After a hang, and after `LIVES` processes, the policy proposes nothing any more.
 
     counted = True  # the time limit is enforced here, by killing the process
 
     def __init__(self, name: str, parameters: Mapping[str, float], budget: float) -> None:
-        """Start the process.
-
-        Args:
-            name: of an installed entry point, `module:Class` or `file.py:Class`.
-            parameters: of the policy.
-            budget: wall-clock time for a proposal, s.
-
-        Raises:
-            PluginError: if the policy cannot be imported, is not a Policy, or does not take these parameters.
-        """
+        """Start the process; `budget` in s."""
         self._order = {"name": name, "parameters": list(parameters.items())}
         self._budget, self._used = budget, 0
         try:
@@ -77,11 +64,7 @@ class GuestPolicy(Policy):
             raise PluginError(f"policy {name!r}: {fault}") from None
 
     def propose(self, seen: Observation) -> dict[str, Motion] | None:
-        """What the policy proposes; `motions_of` checks the names and numbers afterwards.
-
-        Raises:
-            PolicyError: if the policy fails or sends no proposal.
-        """
+        """What the policy proposes; `motions_of` checks the names and numbers afterwards."""
         if not self._end.alive and self._used >= LIVES:
             return None
         try:
@@ -103,15 +86,9 @@ class GuestPolicy(Policy):
         self._used = 0
 
     def _start(self) -> None:
-        """Start a process, in a session of its own, and let it make the policy.
-
-        The process inherits only its ends of the channel and of a pipe. This process alone holds the other end of the
-        pipe. When this process ends, the pipe closes and the policy's process is killed.
-
-        Raises:
-            PluginError: if the policy cannot be made.
-            PolicyError: if the process ends, sends a malformed message, or is late.
-        """
+        """Start a process, in a session of its own, and let it make the policy."""
+        # The process inherits only its ends of the channel and of a pipe. This process alone holds the other end of the
+        # pipe. When this process ends, the pipe closes and the policy's process is killed.
         self._used += 1
         self._channel, theirs = Pipe()
         reader, writer = Pipe(duplex=False)
@@ -137,11 +114,7 @@ class GuestPolicy(Policy):
         self._limit = max(self._budget, COUNTED_S) if answer.get("counted") is True else self._budget
 
     def _ask(self, question: object, limit_s: float) -> dict[str, Any]:
-        """The process's answer, an object. Without one, the process is ended.
-
-        Raises:
-            PolicyError: if there is no well-formed answer within the time limit, s.
-        """
+        """The process's answer, an object. Without one, the process is ended."""
         try:
             with _hung_up_after(limit_s, self._channel) as late:
                 self._channel.send_bytes(encoded(question))
@@ -177,10 +150,7 @@ def end_all() -> None:
 
 @contextmanager
 def _hung_up_after(seconds: float, channel: Connection) -> Iterator[threading.Event]:
-    """Shut a channel after so many seconds, so that the body stops waiting for it, even for half a message.
-
-    The event tells whether this has happened.
-    """
+    """Shut a channel after so many seconds, so that the body stops waiting for it, even for half a message."""
     late = threading.Event()
 
     def hang_up() -> None:

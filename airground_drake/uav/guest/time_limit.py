@@ -20,11 +20,9 @@ class OutOfTime(BaseException):
 
 @contextmanager
 def time_limit(seconds: float, error: type[BaseException] = OutOfTime) -> Iterator[None]:
-    """Raise an error in the body after so many seconds of wall-clock time.
-
-    The limit works in the main thread only. Compiled code is interrupted when it returns to the interpreter. Limits can
-    be nested: an inner limit lasts no longer than the rest of the outer one, which then raises its own error.
-    """
+    """Raise an error in the body after so many seconds of wall-clock time."""
+    # The limit works in the main thread only. Compiled code is interrupted when it returns to the interpreter. Limits
+    # can be nested: an inner limit lasts no longer than the rest of the outer one, which then raises its own error.
     if threading.current_thread() is not threading.main_thread():
         yield
         return

@@ -38,11 +38,8 @@ def main(channel: int) -> None:
 
 
 def answer(policy: Policy, data: bytes) -> dict[str, Any]:
-    """The policy's answer to an encoded observation.
-
-    Returns:
-        `motions`, a list of names and motions, or a `fault` and its `traceback`.
-    """
+    """The policy's answer to an encoded observation."""
+    # Returns `motions`, a list of names and motions, or a `fault` and its `traceback`.
     try:
         seen = decoded(data, KINDS)
         found = {"motions": list(motions_of(policy.propose(seen), seen).items())}

@@ -10,8 +10,8 @@ from airground_drake.ugv.problem import Problem
 from airground_drake.ugv.relaxation import unavoidable_cost
 from airground_drake.ugv.solution import ConstantPlans, Solution, Status, cut_short
 
+# A route's own work on a finite problem, with its constant plans, while there is budget left.
 Search = Callable[[Problem, ConstantPlans, Budget], Solution]
-"""A route's own work on a finite problem, with its constant plans, while there is budget left."""
 
 
 def guarded(problem: Problem, budget: Budget, search: Search) -> Solution:

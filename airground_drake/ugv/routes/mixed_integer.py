@@ -19,27 +19,19 @@ from airground_drake.ugv.relaxation import dual_bound, normals_along, sum_up_rou
 from airground_drake.ugv.routes.guard import guarded
 from airground_drake.ugv.solution import ConstantPlans, Solution, Status, cheapest
 
-_AGREE = 1e-6
-"""Costs that differ by less than this, relative, are equal: the solver's tolerances and ours."""
+_AGREE = 1e-6  # costs that differ by less than this, relative, are equal: the solver's tolerances and ours
+# Another search is made only if the relaxation comes nearer to the plan than this, relative: it is long otherwise.
 _WORTH = 0.02
-"""Another search is made only if the relaxation comes nearer to the plan than this, relative: it is long otherwise."""
 
 
 @dataclass(frozen=True, eq=False)
 class _Proof:
-    """The outcome of a search along half-planes.
+    """The outcome of a search along half-planes."""
 
-    Attributes:
-        status: 'optimal' if the bound is the optimum.
-        bound: lower bound along the half-planes.
-        normals: of these, (N, m, 3).
-        optimum: the plan; None without one.
-    """
-
-    status: Status
-    bound: float
-    normals: Array
-    optimum: Evaluation | None = None
+    status: Status  # 'optimal' if the bound is the optimum
+    bound: float  # lower bound along the half-planes
+    normals: Array  # of these, (N, m, 3)
+    optimum: Evaluation | None = None  # the plan; None without one
 
 
 class MixedIntegerRoute:
@@ -62,22 +54,14 @@ class MixedIntegerRoute:
     """
 
     def __init__(self, blocks: int | None = None, solver: str = "daqp") -> None:
-        """Choose blocks and solver.
-
-        Args:
-            blocks: binaries, each for a block of stages; they need not divide the stages. None: one per stage.
-            solver: of the search; one of `drake_solvers.SOLVERS`. Relaxations are DAQP's.
-
-        Raises:
-            ValueError: if there is less than one block, or the solver cannot be used here.
-        """
+        """Choose blocks and solver."""
+        # blocks: binaries, each for a block of stages; they need not divide the stages. None: one per stage.
         if blocks is not None and blocks < 1:
             raise ValueError(f"blocks: {blocks}, allowed: 1 or more")
         self._blocks = blocks
         self._search, self._programs = Minimiser(solver), Programs()
 
     def solve(self, problem: Problem, budget: Budget = Budget()) -> Solution:  # noqa: B008 (immutable)
-        """See `Route`."""
         return guarded(problem, budget, self._solve)
 
     def _solve(self, problem: Problem, constants: ConstantPlans, budget: Budget) -> Solution:
@@ -120,10 +104,8 @@ class _Searches:
         self._iterations, self._until = budget.search_iterations, time.monotonic() + budget.search_s
 
     def along(self, normals: Array, known: Sequence[Evaluation], relaxed: float) -> _Proof:
-        """Search along half-planes with unit normals (N, m, 3), from the best of known plans.
-
-        The program has these half-planes; `relaxed` is the lower bound by its relaxation.
-        """
+        """Search along half-planes with unit normals (N, m, 3), from the best of known plans."""
+        # The program has these half-planes; `relaxed` is the lower bound by its relaxation.
         problem = self._problem
         costs = [problem.evaluate_half_planes(plan.positions, normals) for plan in known]
         best = int(np.argmin(costs))
@@ -149,7 +131,7 @@ class _Searches:
 
 
 def _known(binary: BinaryProgram, problem: Problem, shares: Array | None) -> list[Array]:
-    """Plans (N,) that need no search: constant ones, the rest of the previous one, and sum-up rounding of shares."""
+    """Plans (N,) without a search: constant ones, the rest of the previous one, sum-up rounding; a lower bound."""
     count = len(binary.omega)
     known = [np.ones(count), np.zeros(count)]
     if problem.previous is not None:

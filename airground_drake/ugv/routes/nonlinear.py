@@ -17,10 +17,9 @@ from airground_drake.ugv.solution import ConstantPlans, Solution, Status, cheape
 
 _AXES = 2  # UGVs move in their plane
 
-_OPTIONS = {"Major optimality tolerance": 1e-5, "Major feasibility tolerance": 1e-6}
-"""Of SNOPT."""
+_OPTIONS = {"Major optimality tolerance": 1e-5, "Major feasibility tolerance": 1e-6}  # of SNOPT
+# Its options that are this multiple of the budget's iterations.
 _LIMITS = {"Major iterations limit": 1, "Iterations limit": 100}
-"""Its options that are this multiple of the budget's iterations."""
 
 
 class NonlinearRoute:
@@ -53,7 +52,6 @@ class NonlinearRoute:
         self._solver = SnoptSolver()
 
     def solve(self, problem: Problem, budget: Budget = Budget()) -> Solution:  # noqa: B008 (immutable)
-        """See `Route`."""
         return guarded(problem, budget, self._solve)
 
     def _solve(self, problem: Problem, constants: ConstantPlans, budget: Budget) -> Solution:
@@ -67,10 +65,8 @@ class NonlinearRoute:
         return cheapest(problem, plans, relaxed=relaxed, rounded=rounded)
 
     def relax(self, problem: Problem, start: Evaluation, budget: Budget) -> tuple[Array | None, Status]:
-        """A local optimum of (27): omega (N,), None if that is not a number; how the solver ended.
-
-        Which local optimum it is depends on the plan from which the search starts.
-        """
+        """A local optimum of (27): omega (N,), None if that is not a number; how the solver ended."""
+        # Which local optimum it is depends on the plan from which the search starts.
         program, omega, guess = relaxation(problem, start)
         try:
             result = self._solver.Solve(program, guess, _options(budget))

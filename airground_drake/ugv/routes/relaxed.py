@@ -15,8 +15,7 @@ from airground_drake.ugv.relaxation import dual_bound, normals_along, sum_up_rou
 from airground_drake.ugv.routes.guard import guarded, without_optimum
 from airground_drake.ugv.solution import ConstantPlans, Solution, cheapest
 
-ACTIVE_SETS = 100
-"""Active sets that DAQP may try for each iteration of the budget: they are as quick as that."""
+ACTIVE_SETS = 100  # active sets that DAQP may try for each iteration of the budget: they are as quick as that
 
 
 class RelaxedRoute:
@@ -39,7 +38,6 @@ class RelaxedRoute:
         self._programs = Programs()
 
     def solve(self, problem: Problem, budget: Budget = Budget()) -> Solution:  # noqa: B008 (immutable)
-        """See `Route`."""
         return guarded(problem, budget, self._solve)
 
     def _solve(self, problem: Problem, constants: ConstantPlans, budget: Budget) -> Solution:

@@ -35,72 +35,47 @@ from airground_drake.verify.runs.pairs import are_too_near
 from airground_drake.verify.runs.proposals import proposal_of
 from airground_drake.verify.runs.sum_up_rounding import compare_rounding, integrated_error_s, is_rounded
 
-SPEED_TOLERANCE = 1e-4
-"""A step may be longer than the speed limit allows by this, relative."""
+SPEED_TOLERANCE = 1e-4  # a step may be longer than the speed limit allows by this, relative
+# Closer than the safe distance by more than this, m, the avoidance inequalities may ask for more speed than that: they
+# ask for less than 1e-5 m/s per point before, at gains up to 10 1/s.
 INSIDE_M = 1e-6
-"""Closer than the safe distance by more than this, m, the avoidance inequalities may ask for more speed than that:
-they ask for less than 1e-5 m/s per point before, at gains up to 10 1/s."""
-LONGER = 1e-6
-"""Of two ways left, one is longer if it is by more than this, relative."""
+LONGER = 1e-6  # of two ways left, one is longer if it is by more than this, relative
+# Width of an enclosure of the optimum, relative to the cheaper constant plan's cost, up to which a gap is known.
 WIDEST = 1e-5
-"""Width of an enclosure of the optimum, relative to the cheaper constant plan's cost, up to which a gap is known."""
-BLOCKS = 10
-"""All plans of at most so many choices are evaluated by exact distances, too."""
+BLOCKS = 10  # all plans of at most so many choices are evaluated by exact distances, too
+# All plans of so many blocks can be evaluated along half-planes; they enclose the optimum of the route's problem.
 MOST_BLOCKS = 12
-"""All plans of so many blocks can be evaluated along half-planes; they enclose the optimum of the route's problem."""
+# Reason of a refusal that follows from another UGV's refusal, and not from the UGV's own two outcomes.
 JOINT_REFUSED = "joint_refused"
-"""Reason of a refusal that follows from another UGV's refusal, and not from the UGV's own two outcomes."""
 NO_PROBLEM = "method (d) compares two predicted outcomes and solves no problem (26)"
 
 
 @dataclass(frozen=True)
 class Choices:
-    """The evidence about decisions.
+    """The evidence about decisions."""
 
-    Attributes:
-        decisions: their number.
-        reasons: how many were made for each reason.
-        comparisons: numbers compared.
-        wrong: of these.
-        optimum: whether the optimum of every problem is known, and if not, why.
-        enumerated: decisions for which all plans were evaluated: at most `BLOCKS` choices, under (d) both outcomes.
-        largest_gap_to_enumeration: of such a plan to the best of all, relative to the best.
-    """
-
-    decisions: int
-    reasons: dict[str, int]
-    comparisons: int
-    wrong: int
-    optimum: str
-    enumerated: int
-    largest_gap_to_enumeration: float | None
+    decisions: int  # their number
+    reasons: dict[str, int]  # how many were made for each reason
+    comparisons: int  # numbers compared
+    wrong: int  # of these
+    optimum: str  # whether the optimum of every problem is known, and if not, why
+    enumerated: int  # decisions for which all plans were evaluated: at most `BLOCKS` choices, under (d) both outcomes
+    largest_gap_to_enumeration: float | None  # of such a plan to the best of all, relative to the best
 
 
 @dataclass(frozen=True)
 class Plans(Choices):
-    """The evidence where problems (26) were solved; gaps and enclosures are relative to the cheaper constant plan.
+    """The evidence where problems (26) were solved; gaps and enclosures are relative to the cheaper constant plan."""
 
-    Attributes:
-        without_a_plan: refusals because there was no plan.
-        largest_slack_m: how far a plan leads inside a safe distance at most.
-        plans_with_slack: how many do.
-        rounded_plans: decisions with a relaxed plan.
-        largest_rounding_error_s: of sum-up rounding.
-        largest_gaps: the five largest, with robot and time; below 0: cheaper by exact distances.
-        median_gap: see above.
-        widest_enclosure: width of the bounds of an optimum.
-        first_stage_certified: plans whose first stage every plan with the other one costs more than.
-    """
-
-    without_a_plan: list[str]
-    largest_slack_m: float
-    plans_with_slack: int
-    rounded_plans: int
-    largest_rounding_error_s: float
-    largest_gaps: list[dict[str, Any]]
-    median_gap: float | None
-    widest_enclosure: float
-    first_stage_certified: int
+    without_a_plan: list[str]  # refusals because there was no plan
+    largest_slack_m: float  # how far a plan leads inside a safe distance at most
+    plans_with_slack: int  # how many do
+    rounded_plans: int  # decisions with a relaxed plan
+    largest_rounding_error_s: float  # of sum-up rounding
+    largest_gaps: list[dict[str, Any]]  # the five largest, with robot and time; below 0: cheaper by exact distances
+    median_gap: float | None  # see above
+    widest_enclosure: float  # width of the bounds of an optimum
+    first_stage_certified: int  # plans whose first stage every plan with the other one costs more than
 
 
 class GatePlan(GateClaim):
@@ -263,10 +238,9 @@ def compare_plan(trace: Trace, row: DecisionRecord) -> Iterator[Deviation]:
 
 
 def _clear(trace: Trace, row: DecisionRecord, positions: Array, period: float) -> npt.NDArray[np.bool_]:
-    """Stages (N,) in which no control sample (every `period`, s) is within a safe distance by more than rounding.
-
-    Neither the points of the problem nor the barriers themselves may be so near: of a wall the problem has but points.
-    """
+    """Stages (N,) in which no control sample (every `period`, s) is within a safe distance by more than rounding."""
+    # Neither the points of the problem nor the barriers themselves may be so near: of a wall the problem has but
+    # points.
     centres = row["centres_m"]
     before = centres[0] - (centres[min(1, len(centres) - 1)] - centres[0])
     start = (np.linalg.norm(row["initial_m"] - before, axis=1) - row["distances_m"]).min(initial=np.inf)

@@ -15,11 +15,10 @@ from airground_drake.verify.claim import TraceClaim
 from airground_drake.verify.engines.geometry import interpolate
 from airground_drake.verify.finding import Finding
 
-AT_REST_S = 1.0
-"""A stalled UGV must have stood still for this long at the end of the run, s."""
+AT_REST_S = 1.0  # a stalled UGV must have stood still for this long at the end of the run, s
 
+# Standing still: no farther than this from the final position, m (the paper's figures resolve about 0.1 m).
 AT_REST_M = 1e-3
-"""Standing still: no farther than this from the final position, m (the paper's figures resolve about 0.1 m)."""
 
 
 class LiveGoal(TraceClaim):

@@ -15,13 +15,11 @@ from airground_drake.verify.engines.bodies import Room, law_m, room_of
 from airground_drake.verify.finding import Finding
 from airground_drake.verify.model.theorem import Hypothesis, TheoremClaim
 
-ROUNDED_M = Fraction(1, 10**12)
-"""Two ways to add up a budget differ by no more than this, m."""
+ROUNDED_M = Fraction(1, 10**12)  # two ways to add up a budget differ by no more than this, m
 BASIC = ("Budget.at_samples", "Budget.budget_always")
-OWN = "own"
-"""Stands for all users' plants among the kinds."""
-FORWARDS = "unicycle that never drives backwards"
-"""One more theorem about such a unicycle."""
+OWN = "own"  # stands for all users' plants among the kinds
+FORWARDS = "unicycle that never drives backwards"  # one more theorem about such a unicycle
+# The theorems about each kind of plant.
 BY_KIND = {
     "unicycle": ("Plants.chord", "Turning.chord_turns", "Turning.shortened_chord", "Turning.shortened"),
     "lag": ("Plants.lag", "Plants.lag_speed", "Plants.lag_pair", "Plants.lag_needs"),
@@ -29,9 +27,8 @@ BY_KIND = {
     FORWARDS: ("Plants.forwards",),
     OWN: ("Mixed.drifting", "Mixed.entry_keeps"),
 }
-"""The theorems about each kind of plant."""
+# Those about a robot beside an obstacle that may move, and the covers that count there.
 BESIDE_MOVING = ("Passive.own_doing", "Passive.kept", "Mixed.unicycle_chord", "Mixed.lagging", "Mixed.delayed")
-"""Those about a robot beside an obstacle that may move, and the covers that count there."""
 
 
 class SafeBudget(TheoremClaim):

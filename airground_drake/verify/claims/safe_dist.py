@@ -20,11 +20,10 @@ from airground_drake.verify.model.theorem import Hypothesis, Proof, TheoremClaim
 
 @dataclass(frozen=True, kw_only=True)
 class LeastDistances(Proof):
-    """The least distances of a centre from the other's core, m, by kind of pair; none without a gain.
+    """The least distances of a centre from the other's core, m, by kind of pair; none without a gain."""
 
-    Of all runs of a report the periods in which a robot was too near to an obstacle that may move: with `w_h_once` it
-    retreats at w or more, and with `kept` at w + V or more.
-    """
+    # Of all runs of a report the periods in which a robot was too near to an obstacle that may move: with `w_h_once` it
+    # retreats at w or more, and with `kept` at w + V or more.
 
     least_distances_m: dict[str, float] | None = None
     passive_periods: int | None = None

@@ -42,35 +42,25 @@ from airground_drake.verify.runs.pairs import (
 )
 from airground_drake.verify.runs.passive import beside, beside_moving, last_period, period_ends, speeds
 
+# A speed may be above its limit by this much, m/s: a command that is shortened to its limit errs by 1e-15 m/s, and in
+# one period of 25 ms this moves a robot by 2.5e-11 m.
 VELOCITY_TOLERANCE_M_S = 1e-9
-"""A speed may be above its limit by this much, m/s: a command that is shortened to its limit errs by 1e-15 m/s, and in
-one period of 25 ms this moves a robot by 2.5e-11 m."""
-BINDING_M_S = 1e-9
-"""An avoidance inequality binds where a command has no more than this to spare, m/s."""
-MOST_LISTED = 300
-"""Pairs that the evidence lists at most: those with the least guarantee."""
-AVOIDANCE = "avoidance"
-"""The hypothesis that the steps met the inequalities."""
-PASSIVE = "avoidance beside an obstacle that may move"
-"""The hypothesis that the steps met the passive law."""
-DECLARED = "declared speed"
-"""The hypothesis that an obstacle moved no faster than it was expected to."""
-FORWARDS = "never backwards"
-"""The hypothesis that a unicycle that must not drive backwards does not."""
+BINDING_M_S = 1e-9  # an avoidance inequality binds where a command has no more than this to spare, m/s
+MOST_LISTED = 300  # pairs that the evidence lists at most: those with the least guarantee
+AVOIDANCE = "avoidance"  # the hypothesis that the steps met the inequalities
+PASSIVE = "avoidance beside an obstacle that may move"  # the hypothesis that the steps met the passive law
+DECLARED = "declared speed"  # the hypothesis that an obstacle moved no faster than it was expected to
+FORWARDS = "never backwards"  # the hypothesis that a unicycle that must not drive backwards does not
+# The hypotheses that a pair begins apart: the points that the law steers, and the bodies that lag or come late.
 START, BODIES = "safe start", "safe start of the bodies"
-"""The hypotheses that a pair begins apart: the points that the law steers, and the bodies that lag or come late."""
+# The hypotheses that a user's plant has the drift and the cover that it declares.
 DRIFT, COVER = "declared drift", "declared cover"
-"""The hypotheses that a user's plant has the drift and the cover that it declares."""
-BUILT = "controller parameters"
-"""The hypothesis that the controllers were built with what the scenario demands."""
+BUILT = "controller parameters"  # the hypothesis that the controllers were built with what the scenario demands
 
 
 @dataclass(frozen=True)
 class _Hypothesis:
-    """One hypothesis over K instants or pairs: margins (K,); it is broken where one is below -`slop`.
-
-    `about` names its robot or pair. With `others`, the k-th margin is about the pair with `others[k]`.
-    """
+    """One hypothesis over K instants or pairs: margins (K,); it is broken where one is below -`slop`."""
 
     name: str
     unit: str
@@ -92,24 +82,17 @@ class _Hypothesis:
 
 
 class Guarantee(NamedTuple):
-    """The distance that is promised for a pair of bodies: their gap is `gap_m` or more at all times of the run.
+    """The distance that is promised for a pair of bodies: their gap is `gap_m` or more at all times of the run."""
 
-    Attributes:
-        pair: the two bodies.
-        missed_m: how far each sample misses the inequalities, e_i + e_j, (K,), m per control period; 0: both are met.
-        short_m: how much too close the steered points started, or were when the obstacle appeared, m.
-        gap_m: what the bodies keep where their steered points keep m - max(e / a - w / A, short_m). There m is the
-            distance in the law, e the largest of `missed_m`, a = min(A h, 1), and w the drift that users' plants
-            declare. Without a gain nothing is restored, and the points keep m - K e - short_m. -inf: nothing is
-            promised.
-        why: the reason if nothing is promised.
-    """
-
-    pair: Pair
+    pair: Pair  # the two bodies
+    # How far each sample misses the inequalities, e_i + e_j, (K,), m per control period; 0: both are met.
     missed_m: Array
-    short_m: float
+    short_m: float  # how much too close the steered points started, or were when the obstacle appeared, m
+    # What the bodies keep where their steered points keep m - max(e / a - w / A, short_m). There m is the distance in
+    # the law, e the largest of `missed_m`, a = min(A h, 1), and w the drift that users' plants declare. Without a gain
+    # nothing is restored, and the points keep m - K e - short_m. -inf: nothing is promised.
     gap_m: float
-    why: str = ""
+    why: str = ""  # the reason if nothing is promised
 
     @property
     def margin_m(self) -> float:
@@ -119,11 +102,10 @@ class Guarantee(NamedTuple):
 
 @dataclass(frozen=True)
 class Hypotheses:
-    """The evidence: the largest shortfall, the least distance promised, and details.
+    """The evidence: the largest shortfall, the least distance promised, and details."""
 
-    `guarantee_m` is None if no pair came within reach, or nothing is promised for one that did. `pairs` are those with
-    the least guarantee, `worst` is the least margin of each other hypothesis.
-    """
+    # `guarantee_m` is None if no pair came within reach, or nothing is promised for one that did. `pairs` are those
+    # with the least guarantee, `worst` is the least margin of each other hypothesis.
 
     e_m: float
     guarantee_m: float | None
@@ -283,10 +265,8 @@ def _gain(trace: Trace) -> Fraction:
 
 
 def guarantees(trace: Trace) -> list[Guarantee]:
-    """The distance that is promised for each pair that comes near.
-
-    Other pairs stay so far apart that the longest steps of both could not break their distance.
-    """
+    """The distance that is promised for each pair that comes near."""
+    # Other pairs stay so far apart that the longest steps of both could not break their distance.
     return trace.derived("guarantees", lambda: list(_guarantees(trace)))
 
 
@@ -329,10 +309,8 @@ def _guarantees(trace: Trace) -> Iterator[Guarantee]:
 def _beside(
     trace: Trace, pair: Pair, places: dict[str, Array], there: slice, reach: float
 ) -> list[tuple[Array, Cores]]:
-    """What the first body of a pair keeps away from: places of the second and its core, or each part of a barrier.
-
-    Parts that stay beyond reach of the way of the first are left out. A point is given by its place.
-    """
+    """What the first body of a pair keeps away from: places of the second and its core, or each part of a barrier."""
+    # Parts that stay beyond reach of the way of the first are left out. A point is given by its place.
     if pair.second in places:
         return [(places[pair.second][there], POINT)]
     cores = cores_of(trace)[pair.second]

@@ -15,8 +15,7 @@ from airground_drake.verify.runs.encounters import own_margins, steps_of
 from airground_drake.verify.runs.pairs import DISTANCE_TOLERANCE_M, apart_of, pairs_of, snapshot
 from airground_drake.verify.runs.passive import beside
 
-MOST_LISTED = 300
-"""Pairs that the evidence lists at most: those of least margin."""
+MOST_LISTED = 300  # pairs that the evidence lists at most: those of least margin
 
 
 class SafeOwn(TraceClaim):

@@ -23,8 +23,7 @@ from airground_drake.verify.runs.pairs import (
     steered_margin,
 )
 
-MOST_LISTED = 300
-"""Pairs that the evidence lists at most: those of least margin."""
+MOST_LISTED = 300  # pairs that the evidence lists at most: those of least margin
 
 
 class SafeTrace(TraceClaim):
@@ -108,10 +107,9 @@ class SafeTrace(TraceClaim):
 
 @dataclass(frozen=True)
 class Distance:
-    """Where a pair was closest, in row `row`: distances of surfaces, m, and the time, s.
+    """Where a pair was closest, in row `row`: distances of surfaces, m, and the time, s."""
 
-    It was exercised if one control period at full speed would have broken the safe distance, or that of the law.
-    """
+    # It was exercised if one control period at full speed would have broken the safe distance, or that of the law.
 
     first: str
     second: str

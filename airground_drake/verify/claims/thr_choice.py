@@ -13,20 +13,18 @@ from airground_drake.verify.claims.thr_root import ThrRoot, rule_of
 from airground_drake.verify.finding import Evidence, Finding
 from airground_drake.verify.model.levels import NUMBERS
 
+# A threshold is the optimum if it differs by this share at most: it then costs less than 1e-11 of the risk.
 EQUAL = 1e-6
-"""A threshold is the optimum if it differs by this share at most: it then costs less than 1e-11 of the risk."""
 
-DIGITS = 12
-"""Decimals of a difference of risks: it is rounded in floating point."""
+DIGITS = 12  # decimals of a difference of risks: it is rounded in floating point
 
 
 @dataclass(frozen=True)
 class Measured(Evidence):
-    """Drift and noise of a UGV whose task error reached the threshold in a run, and what they say of the threshold.
+    """Drift and noise of a UGV whose task error reached the threshold in a run, and what they say of the threshold."""
 
-    The optimum, m, is that for this drift and this noise, 0 without noise. The extra risk is that of the threshold in
-    force, m, against this optimum, with the scenario's c1 and c2.
-    """
+    # The optimum, m, is that for this drift and this noise, 0 without noise. The extra risk is that of the threshold in
+    # force, m, against this optimum, with the scenario's c1 and c2.
 
     drift_m_s: float
     noise_m_sqrt_s: float
@@ -78,7 +76,6 @@ class ThrChoice(ModelClaim):
     exercised_by = "thresholds that are, or must be, the optimum"
 
     def inputs(self, scenario: Scenario) -> dict[str, Any]:
-        """As THR-ROOT."""
         return ThrRoot().inputs(scenario)
 
     def check(self, inputs: dict[str, Any]) -> Finding:

@@ -22,13 +22,11 @@ from airground_drake.verify.model.first_passages import PassageExperiment, Passa
 from airground_drake.verify.model.levels import NUMBERS
 
 LEVEL = 0.99
-ERROR_ALLOWANCE = 2e-4
-"""Bias of the corrected error rate."""
-TIME_ALLOWANCE = 0.05
-"""Bias of the corrected time, in noise periods."""
+ERROR_ALLOWANCE = 2e-4  # bias of the corrected error rate
+TIME_ALLOWANCE = 0.05  # bias of the corrected time, in noise periods
 
+# Mean decision time, s, and error rate that are to be compared with the simulation.
 Formulas = Callable[[PassageExperiment], tuple[float, float]]
-"""Mean decision time, s, and error rate that are to be compared with the simulation."""
 
 
 @dataclass(frozen=True)

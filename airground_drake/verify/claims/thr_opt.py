@@ -17,21 +17,13 @@ from airground_drake.verify.model.theorem import Hypothesis, Proof, TheoremClaim
 
 @dataclass(frozen=True, kw_only=True)
 class Optimum(Proof):
-    """Where both roots are, for which drifts the threshold in force is optimal, and the risks.
+    """Where both roots are, for which drifts the threshold in force is optimal, and the risks."""
 
-    Attributes:
-        enclosures: of both roots, as u and as a threshold, m.
-        optimal_for_drifts_m_s: enclosures of the drifts, m/s.
-        threshold_in_force_m: m.
-        risk_at_the_root: Bayes risk.
-        risk_at_the_threshold_in_force: Bayes risk.
-    """
-
-    enclosures: dict[str, list[float]]
-    optimal_for_drifts_m_s: list[list[float]]
+    enclosures: dict[str, list[float]]  # of both roots, as u and as a threshold, m
+    optimal_for_drifts_m_s: list[list[float]]  # enclosures of the drifts, m/s
     threshold_in_force_m: float
-    risk_at_the_root: float
-    risk_at_the_threshold_in_force: float
+    risk_at_the_root: float  # Bayes risk
+    risk_at_the_threshold_in_force: float  # Bayes risk
 
 
 class ThrOpt(TheoremClaim):
@@ -74,7 +66,6 @@ class ThrOpt(TheoremClaim):
     margin_of = "risk at the printed form's root above that at the minimiser"
 
     def inputs(self, scenario: Scenario) -> dict[str, Any]:
-        """As THR-ROOT."""
         return ThrRoot().inputs(scenario)
 
     def hypotheses(self, inputs: dict[str, Any]) -> list[Hypothesis]:
@@ -113,11 +104,10 @@ def _gap(rule: ThresholdRule, printed: RootInterval) -> Fraction:
 
 
 def _drifts(rule: ThresholdRule, zeta: Fraction) -> list[list[float]]:
-    """Enclosures of the drifts, m/s, for which zeta, m, solves the equation: two, or none.
-
-    The equation is (sinh u + u)/u^2 = m at the drift u noise^2 / (2 zeta), m = c2/c1 noise^2/(4 zeta^2). The left side
-    falls to its least value, near u = 2.4, and rises again: there are at most two (`Threshold.at_most_two_drifts`).
-    """
+    """Enclosures of the drifts, m/s, for which zeta, m, solves the equation: two, or none."""
+    # The equation is (sinh u + u)/u^2 = m at the drift u noise^2 / (2 zeta), m = c2/c1 noise^2/(4 zeta^2). The left
+    # side falls to its least value, near u = 2.4, and rises again: there are at most two
+    # (`Threshold.at_most_two_drifts`).
     m = rule.c2 / rule.c1 * rule.noise**2 / (4 * zeta**2)
 
     def level(u: Any) -> Any:

@@ -33,52 +33,33 @@ from airground_drake.verify.engines.geometry import NormSignal
 from airground_drake.verify.finding import Evidence, Finding
 from airground_drake.verify.runs.triggers import Transition, recorded_events, task_error
 
+# The drift of a run is the growth of the task error over this time before it first reaches the threshold, s.
 BEFORE_S = 1.0
-"""The drift of a run is the growth of the task error over this time before it first reaches the threshold, s."""
 
 
 @dataclass(frozen=True)
 class Decided:
-    """A trigger, or an excursion without one.
+    """A trigger, or an excursion without one."""
 
-    Attributes:
-        robot: the UGV.
-        t_s: time of the trigger, or of the excursion's end, s.
-        kind: see above.
-        error_m: task error then; at its largest for a missed excursion, m.
-        off_m: how far the error was from the threshold: below it at the trigger, or above it before the trigger, m.
-        late_s: time since the error reached the threshold, s; negative: until then; None: it did not.
-    """
-
-    robot: str
-    t_s: float
-    kind: Literal["served", "early", "false", "missed"]
-    error_m: float
-    off_m: float
-    late_s: float | None
+    robot: str  # the UGV
+    t_s: float  # time of the trigger, or of the excursion's end, s
+    kind: Literal["served", "early", "false", "missed"]  # see above
+    error_m: float  # task error then; at its largest for a missed excursion, m
+    off_m: float  # how far the error was from the threshold: below it at the trigger, or above it before the trigger, m
+    late_s: float | None  # time since the error reached the threshold, s; negative: until then; None: it did not
 
 
 @dataclass(frozen=True)
 class Ddm(Evidence):
-    """A UGV's decisions beside (17)-(18) for the drift and the noise of the run.
+    """A UGV's decisions beside (17)-(18) for the drift and the noise of the run."""
 
-    Attributes:
-        drift_m_s: growth of the task error in the last second before it first reached the threshold.
-        noise_m_sqrt_s: of the run.
-        error_rate: share of false triggers and missed excursions in all decisions; None without any.
-        error_rate_of_18: the probability (18).
-        decision_time_s: mean of zeta / drift + late_s; None if no lateness is known.
-        decision_time_of_17_s: the mean (17).
-        decision_time_without_noise_s: zeta / drift.
-    """
-
-    drift_m_s: float
-    noise_m_sqrt_s: float
-    error_rate: float | None
-    error_rate_of_18: float
-    decision_time_s: float | None
-    decision_time_of_17_s: float
-    decision_time_without_noise_s: float
+    drift_m_s: float  # growth of the task error in the last second before it first reached the threshold
+    noise_m_sqrt_s: float  # of the run
+    error_rate: float | None  # share of false triggers and missed excursions in all decisions; None without any
+    error_rate_of_18: float  # the probability (18)
+    decision_time_s: float | None  # mean of zeta / drift + late_s; None if no lateness is known
+    decision_time_of_17_s: float  # the mean (17)
+    decision_time_without_noise_s: float  # zeta / drift
 
 
 @dataclass(frozen=True)
@@ -177,10 +158,9 @@ class ThrQuality(TraceClaim):
 
 
 class Watch(NamedTuple):
-    """From `begin` the trigger of a UGV may act; it does at `trigger`, None: not before `until`, s.
+    """From `begin` the trigger of a UGV may act; it does at `trigger`, None: not before `until`, s."""
 
-    `until` is the release after the trigger, or the end of the run.
-    """
+    # `until` is the release after the trigger, or the end of the run.
 
     begin: float
     trigger: float | None

@@ -13,8 +13,8 @@ from airground_drake.verify.engines.signs import RootInterval, ThresholdRule, va
 from airground_drake.verify.model.levels import NUMBERS, threshold_m
 from airground_drake.verify.model.theorem import Hypothesis, Proof, TheoremClaim
 
+# The program's threshold may be this far outside its enclosure, relative to it: rounding errs by some 1e-15.
 FLOAT_TOLERANCE = Fraction(1, 10**12)
-"""The program's threshold may be this far outside its enclosure, relative to it: rounding errs by some 1e-15."""
 
 
 @dataclass(frozen=True, kw_only=True)

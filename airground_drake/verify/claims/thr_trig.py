@@ -30,20 +30,20 @@ from airground_drake.verify.runs.triggers import (
     transitions,
 )
 
+# Recorded and recomputed events may differ by this, s: ten times the accuracy of the simulator's event isolation.
 EVENT_TOLERANCE_S = 1e-5
-"""Recorded and recomputed events may differ by this, s: ten times the accuracy of the simulator's event isolation."""
 
+# Recorded and recomputed decision variables may differ by this, m: x moves less within the event isolation.
 VARIABLE_TOLERANCE_M = 1e-6
-"""Recorded and recomputed decision variables may differ by this, m: x moves less within the event isolation."""
 
+# Mode after each kind of transition: 'refractory' is a release before the dwell is over, 'resume' the end of it.
 MODES = {"trigger": 1, "release": 0, "refractory": 2, "resume": 0}
-"""Mode after each kind of transition: 'refractory' is a release before the dwell is over, 'resume' the end of it."""
 
+# Why no crossing in a step is missed.
 THEOREMS = ("Isolation.largest_at_an_end", "Isolation.nowhere_below", "Isolation.attained")
-"""Why no crossing in a step is missed."""
 
+# Event that the trace has for a transition.
 EVENT_KINDS = {"trigger": "trigger", "release": "release", "refractory": "release"}
-"""Event that the trace has for a transition."""
 
 
 def _is_root(rule: Threshold, zeta: float) -> bool:
@@ -150,11 +150,7 @@ class TriggerLevels(NamedTuple):
 
 
 def levels_of(trace: Trace) -> TriggerLevels:
-    """The levels of a run by its scenario.
-
-    Raises:
-        TraceError: if the recorded threshold is not the scenario's, or not what its rule computes.
-    """
+    """The levels of a run by its scenario."""
     decision, zeta = trace.scenario.decision, float(trace.meta["zeta_m"])
     rule = decision.threshold
     if rule.rule == "fixed" and rule.zeta_m != zeta:

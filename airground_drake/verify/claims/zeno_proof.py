@@ -10,8 +10,8 @@ from airground_drake.scenario.schema import Scenario
 from airground_drake.verify.model.levels import levels_of, trigger_of
 from airground_drake.verify.model.theorem import Hypothesis, Proof, TheoremClaim
 
+# The bound to refute if the scenario declares 0 s, s. Any number would do: the counterexample scales with it.
 SHORTEST_S = 1e-3
-"""The bound to refute if the scenario declares 0 s, s. Any number would do: the counterexample scales with it."""
 
 
 @dataclass(frozen=True, kw_only=True)

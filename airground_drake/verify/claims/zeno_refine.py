@@ -44,8 +44,7 @@ RESAMPLES = 4000
 DIVERGES_BELOW = -0.25
 FLAT_WITHIN = 0.1
 STANDARD_ERRORS = 5.0
-ROUNDING = 1e-9
-"""Exponents are equal within this: the fit to equal counts gives about 1e-15."""
+ROUNDING = 1e-9  # exponents are equal within this: the fit to equal counts gives about 1e-15
 
 
 @dataclass(frozen=True)
@@ -70,12 +69,11 @@ class Fit(Evidence):
 
 @dataclass(frozen=True)
 class Series(Evidence):
-    """The evidence: everything that the figure needs.
+    """The evidence: everything that the figure needs."""
 
-    `dt_s` are the noise steps, and `expected_bare` is the theory of the bare mean at each. `counts` has a text for each
-    path with its triggers at each dt. `bias` is that of the bare exponent. `most_triggers` is duration/dwell + 1; None
-    without a dwell. `level` is that of the intervals.
-    """
+    # `dt_s` are the noise steps, and `expected_bare` is the theory of the bare mean at each. `counts` has a text for
+    # each path with its triggers at each dt. `bias` is that of the bare exponent. `most_triggers` is duration/dwell +
+    # 1; None without a dwell. `level` is that of the intervals.
 
     dt_s: list[float]
     bare: Counted

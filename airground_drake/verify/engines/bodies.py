@@ -15,25 +15,15 @@ from airground_drake.scenario.schema import Control, Uav, Ugv
 
 
 class Room(NamedTuple):
-    """What a robot's plant takes: lengths in m, times in s, speed in m/s.
+    """What a robot's plant takes: lengths in m, times in s, speed in m/s."""
 
-    Attributes:
-        body_m: how far the body may be from the steered point within a period, dip included.
-        lag_s: time constant.
-        delay_s: of its commands.
-        speed_m_s: limit of its commands.
-        drift_m: what missing its commands, by w at most, costs in distance: w / A.
-        slip_m: what it costs in one period: w h.
-        drawn_m: part of `body_m` by which the body is drawn after the steered point, as a trailer.
-    """
-
-    body_m: float
-    lag_s: float
-    delay_s: float
-    speed_m_s: float
-    drift_m: float = 0.0
-    slip_m: float = 0.0
-    drawn_m: float = 0.0
+    body_m: float  # how far the body may be from the steered point within a period, dip included
+    lag_s: float  # time constant
+    delay_s: float  # of its commands
+    speed_m_s: float  # limit of its commands
+    drift_m: float = 0.0  # what missing its commands, by w at most, costs in distance: w / A
+    slip_m: float = 0.0  # what it costs in one period: w h
+    drawn_m: float = 0.0  # part of `body_m` by which the body is drawn after the steered point, as a trailer
 
     @property
     def rolling_m(self) -> float:
@@ -98,10 +88,8 @@ def law_m(safe_m: float, one: Room, other: Room | None, *, passive: bool) -> flo
 
 
 def kept_m(points_m: float, one: Room, other: Room | None) -> float:
-    """Distance that bodies keep where their steered points keep `points_m`, m: the inverse of `law_m`, not passive.
-
-    -inf where nothing is promised: within tau V of a set, say, the body may be anywhere beside it.
-    """
+    """Distance that bodies keep where their steered points keep `points_m`, m: the inverse of `law_m`, not passive."""
+    # -inf where nothing is promised: within tau V of a set, say, the body may be anywhere beside it.
     left = points_m - one.body_m - one.drift_m - (other.body_m + other.drift_m if other else 0.0)
     if other is None:
         behind = one.drawn_m or one.lag_s * one.speed_m_s
@@ -143,10 +131,8 @@ def on_arc(start: Array, end: Array, turned_rad: float, shares: Array) -> Array:
 
 
 def lagging_m(before: Array, after: Array, lasting_s: Array, lag_s: float) -> Array:
-    """How far a body with a lag leaves the straight line, (...), m, from its velocities at both ends, (..., 3), m/s.
-
-    Its acceleration is at most ||v - u|| / tau, and ||v - u|| falls by exp(-s / tau) in s seconds.
-    """
+    """How far a body with a lag leaves the straight line, (...), m, from its velocities at both ends, (..., 3), m/s."""
+    # Its acceleration is at most ||v - u|| / tau, and ||v - u|| falls by exp(-s / tau) in s seconds.
     gone = -np.expm1(-lasting_s / lag_s)
     short = np.divide(np.linalg.norm(after - before, axis=-1), gone, out=np.zeros_like(gone), where=gone > 0.0)
     return np.asarray(short / lag_s * np.square(lasting_s) / 8.0)
@@ -164,19 +150,13 @@ def on_lag(
 
 
 def unicycle_m(steered: Array, heading: Array, command: Array, since_s: Array, hand_m: float, period_s: float) -> Array:
-    """Axle and heading, (T, 4), of a unicycle under chord steering.
-
-    The hand point goes from where the straight line of the command began to where that line is after a period, while
-    the heading turns at a constant rate by 2 beta, tan(beta) = b h / (2 l + a h): see `model.plants.steering`.
-
-    Args:
-        steered: the straight line at the rows, (T, 3), m.
-        heading: at the last sample before each row, (T,), rad.
-        command: in force up to each row, (T, 3), m/s.
-        since_s: time since that sample, (T,), s.
-        hand_m: l.
-        period_s: h.
-    """
+    """Axle and heading, (T, 4), of a unicycle under chord steering."""
+    # The hand point goes from where the straight line of the command began to where that line is after a period, while
+    # the heading turns at a constant rate by 2 beta, tan(beta) = b h / (2 l + a h): see `model.plants.steering`.
+    # steered: (T, 3), m; heading: (T,), rad; command: (T, 3), m/s
+    # since_s: time since that sample, (T,), s.
+    # hand_m: l.
+    # period_s: h.
     cos, sin = np.cos(heading), np.sin(heading)
     a, b = cos * command[:, 0] + sin * command[:, 1], cos * command[:, 1] - sin * command[:, 0]
     # the axle's chord over a whole period points beta to the left of the heading, and ends l behind the hand point

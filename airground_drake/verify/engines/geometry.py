@@ -18,37 +18,24 @@ from scipy.optimize import brentq
 from airground_drake.base.arrays import Array
 from airground_drake.model.bodies.motion import PeriodMotion
 
+# Rows closer than this are one instant, s: periods that are not binary fractions give simulator steps of 1e-17 s, and
+# at 10 m/s a robot moves 1e-8 m meanwhile.
 MERGE_S = 1e-9
-"""Rows closer than this are one instant, s: periods that are not binary fractions give simulator steps of
-1e-17 s, and at 10 m/s a robot moves 1e-8 m meanwhile."""
 
 
 class Approach(NamedTuple):
-    """A minimum of the distance over continuous time.
+    """A minimum of the distance over continuous time."""
 
-    Attributes:
-        distance_m: the minimum.
-        t_s: the earliest time at which it is attained, inside [t[row-1], t[row]].
-        row: row that ends the segment on which it is attained (0 only for a single row).
-    """
-
-    distance_m: float
-    t_s: float
-    row: int
+    distance_m: float  # the minimum
+    t_s: float  # the earliest time at which it is attained, inside [t[row-1], t[row]]
+    row: int  # row that ends the segment on which it is attained (0 only for a single row)
 
 
 def closest_approach(t: Array, first: Array, second: Array, off_m: float = 0.0) -> Approach:
-    """Minimum distance between two points that move at the same time on straight segments, as (7) defines D.
-
-    Args:
-        t: times of the rows, (T,), T >= 1, s, not decreasing.
-        first: positions, (T, 3), m.
-        second: positions, (T, 3), m, or (3,), m, of a point at rest.
-        off_m: how far from the straight segments both may be, together, m: the minimum is then a lower bound.
-
-    Returns:
-        The minimum over [t[0], t[-1]], its time and its row.
-    """
+    """Minimum distance between two points that move at the same time on straight segments, as (7) defines D."""
+    # t: (T,), s; first, second: (T, 3), m
+    # off_m: how far from the straight segments both may be, together, m: the minimum is then a lower bound.
+    # Returns the minimum over [t[0], t[-1]], its time and its row.
     relative = first - second
     if len(t) == 1:
         return Approach(float(np.linalg.norm(relative[0])), float(t[0]), 0)
@@ -70,16 +57,9 @@ def interpolate(t: Array, values: Array, at: float | Array) -> Array:
 
 
 def travelled(waypoints: Array, speed: float, t: float | Array) -> Array:
-    """Position on a polyline travelled at constant speed from t = 0, held at its last point.
-
-    Args:
-        waypoints: corners, (m, 3), m >= 1, m.
-        speed: m/s.
-        t: one time, or (K,) times, s.
-
-    Returns:
-        (3,) or (K, 3), m.
-    """
+    """Position on a polyline travelled at constant speed from t = 0, held at its last point."""
+    # waypoints: (m, 3), m; t: (K,), s
+    # Returns (3,) or (K, 3), m.
     return interpolate(_lengths(waypoints), waypoints, speed * np.asarray(t))
 
 
@@ -94,17 +74,11 @@ def _lengths(waypoints: Array) -> Array:
 
 @dataclass(frozen=True)
 class NormSignal:
-    """x(t) = ||r(t)|| + n(t) for a vector r and a number n that are linear in time between knots, such as (15).
+    """x(t) = ||r(t)|| + n(t) for a vector r and a number n that are linear in time between knots, such as (15)."""
 
-    Attributes:
-        t: knots, (K,), s; x is monotone between them.
-        parts: r and n at the knots, (K, 4), m.
-        x: value at the knots, (K,), m.
-    """
-
-    t: Array
-    parts: Array
-    x: Array
+    t: Array  # knots, (K,), s; x is monotone between them
+    parts: Array  # r and n at the knots, (K, 4), m
+    x: Array  # value at the knots, (K,), m
 
     @classmethod
     def of(cls, t: Array, parts: Array) -> NormSignal:
@@ -138,12 +112,10 @@ def norm_sum(parts: Array) -> Array:
 
 
 def _minima(t: Array, parts: Array) -> Array:
-    """Interior minima of x on the intervals between t (T,), s: at most one on each, as x is convex there.
-
-    With r = r0 + u w and n = n0 + u m, u in [0, 1], let p be the distance of the line from the origin and
-    s = ||w|| u + r0.w/||w||; then x' = 0 where ||w|| s / sqrt(p^2 + s^2) = -m. Steps w and m are first divided by a
-    power of 2 close to their size, which is exact: squares of very short ones would be 0.
-    """
+    """Interior minima of x on the intervals between t (T,), s: at most one on each, as x is convex there."""
+    # With r = r0 + u w and n = n0 + u m, u in [0, 1], let p be the distance of the line from the origin and s = ||w|| u
+    # + r0.w/||w||; then x' = 0 where ||w|| s / sqrt(p^2 + s^2) = -m. Steps w and m are first divided by a power of 2
+    # close to their size, which is exact: squares of very short ones would be 0.
     change = np.diff(parts, axis=0)
     exponent = np.frexp(np.abs(change).max(axis=1))[1]
     step = np.ldexp(change, -exponent[:, None])
@@ -162,12 +134,9 @@ def _minima(t: Array, parts: Array) -> Array:
     return found[u < 1.0]
 
 
-ROWS = 32
-"""Of a block. Between rows a robot moves straight, so on a block it stays in the box around its rows."""
-AT_ONCE = 300_000
-"""Pairs of boxes that are compared together, so that they fit into the memory."""
-ROUNDING_M = 1e-9
-"""What a bound allows for rounding, m: distances up to 1e4 m err by 1e-12 m."""
+ROWS = 32  # Of a block. Between rows a robot moves straight, so on a block it stays in the box around its rows.
+AT_ONCE = 300_000  # pairs of boxes that are compared together, so that they fit into the memory
+ROUNDING_M = 1e-9  # what a bound allows for rounding, m: distances up to 1e4 m err by 1e-12 m
 
 Indices = npt.NDArray[np.intp]
 

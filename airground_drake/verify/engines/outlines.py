@@ -25,30 +25,21 @@ from airground_drake.verify.engines.geometry import ROUNDING_M, ROWS, boxes_of
 Indices = npt.NDArray[np.intp]
 Flags = npt.NDArray[np.bool_]
 
+# What the numbers of an *outline* in a trace mean: distance to keep, radius of the rounding, speed, heights of the
+# core, number of corners, a circle round them, and the corners; `model.geometry.outline` describes it.
 GAP, RADIUS, SPEED, BASE, TOP, COUNT, MIDDLE, EXTENT, CORNERS = 0, 1, 2, 3, 4, 5, 6, 8, 9
-"""What the numbers of an *outline* in a trace mean: distance to keep, radius of the rounding, speed, heights of the
-core, number of corners, a circle round them, and the corners; `model.geometry.outline` describes it."""
-AT_ONCE = 100_000
-"""Places, or pairs of boxes, that are compared together, so that they fit into memory."""
-BATCH = 32
-"""Blocks of rows whose approaches are computed together."""
-TOUCHING_M = 1e-6
-"""A motion that comes this near to a polygon may lead through it, m."""
+AT_ONCE = 100_000  # places, or pairs of boxes, that are compared together, so that they fit into memory
+BATCH = 32  # blocks of rows whose approaches are computed together
+TOUCHING_M = 1e-6  # a motion that comes this near to a polygon may lead through it, m
 
 
 @dataclass(frozen=True, eq=False)
 class Cores:
-    """Convex cores.
+    """Convex cores."""
 
-    Attributes:
-        corners: (..., n, 2), m, counter-clockwise. A core with fewer corners has its first one again at the end.
-        base: height at which each begins, (...), m.
-        top: height at which each ends, (...), m.
-    """
-
-    corners: Array
-    base: Array
-    top: Array
+    corners: Array  # (..., n, 2), m, counter-clockwise. A core with fewer corners has its first one again at the end.
+    base: Array  # height at which each begins, (...), m
+    top: Array  # height at which each ends, (...), m
 
     @classmethod
     def of(cls, rows: Array) -> Cores:
@@ -108,11 +99,7 @@ class Cores:
 
 
 def unpacked(numbers: Sequence[float]) -> Array:
-    """Outlines (m, W), padded with zeros, from their numbers one after the other.
-
-    Raises:
-        ValueError: if the numbers are not those of outlines.
-    """
+    """Outlines (m, W), padded with zeros, from their numbers one after the other."""
     rows, begin = list[Sequence[float]](), 0
     while begin < len(numbers):
         count = numbers[begin + COUNT] if begin + COUNT < len(numbers) else 0.0
@@ -194,12 +181,10 @@ def _chosen(vectors: Array, k: Indices) -> Array:
 
 
 def least_distances(cores: Cores, start: Array, end: Array, *, planar: bool) -> tuple[Array, Array]:
-    """Least distances of cores from places in straight motion, (...), m, and the share of it where each is, exactly.
-
-    The distance of a point in straight motion from a convex core is least at one of few places: at an end; where it
-    passes a corner or an edge at right angles; where it crosses the line of an edge or the plane of base or top. In a
-    polygon it is also where two edges are equally near. Each is a closed form, and the distance is evaluated there.
-    """
+    """Least distances of cores from places in straight motion, (...), m, and the share of it where each is, exactly."""
+    # The distance of a point in straight motion from a convex core is least at one of few places: at an end; where it
+    # passes a corner or an edge at right angles; where it crosses the line of an edge or the plane of base or top. In a
+    # polygon it is also where two edges are equally near. Each is a closed form, and the distance is evaluated there.
     shape = np.broadcast_shapes(start.shape[:-1], end.shape[:-1], cores.base.shape)
     start, end = (np.broadcast_to(place, (*shape, 3)) for place in (start, end))
     if cores.are_points:
@@ -264,11 +249,9 @@ def _equally_near(cores: Cores, start: Array, end: Array, planar: bool) -> Array
 
 
 def apart_by_blocks(cores: Cores, places: Array) -> Array:
-    """Lower bounds of the distances of m cores from a way (T, 3), m, during each block of `ROWS` rows: (m, B), m.
-
-    Between rows the way is straight. The bounds are distances of boxes; where boxes overlap, no depth is greater than
-    half the shortest side of the core's.
-    """
+    """Lower bounds of the distances of m cores from a way (T, 3), m, during each block of `ROWS` rows: (m, B), m."""
+    # Between rows the way is straight. The bounds are distances of boxes; where boxes overlap, no depth is greater than
+    # half the shortest side of the core's.
     (low, high), (inner, outer) = (side[0] for side in boxes_of(places[None])), cores.box
     found = np.empty((len(inner), len(low)))
     for some in np.array_split(np.arange(len(inner)), len(inner) * len(low) // AT_ONCE + 1):

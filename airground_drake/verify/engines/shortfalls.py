@@ -25,25 +25,17 @@ import numpy.typing as npt
 from airground_drake.base.arrays import Array
 from airground_drake.verify.engines.outlines import Cores, away_from
 
-SCREEN_M = 1e-9
-"""Floats decide pairs by more than this, m: for bodies within 1e5 m they err by less than 1e-10 m."""
-BITS = 160
-"""Lengths are enclosed to 2^-160 units."""
+SCREEN_M = 1e-9  # floats decide pairs by more than this, m: for bodies within 1e5 m they err by less than 1e-10 m
+BITS = 160  # lengths are enclosed to 2^-160 units
+# Inside a core any face counts that is the nearest to within this, m: floats may take another one for the nearest. By
+# how much it is farther away counts as missed.
 TIE_M = Fraction(1, 10**12)
-"""Inside a core any face counts that is the nearest to within this, m: floats may take another one for the nearest. By
-how much it is farther away counts as missed."""
-POINT = Cores(np.zeros((1, 2)), np.array(0.0), np.array(0.0))
-"""The core of a body whose place is its centre."""
+POINT = Cores(np.zeros((1, 2)), np.array(0.0), np.array(0.0))  # the core of a body whose place is its centre
 
 
 def demanded(lacking: Any, inside: Any, outside: Any) -> Any:
-    """Rate at which two bodies have to part, or may approach at most: the law's inequality, here and nowhere else.
-
-    Args:
-        lacking: d - D, the missing distance: an array of doubles, or one rational number.
-        inside: rate per distance where D <= d: the gain.
-        outside: the same where D > d: one over the period.
-    """
+    """Rate at which two bodies have to part, or may approach at most: the law's inequality, here and nowhere else."""
+    # lacking: d - D, the missing distance: an array of doubles, or one rational number.
     return np.where(lacking >= 0, inside, outside) * lacking
 
 
@@ -51,23 +43,13 @@ def shortfalls(
     first: Array, second: Array, d: float, share: Fraction, gain: Fraction, last: Fraction,
     core: Cores = POINT, *, planar: bool = False, held: bool = False,
 ) -> Array:  # fmt: skip
-    """What a pair misses at each sample, e_1 + e_2, rounded up: (K,), m per control period.
-
-    With a body that may move with V, the first one alone keeps the passive law: share 1, gain 0, d + V h in place of d,
-    and the second held where it is at each sample. Then e is what the first one may lack of min(D, d + V h) by its own
-    doing.
-
-    Args:
-        first: positions of a robot at K samples and at the end of the run, (K + 1, 3), m.
-        second: those of another body, (K + 1, 3), m, or the place of one at rest, (3,), m.
-        d: safe distance of the first body's centre from the core, m.
-        share: q_1; the second body takes the rest.
-        gain: a.
-        last: control periods from the last sample to the end of the run, at most 1.
-        core: of the second body, about its place.
-        planar: whether the first body stays in its plane: then no way leads out of a core through its top.
-        held: whether the second body counts as at rest from each sample to the next.
-    """
+    """What a pair misses at each sample, e_1 + e_2, rounded up: (K,), m per control period."""
+    # With a body that may move with V, the first one alone keeps the passive law: share 1, gain 0, d + V h in place of
+    # d, and the second held where it is at each sample. Then e is what the first one may lack of min(D, d + V h) by its
+    # own doing.
+    # first, second: (K + 1, 3), m
+    # gain: a.
+    # planar: whether the first body stays in its plane: then no way leads out of a core through its top.
     other = np.broadcast_to(second, first.shape)
     found = np.zeros(len(first) - 1)
     pair = _Pair(core, planar, Fraction(d), share, gain, held)
@@ -111,13 +93,7 @@ def _doubtful(first: Array, other: Array, pair: _Pair, last: float) -> npt.NDArr
 
 
 def _shortfall(ends: Array, pair: _Pair, lasts: Fraction) -> Fraction:
-    """e_1 + e_2 of one sample, from above.
-
-    Args:
-        ends: where the first body is and goes, and where the second is and goes, (4, 3), m.
-        pair: the bodies.
-        lasts: control periods from here to there.
-    """
+    """e_1 + e_2 of one sample, from above; `ends` (4, 3), m."""
     (here, after, there, beyond), shape, unit = _in_units(ends, pair.core)
     steps = (_minus(after, here), _minus(beyond, there))
     ways = _ways_off(shape, _minus(here, there), pair.planar, unit)
@@ -153,10 +129,8 @@ class _Way(NamedTuple):
 
 
 def _ways_off(shape: _Shape, place: Sequence[int], planar: bool, unit: int) -> list[_Way]:
-    """The direction away from a core, or out of it: there the nearest faces to within `TIE_M`; none on a point.
-
-    On a wall both sides will do.
-    """
+    """The direction away from a core, or out of it: there the nearest faces to within `TIE_M`; none on a point."""
+    # On a wall both sides will do.
     x, y, z = place
     corners, count = shape.corners, len(shape.corners)
     edges = [(a, _minus(b, a)) for a, b in zip(corners, corners[1:] + corners[:1], strict=True)]

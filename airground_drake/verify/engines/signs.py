@@ -14,13 +14,11 @@ from typing import Any, NamedTuple
 import flint
 
 PRECISION_BITS = 256
-NARROW = Fraction(1, 10**12)
-"""Enclosures are at most this wide, relative to their lower end."""
+NARROW = Fraction(1, 10**12)  # enclosures are at most this wide, relative to their lower end
 LARGEST_U = 10**6
 _flint = threading.Lock()  # flint's precision is one for all threads
 
-Function = Callable[[Any], Any]
-"""From a ball u to a ball that contains the value there."""
+Function = Callable[[Any], Any]  # from a ball u to a ball that contains the value there
 
 
 class RootInterval(NamedTuple):
@@ -87,16 +85,9 @@ def sign(function: Function, u: Fraction) -> int:
 
 
 def enclose(function: Function, low: Fraction, high: Fraction | None = None) -> RootInterval:
-    """Rational ends, NARROW apart or less, around a sign change of the function, by bisection.
-
-    Args:
-        function: monotone between `low` and `high`.
-        low: below the sign change; may be 0.
-        high: above it; None: found by doubling.
-
-    Raises:
-        ArithmeticError: if a sign cannot be decided, or none changes below LARGEST_U.
-    """
+    """Rational ends, NARROW apart or less, around a sign change of the function, by bisection."""
+    # low: below the sign change; may be 0.
+    # high: above it; None: found by doubling.
 
     def sure(u: Fraction) -> int:
         found = sign(function, u)

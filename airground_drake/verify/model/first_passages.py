@@ -21,14 +21,11 @@ from airground_drake.model.trigger.bayes import decision_time, error_rate, optim
 from airground_drake.verify.model.levels import NUMBERS
 
 SEED = 20061
-MOST_PERIODS = 1_000_000
-"""Most noise periods of a path; a few hundred are needed with the drifts in use."""
+MOST_PERIODS = 1_000_000  # most noise periods of a path; a few hundred are needed with the drifts in use
+# -zeta(1/2)/sqrt(2 pi): mean overshoot of a sampled Wiener path beyond a far barrier, in steps of one deviation.
 OVERSHOOT = 0.5825971579390107
-"""-zeta(1/2)/sqrt(2 pi): mean overshoot of a sampled Wiener path beyond a far barrier, in steps of one deviation."""
-STEP = 0.2
-"""Standard deviation of x over one noise period as a share of the threshold."""
-DRIFT_STEP = 0.02
-"""Largest mean of x over one noise period as a share of the threshold."""
+STEP = 0.2  # standard deviation of x over one noise period as a share of the threshold
+DRIFT_STEP = 0.02  # largest mean of x over one noise period as a share of the threshold
 
 
 @dataclass(frozen=True)
@@ -65,11 +62,9 @@ class PassageSample:
 
 
 def experiments(inputs: dict[str, Any]) -> tuple[PassageExperiment, ...]:
-    """Experiments with and without deviation, with other drift and noise, and with the threshold of the printed (19).
-
-    The last two have the drift at which the Bayes threshold is at u = 1, where both kinds of decision are common and
-    their thresholds differ most clearly.
-    """
+    """Experiments with and without deviation, with other drift and noise, and with (19) as printed."""
+    # The last two have the drift at which the Bayes threshold is at u = 1, where both kinds of decision are common and
+    # their thresholds differ most clearly.
     drift, noise, c1, c2 = (float(inputs[name]) for name in NUMBERS)
     zeta = optimal_threshold(drift, noise, c1, c2)
     clear = noise * math.sqrt((math.sinh(1.0) + 1.0) * c1 / c2)
@@ -95,11 +90,7 @@ def running(experiment: PassageExperiment) -> tuple[float, float]:
 
 @lru_cache(maxsize=16)
 def simulate(experiment: PassageExperiment) -> PassageSample:
-    """Decide all paths of an experiment.
-
-    Raises:
-        ArithmeticError: if a path is not decided within MOST_PERIODS.
-    """
+    """Decide all paths of an experiment."""
     rng = np.random.default_rng(experiment.seed)
     mean, deviation = experiment.drift * experiment.period, experiment.noise * math.sqrt(experiment.period)
     x = np.full(experiment.paths, experiment.deviation)

@@ -8,8 +8,7 @@ from airground_drake.model.trigger.automaton import Trigger
 from airground_drake.model.trigger.bayes import COMPUTED
 from airground_drake.scenario.schema import Scenario
 
-NUMBERS = ("drift_m_s", "noise_m_sqrt_s", "c1_1_s", "c2")
-"""The numbers of a threshold rule."""
+NUMBERS = ("drift_m_s", "noise_m_sqrt_s", "c1_1_s", "c2")  # the numbers of a threshold rule
 
 
 def levels_of(scenario: Scenario) -> dict[str, float]:

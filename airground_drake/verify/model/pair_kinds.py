@@ -14,18 +14,17 @@ from airground_drake.base.exact import decimal
 from airground_drake.scenario.schema import Control, Scenario, Uav, Ugv
 from airground_drake.verify.engines.bodies import Room, law_m, room_of
 
+# By kind of pair, the parts of an inequality that its two bodies take; an obstacle stands still and takes none.
 SHARES = {"obstacle": (Fraction(1), Fraction(0)), "uav_ugv": (Fraction(1, 2),) * 2, "ugv_ugv": (Fraction(1, 2),) * 2}
-"""By kind of pair, the parts of an inequality that its two bodies take; an obstacle stands still and takes none."""
+# By kind of pair, the theorems that prove its distance. A kind that is not here is never called proved.
 THEOREMS = {
     "obstacle": ("Safety.safe_always", "Safety.obstacle"),
     "uav_ugv": ("Safety.safe_always",),
     "ugv_ugv": ("Safety.safe_always",),
 }
-"""By kind of pair, the theorems that prove its distance. A kind that is not here is never called proved."""
-MOVING = "moving"
-"""The kind of a robot beside an obstacle that may move: no theorem keeps its distance."""
+MOVING = "moving"  # the kind of a robot beside an obstacle that may move: no theorem keeps its distance
+# The kind of a pair with a body that is not where the law steers it: these theorems are about the steered points.
 STEERED = "steered"
-"""The kind of a pair with a body that is not where the law steers it: these theorems are about the steered points."""
 
 
 def kind_of(scenario: Scenario, first: str, second: str) -> str:
@@ -42,10 +41,9 @@ def kind_of(scenario: Scenario, first: str, second: str) -> str:
 
 
 class PairKind(NamedTuple):
-    """Pairs of one kind with the same distance in the law, m, and closing speed, m/s.
+    """Pairs of one kind with the same distance in the law, m, and closing speed, m/s."""
 
-    That is the safe distance of a centre from the other's core, and more if a body is not where the law steers it.
-    """
+    # That is the safe distance of a centre from the other's core, and more if a body is not where the law steers it.
 
     kind: str
     safe_m: Fraction
@@ -74,10 +72,8 @@ def kinds_of(inputs: dict[str, Any]) -> list[PairKind]:
 
 
 def _kinds(scenario: Scenario) -> Iterator[PairKind]:
-    """The extreme pairs of each kind in `THEOREMS`: the hypotheses hold for all pairs if they hold for these.
-
-    Kept are pairs that no other pair exceeds in both distance and speed, and the nearest pair.
-    """
+    """The extreme pairs of each kind in `THEOREMS`: the hypotheses hold for all pairs if they hold for these."""
+    # Kept are pairs that no other pair exceeds in both distance and speed, and the nearest pair.
     safe, control = scenario.safe_distance, scenario.control
     ugvs = [_Robot.of(ugv, control) for ugv in scenario.ugvs.values()]
     uav = _Robot.of(scenario.uav, control)
@@ -116,7 +112,7 @@ class _Robot(NamedTuple):
         return self._in_the_law(safe, other.room), self.speed_m_s + other.speed_m_s
 
     def beside_a_set(self, safe_m: Fraction) -> tuple[Fraction, Fraction]:
-        """The same beside an obstacle at rest, from whose core it keeps a distance, m."""
+        """Distance in the law, m, and closing speed, m/s, beside an obstacle at rest; `safe_m` is from its core."""
         return self._in_the_law(safe_m, None), self.speed_m_s
 
     def _in_the_law(self, safe_m: Fraction, other: Room | None) -> Fraction:

@@ -30,33 +30,21 @@ from airground_drake.verify.model.levels import trigger_of
 SEED = 5
 PATHS = 96
 SERIES = ("bare", "automaton", "automaton_at_scenario_noise")
-HALVINGS = 8
-"""dt is halved this often: a factor of 256."""
-COARSE_STEPS = (64, 640)
-"""Fewest and most steps of the coarsest grid; the first dt or the duration is cut down to that."""
-DWELL_STEPS = 10
-"""Fewest steps of the coarsest grid in a dwell (in 1 s without one): the correction must be small."""
+HALVINGS = 8  # dt is halved this often: a factor of 256
+COARSE_STEPS = (64, 640)  # fewest and most steps of the coarsest grid; the first dt or the duration is cut down to that
+DWELL_STEPS = 10  # fewest steps of the coarsest grid in a dwell (in 1 s without one): the correction must be small
 
 
 @dataclass(frozen=True)
 class Refinement:
-    """Constants of the experiment.
+    """Constants of the experiment."""
 
-    Attributes:
-        trigger: the automaton, the scenario's or a mutant.
-        noise_m_sqrt_s: intensity.
-        own_noise_m_sqrt_s: the scenario's intensity.
-        leak_1_s: leak.
-        duration_s: of a path.
-        dt_s: noise steps, coarsest first, each half the one before.
-    """
-
-    trigger: Trigger
-    noise_m_sqrt_s: float
-    own_noise_m_sqrt_s: float
+    trigger: Trigger  # the automaton, the scenario's or a mutant
+    noise_m_sqrt_s: float  # intensity
+    own_noise_m_sqrt_s: float  # the scenario's intensity
     leak_1_s: float
-    duration_s: float
-    dt_s: tuple[float, ...]
+    duration_s: float  # of a path
+    dt_s: tuple[float, ...]  # noise steps, coarsest first, each half the one before
 
 
 def experiment(inputs: dict[str, Any]) -> Refinement:
@@ -87,10 +75,8 @@ def path(setting: Refinement, index: int) -> list[Array]:
 
 
 def triggers(trigger: Trigger, x: Array, dt: float) -> list[float]:
-    """Times, s, of the running automaton's triggers on the linear path through x, m, at 0, dt, 2 dt, ..., s.
-
-    A touch from below is a rise. Where the levels are one, a touch from above is no fall: x >= zeta all the time.
-    """
+    """Times, s, of the running automaton's triggers on the linear path through x, m, at 0, dt, 2 dt, ..., s."""
+    # A touch from below is a rise. Where the levels are one, a touch from above is no fall: x >= zeta all the time.
     above, below = x - trigger.zeta, trigger.release - x
     rises = np.flatnonzero(above[1:] >= 0.0)  # segments at whose end x is at or above zeta
     falls = np.flatnonzero(below[1:] >= 0.0 if trigger.release < trigger.zeta else below[1:] > 0.0)

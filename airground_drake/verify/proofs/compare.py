@@ -16,30 +16,17 @@ from airground_drake.verify.proofs.runs import CHECKERS, FOUND, SCHEMA, expects_
 from airground_drake.verify.proofs.table import entries, law_file, lawful, missed
 from airground_drake.verify.proofs.too_near import too_near
 
-Broken = tuple[str, Any, Any]
-"""What is wrong, what it should be, and what is recorded."""
+Broken = tuple[str, Any, Any]  # what is wrong, what it should be, and what is recorded
 
+# What is said of a theorem that is proved, and of one that is not, besides name and file.
 _PROVED, _UNPROVED = ("axioms", "seconds", "entries"), ("why", "too_near", "entries", "missed")
-"""What is said of a theorem that is proved, and of one that is not, besides name and file."""
 
 
 def broken_rules(folder: Path, traces: Mapping[str, Trace]) -> tuple[dict[str, Any], list[Broken]]:
-    """Compare proofs.json and the Coq files with the traces of the report.
-
-    The distances are computed here in exact arithmetic, so an unsafe run cannot be called proved. Whether Coq has
-    accepted a file is taken from the record: `airground check --coq` asks Coq again.
-
-    Args:
-        folder: `proofs` of the report.
-        traces: of the report's runs, by name; in the folder `trace` beside `folder`.
-
-    Returns:
-        proofs.json, and the broken rules.
-
-    Raises:
-        KeyError, TypeError, ValueError, AttributeError: if proofs.json is not what `airground prove` writes.
-        OSError: if a file cannot be read.
-    """
+    """Compare proofs.json and the Coq files with the traces of the report."""
+    # The distances are computed here in exact arithmetic, so an unsafe run cannot be called proved. Whether Coq has
+    # accepted a file is taken from the record: `airground check --coq` asks Coq again.
+    # traces: of the report's runs, by name; in the folder `trace` beside `folder`.
     found: dict[str, Any] = json.loads(files.read_text(folder / FOUND))
     return found, [*_broken(folder, found, traces)]
 

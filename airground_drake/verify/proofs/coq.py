@@ -11,26 +11,21 @@ from pathlib import Path
 from airground_drake.base.errors import AirgroundError, one_line
 from airground_drake.verify.proofs.record import ALLOWED_AXIOMS, FOLDER, closure
 
-LIMIT_S = 600.0
-"""Wall-clock time for one call of Coq, s. The longest, `coqchk`, takes some 30 s."""
+LIMIT_S = 600.0  # Wall-clock time for one call of Coq, s. The longest, `coqchk`, takes some 30 s.
+# Words with which a file could assume what it should prove, or turn off Coq's own checks.
 UNSOUND = re.compile(
     r"\b(Admitted|admit|give_up|Axioms?|Parameters?|Conjecture|Declare\s+ML\s+Module|bypass_check|Unset\s+\w+\s+Checking"
     r"|Type\s+In\s+Type|Load|Extract\s+\w+|Drop)\b"
 )
-"""Words with which a file could assume what it should prove, or turn off Coq's own checks."""
 
 
 class CoqError(AirgroundError):
-    """Coq does not accept a file, or a theorem rests on more than is allowed.
-
-    Attributes:
-        line: of the file, from 1; 0 if unknown.
-    """
+    """Coq does not accept a file, or a theorem rests on more than is allowed."""
 
     def __init__(self, message: str, line: int = 0) -> None:
         """Keep the message in one line."""
         super().__init__(one_line(message))
-        self.line = line
+        self.line = line  # of the file, from 1; 0 if unknown
 
 
 class NoCoqError(AirgroundError):
@@ -38,11 +33,7 @@ class NoCoqError(AirgroundError):
 
 
 def version() -> str:
-    """The version of the installed Coq, such as "8.16.1".
-
-    Raises:
-        NoCoqError: if Coq is not installed.
-    """
+    """The version of the installed Coq, such as "8.16.1"."""
     for tool in ("coqc", "coqchk"):
         if shutil.which(tool) is None:
             raise NoCoqError(f"{tool} is not on the PATH: install Coq (Debian, Ubuntu: apt-get install coq)")
@@ -53,11 +44,7 @@ def version() -> str:
 
 
 def screen(text: str, name: str) -> None:
-    """Refuse a file that assumes something, or turns off a check of Coq.
-
-    Raises:
-        CoqError: with the first such word.
-    """
+    """Refuse a file that assumes something, or turns off a check of Coq."""
     found = UNSOUND.search(without_comments(text))
     if found:
         raise CoqError(f"{name} has the word {found[0]!r}: a theory may assume nothing")
@@ -77,15 +64,8 @@ def without_comments(text: str) -> str:
 
 
 def install(names: Iterable[str], folder: Path, source: Path = FOLDER, limit_s: float = LIMIT_S) -> list[str]:
-    """Copy theories, and those that they require, to a folder, and compile them there.
-
-    Returns:
-        The files, in the order in which they were compiled.
-
-    Raises:
-        CoqError: if one is not accepted.
-        OSError: if one cannot be read.
-    """
+    """Copy theories, and those that they require, to a folder, and compile them there."""
+    # Returns the files, in the order in which they were compiled.
     order = closure(names, source)
     for name in order:
         shutil.copyfile(source / name, folder / name)
@@ -94,15 +74,7 @@ def install(names: Iterable[str], folder: Path, source: Path = FOLDER, limit_s: 
 
 
 def compile_file(file: Path, limit_s: float = LIMIT_S) -> str:
-    """Screen a file and compile it, in its folder; what it requires must be compiled there.
-
-    Returns:
-        What Coq prints.
-
-    Raises:
-        CoqError: if Coq does not accept it; has the line.
-        OSError: if it cannot be read.
-    """
+    """Screen a file and compile it, in its folder; what it requires must be compiled there."""
     screen(file.read_text(encoding="utf-8"), file.name)
     said = _run(["coqc", "-q", file.name], file.parent, limit_s)
     if said.returncode:
@@ -114,11 +86,7 @@ def compile_file(file: Path, limit_s: float = LIMIT_S) -> str:
 
 
 def axioms_of(theorems: Sequence[str], folder: Path, limit_s: float = LIMIT_S) -> dict[str, list[str]]:
-    """The axioms of each theorem ("File.name"), from compiled files in a folder.
-
-    Raises:
-        CoqError: if there is no such theorem, or it rests on an axiom outside ALLOWED_AXIOMS.
-    """
+    """The axioms of each theorem ("File.name"), from compiled files in a folder."""
     modules = dict.fromkeys(theorem.partition(".")[0] for theorem in theorems)
     lines = [f"Require {' '.join(modules)}.", *(f"Print Assumptions {theorem}." for theorem in theorems)]
     file = folder / "Assumptions_of_theorems.v"
@@ -129,11 +97,7 @@ def axioms_of(theorems: Sequence[str], folder: Path, limit_s: float = LIMIT_S) -
 
 
 def listed(theorem: str, answer: str) -> list[str]:
-    """The axioms in an answer of `Print Assumptions`: each begins a line, and its type is indented.
-
-    Raises:
-        CoqError: if one is outside ALLOWED_AXIOMS.
-    """
+    """The axioms in an answer of `Print Assumptions`: each begins a line, and its type is indented."""
     if answer.startswith("Closed under"):
         return []
     names = [re.split(r"[\s:]", line, maxsplit=1)[0] for line in answer.splitlines()[1:] if line[:1].strip()]
@@ -144,11 +108,7 @@ def listed(theorem: str, answer: str) -> list[str]:
 
 
 def check_again(modules: Sequence[str], folder: Path, limit_s: float = LIMIT_S) -> None:
-    """Have `coqchk` check compiled files and everything that they require.
-
-    Raises:
-        CoqError: if it does not accept them, or finds an axiom outside ALLOWED_AXIOMS or a check turned off.
-    """
+    """Have `coqchk` check compiled files and everything that they require."""
     said = _run(["coqchk", "-silent", "-o", "-R", ".", "", *modules], folder, limit_s)
     if said.returncode:
         raise CoqError(f"coqchk does not accept the theories: {(said.stderr or said.stdout)[-300:]}")
@@ -166,12 +126,7 @@ def check_again(modules: Sequence[str], folder: Path, limit_s: float = LIMIT_S) 
 
 
 def _run(command: list[str], folder: Path, limit_s: float) -> subprocess.CompletedProcess[str]:
-    """Run a tool of Coq.
-
-    Raises:
-        CoqError: if it takes too long.
-        NoCoqError: if it cannot be started.
-    """
+    """Run a tool of Coq."""
     try:
         return subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=limit_s, check=False)
     except subprocess.TimeoutExpired:

@@ -21,57 +21,41 @@ from airground_drake.verify.proofs.coq import without_comments
 from airground_drake.verify.proofs.record import FOLDER
 from airground_drake.verify.proofs.separating import Prism, Vector, separating
 
+# Positions are rounded to 1/PARTS m: some coordinates are as small as 1e-100 m. At a metre binary64 is coarser.
 PARTS = 2**60
-"""Positions are rounded to 1/PARTS m: some coordinates are as small as 1e-100 m. At a metre binary64 is coarser."""
 
 Place = tuple[Fraction, Fraction, Fraction]
 
 
 class ConvexSet(NamedTuple):
-    """All between two heights that is over a convex outline, m from where its body is.
+    """All between two heights that is over a convex outline, m from where its body is."""
 
-    Attributes:
-        outline: corners, counter-clockwise; two of a wall, one of a post.
-        base: lowest z.
-        top: highest z; the base if the set is flat.
-    """
-
-    outline: tuple[tuple[Fraction, Fraction], ...]
-    base: Fraction = Fraction(0)
-    top: Fraction = Fraction(0)
+    outline: tuple[tuple[Fraction, Fraction], ...]  # corners, counter-clockwise; two of a wall, one of a post
+    base: Fraction = Fraction(0)  # lowest z
+    top: Fraction = Fraction(0)  # highest z; the base if the set is flat
 
     def in_parts(self, unit: int) -> Prism:
-        """The same in whole numbers of metres / unit."""
+        """This set in whole numbers of metres / unit."""
         outline = tuple((int(x * unit), int(y * unit)) for x, y in self.outline)
         return Prism(outline, int(self.base * unit), int(self.top * unit))
 
 
 class Demand(NamedTuple):
-    """Two bodies, by name, and the distance that they are to keep.
+    """Two bodies, by name, and the distance that they are to keep."""
 
-    Attributes:
-        first: a robot.
-        second: the other body.
-        required_m: distance of their surfaces, m.
-        radii_m: sum of their radii, m.
-        core: what the second body is without its radius: "" for a point, "ground" for flat convex sets, "solid" for
-            prisms.
-        passive: whether the second body is an obstacle that may move, beside which robots follow the passive law.
-        room_m: how far the two bodies may be off the recorded straight lines in all, m; or, where the law's points are
-            recorded, what the law adds to the distance.
-        late: whether one of the two is a robot with a lag or a delay.
-        called: what the scenario calls the two, where `first` and `second` are names for Coq.
-    """
-
-    first: str
-    second: str
-    required_m: Fraction
-    radii_m: Fraction
+    first: str  # a robot
+    second: str  # the other body
+    required_m: Fraction  # distance of their surfaces, m
+    radii_m: Fraction  # sum of their radii, m
+    # What the second body is without its radius: "" for a point, "ground" for flat convex sets, "solid" for prisms.
     core: str = ""
+    # Whether the second body is an obstacle that may move, beside which robots follow the passive law.
     passive: bool = False
+    # How far the two bodies may be off the recorded straight lines in all, m; or, where the law's points are recorded,
+    # what the law adds to the distance.
     room_m: Fraction = Fraction(0)
-    late: bool = False
-    called: tuple[str, str] = ("", "")
+    late: bool = False  # whether one of the two is a robot with a lag or a delay
+    called: tuple[str, str] = ("", "")  # what the scenario calls the two, where `first` and `second` are names for Coq
 
     @property
     def body_m(self) -> Fraction:
@@ -80,7 +64,7 @@ class Demand(NamedTuple):
 
     @property
     def safe_m(self) -> Fraction:
-        """The same with room for what is off the recorded straight lines, m: that of the lines."""
+        """Distance of the recorded straight lines, m, with room for what bodies are off them."""
         return self.body_m + self.room_m
 
     @property
@@ -96,24 +80,17 @@ class Demand(NamedTuple):
 
 @dataclass(frozen=True)
 class Recorded:
-    """A run in exact numbers.
+    """A run in exact numbers."""
 
-    Attributes:
-        name: of the run in Coq.
-        times: of the rows, s.
-        places: of each body, m: one per row, or a single one of a body at rest. In the order of their numbers.
-        demands: pairs and distances.
-        gain: A h, the product of gain and control period, at most 1 (see `capped` in Safety.v).
-        off_m: how far bodies may be off the straight lines between these places, m; 0 of those that are not named.
-        sets: the convex sets of demands, by name, from where their body is.
-    """
-
-    name: str
-    times: tuple[Fraction, ...]
+    name: str  # of the run in Coq
+    times: tuple[Fraction, ...]  # of the rows, s
+    # Of each body, m: one per row, or a single one of a body at rest. In the order of their numbers.
     places: Mapping[str, tuple[Place, ...]]
-    demands: tuple[Demand, ...]
-    gain: Fraction
+    demands: tuple[Demand, ...]  # pairs and distances
+    gain: Fraction  # a h, the product of gain and control period, at most 1 (see `capped` in Safety.v)
+    # How far bodies may be off the straight lines between these places, m; 0 of those that are not named.
     off_m: Mapping[str, Fraction]
+    # The convex sets of demands, by name, from where their body is.
     sets: Mapping[str, tuple[ConvexSet, ...]] = field(default_factory=dict)
 
     @cached_property
@@ -148,15 +125,8 @@ class Recorded:
 
 
 def recorded(trace: Trace, *, steered: bool = False) -> Recorded:
-    """A run with its positions rounded to 1/PARTS m; nothing else is rounded.
-
-    Args:
-        trace: the run.
-        steered: whether it is the record of the points that the law steers, in place of the bodies.
-
-    Raises:
-        TraceError: if a column is missing or not finite, or no theorem is about a body of the scenario.
-    """
+    """A run with its positions rounded to 1/PARTS m; nothing else is rounded."""
+    # steered: whether it is the record of the points that the law steers, in place of the bodies.
     refuse_unknown(trace)
     scenario, control = trace.scenario, trace.scenario.control
     barriers = scenario.barriers
@@ -181,22 +151,17 @@ def recorded(trace: Trace, *, steered: bool = False) -> Recorded:
     )
 
 
+# Keys of bodies that theorems take into account, or need not.
 COVERED = frozenset(
     {"start_m", "target_m", "preset", "max_speed_m_s", "radius_m", "name", "altitude_m", "task", "phantoms_m"}
     | {"position_m", "known_to_uav", *SHAPES, "heading_rad", "height_m", "distance_m"}
     | {"moves", "known_motion", "cells", "plant"}
 )
-"""Keys of bodies that theorems take into account, or need not."""
-PLANTS = frozenset({"first_order", "unicycle", "lag", "delay"})
-"""Kinds of plants that `slack` knows."""
+PLANTS = frozenset({"first_order", "unicycle", "lag", "delay"})  # kinds of plants that `slack` knows
 
 
 def refuse_unknown(trace: Trace) -> None:
-    """Refuse a run with a body that no theorem is about.
-
-    Raises:
-        TraceError: with the first such body, and the key of the scenario that makes it so.
-    """
+    """Refuse a run with a body that no theorem is about."""
     for name, body in trace.scenario.bodies.items():
         for key in fields(body):
             given, default = getattr(body, key.name), key.default

@@ -31,12 +31,7 @@ class RereadError(NamedTuple):
 
 
 def compare(text: str, trace: Trace) -> RereadError:
-    """Compare the file about distances with the run that it should be about.
-
-    Raises:
-        ReadbackError: at the first difference.
-        TraceError: if a column of the trace is missing or not finite.
-    """
+    """Compare the file about distances with the run that it should be about."""
     spelled, error = _compare_positions(text, trace)
     named = [each._replace(first=spelled[each.first], second=spelled[each.second]) for each in demands_of(trace)]
     wanted = [(each.first, each.second, each.sets if each.core else "", each.safe_m) for each in named]
@@ -47,17 +42,7 @@ def compare(text: str, trace: Trace) -> RereadError:
 
 
 def compare_positions(text: str, trace: Trace, *, steered: bool = False) -> RereadError:
-    """Compare the positions in an exported file with those of the run that it should be about.
-
-    Args:
-        text: the file.
-        trace: the run.
-        steered: whether the positions are those of the points that the law steers.
-
-    Raises:
-        ReadbackError: at the first difference.
-        TraceError: if a column of the trace is missing or not finite.
-    """
+    """Compare the positions in an exported file with those of the run that it should be about."""
     return _compare_positions(text, trace, steered=steered)[1]
 
 

@@ -12,10 +12,10 @@ from typing import Any
 from airground_drake.base import files
 from airground_drake.verify.proofs.theorems import THEOREMS
 
-FOLDER = Path(__file__).parent.parent / "coq"
-"""Where the theories and their record are."""
+FOLDER = Path(__file__).parent.parent / "coq"  # where the theories and their record are
 RECORD = "record.json"
 
+# Axioms of Coq's real numbers, and of classical logic: a theorem may rest on these alone.
 ALLOWED_AXIOMS = frozenset(
     {
         "ClassicalDedekindReals.sig_forall_dec",
@@ -24,32 +24,20 @@ ALLOWED_AXIOMS = frozenset(
         "Classical_Prop.classic",
     }
 )
-"""Axioms of Coq's real numbers, and of classical logic: a theorem may rest on these alone."""
 
 
 @dataclass(frozen=True)
 class Standing:
-    """Whether theorems count as proved.
+    """Whether theorems count as proved."""
 
-    Attributes:
-        checked: whether Coq has checked exactly the files that are here, on allowed axioms only.
-        words: the same in words, for a report.
-        theory: SHA-256 of each file that the theorems rest on.
-    """
-
-    checked: bool
-    words: str
-    theory: Mapping[str, str]
+    checked: bool  # whether Coq has checked exactly the files that are here, on allowed axioms only
+    words: str  # the same in words, for a report
+    theory: Mapping[str, str]  # SHA-256 of each file that the theorems rest on
 
 
 def standing(*names: str, folder: Path = FOLDER) -> Standing:
-    """Whether the named theorems (default: all) count as proved. Coq is not needed.
-
-    The SHA-256 of each file that they rest on is compared with the record of the last check.
-
-    Raises:
-        ValueError: if a name is unknown; lists the known ones.
-    """
+    """Whether the named theorems (default: all) count as proved. Coq is not needed."""
+    # The SHA-256 of each file that they rest on is compared with the record of the last check.
     unknown = [name for name in names if name not in THEOREMS]
     if unknown:
         raise ValueError(f"no theorem {unknown[0]!r}; there are {', '.join(THEOREMS)}")
@@ -96,20 +84,12 @@ def file_of(theorem: str) -> str:
 
 
 def digest(file: Path) -> str:
-    """SHA-256 of a file.
-
-    Raises:
-        OSError: if it cannot be read.
-    """
+    """SHA-256 of a file."""
     return files.sha256(file.read_bytes())
 
 
 def closure(names: Iterable[str], folder: Path = FOLDER) -> list[str]:
-    """Theories and everything that they require, in an order in which Coq can compile them.
-
-    Raises:
-        OSError: if one cannot be read.
-    """
+    """Theories and everything that they require, in an order in which Coq can compile them."""
     order: list[str] = []
     for name in names:
         order += [each for each in (*closure(required(folder / name), folder), name) if each not in order]
@@ -117,11 +97,7 @@ def closure(names: Iterable[str], folder: Path = FOLDER) -> list[str]:
 
 
 def required(file: Path) -> list[str]:
-    """The theories in the same folder that a file requires.
-
-    Raises:
-        OSError: if it cannot be read.
-    """
+    """The theories in the same folder that a file requires."""
     words = re.findall(r"^Require Import ([^.]*)\.", file.read_text(encoding="utf-8"), re.MULTILINE)
     modules = [f"{word}.v" for line in words for word in line.split()]
     return [module for module in modules if (file.parent / module).exists()]

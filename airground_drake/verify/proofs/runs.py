@@ -28,94 +28,56 @@ from airground_drake.verify.proofs.table import Entry, Missed, entries, law_file
 from airground_drake.verify.proofs.too_near import TooNear, too_near
 
 SCHEMA = "airground_drake.proofs/1"
-PLACE = "proofs"
-"""Folder of a report for what is proved about it."""
-FOUND = "proofs.json"
-"""File in that folder with the results."""
+PLACE = "proofs"  # folder of a report for what is proved about it
+FOUND = "proofs.json"  # file in that folder with the results
+# Part of Coq's message if a checker has computed `false` where the proof says `true`.
 COMPUTED = "is expected to have type"
-"""Part of Coq's message if a checker has computed `false` where the proof says `true`."""
 CHECKERS = ("DistanceChecker.v", "LawChecker.v")
 
 
 @dataclass(frozen=True)
 class CoqReply:
-    """Coq's answer about one theorem.
+    """Coq's answer about one theorem."""
 
-    Attributes:
-        proved: whether it accepts it.
-        theorem: its name.
-        file: its file.
-        why: the reason if it is not proved.
-        refused: the first pair that Coq refuses.
-        too_near: pairs that do not keep their distance.
-        axioms: of the proof.
-        seconds: how long Coq took, s.
-        entries: of the run's table that it accepts; 0 in an answer about distances.
-        missed: pairs with periods that no entry is about.
-    """
-
-    proved: bool
-    theorem: str
+    proved: bool  # whether it accepts it
+    theorem: str  # its name
     file: str
-    why: str = ""
-    refused: Demand | None = None
-    too_near: Sequence[TooNear] = ()
-    axioms: Sequence[str] = ()
-    seconds: float = 0.0
-    entries: int = 0
-    missed: Sequence[Missed] = ()
+    why: str = ""  # the reason if it is not proved
+    refused: Demand | None = None  # the first pair that Coq refuses
+    too_near: Sequence[TooNear] = ()  # pairs that do not keep their distance
+    axioms: Sequence[str] = ()  # of the proof
+    seconds: float = 0.0  # how long Coq took, s
+    entries: int = 0  # of the run's table that it accepts; 0 in an answer about distances
+    missed: Sequence[Missed] = ()  # pairs with periods that no entry is about
 
 
 @dataclass(frozen=True)
 class Proved:
-    """The result for one run.
+    """The result for one run."""
 
-    Attributes:
-        run: its identifier.
-        expected: whether the scenario expects its distances to be kept.
-        pairs: number of pairs.
-        rows: of the trace.
-        lawful: number of pairs whose law is judged.
-        distances: every pair keeps its full distance at all times.
-        law: those pairs obey the avoidance law, without error.
-        rounded: coordinates that were rounded, and by how much at most, m.
-        meta_sha256: of the run's trace/<run>/meta.json.
-    """
-
-    run: str
-    expected: bool
-    pairs: int
-    lawful: int
-    rows: int
-    distances: CoqReply
-    law: CoqReply
-    rounded: readback.RereadError
-    meta_sha256: str
+    run: str  # its identifier
+    expected: bool  # whether the scenario expects its distances to be kept
+    pairs: int  # number of pairs
+    lawful: int  # number of pairs whose law is judged
+    rows: int  # of the trace
+    distances: CoqReply  # every pair keeps its full distance at all times
+    law: CoqReply  # those pairs obey the avoidance law, without error
+    rounded: readback.RereadError  # coordinates that were rounded, and by how much at most, m
+    meta_sha256: str  # of the run's trace/<run>/meta.json
 
 
 @dataclass(frozen=True)
 class Workshop:
-    """A folder in which the checkers are compiled.
+    """A folder in which the checkers are compiled."""
 
-    Attributes:
-        folder: temporary.
-        coq: version of Coq.
-        theory: SHA-256 of each theory used.
-    """
-
-    folder: Path
-    coq: str
-    theory: Mapping[str, str] = field(default_factory=dict)
+    folder: Path  # temporary
+    coq: str  # version of Coq
+    theory: Mapping[str, str] = field(default_factory=dict)  # SHA-256 of each theory used
 
 
 @contextmanager
 def workshop(limit_s: float = coq.LIMIT_S) -> Iterator[Workshop]:
-    """Compile the theories that the files of runs require, in a temporary folder.
-
-    Raises:
-        CoqError: if a theory is not accepted.
-        NoCoqError: if Coq is not installed.
-    """
+    """Compile the theories that the files of runs require, in a temporary folder."""
     version = coq.version()
     with files.temporary_folder() as folder:
         used = coq.install(CHECKERS, folder, limit_s=limit_s)
@@ -123,14 +85,7 @@ def workshop(limit_s: float = coq.LIMIT_S) -> Iterator[Workshop]:
 
 
 def prove(place: Workshop, run: Trace, limit_s: float = coq.LIMIT_S) -> tuple[CoqReply, CoqReply, readback.RereadError]:
-    """Have Coq decide whether a run keeps its distances, and when it obeys the law.
-
-    The exported files stay in the workshop.
-
-    Raises:
-        ReadbackError: if the exported file differs from the trace.
-        TraceError: if the trace lacks something.
-    """
+    """Have Coq decide whether a run keeps its distances, and when it obeys the law."""
     with _usable(run):
         exact = recorded(run)
         text = distances_file(exact)
@@ -169,11 +124,7 @@ def _missing(gaps: Sequence[Missed], many: int) -> str:
 
 @contextmanager
 def _usable(run: Trace) -> Iterator[None]:
-    """Refuse a scenario that was damaged in meta.json.
-
-    Raises:
-        TraceError: in place of what Python says.
-    """
+    """Refuse a scenario that was damaged in meta.json."""
     try:
         yield
     except (KeyError, TypeError, ValueError, AttributeError) as error:
@@ -205,21 +156,8 @@ def _about(run: Recorded, text: str, line: int) -> Demand | None:
 
 
 def prove_report(report: Path, names: Sequence[str] = (), limit_s: float = coq.LIMIT_S) -> Iterator[Proved]:
-    """Prove the runs of a report, one after the other, and write the results to its folder `proofs`.
-
-    Args:
-        report: its folder.
-        names: of the runs; default: all.
-        limit_s: wall-clock time for one call of Coq, s.
-
-    Raises:
-        FolderError: if one of its folders is a link.
-        UnknownNameError: if the report has no run with a name in `names`.
-        TraceError: if a trace cannot be read or is of another run, or no theorem is about a body of its scenario.
-        CoqError: if a theory is not accepted.
-        NoCoqError: if Coq is not installed.
-        OSError: if the folder cannot be written.
-    """
+    """Prove the runs of a report, one after the other, and write the results to its folder `proofs`."""
+    # names: of the runs; default: all.
     files.refuse_links(report)
     there = sorted(path.parent.name for path in report.glob("trace/*/meta.json"))
     for name in names:

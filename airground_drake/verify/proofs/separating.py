@@ -13,27 +13,19 @@ import numpy as np
 from airground_drake.base.arrays import Array
 
 Vector = tuple[int, int, int]
-Stretch = tuple[int, Vector]
-"""A number of periods, and the vector that separates during all of them."""
+Stretch = tuple[int, Vector]  # a number of periods, and the vector that separates during all of them
 
+# Lengths of rounded vectors. They lose about the distance / length^2, and Coq multiplies short numbers faster.
 SCALES = (2**4, 2**12, 2**30)
-"""Lengths of rounded vectors. They lose about the distance / length^2, and Coq multiplies short numbers faster."""
-TRIES = 8
-"""How often a longer stretch is looked for."""
+TRIES = 8  # how often a longer stretch is looked for
 
 
 class Prism(NamedTuple):
-    """A convex set: all between two heights that is over a convex outline. In parts of a metre.
+    """A convex set: all between two heights that is over a convex outline. In parts of a metre."""
 
-    Attributes:
-        outline: its corners, counter-clockwise; two of a wall, one of a post.
-        base: lowest z.
-        top: highest z; the base if the set is flat.
-    """
-
-    outline: tuple[tuple[int, int], ...]
-    base: int = 0
-    top: int = 0
+    outline: tuple[tuple[int, int], ...]  # its corners, counter-clockwise; two of a wall, one of a post
+    base: int = 0  # lowest z
+    top: int = 0  # highest z; the base if the set is flat
 
     @property
     def levels(self) -> list[int]:
@@ -79,17 +71,10 @@ class Prism(NamedTuple):
 
 
 def separating(prisms: Sequence[Prism], way: Sequence[Vector], safe: int) -> list[list[Stretch]]:
-    """Vectors that show that a point keeps a distance on its way, each for as many periods as one is found to serve.
-
-    Args:
-        prisms: sets at rest.
-        way: places of the point at the rows, two or more; straight in between. Parts.
-        safe: the distance, parts.
-
-    Returns:
-        For each set stretches that make up the way. If the distance is not kept, the last one serves the rest of it,
-        and is wrong.
-    """
+    """Vectors that show that a point keeps a distance on its way, each for as many periods as one is found to serve."""
+    # way: places of the point at the rows, two or more; straight in between. Parts.
+    # Returns for each set stretches that make up the way. If the distance is not kept, the last one serves the rest of
+    # it, and is wrong.
     rows = np.array(way, dtype=np.float64)
     return [_stretches(prism, way, _Search(prism, way, rows, safe)) for prism in prisms]
 
@@ -160,11 +145,8 @@ class _Search:
 
 
 def apart(prism: Prism, begin: Vector, end: Vector) -> tuple[Fraction, Vector]:
-    """The least distance of a set from a point that moves straight from one place to another, squared, in parts.
-
-    Returns:
-        The square, 0 if they meet, and the vector that separates them: the direction of the distance.
-    """
+    """The least distance of a set from a point that moves straight from one place to another, squared, in parts."""
+    # Returns the square, 0 if they meet, and the vector that separates them: the direction of the distance.
     best = (Fraction(0), (0, 0, 0))
     corners = prism.corners
     for vector in _directions(prism, begin, end):

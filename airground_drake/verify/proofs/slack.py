@@ -17,9 +17,9 @@ from airground_drake.model.plants.budget import Bounds, law_distance
 from airground_drake.scenario.plants import plant_of
 from airground_drake.sim.trace import Trace
 
+# A dip is rounded down by so much, m: the sum of a budget then is no more than its floating-point value. A dip is the
+# bound of an arc that is not attained, by far more.
 ROUNDED_M = Fraction(1, 2**45)
-"""A dip is rounded down by so much, m: the sum of a budget then is no more than its floating-point value. A dip is the
-bound of an arc that is not attained, by far more."""
 
 
 def speed_m_s(trace: Trace, robot: str) -> float:

@@ -19,31 +19,19 @@ from airground_drake.verify.proofs.separating import Vector
 
 
 class Entry(NamedTuple):
-    """A pair, and the periods in which it obeyed the law.
+    """A pair, and the periods in which it obeyed the law."""
 
-    Attributes:
-        demand: the pair, and the distance that it is to keep.
-        first: row at which they begin.
-        many: their number.
-    """
-
-    demand: Demand
-    first: int
-    many: int
+    demand: Demand  # the pair, and the distance that it is to keep
+    first: int  # row at which they begin
+    many: int  # their number
 
 
 class Missed(NamedTuple):
-    """A pair with periods that no entry is about.
+    """A pair with periods that no entry is about."""
 
-    Attributes:
-        demand: the pair.
-        begin_s: when the first of these periods begins, s.
-        end_s: when the last one ends, s.
-    """
-
-    demand: Demand
-    begin_s: float
-    end_s: float
+    demand: Demand  # the pair
+    begin_s: float  # when the first of these periods begins, s
+    end_s: float  # when the last one ends, s
 
 
 def lawful(demands: Iterable[Demand]) -> list[Demand]:
@@ -112,13 +100,8 @@ Ltac decide_entry i j num den x y :=
 
 
 def law_file(run: Recorded, table: Sequence[Entry], *, alone: bool = False) -> str:
-    """The theorem that the entries of a table were checked, and that they keep their promises.
-
-    Args:
-        run: the run.
-        table: its entries, at least one.
-        alone: whether the file has the positions itself, in place of those in the file about distances.
-    """
+    """The theorem that the entries of a table were checked, and that they keep their promises."""
+    # alone: whether the file has the positions itself, in place of those in the file about distances.
     robots = dict.fromkeys(entry.demand.first for entry in table)
     groups = [[entry for entry in table if entry.demand.first == robot] for robot in robots]
     names = [f"{run.name}_table_of_{group[0].demand.first}" for group in groups]

@@ -12,23 +12,14 @@ from types import MappingProxyType
 
 @dataclass(frozen=True)
 class Theorem:
-    """A theorem of the `.v` files.
+    """A theorem of the `.v` files."""
 
-    Attributes:
-        name: file and name in Coq, such as "Safety.safe_always".
-        equation: number of the paper's equation that it is about, or "ours".
-        checked_where: claims (such as "SAFE-HYP") and commands that check the hypotheses.
-        statement: what it says, in one plain sentence.
-        hypotheses: a sentence each.
-        silent_on: what it does not say, in one plain sentence; empty if nothing needs to be said.
-    """
-
-    name: str
-    equation: str
-    checked_where: tuple[str, ...]
-    statement: str
-    hypotheses: tuple[str, ...] = ()
-    silent_on: str = ""
+    name: str  # file and name in Coq, such as "Safety.safe_always"
+    equation: str  # number of the paper's equation that it is about, or "ours"
+    checked_where: tuple[str, ...]  # claims (such as "SAFE-HYP") and commands that check the hypotheses
+    statement: str  # what it says, in one plain sentence
+    hypotheses: tuple[str, ...] = ()  # a sentence each
+    silent_on: str = ""  # what it does not say, in one plain sentence; empty if nothing needs to be said
 
 
 _STABLE = "The product of gain and control period, A h, is at most 1: min(A h, 1) stands for it (Safety.capped)."
@@ -473,5 +464,4 @@ _ALL = (
     ),
 )  # fmt: skip
 
-THEOREMS: Mapping[str, Theorem] = MappingProxyType({theorem.name: theorem for theorem in _ALL})
-"""All theorems by name."""
+THEOREMS: Mapping[str, Theorem] = MappingProxyType({theorem.name: theorem for theorem in _ALL})  # all theorems by name

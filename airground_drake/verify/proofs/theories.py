@@ -15,21 +15,13 @@ from airground_drake.verify.proofs.theorems import THEOREMS
 
 @dataclass(frozen=True)
 class Checked:
-    """What Coq found.
+    """What Coq found."""
 
-    Attributes:
-        coq: its version.
-        sha256: of each theory.
-        axioms: of each theorem.
-        compile_s: how long `coqc` took, s.
-        again_s: how long `coqchk` took, s.
-    """
-
-    coq: str
-    sha256: dict[str, str]
-    axioms: dict[str, list[str]]
-    compile_s: float
-    again_s: float
+    coq: str  # its version
+    sha256: dict[str, str]  # of each theory
+    axioms: dict[str, list[str]]  # of each theorem
+    compile_s: float  # how long `coqc` took, s
+    again_s: float  # how long `coqchk` took, s
 
     @property
     def record(self) -> dict[str, Any]:
@@ -38,13 +30,7 @@ class Checked:
 
 
 def check(source: Path = FOLDER, limit_s: float = coq.LIMIT_S) -> Checked:
-    """Compile all theories, list the axioms of all theorems, and have `coqchk` check everything again.
-
-    Raises:
-        CoqError: if something is not accepted.
-        NoCoqError: if Coq is not installed.
-        OSError: if a theory cannot be read.
-    """
+    """Compile all theories, list the axioms of all theorems, and have `coqchk` check everything again."""
     version = coq.version()
     with files.temporary_folder() as folder:
         started = time.perf_counter()
@@ -71,10 +57,5 @@ def differences(found: Checked, source: Path = FOLDER) -> list[str]:
 
 
 def write_record(found: Checked, source: Path = FOLDER) -> Path:
-    """Write the record.
-
-    Raises:
-        OSError: if it cannot be written.
-    """
     files.write_json(source / RECORD, found.record)
     return source / RECORD

@@ -12,25 +12,17 @@ from airground_drake.base.arrays import Array
 from airground_drake.verify.proofs.export import Demand, Recorded
 from airground_drake.verify.proofs.separating import Prism, Vector, apart
 
-SCREEN_M = 1e-6
-"""Largest error of floating-point distances, m; steps that come near by less are computed exactly."""
+SCREEN_M = 1e-6  # largest error of floating-point distances, m; steps that come near by less are computed exactly
 
 
 @dataclass(frozen=True)
 class TooNear:
-    """A pair that comes nearer than it may.
+    """A pair that comes nearer than it may."""
 
-    Attributes:
-        demand: the pair, and the distance that it is to keep.
-        least_m: least distance of its surfaces; below 0 they overlap.
-        short_m: by how much that is too little.
-        t_s: when the pair is so near.
-    """
-
-    demand: Demand
-    least_m: float
-    short_m: float
-    t_s: float
+    demand: Demand  # the pair, and the distance that it is to keep
+    least_m: float  # least distance of its surfaces; below 0 they overlap
+    short_m: float  # by how much that is too little
+    t_s: float  # when the pair is so near
 
     def __str__(self) -> str:
         """The pair, its distance and the time."""
@@ -40,10 +32,7 @@ class TooNear:
 
 
 def too_near(run: Recorded) -> list[TooNear]:
-    """All pairs that do not keep their distance at all times of the run, in the order of its demands.
-
-    Bodies move straight from row to row, as in the theorem.
-    """
+    """All pairs that do not keep their distance at all times of the run, in the order of its demands."""
     return [found for demand in run.demands if (found := _worst(run, demand)) is not None]
 
 

@@ -8,36 +8,23 @@ from typing import NamedTuple
 from airground_drake.sim.trace import Trace
 from airground_drake.verify.runs.proposals import ProposalRecord, proposal_of
 
-METHOD = "d"
-"""Only this method has tries and rests, and predicts where an accepted intervention leads."""
+METHOD = "d"  # only this method has tries and rests, and predicts where an accepted intervention leads
 
 
 class Acceptance(NamedTuple):
-    """An accepted proposal, from its acceptance until the UGV gives it back, it is withdrawn, or the run ends.
+    """An accepted proposal, from its acceptance until the UGV gives it back, it is withdrawn, or the run ends."""
 
-    Attributes:
-        on: the proposal.
-        t_s: when it was accepted.
-        end_s: when the UGV gave it back, or the gatekeeper's first sample at which it was withdrawn.
-        until_s: when it must be over: its motion has ended, or it has lasted as long as it may.
-        given_back: whether the UGV ended it.
-        news_s: when the UGV sensed an obstacle for the first time that was not on the proposal's map, s.
-    """
-
-    on: ProposalRecord
-    t_s: float
-    end_s: float
-    until_s: float
-    given_back: bool
+    on: ProposalRecord  # the proposal
+    t_s: float  # when it was accepted
+    end_s: float  # when the UGV gave it back, or the gatekeeper's first sample at which it was withdrawn
+    until_s: float  # when it must be over: its motion has ended, or it has lasted as long as it may
+    given_back: bool  # whether the UGV ended it
+    # When the UGV sensed an obstacle for the first time that was not on the proposal's map, s.
     news_s: tuple[float, ...]
 
 
 def acceptances(trace: Trace) -> dict[str, list[Acceptance]]:
-    """All acceptances of a run by UGV and time; {} for another method.
-
-    Raises:
-        TraceError: if a decision is on a proposal that was not sent.
-    """
+    """All acceptances of a run by UGV and time; {} for another method."""
     return {ugv: _of_ugv(trace, ugv) for ugv in trace.ugvs} if trace.meta["method"] == METHOD else {}
 
 

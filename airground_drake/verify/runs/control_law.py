@@ -16,30 +16,21 @@ from airground_drake.verify.engines.outlines import Indices
 from airground_drake.verify.engines.shortfalls import demanded
 from airground_drake.verify.runs.pairs import contacts, is_planar, pairs_beside, parts_of
 
-PLANE = np.array([1.0, 1.0, 0.0])
-"""Directions in which a UGV can move."""
-ON_TOP = ("b", "c")
-"""Methods that put an accepted intervention above the avoidance inequalities, as (20) does."""
+PLANE = np.array([1.0, 1.0, 0.0])  # directions in which a UGV can move
+ON_TOP = ("b", "c")  # methods that put an accepted intervention above the avoidance inequalities, as (20) does
 
 
 class Inequalities(NamedTuple):
-    """Inequalities normal.v >= bound of a robot along its run, C of them.
+    """Inequalities normal.v >= bound of a robot along its run, C of them."""
 
-    They are by control sample; at each, in the order of the controller: barriers at rest, robots, barriers that move.
+    # They are by control sample; at each, in the order of the controller: barriers at rest, robots, barriers that move.
 
-    Attributes:
-        sample: number of the control sample, (C,).
-        column: what is avoided, (C,): the number of a part in `pairs.parts_of`, or that of a robot after all parts.
-        normal: (C, 3).
-        bound: (C,), m/s.
-        retreat: n.v at which the robot should retreat, (C,), m/s, a task below all inequalities; 0: it need not.
-    """
-
-    sample: Indices
+    sample: Indices  # number of the control sample, (C,)
+    # What is avoided, (C,): the number of a part in `pairs.parts_of`, or that of a robot after all parts.
     column: Indices
-    normal: Array
-    bound: Array
-    retreat: Array
+    normal: Array  # (C, 3)
+    bound: Array  # (C,), m/s
+    retreat: Array  # n.v at which the robot should retreat, (C,), m/s, a task below all inequalities; 0: it need not
 
     def slack(self, velocity: Array) -> Array:
         """Slack of the velocities at the control samples, (S, 3), in each inequality, (C,), m/s."""
@@ -47,20 +38,10 @@ class Inequalities(NamedTuple):
 
 
 def least_speeds(distance: Array, safe: Array, share: Array, control: Control, speed: Array | float = 0.0) -> Array:
-    """Set-based avoidance (7)-(8), (11): n.v >= share A (d - D) where D <= d, else n.v >= share (d - D) / h.
-
-    Beside a body that may move with V > 0 it is n.v >= -(D - d - V h) / h, and never more than n.v >= 0.
-
-    Args:
-        distance: D, (...), m.
-        safe: d, (...), m.
-        share: of each inequality, (...).
-        control: A, h and sensing range R of the scenario.
-        speed: V, (...), m/s.
-
-    Returns:
-        The bounds, (...), m/s; -inf where D > R: nothing is asked there.
-    """
+    """Set-based avoidance (7)-(8), (11): n.v >= share A (d - D) where D <= d, else n.v >= share (d - D) / h."""
+    # Beside a body that may move with V > 0 it is n.v >= -(D - d - V h) / h, and never more than n.v >= 0.
+    # distance, safe: m; speed: m/s
+    # Returns the bounds, (...), m/s; -inf where D > R: nothing is asked there.
     period = control.period_s
     bound = share * demanded(safe - distance, control.avoidance_gain_1_s, 1.0 / period)
     passive = np.minimum(-(distance - safe - speed * period) / period, 0.0)
@@ -73,10 +54,7 @@ def retreats(distance: Array, safe: Array, speed: Array, period_s: float) -> Arr
 
 
 def inequalities_of(trace: Trace, robot: str, *, as_seen: bool = False) -> Inequalities:
-    """The inequalities of a robot at the control samples of its run, beside all that is within sensing range.
-
-    They are those of the true positions, or of the positions that the robot saw.
-    """
+    """The inequalities of a robot at the control samples of its run, beside all that is within sensing range."""
     samples, parts, control = trace.sample_rows, parts_of(trace), trace.scenario.control
     planar, pairs = is_planar(trace, robot), pairs_beside(trace, robot)
 

@@ -14,8 +14,7 @@ from airground_drake.base.arrays import Array
 from airground_drake.base.errors import TraceError
 from airground_drake.verify.runs.gate_record import DecisionRecord
 
-WIDE = 1e-5
-"""Relative width of an enclosure above which a better omega* is looked for."""
+WIDE = 1e-5  # relative width of an enclosure above which a better omega* is looked for
 
 
 @dataclass(frozen=True)
@@ -33,13 +32,11 @@ class Enclosure:
 
 
 def enclose(rows: Sequence[DecisionRecord]) -> list[Enclosure]:
-    """Bounds of the optimum over omega in [0, 1]^N of the cost with distances along the half-planes' normals.
-
-    For any multipliers l_kj >= 0 of u_k >= d_j - n_kj.(rho_k - o_kj), minimising the Lagrangian over u leaves
-    q(omega) - sum_k (sum_j l_kj)^2 / (4 dt b) with q convex and quadratic. The tangent of q at any omega* is below q
-    everywhere, and its minimum is at a corner of the box. Both l and omega* are the solver's; neither need be good.
-    Where costs are tiny, the solver's omega* is not accurate enough, and the minimiser of q is used, too.
-    """
+    """Bounds of the optimum over omega in [0, 1]^N of the cost with distances along the half-planes' normals."""
+    # For any multipliers l_kj >= 0 of u_k >= d_j - n_kj.(rho_k - o_kj), minimising the Lagrangian over u leaves
+    # q(omega) - sum_k (sum_j l_kj)^2 / (4 dt b) with q convex and quadratic. The tangent of q at any omega* is below q
+    # everywhere, and its minimum is at a corner of the box. Both l and omega* are the solver's; neither need be good.
+    # Where costs are tiny, the solver's omega* is not accurate enough, and the minimiser of q is used, too.
     if not rows:
         return []
     found = []
@@ -82,13 +79,8 @@ def _minimiser(row: DecisionRecord, multiplier: Array) -> Array:
 
 
 def _solve(rows: Sequence[DecisionRecord]) -> tuple[list[Array], list[Array]]:
-    """Relaxed plans (N,) and multipliers (N, m) >= 0, costs relative to each scale, of all rows as one program.
-
-    Variables, stage by stage of row by row: task errors e = rho - reference, omega and u.
-
-    Raises:
-        TraceError: if the solver gives no solution at all.
-    """
+    """Relaxed plans (N,) and multipliers (N, m) >= 0, costs relative to each scale, of all rows as one program."""
+    # Variables, stage by stage of row by row: task errors e = rho - reference, omega and u.
     import cvxpy  # takes a second, which other claims need not wait for
 
     cp: Any = cvxpy  # its types are incomplete

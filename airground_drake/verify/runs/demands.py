@@ -25,24 +25,19 @@ from airground_drake.verify.runs.control_law import ON_TOP
 from airground_drake.verify.runs.pairs import carried, declared_pairs, pairs_beside, parts_of
 
 CONTROLLERS = ("ugv_controller", "uav_controller")
-NO_INTERVENTION = "a"
-"""Method without interventions."""
+NO_INTERVENTION = "a"  # method without interventions
+# Parameters that are outlines: of what is at rest, and of what moves, about its origin.
 OUTLINES = ("outlines", "moving_outlines")
-"""Parameters that are outlines: of what is at rest, and of what moves, about its origin."""
-SAME_M = 1e-12
-"""Distances that differ by no more are equal, m: two ways to add up a budget round differently."""
-PLANAR, SPATIAL = (1.0, 1.0, 0.0), (1.0, 1.0, 1.0)
-"""Directions in which UGVs and UAVs move."""
+SAME_M = 1e-12  # distances that differ by no more are equal, m: two ways to add up a budget round differently
+PLANAR, SPATIAL = (1.0, 1.0, 0.0), (1.0, 1.0, 1.0)  # directions in which UGVs and UAVs move
 
 
 def demanded(trace: Trace) -> dict[str, dict[str, Any]]:
-    """The parameters of both controllers by the scenario, as `blocks.controllers.read_back` names them; flat arrays.
-
-    Outlines are without the circles round their corners.
-
-    Every robot avoids all convex parts of the barriers at rest, then all other robots in team order, then the parts of
-    the barriers that move.
-    """
+    """The parameters of both controllers by the scenario, as `systems.controllers.read_back` names them; flat."""
+    # Outlines are without the circles round their corners.
+    #
+    # Every robot avoids all convex parts of the barriers at rest, then all other robots in team order, then the parts
+    # of the barriers that move.
     scenario, robots, parts = trace.scenario, trace.robots, parts_of(trace)
     control, barriers, everybody = scenario.control, scenario.barriers, np.arange(len(robots))
     still, moving = _numbers(trace)

@@ -36,8 +36,7 @@ from airground_drake.verify.runs.pairs import (
 )
 from airground_drake.verify.runs.passive import AT_LIMIT_M_S, STANDING_M_S, Periods, periods_of
 
-BLOCKED_M_S = 1e-6
-"""An inequality blocks a retreat if the retreat would miss it by more than this, m/s."""
+BLOCKED_M_S = 1e-6  # an inequality blocks a retreat if the retreat would miss it by more than this, m/s
 
 
 def samples_before(trace: Trace) -> Indices:
@@ -58,20 +57,17 @@ def steps_of(trace: Trace, robot: str) -> Array:
 
 
 class OwnMargins(NamedTuple):
-    """What a robot left of a distance by its own doing, in the T - 1 segments between rows, (T - 1,), m.
+    """What a robot left of a distance by its own doing, in the T - 1 segments between rows, (T - 1,), m."""
 
-    inf: the two were too far apart for one period to matter, or not both there.
+    # inf: the two were too far apart for one period to matter, or not both there.
 
-    Attributes:
-        of_law: of min(D, L) - c, which the theorem promises. D is the distance of the steered points at the control
-            sample, L what the law keeps, V h included, and c how far both bodies may be from the steered points. Bodies
-            that are nearer than D - c already may stay so.
-        of_body: of min(D, d) where the gap is below the required one: D of the bodies at the sample, d the distance to
-            keep. Only c lets it fall below the margin of the law. Where two bodies start or appear too near, it is not
-            asked until they have been apart.
-    """
-
+    # Of min(D, L) - c, which the theorem promises. D is the distance of the steered points at the control sample, L
+    # what the law keeps, V h included, and c how far both bodies may be from the steered points. Bodies that are nearer
+    # than D - c already may stay so.
     of_law: Array
+    # Of min(D, d) where the gap is below the required one: D of the bodies at the sample, d the distance to keep. Only
+    # c lets it fall below the margin of the law. Where two bodies start or appear too near, it is not asked until they
+    # have been apart.
     of_body: Array
 
     @property
@@ -132,41 +128,28 @@ def _steered(trace: Trace, pair: Pair, robot: str, each: Cores, rows: Indices) -
 
 
 class Encounter(NamedTuple):
-    """How two bodies came nearer to each other than required.
+    """How two bodies came nearer to each other than required."""
 
-    Attributes:
-        first: the robot.
-        second: the obstacle or the other robot.
-        required_m: gap to keep.
-        gap_m: the least gap; 0 where they overlap.
-        t_s: when they collided, or else when the gap was least.
-        collided: whether they did; the model lets both go on.
-        doing: `robot` if the motion of a robot itself took of the distance; `under way` if it did so only within what
-            the law grants to a body that lags or gets its commands late; `other` if the other body's motion took all;
-            `nobody` if they started or appeared there.
-        under_way_m: how far a body that lags or gets its commands late drove on, from where it was last as far as
-            required, or where the other appeared, to where the gap was least; 0 unless that is why, or it appeared.
-        appeared: whether the obstacle appeared nearer than required.
-        reaction: what the robot did beside an obstacle that may move: `retreated at its limit`, `retreated`, `stood` or
-            `moved aside`; '' beside others.
-        speed_m_s: of the robot's command then.
-        blocked_by: the bodies whose inequalities kept it from retreating.
-        caught_s: from when to when they did, without a pause; () if never.
-    """
-
-    first: str
-    second: str
-    required_m: float
-    gap_m: float
-    t_s: float
-    collided: bool
+    first: str  # the robot
+    second: str  # the obstacle or the other robot
+    required_m: float  # gap to keep
+    gap_m: float  # the least gap; 0 where they overlap
+    t_s: float  # when they collided, or else when the gap was least
+    collided: bool  # whether they did; the model lets both go on
+    # `robot` if the motion of a robot itself took of the distance; `under way` if it did so only within what the law
+    # grants to a body that lags or gets its commands late; `other` if the other body's motion took all; `nobody` if
+    # they started or appeared there.
     doing: str
+    # How far a body that lags or gets its commands late drove on, from where it was last as far as required, or where
+    # the other appeared, to where the gap was least; 0 unless that is why, or it appeared.
     under_way_m: float
-    appeared: bool
+    appeared: bool  # whether the obstacle appeared nearer than required
+    # What the robot did beside an obstacle that may move: `retreated at its limit`, `retreated`, `stood` or `moved
+    # aside`; '' beside others.
     reaction: str = ""
-    speed_m_s: float = 0.0
-    blocked_by: tuple[str, ...] = ()
-    caught_s: tuple[float, ...] = ()
+    speed_m_s: float = 0.0  # of the robot's command then
+    blocked_by: tuple[str, ...] = ()  # the bodies whose inequalities kept it from retreating
+    caught_s: tuple[float, ...] = ()  # from when to when they did, without a pause; () if never
 
     def told(self, trace: Trace) -> str:
         """Whose doing it was, in a sentence without a full stop."""
@@ -247,7 +230,7 @@ def _way_m(trace: Trace, pair: Pair, gaps: Array, t_s: float) -> float:
 
 
 def _with_reaction(trace: Trace, pair: Pair, gaps: Array, found: Encounter) -> Encounter:
-    """The same with what the robot did beside an obstacle that may move, and what kept it from more."""
+    """An encounter, with what the robot did beside an obstacle that may move, and what kept it from more."""
     periods, t_s = periods_of(trace, pair), found.t_s
     before = np.flatnonzero((trace.t[periods.row] < t_s) | (periods.row == pair.row))
     k = int(before[-1])

@@ -22,12 +22,12 @@ from airground_drake.verify.finding import Finding
 from airground_drake.verify.runs.control_law import ON_TOP
 from airground_drake.verify.runs.instants import GATED_METHODS, silent, talk_is_due, without_proposals
 
+# Recorded and recomputed positions may differ by this, m: rounding of N additions errs by 1e-13 m.
 POSITION_TOLERANCE_M = 1e-9
-"""Recorded and recomputed positions may differ by this, m: rounding of N additions errs by 1e-13 m."""
+# Costs are compared relative to the cheaper constant plan's, but to no less than this: 1 mm of error for 1 s.
 LEAST_COST = 1e-6
-"""Costs are compared relative to the cheaper constant plan's, but to no less than this: 1 mm of error for 1 s."""
+# Arrays of a problem that a route may leave out.
 MAY_BE_EMPTY = ("plan", "positions_m", "relaxed", "rounded", "normals")
-"""Arrays of a problem that a route may leave out."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,11 +66,7 @@ class DecisionRecord:
         return int(self.given["number"])
 
     def __getitem__(self, name: str) -> Array:
-        """An array that must be there.
-
-        Raises:
-            TraceError: if it is missing.
-        """
+        """An array that must be there."""
         found = self.data[name]
         if found is None:
             raise TraceError(f"{self.label}: the problem has no {name!r}")
@@ -155,12 +151,7 @@ class DecisionRecord:
 
 
 def rows_of(trace: Trace) -> list[DecisionRecord]:
-    """All decisions, with their problems (26); method (d) has no problems.
-
-    Raises:
-        TraceError: if the tables do not belong together, decisions are not in order, a shape is wrong, a number is
-            not finite, or a decision is not of a UGV.
-    """
+    """All decisions, with their problems (26); method (d) has no problems."""
     given = [{str(name): value for name, value in row.items()} for row in trace.decisions.to_dict("records")]
     due = len(given) if trace.meta["method"] in ON_TOP else 0
     if len(trace.problems) != due:
@@ -226,15 +217,8 @@ class Deviation:
     """A comparison: how far a recorded value is from what it should be, and how far it may be."""
 
     def __init__(self, row: DecisionRecord, what: str, by: Any, allowed: float, **more: Any) -> None:
-        """Compare.
-
-        Args:
-            row: the decision.
-            what: is compared.
-            by: differences, of any shape; the largest absolute one counts.
-            allowed: largest difference allowed.
-            more: goes into a counterexample.
-        """
+        """Compare."""
+        # by: differences, of any shape; the largest absolute one counts.
         self.row = row
         self.what = what
         self.allowed = allowed
@@ -266,10 +250,8 @@ def conclude(finding: Finding, compared: Iterable[Deviation]) -> Finding:
 
 
 def without_decisions(trace: Trace) -> list[str]:
-    """UGVs that never decided, though they executed something, or got a proposal and were intervened on long enough.
-
-    This is no refutation: their proposals may have been withdrawn at once.
-    """
+    """UGVs that never decided, though they executed something, or got a proposal and were intervened on long enough."""
+    # This is no refutation: their proposals may have been withdrawn at once.
     asked = [ugv for ugv in trace.ugvs if talk_is_due(trace, ugv) and ugv not in without_proposals(trace)]
     called = [ugv for ugv in trace.ugvs if (trace.executing(ugv) >= 0).any() or ugv in asked]
     return [ugv for ugv in called if not (trace.decisions["robot"] == ugv).any()]

@@ -11,8 +11,7 @@ from airground_drake.sim.trace import Trace
 from airground_drake.verify.claim import TIME_TOLERANCE_S
 from airground_drake.verify.finding import Finding
 
-GATED_METHODS = ("c", "d")
-"""Methods with an optimising gatekeeper."""
+GATED_METHODS = ("c", "d")  # methods with an optimising gatekeeper
 
 
 def row_at(trace: Trace, t_s: float) -> int:

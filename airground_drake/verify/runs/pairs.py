@@ -50,42 +50,28 @@ from airground_drake.verify.engines.outlines import (
 
 
 class Pair(NamedTuple):
-    """A robot, and a barrier or another robot that it must keep away from.
+    """A robot, and a barrier or another robot that it must keep away from."""
 
-    Attributes:
-        first: the robot.
-        second: the barrier or other robot.
-        required_m: gap to keep: the obstacle's own distance, or else the scenario's of the kind of pair.
-        radii_m: sum of both radii.
-        share: part of the avoidance inequality that each robot takes: all beside a barrier, half beside a robot.
-        reach_m: how far they can approach each other in one control period.
-        row: from which on both are there.
-        last: row up to which both are there.
-        speed_m_s: at which robots expect the barrier to move at most; above 0 the robot's law is the passive one.
-        more_m: distance that the law keeps beyond `safe_m`.
-        cover_m: how far both bodies may be from the points that the law steers after a period, together: what users'
-            plants may miss of their commands included.
-        drift_m: the part of `more_m` that makes up for missed commands.
-        slip_m: how much of its command the robot may miss in a control period.
-        drawn_m: how far a robot that never drives backwards is behind its steered point, beside a barrier at rest.
-        under_way_s: for how long commands already given lead the bodies, where the theorem asks for a safe start of the
-            bodies, too (drawn, lagging or late ones); None where it does not.
-    """
-
-    first: str
-    second: str
-    required_m: float
-    radii_m: float
-    share: float
-    reach_m: float
-    row: int = 0
-    last: int | None = None
+    first: str  # the robot
+    second: str  # the barrier or other robot
+    required_m: float  # gap to keep: the obstacle's own distance, or else the scenario's of the kind of pair
+    radii_m: float  # sum of both radii
+    share: float  # part of the avoidance inequality that each robot takes: all beside a barrier, half beside a robot
+    reach_m: float  # how far they can approach each other in one control period
+    row: int = 0  # from which on both are there
+    last: int | None = None  # row up to which both are there
+    # At which robots expect the barrier to move at most; above 0 the robot's law is the passive one.
     speed_m_s: float = 0.0
-    more_m: float = 0.0
+    more_m: float = 0.0  # distance that the law keeps beyond `safe_m`
+    # How far both bodies may be from the points that the law steers after a period, together: what users' plants may
+    # miss of their commands included.
     cover_m: float = 0.0
-    drift_m: float = 0.0
-    slip_m: float = 0.0
+    drift_m: float = 0.0  # the part of `more_m` that makes up for missed commands
+    slip_m: float = 0.0  # how much of its command the robot may miss in a control period
+    # How far a robot that never drives backwards is behind its steered point, beside a barrier at rest.
     drawn_m: float = 0.0
+    # For how long commands already given lead the bodies, where the theorem asks for a safe start of the bodies, too
+    # (drawn, lagging or late ones); None where it does not.
     under_way_s: float | None = None
 
     @property
@@ -104,40 +90,30 @@ class Pair(NamedTuple):
         return self.safe_m + self.more_m
 
     def keeps_m(self, period_s: float) -> float:
-        """The same and V h: who keeps it at a sample keeps d for a period, whatever the barrier does."""
+        """`law_m` and V h: who keeps it at a sample keeps d for a period, whatever the barrier does."""
         return self.law_m + self.speed_m_s * period_s
 
 
 class Gap(NamedTuple):
-    """Where the gap of a pair was smallest.
+    """Where the gap of a pair was smallest."""
 
-    Attributes:
-        pair: the two bodies.
-        gap_m: distance of their surfaces; below 0 they overlap.
-        margin_m: how much more that is than the gap required.
-        t_s: when, the earliest time.
-        row: row of the trace that ends the segment on which it was.
-    """
-
-    pair: Pair
-    gap_m: float
-    margin_m: float
-    t_s: float
-    row: int
+    pair: Pair  # the two bodies
+    gap_m: float  # distance of their surfaces; below 0 they overlap
+    margin_m: float  # how much more that is than the gap required
+    t_s: float  # when, the earliest time
+    row: int  # row of the trace that ends the segment on which it was
 
 
 def pairs_of(trace: Trace) -> tuple[Pair, ...]:
-    """All robot/barrier and robot/robot pairs of a run, with the safe distances of its scenario.
-
-    Barriers that do not appear before the end are in none.
-
-    Those of one robot come in the order in which its controller lists them: barriers, then robots in array order.
-    """
+    """All robot/barrier and robot/robot pairs of a run, with the safe distances of its scenario."""
+    # Barriers that do not appear before the end are in none.
+    #
+    # Those of one robot come in the order in which its controller lists them: barriers, then robots in array order.
     return trace.derived("pairs", lambda: tuple(pair for pair in declared_pairs(trace) if pair.row < len(trace.t)))
 
 
 def declared_pairs(trace: Trace) -> Iterator[Pair]:
-    """The same with barriers that do not appear before the end."""
+    """All robot/barrier and robot/robot pairs, also those with barriers that do not appear before the end."""
     safe, uav, period = trace.scenario.safe_distance, trace.scenario.uav.name, trace.scenario.control.period_s
     radius = {name: robot.radius_m for name, robot in trace.scenario.robots.items()}
     limit = {name: robot.max_speed_m_s for name, robot in trace.scenario.robots.items()}
@@ -170,19 +146,12 @@ def declared_pairs(trace: Trace) -> Iterator[Pair]:
 
 
 class Parts(NamedTuple):
-    """The convex parts of all barriers of a scenario, m of them in the order of the barriers and their parts.
+    """The convex parts of all barriers of a scenario, m of them in the order of the barriers and their parts."""
 
-    Attributes:
-        cores: (m, ...), world frame; those of a barrier that moves are about its origin.
-        owner: the barrier of each, by its number in the order of `names`, (m,).
-        first: number of the first part of each barrier.
-        names: of the barriers.
-    """
-
-    cores: Cores
-    owner: Indices
-    first: Indices
-    names: list[str]
+    cores: Cores  # (m, ...), world frame; those of a barrier that moves are about its origin
+    owner: Indices  # the barrier of each, by its number in the order of `names`, (m,)
+    first: Indices  # number of the first part of each barrier
+    names: list[str]  # of the barriers
 
 
 def parts_of(trace: Trace) -> Parts:
@@ -235,10 +204,8 @@ def carried(trace: Trace) -> list[tuple[Indices, Array | None]]:
 
 
 def contacts(trace: Trace, places: Array, rows: Indices, reach: float, *, planar: bool) -> Contacts:
-    """Pairs of a place and a part of a barrier within a distance, m; the places, (K, 3), m, are in the order of a way.
-
-    Barriers that move are taken where they are at each of the K rows; those that are absent there count for nothing.
-    """
+    """Pairs of a place and a part of a barrier within a distance, m; places, (K, 3), m, are in the order of a way."""
+    # Barriers that move are taken where they are at each of the K rows; those that are absent there count for nothing.
     parts = parts_of(trace)
     found = list[Contacts]()
     for some, origin in carried(trace):
@@ -285,11 +252,9 @@ def numbers_of(trace: Trace) -> dict[frozenset[str], int]:
 
 
 def least_gap(trace: Trace, pair: Pair) -> Gap:
-    """The smallest gap of a pair over continuous time.
-
-    It is exact if both bodies move on straight lines between rows, and to `BENT_M` where it is below the one required;
-    else it is a lower bound.
-    """
+    """The smallest gap of a pair over continuous time."""
+    # It is exact if both bodies move on straight lines between rows, and to `BENT_M` where it is below the one
+    # required; else it is a lower bound.
     return trace.derived(("least gap", pair.first, pair.second), lambda: _least_gap(trace, pair))
 
 
@@ -310,10 +275,8 @@ def _least_gap(trace: Trace, pair: Pair) -> Gap:
 
 
 def start_margin(trace: Trace, pair: Pair) -> float:
-    """By how much the bodies of a pair exceed their distance when both are first there, m; inf where none is needed.
-
-    Commands that were given before then lead a body with a delay on for that time, so its way counts, too.
-    """
+    """By how much the bodies of a pair exceed their distance when both are first there, m; inf where none is needed."""
+    # Commands that were given before then lead a body with a delay on for that time, so its way counts, too.
     if pair.under_way_s is None:
         return inf
     until = trace.t[pair.row] + pair.under_way_s - MERGE_S
@@ -470,10 +433,8 @@ def pairs_beside(trace: Trace, robot: str) -> dict[str, Pair]:
 
 
 def apart_of(trace: Trace) -> Array:
-    """A lower bound of the distance of each pair, as of `Pair.safe_m`, over the run: (P,), m, as in `pairs_of`.
-
-    Obstacles count as there all the time.
-    """
+    """A lower bound of the distance of each pair, as of `Pair.safe_m`, over the run: (P,), m, as in `pairs_of`."""
+    # Obstacles count as there all the time.
     return trace.derived("apart", lambda: _apart_of(trace))
 
 
@@ -515,14 +476,7 @@ def bends_of(trace: Trace, name: str) -> Array:
 
 
 def least_of(bounds: Array, most: int, value: Callable[[int], float]) -> list[int]:
-    """Indices of the smallest of K values, in increasing order; few values have to be computed.
-
-    Args:
-        bounds: lower bounds of the values, (K,).
-        most: how many indices are wanted.
-        value: computes the k-th value. No wanted value is above the largest of any `most` values, so values with larger
-            bounds are not computed.
-    """
+    """Indices of the smallest of K values, in increasing order; few values have to be computed; `bounds` (K,)."""
     if len(bounds) <= most:
         return list(range(len(bounds)))
     enough = max(value(int(k)) for k in np.argsort(bounds, kind="stable")[:most])
@@ -536,10 +490,8 @@ def preset_of(trace: Trace, ugv: str) -> tuple[Array, float]:
 
 
 def snapshot(trace: Trace, names: Iterable[str], t_s: float) -> dict[str, Any]:
-    """Positions of the robots among `names` at a time, and their velocities just after it.
-
-    Of a barrier it is the point of its core that is nearest to the first of these robots.
-    """
+    """Positions of the robots among `names` at a time, and their velocities just after it."""
+    # Of a barrier it is the point of its core that is nearest to the first of these robots.
     t, given = trace.t, list(names)
     row = min(int(np.searchsorted(t, t_s + MERGE_S)), len(t) - 1)
     moving = [name for name in given if name in trace.robots]
@@ -557,12 +509,10 @@ def snapshot(trace: Trace, names: Iterable[str], t_s: float) -> dict[str, Any]:
     }
 
 
+# Segments in which a body that does not move straight may be too near are divided until they are this straight, m.
 BENT_M = 1e-10
-"""Segments in which a body that does not move straight may be too near are divided until they are this straight, m."""
-MOST_PARTS = 5000
-"""Parts of such a segment at most."""
-FEW_PARTS = 50
-"""Parts into which it is divided first."""
+MOST_PARTS = 5000  # parts of such a segment at most
+FEW_PARTS = 50  # parts into which it is divided first
+# A distance may be this much below the safe one, m: the controller steers *onto* the safe distance, and sums of some
+# thousand rounded steps err by 1e-12 m. The reported margin does not contain it.
 DISTANCE_TOLERANCE_M = 1e-9
-"""A distance may be this much below the safe one, m: the controller steers *onto* the safe distance, and sums of
-some thousand rounded steps err by 1e-12 m. The reported margin does not contain it."""

@@ -21,10 +21,8 @@ from airground_drake.verify.engines.outlines import Indices, away_from
 from airground_drake.verify.engines.shortfalls import POINT, SCREEN_M, shortfalls
 from airground_drake.verify.runs.pairs import DISTANCE_TOLERANCE_M, Pair, cores_of, is_planar, origin_of, pairs_of
 
-STANDING_M_S = 1e-9
-"""A robot that is commanded no more than this stands, m/s."""
-AT_LIMIT_M_S = 1e-6
-"""A speed this near to the limit is at the limit, m/s."""
+STANDING_M_S = 1e-9  # a robot that is commanded no more than this stands, m/s
+AT_LIMIT_M_S = 1e-6  # a speed this near to the limit is at the limit, m/s
 
 Flags = npt.NDArray[np.bool_]
 
@@ -47,27 +45,16 @@ def last_period(trace: Trace) -> Fraction:
 
 
 class Periods(NamedTuple):
-    """The control periods in which both bodies of a pair are there, K of them.
+    """The control periods in which both bodies of a pair are there, K of them."""
 
-    Attributes:
-        pair: a robot and an obstacle that may move.
-        row: at which each begins, (K,).
-        apart_m: D at that row, (K,), m.
-        normal: away from the nearest point of the obstacle, (K, 3).
-        keeps_m: d + V h, m.
-        missed_m: how far the robot misses the passive law, (K,), m per period; 0: it is met.
-        too_fast: whether the obstacle moves faster than it is expected to, (K,).
-        velocity: of the robot, (K, 3), m/s.
-    """
-
-    pair: Pair
-    row: Indices
-    apart_m: Array
-    normal: Array
-    keeps_m: float
-    missed_m: Array
-    too_fast: Flags
-    velocity: Array
+    pair: Pair  # a robot and an obstacle that may move
+    row: Indices  # at which each begins, (K,)
+    apart_m: Array  # D at that row, (K,), m
+    normal: Array  # away from the nearest point of the obstacle, (K, 3)
+    keeps_m: float  # d + V h, m
+    missed_m: Array  # how far the robot misses the passive law, (K,), m per period; 0: it is met
+    too_fast: Flags  # whether the obstacle moves faster than it is expected to, (K,)
+    velocity: Array  # of the robot, (K, 3), m/s
 
     @property
     def passive(self) -> Flags:
@@ -142,13 +129,12 @@ def speeds(trace: Trace) -> dict[str, Array]:
 
 @dataclass(frozen=True)
 class BesideMoving:
-    """A robot beside an obstacle that may move, in numbers of control periods.
+    """A robot beside an obstacle that may move, in numbers of control periods."""
 
-    `kept_periods`: all hypotheses were met, so that the distance is proved whatever the obstacle does within its
-    declared speed. In the `passive_periods` it was too near for that, and the robot did not bring itself nearer; in
-    `standing_periods` of these it stood. In `retreating_periods` it retreated so fast that it would have kept the
-    distance, and all that it lost is the obstacle's motion above its declared speed.
-    """
+    # `kept_periods`: all hypotheses were met, so that the distance is proved whatever the obstacle does within its
+    # declared speed. In the `passive_periods` it was too near for that, and the robot did not bring itself nearer; in
+    # `standing_periods` of these it stood. In `retreating_periods` it retreated so fast that it would have kept the
+    # distance, and all that it lost is the obstacle's motion above its declared speed.
 
     first: str
     second: str

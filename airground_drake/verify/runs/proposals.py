@@ -16,40 +16,22 @@ from airground_drake.verify.engines.outlines import unpacked
 
 @dataclass(frozen=True, eq=False)
 class ProposalRecord:
-    """A proposal: a row of `Trace.proposals`.
+    """A proposal: a row of `Trace.proposals`."""
 
-    Attributes:
-        number: identifies it.
-        ugv: the UGV that gets it.
-        policy: the policy that made it.
-        issued_s: time of sending.
-        times_s: times of the vertices of the motion that it asks for, (M,).
-        positions_m: the vertices, (M, 3).
-        selection: J_int of (12)-(14), (m, 3).
-        mapped: outlines of the obstacles on the UAV's map, (k, W), see `model.geometry.outline`.
-        cause: UGV whose trigger it was sent for: `ugv`, or another UGV that `ugv` is to make way for.
-        party: UGVs with a part in the same joint plan; empty: it stands alone.
-    """
-
-    number: int
-    ugv: str
-    policy: str
-    issued_s: float
-    times_s: Array
-    positions_m: Array
-    selection: Array
-    mapped: Array
-    cause: str
-    party: tuple[str, ...]
+    number: int  # identifies it
+    ugv: str  # the UGV that gets it
+    policy: str  # the policy that made it
+    issued_s: float  # time of sending
+    times_s: Array  # times of the vertices of the motion that it asks for, (M,)
+    positions_m: Array  # the vertices, (M, 3)
+    selection: Array  # J_int of (12)-(14), (m, 3)
+    mapped: Array  # outlines of the obstacles on the UAV's map, (k, W), see `model.geometry.outline`
+    cause: str  # UGV whose trigger it was sent for: `ugv`, or another UGV that `ugv` is to make way for
+    party: tuple[str, ...]  # UGVs with a part in the same joint plan; empty: it stands alone
 
 
 def proposals_of(trace: Trace) -> list[ProposalRecord]:
-    """All proposals of a run, by time.
-
-    Raises:
-        TraceError: if one is malformed, two have the same number, they are not those of the events, or a decision is
-            on a proposal that its UGV never got.
-    """
+    """All proposals of a run, by time."""
     return trace.derived("proposals", lambda: _proposals_of(trace))
 
 
@@ -97,11 +79,6 @@ def _proposals_of(trace: Trace) -> list[ProposalRecord]:
 
 
 def proposal_of(trace: Trace, number: int) -> ProposalRecord:
-    """The proposal with a number.
-
-    Raises:
-        TraceError: if no proposal has it.
-    """
     found = trace.derived("proposals by number", lambda: {one.number: one for one in proposals_of(trace)})
     if number not in found:
         raise TraceError(f"no proposal has the number {number}")

@@ -9,18 +9,12 @@ import numpy as np
 from airground_drake.base.errors import TraceError
 from airground_drake.verify.runs.gate_record import DecisionRecord, Deviation
 
-TIE = 1e-9
-"""Accumulated deficits closer to 1/2 than this are a tie: either mode may follow."""
-ROUNDED_ROUTES = ("relaxed", "nonlinear")
-"""Routes that solve (27) and round by (28)-(29)."""
+TIE = 1e-9  # accumulated deficits closer to 1/2 than this are a tie: either mode may follow
+ROUNDED_ROUTES = ("relaxed", "nonlinear")  # routes that solve (27) and round by (28)-(29)
 
 
 def is_rounded(row: DecisionRecord) -> bool:
-    """Whether a relaxed plan or a rounded one was recorded; each needs the other.
-
-    Raises:
-        TraceError: if a route that rounds claims to have solved the problem, but recorded neither.
-    """
+    """Whether a relaxed plan or a rounded one was recorded; each needs the other."""
     found = row.data["relaxed"] is not None or row.data["rounded"] is not None
     if not found and row.given["route"] in ROUNDED_ROUTES and row.given["status"] == "optimal":
         raise TraceError(f"{row.label} claims to be complete, but has no relaxation")
@@ -33,12 +27,10 @@ def integrated_error_s(row: DecisionRecord) -> float:
 
 
 def compare_rounding(row: DecisionRecord) -> Iterator[Deviation]:
-    """Compare the rounded plan with the rule (28)-(29), and the recorded numbers with the plans.
-
-    Each stage is judged by the deficit that the recorded stages before it leave, so that one wrong stage does not
-    blur the next. The integrated error is judged against its own bound as well, so that the verdict does not rest on
-    the theorem that follows from the rule.
-    """
+    """Compare the rounded plan with the rule (28)-(29), and the recorded numbers with the plans."""
+    # Each stage is judged by the deficit that the recorded stages before it leave, so that one wrong stage does not
+    # blur the next. The integrated error is judged against its own bound as well, so that the verdict does not rest on
+    # the theorem that follows from the rule.
     relaxed, rounded, given = row["relaxed"], row["rounded"], row.given
     yield Deviation(row, "relaxed omega is outside [0, 1]", np.maximum(0.0, np.abs(relaxed - 0.5) - 0.5), 0.0)
     yield Deviation(row, "rounded omega is not binary", np.minimum(np.abs(rounded), np.abs(rounded - 1.0)), 0.0)

@@ -17,17 +17,14 @@ from airground_drake.verify.claim import TIME_TOLERANCE_S
 from airground_drake.verify.engines.geometry import NormSignal, corner_times, interpolate, travelled
 from airground_drake.verify.runs.pairs import preset_of
 
-Transition = tuple[float, str]
-"""Time in s, and a key of MODES or kind of event."""
+Transition = tuple[float, str]  # time in s, and a key of MODES or kind of event
 
-Conflict = dict[str, Any]
-"""A disagreement: `t_s`, `what`, and the values on both sides."""
+Conflict = dict[str, Any]  # a disagreement: `t_s`, `what`, and the values on both sides
 
+# Noise at a row may differ by this, m, from the row before and the sample of its period: rows closer than 1e-9 s are
+# one, and noise moves by less in that time.
 NOISE_TOLERANCE_M = 1e-8
-"""Noise at a row may differ by this, m, from the row before and the sample of its period: rows closer than 1e-9 s are
-one, and noise moves by less in that time."""
-LARGEST_SAMPLE = 9.0
-"""Standard deviations: one normal sample in 1e19 is larger."""
+LARGEST_SAMPLE = 9.0  # standard deviations: one normal sample in 1e19 is larger
 
 
 def recorded_events(trace: Trace, ugv: str) -> list[Transition]:
@@ -97,11 +94,9 @@ def transitions(x: NormSignal, zeta: float, release: float, dwell: float) -> Ite
 
 
 def noise_conflict(trace: Trace, ugv: str) -> Conflict | None:
-    """First row at which the noise of a UGV is not that of dn = -leak n dt + s dW, by Euler's method over rows.
-
-    It starts at 0. In each of its periods h one sample w, of standard normal size, is held: between rows n moves at the
-    rate s w / sqrt(h) - leak n.
-    """
+    """First row at which the noise of a UGV is not that of dn = -leak n dt + s dW, by Euler's method over rows."""
+    # It starts at 0. In each of its periods h one sample w, of standard normal size, is held: between rows n moves at
+    # the rate s w / sqrt(h) - leak n.
     given, t, n = trace.scenario.decision, trace.t, trace.column(f"{ugv}.noise_m")
     if abs(n[0]) > NOISE_TOLERANCE_M:
         return {"t_s": float(t[0]), "what": "noise: does not start at 0", "noise_m": float(n[0])}
