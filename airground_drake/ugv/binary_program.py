@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+from numba import njit
 from pydrake.solvers import MathematicalProgram
 
 from airground_drake.base.arrays import Array
@@ -36,7 +37,7 @@ class BinaryProgram:
         u: slack (26e), (N,), m.
         error: cost of task errors in (25).
         slack: cost of slack in (25).
-        half_planes: (26d), one row per half-plane that some plan can violate, over (omega, u).
+        half_planes: (26d), one row per half-plane that can bind, over (omega, u).
         choices: 0 and 1 are allowed where the choice moves the UGV, else 0 only, so that no solver need try both.
         within: which half-planes these are, (N, m).
         block: of each stage, (N,).
@@ -90,16 +91,18 @@ class BinaryProgram:
         """Coefficients (rows, B + N) and lower bounds of the half-planes along normals (N, m, 3)."""
         # Without half-planes: one empty row. `steps` is what accepting at a stage adds to the position, (N, 2), m, and
         # `away` are the task errors of refusing throughout, (N, 3), m.
-        n, b = problem.stages, self._of_block.shape[1]
+        n = problem.stages
         stage, point = np.nonzero(self.within)
-        if len(stage) == 0:
-            return np.zeros((1, b + n)), np.full(1, -np.inf)
         normal = normals[stage, point]
         before = np.arange(n) <= stage[:, None]
         of_omega = (normal[:, :AXES] @ steps.T * before) @ self._of_block
-        of_u = np.equal.outer(stage, np.arange(n)).astype(np.float64)
         lower = offsets(problem, normals)[stage, point] - (normal[:, :AXES] * away[stage, :AXES]).sum(axis=1)
-        return np.hstack([of_omega, of_u]), lower
+        binding = _may_bind(stage, of_omega, lower)
+        self.within[stage[~binding], point[~binding]] = False
+        if not binding.any():
+            return np.zeros((1, self._of_block.shape[1] + n)), np.full(1, -np.inf)
+        of_u = np.equal.outer(stage[binding], np.arange(n)).astype(np.float64)
+        return np.hstack([of_omega[binding], of_u]), lower[binding]
 
     def guess(self, problem: Problem, plan: Evaluation, normals: Array) -> Array:
         """Values of the program's variables for a plan: a solution that satisfies all constraints, (B + N,)."""
@@ -121,6 +124,29 @@ class BinaryProgram:
         """The mode that a plan (N,) has in most stages of each block, (B,), 0 or 1; accepting on a tie."""
         share = self._of_block.T @ plan / self._of_block.sum(axis=0)
         return (share >= 0.5).astype(np.float64)
+
+
+@njit(cache=True)
+def _may_bind(stage: npt.NDArray[np.intp], of_omega: Array, lower: Array) -> npt.NDArray[np.bool_]:
+    """For which half-planes some plan, relaxed or not, needs more slack than for any other of the stage, and than 0.
+
+    A row asks for the slack lower - of_omega . omega, (rows,). Over omega in [0, 1] the least difference of two rows is
+    found term by term.
+    """
+    kept = np.ones(len(lower), dtype=np.bool_)
+    for j in range(len(lower)):
+        most = lower[j]
+        for b in range(of_omega.shape[1]):
+            most -= min(0.0, of_omega[j, b])
+        kept[j] = most > 0.0
+        for i in range(len(lower)):
+            if i == j or not kept[i] or not kept[j] or stage[i] != stage[j]:
+                continue
+            more = lower[i] - lower[j]
+            for b in range(of_omega.shape[1]):
+                more += min(0.0, of_omega[j, b] - of_omega[i, b])
+            kept[j] = more < 0.0
+    return kept
 
 
 class Programs(threading.local):

@@ -103,7 +103,7 @@ class _Layout:
         self.index: dict[int, int] = program.decision_variable_index()
         variables = program.decision_variables()
         self.binary = np.array([x.get_type() == Variable.Type.BINARY for x in variables], dtype=bool)
-        self._places: dict[Any, npt.NDArray[np.intp] | slice] = {}
+        self._places = dict[Any, Any]()
         self._shell, self._clp = MathematicalProgram(), ClpSolver()
         stand_ins = [Variable(x.get_name()) if of else x for x, of in zip(variables, self.binary, strict=True)]
         self._shell.AddDecisionVariables(np.array(stand_ins, dtype=object))
@@ -113,7 +113,7 @@ class _Layout:
         """Whether the program has these variables in this order; a variable never changes its type."""
         return bool(self.index == program.decision_variable_index())
 
-    def places(self, program: MathematicalProgram, binding: Any) -> npt.NDArray[np.intp] | slice:
+    def places(self, program: MathematicalProgram, binding: Any) -> Any:
         """Indices of the variables of a cost or constraint, in its order; a slice, which is quicker, if possible."""
         if binding not in self._places:
             if len(self._places) >= self.MOST:

@@ -83,6 +83,13 @@ class Problem:
         data = self.initial, modes, self.reference, self.centres, self.distances
         return Terms(float(self.dt), *data, weights, float(self.slack_weight))
 
+    @cached_property
+    def boxes(self) -> tuple[Array, Array]:
+        """Least and largest coordinates, (N, 3) each, m, that any plan, relaxed or not, can have at ends of stages."""
+        slower, faster = np.minimum(self.accept, self.refuse), np.maximum(self.accept, self.refuse)
+        low, high = (np.cumsum(np.vstack([self.initial, self.dt * v]), axis=0)[1:] for v in (slower, faster))
+        return low, high
+
     def is_finite(self) -> bool:
         """Whether all data are finite numbers."""
         data = (self.initial, self.accept, self.refuse, self.reference, self.centres, self.distances)

@@ -16,16 +16,9 @@ from airground_drake.ugv.cost import Terms
 from airground_drake.ugv.problem import Problem
 
 
-def boxes(problem: Problem) -> tuple[Array, Array]:
-    """Least and largest coordinates, (N, 3) each, m, that any plan, relaxed or not, can have at the ends of stages."""
-    slower, faster = np.minimum(problem.accept, problem.refuse), np.maximum(problem.accept, problem.refuse)
-    low, high = (np.cumsum(np.vstack([problem.initial, problem.dt * v]), axis=0)[1:] for v in (slower, faster))
-    return low, high
-
-
 def nearest_in_reach(problem: Problem) -> Array:
     """Where in the box of each stage a plan could be nearest to each point, (N, m, 3), m."""
-    low, high = boxes(problem)
+    low, high = problem.boxes
     return np.clip(problem.centres, low[:, None], high[:, None])
 
 
@@ -38,7 +31,7 @@ def within_reach(problem: Problem) -> npt.NDArray[np.bool_]:
 
 def unavoidable_cost(problem: Problem) -> float:
     """Lower bound of (25) over all plans, relaxed or not: the task error of the nearest points of the boxes."""
-    low, high = boxes(problem)
+    low, high = problem.boxes
     beyond = np.maximum(0.0, np.maximum(low - problem.reference, problem.reference - high))
     errors = problem.dt * problem.terms.error_weights * np.square(beyond).sum(axis=1)
     return (1.0 - 1e-9) * float(np.cumsum(errors[::-1])[-1])  # the last digits of the sums must not cut an optimum
