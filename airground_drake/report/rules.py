@@ -6,12 +6,11 @@ No other file of the screen names a claim. A cell takes the first row of its tab
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, NamedTuple
+from typing import Any, NamedTuple
 
 from airground_drake.base.statuses import PASSING
 
-if TYPE_CHECKING:
-    from airground_drake.report.facts import RunFacts
+RunFacts = Any  # `facts.RunFacts`, which reads the names of claims here
 
 # Claims about a run: its distances, the conditions of the proof, what the robots did themselves, where they ended.
 DISTANCES, CONDITIONS, OWN_DOING, ARRIVAL = "SAFE-TRACE", "SAFE-HYP", "SAFE-OWN", "LIVE-GOAL"

@@ -227,7 +227,7 @@ DEVIATIONS: tuple[PaperDeviation, ...] = (
         "Drawn from our runs, in the reports of `case_a` and `case_b`. We do not have the paper's pictures.",
     ),
     PaperDeviation(
-        "Figures 4 and 8", "decision variables", ("report.figures.timelines:decision",), "faithful",
+        "Figures 4 and 8", "decision variables", ("report.figures.timelines:events",), "faithful",
         "As Figures 3 and 7.",
     ),
     PaperDeviation(
