@@ -50,7 +50,7 @@ class Sizes(NamedTuple):
     radius_m: float  # radius of each UGV
     distance_m: float  # what UGVs keep from obstacles and from one another, between surfaces
     # Largest speed; None: `MAX_SPEED_M_S`, or less where radius and distance are below 0.1 m together.
-    max_speed_m_s: float | None
+    max_speed_m_s: float | None = None
 
 
 class Imported(NamedTuple):

@@ -539,8 +539,8 @@ LOGS = (
         "log: position errors do not count",
         "study/logs/judging.py",
         "judge",
-        "eps = sum(",
-        "eps = 0.0 * sum(",
+        "eps = errors_m.get(pair.robot, 0.0) + errors_m.get(pair.other, 0.0)",
+        "eps = 0.0",
         tests=ASSOCIATED,
     ),
     Mutant(
