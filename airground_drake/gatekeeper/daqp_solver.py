@@ -49,8 +49,8 @@ _BINARY, _SOFT, _NO_BOUND = 16, 8, 1e30
 _FLAT = 1e-24
 """A variable counts as linear if its curvature is below this share of the largest."""
 _APPROACH = ((0.0, -1e-4),)
-"""Without binary variables: no added curvature, and the weight of DAQP's proximal point method. A negative weight counts
-only where the Hessian is singular."""
+"""Without binary variables: no added curvature, and the weight of DAQP's proximal point method. A negative weight
+counts only where the Hessian is singular."""
 _APPROACHES = (0.0, 0.0), (1e-6, -1e-6), (1e-4, -1e-6)
 """With binary variables: the curvature that they get, in units of the largest, and this weight. Where DAQP fails, as
 where the Hessian is singular, the next is tried. More curvature makes a search longer: it weakens the bounds."""
