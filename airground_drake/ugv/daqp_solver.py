@@ -48,11 +48,12 @@ _ENDED = {1: FOUND, 2: FOUND, 4: FOUND, 5: STOPPED, -4: STOPPED, -7: STOPPED, -1
 _BINARY, _SOFT, _NO_BOUND = 16, 8, 1e30
 _FLAT = 1e-24
 """A variable counts as linear if its curvature is below this share of the largest."""
-_BINARY_CURVATURE = 1e-6
-"""Curvature that binary variables get, in units of the largest: more makes a search longer, as it weakens bounds."""
-_PROXIMAL, _PROXIMAL_BRANCHING = -1e-4, -1e-6
-"""DAQP's weight of its proximal point method; negative: only where the Hessian is singular. With less, branches end
-more exactly, but other programs may cycle."""
+_APPROACH = ((0.0, -1e-4),)
+"""Without binary variables: no added curvature, and the weight of DAQP's proximal point method. A negative weight
+counts only where the Hessian is singular."""
+_APPROACHES = (0.0, 0.0), (1e-6, -1e-6), (1e-4, -1e-6)
+"""With binary variables: the curvature that they get, in units of the largest, and this weight. Where DAQP fails, as
+where the Hessian is singular, the next is tried. More curvature makes a search longer: it weakens the bounds."""
 _TIGHT = 1e-9
 """DAQP's tolerance of constraints, in the scaled variables."""
 _FEASIBLE = 1e-6
@@ -210,7 +211,7 @@ class _Reduced:
     # - *Constants.* A variable whose bounds are equal is one; so is one with a quadratic cost of its own and no row.
     # - *Slack.* A variable with a quadratic cost of its own, whose one row it can always meet, is a soft row for DAQP.
     # - *Scale.* Variables are scaled to a unit diagonal of the Hessian.
-    # - *Curvature.* Where the Hessian is singular, DAQP approaches the solution by proximal points. Before that, each
+    # - *Curvature.* Where the Hessian is singular, DAQP approaches the solution by proximal points. Where it fails, each
     #   binary variable x gets the cost c (x^2 - x) / 2, which is 0 at 0 and at 1.
 
     def __init__(self, form: _Form) -> None:
@@ -225,12 +226,10 @@ class _Reduced:
         row = entered[:, able].argmax(axis=0) if len(able) else able
         below, above = np.isfinite(form.lower[row]), np.isfinite(form.upper[row])
         meets = (below != above) & ((rows[row, able] > 0.0) == below) & (form.least[able] < form.most[able])
-        slack = np.full(len(rows), -1)
-        slack[row[meets]] = able[meets]  # of several in one row, one
-        self.is_soft = slack >= 0
-        self.soft, self.slack = np.flatnonzero(self.is_soft), slack[self.is_soft]
+        self.slack = np.full(len(rows), -1)  # of each row; of several, one
+        self.slack[row[meets]] = able[meets]
         kept = (form.least < form.most) & ~free
-        kept[self.slack] = False
+        kept[self.slack[self.slack >= 0]] = False
         self.form, self.kept = form, np.flatnonzero(kept)
         self.rows = np.flatnonzero((np.isfinite(form.lower) | np.isfinite(form.upper)) & entered[:, kept].any(axis=1))
         k = self.kept
@@ -241,56 +240,65 @@ class _Reduced:
         # whether, besides binary variables, there are directions without curvature, in which the cost may fall for ever
         self.may_recede = bool(binary.any() and ((curved[k] > 1) | (diagonal[k] <= 0.0))[~binary].any())
         self.hessian = form.hessian[np.ix_(k, k)] / (self.scale[:, None] * self.scale) / self.largest
-        self.hessian[np.diag_indices(len(k))] += np.where(binary, _BINARY_CURVATURE, 0.0)
-        self.gradient = gradient / self.scale / self.largest - np.where(
-            binary, 0.5 * _BINARY_CURVATURE * self.scale, 0.0
-        )
+        self.gradient = gradient / self.scale / self.largest
 
     def solve(self, limits: SolverLimits, known: float = math.inf) -> tuple[SolutionResult, Array, Details]:
         """How it ended, x (n,), NaN without a solution, and details; what costs more than `known` is not looked for."""
         form, k, r, x = self.form, self.kept, self.rows, self.base.copy()
         fixed = np.einsum("ij,j->i", form.rows, self.base)
-        hard = ~self.is_soft
+        hard = self.slack < 0
         hard[r] = False
         if ((fixed < form.lower - _FEASIBLE) | (fixed > form.upper + _FEASIBLE))[hard].any():
             return INFEASIBLE, np.full(len(x), np.nan), Details()
-        at, soft = fixed[r], self.is_soft[r]
         flag, scaled, info = 1, np.zeros(0), dict[str, Any](lam=np.zeros(len(r)))
-        if len(k):
-            model = daqp.Model()
-            model.settings = {
-                "presolve": 0, "primal_tol": _TIGHT, "iter_limit": int(limits.iter_limit),
-                "eps_prox": _PROXIMAL_BRANCHING if form.binary[k].any() else _PROXIMAL,
-                "fval_bound": min(known / self.largest, _NO_BOUND),
-                "time_limit": max(limits.time_limit, 1e-6) if 0.0 < limits.time_limit < math.inf else 0.0,
-            }  # fmt: skip
-            upper, lower = (
-                np.concatenate([ends[k] * self.scale, sides[r] - at]).clip(-_NO_BOUND, _NO_BOUND)
-                for ends, sides in ((form.most, form.upper), (form.least, form.lower))
-            )
-            sense = np.concatenate([np.where(form.binary[k], _BINARY, 0), np.where(soft, _SOFT, 0)]).astype(np.intc)
-            matrix = form.rows[np.ix_(r, k)] / self.scale
-            flag, _ = model.setup(self.hessian, self.gradient, matrix, upper, lower, sense)
-            if flag >= 0:
-                if soft.any():  # slack that enters its row as c x, at a cost w x^2 / 2, has the reciprocal weight c^2/w
-                    weights, j = np.ones(len(sense)), self.slack
-                    entry = form.rows[self.soft, j]
-                    weights[len(k) :][soft] = self.largest * entry**2 / form.hessian[j, j]
-                    model.soft_weights(rho_l=weights, rho_u=weights)
-                scaled, _, flag, info = model.solve()
+        for curvature, proximal in () if not len(k) else _APPROACHES if form.binary[k].any() else _APPROACH:
+            flag, scaled, info = self._by_daqp(limits, known, fixed[r], curvature, proximal)
+            if flag in _ENDED:
+                break
         multipliers = np.zeros(len(form.rows))
         if flag > 0:
             x[k] = scaled / self.scale
             x[form.binary] = x[form.binary].round()
             x = np.clip(x, form.least, form.most)
-            side, entry = np.einsum("ij,j->i", form.rows[self.soft], x), form.rows[self.soft, self.slack]
-            lacking = np.maximum(0.0, form.lower[self.soft] - side) - np.maximum(0.0, side - form.upper[self.soft])
-            x[self.slack] = lacking / entry
+            soft = np.flatnonzero(self.slack >= 0)
+            at, lower, upper = np.einsum("ij,j->i", form.rows[soft], x), form.lower[soft], form.upper[soft]
+            lacking = np.maximum(0.0, lower - at) - np.maximum(0.0, at - upper)
+            x[self.slack[soft]] = lacking / form.rows[soft, self.slack[soft]]
             multipliers[r] = -self.largest * info["lam"][len(k) :]
         else:
             x[:] = np.nan
         details = Details(int(info.get("iterations", 0)), int(info.get("nodes", 0)), multipliers)
         return _ENDED.get(flag, FAILED), x, details
+
+    def _by_daqp(
+        self, limits: SolverLimits, known: float, fixed: Array, curvature: float, proximal: float
+    ) -> tuple[int, Array, dict[str, Any]]:
+        """DAQP's flag, x (k,), scaled, and information; `fixed`: the rows at the base, (p,)."""
+        form, k, r = self.form, self.kept, self.rows
+        binary, soft = form.binary[k], self.slack[r] >= 0
+        upper, lower = (
+            np.concatenate([ends[k] * self.scale, sides[r] - fixed]).clip(-_NO_BOUND, _NO_BOUND)
+            for ends, sides in ((form.most, form.upper), (form.least, form.lower))
+        )
+        hessian, added = self.hessian.copy(), np.where(binary, curvature, 0.0)
+        hessian[np.diag_indices(len(k))] += added
+        model = daqp.Model()
+        model.settings = {
+            "presolve": 0, "primal_tol": _TIGHT, "iter_limit": int(limits.iter_limit), "eps_prox": proximal,
+            "fval_bound": min(known / self.largest, _NO_BOUND),
+            "time_limit": max(limits.time_limit, 1e-6) if 0.0 < limits.time_limit < math.inf else 0.0,
+        }  # fmt: skip
+        sense = np.concatenate([np.where(binary, _BINARY, 0), np.where(soft, _SOFT, 0)]).astype(np.intc)
+        matrix = form.rows[np.ix_(r, k)] / self.scale
+        flag, _ = model.setup(hessian, self.gradient - 0.5 * added * self.scale, matrix, upper, lower, sense)
+        if flag < 0:
+            return flag, np.zeros(0), {}
+        if soft.any():  # slack that enters its row as c x, at a cost w x^2 / 2, has the reciprocal weight c^2 / w
+            weights, j = np.ones(len(sense)), self.slack[r[soft]]
+            weights[len(k) :][soft] = self.largest * form.rows[r[soft], j] ** 2 / form.hessian[j, j]
+            model.soft_weights(rho_l=weights, rho_u=weights)
+        x, _, flag, info = model.solve()
+        return flag, x, info
 
 
 def _add(total: Array, where: Any, values: Array) -> None:

@@ -85,6 +85,7 @@ def test_a_robot_that_is_nowhere_ends_the_run(robot: str, told: str) -> None:
     nowhere = builder.AddSystem(ConstantVectorSource(np.full(3, np.nan)))
     builder.Connect(nowhere.get_output_port(), team.GetInputPort(f"disturbance_{robot}"))
     simulator = Simulator(builder.Build())
+    simulator.get_mutable_context().SetAccuracy(1e-6)
     config = SimulatorConfig(integration_scheme="explicit_euler", max_step_size=0.025, use_error_control=False)
     ApplySimulatorConfig(config, simulator)
     with pytest.raises(PluginError, match=told):
