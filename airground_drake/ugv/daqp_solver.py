@@ -211,8 +211,8 @@ class _Reduced:
     # - *Constants.* A variable whose bounds are equal is one; so is one with a quadratic cost of its own and no row.
     # - *Slack.* A variable with a quadratic cost of its own, whose one row it can always meet, is a soft row for DAQP.
     # - *Scale.* Variables are scaled to a unit diagonal of the Hessian.
-    # - *Curvature.* Where the Hessian is singular, DAQP approaches the solution by proximal points. Where it fails, each
-    #   binary variable x gets the cost c (x^2 - x) / 2, which is 0 at 0 and at 1.
+    # - *Curvature.* Where the Hessian is singular, DAQP approaches the solution by proximal points. Where it fails,
+    #   each binary variable x gets the cost c (x^2 - x) / 2, which is 0 at 0 and at 1.
 
     def __init__(self, form: _Form) -> None:
         """Find constants and slack, and scale."""
