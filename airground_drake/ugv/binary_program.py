@@ -128,11 +128,9 @@ class BinaryProgram:
 
 @njit(cache=True)
 def _may_bind(stage: npt.NDArray[np.intp], of_omega: Array, lower: Array) -> npt.NDArray[np.bool_]:
-    """For which half-planes some plan, relaxed or not, needs more slack than for any other of the stage, and than 0.
-
-    A row asks for the slack lower - of_omega . omega, (rows,). Over omega in [0, 1] the least difference of two rows is
-    found term by term.
-    """
+    """For which half-planes some plan, relaxed or not, needs more slack than for any other of the stage, and than 0."""
+    # A row asks for the slack lower - of_omega . omega, (rows,). Over omega in [0, 1] the least difference of two rows
+    # is found term by term.
     kept = np.ones(len(lower), dtype=np.bool_)
     for j in range(len(lower)):
         most = lower[j]
