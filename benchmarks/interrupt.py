@@ -36,7 +36,7 @@ GRACE_S = 5.0
 def report(folder: Path) -> subprocess.Popen[str]:
     """A report that is being made, in a session of its own."""
     settings = [part for key, value in SHORT.items() for part in ("--set", f"{key}={value}")]
-    command = [sys.executable, "-m", "airground_drake.report", "dwell", *settings, "-o", str(folder)]
+    command = [sys.executable, "-m", "airground_drake.report", "dwell", *settings, "-q", "-o", str(folder)]
     streams = {"stdout": subprocess.DEVNULL, "stderr": subprocess.PIPE}
     return subprocess.Popen(command, text=True, start_new_session=True, **streams)
 
