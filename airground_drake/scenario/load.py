@@ -56,9 +56,22 @@ def validated(scenario: Scenario, overrides: Overrides = ()) -> Scenario:
     """
     source = f"scenario {getattr(scenario, 'name', None) or type(scenario).__name__!r}"
     try:
-        return from_data(resolved(scenario), source, overrides)
+        return from_data(_without_lost_choices(resolved(scenario)), source, overrides)
     except TypeError as error:
         raise ScenarioError(source, "", Fault(str(error)), "wanted: a Scenario") from None
+
+
+def _without_lost_choices(data: dict[str, Any]) -> dict[str, Any]:
+    """A resolved scenario, but for choices about runs that were removed in Python."""
+    listed, runs = data["choices"], data["runs"]
+    if isinstance(listed, list) and isinstance(runs, dict):
+        parts = [place_of(str(choice.get("key"))) if isinstance(choice, dict) else [""] for choice in listed]
+        data["choices"] = [
+            choice
+            for choice, (first, *rest) in zip(listed, parts, strict=True)
+            if first != "runs" or not rest or rest[0] in runs
+        ]
+    return data
 
 
 def from_data(data: Mapping[str, Any], source: str, overrides: Overrides = (), runs: Sequence[str] = ()) -> Scenario:
