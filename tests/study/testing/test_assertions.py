@@ -54,7 +54,8 @@ def test_a_refutation_says_who_when_and_what_was_needed(stuck: Trace) -> None:
     assert "LIVE-GOAL is refuted, on run a of minimal (method a, seed 0)\n  claim: Every robot ended" in told
     assert "  value: tolerance left about where a robot must end: -6.9 m; at least 0 is needed\n" in told
     assert "  who: ugv1, rock\n  when: t = 3 s\n" in told
-    assert "safe distance 3 m; min distance 2 m; positions rock (5, 0, 0) m, ugv1 (3, 0, 0) m" in told
+    assert "safe distance 3 m; min distance 2 m; " in told
+    assert "ugv1 brought itself to 2.00 m from rock; positions rock (5, 0, 0) m, ugv1 (3, 0, 0) m" in told
 
 
 @pytest.mark.parametrize("status", ["inconclusive", "error", "not_run"])
