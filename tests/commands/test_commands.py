@@ -139,7 +139,7 @@ def test_diagram_writes_the_formats_and_the_part_that_are_named(tmp_path: Path, 
 def test_diagram_shows_figure_2_of_the_paper(tmp_path: Path, airground: Airground) -> None:
     """Method (c), whose gatekeeper is an MPC, where the scenario has it; else the most complete method."""
     airground("diagram", "case_a", "--format", "dot", "-o", tmp_path)
-    assert "MPC, (21)-(29)" in (tmp_path / "case_a.dot").read_text(encoding="utf-8")
+    assert "MPC, (21)-(26)" in (tmp_path / "case_a.dot").read_text(encoding="utf-8")
     airground("diagram", "contact", "--format", "dot", "-o", tmp_path)
     assert "contact_method_d" in (tmp_path / "contact.dot").read_text(encoding="utf-8")
     assert (tmp_path / "case_a.dot").read_bytes() == Path(__file__).parents[2].joinpath(
@@ -205,7 +205,7 @@ falsify spec.yaml --jobs 0              # a whole number from 1 to 1000
 falsify spec.yaml --limit 1             # --limit is of a time: name it with --most
 falsify spec.yaml --most intervened_s --limit 0 # a number above 0
 falsify spec.yaml --claim SAFE-INV      # unknown claim about runs 'SAFE-INV'
-falsify spec.yaml --sampler nothing     # allowed: cma, halton, random, module:Class or file.py:Class
+falsify spec.yaml --sampler nothing     # one of cma, halton, random, module:Class or file.py:Class
 falsify spec.yaml --sampler os:path     # --allow-plugins
 falsify spec.yaml --sampler os:path --allow-plugins # --sampler: sampler 'os:path'
 falsify nothing.yaml                    # nothing is drawn
