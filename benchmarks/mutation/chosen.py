@@ -538,7 +538,7 @@ LOGS = (
     Mutant(
         "log: position errors do not count",
         "study/logs/judging.py",
-        "judge",
+        "_judged",
         "eps = errors_m.get(pair.robot, 0.0) + errors_m.get(pair.other, 0.0)",
         "eps = 0.0",
         tests=ASSOCIATED,
