@@ -105,7 +105,7 @@ def test_a_sampler_whose_path_is_not_allowed_is_told_why(falsified: Airground) -
 @pytest.mark.slow
 @pytest.mark.usefixtures("in_this_process")
 def test_a_time_is_made_long(falsified: Airground) -> None:
-    assert "largest intervened_s" in falsified("b", "--most", "intervened_s", "--limit", "0.1", code=1)
+    assert "largest intervened_s" in falsified("b", "--most", "intervened_s", "--limit", "0.1", "-n", 16, code=1)
 
 
 @pytest.mark.usefixtures("in_this_process")
