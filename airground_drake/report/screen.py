@@ -311,7 +311,7 @@ def _paper(document: Document) -> Iterator[Check]:
 
 
 def _beware(document: Document, rows: Sequence[Row]) -> list[str]:
-    """At most `MOST_WARNINGS` clauses, of which the last one always applies."""
+    """At most `MOST_WARNINGS` clauses; the last one always applies."""
     ran = [(row, row.facts) for row in rows if row.facts]
     movers = list(dict.fromkeys(name for _, run in ran for name in run.movers))
     seen = [row.run for row, run in ran if row.plain and row.kept and not run.is_proved]

@@ -26,7 +26,7 @@ class Clock(NamedTuple):
 
     @classmethod
     def around(cls, times_s: Sequence[float], first_s: float, last_s: float) -> Clock:
-        """The stretches around some times between the first and the last one; all the time if there are none."""
+        """The stretches of a run around some times; the whole run without such times."""
         times = np.sort(times_s) if len(times_s) else np.array([first_s, last_s])
         gaps = np.diff(times) if len(times_s) else np.zeros(1)
         longest = np.sort(np.argsort(-gaps, kind="stable")[:MAX_CUTS])

@@ -126,7 +126,7 @@ class _Look(NamedTuple):
 
 
 _SAFE = _Look("#f3f3f3", MUTED, 1.0, 0.0, ("#dddddd", "none"), (0, (1, 1)))
-# Of walls that the UAV knows, and of others.
+# Looks of walls that the UAV knows, and of walls that it does not know.
 _KNOWN, _UNKNOWN = _Look(MUTED, INK, 1.6, 1.0, (MUTED, MUTED)), _Look("white", INK, 1.5, 1.2, ("white", INK))
 
 

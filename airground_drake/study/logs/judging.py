@@ -249,7 +249,7 @@ def _judged(
     """What is found about a pair; None beside an obstacle that is absent during the whole log."""
     if not len(other.t_s):
         return None
-    eps = errors_m.get(pair.robot, 0.0) + errors_m.get(pair.other, 0.0)  # that of what is not in the log is 0
+    eps = errors_m.get(pair.robot, 0.0) + errors_m.get(pair.other, 0.0)  # a body that is not in the log has no error
     spans = _common(own, other)
     if not spans:
         times = (f"{n} {t.t_s[0]:.6g} to {t.t_s[-1]:.6g} s" for n, t in ((pair.robot, own), (pair.other, other)))

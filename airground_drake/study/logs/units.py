@@ -94,7 +94,7 @@ def _of_frames(streams: Mapping[str, Stream], rate_hz: float) -> None:
     """Turn numbers of frames into nanoseconds."""
     counted = [each for each in streams.values() if not each.time_unit and not each.nano.any()]
     if not counted:
-        raise LogError("--rate-hz is for times that are numbers of frames: those of the log are none")
+        raise LogError("--rate-hz is for logs whose times are numbers of frames; this log has other times")
     for each in counted:
         if float(np.abs(each.whole / rate_hz).max(initial=0.0)) > 9e9:
             raise LogError(one_line(f"{each.label} has numbers of frames beyond 9e9 s; wanted: another --rate-hz"))
@@ -165,7 +165,7 @@ def _chosen(
     streams: Mapping[str, Stream], scenario: Json, moving: Mapping[tuple[str, str], _Motion], times: list[str],
     lengths: list[str],
 ) -> tuple[str, str]:  # fmt: skip
-    """The units, of those that are still open; '' for what is not."""
+    """The unit of time and that of length, chosen from the data; '' for one that is known."""
     usual = lengths[0]
     fitting = _fitting(streams, scenario, lengths) if usual else []
     if usual in fitting:

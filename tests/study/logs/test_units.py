@@ -80,7 +80,7 @@ def test_numbers_of_frames_are_no_seconds(head: str, rate: float, tmp_path: Path
 
 
 def test_a_rate_without_frames_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(LogError, match="--rate-hz is for times that are numbers of frames"):
+    with pytest.raises(LogError, match="--rate-hz is for logs whose times are numbers of frames"):
         logs.read(written(tmp_path, FULL, "t_s,body,x,y,z"), document(tmp_path), rate_hz=25.0)
 
 
