@@ -37,7 +37,7 @@ from airground_drake.model.geometry import convex, outline
 from airground_drake.model.geometry.motion import Motion
 from airground_drake.model.law.avoidance import Avoidance
 from airground_drake.model.law.ugv_law import UgvLaw
-from airground_drake.model.plants.plant import Scripted
+from airground_drake.model.plants.scripted import Scripted
 from airground_drake.report.audit.companions import Believing
 from airground_drake.scenario.load import load, validated
 from airground_drake.scenario.schema import Moves, Obstacle, Policy, Run, Scenario

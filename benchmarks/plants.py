@@ -21,8 +21,12 @@ from airground_drake.model.bodies.world import Body, World
 from airground_drake.model.geometry import convex, outline
 from airground_drake.model.law.avoidance import Avoidance
 from airground_drake.model.law.ugv_law import UgvLaw
-from airground_drake.model.plants.plant import Delay, FirstOrder, Lag, Plant, Unicycle
+from airground_drake.model.plants.delay import Delay
+from airground_drake.model.plants.first_order import FirstOrder
+from airground_drake.model.plants.lag import Lag
+from airground_drake.model.plants.plant import Plant
 from airground_drake.model.plants.steering import steer
+from airground_drake.model.plants.unicycle import Unicycle
 from airground_drake.scenario.load import load
 from airground_drake.scenario.world import make_world
 from airground_drake.sim.components import make_law

@@ -263,9 +263,9 @@ def _entry(registry: Registry, name: str) -> str:
 
 def keys() -> Iterator[str]:
     """Every key of a scenario file."""
-    for section, about, entries in sections(SCENARIO):
-        yield from (f"### {section}" if section else "### The file", "", *wrapped(about), "")
-        for entry in entries:
+    for section in sections(SCENARIO):
+        yield from (f"### {section.title or 'The file'}", "", *wrapped(section.says), "")
+        for entry in section.entries:
             yield from wrapped(f"- `{entry.key}` ({entry.allowed}): {entry.says}")
         yield ""
 

@@ -6,7 +6,7 @@ from airground_drake.model.bodies.world import Body, World
 from airground_drake.model.geometry.outline import balls
 from airground_drake.model.law.avoidance import Avoidance
 from airground_drake.model.law.ugv_law import UgvLaw
-from airground_drake.model.plants.plant import FirstOrder
+from airground_drake.model.plants.first_order import FirstOrder
 from airground_drake.sim.blocks import Gatekeeper, UgvController
 from airground_drake.ugv.outcome import Outlook
 from airground_drake.ugv.outcome_gatekeeper import OutcomeGatekeepers

@@ -10,3 +10,9 @@ from functools import lru_cache
 def decimal(number: float) -> Fraction:
     """The decimal number that a float prints as, exactly: 0.1 is 1/10."""
     return Fraction(repr(float(number)))
+
+
+def is_multiple(of: float, unit: float) -> bool:
+    """Whether a number is a whole multiple of a unit, at least once, but for rounding."""
+    ratio = of / unit
+    return round(ratio) >= 1 and abs(ratio - round(ratio)) <= 1e-9 * ratio

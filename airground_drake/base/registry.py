@@ -65,6 +65,11 @@ class Registry:
         return tuple(self._own)
 
     @property
+    def others(self) -> Registry:
+        """The registry without the package's own classes."""
+        return Registry(self.kind, self.group.rpartition(".")[2], {})
+
+    @property
     def allowed(self) -> tuple[str, ...]:
         """The registered names, and `PLUGIN`."""
         return (*self, PLUGIN)
@@ -294,15 +299,19 @@ ROUTES = Registry(
 # Tasks of the UAV below obstacle avoidance: subclasses of `model.law.task.Task`.
 UAV_TASKS = Registry("task", "uav_tasks", {"formation": "airground_drake.model.law.tasks:FormationTask"})
 
-# Plants of robots: those of `model.plants.plant`, and subclasses of Drake's System.
+# Plants of robots: keys of a scenario in a file of that name, subclasses of `model.plants.plant.Keys`; and subclasses
+# of Drake's System. The first is the default.
 PLANTS = Registry(
     "plant",
     "plants",
     {
-        "first_order": "airground_drake.model.plants.plant:FirstOrder",
-        "unicycle": "airground_drake.model.plants.plant:Unicycle",
-        "lag": "airground_drake.model.plants.plant:Lag",
-        "delay": "airground_drake.model.plants.plant:Delay",
+        place.rpartition(".")[2].partition(":")[0]: place
+        for place in (
+            "airground_drake.model.plants.first_order:FirstOrderKeys",
+            "airground_drake.model.plants.unicycle:UnicycleKeys",
+            "airground_drake.model.plants.lag:LagKeys",
+            "airground_drake.model.plants.delay:DelayKeys",
+        )
     },
 )
 

@@ -2,10 +2,19 @@
 
 import math
 import unicodedata
+from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Annotated, Any
 
-from pydantic import AfterValidator, BeforeValidator, Field
-from pydantic_core import PydanticCustomError
+from pydantic import (
+    AfterValidator,
+    BeforeValidator,
+    Field,
+    GetCoreSchemaHandler,
+    GetJsonSchemaHandler,
+    ValidationInfo,
+)
+from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
 from airground_drake.base.arrays import LARGEST
 from airground_drake.base.limits import MAX_NAME, MAX_SEED, MAX_TEXT
@@ -14,6 +23,7 @@ SMALLEST = 1e-9  # of a positive number
 NAME_PATTERN = "^[A-Za-z_][A-Za-z0-9_]*$"  # of a UGV, an obstacle, a run, a parameter
 # Key for the words in which messages describe an allowed value, where its type and bounds do not say it.
 WANTED = "x-wanted"
+RECORDED = "recorded"  # pydantic's context for the scenario in a run's metadata: its rules are not checked again
 
 
 def refused(value: object, allowed: str, *at: str) -> PydanticCustomError:
@@ -55,3 +65,39 @@ Real = Annotated[Number, Field(ge=-LARGEST), BeforeValidator(as_float)]
 Positive = Annotated[Number, Field(ge=SMALLEST), BeforeValidator(as_float)]
 Share = Annotated[Number, Field(ge=SMALLEST, le=1.0), BeforeValidator(as_float)]
 NotNegative = Annotated[Number, Field(ge=0.0), BeforeValidator(as_float)]
+
+
+@dataclass(frozen=True)
+class ValueRule:
+    """A function that returns a value or raises `refused`, and the rule in JSON Schema.
+
+    A registry in the schema stands for its names; `json_schema.py` inserts them.
+    """
+
+    check: Callable[[Any], Any]
+    says: Callable[[], dict[str, Any]]
+
+    def __get_pydantic_core_schema__(self, source: object, handler: GetCoreSchemaHandler) -> CoreSchema:
+        """Check a value after the annotations before this one, except in the metadata of a run."""
+        # A run may be judged on a machine without its plug-ins.
+
+        def checked(value: Any, info: ValidationInfo) -> Any:
+            return value if info.context == RECORDED else self.check(value)
+
+        return core_schema.with_info_after_validator_function(checked, handler(source))
+
+    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
+        """The schema of the annotations before this one, with this rule added."""
+        return {**handler(schema), **self.says()}
+
+
+def _within_a_turn(heading: float) -> float:
+    """Refuse headings of more than one turn: greater ones are degrees."""
+    if abs(heading) > math.tau + SMALLEST:
+        degrees = f"{heading:g} degrees are {math.radians(heading):.6g} rad"
+        raise refused(heading, f"from -{math.tau:.6g} to {math.tau:.6g} rad; {degrees}")
+    return heading
+
+
+_TURN = math.tau + SMALLEST
+Heading = Annotated[Real, ValueRule(_within_a_turn, lambda: {"minimum": -_TURN, "maximum": _TURN})]

@@ -65,18 +65,16 @@ def own_of(robot: Json) -> Json | None:
 
 def taken(robot: Json, control: Json) -> Taken:
     """What the plants of a robot take."""
-    most, sums, period_s = float(robot["max_speed_m_s"]), {"lag": 0.0, "delay": 0.0}, float(control["period_s"])
+    most, period_s = float(robot["max_speed_m_s"]), float(control["period_s"])
     if own := own_of(robot):
         drift = float(own["drift_m_s"])
         restored = drift / float(control["avoidance_gain_1_s"]) if drift else 0.0
         return Taken(float(own["cover_m"]), 0.0, 0.0, most, restored, drift * period_s)
-    for plant in plants_of(robot):
-        if plant["kind"] in sums:
-            sums[plant["kind"]] += plant["time_constant_s"] + plant["delay_s"]
+    lag_s, delay_s = (sum(plant.get(key, 0.0) for plant in plants_of(robot)) for key in ("time_constant_s", "delay_s"))
     drive = unicycle_of(robot)
     body = drive["hand_point_m"] + _dip_m(drive, most * period_s, period_s) if drive else 0.0
     drawn = float(drive["hand_point_m"]) if drive and not drive["backwards"] else 0.0
-    return Taken(body, sums["lag"], sums["delay"], most, drawn_m=drawn)
+    return Taken(body, lag_s, delay_s, most, drawn_m=drawn)
 
 
 def _dip_m(drive: Json, chord_m: float, period_s: float) -> float:

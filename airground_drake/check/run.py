@@ -98,7 +98,7 @@ class Run:
         place = np.stack([self.column(f"{robot}.body_{a}_m") for a in "xyz"], axis=1)
         if unicycle_of(self.robots[robot]):
             return Way(self.t_s, place, heading_rad=self.column(f"{robot}.heading_rad"))
-        lag_s = sum(plant["time_constant_s"] for plant in plants)
+        lag_s = sum(plant.get("time_constant_s", 0.0) for plant in plants)
         if not lag_s:
             return Way(self.t_s, place)
         velocity = np.stack([self.column(f"{robot}.body_v{a}_m_s") for a in "xyz"], axis=1)

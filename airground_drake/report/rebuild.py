@@ -74,7 +74,7 @@ def lines(folder: Path, judge: Judge | None = None) -> Iterator[Line]:
 def off_script(trace: Any, scenario: Any) -> Iterator[Line]:
     """A line for each moving obstacle and preset trajectory that is not where the scenario of the run says."""
     from airground_drake.model.geometry.motion import Motion
-    from airground_drake.model.plants.plant import Scripted
+    from airground_drake.model.plants.scripted import Scripted
     from airground_drake.scenario.world import make_world
 
     def compared(what: str, t_s: Array, theirs: Array, *allowed: Array) -> Iterator[Line]:

@@ -7,7 +7,6 @@ from itertools import combinations
 from typing import NamedTuple
 
 from airground_drake.model.plants.budget import AT_REST, Bounds, costs, law_distance
-from airground_drake.model.plants.plant import Unicycle
 from airground_drake.scenario.outlines import gap_m
 from airground_drake.scenario.plants import plant_of
 from airground_drake.scenario.schema import Scenario
@@ -61,7 +60,7 @@ class PairBudget(NamedTuple):
 
 def takes_room(scenario: Scenario) -> bool:
     """Whether any robot is not where the law steers it, so that the law keeps more than the distances promised."""
-    return any(plant.kind != "first_order" for robot in scenario.robots.values() for plant in robot.plant)
+    return any(plant_of(robot, scenario.control.period_s).signals for robot in scenario.robots.values())
 
 
 def budget(scenario: Scenario) -> Iterator[PairBudget]:
@@ -70,8 +69,7 @@ def budget(scenario: Scenario) -> Iterator[PairBudget]:
     bounds, cover = dict[str, Bounds](), dict[str, str]()
     for name, robot in scenario.robots.items():
         plant = plant_of(robot, scenario.control.period_s)
-        bounds[name] = plant.bounds(robot.max_speed_m_s)
-        cover[name] = "hand_point_m" if isinstance(plant, Unicycle) else "cover_m"
+        bounds[name], cover[name] = plant.bounds(robot.max_speed_m_s), plant.cover_key
 
     def of_pair(first: str, second: str, kind: str, promised: float, radii: float) -> PairBudget:
         both = bounds[first], bounds.get(second, AT_REST)
@@ -101,7 +99,7 @@ def _start(robot: Bounds, promised_m: float, gap_m: float) -> str:
     if robot.exact:
         return f"{gap_m:.3f} m when it appears"
     of_point = f"{gap_m:.3f} m of the steered point when it appears"
-    if not (robot.lag_s or robot.delay_s or robot.drawn):
+    if not (robot.late or robot.drawn):
         return of_point
     way_m = robot.delay_s * robot.speed_m_s
     way = f", also on its way of up to {way_m:.3f} m under commands already given" if way_m else ""

@@ -9,7 +9,7 @@ from pydantic_core import ErrorDetails
 
 from airground_drake.base.errors import Fault, ScenarioError
 from airground_drake.scenario import json_schema
-from airground_drake.scenario.document import Document, unknown
+from airground_drake.scenario.document import UNKNOWN_KEY, Document, suggestion, unknown
 from airground_drake.scenario.recorded import adapter
 
 
@@ -34,14 +34,17 @@ def _in_words(error: ErrorDetails, document: Document, schema: json_schema.Schem
     """An error of pydantic as one line: place, key, value, and what is allowed."""
     kind, given, says = error["type"], error["input"], error.get("ctx", {})
     loc = [str(part) for part in error["loc"]]
+    if json_schema.kinds_at(schema, *loc[:-1]):  # it is no mapping that could have a kind
+        del loc[-1]
     at = _as_written(document.data, [part for part in (*loc, *says.get("at", ())) if part != json_schema.NAMES])
     of_type = kind.endswith(("_type", "missing"))  # the message names the line of the value, not of its key
     key, source = ".".join(at), document.where(*at, key=not of_type)
     if kind == "rule":
         return ScenarioError(source, key, says["value"], says["allowed"])
     if kind in _UNKNOWN:
-        return unknown(source, key, at[-1], json_schema.keys_at(schema, *at[:-1]))
-    place = loc[:-2] + loc[-1:] if loc[-1:] == [json_schema.NAMES] else at
+        options, kinds = json_schema.keys_at(schema, *loc[:-1]), json_schema.kinds_at(schema, *loc[:-2])
+        return _of_another_kind(source, key, loc[-2], kinds) if kinds else unknown(source, key, at[-1], options)
+    place = loc[:-2] + loc[-1:] if loc[-1:] == [json_schema.NAMES] else loc
     wanted = f"wanted: {json_schema.wanted_at(schema, *place)}"
     if kind == "missing":
         new = f", as {'.'.join(at[:-1])} is new" * source.startswith("--set ")
@@ -57,12 +60,20 @@ def _in_words(error: ErrorDetails, document: Document, schema: json_schema.Schem
     return ScenarioError(source, key, given, wanted)
 
 
+def _of_another_kind(source: str, key: str, kind: str, kinds: dict[str, list[str]]) -> ScenarioError:
+    """The error of a key that a mapping of its kind does not have; all kinds with their keys."""
+    part, default = key.rpartition(".")[2], f"{kind}, the default" if kind == next(iter(kinds)) else kind
+    others = [name for name, keys in kinds.items() if part in keys]
+    hint = f"it is a key of {' and '.join(others)}; " if others else suggestion(part, kinds[kind])
+    return ScenarioError(source, key, UNKNOWN_KEY, f"{hint}keys of {default}: {', '.join(kinds[kind])}")
+
+
 def _as_written(data: Any, at: list[str]) -> list[str]:
-    """The way to a value without the number 0 of a mapping that stands for a list with one entry."""
+    """The way to a value without what pydantic adds: the number 0 of a mapping that stands for a list, and kinds."""
     found = list[str]()
-    for part in at:
+    for k, part in enumerate(at):
         if isinstance(data, dict):
-            if part == "0" and part not in data:
+            if part not in data and k < len(at) - 1:
                 continue
             data = data.get(part)
         elif isinstance(data, list):

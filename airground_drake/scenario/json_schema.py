@@ -15,11 +15,12 @@ from typing import Any
 from pydantic import TypeAdapter
 
 from airground_drake.base.limits import MAX_NAME, MAX_SEED, MAX_TEXT
-from airground_drake.base.registry import RUN_CLAIMS, Registry
+from airground_drake.base.registry import PLANTS, RUN_CLAIMS, Registry
 from airground_drake.base.statuses import COUNTS, EXPECTATIONS, NOTHING
 from airground_drake.base.values import NAME_PATTERN, WANTED
 from airground_drake.scenario import schema
 from airground_drake.scenario.kinds import CLAIM_PATTERN, EXPECTED, unit_of
+from airground_drake.scenario.plants import KEYS, OWN
 
 Schema = dict[str, Any]
 
@@ -38,10 +39,15 @@ def text(*, installed: bool = True) -> str:
 def scenario_schema(*, installed: bool = True) -> Schema:
     """The schema of a scenario file."""
     made = _adapted(TypeAdapter(schema.Scenario).json_schema(), installed)
-    kinds = {name: _object(getattr(schema, name), made["$defs"][name]) for name in sorted(made["$defs"])}
+    kinds = {name: _object(class_of(name), made["$defs"][name]) for name in sorted(made["$defs"])}
     top = _object(schema.Scenario, made)
     top["patternProperties"] = {"^_": {"description": "A template, for anchors and aliases."}}
     return {"$schema": DIALECT, "title": "Scenario of airground_drake", **top, "$defs": kinds}
+
+
+def class_of(name: str) -> type:
+    """The dataclass of a definition."""
+    return next((each for each in KEYS.values() if each.__name__ == name), None) or getattr(schema, name)
 
 
 def _adapted(part: Any, installed: bool) -> Any:
@@ -49,7 +55,7 @@ def _adapted(part: Any, installed: bool) -> Any:
     if isinstance(part, Registry):
         return [*part] if installed else [*part.own]
     if isinstance(part, list):
-        return [_adapted(each, installed) for each in part]
+        return [each for each in (_adapted(each, installed) for each in part) if each != {"enum": []}]
     if not isinstance(part, dict):
         return part
     says = {name: _adapted(each, installed) for name, each in part.items() if name != "title" or isinstance(each, dict)}
@@ -105,12 +111,25 @@ def keys_at(whole: Schema, *at: str) -> list[str]:
     return [key for key in _at(whole, at)[0]["properties"] if key != "<<"]
 
 
+def kinds_at(whole: Schema, *at: str) -> dict[str, list[str]]:
+    """Keys of the mappings among which a kind chooses at a place in a file with this schema, by kind; {} elsewhere."""
+    parts = [whole["$defs"][each["$ref"].rpartition("/")[2]] for each in _at(whole, at)[0].get("oneOf", ())]
+    return {kind_of(part): [key for key in part["properties"] if key != "<<"] for part in parts}
+
+
+def kind_of(part: Schema) -> str:
+    """The kind of a mapping, as pydantic names it in the place of an error."""
+    return str(part["properties"]["kind"].get("const", OWN))
+
+
 def wanted_at(whole: Schema, *at: str) -> str:
     """The values that are allowed at a place in a file with this schema, in words."""
     says, name = _at(whole, at)
     kind, unit = says.get("type", "string"), unit_of(name, " in ")
     if WANTED in says:
         return str(says[WANTED])
+    if "oneOf" in says:
+        return f"a mapping with a kind, one of {', '.join(PLANTS.allowed)}, and its keys"
     if "properties" in says:
         return f"a mapping with the keys {', '.join(keys_at(whole, *at))}"
     if kind in ("array", "object"):
@@ -140,7 +159,11 @@ def _at(whole: Schema, at: Sequence[str]) -> tuple[Schema, str]:
     """The schema at a place, and the name whose suffix gives the unit."""
     says, name = whole, ""
     for part in at:
-        if part.isdecimal() and "properties" in says:  # one entry of a list may stand for the list
+        if part.isdecimal() and says.keys() & {"properties", "oneOf"}:  # one entry of a list may stand for the list
+            continue
+        if "oneOf" in says:
+            parts = (whole["$defs"][each["$ref"].rpartition("/")[2]] for each in says["oneOf"])
+            says = next(each for each in parts if kind_of(each) == part)
             continue
         inner = says.get("properties", {}).get(part)
         if inner is not None or not unit_of(name):
@@ -148,6 +171,6 @@ def _at(whole: Schema, at: Sequence[str]) -> tuple[Schema, str]:
         if part == NAMES:
             inner = says["propertyNames"]["anyOf"][0]
         says = inner or says.get("items") or says.get("additionalProperties") or {}
-        says = next((each for each in says.get("anyOf", ()) if "$ref" in each), says)  # else null
+        says = next((each for each in says.get("anyOf", ()) if each.keys() & {"$ref", "oneOf"}), says)  # else null
         says = whole["$defs"][says["$ref"].rpartition("/")[2]] if "$ref" in says else says
     return says, name

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from typing import Any, NamedTuple
 
 from airground_drake.base.registry import PLUGIN
-from airground_drake.scenario.json_schema import Schema
+from airground_drake.scenario.json_schema import Schema, kind_of
 
 
 class Entry(NamedTuple):
@@ -25,6 +25,12 @@ class Section(NamedTuple):
     path: str
     says: str
     entries: list[Entry]
+    kind: str = ""  # of mappings of several kinds: which of them
+
+    @property
+    def title(self) -> str:
+        """Its dotted key, and which kind it is about."""
+        return f"{self.path}: {self.kind}" if self.kind else self.path
 
 
 def sections(schema: Schema) -> Iterator[Section]:
@@ -32,26 +38,27 @@ def sections(schema: Schema) -> Iterator[Section]:
     yield from _sections(schema, schema, "")
 
 
-def _sections(schema: Schema, part: Schema, path: str) -> Iterator[Section]:
+def _sections(schema: Schema, part: Schema, path: str, kind: str = "") -> Iterator[Section]:
     keys = [(key, says) for key, says in part["properties"].items() if key != "<<"]
     entries = [Entry(key, _allowed(key, part), says["description"]) for key, says in keys]
-    yield Section(path, part["description"], entries)
+    yield Section(path, part["description"], entries, kind)
     for key, says in keys:
         for where, below in (
             ("", _ref(says)),
             (".NAME", says.get("additionalProperties") or {}),
             (".N", says.get("items") or {}),
         ):
-            if "$ref" in below:
-                kind = schema["$defs"][below["$ref"].rpartition("/")[2]]
-                yield from _sections(schema, kind, f"{path}.{key}{where}".lstrip("."))
+            for each in below.get("oneOf", [below] if "$ref" in below else []):
+                inner = schema["$defs"][each["$ref"].rpartition("/")[2]]
+                of = kind_of(inner) if "oneOf" in below else ""
+                yield from _sections(schema, inner, f"{path}.{key}{where}".lstrip("."), of)
 
 
 def _allowed(key: str, part: Schema) -> str:
     """What may stand under a key, and its default."""
     says = part["properties"][key]
     words = [_kind(says)]
-    if says.get("type") == "number" and "default" in says:
+    if says.get("type") == "number":
         words += ["0 or more"] * (says["minimum"] == 0.0) + ["above 0"] * (says["minimum"] > 0.0)
     if says.get("type") == "integer":
         words.append(f"{says['minimum']} to {says['maximum']}")
@@ -64,16 +71,18 @@ def _allowed(key: str, part: Schema) -> str:
 
 def _ref(says: Schema) -> Schema:
     """The mapping that may stand under a key, also if nothing may stand there, too."""
-    return next((each for each in says.get("anyOf", ()) if "$ref" in each), says)
+    return next((each for each in says.get("anyOf", ()) if each.keys() & {"$ref", "oneOf"}), says)
 
 
 def _kind(says: dict[str, Any]) -> str:
     says = _ref(says)
     if "anyOf" in says:
-        return f"{_kind(says['anyOf'][0])}, {PLUGIN}"
+        return ", ".join([*(_kind(each) for each in says["anyOf"] if "enum" in each), PLUGIN])
     if "enum" in says:
         return "one of " + ", ".join(f"`{name}`" for name in says["enum"])
-    if "$ref" in says:
+    if "const" in says:
+        return f"`{says['const']}`"
+    if says.keys() & {"$ref", "oneOf"}:
         return "a mapping, see below"
     if says["type"] == "array":
         return "a point, [x, y, z]" if says.get("maxItems") == 3 else f"a list of {_several(_kind(says['items']))}"

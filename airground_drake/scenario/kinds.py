@@ -1,8 +1,7 @@
 """Kinds of values in a scenario file: pydantic's annotations for the dataclasses of `schema.py`."""
 
 import re
-from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from collections.abc import Iterable
 from importlib import import_module
 from typing import Annotated, Any
 
@@ -11,14 +10,13 @@ from pydantic import (
     Field,
     GetCoreSchemaHandler,
     GetJsonSchemaHandler,
-    ValidationInfo,
 )
 from pydantic_core import CoreSchema, core_schema
 
 from airground_drake.base.limits import MAX_CORNERS, MAX_NAME, MAX_SEED
 from airground_drake.base.registry import MODEL_CLAIMS, PLUGIN, PLUGIN_PATTERN, RUN_CLAIMS, Registry, is_plugin
 from airground_drake.base.statuses import COUNTS, EXPECTATIONS, NOTHING, alternatives, declared
-from airground_drake.base.values import Positive, Real, refused, visible
+from airground_drake.base.values import Positive, Real, ValueRule, refused, visible
 from airground_drake.scenario.hints import plugin_path
 from airground_drake.scenario.maps.rectangles import MOST_CELLS
 
@@ -27,7 +25,6 @@ CLAIM_PATTERN = f"^[A-Z][A-Z0-9-]{{0,{MAX_NAME - 1}}}$"
 PLUG_IN = {"type": "string", "pattern": PLUGIN_PATTERN}
 # Key for a registry of claims; `json_schema.py` replaces it by the claims and their expected verdicts.
 EXPECTED = "x-expected"
-RECORDED = "recorded"  # pydantic's context for the scenario in a run's metadata: its rules are not checked again
 # Unit by the suffix of a key, the longest suffix first.
 _UNITS = {"rad": "rad", "rad_s": "rad/s", "m_sqrt_s": "m/sqrt(s)", "1_m2_s": "1/(m^2 s)", "m_s": "m/s", "1_s": "1/s",
           "m": "m", "s": "s"}  # fmt: skip
@@ -75,30 +72,6 @@ def _two_or_none(value: list[Any]) -> list[Any]:
 Point = Annotated[list[Real], Field(strict=True, min_length=3, max_length=3)]  # no set, which has no order
 GroundPoint = Annotated[Point, AfterValidator(_on_the_ground)]
 AirPoint = Annotated[Point, AfterValidator(_in_the_air)]
-
-
-@dataclass(frozen=True)
-class ValueRule:
-    """A function that returns a value or raises `refused`, and the rule in JSON Schema.
-
-    A registry in the schema stands for its names; `json_schema.py` inserts them.
-    """
-
-    check: Callable[[Any], Any]
-    says: Callable[[], dict[str, Any]]
-
-    def __get_pydantic_core_schema__(self, source: object, handler: GetCoreSchemaHandler) -> CoreSchema:
-        """Check a value after the annotations before this one, except in the metadata of a run."""
-        # A run may be judged on a machine without its plug-ins.
-
-        def checked(value: Any, info: ValidationInfo) -> Any:
-            return value if info.context == RECORDED else self.check(value)
-
-        return core_schema.with_info_after_validator_function(checked, handler(source))
-
-    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
-        """The schema of the annotations before this one, with this rule added."""
-        return {**handler(schema), **self.says()}
 
 
 class OneOrList:

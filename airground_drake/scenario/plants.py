@@ -1,28 +1,74 @@
-"""The plants of a scenario's robots, for the world and, independently of it, for claims."""
+"""The plants of a scenario's robots: their keys, one class per kind, and from them the plants of the model."""
 
-from __future__ import annotations
+# No `from __future__ import annotations` here: pydantic needs the types themselves, not their names.
+from types import SimpleNamespace
+from typing import TYPE_CHECKING, Annotated, Any, Protocol, Union
 
-import math
+from pydantic import BeforeValidator, Discriminator, Field, Tag, TypeAdapter, ValidationInfo
 
-from airground_drake.model.plants.plant import Delay, FirstOrder, Lag, Own, Plant, Unicycle
-from airground_drake.scenario.schema import Plant as Given
-from airground_drake.scenario.schema import Uav, Ugv
+from airground_drake.base.registry import PLANTS
+from airground_drake.base.values import RECORDED, refused
+from airground_drake.model.plants.first_order import FirstOrder
+from airground_drake.model.plants.own import OwnKeys
+from airground_drake.model.plants.plant import Keys, Plant
+from airground_drake.scenario.hints import plugin_path
+from airground_drake.scenario.kinds import OneOrList
+
+# The classes of keys, by kind; `OWN` stands for the user's plants.
+OWN = "a plant of your own"
+KEYS: dict[str, type[Keys]] = {name: PLANTS.load(name, of=Keys) for name in PLANTS.own} | {OWN: OwnKeys}
+DEFAULT = next(iter(KEYS))  # the kind of a plant that moves as it is told
+NO_THEOREM = "no theorem covers another combination"
 
 
-def plant_of(robot: Ugv | Uav, period_s: float) -> Plant:
+def tag_of(given: Any) -> str:
+    """The class that a plant's keys belong to, by its name in `KEYS`; the default's for what is no mapping."""
+    kind = given.get("kind", DEFAULT) if isinstance(given, dict) else getattr(given, "kind", DEFAULT)
+    return kind if kind in PLANTS.own else OWN
+
+
+def _known(given: Any, info: ValidationInfo) -> Any:
+    """Refuse a kind that is no name of a plant, whatever the other keys are."""
+    kind = given.get("kind", DEFAULT) if isinstance(given, dict) else DEFAULT
+    if isinstance(kind, str) and info.context != RECORDED and not PLANTS.accepts(kind):
+        raise refused(kind, f"one of {', '.join(PLANTS.allowed)}{plugin_path(kind)}", "kind")
+    return given
+
+
+if TYPE_CHECKING:
+    AnyKeys = Keys
+else:
+    _tagged = (Annotated[kind, Tag(name)] for name, kind in KEYS.items())
+    AnyKeys = Annotated[Union[tuple(_tagged)], Discriminator(tag_of), BeforeValidator(_known)]  # noqa: UP007
+
+Plants = Annotated[list[AnyKeys], Field(strict=True, max_length=2), OneOrList()]
+
+
+class _Robot(Protocol):
+    """A robot of a scenario."""
+
+    plant: list[Keys]
+
+
+def plant_of(robot: _Robot, period_s: float) -> Plant:
     """How a robot moves under its commands, with a control period, s."""
-    first, *after = robot.plant or [Given()]
-    if first.kind == "delay":
-        inner = _plant(after[0], period_s) if after else FirstOrder()
-        assert isinstance(inner, FirstOrder | Lag)
-        return Delay(round(first.delay_s / period_s), period_s, inner)
-    return _plant(first, period_s)
+    found: Plant | None = None
+    for keys in reversed(robot.plant):
+        found = keys.made(period_s, found)
+    return found or FirstOrder()
 
 
-def _plant(given: Given, period_s: float) -> Plant:
-    if given.is_own:
-        return Own(given.kind, given.drift_m_s, given.cover_m, given.parameters)
-    if given.kind == "unicycle":
-        limits = given.max_turn_rad_s or math.inf, given.wheel_base_m, given.max_wheel_speed_m_s or math.inf
-        return Unicycle(given.hand_point_m, period_s, given.heading_rad, *limits, given.backwards)
-    return Lag(given.time_constant_s) if given.kind == "lag" else FirstOrder()
+def made(given: list[dict[str, Any]], period_s: float) -> Plant:
+    """The same of the value of `plant` in a resolved scenario."""
+    return plant_of(SimpleNamespace(plant=_LIST.validate_python(given, context=RECORDED)), period_s)
+
+
+_LIST = TypeAdapter(list[AnyKeys])
+
+
+def refusal(given: list[Keys]) -> str:
+    """Why plants cannot be combined; '' if they can."""
+    if len(given) < 2 or given[0].precedes(given[1]):
+        return ""
+    why = next((keys.alone for keys in given if keys.alone), NO_THEOREM)
+    return f"one plant, or a delay and then a lag: {why}"

@@ -8,7 +8,7 @@ from typing import Any
 from pydantic import TypeAdapter, ValidationError
 
 from airground_drake.base.errors import TraceError
-from airground_drake.scenario.kinds import RECORDED
+from airground_drake.base.values import RECORDED
 from airground_drake.scenario.schema import Scenario
 
 

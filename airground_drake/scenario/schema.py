@@ -15,8 +15,19 @@ from pydantic import ConfigDict, Field
 
 from airground_drake.base.files import sha256
 from airground_drake.base.limits import MAX_CORNERS, MAX_RECTANGLES, MAX_STAGES, MAX_UGVS
-from airground_drake.base.registry import METHODS, MODEL_CLAIMS, PLANTS, POLICIES, ROUTES, RUN_CLAIMS, UAV_TASKS
-from airground_drake.base.values import Count, CountFromZero, Name, NotNegative, Positive, Real, Share, Words, YesNo
+from airground_drake.base.registry import METHODS, MODEL_CLAIMS, POLICIES, ROUTES, RUN_CLAIMS, UAV_TASKS
+from airground_drake.base.values import (
+    Count,
+    CountFromZero,
+    Heading,
+    Name,
+    NotNegative,
+    Positive,
+    Real,
+    Share,
+    Words,
+    YesNo,
+)
 from airground_drake.scenario.kinds import (
     CLAIMS,
     AirPoint,
@@ -25,7 +36,6 @@ from airground_drake.scenario.kinds import (
     Corner,
     CornersOrNone,
     GroundPoint,
-    OneOrList,
     OneValue,
     Place,
     PlaceOrNone,
@@ -37,6 +47,7 @@ from airground_drake.scenario.kinds import (
     registered,
     settings_of,
 )
+from airground_drake.scenario.plants import Plants
 
 Vector = list[float]
 
@@ -72,56 +83,6 @@ class Preset:
 
 
 @dataclass(slots=True)
-class Plant:
-    """How a robot moves. The law steers a point of it, and keeps what its body needs on top: see `budget`.
-
-    - first_order: it moves as it is told.
-    - unicycle (UGVs): a differential drive. The law steers a hand point ahead of its axle, which arrives exactly where
-      the law wants it; commands for which it would have to turn or drive too fast are shortened.
-    - lag: its velocity follows the command with a time constant; the law steers p + tau v.
-    - delay: commands take effect later; the law steers where it will be when those under way are carried out.
-    - `module:Class` or `file.py:Class`: the user's own Drake System, with a drift and a cover that are declared. Each
-      run measures both.
-
-    A list combines: a delay, and after it a lag.
-    """
-
-    kind: Annotated[Words, registered(PLANTS)] = "first_order"
-    """Which of these."""
-    hand_point_m: NotNegative = 0.0
-    """Of a unicycle: distance of the hand point ahead of the axle; above 0."""
-    heading_rad: Real = 0.0
-    """Of a unicycle: heading at the start, counter-clockwise from x."""
-    max_turn_rad_s: NotNegative = 0.0
-    """Of a unicycle: turning limit; 0: none."""
-    wheel_base_m: NotNegative = 0.0
-    """Of a unicycle: distance of its wheels."""
-    max_wheel_speed_m_s: NotNegative = 0.0
-    """Of a unicycle: speed limit of a wheel; 0: none."""
-    backwards: YesNo = True
-    """Of a unicycle: whether it may drive backwards. If not, the law keeps less distance from what is at rest; but a
-    robot can stand for ever if its target is straight behind it, or if it would have to turn towards a wall."""
-    time_constant_s: NotNegative = 0.0
-    """Of a lag: time constant; above 0."""
-    delay_s: NotNegative = 0.0
-    """Of a delay: a whole number of control periods."""
-    drift_m_s: NotNegative = 0.0
-    """Of your own plant: how far its steered point misses a command in a period at most, divided by the period."""
-    cover_m: NotNegative = 0.0
-    """Of your own plant: how far the body is at most from the steered point's straight line in a control period."""
-    parameters: dict[Name, Real] = field(default_factory=dict)
-    """Of your own plant: numbers for its class, by name."""
-
-    @property
-    def is_own(self) -> bool:
-        """Whether it is a class of the user's."""
-        return self.kind not in PLANTS.own
-
-
-Plants = Annotated[list[Plant], Field(strict=True, max_length=2), OneOrList()]
-
-
-@dataclass(slots=True)
 class Ugv:
     """One UGV: a disc of radius `radius_m` on the ground."""
 
@@ -136,7 +97,8 @@ class Ugv:
     radius_m: NotNegative = 0.0
     """Radius of its body, added to the safe distances of its pairs; 0: a point."""
     plant: Plants = field(default_factory=list)
-    """How it moves; by default as it is told (first_order)."""
+    """How it moves; by default as it is told. The law steers a point of it, and keeps what its body needs on top: see
+    `airground budget`. A list combines a delay, and after it a lag."""
 
 
 @dataclass(slots=True)
@@ -164,7 +126,8 @@ class Uav:
     radius_m: NotNegative = 0.0
     """Radius of its body, added to the safe distances of its pairs; 0: a point."""
     plant: Plants = field(default_factory=list)
-    """How it moves; by default as it is told (first_order)."""
+    """How it moves; by default as it is told. The law steers a point of it, and keeps what its body needs on top: see
+    `airground budget`. A list combines a delay, and after it a lag."""
 
 
 @dataclass(slots=True)
@@ -204,7 +167,7 @@ class Obstacle:
     """Corners [x, y] of a thin wall, at least two."""
     size_m: SizeOrNone = field(default_factory=list)
     """Length and width [x, y] of a box about `position_m`."""
-    heading_rad: Real = 0.0
+    heading_rad: Heading = 0.0
     """Turns a polygon, wall or box about `position_m`, counter-clockwise."""
     height_m: NotNegative = 0.0
     """It stands from the ground to this height; 0: flat, or a ball. For UGVs all walls are endless."""

@@ -19,17 +19,18 @@ import numpy as np
 
 from airground_drake.base.arrays import Array
 from airground_drake.base.errors import Fault, ScenarioError
-from airground_drake.base.exact import decimal
+from airground_drake.base.exact import decimal, is_multiple
 from airground_drake.base.registry import MODEL_CLAIMS, ROUTES, RUN_CLAIMS
 from airground_drake.base.statuses import COUNTS, NOTHING, alternatives
 from airground_drake.model.geometry import convex, outline
+from airground_drake.model.plants.plant import Setting
 from airground_drake.model.trigger.bayes import COMPUTED
 from airground_drake.scenario import hints
 from airground_drake.scenario.budget import PairBudget, budget, takes_room
 from airground_drake.scenario.outlines import outlines_of
-from airground_drake.scenario.plants import plant_of
+from airground_drake.scenario.plants import plant_of, refusal
 from airground_drake.scenario.rounding import TOLERANCE_M, Rounding
-from airground_drake.scenario.schema import ABOUT, ARENA, MAP, SHAPES, Obstacle, Plant, Scenario, Uav, Ugv, Vector
+from airground_drake.scenario.schema import ABOUT, ARENA, MAP, SHAPES, Obstacle, Scenario, Vector
 from airground_drake.scenario.shapes import crossing, near_edge
 
 GAINS = ("avoidance_gain_1_s", "motion_gain_1_s", "formation_gain_1_s", "intervention_gain_1_s")
@@ -113,19 +114,6 @@ def _shapes(scenario: Scenario) -> Problems:
                     yield f"{key}.{name}", getattr(robot, name), f"a place within arena_m = {scenario.arena_m}"
 
 
-def _headings(scenario: Scenario) -> Problems:
-    """Headings are at most one turn: greater ones are degrees."""
-    headings = {f"obstacles.{name}": each.heading_rad for name, each in scenario.obstacles.items()}
-    for name, robot in scenario.robots.items():
-        place = f"ugvs.{name}" if name in scenario.ugvs else "uav"
-        several = len(robot.plant) > 1
-        headings |= {f"{place}.plant{f'.{k}' * several}": each.heading_rad for k, each in enumerate(robot.plant)}
-    for key, heading in headings.items():
-        if abs(heading) > math.tau + TOLERANCE:
-            degrees = f"{heading:g} degrees are {math.radians(heading):.6g} rad"
-            yield f"{key}.heading_rad", heading, f"from -{math.tau:.6g} to {math.tau:.6g} rad; {degrees}"
-
-
 def _way(key: str, obstacle: Obstacle, *, flat: bool) -> Problems:
     """The way of an obstacle that moves."""
     moves = obstacle.moves
@@ -200,68 +188,18 @@ def _route(scenario: Scenario) -> Problems:
             yield f"runs.{name}.set.{key}", route, f"this run is of method {run.method}: only method c uses a route"
 
 
-# The keys of each kind of plant.
-KEYS_OF_PLANTS = {
-    "first_order": (),
-    "unicycle": ("hand_point_m", "heading_rad", "max_turn_rad_s", "wheel_base_m", "max_wheel_speed_m_s", "backwards"),
-    "lag": ("time_constant_s",),
-    "delay": ("delay_s",),
-}
-OWN_KEYS = ("drift_m_s", "cover_m", "parameters")  # those of a user's plant
-
-
 def _plants(scenario: Scenario) -> Problems:
-    """Each plant has the keys of its kind, within limits that the theorems need; a list combines what they combine."""
+    """Plants are combined as theorems combine them, and their keys go together."""
+    control = scenario.control
     for name, robot in scenario.robots.items():
-        place = f"{f'ugvs.{name}' if name in scenario.ugvs else 'uav'}.plant"
-        kinds = [plant.kind for plant in robot.plant]
-        if len(kinds) > 1 and kinds != ["delay", "lag"]:
-            why = "no theorem covers another combination; chord steering needs a body that obeys at once"
-            if any(plant.is_own for plant in robot.plant):
-                why = "a plant of your own does everything itself"
-            yield place, f"[{', '.join(kinds)}]", f"one plant, or a delay and then a lag: {why}"
-        for k, plant in enumerate(robot.plant):
-            key = f"{place}.{k}" if len(kinds) > 1 else place
-            keys = KEYS_OF_PLANTS.get(plant.kind, OWN_KEYS)
-            for other in (each for each in _ALL_KEYS if each not in keys):
-                if getattr(plant, other) != getattr(_DEFAULT, other):
-                    allowed = f"keys of {plant.kind}: {', '.join(keys) or 'none'}"
-                    yield f"{key}.{other}", getattr(plant, other), allowed
-            yield from _numbers_of(scenario, key, robot, plant)
-
-
-_DEFAULT = Plant()
-_ALL_KEYS = tuple(key for keys in (*KEYS_OF_PLANTS.values(), OWN_KEYS) for key in keys)
-
-
-def _numbers_of(scenario: Scenario, key: str, robot: Ugv | Uav, plant: Plant) -> Problems:
-    period = scenario.control.period_s
-    if plant.kind == "lag" and not plant.time_constant_s >= TOLERANCE:
-        yield f"{key}.time_constant_s", plant.time_constant_s, "more than 0 s"
-    if plant.kind == "delay" and not _multiple(plant.delay_s, period):
-        yield f"{key}.delay_s", plant.delay_s, f"a whole multiple of control.period_s = {period:.9g} s, more than 0"
-    if plant.drift_m_s and not scenario.control.avoidance_gain_1_s:
-        yield f"{key}.drift_m_s", plant.drift_m_s, "0: without control.avoidance_gain_1_s nothing makes up for a drift"
-    if plant.kind != "unicycle":
-        return
-    if isinstance(robot, Uav):
-        yield f"{key}.kind", plant.kind, "another kind: a UAV is no unicycle"
-    if plant.hand_point_m < TOLERANCE:
-        yield f"{key}.hand_point_m", plant.hand_point_m, "more than 0 m: the law steers a point ahead of the axle"
-        return
-    if bool(plant.wheel_base_m) != bool(plant.max_wheel_speed_m_s):
-        missing = "max_wheel_speed_m_s" if plant.wheel_base_m else "wheel_base_m"
-        yield f"{key}.{missing}", 0.0, "more than 0: wheel_base_m and max_wheel_speed_m_s go together"
-    limits = [plant.max_turn_rad_s] if plant.max_turn_rad_s else []
-    if plant.wheel_base_m:
-        limits.append(2.0 * plant.max_wheel_speed_m_s / plant.wheel_base_m)
-    least = 0.5 * robot.max_speed_m_s * period
-    if not (plant.hand_point_m >= least or (limits and min(limits) * period < math.pi)):
-        allowed = (
-            f"at least max_speed_m_s * control.period_s / 2 = {least:.9g} m, or a turning limit below pi / period_s = "
-            f"{math.pi / period:.6g} rad/s: else the axle could swing round within a period"
-        )
-        yield f"{key}.hand_point_m", plant.hand_point_m, allowed
+        flies = name not in scenario.ugvs
+        place = f"{'uav' if flies else f'ugvs.{name}'}.plant"
+        if allowed := refusal(robot.plant):
+            yield place, f"[{', '.join(keys.kind for keys in robot.plant)}]", allowed
+        setting = Setting(control.period_s, control.avoidance_gain_1_s, robot.max_speed_m_s, flies)
+        for k, keys in enumerate(robot.plant):
+            at = f"{place}.{k}" if len(robot.plant) > 1 else place
+            yield from ((f"{at}.{key}", value, allowed) for key, value, allowed in keys.problems(setting))
 
 
 def _presets(scenario: Scenario) -> Problems:
@@ -314,25 +252,20 @@ def _periods(scenario: Scenario) -> Problems:
     if scenario.duration_s < control:
         yield "duration_s", scenario.duration_s, f"at least one control period, control.period_s = {control} s"
     for key, period in (("gatekeeper", gatekeeper.period_s), ("intervention", scenario.intervention.period_s)):
-        if not _multiple(period, control):
+        if not is_multiple(period, control):
             yield f"{key}.period_s", period, rule
     stage = gatekeeper.horizon_s / gatekeeper.stages
-    if not _multiple(stage, control):
+    if not is_multiple(stage, control):
         fits = f" (gatekeeper.stages: {round(gatekeeper.horizon_s / control)} would do)"
         problem = f"a stage, horizon_s / stages = {stage:.9g} s, {rule}"
-        yield "gatekeeper.horizon_s", gatekeeper.horizon_s, problem + fits * _multiple(gatekeeper.horizon_s, control)
-    if not (_multiple(noise, control) or _multiple(control, noise)):
+        yield "gatekeeper.horizon_s", gatekeeper.horizon_s, problem + fits * is_multiple(gatekeeper.horizon_s, control)
+    if not (is_multiple(noise, control) or is_multiple(control, noise)):
         yield "decision.noise_period_s", noise, f"{rule}, or go into it a whole number of times"
     step, leak = min(control, noise), scenario.decision.leak_1_s
     if leak * step > 1.0:
         most = _shown(1 / decimal(step), ROUND_FLOOR)
         allowed = f"at most {most} 1/s: leak * {step:.9g} s, a step of the noise, must not exceed 1"
         yield "decision.leak_1_s", leak, allowed
-
-
-def _multiple(of: float, unit: float) -> bool:
-    ratio = of / unit
-    return round(ratio) >= 1 and abs(ratio - round(ratio)) <= TOLERANCE * ratio
 
 
 def _release(scenario: Scenario) -> Problems:
@@ -619,6 +552,6 @@ def _keys(value: object, above: str = "") -> Iterator[str]:
 
 # Every rule; later ones rely on earlier ones.
 CHECKS: tuple[Callable[[Scenario], Problems], ...] = (
-    _names, _reserved, _shapes, _headings, _map, _blocks, _route, _runs, _plants, _presets, _ends, _gains, _periods,
+    _names, _reserved, _shapes, _map, _blocks, _route, _runs, _plants, _presets, _ends, _gains, _periods,
     _release, _distances, _sensing, _extent, _clearances, _budget, _reproduction, _choices,
 )  # fmt: skip

@@ -8,7 +8,7 @@ import numpy as np
 
 from airground_drake.model.bodies.world import Body, Kind, World
 from airground_drake.model.geometry import outline
-from airground_drake.model.plants.plant import Scripted
+from airground_drake.model.plants.scripted import Scripted
 from airground_drake.scenario.courses import course
 from airground_drake.scenario.outlines import outlines_of
 from airground_drake.scenario.plants import plant_of

@@ -22,7 +22,8 @@ from airground_drake.model.trigger.bayes import COMPUTED
 from airground_drake.scenario.budget import budget, takes_room
 from airground_drake.scenario.courses import course
 from airground_drake.scenario.outlines import outlines_of
-from airground_drake.scenario.schema import Decision, Plant, Scenario
+from airground_drake.scenario.plants import plant_of
+from airground_drake.scenario.schema import Decision, Scenario
 from airground_drake.scenario.world import make_world
 from airground_drake.uav.database import BehaviourDatabase, make_policy
 from airground_drake.uav.planner import Mover, Planner
@@ -79,15 +80,10 @@ def make_planner(scenario: Scenario, method: Method) -> Planner:
         robot_distance=apart,
         max_speed=np.array([ugv.max_speed_m_s for ugv in scenario.ugvs.values()]),
         radius=radius,
-        trails=tuple(any(_trails(ugv.max_speed_m_s, each) for each in ugv.plant) for ugv in scenario.ugvs.values()),
+        trails=tuple(
+            plant_of(ugv, scenario.control.period_s).trails(ugv.max_speed_m_s) for ugv in scenario.ugvs.values()
+        ),
     )
-
-
-def _trails(speed_m_s: float, plant: Plant) -> bool:
-    """Whether a plant may fall behind a motion within the speed limit: by a turning limit, a lag, or as it likes."""
-    if plant.kind == "unicycle":
-        return 0.0 < plant.max_turn_rad_s * plant.hand_point_m < speed_m_s
-    return plant.kind != "first_order"
 
 
 def _planned_apart(scenario: Scenario) -> tuple[Array, float]:

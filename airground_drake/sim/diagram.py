@@ -19,7 +19,6 @@ from airground_drake.model.bodies.world import ROBOTS, World
 from airground_drake.model.geometry.motion import Motion
 from airground_drake.model.law.avoidance import COMPOSITIONS, Composition
 from airground_drake.model.law.task import Task
-from airground_drake.model.plants.plant import Own
 from airground_drake.scenario.load import validated
 from airground_drake.scenario.schema import Scenario
 from airground_drake.scenario.world import make_world
@@ -331,7 +330,7 @@ def _uav_controller(scenario: Scenario, world: World) -> UavController:
 
 def _own_headings(world: World, plants: Mapping[str, System]) -> dict[str, OutputPort]:
     """The headings of users' plants that have one, by robot."""
-    own = [body.name for body in world.moving if isinstance(body.plant, Own)]
+    own = [body.name for body in world.moving if body.plant and body.plant.measured]
     return {name: plants[name].GetOutputPort("heading") for name in own if plants[name].HasOutputPort("heading")}
 
 

@@ -21,7 +21,7 @@ from airground_drake.model.geometry import convex, outline
 from airground_drake.model.geometry.motion import Motion
 from airground_drake.model.law.avoidance import Avoidance, Composition
 from airground_drake.model.law.ugv_law import UgvLaw
-from airground_drake.model.plants.plant import FirstOrder
+from airground_drake.model.plants.first_order import FirstOrder
 from airground_drake.scenario.load import own, resolved, validated
 from airground_drake.scenario.schema import Scenario
 from airground_drake.sim import recording

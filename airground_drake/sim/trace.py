@@ -55,6 +55,8 @@ from airground_drake.base.arrays import Array, read_only
 from airground_drake.base.errors import TraceError, one_line
 from airground_drake.base.values import NAME_PATTERN
 from airground_drake.model.bodies.motion import SAME_S
+from airground_drake.model.plants.plant import Plant
+from airground_drake.scenario.plants import plant_of
 from airground_drake.scenario.recorded import of_run
 from airground_drake.scenario.schema import Scenario
 from airground_drake.sim.collisions import first_collisions
@@ -207,6 +209,18 @@ class Trace:
         """Headings of a robot whose plant records them, (T,), rad, counter-clockwise from x; else None."""
         name = f"{robot}.heading_rad"
         return self.column(name) if name in self.states else None
+
+    def plant(self, robot: str) -> Plant:
+        """How a robot moves, by its scenario."""
+        of = self.scenario.robots[robot], self.scenario.control.period_s
+        return self.derived(("plant", robot), lambda: plant_of(*of))
+
+    def signals(self, robot: str) -> Array:
+        """What the plant of a robot records, its place first, (T, k)."""
+        names = [f"{robot}.{name}" for name in self.plant(robot).signals]
+        if not names:
+            return self.position(robot)
+        return self.derived(("signals", robot), lambda: read_only(np.column_stack([self.column(n) for n in names])))
 
     def is_apart(self, robot: str) -> bool:
         """Whether the body of a robot is recorded apart from the point that the law steers."""

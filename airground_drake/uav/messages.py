@@ -14,7 +14,7 @@ from typing import Literal, NamedTuple
 
 from airground_drake.base.arrays import Array
 from airground_drake.model.bodies.world import World
-from airground_drake.model.plants.plant import Scripted
+from airground_drake.model.plants.scripted import Scripted
 from airground_drake.uav.policy import Proposal
 
 ACCEPT, SILENT, REFUSE, DONE = 1.0, 0.0, -1.0, 2.0

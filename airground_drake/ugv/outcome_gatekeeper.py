@@ -27,7 +27,7 @@ from airground_drake.model.geometry import convex, outline
 from airground_drake.model.geometry.convex import news_within, within
 from airground_drake.model.geometry.motion import Motion
 from airground_drake.model.law.ugv_law import UgvLaw
-from airground_drake.model.plants.plant import Scripted
+from airground_drake.model.plants.scripted import Scripted
 from airground_drake.uav.messages import (
     ACCEPT,
     DONE,

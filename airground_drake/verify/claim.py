@@ -16,8 +16,6 @@ from airground_drake.base.errors import TraceError, described
 from airground_drake.base.statuses import PASSING, STATUSES, Status, meets, outcome
 from airground_drake.scenario.schema import Scenario
 from airground_drake.sim.trace import Trace
-from airground_drake.verify.engines.bodies import following_m_s, unicycle_m
-from airground_drake.verify.engines.geometry import MERGE_S, interpolate
 from airground_drake.verify.finding import Evidence, Failure, Finding
 
 __all__ = [
@@ -247,7 +245,7 @@ def require_motion(trace: Trace) -> None:
     if len(t) < 2 or (np.diff(t) < 0.0).any():
         raise TraceError("the trace has fewer than two rows, or its time runs backwards")
     for robot in trace.robots:
-        if any(plant.is_own for plant in scenario.robots[robot].plant):
+        if trace.plant(robot).measured:
             require_measured(trace, robot)
             continue
         position = trace.position(robot)
@@ -279,31 +277,30 @@ def require_measured(trace: Trace, robot: str) -> None:
 
 def require_body(trace: Trace, robot: str) -> None:
     """Check that the recorded body of a robot follows from the steered point and the commands, by the robot's plant."""
-    given, period, t = trace.scenario.robots[robot], trace.scenario.control.period_s, trace.t
-    if not any(plant.kind != "first_order" for plant in given.plant):
+    plant, t = trace.plant(robot), trace.t
+    if not plant.signals:
         return
-    steered, command, found = trace.position(robot), trace.command(robot), trace.body(robot)
-    due = steered
-    for plant in given.plant:
-        if plant.kind == "delay":
-            due = interpolate(t, due, t - plant.delay_s)
-            late = np.round((t - plant.delay_s) / MERGE_S) * MERGE_S
-            before = np.clip(np.searchsorted(np.round(t / MERGE_S) * MERGE_S, late), 0, len(t) - 1)
-            command = np.where((late > 0.0)[:, None], command[before], 0.0)
-        elif plant.kind == "lag":
-            velocity = following_m_s(command, np.diff(t), plant.time_constant_s)
-            _agree(robot, t, trace.body_velocity(robot), velocity, "velocity")
-            due = due - plant.time_constant_s * velocity
-        elif plant.kind == "unicycle":
-            heading, rows = trace.column(f"{robot}.heading_rad"), trace.sample_rows
-            last = rows[np.maximum(np.searchsorted(rows, np.arange(len(t)), side="left") - 1, 0)]
-            both = unicycle_m(steered, heading[last], command, t - t[last], plant.hand_point_m, period)
-            _agree(robot, t, heading[:, None], both[:, 3:], "heading")
-            if heading[0] != plant.heading_rad:
-                raise TraceError(f"{robot} begins with the heading {heading[0]} rad, not {plant.heading_rad}")
-            due = both[:, :3]
-    _agree(robot, t, found, due, "body")
+    off = np.abs(trace.signals(robot) - followed(trace, robot))
+    row, column = np.unravel_index(int(np.argmax(off)), off.shape)
+    if not off[row, column] <= MOTION_TOLERANCE_M:
+        what = f"{plant.signals[column]} of {robot} at t = {t[row]} s is {off[row, column]:.3g}"
+        raise TraceError(f"{what} from where its plant has it")
     _begins(trace, robot)
+
+
+def followed(trace: Trace, robot: str) -> Array:
+    """The signals of a body that follows the recorded commands from rest, (T, k)."""
+    plant, period, t = trace.plant(robot), trace.scenario.control.period_s, trace.t
+    steered, command, samples = trace.position(robot), trace.command(robot), {*trace.sample_rows.tolist()}
+    memory, since = plant.memory(), t[0]
+    found = [plant.at(memory, steered[0], command[0], 0.0)]
+    for row in range(1, len(t)):
+        elapsed = float(t[row] - since)
+        elapsed = period if abs(elapsed - period) <= TIME_TOLERANCE_S else elapsed
+        found.append(plant.at(memory, steered[row], command[row], elapsed))
+        if row in samples:
+            memory, since = plant.remembered(memory, command[row], elapsed), t[row]
+    return np.array(found)
 
 
 def _begins(trace: Trace, robot: str) -> None:
@@ -311,14 +308,6 @@ def _begins(trace: Trace, robot: str) -> None:
     begins, start = trace.body(robot)[0], trace.scenario.robots[robot].start_m
     if np.abs(begins - start).max() > MOTION_TOLERANCE_M:
         raise TraceError(f"the body of {robot} begins at {begins.tolist()} m, not at {start}")
-
-
-def _agree(robot: str, t: Array, found: Array, due: Array, what: str) -> None:
-    """Raise a TraceError where rows of a recorded signal differ from those that follow from the plant."""
-    off = np.abs(found - due).max(axis=1)
-    k = int(np.argmax(off))
-    if not off[k] <= MOTION_TOLERANCE_M:
-        raise TraceError(f"the {what} of {robot} at t = {t[k]} s is {off[k]:.3g} from where its plant has it")
 
 
 def require_whole_run(trace: Trace) -> None:

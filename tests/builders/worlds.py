@@ -9,7 +9,7 @@ import numpy as np
 from airground_drake.base.arrays import Array
 from airground_drake.model.bodies.world import Body, Neighbours, World
 from airground_drake.model.geometry import outline
-from airground_drake.model.plants.plant import FirstOrder
+from airground_drake.model.plants.first_order import FirstOrder
 
 
 def world(

@@ -16,7 +16,8 @@ from airground_drake.scenario.schema import Scenario
 from airground_drake.sim.simulation import simulate
 from airground_drake.sim.trace import Trace
 from airground_drake.verify import judge
-from airground_drake.verify.engines.bodies import law_m, room_of
+from airground_drake.model.plants.budget import AT_REST, law_distance
+from airground_drake.scenario.plants import plant_of
 
 FORWARDS = [f"ugvs.{name}.plant.backwards=false" for name in ("burger", "waffle", "tb4")]
 RUNS = (("turtlebots", 12.0), ("lagging", 9.0), ("case_a_unicycle", 10.0), ("turtlebots forwards", 12.0))

@@ -17,7 +17,8 @@ from airground_drake.model.geometry import outline
 from airground_drake.model.geometry.motion import Motion
 from airground_drake.model.law.avoidance import Avoidance
 from airground_drake.model.law.ugv_law import UgvLaw
-from airground_drake.model.plants.plant import FirstOrder, Unicycle
+from airground_drake.model.plants.first_order import FirstOrder
+from airground_drake.model.plants.unicycle import Unicycle
 from airground_drake.sim.blocks.controllers import UgvController
 from airground_drake.uav.policy import Proposal
 from airground_drake.ugv.problem import Horizon, predicted_problem
@@ -51,7 +52,7 @@ def test_plans_are_those_of_the_running_controller(seed: int, on_top: bool, subs
     selection = np.eye(3) if rng.random() < 0.7 else np.array([[rng.normal(), rng.normal(), 0.0]])
     proposal = Proposal("way", 0.0, travel(4, 2.8), selection)
     team = world(("ugv1", "ugv2"), discs, 2.0, 1.0, 1.0, max_speed=[3.0, 3.0, 9.0])
-    near, controller, plant = team.around(slice(0, 1)), UgvController(team, law), FirstOrder()
+    near, controller = team.around(slice(0, 1)), UgvController(team, law)
     places, moving = np.vstack([other, FAR]), np.vstack([drift, np.zeros(3)])
     seen = view(np.zeros(3), preset, discs, 2.0, 3.0, places=places, velocities=moving)
     seen = replace(seen, distances=near.distance[0], shares=near.share[0])
@@ -64,7 +65,7 @@ def test_plans_are_those_of_the_running_controller(seed: int, on_top: bool, subs
             k * H, np.array([position, passing, FAR]), np.array([at, passing]), np.array([rate, np.zeros(3)]),
             [proposal if answers[k // substeps] else None, None],
         )  # fmt: skip
-        position = plant.step(position, command[0], H)
+        position = position + H * command[0]
         if (k + 1) % substeps == 0:
             ends.append(position)
     after = H * np.arange(0.0, 12 * substeps + 1.0)
@@ -99,7 +100,7 @@ def test_roll_outs_never_drive_backwards_either(seed: int, on_top: bool) -> None
         accepted = [proposal if answers[k] else None]
         command = controller.velocity(k * H, np.array([position, FAR]), at[None], rate[None], accepted, memory)
         controller.shorten(command, memory)
-        position, memory = plant.step(position, command[0], H), plant.remembered(memory, command[0], H)
+        position, memory = position + H * command[0], plant.remembered(memory, command[0], H)
         ends.append(position)
     loop = closed_loop(seen, law, proposal, H * np.arange(16.0), np.tile(FAR, (16, 1, 1)))
     np.testing.assert_allclose(follow(loop, answers)[0], ends, atol=1e-9)

@@ -14,7 +14,8 @@ from airground_drake.base.arrays import Array
 from airground_drake.model.bodies.motion import SAME_S
 from airground_drake.model.geometry import outline
 from airground_drake.model.plants.budget import AT_REST, Bounds, law_distance
-from airground_drake.model.plants.plant import Plant, Scripted, Unicycle
+from airground_drake.model.plants.plant import Plant
+from airground_drake.model.plants.scripted import Scripted
 from airground_drake.model.plants.steering import NUMBERS
 
 Kind = Literal["ugv", "uav", "obstacle"]
@@ -212,11 +213,11 @@ class World:
 
     @cached_property
     def steering(self) -> Array | None:
-        """Numbers of the UGVs' steering, (n, 5), see `model.plants.steering`; None if no UGV is a unicycle."""
-        plants = [body.plant for body in self.bodies[self.select("ugv")]]
-        if not any(isinstance(plant, Unicycle) for plant in plants):
+        """Numbers of the UGVs' steering, (n, 5), see `model.plants.steering`; None if all take every command."""
+        found = [body.plant.steering if body.plant else None for body in self.bodies[self.select("ugv")]]
+        if all(numbers is None for numbers in found):
             return None
-        return np.array([plant.steering if isinstance(plant, Unicycle) else np.zeros(NUMBERS) for plant in plants])
+        return np.array([np.zeros(NUMBERS) if numbers is None else numbers for numbers in found])
 
     @cached_property
     def signals(self) -> tuple[str, ...]:

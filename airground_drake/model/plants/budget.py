@@ -26,31 +26,32 @@ from airground_drake.base.arrays import Array
 
 
 class Bounds(NamedTuple):
-    """How far a body may be from where the law steers it.
+    """How far a body may be from where the law steers it."""
 
-    Attributes:
-        cover_m: of the body from the steered point, m.
-        dip_m: of the steered point from the straight line of its command within a period, m.
-        drift_m_s: by which the steered point may miss its command, m/s; it adds up over periods.
-        lag_s: time constant with which the body's velocity follows the command, s.
-        delay_s: time after which a command takes effect, s.
-        speed_m_s: largest command, m/s.
-        drawn: whether the body is drawn after the steered point, as a trailer: then beside a set at rest a cover l
-            costs sqrt(d^2 + l^2) - d (theorem Plants.forwards).
-    """
-
-    cover_m: float = 0.0
-    dip_m: float = 0.0
-    drift_m_s: float = 0.0
-    lag_s: float = 0.0
-    delay_s: float = 0.0
-    speed_m_s: float = 0.0
+    cover_m: float = 0.0  # of the body from the steered point
+    dip_m: float = 0.0  # of the steered point from the straight line of its command within a period
+    drift_m_s: float = 0.0  # by which the steered point may miss its command; it adds up over periods
+    lag_s: float = 0.0  # time constant with which the body's velocity follows the command
+    delay_s: float = 0.0  # time after which a command takes effect
+    speed_m_s: float = 0.0  # largest command
+    # Whether the body is drawn after the steered point, as a trailer: then beside a set at rest a cover l costs
+    # sqrt(d^2 + l^2) - d (theorem Plants.forwards).
     drawn: bool = False
 
     @property
     def exact(self) -> bool:
         """Whether the body is the steered point and moves as it is told."""
         return not any(self[:5])
+
+    @property
+    def late(self) -> bool:
+        """Whether commands under way lead the body on."""
+        return self.lag_s > 0.0 or self.delay_s > 0.0
+
+    @property
+    def rolling_m(self) -> float:
+        """How far the body may be from the steered point in all, but for drift, m."""
+        return self.cover_m + self.dip_m + (self.lag_s + self.delay_s) * self.speed_m_s
 
 
 AT_REST = Bounds()  # of a set that does not move
@@ -79,6 +80,30 @@ def law_distance(
     if _draws(one, other, passive=passive):
         kept = np.hypot(kept, one.cover_m)
     return kept + sum(cost.metres for cost in _added(one, other, gain=gain, passive=passive))
+
+
+def kept_distance(points: float, one: Bounds, other: Bounds = AT_REST, *, gain: float, passive: bool = False) -> float:
+    """Distance that bodies keep where their steered points keep `points`, m, from below: `law_distance` inverted."""
+    # -inf where nothing is promised: within tau V of a set, say, the body may be anywhere beside it.
+    left = points - sum(cost.metres for cost in _added(one, other, gain=gain, passive=passive))
+    if passive:
+        return left
+    if _draws(one, other, passive=passive):
+        left = _leg(left, one.cover_m)
+    if not (one.lag_s or other.lag_s):
+        return left - _delay(one, other)
+    choices = (one.lag_s,) if other == AT_REST else (0.0, one.lag_s, other.lag_s)
+    closing = one.speed_m_s + other.speed_m_s
+    return max(_leg(left - _apart(one, other, tau), tau * closing) for tau in choices) - _delay(one, other)
+
+
+def _leg(hypotenuse: float, leg: float) -> float:
+    """The other leg of a right-angled triangle, from below; -inf if there is none."""
+    if leg == 0.0:
+        return hypotenuse
+    if hypotenuse < leg:
+        return -math.inf
+    return max(math.sqrt((hypotenuse - leg) * (hypotenuse + leg)) * (1.0 - 1e-15), 0.0)
 
 
 def costs(distance: float, one: Bounds, other: Bounds = AT_REST, *, gain: float, passive: bool = False) -> list[Cost]:
@@ -120,10 +145,13 @@ def _lagging(distance: Array | float, one: Bounds, other: Bounds) -> Array | flo
         return distance
     closing = one.speed_m_s + other.speed_m_s
     found = [
-        abs(one.lag_s - tau) * one.speed_m_s
-        + abs(other.lag_s - tau) * other.speed_m_s
-        + np.sqrt(np.square(distance) + (tau * closing) ** 2)
+        _apart(one, other, tau) + np.sqrt(np.square(distance) + (tau * closing) ** 2)
         for tau in (0.0, one.lag_s, other.lag_s)
     ]
     least: Array | float = np.minimum.reduce(found)
     return least
+
+
+def _apart(one: Bounds, other: Bounds, tau: float) -> float:
+    """What lags cost that differ from tau, m."""
+    return abs(one.lag_s - tau) * one.speed_m_s + abs(other.lag_s - tau) * other.speed_m_s

@@ -9,10 +9,12 @@ import numpy.typing as npt
 
 from airground_drake.base.arrays import Array
 from airground_drake.model.geometry import convex, outline
+from airground_drake.model.plants.plant import HEADING
 from airground_drake.model.trigger.automaton import Mode
 from airground_drake.report.view.geometry import outer_edges
 from airground_drake.report.view.looks import OBSTACLE_COLOR, UNSEEN_COLOR
 from airground_drake.scenario.outlines import outlines_of
+from airground_drake.scenario.plants import plant_of
 from airground_drake.scenario.schema import ARENA, Scenario
 from airground_drake.sim.trace import Trace
 
@@ -157,7 +159,7 @@ def stage(scenario: Scenario, visited_m: Array | None = None) -> Stage:
             "UGV" if name in scenario.ugvs else "UAV",
             max(mark, spec.radius_m),
             np.array(spec.target_m),
-            any(plant.kind == "unicycle" for plant in spec.plant),
+            HEADING in plant_of(spec, scenario.control.period_s).signals,
         )
         for name, spec in specs.items()
     )

@@ -32,9 +32,10 @@ from airground_drake.base.errors import PluginError, UnknownNameError, described
 from airground_drake.base.registry import PLANTS
 from airground_drake.model.bodies.motion import SAME_S
 from airground_drake.model.bodies.world import Body
-from airground_drake.model.plants.plant import FirstOrder, Own, Plant, Scripted, Unicycle
+from airground_drake.model.plants.own import Own, OwnKeys
+from airground_drake.model.plants.plant import HEADING, Plant
+from airground_drake.model.plants.scripted import Scripted
 from airground_drake.scenario.load import validated
-from airground_drake.scenario.schema import Plant as Given
 from airground_drake.scenario.schema import Scenario
 from airground_drake.sim.blocks.lifetime import weakly
 
@@ -63,7 +64,7 @@ class SteeredBody(LeafSystem):
 
     Ports (world frame):
         in  `velocity` (3) m/s, held for a control period; `base` (3) m, a first-order robot under that velocity.
-        out `signals` (k), those of the plant; of a unicycle also `heading` (1) rad.
+        out `signals` (k), those of the plant; `heading` (1) rad, if one of them is one.
     State: the time of the last control sample, s, and the plant's memory there.
     Rate: one update per control period, from t = 0. In between all is in closed form, so that no integrator errs.
     """
@@ -78,7 +79,7 @@ class SteeredBody(LeafSystem):
         needs = {self._velocity.ticket(), self._base.ticket(), self.xd_ticket(), self.time_ticket()}
         names = plant.signals
         self.DeclareVectorOutputPort("signals", len(names), weakly(self._calc), prerequisites_of_calc=needs)
-        if isinstance(plant, Unicycle):
+        if HEADING in names:
             self.DeclareVectorOutputPort("heading", 1, weakly(self._calc_heading), prerequisites_of_calc=needs)
         self.DeclarePeriodicDiscreteUpdateEvent(period_s, 0.0, weakly(self._update))
 
@@ -98,8 +99,8 @@ class SteeredBody(LeafSystem):
         output.SetFromVector(self._plant.at(memory, self._base.Eval(context), self._velocity.Eval(context), elapsed))
 
     def _calc_heading(self, context: Context, output: BasicVector) -> None:
-        elapsed, memory = self._since(context)
-        output.SetFromVector(self._plant.remembered(memory, self._velocity.Eval(context), elapsed))
+        signals = self.GetOutputPort("signals").Eval(context)
+        output.SetFromVector(signals[[self._plant.signals.index(HEADING)]])
 
 
 def steered_plant(body: Body, period_s: float) -> Diagram:
@@ -153,7 +154,7 @@ def declared(scenario: Scenario, plants: Mapping[str, OwnPlant]) -> Scenario:
         if not isinstance(made, OwnPlant) or not callable(made.make):
             wanted = "allowed: an OwnPlant, made by a class or a function"
             raise PluginError(f"the plant of {robot} is {short(repr(made))}; {wanted}")
-        given = Given(
+        given = OwnKeys(
             kind=each.name, drift_m_s=each.drift_m_s, cover_m=each.cover_m, parameters={**each.parameters}
         )  # fmt: skip
         changed.robots[robot].plant = [given]
@@ -341,9 +342,11 @@ def plant_system(body: Body, period_s: float, own: Mapping[str, OwnPlant] = Mapp
     """The Drake system of a body that moves."""
     if isinstance(body.plant, Own):
         return own_plant(body, own[body.name].make if body.name in own else None)
-    if isinstance(body.plant, FirstOrder):
+    if isinstance(body.plant, Scripted):
+        return scripted_plant(body)
+    if body.plant is None or not body.plant.signals:
         return first_order_plant(body.name, body.start_m)
-    return scripted_plant(body) if isinstance(body.plant, Scripted) else steered_plant(body, period_s)
+    return steered_plant(body, period_s)
 
 
 class VelocityDisturbance(LeafSystem):

@@ -2,33 +2,24 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Sequence
-from fractions import Fraction
+from dataclasses import asdict
 from typing import Any
 
 from airground_drake.base.exact import decimal
+from airground_drake.model.plants.budget import AT_REST, kept_distance
+from airground_drake.model.plants.plant import Plant
 from airground_drake.scenario.budget import alike, budget, takes_room
-from airground_drake.scenario.schema import Plant, Scenario
+from airground_drake.scenario.plants import made
+from airground_drake.scenario.schema import Scenario
 from airground_drake.verify.claims.safe_inv import stable
-from airground_drake.verify.engines.bodies import Room, law_m, room_of
 from airground_drake.verify.finding import Finding
 from airground_drake.verify.model.theorem import Hypothesis, TheoremClaim
 
-ROUNDED_M = Fraction(1, 10**12)  # two ways to add up a budget differ by no more than this, m
+ROUNDED_M = 1e-12  # by so much rounding may make a distance of the law too small, m
 BASIC = ("Budget.at_samples", "Budget.budget_always")
-OWN = "own"  # stands for all users' plants among the kinds
-FORWARDS = "unicycle that never drives backwards"  # one more theorem about such a unicycle
-# The theorems about each kind of plant.
-BY_KIND = {
-    "unicycle": ("Plants.chord", "Turning.chord_turns", "Turning.shortened_chord", "Turning.shortened"),
-    "lag": ("Plants.lag", "Plants.lag_speed", "Plants.lag_pair", "Plants.lag_needs"),
-    "delay": ("Plants.delay",),
-    FORWARDS: ("Plants.forwards",),
-    OWN: ("Mixed.drifting", "Mixed.entry_keeps"),
-}
-# Those about a robot beside an obstacle that may move, and the covers that count there.
-BESIDE_MOVING = ("Passive.own_doing", "Passive.kept", "Mixed.unicycle_chord", "Mixed.lagging", "Mixed.delayed")
+# Those about a robot beside an obstacle that may move; a plant adds its own.
+BESIDE_MOVING = ("Passive.own_doing", "Passive.kept")
 
 
 class SafeBudget(TheoremClaim):
@@ -55,8 +46,8 @@ class SafeBudget(TheoremClaim):
     )
     method = (
         "Theorems in Coq about each kind of plant. Their hypotheses on the numbers of the scenario are checked here; "
-        "the distances of the law are computed again by separate code, and must agree to 1e-12 m. SAFE-HYP checks what "
-        "a run has to meet."
+        "what bodies keep at each distance of the law is computed, and may be less than the safe distance by 1e-12 m. "
+        "SAFE-HYP checks what a run has to meet. `airground check` computes the distances of the law again."
     )
     equations = "(7)-(8), (11) in the inequality form of the package (set-based avoidance)"
     assumptions = (
@@ -77,79 +68,62 @@ class SafeBudget(TheoremClaim):
         return takes_room(scenario)
 
     def inputs(self, scenario: Scenario) -> dict[str, Any]:
-        """Gain and period; the kinds of plants and what they take; the distances of each kind of pair."""
+        """Gain and period; the plants and their speed limits; the distances of each kind of pair."""
         control, robots = scenario.control, scenario.robots
-        turning = [
-            {
-                "robot": name, "hand_point_m": plant.hand_point_m, "speed_m_s": robot.max_speed_m_s,
-                "turn_rad_s": _limit(plant.max_turn_rad_s, plant.wheel_base_m, plant.max_wheel_speed_m_s),
-            }
-            for name, robot in robots.items() for plant in robot.plant if plant.kind == "unicycle"
-        ]  # fmt: skip
         return {
             "avoidance_gain_1_s": control.avoidance_gain_1_s,
             "period_s": control.period_s,
-            "kinds": sorted({kind for robot in robots.values() for plant in robot.plant for kind in _kinds(plant)}),
-            "unicycles": turning,
+            "robots": {
+                name: {"plant": [asdict(keys) for keys in robot.plant], "max_speed_m_s": robot.max_speed_m_s}
+                for name, robot in robots.items()
+            },
             "pairs": [
                 {
                     "first": one.first, "second": one.second, "kind": one.kind, "law_m": one.law_m,
                     "safe_m": one.promised_m + one.radii_m,
-                    "rooms": [
-                        list(room_of(robots[name], control)) for name in (one.first, one.second) if name in robots
-                    ],
                 }
                 for one in (group[0] for group in alike(budget(scenario))) if one.terms
             ],
         }  # fmt: skip
 
     def check(self, inputs: dict[str, Any]) -> Finding:
-        """Check the hypotheses; the theorems are those about the kinds of plants that the scenario has."""
+        """Check the hypotheses; the theorems are those about the plants that the scenario has."""
         moving = any(pair["kind"] == "moving" for pair in inputs["pairs"])
+        plants = [plant for plant, _ in _plants(inputs).values()]
+        named = [*BASIC, *(name for plant in plants for name in plant.theorems)]
+        if moving:
+            named += [*BESIDE_MOVING, *(name for plant in plants for name in plant.passive_theorems)]
         claim = SafeBudget()
-        claim.theorems = (
-            *BASIC,
-            *(name for kind in inputs["kinds"] for name in BY_KIND[kind]),
-            *(BESIDE_MOVING * moving),
-        )
+        claim.theorems = (*dict.fromkeys(named),)
         return TheoremClaim.check(claim, inputs)
 
     def hypotheses(self, inputs: dict[str, Any]) -> Sequence[Hypothesis]:
-        """A h at most 1; hand points ahead, turns of less than half a circle; distances in the law."""
+        """A h at most 1; what theorems ask of the numbers of plants; distances in the law."""
         gain, h = decimal(inputs["avoidance_gain_1_s"]), decimal(inputs["period_s"])
-        return [*stable(gain, h), *self._unicycles(inputs, h), *self._pairs(inputs)]
-
-    def _unicycles(self, inputs: dict[str, Any], h: Fraction) -> Iterator[Hypothesis]:
-        for each in inputs["unicycles"]:
-            hand, name = decimal(each["hand_point_m"]), each["robot"]
-            yield Hypothesis.of("l", f"{name}: the hand point is ahead of the axle", hand, "m", strict=True)
-            fast = 2 * hand - decimal(each["speed_m_s"]) * h
-            turn = each["turn_rad_s"]
-            half = Fraction(314159265358979, 10**14) - decimal(turn) * h if turn is not None else Fraction(-1)
-            says = f"{name}: V h is at most 2 l, or omega_max h is below pi"
-            yield Hypothesis.of("turn in a period", says, max(fast, half), strict=fast < 0)
+        needs = [
+            Hypothesis.of(need.symbol, f"{name}: {need.says}", need.margin, need.unit, strict=need.strict)
+            for name, (plant, speed) in _plants(inputs).items()
+            for need in plant.needs(speed)
+        ]
+        return [*stable(gain, h), *needs, *self._pairs(inputs)]
 
     def _pairs(self, inputs: dict[str, Any]) -> Iterator[Hypothesis]:
+        bounds = {name: plant.bounds(speed) for name, (plant, speed) in _plants(inputs).items()}
         for pair in inputs["pairs"]:
-            first, *second = (Room(*room) for room in pair["rooms"])
-            passive = pair["kind"] == "moving"
-            needed = law_m(pair["safe_m"], first, second[0] if second else None, passive=passive)
+            both, passive = (bounds[pair["first"]], bounds.get(pair["second"], AT_REST)), pair["kind"] == "moving"
+            kept = kept_distance(pair["law_m"], *both, gain=inputs["avoidance_gain_1_s"], passive=passive)
             says = (
-                f"{pair['first']}, {pair['second']}: {pair['law_m']:.6g} m in the law are at least the "
-                f"{needed:.6g} m that keep {pair['safe_m']:.6g} m"
+                f"{pair['first']}, {pair['second']}: {pair['law_m']:.6g} m in the law keep {kept:.6g} m, at least "
+                f"the {pair['safe_m']:.6g} m promised"
             )
-            margin = Fraction(pair["law_m"]) - Fraction(needed)
-            yield Hypothesis(self.margin_of, says, float(margin), "m", margin >= -ROUNDED_M)
+            margin = max(kept, 0.0) - pair["safe_m"]
+            holds = margin * pair["safe_m"] >= -ROUNDED_M * pair["law_m"]  # rounding in the law, seen in what is kept
+            yield Hypothesis(self.margin_of, says, margin, "m", holds)
 
 
-def _kinds(plant: Plant) -> list[str]:
-    """The keys in `BY_KIND` of a plant."""
-    if plant.is_own:
-        return [OWN]
-    return [*([plant.kind] if plant.kind in BY_KIND else []), *([] if plant.backwards else [FORWARDS])]
-
-
-def _limit(turn_rad_s: float, base_m: float, wheel_m_s: float) -> float | None:
-    """Turning limit by the limits of turns and of wheels, rad/s; None without one."""
-    limits = [turn_rad_s or math.inf, 2.0 * wheel_m_s / base_m if base_m else math.inf]
-    return min(limits) if min(limits) < math.inf else None
+def _plants(inputs: dict[str, Any]) -> dict[str, tuple[Plant, float]]:
+    """The plant and the speed limit, m/s, of each robot among the inputs."""
+    return {
+        name: (made(given["plant"], inputs["period_s"]), given["max_speed_m_s"])
+        for name, given in inputs["robots"].items()
+    }

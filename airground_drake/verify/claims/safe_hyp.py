@@ -19,9 +19,10 @@ import numpy.typing as npt
 
 from airground_drake.base.arrays import Array
 from airground_drake.base.exact import decimal
+from airground_drake.model.plants.budget import AT_REST, kept_distance
+from airground_drake.model.plants.plant import Recorded
 from airground_drake.sim.trace import Trace
 from airground_drake.verify.claim import TIME_TOLERANCE_S, TraceClaim
-from airground_drake.verify.engines.bodies import kept_m, room_of
 from airground_drake.verify.engines.geometry import interpolate
 from airground_drake.verify.engines.outlines import Cores, apart_by_blocks
 from airground_drake.verify.engines.shortfalls import POINT, SCREEN_M, rounded_up, shortage, shortfalls
@@ -32,6 +33,7 @@ from airground_drake.verify.runs.pairs import (
     DISTANCE_TOLERANCE_M,
     Pair,
     apart_of,
+    bounds_of,
     cores_of,
     distances_when_there,
     is_planar,
@@ -50,11 +52,8 @@ MOST_LISTED = 300  # pairs that the evidence lists at most: those with the least
 AVOIDANCE = "avoidance"  # the hypothesis that the steps met the inequalities
 PASSIVE = "avoidance beside an obstacle that may move"  # the hypothesis that the steps met the passive law
 DECLARED = "declared speed"  # the hypothesis that an obstacle moved no faster than it was expected to
-FORWARDS = "never backwards"  # the hypothesis that a unicycle that must not drive backwards does not
 # The hypotheses that a pair begins apart: the points that the law steers, and the bodies that lag or come late.
 START, BODIES = "safe start", "safe start of the bodies"
-# The hypotheses that a user's plant has the drift and the cover that it declares.
-DRIFT, COVER = "declared drift", "declared cover"
 BUILT = "controller parameters"  # the hypothesis that the controllers were built with what the scenario demands
 
 
@@ -274,7 +273,7 @@ def _guarantees(trace: Trace) -> Iterator[Guarantee]:
     samples, last = period_ends(trace), last_period(trace)
     places = {name: trace.position(name)[samples] for name in trace.robots}
     longest = {name: _longest(each, float(last)) for name, each in places.items()}
-    pairs, gain = pairs_of(trace), _gain(trace)
+    pairs, gain, bounds = pairs_of(trace), _gain(trace), bounds_of(trace)
     reach = np.array([pair.law_m + longest[pair.first] + longest.get(pair.second, 0.0) for pair in pairs])
     beyond = SCREEN_M + np.array([pair.cover_m for pair in pairs])  # of the bodies from the points that are steered
     for k in np.flatnonzero(apart_of(trace) <= reach + beyond).tolist():
@@ -298,10 +297,9 @@ def _guarantees(trace: Trace) -> Iterator[Guarantee]:
             if not start >= -DISTANCE_TOLERANCE_M:
                 gap, why = -inf, f"{BODIES} missed by {-start:.3g} m"
             elif lost > 0:  # it comes off what the points keep, from which follows what the bodies keep
-                room = {name: room_of(trace.scenario.robots[name], trace.scenario.control)
-                        for name in (pair.first, pair.second) if name in trace.robots}  # fmt: skip
+                both = bounds[pair.first], bounds.get(pair.second, AT_REST)
                 points = nextafter(pair.law_m - rounded_up(lost), -inf)
-                kept = kept_m(points, room[pair.first], room.get(pair.second)) - pair.radii_m
+                kept = kept_distance(points, *both, gain=trace.scenario.control.avoidance_gain_1_s) - pair.radii_m
                 gap, why = min(gap, kept), "" if isfinite(kept) else "the steered points came too near"
         yield Guarantee(pair, missed_m, rounded_up(short), gap, why)
 
@@ -400,14 +398,13 @@ def _static(trace: Trace) -> Iterator[_Hypothesis]:
 def _sampled(trace: Trace) -> Iterator[_Hypothesis]:
     """Hypotheses at the control samples: their spacing, straight motion between them, speed limits, planar motion."""
     period, robots, t, samples = trace.scenario.control.period_s, trace.scenario.robots, trace.t, trace.sample_rows
-    own = {name for name, robot in robots.items() if any(plant.is_own for plant in robot.plant)}
     spacing = np.diff(np.append(t[samples], t[-1]))
     yield _Hypothesis("sampling", "s", t[samples], period - spacing, TIME_TOLERANCE_S, {})
     ends = np.append(samples, len(t) - 1)
     for robot in trace.robots:
         place, about = trace.position(robot), {"robot": robot}
         off = np.linalg.norm(place - interpolate(t[ends], place[ends], t), axis=1)
-        if robot not in own:  # whose cover is from the straight line
+        if not trace.plant(robot).measured:  # the cover of such a robot is from the straight line
             yield _Hypothesis("straight motion", "m", t, 0.0 - off, DISTANCE_TOLERANCE_M, about)
         spare = robots[robot].max_speed_m_s - np.linalg.norm(trace.command(robot)[1:], axis=1)
         yield _Hypothesis("speed limit", "m/s", t[:-1], spare, VELOCITY_TOLERANCE_M_S, about)
@@ -417,7 +414,7 @@ def _sampled(trace: Trace) -> Iterator[_Hypothesis]:
 
 @dataclass(frozen=True)
 class LeastShare:
-    """The least share s that was left of a command of a unicycle in a run, and the gain s A of its recoveries, 1/s."""
+    """The least share s that was left of a robot's command in a run, and the gain s A of its recoveries, 1/s."""
 
     robot: str
     share: float
@@ -425,9 +422,9 @@ class LeastShare:
 
 
 def least_shares(trace: Trace) -> list[LeastShare]:
-    """Of each unicycle; a command in full has the share 1."""
+    """Of each robot whose commands are shortened to what it can do; a command in full has the share 1."""
     gain = trace.scenario.control.avoidance_gain_1_s
-    names = [ugv for ugv, each in trace.scenario.ugvs.items() if any(plant.kind == "unicycle" for plant in each.plant)]
+    names = [ugv for ugv in trace.ugvs if trace.plant(ugv).steering is not None]
     shares = [float(trace.sampled(f"{name}.command_share").min()) for name in names]
     return [LeastShare(name, share, share * gain) for name, share in zip(names, shares, strict=True)]
 
@@ -446,50 +443,26 @@ class OwnPlant:
 
 def own_plants(trace: Trace) -> list[OwnPlant]:
     """All robots with users' plants."""
-    given = [(name, each) for name, robot in trace.scenario.robots.items() for each in robot.plant if each.is_own]
-    most = {
-        name: [float(trace.sampled(f"{name}.{key}").max()) for key in ("drift_m_s", "cover_m")] for name, _ in given
-    }
-    return [
-        OwnPlant(name, each.kind, most[name][0], each.drift_m_s, most[name][1], each.cover_m) for name, each in given
-    ]
+    found = []
+    for name, robot in trace.scenario.robots.items():
+        if measured := trace.plant(name).measured:
+            drift, cover = (float(trace.sampled(f"{name}.{key}").max()) for key in measured)
+            bounds, (keys,) = bounds_of(trace)[name], robot.plant
+            found.append(OwnPlant(name, keys.kind, drift, bounds.drift_m_s, cover, bounds.cover_m))
+    return found
 
 
 def _of_plants(trace: Trace) -> Iterator[_Hypothesis]:
-    """Hypotheses of the theorems about plants: limits of turns, wheels and dips, and speeds of bodies that lag."""
-    period, ends = trace.scenario.control.period_s, period_ends(trace)
-    whole = np.flatnonzero(np.diff(trace.t[ends]) > 0.5 * period)
-    first, last = ends[whole], ends[whole + 1]
-    t, lasting = trace.t[first], trace.t[last] - trace.t[first]
+    """Hypotheses of the theorems about plants."""
+    ends = period_ends(trace)
+    whole = np.flatnonzero(np.diff(trace.t[ends]) > 0.5 * trace.scenario.control.period_s)
     for name, robot in trace.scenario.robots.items():
-        about = {"robot": name}
-        for plant in robot.plant:
-            if plant.kind == "unicycle":
-                heading, axle = trace.column(f"{name}.heading_rad"), trace.body(name)
-                turned = heading[last] - heading[first]
-                rate, half = np.abs(turned) / lasting, 0.5 * turned
-                chord = np.linalg.norm(axle[last] - axle[first], axis=1)
-                speed = chord / lasting / np.sinc(half / np.pi)
-                if not plant.backwards:
-                    middle = 0.5 * (heading[first] + heading[last])
-                    ahead = np.column_stack([np.cos(middle), np.sin(middle)])
-                    gone = np.einsum("ka,ka->k", (axle[last] - axle[first])[:, :2], ahead)
-                    yield _Hypothesis(FORWARDS, "m/s", t, gone / lasting, VELOCITY_TOLERANCE_M_S, about)
-                if plant.max_turn_rad_s:
-                    spare = plant.max_turn_rad_s - rate
-                    yield _Hypothesis("turning limit", "rad/s", t, spare, VELOCITY_TOLERANCE_M_S, about)
-                if plant.wheel_base_m:
-                    spare = plant.max_wheel_speed_m_s - speed - 0.5 * plant.wheel_base_m * rate
-                    yield _Hypothesis("wheel speeds", "m/s", t, spare, VELOCITY_TOLERANCE_M_S, about)
-                dips = rate * np.hypot(speed, plant.hand_point_m * rate) * lasting**2 / 8.0
-                most = room_of(robot, trace.scenario.control).body_m - plant.hand_point_m
-                yield _Hypothesis("dip of the hand point", "m", t, most - dips, DISTANCE_TOLERANCE_M, about)
-            elif plant.kind == "lag":
-                spare = robot.max_speed_m_s - np.linalg.norm(trace.body_velocity(name), axis=1)
-                yield _Hypothesis("speed of the body", "m/s", trace.t, spare, VELOCITY_TOLERANCE_M_S, about)
-            elif plant.is_own:
-                samples = trace.sampled("t_s")
-                spare = plant.drift_m_s - trace.sampled(f"{name}.drift_m_s")
-                yield _Hypothesis(DRIFT, "m/s", samples, spare, VELOCITY_TOLERANCE_M_S, about)
-                spare = plant.cover_m - trace.sampled(f"{name}.cover_m")
-                yield _Hypothesis(COVER, "m", samples, spare, DISTANCE_TOLERANCE_M, about)
+        plant = trace.plant(name)
+        measured = np.array([trace.sampled(f"{name}.{key}") for key in plant.measured]).T
+        run = Recorded(
+            trace.t, trace.signals(name), ends[whole], ends[whole + 1], trace.sampled("t_s"), measured,
+            robot.max_speed_m_s,
+        )  # fmt: skip
+        for given in plant.premises(run):
+            slop = DISTANCE_TOLERANCE_M if given.unit == "m" else VELOCITY_TOLERANCE_M_S
+            yield _Hypothesis(given.name, given.unit, given.t_s, given.margin, slop, {"robot": name})

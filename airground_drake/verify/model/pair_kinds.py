@@ -11,8 +11,9 @@ from itertools import combinations
 from typing import Any, NamedTuple
 
 from airground_drake.base.exact import decimal
+from airground_drake.model.plants.budget import AT_REST, Bounds, law_distance
+from airground_drake.scenario.plants import plant_of
 from airground_drake.scenario.schema import Control, Scenario, Uav, Ugv
-from airground_drake.verify.engines.bodies import Room, law_m, room_of
 
 # By kind of pair, the parts of an inequality that its two bodies take; an obstacle stands still and takes none.
 SHARES = {"obstacle": (Fraction(1), Fraction(0)), "uav_ugv": (Fraction(1, 2),) * 2, "ugv_ugv": (Fraction(1, 2),) * 2}
@@ -33,7 +34,7 @@ def kind_of(scenario: Scenario, first: str, second: str) -> str:
         if name in scenario.barriers and scenario.barriers[name].expected_speed_m_s > 0.0:
             return MOVING
     robots = [scenario.robots[name] for name in (first, second) if name in scenario.robots]
-    if any(plant.kind != "first_order" for robot in robots for plant in robot.plant):
+    if any(plant_of(robot, scenario.control.period_s).signals for robot in robots):
         return STEERED
     if len(robots) < 2:
         return "obstacle"
@@ -96,27 +97,29 @@ def _kinds(scenario: Scenario) -> Iterator[PairKind]:
 
 
 class _Robot(NamedTuple):
-    """Its radius, its speed limit, and what its plant takes."""
+    """Its radius, its speed limit, what its plant takes, and the gain of the law."""
 
     radius_m: Fraction
     speed_m_s: Fraction
-    room: Room
+    bounds: Bounds
+    gain_1_s: float
 
     @classmethod
     def of(cls, robot: Ugv | Uav, control: Control) -> _Robot:
-        return cls(decimal(robot.radius_m), decimal(robot.max_speed_m_s), room_of(robot, control))
+        bounds = plant_of(robot, control.period_s).bounds(robot.max_speed_m_s)
+        return cls(decimal(robot.radius_m), decimal(robot.max_speed_m_s), bounds, control.avoidance_gain_1_s)
 
     def beside(self, other: _Robot, apart_m: float) -> tuple[Fraction, Fraction]:
         """Distance in the law, m, and closing speed, m/s; `apart_m` is the safe one between surfaces."""
         safe = decimal(apart_m) + self.radius_m + other.radius_m
-        return self._in_the_law(safe, other.room), self.speed_m_s + other.speed_m_s
+        return self._in_the_law(safe, other.bounds), self.speed_m_s + other.speed_m_s
 
     def beside_a_set(self, safe_m: Fraction) -> tuple[Fraction, Fraction]:
         """Distance in the law, m, and closing speed, m/s, beside an obstacle at rest; `safe_m` is from its core."""
-        return self._in_the_law(safe_m, None), self.speed_m_s
+        return self._in_the_law(safe_m, AT_REST), self.speed_m_s
 
-    def _in_the_law(self, safe_m: Fraction, other: Room | None) -> Fraction:
+    def _in_the_law(self, safe_m: Fraction, other: Bounds) -> Fraction:
         """The safe distance and what the plants take, rounded to a float; exact if they take nothing."""
-        if self.room.is_nothing and (other is None or other.is_nothing):
+        if self.bounds.exact and other.exact:
             return safe_m
-        return decimal(law_m(float(safe_m), self.room, other, passive=False))
+        return decimal(float(law_distance(float(safe_m), self.bounds, other, gain=self.gain_1_s)))

@@ -157,7 +157,6 @@ COVERED = frozenset(
     | {"position_m", "known_to_uav", *SHAPES, "heading_rad", "height_m", "distance_m"}
     | {"moves", "known_motion", "cells", "plant"}
 )
-PLANTS = frozenset({"first_order", "unicycle", "lag", "delay"})  # kinds of plants that `slack` knows
 
 
 def refuse_unknown(trace: Trace) -> None:
@@ -168,10 +167,9 @@ def refuse_unknown(trace: Trace) -> None:
             default = default if key.default_factory is MISSING else key.default_factory()
             if key.name not in COVERED and given != default:
                 raise TraceError(f"run {trace.run}: {name} has {key.name}; no theorem is about such a body")
-        for plant in getattr(body, "plant", ()):
-            if plant.kind not in PLANTS:
-                why = "SAFE-BUDGET says what is proved of it" if plant.is_own else "no theorem is about such a body"
-                raise TraceError(f"run {trace.run}: {name} has the plant {plant.kind}; {why}")
+        if name in trace.robots and (why := trace.plant(name).unproved):
+            kinds = " and ".join(keys.kind for keys in trace.scenario.robots[name].plant)
+            raise TraceError(f"run {trace.run}: {name} has the plant {kinds}; {why}")
 
 
 def _centre(obstacle: Obstacle) -> Place:

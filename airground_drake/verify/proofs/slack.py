@@ -14,7 +14,6 @@ from fractions import Fraction
 import numpy as np
 
 from airground_drake.model.plants.budget import Bounds, law_distance
-from airground_drake.scenario.plants import plant_of
 from airground_drake.sim.trace import Trace
 
 # A dip is rounded down by so much, m: the sum of a budget then is no more than its floating-point value. A dip is the
@@ -29,8 +28,7 @@ def speed_m_s(trace: Trace, robot: str) -> float:
 
 def bounds(trace: Trace, robot: str) -> Bounds:
     """How far a robot's body may be from the point that the law steers, with the commands of a run."""
-    plant = plant_of(trace.scenario.robots[robot], trace.scenario.control.period_s)
-    return plant.bounds(speed_m_s(trace, robot))
+    return trace.plant(robot).bounds(speed_m_s(trace, robot))
 
 
 def off_lines_m(trace: Trace, robot: str) -> Fraction:
@@ -49,18 +47,13 @@ def off_steered_m(trace: Trace, robot: str) -> Fraction:
 
 def is_late(trace: Trace, robot: str) -> bool:
     """Whether a lag or a delay keeps a robot's body from where the law steers it."""
-    found = bounds(trace, robot)
-    return found.lag_s > 0.0 or found.delay_s > 0.0
+    return bounds(trace, robot).late
 
 
 def law_m(trace: Trace, distance_m: Fraction, first: str, second: str) -> Fraction:
     """The distance that the law keeps between two steered points, or one and a set at rest, m."""
     robots, control = trace.scenario.robots, trace.scenario.control
-    both = [
-        plant_of(robots[name], control.period_s).bounds(robots[name].max_speed_m_s)
-        for name in (first, second)
-        if name in robots
-    ]
+    both = [trace.plant(name).bounds(robots[name].max_speed_m_s) for name in (first, second) if name in robots]
     if all(each.exact for each in both):
         return distance_m
     return Fraction(float(law_distance(float(distance_m), *both, gain=control.avoidance_gain_1_s)))

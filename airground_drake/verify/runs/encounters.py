@@ -24,6 +24,7 @@ from airground_drake.verify.runs.pairs import (
     Pair,
     apart_of,
     bent,
+    bounds_of,
     cores_of,
     gap_over_time,
     is_planar,
@@ -218,7 +219,7 @@ def _whose_doing(trace: Trace, least: Gap) -> str:
 
 def _is_late(trace: Trace, robot: str) -> bool:
     """Whether commands under way lead the body of a robot."""
-    return any(plant.kind in ("lag", "delay") for plant in trace.scenario.robots[robot].plant)
+    return bounds_of(trace)[robot].late
 
 
 def _way_m(trace: Trace, pair: Pair, gaps: Array, t_s: float) -> float:

@@ -21,10 +21,10 @@ import numpy as np
 import numpy.typing as npt
 
 from airground_drake.base.arrays import Array
+from airground_drake.model.plants.budget import AT_REST, Bounds, law_distance
 from airground_drake.scenario.schema import MAP, Obstacle
 from airground_drake.scenario.shapes import convex_parts
 from airground_drake.sim.trace import Trace
-from airground_drake.verify.engines.bodies import arc_m, lagging_m, law_m, on_arc, on_lag, room_of
 from airground_drake.verify.engines.geometry import (
     MERGE_S,
     Approach,
@@ -119,19 +119,20 @@ def declared_pairs(trace: Trace) -> Iterator[Pair]:
     limit = {name: robot.max_speed_m_s for name, robot in trace.scenario.robots.items()}
     there = [(name, each, trace.there_from(name), trace.there_until(name)) for name, each in
              trace.scenario.barriers.items()]  # fmt: skip
-    room = {name: room_of(robot, trace.scenario.control) for name, robot in trace.scenario.robots.items()}
+    bounds, gain = bounds_of(trace), trace.scenario.control.avoidance_gain_1_s
 
     def found(first: str, second: str, apart: float, radii: float, reach: float, **given: Any) -> Pair:
-        pair = Pair(first, second, apart, radii, 0.5 if second in room else 1.0, reach, **given)
-        more = law_m(pair.safe_m, room[first], room.get(second), passive=pair.speed_m_s > 0.0) - pair.safe_m
-        both = [room[name] for name in (first, second) if name in room]
-        cover = sum(each.rolling_m + each.slip_m for each in both)
-        drift = sum(each.drift_m for each in both)
-        drawn = room[first].drawn_m if second not in room and not pair.speed_m_s else 0.0
-        needs_start = drawn or (not pair.speed_m_s and any(each.lag_s or each.delay_s for each in both))
+        pair = Pair(first, second, apart, radii, 0.5 if second in bounds else 1.0, reach, **given)
+        both, passive = (bounds[first], bounds.get(second, AT_REST)), pair.speed_m_s > 0.0
+        law = float(law_distance(pair.safe_m, *both, gain=gain, passive=passive))
+        cover = sum(each.rolling_m + each.drift_m_s * period for each in both)
+        drift = sum(each.drift_m_s / gain for each in both if each.drift_m_s)
+        drawn = bounds[first].cover_m if bounds[first].drawn and second not in bounds and not passive else 0.0
+        needs_start = drawn or (not passive and any(each.late for each in both))
         under_way = max(each.delay_s for each in both) if needs_start else None
+        slip = bounds[first].drift_m_s * period
         return pair._replace(
-            more_m=more, cover_m=cover, drift_m=drift, slip_m=room[first].slip_m, drawn_m=drawn, under_way_s=under_way
+            more_m=law - pair.safe_m, cover_m=cover, drift_m=drift, slip_m=slip, drawn_m=drawn, under_way_s=under_way
         )
 
     for robot in trace.robots:
@@ -143,6 +144,11 @@ def declared_pairs(trace: Trace) -> Iterator[Pair]:
     for robot, other in combinations(trace.robots, 2):
         apart = safe.air_ground_m if uav in (robot, other) else safe.ugv_m
         yield found(robot, other, apart, radius[robot] + radius[other], (limit[robot] + limit[other]) * period)
+
+
+def bounds_of(trace: Trace) -> dict[str, Bounds]:
+    """How far the bodies of the robots may be from where the law steers them, by name."""
+    return {name: trace.plant(name).bounds(robot.max_speed_m_s) for name, robot in trace.scenario.robots.items()}
 
 
 class Parts(NamedTuple):
@@ -352,17 +358,8 @@ def bent(trace: Trace, name: str, row: int, shares: Array) -> Array:
     if name not in trace.robots:
         way = origin_of(trace, name)
         return np.zeros((len(shares), 3)) if way is None else way[row] + shares[:, None] * (way[row + 1] - way[row])
-    start, end = trace.body(name)[row : row + 2]
-    robot = trace.scenario.robots[name]
-    if any(plant.kind == "unicycle" for plant in robot.plant):
-        turned = float(np.diff(trace.column(f"{name}.heading_rad")[row : row + 2])[0])
-        return on_arc(start, end, turned, shares)
-    for plant in robot.plant:
-        lasting = float(trace.t[row + 1] - trace.t[row])
-        if plant.kind == "lag" and lasting > 0.0:
-            velocity = trace.body_velocity(name)[row : row + 2]
-            return on_lag((start, end), (velocity[0], velocity[1]), lasting, plant.time_constant_s, shares)
-    return start + shares[:, None] * (end - start)
+    ends = slice(row, row + 2)
+    return trace.plant(name).between(trace.t[ends], trace.signals(name)[ends], shares)
 
 
 def to_barrier(trace: Trace, pair: Pair, place: Array) -> float:
@@ -463,16 +460,9 @@ def off_m_of(trace: Trace, name: str) -> float:
 
 def bends_of(trace: Trace, name: str) -> Array:
     """How far a body may be from the straight line between its positions at two rows, in each segment, (T - 1,), m."""
-    found = np.zeros(len(trace.t) - 1)
-    plants = trace.scenario.robots[name].plant if name in trace.robots else []
-    for plant in plants:
-        place = trace.body(name)
-        if plant.kind == "unicycle":
-            found = found + arc_m(place[:-1], place[1:], np.diff(trace.column(f"{name}.heading_rad")))
-        elif plant.kind == "lag":
-            velocity = trace.body_velocity(name)
-            found = found + lagging_m(velocity[:-1], velocity[1:], np.diff(trace.t), plant.time_constant_s)
-    return found
+    if name not in trace.robots:
+        return np.zeros(len(trace.t) - 1)
+    return trace.plant(name).bends_m(trace.t, trace.signals(name))
 
 
 def least_of(bounds: Array, most: int, value: Callable[[int], float]) -> list[int]:

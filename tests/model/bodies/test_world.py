@@ -15,7 +15,7 @@ from hypothesis.extra.numpy import arrays
 from airground_drake.model.bodies.motion import PeriodMotion
 from airground_drake.model.bodies.world import ROBOTS, Body, World
 from airground_drake.model.law.avoidance import Avoidance
-from airground_drake.model.plants.plant import FirstOrder
+from airground_drake.model.plants.first_order import FirstOrder
 
 WORLD = world(
     ("one", "two"), [[5.0, 0.0, 0.0], [9.0, 0.0, 0.0]], 2.0, 1.5, 1.0,

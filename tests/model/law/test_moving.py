@@ -15,7 +15,7 @@ from airground_drake.model.bodies.world import Body, World
 from airground_drake.model.geometry import convex, outline
 from airground_drake.model.geometry.motion import Motion
 from airground_drake.model.law.avoidance import Avoidance
-from airground_drake.model.plants.plant import Scripted
+from airground_drake.model.plants.scripted import Scripted
 
 H, GAP, SPEED, LIMIT = 0.05, 0.3, 1.2, 1.5
 SHAPES = {

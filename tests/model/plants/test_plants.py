@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from airground_drake.verify.engines.bodies import law_m, room_of
 from hypothesis import given
 from hypothesis import strategies as st
 from properties import examples
@@ -22,8 +23,10 @@ from airground_drake.model.geometry import outline
 from airground_drake.model.law.avoidance import Avoidance
 from airground_drake.model.law.ugv_law import UgvLaw
 from airground_drake.model.plants.budget import AT_REST, Bounds, costs, law_distance
-from airground_drake.model.plants.plant import Delay, Lag, Unicycle
+from airground_drake.model.plants.delay import Delay
+from airground_drake.model.plants.lag import Lag
 from airground_drake.model.plants.steering import steer
+from airground_drake.model.plants.unicycle import Unicycle
 from airground_drake.scenario.load import load
 from airground_drake.scenario.schema import Ugv
 from airground_drake.sim.blocks.plant import steered_plant
@@ -31,7 +34,6 @@ from airground_drake.sim.diagram import build_diagram, make_monitor
 from airground_drake.sim.simulation import simulate
 from airground_drake.sim.trace import Trace
 from airground_drake.verify import judge
-from airground_drake.verify.engines.bodies import law_m, room_of
 from airground_drake.verify.runs.pairs import least_gap, pairs_of
 
 H = 0.05

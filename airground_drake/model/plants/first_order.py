@@ -1,0 +1,23 @@
+"""First order: it moves as it is told."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+from airground_drake.model.plants.plant import Keys, Plant
+
+
+@dataclass(slots=True, kw_only=True)
+class FirstOrderKeys(Keys):
+    """It moves as it is told."""
+
+    kind: Literal["first_order"] = "first_order"
+    """The default."""
+
+    def made(self, period_s: float, after: Plant | None) -> "FirstOrder":
+        """The plant."""
+        return FirstOrder()
+
+
+@dataclass(frozen=True)
+class FirstOrder(Plant):
+    """p_dot = v: it moves as it is told."""
