@@ -11,13 +11,13 @@ import pytest
 from airground_drake.check import plants, safety
 from airground_drake.check.rules import Disagreement
 from airground_drake.check.run import Run, _moves_as_commanded
+from airground_drake.model.plants.budget import AT_REST, law_distance
 from airground_drake.scenario.load import load, resolved, validated
+from airground_drake.scenario.plants import plant_of
 from airground_drake.scenario.schema import Scenario
 from airground_drake.sim.simulation import simulate
 from airground_drake.sim.trace import Trace
 from airground_drake.verify import judge
-from airground_drake.model.plants.budget import AT_REST, law_distance
-from airground_drake.scenario.plants import plant_of
 
 FORWARDS = [f"ugvs.{name}.plant.backwards=false" for name in ("burger", "waffle", "tb4")]
 RUNS = (("turtlebots", 12.0), ("lagging", 9.0), ("case_a_unicycle", 10.0), ("turtlebots forwards", 12.0))
@@ -98,13 +98,15 @@ def test_what_plants_take_is_the_same_in_both_programs() -> None:
         everything: dict[str, Any] = resolved(scenario)
         robots = {**everything["ugvs"], everything["uav"]["name"]: everything["uav"]}
         ours = {each: plants.taken(robots[each], everything["control"]) for each in scenario.robots}
-        theirs = {each: room_of(robot, scenario.control) for each, robot in scenario.robots.items()}
+        period, gain = scenario.control.period_s, scenario.control.avoidance_gain_1_s
+        theirs = {name: plant_of(of, period).bounds(of.max_speed_m_s) for name, of in scenario.robots.items()}
         for one in scenario.robots:
             for other in (None, *scenario.robots):
-                both = ours[other] if other else None, theirs[other] if other else None
+                beside = ours[other] if other else None, theirs[other] if other else AT_REST
                 for passive in (False, True) if other is None else (False,):
-                    found = plants.law_m(1.3, ours[one], both[0], passive=passive)
-                    assert found == pytest.approx(law_m(1.3, theirs[one], both[1], passive=passive), abs=1e-13)
+                    found = plants.law_m(1.3, ours[one], beside[0], passive=passive)
+                    due = law_distance(1.3, theirs[one], beside[1], gain=gain, passive=passive)
+                    assert found == pytest.approx(due, abs=1e-13)
 
 
 def test_a_way_that_turns_is_divided_along_its_arc() -> None:

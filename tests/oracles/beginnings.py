@@ -8,10 +8,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from airground_drake.base.arrays import Array
+from airground_drake.check.plants import law_m, taken
 from airground_drake.scenario.courses import course
+from airground_drake.scenario.load import resolved
 from airground_drake.sim.trace import Trace
 from airground_drake.verify.claim import TIME_TOLERANCE_S
-from airground_drake.verify.engines.bodies import law_m, room_of
 from airground_drake.verify.engines.geometry import corner_times, interpolate, travelled
 from airground_drake.verify.engines.outlines import GAP, RADIUS, SPEED, Cores, away_from
 from airground_drake.verify.runs.control_law import ON_TOP
@@ -163,7 +164,8 @@ def known_cores(trace: Trace, row: dict[Any, Any], on: ProposalRecord) -> tuple[
     beside = [pairs[parts.names[k]] for k in parts.owner[known]]
     claimed = on.mapped[told]
     theirs = claimed[:, GAP] + (trace.scenario.ugvs[on.ugv].radius_m + claimed[:, RADIUS])
-    room = room_of(trace.scenario.ugvs[on.ugv], trace.scenario.control)
+    given = resolved(trace.scenario)
+    room = taken(given["ugvs"][on.ugv], given["control"])
     passive = (claimed[:, SPEED] > 0.0).tolist()
     theirs = np.array(
         [law_m(safe, room, None, passive=moves_) for safe, moves_ in zip(theirs.tolist(), passive, strict=True)]

@@ -23,12 +23,15 @@ ALLOWED: dict[str, set[str]] = {
         "verify.engines", "verify.finding",
     },
     "runs": {
-        "base.arrays", "base.errors", "base.exact", "scenario.plants", "scenario.schema", "scenario.shapes",
-        "sim.collisions", "sim.tables", "sim.trace", "verify.claim", "verify.engines", "verify.finding",
-        "verify.model.theorem", "verify.runs", *ABOUT_RUNS,
+        "base.arrays", "base.errors", "base.exact", "model.plants", "scenario.plants", "scenario.schema",
+        "scenario.shapes", "sim.collisions", "sim.tables", "sim.trace", "verify.claim", "verify.engines",
+        "verify.finding", "verify.model.theorem", "verify.runs", *ABOUT_RUNS,
     },
 }  # fmt: skip
-"""By folder of verify/, what its modules may import of this package; claims about a run stand beside `runs`."""
+"""By folder of verify/, what its modules may import of this package; claims about a run stand beside `runs`.
+
+What a plant takes and how its body moves is asked of the plant; `check` has both again, and SAFE-HYP measures them.
+"""
 JUDGED = {
     "model.bodies.world", "model.geometry", "model.law", "model.trigger", "scenario.world", "sim.blocks",
     "sim.components", "sim.diagram", "sim.simulation", "uav", "ugv",

@@ -122,8 +122,9 @@ class Unicycle(Plant):
         """Cover l. The hand point runs through an arc with a chord of at most V h: dip omega V h^2 / (8 sinc)."""
         # An axle that never goes backwards is drawn after the hand point.
         half = 0.5 * self.turning_rad_s(speed_m_s) * self.period_s
-        sinc = math.sin(half) / half if half else 1.0
-        dip = 0.25 * half * speed_m_s * self.period_s / sinc
+        dip = math.inf  # if it could swing round
+        if half < math.pi:
+            dip = 0.25 * half * speed_m_s * self.period_s / (math.sin(half) / half if half else 1.0)
         return Bounds(cover_m=self.hand_m, dip_m=dip, speed_m_s=speed_m_s, drawn=not self.backwards)
 
     def needs(self, speed_m_s: float) -> Iterator[Need]:

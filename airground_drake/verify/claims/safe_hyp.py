@@ -20,7 +20,7 @@ import numpy.typing as npt
 from airground_drake.base.arrays import Array
 from airground_drake.base.exact import decimal
 from airground_drake.model.plants.budget import AT_REST, kept_distance
-from airground_drake.model.plants.plant import Recorded
+from airground_drake.model.plants.plant import Premise, Recorded
 from airground_drake.sim.trace import Trace
 from airground_drake.verify.claim import TIME_TOLERANCE_S, TraceClaim
 from airground_drake.verify.engines.geometry import interpolate
@@ -463,6 +463,13 @@ def _of_plants(trace: Trace) -> Iterator[_Hypothesis]:
             trace.t, trace.signals(name), ends[whole], ends[whole + 1], trace.sampled("t_s"), measured,
             robot.max_speed_m_s,
         )  # fmt: skip
-        for given in plant.premises(run):
+        for given in (*plant.premises(run), *_covers(trace, name)):
             slop = DISTANCE_TOLERANCE_M if given.unit == "m" else VELOCITY_TOLERANCE_M_S
             yield _Hypothesis(given.name, given.unit, given.t_s, given.margin, slop, {"robot": name})
+
+
+def _covers(trace: Trace, robot: str) -> Iterator[Premise]:
+    """A body is no farther from the point that the law steers than the law accounts for."""
+    if trace.is_apart(robot) and not trace.plant(robot).measured:
+        away = np.linalg.norm(trace.body(robot) - trace.position(robot), axis=1)
+        yield Premise("cover of the body", "m", trace.t, bounds_of(trace)[robot].rolling_m - away)

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import copy
 import math
-from dataclasses import replace
+from dataclasses import asdict, replace
 from typing import Any
 
 import numpy as np
 import pytest
-from airground_drake.verify.engines.bodies import law_m, room_of
 from hypothesis import given
 from hypothesis import strategies as st
 from properties import examples
@@ -18,6 +17,7 @@ from scipy.integrate import solve_ivp
 
 from airground_drake.base.arrays import Array
 from airground_drake.base.errors import ScenarioError
+from airground_drake.check.plants import law_m, taken
 from airground_drake.model.bodies.world import Body, World
 from airground_drake.model.geometry import outline
 from airground_drake.model.law.avoidance import Avoidance
@@ -28,6 +28,7 @@ from airground_drake.model.plants.lag import Lag
 from airground_drake.model.plants.steering import steer
 from airground_drake.model.plants.unicycle import Unicycle
 from airground_drake.scenario.load import load
+from airground_drake.scenario.plants import plant_of
 from airground_drake.scenario.schema import Ugv
 from airground_drake.sim.blocks.plant import steered_plant
 from airground_drake.sim.diagram import build_diagram, make_monitor
@@ -169,23 +170,17 @@ def test_the_distance_in_the_law() -> None:
     st.lists(st.sampled_from([UNICYCLE, FORWARDS, LAG, DELAYED_LAG, "{kind: first_order}"]), min_size=2, max_size=2),
     st.lists(st.floats(0.2, 3.0), min_size=2, max_size=2), st.floats(0.1, 2.0), st.booleans(),
 )  # fmt: skip
-def test_claims_have_the_same_distances_in_other_words(
+def test_the_checker_has_the_same_distances_in_other_words(
     kinds: list[str], speeds: list[float], distance: float, alone: bool
 ) -> None:
     scenario = load("swap", [f"ugvs.ugv{k + 1}.plant={kind}" for k, kind in enumerate(kinds)] + ["uav.altitude_m=3"])
     ugvs: list[Ugv] = [replace(ugv, max_speed_m_s=v) for ugv, v in zip(scenario.ugvs.values(), speeds, strict=True)]
     period = scenario.control.period_s
-    plants = [_bounds(ugv, period) for ugv in ugvs]
-    rooms = [room_of(ugv, scenario.control) for ugv in ugvs]
+    plants = [plant_of(ugv, period).bounds(ugv.max_speed_m_s) for ugv in ugvs]
+    rooms = [taken(asdict(ugv), asdict(scenario.control)) for ugv in ugvs]
     for passive in (False, True) if alone else (False,):
         due = law_distance(distance, plants[0], AT_REST if alone else plants[1], gain=3.0, passive=passive)
         assert law_m(distance, rooms[0], None if alone else rooms[1], passive=passive) == pytest.approx(due, abs=1e-13)
-
-
-def _bounds(ugv: Ugv, period_s: float) -> Bounds:
-    from airground_drake.scenario.plants import plant_of
-
-    return plant_of(ugv, period_s).bounds(ugv.max_speed_m_s)
 
 
 def run_of(plant: str, *more: str) -> Trace:
@@ -295,17 +290,17 @@ def test_a_body_that_does_not_follow_its_plant_is_an_error(plant: str, column: s
     ("plant", "kind", "term"),
     [
         (UNICYCLE, Unicycle, "cover_m"),
-        (UNICYCLE, Unicycle, "dip_m"),
         (FORWARDS, Unicycle, "cover_m"),
-        (FORWARDS, Unicycle, "dip_m"),
         (LAG, Lag, "lag_s"),
         (DELAYED_LAG, Delay, "lag_s"),
+        (DELAYED_LAG, Delay, "delay_s"),
     ],
 )
 def test_a_law_that_leaves_out_a_term_or_half_of_it_is_found(
     monkeypatch: pytest.MonkeyPatch, plant: str, kind: type, term: str, share: float
 ) -> None:
-    """SAFE-HYP compares the distances of the controllers with the budget, written again."""
+    """SAFE-HYP measures how far the body is from the steered point."""
+    trace = run_of(plant, "duration_s=4.0", "ugvs.ugv1.preset.speed_m_s=1.4")
     bounds = kind.bounds  # type: ignore[attr-defined]
 
     def less(self: Unicycle | Lag | Delay, speed: float) -> Bounds:
@@ -313,7 +308,15 @@ def test_a_law_that_leaves_out_a_term_or_half_of_it_is_found(
         return found._replace(**{term: share * getattr(found, term)})
 
     monkeypatch.setattr(kind, "bounds", less)
-    (verdict,) = judge(run_of(plant, "duration_s=0.5"), ["SAFE-HYP"])
+    (verdict,) = judge(trace, ["SAFE-HYP"])
+    assert verdict.status == "refuted"
+
+
+def test_a_law_that_leaves_out_the_dip_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    """SAFE-HYP measures it where the robot turns; the checker's distance in the law has it."""
+    trace, bounds = run_of(UNICYCLE), Unicycle.bounds
+    monkeypatch.setattr(Unicycle, "bounds", lambda self, speed: bounds(self, speed)._replace(dip_m=0.0))
+    (verdict,) = judge(trace, ["SAFE-HYP"])
     assert verdict.status == "refuted"
 
 
@@ -330,16 +333,18 @@ def test_a_monitor_knows_what_unicycles_can_do() -> None:
 @pytest.mark.parametrize(
     ("plant", "says"),
     [
-        ("{kind: unicycle}", "hand_point_m: 0.0 is not allowed; more than 0 m"),
+        ("{kind: unicycle}", "hand_point_m: missing; wanted: more than 0 m"),
         ("{kind: unicycle, hand_point_m: 0.01}", "else the axle could swing round within a period"),
         ("{kind: unicycle, hand_point_m: 0.2, wheel_base_m: 0.3}", "go together"),
-        ("{kind: unicycle, hand_point_m: 0.2, delay_s: 0.1}", "keys of unicycle"),
+        ("{kind: unicycle, hand_point_m: 0.2, delay_s: 0.1}", "unknown key; it is a key of delay; keys of unicycle"),
         ("{kind: unicycle, hand_point_m: 3.0}", "Largest term: hand_point_m"),
         ("[{kind: delay, delay_s: 0.1}, {kind: unicycle, hand_point_m: 0.2}]", "no theorem covers another combination"),
         ("{kind: delay, delay_s: 0.03}", "a whole multiple of control.period_s"),
-        ("{kind: lag}", "time_constant_s: 0.0 is not allowed"),
+        ("{kind: lag}", "time_constant_s: missing; wanted: a number in s"),
         ("{kind: spring}", "one of first_order, unicycle, lag, delay"),
-        ("{sort: lag}", "ugvs.ugv1.plant.sort: unknown key"),
+        ("{sort: lag}", "ugvs.ugv1.plant.sort: unknown key; keys of first_order, the default: kind"),
+        ("lag", "ugvs.ugv1.plant: 'lag' is not allowed; wanted: a mapping with a kind, one of first_order, unicycle"),
+        ("[3]", "ugvs.ugv1.plant.0: 3 is not allowed; wanted: a mapping with a kind"),
     ],
 )
 def test_plants_that_no_theorem_covers_are_refused(plant: str, says: str) -> None:

@@ -311,8 +311,11 @@ def test_a_class_in_a_scenario_needs_leave_and_takes_numbers(tmp_path: Path) -> 
 @pytest.mark.parametrize(
     ("given", "said"),
     [
-        ("{kind: weak.py:Weak, hand_point_m: 1.0}", "keys of weak.py:Weak: drift_m_s, cover_m, parameters"),
-        ("{kind: lag, time_constant_s: 0.1, cover_m: 1.0}", "keys of lag: time_constant_s"),
+        (
+            "{kind: weak.py:Weak, hand_point_m: 1.0}",
+            "keys of a plant of your own: kind, drift_m_s, cover_m",
+        ),
+        ("{kind: lag, time_constant_s: 0.1, cover_m: 1.0}", "keys of lag: kind, time_constant_s"),
         ("[{kind: delay, delay_s: 0.05}, {kind: weak.py:Weak}]", "one plant, .*: a plant of your own does everything"),
         ("{kind: sideways}", "one of first_order, unicycle, lag, delay, module:Class or file.py:Class"),
         ("{kind: weak.py:Weak, drift_m_s: 9.0}", r"Largest term: drift_m_s"),

@@ -26,7 +26,7 @@ from airground_drake.sim import trace
 from airground_drake.sim.simulation import simulate
 from airground_drake.sim.trace import Trace
 from airground_drake.study.testing.plugin import Simulations
-from airground_drake.verify.engines.bodies import following_m_s, unicycle_m
+from airground_drake.verify.claim import followed
 from airground_drake.verify.proofs import coq, export
 from airground_drake.verify.proofs.compare import broken_rules
 from airground_drake.verify.proofs.export import demands, distances_file, recorded, without_vectors
@@ -399,24 +399,10 @@ def turning(of: Trace, **plant: Any) -> Trace:
         meta["scenario"]["ugvs"][name]["plant"] = [plant]
     meta["scenario"]["safe_distance"].update(obstacle_m=1.5, ugv_m=0.5, air_ground_m=0.8)
     meta["scenario"]["obstacles"]["wall_1"] = {"segment_m": [[-6.0, -3.0], [6.0, -3.0]]}
-    table = of.states
-    period = of.scenario.control.period_s
+    given, table = replace(of, meta=meta), of.states
     for name in ("ugv1", "ugv2"):
-        steered, command, bodies = of.position(name), of.command(name), []
-        if plant["kind"] == "unicycle":
-            now = np.append(steered[0] - [plant["hand_point_m"], 0.0, 0.0], 0.0)
-            for k in range(len(of.t)):
-                heading, since = now[3:], of.t[k : k + 1] - of.t[max(k - 1, 0)]
-                now = unicycle_m(steered[k : k + 1], heading, command[k : k + 1], since, plant["hand_point_m"], period)[
-                    0
-                ]
-                bodies.append(now)
-            columns = ["body_x_m", "body_y_m", "body_z_m", "heading_rad"]
-        else:
-            velocity = following_m_s(command, np.diff(of.t), plant["time_constant_s"])
-            bodies = [*np.hstack([steered - plant["time_constant_s"] * velocity, velocity])]
-            columns = [f"body_{axis}_m" for axis in "xyz"] + [f"body_v{axis}_m_s" for axis in "xyz"]
-        table = table.assign(**{f"{name}.{key}": np.array(bodies)[:, i] for i, key in enumerate(columns)})
+        bodies = followed(given, name)
+        table = table.assign(**{f"{name}.{key}": bodies[:, i] for i, key in enumerate(given.plant(name).signals)})
     return replace(of, meta=meta, states=table)
 
 

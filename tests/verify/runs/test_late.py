@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 from promises import judged
 
+from airground_drake.model.plants.budget import AT_REST, Bounds, kept_distance, law_distance
 from airground_drake.scenario.load import from_data, load
 from airground_drake.sim.simulation import simulate
 from airground_drake.sim.trace import Trace
 from airground_drake.verify import judge
 from airground_drake.verify.claims.safe_hyp import SafeHyp
-from airground_drake.verify.engines.bodies import Room, kept_m, law_m
 from airground_drake.verify.runs.pairs import least_gap, pair_of
 
 LATE = {"kind": "delay", "delay_s": 1.0}
@@ -89,14 +89,28 @@ def test_what_is_lost_comes_off_what_the_points_keep() -> None:
     assert least_gap(trace, pair_of(trace, "u1", "rock")).gap_m == pytest.approx(-0.088, abs=1e-3)
 
 
-@pytest.mark.parametrize("other", [None, Room(0.1, 0.2, 0.3, 2.0, 0.05), Room(0.0, 0.0, 0.0, 1.0)])
-def test_bodies_keep_what_points_keep_less_lag_and_cover(other: Room | None) -> None:
+LAGGING = Bounds(lag_s=0.5, speed_m_s=2.0)
+
+
+@pytest.mark.parametrize(
+    ("other", "passive"),
+    [
+        (AT_REST, False),
+        (AT_REST, True),
+        (Bounds(cover_m=0.1, drift_m_s=0.15, lag_s=0.2, delay_s=0.3, speed_m_s=2.0), False),
+        (Bounds(speed_m_s=1.0), False),
+    ],
+)
+def test_bodies_keep_what_points_keep_less_lag_and_cover(other: Bounds, passive: bool) -> None:
     """The inverse of the law's distance; the legs of a triangle by hand."""
-    one = Room(0.05, 0.5, 0.1, 2.0, 0.01)
-    for safe in (0.0, 0.2, 3.0):
-        assert kept_m(law_m(safe, one, other, passive=False), one, other) == pytest.approx(safe, abs=1e-12)
-    assert kept_m(1.25, Room(0.0, 0.5, 0.0, 2.0), None) == pytest.approx(0.75)
-    assert kept_m(0.9, Room(0.0, 0.5, 0.0, 2.0), None) == -np.inf
+    lagging = Bounds(cover_m=0.05, drift_m_s=0.03, lag_s=0.5, delay_s=0.1, speed_m_s=2.0)
+    drawn = Bounds(cover_m=0.3, dip_m=0.01, speed_m_s=1.0, drawn=True)
+    for one in (lagging, drawn, Bounds(speed_m_s=1.0)):
+        for safe in (0.0, 0.2, 3.0):
+            law = float(law_distance(safe, one, other, gain=3.0, passive=passive))
+            assert kept_distance(law, one, other, gain=3.0, passive=passive) == pytest.approx(safe, abs=1e-12)
+    assert kept_distance(1.25, LAGGING, gain=3.0) == pytest.approx(0.75)
+    assert kept_distance(0.9, LAGGING, gain=3.0) == -np.inf
 
 
 WHEELS = "{kind: unicycle, hand_point_m: 0.3, max_turn_rad_s: 2.0, wheel_base_m: 0.4, max_wheel_speed_m_s: 1.5}"
