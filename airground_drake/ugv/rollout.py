@@ -14,7 +14,7 @@ from airground_drake.model.geometry import convex
 from airground_drake.model.geometry.motion import Motion
 from airground_drake.model.law.kernels import fill_half_spaces
 from airground_drake.model.law.ugv_law import AcceptedMotion, Numbers, Tracking, UgvLaw, UgvState, command
-from airground_drake.model.plants.steering import HAND, NUMBERS, ahead, steer
+from airground_drake.model.plants.steering import EDGES, HAND, NUMBERS, keep_ahead, steer
 from airground_drake.uav.policy import Proposal
 
 REFUSED, ACCEPTED = 0, 1  # modes of a control period: whether the proposal is in force
@@ -38,7 +38,7 @@ class View:
         asked: under method (d), per part that moves, the motion that its body is asked to make and whether it has
             accepted it, or None.
         heading: own heading, rad, of a unicycle.
-        steering: numbers of its steering, (5,), see `model.plants.steering`; zeros for a robot that is no unicycle.
+        steering: numbers of its steering, (6,), see `model.plants.steering`; zeros for a robot that is no unicycle.
     """
 
     t: float
@@ -90,7 +90,7 @@ class ClosedLoop(NamedTuple):
         max_speed: own speed limit, m/s.
         substeps: control periods per stage.
         heading: at the beginning, rad, of a unicycle.
-        steering: numbers of its steering, (5,), see `model.plants.steering`.
+        steering: numbers of its steering, (6,), see `model.plants.steering`.
     """
 
     law: Numbers
@@ -155,7 +155,7 @@ class Workspace(NamedTuple):
 @njit(cache=True)
 def workspace(loop: ClosedLoop) -> Workspace:
     """Arrays for `advance`, uninitialised but for the heading."""
-    count = len(loop.distances) + 1
+    count = len(loop.distances) + EDGES
     plane = np.array([1.0, 1.0, 0.0])
     return Workspace(
         plane,
@@ -194,9 +194,7 @@ def _command(loop: ClosedLoop, mode: int, k: int, position: Array, work: Workspa
         position, mobility, loop.still, loop.parts, every, every, loop.places[k], loop.distances, loop.shares,
         law.layer, which, normal, bound, retreat,
     )  # fmt: skip
-    if ahead(heading[0], loop.steering, normal[count]):
-        bound[count], retreat[count] = 0.0, 0.0
-        count += 1
+    count = keep_ahead(heading[0], loop.steering, normal, bound, retreat, count)
     for a in range(3):
         rate[a] = (loop.preset[k + 1, a] - loop.preset[k, a]) / law.layer.period
         asked[a] = (loop.wanted[k + 1, a] - loop.wanted[k, a]) / law.layer.period

@@ -213,7 +213,7 @@ class World:
 
     @cached_property
     def steering(self) -> Array | None:
-        """Numbers of the UGVs' steering, (n, 5), see `model.plants.steering`; None if all take every command."""
+        """Numbers of the UGVs' steering, (n, 6), see `model.plants.steering`; None if all take every command."""
         found = [body.plant.steering if body.plant else None for body in self.bodies[self.select("ugv")]]
         if all(numbers is None for numbers in found):
             return None

@@ -21,7 +21,7 @@ from airground_drake.base.compiling import njit
 from airground_drake.model.bodies.world import Neighbours
 from airground_drake.model.law.avoidance import Avoidance
 from airground_drake.model.law.kernels import Layer, avoid_one, fill_half_spaces, limit_one, yielding
-from airground_drake.model.plants.steering import NUMBERS, ahead
+from airground_drake.model.plants.steering import EDGES, NUMBERS, keep_ahead
 
 
 class AcceptedMotion(NamedTuple):
@@ -108,7 +108,7 @@ class UgvLaw:
             target: of the UGVs' own task (6), (n, 3), m.
             rate: velocity of the target, (n, 3), m/s.
             asked: per UGV, what the accepted intervention asks for, or None.
-            steered: of unicycles, the headings (n,), rad, and the numbers of their steering, (n, 5): those that never
+            steered: of unicycles, the headings (n,), rad, and the numbers of their steering, (n, 6): those that never
                 drive backwards get no command to. None: there is no unicycle.
         """
         count = len(target)
@@ -187,7 +187,7 @@ def _commands(
     target, rate = track
     wanted, wanted_rate, chosen = asked
     velocity = np.empty(target.shape)
-    most = distance.shape[1] + 1
+    most = distance.shape[1] + EDGES
     normal, bound, which, retreat = np.empty((most, 3)), np.empty(most), np.empty(most, np.intp), np.empty(most)
     for i in range(len(target)):
         ugv = UgvState(positions[members[i]], mobility[i], max_speed[i])
@@ -195,9 +195,7 @@ def _commands(
             ugv.position, ugv.mobility, still, parts, carrier, others[i], positions, distance[i], share[i],
             law.layer, which, normal, bound, retreat,
         )  # fmt: skip
-        if ahead(headings[i], steering[i], normal[count]):
-            bound[count], retreat[count] = 0.0, 0.0
-            count += 1
+        count = keep_ahead(headings[i], steering[i], normal, bound, retreat, count)
         task, own = AcceptedMotion(wanted[i], wanted_rate[i], chosen[i]), Tracking(target[i], rate[i])
         velocity[i] = command(law, ugv, own, task, executing[i], normal[:count], bound[:count], retreat[:count])
     return velocity

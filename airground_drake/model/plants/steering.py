@@ -13,8 +13,9 @@ A command that asks for too fast a turn is shortened: s u with
 needs |omega| <= omega_max (theorems Turning.turns_within and Turning.shortened_chord). It is shortened further, by
 bisection, until no wheel exceeds its speed limit, |v| + |omega| B / 2 <= w_max.
 
-A unicycle that never drives backwards has v >= 0 if a >= 0: the law takes that as one more inequality (`ahead`), and
-where its other tasks come first, or inequalities contradict each other, a command with a < 0 makes it stand.
+A robot that never drives backwards has v >= 0 if a >= 0. One that turns at a radius of R at least has R |omega| <= v
+if R |b| <= l a (theorem Turning.car). The law takes that as one or two more inequalities (`keep_ahead`), and where its
+other tasks come first, or inequalities contradict each other, a command outside makes it stand.
 """
 
 from __future__ import annotations
@@ -26,10 +27,12 @@ import numpy as np
 from airground_drake.base.arrays import Array
 from airground_drake.base.compiling import njit
 
-# Entries of the numbers of a steering, (5,): hand point l, m (0: no unicycle); largest turning rate, rad/s; half the
-# wheel base, m; largest speed of a wheel, m/s; 1 if it never drives backwards, else 0. inf: no limit.
-HAND, TURN, HALF_BASE, WHEEL, FORWARD = 0, 1, 2, 3, 4
-NUMBERS = 5
+# Entries of the numbers of a steering, (6,): hand point l, m (0: no unicycle); largest turning rate, rad/s; half the
+# wheel base, m; largest speed of a wheel, m/s; 1 if it never drives backwards, else 0; and then its least turning
+# radius, m. inf: no limit.
+HAND, TURN, HALF_BASE, WHEEL, FORWARD, RADIUS = 0, 1, 2, 3, 4, 5
+NUMBERS = 6
+EDGES = 2  # most half-planes that bound the commands that a robot can follow
 BISECTIONS = 50  # halvings in the search for a share that the wheels can do; the result always can be done
 
 
@@ -77,9 +80,12 @@ def steer(velocity: Array, heading: float, steering: Array, period: float) -> tu
     """Shorten a command (3,), m/s, world frame, in place, for a unicycle with a heading, rad."""
     # Returns the share s that is left of the command, 0 if it stands, and the turning rate, rad/s.
     cos, sin = math.cos(heading), math.sin(heading)
-    if steering[FORWARD] > 0.0 and velocity[0] * cos + velocity[1] * sin < 0.0:
-        velocity[:] = 0.0
-        return 0.0, 0.0
+    edge = np.empty(3)
+    for side in range(_edges(steering)):
+        _edge(heading, steering, side, edge)
+        if velocity[0] * edge[0] + velocity[1] * edge[1] < 0.0:
+            velocity[:] = 0.0
+            return 0.0, 0.0
     left = share(velocity[0] * cos + velocity[1] * sin, velocity[1] * cos - velocity[0] * sin, steering, period)
     if left < 1.0:
         for axis in range(3):
@@ -90,7 +96,7 @@ def steer(velocity: Array, heading: float, steering: Array, period: float) -> tu
 
 @njit(cache=True)
 def steer_all(velocity: Array, headings: Array, steering: Array, period: float) -> Array:
-    """Shorten the commands (n, 3), m/s, of UGVs with headings (n,), rad, in place; `steering` is (n, 5)."""
+    """Shorten the commands (n, 3), m/s, of UGVs with headings (n,), rad, in place; `steering` is (n, 6)."""
     # Returns the shares that are left, (n,); 1 for a UGV that is no unicycle.
     left = np.ones(len(velocity))
     for i in range(len(velocity)):
@@ -100,12 +106,32 @@ def steer_all(velocity: Array, headings: Array, steering: Array, period: float) 
 
 
 @njit(cache=True)
-def ahead(heading: float, steering: Array, direction: Array) -> bool:
-    """Whether a robot never drives backwards; writes the unit vector ahead of it, for a heading in rad, if so."""
+def _edges(steering: Array) -> int:
+    """How many half-planes bound the commands that a robot can follow: 0, 1, or 2 with a least turning radius."""
     if steering[FORWARD] == 0.0:
-        return False
-    direction[0], direction[1], direction[2] = math.cos(heading), math.sin(heading), 0.0
-    return True
+        return 0
+    return 2 if steering[RADIUS] > 0.0 else 1
+
+
+@njit(cache=True)
+def _edge(heading: float, steering: Array, side: int, direction: Array) -> None:
+    """Write the unit normal of such a half-plane, for a heading in rad."""
+    cos, sin, radius = math.cos(heading), math.sin(heading), steering[RADIUS]
+    direction[0], direction[1], direction[2] = cos, sin, 0.0
+    if radius > 0.0:
+        length = math.hypot(steering[HAND], radius)
+        a, b = steering[HAND] / length, (radius if side == 0 else -radius) / length
+        direction[0], direction[1] = a * cos - b * sin, a * sin + b * cos
+
+
+@njit(cache=True)
+def keep_ahead(heading: float, steering: Array, normal: Array, bound: Array, retreat: Array, count: int) -> int:
+    """Add the inequalities of a robot that never drives backwards to the first `count`; returns how many there are."""
+    for side in range(_edges(steering)):
+        _edge(heading, steering, side, normal[count])
+        bound[count], retreat[count] = 0.0, 0.0
+        count += 1
+    return count
 
 
 @njit(cache=True)

@@ -90,7 +90,7 @@ class Unicycle(Plant):
 
     @property
     def steering(self) -> Array:
-        """Numbers for `model.plants.steering`, (5,)."""
+        """Numbers for `model.plants.steering`, (6,)."""
         found = np.zeros(NUMBERS)
         found[HAND], found[TURN] = self.hand_m, self.max_turn_rad_s
         found[HALF_BASE], found[WHEEL] = 0.5 * self.wheel_base_m, self.max_wheel_m_s
