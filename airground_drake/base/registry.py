@@ -309,6 +309,7 @@ PLANTS = Registry(
         for place in (
             "airground_drake.model.plants.first_order:FirstOrderKeys",
             "airground_drake.model.plants.unicycle:UnicycleKeys",
+            "airground_drake.model.plants.ackermann:AckermannKeys",
             "airground_drake.model.plants.lag:LagKeys",
             "airground_drake.model.plants.delay:DelayKeys",
         )

@@ -3,6 +3,7 @@
 The law steers a point that goes straight from row to row. Of the body the plant says:
 
     unicycle   the axle is l behind the hand point, which goes along an arc with the same ends in each control period
+    ackermann  the same of the rear axle of a car
     delay      the body is where the steered point was
     lag        tau v' = u - v; the steered point is p + tau v
 
@@ -23,7 +24,8 @@ from .rules import SMALL, Array, close
 
 Rows = npt.NDArray[np.intp]
 
-KINDS = ("first_order", "unicycle", "lag", "delay")  # kinds of plants; any other is the name of a class
+DRIVES = ("unicycle", "ackermann")  # those steered by a hand point
+KINDS = ("first_order", *DRIVES, "lag", "delay")  # kinds of plants; any other is the name of a class
 STRAIGHT_M = 1e-10  # parts of a way that count as straight leave the line by no more, m
 MOST_PARTS = 5000
 
@@ -54,8 +56,18 @@ def plants_of(robot: Json) -> list[Json]:
 
 
 def unicycle_of(robot: Json) -> Json | None:
-    """The plant of a robot that is a unicycle."""
-    return next((plant for plant in robot["plant"] if plant["kind"] == "unicycle"), None)
+    """The plant of a robot that is a unicycle or a car."""
+    return next((plant for plant in robot["plant"] if plant["kind"] in DRIVES), None)
+
+
+def only_ahead(drive: Json) -> bool:
+    """Whether a unicycle never drives backwards; a car does not."""
+    return drive["kind"] != "unicycle" or not drive["backwards"]
+
+
+def least_radius_m(drive: Json) -> float:
+    """Least turning radius of a car, m; 0 of a unicycle."""
+    return float(drive["wheelbase_m"]) / math.tan(drive["max_steering_rad"]) if drive["kind"] != "unicycle" else 0.0
 
 
 def own_of(robot: Json) -> Json | None:
@@ -73,14 +85,14 @@ def taken(robot: Json, control: Json) -> Taken:
     lag_s, delay_s = (sum(plant.get(key, 0.0) for plant in plants_of(robot)) for key in ("time_constant_s", "delay_s"))
     drive = unicycle_of(robot)
     body = drive["hand_point_m"] + _dip_m(drive, most * period_s, period_s) if drive else 0.0
-    drawn = float(drive["hand_point_m"]) if drive and not drive["backwards"] else 0.0
+    drawn = float(drive["hand_point_m"]) if drive and only_ahead(drive) else 0.0
     return Taken(body, lag_s, delay_s, most, drawn_m=drawn)
 
 
 def _dip_m(drive: Json, chord_m: float, period_s: float) -> float:
     """|omega| ||w|| h^2 / 8 for the largest turn, where the hand point goes ||w|| h along an arc with this chord."""
-    turns = [drive["max_turn_rad_s"]] if drive["max_turn_rad_s"] else []
-    if drive["wheel_base_m"]:
+    turns = [drive["max_turn_rad_s"]] if drive.get("max_turn_rad_s") else []
+    if drive.get("wheel_base_m"):
         turns.append(2.0 * drive["max_wheel_speed_m_s"] / drive["wheel_base_m"])
     turned = [turn * period_s for turn in turns]
     if chord_m <= 2.0 * drive["hand_point_m"]:

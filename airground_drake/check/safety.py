@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .files import Json
-from .plants import MOST_PARTS, STRAIGHT_M, own_of, unicycle_of
+from .plants import MOST_PARTS, STRAIGHT_M, least_radius_m, only_ahead, own_of, unicycle_of
 from .rules import SMALL, Array, Disagreement, Found, close, holds
 from .run import Run, column_of
 from .scenario import Pair, expected_m_s, written
@@ -278,13 +278,20 @@ def _rolled_m(run: Run, robot: str) -> Array:
     return np.asarray(step[:, 0] * np.cos(middle) + step[:, 1] * np.sin(middle))
 
 
+def _chord_rad(run: Run, robot: str) -> Array:
+    """2 sin of half the turn from row to row: the chord of an arc over its radius."""
+    return np.asarray(2.0 * np.abs(np.sin(0.5 * np.diff(run.ways[robot].heading_rad))))
+
+
 def _motion(run: Run) -> None:
     """Robots and obstacles keep their speed limits, and UGVs their height; straight motion is the law of motion."""
     for robot, spec in run.robots.items():
         place = run.position_m[robot]
         drive = unicycle_of(spec)
-        if drive and not drive["backwards"]:
+        if drive and only_ahead(drive):
             holds("never backwards", _rolled_m(run, robot) >= -SMALL, _rolled_m(run, robot), "0 at least", about=robot)
+            spare = _rolled_m(run, robot) - least_radius_m(drive) * _chord_rad(run, robot)
+            holds("least turning radius", spare >= -SMALL, spare, "0 m at least to spare", about=robot)
         if own := own_of(spec):
             for key, unit in (("drift_m_s", "m/s"), ("cover_m", "m")):
                 found, about = column_of(run.samples, f"{robot}.{key}"), f"{own[key]} {unit} at most"

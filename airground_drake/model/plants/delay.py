@@ -28,7 +28,6 @@ class DelayKeys(Keys):
         return other.may_be_late
 
     def made(self, period_s: float, after: Plant | None) -> "Delay":
-        """The plant."""
         return Delay(round(self.delay_s / period_s), period_s, after or FirstOrder())
 
     def problems(self, setting: Setting) -> Iterator[tuple[str, object, str]]:
@@ -62,7 +61,6 @@ class Delay(Plant):
         return ("Plants.delay", *self.after.theorems)
 
     def trails(self, speed_m_s: float) -> bool:
-        """It does."""
         return True
 
     def bounds(self, speed_m_s: float) -> Bounds:
@@ -70,7 +68,6 @@ class Delay(Plant):
         return self.after.bounds(speed_m_s)._replace(delay_s=self.periods * self.period_s)
 
     def needs(self, speed_m_s: float) -> Iterator[Need]:
-        """Those of `after`."""
         return self.after.needs(speed_m_s)
 
     def memory(self) -> Array:
@@ -92,15 +89,12 @@ class Delay(Plant):
         return self.after.at(inner, behind, now, elapsed_s) if self.after.signals else behind
 
     def bends_m(self, t_s: Array, signals: Array) -> Array:
-        """As `after`."""
         return self.after.bends_m(t_s, signals)
 
     def between(self, t_s: Array, signals: Array, shares: Array) -> Array:
-        """As `after`."""
         return self.after.between(t_s, signals, shares)
 
     def premises(self, run: Recorded) -> Iterator[Premise]:
-        """Those of `after`."""
         return self.after.premises(run)
 
     def _of_after(self, memory: Array) -> tuple[Array, Array]:

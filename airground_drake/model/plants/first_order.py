@@ -14,7 +14,6 @@ class FirstOrderKeys(Keys):
     """The default."""
 
     def made(self, period_s: float, after: Plant | None) -> "FirstOrder":
-        """The plant."""
         return FirstOrder()
 
 

@@ -24,7 +24,6 @@ class LagKeys(Keys):
     may_be_late: ClassVar[bool] = True
 
     def made(self, period_s: float, after: Plant | None) -> "Lag":
-        """The plant."""
         return Lag(self.time_constant_s)
 
 
@@ -39,15 +38,12 @@ class Lag(Plant):
     passive_theorems: ClassVar[tuple[str, ...]] = ("Mixed.lagging",)
 
     def trails(self, speed_m_s: float) -> bool:
-        """It does."""
         return True
 
     def bounds(self, speed_m_s: float) -> Bounds:
-        """The lag."""
         return Bounds(lag_s=self.time_s, speed_m_s=speed_m_s)
 
     def memory(self) -> Array:
-        """At rest."""
         return np.zeros(3)
 
     def remembered(self, memory: Array, command: Array, elapsed_s: float) -> Array:

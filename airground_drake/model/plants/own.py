@@ -26,7 +26,6 @@ class OwnKeys(Keys):
     alone: ClassVar[str] = "a plant of your own does everything itself"
 
     def made(self, period_s: float, after: Plant | None) -> "Own":
-        """The plant."""
         return Own(self.kind, self.drift_m_s, self.cover_m, self.parameters)
 
     def problems(self, setting: Setting) -> Iterator[tuple[str, object, str]]:
@@ -55,11 +54,9 @@ class Own(Plant):
     unproved: ClassVar[str] = "SAFE-BUDGET says what is proved of it"
 
     def trails(self, speed_m_s: float) -> bool:
-        """It may move as it likes."""
         return True
 
     def bounds(self, speed_m_s: float) -> Bounds:
-        """What is declared."""
         return Bounds(cover_m=self.cover_m, drift_m_s=self.drift_m_s, speed_m_s=speed_m_s)
 
     def premises(self, run: Recorded) -> Iterator[Premise]:

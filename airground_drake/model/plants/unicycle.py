@@ -17,6 +17,7 @@ from airground_drake.model.plants.plant import HEADING, PLACE, Keys, Need, Plant
 from airground_drake.model.plants.steering import FORWARD, HALF_BASE, HAND, NUMBERS, TURN, WHEEL, along, chord
 
 _AHEAD = wanted("more than 0 m: the law steers a point ahead of the axle", ge=SMALLEST)
+Ahead = Annotated[Number, _AHEAD, BeforeValidator(as_float)]
 
 
 @dataclass(slots=True, kw_only=True)
@@ -29,7 +30,7 @@ class UnicycleKeys(Keys):
 
     kind: Literal["unicycle"]
     """A unicycle."""
-    hand_point_m: Annotated[Number, _AHEAD, BeforeValidator(as_float)]
+    hand_point_m: Ahead
     """Distance of the hand point ahead of the axle."""
     heading_rad: Heading = 0.0
     """Heading at the start, counter-clockwise from x."""
@@ -45,7 +46,6 @@ class UnicycleKeys(Keys):
     alone: ClassVar[str] = "no theorem covers another combination; chord steering needs a body that obeys at once"
 
     def made(self, period_s: float, after: Plant | None) -> "Unicycle":
-        """The plant."""
         limits = self.max_turn_rad_s or math.inf, self.wheel_base_m, self.max_wheel_speed_m_s or math.inf
         return Unicycle(self.hand_point_m, period_s, self.heading_rad, *limits, self.backwards)
 
@@ -56,13 +56,7 @@ class UnicycleKeys(Keys):
         if bool(self.wheel_base_m) != bool(self.max_wheel_speed_m_s):
             missing = "max_wheel_speed_m_s" if self.wheel_base_m else "wheel_base_m"
             yield missing, 0.0, "more than 0: wheel_base_m and max_wheel_speed_m_s go together"
-        h, limit = setting.period_s, self.made(setting.period_s, None).limit_rad_s
-        least = 0.5 * setting.max_speed_m_s * h
-        if not (self.hand_point_m >= least or limit * h < math.pi):
-            allowed = (
-                f"at least max_speed_m_s * control.period_s / 2 = {least:.9g} m, or a turning limit below pi / "
-                f"period_s = {math.pi / h:.6g} rad/s: else the axle could swing round within a period"
-            )
+        if allowed := may_swing_round(self.made(setting.period_s, None), setting.max_speed_m_s):
             yield "hand_point_m", self.hand_point_m, allowed
 
 
@@ -90,7 +84,6 @@ class Unicycle(Plant):
 
     @property
     def steering(self) -> Array:
-        """Numbers for `model.plants.steering`, (6,)."""
         found = np.zeros(NUMBERS)
         found[HAND], found[TURN] = self.hand_m, self.max_turn_rad_s
         found[HALF_BASE], found[WHEEL] = 0.5 * self.wheel_base_m, self.max_wheel_m_s
@@ -114,7 +107,6 @@ class Unicycle(Plant):
         return min(most, self.limit_rad_s)
 
     def steered(self, start: Array) -> Array:
-        """The hand point."""
         ahead = np.array([math.cos(self.heading_rad), math.sin(self.heading_rad), 0.0])
         return start + self.hand_m * ahead
 
@@ -137,7 +129,6 @@ class Unicycle(Plant):
         yield Need("turn in a period", says, max(fast, half), strict=fast < 0)
 
     def memory(self) -> Array:
-        """The heading."""
         return np.array([self.heading_rad])
 
     def remembered(self, memory: Array, command: Array, elapsed_s: float) -> Array:
@@ -168,16 +159,20 @@ class Unicycle(Plant):
         ], axis=1)  # fmt: skip
         return np.asarray(start + ratio[:, None] * turned)
 
+    def driven(self, run: Recorded) -> tuple[Array, Array, Array, Array]:
+        """When each period begins and how long it lasts, s, turning rates, rad/s, and speeds along arcs, m/s."""
+        begun, ended = run.signals[run.first], run.signals[run.last]
+        t, lasting, turned = run.t_s[run.first], run.t_s[run.last] - run.t_s[run.first], ended[:, 3] - begun[:, 3]
+        chords = np.linalg.norm((ended - begun)[:, :3], axis=1)
+        return t, lasting, np.abs(turned) / lasting, chords / lasting / np.sinc(0.5 * turned / np.pi)
+
     def premises(self, run: Recorded) -> Iterator[Premise]:
         """Limits of turns, wheels and dips, and that it never drives backwards if it may not."""
         begun, ended = run.signals[run.first], run.signals[run.last]
-        t, lasting, way = run.t_s[run.first], run.t_s[run.last] - run.t_s[run.first], (ended - begun)[:, :3]
-        turned = ended[:, 3] - begun[:, 3]
-        rate, half = np.abs(turned) / lasting, 0.5 * turned
-        speed = np.linalg.norm(way, axis=1) / lasting / np.sinc(half / np.pi)
+        t, lasting, rate, speed = self.driven(run)
         if not self.backwards:
             middle = 0.5 * (begun[:, 3] + ended[:, 3])
-            gone = np.einsum("ka,ka->k", way[:, :2], np.column_stack([np.cos(middle), np.sin(middle)]))
+            gone = np.einsum("ka,ka->k", (ended - begun)[:, :2], np.column_stack([np.cos(middle), np.sin(middle)]))
             yield Premise("never backwards", "m/s", t, gone / lasting)
         if self.max_turn_rad_s < math.inf:
             yield Premise("turning limit", "rad/s", t, self.max_turn_rad_s - rate)
@@ -186,3 +181,14 @@ class Unicycle(Plant):
             yield Premise("wheel speeds", "m/s", t, spare)
         dips = rate * np.hypot(speed, self.hand_m * rate) * lasting**2 / 8.0
         yield Premise("dip of the hand point", "m", t, self.bounds(run.max_speed_m_s).dip_m - dips)
+
+
+def may_swing_round(plant: Unicycle, speed_m_s: float) -> str:
+    """What is allowed for a hand point with which the axle could swing round within a period; '' for others."""
+    h, least = plant.period_s, 0.5 * speed_m_s * plant.period_s
+    if plant.hand_m >= least or plant.limit_rad_s * h < math.pi:
+        return ""
+    return (
+        f"at least max_speed_m_s * control.period_s / 2 = {least:.9g} m, or a turning limit below pi / period_s = "
+        f"{math.pi / h:.6g} rad/s: else the axle could swing round within a period"
+    )

@@ -140,6 +140,47 @@ Proof.
   unfold Rabs; destruct Rcase_abs; lra.
 Qed.
 
+(** ** A car: its front wheels steer, so that it turns at a radius of [rho] at least. It follows every command of the cone
+    [rho |b| <= l a]: then [rho |omega| <= v]. So it never drives backwards, and it cannot turn on the spot. *)
+Theorem car l h a b om v rho : 0 < l -> 0 < h -> 0 <= a -> 0 <= rho -> rho * Rabs b <= l * a ->
+  chord_steering l h a b om v -> rho * Rabs om <= v.
+Proof.
+  intros Hl Hh Ha Hr Cone C; destruct (Req_dec b 0) as [B | B].
+  { subst b; destruct (straight l h a om v Hh C) as [-> ->]; rewrite Rabs_R0; lra. }
+  destruct C as [_ [Om [V _]]]; set (be := atan (b * h / (2 * l + a * h))) in *.
+  destruct (atan_bound (b * h / (2 * l + a * h))) as [B1 B2]; fold be in B1, B2.
+  assert (P : 0 < cos be) by (apply cos_gt_0; lra); assert (Y : 0 < 2 * l + a * h) by nra.
+  assert (T : (2 * l + a * h) * sin be = b * h * cos be).
+  { assert (Q : tan be = b * h / (2 * l + a * h)) by apply tan_atan; unfold tan in Q.
+    replace (sin be) with (sin be / cos be * cos be) by (field; lra); rewrite Q; field; lra. }
+  set (y := 2 * l + a * h) in *; set (w := Rabs b) in *.
+  assert (E : 2 * rho * w <= a * y + b * b * h) by (unfold y; nra).
+  assert (G : forall be' s', 0 < be' -> 0 < s' -> Rabs om = 2 * be' / h -> y * s' = w * h * cos be ->
+    v * s' * y = be' * (cos be * (a * y + b * b * h)) -> rho * Rabs om <= v).
+  { intros be' s' Bp Sp -> T' V'; apply Rmult_le_reg_r with (s' * y); [nra |].
+    replace (rho * (2 * be' / h) * (s' * y)) with (rho * (2 * be' / h) * (y * s')) by ring; rewrite T'.
+    replace (rho * (2 * be' / h) * (w * h * cos be)) with (be' * (cos be * (2 * rho * w))) by (field; lra).
+    replace (v * (s' * y)) with (v * s' * y) by ring; rewrite V'.
+    apply Rmult_le_compat_l; [lra |]; apply Rmult_le_compat_l; lra. }
+  assert (V1 : v * sin be * y = be * (cos be * (a * y + b * b * h))).
+  { replace (v * sin be * y) with ((a * cos be + b * sin be) * be * y) by (rewrite <- V; ring).
+    replace ((a * cos be + b * sin be) * be * y) with (be * (a * cos be * y + b * (y * sin be))) by ring.
+    rewrite T; ring. }
+  destruct (Rtotal_order b 0) as [L | [Z | L]]; [| contradiction |].
+  - assert (be < 0).
+    { unfold be; rewrite <- atan_0; apply atan_increasing; unfold y in *; apply Rmult_lt_reg_r with (2 * l + a * h);
+      [exact Y |]; replace (b * h / (2 * l + a * h) * (2 * l + a * h)) with (b * h) by (field; lra); nra. }
+    assert (W : w = - b) by (unfold w; apply Rabs_left; exact L).
+    apply (G (- be) (- sin be)); [lra | pose proof (sin_lt_0_var be ltac:(lra) H); lra | | rewrite W; lra | lra].
+    rewrite Om, Rabs_left; [field; lra |]; replace (2 * be / h) with (be * (2 / h)) by (field; lra).
+    assert (0 < 2 / h) by (apply Rdiv_lt_0_compat; lra); nra.
+  - assert (0 < be).
+    { unfold be; rewrite <- atan_0; apply atan_increasing; unfold y in *; apply Rdiv_lt_0_compat; nra. }
+    assert (W : w = b) by (unfold w; apply Rabs_right; lra).
+    apply (G be (sin be)); [lra | apply sin_gt_0; lra | | rewrite W; lra | lra].
+    rewrite Om; apply Rabs_right; apply Rle_ge; left; apply Rdiv_lt_0_compat; lra.
+Qed.
+
 (** * What a shortened command still meets *)
 Section Shortened.
 

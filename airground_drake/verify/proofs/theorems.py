@@ -218,6 +218,12 @@ _ALL = (
         ("V h is at most 2 l.", "2 l + a h is positive, a the command ahead."),
     ),
     Theorem(
+        "Turning.car", "ours", ("SAFE-BUDGET", "SAFE-HYP"),
+        "With chord steering a car follows every command of the cone R |b| <= l a at a radius of R at least.",
+        ("The hand point is ahead of the axle.", "The command leads ahead: a is not negative.", _CHORD),
+        "That a car gets anywhere: it stands where no command of the cone is allowed.",
+    ),
+    Theorem(
         "Turning.shortened", "ours", ("SAFE-BUDGET", "SAFE-HYP"),
         "A shortened command still meets every inequality that v = 0 meets.",
         ("The share that is left is above 0 and at most 1.",),

@@ -341,7 +341,7 @@ def test_a_monitor_knows_what_unicycles_can_do() -> None:
         ("[{kind: delay, delay_s: 0.1}, {kind: unicycle, hand_point_m: 0.2}]", "no theorem covers another combination"),
         ("{kind: delay, delay_s: 0.03}", "a whole multiple of control.period_s"),
         ("{kind: lag}", "time_constant_s: missing; wanted: a number in s"),
-        ("{kind: spring}", "one of first_order, unicycle, lag, delay"),
+        ("{kind: spring}", "one of first_order, unicycle, ackermann, lag, delay"),
         ("{sort: lag}", "ugvs.ugv1.plant.sort: unknown key; keys of first_order, the default: kind"),
         ("lag", "ugvs.ugv1.plant: 'lag' is not allowed; wanted: a mapping with a kind, one of first_order, unicycle"),
         ("[3]", "ugvs.ugv1.plant.0: 3 is not allowed; wanted: a mapping with a kind"),

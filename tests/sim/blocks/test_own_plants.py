@@ -317,7 +317,7 @@ def test_a_class_in_a_scenario_needs_leave_and_takes_numbers(tmp_path: Path) -> 
         ),
         ("{kind: lag, time_constant_s: 0.1, cover_m: 1.0}", "keys of lag: kind, time_constant_s"),
         ("[{kind: delay, delay_s: 0.05}, {kind: weak.py:Weak}]", "one plant, .*: a plant of your own does everything"),
-        ("{kind: sideways}", "one of first_order, unicycle, lag, delay, module:Class or file.py:Class"),
+        ("{kind: sideways}", "one of first_order, unicycle, ackermann, lag, delay, module:Class or file.py:Class"),
         ("{kind: weak.py:Weak, drift_m_s: 9.0}", r"Largest term: drift_m_s"),
     ],
 )

@@ -118,6 +118,7 @@ LIMITS = {
     "turning limit": (WHEELS.replace(", wheel_base_m: 0.4, max_wheel_speed_m_s: 1.5", ""), 2.1),
     "wheel speeds": (WHEELS.replace(" max_turn_rad_s: 2.0,", ""), 3.2),
     "dip of the hand point": ("{kind: unicycle, hand_point_m: 0.3}", 9.0),
+    "least turning radius": ("{kind: ackermann, hand_point_m: 0.3, wheelbase_m: 0.3, max_steering_rad: 0.3}", 1.5),
 }
 
 
