@@ -7,6 +7,7 @@ import time
 import weakref
 from contextlib import suppress
 
+import numba
 import pytest
 
 from airground_drake.uav.guest.time_limit import OutOfTime, time_limit
@@ -47,3 +48,20 @@ def test_a_limit_that_python_ignores_in_a_callback_comes_again() -> None:
     with pytest.raises(OutOfTime), time_limit(0.05):
         forget_and_wait()
     assert reference() is None
+
+
+def test_compilation_does_not_count() -> None:
+    """Else a slow machine would interrupt it each time, and never have the compiled function."""
+
+    def total(n: int) -> int:
+        found = 0
+        for number in range(n):
+            found += number
+        return found
+
+    with time_limit(0.01):
+        assert numba.njit(total)(10) == 45
+    with pytest.raises(OutOfTime), time_limit(0.01):
+        numba.njit(total)(11)
+        while True:
+            pass
