@@ -7,10 +7,10 @@ import time
 import weakref
 from contextlib import suppress
 
-import numba
 import numpy as np
 import pytest
 
+from airground_drake.base.compiling import njit
 from airground_drake.uav.guest.time_limit import OutOfTime, time_limit
 
 
@@ -58,9 +58,9 @@ def test_compilation_does_not_count() -> None:
         return float(np.sort(numbers).cumsum()[-1])
 
     with time_limit(0.01):
-        assert numba.njit(total)(np.ones(3)) == 3.0
+        assert njit(cache=False)(total)(np.ones(3)) == 3.0
     with pytest.raises(OutOfTime), time_limit(0.01):
-        _waits_for_ever(numba.njit(total)(np.ones(4)))
+        _waits_for_ever(njit(cache=False)(total)(np.ones(4)))
 
 
 def _waits_for_ever(_: float) -> None:
