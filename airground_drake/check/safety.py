@@ -280,7 +280,9 @@ def _rolled_m(run: Run, robot: str) -> Array:
 
 def _chord_rad(run: Run, robot: str) -> Array:
     """2 sin of half the turn from row to row: the chord of an arc over its radius."""
-    return np.asarray(2.0 * np.abs(np.sin(0.5 * np.diff(run.ways[robot].heading_rad))))
+    heading = run.ways[robot].heading_rad
+    assert heading is not None
+    return np.asarray(2.0 * np.abs(np.sin(0.5 * np.diff(heading))))
 
 
 def _motion(run: Run) -> None:
