@@ -1,7 +1,7 @@
 """First order: it moves as it is told."""
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import ClassVar, Literal
 
 from airground_drake.model.plants.plant import Keys, Plant
 
@@ -20,3 +20,5 @@ class FirstOrderKeys(Keys):
 @dataclass(frozen=True)
 class FirstOrder(Plant):
     """p_dot = v: it moves as it is told."""
+
+    unproved: ClassVar[str] = ""

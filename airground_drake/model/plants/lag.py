@@ -36,6 +36,7 @@ class Lag(Plant):
     signals: ClassVar[tuple[str, ...]] = (*PLACE, "body_vx_m_s", "body_vy_m_s", "body_vz_m_s")
     theorems: ClassVar[tuple[str, ...]] = ("Plants.lag", "Plants.lag_speed", "Plants.lag_pair", "Plants.lag_needs")
     passive_theorems: ClassVar[tuple[str, ...]] = ("Mixed.lagging",)
+    unproved: ClassVar[str] = ""
 
     def trails(self, speed_m_s: float) -> bool:
         return True

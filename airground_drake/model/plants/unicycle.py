@@ -75,6 +75,7 @@ class Unicycle(Plant):
     signals: ClassVar[tuple[str, ...]] = (*PLACE, HEADING)
     cover_key: ClassVar[str] = "hand_point_m"
     passive_theorems: ClassVar[tuple[str, ...]] = ("Mixed.unicycle_chord",)
+    unproved: ClassVar[str] = ""
 
     @property
     def theorems(self) -> tuple[str, ...]:

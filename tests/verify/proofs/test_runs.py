@@ -20,6 +20,8 @@ from builders.edits import with_scenario
 from airground_drake.base.arrays import Array
 from airground_drake.base.errors import TraceError
 from airground_drake.commands import main
+from airground_drake.model.plants.plant import Plant
+from airground_drake.model.plants.unicycle import Unicycle
 from airground_drake.scenario.load import load
 from airground_drake.scenario.schema import Obstacle, Preset, Run, SafeDistance, Scenario, Uav, Ugv
 from airground_drake.sim import trace
@@ -451,7 +453,7 @@ def test_room_comes_from_the_numbers_of_a_plant(run: Simulations) -> None:
 def test_a_plant_that_nobody_has_thought_of_is_refused(run: Simulations, monkeypatch: pytest.MonkeyPatch) -> None:
     few = short(turning(run("case_a", "d"), **UNICYCLE))
     recorded(few)
-    monkeypatch.setattr(export, "PLANTS", export.PLANTS - {"unicycle"})
+    monkeypatch.setattr(Unicycle, "unproved", Plant.unproved)
     with pytest.raises(TraceError, match=r"^run d: ugv1 has the plant unicycle; no theorem is about such a body$"):
         recorded(few)
 
