@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from fractions import Fraction
-from itertools import combinations
+from itertools import combinations, product
 from typing import Any, NamedTuple
 
 from airground_drake.base.exact import decimal
@@ -39,6 +39,28 @@ def kind_of(scenario: Scenario, first: str, second: str) -> str:
     if len(robots) < 2:
         return "obstacle"
     return "uav_ugv" if scenario.uav.name in (first, second) else "ugv_ugv"
+
+
+class Apart(NamedTuple):
+    """A robot, and a barrier or another robot that it must keep apart from, by name."""
+
+    first: str  # the robot
+    second: str
+    kind: str  # one in `SHARES`, or `MOVING`
+    required_m: float  # gap to keep between the surfaces
+    radii_m: tuple[float, float]  # of the two bodies
+
+
+def apart(scenario: Scenario) -> Iterator[Apart]:
+    """Who must keep apart: robot by robot each barrier, and then each two robots."""
+    safe, uav, robots = scenario.safe_distance, scenario.uav.name, scenario.robots
+    for (name, robot), (other, barrier) in product(robots.items(), scenario.barriers.items()):
+        moves = barrier.expected_speed_m_s > 0.0
+        required = barrier.distance_m or (moves and safe.moving_m) or safe.obstacle_m
+        yield Apart(name, other, MOVING if moves else "obstacle", required, (robot.radius_m, barrier.radius_m))
+    for name, other in combinations(robots, 2):
+        kind, required = ("uav_ugv", safe.air_ground_m) if uav in (name, other) else ("ugv_ugv", safe.ugv_m)
+        yield Apart(name, other, kind, required, (robots[name].radius_m, robots[other].radius_m))
 
 
 class PairKind(NamedTuple):
@@ -75,16 +97,12 @@ def kinds_of(inputs: dict[str, Any]) -> list[PairKind]:
 def _kinds(scenario: Scenario) -> Iterator[PairKind]:
     """The extreme pairs of each kind in `THEOREMS`: the hypotheses hold for all pairs if they hold for these."""
     # Kept are pairs that no other pair exceeds in both distance and speed, and the nearest pair.
-    safe, control = scenario.safe_distance, scenario.control
-    ugvs = [_Robot.of(ugv, control) for ugv in scenario.ugvs.values()]
-    uav = _Robot.of(scenario.uav, control)
-    barriers = {(decimal(each.distance_m or safe.obstacle_m), decimal(each.radius_m)) for each in
-                scenario.barriers.values() if not each.expected_speed_m_s}  # fmt: skip
-    pairs: dict[str, set[tuple[Fraction, Fraction]]] = {
-        "obstacle": {own.beside_a_set(d + (own.radius_m + r)) for own in {*ugvs, uav} for d, r in barriers},
-        "uav_ugv": {uav.beside(ugv, safe.air_ground_m) for ugv in ugvs},
-        "ugv_ugv": {one.beside(other, safe.ugv_m) for one, other in combinations(ugvs, 2)},
-    }
+    robots = {name: _Robot.of(robot, scenario.control) for name, robot in scenario.robots.items()}
+    asked = {(pair.kind, robots[pair.first], robots.get(pair.second), *pair[3:]) for pair in apart(scenario)}
+    pairs: dict[str, set[tuple[Fraction, Fraction]]] = {kind: set() for kind in SHARES}
+    for kind, own, other, required, (_, radius) in asked:
+        if kind in pairs:
+            pairs[kind].add(own.beside(other, decimal(required) + (own.radius_m + decimal(radius))))
     for kind, both in pairs.items():
         kept: list[tuple[Fraction, Fraction]] = []
         for each in sorted(both, reverse=True):
@@ -109,14 +127,11 @@ class _Robot(NamedTuple):
         bounds = plant_of(robot, control.period_s).bounds(robot.max_speed_m_s)
         return cls(decimal(robot.radius_m), decimal(robot.max_speed_m_s), bounds, control.avoidance_gain_1_s)
 
-    def beside(self, other: _Robot, apart_m: float) -> tuple[Fraction, Fraction]:
-        """Distance in the law, m, and closing speed, m/s; `apart_m` is the safe one between surfaces."""
-        safe = decimal(apart_m) + self.radius_m + other.radius_m
-        return self._in_the_law(safe, other.bounds), self.speed_m_s + other.speed_m_s
-
-    def beside_a_set(self, safe_m: Fraction) -> tuple[Fraction, Fraction]:
-        """Distance in the law, m, and closing speed, m/s, beside an obstacle at rest; `safe_m` is from its core."""
-        return self._in_the_law(safe_m, AT_REST), self.speed_m_s
+    def beside(self, other: _Robot | None, safe_m: Fraction) -> tuple[Fraction, Fraction]:
+        """Distance in the law, m, and closing speed, m/s, beside another robot, or None, a set at rest."""
+        if other is None:
+            return self._in_the_law(safe_m, AT_REST), self.speed_m_s
+        return self._in_the_law(safe_m, other.bounds), self.speed_m_s + other.speed_m_s
 
     def _in_the_law(self, safe_m: Fraction, other: Bounds) -> Fraction:
         """The safe distance and what the plants take, rounded to a float; exact if they take nothing."""

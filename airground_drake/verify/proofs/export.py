@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import MISSING, dataclass, field, fields
 from fractions import Fraction
 from functools import cache, cached_property
-from itertools import chain, combinations, groupby, pairwise, product
+from itertools import chain, groupby, pairwise
 from math import isqrt, lcm
 from typing import NamedTuple
 
@@ -16,6 +16,7 @@ from airground_drake.base.exact import decimal
 from airground_drake.scenario.schema import SHAPES, Obstacle, Scenario
 from airground_drake.scenario.shapes import convex_parts
 from airground_drake.sim.trace import Trace
+from airground_drake.verify.model.pair_kinds import MOVING, apart
 from airground_drake.verify.proofs import slack
 from airground_drake.verify.proofs.coq import without_comments
 from airground_drake.verify.proofs.record import FOLDER
@@ -206,18 +207,13 @@ def demands_of(trace: Trace, *, steered: bool = False) -> list[Demand]:
 
 def demands(scenario: Scenario) -> list[Demand]:
     """Who is to keep which distance from whom: each robot from each obstacle, and each two robots."""
-    safe, uav = scenario.safe_distance, scenario.uav.name
-    radius = {name: decimal(robot.radius_m) for name, robot in scenario.robots.items()}
     balls = {name for name, obstacle in scenario.barriers.items() if convex_parts(obstacle) is None}
     found = []
-    for (robot, own), (name, obstacle) in product(radius.items(), scenario.barriers.items()):
-        moves = obstacle.expected_speed_m_s > 0.0
-        gap = decimal(obstacle.distance_m or (moves and safe.moving_m) or safe.obstacle_m)
-        core = "" if name in balls else "solid" if robot == uav else "ground"
-        found.append(Demand(robot, name, gap, own + decimal(obstacle.radius_m), core, moves))
-    for one, other in combinations(radius, 2):
-        apart = decimal(safe.air_ground_m if uav in (one, other) else safe.ugv_m)
-        found.append(Demand(one, other, apart, radius[one] + radius[other]))
+    for pair in apart(scenario):
+        is_point = pair.second in balls or pair.second in scenario.robots
+        core = "" if is_point else "solid" if pair.first == scenario.uav.name else "ground"
+        radii = sum(map(decimal, pair.radii_m), Fraction(0))
+        found.append(Demand(pair.first, pair.second, decimal(pair.required_m), radii, core, pair.kind == MOVING))
     return found
 
 

@@ -13,7 +13,6 @@ the points that it steers, which is more if a robot's plant takes room.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
-from itertools import combinations
 from math import ceil, inf
 from typing import Any, NamedTuple
 
@@ -47,6 +46,7 @@ from airground_drake.verify.engines.outlines import (
     over_time,
     within,
 )
+from airground_drake.verify.model.pair_kinds import MOVING, apart
 
 
 class Pair(NamedTuple):
@@ -114,36 +114,28 @@ def pairs_of(trace: Trace) -> tuple[Pair, ...]:
 
 def declared_pairs(trace: Trace) -> Iterator[Pair]:
     """All robot/barrier and robot/robot pairs, also those with barriers that do not appear before the end."""
-    safe, uav, period = trace.scenario.safe_distance, trace.scenario.uav.name, trace.scenario.control.period_s
-    radius = {name: robot.radius_m for name, robot in trace.scenario.robots.items()}
-    limit = {name: robot.max_speed_m_s for name, robot in trace.scenario.robots.items()}
-    there = [(name, each, trace.there_from(name), trace.there_until(name)) for name, each in
-             trace.scenario.barriers.items()]  # fmt: skip
-    bounds, gain = bounds_of(trace), trace.scenario.control.avoidance_gain_1_s
-
-    def found(first: str, second: str, apart: float, radii: float, reach: float, **given: Any) -> Pair:
-        pair = Pair(first, second, apart, radii, 0.5 if second in bounds else 1.0, reach, **given)
-        both, passive = (bounds[first], bounds.get(second, AT_REST)), pair.speed_m_s > 0.0
-        law = float(law_distance(pair.safe_m, *both, gain=gain, passive=passive))
-        cover = sum(each.rolling_m + each.drift_m_s * period for each in both)
-        drift = sum(each.drift_m_s / gain for each in both if each.drift_m_s)
-        drawn = bounds[first].cover_m if bounds[first].drawn and second not in bounds and not passive else 0.0
-        needs_start = drawn or (not passive and any(each.late for each in both))
-        under_way = max(each.delay_s for each in both) if needs_start else None
-        slip = bounds[first].drift_m_s * period
-        return pair._replace(
-            more_m=law - pair.safe_m, cover_m=cover, drift_m=drift, slip_m=slip, drawn_m=drawn, under_way_s=under_way
-        )
-
-    for robot in trace.robots:
-        for name, each, row, last in there:
-            radii, speed = radius[robot] + each.radius_m, each.expected_speed_m_s
-            apart = each.distance_m or (safe.moving_m if speed else 0.0) or safe.obstacle_m
-            reach = (limit[robot] + speed) * period
-            yield found(robot, name, apart, radii, reach, row=row, last=last, speed_m_s=speed)
-    for robot, other in combinations(trace.robots, 2):
-        apart = safe.air_ground_m if uav in (robot, other) else safe.ugv_m
-        yield found(robot, other, apart, radius[robot] + radius[other], (limit[robot] + limit[other]) * period)
+    scenario, bounds = trace.scenario, bounds_of(trace)
+    period, gain = scenario.control.period_s, scenario.control.avoidance_gain_1_s
+    there = {name: (trace.there_from(name), trace.there_until(name)) for name in scenario.barriers}
+    for given in apart(scenario):
+        first, second, *_ = given
+        passive, share = given.kind == MOVING, 1.0 if second in there else 0.5
+        one, other = bounds[first], bounds.get(second, AT_REST)
+        speed = scenario.barriers[second].expected_speed_m_s if second in there else 0.0
+        reach = (one.speed_m_s + (speed or other.speed_m_s)) * period
+        row, last = there.get(second, (0, None))
+        safe = given.required_m + sum(given.radii_m)
+        drawn = one.cover_m if one.drawn and second in there and not passive else 0.0
+        needs_start = drawn or (not passive and (one.late or other.late))
+        yield Pair(
+            first, second, given.required_m, sum(given.radii_m), share, reach, row, last, speed,
+            more_m=float(law_distance(safe, one, other, gain=gain, passive=passive)) - safe,
+            cover_m=sum(each.rolling_m + each.drift_m_s * period for each in (one, other)),
+            drift_m=sum(each.drift_m_s / gain for each in (one, other) if each.drift_m_s),
+            slip_m=one.drift_m_s * period,
+            drawn_m=drawn,
+            under_way_s=max(one.delay_s, other.delay_s) if needs_start else None,
+        )  # fmt: skip
 
 
 def bounds_of(trace: Trace) -> dict[str, Bounds]:
