@@ -186,7 +186,7 @@ def courses(trace: Trace, period_s: float) -> dict[tuple[str, str], Course]:
     ways = {name: way_of(trace, name) for name in ugvs}
     times = np.arange(len(next(iter(ways.values())).body)) * period_s / FINE
     sample = np.arange(len(times)) // FINE * FINE
-    delay = {name: sum(plant.delay_s for plant in given.ugvs[name].plant) for name in ugvs}
+    delay = {name: sum(getattr(plant, "delay_s", 0.0) for plant in given.ugvs[name].plant) for name in ugvs}
     found = {}
     for k, name in enumerate(ugvs):
         body, steered = ways[name]

@@ -17,7 +17,7 @@ from airground_drake.sim.collisions import first_collisions
 from airground_drake.sim.trace import Trace
 from airground_drake.verify.claims.live_goal import AT_REST_M, AT_REST_S, moved_at_the_end
 from airground_drake.verify.engines.geometry import interpolate
-from airground_drake.verify.model.pair_kinds import MOVING, kind_of
+from airground_drake.verify.pair_kinds import MOVING, kind_of
 from airground_drake.verify.runs.gate_record import without_decisions
 from airground_drake.verify.runs.instants import lost_at_the_end, reasons, without_proposals
 from airground_drake.verify.runs.pairs import (

@@ -6,11 +6,12 @@ May import: `base`, `model`, `scenario`, `sim`.
 
 `judge(trace)` judges a run from its trace alone. `judge_model(scenario)` checks the hypotheses of theorems for the
 constants of a scenario, or runs experiments. Claims about a run share no code with the controllers, the simulator and
-the optimiser that they judge.
+the optimiser that they judge. How a body moves, and what that takes of a distance, they ask its plant (`model/plants`),
+and measure it in the run; `check` has both again.
 
-`claim.py` defines a claim, and `base/registry.py` lists them. `claims/` has the claims, each in the file of its name.
-`runs/` has what those about a trace share, `model/` what those about the model share. `engines/` computes for them and
-imports no claim. `proofs/` and `coq/` have the theorems.
+`claim.py` defines a claim, and `base/registry.py` lists them. `pair_kinds.py` says who must keep apart from whom.
+`claims/` has the claims, each in the file of its name. `runs/` has what those about a trace share, `model/` what those
+about the model share. `engines/` computes for them and imports no claim. `proofs/` and `coq/` have the theorems.
 """
 
 from __future__ import annotations

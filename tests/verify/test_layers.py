@@ -25,7 +25,7 @@ ALLOWED: dict[str, set[str]] = {
     "runs": {
         "base.arrays", "base.errors", "base.exact", "model.plants", "scenario.plants", "scenario.schema",
         "scenario.shapes", "sim.collisions", "sim.tables", "sim.trace", "verify.claim", "verify.engines",
-        "verify.finding", "verify.model.pair_kinds", "verify.model.theorem", "verify.runs", *ABOUT_RUNS,
+        "verify.finding", "verify.pair_kinds", "verify.model.theorem", "verify.runs", *ABOUT_RUNS,
     },
 }  # fmt: skip
 """By folder of verify/, what its modules may import of this package; claims about a run stand beside `runs`.

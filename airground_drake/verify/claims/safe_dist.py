@@ -14,8 +14,8 @@ from typing import Any
 from airground_drake.base.exact import decimal
 from airground_drake.scenario.schema import Scenario
 from airground_drake.verify.claims.safe_inv import stable
-from airground_drake.verify.model.pair_kinds import PairKind, constants, kinds_of
 from airground_drake.verify.model.theorem import Hypothesis, Proof, TheoremClaim
+from airground_drake.verify.pair_kinds import PairKind, constants, kinds_of
 
 
 @dataclass(frozen=True, kw_only=True)

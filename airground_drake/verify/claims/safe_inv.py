@@ -12,8 +12,8 @@ from typing import Any
 
 from airground_drake.base.exact import decimal
 from airground_drake.scenario.schema import Scenario
-from airground_drake.verify.model.pair_kinds import SHARES, constants, kinds_of
 from airground_drake.verify.model.theorem import Hypothesis, TheoremClaim
+from airground_drake.verify.pair_kinds import SHARES, constants, kinds_of
 
 
 class SafeInv(TheoremClaim):

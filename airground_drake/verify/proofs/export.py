@@ -16,7 +16,7 @@ from airground_drake.base.exact import decimal
 from airground_drake.scenario.schema import SHAPES, Obstacle, Scenario
 from airground_drake.scenario.shapes import convex_parts
 from airground_drake.sim.trace import Trace
-from airground_drake.verify.model.pair_kinds import MOVING, apart
+from airground_drake.verify.pair_kinds import MOVING, apart
 from airground_drake.verify.proofs import slack
 from airground_drake.verify.proofs.coq import without_comments
 from airground_drake.verify.proofs.record import FOLDER

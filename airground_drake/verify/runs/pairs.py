@@ -46,7 +46,7 @@ from airground_drake.verify.engines.outlines import (
     over_time,
     within,
 )
-from airground_drake.verify.model.pair_kinds import MOVING, apart
+from airground_drake.verify.pair_kinds import MOVING, apart
 
 
 class Pair(NamedTuple):

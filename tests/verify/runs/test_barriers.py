@@ -21,7 +21,7 @@ from airground_drake.scenario.schema import Obstacle, Policy, SafeDistance
 from airground_drake.sim.simulation import simulate as simulated
 from airground_drake.sim.trace import Trace
 from airground_drake.verify.claims.gate_plan import INSIDE_M
-from airground_drake.verify.model.pair_kinds import constants
+from airground_drake.verify.pair_kinds import constants
 from airground_drake.verify.runs.pairs import are_too_near, gap_over_time, pair_of
 
 ROOT = 0.5**0.5

@@ -19,7 +19,7 @@ from airground_drake.verify import TRACE_CLAIMS, judge
 from airground_drake.verify.claim import ModelClaim
 from airground_drake.verify.claims.safe_hyp import DECLARED, PASSIVE
 from airground_drake.verify.judging import judge_all
-from airground_drake.verify.model.pair_kinds import THEOREMS, kind_of
+from airground_drake.verify.pair_kinds import THEOREMS, kind_of
 from airground_drake.verify.runs import encounters as encounters_module
 from airground_drake.verify.runs.control_law import least_speeds, retreats
 from airground_drake.verify.runs.encounters import encounters, steps_of
