@@ -9,6 +9,7 @@ from graphlib import TopologicalSorter
 from pathlib import Path
 
 import airground_drake
+from airground_drake.base.registry import PLANTS
 
 PACKAGE = Path(airground_drake.__file__).parent
 ROOMS = ("base", "check", "model", "uav", "ugv", "scenario", "sim", "verify", "report", "study", "commands")
@@ -83,6 +84,20 @@ def folder(module: str) -> str:
     """The folder of a module inside its room; the module itself if it stands in the room."""
     parts = module.split(".")
     return ".".join(parts[:3]) if PACKAGE.joinpath(*parts[1:3]).is_dir() else module
+
+
+TERMS = {"model/plants/budget.py", "scenario/budget.py"}
+"""Files in which `lag` and `delay` are terms of a budget."""
+
+
+def test_a_plant_is_named_in_its_own_file_only() -> None:
+    """Whoever asks for a kind by its name would have to be found for each new plant; the checker is apart."""
+    for path in sorted({*PACKAGE.rglob("*.py")} - {*(PACKAGE / "check").rglob("*.py")}):
+        file = path.relative_to(PACKAGE).as_posix()
+        texts = {node.value for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+                 if isinstance(node, ast.Constant) and isinstance(node.value, str)}  # fmt: skip
+        named = texts & {*PLANTS.own}
+        assert named <= ({path.stem} if file.startswith("model/plants/") else set()) or file in TERMS, (file, named)
 
 
 def test_only_the_command_line_knows_programs() -> None:

@@ -140,7 +140,8 @@ def declared_pairs(trace: Trace) -> Iterator[Pair]:
 
 def bounds_of(trace: Trace) -> dict[str, Bounds]:
     """How far the bodies of the robots may be from where the law steers them, by name."""
-    return {name: trace.plant(name).bounds(robot.max_speed_m_s) for name, robot in trace.scenario.robots.items()}
+    robots = trace.scenario.robots
+    return trace.derived("bounds", lambda: {name: trace.plant(name).bounds(robots[name].max_speed_m_s) for name in robots})
 
 
 class Parts(NamedTuple):
