@@ -6,12 +6,15 @@ import argparse
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from airground_drake.base import files
 from airground_drake.base.errors import one_line, short
 from airground_drake.base.usage import Parser, output_file
 from airground_drake.report import compare
+
+if TYPE_CHECKING:
+    from airground_drake.report.model import Report
 
 EXIT_WORSE = 1
 PARTS = ("inputs", "overall", "verdicts", "margins", "exercised", "expectations", "reproduction", "audit", "events")
@@ -41,7 +44,9 @@ def parser() -> argparse.ArgumentParser:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Compare, and print what differs; the exit codes are in the help."""
     options = parser().parse_args(arguments)
-    before, after = compare.read(options.before), compare.read(options.after)
+    from airground_drake.report import model
+
+    before, after = model.read(options.before), model.read(options.after)
     found = compare.compared(before, after)
     if options.html is not None:
         page = _page((options.before, options.after), before, after, found)
@@ -95,9 +100,7 @@ def _side(value: Any) -> str:
     return f"{value:.9g}" if isinstance(value, float) else "none" if value is None else str(value)
 
 
-def _page(
-    folders: tuple[Path, Path], before: compare.Document, after: compare.Document, found: Mapping[str, Any]
-) -> str:
+def _page(folders: tuple[Path, Path], before: Report, after: Report, found: Mapping[str, Any]) -> str:
     """The comparison as a page."""
     from airground_drake.report.html import render_beside
 

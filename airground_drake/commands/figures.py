@@ -35,13 +35,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = parser().parse_args(arguments)
     runs = runs_of(options.folder)
     outside_reports(options.output, "the figures")
-    from airground_drake.report.compare import read
+    from airground_drake.report import model
     from airground_drake.report.export import figures
 
     saved = {name: trace_of(options.folder, name) for name in runs}
-    document = read(options.folder)
-    traces = {name: saved[name][0] for name in document["runs"] if name in saved}
+    report = model.read(options.folder)
+    traces = {name: saved[name][0] for name in report.runs if name in saved}
     scenario = saved[next(iter(traces))][1]
-    for path in figures.write(document, scenario, traces, options.output, options.style, options.format):
+    for path in figures.write(report, scenario, traces, options.output, options.style, options.format):
         print(one_line(str(path)))
     return 0

@@ -87,7 +87,7 @@ def _reported(options: argparse.Namespace, command: str) -> int:
     scenario = load(AUDITED if audited else options.scenario, overrides)
     if audited:
         scenario.name, scenario.title, scenario.description = AUDIT, AUDIT_TITLE, AUDIT_DESCRIPTION
-    from airground_drake.report import attention, make, terminal  # slow to import: only for a valid scenario
+    from airground_drake.report import attention, make, model, terminal  # slow to import: only for a valid scenario
     from airground_drake.verify.cache import cache_folder
 
     kept = None if options.no_cache else cache_folder()
@@ -106,19 +106,19 @@ def _reported(options: argparse.Namespace, command: str) -> int:
     ):
         findings = partial(_findings, progress, audited=audited)
         wanted = make.Wanted(options.format, command, kept, findings, audited, limits, options.seeds)
-        report = make.write_report(scenario, output, wanted, progress)
-    overall = report["overall"]
-    for line in attention.failures({name: run["faults"] for name, run in report["runs"].items()}):
+        report = model.of(make.write_report(scenario, output, wanted, progress))
+    overall = report.overall
+    for line in attention.failures({name: run.faults for name, run in report.runs.items()}):
         print(line, file=sys.stderr)
     if not options.quiet:
         for item in attention.beforehand(report):
             print(f"{item.words}{f', run {item.run}' if item.run else ''}")
         print(terminal.text(report))
-        print(f"{scenario.name}: {overall['status'].replace('_', ' ')}. {overall['why']}")
+        print(f"{scenario.name}: {overall.status.replace('_', ' ')}. {overall.why}")
         print(one_line(str(output)))
     if options.open and "html" in options.format:
         webbrowser.open((output / "report.html").resolve().as_uri())
-    return int(overall["exit_code"])
+    return overall.exit_code
 
 
 def _findings(

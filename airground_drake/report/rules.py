@@ -28,7 +28,7 @@ SUBJECTS = {
     "GATE-PLAN": "plans of the gatekeeper",
 }  # fmt: skip
 # Verdicts that are not those declared, in words.
-CAME_OUT = {
+CAME_OUT: Mapping[str, str] = {
     "refuted": "failed", "inconclusive": "undecided", "error": "could not be checked", "not_run": "not checked",
     **dict.fromkeys(PASSING, "passed"),
 }  # fmt: skip
@@ -56,10 +56,10 @@ SAFE = (
 
 # Why a UGV did not arrive.
 CAUSES: tuple[tuple[Callable[[RunFacts, str], object], str], ...] = (
-    (lambda run, robot: run.way(robot).get("kept_away"), "{by} is at its target"),
+    (lambda run, robot: run.way(robot).kept_away, "{by} is at its target"),
     (lambda run, robot: robot in run.failed, "the policy failed"),
     (lambda run, robot: robot in run.lost, "no way found"),
-    (lambda run, robot: run.way(robot).get("left_s") is not None, "{left_s:.2g} s to go"),
+    (lambda run, robot: run.way(robot).left_s is not None, "{left_s:.2g} s to go"),
     (lambda run, robot: run.holders(robot), "held by {held_by}"),
     (lambda run, robot: run.refused_all(robot), "refused all proposals"),
 )
