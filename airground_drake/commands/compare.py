@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING, Any
 
 from airground_drake.base import files
 from airground_drake.base.errors import one_line, short
-from airground_drake.base.usage import Parser, output_file
+from airground_drake.base.usage import output_file
 from airground_drake.report import compare
+from airground_drake.scenario.options import option, parser_of
 
 if TYPE_CHECKING:
     from airground_drake.report.model import Report
@@ -23,22 +24,22 @@ _ABOUT = ("claim", "id", "run", "robot", "kind", "n")
 
 
 def parser() -> argparse.ArgumentParser:
-    """Make the parser."""
-    parser = Parser(
-        prog="airground compare",
-        description="What differs between two reports: first what they were made from (keys of the scenario, "
-        "versions), then verdicts, margins, what was exercised, events. Changes by rounding are counted, not listed.",
-        epilog="verdicts from the best to the worst: "
+    return parser_of(
+        "compare",
+        "What differs between two reports: first what they were made from (keys of the scenario, versions), then "
+        "verdicts, margins, what was exercised, events. Changes by rounding are counted, not listed.",
+        {
+            "before": option("folder of a report", "BEFORE", Path),
+            "after": option("folder of another", "AFTER", Path),
+            "--json": None,
+            "--html": option("write a page", "FILE", output_file),
+            "--exact": "exit code 1 if any result differs, to the last digit",
+        },
+        "verdicts from the best to the worst: "
         + "; ".join(", ".join(alike) for alike in compare.ORDER).replace("_", " ")
         + ". One that was as expected and is no longer is worse, too. Exit codes: 0 nothing is worse than before, 1 "
         "something is (with --exact: any result differs), 2 usage, or a folder is not a report.",
     )
-    parser.add_argument("before", type=Path, metavar="BEFORE", help="folder of a report")
-    parser.add_argument("after", type=Path, metavar="AFTER", help="folder of another")
-    parser.add_argument("--json", action="store_true", help="print all of it as JSON")
-    parser.add_argument("--html", type=output_file, metavar="FILE", help="write a page")
-    parser.add_argument("--exact", action="store_true", help="exit code 1 if any result differs, to the last digit")
-    return parser
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -7,27 +7,23 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from airground_drake.base.errors import one_line
-from airground_drake.base.usage import formats_of, output_folder
-from airground_drake.commands.saved import outside_reports, parser_of, runs_of, trace_of
+from airground_drake.base.usage import formats_of
+from airground_drake.commands.saved import outside_reports, runs_of, trace_of
+from airground_drake.scenario.options import option, parser_of
 
 # Copies of those of `export.figures`, which takes seconds to import.
 FORMATS, STYLES = ("pdf", "png", "svg"), ("ieee", "thesis")
 
 
 def parser() -> argparse.ArgumentParser:
-    """Make the parser."""
-    parser = parser_of(
-        "figures", "Write the figures of a report as files, figures.tex with captions, and tables in LaTeX."
-    )
-    parser.add_argument("--style", choices=STYLES, default="ieee", help="type and width (default: ieee)")
-    parser.add_argument(
-        "--format", type=formats_of(FORMATS), default=("pdf",), help=f"comma-separated: {','.join(FORMATS)} "
-        "(default: pdf)",
-    )  # fmt: skip
-    parser.add_argument(
-        "-o", "--output", type=output_folder, default=Path("figures"), metavar="FOLDER", help="default: figures"
-    )
-    return parser
+    says = "Write the figures of a report as files, figures.tex with captions, and tables in LaTeX."
+    return parser_of("figures", says, {
+        "folder": None,
+        "--style": option("type and width (default: ieee)", choices=STYLES, default="ieee"),
+        "--format": option(f"comma-separated: {','.join(FORMATS)} (default: pdf)", kind=formats_of(FORMATS),
+                           default=("pdf",)),
+        "-o --output": {"help": "default: figures", "metavar": "FOLDER", "default": Path("figures")},
+    })  # fmt: skip
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

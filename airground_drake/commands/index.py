@@ -11,9 +11,9 @@ from urllib.parse import quote
 
 from airground_drake.base import files
 from airground_drake.base.errors import FolderError, ReportError, TraceError, one_line
-from airground_drake.base.usage import Parser
 from airground_drake.report import folder
 from airground_drake.report.sentences import Line
+from airground_drake.scenario.options import parser_of
 
 if TYPE_CHECKING:
     from airground_drake.report.model import Report
@@ -23,12 +23,8 @@ MARK = "airground_drake index"  # text in every page that this command has writt
 
 
 def parser() -> argparse.ArgumentParser:
-    """Make the parser."""
-    parser = Parser(
-        prog="airground index", description=f"Write DIR/{PAGE}, which lists the reports below DIR and leads to them."
-    )
-    parser.add_argument("folder", type=Path, metavar="DIR", help="folder with folders of reports in it")
-    return parser
+    says = f"Write DIR/{PAGE}, which lists the reports below DIR and leads to them."
+    return parser_of("index", says, {"folder": "folder with folders of reports in it"})
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
