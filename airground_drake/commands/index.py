@@ -51,7 +51,7 @@ def _write(place: Path) -> Path:
     if not entries:
         why = f": {problems[0]}" if problems else ""
         raise FolderError(f"there are no reports in the folders below {place}{why}")
-    entries.sort(key=lambda entry: (entry["scenario"].name, entry["provenance"].get("started", ""), entry["place"]))
+    entries.sort(key=lambda entry: (entry["scenario"].name, str(entry["provenance"].get("started")), entry["place"]))
     name = place.resolve().name
     files.write_text(page, render_beside("index.html.j2", entries=entries, problems=problems, name=name, mark=MARK))
     return page

@@ -7,8 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
-from typing_extensions import TypedDict
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
 
 from airground_drake.base import files
 from airground_drake.base.errors import ReportError, one_line, short
@@ -271,20 +270,18 @@ class Finding(Entry):
     demonstrated: YesNo
 
 
-class Provenance(TypedDict, total=False):
+def _provenance(given: Json) -> Json:
     """Where a report comes from: versions, machine, command, and more."""
-
-    __pydantic_config__ = ConfigDict(extra="allow")  # type: ignore[misc]
-
-    started: str
-    third_party: dict[str, str]  # SHA-256 of files by class
+    if not isinstance(given.get("third_party", {}), dict):
+        raise ValueError("third_party is the SHA-256 of files by class")
+    return given
 
 
 class Report(Entry):
     """report.json."""
 
     scenario: Told
-    provenance: Provenance
+    provenance: Annotated[Json, AfterValidator(_provenance)]
     overall: Overall
     runs: dict[str, Run]
     seeds: list[Seed]
