@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING, Any
 
 from airground_drake.base import files
 from airground_drake.base.errors import AirgroundError, one_line
+from airground_drake.base.limits import MAX_SEED
 from airground_drake.base.parallel import one_thread_each, processors
 from airground_drake.base.progress import progress_bar
 from airground_drake.base.usage import EXIT_TOOL, REFUSALS, positive, refuse, whole
 from airground_drake.scenario import plugins
 from airground_drake.scenario.estimate import DEFAULT_LIMITS, Limits
-from airground_drake.scenario.limits import MAX_SEED
 from airground_drake.scenario.options import option, parser_of
 from airground_drake.scenario.shipped import argument
 from airground_drake.study.campaign.rows import UNFINISHED

@@ -132,8 +132,8 @@ def _small(path: Path) -> Path:
 
 def _save(search: Search, best: Best, path: Path, tests: int) -> None:
     """Write the scenario of the best point; beside it a small one, if it is a counterexample."""
+    from airground_drake.base.limits import MAX_NAME
     from airground_drake.scenario.document import text_of
-    from airground_drake.scenario.limits import MAX_NAME
     from airground_drake.scenario.load import resolved
     from airground_drake.study.campaign.shrink import shrink
 

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING
 
 from airground_drake.base import files
 from airground_drake.base.errors import ScenarioError, one_line
+from airground_drake.base.limits import MAX_NAME, MAX_UGVS
 from airground_drake.base.usage import between, output_file, refuse, whole
-from airground_drake.scenario.limits import MAX_NAME, MAX_UGVS
 from airground_drake.scenario.options import option, parser_of
 from airground_drake.scenario.shipped import argument
 

@@ -9,9 +9,9 @@ from pathlib import Path
 
 from airground_drake.base import files
 from airground_drake.base.errors import one_line
+from airground_drake.base.limits import MAX_NAME, MAX_SEED, MAX_UGVS
 from airground_drake.base.usage import output_file, refuse, whole
 from airground_drake.scenario.fleet import fleet
-from airground_drake.scenario.limits import MAX_NAME, MAX_SEED, MAX_UGVS
 from airground_drake.scenario.options import option, parser_of
 from airground_drake.scenario.shipped import argument, json_schema_file, shipped_files
 
