@@ -72,7 +72,7 @@ class SafeBudget(TheoremClaim):
     theorems: tuple[str, ...] = ()
     margin_of = "distance in the law less what the plants take"
 
-    def applies_to(self, scenario: Scenario) -> bool:
+    def applies(self, scenario: Scenario) -> bool:
         """Only a scenario with robots that are not where the law steers them."""
         return takes_room(scenario)
 

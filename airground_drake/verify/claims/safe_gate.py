@@ -7,8 +7,10 @@ from typing import Any
 
 from airground_drake.base.registry import METHODS
 from airground_drake.scenario.schema import Scenario
+from airground_drake.sim.trace import Trace
 from airground_drake.verify.claims.safe_inv import SafeInv
 from airground_drake.verify.model.theorem import Hypothesis
+from airground_drake.verify.runs.acceptances import below_avoidance
 
 
 class SafeGate(SafeInv):
@@ -55,3 +57,7 @@ class SafeGate(SafeInv):
         on_top = Fraction(inputs["intervention_on_top"])
         order = Hypothesis.of("order of priorities", "method (d) has avoidance above the intervention", -on_top)
         return [*super().hypotheses(inputs), order]
+
+    def seen_in(self, trace: Trace) -> tuple[int, int]:
+        """The executed interventions below avoidance, and all."""
+        return below_avoidance(trace)

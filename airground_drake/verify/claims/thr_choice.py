@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 from airground_drake.base.statuses import Status
 from airground_drake.model.trigger.bayes import bayes_risk, optimal_threshold, printed_threshold
 from airground_drake.scenario.schema import Scenario, Threshold
+from airground_drake.sim.trace import Trace
 from airground_drake.verify.claim import ModelClaim
+from airground_drake.verify.claims.thr_quality import drift_of
 from airground_drake.verify.claims.thr_root import ThrRoot, rule_of
 from airground_drake.verify.finding import Evidence, Finding
 from airground_drake.verify.model.levels import NUMBERS
+from airground_drake.verify.runs.triggers import task_error
 
 # A threshold is the optimum if it differs by this share at most: it then costs less than 1e-11 of the risk.
 EQUAL = 1e-6
@@ -108,6 +112,23 @@ class ThrChoice(ModelClaim):
             evidence=evidence,
             exercised=1,
         )
+
+    def seen_in(self, trace: Trace) -> dict[str, Measured]:
+        """What the drift and the noise of UGVs say whose task error grew to the threshold, by `run UGV`."""
+        decision, zeta = trace.scenario.decision, float(trace.meta["zeta_m"])
+        drifts = {ugv: drift_of(task_error(trace, ugv), zeta) for ugv in trace.ugvs}
+        return {
+            f"{trace.run} {ugv}": measured(zeta, drift, decision.noise_m_sqrt_s, decision.threshold)
+            for ugv, drift in drifts.items()
+            if drift is not None
+        }
+
+    def with_runs(self, finding: Finding, seen: Sequence[dict[str, Measured]]) -> Finding:
+        """Add these UGVs."""
+        if not isinstance(finding.evidence, ThresholdChoice):
+            return finding
+        runs = {name: row for of_run in seen for name, row in of_run.items()}
+        return replace(finding, evidence=replace(finding.evidence, runs=runs))
 
 
 def measured(zeta: float, drift: float, noise: float, rule: Threshold) -> Measured:

@@ -129,6 +129,7 @@ class ZenoRefine(ModelClaim):
     )
 
     record = Series
+    kept = True
     exercised_by = "simulated paths, each at every noise step"
 
     def inputs(self, scenario: Scenario) -> dict[str, Any]:

@@ -16,7 +16,6 @@ from airground_drake.report.figures import model
 from airground_drake.scenario.load import load
 from airground_drake.sim.trace import Trace
 from airground_drake.verify import judge_all, judge_model
-from airground_drake.verify.applications import measured
 from airground_drake.verify.claims.thr_choice import ThrChoice
 
 
@@ -61,12 +60,12 @@ def test_shipped_scenarios(scenario: str, run: str, rule: str, in_force: float, 
 
 
 def test_runs_show_the_drift_and_the_noise_that_they_had(run: Callable[[str, str], Trace]) -> None:
-    found = measured(run("case_a", "b"))["b ugv1"]
+    found = ThrChoice().seen_in(run("case_a", "b"))["b ugv1"]
     assert found.drift_m_s == pytest.approx(0.5606, abs=5e-4)
     assert found.noise_m_sqrt_s == 0.004
     assert found.optimum_m == pytest.approx(0.00016, abs=5e-6)
     assert found.extra_risk == pytest.approx(0.5 * 3.0 / 0.5606, rel=1e-2)  # c1 times the time to reach 3 m
-    quiet = measured(with_scenario(run_of("d"), decision__noise_m_sqrt_s=0.0))["d ugv1"]
+    quiet = ThrChoice().seen_in(with_scenario(run_of("d"), decision__noise_m_sqrt_s=0.0))["d ugv1"]
     assert quiet.optimum_m == 0.0
     assert quiet.extra_risk == pytest.approx(0.5 * 3.0 / quiet.drift_m_s)
 
