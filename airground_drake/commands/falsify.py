@@ -1,4 +1,4 @@
-"""`airground falsify SPEC --claim SAFE-TRACE`: search for a scenario that violates a claim, and shrink it."""
+"""`airground falsify SPEC --claim ID`: search for a scenario that violates a claim, and shrink it."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ from airground_drake.base.parallel import one_thread_each, processors
 from airground_drake.base.progress import progress_bar
 from airground_drake.base.registry import RUN_CLAIMS, SAMPLERS, is_plugin
 from airground_drake.base.usage import EXIT_TOOL, REFUSALS, Parser, output_file, parallel, positive, refuse, whole
+from airground_drake.report.rules import DISTANCES
 from airground_drake.scenario import plugins
 from airground_drake.scenario.estimate import DEFAULT_LIMITS
 from airground_drake.scenario.hints import plugin_path
@@ -41,7 +42,7 @@ def parser() -> argparse.ArgumentParser:
         "4 tool error, 130 and 143 interrupted",
     )
     parser.add_argument("spec", type=Path, help="YAML file of a campaign")
-    parser.add_argument("--claim", default="SAFE-TRACE", metavar="ID", help="claim about runs (default: %(default)s)")
+    parser.add_argument("--claim", default=DISTANCES, metavar="ID", help="claim about runs (default: %(default)s)")
     parser.add_argument("--most", choices=TIMES, help="maximise this time instead of minimising a margin")
     parser.add_argument("--limit", type=positive, metavar="S", help="with --most: a longer time is a counterexample")
     parser.add_argument(

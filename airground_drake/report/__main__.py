@@ -160,7 +160,7 @@ def parser() -> argparse.ArgumentParser:
         help="also simulate every run with the seeds 1 to N, and say how many keep all distances and bring all home",
     )  # fmt: skip
     parser.add_argument(
-        "--no-cache", action="store_true", help="repeat ZENO-REFINE and THR-DDM instead of reusing earlier results"
+        "--no-cache", action="store_true", help="repeat experiments about the model instead of reusing earlier results"
     )
     parser.add_argument(plugins.OPTION, action="store_true", help=plugins.HELP)
     parser.add_argument(plugins.SHOW, action="store_true", help=plugins.SHOW_HELP)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
-SLACK_M = 1e-9  # a distance counts as kept if it falls short of the required one by less, as in SAFE-TRACE
+SLACK_M = 1e-9  # a distance counts as kept if it falls short of the required one by less, as verdicts have it
 
 Document = Mapping[str, Any]
 

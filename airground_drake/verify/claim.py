@@ -19,7 +19,7 @@ from airground_drake.scenario.schema import Scenario
 from airground_drake.sim.trace import Trace
 from airground_drake.verify.engines.bodies import following_m_s, unicycle_m
 from airground_drake.verify.engines.geometry import MERGE_S, interpolate
-from airground_drake.verify.finding import Evidence, Failure, Finding
+from airground_drake.verify.finding import Chart, Evidence, Failure, Finding
 
 __all__ = [
     "Claim",
@@ -245,6 +245,8 @@ def well_formed(claim: Claim, finding: Finding) -> Finding:
         raise ValueError(
             f"{claim.id} found {finding.status!r} with the margin {margin!r}; allowed: one from 0, or None"
         )
+    if not (finding.figure is None or isinstance(finding.figure, Chart)):
+        raise ValueError(f"{claim.id} found the figure {type(finding.figure).__name__}; allowed: a Chart, or None")
     if count is None and claim.exercised_by and finding.status in PASSING:
         raise ValueError(f"{claim.id} passes without a count of {claim.exercised_by}")
     if count is None:

@@ -35,6 +35,7 @@ class SafeBudget(TheoremClaim):
     """SAFE-BUDGET."""
 
     id = "SAFE-BUDGET"
+    subject = "distance for lag and delay"
     summary = (
         "The law keeps the safe distance plus what turning, lags and delays cost, so bodies keep the safe distance."
     )

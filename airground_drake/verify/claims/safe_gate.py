@@ -17,6 +17,7 @@ class SafeGate(SafeInv):
     """SAFE-GATE; its hypotheses are those of SAFE-INV and one more."""
 
     id = "SAFE-GATE"
+    subject = "proof of distances"
     summary = "Under method (d) nothing that the UAV asks for makes a robot bring itself closer than the safe distance."
     statement = (
         "Under method (d) no intervention, accepted or not, leaves the safe set. The avoidance layer comes last, and "

@@ -22,6 +22,7 @@ class SafeInv(TheoremClaim):
     """SAFE-INV."""
 
     id = "SAFE-INV"
+    subject = "proof of distances"
     summary = "A robot that obeys the avoidance inequalities and starts at a safe distance keeps it."
     statement = (
         "Any number of robots and obstacles at rest whose pairs start at their safe distances keep them at all times, "

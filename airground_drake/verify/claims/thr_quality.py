@@ -79,6 +79,7 @@ class ThrQuality(TraceClaim):
     """THR-QUALITY."""
 
     id = "THR-QUALITY"
+    subject = "timing of triggers"
     summary = "The UAV stepped in when the real task error, without noise, was about at the threshold."
     statement = (
         "At every trigger, and while the UAV watched without one, the task error without noise agreed with the "

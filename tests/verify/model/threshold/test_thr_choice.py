@@ -12,7 +12,6 @@ from verify.model.threshold.cases import INPUTS, TABLE_1
 
 from airground_drake.model.trigger.bayes import optimal_threshold
 from airground_drake.report import html
-from airground_drake.report.figures import model
 from airground_drake.scenario.load import load
 from airground_drake.sim.trace import Trace
 from airground_drake.verify import judge_all, judge_model
@@ -83,11 +82,10 @@ def test_a_report_has_the_runs_beside_the_numbers_of_the_rule(run: Callable[[str
 
 
 def test_the_figure_marks_three_thresholds() -> None:
-    figure = model.bayes_risks(TABLE_1, ThrChoice().judge(TABLE_1).to_json()["evidence"])
-    assert figure is not None
-    rows = {row[0]: row[1:] for row in figure.panels[0].table.rows[-3:]}
-    assert rows == {"in force": ("3", "0.4547"), "optimal": ("2.992", "0.4547"), "(19) as printed": ("0.7557", "0.48")}
-    assert model.bayes_risks(TABLE_1, {"error": "failed"}) is None
+    chart = ThrChoice().judge(TABLE_1).figure
+    assert chart is not None
+    marks = {name: tuple(f"{number:.4g}" for number in at) for name, at in chart.marks.items()}
+    assert marks == {"in force": ("3", "0.4547"), "optimal": ("2.992", "0.4547"), "(19) as printed": ("0.7557", "0.48")}
 
 
 @pytest.mark.parametrize(("kind", "shown"), [("declared", "declared"), ("optimal", "holds")])
