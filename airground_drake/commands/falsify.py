@@ -1,4 +1,4 @@
-"""`airground falsify SPEC --claim SAFE-TRACE`: search for a scenario that violates a claim, and shrink it."""
+"""`airground falsify SPEC --claim ID`: search for a scenario that violates a claim, and shrink it."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ from airground_drake.base.parallel import one_thread_each, processors
 from airground_drake.base.progress import progress_bar
 from airground_drake.base.registry import RUN_CLAIMS, SAMPLERS, is_plugin
 from airground_drake.base.usage import EXIT_TOOL, REFUSALS, output_file, positive, refuse, whole
+from airground_drake.report.rules import DISTANCES
 from airground_drake.scenario import plugins
 from airground_drake.scenario.estimate import DEFAULT_LIMITS
 from airground_drake.scenario.hints import plugin_path
@@ -36,7 +37,7 @@ TIMES = tuple(name for name in COLUMNS if name.endswith("_s") and name not in ("
 def parser() -> argparse.ArgumentParser:
     return parser_of("falsify", "Search the space of a campaign for a scenario that violates a claim, and shrink it.", {
         "spec": None,
-        "--claim": option("claim about runs (default: %(default)s)", "ID", default="SAFE-TRACE"),
+        "--claim": option("claim about runs (default: %(default)s)", "ID", default=DISTANCES),
         "--most": option("maximise this time instead of minimising a margin", choices=TIMES),
         "--limit": option("with --most: a longer time is a counterexample", "S", positive),
         "--sampler": option(f"{', '.join(SAMPLERS.allowed)} (default: %(default)s)", "NAME", default="cma"),

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from airground_drake.base.usage import positive, refuse
+from airground_drake.report.rules import DISTANCES
 from airground_drake.scenario.options import option, parser_of
 
 if TYPE_CHECKING:
@@ -83,7 +84,7 @@ def _runs(options: argparse.Namespace) -> int:
         if (found.expected or options.run) and not found.distances.proved:
             code = EXIT_UNPROVED
     if proved.write(options.report):
-        print(f"{options.report / 'report.html'} says so beside {proved.CLAIM}")
+        print(f"{options.report / 'report.html'} says so beside {DISTANCES}")
     return code
 
 
@@ -101,5 +102,5 @@ def _lines(found: Proved) -> list[str]:
         else:
             lines.append(f"run {found.run}: {what}: not proved: {answer.why}")
     if not found.expected:
-        lines.append(f"run {found.run}: the scenario does not ask for it: it does not expect SAFE-TRACE to hold")
+        lines.append(f"run {found.run}: the scenario does not ask for it: it does not expect {DISTANCES} to hold")
     return lines

@@ -140,7 +140,7 @@ def parser() -> argparse.ArgumentParser:
         "--seed": None,
         "--seeds": option("also simulate every run with the seeds 1 to N, and say how many keep all distances and "
                           "bring all home", "N", whole(1), default=0),
-        "--no-cache": "repeat ZENO-REFINE and THR-DDM instead of reusing earlier results",
+        "--no-cache": "repeat experiments about the model instead of reusing earlier results",
         plugins.OPTION: None,
         plugins.SHOW: None,
         "--limit-steps": "refuse a scenario with more simulated steps, counted per robot, over all runs (default: "

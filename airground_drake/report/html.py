@@ -19,7 +19,7 @@ from jinja2 import Environment
 from markupsafe import Markup
 
 from airground_drake.base.statuses import PASSING, outcome
-from airground_drake.report import attention, evidence
+from airground_drake.report import attention, evidence, rules
 from airground_drake.report.figures.panels import Figure, Table
 from airground_drake.report.mathml import mathml
 from airground_drake.report.model import Claim, Report
@@ -59,7 +59,7 @@ SECTIONS = {
 # What the first screen calls the sections that it leads to.
 LINKS = {"claims": "proof", "intervened": "timing, choice", "reproduction": "all numbers"}
 # Sections of the figures; the others are maps of what happened.
-PLACES = {"distances": "safe", **dict.fromkeys(("timelines", "threshold-choice"), "intervened")}
+PLACES = {"distances": "safe", "timelines": "intervened"}
 
 # How a status is shown: icon, word, class (which sets the colour): never by colour alone.
 CHIPS = {
@@ -92,7 +92,7 @@ def render(report: Report, figures: Sequence[Figure], diagram_svg: str | None = 
     # diagram_svg: the block diagram; left out if it is no SVG or too large to inline.
     distances = [(name, pair) for name, run in report.runs.items() for pair in pairs(run)]
     distances.sort(key=lambda found: found[1].margin_m)
-    plates = grouped((PLACES.get(figure.id, "happened"), figure) for figure in figures if not figure.beside)
+    plates = grouped((figure.beside or PLACES.get(figure.id, "happened"), figure) for figure in figures)
     diagram = _diagram(diagram_svg, report.scenario.name)
     sections = {
         "happened": bool(report.runs),
@@ -110,7 +110,6 @@ def render(report: Report, figures: Sequence[Figure], diagram_svg: str | None = 
         linked={name: words for name, words in LINKS.items() if sections.get(name, True)},
         sections=[(name, title) for name, title in SECTIONS.items() if sections.get(name, True)],
         plates=plates,
-        beside=grouped((figure.beside, figure) for figure in figures if figure.beside),
         diagram=diagram,
         groups=_by_claim(report.claims),
         outcomes=list(dict.fromkeys(map(_shown, report.claims))),
@@ -140,7 +139,7 @@ def environment() -> Environment:
     )  # fmt: skip
     environment.globals.update(
         chips=CHIPS, shown=_shown, reasons=WORDS, max_faults=MAX_FAULTS, max_interventions=MAX_INTERVENTIONS,
-        marks=MARKS,
+        marks=MARKS, rules=rules,
         policy=Markup(security_policy(style, script)), style=Markup(style), script=Markup(script),
     )  # fmt: skip
     return environment

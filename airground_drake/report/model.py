@@ -43,6 +43,7 @@ class Claim(Entry):
     as_expected: YesNo | None  # none if nothing is expected
     exercised: Whole | None  # how often it was put to the test; none if that is not counted
     exercised_by: Words = ""  # what is counted
+    subject: Words = ""  # what it is about, in a few words
     statement: Words = ""
     assumptions: list[Words] = []
     margin: Number | None = None
@@ -51,6 +52,7 @@ class Claim(Entry):
     where: Json = {}  # where the margin is
     counterexample: Json | None = None
     evidence: Json
+    figure: Json | None = None  # its chart
     inputs: Json
 
 

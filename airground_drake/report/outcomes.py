@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from airground_drake.report.model import Approach, Distance, Run
 
-SLACK_M = 1e-9  # a distance counts as kept if it falls short of the required one by less, as in SAFE-TRACE
+SLACK_M = 1e-9  # a distance counts as kept if it falls short of the required one by less, as verdicts have it
 
 
 class Near(NamedTuple):

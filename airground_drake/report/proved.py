@@ -1,4 +1,4 @@
-"""Puts what `airground prove DIR` found into the page of that report: a line beside SAFE-TRACE of each run.
+"""Puts what `airground prove DIR` found into the page of that report: a line beside the distances of each run.
 
 The page is written before anything is proved, with an empty place for each line; `write` fills these places.
 """
@@ -18,15 +18,15 @@ from airground_drake.base.errors import ReportError, one_line
 from airground_drake.report.folder import PAGES
 from airground_drake.report.model import Claim
 from airground_drake.report.outcomes import distance
+from airground_drake.report.rules import DISTANCES
 
-CLAIM = "SAFE-TRACE"  # the claim that Coq proves of a run: every pair keeps its distance at all times
 _PLACE = "<!--Coq on {run}-->{line}<!--end-->"
 _PLACES = re.compile(r"<!--Coq on (\w+)-->.*?<!--end-->", re.DOTALL)
 
 
 def place(claim: Claim) -> Markup:
     """The place of Coq's line about a claim; '' if Coq is not asked about that claim."""
-    return _place(claim.run) if claim.id == CLAIM else Markup("")
+    return _place(claim.run) if claim.id == DISTANCES else Markup("")
 
 
 def _place(run: str, line: str = "") -> Markup:

@@ -338,7 +338,8 @@ def declared(report: Report) -> Cell:
     told = [f"{overall.as_expected} of {counted(overall.checks, 'check')} came out as the scenario declares"]
     told[0] += f" (failures among them: {refuted})" * bool(refuted)
     wrong = [*overall.differs, *overall.undecided, *overall.missing]
-    names = [f"{each.run or 'model'}: {rules.SUBJECTS.get(each.id, each.id) or 'run'} "
+    subjects = {claim.id: claim.subject for claim in report.claims}
+    names = [f"{each.run or 'model'}: {subjects.get(each.id) or each.id or 'run'} "
              f"{rules.CAME_OUT.get(each.status, each.status)}" for each in wrong]  # fmt: skip
     names += [f"finding {number} about the paper not demonstrated" for number in overall.undemonstrated]
     told += [f"{', '.join(names[:3])}{f' and {len(names) - 3} more' * (len(names) > 3)}"] * bool(names)

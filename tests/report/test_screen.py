@@ -20,6 +20,7 @@ Edit = Callable[[Document], object]
 AT_HOME, NEAR = [9.0, 0.0, 0.0], {"value": 0.5, "t_s": 3.0, "safe_distance_m": 0.3}
 RUN_CLAIMS = ("SAFE-TRACE", "SAFE-HYP", "SAFE-OWN", "LIVE-GOAL", "ZENO-TRACE", "THR-TRIG", "THR-QUALITY")
 PROOFS = ("SAFE-INV", "SAFE-GATE", "SAFE-BUDGET", "ZENO-PROOF")
+SUBJECTS = {"SAFE-TRACE": "distances", "LIVE-GOAL": "arrival"}
 
 
 SEED = {"run": "d", "kept": False, "home": True, "seed": 1, "first": "r1", "second": "rock", "min_distance_m": 0.2,
@@ -32,7 +33,7 @@ def screen_of(document: Document) -> FirstScreen:
 
 def claim(name: str, run: str = "", status: str = "holds", **more: Any) -> Document:
     known = {"id": name, "run": run, "status": status, "expected": "holds", "as_expected": True, "exercised": 1}
-    return known | {"evidence": {}, "inputs": {}, "counterexample": None} | more
+    return known | {"subject": SUBJECTS.get(name, ""), "evidence": {}, "inputs": {}, "counterexample": None} | more
 
 
 def ran() -> Document:
@@ -333,11 +334,13 @@ def test_what_is_not_as_declared_and_what_not_to_conclude() -> None:
     differs = [
         {"id": "SAFE-TRACE", "run": "d", "status": "refuted"},
         {"id": "LIVE-GOAL", "run": "d", "status": "error"},
+        {"id": "SAFE-HYP", "run": "d", "status": "inconclusive"},
     ]
     over = {"status": "not_as_expected", "as_expected": 9, "differs": differs, "unpromised": [{}, {}]}
     shown = screen_of(document(man, lambda found: found["overall"].update(over), methods="abd"))
     assert shown.declared == ("no", [
-        "9 of 11 checks came out as the scenario declares", "d: distances failed, d: arrival could not be checked",
+        "9 of 11 checks came out as the scenario declares",
+        "d: distances failed, d: arrival could not be checked, d: SAFE-HYP undecided",
         "2 more checks: nothing is promised",
     ])  # fmt: skip
     assert [told.partition(":")[0] for told in shown.beware] == [

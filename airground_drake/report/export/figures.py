@@ -9,6 +9,7 @@ from typing import Any
 
 from airground_drake.base import files
 from airground_drake.base.statuses import PASSING, outcome
+from airground_drake.report import rules
 from airground_drake.report.export import latex
 from airground_drake.report.figures import draw
 from airground_drake.report.figures.panels import Figure
@@ -24,13 +25,6 @@ STYLES: dict[str, dict[str, Any]] = {
     "thesis": {"font.family": "sans-serif", "font.sans-serif": ["DejaVu Sans"]},
 }
 WIDTHS = {"ieee": r"\columnwidth", "thesis": r"0.7\linewidth"}  # width of a figure in the text
-
-# Claims that a figure is about, by its identifier.
-SHOWN = {
-    "trajectories": ("LIVE-GOAL",),
-    "distances": ("SAFE-TRACE", "SAFE-GATE"),
-    "timelines": ("THR-TRIG", "THR-CHOICE", "LIVE-HYP", "ZENO-TRACE", "ZENO-PROOF"),
-}
 
 # Metadata without a date, by format, so that the same run gives the same file.
 UNDATED: dict[str, dict[str, None]] = {"pdf": {"CreationDate": None}, "svg": {"Date": None}}
@@ -71,7 +65,7 @@ def _environment(figure: Figure, names: Sequence[str], width: str, report: Repor
     """A figure in LaTeX: its panels, narrow ones side by side, and a caption that says what is established."""
     across, width = ("figure*", r"\textwidth") if figure.look == "wide" else ("figure", width)
     panels = [rf"  \includegraphics[width={width}]{{{name}}}\\" for name in names]
-    caption = latex.escaped(" ".join([figure.caption, *_established(SHOWN.get(figure.id, ()), report)]))
+    caption = latex.escaped(" ".join([figure.caption, *_established(rules.CAPTIONS.get(figure.id, ()), report)]))
     lines = [
         rf"\begin{{{across}}}",
         r"  \centering",
@@ -91,5 +85,5 @@ def _established(claims: Sequence[str], report: Report) -> Iterator[str]:
             if claim.id == name and status in (*PASSING, "refuted"):
                 found.setdefault(status, []).append(claim.run)
         for status, runs in found.items():
-            where = f" in run{'s' * (len(runs) > 1)} {', '.join(runs)}" if any(runs) else ""
+            where = f" in {'run' if len(runs) == 1 else 'runs'} {', '.join(runs)}" if any(runs) else ""
             yield f"{name} {status if status == 'holds' else f'is {status}'}{where}."
