@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from airground_drake.base.arrays import Array
 from airground_drake.base.registry import method_of
 from airground_drake.report.interventions import avoidance, farthest_from_prediction, interventions, messages
+from airground_drake.report.outcomes import Near
 from airground_drake.report.stalls import stalls
 from airground_drake.scenario.schema import MAP
 from airground_drake.sim.collisions import first_collisions
@@ -40,18 +41,6 @@ from airground_drake.verify.runs.passive import passive_pairs
 MOST_OBSTACLES = 20  # maximum number of obstacles listed per robot
 NEAR_OBSTACLES, NEAR_ROBOTS = 3, 1  # numbers of obstacles and robots that count as close by
 NO_GAP = 1e-9  # a relative optimality gap up to this is a rounding error
-
-
-class Nearby(NamedTuple):
-    """Smallest distance of surfaces over continuous time, m; when, s; to what; and the distance required, m."""
-
-    # `at_m` is the place of the map that was nearest, [x, y], m, if it is the map.
-
-    value: float
-    t_s: float
-    other: str
-    required_m: float
-    at_m: Sequence[float] | None = None
 
 
 def of_run(trace: Trace) -> dict[str, Any]:
@@ -273,21 +262,23 @@ def _closest_call(trace: Trace) -> dict[str, Any] | None:
     }
 
 
-def closest_obstacle(trace: Trace, robot: str) -> Nearby | None:
+def closest_obstacle(trace: Trace, robot: str) -> Near | None:
     """Smallest distance of a robot to any obstacle over continuous time, exact; None without obstacles."""
-    return min(_nearby(trace, _least(trace, robot, _obstacles(trace), MOST_OBSTACLES)), default=None)
+    found = _least(trace, robot, _obstacles(trace), MOST_OBSTACLES)
+    return min(_near(trace, robot, found), key=lambda near: (near.value_m, near.t_s), default=None)
 
 
-def close_by(trace: Trace, robot: str) -> list[Nearby]:
+def close_by(trace: Trace, robot: str) -> list[Near]:
     """Smallest distances of a robot to its nearest obstacles and robots, exact, those of least margin first."""
     found = _least(trace, robot, _obstacles(trace), NEAR_OBSTACLES)
     found |= _least(trace, robot, _others(trace, robot), NEAR_ROBOTS)
-    return sorted(_nearby(trace, found), key=lambda at: at.value - at.required_m)
+    return sorted(_near(trace, robot, found), key=lambda near: near.margin_m)
 
 
-def _nearby(trace: Trace, found: dict[str, Gap]) -> Iterator[Nearby]:
+def _near(trace: Trace, robot: str, found: dict[str, Gap]) -> Iterator[Near]:
     for other, least in found.items():
-        yield Nearby(least.gap_m, least.t_s, other, least.pair.required_m, **_place(trace, other, least))
+        about = (least.margin_m, robot, other, least.gap_m, least.pair.required_m, least.t_s)
+        yield Near(*about, at_m=_place(trace, other, least).get("at_m"))
 
 
 def _place(trace: Trace, other: str, least: Gap) -> dict[str, list[float]]:

@@ -24,7 +24,6 @@ Whole = Annotated[int, Field(strict=True)]
 Words = Annotated[str, BeforeValidator(str)]  # of third-party claims, whatever they are
 YesNo = Annotated[bool, Field(strict=True)]
 Json = dict[str, Any]
-Match = Literal["reproduced", "calibrated", "by_construction", "ambiguous", "not_reproduced"]
 
 
 class Entry(BaseModel):
@@ -84,15 +83,6 @@ class Seed(Approach):
     value: Number = Field(alias="min_distance_m")
 
 
-class KeptAway(Entry):
-    """An obstacle that moves and at the end keeps a UGV away from its target."""
-
-    by: str
-    on: YesNo = False  # it covers the target, and is not only near it
-    since_s: Number = 0.0  # from when on the UGV has stood
-    off_m: Number = 0.0  # how far from its target
-
-
 class OnTheWay(Entry):
     """How far a UGV had come that neither arrived nor collided when the run ended."""
 
@@ -100,7 +90,7 @@ class OnTheWay(Entry):
     creeps: YesNo = False  # it hardly did
     left_m: Number = 0.0  # the way to its target along its preset
     left_s: Number | None = None  # if it comes nearer as fast as in the last second; none if it stands or creeps
-    kept_away: KeptAway | None = None
+    kept_away: Json | None = None  # the obstacle that moves and keeps it away from its target, if one does
     at_m: list[Number] | None = None  # the nearest place of the map, if it stands as near to it as it may
 
 
@@ -136,23 +126,20 @@ class Intervention(Entry):
 
 
 class Messages(Entry):
-    """How many messages were delivered, and how many an always-on scheme takes."""
+    """Numbers of messages that were delivered."""
 
-    # Always on: every UGV gets a proposal in every planning period, and decides in every period of the gatekeeper.
     proposals: Whole = 0
     withdrawals: Whole = 0
     answers: Whole = 0  # each is a decision of the gatekeeper
-    always_on: dict[str, Whole]
+    always_on: dict[str, Whole]  # if every UGV got a proposal, and decided, in every period
 
 
 class Gatekeeper(Entry):
     """The gatekeeper's decisions in numbers."""
 
-    calls: Whole = 0
     solver_failures: Whole = 0  # decisions that rest on the best plan known because the solver failed
     budget_spent: Whole = 0  # the same because the budget was spent
     refusals: dict[str, dict[str, Whole]] = {}  # by robot and reason: proposals refused at the first answer
-    reasons: dict[str, Whole] = {}  # decisions by reason
     farthest_from_prediction: Json | None = None  # where a UGV was farthest from its prediction while an answer stood
     max_gap: Number | None = None  # largest optimality gap
     gaps: dict[str, Whole] = {}  # decisions with no gap, up to 1 %, and more
@@ -183,7 +170,7 @@ class Metrics(Entry):
 
 
 class Event(Entry):
-    """An event of a robot; a collision is with an obstacle or with another robot."""
+    """An event of a robot."""
 
     t_s: Number
     robot: str
@@ -207,12 +194,12 @@ class Run(Entry):
 
 
 class Told(Entry):
-    """The scenario, with all defaults."""
+    """The scenario."""
 
     name: str
     title: str
     description: str = ""
-    resolved: Scenario
+    resolved: Scenario  # with all defaults
 
 
 class Named(Entry):
@@ -259,7 +246,7 @@ class Row(Entry):
     paper: Any = None
     ours: Any = None  # a number, or one per component; none without a value
     unit: str = ""
-    status: Match
+    status: Literal["reproduced", "calibrated", "by_construction", "ambiguous", "not_reproduced"]
 
 
 class Finding(Entry):
@@ -273,14 +260,13 @@ class Finding(Entry):
 
 
 def _provenance(given: Json) -> Json:
-    """Where a report comes from: versions, machine, command, and more."""
     if not isinstance(given.get("third_party", {}), dict):
         raise ValueError("third_party is the SHA-256 of files by class")
     return given
 
 
 class Report(Entry):
-    """report.json."""
+    """The whole of report.json."""
 
     scenario: Told
     provenance: Annotated[Json, AfterValidator(_provenance)]

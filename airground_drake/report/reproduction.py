@@ -175,7 +175,7 @@ def _taken_back(trace: Trace, robot: str) -> list[str]:
 def minimum_distance(trace: Trace, robot: str) -> list[float]:
     """Smallest distance to any obstacle over continuous time, m."""
     nearest = closest_obstacle(trace, robot)
-    return [] if nearest is None else [nearest.value]
+    return [] if nearest is None else [nearest.value_m]
 
 
 @measure
