@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import subprocess
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
@@ -10,9 +9,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from airground_drake.base.files import sha256
+from airground_drake.base import files
 from airground_drake.base.registry import method_of
 from airground_drake.base.statuses import COUNTS, NOT_EXERCISED, STATUSES, UNDECIDED, outcome
 from airground_drake.report import metrics, reproduction
@@ -71,13 +68,13 @@ def build(
         "audit": items,
         "files": {},
     }
-    strict: dict[str, Any] = _strict(document)
-    return strict
+    made: dict[str, Any] = files.strict(document)
+    return made
 
 
 def sealed(document: Mapping[str, Any], folder: Path, names: Iterable[str]) -> dict[str, Any]:
     """The document with the SHA-256 of every other file of the report under `files`: an exchanged file is noticed."""
-    return {**document, "files": {name: sha256((folder / name).read_bytes()) for name in sorted(names)}}
+    return {**document, "files": {name: files.sha256((folder / name).read_bytes()) for name in sorted(names)}}
 
 
 def overall(
@@ -216,21 +213,6 @@ def _told(item: Mapping[str, Any]) -> str:
         return f"{name} ({item['why']})"
     idle = outcome(item["status"], item["exercised"]) == NOT_EXERCISED
     return f"{name} ({item['status']}{', nothing to check' * idle}, expected {item['expected']})"
-
-
-def _strict(value: Any) -> Any:
-    """Plain JSON types: numpy scalars and arrays unwrapped, tuples as lists, numbers that are not finite as None."""
-    if isinstance(value, Mapping):
-        return {str(key): _strict(item) for key, item in value.items()}
-    if isinstance(value, (list, tuple, set, frozenset)):
-        return [_strict(item) for item in value]
-    if isinstance(value, (np.ndarray, np.generic)):
-        return _strict(value.tolist())
-    if isinstance(value, float):
-        return value if math.isfinite(value) else None
-    if value is None or isinstance(value, (str, int)):
-        return value
-    return str(value)
 
 
 def commit() -> str:
