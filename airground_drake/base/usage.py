@@ -10,13 +10,14 @@ import sys
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from pathlib import Path
-from typing import NoReturn
+from typing import NoReturn, TypeVar
 
 from airground_drake.base.errors import FolderError, LimitError, ScenarioError, UnknownNameError, one_line
 
 EXIT_USAGE, EXIT_TOOL = 2, 4
 # Mistakes of the user. Where a command does long work, other errors are faults of the tool.
 REFUSALS = (ScenarioError, LimitError, FolderError, UnknownNameError)
+N = TypeVar("N", int, float)
 MOST = 1e15  # largest number that an option takes
 MOST_JOBS = 1000  # most processes that a command starts at once
 
@@ -56,37 +57,30 @@ def output_file(text: str) -> Path:
     return output_folder(text)
 
 
+def _reader(read: Callable[[str], N], fits: Callable[[N], bool], wanted: str) -> Callable[[str], N]:
+    """Make the parser of a number that has to fit."""
+
+    def number(text: str) -> N:
+        with suppress(ValueError):
+            if fits(value := read(text)):
+                return value
+        raise argparse.ArgumentTypeError(f"{text!r} is not allowed; wanted: {wanted}")
+
+    return number
+
+
 def whole(least: int, most: float = math.inf) -> Callable[[str], int]:
     """Make the parser of a whole number; `least` and `most` are allowed."""
     up_to = "on" if most == math.inf else f"to {most}"
-
-    def number(text: str) -> int:
-        with suppress(ValueError):
-            if least <= (value := int(text)) <= most:
-                return value
-        raise argparse.ArgumentTypeError(f"{text!r} is not allowed; wanted: a whole number from {least} {up_to}")
-
-    return number
+    return _reader(int, lambda value: least <= value <= most, f"a whole number from {least} {up_to}")
 
 
 def between(least: float, most: float) -> Callable[[str], float]:
     """Make the parser of a number; `least` and `most` are allowed."""
-
-    def number(text: str) -> float:
-        with suppress(ValueError):
-            if least <= (value := float(text)) <= most:
-                return value
-        raise argparse.ArgumentTypeError(f"{text!r} is not allowed; wanted: a number from {least:g} to {most:g}")
-
-    return number
+    return _reader(float, lambda value: least <= value <= most, f"a number from {least:g} to {most:g}")
 
 
-def positive(text: str) -> float:
-    """Parse a number above 0, at most MOST."""
-    with suppress(ValueError):
-        if 0.0 < (value := float(text)) <= MOST:
-            return value
-    raise argparse.ArgumentTypeError(f"{text!r} is not allowed; wanted: a number above 0, at most {MOST:g}")
+positive = _reader(float, lambda value: 0.0 < value <= MOST, f"a number above 0, at most {MOST:g}")
 
 
 def formats_of(allowed: Sequence[str]) -> Callable[[str], tuple[str, ...]]:

@@ -30,8 +30,6 @@ class Command(NamedTuple):
     says: str
 
 
-GONE = {"proofs": "airground prove"}  # commands of earlier versions, and the commands that replace them
-
 COMMANDS: dict[str, Command] = {
     "report": Command("airground_drake.report.__main__", "simulate a scenario, check its claims, write the report"),
     "run": Command("airground_drake.commands.run", "simulate one run and print its events, or watch it in Meshcat"),
@@ -62,8 +60,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
     name = "".join(unknown) or options.command
     if name is None:
         return refuse(f"a command is needed: {', '.join(COMMANDS)}")
-    if name in GONE:
-        return refuse(f"`airground {name}` is gone: use `{GONE[name]}` (CHANGELOG.md)")
     if name not in COMMANDS:
         close = difflib.get_close_matches(name, COMMANDS, n=1)
         meant = f"did you mean {close[0]}? " if close else ""

@@ -58,23 +58,36 @@ def compared(before: Report, after: Report) -> dict[str, Any]:
 
 def is_rounding(change: Change) -> bool:
     """Whether a number changed by no more than rounding differs between versions of numpy, scipy and solvers."""
-    return not change["worse"] and _agree(change["before"], change["after"])
+    return not change["worse"] and not any(differences(change["before"], change["after"]))
+
+
+def differences(
+    recorded: Any, rebuilt: Any, path: str = "", *, within: float = WITHIN
+) -> Iterator[tuple[str, Any, Any]]:
+    """Each value of two JSON documents that differs, with its dotted path: numbers by more than `within`."""
+    pairs: list[tuple[Any, Any, Any]] = []
+    if isinstance(recorded, dict) and isinstance(rebuilt, dict):
+        pairs = [(key, recorded.get(key, "nothing"), rebuilt.get(key, "nothing")) for key in {**rebuilt, **recorded}]
+    elif isinstance(recorded, list) and isinstance(rebuilt, list):
+        pairs = [(k, *both) for k, both in enumerate(zip(recorded, rebuilt, strict=False))]
+    elif _is_number(recorded) and _is_number(rebuilt):
+        if not abs(recorded - rebuilt) <= within * (1.0 + abs(rebuilt)):
+            yield path, recorded, rebuilt
+    elif type(recorded) is not type(rebuilt) or recorded != rebuilt:
+        yield path, recorded, rebuilt
+    for key, theirs, ours in pairs:
+        yield from differences(theirs, ours, f"{path}.{key}".strip("."), within=within)
+    if isinstance(recorded, list) and isinstance(rebuilt, list) and len(recorded) != len(rebuilt):
+        yield f"{path}: number of entries", len(recorded), len(rebuilt)
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, (int, float)) and not isinstance(value, bool)
 
 
 def rounded(found: Mapping[str, Any], part: str) -> list[Change]:
     """The changes of a part by no more than rounding; whatever changes in the inputs counts."""
     return [] if part == "inputs" else [change for change in found[part] if is_rounding(change)]
-
-
-def _agree(was: Any, now: Any) -> bool:
-    """Whether two values are the same but for the rounding of numbers in them."""
-    if isinstance(was, Mapping) and isinstance(now, Mapping):
-        return was.keys() == now.keys() and all(_agree(was[key], now[key]) for key in was)
-    if isinstance(was, list) and isinstance(now, list):
-        return len(was) == len(now) and all(map(_agree, was, now))
-    if all(isinstance(side, int | float) and not isinstance(side, bool) for side in (was, now)):
-        return bool(abs(now - was) <= WITHIN * (1.0 + abs(now)))
-    return type(was) is type(now) and bool(was == now)
 
 
 def _inputs(before: Report, after: Report) -> Iterator[Change]:

@@ -15,7 +15,7 @@ from airground_drake.base.statuses import COUNTS, NOT_EXERCISED, STATUSES, UNDEC
 from airground_drake.report import metrics, reproduction
 from airground_drake.report.model import SCHEMA
 from airground_drake.report.sentences import counted
-from airground_drake.scenario.document import place_of
+from airground_drake.scenario.document import place_of, way
 from airground_drake.scenario.plugins import OPTION
 from airground_drake.scenario.schema import Scenario
 from airground_drake.sim.trace import Trace
@@ -64,7 +64,7 @@ def build(
         "seeds": list(seeds),
         "claims": claims,
         "reproduction": reproduction.rows(scenario, traces),
-        "choices": [{**asdict(choice), "ours": _lookup(resolved, choice.key)} for choice in scenario.choices],
+        "choices": [{**asdict(choice), "ours": _at(resolved, choice.key)} for choice in scenario.choices],
         "audit": items,
         "files": {},
     }
@@ -186,15 +186,10 @@ def _run(scenario: Scenario, trace: Trace) -> dict[str, Any]:
     }
 
 
-def _lookup(resolved: Any, key: str) -> Any:
-    """Value at a dotted path of the resolved scenario, None if the path leads nowhere."""
-    for part in place_of(key):
-        if isinstance(resolved, list):
-            resolved = {str(position): each for position, each in enumerate(resolved)}
-        if not isinstance(resolved, dict) or part not in resolved:
-            return None
-        resolved = resolved[part]
-    return resolved
+def _at(resolved: Mapping[str, Any], key: str) -> Any:
+    """The value at a dotted key of the resolved scenario, None if the key leads nowhere."""
+    values = way(resolved, key)
+    return values[-1] if len(values) == len(place_of(key)) else None
 
 
 def _named(claims: Iterable[Mapping[str, Any]]) -> list[dict[str, str]]:

@@ -25,8 +25,8 @@ from airground_drake.base.arrays import Array
 from airground_drake.base.registry import MODEL_CLAIMS
 from airground_drake.base.statuses import meets
 from airground_drake.check.line import AGREES, DISAGREES, OPEN, RECORDED
-from airground_drake.report.compare import WITHIN
-from airground_drake.report.lines import Line, differences, different, line_of, print_lines, short
+from airground_drake.report.compare import WITHIN, differences
+from airground_drake.report.lines import Line, different, line_of, print_lines, short
 
 WITHIN_PX = 0.02  # coordinates in drawings agree to this: they are rounded to 0.01
 

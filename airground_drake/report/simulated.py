@@ -21,7 +21,8 @@ from airground_drake.base import files
 from airground_drake.base.progress import SILENT, Progress
 from airground_drake.check.line import AGREES, NOT_HERE
 from airground_drake.report.after_runs import versions, with_seeds
-from airground_drake.report.lines import Line, differences, line_of, print_lines, short
+from airground_drake.report.compare import differences
+from airground_drake.report.lines import Line, line_of, print_lines, short
 from airground_drake.scenario import plugins
 from airground_drake.scenario.estimate import DEFAULT_LIMITS, within
 from airground_drake.scenario.load import from_data

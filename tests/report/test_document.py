@@ -139,4 +139,4 @@ def test_a_choice_may_be_an_entry_of_a_list_or_what_a_run_sets() -> None:
     runs = {"c_literal": {"set": {"gatekeeper.route": "nonlinear"}}}
     resolved = {"ugvs": {"ugv1": {"start_m": [1.0, 2.0]}}, "policies": [{"name": "detour"}], "runs": runs}
     keys = "ugvs.ugv1.start_m.1", "policies.0.name", "policies.1.name", "runs.c_literal.set.gatekeeper.route"
-    assert [document._lookup(resolved, key) for key in keys] == [2.0, "detour", None, "nonlinear"]
+    assert [document._at(resolved, key) for key in keys] == [2.0, "detour", None, "nonlinear"]
