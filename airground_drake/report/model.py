@@ -198,7 +198,6 @@ class Told(Entry):
 
     name: str
     title: str
-    description: str = ""
     resolved: Scenario  # with all defaults
 
 
@@ -255,7 +254,6 @@ class Finding(Entry):
     id: Whole
     paper: Any
     ours: Any
-    evidence: Json = {}
     demonstrated: YesNo
 
 

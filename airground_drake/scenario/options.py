@@ -33,9 +33,10 @@ OPTIONS: dict[str, Option] = {
     "--limit-steps": option("", "N", positive, default=DEFAULT_LIMITS.work),
     "--seed": option("seed of the decision noise", "N", int),
     "--set": option("override a key of the scenario", "KEY=VALUE", action="append", default=[]),
-    plugins.OPTION: option(plugins.HELP),
-    plugins.SHOW: option(plugins.SHOW_HELP),
-}
+    plugins.OPTION: option("import and run what is named as module:Class or file.py:Class; looked for beside the "
+                           "scenario or spec, too"),
+    plugins.SHOW: option("pass on what third-party policies print, to standard error"),
+}  # fmt: skip
 
 
 def parser_of(

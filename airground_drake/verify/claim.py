@@ -5,6 +5,7 @@ from __future__ import annotations
 import abc
 import json
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, fields, replace
 from math import ceil, isfinite
 from numbers import Integral, Real
@@ -79,10 +80,9 @@ class Claim(abc.ABC):
 
     def may_apply(self, about: Any) -> bool:
         """`applies`; a claim that cannot say is judged, which turns the exception into the status `error`."""
-        try:
+        with suppress(Exception, SystemExit):
             return self.applies(about)
-        except (Exception, SystemExit):
-            return True
+        return True
 
     def decided(self, find: Callable[[], Finding]) -> Finding:
         """What `find` returns, well formed; after an exception the status `error`: the claim was not decided."""
@@ -142,10 +142,8 @@ class ModelClaim(Claim):
 
     def judge_run(self, trace: Trace) -> Any:
         """`seen_in`; None after an exception: records are missing or wrong, which claims about the run report."""
-        try:
+        with suppress(Exception, SystemExit):
             return self.seen_in(trace)
-        except (Exception, SystemExit):
-            return None
 
     def judge_runs(self, finding: Finding, seen: Sequence[Any]) -> Finding:
         """`with_runs`, from what `judge_run` returned, with exceptions turned into the status `error`."""

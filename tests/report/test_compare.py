@@ -162,27 +162,27 @@ def test_what_is_no_report_is_one_line_and_exit_code_2(
 
 
 @pytest.mark.parametrize(
-    "change",
+    ("change", "why"),
     [
-        lambda found: claim(found, "a").update(status="fine"),
-        lambda found: claim(found, "a").update(margin="wide"),
-        lambda found: claim(found, "a").update(margin=float("inf")),
-        lambda found: claim(found, "a").update(exercised=10**30),
-        lambda found: claim(found, "a").update(expected=["holds"]),
-        lambda found: found.update(provenance=3),
-        lambda found: found["scenario"].update(name=["x"]),
-        lambda found: found["scenario"].update(title="\ud800"),
-        lambda found: found["overall"].update(status="fine"),
-        lambda found: found["overall"]["counts"].update(fine=1),
-        lambda found: found["runs"]["c"]["events"][0].update(t_s="nan"),
-        lambda found: found["reproduction"][0].update(status="fine"),
-        lambda found: found.pop("audit"),
+        (lambda found: claim(found, "a").update(status="fine"), "claims.0.status: 'fine' is not allowed; "),
+        (lambda found: claim(found, "a").update(margin="wide"), "claims.0.margin: 'wide' is not allowed; "),
+        (lambda found: claim(found, "a").update(margin=float("inf")), "ValueError: Infinity is not finite"),
+        (lambda found: claim(found, "a").update(exercised=10**30), "ValueError: an integer of 31 digits"),
+        (lambda found: found.update(provenance={"third_party": 3}), "provenance: {'third_party': 3} is not allowed; "),
+        (lambda found: found["scenario"].update(title="\ud800"), "UnicodeEncodeError"),
+        (lambda found: found["scenario"]["resolved"].update(seed="x"), "scenario.resolved.seed: 'x' is not allowed; "),
+        (lambda found: found["overall"]["counts"].update(fine=1), "overall.counts.fine.[key]: 'fine' is not allowed; "),
+        (lambda found: found["runs"]["c"]["events"][0].update(t_s="nan"), "runs.c.events.0.t_s: 'nan' is not allowed; "),
+        (lambda found: found.pop("audit"), "audit: missing; Field required"),
     ],
-)
-def test_values_of_another_kind_are_no_report(change: Callable[[Json], object], before: Json, tmp_path: Path) -> None:
+)  # fmt: skip
+def test_values_of_another_kind_are_no_report(
+    change: Callable[[Json], object], why: str, before: Json, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     bad = copy.deepcopy(before)
     change(bad)
     assert main([str(save(tmp_path / "a", before)), str(save(tmp_path / "b", bad))]) == 2
+    assert f"b/report.json is not a report that can be used: {why}" in capsys.readouterr().err
 
 
 def test_the_page_shows_the_regression_first_and_nothing_foreign(
