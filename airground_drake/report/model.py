@@ -193,7 +193,7 @@ class Run(Entry):
         return [ugv for ugv in lost if ugv not in failed]
 
 
-class Told(Entry):
+class ScenarioPart(Entry):
     """The scenario."""
 
     name: str
@@ -201,7 +201,7 @@ class Told(Entry):
     resolved: Scenario  # with all defaults
 
 
-class Named(Entry):
+class Deviation(Entry):
     """A claim, or a finding that is not as expected, undecided or missing."""
 
     id: str
@@ -210,7 +210,7 @@ class Named(Entry):
     why: str = ""  # it is missing
 
 
-class Counted(Entry):
+class ExpectedNumber(Entry):
     """A number that a scenario expects of a run."""
 
     id: str
@@ -229,15 +229,15 @@ class Overall(Entry):
     checks: Whole  # claims about which something is expected, and numbers
     as_expected: Whole
     counts: dict[Literal[(*STATUSES, NOT_EXERCISED)], Whole] = {}  # type: ignore[valid-type]
-    differs: list[Named]
-    undecided: list[Named]
-    missing: list[Named]
+    differs: list[Deviation]
+    undecided: list[Deviation]
+    missing: list[Deviation]
     undemonstrated: list[Whole]  # findings about the paper
     unpromised: list[Json]
-    numbers: list[Counted] = []
+    numbers: list[ExpectedNumber] = []
 
 
-class Row(Entry):
+class ReproductionRow(Entry):
     """A result of the paper, and ours."""
 
     id: str
@@ -266,13 +266,13 @@ def _provenance(given: Json) -> Json:
 class Report(Entry):
     """The whole of report.json."""
 
-    scenario: Told
+    scenario: ScenarioPart
     provenance: Annotated[Json, AfterValidator(_provenance)]
     overall: Overall
     runs: dict[str, Run]
     seeds: list[Seed]
     claims: list[Claim]
-    reproduction: list[Row]
+    reproduction: list[ReproductionRow]
     choices: list[Json]
     audit: list[Finding]
 

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from airground_drake.report.export import latex
-from airground_drake.report.model import Claim, Report, Row
+from airground_drake.report.model import Claim, Report, ReproductionRow
 
 NO: dict[str, Any] = {"as_expected": None, "evidence": {}, "inputs": {}}
 REPORT = Report.model_construct(
@@ -21,10 +21,10 @@ REPORT = Report.model_construct(
         Claim(id="SAFE-TRACE", run="a", status="refuted", exercised=4, **NO),
     ],
     reproduction=[
-        Row(id="A1", quantity="stall & 5 %", paper=[3.3, 5.1], ours=[3.36889, 5.10219], unit="m",
+        ReproductionRow(id="A1", quantity="stall & 5 %", paper=[3.3, 5.1], ours=[3.36889, 5.10219], unit="m",
             status="not_reproduced"),
-        Row(id="A3", quantity="grows", paper=1.0, ours=0.0, unit="yes/no", status="calibrated"),
-        Row(id="A5", quantity="trigger", paper=14.45, ours=None, unit="s", status="not_reproduced"),
+        ReproductionRow(id="A3", quantity="grows", paper=1.0, ours=0.0, unit="yes/no", status="calibrated"),
+        ReproductionRow(id="A5", quantity="trigger", paper=14.45, ours=None, unit="s", status="not_reproduced"),
     ],
 )  # fmt: skip
 
