@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from airground_drake.base.arrays import Array
-from airground_drake.sim.trace import Trace
+from airground_drake.sim.trace import Trace, per_trace
 from airground_drake.verify.engines.outlines import Cores, Indices, apart_by_blocks, away_from, least_distances
 from airground_drake.verify.runs.control_law import Inequalities, inequalities_of
 from airground_drake.verify.runs.pairs import (
@@ -28,7 +28,6 @@ from airground_drake.verify.runs.pairs import (
     gap_over_time,
     is_planar,
     least_gap,
-    numbers_of,
     off_m_of,
     origin_of,
     pairs_of,
@@ -45,15 +44,12 @@ def samples_before(trace: Trace) -> Indices:
     return samples[np.searchsorted(samples, np.arange(len(trace.t) - 1), side="right") - 1]
 
 
+@per_trace
 def steps_of(trace: Trace, robot: str) -> Array:
     """How far from its place at the control sample a robot's body gets in each segment between rows, (T - 1,), m."""
-
-    def found() -> Array:
-        place, sample = trace.body(robot), trace.body(robot)[samples_before(trace)]
-        ends = [np.linalg.norm(each - sample, axis=1) for each in (place[:-1], place[1:])]
-        return np.asarray(np.max(ends, axis=0) + off_m_of(trace, robot))
-
-    return trace.derived(("steps", robot), found)
+    place, sample = trace.body(robot), trace.body(robot)[samples_before(trace)]
+    begun, ended = (np.linalg.norm(at - sample, axis=1) for at in (place[:-1], place[1:]))
+    return np.asarray(np.maximum(begun, ended) + off_m_of(trace, robot))
 
 
 class OwnMargins(NamedTuple):
@@ -172,17 +168,13 @@ class Encounter(NamedTuple):
         return f"{came}; {self.first} {self.reaction}{speed}{blocked}"
 
 
+@per_trace
 def encounters(trace: Trace) -> list[Encounter]:
     """The pairs that came nearer to each other than required, by time."""
-
-    def found() -> list[Encounter]:
-        apart, numbers = apart_of(trace), numbers_of(trace)
-        near = [pair for pair in pairs_of(trace) if apart[numbers[frozenset((pair.first, pair.second))]] <= pair.safe_m]
-        least = [least_gap(trace, pair) for pair in near]
-        short = [gap for gap in least if gap.margin_m < -DISTANCE_TOLERANCE_M]
-        return sorted((_encounter(trace, gap) for gap in short), key=lambda encounter: encounter.t_s)
-
-    return trace.derived("encounters", found)
+    pairs = zip(pairs_of(trace), apart_of(trace).tolist(), strict=True)
+    least = [least_gap(trace, pair) for pair, apart_m in pairs if apart_m <= pair.safe_m]
+    short = [gap for gap in least if gap.margin_m < -DISTANCE_TOLERANCE_M]
+    return sorted((_encounter(trace, gap) for gap in short), key=lambda encounter: encounter.t_s)
 
 
 def _encounter(trace: Trace, least: Gap) -> Encounter:

@@ -23,7 +23,7 @@ import numpy.typing as npt
 from airground_drake.base.arrays import Array
 from airground_drake.scenario.schema import MAP, Obstacle
 from airground_drake.scenario.shapes import convex_parts
-from airground_drake.sim.trace import Trace
+from airground_drake.sim.trace import Trace, per_trace
 from airground_drake.verify.engines.bodies import arc_m, lagging_m, law_m, on_arc, on_lag, room_of
 from airground_drake.verify.engines.geometry import (
     MERGE_S,
@@ -104,12 +104,13 @@ class Gap(NamedTuple):
     row: int  # row of the trace that ends the segment on which it was
 
 
+@per_trace
 def pairs_of(trace: Trace) -> tuple[Pair, ...]:
     """All robot/barrier and robot/robot pairs of a run, with the safe distances of its scenario."""
     # Barriers that do not appear before the end are in none.
     #
     # Those of one robot come in the order in which its controller lists them: barriers, then robots in array order.
-    return trace.derived("pairs", lambda: tuple(pair for pair in declared_pairs(trace) if pair.row < len(trace.t)))
+    return tuple(pair for pair in declared_pairs(trace) if pair.row < len(trace.t))
 
 
 def declared_pairs(trace: Trace) -> Iterator[Pair]:
@@ -154,22 +155,19 @@ class Parts(NamedTuple):
     names: list[str]  # of the barriers
 
 
+@per_trace
 def parts_of(trace: Trace) -> Parts:
     """The convex parts of the barriers, whether the UAV knows them or not."""
-
-    def found() -> Parts:
-        each = cores_of(trace)
-        counts = [len(cores.base) for cores in each.values()]
-        first = np.concatenate([[0], np.cumsum(counts)])[: len(counts)].astype(np.intp)
-        return Parts(Cores.joined([*each.values()]), np.repeat(np.arange(len(counts)), counts), first, [*each])
-
-    return trace.derived("parts", found)
+    cores = cores_of(trace)
+    counts = [len(parts.base) for parts in cores.values()]
+    first = np.concatenate([[0], np.cumsum(counts)])[: len(counts)].astype(np.intp)
+    return Parts(Cores.joined([*cores.values()]), np.repeat(np.arange(len(counts)), counts), first, [*cores])
 
 
+@per_trace
 def cores_of(trace: Trace) -> dict[str, Cores]:
     """The cores of the convex parts of each barrier, by its name."""
-    barriers = trace.scenario.barriers
-    return trace.derived("cores", lambda: {name: _cores(each) for name, each in barriers.items()})
+    return {name: _cores(barrier) for name, barrier in trace.scenario.barriers.items()}
 
 
 def _cores(obstacle: Obstacle) -> Cores:
@@ -190,17 +188,14 @@ def seen_from(trace: Trace, robot: str, barrier: str) -> Array:
     return place if origin is None else place - origin
 
 
+@per_trace
 def carried(trace: Trace) -> list[tuple[Indices, Array | None]]:
     """Numbers of the parts that are at rest, and of those of each barrier that moves, with the places of its origin."""
-
-    def found() -> list[tuple[Indices, Array | None]]:
-        parts = parts_of(trace)
-        origins = [origin_of(trace, name) for name in parts.names]
-        still = np.array([origin is None for origin in origins], dtype=np.bool_)
-        moving = [(np.flatnonzero(parts.owner == k), each) for k, each in enumerate(origins) if each is not None]
-        return [(np.flatnonzero(still[parts.owner]), None), *moving]
-
-    return trace.derived("carried", found)
+    parts = parts_of(trace)
+    origins = [origin_of(trace, name) for name in parts.names]
+    still = np.array([origin is None for origin in origins], dtype=np.bool_)
+    moving = [(np.flatnonzero(parts.owner == k), origin) for k, origin in enumerate(origins) if origin is not None]
+    return [(np.flatnonzero(still[parts.owner]), None), *moving]
 
 
 def contacts(trace: Trace, places: Array, rows: Indices, reach: float, *, planar: bool) -> Contacts:
@@ -220,16 +215,13 @@ def contacts(trace: Trace, places: Array, rows: Indices, reach: float, *, planar
     return Contacts(place[there], core[there], Away(distance[there], normal[there]))
 
 
+@per_trace
 def lifetimes(trace: Trace) -> tuple[Indices, Indices]:
     """The row from which on each convex part is there, and that from which on it is not, (m,)."""
-
-    def found() -> tuple[Indices, Indices]:
-        parts, end = parts_of(trace), len(trace.t) - 1
-        first = np.array([trace.there_from(name) for name in parts.names], dtype=np.intp)
-        last = np.array([trace.there_until(name) for name in parts.names], dtype=np.intp)
-        return first[parts.owner], np.where(last == end, end + 1, last)[parts.owner]
-
-    return trace.derived("lifetimes", found)
+    parts, end = parts_of(trace), len(trace.t) - 1
+    first = np.array([trace.there_from(name) for name in parts.names], dtype=np.intp)
+    last = np.array([trace.there_until(name) for name in parts.names], dtype=np.intp)
+    return first[parts.owner], np.where(last == end, end + 1, last)[parts.owner]
 
 
 def is_planar(trace: Trace, robot: str) -> bool:
@@ -242,23 +234,17 @@ def pair_of(trace: Trace, one: str, other: str) -> Pair:
     return pairs_of(trace)[numbers_of(trace)[frozenset((one, other))]]
 
 
+@per_trace
 def numbers_of(trace: Trace) -> dict[frozenset[str], int]:
     """The place of each pair in `pairs_of`, by the names of its bodies."""
-
-    def numbered() -> dict[frozenset[str], int]:
-        return {frozenset((pair.first, pair.second)): k for k, pair in enumerate(pairs_of(trace))}
-
-    return trace.derived("numbers", numbered)
+    return {frozenset((pair.first, pair.second)): k for k, pair in enumerate(pairs_of(trace))}
 
 
+@per_trace
 def least_gap(trace: Trace, pair: Pair) -> Gap:
     """The smallest gap of a pair over continuous time."""
     # It is exact if both bodies move on straight lines between rows, and to `BENT_M` where it is below the one
     # required; else it is a lower bound.
-    return trace.derived(("least gap", pair.first, pair.second), lambda: _least_gap(trace, pair))
-
-
-def _least_gap(trace: Trace, pair: Pair) -> Gap:
     t, off_m = trace.t[pair.rows], off_m_of(trace, pair.first) + off_m_of(trace, pair.second)
     cores = cores_of(trace).get(pair.second)
     if cores is None:
@@ -283,7 +269,7 @@ def start_margin(trace: Trace, pair: Pair) -> float:
     last = len(trace.t) - 1 if pair.last is None else pair.last
     end = min(int(np.searchsorted(trace.t, until)), last)
     if end > pair.row:
-        return _least_gap(trace, pair._replace(last=end)).margin_m
+        return least_gap(trace, pair._replace(last=end)).margin_m
     return float(gap_over_time(trace, pair)[pair.row]) - pair.required_m
 
 
@@ -292,19 +278,16 @@ def at_appearance(trace: Trace, gap: Gap) -> bool:
     return gap.pair.row > 0 and gap.t_s <= trace.t[gap.pair.row]
 
 
+@per_trace
 def steered_margin(trace: Trace, pair: Pair) -> float:
     """The least distance of the points of a pair that the law steers, less what the law keeps, m."""
-
-    def found() -> float:
-        cores, first = cores_of(trace).get(pair.second), trace.position(pair.first)[pair.rows]
-        if cores is None:
-            second = trace.position(pair.second)[pair.rows]
-            return closest_approach(trace.t[pair.rows], first, second).distance_m - pair.law_m
-        origin = origin_of(trace, pair.second)
-        way = first if origin is None else first - origin[pair.rows]
-        return closest(cores, way, planar=is_planar(trace, pair.first)).distance - pair.law_m
-
-    return trace.derived(("steered", pair.first, pair.second), found)
+    cores, first = cores_of(trace).get(pair.second), trace.position(pair.first)[pair.rows]
+    if cores is None:
+        second = trace.position(pair.second)[pair.rows]
+        return closest_approach(trace.t[pair.rows], first, second).distance_m - pair.law_m
+    origin = origin_of(trace, pair.second)
+    way = first if origin is None else first - origin[pair.rows]
+    return closest(cores, way, planar=is_planar(trace, pair.first)).distance - pair.law_m
 
 
 def _least_of_bent(trace: Trace, pair: Pair, off_m: float) -> Approach:
@@ -420,25 +403,23 @@ def are_too_near(trace: Trace, robot: str, places: Array, t_s: float, by_m: floa
 
 def pairs_beside(trace: Trace, robot: str) -> dict[str, Pair]:
     """The pairs of a robot by the name of the other body, also those that do not appear before the end."""
-
-    def by_robot() -> dict[str, dict[str, Pair]]:
-        found = {name: dict[str, Pair]() for name in trace.robots}
-        for pair in declared_pairs(trace):
-            found[pair.first][pair.second] = pair
-            if pair.second in found:
-                found[pair.second][pair.first] = pair
-        return found
-
-    return trace.derived("beside", by_robot)[robot]
+    return _beside(trace)[robot]
 
 
+@per_trace
+def _beside(trace: Trace) -> dict[str, dict[str, Pair]]:
+    found = {name: dict[str, Pair]() for name in trace.robots}
+    for pair in declared_pairs(trace):
+        found[pair.first][pair.second] = pair
+        if pair.second in found:
+            found[pair.second][pair.first] = pair
+    return found
+
+
+@per_trace
 def apart_of(trace: Trace) -> Array:
     """A lower bound of the distance of each pair, as of `Pair.safe_m`, over the run: (P,), m, as in `pairs_of`."""
     # Obstacles count as there all the time.
-    return trace.derived("apart", lambda: _apart_of(trace))
-
-
-def _apart_of(trace: Trace) -> Array:
     robots, parts = trace.robots, parts_of(trace)
     off = {robot: off_m_of(trace, robot) for robot in robots}
     found = dict[tuple[str, str], float]()

@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from airground_drake.base.arrays import Array
-from airground_drake.sim.trace import Trace
+from airground_drake.sim.trace import Trace, per_trace
 from airground_drake.verify.claim import TIME_TOLERANCE_S
 from airground_drake.verify.engines.outlines import Indices, away_from
 from airground_drake.verify.engines.shortfalls import POINT, SCREEN_M, shortfalls
@@ -82,12 +82,9 @@ class Periods(NamedTuple):
         return self.passive & (self.away_m_s >= self.pair.speed_m_s - AT_LIMIT_M_S)
 
 
+@per_trace
 def periods_of(trace: Trace, pair: Pair) -> Periods:
     """The control periods of a robot beside an obstacle that may move."""
-    return trace.derived(("periods", pair.first, pair.second), lambda: _periods(trace, pair))
-
-
-def _periods(trace: Trace, pair: Pair) -> Periods:
     ends, period = period_ends(trace), trace.scenario.control.period_s
     last_row = len(trace.t) - 1 if pair.last is None else pair.last
     which = np.flatnonzero((ends[:-1] >= pair.row) & (ends[:-1] < last_row))
