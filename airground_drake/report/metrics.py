@@ -181,7 +181,7 @@ def _kept_away(trace: Trace, ugv: str) -> dict[str, Any]:
     # has stood) and `off_m` (how far from its target).
     own = trace.scenario.ugvs[ugv]
     for pair in passive_pairs(trace):
-        if pair.first == ugv and pair.last in (None, len(trace.t) - 1):
+        if pair.first == ugv and pair.last == len(trace.t) - 1:
             apart = to_barrier(trace, pair, np.array(own.target_m))
             if apart < pair.safe_m:
                 place = trace.position(ugv)

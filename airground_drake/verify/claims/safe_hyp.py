@@ -283,7 +283,7 @@ def _guarantees(trace: Trace) -> Iterator[Guarantee]:
         if pair.speed_m_s > 0.0:  # see `passive`
             continue
         begin = int(np.searchsorted(samples, pair.row))
-        end = len(samples) if pair.last is None else int(np.searchsorted(samples, pair.last)) + 1
+        end = int(np.searchsorted(samples, pair.last)) + 1
         there, planar = slice(begin, end), is_planar(trace, pair.first)
         first, beside = places[pair.first][there], _beside(trace, pair, places, there, float(reach[k]))
         asked = Fraction(pair.share), gain, last if end == len(samples) else Fraction(1)

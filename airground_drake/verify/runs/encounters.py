@@ -81,7 +81,6 @@ def own_margins(trace: Trace, pair: Pair, robot: str) -> OwnMargins:
     place, planar = trace.body(robot), is_planar(trace, robot)
     origin = np.zeros_like(place) if origin is None else origin
     keeps, off_m = pair.keeps_m(trace.scenario.control.period_s) - pair.cover_m, off_m_of(trace, robot)
-    last = len(trace.t) - 1 if pair.last is None else pair.last
     step = steps_of(trace, robot)
     bounds = apart_by_blocks(cores, place - origin).min(axis=1)
     each = cores.take(np.flatnonzero(bounds <= max(keeps, pair.safe_m) + step.max())).take((slice(None), None))
@@ -89,7 +88,7 @@ def own_margins(trace: Trace, pair: Pair, robot: str) -> OwnMargins:
     if not len(each.base):
         return found
     at_sample = away_from(each, place[sample] - origin[sample], planar=planar).distance.min(axis=0)
-    there = (sample >= pair.row) & (rows < last)
+    there = (sample >= pair.row) & (rows < pair.last)
     gaps, short = gap_over_time(trace, pair), pair.required_m - DISTANCE_TOLERANCE_M
     broken = there & (rows >= _first_apart(pair, gaps)) & (np.minimum(gaps[:-1], gaps[1:]) < short)
     near = there & ((at_sample <= keeps + step) | broken)

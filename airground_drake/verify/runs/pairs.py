@@ -58,8 +58,8 @@ class Pair(NamedTuple):
     radii_m: float  # sum of both radii
     share: float  # part of the avoidance inequality that each robot takes: all beside a barrier, half beside a robot
     reach_m: float  # how far they can approach each other in one control period
-    row: int = 0  # from which on both are there
-    last: int | None = None  # row up to which both are there
+    row: int  # from which on both are there
+    last: int  # row up to which both are there
     # At which robots expect the barrier to move at most; above 0 the robot's law is the passive one.
     speed_m_s: float = 0.0
     more_m: float = 0.0  # distance that the law keeps beyond `safe_m`
@@ -77,7 +77,7 @@ class Pair(NamedTuple):
     @property
     def rows(self) -> slice:
         """The rows in which both are there."""
-        return slice(self.row, None if self.last is None else self.last + 1)
+        return slice(self.row, self.last + 1)
 
     @property
     def safe_m(self) -> float:
@@ -143,7 +143,8 @@ def declared_pairs(trace: Trace) -> Iterator[Pair]:
             yield found(robot, name, apart, radii, reach, row=row, last=last, speed_m_s=speed)
     for robot, other in combinations(trace.robots, 2):
         apart = safe.air_ground_m if uav in (robot, other) else safe.ugv_m
-        yield found(robot, other, apart, radius[robot] + radius[other], (limit[robot] + limit[other]) * period)
+        radii, reach = radius[robot] + radius[other], (limit[robot] + limit[other]) * period
+        yield found(robot, other, apart, radii, reach, row=0, last=len(trace.t) - 1)
 
 
 class Parts(NamedTuple):
@@ -266,8 +267,7 @@ def start_margin(trace: Trace, pair: Pair) -> float:
     if pair.under_way_s is None:
         return inf
     until = trace.t[pair.row] + pair.under_way_s - MERGE_S
-    last = len(trace.t) - 1 if pair.last is None else pair.last
-    end = min(int(np.searchsorted(trace.t, until)), last)
+    end = min(int(np.searchsorted(trace.t, until)), pair.last)
     if end > pair.row:
         return least_gap(trace, pair._replace(last=end)).margin_m
     return float(gap_over_time(trace, pair)[pair.row]) - pair.required_m

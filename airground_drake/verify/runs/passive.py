@@ -86,8 +86,7 @@ class Periods(NamedTuple):
 def periods_of(trace: Trace, pair: Pair) -> Periods:
     """The control periods of a robot beside an obstacle that may move."""
     ends, period = period_ends(trace), trace.scenario.control.period_s
-    last_row = len(trace.t) - 1 if pair.last is None else pair.last
-    which = np.flatnonzero((ends[:-1] >= pair.row) & (ends[:-1] < last_row))
+    which = np.flatnonzero((ends[:-1] >= pair.row) & (ends[:-1] < pair.last))
     row = ends[which]
     around = np.append(row, ends[which[-1:] + 1])  # the ends, too
     cores, planar, keeps = cores_of(trace)[pair.second], is_planar(trace, pair.first), pair.keeps_m(period)
