@@ -77,9 +77,7 @@ def own_margins(trace: Trace, pair: Pair, robot: str) -> OwnMargins:
     other, rows = pair.second if robot == pair.first else pair.first, np.arange(len(trace.t) - 1)
     sample = samples_before(trace)
     cores = cores_of(trace).get(other, Cores.at(np.zeros((1, 3))))
-    origin = trace.body(other) if other in trace.robots else origin_of(trace, other)
-    place, planar = trace.body(robot), is_planar(trace, robot)
-    origin = np.zeros_like(place) if origin is None else origin
+    place, origin, planar = trace.body(robot), origin_of(trace, other), is_planar(trace, robot)
     keeps, off_m = pair.keeps_m(trace.scenario.control.period_s) - pair.cover_m, off_m_of(trace, robot)
     step = steps_of(trace, robot)
     bounds = apart_by_blocks(cores, place - origin).min(axis=1)
@@ -117,8 +115,7 @@ def _steered(trace: Trace, pair: Pair, robot: str, each: Cores, rows: Indices) -
     """Distances of the steered points of a pair, or of one from the cores of an obstacle, at some rows, m."""
     other = pair.second if robot == pair.first else pair.first
     origin = trace.position(other) if other in trace.robots else origin_of(trace, other)
-    place = trace.position(robot)[rows]
-    away = away_from(each, place if origin is None else place - origin[rows], planar=is_planar(trace, robot))
+    away = away_from(each, (trace.position(robot) - origin)[rows], planar=is_planar(trace, robot))
     return np.asarray(away.distance.min(axis=0))
 
 
@@ -202,9 +199,8 @@ def _whose_doing(trace: Trace, least: Gap) -> str:
         return "under way" if any(_is_late(trace, robot) for robot in taking) else "robot"
     if least.row <= _first_apart(pair, gap_over_time(trace, pair)):
         return "nobody"
-    origin = None if pair.second in trace.robots else origin_of(trace, pair.second)
-    moved = origin is not None and bool(np.ptp(origin[pair.rows], axis=0).any())
-    return "other" if moved else "robot"
+    moved = np.ptp(origin_of(trace, pair.second)[pair.rows], axis=0).any()
+    return "other" if moved and pair.second not in trace.robots else "robot"
 
 
 def _is_late(trace: Trace, robot: str) -> bool:

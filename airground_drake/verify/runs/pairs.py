@@ -178,25 +178,25 @@ def _cores(obstacle: Obstacle) -> Cores:
     return Cores.prisms(parts, obstacle.height_m)
 
 
-def origin_of(trace: Trace, barrier: str) -> Array | None:
-    """Where the origin of a barrier's parts is at the rows, (T, 3), m; None if it does not move."""
-    return trace.position(barrier) if trace.scenario.barriers[barrier].moves else None
+def origin_of(trace: Trace, name: str) -> Array:
+    """Where the body of a robot or the origin of a barrier's parts is at the rows, (T, 3), m; 0 for one at rest."""
+    if name in trace.robots or trace.scenario.barriers[name].moves:
+        return trace.body(name)
+    return np.broadcast_to(0.0, (len(trace.t), 3))
 
 
-def seen_from(trace: Trace, robot: str, barrier: str) -> Array:
-    """Places of a robot's body at the rows as seen from the origin of a barrier's parts, (T, 3), m."""
-    origin, place = origin_of(trace, barrier), trace.body(robot)
-    return place if origin is None else place - origin
+def seen_from(trace: Trace, robot: str, other: str) -> Array:
+    """Places of a robot's body at the rows as seen from another robot or the origin of a barrier's parts, (T, 3), m."""
+    return trace.body(robot) - origin_of(trace, other)
 
 
 @per_trace
-def carried(trace: Trace) -> list[tuple[Indices, Array | None]]:
+def carried(trace: Trace) -> list[tuple[Indices, Array]]:
     """Numbers of the parts that are at rest, and of those of each barrier that moves, with the places of its origin."""
-    parts = parts_of(trace)
-    origins = [origin_of(trace, name) for name in parts.names]
-    still = np.array([origin is None for origin in origins], dtype=np.bool_)
-    moving = [(np.flatnonzero(parts.owner == k), origin) for k, origin in enumerate(origins) if origin is not None]
-    return [(np.flatnonzero(still[parts.owner]), None), *moving]
+    parts, barriers = parts_of(trace), trace.scenario.barriers
+    still = np.array([barriers[name].moves is None for name in parts.names], dtype=np.bool_)
+    moving = [(np.flatnonzero(parts.owner == k), trace.body(parts.names[k])) for k in np.flatnonzero(~still).tolist()]
+    return [(np.flatnonzero(still[parts.owner]), np.broadcast_to(0.0, (len(trace.t), 3))), *moving]
 
 
 def contacts(trace: Trace, places: Array, rows: Indices, reach: float, *, planar: bool) -> Contacts:
@@ -205,8 +205,7 @@ def contacts(trace: Trace, places: Array, rows: Indices, reach: float, *, planar
     parts = parts_of(trace)
     found = list[Contacts]()
     for some, origin in carried(trace):
-        seen = places if origin is None else places - origin[rows]
-        near = within(parts.cores.take(some), seen, reach, planar=planar)
+        near = within(parts.cores.take(some), places - origin[rows], reach, planar=planar)
         found.append(near._replace(core=some[near.core]))
     place, core = (np.concatenate([each[k] for each in found]) for k in (0, 1))
     distance, normal = (np.concatenate([each.away[k] for each in found]) for k in (0, 1))
@@ -285,15 +284,14 @@ def steered_margin(trace: Trace, pair: Pair) -> float:
     if cores is None:
         second = trace.position(pair.second)[pair.rows]
         return closest_approach(trace.t[pair.rows], first, second).distance_m - pair.law_m
-    origin = origin_of(trace, pair.second)
-    way = first if origin is None else first - origin[pair.rows]
+    way = first - origin_of(trace, pair.second)[pair.rows]
     return closest(cores, way, planar=is_planar(trace, pair.first)).distance - pair.law_m
 
 
 def _least_of_bent(trace: Trace, pair: Pair, off_m: float) -> Approach:
     """The least distance of a pair whose bodies do not move straight: segments that may be too near are divided."""
     cores, planar = cores_of(trace).get(pair.second, Cores.at(np.zeros((1, 3)))), is_planar(trace, pair.first)
-    way = _relative(trace, pair, np.arange(len(trace.t))[pair.rows])
+    way = seen_from(trace, pair.first, pair.second)[pair.rows]
     each = cores.take((slice(None), None))
     lower = least_distances(each, way[:-1], way[1:], planar=planar)[0].min(axis=0) - off_m
     most, t = min(ceil((off_m / BENT_M) ** 0.5), MOST_PARTS), trace.t[pair.rows]
@@ -323,18 +321,11 @@ def _least_of_bent(trace: Trace, pair: Pair, off_m: float) -> Approach:
     return min(found)
 
 
-def _relative(trace: Trace, pair: Pair, rows: Indices) -> Array:
-    """The body of the first of a pair as seen from the other, or from the origin of its parts, at some rows."""
-    if pair.second in trace.robots:
-        return trace.body(pair.first)[rows] - trace.body(pair.second)[rows]
-    return seen_from(trace, pair.first, pair.second)[rows]
-
-
 def bent(trace: Trace, name: str, row: int, shares: Array) -> Array:
     """Where a body is at shares (n,) of the time from a row to the next, (n, 3), m; origins of barriers, too."""
     if name not in trace.robots:
         way = origin_of(trace, name)
-        return np.zeros((len(shares), 3)) if way is None else way[row] + shares[:, None] * (way[row + 1] - way[row])
+        return way[row] + shares[:, None] * (way[row + 1] - way[row])
     start, end = trace.body(name)[row : row + 2]
     robot = trace.scenario.robots[name]
     if any(plant.kind == "unicycle" for plant in robot.plant):
@@ -350,8 +341,7 @@ def bent(trace: Trace, name: str, row: int, shares: Array) -> Array:
 
 def to_barrier(trace: Trace, pair: Pair, place: Array) -> float:
     """Distance of a place (3,), m, from the core of the barrier of a pair as it is at the end of the run, m."""
-    way = origin_of(trace, pair.second)
-    here = place if way is None else place - way[-1]
+    here = place - origin_of(trace, pair.second)[-1]
     return float(away_from(cores_of(trace)[pair.second], here, planar=is_planar(trace, pair.first)).distance.min())
 
 
@@ -367,12 +357,11 @@ def place_on_map(trace: Trace, robot: str, t_s: float) -> dict[str, list[float]]
 def gap_over_time(trace: Trace, pair: Pair) -> Array:
     """The gap of a pair at the rows of a trace, (T,), m; NaN where an obstacle is not there."""
     cores = cores_of(trace).get(pair.second)
+    way = seen_from(trace, pair.first, pair.second)
     if cores is None:
-        apart = np.linalg.norm(trace.body(pair.first) - trace.body(pair.second), axis=1)
-        return np.asarray(apart) - pair.radii_m
+        return np.asarray(np.linalg.norm(way, axis=1)) - pair.radii_m
     found, rows = np.full(len(trace.t), np.nan), pair.rows
-    way = seen_from(trace, pair.first, pair.second)[rows]
-    found[rows] = over_time(cores, way, planar=is_planar(trace, pair.first)) - pair.radii_m
+    found[rows] = over_time(cores, way[rows], planar=is_planar(trace, pair.first)) - pair.radii_m
     return found
 
 
@@ -384,8 +373,7 @@ def distances_when_there(trace: Trace, robot: str) -> dict[str, float]:
     row = np.minimum(lifetimes(trace)[0], last)
     place = trace.position(robot)[row]
     for some, origin in carried(trace):
-        if origin is not None:
-            place[some] -= origin[row[some]]
+        place[some] -= origin[row[some]]
     apart = away_from(parts.cores, place, planar=is_planar(trace, robot)).distance
     return dict(zip(parts.names, np.minimum.reduceat(apart, parts.first).tolist(), strict=True))
 
@@ -426,8 +414,7 @@ def apart_of(trace: Trace) -> Array:
     for robot in robots:
         apart, place = np.empty(len(parts.owner)), trace.body(robot)
         for some, origin in carried(trace):
-            way = place if origin is None else place - origin
-            apart[some] = apart_by_blocks(parts.cores.take(some), way).min(axis=1) - off[robot]
+            apart[some] = apart_by_blocks(parts.cores.take(some), place - origin).min(axis=1) - off[robot]
         least = np.minimum.reduceat(apart, parts.first) if len(apart) else apart
         found |= {(robot, name): bound for name, bound in zip(parts.names, least.tolist(), strict=True)}
     first, second = np.triu_indices(len(robots), 1)
@@ -480,8 +467,7 @@ def snapshot(trace: Trace, names: Iterable[str], t_s: float) -> dict[str, Any]:
     fixed = dict[str, list[float]]()
     for name, cores in cores_of(trace).items():
         if name in given and moving:
-            way = origin_of(trace, name)
-            origin = np.zeros(3) if way is None else interpolate(t, way, t_s)
+            origin = interpolate(t, origin_of(trace, name), t_s)
             there = nearest_point(cores, places[moving[0]] - origin, planar=is_planar(trace, moving[0]))
             fixed[name] = (origin + there).tolist()
     return {

@@ -90,8 +90,7 @@ def periods_of(trace: Trace, pair: Pair) -> Periods:
     row = ends[which]
     around = np.append(row, ends[which[-1:] + 1])  # the ends, too
     cores, planar, keeps = cores_of(trace)[pair.second], is_planar(trace, pair.first), pair.keeps_m(period)
-    first, way = trace.position(pair.first)[around], origin_of(trace, pair.second)
-    origin = np.zeros_like(first) if way is None else way[around]
+    first, origin = trace.position(pair.first)[around], origin_of(trace, pair.second)[around]
     away = away_from(cores.take((slice(None), None)), (first - origin)[:-1], planar=planar)
     nearest, k = away.distance.argmin(axis=0), np.arange(len(row))
     last = last_period(trace) if len(which) and which[-1] == len(ends) - 2 else Fraction(1)
