@@ -23,15 +23,9 @@ from airground_drake.verify.registry import model_claims, run_claims
 
 def verdicts_to_pandas(verdicts: Iterable[Verdict]) -> pd.DataFrame:
     """A row per verdict: claim, run ('' for the model), status, how often tested, margin, unit, quantity, expected."""
-    columns = ["claim", "run", "status", "exercised", "margin", "unit", "quantity", "expected"]
-    rows = [
-        (
-            verdict.claim.id, verdict.run, verdict.status, verdict.exercised, verdict.margin,
-            verdict.unit, verdict.quantity, verdict.expected,
-        )
-        for verdict in verdicts
-    ]  # fmt: skip
-    return pd.DataFrame(rows, columns=columns)
+    columns = ["run", "status", "exercised", "margin", "unit", "quantity", "expected"]
+    rows = [(verdict.claim.id, *(getattr(verdict, name) for name in columns)) for verdict in verdicts]
+    return pd.DataFrame(rows, columns=["claim", *columns])
 
 
 def judge(trace: Trace, claims: Collection[str] | None = None, progress: Progress = SILENT) -> list[Verdict]:

@@ -174,17 +174,29 @@ class SafeHyp(TraceClaim):
 
     def check(self, trace: Trace) -> Finding:
         """Evaluate all hypotheses; the first violation in time is the counterexample."""
-        kept = sorted(guarantees(trace), key=lambda one: one.margin_m)
+        kept = sorted(guarantees(trace), key=lambda promised: promised.margin_m)
         others = [*_static(trace), *_sampled(trace), *_of_plants(trace), *_beside_moving(trace)]
-        moving, shares, own = beside_moving(trace), least_shares(trace), own_plants(trace)
         different = list(differences(trace))
         broken = [h.at(int(k)) for h in [*others, *_avoidance(trace, kept)] for k in h.broken()[:1]]
         broken += [{"hypothesis": BUILT, "t_s": float(trace.t[0]), **each} for each in different[:1]]
         first = min(broken, key=lambda entry: float(entry["t_s"]), default=None)
-        worst, listed = _worst(others), [_listed(trace, one) for one in kept[:MOST_LISTED]]
+        worst, listed = _worst(others), [_listed(trace, promised) for promised in kept[:MOST_LISTED]]
         shown = _shown(first, worst, listed, kept)
         name = shown["hypothesis"]
         in_range, binding = _binding(trace)
+        evidence = Hypotheses(
+            e_m=float(max((promised.missed_m.max() for promised in kept), default=0.0)),
+            guarantee_m=_finite(kept[0].gap_m) if kept else None,
+            pairs=listed,
+            pairs_in_reach=len(kept),
+            different_parameters=different,
+            worst=worst,
+            inequalities_in_range=in_range,
+            inequalities_that_bind=binding,
+        )
+        more: dict[str, Sequence[Any]] = {
+            "beside_moving": beside_moving(trace), "least_shares": least_shares(trace), "own_plants": own_plants(trace)
+        }  # fmt: skip
         return Finding(
             "refuted" if first else "holds",
             margin=shown.get("margin"),
@@ -192,21 +204,7 @@ class SafeHyp(TraceClaim):
             quantity="distance promised less the safe one" if name == AVOIDANCE else f"least slack of {name!r}",
             where={key: shown[key] for key in shown if key not in ("margin", "unit")},
             counterexample=_against(trace, first, broken) if first else None,
-            evidence=asdict(
-                Hypotheses(
-                    float(max((one.missed_m.max() for one in kept), default=0.0)),
-                    _finite(kept[0].gap_m) if kept else None,
-                    listed,
-                    len(kept),
-                    different,
-                    worst,
-                    in_range,
-                    binding,
-                )
-            )
-            | ({"beside_moving": [asdict(each) for each in moving]} if moving else {})
-            | ({"least_shares": [asdict(each) for each in shares]} if shares else {})
-            | ({"own_plants": [asdict(each) for each in own]} if own else {}),
+            evidence=asdict(evidence) | {key: [asdict(row) for row in rows] for key, rows in more.items() if rows},
             exercised=sum(binding.values()),
         )
 

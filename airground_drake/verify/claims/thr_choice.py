@@ -92,15 +92,15 @@ class ThrChoice(ModelClaim):
         numbers = [inputs[name] for name in NUMBERS]
         rule, zeta = rule_of(inputs), float(inputs["zeta_m"])
         optimum = float(rule.zeta(rule.root.low))
-        least, risk = (float(bayes_risk(each, *numbers)) for each in (optimum, zeta))
+        least, risk = (float(bayes_risk(at, *numbers)) for at in (optimum, zeta))
         off = abs(zeta - optimum)
         optimal = off <= EQUAL * optimum
         evidence = ThresholdChoice(
-            "optimal" if optimal else "declared",
-            inputs["rule"],
-            zeta,
-            optimum,
-            float(printed_threshold(*numbers)),
+            kind="optimal" if optimal else "declared",
+            rule=inputs["rule"],
+            threshold_in_force_m=zeta,
+            optimal_threshold_m=optimum,
+            threshold_as_printed_in_19_m=float(printed_threshold(*numbers)),
             risk_in_force=risk,
             least_risk=least,
             extra_risk=max(round(risk - least, DIGITS), 0.0),

@@ -182,8 +182,8 @@ def _encounter(trace: Trace, least: Gap) -> Encounter:
     drove_on = doing == "under way" or (doing == "nobody" and appeared and _is_late(trace, pair.first))
     under_way_m = _way_m(trace, pair, gaps, least.t_s) if drove_on else 0.0
     found = Encounter(
-        pair.first, pair.second, pair.required_m, max(least.gap_m, 0.0), t_s, bool(len(hits)), doing, under_way_m,
-        appeared,
+        first=pair.first, second=pair.second, required_m=pair.required_m, gap_m=max(least.gap_m, 0.0), t_s=t_s,
+        collided=bool(len(hits)), doing=doing, under_way_m=under_way_m, appeared=appeared,
     )  # fmt: skip
     return _with_reaction(trace, pair, gaps, found) if pair.speed_m_s > 0.0 else found
 
@@ -221,21 +221,24 @@ def _with_reaction(trace: Trace, pair: Pair, gaps: Array, found: Encounter) -> E
     periods, t_s = periods_of(trace, pair), found.t_s
     before = np.flatnonzero((trace.t[periods.row] < t_s) | (periods.row == pair.row))
     k = int(before[-1])
-    given, samples = inequalities_of(trace, pair.first), trace.sample_rows
-    number = np.searchsorted(samples, periods.row)
-    blocked = [_blocked_by(trace, pair, periods, int(each), given, int(number[each])) for each in before]
-    short = pair.required_m - DISTANCE_TOLERANCE_M
-    held = [bool(each) and gaps[row] < short for each, row in zip(blocked, periods.row[before], strict=True)]
-    end = max((each for each in range(len(held)) if held[each]), default=-1)
-    begin = end
-    while begin > 0 and held[begin - 1]:
-        begin -= 1
-    ends = np.append(trace.t[periods.row], t_s)
-    caught = (float(ends[begin]), float(min(ends[end + 1], max(t_s, ends[end])))) if end >= 0 else ()
+    given = inequalities_of(trace, pair.first)
+    number = np.searchsorted(trace.sample_rows, periods.row)
+    blocked = [_blocked_by(trace, pair, periods, period, given, int(number[period])) for period in before.tolist()]
+    short = gaps[periods.row[before]] < pair.required_m - DISTANCE_TOLERANCE_M
+    held = np.array([bool(names) for names in blocked]) & short
+    caught: tuple[float, ...] = ()
+    names = dict[str, None]()
+    if held.any():
+        end = int(np.flatnonzero(held)[-1])
+        begin = int(
+            np.flatnonzero(~np.append(False, held[:end]))[-1]
+        )  # after the last period before in which it was free
+        ends = np.append(trace.t[periods.row], t_s)
+        caught = float(ends[begin]), float(min(ends[end + 1], max(t_s, ends[end])))
+        names = dict.fromkeys(name for of_period in blocked[begin : end + 1] for name in of_period)
     velocity = periods.velocity[k]
     speed, limit = float(np.linalg.norm(velocity)), trace.scenario.robots[pair.first].max_speed_m_s
     away = float(periods.normal[k] @ velocity)
-    names = dict.fromkeys(name for each in blocked[begin : end + 1] for name in each) if end >= 0 else {}
     return found._replace(
         reaction=_reaction(speed, away, limit), speed_m_s=speed, blocked_by=(*names,), caught_s=caught
     )

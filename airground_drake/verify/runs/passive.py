@@ -106,8 +106,9 @@ def periods_of(trace: Trace, pair: Pair) -> Periods:
     moved = np.linalg.norm(np.diff(origin, axis=0), axis=1)
     lasting = np.diff(trace.t[around])
     return Periods(
-        pair, row, away.distance[nearest, k], away.normal[nearest, k], keeps, missed,
-        moved > pair.speed_m_s * lasting + DISTANCE_TOLERANCE_M, trace.chosen(pair.first)[which],
+        pair=pair, row=row, apart_m=away.distance[nearest, k], normal=away.normal[nearest, k], keeps_m=keeps,
+        missed_m=missed, too_fast=moved > pair.speed_m_s * lasting + DISTANCE_TOLERANCE_M,
+        velocity=trace.chosen(pair.first)[which],
     )  # fmt: skip
 
 
@@ -158,13 +159,22 @@ def beside_moving(trace: Trace) -> list[BesideMoving]:
 
 def _beside_each(trace: Trace) -> Iterator[BesideMoving]:
     fast, slop = speeds(trace), DISTANCE_TOLERANCE_M / trace.scenario.control.period_s
-    for one in beside(trace):
-        pair, of_body = one.pair, fast.get(one.pair.second, np.zeros(1))
-        over = np.flatnonzero(of_body > pair.speed_m_s + slop)
+    for periods in beside(trace):
+        pair = periods.pair
+        speed = fast.get(pair.second, np.zeros(1))
+        over = np.flatnonzero(speed > pair.speed_m_s + slop)
         yield BesideMoving(
-            pair.first, pair.second, pair.required_m, pair.speed_m_s, float(of_body.max()),
-            float(trace.t[period_ends(trace)[over[0]]]) if len(over) else None,
-            float(of_body[over[0]]) if len(over) else None,
-            len(one.row), int(one.kept.sum()), int(one.passive.sum()), int(one.retreated.sum()), int(one.stood.sum()),
-            float(one.missed_m.max(initial=0.0)),
-        )  # fmt: skip
+            first=pair.first,
+            second=pair.second,
+            safe_distance_m=pair.required_m,
+            declared_m_s=pair.speed_m_s,
+            fastest_m_s=float(speed.max()),
+            too_fast_s=float(trace.t[period_ends(trace)[over[0]]]) if len(over) else None,
+            too_fast_m_s=float(speed[over[0]]) if len(over) else None,
+            periods=len(periods.row),
+            kept_periods=int(periods.kept.sum()),
+            passive_periods=int(periods.passive.sum()),
+            retreating_periods=int(periods.retreated.sum()),
+            standing_periods=int(periods.stood.sum()),
+            e_m=float(periods.missed_m.max(initial=0.0)),
+        )

@@ -52,8 +52,9 @@ def _sent(trace: Trace, row: Mapping[Any, Any]) -> ProposalRecord:
     if len(party) != len(row["party"]) or (party and row["robot"] not in party):
         raise TraceError(f"{label}: not in the joint plan of the UGVs {list(row['party'])}")
     return ProposalRecord(
-        int(row["number"]), str(row["robot"]), str(row["policy"]), float(row["issued_s"]), times,
-        places.reshape(-1, 3), selection.reshape(-1, 3), outlines, str(row["cause"]), party,
+        number=int(row["number"]), ugv=str(row["robot"]), policy=str(row["policy"]), issued_s=float(row["issued_s"]),
+        times_s=times, positions_m=places.reshape(-1, 3), selection=selection.reshape(-1, 3), mapped=outlines,
+        cause=str(row["cause"]), party=party,
     )  # fmt: skip
 
 
