@@ -60,7 +60,8 @@ class LiveGate(LiveWait):
     def seen_in(self, trace: Trace) -> tuple[int, int]:
         """The acceptances during which no obstacle was new and none in range may move, and all."""
         accepted = [acceptance for of_ugv in acceptances(trace).values() for acceptance in of_ugv]
-        return sum(not each.news_s and not _beside_a_mover(trace, each) for each in accepted), len(accepted)
+        met = [acceptance for acceptance in accepted if not (acceptance.news_s or _beside_a_mover(trace, acceptance))]
+        return len(met), len(accepted)
 
 
 def _beside_a_mover(trace: Trace, acceptance: Acceptance) -> bool:

@@ -56,12 +56,14 @@ class LiveGoal(TraceClaim):
         if unknown := set(stalls) - set(trace.ugvs):
             raise TraceError(f"stalls_m names {sorted(unknown)}, which are not UGVs of the trace")
         judged = list(_conditions(trace, stalls))
+        conditions = [condition.entry for condition in judged]
+        had_a_way = [condition.entry["robot"] for condition in judged if condition.had_a_way]
         hits = first_collisions(trace.events)
-        for entry in (one.entry for one in judged if one.entry["robot"] in hits):
-            entry["collided_s"] = hits[entry["robot"]]["t_s"]
-        conditions, had_a_way = [one.entry for one in judged], [one.entry["robot"] for one in judged if one.had_a_way]
-        worst = min(conditions, key=lambda one: (one["margin_m"] >= 0.0, "collided_s" not in one, one["margin_m"]))
-        live = all(one["margin_m"] >= 0.0 for one in conditions)
+        for entry in conditions:
+            if entry["robot"] in hits:
+                entry["collided_s"] = hits[entry["robot"]]["t_s"]
+        worst = min(conditions, key=lambda at: (at["margin_m"] >= 0.0, "collided_s" not in at, at["margin_m"]))
+        live = worst["margin_m"] >= 0.0
         return Finding(
             "holds" if live else "refuted",
             margin=worst["margin_m"],

@@ -97,7 +97,7 @@ class SafeDist(TheoremClaim):
     def inputs(self, scenario: Scenario) -> dict[str, Any]:
         """The constants of SAFE-INV, and the bound on the disturbance, m/s."""
         given = constants(scenario)
-        least = float(min(each.safe_m for each in kinds_of(given)))
+        least = float(min(pair.safe_m for pair in kinds_of(given)))
         fastest = max(robot.max_speed_m_s for robot in scenario.robots.values())
         return {**given, "disturbance_m_s": min(0.1 * fastest, given["avoidance_gain_1_s"] * least / 4.0)}
 
@@ -111,8 +111,8 @@ class SafeDist(TheoremClaim):
         if gain <= 0:
             return found
         return found + [
-            Hypothesis.of(self.margin_of, f"{each.kind}: d - W/A is above 0", left_m(inputs, each), "m", strict=True)
-            for each in kinds_of(inputs)
+            Hypothesis.of(self.margin_of, f"{pair.kind}: d - W/A is above 0", left_m(inputs, pair), "m", strict=True)
+            for pair in kinds_of(inputs)
         ]
 
     def evidence(self, inputs: dict[str, Any], **proof: Any) -> LeastDistances:

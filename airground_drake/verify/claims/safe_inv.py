@@ -93,21 +93,21 @@ class SafeInv(TheoremClaim):
                 f"{kind}: the shares of both bodies add up to 1",
                 -abs(sum(SHARES[kind], Fraction(-1))),
             )
-            for kind in dict.fromkeys(each.kind for each in pairs)
+            for kind in dict.fromkeys(pair.kind for pair in pairs)
         ]
         apart = [
-            Hypothesis.of("safe distance", f"{each.kind}: the safe distance is above 0", each.safe_m, "m", strict=True)
-            for each in pairs
+            Hypothesis.of("safe distance", f"{pair.kind}: the safe distance is above 0", pair.safe_m, "m", strict=True)
+            for pair in pairs
         ]
         ranges = [
             Hypothesis.of(
                 self.margin_of,
-                f"{each.kind}: the sensing range {float(reach):g} m is at least d + c h = {float(each.safe_m):g} m "
-                f"between centre and core + {float(each.closing_m_s):g} m/s * {float(h):g} s",
-                reach - each.safe_m - each.closing_m_s * h,
+                f"{pair.kind}: the sensing range {float(reach):g} m is at least d + c h = {float(pair.safe_m):g} m "
+                f"between centre and core + {float(pair.closing_m_s):g} m/s * {float(h):g} s",
+                reach - pair.safe_m - pair.closing_m_s * h,
                 "m",
             )
-            for each in pairs
+            for pair in pairs
         ]
         return [*stable(gain, h), *shares, *apart, *ranges]
 

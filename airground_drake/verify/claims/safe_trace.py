@@ -97,7 +97,7 @@ class SafeTrace(TraceClaim):
             if safe
             else asdict(worst) | _place(trace, worst) | _why(trace, worst) | snapshot(trace, both, worst.t_s),
             evidence={
-                "pairs": [asdict(each) for each in listed],
+                "pairs": [asdict(distance) for distance in listed],
                 "pairs_in_all": len(pairs),
                 "encounters": [encounter._asdict() for encounter in encounters(trace)[:MOST_LISTED]],
                 "tolerance_m": DISTANCE_TOLERANCE_M,
@@ -136,4 +136,5 @@ def _place(trace: Trace, worst: Distance) -> dict[str, list[float]]:
 
 def _why(trace: Trace, worst: Distance) -> dict[str, str]:
     """Whose doing it was."""
-    return {"why": next(each.told(trace) for each in encounters(trace) if each[:2] == (worst.first, worst.second))}
+    both = worst.first, worst.second
+    return {"why": next(encounter.told(trace) for encounter in encounters(trace) if encounter[:2] == both)}

@@ -85,7 +85,7 @@ class ThrOpt(TheoremClaim):
         """Add the enclosures of both roots and of the drifts, and the risks."""
         rule, zeta = rule_of(inputs), inputs["zeta_m"]
         root, printed = rule.root, rule.printed_root
-        numbers = [inputs[each] for each in NUMBERS]
+        numbers = [inputs[name] for name in NUMBERS]
         return Optimum(
             enclosures={**as_floats(rule, root), **as_floats(rule, printed, "printed_")},
             optimal_for_drifts_m_s=_drifts(rule, decimal(zeta)),

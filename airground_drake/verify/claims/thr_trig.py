@@ -109,10 +109,10 @@ class ThrTrig(TraceClaim):
         """Compare the events of each UGV with the recomputed ones; the first disagreement is the counterexample."""
         levels = levels_of(trace)
         judged = [_judged(trace, ugv, levels) for ugv in trace.ugvs]
-        wrong = [*_of_strangers(trace), *(conflict for one in judged for conflict in one.wrong)]
-        due = Counter(kind for one in judged for kind in _as_transitions(one.predicted))
-        replayed = [one.evidence for one in judged]
-        lags = [(one.worst_time_difference_s, one.robot) for one in replayed if one.events]
+        wrong = [*_of_strangers(trace), *(conflict for ugv in judged for conflict in ugv.wrong)]
+        due = Counter(kind for ugv in judged for kind in _as_transitions(ugv.predicted))
+        replayed = [ugv.evidence for ugv in judged]
+        lags = [(ugv.worst_time_difference_s, ugv.robot) for ugv in replayed if ugv.events]
         worst = max(lags) if lags and not wrong else None
         return Finding(
             "refuted" if wrong else "holds",

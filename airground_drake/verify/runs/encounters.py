@@ -81,18 +81,18 @@ def own_margins(trace: Trace, pair: Pair, robot: str) -> OwnMargins:
     keeps, off_m = pair.keeps_m(trace.scenario.control.period_s) - pair.cover_m, off_m_of(trace, robot)
     step = steps_of(trace, robot)
     bounds = apart_by_blocks(cores, place - origin).min(axis=1)
-    each = cores.take(np.flatnonzero(bounds <= max(keeps, pair.safe_m) + step.max())).take((slice(None), None))
+    beside = cores.take(np.flatnonzero(bounds <= max(keeps, pair.safe_m) + step.max())).take((slice(None), None))
     found = OwnMargins(np.full(len(rows), np.inf), np.full(len(rows), np.inf))
-    if not len(each.base):
+    if not len(beside.base):
         return found
-    at_sample = away_from(each, place[sample] - origin[sample], planar=planar).distance.min(axis=0)
+    at_sample = away_from(beside, place[sample] - origin[sample], planar=planar).distance.min(axis=0)
     there = (sample >= pair.row) & (rows < pair.last)
     gaps, short = gap_over_time(trace, pair), pair.required_m - DISTANCE_TOLERANCE_M
     broken = there & (rows >= _first_apart(pair, gaps)) & (np.minimum(gaps[:-1], gaps[1:]) < short)
     near = there & ((at_sample <= keeps + step) | broken)
     start, end = (place[rows[near] + k] - origin[sample[near]] for k in (0, 1))
-    least = least_distances(each, start, end, planar=planar)[0].min(axis=0, initial=np.inf) - off_m
-    steered = _steered(trace, pair, robot, each, sample[near]) - pair.cover_m
+    least = least_distances(beside, start, end, planar=planar)[0].min(axis=0, initial=np.inf) - off_m
+    steered = _steered(trace, pair, robot, beside, sample[near]) - pair.cover_m
     of_law = np.minimum(np.minimum(steered, at_sample[near]), keeps)
     of_body = np.where(broken[near], np.minimum(at_sample[near], pair.safe_m), -np.inf)
     due = np.maximum(of_law, of_body)
@@ -100,7 +100,7 @@ def own_margins(trace: Trace, pair: Pair, robot: str) -> OwnMargins:
         row = int(rows[near][k])
         parts = min(ceil((off_m / BENT_M) ** 0.5), MOST_PARTS)
         fine = bent(trace, robot, row, np.linspace(0.0, 1.0, parts + 1)) - origin[sample[row]]
-        least[k] = least_distances(each, fine[:-1], fine[1:], planar=planar)[0].min() - off_m / parts**2
+        least[k] = least_distances(beside, fine[:-1], fine[1:], planar=planar)[0].min() - off_m / parts**2
     found.of_law[near], found.of_body[near] = least - of_law, least - of_body
     return found
 
@@ -111,11 +111,11 @@ def _first_apart(pair: Pair, gaps: Array) -> int:
     return pair.row + int(apart[0]) if len(apart) else len(gaps)
 
 
-def _steered(trace: Trace, pair: Pair, robot: str, each: Cores, rows: Indices) -> Array:
+def _steered(trace: Trace, pair: Pair, robot: str, beside: Cores, rows: Indices) -> Array:
     """Distances of the steered points of a pair, or of one from the cores of an obstacle, at some rows, m."""
     other = pair.second if robot == pair.first else pair.first
     origin = trace.position(other) if other in trace.robots else origin_of(trace, other)
-    away = away_from(each, (trace.position(robot) - origin)[rows], planar=is_planar(trace, robot))
+    away = away_from(beside, (trace.position(robot) - origin)[rows], planar=is_planar(trace, robot))
     return np.asarray(away.distance.min(axis=0))
 
 

@@ -207,8 +207,8 @@ def contacts(trace: Trace, places: Array, rows: Indices, reach: float, *, planar
     for some, origin in carried(trace):
         near = within(parts.cores.take(some), places - origin[rows], reach, planar=planar)
         found.append(near._replace(core=some[near.core]))
-    place, core = (np.concatenate([each[k] for each in found]) for k in (0, 1))
-    distance, normal = (np.concatenate([each.away[k] for each in found]) for k in (0, 1))
+    place, core = (np.concatenate([contact[k] for contact in found]) for k in (0, 1))
+    distance, normal = (np.concatenate([contact.away[k] for contact in found]) for k in (0, 1))
     first, last = lifetimes(trace)
     there = np.flatnonzero((first[core] <= rows[place]) & (rows[place] < last[core]))
     there = there[np.lexsort([core[there], place[there]])]
@@ -292,8 +292,8 @@ def _least_of_bent(trace: Trace, pair: Pair, off_m: float) -> Approach:
     """The least distance of a pair whose bodies do not move straight: segments that may be too near are divided."""
     cores, planar = cores_of(trace).get(pair.second, Cores.at(np.zeros((1, 3)))), is_planar(trace, pair.first)
     way = seen_from(trace, pair.first, pair.second)[pair.rows]
-    each = cores.take((slice(None), None))
-    lower = least_distances(each, way[:-1], way[1:], planar=planar)[0].min(axis=0) - off_m
+    beside = cores.take((slice(None), None))
+    lower = least_distances(beside, way[:-1], way[1:], planar=planar)[0].min(axis=0) - off_m
     most, t = min(ceil((off_m / BENT_M) ** 0.5), MOST_PARTS), trace.t[pair.rows]
     found = list[Approach]()
     for k in sorted(np.flatnonzero(lower < pair.safe_m).tolist(), key=lower.__getitem__):
@@ -304,7 +304,7 @@ def _least_of_bent(trace: Trace, pair: Pair, off_m: float) -> Approach:
             shares = np.linspace(0.0, 1.0, parts + 1)
             places = [bent(trace, name, pair.row + k, shares) for name in (pair.first, pair.second)]
             fine = places[0] - places[1]
-            least, where = least_distances(each, fine[:-1], fine[1:], planar=planar)
+            least, where = least_distances(beside, fine[:-1], fine[1:], planar=planar)
             least, where = least.min(axis=0), where[least.argmin(axis=0), np.arange(parts)]
             j = int(np.argmin(least))
             nearest = Approach(

@@ -120,8 +120,8 @@ def beside(trace: Trace) -> list[Periods]:
 def speeds(trace: Trace) -> dict[str, Array]:
     """Mean speeds of the obstacles that move during the control periods, (K,), m/s, by name; 0 while not there."""
     ends, found = period_ends(trace), dict[str, Array]()
-    for name, each in trace.scenario.barriers.items():
-        if each.moves:
+    for name, barrier in trace.scenario.barriers.items():
+        if barrier.moves:
             speed = np.linalg.norm(np.diff(trace.position(name)[ends], axis=0), axis=1) / np.diff(trace.t[ends])
             there = (ends[:-1] >= trace.there_from(name)) & (ends[:-1] < trace.there_until(name))
             found[name] = np.where(there, speed, 0.0)
