@@ -79,8 +79,6 @@ class Plans(Choices):
 
 
 class GatePlan(GateClaim):
-    """GATE-PLAN."""
-
     id = "GATE-PLAN"
     subject = "plans of the gatekeeper"
     summary = "Every decision rests on a plan that is feasible and costs what was recorded."

@@ -20,8 +20,6 @@ class LatestEnd(Proof):
 
 
 class LiveGate(LiveWait):
-    """LIVE-GATE; its hypotheses are those of LIVE-WAIT."""
-
     id = "LIVE-GATE"
     summary = "An accepted intervention is carried through to its end, unless a new obstacle is sensed."
     statement = (
@@ -54,7 +52,6 @@ class LiveGate(LiveWait):
     theorems = ("Patience.kept", "Patience.over_in_time")
 
     def evidence(self, inputs: dict[str, Any], **proof: Any) -> Proof:
-        """Add the longest that an accepted intervention may last."""
         return LatestEnd(over_after_s=float(inputs["longest_s"] + inputs["period_s"]), **proof)
 
     def seen_in(self, trace: Trace) -> tuple[int, int]:

@@ -22,8 +22,6 @@ AT_REST_M = 1e-3
 
 
 class LiveGoal(TraceClaim):
-    """LIVE-GOAL."""
-
     id = "LIVE-GOAL"
     subject = "arrival"
     summary = "Every robot ended where it must: at its target, or where the scenario says that it stalls."
@@ -51,7 +49,6 @@ class LiveGoal(TraceClaim):
     exercised_by = "robots that had a way to go to where they must end"
 
     def check(self, trace: Trace) -> Finding:
-        """Compare each robot's end with what its scenario declares; the least margin is reported."""
         stalls = trace.scenario.runs[trace.run].stalls_m
         if unknown := set(stalls) - set(trace.ugvs):
             raise TraceError(f"stalls_m names {sorted(unknown)}, which are not UGVs of the trace")

@@ -26,8 +26,6 @@ class Followed:
 
 
 class LiveHyp(GateClaim):
-    """LIVE-HYP."""
-
     id = "LIVE-HYP"
     summary = "No UGV followed the UAV more often or longer than it may, or changed its mind without a new obstacle."
     statement = (

@@ -119,8 +119,6 @@ class Hypotheses:
 
 
 class SafeHyp(TraceClaim):
-    """SAFE-HYP."""
-
     id = "SAFE-HYP"
     subject = "conditions of the proof"
     summary = "Every step of the run met the conditions under which the safety theorem (SAFE-INV) holds."

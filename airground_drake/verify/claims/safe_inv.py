@@ -19,8 +19,6 @@ from airground_drake.verify.model.theorem import Hypothesis, TheoremClaim
 
 
 class SafeInv(TheoremClaim):
-    """SAFE-INV."""
-
     id = "SAFE-INV"
     subject = "proof of distances"
     summary = "A robot that obeys the avoidance inequalities and starts at a safe distance keeps it."
@@ -79,11 +77,9 @@ class SafeInv(TheoremClaim):
     margin_of = "sensing range less d + c h"
 
     def inputs(self, scenario: Scenario) -> dict[str, Any]:
-        """Gain, period, sensing range; safe distances and closing speeds of the pairs."""
         return constants(scenario)
 
     def hypotheses(self, inputs: dict[str, Any]) -> list[Hypothesis]:
-        """A h is at most 1, shares add up to 1, d is above 0, the sensing range covers d + c h."""
         gain, h = decimal(inputs["avoidance_gain_1_s"]), decimal(inputs["period_s"])
         reach = decimal(inputs["sensing_range_m"])
         pairs = kinds_of(inputs)

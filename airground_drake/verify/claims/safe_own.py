@@ -19,8 +19,6 @@ MOST_LISTED = 300  # pairs that the evidence lists at most: those of least margi
 
 
 class SafeOwn(TraceClaim):
-    """SAFE-OWN."""
-
     id = "SAFE-OWN"
     subject = "the robots' own doing"
     summary = "No robot itself brought a distance below the required one, whatever the obstacles that move did."

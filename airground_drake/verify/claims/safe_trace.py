@@ -27,8 +27,6 @@ MOST_LISTED = 300  # pairs that the evidence lists at most: those of least margi
 
 
 class SafeTrace(TraceClaim):
-    """SAFE-TRACE."""
-
     id = "SAFE-TRACE"
     subject = "distances"
     summary = "No robot came closer to an obstacle or to another robot than the safe distance."
@@ -73,7 +71,6 @@ class SafeTrace(TraceClaim):
     )
 
     def check(self, trace: Trace) -> Finding:
-        """Compare the minimum distance of each pair with its safe distance; the worst pair gives the margin."""
         pairs = pairs_of(trace)
 
         @cache

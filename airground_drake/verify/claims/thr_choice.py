@@ -57,8 +57,6 @@ class ThresholdChoice(Evidence):
 
 
 class ThrChoice(ModelClaim):
-    """THR-CHOICE."""
-
     id = "THR-CHOICE"
     subject = "choice of the threshold"
     summary = "The threshold in force is the best one for the scenario's own numbers, or it is declared by the user."
@@ -88,7 +86,6 @@ class ThrChoice(ModelClaim):
         return ThrRoot().inputs(scenario)
 
     def check(self, inputs: dict[str, Any]) -> Finding:
-        """Compare the threshold in force with the optimum, and their risks."""
         numbers = [inputs[name] for name in NUMBERS]
         rule, zeta = rule_of(inputs), float(inputs["zeta_m"])
         optimum = float(rule.zeta(rule.root.low))
@@ -131,7 +128,6 @@ class ThrChoice(ModelClaim):
         }
 
     def with_runs(self, finding: Finding, seen: Sequence[dict[str, Measured]]) -> Finding:
-        """Add these UGVs."""
         if not isinstance(finding.evidence, ThresholdChoice):
             return finding
         runs = {name: row for of_run in seen for name, row in of_run.items()}

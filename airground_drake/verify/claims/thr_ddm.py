@@ -57,8 +57,6 @@ class Comparisons(Evidence):
 
 
 class ThrDdm(ModelClaim):
-    """THR-DDM."""
-
     id = "THR-DDM"
     summary = "Simulated decisions take as long, and err as often, as the formulas say."
     statement = (
@@ -92,12 +90,10 @@ class ThrDdm(ModelClaim):
     exercised_by = "simulated paths"
 
     def inputs(self, scenario: Scenario) -> dict[str, Any]:
-        """The numbers of the threshold rule."""
         rule = scenario.decision.threshold
         return {name: getattr(rule, name) for name in NUMBERS}
 
     def check(self, inputs: dict[str, Any]) -> Finding:
-        """Simulate and compare."""
         return compare(experiments(inputs), running)
 
 

@@ -76,8 +76,6 @@ class Quality:
 
 
 class ThrQuality(TraceClaim):
-    """THR-QUALITY."""
-
     id = "THR-QUALITY"
     subject = "timing of triggers"
     summary = "The UAV stepped in when the real task error, without noise, was about at the threshold."

@@ -55,8 +55,6 @@ def _is_root(rule: Threshold, zeta: float) -> bool:
 
 
 class ThrTrig(TraceClaim):
-    """THR-TRIG."""
-
     id = "THR-TRIG"
     subject = "triggers"
     summary = "The UAV stepped in exactly when the error reached the threshold: never late, never without cause."
