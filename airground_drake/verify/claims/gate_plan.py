@@ -138,13 +138,40 @@ class GatePlan(GateClaim):
         """Judge every plan; the margin is the largest gap."""
         if trace.meta["method"] not in ON_TOP:
             return _judge_outcomes(trace, rows)
-        planned, rounded = [row for row in rows if row.planned], [row for row in rows if is_rounded(row)]
+        planned = [row for row in rows if row.planned]
+        rounded = [row for row in rows if is_rounded(row)]
         compared = [deviation for row in rows for deviation in compare_plan(trace, row)]
         compared += [deviation for row in rounded for deviation in compare_rounding(row)]
         blocks = int(trace.scenario.gatekeeper.blocks)
         bounded = bound([row for row in planned if row.unit_normals], blocks)
-        evidence = _plans(trace, rows, bounded, compared, blocks)
-        known = evidence.optimum == "known"
+        bounded.sort(key=lambda decision: -decision.gap)
+        widest = max((decision.width for decision in bounded), default=0.0)
+        slack = [float(np.maximum(0.0, -row.clearance(row["positions_m"])).max()) for row in planned]
+        beside_all = [above_the_best(row, blocks) for row in planned if min(blocks or row.stages, row.stages) <= BLOCKS]
+        optimum = "known" if planned else "unknown: no decision rests on a plan"
+        if len(bounded) < len(planned):
+            optimum = f"unknown: {len(planned) - len(bounded)} of {len(planned)} plans have no half-planes"
+        elif widest > WIDEST:
+            optimum = f"unknown: the bounds of an optimum are {widest:.2g} apart"
+        evidence = Plans(
+            decisions=len(rows),
+            reasons=reasons_of(trace),
+            comparisons=len(compared),
+            wrong=sum(deviation.wrong for deviation in compared),
+            optimum=optimum,
+            enumerated=len(beside_all),
+            largest_gap_to_enumeration=max(beside_all, default=None),
+            without_a_plan=[row.label for row in rows if not row.planned],
+            largest_slack_m=max(slack, default=0.0),
+            plans_with_slack=sum(value > 0.0 for value in slack),
+            rounded_plans=len(rounded),
+            largest_rounding_error_s=max(map(integrated_error_s, rounded), default=0.0),
+            largest_gaps=[{"t_s": each.row.t_s, "robot": each.row.robot, "gap": each.gap} for each in bounded[:5]],
+            median_gap=float(np.median([decision.gap for decision in bounded])) if bounded else None,
+            widest_enclosure=widest,
+            first_stage_certified=sum(decision.first_stage_certified for decision in bounded),
+        )
+        known = optimum == "known"
         worst = evidence.largest_gaps[0] if known else {}
         finding = Finding(
             "holds",
@@ -156,41 +183,6 @@ class GatePlan(GateClaim):
             exercised=len(planned),
         )
         return conclude(finding, compared)
-
-
-def _plans(
-    trace: Trace, rows: Sequence[DecisionRecord], bounded: Sequence[Bounded], compared: Sequence[Deviation], blocks: int
-) -> Plans:
-    planned, rounded = [row for row in rows if row.planned], [row for row in rows if is_rounded(row)]
-    gaps, widest = [decision.gap for decision in bounded], max((decision.width for decision in bounded), default=0.0)
-    slack = [float(np.maximum(0.0, -row.clearance(row["positions_m"])).max()) for row in planned]
-    beside_all = [above_the_best(row, blocks) for row in planned if min(blocks or row.stages, row.stages) <= BLOCKS]
-    optimum = "known" if planned else "unknown: no decision rests on a plan"
-    if len(bounded) < len(planned):
-        optimum = f"unknown: {len(planned) - len(bounded)} of {len(planned)} plans have no half-planes"
-    elif widest > WIDEST:
-        optimum = f"unknown: the bounds of an optimum are {widest:.2g} apart"
-    return Plans(
-        decisions=len(rows),
-        reasons=reasons_of(trace),
-        comparisons=len(compared),
-        wrong=sum(deviation.wrong for deviation in compared),
-        optimum=optimum,
-        enumerated=len(beside_all),
-        largest_gap_to_enumeration=max(beside_all, default=None),
-        without_a_plan=[row.label for row in rows if not row.planned],
-        largest_slack_m=max(slack, default=0.0),
-        plans_with_slack=sum(value > 0.0 for value in slack),
-        rounded_plans=len(rounded),
-        largest_rounding_error_s=max(map(integrated_error_s, rounded), default=0.0),
-        largest_gaps=[
-            {"t_s": decision.row.t_s, "robot": decision.row.robot, "gap": decision.gap}
-            for decision in sorted(bounded, key=lambda decision: -decision.gap)[:5]
-        ],
-        median_gap=float(np.median(gaps)) if gaps else None,
-        widest_enclosure=widest,
-        first_stage_certified=sum(decision.first_stage_certified for decision in bounded),
-    )
 
 
 def compare_plan(trace: Trace, row: DecisionRecord) -> Iterator[Deviation]:
