@@ -133,11 +133,11 @@ def _rows(sample: PassageSample, formula: tuple[float, float], comparisons: int)
         ("error rate", "", rate, spread, [low - ERROR_ALLOWANCE, high + ERROR_ALLOWANCE], formula[1]),
     )
     constants = {**asdict(experiment), "noise_period_s": period, "barrier_m": experiment.barrier}
-    counted = wrong, sample.periods, sample.squares
     return [
         Comparison(
-            experiment.name, quantity, unit, constants, *counted, estimate, interval, value,
-            z_score=(estimate - value) / error,
+            experiment=experiment.name, quantity=quantity, unit=unit, constants=constants, wrong_decisions=wrong,
+            periods_sum=sample.periods, periods_sum_of_squares=sample.squares, estimate=estimate, interval=interval,
+            formula=value, z_score=(estimate - value) / error,
             margin=2.0 * min(value - interval[0], interval[1] - value) / (interval[1] - interval[0]),
         )
         for quantity, unit, estimate, error, interval, value in found

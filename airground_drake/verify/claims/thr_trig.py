@@ -212,11 +212,18 @@ def _judged(trace: Trace, ugv: str, levels: TriggerLevels) -> Reconstruction:
     expected = [(time, EVENT_KINDS[kind]) for time, kind in predicted if kind in EVENT_KINDS]
     recorded = recorded_events(trace, ugv)
     lag, mismatch = _compare(expected, recorded, x)
-    columns, modes = column_conflict(trace, ugv, recorded), _mode_conflict(trace, ugv, predicted)
-    found = (off, mismatch, columns, modes, noise_conflict(trace, ugv))
-    wrong = [{"robot": ugv, **conflict} for conflict in found if conflict is not None]
-    events = [{"t_s": time, "kind": kind} for time, kind in expected]
-    return Reconstruction(Replayed(ugv, events, lag, float(x.x.max()), against_15), predicted, wrong)
+    columns = column_conflict(trace, ugv, recorded)
+    modes = _mode_conflict(trace, ugv, predicted)
+    conflicts = (off, mismatch, columns, modes, noise_conflict(trace, ugv))
+    evidence = Replayed(
+        robot=ugv,
+        events=[{"t_s": time, "kind": kind} for time, kind in expected],
+        worst_time_difference_s=lag,
+        largest_decision_variable_m=float(x.x.max()),
+        port_against_15=against_15,
+    )
+    wrong = [{"robot": ugv, **conflict} for conflict in conflicts if conflict is not None]
+    return Reconstruction(evidence, predicted, wrong)
 
 
 def _as_transitions(predicted: list[Transition]) -> Iterator[str]:
