@@ -100,7 +100,7 @@ def _margins(trace: Trace) -> Iterator[OwnMargin]:
                 continue
             other = pair.second if robot == pair.first else pair.first
             margins = own_margins(trace, pair, robot).least
-            k = int(np.argmin(margins)) if not np.isnan(margins).any() else int(np.argmax(np.isnan(margins)))
+            k = int(np.argmin(margins))  # the first one that is not a number, if there is any
             if margins[k] != np.inf:
                 yield OwnMargin(robot, other, float(margins[k]), float(trace.t[k + 1]))
 

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass
-from functools import cache
+from functools import partial
 
 import numpy as np
 
 from airground_drake.scenario.schema import MAP
-from airground_drake.sim.trace import Trace
+from airground_drake.sim.trace import Trace, per_trace
 from airground_drake.verify.claim import TraceClaim
 from airground_drake.verify.finding import Finding
 from airground_drake.verify.runs.encounters import encounters
@@ -72,16 +72,12 @@ class SafeTrace(TraceClaim):
 
     def check(self, trace: Trace) -> Finding:
         pairs = pairs_of(trace)
-
-        @cache
-        def entry(k: int) -> Distance:
-            return _entry(trace, k)
-
+        entry = partial(_entry, trace)
         least = apart_of(trace) - np.array([pair.safe_m for pair in pairs])
         listed = [entry(k) for k in least_of(least, MOST_LISTED, lambda k: entry(k).margin_m)]
         reach = np.array([pair.reach_m + pair.cover_m + pair.more_m for pair in pairs])
         close_by = np.flatnonzero(least < reach).tolist()
-        worst = min(listed, key=lambda entry: entry.margin_m)
+        worst = min(listed, key=lambda distance: distance.margin_m)
         safe = worst.margin_m >= -DISTANCE_TOLERANCE_M
         both = (worst.first, worst.second)
         return Finding(
@@ -119,6 +115,7 @@ class Distance:
     exercised: bool
 
 
+@per_trace
 def _entry(trace: Trace, k: int) -> Distance:
     """Where the k-th pair was closest."""
     pair, gap_m, margin_m, t_s, row = least_gap(trace, pairs_of(trace)[k])
