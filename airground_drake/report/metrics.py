@@ -154,7 +154,7 @@ def _kept_away(trace: Trace, ugv: str) -> dict[str, Any]:
     """The obstacle that moves and at the end keeps a UGV away from its target; {} without one."""
     own = trace.scenario.ugvs[ugv]
     for pair in passive_pairs(trace):
-        if pair.first == ugv and pair.last in (None, len(trace.t) - 1):
+        if pair.first == ugv and pair.last == len(trace.t) - 1:
             apart = to_barrier(trace, pair, np.array(own.target_m))
             if apart < pair.safe_m:
                 place = trace.position(ugv)

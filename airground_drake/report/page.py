@@ -22,9 +22,9 @@ def _of_claims(report: Report) -> Iterator[Figure]:
     """The charts of claims, where `rules.CHARTS` puts them, or else beside the claim."""
     places = {*html.SECTIONS, *(f"audit-{finding.id}" for finding in report.audit)}
     with canvas.style():
-        for claim in report.claims:
+        for number, claim in enumerate(report.claims):
             if claim.figure:
                 place = rules.CHARTS.get(claim.id)
                 beside = place if place in places else claim.id
-                name, heading = "-".join(("chart", claim.id, claim.run)), claim.run and f"Run {claim.run}"
-                yield of_chart(Chart(**claim.figure), name, heading, beside)
+                heading = claim.run and f"Run {claim.run}"
+                yield of_chart(Chart(**claim.figure), f"chart-{number}", heading, beside)

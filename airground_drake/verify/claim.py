@@ -197,7 +197,7 @@ class Verdict(Finding):
         cls, claim: Claim, run: str, finding: Finding, expected: str, inputs: dict[str, Any] | None = None
     ) -> Verdict:
         """The finding, with what it is about."""
-        found = {each.name: getattr(finding, each.name) for each in fields(Finding)}
+        found = {column.name: getattr(finding, column.name) for column in fields(Finding)}
         return cls(**found, claim=claim, run=run, expected=expected, inputs=inputs or {})
 
     def __repr__(self) -> str:

@@ -96,15 +96,16 @@ class Finding:
 
     def to_json(self) -> dict[str, Any]:
         """All fields, with records as objects."""
-        return {each.name: _in_json(getattr(self, each.name)) for each in fields(Finding)}
+        return {column.name: _in_json(getattr(self, column.name)) for column in fields(Finding)}
 
 
 def _in_json(value: Any) -> Any:
     if is_dataclass(value):
-        pairs = ((each, getattr(value, each.name)) for each in fields(value))
-        return {each.name: _in_json(one) for each, one in pairs if one is not None or each.default is not None}
+        given = {column.name: getattr(value, column.name) for column in fields(value)}
+        optional = {column.name for column in fields(value) if column.default is None}
+        return {key: _in_json(item) for key, item in given.items() if item is not None or key not in optional}
     if isinstance(value, Mapping):
-        return {key: _in_json(one) for key, one in value.items()}
+        return {key: _in_json(item) for key, item in value.items()}
     if isinstance(value, np.ndarray):
         return value.tolist()
-    return [_in_json(one) for one in value] if isinstance(value, (list, tuple)) else value
+    return [_in_json(item) for item in value] if isinstance(value, (list, tuple)) else value

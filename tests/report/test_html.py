@@ -19,10 +19,11 @@ from airground_drake.report import attention, document, html
 from airground_drake.report.figures import draw
 from airground_drake.report.figures.panels import Figure
 from airground_drake.report.model import of
+from airground_drake.report.page import page as page_of
 from airground_drake.scenario.schema import Run, Scenario
 from airground_drake.sim.trace import Trace
 from airground_drake.verify.claim import Verdict
-from airground_drake.verify.finding import Finding
+from airground_drake.verify.finding import Chart, Finding
 
 HOSTILE, PLACEHOLDER = "<script>alert('$x$')</script>", "placeholder"
 DIAGRAM = '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 9 9"><text>plant</text></svg>'
@@ -64,14 +65,15 @@ def hostile_page() -> str:
     traces = make_traces(scenario)
     traces[PLACEHOLDER] = make_trace(scenario, PLACEHOLDER, events=[event(1.0, PLACEHOLDER, PLACEHOLDER)])
     traces[PLACEHOLDER].meta["faults"].append({"t_s": 1.0, "robot": HOSTILE, "policy": HOSTILE, "what": HOSTILE})
-    texts = dict.fromkeys(("id", "summary", "statement", "formula", "method", "exercised_by"), HOSTILE)
+    texts = dict.fromkeys(("id", "subject", "summary", "statement", "formula", "method", "exercised_by"), HOSTILE)
     latex = (HOSTILE, rf"\text{{{HOSTILE}}} \href{{javascript:alert(1)}}{{x}}")
     claim = type("Hostile", (Kept,), {**texts, "latex": latex, "assumptions": (HOSTILE,)})
-    finding = Finding("refuted", -1.0, HOSTILE, {HOSTILE: HOSTILE}, {"x": HOSTILE}, {HOSTILE: [HOSTILE]})
+    chart = Chart(HOSTILE, HOSTILE, HOSTILE, {HOSTILE: ([1.0, 2.0], [1.0, 2.0])}, {HOSTILE: (1.0, 2.0)}, "", HOSTILE)
+    finding = Finding("refuted", -1.0, HOSTILE, {HOSTILE: HOSTILE}, {"x": HOSTILE}, {HOSTILE: [HOSTILE]}, figure=chart)
     report = built(scenario, traces, [*FINE, Verdict.of(claim(), PLACEHOLDER, finding, "holds")])
     figures = draw.draw(scenario, traces)
     report["provenance"][HOSTILE] = report["provenance"]["command"] = HOSTILE
-    return html.render(spoilt(of(report)), figures, DIAGRAM)
+    return page_of(spoilt(of(report)), figures, DIAGRAM)
 
 
 def spoilt(value: Any) -> Any:
@@ -196,6 +198,19 @@ def test_the_cost_of_the_threshold_is_told_for_the_assumed_drift_and_for_that_of
         "assumed: 13 m/s, 4 m/√s|2.992 m|0.002 s|",
         "ugv 1.5 in run c: 0.5 m/s, 0 m/√s|the lower, the better|6 s|25 % (1 %)|\N{EN DASH} s (5.98 s)|",
     ]
+
+
+def test_a_chart_stands_beside_its_claim_or_where_the_rules_put_it(
+    scenario: Scenario, traces: dict[str, Trace]
+) -> None:
+    chart = Chart("Spare room", "t, s", "m", {"ugv1": ([0.0, 1.0], [2.0, 3.0])}, caption="All of it.")
+    report = built(scenario, traces, [verdict("c", figure=chart), verdict("a")])
+    report["claims"].append({**report["claims"][0], "id": "THR-CHOICE", "run": ""})
+    text = page_of(of(report), [], None)
+    headings = re.findall(r"<h[234]?(?: id=\"\w+\")?>([\w -]*(?:SAFE-TRACE|Spare room|step in|All checks)[^<]*)<", text)
+    assert headings == ["When did the UAV step in?", "Spare room", "All checks", "SAFE-TRACE", "Spare room"]
+    assert text.count("All of it.") == 2
+    assert text.count('<p class="panel-title">Run c</p>') == 1
 
 
 def test_sections_that_would_say_nothing_are_absent(scenario: Scenario, traces: dict[str, Trace]) -> None:

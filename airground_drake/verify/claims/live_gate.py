@@ -20,8 +20,6 @@ class LatestEnd(Proof):
 
 
 class LiveGate(LiveWait):
-    """LIVE-GATE; its hypotheses are those of LIVE-WAIT."""
-
     id = "LIVE-GATE"
     summary = "An accepted intervention is carried through to its end, unless a new obstacle is sensed."
     statement = (
@@ -54,13 +52,13 @@ class LiveGate(LiveWait):
     theorems = ("Patience.kept", "Patience.over_in_time")
 
     def evidence(self, inputs: dict[str, Any], **proof: Any) -> Proof:
-        """Add the longest that an accepted intervention may last."""
         return LatestEnd(over_after_s=float(inputs["longest_s"] + inputs["period_s"]), **proof)
 
     def seen_in(self, trace: Trace) -> tuple[int, int]:
         """The acceptances during which no obstacle was new and none in range may move, and all."""
         accepted = [acceptance for of_ugv in acceptances(trace).values() for acceptance in of_ugv]
-        return sum(not each.news_s and not _beside_a_mover(trace, each) for each in accepted), len(accepted)
+        met = [acceptance for acceptance in accepted if not (acceptance.news_s or _beside_a_mover(trace, acceptance))]
+        return len(met), len(accepted)
 
 
 def _beside_a_mover(trace: Trace, acceptance: Acceptance) -> bool:

@@ -20,8 +20,6 @@ class Bound(Proof):
 
 
 class LiveWait(TheoremClaim):
-    """LIVE-WAIT."""
-
     id = "LIVE-WAIT"
     summary = "No UAV can keep a UGV from its own task for ever."
     statement = (
@@ -51,7 +49,6 @@ class LiveWait(TheoremClaim):
     margin_of = "longest intervention allowed"
 
     def inputs(self, scenario: Scenario) -> dict[str, Any]:
-        """The numbers of a UGV's patience, and the period of the gatekeeper, s."""
         gate = scenario.gatekeeper
         return {
             "tries": int(gate.tries),
@@ -61,7 +58,6 @@ class LiveWait(TheoremClaim):
         }
 
     def hypotheses(self, inputs: dict[str, Any]) -> list[Hypothesis]:
-        """Times are positive."""
         longest, period = decimal(inputs["longest_s"]), decimal(inputs["period_s"])
         return [
             Hypothesis.of(self.margin_of, "the longest intervention takes more than 0 s", longest, "s", strict=True),
@@ -69,10 +65,8 @@ class LiveWait(TheoremClaim):
         ]
 
     def evidence(self, inputs: dict[str, Any], **proof: Any) -> Proof:
-        """Add the bound."""
         bound = inputs["tries"] * (decimal(inputs["longest_s"]) + decimal(inputs["period_s"]))
         return Bound(bound_s=float(bound), **proof)
 
     def seen_in(self, trace: Trace) -> tuple[int, int]:
-        """The executed interventions below avoidance, and all."""
         return below_avoidance(trace)

@@ -36,8 +36,6 @@ class LeastDistances(Proof):
 
 
 class SafeDist(TheoremClaim):
-    """SAFE-DIST."""
-
     id = "SAFE-DIST"
     summary = "Bounded velocity errors cost a bounded distance."
     statement = (
@@ -95,14 +93,12 @@ class SafeDist(TheoremClaim):
     margin_of = "distance from centre to core that is left, d - W/A"
 
     def inputs(self, scenario: Scenario) -> dict[str, Any]:
-        """The constants of SAFE-INV, and the bound on the disturbance, m/s."""
         given = constants(scenario)
-        least = float(min(each.safe_m for each in kinds_of(given)))
+        least = float(min(pair.safe_m for pair in kinds_of(given)))
         fastest = max(robot.max_speed_m_s for robot in scenario.robots.values())
         return {**given, "disturbance_m_s": min(0.1 * fastest, given["avoidance_gain_1_s"] * least / 4.0)}
 
     def hypotheses(self, inputs: dict[str, Any]) -> list[Hypothesis]:
-        """A is positive, A h at most 1; robots stay apart, so that the normals are defined."""
         gain, h = decimal(inputs["avoidance_gain_1_s"]), decimal(inputs["period_s"])
         found = [
             *stable(gain, h),
@@ -111,12 +107,11 @@ class SafeDist(TheoremClaim):
         if gain <= 0:
             return found
         return found + [
-            Hypothesis.of(self.margin_of, f"{each.kind}: d - W/A is above 0", left_m(inputs, each), "m", strict=True)
-            for each in kinds_of(inputs)
+            Hypothesis.of(self.margin_of, f"{pair.kind}: d - W/A is above 0", left_m(inputs, pair), "m", strict=True)
+            for pair in kinds_of(inputs)
         ]
 
     def evidence(self, inputs: dict[str, Any], **proof: Any) -> LeastDistances:
-        """Add the least distances."""
         if not inputs["avoidance_gain_1_s"] > 0.0:
             return LeastDistances(**proof)
         least = dict[str, float]()
@@ -136,7 +131,6 @@ class SafeDist(TheoremClaim):
         return passive, once, kept
 
     def with_runs(self, finding: Finding, seen: Sequence[tuple[int, ...]]) -> Finding:
-        """Add these periods, if there are any."""
         passive, once, kept = (sum(column) for column in zip(*seen, (0, 0, 0), strict=True))
         if not passive or not isinstance(finding.evidence, LeastDistances):
             return finding

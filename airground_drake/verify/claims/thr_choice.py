@@ -57,8 +57,6 @@ class ThresholdChoice(Evidence):
 
 
 class ThrChoice(ModelClaim):
-    """THR-CHOICE."""
-
     id = "THR-CHOICE"
     subject = "choice of the threshold"
     summary = "The threshold in force is the best one for the scenario's own numbers, or it is declared by the user."
@@ -88,19 +86,18 @@ class ThrChoice(ModelClaim):
         return ThrRoot().inputs(scenario)
 
     def check(self, inputs: dict[str, Any]) -> Finding:
-        """Compare the threshold in force with the optimum, and their risks."""
         numbers = [inputs[name] for name in NUMBERS]
         rule, zeta = rule_of(inputs), float(inputs["zeta_m"])
         optimum = float(rule.zeta(rule.root.low))
-        least, risk = (float(bayes_risk(each, *numbers)) for each in (optimum, zeta))
+        least, risk = (float(bayes_risk(at, *numbers)) for at in (optimum, zeta))
         off = abs(zeta - optimum)
         optimal = off <= EQUAL * optimum
         evidence = ThresholdChoice(
-            "optimal" if optimal else "declared",
-            inputs["rule"],
-            zeta,
-            optimum,
-            float(printed_threshold(*numbers)),
+            kind="optimal" if optimal else "declared",
+            rule=inputs["rule"],
+            threshold_in_force_m=zeta,
+            optimal_threshold_m=optimum,
+            threshold_as_printed_in_19_m=float(printed_threshold(*numbers)),
             risk_in_force=risk,
             least_risk=least,
             extra_risk=max(round(risk - least, DIGITS), 0.0),
@@ -131,7 +128,6 @@ class ThrChoice(ModelClaim):
         }
 
     def with_runs(self, finding: Finding, seen: Sequence[dict[str, Measured]]) -> Finding:
-        """Add these UGVs."""
         if not isinstance(finding.evidence, ThresholdChoice):
             return finding
         runs = {name: row for of_run in seen for name, row in of_run.items()}

@@ -76,8 +76,6 @@ class Quality:
 
 
 class ThrQuality(TraceClaim):
-    """THR-QUALITY."""
-
     id = "THR-QUALITY"
     subject = "timing of triggers"
     summary = "The UAV stepped in when the real task error, without noise, was about at the threshold."
@@ -129,22 +127,22 @@ class ThrQuality(TraceClaim):
             drift = drift_of(e, zeta)
             if drift is not None:
                 ddm[ugv] = _ddm(own, zeta, drift, trace.scenario.decision.noise_m_sqrt_s)
-        counts = Counter(one.kind for one in decisions)
-        timed = [(one.late_s, k) for k, one in enumerate(decisions) if one.late_s is not None and one.kind != "missed"]
-        late = max((each for each in timed if each[0] > EVENT_TOLERANCE_S), default=None)
-        early = min((each for each in timed if each[0] < -EVENT_TOLERANCE_S), default=None)
+        counts = Counter(decided.kind for decided in decisions)
+        timed = [(decided.late_s, k) for k, decided in enumerate(decisions)
+                 if decided.late_s is not None and decided.kind != "missed"]  # fmt: skip
+        latest, earliest = max(timed, default=(0.0, 0)), min(timed, default=(0.0, 0))
         evidence = Quality(
-            zeta,
-            tolerance,
-            {kind: counts[kind] for kind in ("served", "early", "false", "missed")},
-            decisions[late[1]] if late else None,
-            decisions[early[1]] if early else None,
-            decisions,
-            ddm,
+            zeta_m=zeta,
+            tolerance_m=tolerance,
+            counts={kind: counts[kind] for kind in ("served", "early", "false", "missed")},
+            latest=decisions[latest[1]] if latest[0] > EVENT_TOLERANCE_S else None,
+            earliest=decisions[earliest[1]] if earliest[0] < -EVENT_TOLERANCE_S else None,
+            decisions=decisions,
+            ddm=ddm,
         )
         if not decisions:
             return Finding("holds", evidence=evidence, exercised=0)
-        worst = max(decisions, key=lambda one: one.off_m)
+        worst = max(decisions, key=lambda decided: decided.off_m)
         good = worst.off_m <= tolerance
         return Finding(
             "holds" if good else "refuted",
@@ -259,11 +257,11 @@ def _ddm(decisions: Sequence[Decided], zeta: float, drift: float, noise: float) 
     """The decisions about a UGV beside (17)-(18), without initial deviation."""
     alone = zeta / drift
     k = alone * (drift / noise) ** 2 if noise > 0.0 else math.inf
-    late = [one.late_s for one in decisions if one.late_s is not None and one.kind != "missed"]
-    wrong = sum(one.kind in ("false", "missed") for one in decisions)
+    late = [decided.late_s for decided in decisions if decided.late_s is not None and decided.kind != "missed"]
+    wrong = sum(decided.kind in ("false", "missed") for decided in decisions)
     return Ddm(
-        drift,
-        noise,
+        drift_m_s=drift,
+        noise_m_sqrt_s=noise,
         error_rate=wrong / len(decisions) if decisions else None,
         error_rate_of_18=0.5 * (1.0 - math.tanh(k)),
         decision_time_s=alone + sum(late) / len(late) if late else None,

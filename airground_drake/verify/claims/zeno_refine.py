@@ -95,8 +95,6 @@ class Series(Evidence):
 
 
 class ZenoRefine(ModelClaim):
-    """ZENO-REFINE."""
-
     id = "ZENO-REFINE"
     expected = "supported"
     summary = "With ever finer noise a bare threshold triggers ever more often; the trigger in use does not."
@@ -134,7 +132,6 @@ class ZenoRefine(ModelClaim):
     exercised_by = "simulated paths, each at every noise step"
 
     def inputs(self, scenario: Scenario) -> dict[str, Any]:
-        """The running trigger, the noise of (15) and its step, the duration."""
         decision = scenario.decision
         return {
             **levels_of(scenario),
@@ -145,7 +142,6 @@ class ZenoRefine(ModelClaim):
         }
 
     def check(self, inputs: dict[str, Any]) -> Finding:
-        """Run the experiment for these constants."""
         return judge_experiment(experiment(inputs))
 
 

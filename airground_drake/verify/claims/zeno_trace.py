@@ -40,8 +40,6 @@ class Gaps:
 
 
 class ZenoTrace(TraceClaim):
-    """ZENO-TRACE."""
-
     id = "ZENO-TRACE"
     subject = "gaps between triggers"
     summary = "No UGV was triggered twice within the minimum inter-event time."
@@ -62,7 +60,6 @@ class ZenoTrace(TraceClaim):
     exercised_by = "gaps between consecutive triggers of one UGV"
 
     def check(self, trace: Trace) -> Finding:
-        """Compare the smallest gap of each UGV with the bound."""
         bound = float(trace.scenario.decision.min_inter_event_s)
         if bound <= 0.0:
             return Finding("not_run", evidence={"reason": "min_inter_event_s is 0: no bound to compare with"})

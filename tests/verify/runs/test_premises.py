@@ -40,6 +40,7 @@ def test_counts_of_several_runs_are_added() -> None:
     found = Finding("proved", evidence=proof, exercised=1)
     assert LiveGate().judge_runs(found, [(1, 2), None, (0, 3)]).evidence == replace(proof, applies_to=1, of=5)
     assert LiveGate().judge_runs(found, [None]).evidence is proof
+    assert LiveGate().judge_runs(found, ["?"]).status == "error"
 
 
 def test_a_run_whose_records_are_wrong_is_not_counted(run: Run) -> None:
