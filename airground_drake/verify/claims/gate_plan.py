@@ -144,7 +144,7 @@ class GatePlan(GateClaim):
         compared += [deviation for row in rounded for deviation in compare_rounding(row)]
         blocks = int(trace.scenario.gatekeeper.blocks)
         bounded = bound([row for row in planned if row.unit_normals], blocks)
-        bounded.sort(key=lambda decision: -decision.gap)
+        bounded = sorted(bounded, key=lambda decision: -decision.gap)
         widest = max((decision.width for decision in bounded), default=0.0)
         slack = [float(np.maximum(0.0, -row.clearance(row["positions_m"])).max()) for row in planned]
         beside_all = [above_the_best(row, blocks) for row in planned if min(blocks or row.stages, row.stages) <= BLOCKS]
