@@ -1,16 +1,15 @@
-"""Parsers of command lines, the values that their options take, and how a command refuses."""
+"""The values that options of commands take, and how a command refuses."""
 
 from __future__ import annotations
 
 import argparse
-import difflib
 import math
 import os
 import sys
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from pathlib import Path
-from typing import NoReturn, TypeVar
+from typing import TypeVar
 
 from airground_drake.base.errors import FolderError, LimitError, ScenarioError, UnknownNameError, one_line
 
@@ -29,20 +28,6 @@ def refuse(why: object, code: int = EXIT_USAGE) -> int:
     with suppress(OSError):
         print(f"error: {one_line(str(why))}", file=sys.stderr)
     return code
-
-
-class Parser(argparse.ArgumentParser):
-    """Refuses a bad command line in one line."""
-
-    def error(self, message: str) -> NoReturn:
-        """Print the message, and exit with 2; for arguments that are too many, with those that the command takes."""
-        words = message.removeprefix("unrecognized arguments: ").split()
-        if words != message.split():
-            options = [option for option in self._option_string_actions if option.startswith("--")]
-            close = difflib.get_close_matches(words[0].partition("=")[0], options, n=1) if words[0][0] == "-" else []
-            takes = [action.metavar or action.dest for action in self._actions if not action.option_strings]
-            message += f"; did you mean {close[0]}?" if close else f"; wanted: {' '.join(map(str, takes)) or 'options'}"
-        raise SystemExit(refuse(f"{message}; see {self.prog} --help"))
 
 
 def output_folder(text: str) -> Path:

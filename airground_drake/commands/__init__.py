@@ -17,7 +17,8 @@ from typing import NamedTuple
 
 from airground_drake.base import interruption
 from airground_drake.base.errors import AirgroundError, SimulationError
-from airground_drake.base.usage import EXIT_TOOL, EXIT_USAGE, Parser, refuse
+from airground_drake.base.usage import EXIT_TOOL, EXIT_USAGE, refuse
+from airground_drake.scenario.options import Parser
 
 
 class Command(NamedTuple):

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import argparse
 import json
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from airground_drake.base import files
 from airground_drake.base.usage import output_file
-from airground_drake.scenario.options import option, parser_of
+from airground_drake.scenario.options import Parser, option, parser_of
 
 if TYPE_CHECKING:
     from airground_drake.scenario.budget import PairBudget
@@ -17,7 +16,7 @@ if TYPE_CHECKING:
 MOST_NAMED = 6  # bodies that are named in a line at most
 
 
-def parser() -> argparse.ArgumentParser:
+def parser() -> Parser:
     return parser_of(
         "budget",
         "Print, for each kind of pair, the promised distance, the distance that the law keeps between steered points, "

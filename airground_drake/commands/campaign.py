@@ -16,7 +16,7 @@ from airground_drake.base.progress import progress_bar
 from airground_drake.base.usage import EXIT_TOOL, REFUSALS, positive, refuse, whole
 from airground_drake.scenario import plugins
 from airground_drake.scenario.estimate import DEFAULT_LIMITS, Limits
-from airground_drake.scenario.options import option, parser_of
+from airground_drake.scenario.options import Parser, option, parser_of
 from airground_drake.scenario.shipped import argument
 from airground_drake.study.campaign.rows import UNFINISHED
 
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 EXIT_REFUTED, EXIT_UNDECIDED = 1, 3
 
 
-def parser() -> argparse.ArgumentParser:
+def parser() -> Parser:
     return parser_of("campaign", "Simulate and judge many draws of a scenario, and bound how likely a violation is.", {
         "spec": "YAML file: a scenario, and distributions over its keys",
         "-n --number": "draws (default: one, or all combinations of grids)",

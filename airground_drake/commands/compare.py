@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
@@ -12,7 +11,7 @@ from airground_drake.base import files
 from airground_drake.base.errors import one_line, short
 from airground_drake.base.usage import output_file
 from airground_drake.report import compare
-from airground_drake.scenario.options import option, parser_of
+from airground_drake.scenario.options import Parser, option, parser_of
 
 if TYPE_CHECKING:
     from airground_drake.report.model import Report
@@ -23,7 +22,7 @@ MOST_LINES, MOST_ROWS = 20, 200  # changes of one part that are shown, in the te
 _ABOUT = ("claim", "id", "run", "robot", "kind", "n")
 
 
-def parser() -> argparse.ArgumentParser:
+def parser() -> Parser:
     return parser_of(
         "compare",
         "What differs between two reports: first what they were made from (keys of the scenario, versions), then "

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -10,12 +9,12 @@ from airground_drake.base import files
 from airground_drake.base.errors import UnknownNameError, one_line
 from airground_drake.base.registry import METHODS
 from airground_drake.scenario import plugins
-from airground_drake.scenario.options import option, parser_of
+from airground_drake.scenario.options import Parser, option, parser_of
 
 FORMATS = ("dot", "svg", "pdf", "png")
 
 
-def parser() -> argparse.ArgumentParser:
+def parser() -> Parser:
     return parser_of("diagram", "Draw the diagram of a scenario.", {
         "scenario": None,
         "--method": option("default: c, the paper's Figure 2, if it has such a run", choices=tuple(METHODS)),

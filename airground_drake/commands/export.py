@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from airground_drake.base import files
 from airground_drake.base.errors import one_line
 from airground_drake.commands.saved import outside_reports, runs_of, trace_of
-from airground_drake.scenario.options import option, parser_of
+from airground_drake.scenario.options import Parser, option, parser_of
 
 KINDS = ("csv", "mcap")
 
 
-def parser() -> argparse.ArgumentParser:
+def parser() -> Parser:
     return parser_of("export", "Write the runs of a report as CSV tables, or as MCAP files for Foxglove.", {
         "folder": None,
         "run": None,

@@ -20,7 +20,7 @@ from airground_drake.report.rules import DISTANCES
 from airground_drake.scenario import plugins
 from airground_drake.scenario.estimate import DEFAULT_LIMITS
 from airground_drake.scenario.hints import plugin_path
-from airground_drake.scenario.options import option, parser_of
+from airground_drake.scenario.options import Parser, option, parser_of
 from airground_drake.scenario.shipped import argument
 from airground_drake.study.campaign.rows import COLUMNS
 
@@ -34,7 +34,7 @@ EXIT_FOUND, EXIT_UNDECIDED = 1, 3
 TIMES = tuple(name for name in COLUMNS if name.endswith("_s") and name not in ("wall_s", "duration_s"))
 
 
-def parser() -> argparse.ArgumentParser:
+def parser() -> Parser:
     return parser_of("falsify", "Search the space of a campaign for a scenario that violates a claim, and shrink it.", {
         "spec": None,
         "--claim": option("claim about runs (default: %(default)s)", "ID", default=DISTANCES),

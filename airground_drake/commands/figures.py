@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Sequence
 from pathlib import Path
 
 from airground_drake.base.errors import one_line
 from airground_drake.base.usage import formats_of
 from airground_drake.commands.saved import outside_reports, runs_of, trace_of
-from airground_drake.scenario.options import option, parser_of
+from airground_drake.scenario.options import Parser, option, parser_of
 
 # Copies of those of `export.figures`, which takes seconds to import.
 FORMATS, STYLES = ("pdf", "png", "svg"), ("ieee", "thesis")
 
 
-def parser() -> argparse.ArgumentParser:
+def parser() -> Parser:
     says = "Write the figures of a report as files, figures.tex with captions, and tables in LaTeX."
     return parser_of("figures", says, {
         "folder": None,

@@ -13,7 +13,7 @@ from airground_drake.base import files
 from airground_drake.base.errors import ScenarioError, one_line
 from airground_drake.base.limits import MAX_NAME, MAX_UGVS
 from airground_drake.base.usage import between, output_file, refuse, whole
-from airground_drake.scenario.options import option, parser_of
+from airground_drake.scenario.options import Parser, option, parser_of
 from airground_drake.scenario.shipped import argument
 
 if TYPE_CHECKING:
@@ -31,7 +31,7 @@ HEIGHT_M = 1.0  # default height of UGVs, m: robots of this kind are lower, with
 SIZES = (0.001, 100.0)  # least and greatest radius and distance, m
 
 
-def parser() -> argparse.ArgumentParser:
+def parser() -> Parser:
     size = between(*SIZES)
     radii = ", ".join(f"{kind} {radius:g}" for kind, radius in RADII_M.items())
     return parser_of(

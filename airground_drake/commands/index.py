@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
 import os
 from collections.abc import Sequence
 from pathlib import Path
@@ -13,7 +12,7 @@ from airground_drake.base import files
 from airground_drake.base.errors import FolderError, ReportError, TraceError, one_line
 from airground_drake.report import folder
 from airground_drake.report.sentences import Line
-from airground_drake.scenario.options import parser_of
+from airground_drake.scenario.options import Parser, parser_of
 
 if TYPE_CHECKING:
     from airground_drake.report.model import Report
@@ -22,7 +21,7 @@ PAGE = "index.html"
 MARK = "airground_drake index"  # text in every page that this command has written
 
 
-def parser() -> argparse.ArgumentParser:
+def parser() -> Parser:
     says = f"Write DIR/{PAGE}, which lists the reports below DIR and leads to them."
     return parser_of("index", says, {"folder": "folder with folders of reports in it"})
 
@@ -77,7 +76,7 @@ def _headline(report: Report) -> list[Line]:
     from airground_drake.report import screen
 
     try:
-        return screen.headline(report)
+        return screen.first_screen(report).headline
     except (LookupError, TypeError, ValueError, AttributeError):
         return []
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
 import re
 from collections.abc import Sequence
 from pathlib import Path
@@ -12,14 +11,14 @@ from airground_drake.base.errors import one_line
 from airground_drake.base.limits import MAX_NAME, MAX_SEED, MAX_UGVS
 from airground_drake.base.usage import output_file, refuse, whole
 from airground_drake.scenario.fleet import fleet
-from airground_drake.scenario.options import option, parser_of
+from airground_drake.scenario.options import Parser, option, parser_of
 from airground_drake.scenario.shipped import argument, json_schema_file, shipped_files
 
 MOST_OBSTACLES = 2000 - MAX_UGVS  # with the largest number of UGVs, as many bodies as the checker accepts
 MODEL = "minimal"  # the shipped scenario that is copied by default
 
 
-def parser() -> argparse.ArgumentParser:
+def parser() -> Parser:
     return parser_of("init", "Write a small scenario that runs: a UGV, an obstacle in its way, a UAV.", {
         "file": option("default: %(default)s", kind=output_file, nargs="?", default=Path("scenario.yaml")),
         "--like": option("copy this shipped scenario instead", "NAME", choices=shipped_files()),

@@ -11,7 +11,7 @@ from typing import Any
 
 from airground_drake.base.errors import one_line
 from airground_drake.base.usage import between, refuse
-from airground_drake.scenario.options import option, parser_of
+from airground_drake.scenario.options import Parser, option, parser_of
 
 MOST_GAP_S, MOST_ERROR_M = 1e6, 1e6
 EPILOG = """\
@@ -39,7 +39,7 @@ broken, or the position error decides, 2 usage, or a log that cannot be used
 """
 
 
-def parser() -> argparse.ArgumentParser:
+def parser() -> Parser:
     several: dict[str, Any] = {"action": "append", "default": []}
     return parser_of(
         "judge",

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
 import inspect
 import textwrap
 from collections.abc import Callable, Iterator, Sequence
@@ -20,13 +19,13 @@ from airground_drake.base.registry import (
     Registry,
     parameters,
 )
-from airground_drake.scenario.options import option, parser_of
+from airground_drake.scenario.options import Parser, option, parser_of
 from airground_drake.scenario.shipped import shipped, title
 
 Lines = Iterator[tuple[str, str]]  # names and their descriptions
 
 
-def parser() -> argparse.ArgumentParser:
+def parser() -> Parser:
     return parser_of("list", f"List {__doc__.partition(': ')[2]}", {
         "kind": option("default: all of them but the keys", nargs="?", choices=(*KINDS, KEYS)),
         "name": option("a name, or the beginning of a key: all about it", "NAME", nargs="?"),

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from airground_drake.base.usage import positive, refuse
 from airground_drake.report.rules import DISTANCES
-from airground_drake.scenario.options import option, parser_of
+from airground_drake.scenario.options import Parser, option, parser_of
 
 if TYPE_CHECKING:
     from airground_drake.verify.proofs.runs import Proved
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 EXIT_UNPROVED = 1
 
 
-def parser() -> argparse.ArgumentParser:
+def parser() -> Parser:
     return parser_of(
         "prove",
         "Have the proof checker Coq check the package's theorems (without DIR), or prove for the runs of a report that "

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -10,12 +9,12 @@ from airground_drake.base import files
 from airground_drake.base.errors import FolderError, one_line
 from airground_drake.base.usage import between, output_file, refuse
 from airground_drake.commands.saved import outside_reports, runs_of, trace_of
-from airground_drake.scenario.options import option, parser_of
+from airground_drake.scenario.options import Parser, option, parser_of
 
 SLOWEST, SPEED, FASTEST = 0.1, 4.0, 100.0  # limits and default of a video's speed
 
 
-def parser() -> argparse.ArgumentParser:
+def parser() -> Parser:
     says = "Write replay_RUN.html for the runs of a report: one file each, which works offline."
     return parser_of("replay", says, {
         "folder": None,

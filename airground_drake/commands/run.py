@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
 import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
@@ -15,7 +14,7 @@ from airground_drake.base.registry import METHODS
 from airground_drake.base.usage import positive, refuse
 from airground_drake.scenario import plugins
 from airground_drake.scenario.estimate import estimate
-from airground_drake.scenario.options import option, parser_of
+from airground_drake.scenario.options import Parser, option, parser_of
 
 if TYPE_CHECKING:
     from airground_drake.sim.trace import Trace
@@ -23,7 +22,7 @@ if TYPE_CHECKING:
 SPEED = 1.0  # default speed in Meshcat, simulated seconds per second
 
 
-def parser() -> argparse.ArgumentParser:
+def parser() -> Parser:
     return parser_of("run", "Simulate one run of a scenario and print its events.", {
         "scenario": None,
         "run": "default: the run with the most complete method",

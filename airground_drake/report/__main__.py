@@ -30,7 +30,7 @@ from airground_drake.base.usage import EXIT_TOOL, formats_of, positive, refuse, 
 from airground_drake.report import folder
 from airground_drake.scenario import plugins
 from airground_drake.scenario.estimate import DEFAULT_LIMITS, GIB, Limits, estimate
-from airground_drake.scenario.options import option, parser_of
+from airground_drake.scenario.options import Parser, option, parser_of
 from airground_drake.scenario.shipped import AUDIT, shipped
 
 if TYPE_CHECKING:  # slow to import
@@ -130,7 +130,7 @@ def _findings(
     return [*audit.of_runs(scenario, traces), *audit.whole(scenario, verdicts)]
 
 
-def parser() -> argparse.ArgumentParser:
+def parser() -> Parser:
     return parser_of("report", "Simulate all runs of a scenario, check the claims on them, and write the report.", {
         "scenario": {"nargs": "?", "help": "name of a shipped scenario, path to a YAML file, or audit"},
         "-o --output": f"default: reports/<scenario>; {folder.RULE}",

@@ -8,15 +8,16 @@ demonstrated. Numbers are compared to the last digit.
 from __future__ import annotations
 
 import math
-from collections import defaultdict
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict
+from itertools import zip_longest
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from airground_drake.base.statuses import UNDECIDED, outcome
+from airground_drake.report.sentences import grouped
 
 if TYPE_CHECKING:  # slow to import
-    from airground_drake.report.model import Claim, Entry, Event, Report
+    from airground_drake.report.model import Claim, Entry, Report
 
 SCHEMA = "airground_drake.comparison/1"
 
@@ -159,21 +160,14 @@ def _findings(before: Report, after: Report) -> Iterator[Change]:
 def _events(before: Report, after: Report) -> Iterator[Change]:
     """Times of events, the first of a kind with the first, and so on."""
     for run in dict.fromkeys([*before.runs, *after.runs]):
-        old, new = (_times(of.runs[run].events if run in of.runs else ()) for of in (before, after))
+        happened = (of.runs[run].events if run in of.runs else () for of in (before, after))
+        old, new = (grouped(((event.robot, event.kind), event.t_s) for event in events) for events in happened)
         for robot, kind in dict.fromkeys([*old, *new]):
-            was, now = old.get((robot, kind), []), new.get((robot, kind), [])
-            for n in range(max(len(was), len(now))):
-                times = [each[n] if n < len(each) else None for each in (was, now)]
-                if times[0] != times[1]:
-                    about = {"run": run, "robot": robot, "kind": kind, "n": n + 1}
-                    yield {**about, "before": times[0], "after": times[1], "unit": "s"}
-
-
-def _times(events: Iterable[Event]) -> dict[tuple[str, str], list[float]]:
-    found = defaultdict(list)
-    for event in events:
-        found[event.robot, event.kind].append(event.t_s)
-    return found
+            pairs = zip_longest(old.get((robot, kind), ()), new.get((robot, kind), ()))
+            for n, (was, now) in enumerate(pairs, start=1):
+                if was != now:
+                    about = {"run": run, "robot": robot, "kind": kind, "n": n}
+                    yield {**about, "before": was, "after": now, "unit": "s"}
 
 
 def _paired(

@@ -83,11 +83,7 @@ def overall(
     items: Sequence[Mapping[str, Any]] = (),
     numbers: Sequence[Mapping[str, Any]] = (),
 ) -> dict[str, Any]:
-    """The verdict over all claims, over the findings about the paper `items`, and over expected `numbers`."""
-    # Returns `status`, `exit_code`, `why`, counts, and lists of what differs, is undecided or is missing. `counts` has
-    # a claim that nothing put to the test under `not_exercised`, never under its status; the list of that name says
-    # which these are. `checks` counts claims about which something is expected, and `numbers`; `unpromised` lists the
-    # other claims. A finding that was not demonstrated differs, too, and so does a number that is too small.
+    """The verdict over all claims, over findings about the paper and over expected numbers, as of `model.Overall`."""
     undemonstrated = [item["id"] for item in items if not item["demonstrated"]]
     keys = ("id", "run", "status", "expected", "exercised")
     unexpected = [{key: claim[key] for key in keys} for claim in claims if claim["as_expected"] is False]

@@ -3,7 +3,6 @@
 # No `from __future__ import annotations` here: pydantic needs the types themselves, not their names.
 import json
 import math
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -67,8 +66,6 @@ class Distance(Entry):
 
 
 class Approach(Distance):
-    """The distance of a pair."""
-
     first: str
     second: str
 
@@ -95,8 +92,6 @@ class OnTheWay(Entry):
 
 
 class Stall(Entry):
-    """Where a UGV stood short of its target."""
-
     robot: str
     from_s: Number
     until_s: Number  # at most the end of the run
@@ -104,8 +99,6 @@ class Stall(Entry):
 
 
 class Ending(Entry):
-    """How a proposal ended."""
-
     # If the UGV executed it: `over` (its motion was), `given up` (the UGV refused it after all), `replaced`,
     # `withdrawn`, `released` (nobody was intervened on any more) or `end of the run`; else `refused`, `lost` (never
     # delivered), `withdrawn first` or `end of the run`.
@@ -126,8 +119,6 @@ class Intervention(Entry):
 
 
 class Messages(Entry):
-    """Numbers of messages that were delivered."""
-
     proposals: Whole = 0
     withdrawals: Whole = 0
     answers: Whole = 0  # each is a decision of the gatekeeper
@@ -135,8 +126,6 @@ class Messages(Entry):
 
 
 class Gatekeeper(Entry):
-    """The gatekeeper's decisions in numbers."""
-
     solver_failures: Whole = 0  # decisions that rest on the best plan known because the solver failed
     budget_spent: Whole = 0  # the same because the budget was spent
     refusals: dict[str, dict[str, Whole]] = {}  # by robot and reason: proposals refused at the first answer
@@ -149,8 +138,6 @@ class Gatekeeper(Entry):
 
 
 class Metrics(Entry):
-    """Numbers of a run."""
-
     min_distance_m: dict[str, dict[str, Distance]]  # by robot and obstacle: at most 20, those of least margin
     min_robot_distance_m: dict[str, dict[str, Distance]]  # by robot: to the other robot of least margin
     came_near: list[Approach]  # at most two, see `metrics.came_near`
@@ -170,16 +157,12 @@ class Metrics(Entry):
 
 
 class Event(Entry):
-    """An event of a robot."""
-
     t_s: Number
     robot: str
     kind: str
 
 
 class Run(Entry):
-    """What came of a run."""
-
     zeta_m: Number  # the threshold
     events: list[Event]
     faults: list[Json]  # of policies and solvers
@@ -194,8 +177,6 @@ class Run(Entry):
 
 
 class ScenarioPart(Entry):
-    """The scenario."""
-
     name: str
     title: str
     resolved: Scenario  # with all defaults
@@ -221,19 +202,18 @@ class ExpectedNumber(Entry):
 
 
 class Overall(Entry):
-    """The verdict over all claims."""
-
     status: Literal["as_expected", "not_as_expected", "inconclusive"]
     exit_code: Whole = 0
     why: str = ""
     checks: Whole  # claims about which something is expected, and numbers
     as_expected: Whole
+    # Claims by outcome: one that nothing put to the test is counted apart, not under its status.
     counts: dict[Literal[(*STATUSES, NOT_EXERCISED)], Whole] = {}  # type: ignore[valid-type]
-    differs: list[Deviation]
+    differs: list[Deviation]  # also numbers that are too small
     undecided: list[Deviation]
     missing: list[Deviation]
     undemonstrated: list[Whole]  # findings about the paper
-    unpromised: list[Json]
+    unpromised: list[Json]  # claims about which nothing is expected
     numbers: list[ExpectedNumber] = []
 
 
@@ -249,8 +229,6 @@ class ReproductionRow(Entry):
 
 
 class Finding(Entry):
-    """A finding about the paper."""
-
     id: Whole
     paper: Any
     ours: Any
@@ -264,8 +242,7 @@ def _provenance(given: Json) -> Json:
 
 
 class Report(Entry):
-    """The whole of report.json."""
-
+    form: Literal[SCHEMA] = Field(alias="schema")  # type: ignore[valid-type]
     scenario: ScenarioPart
     provenance: Annotated[Json, AfterValidator(_provenance)]
     overall: Overall
@@ -281,10 +258,8 @@ class Report(Entry):
         return [claim for claim in self.claims if claim.id in names]
 
 
-def of(document: Mapping[str, Any], source: str = "report.json") -> Report:
+def of(document: Any, source: str = "report.json") -> Report:
     """A report from its JSON; ReportError names the first key that is not as it must be."""
-    if document.get("schema") != SCHEMA:
-        raise _unusable(source, f"its schema is not {SCHEMA}")
     try:
         return Report.model_validate(document, context=RECORDED)
     except ValidationError as error:
@@ -301,7 +276,7 @@ def read(folder: Path) -> Report:
         json.dumps(document, ensure_ascii=False).encode()  # refuses half of a surrogate pair
     except (OSError, ValueError, RecursionError) as error:
         raise _unusable(path, getattr(error, "strerror", None) or f"{type(error).__name__}: {error}") from None
-    return of(document if isinstance(document, dict) else {}, str(path))
+    return of(document, str(path))
 
 
 def _unusable(source: object, why: str) -> ReportError:

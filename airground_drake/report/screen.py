@@ -96,12 +96,8 @@ def first_screen(report: Report) -> FirstScreen:
     return FirstScreen(_headline(rows), rows, within, checks, _beware(report, rows), declared(report))
 
 
-def headline(report: Report) -> list[Line]:
-    """One or two lines: what came of the best runs, and of the worst of the others."""
-    return _headline(_rows(report))
-
-
 def _headline(rows: Sequence[Row]) -> list[Line]:
+    """What came of the best runs, and of the worst of the others."""
     main = sorted([row for row in rows if row.plain] or rows, key=lambda row: row.rank)
     collided = [row for row in rows if not row.plain and row.facts and row.facts.collided]
     rest = sorted((row for row in [*main, *collided] if row.clause != main[0].clause), key=lambda row: row.rank)

@@ -3,13 +3,29 @@
 from __future__ import annotations
 
 import argparse
+import difflib
 from collections.abc import Callable, Collection, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
-from airground_drake.base.usage import MOST_JOBS, Parser, output_folder, positive, whole
+from airground_drake.base.usage import MOST_JOBS, output_folder, positive, refuse, whole
 from airground_drake.scenario import plugins
 from airground_drake.scenario.estimate import DEFAULT_LIMITS
+
+
+class Parser(argparse.ArgumentParser):
+    """Refuses a bad command line in one line."""
+
+    def error(self, message: str) -> NoReturn:
+        """Print the message, and exit with 2; for arguments that are too many, with those that the command takes."""
+        words = message.removeprefix("unrecognized arguments: ").split()
+        if words != message.split():
+            options = [option for option in self._option_string_actions if option.startswith("--")]
+            close = difflib.get_close_matches(words[0].partition("=")[0], options, n=1) if words[0][0] == "-" else []
+            takes = [action.metavar or action.dest for action in self._actions if not action.option_strings]
+            message += f"; did you mean {close[0]}?" if close else f"; wanted: {' '.join(map(str, takes)) or 'options'}"
+        raise SystemExit(refuse(f"{message}; see {self.prog} --help"))
+
 
 Option = dict[str, Any]  # what argparse is told of an option or argument
 

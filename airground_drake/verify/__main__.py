@@ -7,7 +7,6 @@ from airground_drake.base import interruption
 if __name__ == "__main__":
     interruption.begin()  # before the imports, which take seconds
 
-import argparse
 import json
 import os
 from collections.abc import Sequence
@@ -19,7 +18,7 @@ from airground_drake.base.progress import Progress, progress_bar
 from airground_drake.base.statuses import NOT_EXERCISED, outcome
 from airground_drake.base.usage import refuse
 from airground_drake.scenario import plugins
-from airground_drake.scenario.options import option, parser_of
+from airground_drake.scenario.options import Parser, option, parser_of
 
 if TYPE_CHECKING:
     from airground_drake.verify.claim import Verdict
@@ -27,7 +26,7 @@ if TYPE_CHECKING:
 EXIT_DIFFERS = 1
 
 
-def parser() -> argparse.ArgumentParser:
+def parser() -> Parser:
     return parser_of(
         "verify",
         "Judge claims anew, on a saved run or about a scenario's model; nothing is taken from a cache.",
