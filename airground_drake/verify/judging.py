@@ -116,7 +116,7 @@ def judge_all(
         AirgroundError: if a process dies.
     """
     cases = [case for case in _cases(scenario) if claims is None or case.claim.id in claims]
-    about_model = {case.claim.id: case.claim for case in cases}.values()
+    about_model = [*{case.claim.id: case.claim for case in cases}.values()]
     of_runs = [
         (replace(trace), [claim for claim in _applicable(trace) if claims is None or claim.id in claims])
         for trace in traces
