@@ -7,12 +7,13 @@ import fcntl
 import hashlib
 import io
 import json
+import math
 import os
 import re
 import shutil
 import stat
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from itertools import chain
 from pathlib import Path
@@ -263,6 +264,20 @@ def write_text(path: Path, text: str) -> None:
 def write_json(path: Path, value: Any) -> None:
     """Write strict JSON atomically; ValueError for NaN or infinity."""
     write_text(path, json.dumps(value, indent=1, allow_nan=False, ensure_ascii=False) + "\n")
+
+
+def strict(value: Any, of_others: Callable[[float], Any] = lambda _: None) -> Any:
+    """Plain JSON types: values of numpy unwrapped, tuples as lists, numbers that are not finite as None."""
+    # of_others: what else becomes of numbers that are not finite.
+    if isinstance(value, Mapping):
+        return {str(key): strict(item, of_others) for key, item in value.items()}
+    if isinstance(value, list | tuple | set | frozenset):
+        return [strict(item, of_others) for item in value]
+    if hasattr(value, "tolist"):
+        return strict(value.tolist(), of_others)
+    if isinstance(value, float) and not math.isfinite(value):
+        return of_others(value)
+    return value if value is None or isinstance(value, str | int | float) else str(value)
 
 
 def sha256(data: bytes) -> str:

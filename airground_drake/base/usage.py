@@ -1,22 +1,22 @@
-"""Parsers of command lines, the values that their options take, and how a command refuses."""
+"""The values that options of commands take, and how a command refuses."""
 
 from __future__ import annotations
 
 import argparse
-import difflib
 import math
 import os
 import sys
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from pathlib import Path
-from typing import NoReturn
+from typing import TypeVar
 
 from airground_drake.base.errors import FolderError, LimitError, ScenarioError, UnknownNameError, one_line
 
 EXIT_USAGE, EXIT_TOOL = 2, 4
 # Mistakes of the user. Where a command does long work, other errors are faults of the tool.
 REFUSALS = (ScenarioError, LimitError, FolderError, UnknownNameError)
+N = TypeVar("N", int, float)
 MOST = 1e15  # largest number that an option takes
 MOST_JOBS = 1000  # most processes that a command starts at once
 
@@ -28,35 +28,6 @@ def refuse(why: object, code: int = EXIT_USAGE) -> int:
     with suppress(OSError):
         print(f"error: {one_line(str(why))}", file=sys.stderr)
     return code
-
-
-class Parser(argparse.ArgumentParser):
-    """Refuses a bad command line in one line."""
-
-    def error(self, message: str) -> NoReturn:
-        """Print the message, and exit with 2; for arguments that are too many, with those that the command takes."""
-        words = message.removeprefix("unrecognized arguments: ").split()
-        if words != message.split():
-            options = [option for option in self._option_string_actions if option.startswith("--")]
-            close = difflib.get_close_matches(words[0].partition("=")[0], options, n=1) if words[0][0] == "-" else []
-            takes = [action.metavar or action.dest for action in self._actions if not action.option_strings]
-            message += f"; did you mean {close[0]}?" if close else f"; wanted: {' '.join(map(str, takes)) or 'options'}"
-        raise SystemExit(refuse(f"{message}; see {self.prog} --help"))
-
-
-def overridable(parser: argparse.ArgumentParser) -> None:
-    """Add the option `--set`."""
-    parser.add_argument(
-        "--set", action="append", default=[], metavar="KEY=VALUE", help="override a key of the scenario"
-    )
-
-
-def parallel(parser: argparse.ArgumentParser) -> None:
-    """Add the options `--jobs` and `--quiet`."""
-    parser.add_argument(
-        "--jobs", type=whole(1, MOST_JOBS), metavar="N", help="processes (default: one for each processor)"
-    )
-    parser.add_argument("-q", "--quiet", action="store_true", help="no progress")
 
 
 def output_folder(text: str) -> Path:
@@ -71,37 +42,30 @@ def output_file(text: str) -> Path:
     return output_folder(text)
 
 
+def _reader(read: Callable[[str], N], fits: Callable[[N], bool], wanted: str) -> Callable[[str], N]:
+    """Make the parser of a number that has to fit."""
+
+    def number(text: str) -> N:
+        with suppress(ValueError):
+            if fits(value := read(text)):
+                return value
+        raise argparse.ArgumentTypeError(f"{text!r} is not allowed; wanted: {wanted}")
+
+    return number
+
+
 def whole(least: int, most: float = math.inf) -> Callable[[str], int]:
     """Make the parser of a whole number; `least` and `most` are allowed."""
     up_to = "on" if most == math.inf else f"to {most}"
-
-    def number(text: str) -> int:
-        with suppress(ValueError):
-            if least <= (value := int(text)) <= most:
-                return value
-        raise argparse.ArgumentTypeError(f"{text!r} is not allowed; wanted: a whole number from {least} {up_to}")
-
-    return number
+    return _reader(int, lambda value: least <= value <= most, f"a whole number from {least} {up_to}")
 
 
 def between(least: float, most: float) -> Callable[[str], float]:
     """Make the parser of a number; `least` and `most` are allowed."""
-
-    def number(text: str) -> float:
-        with suppress(ValueError):
-            if least <= (value := float(text)) <= most:
-                return value
-        raise argparse.ArgumentTypeError(f"{text!r} is not allowed; wanted: a number from {least:g} to {most:g}")
-
-    return number
+    return _reader(float, lambda value: least <= value <= most, f"a number from {least:g} to {most:g}")
 
 
-def positive(text: str) -> float:
-    """Parse a number above 0, at most MOST."""
-    with suppress(ValueError):
-        if 0.0 < (value := float(text)) <= MOST:
-            return value
-    raise argparse.ArgumentTypeError(f"{text!r} is not allowed; wanted: a number above 0, at most {MOST:g}")
+positive = _reader(float, lambda value: 0.0 < value <= MOST, f"a number above 0, at most {MOST:g}")
 
 
 def formats_of(allowed: Sequence[str]) -> Callable[[str], tuple[str, ...]]:

@@ -17,7 +17,8 @@ from typing import NamedTuple
 
 from airground_drake.base import interruption
 from airground_drake.base.errors import AirgroundError, SimulationError
-from airground_drake.base.usage import EXIT_TOOL, EXIT_USAGE, Parser, refuse
+from airground_drake.base.usage import EXIT_TOOL, EXIT_USAGE, refuse
+from airground_drake.scenario.options import Parser
 
 
 class Command(NamedTuple):
@@ -29,8 +30,6 @@ class Command(NamedTuple):
     module: str
     says: str
 
-
-GONE = {"proofs": "airground prove"}  # commands of earlier versions, and the commands that replace them
 
 COMMANDS: dict[str, Command] = {
     "report": Command("airground_drake.report.__main__", "simulate a scenario, check its claims, write the report"),
@@ -62,8 +61,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
     name = "".join(unknown) or options.command
     if name is None:
         return refuse(f"a command is needed: {', '.join(COMMANDS)}")
-    if name in GONE:
-        return refuse(f"`airground {name}` is gone: use `{GONE[name]}` (CHANGELOG.md)")
     if name not in COMMANDS:
         close = difflib.get_close_matches(name, COMMANDS, n=1)
         meant = f"did you mean {close[0]}? " if close else ""

@@ -149,7 +149,8 @@ def _proved_again(folder: Path, lines: Sequence[CheckLine]) -> Iterator[CheckLin
 
 def _compared(run: str, entry: Any, recorded: Any) -> CheckLine:
     """Compare what Coq finds of a run with its entry in proofs.json, `recorded`; None if it has no entry."""
-    from airground_drake.report.lines import differences, short
+    from airground_drake.report.compare import differences
+    from airground_drake.report.lines import short
 
     line = partial(CheckLine, "proofs", run, by="Coq")
     kept, law = entry["distances"]["proved"], entry["law"]["proved"]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import subprocess
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
@@ -10,20 +9,17 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from airground_drake.base.files import sha256
+from airground_drake.base import files
 from airground_drake.base.registry import method_of
 from airground_drake.base.statuses import COUNTS, NOT_EXERCISED, STATUSES, UNDECIDED, outcome
 from airground_drake.report import metrics, reproduction
+from airground_drake.report.model import SCHEMA
 from airground_drake.report.sentences import counted
-from airground_drake.scenario.document import place_of
+from airground_drake.scenario.document import place_of, way
 from airground_drake.scenario.plugins import OPTION
 from airground_drake.scenario.schema import Scenario
 from airground_drake.sim.trace import Trace
 from airground_drake.verify.claim import Verdict
-
-SCHEMA = "airground_drake.report/4"
 
 MOST_LISTED = 4  # maximum number of checks that a sentence names
 EXIT_CODES = {"as_expected": 0, "not_as_expected": 1, "inconclusive": 3}
@@ -68,17 +64,17 @@ def build(
         "seeds": list(seeds),
         "claims": claims,
         "reproduction": reproduction.rows(scenario, traces),
-        "choices": [{**asdict(choice), "ours": _lookup(resolved, choice.key)} for choice in scenario.choices],
+        "choices": [{**asdict(choice), "ours": _at(resolved, choice.key)} for choice in scenario.choices],
         "audit": items,
         "files": {},
     }
-    strict: dict[str, Any] = _strict(document)
-    return strict
+    made: dict[str, Any] = files.strict(document)
+    return made
 
 
 def sealed(document: Mapping[str, Any], folder: Path, names: Iterable[str]) -> dict[str, Any]:
     """The document with the SHA-256 of every other file of the report under `files`: an exchanged file is noticed."""
-    return {**document, "files": {name: sha256((folder / name).read_bytes()) for name in sorted(names)}}
+    return {**document, "files": {name: files.sha256((folder / name).read_bytes()) for name in sorted(names)}}
 
 
 def overall(
@@ -87,11 +83,7 @@ def overall(
     items: Sequence[Mapping[str, Any]] = (),
     numbers: Sequence[Mapping[str, Any]] = (),
 ) -> dict[str, Any]:
-    """The verdict over all claims, over the findings about the paper `items`, and over expected `numbers`."""
-    # Returns `status`, `exit_code`, `why`, counts, and lists of what differs, is undecided or is missing. `counts` has
-    # a claim that nothing put to the test under `not_exercised`, never under its status; the list of that name says
-    # which these are. `checks` counts claims about which something is expected, and `numbers`; `unpromised` lists the
-    # other claims. A finding that was not demonstrated differs, too, and so does a number that is too small.
+    """The verdict over all claims, over findings about the paper and over expected numbers, as of `model.Overall`."""
     undemonstrated = [item["id"] for item in items if not item["demonstrated"]]
     keys = ("id", "run", "status", "expected", "exercised")
     unexpected = [{key: claim[key] for key in keys} for claim in claims if claim["as_expected"] is False]
@@ -190,15 +182,10 @@ def _run(scenario: Scenario, trace: Trace) -> dict[str, Any]:
     }
 
 
-def _lookup(resolved: Any, key: str) -> Any:
-    """Value at a dotted path of the resolved scenario, None if the path leads nowhere."""
-    for part in place_of(key):
-        if isinstance(resolved, list):
-            resolved = {str(position): each for position, each in enumerate(resolved)}
-        if not isinstance(resolved, dict) or part not in resolved:
-            return None
-        resolved = resolved[part]
-    return resolved
+def _at(resolved: Mapping[str, Any], key: str) -> Any:
+    """The value at a dotted key of the resolved scenario, None if the key leads nowhere."""
+    values = way(resolved, key)
+    return values[-1] if len(values) == len(place_of(key)) else None
 
 
 def _named(claims: Iterable[Mapping[str, Any]]) -> list[dict[str, str]]:
@@ -217,21 +204,6 @@ def _told(item: Mapping[str, Any]) -> str:
         return f"{name} ({item['why']})"
     idle = outcome(item["status"], item["exercised"]) == NOT_EXERCISED
     return f"{name} ({item['status']}{', nothing to check' * idle}, expected {item['expected']})"
-
-
-def _strict(value: Any) -> Any:
-    """Plain JSON types: numpy scalars and arrays unwrapped, tuples as lists, numbers that are not finite as None."""
-    if isinstance(value, Mapping):
-        return {str(key): _strict(item) for key, item in value.items()}
-    if isinstance(value, (list, tuple, set, frozenset)):
-        return [_strict(item) for item in value]
-    if isinstance(value, (np.ndarray, np.generic)):
-        return _strict(value.tolist())
-    if isinstance(value, float):
-        return value if math.isfinite(value) else None
-    if value is None or isinstance(value, (str, int)):
-        return value
-    return str(value)
 
 
 def commit() -> str:

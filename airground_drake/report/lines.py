@@ -12,7 +12,6 @@ from typing import Any
 from airground_drake.base.errors import AirgroundError
 from airground_drake.base.progress import Progress
 from airground_drake.check.line import DISAGREES
-from airground_drake.report.compare import WITHIN
 
 JUDGED = "judged"  # key of a line about progress
 # Keys `claim`, `run`, `outcome` and `text`; a difference has `rule`, `about`, `recorded` and `recomputed` besides.
@@ -29,30 +28,6 @@ def different(claim: str, run: str, about: str, theirs: Any, ours: Any) -> Line:
     text = f"made again, {about or 'it'} is {short(ours)}; recorded {short(theirs)}"
     values = {"about": about, "recorded": theirs, "recomputed": ours}
     return line_of(claim, run, DISAGREES, text, "the files give what is recorded") | values
-
-
-def differences(
-    recorded: Any, rebuilt: Any, path: str = "", *, within: float = WITHIN
-) -> Iterator[tuple[str, Any, Any]]:
-    """Each value of two JSON documents that differs, with its dotted path: numbers by more than `within`."""
-    pairs: list[tuple[Any, Any, Any]] = []
-    if isinstance(recorded, dict) and isinstance(rebuilt, dict):
-        pairs = [(key, recorded.get(key, "nothing"), rebuilt.get(key, "nothing")) for key in {**rebuilt, **recorded}]
-    elif isinstance(recorded, list) and isinstance(rebuilt, list):
-        pairs = [(k, *both) for k, both in enumerate(zip(recorded, rebuilt, strict=False))]
-    elif _is_number(recorded) and _is_number(rebuilt):
-        if not abs(recorded - rebuilt) <= within * (1.0 + abs(rebuilt)):
-            yield path, recorded, rebuilt
-    elif type(recorded) is not type(rebuilt) or recorded != rebuilt:
-        yield path, recorded, rebuilt
-    for key, theirs, ours in pairs:
-        yield from differences(theirs, ours, f"{path}.{key}".strip("."), within=within)
-    if isinstance(recorded, list) and isinstance(rebuilt, list) and len(recorded) != len(rebuilt):
-        yield f"{path}: number of entries", len(recorded), len(rebuilt)
-
-
-def _is_number(value: Any) -> bool:
-    return isinstance(value, (int, float)) and not isinstance(value, bool)
 
 
 def short(value: Any, most: int = 120) -> str:

@@ -25,8 +25,8 @@ from airground_drake.base.arrays import Array
 from airground_drake.base.registry import MODEL_CLAIMS
 from airground_drake.base.statuses import meets
 from airground_drake.check.line import AGREES, DISAGREES, OPEN, RECORDED
-from airground_drake.report.compare import WITHIN
-from airground_drake.report.lines import Line, differences, different, line_of, print_lines, short
+from airground_drake.report.compare import WITHIN, differences
+from airground_drake.report.lines import Line, different, line_of, print_lines, short
 
 WITHIN_PX = 0.02  # coordinates in drawings agree to this: they are rounded to 0.01
 
@@ -216,12 +216,12 @@ def _map(folder: Path, scenario: Any) -> Iterator[Line]:
 
 def _pages(folder: Path, report: Mapping[str, Any], scenario: Any, traces: Mapping[str, Any]) -> Iterator[Line]:
     """The files that follow from report.json and the traces: pages, and what `airground prove` has added."""
-    from airground_drake.report import junit, proved
+    from airground_drake.report import junit, model, proved
     from airground_drake.report.figures.draw import draw
     from airground_drake.report.page import page
     from airground_drake.verify.proofs.compare import broken_rules
 
-    made = {**report, "files": {}}
+    made = model.of(report)
     found: Any = None
     if (folder / "proofs").is_dir():
         try:

@@ -194,6 +194,19 @@ def place_of(key: str) -> tuple[str, ...]:
     return at[:3] + (".".join(at[3:]),) * (len(at) > 3) if at[::2][:2] == ("runs", "set") else at  # its keys have dots
 
 
+def way(data: Any, key: str) -> list[Any]:
+    """The values of a document that a dotted key leads through, as far as they are there."""
+    found = []
+    for part in place_of(key):
+        if isinstance(data, list):
+            data = dict(zip(map(str, range(len(data))), data, strict=True))
+        if not isinstance(data, dict) or part not in data:
+            break
+        data = data[part]
+        found.append(data)
+    return found
+
+
 def put(document: Document, at: tuple[str, ...], new: Any, source: str) -> None:
     """Change a document: put another value at a place."""
     data = document.data

@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 from airground_drake.base.errors import Fault, ScenarioError, short
 from airground_drake.base.exact import decimal
 from airground_drake.scenario import map_file, validate
-from airground_drake.scenario.document import Document, of_data, place_of, put, read, replace, simple
+from airground_drake.scenario.document import Document, of_data, place_of, put, read, replace, simple, way
 from airground_drake.scenario.filled import filled
 from airground_drake.scenario.schema import SET, Scenario, Vector
 from airground_drake.scenario.shipped import shipped
@@ -131,20 +131,7 @@ class Chosen(NamedTuple):
 def _choices(document: Document) -> list[Chosen]:
     listed = document.data.get("choices") if isinstance(document.data, dict) else None
     entries = [each for each in listed if isinstance(each, dict)] if isinstance(listed, list) else []
-    return [Chosen(each, dict(each), deepcopy(_way(document.data, str(each.get("key"))))) for each in entries]
-
-
-def _way(data: Any, key: str) -> list[Any]:
-    """The values of a document that a dotted key leads through, as far as they are there."""
-    found = []
-    for part in place_of(key):
-        if isinstance(data, list):
-            data = dict(zip(map(str, range(len(data))), data, strict=True))
-        if not isinstance(data, dict) or part not in data:
-            break
-        data = data[part]
-        found.append(data)
-    return found
+    return [Chosen(each, dict(each), deepcopy(way(document.data, str(each.get("key"))))) for each in entries]
 
 
 def _mark_set(document: Document, before: Sequence[Chosen]) -> None:

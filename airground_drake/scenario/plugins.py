@@ -20,9 +20,7 @@ if TYPE_CHECKING:  # pydantic, which the schema imports, would delay `report --l
     from airground_drake.scenario.schema import Scenario
 
 OPTION = "--allow-plugins"
-HELP = "import and run what is named as module:Class or file.py:Class; looked for beside the scenario or spec, too"
 SHOW = "--show-policy-output"
-SHOW_HELP = "pass on what third-party policies print, to standard error"
 _POLICY = re.compile(r"intervention\.policies\.\d+\.name")
 WANTED = f"third-party code is imported and run only with {OPTION}"
 

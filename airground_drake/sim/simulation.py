@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import AbstractContextManager
 from dataclasses import replace
 from functools import cache
 from typing import Any
@@ -15,7 +15,7 @@ from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorC
 from pydrake.systems.framework import Context, DiagramBuilder, LeafSystem
 from pydrake.systems.primitives import LogVectorOutput, Multiplexer
 
-from airground_drake.base.errors import SimulationError, UnknownNameError, described
+from airground_drake.base.errors import SimulationError, UnknownNameError, described, raised_as
 from airground_drake.model.bodies.world import Body, World
 from airground_drake.model.geometry import convex, outline
 from airground_drake.model.geometry.motion import Motion
@@ -151,13 +151,9 @@ class Recorder:
         with self._reported(simulator.get_context()):
             simulator.AdvanceTo(until)
 
-    @contextmanager
-    def _reported(self, context: Context) -> Iterator[None]:
-        """Errors of Drake or a system in the body as SimulationError."""
-        try:
-            yield
-        except (Exception, SystemExit) as error:  # Drake raises many kinds
-            raise SimulationError(self._name, context.get_time(), self._what(error)) from error
+    def _reported(self, context: Context) -> AbstractContextManager[None]:
+        """Errors of Drake, which raises many kinds, or a system in the body as SimulationError."""
+        return raised_as(lambda error: SimulationError(self._name, context.get_time(), self._what(error)))
 
     def _what(self, error: BaseException) -> str:
         """An error in words, with the place in the file of a user's plant, and such plants by name."""

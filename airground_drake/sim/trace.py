@@ -42,9 +42,10 @@ import json
 import re
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import wraps
 from math import ceil
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, Concatenate, ParamSpec, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -72,6 +73,7 @@ from airground_drake.sim.tables import (
     typed,
 )
 
+P = ParamSpec("P")
 T = TypeVar("T")
 
 
@@ -325,6 +327,17 @@ class Trace:
         """Run, scenario, numbers of rows and events in one line."""
         scenario, events = self.meta.get("scenario", {}).get("name"), self.meta.get("events", [])
         return f"<Trace: run {self.meta.get('run')!r} of {scenario!r}, {len(self.states)} rows, {len(events)} events>"
+
+
+def per_trace(work_out: Callable[Concatenate[Trace, P], T]) -> Callable[Concatenate[Trace, P], T]:
+    """A function that works something out once per trace and arguments; these are hashable."""
+
+    @wraps(work_out)
+    def known(trace: Trace, /, *about: P.args, **named: P.kwargs) -> T:
+        key = work_out.__module__, work_out.__qualname__, *about, *named.items()
+        return trace.derived(key, lambda: work_out(trace, *about, **named))
+
+    return known
 
 
 def save(trace: Trace, folder: Path) -> list[str]:

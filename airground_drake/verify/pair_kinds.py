@@ -17,12 +17,6 @@ from airground_drake.scenario.schema import Control, Scenario, Uav, Ugv
 
 # By kind of pair, the parts of an inequality that its two bodies take; an obstacle stands still and takes none.
 SHARES = {"obstacle": (Fraction(1), Fraction(0)), "uav_ugv": (Fraction(1, 2),) * 2, "ugv_ugv": (Fraction(1, 2),) * 2}
-# By kind of pair, the theorems that prove its distance. A kind that is not here is never called proved.
-THEOREMS = {
-    "obstacle": ("Safety.safe_always", "Safety.obstacle"),
-    "uav_ugv": ("Safety.safe_always",),
-    "ugv_ugv": ("Safety.safe_always",),
-}
 MOVING = "moving"  # the kind of a robot beside an obstacle that may move: no theorem keeps its distance
 # The kind of a pair with a body that is not where the law steers it: these theorems are about the steered points.
 STEERED = "steered"
@@ -95,7 +89,7 @@ def kinds_of(inputs: dict[str, Any]) -> list[PairKind]:
 
 
 def _kinds(scenario: Scenario) -> Iterator[PairKind]:
-    """The extreme pairs of each kind in `THEOREMS`: the hypotheses hold for all pairs if they hold for these."""
+    """The extreme pairs of each kind in `SHARES`: the hypotheses hold for all pairs if they hold for these."""
     # Kept are pairs that no other pair exceeds in both distance and speed, and the nearest pair.
     robots = {name: _Robot.of(robot, scenario.control) for name, robot in scenario.robots.items()}
     asked = {(pair.kind, robots[pair.first], robots.get(pair.second), *pair[3:]) for pair in apart(scenario)}

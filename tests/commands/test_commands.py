@@ -154,7 +154,6 @@ MISTAKES = """
                                         # a command is needed: report, run
 --versoin                               # is no command: commands are report
 repot case_a                            # did you mean report?
-proofs                                  # `airground proofs` is gone: use `airground prove`
 report                                  # a scenario is needed
 report minimal --format html,,json      # formats are html, json, junit
 report minimal --limit-steps x          # a number above 0, at most 1e+15

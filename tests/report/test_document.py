@@ -13,6 +13,7 @@ from report.cases import FINE, GOING_ROUND, STALL, Kept, built, make_trace, verd
 
 from airground_drake.report import attention, document, junit, screen
 from airground_drake.report.audit import of_runs
+from airground_drake.report.model import of
 from airground_drake.scenario.schema import Scenario
 from airground_drake.sim.trace import Trace
 from airground_drake.verify.claim import Verdict
@@ -78,10 +79,10 @@ def test_too_few_interventions_or_messages_are_not_as_declared(scenario: Scenari
     why = "1 of 5 checks differs from what the scenario declares: interventions on run c (0, expected at least 1)."
     assert overall["why"] == why
     assert overall["missing"] == []
-    assert screen.declared(report).lines[1] == "c: interventions 0"
-    (item,) = (each for each in attention.items(report) if each.run == "c" and each.chip == "not_as_expected")
+    assert screen.declared(of(report)).lines[1] == "c: interventions 0"
+    (item,) = (each for each in attention.items(of(report)) if each.run == "c" and each.chip == "not_as_expected")
     assert (item.words, item.about) == ("0 interventions", "expected: at least 1")
-    failed = ET.fromstring(junit.render(report)).find("*/*[@name='interventions']/failure")
+    failed = ET.fromstring(junit.render(of(report))).find("*/*[@name='interventions']/failure")
     assert failed is not None
     assert failed.get("message") == "0 interventions, expected at least 1"
 
@@ -138,4 +139,4 @@ def test_a_choice_may_be_an_entry_of_a_list_or_what_a_run_sets() -> None:
     runs = {"c_literal": {"set": {"gatekeeper.route": "nonlinear"}}}
     resolved = {"ugvs": {"ugv1": {"start_m": [1.0, 2.0]}}, "policies": [{"name": "detour"}], "runs": runs}
     keys = "ugvs.ugv1.start_m.1", "policies.0.name", "policies.1.name", "runs.c_literal.set.gatekeeper.route"
-    assert [document._lookup(resolved, key) for key in keys] == [2.0, "detour", None, "nonlinear"]
+    assert [document._at(resolved, key) for key in keys] == [2.0, "detour", None, "nonlinear"]

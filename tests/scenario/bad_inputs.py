@@ -87,10 +87,7 @@ EDITS: list[tuple[str, object]] = [
     ("intervention.policies.0.parameters.not ok", 1),
     # counts
     ("ugvs", {}),
-    ("runs", {}),
     ("seed", -1),
-    ("seed", 2**31),
-    ("gatekeeper.stages", 0),
     ("gatekeeper.stages", 1001),
     ("gatekeeper.budget_share", 1.5),
     # options
@@ -99,14 +96,9 @@ EDITS: list[tuple[str, object]] = [
     ("gatekeeper.route", "exact"),
     ("gatekeeper.route", "mine.py:Mine"),
     ("runs.d.set", {"gatekeeper.route": "mine.py:Mine"}),
-    ("gatekeeper.rule", "x"),
-    ("intervention.ranking", "x"),
-    ("uav.task", "hover"),
-    ("decision.trigger", "x"),
     ("decision.threshold.rule", "x"),
     ("runs.d.method", "e"),
     ("intervention.policies.0.name", "detuor"),
-    ("choices.0.source", "paper"),
     # runs, reproduction, choices
     ("runs.d.stalls_m.three", [1, 0, 0]),
     ("runs.d.expected.SAFE", "holds"),
@@ -138,15 +130,12 @@ EDITS: list[tuple[str, object]] = [
     # plane, presets
     ("ugvs.one.start_m", [0, 0, 1]),
     ("uav.start_m", [0, 0, -3]),
-    ("uav.target_m", [0, 0, -3]),
-    ("runs.d.stalls_m.one", [1, 0, 1]),
     ("ugvs.one.preset.waypoints_m", [[0, 0, 0]]),
     ("ugvs.one.preset.waypoints_m.1", [0, 0, 0]),
     ("ugvs.one.preset.speed_m_s", 2.5),
     ("ugvs.two.preset.waypoints_m.1", [9, -5, 0]),
     # gains and periods
     ("control.avoidance_gain_1_s", 41),
-    ("control.intervention_gain_1_s", 41),
     ("gatekeeper.period_s", 0.06),
     ("gatekeeper.period_s", 0.0125),
     ("gatekeeper.horizon_s", 3.1),
@@ -160,7 +149,6 @@ EDITS: list[tuple[str, object]] = [
     # distances
     ("uav.altitude_m", 1),
     ("safe_distance.collision_m", 1),
-    ("safe_distance.collision_m", 2),
     ("control.sensing_range_m", 2.2),
     ("safe_distance.ugv_m", 3.9),
     ("ugvs.one.start_m", [5, -4, 0]),
@@ -171,7 +159,6 @@ EDITS: list[tuple[str, object]] = [
     ("ugvs.two.target_m", [9, 1, 0]),
     ("uav.start_m", [1e8, 0, 2]),
     ("control.avoidance_gain_1_s", 1e-9),
-    # claims that have moved
     # radii
     ("obstacles.rock.radius_m", -1),
     ("obstacles.rock.radius_m", 1.9),

@@ -16,7 +16,7 @@ from airground_drake.scenario.schema import Scenario
 from airground_drake.sim.trace import Trace, load, save
 from airground_drake.verify import Finding, judge, judge_model
 from airground_drake.verify.claims.safe_budget import SafeBudget
-from airground_drake.verify.finding import Failure
+from airground_drake.verify.finding import Chart, Failure
 
 
 @pytest.mark.parametrize("method", "abcd")
@@ -75,6 +75,7 @@ def test_of_a_broken_trace_no_claim_passes(name: str) -> None:
         (Finding("holds", margin="big", exercised=1), "ValueError: LIVE-GOAL found the margin 'big'"),  # type: ignore[arg-type]
         (Finding("holds", exercised=-3), "ValueError: LIVE-GOAL was exercised -3 times; allowed: a whole number"),
         (Finding("holds", exercised=1.5), "ValueError: LIVE-GOAL was exercised 1.5 times"),  # type: ignore[arg-type]
+        (Finding("holds", exercised=1, figure={}), "ValueError: LIVE-GOAL found the figure dict; allowed: a Chart"),  # type: ignore[arg-type]
         (None, "AttributeError"),
     ],
 )
@@ -90,6 +91,19 @@ def test_a_check_that_fails_is_an_error(returned: Any, error: str) -> None:
     assert finding.evidence.error.startswith(error)
 
 
+@pytest.mark.parametrize(
+    ("line", "log", "why"),
+    [
+        (([1.0, 2.0], [1.0]), "", r"line 'a' has 2 numbers across and 1 up; wanted: as many"),
+        (([], []), "", "line 'a' has 0 numbers"),
+        (([1.0, 2.0], [0.0, 1.0]), "xy", "0 on the logarithmic axis y; allowed: numbers above 0"),
+    ],
+)
+def test_a_chart_that_cannot_be_drawn_is_refused(line: Any, log: str, why: str) -> None:
+    with pytest.raises(ValueError, match=why):
+        Chart("Title", "t, s", "x, m", {"a": line}, {"b": (1.0, 1.0)}, log)
+
+
 def test_a_claim_that_cannot_say_whether_it_applies_is_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
     def applies(self: Any, trace: Trace) -> bool:
         raise ValueError("applies")
@@ -102,10 +116,10 @@ def test_a_claim_that_cannot_say_whether_it_applies_is_an_error(monkeypatch: pyt
 def test_a_claim_about_the_model_that_cannot_say_whether_it_applies_is_an_error(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    def applies_to(self: Any, scenario: Scenario) -> bool:
+    def applies(self: Any, scenario: Scenario) -> bool:
         raise ValueError("applies")
 
-    monkeypatch.setattr(SafeBudget, "applies_to", applies_to)
+    monkeypatch.setattr(SafeBudget, "applies", applies)
     (verdict,) = judge_model(run_of("d").scenario, claims=["SAFE-BUDGET"])
     assert (verdict.status, verdict.evidence.error) == ("error", "ValueError: applies")
 

@@ -102,8 +102,8 @@ def _soft_gate() -> Item:
             "least_predicted_clearance_of_accepted_m": (
                 float(accepted.min()) if len(accepted) and name in ("c", LIGHT) else None
             ),
-            "min_distance_m": nearest[0] if nearest else None,
-            "t_s": nearest[1] if nearest else None,
+            "min_distance_m": nearest.value_m if nearest else None,
+            "t_s": nearest.t_s if nearest else None,
         }
     paper, ours = evidence["c"], evidence[EVERYTHING]
     predicted = paper["least_predicted_clearance_of_accepted_m"]
@@ -184,7 +184,7 @@ def _method_b(direct: Trace, gated: Trace) -> Item:
     """Item 23: method (b) with a gatekeeper, as in section 5.1, is method (c)."""
     answer, traces = gated.decisions.iloc[0], {"without": direct, "with": gated}
     nearest = {name: closest_obstacle(trace, "ugv1") for name, trace in traces.items()}
-    least = {name: round(found[0], 9) if found else None for name, found in nearest.items()}
+    least = {name: round(found.value_m, 9) if found else None for name, found in nearest.items()}
     triggers = {name: MEASURES["trigger_time"](trace, "ugv1") for name, trace in traces.items()}
     return item(
         23, "section 5, Figures 6 and 10",

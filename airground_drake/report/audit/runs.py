@@ -36,17 +36,17 @@ def _recursion(scenario: Scenario, traces: Mapping[str, Trace]) -> Item | None:
     evidence: dict[str, dict[str, Any]] = {}
     for name in compared:
         trace = traces[name]
-        found = [(nearest, robot) for robot in trace.ugvs if (nearest := closest_obstacle(trace, robot))]
+        found = [near for robot in trace.ugvs if (near := closest_obstacle(trace, robot))]
         if not found:
             return None
-        (value, t_s, obstacle, *_), robot = min(found)
+        nearest = min(found, key=lambda near: (near.value_m, near.t_s))
         evidence[name] = {
             "composition": scenario.runs[name].composition,
-            "robot": robot,
-            "obstacle": obstacle,
-            "min_distance_m": value,
-            "t_s": t_s,
-            "margin_m": value - d,
+            "robot": nearest.robot,
+            "obstacle": nearest.other,
+            "min_distance_m": nearest.value_m,
+            "t_s": nearest.t_s,
+            "margin_m": nearest.value_m - d,
             "stalls_m": {ugv: at for ugv in trace.ugvs if (at := MEASURES["stall_position"](trace, ugv))},
         }
     theirs, ours = ([evidence[name] for name in compared if (name in printed) == own] for own in (True, False))

@@ -27,10 +27,10 @@ def draw(scenario: Scenario, traces: Mapping[str, Trace]) -> Figure | None:
     minima = {(name, ugv): closest_obstacle(trace, ugv) for name, trace in runs.items() for ugv in first.ugvs}
     if None in minima.values():  # no obstacle was there
         return None
-    (_, robot), _ = min(minima.items(), key=lambda item: item[1].value if item[1] else np.inf)
+    (_, robot), _ = min(minima.items(), key=lambda item: item[1].value_m if item[1] else np.inf)
     worst = {name: minima[name, robot] for name in runs}
     required = " or ".join(f"{d:g} m" for d in sorted({at.required_m for at in worst.values() if at}))
-    listed = "; ".join(f"{_how(scenario, name)}: {at.value:.3f} m" for name, at in worst.items() if at)
+    listed = "; ".join(f"{_how(scenario, name)}: {at.value_m:.3f} m" for name, at in worst.items() if at)
     text = f"{robot}, smallest distance to an obstacle: {listed}; safe distance {required}."
     heading = f"Distance of {robot} to the nearest obstacle"
     gaps = {

@@ -16,8 +16,8 @@ from airground_drake.base.errors import TraceError, one_line
 from airground_drake.base.registry import method_of
 from airground_drake.report.figures import comparison, maps, timelines
 from airground_drake.report.figures.panels import MAX_TABLE_ROWS, Figure, Panel, Table, panel, series
-from airground_drake.report.metrics import Nearby, close_by, events_of, gap_m, radius_m
-from airground_drake.report.outcomes import SLACK_M, distance, named
+from airground_drake.report.metrics import close_by, events_of, gap_m, radius_m
+from airground_drake.report.outcomes import Near
 from airground_drake.report.reproduction import MEASURES
 from airground_drake.report.rules import SETTINGS
 from airground_drake.report.view import canvas
@@ -98,7 +98,7 @@ def _select(scenario: Scenario, traces: Mapping[str, Trace]) -> _Selection:
 
     def rank(ugv: str) -> tuple[bool, bool, bool, int]:
         near = [close_by(trace, ugv)[:1] for trace in runs.values()]
-        kept = all(found.value >= found.required_m - SLACK_M for each in near for found in each)
+        kept = all(not found.is_short for each in near for found in each)
         arrived = all(MEASURES["arrives"](trace, ugv)[0] for trace in runs.values())
         called = any(events_of(trace, ugv, "trigger") for trace in runs.values())
         return kept, arrived, not called, first.ugvs.index(ugv)
@@ -195,7 +195,7 @@ def _distances(chosen: _Selection) -> Figure | None:
     most = max((found.required_m for each in near.values() for found in each), default=None)
     if most is None:
         return None
-    near = {key: [at for at in each if at is each[0] or at.value < NEAR * most] for key, each in near.items()}
+    near = {key: [at for at in each if at is each[0] or at.value_m < NEAR * most] for key, each in near.items()}
     top = FARTHEST * most
     world = [*chosen.first.scenario.barriers, *chosen.first.robots]
     met = {ugv: {at.other for (_, each), those in near.items() if each == ugv for at in those} for ugv in chosen.ugvs}
@@ -212,9 +212,9 @@ def _distances(chosen: _Selection) -> Figure | None:
         name = f"distances-{len(panels)}"
         panels.append(panel(drawing, name, f"Distances, {heading}", says, _runs(heading), table))
     pairs = [(each[0], ugv, heading) for (heading, ugv), each in near.items() if each]
-    at, ugv, heading = min(pairs, key=lambda pair: pair[0].value - pair[0].required_m)
-    least = "Too close" if at.value < at.required_m - SLACK_M else "Closest"
-    least += f": {ugv} is {distance(at.value, at.required_m)} from {named(at.other, at.at_m)} at {at.t_s:.2f} s"
+    at, ugv, heading = min(pairs, key=lambda pair: pair[0].margin_m)
+    least = "Too close" if at.is_short else "Closest"
+    least += f": {ugv} is {at} from {at.whom} at {at.t_s:.2f} s"
     least += f", {at.required_m:g} m required"
     caption = (
         f"{least} ({_runs(heading).lower()}). No line may enter the hatched band. "
@@ -223,8 +223,8 @@ def _distances(chosen: _Selection) -> Figure | None:
     return Figure("distances", "Distances to the nearest obstacles and robot", caption, tuple(panels))
 
 
-def _told(at: Nearby) -> str:
-    return f"{distance(at.value, at.required_m)} to {named(at.other, at.at_m)} at {at.t_s:.2f} s"
+def _told(at: Near) -> str:
+    return f"{at} to {at.whom} at {at.t_s:.2f} s"
 
 
 def _timelines(chosen: _Selection) -> Figure:
@@ -266,7 +266,7 @@ def _team(chosen: _Selection) -> Figure:
     }  # fmt: skip
     for name, trace in chosen.runs.items():
         found = (
-            [min((at.value - at.required_m for at in close_by(trace, ugv)), default=np.nan) for ugv in ugvs],
+            [min((at.margin_m for at in close_by(trace, ugv)), default=np.nan) for ugv in ugvs],
             [float(event["t_s"]) for ugv in ugvs for event in events_of(trace, ugv, "arrival")[-1:]],
             [float(trace.column(f"{ugv}.decision_variable_m").max()) for ugv in ugvs],
         )

@@ -13,8 +13,8 @@ from matplotlib.figure import Figure
 
 from airground_drake.base.arrays import Array
 from airground_drake.report.figures.clock import CUT_S, Clock
-from airground_drake.report.metrics import Nearby, closest_obstacle, events_of, gap_m
-from airground_drake.report.outcomes import SLACK_M, metres
+from airground_drake.report.metrics import closest_obstacle, events_of, gap_m
+from airground_drake.report.outcomes import Near, metres
 from airground_drake.report.view.canvas import (
     ALARM,
     GOOD,
@@ -51,13 +51,13 @@ _FORBIDDEN: dict[str, Any] = {
 
 
 def distances(
-    trace: Trace, near: Mapping[str, Sequence[Nearby]], looks: Mapping[str, Mapping[str, int]], top: float
+    trace: Trace, near: Mapping[str, Sequence[Near]], looks: Mapping[str, Mapping[str, int]], top: float
 ) -> Figure:
     """Distances between the surfaces of each UGV and bodies near it, the required ones, and the exact minimum."""
     figure, every = _time_axes(1.45, [0.24, *[0.32] * (len(near) - 1)], trace)
     required = sorted({found.required_m for each in near.values() for found in each})
     for axes, (ugv, those) in zip(every, near.items(), strict=True):
-        bottom = min(0.0, *(found.value for found in those)) if those else 0.0
+        bottom = min(0.0, *(found.value_m for found in those)) if those else 0.0
         axes.axhspan(bottom, required[0], **_FORBIDDEN)
         labels = [(d, f"required {d:.3g}", INK) for d in required]
         for d in required:
@@ -75,12 +75,12 @@ def distances(
             axes.set_title(short(ugv))
             continue
         least = those[0]
-        below = least.value < least.required_m - SLACK_M
+        below = least.is_short
         axes.plot(
-            least.t_s, least.value, marker="o", markersize=9, markerfacecolor="none", markeredgewidth=1.6,
+            least.t_s, least.value_m, marker="o", markersize=9, markerfacecolor="none", markeredgewidth=1.6,
             color=ALARM if below else INK, zorder=5, clip_on=False,
         )  # fmt: skip
-        value = metres(least.value, least.required_m)
+        value = metres(least.value_m, least.required_m)
         value = f"{value}, not {least.required_m:g} m," if below else value
         note = f"{short(ugv, 14)}: {value} from {short(least.other, 14)} at {least.t_s:.2f} s"
         axes.set_title(note, color=ALARM if below else INK)
@@ -247,9 +247,11 @@ def compared_distances(runs: Mapping[str, Trace], robot: str) -> Figure:
         appearance, minimum = look(position), minima[name]
         if minimum is None:
             continue
-        text = f"run {short(name, 24)}: minimum {minimum.value:.3f} m"
+        text = f"run {short(name, 24)}: minimum {minimum.value_m:.3f} m"
         time_line(axes, trace.t, gaps[name], appearance, label=text)
-        axes.plot(minimum.t_s, minimum.value, marker="o", markersize=9, markerfacecolor="none", color=appearance.color)
+        axes.plot(
+            minimum.t_s, minimum.value_m, marker="o", markersize=9, markerfacecolor="none", color=appearance.color
+        )
     axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), frameon=False, handlelength=4.0)
     return figure
 

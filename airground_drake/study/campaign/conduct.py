@@ -15,7 +15,7 @@ from airground_drake.base.errors import FolderError, LimitError, one_line
 from airground_drake.base.progress import SILENT, Progress
 from airground_drake.base.registry import RUN_CLAIMS
 from airground_drake.scenario.estimate import DEFAULT_LIMITS, MOST_ROWS, Limits
-from airground_drake.study.campaign.evidence import evidence, strict
+from airground_drake.study.campaign.evidence import evidence
 from airground_drake.study.campaign.page import page
 from airground_drake.study.campaign.pool import Pool
 from airground_drake.study.campaign.spec import Spec
@@ -77,7 +77,7 @@ def conduct(
         table = table[table["index"] <= stopped]
     runs = per_run(table)
     of["swept"] = [{"key": key, "entries": by_value(runs, key)} for key in spec.swept if key in runs]
-    found: dict[str, Any] = strict(evidence(table, spec.marks, spec.dependent)) | of
+    found: dict[str, Any] = files.strict(evidence(table, spec.marks, spec.dependent)) | of
     files.write_json(folder / EVIDENCE, found)
     files.write_text(folder / PAGE, page(found, table))
     return found

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 from collections.abc import Mapping, Sequence
 from itertools import chain, combinations
 from typing import Any, NamedTuple
@@ -179,14 +178,3 @@ def _parts(values: pd.Series) -> pd.Series | None:
         quarters = pd.qcut(values, BINS, duplicates="drop")
         found = quarters.map(lambda part: f"{part.left:.4g} to {part.right:.4g}").astype(str)
     return found.reset_index(drop=True) if len(found.unique()) > 1 else None
-
-
-def strict(value: Any) -> Any:
-    """The value as strict JSON: None for numbers that are not finite."""
-    if isinstance(value, dict):
-        return {str(key): strict(each) for key, each in value.items()}
-    if isinstance(value, list | tuple):
-        return [strict(each) for each in value]
-    if isinstance(value, np.generic):
-        value = value.item()
-    return None if isinstance(value, float) and not math.isfinite(value) else value

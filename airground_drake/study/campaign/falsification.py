@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
@@ -11,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from airground_drake.base.arrays import Array
-from airground_drake.base.errors import PluginError, ScenarioError, described, one_line
+from airground_drake.base.errors import PluginError, ScenarioError, described, one_line, raised_as
 from airground_drake.base.progress import SILENT, Progress
 from airground_drake.scenario.estimate import Limits
 from airground_drake.scenario.load import from_data
@@ -98,13 +97,9 @@ def _asked(sampler: Sampler, n: int) -> Array:
     return points
 
 
-@contextmanager
-def _guarded(sampler: Sampler, what: str) -> Iterator[None]:
+def _guarded(sampler: Sampler, what: str) -> AbstractContextManager[None]:
     """Turn an exception of a sampler's method into a `PluginError` that names the method."""
-    try:
-        yield
-    except (Exception, SystemExit) as error:
-        raise PluginError(f"{what} of sampler {_name(sampler)}: {described(error)}") from error
+    return raised_as(lambda error: PluginError(f"{what} of sampler {_name(sampler)}: {described(error)}"))
 
 
 def _name(sampler: Sampler) -> str:

@@ -13,6 +13,7 @@ from markupsafe import Markup
 from matplotlib.figure import Figure
 
 from airground_drake.base.arrays import Array
+from airground_drake.report import rules
 from airground_drake.report.html import number
 from airground_drake.report.sentences import MARKS, Line
 from airground_drake.report.templating import environment_of
@@ -22,7 +23,7 @@ from airground_drake.study.campaign.rows import JUDGED
 
 BARS = 40
 MOST_TOLD = 8  # sentences about claims on the first screen; the others are folded
-SHOWN = ("SAFE-TRACE", "SAFE-HYP", "LIVE-GOAL")  # claims whose margins are drawn
+SHOWN = (rules.DISTANCES, rules.CONDITIONS, rules.ARRIVAL)  # claims whose margins are drawn
 
 
 class Drawing(NamedTuple):

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import gc
 import json
-import math
 import time
 from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager
@@ -13,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from airground_drake.base import files
 from airground_drake.base.errors import AirgroundError, ScenarioError, described, one_line
 from airground_drake.scenario import plugins
 from airground_drake.scenario.estimate import Limits, within
@@ -43,21 +43,12 @@ def _keep_what_is_loaded() -> None:
 
 def rows_at(spec: Spec, values: Mapping[str, Any], index: int, limits: Limits) -> list[Row]:
     """Simulate and judge any values by dotted key, on the course of a draw."""
-    common = blank() | {"index": index, "drawn": json.dumps(_strict(dict(values)), allow_nan=False)}
+    common = blank() | {"index": index, "drawn": json.dumps(files.strict(values, str), allow_nan=False)}
     try:
         scenario = spec.scenario_of(values, index)
     except ScenarioError as error:
         return [common | {"ended": INVALID, "what": one_line(str(error))}]
     return rows_of_scenario(spec, scenario, limits, common)
-
-
-def _strict(value: Any) -> Any:
-    """Drawn values as strict JSON; numbers that are not finite as text."""
-    if isinstance(value, dict):
-        return {name: _strict(each) for name, each in value.items()}
-    if isinstance(value, list):
-        return [_strict(each) for each in value]
-    return str(value) if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def rows_of_scenario(spec: Spec, scenario: Scenario, limits: Limits, common: Row | None = None) -> list[Row]:

@@ -79,9 +79,8 @@ class Plans(Choices):
 
 
 class GatePlan(GateClaim):
-    """GATE-PLAN."""
-
     id = "GATE-PLAN"
+    subject = "plans of the gatekeeper"
     summary = "Every decision rests on a plan that is feasible and costs what was recorded."
     statement = (
         "Under method (c) the plan of every decision satisfies (26b)-(26e) at its recorded cost, no step of it is "
@@ -139,13 +138,40 @@ class GatePlan(GateClaim):
         """Judge every plan; the margin is the largest gap."""
         if trace.meta["method"] not in ON_TOP:
             return _judge_outcomes(trace, rows)
-        planned, rounded = [row for row in rows if row.planned], [row for row in rows if is_rounded(row)]
-        compared = [one for row in rows for one in compare_plan(trace, row)]
-        compared += [one for row in rounded for one in compare_rounding(row)]
+        planned = [row for row in rows if row.planned]
+        rounded = [row for row in rows if is_rounded(row)]
+        compared = [deviation for row in rows for deviation in compare_plan(trace, row)]
+        compared += [deviation for row in rounded for deviation in compare_rounding(row)]
         blocks = int(trace.scenario.gatekeeper.blocks)
         bounded = bound([row for row in planned if row.unit_normals], blocks)
-        evidence = _plans(trace, rows, bounded, compared, blocks)
-        known = evidence.optimum == "known"
+        bounded = sorted(bounded, key=lambda decision: -decision.gap)
+        widest = max((decision.width for decision in bounded), default=0.0)
+        slack = [float(np.maximum(0.0, -row.clearance(row["positions_m"])).max()) for row in planned]
+        beside_all = [above_the_best(row, blocks) for row in planned if min(blocks or row.stages, row.stages) <= BLOCKS]
+        optimum = "known" if planned else "unknown: no decision rests on a plan"
+        if len(bounded) < len(planned):
+            optimum = f"unknown: {len(planned) - len(bounded)} of {len(planned)} plans have no half-planes"
+        elif widest > WIDEST:
+            optimum = f"unknown: the bounds of an optimum are {widest:.2g} apart"
+        evidence = Plans(
+            decisions=len(rows),
+            reasons=reasons_of(trace),
+            comparisons=len(compared),
+            wrong=sum(deviation.wrong for deviation in compared),
+            optimum=optimum,
+            enumerated=len(beside_all),
+            largest_gap_to_enumeration=max(beside_all, default=None),
+            without_a_plan=[row.label for row in rows if not row.planned],
+            largest_slack_m=max(slack, default=0.0),
+            plans_with_slack=sum(value > 0.0 for value in slack),
+            rounded_plans=len(rounded),
+            largest_rounding_error_s=max(map(integrated_error_s, rounded), default=0.0),
+            largest_gaps=[{"t_s": each.row.t_s, "robot": each.row.robot, "gap": each.gap} for each in bounded[:5]],
+            median_gap=float(np.median([decision.gap for decision in bounded])) if bounded else None,
+            widest_enclosure=widest,
+            first_stage_certified=sum(decision.first_stage_certified for decision in bounded),
+        )
+        known = optimum == "known"
         worst = evidence.largest_gaps[0] if known else {}
         finding = Finding(
             "holds",
@@ -159,41 +185,6 @@ class GatePlan(GateClaim):
         return conclude(finding, compared)
 
 
-def _plans(
-    trace: Trace, rows: Sequence[DecisionRecord], bounded: Sequence[Bounded], compared: Sequence[Deviation], blocks: int
-) -> Plans:
-    planned, rounded = [row for row in rows if row.planned], [row for row in rows if is_rounded(row)]
-    gaps, widest = [each.gap for each in bounded], max((each.width for each in bounded), default=0.0)
-    slack = [float(np.maximum(0.0, -row.clearance(row["positions_m"])).max()) for row in planned]
-    beside_all = [above_the_best(row, blocks) for row in planned if min(blocks or row.stages, row.stages) <= BLOCKS]
-    optimum = "known" if planned else "unknown: no decision rests on a plan"
-    if len(bounded) < len(planned):
-        optimum = f"unknown: {len(planned) - len(bounded)} of {len(planned)} plans have no half-planes"
-    elif widest > WIDEST:
-        optimum = f"unknown: the bounds of an optimum are {widest:.2g} apart"
-    return Plans(
-        decisions=len(rows),
-        reasons=reasons_of(trace),
-        comparisons=len(compared),
-        wrong=sum(one.wrong for one in compared),
-        optimum=optimum,
-        enumerated=len(beside_all),
-        largest_gap_to_enumeration=max(beside_all, default=None),
-        without_a_plan=[row.label for row in rows if not row.planned],
-        largest_slack_m=max(slack, default=0.0),
-        plans_with_slack=sum(value > 0.0 for value in slack),
-        rounded_plans=len(rounded),
-        largest_rounding_error_s=max(map(integrated_error_s, rounded), default=0.0),
-        largest_gaps=[
-            {"t_s": each.row.t_s, "robot": each.row.robot, "gap": each.gap}
-            for each in sorted(bounded, key=lambda each: -each.gap)[:5]
-        ],
-        median_gap=float(np.median(gaps)) if gaps else None,
-        widest_enclosure=widest,
-        first_stage_certified=sum(each.first_stage_certified for each in bounded),
-    )
-
-
 def compare_plan(trace: Trace, row: DecisionRecord) -> Iterator[Deviation]:
     """(26b)-(26e), (25) and what was recorded about the plan."""
     limit = trace.scenario.ugvs[row.robot].max_speed_m_s
@@ -201,7 +192,7 @@ def compare_plan(trace: Trace, row: DecisionRecord) -> Iterator[Deviation]:
     begins = row["initial_m"] - interpolate(trace.t, trace.position(row.robot), row.t_s)
     yield Deviation(row, "initial position, m", begins, POSITION_TOLERANCE_M)
     refusing, accepting = row.constant
-    clear_refusing, clear_accepting = (_clear(trace, row, each, period) for each in (refusing, accepting))
+    clear_refusing, clear_accepting = (_clear(trace, row, way, period) for way in (refusing, accepting))
     ways = [("refusing throughout", refusing, clear_refusing), ("accepting throughout", accepting, clear_accepting)]
     if row.planned:
         plan = row["plan"]
@@ -254,7 +245,7 @@ def _judge_outcomes(trace: Trace, rows: Sequence[DecisionRecord]) -> Finding:
     """Method (d): the choice of every decision for which both outcomes were predicted, and that was the UGV's own."""
     own = [row for row in rows if row.given["reason"] != JOINT_REFUSED]
     looked = [row for row in own if row.given["accept_stalls"] >= 0.0]
-    compared = [one for row in looked for one in _compare_choice(trace, row)]
+    compared = [deviation for row in looked for deviation in _compare_choice(trace, row)]
     refused = {_part(trace, row) for row in own if row.given["decision"] == "refuse"}
     for row in rows:
         if row.given["reason"] == JOINT_REFUSED:
@@ -265,7 +256,7 @@ def _judge_outcomes(trace: Trace, rows: Sequence[DecisionRecord]) -> Finding:
         decisions=len(rows),
         reasons=reasons_of(trace),
         comparisons=len(compared),
-        wrong=sum(one.wrong for one in compared),
+        wrong=sum(deviation.wrong for deviation in compared),
         optimum=f"unknown: {NO_PROBLEM}",
         enumerated=len(looked),
         largest_gap_to_enumeration=max(gaps, default=None),
@@ -329,7 +320,7 @@ class Bounded:
 def bound(rows: Sequence[DecisionRecord], blocks: int) -> list[Bounded]:
     """Bounds for each decision: of the relaxation, or of all plans if `blocks` are few (0: one per stage)."""
     optima = [cheapest_of_blocks(row, blocks) for row in rows] if 0 < blocks <= MOST_BLOCKS else enclose(rows)
-    return [Bounded(*one) for one in zip(rows, optima, strict=True)]
+    return [Bounded(row, optimum) for row, optimum in zip(rows, optima, strict=True)]
 
 
 def cheapest_of_blocks(row: DecisionRecord, blocks: int) -> Enclosure:

@@ -5,8 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
+from airground_drake.sim.trace import Trace
 from airground_drake.verify.claims.live_wait import LiveWait
 from airground_drake.verify.model.theorem import Proof
+from airground_drake.verify.runs.acceptances import Acceptance, acceptances
+from airground_drake.verify.runs.passive import beside
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -17,8 +20,6 @@ class LatestEnd(Proof):
 
 
 class LiveGate(LiveWait):
-    """LIVE-GATE; its hypotheses are those of LIVE-WAIT."""
-
     id = "LIVE-GATE"
     summary = "An accepted intervention is carried through to its end, unless a new obstacle is sensed."
     statement = (
@@ -51,5 +52,21 @@ class LiveGate(LiveWait):
     theorems = ("Patience.kept", "Patience.over_in_time")
 
     def evidence(self, inputs: dict[str, Any], **proof: Any) -> Proof:
-        """Add the longest that an accepted intervention may last."""
         return LatestEnd(over_after_s=float(inputs["longest_s"] + inputs["period_s"]), **proof)
+
+    def seen_in(self, trace: Trace) -> tuple[int, int]:
+        """The acceptances during which no obstacle was new and none in range may move, and all."""
+        accepted = [acceptance for of_ugv in acceptances(trace).values() for acceptance in of_ugv]
+        met = [acceptance for acceptance in accepted if not (acceptance.news_s or _beside_a_mover(trace, acceptance))]
+        return len(met), len(accepted)
+
+
+def _beside_a_mover(trace: Trace, acceptance: Acceptance) -> bool:
+    """Whether an obstacle that may move was within sensing range of the UGV while it executed the proposal."""
+    for periods in beside(trace):
+        t_s = trace.t[periods.row]
+        meanwhile = (t_s >= acceptance.t_s) & (t_s <= acceptance.end_s)
+        in_range = periods.apart_m <= trace.scenario.control.sensing_range_m
+        if periods.pair.first == acceptance.on.ugv and (meanwhile & in_range).any():
+            return True
+    return False

@@ -22,9 +22,8 @@ AT_REST_M = 1e-3
 
 
 class LiveGoal(TraceClaim):
-    """LIVE-GOAL."""
-
     id = "LIVE-GOAL"
+    subject = "arrival"
     summary = "Every robot ended where it must: at its target, or where the scenario says that it stalls."
     statement = (
         "Every robot ended the run at its target, or standing where the scenario declares that it stalls. For a robot "
@@ -50,17 +49,18 @@ class LiveGoal(TraceClaim):
     exercised_by = "robots that had a way to go to where they must end"
 
     def check(self, trace: Trace) -> Finding:
-        """Compare each robot's end with what its scenario declares; the least margin is reported."""
         stalls = trace.scenario.runs[trace.run].stalls_m
         if unknown := set(stalls) - set(trace.ugvs):
             raise TraceError(f"stalls_m names {sorted(unknown)}, which are not UGVs of the trace")
         judged = list(_conditions(trace, stalls))
+        conditions = [condition.entry for condition in judged]
+        had_a_way = [condition.entry["robot"] for condition in judged if condition.had_a_way]
         hits = first_collisions(trace.events)
-        for entry in (one.entry for one in judged if one.entry["robot"] in hits):
-            entry["collided_s"] = hits[entry["robot"]]["t_s"]
-        conditions, had_a_way = [one.entry for one in judged], [one.entry["robot"] for one in judged if one.had_a_way]
-        worst = min(conditions, key=lambda one: (one["margin_m"] >= 0.0, "collided_s" not in one, one["margin_m"]))
-        live = all(one["margin_m"] >= 0.0 for one in conditions)
+        for entry in conditions:
+            if entry["robot"] in hits:
+                entry["collided_s"] = hits[entry["robot"]]["t_s"]
+        worst = min(conditions, key=lambda at: (at["margin_m"] >= 0.0, "collided_s" not in at, at["margin_m"]))
+        live = worst["margin_m"] >= 0.0
         return Finding(
             "holds" if live else "refuted",
             margin=worst["margin_m"],

@@ -26,8 +26,6 @@ class Followed:
 
 
 class LiveHyp(GateClaim):
-    """LIVE-HYP."""
-
     id = "LIVE-HYP"
     summary = "No UGV followed the UAV more often or longer than it may, or changed its mind without a new obstacle."
     statement = (
@@ -65,10 +63,10 @@ class LiveHyp(GateClaim):
         gate, found = trace.scenario.gatekeeper, acceptances(trace)
         allowed_s = gate.tries * (gate.longest_s + gate.period_s)
         most, longest_s, where = 0, 0.0, dict[str, Any]()
-        wrong = [fault for each in found.values() for fault in _wrong(trace, each)]
-        for ugv, each in found.items():
-            begins = _after_rests(each, gate.rest_s)
-            tries = np.diff(np.searchsorted([one.t_s for one in each], [*begins, np.inf]))
+        wrong = [fault for of_ugv in found.values() for fault in _wrong(trace, of_ugv)]
+        for ugv, of_ugv in found.items():
+            begins = _after_rests(of_ugv, gate.rest_s)
+            tries = np.diff(np.searchsorted([acceptance.t_s for acceptance in of_ugv], [*begins, np.inf]))
             executed_s = _executed_s(trace, ugv, begins)
             k = int(np.argmax(executed_s))
             most = max(most, int(tries.max()))
@@ -82,7 +80,7 @@ class LiveHyp(GateClaim):
             ]
         if longest_s > allowed_s + TIME_TOLERANCE_S:
             wrong.append({**where, "what": "longer from its own task than allowed, s", "found": longest_s})
-        total = [one for each in found.values() for one in each]
+        total = [acceptance for of_ugv in found.values() for acceptance in of_ugv]
         return Finding(
             "refuted" if wrong else "holds",
             margin=allowed_s - longest_s if not wrong or longest_s > allowed_s else None,
@@ -90,7 +88,7 @@ class LiveHyp(GateClaim):
             quantity="time that LIVE-WAIT allows between two rests, less the longest that was executed",
             where=where,
             counterexample=min(wrong, key=lambda fault: float(fault["t_s"]), default=None),
-            evidence=asdict(Followed(len(total), sum(one.given_back for one in total), most, longest_s)),
+            evidence=asdict(Followed(len(total), sum(acceptance.given_back for acceptance in total), most, longest_s)),
             exercised=len(total),
         )
 
@@ -98,19 +96,21 @@ class LiveHyp(GateClaim):
 def _wrong(trace: Trace, of_ugv: list[Acceptance]) -> Iterator[dict[str, Any]]:
     """Acceptances that were over too late, or given back too early without news."""
     period_s = trace.scenario.gatekeeper.period_s
-    for one in of_ugv:
-        at = {"robot": one.on.ugv, "t_s": one.end_s, "number": one.on.number, "until_s": one.until_s}
-        if one.end_s > one.until_s + period_s + TIME_TOLERANCE_S:
+    for acceptance in of_ugv:
+        sent, end_s, until_s = acceptance.on, acceptance.end_s, acceptance.until_s
+        at = {"robot": sent.ugv, "t_s": end_s, "number": sent.number, "until_s": until_s}
+        if end_s > until_s + period_s + TIME_TOLERANCE_S:
             yield {**at, "what": "an acceptance was over too late"}
-        early = one.given_back and one.end_s < one.until_s - TIME_TOLERANCE_S
-        if early and one.end_s not in one.news_s:
+        early = acceptance.given_back and end_s < until_s - TIME_TOLERANCE_S
+        if early and end_s not in acceptance.news_s:
             yield {**at, "what": "an acceptance was reversed without news"}
 
 
 def _after_rests(of_ugv: list[Acceptance], rest_s: float) -> list[float]:
     """When tries begin to count anew, s: at the start of the run, and at each acceptance after a rest."""
-    ends = [0.0, *(one.end_s for one in of_ugv)]
-    rested = (one.t_s for one, end_s in zip(of_ugv, ends, strict=False) if one.t_s - end_s >= rest_s - TIME_TOLERANCE_S)
+    begins = [acceptance.t_s for acceptance in of_ugv]
+    ends = [0.0, *(acceptance.end_s for acceptance in of_ugv)]
+    rested = (t_s for t_s, end_s in zip(begins, ends, strict=False) if t_s - end_s >= rest_s - TIME_TOLERANCE_S)
     return [0.0, *(t_s for t_s in rested if t_s > 0.0)]
 
 

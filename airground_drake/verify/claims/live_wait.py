@@ -7,7 +7,9 @@ from typing import Any
 
 from airground_drake.base.exact import decimal
 from airground_drake.scenario.schema import Scenario
+from airground_drake.sim.trace import Trace
 from airground_drake.verify.model.theorem import Hypothesis, Proof, TheoremClaim
+from airground_drake.verify.runs.acceptances import below_avoidance
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -18,8 +20,6 @@ class Bound(Proof):
 
 
 class LiveWait(TheoremClaim):
-    """LIVE-WAIT."""
-
     id = "LIVE-WAIT"
     summary = "No UAV can keep a UGV from its own task for ever."
     statement = (
@@ -49,7 +49,6 @@ class LiveWait(TheoremClaim):
     margin_of = "longest intervention allowed"
 
     def inputs(self, scenario: Scenario) -> dict[str, Any]:
-        """The numbers of a UGV's patience, and the period of the gatekeeper, s."""
         gate = scenario.gatekeeper
         return {
             "tries": int(gate.tries),
@@ -59,7 +58,6 @@ class LiveWait(TheoremClaim):
         }
 
     def hypotheses(self, inputs: dict[str, Any]) -> list[Hypothesis]:
-        """Times are positive."""
         longest, period = decimal(inputs["longest_s"]), decimal(inputs["period_s"])
         return [
             Hypothesis.of(self.margin_of, "the longest intervention takes more than 0 s", longest, "s", strict=True),
@@ -67,6 +65,8 @@ class LiveWait(TheoremClaim):
         ]
 
     def evidence(self, inputs: dict[str, Any], **proof: Any) -> Proof:
-        """Add the bound."""
         bound = inputs["tries"] * (decimal(inputs["longest_s"]) + decimal(inputs["period_s"]))
         return Bound(bound_s=float(bound), **proof)
+
+    def seen_in(self, trace: Trace) -> tuple[int, int]:
+        return below_avoidance(trace)

@@ -6,16 +6,20 @@ an obstacle, 2 w between robots. Other symbols are those of `safe_inv.py`.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from math import inf
 from typing import Any
 
 from airground_drake.base.exact import decimal
 from airground_drake.scenario.schema import Scenario
+from airground_drake.sim.trace import Trace
 from airground_drake.verify.claims.safe_inv import stable
+from airground_drake.verify.finding import Finding
 from airground_drake.verify.model.theorem import Hypothesis, Proof, TheoremClaim
 from airground_drake.verify.pair_kinds import PairKind, constants, kinds_of
+from airground_drake.verify.runs.passive import beside
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -32,8 +36,6 @@ class LeastDistances(Proof):
 
 
 class SafeDist(TheoremClaim):
-    """SAFE-DIST."""
-
     id = "SAFE-DIST"
     summary = "Bounded velocity errors cost a bounded distance."
     statement = (
@@ -91,14 +93,12 @@ class SafeDist(TheoremClaim):
     margin_of = "distance from centre to core that is left, d - W/A"
 
     def inputs(self, scenario: Scenario) -> dict[str, Any]:
-        """The constants of SAFE-INV, and the bound on the disturbance, m/s."""
         given = constants(scenario)
-        least = float(min(each.safe_m for each in kinds_of(given)))
+        least = float(min(pair.safe_m for pair in kinds_of(given)))
         fastest = max(robot.max_speed_m_s for robot in scenario.robots.values())
         return {**given, "disturbance_m_s": min(0.1 * fastest, given["avoidance_gain_1_s"] * least / 4.0)}
 
     def hypotheses(self, inputs: dict[str, Any]) -> list[Hypothesis]:
-        """A is positive, A h at most 1; robots stay apart, so that the normals are defined."""
         gain, h = decimal(inputs["avoidance_gain_1_s"]), decimal(inputs["period_s"])
         found = [
             *stable(gain, h),
@@ -107,18 +107,37 @@ class SafeDist(TheoremClaim):
         if gain <= 0:
             return found
         return found + [
-            Hypothesis.of(self.margin_of, f"{each.kind}: d - W/A is above 0", left_m(inputs, each), "m", strict=True)
-            for each in kinds_of(inputs)
+            Hypothesis.of(self.margin_of, f"{pair.kind}: d - W/A is above 0", left_m(inputs, pair), "m", strict=True)
+            for pair in kinds_of(inputs)
         ]
 
     def evidence(self, inputs: dict[str, Any], **proof: Any) -> LeastDistances:
-        """Add the least distances."""
         if not inputs["avoidance_gain_1_s"] > 0.0:
             return LeastDistances(**proof)
         least = dict[str, float]()
         for pair in kinds_of(inputs):
             least[pair.kind] = min(float(left_m(inputs, pair)), least.get(pair.kind, inf))
         return LeastDistances(least_distances_m=least, **proof)
+
+    def seen_in(self, trace: Trace) -> tuple[int, int, int]:
+        """Periods too near to an obstacle that may move, and those of them with a retreat at w, and at w + V."""
+        w = self.inputs(trace.scenario)["disturbance_m_s"]
+        passive = once = kept = 0
+        for periods in beside(trace):
+            away_m_s = periods.away_m_s[periods.passive]
+            passive += len(away_m_s)
+            once += int((away_m_s >= w).sum())
+            kept += int((away_m_s >= w + periods.pair.speed_m_s).sum())
+        return passive, once, kept
+
+    def with_runs(self, finding: Finding, seen: Sequence[tuple[int, ...]]) -> Finding:
+        passive, once, kept = (sum(column) for column in zip(*seen, (0, 0, 0), strict=True))
+        if not passive or not isinstance(finding.evidence, LeastDistances):
+            return finding
+        evidence = replace(
+            finding.evidence, passive_periods=passive, passive_periods_w_h_once=once, passive_periods_kept=kept
+        )
+        return replace(finding, evidence=evidence)
 
 
 def left_m(inputs: dict[str, Any], pair: PairKind) -> Fraction:

@@ -7,14 +7,15 @@ from typing import Any
 
 from airground_drake.base.registry import METHODS
 from airground_drake.scenario.schema import Scenario
+from airground_drake.sim.trace import Trace
 from airground_drake.verify.claims.safe_inv import SafeInv
 from airground_drake.verify.model.theorem import Hypothesis
+from airground_drake.verify.runs.acceptances import below_avoidance
 
 
 class SafeGate(SafeInv):
-    """SAFE-GATE; its hypotheses are those of SAFE-INV and one more."""
-
     id = "SAFE-GATE"
+    subject = "proof of distances"
     summary = "Under method (d) nothing that the UAV asks for makes a robot bring itself closer than the safe distance."
     statement = (
         "Under method (d) no intervention, accepted or not, leaves the safe set. The avoidance layer comes last, and "
@@ -47,11 +48,12 @@ class SafeGate(SafeInv):
     theorems = ("Gate.scaled_back", "Safety.standing", "Safety.safe_always", "Passive.own_doing")
 
     def inputs(self, scenario: Scenario) -> dict[str, Any]:
-        """Those of SAFE-INV, and whether method (d) puts an intervention above avoidance."""
         return {**super().inputs(scenario), "intervention_on_top": METHODS["d"].intervention_on_top}
 
     def hypotheses(self, inputs: dict[str, Any]) -> list[Hypothesis]:
-        """Those of SAFE-INV, and the order of priorities."""
         on_top = Fraction(inputs["intervention_on_top"])
         order = Hypothesis.of("order of priorities", "method (d) has avoidance above the intervention", -on_top)
         return [*super().hypotheses(inputs), order]
+
+    def seen_in(self, trace: Trace) -> tuple[int, int]:
+        return below_avoidance(trace)

@@ -118,9 +118,8 @@ class Hypotheses:
 
 
 class SafeHyp(TraceClaim):
-    """SAFE-HYP."""
-
     id = "SAFE-HYP"
+    subject = "conditions of the proof"
     summary = "Every step of the run met the conditions under which the safety theorem (SAFE-INV) holds."
     statement = (
         "At every control sample of the run the hypotheses of the safety theorem held, up to e per pair of bodies: so "
@@ -172,17 +171,29 @@ class SafeHyp(TraceClaim):
 
     def check(self, trace: Trace) -> Finding:
         """Evaluate all hypotheses; the first violation in time is the counterexample."""
-        kept = sorted(guarantees(trace), key=lambda one: one.margin_m)
+        kept = sorted(guarantees(trace), key=lambda promised: promised.margin_m)
         others = [*_static(trace), *_sampled(trace), *_of_plants(trace), *_beside_moving(trace)]
-        moving, shares, own = beside_moving(trace), least_shares(trace), own_plants(trace)
         different = list(differences(trace))
         broken = [h.at(int(k)) for h in [*others, *_avoidance(trace, kept)] for k in h.broken()[:1]]
-        broken += [{"hypothesis": BUILT, "t_s": float(trace.t[0]), **each} for each in different[:1]]
+        broken += [{"hypothesis": BUILT, "t_s": float(trace.t[0]), **difference} for difference in different[:1]]
         first = min(broken, key=lambda entry: float(entry["t_s"]), default=None)
-        worst, listed = _worst(others), [_listed(trace, one) for one in kept[:MOST_LISTED]]
+        worst, listed = _worst(others), [_listed(trace, promised) for promised in kept[:MOST_LISTED]]
         shown = _shown(first, worst, listed, kept)
         name = shown["hypothesis"]
         in_range, binding = _binding(trace)
+        evidence = Hypotheses(
+            e_m=float(max((promised.missed_m.max() for promised in kept), default=0.0)),
+            guarantee_m=_finite(kept[0].gap_m) if kept else None,
+            pairs=listed,
+            pairs_in_reach=len(kept),
+            different_parameters=different,
+            worst=worst,
+            inequalities_in_range=in_range,
+            inequalities_that_bind=binding,
+        )
+        more: dict[str, Sequence[Any]] = {
+            "beside_moving": beside_moving(trace), "least_shares": least_shares(trace), "own_plants": own_plants(trace)
+        }  # fmt: skip
         return Finding(
             "refuted" if first else "holds",
             margin=shown.get("margin"),
@@ -190,21 +201,7 @@ class SafeHyp(TraceClaim):
             quantity="distance promised less the safe one" if name == AVOIDANCE else f"least slack of {name!r}",
             where={key: shown[key] for key in shown if key not in ("margin", "unit")},
             counterexample=_against(trace, first, broken) if first else None,
-            evidence=asdict(
-                Hypotheses(
-                    float(max((one.missed_m.max() for one in kept), default=0.0)),
-                    _finite(kept[0].gap_m) if kept else None,
-                    listed,
-                    len(kept),
-                    different,
-                    worst,
-                    in_range,
-                    binding,
-                )
-            )
-            | ({"beside_moving": [asdict(each) for each in moving]} if moving else {})
-            | ({"least_shares": [asdict(each) for each in shares]} if shares else {})
-            | ({"own_plants": [asdict(each) for each in own]} if own else {}),
+            evidence=asdict(evidence) | {key: [asdict(row) for row in rows] for key, rows in more.items() if rows},
             exercised=sum(binding.values()),
         )
 
@@ -216,7 +213,7 @@ def _against(trace: Trace, first: dict[str, Any], broken: Sequence[dict[str, Any
         return found
     declared = trace.scenario.barriers[first["other"]].expected_speed_m_s
     told = f"{first['other']} moved at {declared - first['margin']:.2f} m/s at {first['t_s']:.2f} s"
-    more = sorted({str(each["hypothesis"]) for each in broken} - {DECLARED})
+    more = sorted({str(entry["hypothesis"]) for entry in broken} - {DECLARED})
     return found | {"why": f"{told}, declared {declared:.2f}", "also_broken": more}
 
 
@@ -242,15 +239,17 @@ def _shown(
         "margin": _finite(kept[0].margin_m) if kept else 0.0, "unit": "m", "hypothesis": AVOIDANCE
     }  # fmt: skip
     least |= {key: listed[0][key] for key in ("first", "second")} if kept else {}
-    return min((one for one in worst if one["hypothesis"] == name), key=lambda one: float(one["margin"]), default=least)
+    named = (entry for entry in worst if entry["hypothesis"] == name)
+    return min(named, key=lambda entry: float(entry["margin"]), default=least)
 
 
-def _listed(trace: Trace, one: Guarantee) -> dict[str, Any]:
+def _listed(trace: Trace, promised: Guarantee) -> dict[str, Any]:
     """A row of the evidence, with the sample at which the most was missed, if anything was."""
-    e, k = float(one.missed_m.max()), int(np.argmax(one.missed_m))
-    described = {"first": one.pair.first, "second": one.pair.second, "safe_distance_m": one.pair.required_m}
+    e, k = float(promised.missed_m.max()), int(np.argmax(promised.missed_m))
+    pair, why = promised.pair, {"why": promised.why} if promised.why else {}
+    described = {"first": pair.first, "second": pair.second, "safe_distance_m": pair.required_m}
     t = float(trace.t[trace.sample_rows[k]]) if e > 0.0 else None
-    return {**described, "guarantee_m": _finite(one.gap_m), "e_m": e, "t_s": t, **({"why": one.why} if one.why else {})}
+    return {**described, "guarantee_m": _finite(promised.gap_m), "e_m": e, "t_s": t, **why}
 
 
 def _finite(metres: float) -> float | None:
@@ -272,7 +271,7 @@ def guarantees(trace: Trace) -> list[Guarantee]:
 def _guarantees(trace: Trace) -> Iterator[Guarantee]:
     samples, last = period_ends(trace), last_period(trace)
     places = {name: trace.position(name)[samples] for name in trace.robots}
-    longest = {name: _longest(each, float(last)) for name, each in places.items()}
+    longest = {name: _longest(way, float(last)) for name, way in places.items()}
     pairs, gain, bounds = pairs_of(trace), _gain(trace), bounds_of(trace)
     reach = np.array([pair.law_m + longest[pair.first] + longest.get(pair.second, 0.0) for pair in pairs])
     beyond = SCREEN_M + np.array([pair.cover_m for pair in pairs])  # of the bodies from the points that are steered
@@ -281,7 +280,7 @@ def _guarantees(trace: Trace) -> Iterator[Guarantee]:
         if pair.speed_m_s > 0.0:  # see `passive`
             continue
         begin = int(np.searchsorted(samples, pair.row))
-        end = len(samples) if pair.last is None else int(np.searchsorted(samples, pair.last)) + 1
+        end = int(np.searchsorted(samples, pair.last)) + 1
         there, planar = slice(begin, end), is_planar(trace, pair.first)
         first, beside = places[pair.first][there], _beside(trace, pair, places, there, float(reach[k]))
         asked = Fraction(pair.share), gain, last if end == len(samples) else Fraction(1)
@@ -329,18 +328,19 @@ def _longest(places: Array, last: float) -> float:
 def _avoidance(trace: Trace, kept: Sequence[Guarantee]) -> Iterator[_Hypothesis]:
     """The distance that is lost, m, because a sample misses the inequalities."""
     t, gain = trace.sampled("t_s"), float(_gain(trace))
-    for one in kept:
-        lost = np.maximum(one.missed_m / gain - one.pair.drift_m, 0.0) if gain else one.missed_m * len(t)
-        about = {"first": one.pair.first, "second": one.pair.second}
+    for promised in kept:
+        pair, missed_m = promised.pair, promised.missed_m
+        lost = np.maximum(missed_m / gain - pair.drift_m, 0.0) if gain else missed_m * len(t)
+        about = {"first": pair.first, "second": pair.second}
         yield _Hypothesis(AVOIDANCE, "m", t, 0.0 - lost, DISTANCE_TOLERANCE_M, about)
 
 
 def _beside_moving(trace: Trace) -> Iterator[_Hypothesis]:
     """Beside obstacles that may move: the passive law, and that they move no faster than declared."""
     period_s, ends = trace.scenario.control.period_s, period_ends(trace)
-    for one in beside(trace):
-        about = {"first": one.pair.first, "second": one.pair.second}
-        yield _Hypothesis(PASSIVE, "m", trace.t[one.row], 0.0 - one.missed_m, DISTANCE_TOLERANCE_M, about)
+    for periods in beside(trace):
+        about = {"first": periods.pair.first, "second": periods.pair.second}
+        yield _Hypothesis(PASSIVE, "m", trace.t[periods.row], 0.0 - periods.missed_m, DISTANCE_TOLERANCE_M, about)
     for name, speed in speeds(trace).items():
         spare = trace.scenario.barriers[name].expected_speed_m_s - speed
         yield _Hypothesis(DECLARED, "m/s", trace.t[ends[:-1]], spare, DISTANCE_TOLERANCE_M / period_s, {"other": name})

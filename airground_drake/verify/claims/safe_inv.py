@@ -12,14 +12,15 @@ from typing import Any
 
 from airground_drake.base.exact import decimal
 from airground_drake.scenario.schema import Scenario
+from airground_drake.sim.trace import Trace
+from airground_drake.verify.claims.safe_hyp import guarantees
 from airground_drake.verify.model.theorem import Hypothesis, TheoremClaim
 from airground_drake.verify.pair_kinds import SHARES, constants, kinds_of
 
 
 class SafeInv(TheoremClaim):
-    """SAFE-INV."""
-
     id = "SAFE-INV"
+    subject = "proof of distances"
     summary = "A robot that obeys the avoidance inequalities and starts at a safe distance keeps it."
     statement = (
         "Any number of robots and obstacles at rest whose pairs start at their safe distances keep them at all times, "
@@ -76,11 +77,9 @@ class SafeInv(TheoremClaim):
     margin_of = "sensing range less d + c h"
 
     def inputs(self, scenario: Scenario) -> dict[str, Any]:
-        """Gain, period, sensing range; safe distances and closing speeds of the pairs."""
         return constants(scenario)
 
     def hypotheses(self, inputs: dict[str, Any]) -> list[Hypothesis]:
-        """A h is at most 1, shares add up to 1, d is above 0, the sensing range covers d + c h."""
         gain, h = decimal(inputs["avoidance_gain_1_s"]), decimal(inputs["period_s"])
         reach = decimal(inputs["sensing_range_m"])
         pairs = kinds_of(inputs)
@@ -90,23 +89,28 @@ class SafeInv(TheoremClaim):
                 f"{kind}: the shares of both bodies add up to 1",
                 -abs(sum(SHARES[kind], Fraction(-1))),
             )
-            for kind in dict.fromkeys(each.kind for each in pairs)
+            for kind in dict.fromkeys(pair.kind for pair in pairs)
         ]
         apart = [
-            Hypothesis.of("safe distance", f"{each.kind}: the safe distance is above 0", each.safe_m, "m", strict=True)
-            for each in pairs
+            Hypothesis.of("safe distance", f"{pair.kind}: the safe distance is above 0", pair.safe_m, "m", strict=True)
+            for pair in pairs
         ]
         ranges = [
             Hypothesis.of(
                 self.margin_of,
-                f"{each.kind}: the sensing range {float(reach):g} m is at least d + c h = {float(each.safe_m):g} m "
-                f"between centre and core + {float(each.closing_m_s):g} m/s * {float(h):g} s",
-                reach - each.safe_m - each.closing_m_s * h,
+                f"{pair.kind}: the sensing range {float(reach):g} m is at least d + c h = {float(pair.safe_m):g} m "
+                f"between centre and core + {float(pair.closing_m_s):g} m/s * {float(h):g} s",
+                reach - pair.safe_m - pair.closing_m_s * h,
                 "m",
             )
-            for each in pairs
+            for pair in pairs
         ]
         return [*stable(gain, h), *shares, *apart, *ranges]
+
+    def seen_in(self, trace: Trace) -> tuple[int, int]:
+        """The pairs that met every inequality, and those within reach of each other."""
+        margins_m = [promised.margin_m for promised in guarantees(trace)]
+        return margins_m.count(0.0), len(margins_m)
 
 
 def stable(gain: Fraction, h: Fraction) -> list[Hypothesis]:

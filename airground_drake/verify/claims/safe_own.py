@@ -19,9 +19,8 @@ MOST_LISTED = 300  # pairs that the evidence lists at most: those of least margi
 
 
 class SafeOwn(TraceClaim):
-    """SAFE-OWN."""
-
     id = "SAFE-OWN"
+    subject = "the robots' own doing"
     summary = "No robot itself brought a distance below the required one, whatever the obstacles that move did."
     statement = (
         "In every control period, with the other body held where it was at the control sample, no robot came nearer to "
@@ -58,16 +57,16 @@ class SafeOwn(TraceClaim):
     def applies(self, trace: Trace) -> bool:
         """Only a run with obstacles that may move; else SAFE-TRACE says the same."""
         try:
-            return any(each.expected_speed_m_s > 0.0 for each in trace.scenario.barriers.values())
+            return any(barrier.expected_speed_m_s > 0.0 for barrier in trace.scenario.barriers.values())
         except TraceError:
             return True  # `judge` says what is wrong
 
     def check(self, trace: Trace) -> Finding:
         """The least of the margins of all robots in all pairs."""
-        found = sorted(_margins(trace), key=lambda each: each.margin_m)
+        found = sorted(_margins(trace), key=lambda own: own.margin_m)
         worst = found[0] if found else None
         own = worst is not None and not worst.margin_m >= -DISTANCE_TOLERANCE_M
-        within_reach = sum(int((each.apart_m < each.keeps_m + each.pair.reach_m).sum()) for each in beside(trace))
+        within_reach = [periods.apart_m < periods.keeps_m + periods.pair.reach_m for periods in beside(trace)]
         return Finding(
             "refuted" if own else "holds",
             margin=worst.margin_m if worst else None,
@@ -76,10 +75,10 @@ class SafeOwn(TraceClaim):
             where=worst._asdict() if worst else {},
             counterexample=_against(trace, worst) if worst and own else None,
             evidence={
-                "robots_beside_others": [each._asdict() for each in found[:MOST_LISTED]],
+                "robots_beside_others": [own._asdict() for own in found[:MOST_LISTED]],
                 "tolerance_m": DISTANCE_TOLERANCE_M,
             },
-            exercised=within_reach,
+            exercised=sum(int(near.sum()) for near in within_reach),
         )
 
 
@@ -101,7 +100,7 @@ def _margins(trace: Trace) -> Iterator[OwnMargin]:
                 continue
             other = pair.second if robot == pair.first else pair.first
             margins = own_margins(trace, pair, robot).least
-            k = int(np.argmin(margins)) if not np.isnan(margins).any() else int(np.argmax(np.isnan(margins)))
+            k = int(np.argmin(margins))  # the first one that is not a number, if there is any
             if margins[k] != np.inf:
                 yield OwnMargin(robot, other, float(margins[k]), float(trace.t[k + 1]))
 

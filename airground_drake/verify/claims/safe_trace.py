@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass
-from functools import cache
+from functools import partial
 
 import numpy as np
 
 from airground_drake.scenario.schema import MAP
-from airground_drake.sim.trace import Trace
+from airground_drake.sim.trace import Trace, per_trace
 from airground_drake.verify.claim import TraceClaim
 from airground_drake.verify.finding import Finding
 from airground_drake.verify.runs.encounters import encounters
@@ -27,9 +27,8 @@ MOST_LISTED = 300  # pairs that the evidence lists at most: those of least margi
 
 
 class SafeTrace(TraceClaim):
-    """SAFE-TRACE."""
-
     id = "SAFE-TRACE"
+    subject = "distances"
     summary = "No robot came closer to an obstacle or to another robot than the safe distance."
     statement = "During the whole run every robot kept the safe distance from every obstacle and every other robot."
     latex = (
@@ -72,18 +71,13 @@ class SafeTrace(TraceClaim):
     )
 
     def check(self, trace: Trace) -> Finding:
-        """Compare the minimum distance of each pair with its safe distance; the worst pair gives the margin."""
         pairs = pairs_of(trace)
-
-        @cache
-        def entry(k: int) -> Distance:
-            return _entry(trace, k)
-
+        entry = partial(_entry, trace)
         least = apart_of(trace) - np.array([pair.safe_m for pair in pairs])
         listed = [entry(k) for k in least_of(least, MOST_LISTED, lambda k: entry(k).margin_m)]
         reach = np.array([pair.reach_m + pair.cover_m + pair.more_m for pair in pairs])
         close_by = np.flatnonzero(least < reach).tolist()
-        worst = min(listed, key=lambda entry: entry.margin_m)
+        worst = min(listed, key=lambda distance: distance.margin_m)
         safe = worst.margin_m >= -DISTANCE_TOLERANCE_M
         both = (worst.first, worst.second)
         return Finding(
@@ -96,7 +90,7 @@ class SafeTrace(TraceClaim):
             if safe
             else asdict(worst) | _place(trace, worst) | _why(trace, worst) | snapshot(trace, both, worst.t_s),
             evidence={
-                "pairs": [asdict(each) for each in listed],
+                "pairs": [asdict(distance) for distance in listed],
                 "pairs_in_all": len(pairs),
                 "encounters": [encounter._asdict() for encounter in encounters(trace)[:MOST_LISTED]],
                 "tolerance_m": DISTANCE_TOLERANCE_M,
@@ -121,6 +115,7 @@ class Distance:
     exercised: bool
 
 
+@per_trace
 def _entry(trace: Trace, k: int) -> Distance:
     """Where the k-th pair was closest."""
     pair, gap_m, margin_m, t_s, row = least_gap(trace, pairs_of(trace)[k])
@@ -135,4 +130,5 @@ def _place(trace: Trace, worst: Distance) -> dict[str, list[float]]:
 
 def _why(trace: Trace, worst: Distance) -> dict[str, str]:
     """Whose doing it was."""
-    return {"why": next(each.told(trace) for each in encounters(trace) if each[:2] == (worst.first, worst.second))}
+    both = worst.first, worst.second
+    return {"why": next(encounter.told(trace) for encounter in encounters(trace) if encounter[:2] == both)}

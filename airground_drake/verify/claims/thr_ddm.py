@@ -57,8 +57,6 @@ class Comparisons(Evidence):
 
 
 class ThrDdm(ModelClaim):
-    """THR-DDM."""
-
     id = "THR-DDM"
     summary = "Simulated decisions take as long, and err as often, as the formulas say."
     statement = (
@@ -88,24 +86,23 @@ class ThrDdm(ModelClaim):
     )
     expected = "supported"
     record = Comparisons
+    kept = True
     exercised_by = "simulated paths"
 
     def inputs(self, scenario: Scenario) -> dict[str, Any]:
-        """The numbers of the threshold rule."""
         rule = scenario.decision.threshold
         return {name: getattr(rule, name) for name in NUMBERS}
 
     def check(self, inputs: dict[str, Any]) -> Finding:
-        """Simulate and compare."""
         return compare(experiments(inputs), running)
 
 
 def compare(chosen: tuple[PassageExperiment, ...], formulas: Formulas) -> Finding:
     """The verdict for these formulas: 'supported' if all intervals contain them, else 'refuted'."""
-    rows = [row for each in chosen for row in _rows(simulate(each), formulas(each), 2 * len(chosen))]
+    rows = [row for experiment in chosen for row in _rows(simulate(experiment), formulas(experiment), 2 * len(chosen))]
     worst = min(rows, key=lambda row: row.margin)
     supported = worst.margin >= 0.0
-    paths = sum(each.paths for each in chosen)
+    paths = sum(experiment.paths for experiment in chosen)
     return Finding(
         "supported" if supported else "refuted",
         margin=worst.margin,
@@ -120,8 +117,8 @@ def compare(chosen: tuple[PassageExperiment, ...], formulas: Formulas) -> Findin
 
 def _rows(sample: PassageSample, formula: tuple[float, float], comparisons: int) -> list[Comparison]:
     """Compare the mean decision time and the error rate of an experiment with the formula's."""
-    each, wrong = sample.experiment, sample.wrong
-    count, period = each.paths, each.period
+    experiment, wrong = sample.experiment, sample.wrong
+    count, period = experiment.paths, experiment.period
     tail = (1.0 - LEVEL) / comparisons / 2.0
     mean = sample.periods / count
     deviation = math.sqrt((sample.squares - sample.periods * mean) / (count - 1.0) / count)
@@ -135,12 +132,12 @@ def _rows(sample: PassageSample, formula: tuple[float, float], comparisons: int)
         ("mean decision time", "s", (mean - 0.25) * period, deviation * period, time, formula[0]),
         ("error rate", "", rate, spread, [low - ERROR_ALLOWANCE, high + ERROR_ALLOWANCE], formula[1]),
     )
-    constants = {**asdict(each), "noise_period_s": period, "barrier_m": each.barrier}
-    counted = wrong, sample.periods, sample.squares
+    constants = {**asdict(experiment), "noise_period_s": period, "barrier_m": experiment.barrier}
     return [
         Comparison(
-            each.name, quantity, unit, constants, *counted, estimate, interval, value,
-            z_score=(estimate - value) / error,
+            experiment=experiment.name, quantity=quantity, unit=unit, constants=constants, wrong_decisions=wrong,
+            periods_sum=sample.periods, periods_sum_of_squares=sample.squares, estimate=estimate, interval=interval,
+            formula=value, z_score=(estimate - value) / error,
             margin=2.0 * min(value - interval[0], interval[1] - value) / (interval[1] - interval[0]),
         )
         for quantity, unit, estimate, error, interval, value in found

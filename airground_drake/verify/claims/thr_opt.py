@@ -27,8 +27,6 @@ class Optimum(Proof):
 
 
 class ThrOpt(TheoremClaim):
-    """THR-OPT."""
-
     id = "THR-OPT"
     summary = "The threshold of least Bayes risk is the root of the corrected equation, not of the printed one."
     statement = (
@@ -69,7 +67,6 @@ class ThrOpt(TheoremClaim):
         return ThrRoot().inputs(scenario)
 
     def hypotheses(self, inputs: dict[str, Any]) -> list[Hypothesis]:
-        """Those of THR-ROOT; the printed equation's root and its risk."""
         rule = rule_of(inputs)
         found = ThrRoot().hypotheses(inputs)
         if rule.c1 == rule.c2:
@@ -82,10 +79,9 @@ class ThrOpt(TheoremClaim):
         ]
 
     def evidence(self, inputs: dict[str, Any], **proof: Any) -> Optimum:
-        """Add the enclosures of both roots and of the drifts, and the risks."""
         rule, zeta = rule_of(inputs), inputs["zeta_m"]
         root, printed = rule.root, rule.printed_root
-        numbers = [inputs[each] for each in NUMBERS]
+        numbers = [inputs[name] for name in NUMBERS]
         return Optimum(
             enclosures={**as_floats(rule, root), **as_floats(rule, printed, "printed_")},
             optimal_for_drifts_m_s=_drifts(rule, decimal(zeta)),

@@ -76,9 +76,8 @@ class Quality:
 
 
 class ThrQuality(TraceClaim):
-    """THR-QUALITY."""
-
     id = "THR-QUALITY"
+    subject = "timing of triggers"
     summary = "The UAV stepped in when the real task error, without noise, was about at the threshold."
     statement = (
         "At every trigger, and while the UAV watched without one, the task error without noise agreed with the "
@@ -126,24 +125,24 @@ class ThrQuality(TraceClaim):
             own = list(judge.decisions(recorded_events(trace, ugv), dwell))
             decisions += own
             drift = drift_of(e, zeta)
-            if drift is not None and drift > 0.0:
+            if drift is not None:
                 ddm[ugv] = _ddm(own, zeta, drift, trace.scenario.decision.noise_m_sqrt_s)
-        counts = Counter(one.kind for one in decisions)
-        timed = [(one.late_s, k) for k, one in enumerate(decisions) if one.late_s is not None and one.kind != "missed"]
-        late = max((each for each in timed if each[0] > EVENT_TOLERANCE_S), default=None)
-        early = min((each for each in timed if each[0] < -EVENT_TOLERANCE_S), default=None)
+        counts = Counter(decided.kind for decided in decisions)
+        timed = [(decided.late_s, k) for k, decided in enumerate(decisions)
+                 if decided.late_s is not None and decided.kind != "missed"]  # fmt: skip
+        latest, earliest = max(timed, default=(0.0, 0)), min(timed, default=(0.0, 0))
         evidence = Quality(
-            zeta,
-            tolerance,
-            {kind: counts[kind] for kind in ("served", "early", "false", "missed")},
-            decisions[late[1]] if late else None,
-            decisions[early[1]] if early else None,
-            decisions,
-            ddm,
+            zeta_m=zeta,
+            tolerance_m=tolerance,
+            counts={kind: counts[kind] for kind in ("served", "early", "false", "missed")},
+            latest=decisions[latest[1]] if latest[0] > EVENT_TOLERANCE_S else None,
+            earliest=decisions[earliest[1]] if earliest[0] < -EVENT_TOLERANCE_S else None,
+            decisions=decisions,
+            ddm=ddm,
         )
         if not decisions:
             return Finding("holds", evidence=evidence, exercised=0)
-        worst = max(decisions, key=lambda one: one.off_m)
+        worst = max(decisions, key=lambda decided: decided.off_m)
         good = worst.off_m <= tolerance
         return Finding(
             "holds" if good else "refuted",
@@ -245,23 +244,24 @@ class Judge:
 
 
 def drift_of(e: NormSignal, zeta: float) -> float | None:
-    """Growth of e over `BEFORE_S` before it first reaches zeta, m/s; None if it does not, or is there at the start."""
+    """Growth of e over `BEFORE_S` before it first reaches zeta, m/s; None without growth, or if e starts there."""
     reached = e.reaches(zeta, float(e.t[0]), above=True)
     if reached is None or e.x[0] >= zeta:
         return None
     begin = max(reached - BEFORE_S, float(e.t[0]))
-    return float(e.at(reached) - e.at(begin)) / (reached - begin)
+    grown = float(e.at(reached) - e.at(begin))
+    return grown / (reached - begin) if grown > 0.0 else None
 
 
 def _ddm(decisions: Sequence[Decided], zeta: float, drift: float, noise: float) -> Ddm:
     """The decisions about a UGV beside (17)-(18), without initial deviation."""
     alone = zeta / drift
     k = alone * (drift / noise) ** 2 if noise > 0.0 else math.inf
-    late = [one.late_s for one in decisions if one.late_s is not None and one.kind != "missed"]
-    wrong = sum(one.kind in ("false", "missed") for one in decisions)
+    late = [decided.late_s for decided in decisions if decided.late_s is not None and decided.kind != "missed"]
+    wrong = sum(decided.kind in ("false", "missed") for decided in decisions)
     return Ddm(
-        drift,
-        noise,
+        drift_m_s=drift,
+        noise_m_sqrt_s=noise,
         error_rate=wrong / len(decisions) if decisions else None,
         error_rate_of_18=0.5 * (1.0 - math.tanh(k)),
         decision_time_s=alone + sum(late) / len(late) if late else None,

@@ -26,8 +26,6 @@ class Root(Proof):
 
 
 class ThrRoot(TheoremClaim):
-    """THR-ROOT."""
-
     id = "THR-ROOT"
     summary = "The threshold equation has exactly one solution, and the program finds it."
     statement = "The threshold equation, with c2/c1 on the right, has exactly one root, and the code returns it."
@@ -54,13 +52,11 @@ class ThrRoot(TheoremClaim):
     margin_of = "threshold against its enclosure"
 
     def inputs(self, scenario: Scenario) -> dict[str, Any]:
-        """The numbers of the threshold rule and the threshold in force."""
         rule = scenario.decision.threshold
         numbers = {name: getattr(rule, name) for name in NUMBERS}
         return {"rule": rule.rule, **numbers, "zeta_m": threshold_m(scenario)}
 
     def hypotheses(self, inputs: dict[str, Any]) -> list[Hypothesis]:
-        """The constants are positive, two signs enclose the root, and the program's threshold is between them."""
         rule = rule_of(inputs)
         root = rule.root
         judged = [Fraction(self.computed(inputs))]
@@ -79,12 +75,10 @@ class ThrRoot(TheoremClaim):
         ]
 
     def evidence(self, inputs: dict[str, Any], **proof: Any) -> Root:
-        """Add the enclosure of the root, and what the program computes."""
         rule = rule_of(inputs)
         return Root(enclosures=as_floats(rule, rule.root), computed_threshold_m=self.computed(inputs), **proof)
 
     def counterexample(self, inputs: dict[str, Any], broken: Hypothesis) -> dict[str, Any] | None:
-        """The program's threshold does not solve the equation."""
         if broken.hypothesis != self.margin_of:
             return None
         rule, zeta = rule_of(inputs), self.computed(inputs)

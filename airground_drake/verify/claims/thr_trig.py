@@ -55,9 +55,8 @@ def _is_root(rule: Threshold, zeta: float) -> bool:
 
 
 class ThrTrig(TraceClaim):
-    """THR-TRIG."""
-
     id = "THR-TRIG"
+    subject = "triggers"
     summary = "The UAV stepped in exactly when the error reached the threshold: never late, never without cause."
     statement = (
         "The UAV triggered exactly when the decision variable reached the threshold, none missing and none spurious; "
@@ -108,10 +107,10 @@ class ThrTrig(TraceClaim):
         """Compare the events of each UGV with the recomputed ones; the first disagreement is the counterexample."""
         levels = levels_of(trace)
         judged = [_judged(trace, ugv, levels) for ugv in trace.ugvs]
-        wrong = [*_of_strangers(trace), *(conflict for one in judged for conflict in one.wrong)]
-        due = Counter(kind for one in judged for kind in _as_transitions(one.predicted))
-        replayed = [one.evidence for one in judged]
-        lags = [(one.worst_time_difference_s, one.robot) for one in replayed if one.events]
+        wrong = [*_of_strangers(trace), *(conflict for ugv in judged for conflict in ugv.wrong)]
+        due = Counter(kind for ugv in judged for kind in _as_transitions(ugv.predicted))
+        replayed = [ugv.evidence for ugv in judged]
+        lags = [(ugv.worst_time_difference_s, ugv.robot) for ugv in replayed if ugv.events]
         worst = max(lags) if lags and not wrong else None
         return Finding(
             "refuted" if wrong else "holds",
@@ -213,11 +212,18 @@ def _judged(trace: Trace, ugv: str, levels: TriggerLevels) -> Reconstruction:
     expected = [(time, EVENT_KINDS[kind]) for time, kind in predicted if kind in EVENT_KINDS]
     recorded = recorded_events(trace, ugv)
     lag, mismatch = _compare(expected, recorded, x)
-    columns, modes = column_conflict(trace, ugv, recorded), _mode_conflict(trace, ugv, predicted)
-    found = (off, mismatch, columns, modes, noise_conflict(trace, ugv))
-    wrong = [{"robot": ugv, **conflict} for conflict in found if conflict is not None]
-    events = [{"t_s": time, "kind": kind} for time, kind in expected]
-    return Reconstruction(Replayed(ugv, events, lag, float(x.x.max()), against_15), predicted, wrong)
+    columns = column_conflict(trace, ugv, recorded)
+    modes = _mode_conflict(trace, ugv, predicted)
+    conflicts = (off, mismatch, columns, modes, noise_conflict(trace, ugv))
+    evidence = Replayed(
+        robot=ugv,
+        events=[{"t_s": time, "kind": kind} for time, kind in expected],
+        worst_time_difference_s=lag,
+        largest_decision_variable_m=float(x.x.max()),
+        port_against_15=against_15,
+    )
+    wrong = [{"robot": ugv, **conflict} for conflict in conflicts if conflict is not None]
+    return Reconstruction(evidence, predicted, wrong)
 
 
 def _as_transitions(predicted: list[Transition]) -> Iterator[str]:

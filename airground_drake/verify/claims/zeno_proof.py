@@ -23,9 +23,8 @@ class Dwell(Proof):
 
 
 class ZenoProof(TheoremClaim):
-    """ZENO-PROOF."""
-
     id = "ZENO-PROOF"
+    subject = "proof of gaps between triggers"
     summary = "Triggers never pile up: two are at least the minimum inter-event time apart, whatever the noise."
     statement = (
         "Triggers i < j of a UGV are at least (j - i) times the minimum inter-event time apart, whatever the decision "
@@ -57,7 +56,6 @@ class ZenoProof(TheoremClaim):
     margin_of = "dwell in force"
 
     def inputs(self, scenario: Scenario) -> dict[str, Any]:
-        """The trigger's levels, m, and dwell, s; the bound claimed, s; the duration, s."""
         return {
             **levels_of(scenario),
             "min_inter_event_s": float(scenario.decision.min_inter_event_s),
@@ -65,7 +63,6 @@ class ZenoProof(TheoremClaim):
         }
 
     def hypotheses(self, inputs: dict[str, Any]) -> list[Hypothesis]:
-        """The dwell is in force and positive; the release level is not above the threshold."""
         dwell, zeta, release = (decimal(inputs[name]) for name in ("dwell_s", "zeta_m", "released_below_m"))
         bound = decimal(inputs["min_inter_event_s"])
         return [
@@ -77,7 +74,6 @@ class ZenoProof(TheoremClaim):
         ]
 
     def evidence(self, inputs: dict[str, Any], **proof: Any) -> Dwell:
-        """Add the bound, and how many triggers the run can have at most."""
         dwell = decimal(inputs["dwell_s"])
         most = int(decimal(inputs["duration_s"]) // dwell) + 1 if dwell > 0 else None
         return Dwell(bound_s=inputs["min_inter_event_s"] or SHORTEST_S, most_triggers=most, **proof)

@@ -40,9 +40,8 @@ class Gaps:
 
 
 class ZenoTrace(TraceClaim):
-    """ZENO-TRACE."""
-
     id = "ZENO-TRACE"
+    subject = "gaps between triggers"
     summary = "No UGV was triggered twice within the minimum inter-event time."
     statement = "In this run no UGV was triggered twice within the minimum inter-event time."
     latex = (r"t_{k+1} - t_k \ge \tau_{\min} - 10^{-9} \text{ s} \quad \text{for consecutive triggers of each UGV}",)
@@ -61,7 +60,6 @@ class ZenoTrace(TraceClaim):
     exercised_by = "gaps between consecutive triggers of one UGV"
 
     def check(self, trace: Trace) -> Finding:
-        """Compare the smallest gap of each UGV with the bound."""
         bound = float(trace.scenario.decision.min_inter_event_s)
         if bound <= 0.0:
             return Finding("not_run", evidence={"reason": "min_inter_event_s is 0: no bound to compare with"})

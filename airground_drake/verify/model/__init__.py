@@ -1,6 +1,5 @@
-"""Claims about the model and its constants; each file is named after its claim.
+"""What claims about the model share.
 
-Safety begins with `safe_inv.py`, the trigger with `zeno_proof.py`, the threshold with `thr_root.py`. Several share
-`theorem.py` (a theorem and its hypotheses) and `levels.py` (the trigger).
-THR-DDM simulates `first_passages.py`, ZENO-REFINE `refined_paths.py`.
+A theorem and its hypotheses (`theorem.py`), the trigger (`levels.py`). Of experiments: paths of THR-DDM
+(`first_passages.py`) and of ZENO-REFINE (`refined_paths.py`).
 """

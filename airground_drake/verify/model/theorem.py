@@ -60,7 +60,8 @@ class Proof(Evidence):
 
 def grounds(theorems: Sequence[str], hypotheses: Sequence[Hypothesis]) -> dict[str, Any]:
     """The fields of a `Proof`; `reason` says why the theorems prove nothing here, and is None if they do."""
-    stands, broken = standing(*theorems), next((each for each in hypotheses if not each.holds), None)
+    stands = standing(*theorems)
+    broken = next((hypothesis for hypothesis in hypotheses if not hypothesis.holds), None)
     reason = None if stands.checked else f"the theorems are {stands.words}"
     return {
         "proof": stands.words,
@@ -93,6 +94,13 @@ class TheoremClaim(ModelClaim):
         """The proof, with the numbers that follow for these constants."""
         return Proof(**proof)
 
+    def with_runs(self, finding: Finding, seen: Sequence[tuple[int, int]]) -> Finding:
+        """Add how often the runs met the premise, of how many times: a theorem that never applies protects nothing."""
+        if not seen or not isinstance(finding.evidence, Proof):
+            return finding
+        met, cases = (sum(column) for column in zip(*seen, strict=True))
+        return replace(finding, evidence=replace(finding.evidence, applies_to=met, of=cases))
+
     def counterexample(self, inputs: dict[str, Any], broken: Hypothesis) -> dict[str, Any] | None:
         """A case that refutes the claim if this hypothesis fails; None: the claim is only left open."""
         return None
@@ -100,12 +108,14 @@ class TheoremClaim(ModelClaim):
     def check(self, inputs: dict[str, Any]) -> Finding:
         """Check the hypotheses, and whether Coq has checked the theorems as they stand here."""
         found = self.hypotheses(inputs)
-        named = [each for each in found if each.hypothesis == self.margin_of]
-        shown = next((each for each in found if not each.holds), None) or min(named, key=lambda each: each.margin)
+        broken = [hypothesis for hypothesis in found if not hypothesis.holds]
+        named = [hypothesis for hypothesis in found if hypothesis.hypothesis == self.margin_of]
+        shown = broken[0] if broken else min(named, key=lambda hypothesis: hypothesis.margin)
         evidence = self.evidence(inputs, **grounds(self.theorems, found))
         finding = Finding(
             "proved", shown.margin, shown.unit, evidence=evidence, quantity=shown.hypothesis, exercised=len(found)
         )
-        if not shown.holds and (against := self.counterexample(inputs, shown)) is not None:
+        against = self.counterexample(inputs, shown) if broken else None
+        if against is not None:
             return replace(finding, status="refuted", counterexample=against, evidence=replace(evidence, reason=None))
         return finding if evidence.reason is None else replace(finding, status="inconclusive")

@@ -1,8 +1,8 @@
-"""Claims about a run, decided from its trace alone; one claim, one file, named by its identifier.
+"""What claims about a run share, all of it from the trace alone; nothing here imports the code that it judges.
 
-Nothing here imports the code that it judges. What several claims share: `pairs.py` (who keeps apart from whom),
-`instants.py` (control samples, interventions), `control_law.py` (avoidance inequalities), `triggers.py`
-(recorded and recomputed), `proposals.py` (as recorded), `acceptances.py` (under method (d)), `sensing.py` (what a UGV
-senses), `gate_record.py` (a recorded decision), `convex_bounds.py` (of its optimum). That the code does what it is
-designed to do is tested: `tests/oracles` judges runs by other code.
+Who keeps apart from whom (`pairs.py`), whose doing it was that they did not (`encounters.py`, `passive.py`), control
+samples and interventions (`instants.py`), avoidance inequalities (`control_law.py`) and parameters (`demands.py`),
+triggers recorded and recomputed (`triggers.py`), proposals as recorded (`proposals.py`), acceptances under method (d)
+(`acceptances.py`), a recorded decision (`gate_record.py`) and its optimum (`convex_bounds.py`). That the code does what
+it is designed to do is tested: `tests/oracles` judges runs by other code.
 """

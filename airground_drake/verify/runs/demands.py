@@ -92,11 +92,11 @@ def outlines_of(trace: Trace) -> Iterator[Array]:
     """The numbers of the outline of each convex part of the barriers, but for the circle round its corners."""
     parts, pairs = parts_of(trace), pairs_beside(trace, trace.robots[0])
     for k, number in enumerate(parts.owner.tolist()):
-        each, core = trace.scenario.barriers[parts.names[number]], parts.cores.take(k)
+        barrier, core = trace.scenario.barriers[parts.names[number]], parts.cores.take(k)
         corners = list(dict.fromkeys(map(tuple, core.corners.tolist())))
         heights = [float(core.base), float(core.top), float(len(corners))]
-        gap, speed = pairs[parts.names[number]].required_m, each.expected_speed_m_s
-        yield np.array([gap, each.radius_m, speed, *heights, *(x for corner in corners for x in corner)])
+        gap, speed = pairs[parts.names[number]].required_m, barrier.expected_speed_m_s
+        yield np.array([gap, barrier.radius_m, speed, *heights, *(x for corner in corners for x in corner)])
 
 
 def _without_circles(numbers: Sequence[float]) -> Array:
@@ -139,14 +139,14 @@ def differences(trace: Trace) -> Iterator[dict[str, Any]]:
 def _place(trace: Trace, wanted: dict[str, Any], parameter: str, k: int) -> dict[str, Any]:
     """Which robot, and beside what, the k-th number of a parameter is about."""
     members, parts = wanted["members"], parts_of(trace)
-    each = len(wanted[parameter]) // len(members)
+    length = len(wanted[parameter]) // len(members)
     if parameter in ("safe_m", "share"):
-        robot, column = divmod(k, each)
+        robot, column = divmod(k, length)
         others = wanted["others"].reshape(len(members), -1)[robot]
         still, _ = _numbers(trace)
         m, moving = len(still), [name for name, barrier in trace.scenario.barriers.items() if barrier.moves]
         beside = parts.names[parts.owner[still[column]]] if column < m else [*trace.robots, *moving][others[column - m]]
         return {"robot": trace.robots[members[robot]], "other": beside}
     if parameter in ("mobility", "max_speed_m_s"):
-        return {"robot": trace.robots[members[k // each]]}
+        return {"robot": trace.robots[members[k // length]]}
     return {"index": k}

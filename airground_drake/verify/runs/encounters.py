@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from airground_drake.base.arrays import Array
-from airground_drake.sim.trace import Trace
+from airground_drake.sim.trace import Trace, per_trace
 from airground_drake.verify.engines.outlines import Cores, Indices, apart_by_blocks, away_from, least_distances
 from airground_drake.verify.runs.control_law import Inequalities, inequalities_of
 from airground_drake.verify.runs.pairs import (
@@ -29,7 +29,6 @@ from airground_drake.verify.runs.pairs import (
     gap_over_time,
     is_planar,
     least_gap,
-    numbers_of,
     off_m_of,
     origin_of,
     pairs_of,
@@ -46,15 +45,12 @@ def samples_before(trace: Trace) -> Indices:
     return samples[np.searchsorted(samples, np.arange(len(trace.t) - 1), side="right") - 1]
 
 
+@per_trace
 def steps_of(trace: Trace, robot: str) -> Array:
     """How far from its place at the control sample a robot's body gets in each segment between rows, (T - 1,), m."""
-
-    def found() -> Array:
-        place, sample = trace.body(robot), trace.body(robot)[samples_before(trace)]
-        ends = [np.linalg.norm(each - sample, axis=1) for each in (place[:-1], place[1:])]
-        return np.asarray(np.max(ends, axis=0) + off_m_of(trace, robot))
-
-    return trace.derived(("steps", robot), found)
+    place, sample = trace.body(robot), trace.body(robot)[samples_before(trace)]
+    begun, ended = (np.linalg.norm(at - sample, axis=1) for at in (place[:-1], place[1:]))
+    return np.asarray(np.maximum(begun, ended) + off_m_of(trace, robot))
 
 
 class OwnMargins(NamedTuple):
@@ -82,25 +78,22 @@ def own_margins(trace: Trace, pair: Pair, robot: str) -> OwnMargins:
     other, rows = pair.second if robot == pair.first else pair.first, np.arange(len(trace.t) - 1)
     sample = samples_before(trace)
     cores = cores_of(trace).get(other, Cores.at(np.zeros((1, 3))))
-    origin = trace.body(other) if other in trace.robots else origin_of(trace, other)
-    place, planar = trace.body(robot), is_planar(trace, robot)
-    origin = np.zeros_like(place) if origin is None else origin
+    place, origin, planar = trace.body(robot), origin_of(trace, other), is_planar(trace, robot)
     keeps, off_m = pair.keeps_m(trace.scenario.control.period_s) - pair.cover_m, off_m_of(trace, robot)
-    last = len(trace.t) - 1 if pair.last is None else pair.last
     step = steps_of(trace, robot)
     bounds = apart_by_blocks(cores, place - origin).min(axis=1)
-    each = cores.take(np.flatnonzero(bounds <= max(keeps, pair.safe_m) + step.max())).take((slice(None), None))
+    beside = cores.take(np.flatnonzero(bounds <= max(keeps, pair.safe_m) + step.max())).take((slice(None), None))
     found = OwnMargins(np.full(len(rows), np.inf), np.full(len(rows), np.inf))
-    if not len(each.base):
+    if not len(beside.base):
         return found
-    at_sample = away_from(each, place[sample] - origin[sample], planar=planar).distance.min(axis=0)
-    there = (sample >= pair.row) & (rows < last)
+    at_sample = away_from(beside, place[sample] - origin[sample], planar=planar).distance.min(axis=0)
+    there = (sample >= pair.row) & (rows < pair.last)
     gaps, short = gap_over_time(trace, pair), pair.required_m - DISTANCE_TOLERANCE_M
     broken = there & (rows >= _first_apart(pair, gaps)) & (np.minimum(gaps[:-1], gaps[1:]) < short)
     near = there & ((at_sample <= keeps + step) | broken)
     start, end = (place[rows[near] + k] - origin[sample[near]] for k in (0, 1))
-    least = least_distances(each, start, end, planar=planar)[0].min(axis=0, initial=np.inf) - off_m
-    steered = _steered(trace, pair, robot, each, sample[near]) - pair.cover_m
+    least = least_distances(beside, start, end, planar=planar)[0].min(axis=0, initial=np.inf) - off_m
+    steered = _steered(trace, pair, robot, beside, sample[near]) - pair.cover_m
     of_law = np.minimum(np.minimum(steered, at_sample[near]), keeps)
     of_body = np.where(broken[near], np.minimum(at_sample[near], pair.safe_m), -np.inf)
     due = np.maximum(of_law, of_body)
@@ -108,7 +101,7 @@ def own_margins(trace: Trace, pair: Pair, robot: str) -> OwnMargins:
         row = int(rows[near][k])
         parts = min(ceil((off_m / BENT_M) ** 0.5), MOST_PARTS)
         fine = bent(trace, robot, row, np.linspace(0.0, 1.0, parts + 1)) - origin[sample[row]]
-        least[k] = least_distances(each, fine[:-1], fine[1:], planar=planar)[0].min() - off_m / parts**2
+        least[k] = least_distances(beside, fine[:-1], fine[1:], planar=planar)[0].min() - off_m / parts**2
     found.of_law[near], found.of_body[near] = least - of_law, least - of_body
     return found
 
@@ -119,12 +112,11 @@ def _first_apart(pair: Pair, gaps: Array) -> int:
     return pair.row + int(apart[0]) if len(apart) else len(gaps)
 
 
-def _steered(trace: Trace, pair: Pair, robot: str, each: Cores, rows: Indices) -> Array:
+def _steered(trace: Trace, pair: Pair, robot: str, beside: Cores, rows: Indices) -> Array:
     """Distances of the steered points of a pair, or of one from the cores of an obstacle, at some rows, m."""
     other = pair.second if robot == pair.first else pair.first
     origin = trace.position(other) if other in trace.robots else origin_of(trace, other)
-    place = trace.position(robot)[rows]
-    away = away_from(each, place if origin is None else place - origin[rows], planar=is_planar(trace, robot))
+    away = away_from(beside, (trace.position(robot) - origin)[rows], planar=is_planar(trace, robot))
     return np.asarray(away.distance.min(axis=0))
 
 
@@ -173,17 +165,13 @@ class Encounter(NamedTuple):
         return f"{came}; {self.first} {self.reaction}{speed}{blocked}"
 
 
+@per_trace
 def encounters(trace: Trace) -> list[Encounter]:
     """The pairs that came nearer to each other than required, by time."""
-
-    def found() -> list[Encounter]:
-        apart, numbers = apart_of(trace), numbers_of(trace)
-        near = [pair for pair in pairs_of(trace) if apart[numbers[frozenset((pair.first, pair.second))]] <= pair.safe_m]
-        least = [least_gap(trace, pair) for pair in near]
-        short = [gap for gap in least if gap.margin_m < -DISTANCE_TOLERANCE_M]
-        return sorted((_encounter(trace, gap) for gap in short), key=lambda encounter: encounter.t_s)
-
-    return trace.derived("encounters", found)
+    pairs = zip(pairs_of(trace), apart_of(trace).tolist(), strict=True)
+    least = [least_gap(trace, pair) for pair, apart_m in pairs if apart_m <= pair.safe_m]
+    short = [gap for gap in least if gap.margin_m < -DISTANCE_TOLERANCE_M]
+    return sorted((_encounter(trace, gap) for gap in short), key=lambda encounter: encounter.t_s)
 
 
 def _encounter(trace: Trace, least: Gap) -> Encounter:
@@ -195,8 +183,8 @@ def _encounter(trace: Trace, least: Gap) -> Encounter:
     drove_on = doing == "under way" or (doing == "nobody" and appeared and _is_late(trace, pair.first))
     under_way_m = _way_m(trace, pair, gaps, least.t_s) if drove_on else 0.0
     found = Encounter(
-        pair.first, pair.second, pair.required_m, max(least.gap_m, 0.0), t_s, bool(len(hits)), doing, under_way_m,
-        appeared,
+        first=pair.first, second=pair.second, required_m=pair.required_m, gap_m=max(least.gap_m, 0.0), t_s=t_s,
+        collided=bool(len(hits)), doing=doing, under_way_m=under_way_m, appeared=appeared,
     )  # fmt: skip
     return _with_reaction(trace, pair, gaps, found) if pair.speed_m_s > 0.0 else found
 
@@ -212,9 +200,8 @@ def _whose_doing(trace: Trace, least: Gap) -> str:
         return "under way" if any(_is_late(trace, robot) for robot in taking) else "robot"
     if least.row <= _first_apart(pair, gap_over_time(trace, pair)):
         return "nobody"
-    origin = None if pair.second in trace.robots else origin_of(trace, pair.second)
-    moved = origin is not None and bool(np.ptp(origin[pair.rows], axis=0).any())
-    return "other" if moved else "robot"
+    moved = np.ptp(origin_of(trace, pair.second)[pair.rows], axis=0).any()
+    return "other" if moved and pair.second not in trace.robots else "robot"
 
 
 def _is_late(trace: Trace, robot: str) -> bool:
@@ -235,21 +222,24 @@ def _with_reaction(trace: Trace, pair: Pair, gaps: Array, found: Encounter) -> E
     periods, t_s = periods_of(trace, pair), found.t_s
     before = np.flatnonzero((trace.t[periods.row] < t_s) | (periods.row == pair.row))
     k = int(before[-1])
-    given, samples = inequalities_of(trace, pair.first), trace.sample_rows
-    number = np.searchsorted(samples, periods.row)
-    blocked = [_blocked_by(trace, pair, periods, int(each), given, int(number[each])) for each in before]
-    short = pair.required_m - DISTANCE_TOLERANCE_M
-    held = [bool(each) and gaps[row] < short for each, row in zip(blocked, periods.row[before], strict=True)]
-    end = max((each for each in range(len(held)) if held[each]), default=-1)
-    begin = end
-    while begin > 0 and held[begin - 1]:
-        begin -= 1
-    ends = np.append(trace.t[periods.row], t_s)
-    caught = (float(ends[begin]), float(min(ends[end + 1], max(t_s, ends[end])))) if end >= 0 else ()
+    given = inequalities_of(trace, pair.first)
+    number = np.searchsorted(trace.sample_rows, periods.row)
+    blocked = [_blocked_by(trace, pair, periods, period, given, int(number[period])) for period in before.tolist()]
+    short = gaps[periods.row[before]] < pair.required_m - DISTANCE_TOLERANCE_M
+    held = np.array([bool(names) for names in blocked]) & short
+    caught: tuple[float, ...] = ()
+    names = dict[str, None]()
+    if held.any():
+        end = int(np.flatnonzero(held)[-1])
+        begin = int(
+            np.flatnonzero(~np.append(False, held[:end]))[-1]
+        )  # after the last period before in which it was free
+        ends = np.append(trace.t[periods.row], t_s)
+        caught = float(ends[begin]), float(min(ends[end + 1], max(t_s, ends[end])))
+        names = dict.fromkeys(name for of_period in blocked[begin : end + 1] for name in of_period)
     velocity = periods.velocity[k]
     speed, limit = float(np.linalg.norm(velocity)), trace.scenario.robots[pair.first].max_speed_m_s
     away = float(periods.normal[k] @ velocity)
-    names = dict.fromkeys(name for each in blocked[begin : end + 1] for name in each) if end >= 0 else {}
     return found._replace(
         reaction=_reaction(speed, away, limit), speed_m_s=speed, blocked_by=(*names,), caught_s=caught
     )

@@ -117,8 +117,8 @@ class DecisionRecord:
         At the end of a stage plans are between the sums of the smaller and of the larger velocities so far.
         """
         low, high = (
-            self["initial_m"] + self.dt * np.cumsum(one(self["accept_m_s"], self["refuse_m_s"]), axis=0)[:, None]
-            for one in (np.minimum, np.maximum)
+            self["initial_m"] + self.dt * np.cumsum(bound(self["accept_m_s"], self["refuse_m_s"]), axis=0)[:, None]
+            for bound in (np.minimum, np.maximum)
         )
         away = np.clip(self["centres_m"], low, high) - self["centres_m"]
         near = np.linalg.norm(away, axis=-1) < self["distances_m"]
@@ -162,11 +162,9 @@ def rows_of(trace: Trace) -> list[DecisionRecord]:
         if not (np.diff(times.to_numpy(dtype=np.float64)) >= 0.0).all():
             raise TraceError(f"the decisions of {ugv} are not in order of their times")
     problems = trace.problems.to_dict("records")
-    rows = (
-        [_solved(trace, *both) for both in zip(given, problems, strict=True)]
-        if due
-        else [DecisionRecord(one) for one in given]
-    )
+    rows = [DecisionRecord(row) for row in given]
+    if due:
+        rows = [_solved(trace, row, problem) for row, problem in zip(given, problems, strict=True)]
     for row in rows:
         if not np.isfinite([value for value in row.given.values() if isinstance(value, float)]).all():
             raise TraceError(f"{row.label}: it has numbers that are not finite")
@@ -243,7 +241,8 @@ def cost_tolerance(cost: float) -> float:
 
 def conclude(finding: Finding, compared: Iterable[Deviation]) -> Finding:
     """The finding, or a refutation by the first wrong comparison in time."""
-    first = min((one for one in compared if one.wrong), key=lambda one: one.row.t_s, default=None)
+    wrong = (deviation for deviation in compared if deviation.wrong)
+    first = min(wrong, key=lambda deviation: deviation.row.t_s, default=None)
     if first is None:
         return finding
     return replace(finding, status="refuted", margin=None, counterexample=first.to_json())

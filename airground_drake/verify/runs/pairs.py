@@ -23,7 +23,7 @@ from airground_drake.base.arrays import Array
 from airground_drake.model.plants.budget import AT_REST, Bounds, law_distance
 from airground_drake.scenario.schema import MAP, Obstacle
 from airground_drake.scenario.shapes import convex_parts
-from airground_drake.sim.trace import Trace
+from airground_drake.sim.trace import Trace, per_trace
 from airground_drake.verify.engines.geometry import (
     MERGE_S,
     Approach,
@@ -58,8 +58,8 @@ class Pair(NamedTuple):
     radii_m: float  # sum of both radii
     share: float  # part of the avoidance inequality that each robot takes: all beside a barrier, half beside a robot
     reach_m: float  # how far they can approach each other in one control period
-    row: int = 0  # from which on both are there
-    last: int | None = None  # row up to which both are there
+    row: int  # from which on both are there
+    last: int  # row up to which both are there
     # At which robots expect the barrier to move at most; above 0 the robot's law is the passive one.
     speed_m_s: float = 0.0
     more_m: float = 0.0  # distance that the law keeps beyond `safe_m`
@@ -77,7 +77,7 @@ class Pair(NamedTuple):
     @property
     def rows(self) -> slice:
         """The rows in which both are there."""
-        return slice(self.row, None if self.last is None else self.last + 1)
+        return slice(self.row, self.last + 1)
 
     @property
     def safe_m(self) -> float:
@@ -104,12 +104,13 @@ class Gap(NamedTuple):
     row: int  # row of the trace that ends the segment on which it was
 
 
+@per_trace
 def pairs_of(trace: Trace) -> tuple[Pair, ...]:
     """All robot/barrier and robot/robot pairs of a run, with the safe distances of its scenario."""
     # Barriers that do not appear before the end are in none.
     #
     # Those of one robot come in the order in which its controller lists them: barriers, then robots in array order.
-    return trace.derived("pairs", lambda: tuple(pair for pair in declared_pairs(trace) if pair.row < len(trace.t)))
+    return tuple(pair for pair in declared_pairs(trace) if pair.row < len(trace.t))
 
 
 def declared_pairs(trace: Trace) -> Iterator[Pair]:
@@ -123,7 +124,7 @@ def declared_pairs(trace: Trace) -> Iterator[Pair]:
         one, other = bounds[first], bounds.get(second, AT_REST)
         speed = scenario.barriers[second].expected_speed_m_s if second in there else 0.0
         reach = (one.speed_m_s + (speed or other.speed_m_s)) * period
-        row, last = there.get(second, (0, None))
+        row, last = there.get(second, (0, len(trace.t) - 1))
         safe = given.required_m + sum(given.radii_m)
         drawn = one.cover_m if one.drawn and second in there and not passive else 0.0
         needs_start = drawn or (not passive and (one.late or other.late))
@@ -138,10 +139,11 @@ def declared_pairs(trace: Trace) -> Iterator[Pair]:
         )  # fmt: skip
 
 
+@per_trace
 def bounds_of(trace: Trace) -> dict[str, Bounds]:
     """How far the bodies of the robots may be from where the law steers them, by name."""
     robots = trace.scenario.robots
-    return trace.derived("bounds", lambda: {name: trace.plant(name).bounds(robots[name].max_speed_m_s) for name in robots})
+    return {name: trace.plant(name).bounds(robots[name].max_speed_m_s) for name in robots}
 
 
 class Parts(NamedTuple):
@@ -153,22 +155,19 @@ class Parts(NamedTuple):
     names: list[str]  # of the barriers
 
 
+@per_trace
 def parts_of(trace: Trace) -> Parts:
     """The convex parts of the barriers, whether the UAV knows them or not."""
-
-    def found() -> Parts:
-        each = cores_of(trace)
-        counts = [len(cores.base) for cores in each.values()]
-        first = np.concatenate([[0], np.cumsum(counts)])[: len(counts)].astype(np.intp)
-        return Parts(Cores.joined([*each.values()]), np.repeat(np.arange(len(counts)), counts), first, [*each])
-
-    return trace.derived("parts", found)
+    cores = cores_of(trace)
+    counts = [len(parts.base) for parts in cores.values()]
+    first = np.concatenate([[0], np.cumsum(counts)])[: len(counts)].astype(np.intp)
+    return Parts(Cores.joined([*cores.values()]), np.repeat(np.arange(len(counts)), counts), first, [*cores])
 
 
+@per_trace
 def cores_of(trace: Trace) -> dict[str, Cores]:
     """The cores of the convex parts of each barrier, by its name."""
-    barriers = trace.scenario.barriers
-    return trace.derived("cores", lambda: {name: _cores(each) for name, each in barriers.items()})
+    return {name: _cores(barrier) for name, barrier in trace.scenario.barriers.items()}
 
 
 def _cores(obstacle: Obstacle) -> Cores:
@@ -178,28 +177,25 @@ def _cores(obstacle: Obstacle) -> Cores:
     return Cores.prisms(parts, obstacle.height_m)
 
 
-def origin_of(trace: Trace, barrier: str) -> Array | None:
-    """Where the origin of a barrier's parts is at the rows, (T, 3), m; None if it does not move."""
-    return trace.position(barrier) if trace.scenario.barriers[barrier].moves else None
+def origin_of(trace: Trace, name: str) -> Array:
+    """Where the body of a robot or the origin of a barrier's parts is at the rows, (T, 3), m; 0 for one at rest."""
+    if name in trace.robots or trace.scenario.barriers[name].moves:
+        return trace.body(name)
+    return np.broadcast_to(0.0, (len(trace.t), 3))
 
 
-def seen_from(trace: Trace, robot: str, barrier: str) -> Array:
-    """Places of a robot's body at the rows as seen from the origin of a barrier's parts, (T, 3), m."""
-    origin, place = origin_of(trace, barrier), trace.body(robot)
-    return place if origin is None else place - origin
+def seen_from(trace: Trace, robot: str, other: str) -> Array:
+    """Places of a robot's body at the rows as seen from another robot or the origin of a barrier's parts, (T, 3), m."""
+    return trace.body(robot) - origin_of(trace, other)
 
 
-def carried(trace: Trace) -> list[tuple[Indices, Array | None]]:
+@per_trace
+def carried(trace: Trace) -> list[tuple[Indices, Array]]:
     """Numbers of the parts that are at rest, and of those of each barrier that moves, with the places of its origin."""
-
-    def found() -> list[tuple[Indices, Array | None]]:
-        parts = parts_of(trace)
-        origins = [origin_of(trace, name) for name in parts.names]
-        still = np.array([origin is None for origin in origins], dtype=np.bool_)
-        moving = [(np.flatnonzero(parts.owner == k), each) for k, each in enumerate(origins) if each is not None]
-        return [(np.flatnonzero(still[parts.owner]), None), *moving]
-
-    return trace.derived("carried", found)
+    parts, barriers = parts_of(trace), trace.scenario.barriers
+    still = np.array([barriers[name].moves is None for name in parts.names], dtype=np.bool_)
+    moving = [(np.flatnonzero(parts.owner == k), trace.body(parts.names[k])) for k in np.flatnonzero(~still).tolist()]
+    return [(np.flatnonzero(still[parts.owner]), np.broadcast_to(0.0, (len(trace.t), 3))), *moving]
 
 
 def contacts(trace: Trace, places: Array, rows: Indices, reach: float, *, planar: bool) -> Contacts:
@@ -208,27 +204,23 @@ def contacts(trace: Trace, places: Array, rows: Indices, reach: float, *, planar
     parts = parts_of(trace)
     found = list[Contacts]()
     for some, origin in carried(trace):
-        seen = places if origin is None else places - origin[rows]
-        near = within(parts.cores.take(some), seen, reach, planar=planar)
+        near = within(parts.cores.take(some), places - origin[rows], reach, planar=planar)
         found.append(near._replace(core=some[near.core]))
-    place, core = (np.concatenate([each[k] for each in found]) for k in (0, 1))
-    distance, normal = (np.concatenate([each.away[k] for each in found]) for k in (0, 1))
+    place, core = (np.concatenate([contact[k] for contact in found]) for k in (0, 1))
+    distance, normal = (np.concatenate([contact.away[k] for contact in found]) for k in (0, 1))
     first, last = lifetimes(trace)
     there = np.flatnonzero((first[core] <= rows[place]) & (rows[place] < last[core]))
     there = there[np.lexsort([core[there], place[there]])]
     return Contacts(place[there], core[there], Away(distance[there], normal[there]))
 
 
+@per_trace
 def lifetimes(trace: Trace) -> tuple[Indices, Indices]:
     """The row from which on each convex part is there, and that from which on it is not, (m,)."""
-
-    def found() -> tuple[Indices, Indices]:
-        parts, end = parts_of(trace), len(trace.t) - 1
-        first = np.array([trace.there_from(name) for name in parts.names], dtype=np.intp)
-        last = np.array([trace.there_until(name) for name in parts.names], dtype=np.intp)
-        return first[parts.owner], np.where(last == end, end + 1, last)[parts.owner]
-
-    return trace.derived("lifetimes", found)
+    parts, end = parts_of(trace), len(trace.t) - 1
+    first = np.array([trace.there_from(name) for name in parts.names], dtype=np.intp)
+    last = np.array([trace.there_until(name) for name in parts.names], dtype=np.intp)
+    return first[parts.owner], np.where(last == end, end + 1, last)[parts.owner]
 
 
 def is_planar(trace: Trace, robot: str) -> bool:
@@ -241,23 +233,17 @@ def pair_of(trace: Trace, one: str, other: str) -> Pair:
     return pairs_of(trace)[numbers_of(trace)[frozenset((one, other))]]
 
 
+@per_trace
 def numbers_of(trace: Trace) -> dict[frozenset[str], int]:
     """The place of each pair in `pairs_of`, by the names of its bodies."""
-
-    def numbered() -> dict[frozenset[str], int]:
-        return {frozenset((pair.first, pair.second)): k for k, pair in enumerate(pairs_of(trace))}
-
-    return trace.derived("numbers", numbered)
+    return {frozenset((pair.first, pair.second)): k for k, pair in enumerate(pairs_of(trace))}
 
 
+@per_trace
 def least_gap(trace: Trace, pair: Pair) -> Gap:
     """The smallest gap of a pair over continuous time."""
     # It is exact if both bodies move on straight lines between rows, and to `BENT_M` where it is below the one
     # required; else it is a lower bound.
-    return trace.derived(("least gap", pair.first, pair.second), lambda: _least_gap(trace, pair))
-
-
-def _least_gap(trace: Trace, pair: Pair) -> Gap:
     t, off_m = trace.t[pair.rows], off_m_of(trace, pair.first) + off_m_of(trace, pair.second)
     cores = cores_of(trace).get(pair.second)
     if cores is None:
@@ -279,10 +265,9 @@ def start_margin(trace: Trace, pair: Pair) -> float:
     if pair.under_way_s is None:
         return inf
     until = trace.t[pair.row] + pair.under_way_s - MERGE_S
-    last = len(trace.t) - 1 if pair.last is None else pair.last
-    end = min(int(np.searchsorted(trace.t, until)), last)
+    end = min(int(np.searchsorted(trace.t, until)), pair.last)
     if end > pair.row:
-        return _least_gap(trace, pair._replace(last=end)).margin_m
+        return least_gap(trace, pair._replace(last=end)).margin_m
     return float(gap_over_time(trace, pair)[pair.row]) - pair.required_m
 
 
@@ -291,27 +276,23 @@ def at_appearance(trace: Trace, gap: Gap) -> bool:
     return gap.pair.row > 0 and gap.t_s <= trace.t[gap.pair.row]
 
 
+@per_trace
 def steered_margin(trace: Trace, pair: Pair) -> float:
     """The least distance of the points of a pair that the law steers, less what the law keeps, m."""
-
-    def found() -> float:
-        cores, first = cores_of(trace).get(pair.second), trace.position(pair.first)[pair.rows]
-        if cores is None:
-            second = trace.position(pair.second)[pair.rows]
-            return closest_approach(trace.t[pair.rows], first, second).distance_m - pair.law_m
-        origin = origin_of(trace, pair.second)
-        way = first if origin is None else first - origin[pair.rows]
-        return closest(cores, way, planar=is_planar(trace, pair.first)).distance - pair.law_m
-
-    return trace.derived(("steered", pair.first, pair.second), found)
+    cores, first = cores_of(trace).get(pair.second), trace.position(pair.first)[pair.rows]
+    if cores is None:
+        second = trace.position(pair.second)[pair.rows]
+        return closest_approach(trace.t[pair.rows], first, second).distance_m - pair.law_m
+    way = first - origin_of(trace, pair.second)[pair.rows]
+    return closest(cores, way, planar=is_planar(trace, pair.first)).distance - pair.law_m
 
 
 def _least_of_bent(trace: Trace, pair: Pair, off_m: float) -> Approach:
     """The least distance of a pair whose bodies do not move straight: segments that may be too near are divided."""
     cores, planar = cores_of(trace).get(pair.second, Cores.at(np.zeros((1, 3)))), is_planar(trace, pair.first)
-    way = _relative(trace, pair, np.arange(len(trace.t))[pair.rows])
-    each = cores.take((slice(None), None))
-    lower = least_distances(each, way[:-1], way[1:], planar=planar)[0].min(axis=0) - off_m
+    way = seen_from(trace, pair.first, pair.second)[pair.rows]
+    beside = cores.take((slice(None), None))
+    lower = least_distances(beside, way[:-1], way[1:], planar=planar)[0].min(axis=0) - off_m
     most, t = min(ceil((off_m / BENT_M) ** 0.5), MOST_PARTS), trace.t[pair.rows]
     found = list[Approach]()
     for k in sorted(np.flatnonzero(lower < pair.safe_m).tolist(), key=lower.__getitem__):
@@ -322,7 +303,7 @@ def _least_of_bent(trace: Trace, pair: Pair, off_m: float) -> Approach:
             shares = np.linspace(0.0, 1.0, parts + 1)
             places = [bent(trace, name, pair.row + k, shares) for name in (pair.first, pair.second)]
             fine = places[0] - places[1]
-            least, where = least_distances(each, fine[:-1], fine[1:], planar=planar)
+            least, where = least_distances(beside, fine[:-1], fine[1:], planar=planar)
             least, where = least.min(axis=0), where[least.argmin(axis=0), np.arange(parts)]
             j = int(np.argmin(least))
             nearest = Approach(
@@ -339,26 +320,18 @@ def _least_of_bent(trace: Trace, pair: Pair, off_m: float) -> Approach:
     return min(found)
 
 
-def _relative(trace: Trace, pair: Pair, rows: Indices) -> Array:
-    """The body of the first of a pair as seen from the other, or from the origin of its parts, at some rows."""
-    if pair.second in trace.robots:
-        return trace.body(pair.first)[rows] - trace.body(pair.second)[rows]
-    return seen_from(trace, pair.first, pair.second)[rows]
-
-
 def bent(trace: Trace, name: str, row: int, shares: Array) -> Array:
     """Where a body is at shares (n,) of the time from a row to the next, (n, 3), m; origins of barriers, too."""
     if name not in trace.robots:
         way = origin_of(trace, name)
-        return np.zeros((len(shares), 3)) if way is None else way[row] + shares[:, None] * (way[row + 1] - way[row])
+        return way[row] + shares[:, None] * (way[row + 1] - way[row])
     ends = slice(row, row + 2)
     return trace.plant(name).between(trace.t[ends], trace.signals(name)[ends], shares)
 
 
 def to_barrier(trace: Trace, pair: Pair, place: Array) -> float:
     """Distance of a place (3,), m, from the core of the barrier of a pair as it is at the end of the run, m."""
-    way = origin_of(trace, pair.second)
-    here = place if way is None else place - way[-1]
+    here = place - origin_of(trace, pair.second)[-1]
     return float(away_from(cores_of(trace)[pair.second], here, planar=is_planar(trace, pair.first)).distance.min())
 
 
@@ -374,12 +347,11 @@ def place_on_map(trace: Trace, robot: str, t_s: float) -> dict[str, list[float]]
 def gap_over_time(trace: Trace, pair: Pair) -> Array:
     """The gap of a pair at the rows of a trace, (T,), m; NaN where an obstacle is not there."""
     cores = cores_of(trace).get(pair.second)
+    way = seen_from(trace, pair.first, pair.second)
     if cores is None:
-        apart = np.linalg.norm(trace.body(pair.first) - trace.body(pair.second), axis=1)
-        return np.asarray(apart) - pair.radii_m
+        return np.asarray(np.linalg.norm(way, axis=1)) - pair.radii_m
     found, rows = np.full(len(trace.t), np.nan), pair.rows
-    way = seen_from(trace, pair.first, pair.second)[rows]
-    found[rows] = over_time(cores, way, planar=is_planar(trace, pair.first)) - pair.radii_m
+    found[rows] = over_time(cores, way[rows], planar=is_planar(trace, pair.first)) - pair.radii_m
     return found
 
 
@@ -391,8 +363,7 @@ def distances_when_there(trace: Trace, robot: str) -> dict[str, float]:
     row = np.minimum(lifetimes(trace)[0], last)
     place = trace.position(robot)[row]
     for some, origin in carried(trace):
-        if origin is not None:
-            place[some] -= origin[row[some]]
+        place[some] -= origin[row[some]]
     apart = away_from(parts.cores, place, planar=is_planar(trace, robot)).distance
     return dict(zip(parts.names, np.minimum.reduceat(apart, parts.first).tolist(), strict=True))
 
@@ -410,33 +381,30 @@ def are_too_near(trace: Trace, robot: str, places: Array, t_s: float, by_m: floa
 
 def pairs_beside(trace: Trace, robot: str) -> dict[str, Pair]:
     """The pairs of a robot by the name of the other body, also those that do not appear before the end."""
-
-    def by_robot() -> dict[str, dict[str, Pair]]:
-        found = {name: dict[str, Pair]() for name in trace.robots}
-        for pair in declared_pairs(trace):
-            found[pair.first][pair.second] = pair
-            if pair.second in found:
-                found[pair.second][pair.first] = pair
-        return found
-
-    return trace.derived("beside", by_robot)[robot]
+    return _beside(trace)[robot]
 
 
+@per_trace
+def _beside(trace: Trace) -> dict[str, dict[str, Pair]]:
+    found = {name: dict[str, Pair]() for name in trace.robots}
+    for pair in declared_pairs(trace):
+        found[pair.first][pair.second] = pair
+        if pair.second in found:
+            found[pair.second][pair.first] = pair
+    return found
+
+
+@per_trace
 def apart_of(trace: Trace) -> Array:
     """A lower bound of the distance of each pair, as of `Pair.safe_m`, over the run: (P,), m, as in `pairs_of`."""
     # Obstacles count as there all the time.
-    return trace.derived("apart", lambda: _apart_of(trace))
-
-
-def _apart_of(trace: Trace) -> Array:
     robots, parts = trace.robots, parts_of(trace)
     off = {robot: off_m_of(trace, robot) for robot in robots}
     found = dict[tuple[str, str], float]()
     for robot in robots:
         apart, place = np.empty(len(parts.owner)), trace.body(robot)
         for some, origin in carried(trace):
-            way = place if origin is None else place - origin
-            apart[some] = apart_by_blocks(parts.cores.take(some), way).min(axis=1) - off[robot]
+            apart[some] = apart_by_blocks(parts.cores.take(some), place - origin).min(axis=1) - off[robot]
         least = np.minimum.reduceat(apart, parts.first) if len(apart) else apart
         found |= {(robot, name): bound for name, bound in zip(parts.names, least.tolist(), strict=True)}
     first, second = np.triu_indices(len(robots), 1)
@@ -482,8 +450,7 @@ def snapshot(trace: Trace, names: Iterable[str], t_s: float) -> dict[str, Any]:
     fixed = dict[str, list[float]]()
     for name, cores in cores_of(trace).items():
         if name in given and moving:
-            way = origin_of(trace, name)
-            origin = np.zeros(3) if way is None else interpolate(t, way, t_s)
+            origin = interpolate(t, origin_of(trace, name), t_s)
             there = nearest_point(cores, places[moving[0]] - origin, planar=is_planar(trace, moving[0]))
             fixed[name] = (origin + there).tolist()
     return {

@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from airground_drake.base.arrays import Array
-from airground_drake.sim.trace import Trace
+from airground_drake.sim.trace import Trace, per_trace
 from airground_drake.verify.claim import TIME_TOLERANCE_S
 from airground_drake.verify.engines.outlines import Indices, away_from
 from airground_drake.verify.engines.shortfalls import POINT, SCREEN_M, shortfalls
@@ -72,25 +72,25 @@ class Periods(NamedTuple):
         return self.passive & (np.linalg.norm(self.velocity, axis=1) <= STANDING_M_S)
 
     @property
+    def away_m_s(self) -> Array:
+        """How fast the robot's command leads away from the obstacle, (K,), m/s."""
+        return np.asarray(np.einsum("ka,ka->k", self.normal, self.velocity))
+
+    @property
     def retreated(self) -> Flags:
         """Where it was passive and went away from the obstacle as fast as that may come."""
-        return self.passive & (np.einsum("ka,ka->k", self.normal, self.velocity) >= self.pair.speed_m_s - AT_LIMIT_M_S)
+        return self.passive & (self.away_m_s >= self.pair.speed_m_s - AT_LIMIT_M_S)
 
 
+@per_trace
 def periods_of(trace: Trace, pair: Pair) -> Periods:
     """The control periods of a robot beside an obstacle that may move."""
-    return trace.derived(("periods", pair.first, pair.second), lambda: _periods(trace, pair))
-
-
-def _periods(trace: Trace, pair: Pair) -> Periods:
     ends, period = period_ends(trace), trace.scenario.control.period_s
-    last_row = len(trace.t) - 1 if pair.last is None else pair.last
-    which = np.flatnonzero((ends[:-1] >= pair.row) & (ends[:-1] < last_row))
+    which = np.flatnonzero((ends[:-1] >= pair.row) & (ends[:-1] < pair.last))
     row = ends[which]
     around = np.append(row, ends[which[-1:] + 1])  # the ends, too
     cores, planar, keeps = cores_of(trace)[pair.second], is_planar(trace, pair.first), pair.keeps_m(period)
-    first, way = trace.position(pair.first)[around], origin_of(trace, pair.second)
-    origin = np.zeros_like(first) if way is None else way[around]
+    first, origin = trace.position(pair.first)[around], origin_of(trace, pair.second)[around]
     away = away_from(cores.take((slice(None), None)), (first - origin)[:-1], planar=planar)
     nearest, k = away.distance.argmin(axis=0), np.arange(len(row))
     last = last_period(trace) if len(which) and which[-1] == len(ends) - 2 else Fraction(1)
@@ -106,8 +106,9 @@ def _periods(trace: Trace, pair: Pair) -> Periods:
     moved = np.linalg.norm(np.diff(origin, axis=0), axis=1)
     lasting = np.diff(trace.t[around])
     return Periods(
-        pair, row, away.distance[nearest, k], away.normal[nearest, k], keeps, missed,
-        moved > pair.speed_m_s * lasting + DISTANCE_TOLERANCE_M, trace.chosen(pair.first)[which],
+        pair=pair, row=row, apart_m=away.distance[nearest, k], normal=away.normal[nearest, k], keeps_m=keeps,
+        missed_m=missed, too_fast=moved > pair.speed_m_s * lasting + DISTANCE_TOLERANCE_M,
+        velocity=trace.chosen(pair.first)[which],
     )  # fmt: skip
 
 
@@ -119,8 +120,8 @@ def beside(trace: Trace) -> list[Periods]:
 def speeds(trace: Trace) -> dict[str, Array]:
     """Mean speeds of the obstacles that move during the control periods, (K,), m/s, by name; 0 while not there."""
     ends, found = period_ends(trace), dict[str, Array]()
-    for name, each in trace.scenario.barriers.items():
-        if each.moves:
+    for name, barrier in trace.scenario.barriers.items():
+        if barrier.moves:
             speed = np.linalg.norm(np.diff(trace.position(name)[ends], axis=0), axis=1) / np.diff(trace.t[ends])
             there = (ends[:-1] >= trace.there_from(name)) & (ends[:-1] < trace.there_until(name))
             found[name] = np.where(there, speed, 0.0)
@@ -158,13 +159,22 @@ def beside_moving(trace: Trace) -> list[BesideMoving]:
 
 def _beside_each(trace: Trace) -> Iterator[BesideMoving]:
     fast, slop = speeds(trace), DISTANCE_TOLERANCE_M / trace.scenario.control.period_s
-    for one in beside(trace):
-        pair, of_body = one.pair, fast.get(one.pair.second, np.zeros(1))
-        over = np.flatnonzero(of_body > pair.speed_m_s + slop)
+    for periods in beside(trace):
+        pair = periods.pair
+        speed = fast.get(pair.second, np.zeros(1))
+        over = np.flatnonzero(speed > pair.speed_m_s + slop)
         yield BesideMoving(
-            pair.first, pair.second, pair.required_m, pair.speed_m_s, float(of_body.max()),
-            float(trace.t[period_ends(trace)[over[0]]]) if len(over) else None,
-            float(of_body[over[0]]) if len(over) else None,
-            len(one.row), int(one.kept.sum()), int(one.passive.sum()), int(one.retreated.sum()), int(one.stood.sum()),
-            float(one.missed_m.max(initial=0.0)),
-        )  # fmt: skip
+            first=pair.first,
+            second=pair.second,
+            safe_distance_m=pair.required_m,
+            declared_m_s=pair.speed_m_s,
+            fastest_m_s=float(speed.max()),
+            too_fast_s=float(trace.t[period_ends(trace)[over[0]]]) if len(over) else None,
+            too_fast_m_s=float(speed[over[0]]) if len(over) else None,
+            periods=len(periods.row),
+            kept_periods=int(periods.kept.sum()),
+            passive_periods=int(periods.passive.sum()),
+            retreating_periods=int(periods.retreated.sum()),
+            standing_periods=int(periods.stood.sum()),
+            e_m=float(periods.missed_m.max(initial=0.0)),
+        )

@@ -10,7 +10,7 @@ import numpy as np
 
 from airground_drake.base.arrays import Array
 from airground_drake.base.errors import TraceError
-from airground_drake.sim.trace import Trace
+from airground_drake.sim.trace import Trace, per_trace
 from airground_drake.verify.engines.outlines import unpacked
 
 
@@ -28,11 +28,6 @@ class ProposalRecord:
     mapped: Array  # outlines of the obstacles on the UAV's map, (k, W), see `model.geometry.outline`
     cause: str  # UGV whose trigger it was sent for: `ugv`, or another UGV that `ugv` is to make way for
     party: tuple[str, ...]  # UGVs with a part in the same joint plan; empty: it stands alone
-
-
-def proposals_of(trace: Trace) -> list[ProposalRecord]:
-    """All proposals of a run, by time."""
-    return trace.derived("proposals", lambda: _proposals_of(trace))
 
 
 def _sent(trace: Trace, row: Mapping[Any, Any]) -> ProposalRecord:
@@ -57,12 +52,15 @@ def _sent(trace: Trace, row: Mapping[Any, Any]) -> ProposalRecord:
     if len(party) != len(row["party"]) or (party and row["robot"] not in party):
         raise TraceError(f"{label}: not in the joint plan of the UGVs {list(row['party'])}")
     return ProposalRecord(
-        int(row["number"]), str(row["robot"]), str(row["policy"]), float(row["issued_s"]), times,
-        places.reshape(-1, 3), selection.reshape(-1, 3), outlines, str(row["cause"]), party,
+        number=int(row["number"]), ugv=str(row["robot"]), policy=str(row["policy"]), issued_s=float(row["issued_s"]),
+        times_s=times, positions_m=places.reshape(-1, 3), selection=selection.reshape(-1, 3), mapped=outlines,
+        cause=str(row["cause"]), party=party,
     )  # fmt: skip
 
 
-def _proposals_of(trace: Trace) -> list[ProposalRecord]:
+@per_trace
+def proposals_of(trace: Trace) -> list[ProposalRecord]:
+    """All proposals of a run, by time."""
     found = [_sent(trace, row) for row in trace.proposals.to_dict("records")]
     recorded = sorted((s.ugv, s.issued_s, s.policy) for s in found)
     events = sorted((e["robot"], float(e["t_s"]), e["policy"]) for e in trace.events if e["kind"] == "proposal")
@@ -78,8 +76,9 @@ def _proposals_of(trace: Trace) -> list[ProposalRecord]:
     return sorted(found, key=lambda sent: sent.issued_s)
 
 
+@per_trace
 def proposal_of(trace: Trace, number: int) -> ProposalRecord:
-    found = trace.derived("proposals by number", lambda: {one.number: one for one in proposals_of(trace)})
-    if number not in found:
+    found = next((sent for sent in proposals_of(trace) if sent.number == number), None)
+    if found is None:
         raise TraceError(f"no proposal has the number {number}")
-    return found[number]
+    return found

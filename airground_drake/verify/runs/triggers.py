@@ -29,8 +29,8 @@ LARGEST_SAMPLE = 9.0  # standard deviations: one normal sample in 1e19 is larger
 
 def recorded_events(trace: Trace, ugv: str) -> list[Transition]:
     """Trigger and release events of a UGV by time."""
-    found = [(float(e["t_s"]), str(e["kind"])) for e in trace.events if e["robot"] == ugv]
-    return sorted(event for event in found if event[1] in ("trigger", "release"))
+    own = (event for event in trace.events if event["robot"] == ugv and event["kind"] in ("trigger", "release"))
+    return sorted((float(event["t_s"]), str(event["kind"])) for event in own)
 
 
 def column_conflict(trace: Trace, ugv: str, events: list[Transition]) -> Conflict | None:

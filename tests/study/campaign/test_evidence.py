@@ -10,9 +10,10 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from airground_drake.base import files
 from airground_drake.base.errors import UnknownNameError
 from airground_drake.commands.campaign import _code, _summary
-from airground_drake.study.campaign.evidence import evidence, strict
+from airground_drake.study.campaign.evidence import evidence
 from airground_drake.study.campaign.page import page, told
 from airground_drake.study.campaign.rows import COLUMNS, INVALID, JUDGED, STOPPED, Row, blank
 from airground_drake.study.campaign.statistics import clopper_pearson, confidence_sequence
@@ -38,7 +39,7 @@ def table(rows: list[Row]) -> pd.DataFrame:
 
 
 def conclude(rows: list[Row], **more: Any) -> dict[str, Any]:
-    found = strict(evidence(table(rows), **more)) | {"name": "x", "title": "", "spec": "x.yaml", "stopped": None}
+    found = files.strict(evidence(table(rows), **more)) | {"name": "x", "title": "", "spec": "x.yaml", "stopped": None}
     json.dumps(found, allow_nan=False)
     return dict(found)
 

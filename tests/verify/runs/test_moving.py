@@ -19,7 +19,7 @@ from airground_drake.verify import TRACE_CLAIMS, judge
 from airground_drake.verify.claim import ModelClaim
 from airground_drake.verify.claims.safe_hyp import DECLARED, PASSIVE
 from airground_drake.verify.judging import judge_all
-from airground_drake.verify.pair_kinds import THEOREMS, kind_of
+from airground_drake.verify.pair_kinds import SHARES, kind_of
 from airground_drake.verify.runs import encounters as encounters_module
 from airground_drake.verify.runs.control_law import least_speeds, retreats
 from airground_drake.verify.runs.encounters import encounters, steps_of
@@ -193,7 +193,7 @@ def test_theorems_are_about_bodies_at_rest_and_robots() -> None:
     scenario = persons.scenario("two kinds")
     kinds = {other: kind_of(scenario, "ugv1", other) for other in ("person", "post", "uav")}
     assert kinds == {"person": "moving", "post": "obstacle", "uav": "uav_ugv"}
-    assert kinds["person"] not in THEOREMS
+    assert kinds["person"] not in SHARES
     verdicts = judge_all(scenario, [persons.run("two kinds", "d")])
     for each in verdicts:
         if isinstance(each.claim, ModelClaim) and "pairs" in each.inputs:
