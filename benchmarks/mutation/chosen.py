@@ -367,7 +367,7 @@ JUDGES = (
         "LIVE-HYP takes every reversal for one with news",
         "verify/claims/live_hyp.py",
         "_wrong",
-        "if early and one.end_s not in one.news_s:",
+        "if early and end_s not in acceptance.news_s:",
         "if False:",
         tests=(f"{RUNS}/test_breakages.py",),
     ),
