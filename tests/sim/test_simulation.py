@@ -14,7 +14,6 @@ from timeline import kinds, times
 
 from airground_drake.base.errors import TraceError
 from airground_drake.base.progress import Progress
-from airground_drake.scenario.load import load, shipped
 from airground_drake.scenario.schema import Preset, Run, Scenario, Uav, Ugv
 from airground_drake.sim import runs, trace
 from airground_drake.sim.runs import simulate_all
@@ -48,14 +47,6 @@ def test_ugv1_goes_through_what_the_paper_tells(
     if events[-1] != "arrival":
         end = [3.3, 5.1] if scenario == "case_a" else [5.5, 5.8]
         assert np.linalg.norm(of_run.position("ugv1")[-1, :2] - end) < 0.1
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("scenario", shipped())
-def test_every_run_has_the_verdicts_that_its_scenario_declares(run: Runs, scenario: str) -> None:
-    for name in load(scenario).runs:
-        for verdict in judge(run(scenario, name)):
-            assert verdict.as_expected is not False, (name, verdict.claim.id, verdict)
 
 
 @pytest.mark.parametrize("name", ["case_a", "case_b"])
