@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from numba import njit
 from pydrake.solvers import MathematicalProgram
 
 from airground_drake.base.arrays import Array
+from airground_drake.base.compiling import njit
 from airground_drake.ugv.problem import Evaluation, Problem
 from airground_drake.ugv.relaxation import offsets, within_reach
 

@@ -72,8 +72,8 @@ def test_an_unexpected_verdict_is_exit_code_1(tmp_path: Path, capsys: pytest.Cap
         (tmp_path / old).write_text("of an older run")
     assert main(["case_a", "-o", str(tmp_path), *one, "--format", "json"]) == 1
     said = capsys.readouterr()
-    assert "SAFE-TRACE" in said.out
-    assert said.out.startswith("[✗] Safe, but not all arrive: ugv1 is standing still.")
+    assert said.out.startswith("[≈] Without the UAV (a): 1 of 2 arrive, every distance kept.\n")
+    assert "SAFE-TRACE on run a" in said.out[said.out.index("As declared?        ✗") :]
     assert all(line.endswith(" done") for line in said.err.splitlines())  # no terminal: a line for a long stage
     assert not {"report.html", "junit.xml"} & {path.name for path in tmp_path.iterdir()}
 

@@ -7,10 +7,10 @@ from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 from scipy.optimize import minimize
 
 from airground_drake.base.arrays import Array
+from airground_drake.base.compiling import njit
 from airground_drake.model.law.ugv_law import UgvLaw
 from airground_drake.report.audit.item import Item, item
 from airground_drake.scenario.load import load
