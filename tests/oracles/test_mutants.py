@@ -37,6 +37,8 @@ from oracles.mutants import (
     with_law,
 )
 
+pytestmark = pytest.mark.slow  # each simulates a run of its own
+
 
 def found(oracle: str, run: str = "d", scenario: str = "case_b", given: Sequence[str] = ()) -> list[Fault]:
     """The faults that an oracle finds in a new run."""
