@@ -56,10 +56,12 @@ def test_the_checker_agrees_with_a_run_of_one_period() -> None:
 DRAWN = {
     "steered_point_within_reach": (20089, 6),
     "bent_ways_that_overlap": (20051, 6),  # in contact in many periods: the checker once did not end within its limit
-    **{f"plan_{number}": (number, 6) for number in (17, 39, 49, 66)},
-    **{f"of_many_{number}": (number, 30) for number in (8, 23, 54)},
+    "unicycles_under_b": (39, 6),
+    "every_plant_under_c": (51, 6),
+    "wheels_and_delay_under_d": (66, 6),
+    "nineteen_under_c": (8, 30),
 }
-"""Random scenarios by number and most UGVs; most have robots that turn or lag, and a plan that is proposed."""
+"""Random scenarios by number and most UGVs; something is proposed, but for the first two."""
 
 
 @pytest.mark.parametrize("name", DRAWN)
@@ -67,7 +69,7 @@ def test_the_checker_agrees_where_bodies_are_apart_from_their_steered_points(nam
     number, most_ugvs = DRAWN[name]
     trace, _, wrong = tried(from_data(draw(number, most_ugvs), "drawn"))
     assert wrong == []
-    assert len(trace.proposals) or number > 20000
+    assert len(trace.proposals) > 0 or number > 20000
 
 
 @pytest.mark.parametrize("name", "bcd")
