@@ -14,8 +14,6 @@ NOTE = (
     "note: no folder for compiled functions can be written: each command compiles them anew, which may take a minute; "
     "NUMBA_CACHE_DIR can name a folder"
 )
-
-
 _jit: Any = numba.njit  # its stubs lack options
 _kind: Any = numba.types.unliteral
 
@@ -30,7 +28,8 @@ def njit(*, cache: bool, **options: Any) -> Callable[[Callable[..., Any]], Any]:
         except RuntimeError:  # "no locator available": numba looks for a folder when a function is decorated
             _say()
             found = _jit(**options)(function)
-        found.get_call_template = _without_constants(found.get_call_template)
+        if hasattr(found, "get_call_template"):  # unless NUMBA_DISABLE_JIT is set
+            found.get_call_template = _without_constants(found.get_call_template)
         return found
 
     return compiled
