@@ -30,6 +30,13 @@ def test_where_nothing_can_be_kept_functions_are_compiled_and_it_is_said_once(
     assert "NUMBA_CACHE_DIR can name a folder" in said
 
 
+def test_what_is_called_with_a_constant_is_not_compiled_for_it_alone() -> None:
+    inner = compiling.njit(cache=False)(lambda x, k: x * k)
+    outer = compiling.njit(cache=False)(lambda x, k: inner(x, 2) + inner(x, k))
+    assert outer(1.5, 3) == 7.5
+    assert len(inner.signatures) == 1
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(("name", "encoding"), [(b"b\xff.yaml", "utf-8"), ("ü.yaml".encode(), "ascii")])
 def test_a_path_that_cannot_be_printed_is_escaped(name: bytes, encoding: str, tmp_path: Path) -> None:

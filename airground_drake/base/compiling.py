@@ -14,19 +14,30 @@ NOTE = (
     "note: no folder for compiled functions can be written: each command compiles them anew, which may take a minute; "
     "NUMBA_CACHE_DIR can name a folder"
 )
+_jit: Any = numba.njit  # its stubs lack options
+_kind: Any = numba.types.unliteral
 
 
-def njit(*, cache: bool) -> Callable[[Callable[..., Any]], Any]:
+def njit(*, cache: bool, **options: Any) -> Callable[[Callable[..., Any]], Any]:
     """`numba.njit`; where numba finds no folder for its cache, it is said once, and nothing is kept."""
+    options["no_cfunc_wrapper"] = True  # nobody calls them from C
 
     def compiled(function: Callable[..., Any]) -> Any:
         try:
-            return numba.njit(cache=cache)(function)
+            found = _jit(cache=cache, **options)(function)
         except RuntimeError:  # "no locator available": numba looks for a folder when a function is decorated
             _say()
-            return numba.njit(function)
+            found = _jit(**options)(function)
+        if hasattr(found, "get_call_template"):  # unless NUMBA_DISABLE_JIT is set
+            found.get_call_template = _without_constants(found.get_call_template)
+        return found
 
     return compiled
+
+
+def _without_constants(template: Callable[..., Any]) -> Callable[..., Any]:
+    """numba's choice of what a call means; otherwise it compiles a function once more for each constant argument."""
+    return lambda args, named: template(tuple(map(_kind, args)), {name: _kind(of) for name, of in named.items()})
 
 
 @once

@@ -11,8 +11,8 @@ from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Fie
 from airground_drake.base import files
 from airground_drake.base.errors import ReportError, one_line, short
 from airground_drake.base.statuses import NOT_EXERCISED, STATUSES, Status
+from airground_drake.base.values import RECORDED
 from airground_drake.report.folder import PAGES
-from airground_drake.scenario.kinds import RECORDED
 from airground_drake.scenario.schema import Scenario
 
 SCHEMA = "airground_drake.report/4"

@@ -29,7 +29,8 @@ def watched(halts: Array, t: float, positions: Array, room: Array) -> Array:
         for a in range(3):
             away += (positions[3 * i + a] - halts[4 * i + a]) ** 2
         if halts[4 * i + 3] == NOT_WATCHED or np.sqrt(away) > room[i]:
-            found[4 * i : 4 * i + 3] = positions[3 * i : 3 * i + 3]
+            for a in range(3):
+                found[4 * i + a] = positions[3 * i + a]
             found[4 * i + 3] = t
     return found
 

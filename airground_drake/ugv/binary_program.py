@@ -92,7 +92,7 @@ class BinaryProgram:
         # Without half-planes: one empty row. `steps` is what accepting at a stage adds to the position, (N, 2), m, and
         # `away` are the task errors of refusing throughout, (N, 3), m.
         n = problem.stages
-        stage, point = np.nonzero(self.within)
+        stage, point = map(np.ascontiguousarray, np.nonzero(self.within))  # the layout that is compiled for
         normal = normals[stage, point]
         before = np.arange(n) <= stage[:, None]
         of_omega = (normal[:, :AXES] @ steps.T * before) @ self._of_block

@@ -66,8 +66,11 @@ def improve(terms: Terms, block: Blocks, start: Array, pairs: bool) -> tuple[Arr
         for i in range(blocks):
             for j in range(i, blocks if pairs else i + 1):
                 if _cost_changed(terms, block, plan, before, i, j) < before.cost[-1] * (1.0 - 1e-12):
-                    plan, changed = np.where((block == i) | (block == j), 1.0 - plan, plan), True
+                    for k in range(len(plan)):
+                        if block[k] == i or block[k] == j:
+                            plan[k] = 1.0 - plan[k]
                     _begin(terms, plan, before)
+                    changed = True
     return plan, terms.dt * before.cost[-1]
 
 
@@ -81,7 +84,9 @@ class _Beginnings(NamedTuple):
 @njit(cache=True)
 def _begin(terms: Terms, plan: Array, before: _Beginnings) -> None:
     """Write the beginnings of a plan."""
-    before.end[0], before.cost[0] = terms.initial, 0.0
+    for a in range(3):
+        before.end[0, a] = terms.initial[a]
+    before.cost[0] = 0.0
     for k in range(len(plan)):
         for a in range(3):
             before.end[k + 1, a] = before.end[k, a] + terms.dt * terms.velocities[int(plan[k]), k, a]

@@ -169,7 +169,7 @@ def workspace(loop: ClosedLoop) -> Workspace:
     )
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def advance(loop: ClosedLoop, mode: int, k: int, position: Array, work: Workspace) -> Array:
     """Move the UGV through control period k, and return its mean velocity in it, (3,), m/s."""
     # Only here do predictions assume a plant. The steered point of every plant of `model.plants.plant` gets from sample
@@ -185,7 +185,7 @@ def advance(loop: ClosedLoop, mode: int, k: int, position: Array, work: Workspac
     return velocity
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def _command(loop: ClosedLoop, mode: int, k: int, position: Array, work: Workspace) -> Array:
     """Velocity that the law commands in control period k, (3,), m/s; rates are of the sampled motions."""
     mobility, which, normal, bound, retreat, rate, asked, heading = work

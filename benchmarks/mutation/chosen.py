@@ -110,7 +110,7 @@ LAW = (
         "contradictions are not looked for",
         "model/law/kernels.py",
         "_closest_feasible",
-        "return velocity if missed == 0.0 else _least_violation(normal, bound + MARGIN_M_S)",
+        "return velocity if missed == 0.0 else _least_violation(normal, within)",
         "return velocity",
         tests=(*WIRING, "tests/model/law/test_projection.py"),
     ),

@@ -12,7 +12,7 @@ import hashlib
 import json
 import re
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict
 from functools import partial
 from pathlib import Path
@@ -269,8 +269,11 @@ FORGERIES: dict[str, tuple[str, Edit]] = {
 # ------------------------------------------------------------------------------------- who refuses
 
 
-def refused_by(folder: Path) -> dict[str, str]:
-    """Of each program that refuses a report, the first line that says so; each one goes over the whole report."""
+PROGRAMS = ("i", "ii", "iii")
+
+
+def refused_by(folder: Path, programs: Sequence[str] = PROGRAMS) -> dict[str, str]:
+    """Of each of these programs that refuses a report, the first line that says so."""
 
     def lines(by: str) -> Iterator[tuple[str, str]]:
         if by == "i":
@@ -282,13 +285,13 @@ def refused_by(folder: Path) -> dict[str, str]:
                 yield each["outcome"], f"{each['claim']} {each['run']}: {each['text']}"
 
     found = {}
-    for by in ("i", "ii", "iii"):
+    for by in programs:
         try:
-            said = [text for outcome, text in lines(by) if outcome not in (AGREES, RECORDED)]
+            said = next((text for outcome, text in lines(by) if outcome not in (AGREES, RECORDED)), "")
         except (AirgroundError, checker.UsageError) as error:
-            said = [str(error)]
+            said = str(error)
         if said:
-            found[by] = said[0]
+            found[by] = said
     return found
 
 
@@ -321,7 +324,7 @@ def main(folder: Path) -> None:
         remembering(patch)
         for name, (due, edit) in FORGERIES.items():
             found = refused_by(forged(folder, edit))
-            cells_of = " | ".join("x" if by in found else "" for by in ("i", "ii", "iii"))
+            cells_of = " | ".join("x" if by in found else "" for by in PROGRAMS)
             note = "" if {*filter(None, due.split(", "))} <= {*found} else f"  NOT AS DUE: {due}"
             print(f"| {name} | {cells_of} |{note}", flush=True)
             for by, text in found.items():

@@ -8,18 +8,27 @@ import os
 import shutil
 import subprocess
 import sys
+from contextlib import redirect_stderr, redirect_stdout
+from io import StringIO
 from pathlib import Path
 
 import pytest
 from check.concerted import made_again
 from check.forgeries import HOSTILE, both, everywhere
-from check.forging import claim_of, copy, edited_report, mend
+from check.forging import claim_of, copy, edited_report, judged, mend
 from commands.conftest import Airground
 
 from airground_drake.base import progress
-from airground_drake.commands import main
+from airground_drake.base.errors import AirgroundError
+from airground_drake.base.progress import Progress
+from airground_drake.check.command import LIMIT_S, verdict
+from airground_drake.check.line import DISAGREES, NOT_HERE, OPEN, CheckLine
+from airground_drake.commands import check, main
+from airground_drake.report import rebuild, simulated
 from airground_drake.report.__main__ import main as report
 from airground_drake.scenario import plugins
+
+pytestmark = pytest.mark.slow
 
 GONE = {"name": "no_such.module:It", "parameters": {}}
 """A policy that is not there."""
@@ -34,21 +43,32 @@ def short(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def test_both_go_over_an_untouched_report(short: Path, airground: Airground) -> None:
-    lines = json.loads(airground("check", "--json", short))["checks"]
-    claims = {(claim["id"], claim["run"]) for claim in json.loads((short / "report.json").read_text())["claims"]}
-    assert claims <= {(line["claim"], line["run"]) for line in lines if line["by"] == "made again"}
-    assert ("SAFE-TRACE", "d") in {(line["claim"], line["run"]) for line in lines if line["by"] == "checker"}
+@pytest.fixture(scope="module")
+def checked(short: Path) -> tuple[str, str]:
+    """What all three programs say of it on standard output and standard error."""
+    with (
+        pytest.MonkeyPatch.context() as patch,
+        redirect_stdout(StringIO()) as said,
+        redirect_stderr(StringIO()) as told,
+    ):
+        patch.setattr(progress, "TOLD_S", 0.0)
+        assert main(["check", "--simulate", str(short)]) == 0
+    return said.getvalue(), told.getvalue()
 
 
-def test_what_takes_long_is_told(
-    short: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+def test_all_three_go_over_an_untouched_report_and_say_what_was_taken_as_recorded(
+    short: Path, checked: tuple[str, str]
 ) -> None:
-    monkeypatch.setattr(progress, "TOLD_S", 0.0)
-    assert main(["check", str(short)]) == 0
-    assert capsys.readouterr().err == "checking: 1 done\nmade again: 1 done\n"
-    assert main(["check", "-q", str(short)]) == 0
-    assert capsys.readouterr().err == ""
+    said, told = checked
+    *lines, _, taken = said.splitlines()
+    of = {by: [line for line in lines if f"({by})" in line] for by in ("checker", "made again", "simulated again")}
+    claims = {claim["id"] for claim in json.loads((short / "report.json").read_text())["claims"]}
+    assert claims <= {line.split()[0] for line in of["made again"]}
+    assert ["SAFE-TRACE", "d"] in [line.split()[:2] for line in of["checker"]]
+    assert [line.split()[0] for line in of["simulated again"]] == ["trace", "diagram.dot", "diagram.svg"]
+    assert all(line.endswith("exactly") for line in of["simulated again"])
+    assert "seeds and faults" not in taken
+    assert told == "checking: 1 done\nmade again: 1 done\nsimulated again: 1 done\n"
 
 
 def test_what_the_checker_does_not_decide_is_refused_when_the_report_is_made_again(
@@ -57,8 +77,10 @@ def test_what_the_checker_does_not_decide_is_refused_when_the_report_is_made_aga
     folder = copy(short, tmp_path / "copy")
     with edited_report(folder) as document:
         claim_of(document, "LIVE-GOAL")["statement"] += " They say."
-    (refused,) = (line for line in airground("check", folder, code=1).splitlines() if " DISAGREES (" in line)
+    *lines, _, taken = airground("check", folder, code=1).splitlines()
+    (refused,) = (line for line in lines if " DISAGREES (" in line)
     assert refused.startswith("LIVE-GOAL   d        DISAGREES (made again): ")
+    assert taken.startswith("Taken as recorded: policies, seeds and faults;")
 
 
 def test_foreign_files_are_not_judged_again(short: Path, tmp_path: Path, airground: Airground) -> None:
@@ -71,42 +93,25 @@ def test_foreign_files_are_not_judged_again(short: Path, tmp_path: Path, airgrou
         assert said.count(f"({by})") == 1
 
 
-def test_runs_that_are_simulated_again_agree_and_the_last_line_says_what_was_not(
-    short: Path, airground: Airground
-) -> None:
-    *_, seeds = airground("check", short).splitlines()
-    assert seeds.startswith("Taken as recorded: policies, seeds and faults;")
-    *lines, taken = airground("check", "--simulate", short).splitlines()
-    again = [line for line in lines if "(simulated again)" in line]
-    assert [line.split()[0] for line in again] == ["trace", "diagram.dot", "diagram.svg"]
-    assert all(line.endswith("exactly") for line in again)
-    assert "seeds and faults" not in taken
-
-
-def test_another_seed_is_not_reproduced_which_is_exit_code_3(short: Path, tmp_path: Path, airground: Airground) -> None:
+def test_another_seed_is_not_reproduced_which_is_exit_code_3(short: Path, tmp_path: Path) -> None:
     folder = copy(short, tmp_path / "copy")
     made_again(everywhere("seed", value=7), both("seed", value=7))(folder)
-    mend(folder)
-    said = airground("check", folder, "--simulate", code=3)
-    (line,) = (line for line in said.splitlines() if "not reproduced here (" in line)
-    assert line.startswith("trace       d        not reproduced here (simulated again): states, row 1, t = 0.05 s: ugv")
+    lines = [CheckLine(**line, by="simulated again") for line in simulated.lines(folder)]
+    (line,) = (line for line in lines if line.outcome == NOT_HERE)
+    assert line.text.startswith("states, row 1, t = 0.05 s: ugv")
+    assert verdict(lines) == 3
 
 
-def test_third_party_code_is_simulated_only_where_it_is_allowed(
-    short: Path, tmp_path: Path, airground: Airground
-) -> None:
+def test_third_party_code_is_simulated_only_where_it_is_allowed(short: Path, tmp_path: Path) -> None:
     folder = copy(short, tmp_path / "copy")
     made_again(everywhere("intervention", "policies", value=lambda old: [*old, GONE]))(folder)
-    mend(folder)
-    (refused,) = (
-        line for line in airground("check", folder, "--simulate", code=1).splitlines() if "cannot be checked (" in line
-    )
-    assert "third-party code is imported and run only with --allow-plugins" in refused
-    said = airground("check", folder, "--simulate", "--allow-plugins", code=1)
-    assert "no_such" in said
+    (line,) = check.made_again(folder, [], LIMIT_S, Progress(), "simulated again", "airground_drake.report.simulated")
+    assert line.outcome == OPEN
+    assert "third-party code is imported and run only with --allow-plugins" in line.text
+    with pytest.raises(AirgroundError, match="no_such"):
+        [*simulated.lines(folder, allow_plugins=True)]
 
 
-@pytest.mark.slow
 def test_claims_are_judged_again_where_drake_cannot_be_imported(short: Path) -> None:
     code = "import sys, runpy; sys.modules['pydrake'] = None; "
     code += "runpy.run_module('airground_drake.report.rebuild', run_name='__main__')"
@@ -123,17 +128,14 @@ def digests(folder: Path) -> dict[str, str]:
     return {str(path): hashlib.sha256(path.read_bytes()).hexdigest() for path in folder.rglob("*") if path.is_file()}
 
 
-def test_other_line_ends_in_the_page_disagree(short: Path, tmp_path: Path, airground: Airground) -> None:
+def test_other_line_ends_in_the_page_disagree(short: Path, tmp_path: Path) -> None:
     page = copy(short, tmp_path / "copy") / "report.html"
     page.write_bytes(page.read_bytes().replace(b"\n", b"\r\n"))
-    mend(page.parent)
-    lines = airground("check", page.parent, code=1).splitlines()
-    (line,) = (each for each in lines if each.startswith("report.html"))
-    assert "DISAGREES" in line
-    assert r"\r\n" in line
+    (line,) = (line for line in rebuild.lines(page.parent, judge=judged) if line["claim"] == "report.html")
+    assert line["outcome"] == DISAGREES
+    assert r"\r\n" in line["text"]
 
 
-@pytest.mark.slow
 @pytest.mark.skipif(shutil.which("coqc") is None and not os.environ.get("CI"), reason="Coq is not installed")
 def test_coq_proves_the_runs_again(short: Path, tmp_path: Path, airground: Airground) -> None:
     folder = copy(short, tmp_path / "copy")
@@ -145,7 +147,6 @@ def test_coq_proves_the_runs_again(short: Path, tmp_path: Path, airground: Airgr
     assert proved["text"].startswith("machine-checked for this run: every distance is kept; the law is obeyed")
 
 
-@pytest.mark.slow
 def test_third_party_claims_and_other_seeds_are_made_again_where_allowed(
     tmp_path: Path, airground: Airground, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -15,24 +15,24 @@ from airground_drake.sim import trace
 
 
 @pytest.fixture(scope="module")
-def report() -> dict[str, Any]:
+def document() -> dict[str, Any]:
     scenario = make_scenario()
     return dict(json.loads(json.dumps(built(scenario, make_traces(scenario), FINE))))
 
 
-def save(folder: Path, report: dict[str, Any], **scenario: str) -> None:
+def save(folder: Path, document: dict[str, Any], **scenario: str) -> None:
     folder.mkdir(parents=True)
-    (folder / "report.json").write_text(json.dumps({**report, "scenario": {**report["scenario"], **scenario}}))
+    (folder / "report.json").write_text(json.dumps({**document, "scenario": {**document["scenario"], **scenario}}))
 
 
 def test_every_report_is_there_with_its_verdict_a_link_and_a_picture(
-    report: dict[str, Any], tmp_path: Path, airground: Airground
+    document: dict[str, Any], tmp_path: Path, airground: Airground
 ) -> None:
-    save(tmp_path / "plain", report)
-    save(tmp_path / "a b" / "100%", report, title="<script>alert(1)</script>")
-    save(tmp_path / "bad", {**report, "claims": 3})
+    save(tmp_path / "plain", document)
+    save(tmp_path / "a b" / "100%", document, title="<script>alert(1)</script>")
+    save(tmp_path / "bad", {**document, "claims": 3})
     (tmp_path / "plain" / "report.html").touch()
-    run = list(report["runs"])[-1]
+    run = list(document["runs"])[-1]
     trace.save(make_traces(make_scenario())[run], tmp_path / "plain" / "trace" / run)
     for _ in range(2):  # again, over its own page
         assert airground("index", tmp_path) == f"{tmp_path / PAGE}\n"
@@ -46,8 +46,8 @@ def test_every_report_is_there_with_its_verdict_a_link_and_a_picture(
     assert "no trace" in page
 
 
-def test_a_foreign_page_is_left_alone(report: dict[str, Any], tmp_path: Path, airground: Airground) -> None:
-    save(tmp_path / "good", report)
+def test_a_foreign_page_is_left_alone(document: dict[str, Any], tmp_path: Path, airground: Airground) -> None:
+    save(tmp_path / "good", document)
     (tmp_path / PAGE).write_text("mine")
     assert "left alone" in airground("index", tmp_path, code=2)
     assert (tmp_path / PAGE).read_text() == "mine"

@@ -67,6 +67,7 @@ def test_the_reproduction_table_meets_its_targets(report: Report) -> None:
         assert all(found[name]["value"] >= 2.0 - 1e-9 for name in document["scenario"]["resolved"]["obstacles"])
 
 
+@pytest.mark.slow
 def test_an_unexpected_verdict_is_exit_code_1(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     one = ["--set", "runs={a: {method: a, expected: {SAFE-TRACE: refuted}}}", "--set", "reproduction=[]"]
     for old in ("report.html", "junit.xml"):

@@ -59,6 +59,7 @@ def test_a_run_is_home_if_every_robot_arrives() -> None:
         assert metrics.outcome(trace)["home"] is (count == 3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("own", [0, 2])
 def test_seeds_are_those_from_1_on_and_the_reports_own_runs_serve_for_theirs(own: int) -> None:
     runs, noise = "runs={a: {method: a}, b: {method: b}}", "decision.noise_m_sqrt_s=1"

@@ -117,7 +117,7 @@ class It(Policy):
 """
 
 
-@pytest.mark.parametrize("command", ["run", "report"])
+@pytest.mark.parametrize("command", ["run", pytest.param("report", marks=pytest.mark.slow)])
 def test_a_policy_that_crashes_is_told_with_its_first_traceback_and_may_be_heard(
     command: str, module: Callable[[str], str], tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:

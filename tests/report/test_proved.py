@@ -36,7 +36,7 @@ def proofs(folder: Path, *runs: str) -> None:
 
 
 @pytest.fixture
-def report(tmp_path: Path, scenario: Scenario, traces: dict[str, Trace]) -> Path:
+def made(tmp_path: Path, scenario: Scenario, traces: dict[str, Trace]) -> Path:
     folder = tmp_path / "report"
     written = [
         f"trace/{name}/{file}" for name, of in traces.items() for file in trace.save(of, folder / "trace" / name)
@@ -59,34 +59,34 @@ def consistent(folder: Path) -> None:
     check_files(folder, names_in(folder), recorded)
 
 
-def test_each_run_has_a_line_of_its_own_and_the_files_are_still_those_of_the_report(report: Path) -> None:
-    assert rows(report) == {"a": "", "c": "", "a_printed": ""}
-    proofs(report, *ANSWERS)
-    assert proved.write(report)
-    consistent(report)
-    lines = rows(report)
+def test_each_run_has_a_line_of_its_own_and_the_files_are_still_those_of_the_report(made: Path) -> None:
+    assert rows(made) == {"a": "", "c": "", "a_printed": ""}
+    proofs(made, *ANSWERS)
+    assert proved.write(made)
+    consistent(made)
+    lines = rows(made)
     assert f'<a href="proofs/run_a.v">{CHECKED}</a>' in lines["a"]
     assert "Coq did not prove this run: coqc took longer than 1 s &amp; more" in lines["c"]
     near = "pair ugv1, uav: 0.500 m at {} s, 2 m required"
     says = f"Coq refused this run: {near.format(13)}; {near.format(14)}"
     assert says in lines["a_printed"]
 
-    proofs(report, "c")  # asked again, and about one run only: nothing is left of what was said of the others
-    assert proved.write(report)
-    consistent(report)
-    assert {run: bool(line) for run, line in rows(report).items()} == {"a": False, "c": True, "a_printed": False}
+    proofs(made, "c")  # asked again, and about one run only: nothing is left of what was said of the others
+    assert proved.write(made)
+    consistent(made)
+    assert {run: bool(line) for run, line in rows(made).items()} == {"a": False, "c": True, "a_printed": False}
 
 
 @pytest.mark.parametrize("name", ["report.html", "trace/a/meta.json"])
-def test_a_page_or_a_trace_that_is_not_the_reports_is_not_vouched_for(name: str, report: Path) -> None:
-    (report / name).write_bytes((report / name).read_bytes() + b"\n")
-    proofs(report, "a")
-    before = (report / "report.html").read_bytes(), (report / "report.json").read_bytes()
+def test_a_page_or_a_trace_that_is_not_the_reports_is_not_vouched_for(name: str, made: Path) -> None:
+    (made / name).write_bytes((made / name).read_bytes() + b"\n")
+    proofs(made, "a")
+    before = (made / "report.html").read_bytes(), (made / "report.json").read_bytes()
     with pytest.raises(ReportError, match=f"{name} is not the file that report.json names"):
-        proved.write(report)
-    assert ((report / "report.html").read_bytes(), (report / "report.json").read_bytes()) == before
+        proved.write(made)
+    assert ((made / "report.html").read_bytes(), (made / "report.json").read_bytes()) == before
 
 
-def test_traces_without_a_page_are_left_alone(report: Path) -> None:
-    (report / "report.html").unlink()
-    assert not proved.write(report)
+def test_traces_without_a_page_are_left_alone(made: Path) -> None:
+    (made / "report.html").unlink()
+    assert not proved.write(made)

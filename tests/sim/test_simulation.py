@@ -14,7 +14,6 @@ from timeline import kinds, times
 
 from airground_drake.base.errors import TraceError
 from airground_drake.base.progress import Progress
-from airground_drake.scenario.load import load, shipped
 from airground_drake.scenario.schema import Preset, Run, Scenario, Uav, Ugv
 from airground_drake.sim import runs, trace
 from airground_drake.sim.runs import simulate_all
@@ -50,20 +49,15 @@ def test_ugv1_goes_through_what_the_paper_tells(
         assert np.linalg.norm(of_run.position("ugv1")[-1, :2] - end) < 0.1
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("scenario", shipped())
-def test_every_run_has_the_verdicts_that_its_scenario_declares(run: Runs, scenario: str) -> None:
-    for name in load(scenario).runs:
-        for verdict in judge(run(scenario, name)):
-            assert verdict.as_expected is not False, (name, verdict.claim.id, verdict)
-
-
-@pytest.mark.parametrize("name", ["case_a", "case_b"])
-def test_events_are_isolated_far_more_precisely_than_claims_ask_for(run: Runs, name: str) -> None:
+@pytest.mark.parametrize(("name", "events", "within_s"), [("case_a", 2, 1e-7), ("case_b", 2, 1e-7), ("dwell", 4, 1e-9)])
+def test_events_are_isolated_far_more_precisely_than_claims_ask_for(
+    run: Runs, name: str, events: int, within_s: float
+) -> None:
+    """Against Brent's method on the recorded signals; a hundredth of the accuracy would give 1e-8 s in `dwell`."""
     (verdict,) = judge(run(name, "d"), ["THR-TRIG"])
     found = {each["robot"]: each for each in verdict.evidence["ugvs"]}["ugv1"]
-    assert len(found["events"]) == 2
-    assert found["worst_time_difference_s"] < 1e-7
+    assert len(found["events"]) >= events
+    assert found["worst_time_difference_s"] < within_s
     assert times(run(name, "d"), "trigger")[0] % 0.05 > 1e-6
 
 
@@ -173,14 +167,6 @@ def test_a_trace_survives_saving_and_a_changed_file_does_not(run: Runs, tmp_path
     (tmp_path / "meta.json").write_text("[" * 100_000, encoding="utf-8")
     with pytest.raises(TraceError, match="not a readable trace"):
         trace.load(tmp_path)
-
-
-def test_events_are_isolated_far_better_than_the_claims_ask(run: Runs) -> None:
-    """Against Brent's method on the recorded signals; a hundredth of the accuracy would give 1e-8 s."""
-    (verdict,) = judge(run("dwell", "d"), ["THR-TRIG"])
-    (ugv,) = verdict.evidence["ugvs"]
-    assert len(ugv["events"]) > 3
-    assert ugv["worst_time_difference_s"] < 1e-9
 
 
 @pytest.mark.parametrize(("period", "noise_period"), [(0.01, 0.05), (0.05, 0.01), (0.025, 0.05)])

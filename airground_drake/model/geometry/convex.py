@@ -204,7 +204,7 @@ def approach(row: Array, start: Array, end: Array, planar: bool) -> tuple[float,
 def _breaks(row: Array, start: Array, vx: float, vy: float, vz: float) -> Array:
     """Shares of a straight motion between which the nearest point is on the same edge, corner or face: from 0 to 1."""
     count = int(row[COUNT])
-    found, n = np.empty(3 * count + 4), 1
+    found, n = np.empty(3 * count + 3), 1
     found[0] = 0.0
     if vz != 0.0:
         found[1], found[2] = (row[BASE] - start[2]) / vz, (row[TOP] - start[2]) / vz
@@ -221,8 +221,17 @@ def _breaks(row: Array, start: Array, vx: float, vy: float, vz: float) -> Array:
         if across != 0.0:  # where it crosses the line of the edge
             found[n] = (px * ey - py * ex) / across
             n += 1
-    inner = found[:n][(found[:n] >= 0.0) & (found[:n] < 1.0)]
-    return np.append(np.sort(inner), 1.0)
+    inner, size = np.empty(n + 1), 0
+    for k in range(n):
+        if 0.0 <= found[k] < 1.0:
+            at = size
+            while at > 0 and inner[at - 1] > found[k]:
+                inner[at] = inner[at - 1]
+                at -= 1
+            inner[at] = found[k]
+            size += 1
+    inner[size] = 1.0
+    return inner[: size + 1]
 
 
 @njit(cache=True)
@@ -258,9 +267,11 @@ def segments_are_free(begin: Array, end: Array, rows: Array, keep: Array, slack:
     # One with an end too near to a core must come no nearer than that end.
     # begin, end: (K, 2), m; rows: (m, W); keep: (m,), m; slack: m
     free = np.ones(len(begin), np.bool_)
-    cells, half = _cells_of(0.5 * (begin + end)), 0.0
+    middle, half = np.empty((len(begin), 2)), 0.0
     for k in range(len(begin)):
+        middle[k, 0], middle[k, 1] = 0.5 * (begin[k, 0] + end[k, 0]), 0.5 * (begin[k, 1] + end[k, 1])
         half = max(half, 0.5 * abs(end[k, 0] - begin[k, 0]), 0.5 * abs(end[k, 1] - begin[k, 1]))
+    cells = _cells_of(middle)
     for m in range(len(rows)):
         low_x, high_x, low_y, high_y = reached(rows[m], keep[m])
         first, last, bottom, top = _cells_between(cells, low_x - half, high_x + half, low_y - half, high_y + half)
@@ -289,9 +300,10 @@ class _Cells(NamedTuple):
 def _cells_of(points: Array) -> _Cells:
     """Points (K, 2), m, in cells of about `PER_CELL`."""
     low, high = np.zeros(2), np.zeros(2)
-    for a in range(2):
-        if len(points) > 0:
-            low[a], high[a] = points[:, a].min(), points[:, a].max()
+    for k in range(len(points)):
+        for a in range(2):
+            low[a] = points[k, a] if k == 0 else min(low[a], points[k, a])
+            high[a] = points[k, a] if k == 0 else max(high[a], points[k, a])
     wide, tall = high[0] - low[0], high[1] - low[1]
     size = max(np.sqrt(wide * tall * PER_CELL / max(len(points), 1)), max(wide, tall) / 1000.0, 1e-9)
     columns, rows = int(wide / size) + 1, int(tall / size) + 1
@@ -300,10 +312,12 @@ def _cells_of(points: Array) -> _Cells:
         column = min(int((points[k, 0] - low[0]) / size), columns - 1)
         number[k] = column * rows + min(int((points[k, 1] - low[1]) / size), rows - 1)
         count[number[k] + 1] += 1
-    count = np.cumsum(count)
+    for cell in range(columns * rows):
+        count[cell + 1] += count[cell]
     first, members = np.empty((columns, rows + 1), np.int64), np.empty(len(points), np.int64)
     for column in range(columns):
-        first[column] = count[column * rows : (column + 1) * rows + 1]
+        for row in range(rows + 1):
+            first[column, row] = count[column * rows + row]
     for k in range(len(points)):
         members[count[number[k]]] = k
         count[number[k]] += 1

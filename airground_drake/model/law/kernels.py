@@ -1,7 +1,8 @@
 """Compiled inner loops of set-based avoidance (7)-(8) (numba); `avoidance.py` explains and wraps them.
 
-Scalar code without temporaries, because the gatekeeper computes the command of hundreds of thousands of periods. No
-fast-math: results are those of IEEE arithmetic in the order written.
+Scalar code without temporaries, because the gatekeeper computes the command of hundreds of thousands of periods, and
+numba compiles an expression of whole arrays several times as long as a loop. No fast-math: results are those of IEEE
+arithmetic in the order written.
 """
 
 from __future__ import annotations
@@ -115,7 +116,7 @@ def avoid_one(lower: Array, normal: Array, bound: Array, composition: int) -> Ar
 
     A `lower` that is not finite asks for nothing.
     """
-    if not np.isfinite(lower).all():
+    if not is_finite(lower):
         lower = np.zeros(3)
     for k in range(len(bound)):
         if _dot(normal[k], lower) < bound[k]:
@@ -129,7 +130,10 @@ def avoid_one(lower: Array, normal: Array, bound: Array, composition: int) -> Ar
         if _dot(found, found) >= 1e-6 * speed or speed < CONTRADICTION_M_S:
             return found
         # between two bodies that it touches no margin fits: the exact bounds, which let it slide along
-        touched = np.where(bound <= CONTRADICTION_M_S, np.minimum(bound, 0.0), bound)
+        touched = bound.copy()
+        for k in range(len(bound)):
+            if bound[k] <= CONTRADICTION_M_S:
+                touched[k] = np.minimum(bound[k], 0.0)
         exactly, missed = _closest(lower, normal, touched, CONTRADICTION_M_S)
         if missed > 0.0:
             return found
@@ -146,7 +150,10 @@ def yielding(task: Array, normal: Array, retreat: Array, max_speed: float) -> Ar
             break
     else:
         return task
-    found = avoid_one(task, normal, np.where(retreat > 0.0, retreat, -np.inf), AUGMENTED)
+    bound = np.empty(len(retreat))
+    for k in range(len(retreat)):
+        bound[k] = retreat[k] if retreat[k] > 0.0 else -np.inf
+    found = avoid_one(task, normal, bound, AUGMENTED)
     limit_one(found, max_speed)
     return found
 
@@ -210,6 +217,21 @@ def limit_one(velocity: Array, max_speed: float) -> None:
 
 
 @njit(cache=True)
+def is_finite(velocity: Array) -> bool:
+    """Whether all three numbers are."""
+    return bool(np.isfinite(velocity[0]) and np.isfinite(velocity[1]) and np.isfinite(velocity[2]))
+
+
+@njit(cache=True)
+def _raised(bound: Array, by: float) -> Array:
+    """All bounds, higher by so much, m/s."""
+    raised = np.empty(len(bound))
+    for k in range(len(bound)):
+        raised[k] = bound[k] + by
+    return raised
+
+
+@njit(cache=True)
 def _dot(a: Array, b: Array) -> float:
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
@@ -217,8 +239,9 @@ def _dot(a: Array, b: Array) -> float:
 @njit(cache=True)
 def _closest_feasible(lower: Array, normal: Array, bound: Array) -> Array:
     """Closest velocity to `lower` under all constraints; where none meets them, see `_least_violation`."""
-    velocity, missed = _closest(lower, normal, bound + MARGIN_M_S, CONTRADICTION_M_S)
-    return velocity if missed == 0.0 else _least_violation(normal, bound + MARGIN_M_S)
+    within = _raised(bound, MARGIN_M_S)
+    velocity, missed = _closest(lower, normal, within, CONTRADICTION_M_S)
+    return velocity if missed == 0.0 else _least_violation(normal, within)
 
 
 @njit(cache=True)
@@ -230,9 +253,10 @@ def _least_violation(normal: Array, bound: Array) -> Array:
     still = np.zeros(normal.shape[1])
     least, more = 0.0, np.inf
     while more > 1e-14 * least:
-        more = _closest(still, normal, bound - least, 0.0)[1]
+        more = _closest(still, normal, _raised(bound, -least), 0.0)[1]
         least += more
-    return _closest(still, normal, bound - ((1.0 + ABOVE_LEAST) * least + ABOVE_LEAST_M_S), CONTRADICTION_M_S)[0]
+    lowered = _raised(bound, -((1.0 + ABOVE_LEAST) * least + ABOVE_LEAST_M_S))
+    return _closest(still, normal, lowered, CONTRADICTION_M_S)[0]
 
 
 @njit(cache=True)
@@ -358,8 +382,10 @@ def _remove(
 def _split(vector: Array, across: Array, share: Array, k: int) -> None:
     """Write the part of a vector that is orthogonal to across[:k] into across[k], and into share[k, :k] its shares."""
     # Gram-Schmidt, twice: of nearly parallel vectors, one pass leaves a part along the others as large as the rest.
-    across[k] = vector
-    share[k, :k] = 0.0
+    for a in range(len(vector)):
+        across[k, a] = vector[a]
+    for m in range(k):
+        share[k, m] = 0.0
     for _ in range(2):
         for m in range(k):
             along, squared = 0.0, 0.0

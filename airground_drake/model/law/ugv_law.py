@@ -20,7 +20,7 @@ from airground_drake.base.arrays import Array
 from airground_drake.base.compiling import njit
 from airground_drake.model.bodies.world import Neighbours
 from airground_drake.model.law.avoidance import Avoidance
-from airground_drake.model.law.kernels import Layer, avoid_one, fill_half_spaces, limit_one, yielding
+from airground_drake.model.law.kernels import Layer, avoid_one, fill_half_spaces, is_finite, limit_one, yielding
 from airground_drake.model.plants.steering import EDGES, NUMBERS, keep_ahead
 
 
@@ -125,7 +125,7 @@ class UgvLaw:
         return velocity
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def command(
     law: Numbers,
     ugv: UgvState,
@@ -162,7 +162,7 @@ def command(
             task[a] += asked.chosen[a, b] * (wish - below[b])
     for a in range(3):
         task[a] *= ugv.mobility[a]
-    if not np.isfinite(task).all():  # the planner never sends such numbers
+    if not is_finite(task):  # the planner never sends such numbers
         task = below
     limit_one(task, ugv.max_speed)
     if law.intervention_on_top:

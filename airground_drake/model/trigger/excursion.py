@@ -100,7 +100,8 @@ def spans(begun: Array, now: Array) -> Array:
     """Least and largest x of (15) over a step, (2, n), m, of its signals as `gathered` gives them at both ends."""
     before, after = begun[1:].reshape(-1, 5), now[1:].reshape(-1, 5)
     ends = np.empty((2, len(before)))
-    ends[0], ends[1] = before[:, 4], after[:, 4]
+    for j in range(len(before)):
+        ends[0, j], ends[1, j] = before[j, 4], after[j, 4]
     return extremes(before[:, :4], after[:, :4], ends)
 
 

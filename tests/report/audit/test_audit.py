@@ -19,6 +19,8 @@ from airground_drake.scenario.load import load
 from airground_drake.ugv.solution import ConstantPlans
 from airground_drake.verify import Finding, cache_folder, judge_model
 
+pytestmark = pytest.mark.slow  # it looks at many runs
+
 DOCS = Path(__file__).parents[3] / "docs"
 FINDINGS = 25
 FORMULAS = (2, 3, 4, 5, 8, 9, *range(12, 23))

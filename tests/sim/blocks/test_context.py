@@ -61,6 +61,7 @@ def test_a_cloned_context_goes_on_identically(method: str) -> None:
     assert ends(model, second.get_context()) == first
 
 
+@pytest.mark.slow
 def test_two_simulators_of_one_diagram_do_not_disturb_each_other() -> None:
     scenario = load("case_a")
     model = build_model(scenario, "d")
@@ -74,6 +75,7 @@ def test_two_simulators_of_one_diagram_do_not_disturb_each_other() -> None:
         assert ends(model, simulator.get_context()) == expected
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", ["c", "d"])
 def test_runs_of_one_diagram_in_threads_are_those_made_one_after_the_other(
     method: str, monkeypatch: pytest.MonkeyPatch

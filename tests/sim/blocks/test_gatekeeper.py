@@ -24,6 +24,7 @@ from airground_drake.sim import components
 from airground_drake.sim.blocks import DirectAcceptance, InterventionPlanner
 from airground_drake.sim.diagram import build_model
 from airground_drake.sim.simulation import Recorder, simulate
+from airground_drake.study.testing.plugin import Simulations
 from airground_drake.uav.messages import Report
 from airground_drake.ugv import mpc_gatekeeper
 from airground_drake.ugv.answer import Rules
@@ -101,14 +102,14 @@ def test_a_route_that_writes_into_its_problem_is_named(case_a: Scenario, route: 
         simulate(case_a, "c")
 
 
-def test_a_route_cannot_change_the_problem_that_is_recorded(case_a: Scenario) -> None:
+def test_a_route_cannot_change_the_problem_that_is_recorded(case_a: Scenario, run: Simulations) -> None:
     case_a.duration_s = 16.0
-    honest = simulate(case_a, "c").problems
+    honest = run("case_a", "c").problems
     case_a.gatekeeper.route = "hostile"
     with ROUTES.adding("hostile", Exchanging):
         trace = simulate(case_a, "c")
     assert any(honest["accept_m_s"][0])
-    assert trace.problems["accept_m_s"][0] == honest["accept_m_s"][0]
+    assert [*trace.problems["accept_m_s"][0]] == [*honest["accept_m_s"][0]]
     (verdict,) = judge(trace, ["GATE-PLAN"])
     assert verdict.status == "refuted"
     assert "positions are not those of (23)" in str(verdict.counterexample)
@@ -129,8 +130,8 @@ class FailingLater:
         return found if self.calls % 2 else Solution(False, "solver_failed")
 
 
-def test_a_failing_solver_withdraws_no_acceptance_and_is_recorded(case_a: Scenario) -> None:
-    well = simulate(case_a, "c").decisions
+def test_a_failing_solver_withdraws_no_acceptance_and_is_recorded(case_a: Scenario, run: Simulations) -> None:
+    well = run("case_a", "c").decisions
     case_a.gatekeeper.route = "failing"
     with ROUTES.adding("failing", FailingLater):
         trace = simulate(case_a, "c")

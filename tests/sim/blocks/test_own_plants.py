@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -122,6 +123,7 @@ class Lagging(Diagram):
         builder.BuildInto(self)
 
 
+@cache
 def of(make: Callable[..., System], drift_m_s: float = 0.0, cover_m: float = 0.0, **parameters: float) -> Trace:
     """A run of `minimal` in which the UGV has a user's plant."""
     return simulate(load("minimal", SETTINGS), "d", plants={"ugv1": OwnPlant(make, drift_m_s, cover_m, parameters)})

@@ -32,8 +32,9 @@ def test_theorems_and_claims_name_each_other() -> None:
 
 @pytest.mark.parametrize("scenario", shipped())
 def test_shipped_scenarios_meet_all_hypotheses(scenario: str) -> None:
+    loaded = load(scenario)
     for claim in CLAIMS.values():
-        inputs = claim.inputs(load(scenario))
+        inputs = claim.inputs(loaded)
         assert json.loads(json.dumps(inputs, allow_nan=False)) == inputs
         finding = claim.judge(inputs)
         assert finding.status == "proved", (claim.id, finding)

@@ -326,16 +326,16 @@ def compiled_before(compiled: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.fixture
-def report(tmp_path: Path, run: Simulations) -> Path:
+def made(tmp_path: Path, run: Simulations) -> Path:
     """What there is to prove of a report: case A (d), its first rows."""
     trace.save(short(run("case_a", "d")), tmp_path / "report" / "trace" / "d")
     return tmp_path / "report"
 
 
-def _each_forged_value_is_found(report: Path, found: dict[str, Any]) -> None:
+def _each_forged_value_is_found(made: Path, found: dict[str, Any]) -> None:
     """What can be computed without Coq is compared, and nothing is added to proofs.json."""
-    traces = {"d": trace.load(report / "trace" / "d")}
-    assert broken_rules(report / "proofs", traces)[1] == []
+    traces = {"d": trace.load(made / "trace" / "d")}
+    assert broken_rules(made / "proofs", traces)[1] == []
     for *parents, key, value in (
         ("certified", True), ("theory", {}), ("runs", "d", "certified", True), ("runs", "d", "rounded_by_m", -5.0),
         ("runs", "d", "rounded_coordinates", -1), ("runs", "d", "distances", "theorem", "all_safe_for_ever"),
@@ -347,47 +347,47 @@ def _each_forged_value_is_found(report: Path, found: dict[str, Any]) -> None:
         for parent in parents:
             place = place[parent]
         place[key] = value
-        (report / "proofs" / "proofs.json").write_text(json.dumps(forged), encoding="utf-8")
-        assert len(broken_rules(report / "proofs", traces)[1]) == 1, (parents, key)
+        (made / "proofs" / "proofs.json").write_text(json.dumps(forged), encoding="utf-8")
+        assert len(broken_rules(made / "proofs", traces)[1]) == 1, (parents, key)
 
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("compiled_before")
 def test_the_command_proves_a_report_and_writes_down_what_it_found(
-    report: Path, coq_version: str, capsys: pytest.CaptureFixture[str]
+    made: Path, coq_version: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert main(["prove", str(report)]) == 0
+    assert main(["prove", str(made)]) == 0
     assert "run d: all 12 distances kept at all times: proved in " in capsys.readouterr().out
-    found = json.loads((report / "proofs" / "proofs.json").read_text(encoding="utf-8"))
+    found = json.loads((made / "proofs" / "proofs.json").read_text(encoding="utf-8"))
     assert found["coq"] == coq_version
     assert found["runs"]["d"]["distances"]["proved"] is found["runs"]["d"]["law"]["proved"] is True
-    assert sorted(path.name for path in (report / "proofs").iterdir()) == ["proofs.json", "run_d.v", "run_d_law.v"]
-    _each_forged_value_is_found(report, found)
+    assert sorted(path.name for path in (made / "proofs").iterdir()) == ["proofs.json", "run_d.v", "run_d_law.v"]
+    _each_forged_value_is_found(made, found)
 
-    of = trace.load(report / "trace" / "d")
+    of = trace.load(made / "trace" / "d")
     rock = np.array(of.scenario.obstacles[ROCK].position_m)
-    trace.save(moved(of, 3, rock), report / "trace" / "d")
-    assert main(["prove", str(report), "--run", "d"]) == 1
+    trace.save(moved(of, 3, rock), made / "trace" / "d")
+    assert main(["prove", str(made), "--run", "d"]) == 1
     said = capsys.readouterr().out
     assert f"run d: all 12 distances kept at all times: not proved: {REFUSED}" in said
-    assert sorted(path.name for path in (report / "proofs").iterdir()) == ["proofs.json", "run_d.v", "run_d_law.v"]
+    assert sorted(path.name for path in (made / "proofs").iterdir()) == ["proofs.json", "run_d.v", "run_d_law.v"]
 
 
 def test_what_cannot_be_proved_for_want_of_coq_or_of_files_is_said(
-    report: Path, coq_version: str, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    made: Path, coq_version: str, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     for arguments, why in (
         ([str(tmp_path)], "wanted: the folder of a report"),
-        ([str(report), "--run", "e"], "unknown run of .* 'e'; allowed: d"),
+        ([str(made), "--run", "e"], "unknown run of .* 'e'; allowed: d"),
         (["--run", "d"], "--run needs DIR"),
-        ([str(report), "--record"], "--record goes without DIR"),
+        ([str(made), "--record"], "--record goes without DIR"),
     ):
         assert main(["prove", *arguments]) == 2
         said = capsys.readouterr().err
         assert said.count("\n") == 1
         assert re.search(why, said), said
-    (report / "trace" / "d" / "states.parquet").write_bytes(b"")
-    assert main(["prove", str(report)]) == 2
+    (made / "trace" / "d" / "states.parquet").write_bytes(b"")
+    assert main(["prove", str(made)]) == 2
     assert "SHA-256" in capsys.readouterr().err
     monkeypatch.setenv("PATH", str(tmp_path))
     assert main(["prove"]) == 2
