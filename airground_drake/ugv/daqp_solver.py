@@ -32,35 +32,28 @@ from pydrake.symbolic import Expression, Variable
 
 from airground_drake.base.arrays import Array
 
-SUPPORTED = frozenset(
-    {
-        ProgramAttribute.kLinearCost, ProgramAttribute.kQuadraticCost, ProgramAttribute.kLinearConstraint,
-        ProgramAttribute.kLinearEqualityConstraint, ProgramAttribute.kBinaryVariable, ProgramAttribute.kCallback,
-    }
-)  # fmt: skip
-"""What a program may have. Visualization callbacks are not called."""
-
+# What a program may have. Visualization callbacks are not called.
+SUPPORTED = frozenset({
+    ProgramAttribute.kLinearCost, ProgramAttribute.kQuadraticCost, ProgramAttribute.kLinearConstraint,
+    ProgramAttribute.kLinearEqualityConstraint, ProgramAttribute.kBinaryVariable, ProgramAttribute.kCallback,
+})  # fmt: skip
 FOUND, INFEASIBLE, UNBOUNDED, STOPPED, INVALID, FAILED = (
     SolutionResult.kSolutionFound, SolutionResult.kInfeasibleConstraints, SolutionResult.kUnbounded,
     SolutionResult.kIterationLimit, SolutionResult.kInvalidInput, SolutionResult.kSolverSpecificError,
 )  # fmt: skip
+# What DAQP's flags mean; 4: solved, inexactly; 5: stopped with a solution, -7: without one. Others are failures.
 _ENDED = {1: FOUND, 2: FOUND, 4: FOUND, 5: STOPPED, -4: STOPPED, -7: STOPPED, -1: INFEASIBLE, -3: UNBOUNDED}
-"""What DAQP's flags mean; 4: solved, inexactly; 5: stopped with a solution, -7: without one. Others are failures."""
 _BINARY, _NO_BOUND = 16, 1e30
-_FLAT = 1e-24
-"""A variable counts as linear if its curvature is below this share of the largest."""
-_APPROACH = ((0.0, -1e-4),)
-"""Without binary variables: no added curvature, and the weight of DAQP's proximal point method. A negative weight
-counts only where the Hessian is singular."""
+_FLAT = 1e-24  # a variable counts as linear if its curvature is below this share of the largest
+# Curvature that binary variables get, in units of the largest, and weight of DAQP's proximal point method. A negative
+# weight counts only where the Hessian is singular. Where DAQP fails, the next is tried. More curvature makes a search
+# longer: it weakens the bounds.
 _APPROACHES = (0.0, 0.0), (1e-6, -1e-6), (1e-4, -1e-6)
-"""With binary variables: the curvature that they get, in units of the largest, and this weight. Where DAQP fails, as
-where the Hessian is singular, the next is tried. More curvature makes a search longer: it weakens the bounds."""
-_TIGHT = 1e-9
-"""DAQP's tolerance of constraints, in the scaled variables."""
-_FEASIBLE = 1e-6
-"""Largest violation of a constraint, in its own units, of a guess or a solution."""
+_APPROACH = ((0.0, -1e-4),)  # without binary variables
+_TIGHT = 1e-9  # DAQP's tolerance of constraints, in the scaled variables
+_FEASIBLE = 1e-6  # largest violation of a constraint, in its own units, of a guess or a solution
+# A search finds the guess again if nothing is cheaper: its cost may be this much above that of the guess, relative.
 _AGAIN = 1e-7
-"""A search finds the guess again if nothing is cheaper: its cost may be this much above that of the guess, relative."""
 
 
 class SolverLimits(NamedTuple):
@@ -201,8 +194,7 @@ class _Form(NamedTuple):
 
     def own(self) -> npt.NDArray[np.bool_]:
         """Variables with a quadratic cost that involves no other variable, (n,)."""
-        own: npt.NDArray[np.bool_] = ((self.hessian != 0.0).sum(axis=0) == 1) & (self.hessian.diagonal() > 0.0)
-        return own
+        return np.asarray(((self.hessian != 0.0).sum(axis=0) == 1) & (self.hessian.diagonal() > 0.0))
 
     def may_recede(self) -> bool:
         """Whether, besides binary variables, there are directions without curvature: the cost may fall for ever."""
@@ -291,7 +283,6 @@ class DaqpResult(MathematicalProgramResult):  # type: ignore[misc]
     """A result that also has the values of binary variables, and the details of the solution."""
 
     def __init__(self) -> None:
-        """An empty result."""
         super().__init__()
         self._index, self._details = dict[int, int](), Details()
 

@@ -204,12 +204,15 @@ class OutcomeGatekeepers(Gatekeepers):
 
 def _jointly(judged: Sequence[GatekeeperDecision], said: Sequence[float]) -> list[GatekeeperDecision]:
     """The decisions of a sample. Where a part of a joint plan is refused, no other part of it is newly accepted."""
-    refused = {each.proposal.joint for each in judged if _answer(each, said[each.robot]) == REFUSE}
+    refused = {answer.proposal.joint for answer in judged if _answer(answer, said[answer.robot]) == REFUSE}
     return [
-        replace(each, accepted=False, reason=JOINT_REFUSED)
-        if each.accepted and said[each.robot] == SILENT and each.proposal.party and each.proposal.joint in refused
-        else each
-        for each in judged
+        replace(answer, accepted=False, reason=JOINT_REFUSED)
+        if answer.accepted
+        and said[answer.robot] == SILENT
+        and answer.proposal.party
+        and answer.proposal.joint in refused
+        else answer
+        for answer in judged
     ]
 
 
