@@ -102,8 +102,8 @@ LAW = (
         "no scaling back",
         "model/law/kernels.py",
         "avoid_one",
-        "found = _scale_back(found, normal, bound)",
-        "found = found",
+        "velocity = _scale_back(velocity, normal, bound)",
+        "velocity = velocity",
         tests=(*WIRING, "tests/model/law/test_avoidance.py"),
     ),
     Mutant(

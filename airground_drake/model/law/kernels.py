@@ -123,18 +123,18 @@ def avoid_one(lower: Array, normal: Array, bound: Array, composition: int) -> Ar
     else:
         return lower.copy()
     if composition == AUGMENTED:
-        found = _closest_feasible(lower, normal, bound)
-        speed = _dot(found, found)
-        found = _scale_back(found, normal, bound)
-        if _dot(found, found) >= 1e-6 * speed or speed < CONTRADICTION_M_S:
-            return found
+        velocity = _closest_feasible(lower, normal, bound)
+        speed = _dot(velocity, velocity)
+        velocity = _scale_back(velocity, normal, bound)
+        if _dot(velocity, velocity) >= 1e-6 * speed or speed < CONTRADICTION_M_S:
+            return velocity
         # between two bodies that it touches no margin fits: the exact bounds, which let it slide along
         touched = np.where(bound <= CONTRADICTION_M_S, np.minimum(bound, 0.0), bound)
         exactly, missed = _closest(lower, normal, touched, CONTRADICTION_M_S)
         if missed > 0.0:
-            return found
+            return velocity
         exactly = _scale_back(exactly, normal, bound)
-        return exactly if _dot(exactly, exactly) > _dot(found, found) else found
+        return exactly if _dot(exactly, exactly) > _dot(velocity, velocity) else velocity
     return _recursion(lower, normal, bound, composition == RECURSION_NEAREST)
 
 
@@ -146,9 +146,9 @@ def yielding(task: Array, normal: Array, retreat: Array, max_speed: float) -> Ar
             break
     else:
         return task
-    found = avoid_one(task, normal, np.where(retreat > 0.0, retreat, -np.inf), AUGMENTED)
-    limit_one(found, max_speed)
-    return found
+    velocity = avoid_one(task, normal, np.where(retreat > 0.0, retreat, -np.inf), AUGMENTED)
+    limit_one(velocity, max_speed)
+    return velocity
 
 
 @njit(cache=True)
@@ -304,7 +304,7 @@ def _squared(vectors: Array, k: int) -> float:
 @njit(cache=True)
 def _most_missed(velocity: Array, normal: Array, bound: Array, settled: npt.NDArray[np.bool_]) -> int:
     """Index of the constraint that is missed most, by more than rounding, among those not settled; -1 without one."""
-    found, worst = -1, 0.0
+    missed_most, worst = -1, 0.0
     for k in range(len(bound)):
         missed = _missed(velocity, normal, bound, k)
         if missed > worst and not settled[k]:
@@ -312,8 +312,8 @@ def _most_missed(velocity: Array, normal: Array, bound: Array, settled: npt.NDAr
             for a in range(len(velocity)):
                 terms += abs(normal[k, a] * velocity[a])
             if missed > ROUNDING * terms:
-                found, worst = k, missed
-    return found
+                missed_most, worst = k, missed
+    return missed_most
 
 
 @njit(cache=True)
