@@ -36,10 +36,10 @@ def _recursion(scenario: Scenario, traces: Mapping[str, Trace]) -> Item | None:
     evidence: dict[str, dict[str, Any]] = {}
     for name in compared:
         trace = traces[name]
-        found = [(nearest, robot) for robot in trace.ugvs if (nearest := closest_obstacle(trace, robot))]
-        if not found:
+        nearest_of = [(nearest, robot) for robot in trace.ugvs if (nearest := closest_obstacle(trace, robot))]
+        if not nearest_of:
             return None
-        (value, t_s, obstacle, *_), robot = min(found)
+        (value, t_s, obstacle, *_), robot = min(nearest_of)
         evidence[name] = {
             "composition": scenario.runs[name].composition,
             "robot": robot,

@@ -327,7 +327,5 @@ def _pack(states: Sequence[TriggerState]) -> Array:
 
 
 def _unpack(status: Array, index: int) -> TriggerState:
-    fields = Status(status[FIELDS * index : FIELDS * (index + 1)])
-    return TriggerState(
-        Mode(int(fields.mode)), int(fields.triggers), float(fields.triggered_at_s), float(fields.released_at_s)
-    )
+    own = Status(status[FIELDS * index : FIELDS * (index + 1)])
+    return TriggerState(Mode(int(own.mode)), int(own.triggers), float(own.triggered_at_s), float(own.released_at_s))
