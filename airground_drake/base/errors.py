@@ -34,7 +34,6 @@ class ScenarioError(AirgroundError):
     """
 
     def __init__(self, source: str, key: str, value: object, allowed: str) -> None:
-        """Build the one-line message from its parts."""
         self.source, self.key, self.value, self.allowed = source, key, value, allowed
         where = f"{source}: {key}: " if key else f"{source}: "
         fault = str(value) if isinstance(value, Fault) else f"{short(repr(value))} is not allowed"
@@ -49,7 +48,6 @@ class LimitError(AirgroundError):
         super().__init__(scenario, asked, allowed)
 
     def __str__(self) -> str:
-        """One line."""
         return one_line("{} asks for about {}; allowed: {}".format(*self.args))
 
 
@@ -67,7 +65,6 @@ class UnknownNameError(AirgroundError):
     """
 
     def __init__(self, kind: str, name: object, allowed: Iterable[str]) -> None:
-        """Build the one-line message from its parts."""
         self.kind, self.name, self.allowed = kind, name, tuple(allowed)
         options = ", ".join(self.allowed) or "none"
         super().__init__(one_line(f"unknown {kind} {short(repr(name))}; allowed: {options}"))
@@ -85,7 +82,6 @@ class PolicyError(AirgroundError):
     """
 
     def __init__(self, what: str, traceback: str = "") -> None:
-        """See the attributes."""
         super().__init__(what)
         self.traceback = traceback
 
@@ -116,12 +112,10 @@ class SimulationError(AirgroundError):
     """
 
     def __init__(self, run: str, t: float, what: str) -> None:
-        """Build the one-line message from its parts."""
         super().__init__(run, t, what)
         self.run, self.t, self.what = run, t, what
 
     def __str__(self) -> str:
-        """One line."""
         return one_line(f"run {self.run} stopped at t = {self.t:.6g} s: {self.what}")
 
 

@@ -100,13 +100,15 @@ def read_table(content: bytes, *, others: bool = False) -> pd.DataFrame:
     import pyarrow.compute as pc
     import pyarrow.parquet as pq
 
-    numbers = (pa.types.is_floating, pa.types.is_integer, pa.types.is_boolean, pa.types.is_null)
-    numbers += (pa.types.is_timestamp,) * others
-    categories = [pa.dictionary(index, pa.string()) for index in (pa.int8(), pa.int16(), pa.int32())] * others
+    numbers = [pa.types.is_floating, pa.types.is_integer, pa.types.is_boolean, pa.types.is_null]
+    text_types = [pa.string(), pa.large_string()]
+    if others:
+        numbers.append(pa.types.is_timestamp)
+        text_types += [pa.dictionary(index, pa.string()) for index in (pa.int8(), pa.int16(), pa.int32())]
     try:
         file = pq.ParquetFile(io.BytesIO(content))
         schema, about = file.schema_arrow, file.metadata
-        texts = [field.name for field in schema if field.type in (pa.string(), pa.large_string(), *categories)]
+        texts = [field.name for field in schema if field.type in text_types]
         for field in schema:
             kind = field.type.value_type if pa.types.is_list(field.type) else field.type
             if not (field.name in texts or any(is_kind(kind) for is_kind in numbers)):
@@ -247,9 +249,9 @@ def try_to_create(path: Path) -> None:
 def sweep(folder: Path) -> None:
     """Remove the temporary files of killed processes in and below a folder."""
     for path in folder.rglob(".*.partial"):
-        if found := _PARTIAL.fullmatch(path.name):
+        if partial := _PARTIAL.fullmatch(path.name):
             try:
-                os.kill(int(found["pid"]), 0)
+                os.kill(int(partial["pid"]), 0)
             except (ProcessLookupError, OverflowError):
                 path.unlink(missing_ok=True)
             except PermissionError:  # it runs, for another user

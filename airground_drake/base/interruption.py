@@ -73,15 +73,14 @@ def _go_on_in_a_child() -> None:
             os._exit(1)
         return
     os.close(_exit_code)
-    for each in STOPPING:
-        if signal.getsignal(each) is not signal.SIG_IGN:
-            signal.signal(each, lambda number, _: os.kill(child, number))
+    for heeded in _heeded():
+        signal.signal(heeded, lambda number, _: os.kill(child, number))
     status: int | None = None
     while status is None:
-        ended, found = os.wait()  # also for the children that this process has adopted
-        status = found if ended == child else None
-    for each in STOPPING:
-        signal.signal(each, signal.SIG_IGN)
+        ended, reaped = os.wait()  # also for the children that this process has adopted
+        status = reaped if ended == child else None
+    for stopping in STOPPING:
+        signal.signal(stopping, signal.SIG_IGN)
     code = os.waitstatus_to_exitcode(status)
     os.set_blocking(told, False)
     with suppress(BlockingIOError):
@@ -112,8 +111,8 @@ def end_on_signals() -> None:
     stderr = os.dup(2)  # 2 itself may point elsewhere while a C library is kept silent
 
     def end(number: int, frame: FrameType | None) -> NoReturn:
-        for each in STOPPING:
-            signal.signal(each, signal.SIG_IGN)
+        for stopping in STOPPING:
+            signal.signal(stopping, signal.SIG_IGN)
         if os.getpid() == owner:  # forked processes have inherited this handler
             end_descendants()
             files.discard_partial()
@@ -122,9 +121,13 @@ def end_on_signals() -> None:
             _exit(128 + number)
         os._exit(128 + number)
 
-    for each in STOPPING:
-        if signal.getsignal(each) is not signal.SIG_IGN:  # `nohup` ignores them
-            signal.signal(each, end)
+    for number in _heeded():
+        signal.signal(number, end)
+
+
+def _heeded() -> list[signal.Signals]:
+    """Those of `STOPPING` that are not ignored, as by `nohup`."""
+    return [number for number in STOPPING if signal.getsignal(number) is not signal.SIG_IGN]
 
 
 def _open_standard_streams() -> None:
@@ -174,8 +177,8 @@ def end_descendants() -> None:
     """Kill every process below this one, until /proc shows none: one that is killed may have begun another."""
     # A process keeps its locks until it has ended. Temporary folders are removed by these locks.
     until = time.monotonic() + PATIENCE_S
-    while (found := _descendants()) and time.monotonic() < until:
-        for pid in found:
+    while (descendants := _descendants()) and time.monotonic() < until:
+        for pid in descendants:
             with suppress(ProcessLookupError, PermissionError):
                 os.kill(pid, signal.SIGKILL)
         time.sleep(0.001)
@@ -189,12 +192,12 @@ def _descendants() -> list[int]:
             state, parent = entry.read_text(errors="replace").rpartition(")")[2].split()[:2]
             if state not in "ZX":
                 children.setdefault(int(parent), []).append(int(entry.parent.name))
-    found, above = [], [os.getpid()]
+    descendants, above = [], [os.getpid()]
     while above:
         below = children.get(above.pop(), [])
-        found += below
+        descendants += below
         above += below
-    return found
+    return descendants
 
 
 def end_with_parent(how: signal.Signals = signal.SIGKILL) -> None:

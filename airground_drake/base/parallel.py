@@ -111,12 +111,12 @@ def start_in_process(work: Callable[[], T]) -> Callable[[], T]:
 
     def returned() -> T:
         try:
-            found: T = receiver.recv()
+            answer: T = receiver.recv()
         except EOFError:
             process.join()
             raise AirgroundError(f"a process died before its work was done (exit code {process.exitcode})") from None
         process.join()
-        return found
+        return answer
 
     return returned
 
@@ -136,7 +136,7 @@ def _timed(piece: Callable[[], T]) -> tuple[T, float]:
     return piece(), time.perf_counter() - started
 
 
-def _done(found: tuple[T, float], name: str, progress: Progress) -> T:
-    progress.elapsed_s(name, found[1])
+def _done(outcome: tuple[T, float], name: str, progress: Progress) -> T:
+    progress.elapsed_s(name, outcome[1])
     progress.advance(1.0, name)
-    return found[0]
+    return outcome[0]

@@ -19,13 +19,7 @@ class Progress:
     """Receives the progress of long work. This class shows nothing. Several threads may call it."""
 
     def stage(self, name: str, amount: float = 0.0, unit: str = "") -> None:
-        """Begin a stage, and end the stage before.
-
-        Args:
-            name: of the stage.
-            amount: of work in it; 0: unknown.
-            unit: of the amount.
-        """
+        """Begin a stage with an amount of work in it (0: unknown), and end the stage before."""
 
     def advance(self, amount: float, what: str = "") -> None:
         """Add an amount of finished work, the last of it on `what`."""
@@ -52,7 +46,8 @@ class ProgressBar(Progress):
         """Choose a bar for the current stage, lines for finished parts, and one line for a stage that takes long."""
         self._shows_bar, self._shows_lines, self._shows_stages = bar, lines, stages
         self._bar: Any = None
-        self._stage, self._since, self._done, self._of = "", 0.0, 0.0, ""
+        self._stage = self._of = ""
+        self._since = self._done = 0.0
         self._waits_for_line = False
         self._lock = threading.RLock()
 

@@ -91,11 +91,12 @@ class Registry:
         with suppress(Exception):  # an installed package may raise anything
             spec = importlib.util.find_spec(module)
             tree = ast.parse(Path(spec.origin or "").read_bytes() if spec else b"")
-            (found,) = (node for node in tree.body if isinstance(node, ast.ClassDef) and node.name == attribute)
-            assigned = {ast.unparse(one.targets[0]): one.value for one in found.body if isinstance(one, ast.Assign)}
+            (definition,) = (node for node in tree.body if isinstance(node, ast.ClassDef) and node.name == attribute)
+            statements = (node for node in definition.body if isinstance(node, ast.Assign))
+            assigned = {ast.unparse(statement.targets[0]): statement.value for statement in statements}
             if summary := assigned.get("summary"):
                 return str(ast.literal_eval(summary))
-            return (ast.get_docstring(found) or "").partition("\n")[0]
+            return (ast.get_docstring(definition) or "").partition("\n")[0]
         return ""
 
     def load(self, name: str, of: type[T]) -> type[T]:
@@ -109,22 +110,22 @@ class Registry:
             UnknownNameError: if the name is not registered and not of the form of `PLUGIN`.
             PluginError: if it cannot be imported, or is no such class; names the folders that were searched.
         """
-        found: object = self._added.get(name)
-        if found is None:
+        value: object = self._added.get(name)
+        if value is None:
             place = self._own.get(name) or _entry_points(self.group).get(name) or (name if is_plugin(name) else None)
             if place is None:
                 raise UnknownNameError(self.kind, name, self.allowed)
             module, _, attribute = place.partition(":")
             try:
-                found = getattr(_imported(module), attribute)
+                value = getattr(_imported(module), attribute)
             except KeyboardInterrupt:
                 raise
             except BaseException as error:  # a third-party module may raise anything when it is imported
                 looked = f"; looked in {_places()}" if isinstance(error, ModuleNotFoundError) else ""
                 raise PluginError(f"{self.kind} {name!r} cannot be imported: {described(error)}{looked}") from None
-        if not (isinstance(found, type) and issubclass(found, of)):
+        if not (isinstance(value, type) and issubclass(value, of)):
             raise PluginError(f"{self.kind} {name!r} is not a subclass of {of.__module__}.{of.__qualname__}")
-        return found
+        return value
 
     def make(self, name: str, of: type[T], **parameters: Any) -> T:
         """Make an object of a class.
@@ -161,16 +162,16 @@ def _misfit(kind: type, parameters: Mapping[str, Any]) -> str:
     try:
         signature.bind(**parameters)
     except TypeError as error:
-        takes = [f"{each.name} (needed)" if each.default is each.empty else each.name
-                 for each in signature.parameters.values() if each.kind is not each.VAR_KEYWORD]  # fmt: skip
+        given = (key for key in signature.parameters.values() if key.kind is not key.VAR_KEYWORD)
+        takes = [f"{key.name} (needed)" if key.default is key.empty else key.name for key in given]
         return f"{error}; allowed: {', '.join(takes) or 'none'}"
     return ""
 
 
 def parameters(kind: type) -> list[str]:
     """The parameters that a class takes by keyword, each with its default: `name`, or `name = value`."""
-    given = [each for each in inspect.signature(kind).parameters.values() if each.kind is each.KEYWORD_ONLY]
-    return [each.name if each.default is each.empty else f"{each.name} = {each.default}" for each in given]
+    keys = [key for key in inspect.signature(kind).parameters.values() if key.kind is key.KEYWORD_ONLY]
+    return [key.name if key.default is key.empty else f"{key.name} = {key.default}" for key in keys]
 
 
 def is_plugin(name: str) -> bool:
@@ -182,7 +183,7 @@ def source_of(place: str) -> Path | None:
     """The file of a class named as `module:Class` or `file.py:Class`, in a folder of Python's path, or None."""
     module = place.partition(":")[0]
     if module.endswith(".py"):
-        return _found(module)
+        return _on_path(module)
     inside = module.replace(".", "/")
     files = (Path(folder or ".", f"{inside}{end}") for folder in sys.path for end in (".py", "/__init__.py"))
     return next((file for file in files if file.is_file()), None)
@@ -192,12 +193,12 @@ def _imported(module: str) -> ModuleType:
     """Import a module by its name, or by a file in a folder of Python's path (the last folder is searched first)."""
     if not module.endswith(".py"):
         return importlib.import_module(module)
-    if (path := _found(module)) is None:
+    if (path := _on_path(module)) is None:
         raise ModuleNotFoundError(f"no file {module}")
     return _executed(path)
 
 
-def _found(file: str) -> Path | None:
+def _on_path(file: str) -> Path | None:
     """A file in a folder of Python's path; the last folder is searched first."""
     paths = (Path(folder or ".", file).resolve() for folder in reversed(sys.path))
     return next((path for path in paths if path.is_file()), None)

@@ -31,7 +31,7 @@ def alternatives(expected: str) -> tuple[str, ...]:
 def declared(expected: str) -> str:
     """An expectation as it counts: one that admits both an established and a refuted claim expects nothing."""
     admitted = alternatives(expected)
-    either = "refuted" in admitted and any(each in (*PASSING, EXERCISED) for each in admitted)
+    either = "refuted" in admitted and any(status in (*PASSING, EXERCISED) for status in admitted)
     return NOTHING if either else expected
 
 
@@ -46,5 +46,5 @@ def meets(expected: str, status: str, exercised: int | None) -> bool | None:
     # An expected status ignores how often the claim was tested.
     if expected == NOTHING:
         return False if status in ("error", "not_run") else None
-    put_to_the_test = status in PASSING and bool(exercised)
-    return any(status == each or (each == EXERCISED and put_to_the_test) for each in alternatives(expected))
+    admitted = alternatives(expected)
+    return status in admitted or (EXERCISED in admitted and status in PASSING and bool(exercised))

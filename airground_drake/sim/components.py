@@ -90,8 +90,8 @@ def _planned_apart(scenario: Scenario) -> tuple[Array, float]:
     """Radii of the UGVs, (n,), and distance between them, m, with which plans keep the distances of the law."""
     # A UGV whose plant takes room is planned for as a larger disc.
     more, between = dict.fromkeys(scenario.ugvs, 0.0), 0.0
-    every = budget(scenario) if takes_room(scenario) else ()
-    pairs = [each for each in every if each.terms and each.first in more]
+    budgets = budget(scenario) if takes_room(scenario) else ()
+    pairs = [pair for pair in budgets if pair.terms and pair.first in more]
     for pair in pairs:
         if pair.kind in ("obstacle", "moving"):
             more[pair.first] = max(more[pair.first], pair.gap_m - pair.promised_m)
@@ -105,12 +105,12 @@ def _planned_apart(scenario: Scenario) -> tuple[Array, float]:
 def make_map(scenario: Scenario) -> tuple[Array, Array, Array]:
     """The UAV's map: obstacles at rest that it knows, and phantoms, which exist on the map only and have no radius."""
     # Returns outlines, (m, W), see `model.geometry.outline`, and when each appears and disappears, (m,), s.
-    known = [each for each in scenario.barriers.values() if each.known_to_uav and not each.moves]
+    known = [barrier for barrier in scenario.barriers.values() if barrier.known_to_uav and not barrier.moves]
     parts = [outlines_of(scenario, obstacle) for obstacle in known]
     phantoms = outline.balls(scenario.uav.phantoms_m, gap=scenario.safe_distance.obstacle_m)
     count = [*map(len, parts), len(phantoms)]
-    appears = np.repeat([*(each.appears_s for each in known), 0.0], count)
-    disappears = np.repeat([*(each.disappears_s or np.inf for each in known), np.inf], count)
+    appears = np.repeat([*(barrier.appears_s for barrier in known), 0.0], count)
+    disappears = np.repeat([*(barrier.disappears_s or np.inf for barrier in known), np.inf], count)
     return outline.joined(*parts, phantoms), appears, disappears
 
 
@@ -119,11 +119,11 @@ def make_movers(scenario: Scenario) -> tuple[Mover, ...]:
     period, until = scenario.control.period_s, scenario.duration_s
     return tuple(
         Mover(
-            name, outlines_of(scenario, each), each.known_to_uav,
-            course(each.moves, period, until) if each.known_motion else None,
+            name, outlines_of(scenario, barrier), barrier.known_to_uav,
+            course(barrier.moves, period, until) if barrier.known_motion else None,
         )
-        for name, each in scenario.barriers.items()
-        if each.moves
+        for name, barrier in scenario.barriers.items()
+        if barrier.moves
     )  # fmt: skip
 
 

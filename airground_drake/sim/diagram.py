@@ -151,7 +151,17 @@ def build_model(
     recorded = (*RECORDED, *(name for name in OF_PLANTS if name in named))
     exported = [*recorded, *(["violation"] if monitor is not None else [])]
     diagram = _assembled(f"{scenario.name}_method_{chosen.id}", parts, named, exported)
-    return Model(diagram, world, block, trigger, planner, gatekeeper, controllers, signals, recorded)
+    return Model(
+        diagram=diagram,
+        world=world,
+        decision_block=block,
+        trigger=trigger,
+        planner=planner,
+        gatekeeper=gatekeeper,
+        controllers=controllers,
+        signals=signals,
+        recorded=recorded,
+    )
 
 
 def method_drawn(scenario: Scenario) -> str:
@@ -265,8 +275,8 @@ def _assembled(
     """A Diagram of systems by name, in which input ports are fed by name."""
     # exported: which of `named` become output ports of the diagram; default: all.
     builder = DiagramBuilder()
-    for each, system in systems.items():
-        builder.AddNamedSystem(each, system)
+    for key, system in systems.items():
+        builder.AddNamedSystem(key, system)
     for source, target in wires:
         builder.Connect(source, target)
     inputs = set()
@@ -281,8 +291,8 @@ def _assembled(
         else:
             builder.ExportInput(port, wanted)
             inputs.add(wanted)
-    for each in named if exported is None else exported:
-        builder.ExportOutput(named[each], each)
+    for key in named if exported is None else exported:
+        builder.ExportOutput(named[key], key)
     return _built(name, builder)
 
 

@@ -25,11 +25,11 @@ from airground_drake.ugv.reasons import OVER
 def extract(trace: Trace) -> list[dict[str, Any]]:
     """All events of a run in the order of time, from its states, proposals and decisions."""
     t, order = trace.t, {robot: k for k, robot in enumerate(trace.robots)}
-    found: list[dict[str, Any]] = []
+    events: list[dict[str, Any]] = []
 
     def add(time_s: float, robot: str, kind: str, **more: Any) -> None:
         where = [float(np.interp(time_s, t, axis)) for axis in trace.body(robot).T]
-        found.append({"t_s": float(time_s), "robot": robot, "kind": kind, "position_m": where, **more})
+        events.append({"t_s": float(time_s), "robot": robot, "kind": kind, "position_m": where, **more})
 
     for ugv in trace.ugvs:
         for kind, name in (("trigger", "triggered_at_s"), ("release", "released_at_s")):
@@ -47,10 +47,10 @@ def extract(trace: Trace) -> list[dict[str, Any]]:
             kind = OVER if row["reason"] == OVER else row["decision"]
             add(row["t_s"], row["robot"], kind, policy=row["policy"], status=row["status"])
     _add_collisions(trace, add)
-    hits = first_collisions(found)
+    hits = first_collisions(events)
     for robot in trace.robots:
         _add_arrival(trace, robot, trace.rows_before(hits[robot]["t_s"] if robot in hits else np.inf), add)
-    return sorted(found, key=lambda event: (event["t_s"], order[event["robot"]]))
+    return sorted(events, key=lambda event: (event["t_s"], order[event["robot"]]))
 
 
 def _add_arrival(trace: Trace, robot: str, rows: int, add: Any) -> None:

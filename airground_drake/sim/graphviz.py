@@ -74,10 +74,10 @@ def dot(diagram: Diagram) -> str:
     if not has_layers(diagram):
         return whole
     layers = {layer: diagram.GetSubsystemByName(layer) for layer in LAYERS}
-    shown = {layer: {each.get_name(): each for each in parts.GetSystems()} for layer, parts in layers.items()}
-    beside = {each.get_name(): each for each in diagram.GetSystems() if each.get_name() not in LAYERS}
-    blocks = {n: each for n, each in ChainMap(beside, *shown.values()).items() if n != HIDDEN}
-    texts = {n: "".join(each.GetGraphvizFragment(max_depth=0).fragments) for n, each in blocks.items()}
+    shown = {layer: {system.get_name(): system for system in parts.GetSystems()} for layer, parts in layers.items()}
+    beside = {system.get_name(): system for system in diagram.GetSystems() if system.get_name() not in LAYERS}
+    blocks = {n: system for n, system in ChainMap(beside, *shown.values()).items() if n != HIDDEN}
+    texts = {n: "".join(system.GetGraphvizFragment(max_depth=0).fragments) for n, system in blocks.items()}
     # Drake's numbers of systems depend on what the process has built before
     wired = "".join([whole, *(str(layer.GetGraphvizString(max_depth=1)) for layer in layers.values())])
     for n, text in texts.items():
@@ -99,7 +99,7 @@ def dot(diagram: Diagram) -> str:
         f"label=<<B>{name}</B><BR/>{LEGEND}>, fontname=Helvetica, fontsize=10]",
         "node [shape=none, margin=0, fontname=Helvetica, fontsize=8]",
         f'edge [arrowsize=0.6, color="{INK}"]',
-        *(_node(n, each, texts[n], recorded, fed_unseen) for n, each in blocks.items()),
+        *(_node(n, system, texts[n], recorded, fed_unseen) for n, system in blocks.items()),
     ]
     for layer, color in LAYERS.items():
         look = f'style=filled; color="{color}"; label=<<B>{layer.replace("_", " ").capitalize()}</B>>'
@@ -140,10 +140,10 @@ def svg(dot_text: str) -> str:
     """Lay out Graphviz text as SVG."""
     # The same text gives the same bytes on the same machine; box sizes depend on its fonts. The picture holds the
     # digest of its text for `is_current`.
-    found = _PICTURE.search(re.sub(r"<!--.*?-->\n?", "", _laid_out(dot_text, "svg").decode(), flags=re.DOTALL))
-    if found is None:
+    picture = _PICTURE.search(re.sub(r"<!--.*?-->\n?", "", _laid_out(dot_text, "svg").decode(), flags=re.DOTALL))
+    if picture is None:
         raise ValueError("this version of Graphviz writes SVG of another form")
-    width, height, inner = found.groups()
+    width, height, inner = picture.groups()
     return "\n".join([
         '<?xml version="1.0" encoding="UTF-8" standalone="no"?>',
         f"<!-- {_digest(dot_text)} -->",
@@ -169,12 +169,12 @@ def _laid_out(dot_text: str, kind: str) -> bytes:
     return picture
 
 
-def is_current(name: str, content: str, found: str) -> bool:
-    """Whether the file `name` with text `found` is up to date: `.dot` must equal `content`, `.svg` have its digest."""
+def is_current(name: str, content: str, committed: str) -> bool:
+    """Whether the file `name` with text `committed` is current: `.dot` must equal `content`, `.svg` have its digest."""
     if name.endswith(".svg"):
         mark = re.search(r"<!-- (dot sha256 \w+) -->", content)
-        return mark is not None and mark[1] in found
-    return content == found
+        return mark is not None and mark[1] in committed
+    return content == committed
 
 
 def _digest(dot_text: str) -> str:

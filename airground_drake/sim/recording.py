@@ -61,7 +61,7 @@ def states(
 
 def measured(states: pd.DataFrame, samples: pd.DataFrame, robots: Iterable[str]) -> dict[str, Array]:
     """Drift and cover of robots with users' plants in each control period: columns of `Trace.samples`, (S,)."""
-    rows, found = np.searchsorted(states["t_s"], samples["t_s"]), dict[str, Array]()
+    rows, columns = np.searchsorted(states["t_s"], samples["t_s"]), dict[str, Array]()
     ends = np.append(rows, len(states) - 1)
     t = states["t_s"].to_numpy()
     for robot in robots:
@@ -72,9 +72,9 @@ def measured(states: pd.DataFrame, samples: pd.DataFrame, robots: Iterable[str])
         missed = np.diff(place[ends], axis=0) / np.diff(t[ends])[:, None] - command
         line = np.stack([np.interp(t, t[ends], axis) for axis in place[ends].T], axis=1)
         off = np.linalg.norm(body - line, axis=1)
-        found[f"{robot}.drift_m_s"] = np.linalg.norm(missed, axis=1)
-        found[f"{robot}.cover_m"] = np.maximum(np.maximum.reduceat(off, rows), off[ends[1:]])
-    return found
+        columns[f"{robot}.drift_m_s"] = np.linalg.norm(missed, axis=1)
+        columns[f"{robot}.cover_m"] = np.maximum(np.maximum.reduceat(off, rows), off[ends[1:]])
+    return columns
 
 
 def samples(
@@ -201,19 +201,19 @@ def plans(asked: Sequence[Asked], sent: Sequence[tuple[int, Proposal]], ugvs: Se
     numbers = {(proposal.issued, ugvs[i]): proposal.number for i, proposal in sent}
     rows = [
         {
-            "t_s": each.t, "uav": uav, "ugv": each.robot, "policy": each.policy, "outcome": _outcome(each),
-            "reason": each.reason,
-            "sent": [numbers[each.t, ugv] for ugv in each.party if each.chosen and (each.t, ugv) in numbers],
+            "t_s": asking.t, "uav": uav, "ugv": asking.robot, "policy": asking.policy, "outcome": _outcome(asking),
+            "reason": asking.reason,
+            "sent": [numbers[asking.t, ugv] for ugv in asking.party if asking.chosen and (asking.t, ugv) in numbers],
         }
-        for each in asked
+        for asking in asked
     ]  # fmt: skip
     return typed(rows, PLAN_COLUMNS, "sent")
 
 
-def _outcome(each: Asked) -> str:
-    if each.what:
+def _outcome(asking: Asked) -> str:
+    if asking.what:
         return "failed"
-    return "proposed" if each.chosen else "passed over" if each.party else "nothing"
+    return "proposed" if asking.chosen else "passed over" if asking.party else "nothing"
 
 
 def messages(memory: PlannerState, trace: Trace, uav: str) -> pd.DataFrame:
@@ -254,11 +254,11 @@ def _messages(memory: PlannerState, trace: Trace, uav: str) -> Iterator[dict[str
 
 def faults(asked: Sequence[Asked]) -> list[dict[str, Any]]:
     """Entries of `Trace.meta["faults"]`; the first fault of each policy has a traceback, if it is known."""
-    told, found = set[str](), []
-    for fault in (each for each in asked if each.what):
+    told, entries = set[str](), []
+    for fault in (asking for asking in asked if asking.what):
         entry = {"t_s": fault.t, "robot": fault.robot, "policy": fault.policy, "what": fault.what}
         if fault.traceback and fault.policy not in told:
             entry["traceback"] = fault.traceback
             told.add(fault.policy)
-        found.append(entry)
-    return found
+        entries.append(entry)
+    return entries

@@ -107,7 +107,7 @@ def simulate_seeds(
 ) -> Iterator[Trace]:
     """Simulate every run of a scenario with each of some seeds, and yield each trace when it is there."""
     several = [validated(replace(scenario, seed=seed)) for seed in seeds]
-    work = [(each, name) for each in several for name in each.runs]
+    work = [(scenario, name) for scenario in several for name in scenario.runs]
     return _simulated(work, f"{len(several)} more seeds", jobs, progress)
 
 
@@ -136,13 +136,13 @@ def _simulated(
                 if meanwhile is not None:
                     meanwhile()
                     meanwhile = None
-                wait([each.process.sentinel for each in running.values()], TOLD_S)
-                ended = [number for number, each in running.items() if not each.process.is_alive()]
-                progress.advance(sum(each.advanced() for each in running.values()))
+                wait([worker.process.sentinel for worker in running.values()], TOLD_S)
+                ended = [number for number, worker in running.items() if not worker.process.is_alive()]
+                progress.advance(sum(worker.advanced() for worker in running.values()))
                 for number in ended:
                     yield running.pop(number).trace()
         finally:
-            _stop([each.process for each in running.values()])
+            _stop([worker.process for worker in running.values()])
 
 
 def _simulate(scenario: Scenario, run: str, folder: Path, clock: Any) -> None:
@@ -154,9 +154,9 @@ def _simulate(scenario: Scenario, run: str, folder: Path, clock: Any) -> None:
     try:
         trace.save(simulate(scenario, run, watch=partial(setattr, clock, "value")), folder)
     except BaseException as error:
-        stopped = (
-            [error.run, error.t, f"{error.what} (seed {scenario.seed})"] if isinstance(error, SimulationError) else None
-        )
+        stopped = None
+        if isinstance(error, SimulationError):
+            stopped = [error.run, error.t, f"{error.what} (seed {scenario.seed})"]
         plain = str(error) if isinstance(error, AirgroundError) else described(error)
         refused = isinstance(error, PluginError | ScenarioError)
         with suppress(OSError):  # a full disk: the parent reports that this process died

@@ -158,10 +158,10 @@ class Recorder:
     def _what(self, error: BaseException) -> str:
         """An error in words, with the place in the file of a user's plant, and such plants by name."""
         own = self._own_plants
-        what = max((described(error, each.function) for each in own.values()), key=len, default=described(error))
-        if not own or any(each.name in what for each in own.values()):
+        what = max((described(error, code.function) for code in own.values()), key=len, default=described(error))
+        if not own or any(code.name in what for code in own.values()):
             return what
-        return f"{what} (users' plants: {', '.join(f'{each.name} of {robot}' for robot, each in own.items())})"
+        return f"{what} (users' plants: {', '.join(f'{code.name} of {robot}' for robot, code in own.items())})"
 
     def trace(self, simulator: Simulator, seed: int | None, wall: float = 0.0) -> Trace:
         """The trace of what a simulator has simulated: of a run that lasts until now.
@@ -205,7 +205,7 @@ class Recorder:
             states=states,
             samples=samples.assign(**recording.measured(states, samples, self._own_plants)),
             decisions=recording.decisions(decided, ugvs, self._own.gatekeeper.route),
-            timings={"wall_s": wall, "decision_times_s": [each.cpu_s for each in decided]},
+            timings={"wall_s": wall, "decision_times_s": [decision.cpu_s for decision in decided]},
             problems=recording.problems(decided),
             proposals=recording.proposals(ugvs, memory.sent),
             plans=recording.plans(memory.asked, memory.sent, ugvs, uav),
@@ -218,24 +218,24 @@ class Recorder:
 def read_back(model: Model, root: Context) -> dict[str, Any]:
     """Parameters in force in a Context, for `Trace.meta`: `zeta_m`, and `controllers` (see `controllers.read_back`)."""
     levels = model.trigger.levels(model.trigger.GetMyContextFromRoot(root))
-    ran = {each.get_name(): each.parameters(each.GetMyContextFromRoot(root)) for each in model.controllers}
+    ran = {part.get_name(): part.parameters(part.GetMyContextFromRoot(root)) for part in model.controllers}
     return {"zeta_m": float(levels.zeta_m), "controllers": ran}
 
 
 @cache
 def warm_up() -> None:
     """Load the compiled kernels and the solver, once per process, so that no run's time includes loading."""
-    one, motion = np.ones((1, 3)), Motion(np.array([0.0, 1.0]), np.zeros((2, 3)))
-    rows = outline.balls(one)
-    convex.news_within(rows, one, 1.0, True, convex.within(rows, one, 1.0, True))
+    ones, motion = np.ones((1, 3)), Motion(np.array([0.0, 1.0]), np.zeros((2, 3)))
+    rows = outline.balls(ones)
+    convex.news_within(rows, ones, 1.0, True, convex.within(rows, ones, 1.0, True))
     avoidance = Avoidance(gain=1.0, period=0.1)
     plant = FirstOrder()
-    world = World((Body("a", "ugv", one[0], plant=plant), Body("b", "uav", one[0], plant=plant)), {})
+    world = World((Body("a", "ugv", ones[0], plant=plant), Body("b", "uav", ones[0], plant=plant)), {})
     near = world.around(slice(0, 1))
-    avoidance.command(one, world.starts, near)
-    seen = View(0.0, one[0], motion, rows, rows, one, one, np.ones(2), np.ones(2), 1.0, (None,))
+    avoidance.command(ones, world.starts, near)
+    seen = View(0.0, ones[0], motion, rows, rows, ones, ones, np.ones(2), np.ones(2), 1.0, (None,))
     law, horizon = UgvLaw(avoidance, 1.0, 1.0, False), Horizon(2, 1, 1.0, 1.0)
-    law.velocity(world.starts, near, one, one, [None])
+    law.velocity(world.starts, near, ones, ones, [None])
     MixedIntegerRoute().solve(predicted_problem(seen, law, Proposal("", 0.0, motion), horizon))
     outcomes(seen, law, Proposal("", 0.0, motion), Outlook(longest=1.0))
 

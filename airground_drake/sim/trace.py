@@ -184,8 +184,8 @@ class Trace:
         """The value of `work_out`, computed once per key: several claims need the same."""
         if key not in self._derived:
             self._derived[key] = work_out()
-        found: T = self._derived[key]
-        return found
+        value: T = self._derived[key]
+        return value
 
     def _vectors(self, column: Callable[[str], Array], robot: str, stem: str, unit: str) -> Array:
         """Three columns side by side, (., 3), read-only."""
@@ -324,7 +324,6 @@ class Trace:
         return table
 
     def __repr__(self) -> str:
-        """Run, scenario, numbers of rows and events in one line."""
         scenario, events = self.meta.get("scenario", {}).get("name"), self.meta.get("events", [])
         return f"<Trace: run {self.meta.get('run')!r} of {scenario!r}, {len(self.states)} rows, {len(events)} events>"
 

@@ -21,7 +21,6 @@ class Agent(Policy):
     counted = True
 
     def __init__(self) -> None:
-        """Nothing is chosen yet."""
         self.chosen: dict[str, Proposed] = {}
         self.requests: dict[str, Observation] = {}
 

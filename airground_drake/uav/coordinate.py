@@ -105,7 +105,8 @@ class Coordinate(Policy):
         if (known := failures.in_vain.get(waiting)) is not None and _is_as_before(known[0], seen):
             self.reason = known[1]
             return None
-        own, tried = [mate.name for mate in seen.team].index(seen.robot), []
+        own = [mate.name for mate in seen.team].index(seen.robot)
+        tried = []
         for share in NARROWER:
             space = self._space(seen, share * self.clearance, self.spacing)
             alone = cache(partial(self._alone, seen, space))
@@ -113,17 +114,17 @@ class Coordinate(Policy):
             lost = tried[-1][0][0]
             if not lost or (alone(own) is not None and tried[-1][2].outcome != "exhausted"):
                 break
-        _, group, found = min(tried, key=lambda each: each[0])
-        self.reason = _reason(seen, group, found)
+        _, group, joint_plan = min(tried, key=lambda option: option[0])
+        self.reason = _reason(seen, group, joint_plan)
         if lost and alone(own) is None:
             failures = replace(failures, shut_in={**failures.shut_in, seen.robot: (seen, self.reason)})
             self.remembered = failures
-        motions = self._proposals(seen, group, found)
+        motions = self._proposals(seen, group, joint_plan)
         if motions is None and alone(own) is not None:
             for spacing in NARROWER[1:]:
                 space = self._space(seen, share * self.clearance, spacing * self.spacing)
-                _, group, found = self._joint(seen, space, cache(partial(self._alone, seen, space)), ONE_BY_ONE)
-                if (motions := self._proposals(seen, group, found)) is not None:
+                _, group, joint_plan = self._joint(seen, space, cache(partial(self._alone, seen, space)), ONE_BY_ONE)
+                if (motions := self._proposals(seen, group, joint_plan)) is not None:
                     return motions
             self.remembered = replace(failures, in_vain={**failures.in_vain, waiting: (seen, self.reason)})
         return motions
@@ -141,38 +142,38 @@ class Coordinate(Policy):
         best: tuple[list[int], Plan] | None = None
         least: tuple[float, ...] = ()
         for _ in range(MOST_PLANS):
-            found = self._plan(seen, space, group, effort)
-            cost = _cost(seen, group, found)
+            joint_plan = self._plan(seen, space, group, effort)
+            cost = _cost(seen, group, joint_plan)
             if best is None or cost < least:
-                best, least = (group, found), cost
+                best, least = (group, joint_plan), cost
             if cost[0] == 0:
                 break
-            more = self._in_the_way(seen, space, group, found, alone)
+            more = self._in_the_way(seen, space, group, joint_plan, alone)
             if not more:
                 break
             group = sorted([*group, *more])
         assert best is not None
-        if least[0] > 0 and effort is QUICK and found.outcome == "effort spent":
-            found = self._plan(seen, space, group, Effort())
-            if (cost := _cost(seen, group, found)) < least:
-                best, least = (group, found), cost
+        if least[0] > 0 and effort is QUICK and joint_plan.outcome == "effort spent":
+            joint_plan = self._plan(seen, space, group, Effort())
+            if (cost := _cost(seen, group, joint_plan)) < least:
+                best, least = (group, joint_plan), cost
         return least, *best
 
     def _plan(self, seen: Observation, space: Space, group: Sequence[int], effort: Effort) -> Plan:
         team = seen.team
         fixed = [OtherRobot(predicted(mate, seen.start), mate.radius) for i, mate in enumerate(team) if i not in group]
-        fixed += [_as_robot(each, seen) for each in seen.moving]
+        fixed += [_as_robot(body, seen) for body in seen.moving]
         tasks = [task_of(team[i], seen.start) for i in group]
         speeds = [self._pace(team[i]) for i in group]
         return plan(space, tasks, speeds, fixed, follow=self.follow, effort=effort)
 
     def _in_the_way(
-        self, seen: Observation, space: Space, group: Sequence[int], found: Plan, alone: Alone
+        self, seen: Observation, space: Space, group: Sequence[int], joint_plan: Plan, alone: Alone
     ) -> list[int]:
         """Willing UGVs outside the group that are in the way of its triggered UGVs without a way."""
         # A UGV is in the way if it comes near the way that such a UGV would have alone. Without any near one, all
         # willing UGVs are returned. If no such UGV has a way even alone, nobody can help: the list is empty.
-        lost = [i for i, way in zip(group, found.ways, strict=True) if way is None and seen.team[i].triggered]
+        lost = [i for i, way in zip(group, joint_plan.ways, strict=True) if way is None and seen.team[i].triggered]
         ways = [(seen.team[i], way) for i in lost if (way := alone(i)) is not None]
         if not ways:
             return []
@@ -194,9 +195,9 @@ class Coordinate(Policy):
         """The speed at which a UGV is planned for, m/s: half of it after each motion that was too fast for it."""
         return min(self.speed, SHARE * mate.max_speed) / 2.0 ** min(mate.too_fast, MOST_HALVINGS)
 
-    def _proposals(self, seen: Observation, group: Sequence[int], found: Plan) -> dict[str, Motion] | None:
+    def _proposals(self, seen: Observation, group: Sequence[int], joint_plan: Plan) -> dict[str, Motion] | None:
         motions = {}
-        for i, way in zip(group, found.ways, strict=True):
+        for i, way in zip(group, joint_plan.ways, strict=True):
             mate = seen.team[i]
             if way is None or (not mate.triggered and speed(way.motion) == 0.0):
                 continue
@@ -212,8 +213,8 @@ class Coordinate(Policy):
 
 def _has_the_map_of(before: Observation, seen: Observation) -> bool:
     """Whether the obstacles are those of an earlier observation."""
-    moved = any(each.velocity.any() for each in (*before.moving, *seen.moving))
-    same = [each.name for each in before.moving] == [each.name for each in seen.moving]
+    moved = any(body.velocity.any() for body in (*before.moving, *seen.moving))
+    same = [body.name for body in before.moving] == [body.name for body in seen.moving]
     return before.t <= seen.t and same and not moved and np.array_equal(before.obstacles, seen.obstacles)
 
 
@@ -223,12 +224,12 @@ def _stands_as_before(before: Observation, seen: Observation) -> bool:
     return math.dist(before.position, seen.position) <= SAME_PLACE_M and _has_the_map_of(before, seen)
 
 
-def _reason(seen: Observation, group: Sequence[int], found: Plan) -> str:
+def _reason(seen: Observation, group: Sequence[int], joint_plan: Plan) -> str:
     """Why a plan leaves UGVs without a way; empty if it leaves none."""
-    if found.outcome == "no plan exists":
-        names = [seen.team[group[i]].name for i in found.separated]
+    if joint_plan.outcome == "no plan exists":
+        names = [seen.team[group[i]].name for i in joint_plan.separated]
         return f"no plan exists: on the UAV's map, {', '.join(names)} cannot come to the target"
-    return REASONS[found.outcome]
+    return REASONS[joint_plan.outcome]
 
 
 def _is_as_before(before: Observation, seen: Observation) -> bool:
@@ -237,8 +238,8 @@ def _is_as_before(before: Observation, seen: Observation) -> bool:
         _has_the_map_of(before, seen)
         and [_state(mate) for mate in before.team] == [_state(mate) for mate in seen.team]
         and all(
-            math.dist(one.position, other.position) <= PITCH * seen.robot_distance
-            for one, other in zip(before.team, seen.team, strict=True)
+            math.dist(member.position, other.position) <= PITCH * seen.robot_distance
+            for member, other in zip(before.team, seen.team, strict=True)
         )
     )
 
@@ -301,9 +302,9 @@ def _is_willing(mate: Teammate, t: float) -> bool:
     return not (mate.resting or just_asked)
 
 
-def _cost(seen: Observation, group: Sequence[int], found: Plan) -> tuple[float, ...]:
+def _cost(seen: Observation, group: Sequence[int], joint_plan: Plan) -> tuple[float, ...]:
     """Cost of a plan: triggered UGVs without a way, UGVs that move, and the sum of the times to join presets, s."""
-    ways = list(zip(group, found.ways, strict=True))
+    ways = list(zip(group, joint_plan.ways, strict=True))
     lost = sum(way is None and seen.team[i].triggered for i, way in ways)
     moved = sum(way is not None and speed(way.motion) > 0.0 for _, way in ways)
     return float(lost), float(moved), float(sum(way.joined for _, way in ways if way is not None))

@@ -146,19 +146,17 @@ class BehaviourDatabase:
             candidates, asked = self._next(seen, held, memories)
         in_vain = 0 if candidates else held.in_vain + 1
         rest = self.retry * 2.0 ** min(max(0, in_vain - 1), MOST_DOUBLINGS)
-        found = {seen.robot: replace(held, in_vain=in_vain, retry_at=seen.t + rest)}
+        held_by = {seen.robot: replace(held, in_vain=in_vain, retry_at=seen.t + rest)}
         for turn, chosen, motions in candidates[:1]:
-            asked = [replace(each, chosen=True) if each is chosen else each for each in asked]
+            asked = [replace(candidate, chosen=True) if candidate is chosen else candidate for candidate in asked]
             party = tuple(sorted(motions)) if self.joint and len(motions) > 1 else ()
             for robot, motion in motions.items():
-                mate = None if robot == seen.robot else next(each for each in seen.team if each.name == robot)
+                mate = None if robot == seen.robot else next(member for member in seen.team if member.name == robot)
                 before = held if mate is None else Negotiation(refusals=mate.refusals, too_fast=mate.too_fast)
                 cause = robot if mate is None or mate.triggered else seen.robot
-                proposal = Proposal(
-                    chosen.policy, seen.t, motion, cause=cause, mapped=seen.obstacles, party=party
-                )  # fmt: skip
-                found[robot] = replace(before, proposal=proposal, turn=turn, in_vain=0, cause=cause)
-        return found, asked
+                proposal = Proposal(chosen.policy, seen.t, motion, cause=cause, mapped=seen.obstacles, party=party)
+                held_by[robot] = replace(before, proposal=proposal, turn=turn, in_vain=0, cause=cause)
+        return held_by, asked
 
     def _next(
         self, seen: Observation, held: Negotiation, memories: dict[int, Any]
@@ -176,9 +174,9 @@ class BehaviourDatabase:
         """All proposals from best to worst, rotated so that the proposal with the index `turn` comes first."""
         asked: list[Asked] = []
         every = [self._ask(i, seen, asked, memories) for i in range(len(self.policies))]
-        found = [(each, motions) for each, motions in zip(asked, every, strict=True) if motions]
-        found.sort(key=lambda entry: predicted_cost(entry[1], seen))
-        ranked = [(i, each, motions) for i, (each, motions) in enumerate(found)]
+        able = [(candidate, motions) for candidate, motions in zip(asked, every, strict=True) if motions]
+        able.sort(key=lambda entry: predicted_cost(entry[1], seen))
+        ranked = [(i, candidate, motions) for i, (candidate, motions) in enumerate(able)]
         first = turn % len(ranked) if ranked else 0
         return ranked[first:] + ranked[:first], asked
 
@@ -192,8 +190,9 @@ class BehaviourDatabase:
         return motions
 
     def _proposed(self, index: int, seen: Observation, asked: list[Asked]) -> dict[str, Motion]:
-        (name, policy), motions, what, traceback = self.policies[index], dict[str, Motion](), "", ""
-        reason = ""
+        name, policy = self.policies[index]
+        motions = dict[str, Motion]()
+        what = traceback = reason = ""
         try:
             with nullcontext() if policy.counted else time_limit(self.budget):
                 motions = motions_of(policy.propose(seen if isinstance(policy, GuestPolicy) else seen.fresh()), seen)
@@ -219,10 +218,10 @@ def predicted_cost(motions: Mapping[str, Motion], seen: Observation) -> float:
         apart = np.array([convex.distances(seen.obstacles, position, True) for position in positions])
         lacking = (seen.obstacle_distances - apart).max(axis=1)
         cost += INTRUSION * np.square(np.maximum(0.0, lacking)).sum()
-    for each in seen.moving:
-        offsets = positions - each.motion.sample(t)
-        apart = np.array([convex.distances(each.outlines, offset, True) for offset in offsets])
-        lacking = (each.distances(seen.radius) - apart).max(axis=1)
+    for body in seen.moving:
+        offsets = positions - body.motion.sample(t)
+        apart = np.array([convex.distances(body.outlines, offset, True) for offset in offsets])
+        lacking = (body.distances(seen.radius) - apart).max(axis=1)
         cost += INTRUSION * np.square(np.maximum(0.0, lacking)).sum()
     for mate in seen.team:
         motion = motions.get(mate.name, mate.proposal.motion if mate.proposal and mate.answered == "accepted" else None)

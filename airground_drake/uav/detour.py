@@ -105,11 +105,11 @@ class Detour(Policy):
     def _in_the_way(self, seen: Observation) -> tuple[Array, Array]:
         """Outlines (m, W) in the plane of the path, and the distances to keep from their cores, (m,), m."""
         robots = [mate for mate in seen.team if mate.name != seen.robot and mate.standing and not _will_move(mate)]
-        waiting = [each for each in seen.moving if not each.velocity.any()]
-        stand = [outline.moved(each.outlines, each.position) for each in waiting]
+        waiting = [body for body in seen.moving if not body.velocity.any()]
+        stand = [outline.moved(body.outlines, body.position) for body in waiting]
         around = outline.joined(seen.obstacles, outline.balls([mate.position for mate in robots]), *stand)
         apart = [seen.distance_to(mate) for mate in robots]
-        least = np.concatenate([seen.obstacle_distances, apart, *(each.distances(seen.radius) for each in waiting)])
+        least = np.concatenate([seen.obstacle_distances, apart, *(body.distances(seen.radius) for body in waiting)])
         # an obstacle may be as near to the target as the safe distance allows: then it gets no clearance
         from_target = convex.distances(around, seen.preset.positions[-1], True)
         reach = np.clip(from_target, least, least + self.clearance)

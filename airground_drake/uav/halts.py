@@ -23,16 +23,16 @@ def room(max_speed: Array) -> Array:
 def watched(halts: Array, t: float, positions: Array, room: Array) -> Array:
     """Halts of n UGVs at time t, s, (4n,); `positions` (3n + ...,), m; `room` (n,), m."""
     # halts: place, m, world frame, and time, s, of each UGV's halt as noted before, (4n,).
-    found = halts.copy()
+    updated = halts.copy()
     for i in range(len(room)):
         away = 0.0
         for a in range(3):
             away += (positions[3 * i + a] - halts[4 * i + a]) ** 2
         if halts[4 * i + 3] == NOT_WATCHED or np.sqrt(away) > room[i]:
             for a in range(3):
-                found[4 * i + a] = positions[3 * i + a]
-            found[4 * i + 3] = t
-    return found
+                updated[4 * i + a] = positions[3 * i + a]
+            updated[4 * i + 3] = t
+    return updated
 
 
 def standing(halts: Array, t: float) -> npt.NDArray[np.bool_]:

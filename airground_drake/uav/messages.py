@@ -38,21 +38,13 @@ class Sighting(NamedTuple):
 
 
 class Report(NamedTuple):
-    """A UGV's report, sent with its answer.
+    """A UGV's report, sent with its answer."""
 
-    Attributes:
-        number: of the answer, which counts the answers of all UGVs; -1: no answer.
-        sensed: obstacles at rest that the UGV sensed when it decided.
-        reason: why it answers so, see `ugv.answer.Reason`; empty before it has decided.
-        words: the reason as a sentence.
-        seen: obstacles that move and that the UGV sensed when it decided.
-    """
-
-    number: int = -1
-    sensed: tuple[Outline, ...] = ()
-    reason: str = ""
-    words: str = ""
-    seen: tuple[Sighting, ...] = ()
+    number: int = -1  # of the answer, which counts the answers of all UGVs; -1: no answer
+    sensed: tuple[Outline, ...] = ()  # obstacles at rest that the UGV sensed when it decided
+    reason: str = ""  # why it answers so, see `ugv.answer.Reason`; empty before it has decided
+    words: str = ""  # the reason as a sentence
+    seen: tuple[Sighting, ...] = ()  # obstacles that move and that the UGV sensed when it decided
 
 
 Reports = tuple[Report, ...]  # one entry per UGV
@@ -62,12 +54,12 @@ Proposals = tuple[Proposal | None, ...]  # one entry per UGV
 
 def sightings(world: World, t: float, positions: Array) -> list[Sighting]:
     """The obstacles that move and are there at time t, s, with all bodies that move at positions (M, 3), m."""
-    found = []
+    seen = []
     for body, place in zip(world.moving, positions, strict=True):
         if isinstance(body.plant, Scripted) and world.there(t, [body])[0]:
             velocity = body.plant.script.at(t)[1]
-            found.append(Sighting(body.name, (*place.tolist(),), (*velocity.tolist(),)))
-    return found
+            seen.append(Sighting(body.name, (*place.tolist(),), (*velocity.tolist(),)))
+    return seen
 
 
 def answer_to(proposal: Proposal | None, answers: Sequence[float] | Array, robot: int) -> float:

@@ -68,7 +68,7 @@ class PlannerState:
     @property
     def faults(self) -> list[Asked]:
         """Failures of policies, in order."""
-        return [each for each in self.asked if each.what]
+        return [asked for asked in self.asked if asked.what]
 
     @property
     def proposals(self) -> Proposals:
@@ -126,10 +126,10 @@ class Planner:
     @cached_property
     def _rows(self) -> dict[Outline, list[int]]:
         """Rows of each outline on the map."""
-        found: dict[Outline, list[int]] = {}
+        indices: dict[Outline, list[int]] = {}
         for k, row in enumerate(self.mapped):
-            found.setdefault(outline.as_tuple(row), []).append(k)
-        return found
+            indices.setdefault(outline.as_tuple(row), []).append(k)
+        return indices
 
     def _is_on_map(self, given: Outline, there: npt.NDArray[np.bool_]) -> bool:
         """Whether an outline is one of those on the map that are there, (m,)."""
@@ -162,12 +162,12 @@ class Planner:
         there = (np.less_equal(self.mapped_from, t + SAME_S)) & np.less(t + SAME_S, self.mapped_until)
         there = np.broadcast_to(there, len(self.mapped))
         mapped = self.mapped[there]
-        latest = {each.name: (each, when) for each, when in memory.seen} | {
-            each.name: (each, t) for report in heard for each in report.seen
+        latest = {sighting.name: (sighting, when) for sighting, when in memory.seen} | {
+            sighting.name: (sighting, t) for report in heard for sighting in report.seen
         }
-        moving = self._moving(t, {each.name: each for each in sightings}, latest)
+        moving = self._moving(t, {sighting.name: sighting for sighting in sightings}, latest)
         unknown = reported - set(memory.learnt)
-        fresh = tuple(sorted((each for each in unknown if not self._is_on_map(each, there)), key=_place))
+        fresh = tuple(sorted((row for row in unknown if not self._is_on_map(row, there)), key=_place))
         learnt = memory.learnt + fresh
         obstacles = outline.joined(mapped, outline.stacked(learnt)) if learnt else mapped
         talks = self._after_answers(memory.talks, t, positions, intervening, said, reports, learnt=bool(fresh))
@@ -206,15 +206,15 @@ class Planner:
         self, t: float, now: Mapping[str, Sighting], latest: Mapping[str, tuple[Sighting, float]]
     ) -> tuple[MovingObstacle, ...]:
         """The obstacles that move, as the UAV sees them at time t, s, or as UGVs last reported them."""
-        found = []
+        bodies = []
         for mover in self.movers:
             sighting, when = (now.get(mover.name), t) if mover.known else latest.get(mover.name, (None, t))
             if sighting is None:
                 continue
             place, velocity = np.array(sighting.place), np.array(sighting.velocity)
             coasts = Motion(np.array([when, when + self.coasting]), np.array([place, place + self.coasting * velocity]))
-            found.append(MovingObstacle(mover.name, mover.outlines, place, velocity, mover.script or coasts))
-        return tuple(found)
+            bodies.append(MovingObstacle(mover.name, mover.outlines, place, velocity, mover.script or coasts))
+        return tuple(bodies)
 
     def _after_answers(
         self,
@@ -233,10 +233,10 @@ class Planner:
         # trajectory goes on: the others' ways were planned with it. A UGV that refuses only because another one does is
         # asked again at once. If a UGV that may fall behind would have stalled, or was left behind, its motion was too
         # fast.
-        called = {name for name, one in zip(self.ugvs, intervening, strict=True) if one}
-        own = [a == REFUSE and each.reason != JOINT_REFUSED for a, each in zip(said, reports, strict=True)]
+        called = {name for name, active in zip(self.ugvs, intervening, strict=True) if active}
+        own = [a == REFUSE and report.reason != JOINT_REFUSED for a, report in zip(said, reports, strict=True)]
         refused = {talk.proposal.joint for talk, no in zip(talks, own, strict=True) if talk.proposal and no}
-        found = []
+        after = []
         for i, (name, talk, answer, refuses) in enumerate(zip(self.ugvs, talks, said, own, strict=True)):
             proposal, trails = talk.proposal, bool(self.trails and self.trails[i])
             party_refused = proposal is not None and bool(proposal.party) and proposal.joint in refused
@@ -251,8 +251,8 @@ class Planner:
                 off = np.linalg.norm(positions[i] - proposal.motion.positions[-1]) if t >= proposal.motion.end else 0.0
                 behind = trails and bool(off > BEHIND_S * self.max_speed[i])
                 talk = replace(talk, proposal=None, too_fast=talk.too_fast + behind)
-            found.append(talk)
-        return found
+            after.append(talk)
+        return after
 
     def _team(
         self,

@@ -242,6 +242,6 @@ def _fresh(value: Any) -> Any:
     if isinstance(value, tuple):
         return tuple(map(_fresh, value))
     if is_dataclass(value) and not isinstance(value, type):
-        given = [each.name for each in fields(value) if each.init]
+        given = [parameter.name for parameter in fields(value) if parameter.init]
         return replace(value, **{name: _fresh(getattr(value, name)) for name in given})
     return value

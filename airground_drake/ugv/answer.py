@@ -38,20 +38,13 @@ class Rules:
 
 
 class Basis(NamedTuple):
-    """What a prediction rested on; empty where nothing was predicted. Obstacles are indices in the order of the world.
+    """What a prediction rested on; empty where nothing was predicted. Obstacles are indices as in the world."""
 
-    Attributes:
-        sensed: obstacles within sensing range.
-        known: under method (d), obstacles sensed so far and not seen to be gone.
-        new: of these, those sensed for the first time that are not on the proposal's map.
-        told: rows of the proposal's map that the UGV believed.
-        asked: under method (d), the proposals that other UGVs had and had not refused: number, and whether accepted.
-    """
-
-    sensed: tuple[int, ...] = ()
-    known: tuple[int, ...] = ()
-    new: tuple[int, ...] = ()
-    told: tuple[int, ...] = ()
+    sensed: tuple[int, ...] = ()  # obstacles within sensing range
+    known: tuple[int, ...] = ()  # under method (d), obstacles sensed so far and not seen to be gone
+    new: tuple[int, ...] = ()  # of these, those sensed for the first time that are not on the proposal's map
+    told: tuple[int, ...] = ()  # rows of the proposal's map that the UGV believed
+    # under method (d), the proposals that other UGVs had and had not refused: number, and whether accepted
     asked: tuple[tuple[int, bool], ...] = ()
 
 
@@ -60,37 +53,23 @@ class GatekeeperDecision:
     """The decision about one proposal for one UGV at one sample: a row of the trace's table `decisions`.
 
     Under method (c) it rests on `problem`, `solution` and `throughout`; under (d), on `refuse`, `accept` and `tries`.
-
-    Attributes:
-        t: time, s.
-        robot: index of the UGV.
-        proposal: the proposal.
-        accepted: the answer.
-        reason: see `reasons.WORDS`.
-        problem: (26) as predicted.
-        solution: the route's.
-        throughout: costs (25) of accepting and of refusing throughout; -1 without a plan.
-        refuse: outcome of refusing; None if no outcomes were compared.
-        accept: outcome of accepting; None if no outcomes were compared.
-        tries: acceptances since the last rest, with this decision.
-        answer: number of the answer, which counts the answers of all UGVs.
-        basis: what the prediction rested on.
-        cpu_s: CPU time of prediction and decision, s, in which identical runs differ.
     """
 
-    t: float
-    robot: int
+    t: float  # time, s
+    robot: int  # index of the UGV
     proposal: Proposal
     accepted: bool
-    reason: Reason
-    problem: Problem | None = None
-    solution: Solution | None = None
+    reason: Reason  # see `reasons.WORDS`
+    problem: Problem | None = None  # (26) as predicted
+    solution: Solution | None = None  # the route's
+    # costs (25) of accepting and of refusing throughout; -1 without a plan
     throughout: tuple[float, float] = (-1.0, -1.0)
-    refuse: Outcome | None = None
-    accept: Outcome | None = None
-    tries: int = 0
-    answer: int = -1
-    basis: Basis = field(default_factory=Basis)
+    refuse: Outcome | None = None  # outcome of refusing; None if no outcomes were compared
+    accept: Outcome | None = None  # outcome of accepting; None if no outcomes were compared
+    tries: int = 0  # acceptances since the last rest, with this decision
+    answer: int = -1  # number of the answer, which counts the answers of all UGVs
+    basis: Basis = field(default_factory=Basis)  # what the prediction rested on
+    # CPU time of prediction and decision, s, in which identical runs differ
     cpu_s: float = field(default=0.0, compare=False)
 
 

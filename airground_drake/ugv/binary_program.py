@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import threading
 from typing import Any
 
@@ -30,35 +31,28 @@ class BinaryProgram:
 
     By (23) the positions are affine in omega. So (25) is a quadratic cost in omega, and (26d) as half-planes are rows
     over omega and u: n.(rho(omega) - o) >= d - u. As constraints, the positions would make a solver ten times slower.
-
-    Attributes:
-        program: (26); with shares in [0, 1] in place of binary values it is (27).
-        omega: binary variables (24), (26c), (B,): 1 accepts, and 1 - omega is the other mode.
-        u: slack (26e), (N,), m.
-        error: cost of task errors in (25).
-        slack: cost of slack in (25).
-        half_planes: (26d), one row per half-plane that can bind, over (omega, u).
-        choices: 0 and 1 are allowed where the choice moves the UGV, else 0 only, so that no solver need try both.
-        within: which half-planes these are, (N, m).
-        block: of each stage, (N,).
     """
 
     def __init__(self, stages: int, blocks: int) -> None:
         """A program without any problem's data, for N stages and B <= N accept variables, one per block of stages."""
         n, b = stages, blocks
-        self.program = MathematicalProgram()
-        self.block = block_of_stage(n, b)
+        self.program = MathematicalProgram()  # (26); with shares in place of binary values it is (27)
+        self.block = block_of_stage(n, b)  # of each stage, (N,)
+        # Binary variables (24), (26c), (B,): 1 accepts. Slack (26e), (N,), m.
         self.omega: Any = self.program.NewBinaryVariables(b, "omega")
         self.u: Any = self.program.NewContinuousVariables(n, "u")
+        # (25): costs of task errors and of slack
         self.error = self.program.AddQuadraticCost(np.zeros((b, b)), np.zeros(b), self.omega, is_convex=True)
         self.slack = self.program.AddQuadraticCost(np.zeros((n, n)), np.zeros(n), self.u, is_convex=True)
+        # (26d), one row per half-plane that can bind, over (omega, u), and which half-planes these are, (N, m)
         self.half_planes = self.program.AddLinearConstraint(
             np.zeros((1, b + n)), np.full(1, -np.inf), np.full(1, np.inf), np.concatenate([self.omega, self.u])
         )
-        self.choices = self.program.AddBoundingBoxConstraint(0.0, 1.0, self.omega)  # (26c)
+        self.within = np.zeros((n, 0), dtype=bool)
+        # (26c): 1 is allowed only where the choice moves the UGV, so that no solver need try both.
+        self.choices = self.program.AddBoundingBoxConstraint(0.0, 1.0, self.omega)
         self.program.AddBoundingBoxConstraint(0.0, np.inf, self.u)  # (26e)
         self._live = np.ones(b, dtype=bool)
-        self.within = np.zeros((n, 0), dtype=bool)
         self._of_block = np.equal.outer(self.block, np.arange(b)).astype(np.float64)
 
     def update(self, problem: Problem, normals: Array) -> None:
@@ -85,9 +79,7 @@ class BinaryProgram:
         rows, lower = self._rows(problem, normals, steps, refused - problem.reference)
         self.half_planes.evaluator().UpdateCoefficients(rows, lower, np.full(len(lower), np.inf))
 
-    def _rows(
-        self, problem: Problem, normals: Array, steps: Array, away: Array
-    ) -> tuple[Array, npt.NDArray[np.float64]]:
+    def _rows(self, problem: Problem, normals: Array, steps: Array, away: Array) -> tuple[Array, Array]:
         """Coefficients (rows, B + N) and lower bounds of the half-planes along normals (N, m, 3)."""
         # Without half-planes: one empty row. `steps` is what accepting at a stage adds to the position, (N, 2), m, and
         # `away` are the task errors of refusing throughout, (N, 3), m.
@@ -151,11 +143,4 @@ class Programs(threading.local):
     """The programs of one thread by their sizes: to build one takes longer than to put in the data of a problem."""
 
     def __init__(self) -> None:
-        """Without any program."""
-        self._built: dict[tuple[int, int], BinaryProgram] = {}
-
-    def of(self, stages: int, blocks: int) -> BinaryProgram:
-        """The program of this size, to be updated."""
-        if (stages, blocks) not in self._built:
-            self._built[stages, blocks] = BinaryProgram(stages, blocks)
-        return self._built[stages, blocks]
+        self.of = functools.cache(BinaryProgram)  # of a number of stages and of blocks, to be updated

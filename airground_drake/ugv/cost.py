@@ -16,19 +16,15 @@ from airground_drake.base.compiling import njit
 
 
 class Terms(NamedTuple):
-    """The data of a `Problem` as numba takes them.
-
-    Attributes:
-        velocities: of the modes, (2, N, 3), m/s, in the order of `rollout.REFUSED` and `ACCEPTED`.
-        error_weights: a_i of (25) at the ends of the stages, (N,), 1/(m^2 s); the last one includes the terminal cost.
-    """
+    """The data of a `Problem` as numba takes them."""
 
     dt: float
     initial: Array
-    velocities: Array
+    velocities: Array  # of the modes, (2, N, 3), m/s, in the order of `rollout.REFUSED` and `ACCEPTED`
     reference: Array
     centres: Array
     distances: Array
+    # a_i of (25) at the ends of the stages, (N,), 1/(m^2 s); the last one includes the terminal cost
     error_weights: Array
     slack_weight: float
 

@@ -5,11 +5,12 @@ It solves convex quadratic and linear programs, also with binary variables, to a
     result = DaqpSolver().Solve(program)
 
 A program may have linear costs, convex quadratic costs, linear constraints, bounds and binary variables. The result
-says whether it is infeasible or unbounded, or whether a limit stopped the search. `_Reduced` is what DAQP sees of it.
+says whether it is infeasible or unbounded, or whether a limit stopped the search.
 """
 
 from __future__ import annotations
 
+import functools
 import math
 import threading
 from typing import Any, NamedTuple
@@ -31,35 +32,28 @@ from pydrake.symbolic import Expression, Variable
 
 from airground_drake.base.arrays import Array
 
-SUPPORTED = frozenset(
-    {
-        ProgramAttribute.kLinearCost, ProgramAttribute.kQuadraticCost, ProgramAttribute.kLinearConstraint,
-        ProgramAttribute.kLinearEqualityConstraint, ProgramAttribute.kBinaryVariable, ProgramAttribute.kCallback,
-    }
-)  # fmt: skip
-"""What a program may have. Visualization callbacks are not called."""
-
+# What a program may have. Visualization callbacks are not called.
+SUPPORTED = frozenset({
+    ProgramAttribute.kLinearCost, ProgramAttribute.kQuadraticCost, ProgramAttribute.kLinearConstraint,
+    ProgramAttribute.kLinearEqualityConstraint, ProgramAttribute.kBinaryVariable, ProgramAttribute.kCallback,
+})  # fmt: skip
 FOUND, INFEASIBLE, UNBOUNDED, STOPPED, INVALID, FAILED = (
     SolutionResult.kSolutionFound, SolutionResult.kInfeasibleConstraints, SolutionResult.kUnbounded,
     SolutionResult.kIterationLimit, SolutionResult.kInvalidInput, SolutionResult.kSolverSpecificError,
 )  # fmt: skip
+# What DAQP's flags mean; 4: solved, inexactly; 5: stopped with a solution, -7: without one. Others are failures.
 _ENDED = {1: FOUND, 2: FOUND, 4: FOUND, 5: STOPPED, -4: STOPPED, -7: STOPPED, -1: INFEASIBLE, -3: UNBOUNDED}
-"""What DAQP's flags mean; 4: solved, inexactly; 5: stopped with a solution, -7: without one. Others are failures."""
-_BINARY, _SOFT, _NO_BOUND = 16, 8, 1e30
-_FLAT = 1e-24
-"""A variable counts as linear if its curvature is below this share of the largest."""
-_APPROACH = ((0.0, -1e-4),)
-"""Without binary variables: no added curvature, and the weight of DAQP's proximal point method. A negative weight
-counts only where the Hessian is singular."""
+_BINARY, _NO_BOUND = 16, 1e30
+_FLAT = 1e-24  # a variable counts as linear if its curvature is below this share of the largest
+# Curvature that binary variables get, in units of the largest, and weight of DAQP's proximal point method. A negative
+# weight counts only where the Hessian is singular. Where DAQP fails, the next is tried. More curvature makes a search
+# longer: it weakens the bounds.
 _APPROACHES = (0.0, 0.0), (1e-6, -1e-6), (1e-4, -1e-6)
-"""With binary variables: the curvature that they get, in units of the largest, and this weight. Where DAQP fails, as
-where the Hessian is singular, the next is tried. More curvature makes a search longer: it weakens the bounds."""
-_TIGHT = 1e-9
-"""DAQP's tolerance of constraints, in the scaled variables."""
-_FEASIBLE = 1e-6
-"""Largest violation of a constraint, in its own units, of a guess or a solution."""
+_APPROACH = ((0.0, -1e-4),)  # without binary variables
+_TIGHT = 1e-9  # DAQP's tolerance of constraints, in the scaled variables
+_FEASIBLE = 1e-6  # largest violation of a constraint, in its own units, of a guess or a solution
+# A search finds the guess again if nothing is cheaper: its cost may be this much above that of the guess, relative.
 _AGAIN = 1e-7
-"""A search finds the guess again if nothing is cheaper: its cost may be this much above that of the guess, relative."""
 
 
 class SolverLimits(NamedTuple):
@@ -97,16 +91,13 @@ class _Layout:
     # It includes a program without constraints by which CLP fills results: Python cannot set their variables, nor their
     # cost. CLP takes no binary variables, so continuous ones stand in for them.
 
-    MOST = 256  # bindings that are remembered
-
     def __init__(self, program: MathematicalProgram) -> None:
-        """Of a program as it is now."""
         self.index: dict[int, int] = program.decision_variable_index()
         variables = program.decision_variables()
         self.binary = np.array([x.get_type() == Variable.Type.BINARY for x in variables], dtype=bool)
-        self._places = dict[Any, Any]()
+        self.places = functools.lru_cache(256)(self._places)
         self._shell, self._clp = MathematicalProgram(), ClpSolver()
-        stand_ins = [Variable(x.get_name()) if of else x for x, of in zip(variables, self.binary, strict=True)]
+        stand_ins = [Variable(x.get_name()) if binary else x for x, binary in zip(variables, self.binary, strict=True)]
         self._shell.AddDecisionVariables(np.array(stand_ins, dtype=object))
         self._cost = self._shell.AddLinearCost(np.zeros(len(variables)), self._shell.decision_variables())
 
@@ -114,15 +105,11 @@ class _Layout:
         """Whether the program has these variables in this order; a variable never changes its type."""
         return bool(self.index == program.decision_variable_index())
 
-    def places(self, program: MathematicalProgram, binding: Any) -> Any:
+    def _places(self, binding: Any) -> Any:
         """Indices of the variables of a cost or constraint, in its order; a slice, which is quicker, if possible."""
-        if binding not in self._places:
-            if len(self._places) >= self.MOST:
-                self._places.clear()
-            found = np.asarray(program.FindDecisionVariableIndices(binding.variables()), dtype=np.intp)
-            follow = len(found) and (np.diff(found) == 1).all()
-            self._places[binding] = slice(int(found[0]), int(found[-1]) + 1) if follow else found
-        return self._places[binding]
+        indices = np.array([self.index[x.get_id()] for x in binding.variables()], dtype=np.intp)
+        follow = len(indices) and (np.diff(indices) == 1).all()
+        return slice(int(indices[0]), int(indices[-1]) + 1) if follow else indices
 
     def fill(self, result: MathematicalProgramResult, ended: SolutionResult, x: Array, cost: float) -> None:
         """Put a solution into a result of Drake."""
@@ -151,35 +138,36 @@ class _Form(NamedTuple):
     def of(cls, program: MathematicalProgram, layout: _Layout) -> _Form:
         """Read the evaluators; pydrake has no bindings for `AggregateQuadraticCosts` and the like."""
         n = program.num_vars()
-        hessian, gradient, least, most = np.zeros((n, n)), np.zeros(n), np.full(n, -np.inf), np.full(n, np.inf)
-        rows, lower, upper, constant = [np.zeros((0, n))], [np.zeros(0)], [np.zeros(0)], 0.0
+        constant, hessian, gradient = 0.0, np.zeros((n, n)), np.zeros(n)
         for binding in program.quadratic_costs():
-            i = layout.places(program, binding)
-            _add(hessian, (i, i) if isinstance(i, slice) else (i[:, None], i), binding.evaluator().Q())
-            _add(gradient, (i,), binding.evaluator().b())
-            constant += binding.evaluator().c()
+            i, cost = layout.places(binding), binding.evaluator()
+            _add(hessian, (i, i) if isinstance(i, slice) else (i[:, None], i), cost.Q())
+            _add(gradient, (i,), cost.b())
+            constant += cost.c()
         for binding in program.linear_costs():
-            _add(gradient, (layout.places(program, binding),), binding.evaluator().a())
+            _add(gradient, (layout.places(binding),), binding.evaluator().a())
             constant += binding.evaluator().b()
+        rows, lower, upper = [np.zeros((0, n))], [np.zeros(0)], [np.zeros(0)]
         for binding in (*program.linear_constraints(), *program.linear_equality_constraints()):
             constraint = binding.evaluator()
             rows.append(np.zeros((constraint.num_constraints(), n)))
-            _add(rows[-1], (slice(None), layout.places(program, binding)), constraint.GetDenseA())
+            _add(rows[-1], (slice(None), layout.places(binding)), constraint.GetDenseA())
             lower.append(constraint.lower_bound())
             upper.append(constraint.upper_bound())
+        least = np.where(layout.binary, 0.0, -np.inf)
+        most = np.where(layout.binary, 1.0, np.inf)
         for binding in program.bounding_box_constraints():
-            i = layout.places(program, binding)
-            np.maximum.at(least, i, binding.evaluator().lower_bound())
-            np.minimum.at(most, i, binding.evaluator().upper_bound())
-        least = np.where(layout.binary, np.ceil(np.maximum(least, 0.0)), least)
-        most = np.where(layout.binary, np.floor(np.minimum(most, 1.0)), most)
+            np.maximum.at(least, layout.places(binding), binding.evaluator().lower_bound())
+            np.minimum.at(most, layout.places(binding), binding.evaluator().upper_bound())
+        least = np.where(layout.binary, np.ceil(least), least)
+        most = np.where(layout.binary, np.floor(most), most)
         bounds = np.concatenate(lower), np.concatenate(upper), least, most
         return cls(constant, hessian, gradient, np.concatenate(rows), *bounds, layout.binary)
 
     def fault(self) -> SolutionResult | None:
         """INVALID or INFEASIBLE, if that shows at sight."""
         bounds = np.concatenate([self.lower, self.upper, self.least, self.most])
-        if np.isnan(bounds).any() or not all(np.isfinite(one).all() for one in self[:4]):
+        if np.isnan(bounds).any() or not all(np.isfinite(coefficients).all() for coefficients in self[:4]):
             return INVALID
         crossed = (self.least > self.most).any() or (self.lower > self.upper).any()
         empty = ~self.rows.any(axis=1)
@@ -204,106 +192,69 @@ class _Form(NamedTuple):
         n = len(self.gradient)
         return self._replace(constant=0.0, hessian=np.eye(n), gradient=np.zeros(n))
 
+    def own(self) -> npt.NDArray[np.bool_]:
+        """Variables with a quadratic cost that involves no other variable, (n,)."""
+        return np.asarray(((self.hessian != 0.0).sum(axis=0) == 1) & (self.hessian.diagonal() > 0.0))
 
-class _Reduced:
-    """A program as DAQP sees it: without what would make it slow, or what it does not take."""
-
-    # - *Constants.* A variable whose bounds are equal is one; so is one with a quadratic cost of its own and no row.
-    # - *Slack.* A variable with a quadratic cost of its own, whose one row it can always meet, is a soft row for DAQP.
-    # - *Scale.* Variables are scaled to a unit diagonal of the Hessian.
-    # - *Curvature.* Where the Hessian is singular, DAQP approaches the solution by proximal points. Where it fails,
-    #   each binary variable x gets the cost c (x^2 - x) / 2, which is 0 at 0 and at 1.
-
-    def __init__(self, form: _Form) -> None:
-        """Find constants and slack, and scale."""
-        rows, diagonal, entered = form.rows, form.hessian.diagonal(), form.rows != 0.0
-        uses, curved = entered.sum(axis=0), (form.hessian != 0.0).sum(axis=0)
-        own = (curved == 1) & (diagonal > 0.0) & ~form.binary
-        free = own & (uses == 0)
-        self.base = np.where(form.least == form.most, form.least, 0.0)
-        self.base[free] = np.clip(-form.gradient[free] / diagonal[free], form.least[free], form.most[free])
-        able = np.flatnonzero(own & (uses == 1) & (form.gradient == 0.0) & (form.least <= 0.0) & (form.most == np.inf))
-        row = entered[:, able].argmax(axis=0) if len(able) else able
-        below, above = np.isfinite(form.lower[row]), np.isfinite(form.upper[row])
-        meets = (below != above) & ((rows[row, able] > 0.0) == below) & (form.least[able] < form.most[able])
-        self.slack = np.full(len(rows), -1)  # of each row; of several, one
-        self.slack[row[meets]] = able[meets]
-        kept = (form.least < form.most) & ~free
-        kept[self.slack[self.slack >= 0]] = False
-        self.form, self.kept = form, np.flatnonzero(kept)
-        self.rows = np.flatnonzero((np.isfinite(form.lower) | np.isfinite(form.upper)) & entered[:, kept].any(axis=1))
-        k = self.kept
-        gradient = form.gradient[k] + np.einsum("ij,j->i", form.hessian, self.base)[k]
-        self.largest = diagonal[k].max(initial=0.0) or np.abs(gradient).max(initial=0.0) or 1.0
-        self.scale = np.sqrt(np.where(diagonal[k] > _FLAT * self.largest, diagonal[k] / self.largest, 1.0))
-        binary = form.binary[k]
-        # whether, besides binary variables, there are directions without curvature, in which the cost may fall for ever
-        self.may_recede = bool(binary.any() and ((curved[k] > 1) | (diagonal[k] <= 0.0))[~binary].any())
-        self.hessian = form.hessian[np.ix_(k, k)] / (self.scale[:, None] * self.scale) / self.largest
-        self.gradient = gradient / self.scale / self.largest
+    def may_recede(self) -> bool:
+        """Whether, besides binary variables, there are directions without curvature: the cost may fall for ever."""
+        return bool(self.binary.any() and not self.own()[~self.binary].all())
 
     def solve(self, limits: SolverLimits, known: float = math.inf) -> tuple[SolutionResult, Array, Details]:
         """How it ended, x (n,), NaN without a solution, and details; what costs more than `known` is not looked for."""
-        form, k, r, x = self.form, self.kept, self.rows, self.base.copy()
-        fixed = np.einsum("ij,j->i", form.rows, self.base)
-        hard = self.slack < 0
-        hard[r] = False
-        if ((fixed < form.lower - _FEASIBLE) | (fixed > form.upper + _FEASIBLE))[hard].any():
-            return INFEASIBLE, np.full(len(x), np.nan), Details()
-        flag, scaled, info = 1, np.zeros(0), dict[str, Any](lam=np.zeros(len(r)))
-        for curvature, proximal in () if not len(k) else _APPROACHES if form.binary[k].any() else _APPROACH:
-            flag, scaled, info = self._by_daqp(limits, known, fixed[r], curvature, proximal)
+        # A variable with a quadratic cost of its own that is in no row needs no solver: DAQP would be slower with it.
+        free = self.own() & ~self.binary & ~self.rows.any(axis=0)
+        x, k = np.zeros(len(free)), np.flatnonzero(~free)
+        x[free] = np.clip(-self.gradient[free] / self.hessian.diagonal()[free], self.least[free], self.most[free])
+        rest = self._replace(
+            constant=self.cost(x), hessian=self.hessian[np.ix_(k, k)], gradient=self.gradient[k], rows=self.rows[:, k],
+            least=self.least[k], most=self.most[k], binary=self.binary[k],
+        )  # fmt: skip
+        ended, x[k], details = rest._by_daqp(limits, known)
+        return ended, x if np.isfinite(x).all() else np.full(len(x), np.nan), details
+
+    def _by_daqp(self, limits: SolverLimits, known: float) -> tuple[SolutionResult, Array, Details]:
+        # Variables are scaled to a unit diagonal of the Hessian. Where it is singular, DAQP approaches the solution by
+        # proximal points. Where it fails, each binary variable x gets the cost c (x^2 - x) / 2, which is 0 at 0 and 1.
+        n, multipliers = len(self.gradient), np.zeros(len(self.rows))
+        if n == 0:
+            return FOUND, np.zeros(0), Details(multipliers=multipliers)
+        diagonal = self.hessian.diagonal()
+        largest = diagonal.max() or np.abs(self.gradient).max() or 1.0
+        scale = np.sqrt(np.where(diagonal > _FLAT * largest, diagonal / largest, 1.0))
+        hessian = self.hessian / (scale[:, None] * scale) / largest
+        gradient = self.gradient / scale / largest
+        rows = np.flatnonzero((np.isfinite(self.lower) | np.isfinite(self.upper)) & self.rows.any(axis=1))
+        upper = np.concatenate([self.most * scale, self.upper[rows]]).clip(-_NO_BOUND, _NO_BOUND)
+        lower = np.concatenate([self.least * scale, self.lower[rows]]).clip(-_NO_BOUND, _NO_BOUND)
+        sense = np.zeros(len(upper), dtype=np.intc)
+        sense[:n][self.binary] = _BINARY
+        x, info = np.full(n, np.nan), dict[str, Any]()
+        for curvature, proximal in _APPROACHES if self.binary.any() else _APPROACH:
+            added = np.where(self.binary, curvature, 0.0)
+            model = daqp.Model()
+            model.settings = {
+                "presolve": 0, "primal_tol": _TIGHT, "iter_limit": int(limits.iter_limit), "eps_prox": proximal,
+                "fval_bound": min((known - self.constant) / largest, _NO_BOUND),
+                "time_limit": max(limits.time_limit, 1e-6) if 0.0 < limits.time_limit < math.inf else 0.0,
+            }  # fmt: skip
+            linear = gradient - 0.5 * added * scale
+            flag, _ = model.setup(hessian + np.diag(added), linear, self.rows[rows] / scale, upper, lower, sense)
+            if flag >= 0:
+                scaled, _, flag, info = model.solve()
             if flag in _ENDED:
                 break
-        multipliers = np.zeros(len(form.rows))
         if flag > 0:
-            x[k] = scaled / self.scale
-            x[form.binary] = x[form.binary].round()
-            x = np.clip(x, form.least, form.most)
-            soft = np.flatnonzero(self.slack >= 0)
-            at, lower, upper = np.einsum("ij,j->i", form.rows[soft], x), form.lower[soft], form.upper[soft]
-            lacking = np.maximum(0.0, lower - at) - np.maximum(0.0, at - upper)
-            x[self.slack[soft]] = lacking / form.rows[soft, self.slack[soft]]
-            multipliers[r] = -self.largest * info["lam"][len(k) :]
-        else:
-            x[:] = np.nan
-        details = Details(int(info.get("iterations", 0)), int(info.get("nodes", 0)), multipliers)
-        return _ENDED.get(flag, FAILED), x, details
-
-    def _by_daqp(
-        self, limits: SolverLimits, known: float, fixed: Array, curvature: float, proximal: float
-    ) -> tuple[int, Array, dict[str, Any]]:
-        """DAQP's flag, x (k,), scaled, and information; `fixed`: the rows at the base, (p,)."""
-        form, k, r = self.form, self.kept, self.rows
-        binary, soft = form.binary[k], self.slack[r] >= 0
-        upper, lower = (
-            np.concatenate([ends[k] * self.scale, sides[r] - fixed]).clip(-_NO_BOUND, _NO_BOUND)
-            for ends, sides in ((form.most, form.upper), (form.least, form.lower))
-        )
-        hessian, added = self.hessian.copy(), np.where(binary, curvature, 0.0)
-        hessian[np.diag_indices(len(k))] += added
-        model = daqp.Model()
-        model.settings = {
-            "presolve": 0, "primal_tol": _TIGHT, "iter_limit": int(limits.iter_limit), "eps_prox": proximal,
-            "fval_bound": min(known / self.largest, _NO_BOUND),
-            "time_limit": max(limits.time_limit, 1e-6) if 0.0 < limits.time_limit < math.inf else 0.0,
-        }  # fmt: skip
-        sense = np.concatenate([np.where(binary, _BINARY, 0), np.where(soft, _SOFT, 0)]).astype(np.intc)
-        matrix = form.rows[np.ix_(r, k)] / self.scale
-        flag, _ = model.setup(hessian, self.gradient - 0.5 * added * self.scale, matrix, upper, lower, sense)
-        if flag < 0:
-            return flag, np.zeros(0), {}
-        if soft.any():  # slack that enters its row as c x, at a cost w x^2 / 2, has the reciprocal weight c^2 / w
-            weights, j = np.ones(len(sense)), self.slack[r[soft]]
-            weights[len(k) :][soft] = self.largest * form.rows[r[soft], j] ** 2 / form.hessian[j, j]
-            model.soft_weights(rho_l=weights, rho_u=weights)
-        x, _, flag, info = model.solve()
-        return flag, x, info
+            x = scaled / scale
+            x[self.binary] = x[self.binary].round()
+            x = np.clip(x, self.least, self.most)
+            multipliers[rows] = -largest * info["lam"][n:]
+        return _ENDED.get(flag, FAILED), x, Details(info.get("iterations", 0), info.get("nodes", 0), multipliers)
 
 
 def _add(total: Array, where: Any, values: Array) -> None:
     """Add values at indices; indices, but not slices, may repeat."""
-    if all(isinstance(one, slice) for one in where):
+    if all(isinstance(axis, slice) for axis in where):
         total[where] += values
     else:
         np.add.at(total, where, values)
@@ -314,17 +265,17 @@ def _minimise(form: _Form, guess: Array, limits: SolverLimits) -> tuple[Solution
     nothing = np.full(len(guess), np.nan), Details()
     if (fault := form.fault()) is not None:
         return fault, *nothing
-    reduced, guessed = _Reduced(form), form.is_met(guess)
-    if reduced.may_recede and _Reduced(form.relaxed()).solve(limits)[0] == UNBOUNDED:
-        feasible = _Reduced(form.without_cost()).solve(limits)[0]
+    if form.may_recede() and form.relaxed().solve(limits)[0] == UNBOUNDED:
+        feasible = form.without_cost().solve(limits)[0]
         return UNBOUNDED if feasible == FOUND else feasible, *nothing
+    guessed = form.is_met(guess)
     cost = form.cost(guess) if guessed else math.inf
-    ended, x, details = reduced.solve(limits, cost + _AGAIN * abs(cost) - form.cost(reduced.base))
+    ended, x, details = form.solve(limits, cost + _AGAIN * abs(cost))
     if ended == STOPPED and guessed and not form.cost(x) < cost:
         x = guess
     wrong = ended == FOUND and not form.is_met(x)
     if ended == INFEASIBLE:
-        wrong = guessed or _Reduced(form.without_cost()).solve(limits)[0] == FOUND
+        wrong = guessed or form.without_cost().solve(limits)[0] == FOUND
     return FAILED if wrong else ended, x, details
 
 
@@ -332,7 +283,6 @@ class DaqpResult(MathematicalProgramResult):  # type: ignore[misc]
     """A result that also has the values of binary variables, and the details of the solution."""
 
     def __init__(self) -> None:
-        """An empty result."""
         super().__init__()
         self._index, self._details = dict[int, int](), Details()
 
@@ -341,7 +291,7 @@ class DaqpResult(MathematicalProgramResult):  # type: ignore[misc]
         if not what:
             return self.get_x_val()
         if isinstance(what[0], np.ndarray):
-            return np.array([self.GetSolution(one) for one in what[0].ravel()]).reshape(what[0].shape)
+            return np.array([self.GetSolution(entry) for entry in what[0].ravel()]).reshape(what[0].shape)
         if isinstance(what[0], Variable) and what[0].get_id() in self._index:
             return self.get_x_val()[self._index[what[0].get_id()]]
         if isinstance(what[0], Expression):
@@ -401,9 +351,9 @@ class DaqpSolver(SolverInterface):  # type: ignore[misc]
 
     def ExplainUnsatisfiedProgramAttributes(self, prog: MathematicalProgram) -> str:
         """Why it does not solve programs of this kind; '' if it does."""
-        if beyond := sorted(one.name.removeprefix("k") for one in prog.required_capabilities() - SUPPORTED):
-            found = ", ".join(beyond)
-            return f"DaqpSolver is unable to solve because a {found} was declared but is not supported."
+        if beyond := prog.required_capabilities() - SUPPORTED:
+            names = ", ".join(sorted(attribute.name.removeprefix("k") for attribute in beyond))
+            return f"DaqpSolver is unable to solve because a {names} was declared but is not supported."
         if not all(binding.evaluator().is_convex() for binding in prog.quadratic_costs()):
             return "DaqpSolver is unable to solve because a quadratic cost is not convex."
         return ""
@@ -448,8 +398,10 @@ _COSTS = {INFEASIBLE: math.inf, UNBOUNDED: -math.inf}
 
 def _limits(*given: SolverOptions | None) -> SolverLimits:
     """From options of Drake, the later ones counting more."""
-    chosen = {name: value for one in given if one for name, value in one.options.get(DaqpSolver.NAME, {}).items()}
-    if unknown := sorted(set(chosen) - set(SolverLimits._fields)):
+    chosen = dict[str, Any]()
+    for options in filter(None, given):
+        chosen |= options.options.get(DaqpSolver.NAME, {})
+    if unknown := sorted(chosen.keys() - set(SolverLimits._fields)):
         raise ValueError(
             f"{DaqpSolver.NAME}: no options {', '.join(unknown)}; allowed: {', '.join(SolverLimits._fields)}"
         )

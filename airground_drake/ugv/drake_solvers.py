@@ -55,16 +55,11 @@ class Minimiser:
 
     def minimise(self, binary: BinaryProgram, guess: Array, seconds: float = math.inf) -> SolverResult:
         """The optimum of (26), searched for no longer than `seconds` by the clock; DAQP looks at it every 32 nodes."""
-        options = SolverOptions()
-        options.SetOption(CommonSolverOption.kMaxThreads, 1)
-        for option, value in self._exact.items():
-            options.SetOption(self._solver.solver_id(), option, value)
-        if seconds < math.inf:
-            options.SetOption(self._solver.solver_id(), self._limit, max(seconds, 1e-6))
+        given = self._exact | ({self._limit: max(seconds, 1e-6)} if seconds < math.inf else {})
         started = time.monotonic()
-        found = _found(self._solver.Solve(binary.program, guess, options), len(binary.omega))
-        late = found.ended == "solver_failed" and time.monotonic() - started >= seconds
-        return SolverResult(None, "budget_spent") if late else found
+        result = _solved(self._solver, binary, guess, given)
+        late = result.ended == "solver_failed" and time.monotonic() - started >= seconds
+        return SolverResult(None, "budget_spent") if late else result
 
 
 _RELAXING = DaqpSolver()
@@ -72,19 +67,19 @@ _RELAXING = DaqpSolver()
 
 def relax(binary: BinaryProgram, seconds: float = math.inf, iterations: int = 10_000) -> SolverResult:
     """The optimum of (27), by DAQP, within `iterations` of the active-set method and `seconds` by the clock."""
+    limit = {"time_limit": max(seconds, 1e-6)} if seconds < math.inf else {}
+    return _solved(_RELAXING, binary, None, {"relaxed": 1, "iter_limit": iterations} | limit)
+
+
+def _solved(solver: Any, binary: BinaryProgram, guess: Array | None, given: dict[str, float]) -> SolverResult:
     options = SolverOptions()
-    options.SetOption(DaqpSolver.id(), "relaxed", 1)
-    options.SetOption(DaqpSolver.id(), "iter_limit", iterations)
-    if seconds < math.inf:
-        options.SetOption(DaqpSolver.id(), "time_limit", max(seconds, 1e-6))
-    return _found(_RELAXING.Solve(binary.program, None, options), len(binary.omega))
-
-
-def _found(result: Any, count: int) -> SolverResult:
-    """A result; the accept variables, or shares, are the first `count` variables of their program."""
+    options.SetOption(CommonSolverOption.kMaxThreads, 1)
+    for option, value in given.items():
+        options.SetOption(solver.solver_id(), option, value)
+    result = solver.Solve(binary.program, guess, options)
     details = result.get_solver_details()
-    more = (details.iterations, details.multipliers) if isinstance(details, Details) else (0, None)
+    effort = (details.iterations, details.multipliers) if isinstance(details, Details) else (0, None)
     if result.is_success():
-        return SolverResult(result.get_x_val()[:count], "optimal", *more)
+        return SolverResult(result.get_x_val()[: len(binary.omega)], "optimal", *effort)
     limited = result.get_solution_result() == SolutionResult.kIterationLimit
-    return SolverResult(None, "budget_spent" if limited else "solver_failed", *more)
+    return SolverResult(None, "budget_spent" if limited else "solver_failed", *effort)

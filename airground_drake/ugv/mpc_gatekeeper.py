@@ -40,24 +40,16 @@ from airground_drake.ugv.solution import ConstantPlans, Solution, after_failure
 
 @dataclass(frozen=True, eq=False)
 class GatekeeperState:
-    """The memory of the gatekeepers of n UGVs between samples.
+    """The memory of the gatekeepers of n UGVs between samples."""
 
-    Attributes:
-        answers: in force, (2n,), see `messages`.
-        since: when each UGV's answer became what it is, (n,), s.
-        reports: what came with them.
-        decisions: those of the last sample that was not idle.
-        commitments: under method (d), each UGV's tries and rests.
-        sensed: under method (d), which outlines at rest each UGV has sensed and not seen to be gone, (n, m).
-        made: all decisions of the run so far; the number of an answer is the index of its decision.
-    """
-
-    answers: tuple[float, ...]
-    since: tuple[float, ...]
-    reports: Reports
-    decisions: tuple[GatekeeperDecision, ...] = ()
-    commitments: tuple[Commitment, ...] = ()
+    answers: tuple[float, ...]  # in force, (2n,), see `messages`
+    since: tuple[float, ...]  # when each UGV's answer became what it is, (n,), s
+    reports: Reports  # what came with them
+    decisions: tuple[GatekeeperDecision, ...] = ()  # those of the last sample that was not idle
+    commitments: tuple[Commitment, ...] = ()  # under method (d), each UGV's tries and rests
+    # under method (d), which outlines at rest each UGV has sensed and not seen to be gone, (n, m)
     sensed: npt.NDArray[np.bool_] = field(default_factory=lambda: np.zeros((0, 0), dtype=bool))
+    # all decisions of the run so far; the number of an answer is the index of its decision
     made: tuple[GatekeeperDecision, ...] = ()
 
     @classmethod
@@ -73,23 +65,14 @@ class GatekeeperState:
 
 @dataclass(frozen=True, eq=False)
 class Inputs:
-    """The inputs at a sample.
+    """The inputs at a sample."""
 
-    Attributes:
-        t: time, s.
-        proposals: in force, one entry per UGV.
-        positions: of all bodies that move, (M, 3), m.
-        velocities: of these, (M, 3), m/s.
-        law: the UGVs' control law, with the gains in force.
-        headings: of the UGVs, (n,), rad; None if no UGV is a unicycle.
-    """
-
-    t: float
-    proposals: Proposals
-    positions: Array
-    velocities: Array
-    law: UgvLaw
-    headings: Array | None = None
+    t: float  # time, s
+    proposals: Proposals  # in force, one entry per UGV
+    positions: Array  # of all bodies that move, (M, 3), m
+    velocities: Array  # of these, (M, 3), m/s
+    law: UgvLaw  # the UGVs' control law, with the gains in force
+    headings: Array | None = None  # of the UGVs, (n,), rad; None if no UGV is a unicycle
 
 
 class Gatekeepers(abc.ABC):
@@ -100,7 +83,6 @@ class Gatekeepers(abc.ABC):
     """
 
     def __init__(self, world: World, law: UgvLaw, presets: Sequence[Motion]) -> None:
-        """Of the UGVs of a world, with their control law and preset trajectories."""
         self.law = law
         self._presets = tuple(presets)
         self._world = world
@@ -122,8 +104,7 @@ class Gatekeepers(abc.ABC):
     def _in_range(self, t: float, position: Array) -> npt.NDArray[np.bool_]:
         """Which outlines at rest are there at time t, s, and within sensing range, (m,)."""
         still, reach = self._world.at(self._near, t).still, self.law.avoidance.sensing_range
-        found: npt.NDArray[np.bool_] = convex.within(still, position[None], reach, True)[0]
-        return found
+        return np.asarray(convex.within(still, position[None], reach, True)[0])
 
     def _beside(self, now: Inputs, i: int) -> npt.NDArray[np.intp]:
         """Parts that move around a UGV: of all robots, and of obstacles within sensing range; rows of `parts`."""
@@ -144,7 +125,9 @@ class Gatekeepers(abc.ABC):
         seen: tuple[Sighting, ...] = ()
         if len(self._world.moving) > len(self._world.robots):
             beside = {self._world.moving[body].name for body in self._near.carrier[self._beside(now, i)]}
-            seen = tuple(each for each in sightings(self._world, now.t, now.positions) if each.name in beside)
+            seen = tuple(
+                sighting for sighting in sightings(self._world, now.t, now.positions) if sighting.name in beside
+            )
         return Report(decision.answer, tuple(map(outline.as_tuple, near)), decision.reason, in_words(decision), seen)
 
     def _view(self, now: Inputs, i: int) -> View:
@@ -231,12 +214,12 @@ class PaperGatekeepers(Gatekeepers):
         """The route's solution; the route gets a `Problem` of its own, so that it cannot change what is recorded."""
         kind = type(self._route)
         with raised_as(lambda error: PluginError(f"route {kind.__qualname__} raised {described(error, kind.solve)}")):
-            found: object = self._route.solve(replace(problem), budget)
-        if not isinstance(found, Solution):
-            returned = f"{short(repr(found))}, of type {type(found).__qualname__}"
+            solution: object = self._route.solve(replace(problem), budget)
+        if not isinstance(solution, Solution):
+            returned = f"{short(repr(solution))}, of type {type(solution).__qualname__}"
             allowed = f"{Solution.__module__}.{Solution.__qualname__}"
             raise PluginError(one_line(f"route {kind.__qualname__} returned {returned}; allowed: {allowed}"))
-        return found
+        return solution
 
 
 def _rest_of_plan(before: GatekeeperState, t: float, i: int, proposal: Proposal) -> Array | None:

@@ -54,19 +54,12 @@ class Outlook:
 
 @dataclass(frozen=True, eq=False)
 class Outcome:
-    """The outcome of one choice.
+    """The outcome of one choice."""
 
-    Attributes:
-        positions: at the control samples, (S + 1, 3), m.
-        stalls: whether it comes to rest short of the goal.
-        left: length of the way to the goal from its end, m.
-        cost: (25) with weight 1, plus the cost-to-go V; V alone for one that stalls, m^2 s.
-    """
-
-    positions: Array
-    stalls: bool
-    left: float
-    cost: float
+    positions: Array  # at the control samples, (S + 1, 3), m
+    stalls: bool  # whether it comes to rest short of the goal
+    left: float  # length of the way to the goal from its end, m
+    cost: float  # (25) with weight 1, plus the cost-to-go V; V alone for one that stalls, m^2 s
 
     @property
     def end(self) -> Array:
@@ -91,14 +84,14 @@ def outcomes(seen: View, law: UgvLaw, proposal: Proposal, look: Outlook) -> tupl
     goal = seen.preset.positions[-1]
     settled = max(until, seen.preset.end, t + look.coasting, *(asked[0].end for asked in seen.asked if asked))
     steps = int(np.ceil((settled - t) / h - 1e-9))
-    found = []
+    both = []
     for together, accepted in ((False, 0), (True, max(0, int(np.ceil((until - t) / h - 1e-9))))):
         places = [robot_at(seen, j, after, look.coasting, together=together) for j in range(len(seen.parts))]
         moving = np.stack(places, axis=1) if places else np.empty((len(after), 0, 3))
         loop = closed_loop(seen, law, proposal, after, moving)
         positions, cost = _rolled_out(loop, accepted, goal, steps, look.near, look.still)
-        found.append(_outcome(positions, cost, goal, seen, seen.distances[:m], h, look))
-    return found[0], found[1]
+        both.append(_outcome(positions, cost, goal, seen, seen.distances[:m], h, look))
+    return both[0], both[1]
 
 
 def robot_at(seen: View, robot: int, after: Array, coasting: float, *, together: bool) -> Array:
@@ -133,7 +126,7 @@ def way_left(place: Array, goal: Array, rows: Array, distances: Array) -> float:
     # Among cores with more than `MOST_CORNERS` the length is that of a way on a lattice (`distance_field`), a little
     # longer: no map makes it take long.
     rows, distances = outline.sections(rows, distances, float(place[2]))
-    start, end = (np.append(each[:2], 0.0) for each in (place, goal))
+    start, end = (np.append(point[:2], 0.0) for point in (place, goal))
     leg = end - start
     length = float(np.sqrt(leg @ leg))
     beside = convex.beside(rows, start, end) - distances

@@ -204,13 +204,13 @@ class OutcomeGatekeepers(Gatekeepers):
 
 def _jointly(judged: Sequence[GatekeeperDecision], said: Sequence[float]) -> list[GatekeeperDecision]:
     """The decisions of a sample. Where a part of a joint plan is refused, no other part of it is newly accepted."""
-    refused = {each.proposal.joint for each in judged if _answer(each, said[each.robot]) == REFUSE}
-    return [
-        replace(each, accepted=False, reason=JOINT_REFUSED)
-        if each.accepted and said[each.robot] == SILENT and each.proposal.party and each.proposal.joint in refused
-        else each
-        for each in judged
-    ]
+    refused = {decision.proposal.joint for decision in judged if _answer(decision, said[decision.robot]) == REFUSE}
+
+    def is_refused(decision: GatekeeperDecision) -> bool:
+        proposal, new = decision.proposal, said[decision.robot] == SILENT
+        return decision.accepted and new and bool(proposal.party) and proposal.joint in refused
+
+    return [replace(d, accepted=False, reason=JOINT_REFUSED) if is_refused(d) else d for d in judged]
 
 
 def _answer(decision: GatekeeperDecision, standing: float) -> float:

@@ -23,7 +23,7 @@ def cheap_plan(terms: Terms, block: Blocks, known: Sequence[Array]) -> Array:
     """The cheapest plan (N,) found: that of the beam and known ones, improved by changes of one block, then of two."""
     starts = distinct([beam_search(terms, block), *known])
     improved = [improve(terms, block, plan, False) for plan in starts]
-    return improve(terms, block, min(improved, key=lambda one: one[1])[0], True)[0]
+    return improve(terms, block, min(improved, key=lambda plan_and_cost: plan_and_cost[1])[0], True)[0]
 
 
 def distinct(plans: Sequence[Array]) -> list[Array]:

@@ -60,7 +60,6 @@ class Problem:
     previous: Array | None = None
 
     def __post_init__(self) -> None:
-        """Copy the arrays."""
         for name, value in vars(self).items():
             if isinstance(value, np.ndarray):
                 object.__setattr__(self, name, read_only(value))
@@ -97,8 +96,7 @@ class Problem:
 
     def positions(self, omega: Array) -> Array:
         """Predicted positions at the ends of the stages, (23): omega (N,) in [0, 1] to (N, 3), m."""
-        positions: Array = positions_of(self.terms, np.ascontiguousarray(omega, dtype=np.float64))
-        return positions
+        return np.asarray(positions_of(self.terms, np.ascontiguousarray(omega, dtype=np.float64)))
 
     def evaluate(self, omega: Array) -> Evaluation:
         """Cost (25) of a plan, (N,), by the mode velocities of (23), with the exact distances of (26d)."""

@@ -22,37 +22,23 @@ REFUSED, ACCEPTED = 0, 1  # modes of a control period: whether the proposal is i
 
 @dataclass(frozen=True, eq=False)
 class View:
-    """A UGV's view when it decides: m outlines at rest, then n parts of bodies that move, see `model.geometry.outline`.
+    """A UGV's view when it decides: m outlines at rest, then n parts of bodies that move (`model.geometry.outline`)."""
 
-    Attributes:
-        t: time, s.
-        position: own position, (3,), m.
-        preset: own preset trajectory.
-        still: outlines at rest, (m, W), world frame.
-        parts: outlines that move, about the origins of their bodies, (n, W).
-        places: positions of these bodies, (n, 3), m.
-        velocities: their velocities, taken as constant, (n, 3), m/s.
-        distances: safe distances from the cores, (m + n,), m.
-        shares: share of each avoidance inequality, (m + n,).
-        max_speed: own speed limit, m/s.
-        asked: under method (d), per part that moves, the motion that its body is asked to make and whether it has
-            accepted it, or None.
-        heading: own heading, rad, of a unicycle.
-        steering: numbers of its steering, (6,), see `model.plants.steering`; zeros for a robot that is no unicycle.
-    """
-
-    t: float
-    position: Array
-    preset: Motion
-    still: Array
-    parts: Array
-    places: Array
-    velocities: Array
-    distances: Array
-    shares: Array
-    max_speed: float
+    t: float  # time, s
+    position: Array  # own position, (3,), m
+    preset: Motion  # own preset trajectory
+    still: Array  # outlines at rest, (m, W), world frame
+    parts: Array  # outlines that move, about the origins of their bodies, (n, W)
+    places: Array  # positions of these bodies, (n, 3), m
+    velocities: Array  # their velocities, taken as constant, (n, 3), m/s
+    distances: Array  # safe distances from the cores, (m + n,), m
+    shares: Array  # share of each avoidance inequality, (m + n,)
+    max_speed: float  # own speed limit, m/s
+    # under method (d), per part that moves, the motion that its body is asked to make and whether it has accepted it,
+    # or None
     asked: tuple[tuple[Motion, bool] | None, ...] = ()
-    heading: float = 0.0
+    heading: float = 0.0  # own heading, rad, of a unicycle
+    # numbers of its steering, (6,), see `model.plants.steering`; zeros for a robot that is no unicycle
     steering: Array = field(default_factory=lambda: np.zeros(NUMBERS))
 
     def apart(self) -> Array:
@@ -74,40 +60,23 @@ class ClosedLoop(NamedTuple):
     """All that the motion of one UGV over the horizon depends on, besides the answers to the proposal.
 
     N stages of `substeps` control periods each, S = N * substeps in all. The arrays are never written to.
-
-    Attributes:
-        law: the numbers of its control law.
-        start: position at the beginning, (3,), m, world frame.
-        preset: own preset trajectory at the control samples, (S + 1, 3), m.
-        wanted: the proposed motion at the control samples, (S + 1, 3), m.
-        chosen: J_int^+ J_int, projector onto the directions in which the UAV intervenes, (3, 3).
-        still: outlines at rest, (m, W).
-        parts: outlines that move, (n, W).
-        every: 0 to n - 1, the indices of all of them.
-        places: where the bodies that move are at the control samples, (S + 1, n, 3), m.
-        distances: safe distances from the cores, (m + n,), m.
-        shares: share of each avoidance inequality, (m + n,).
-        max_speed: own speed limit, m/s.
-        substeps: control periods per stage.
-        heading: at the beginning, rad, of a unicycle.
-        steering: numbers of its steering, (6,), see `model.plants.steering`.
     """
 
-    law: Numbers
-    start: Array
-    preset: Array
-    wanted: Array
-    chosen: Array
-    still: Array
-    parts: Array
-    every: npt.NDArray[np.intp]
-    places: Array
-    distances: Array
-    shares: Array
-    max_speed: float
-    substeps: int
-    heading: float
-    steering: Array
+    law: Numbers  # the numbers of its control law
+    start: Array  # position at the beginning, (3,), m, world frame
+    preset: Array  # own preset trajectory at the control samples, (S + 1, 3), m
+    wanted: Array  # the proposed motion at the control samples, (S + 1, 3), m
+    chosen: Array  # J_int^+ J_int, projector onto the directions in which the UAV intervenes, (3, 3)
+    still: Array  # outlines at rest, (m, W)
+    parts: Array  # outlines that move, (n, W)
+    every: npt.NDArray[np.intp]  # 0 to n - 1, the indices of all of them
+    places: Array  # where the bodies that move are at the control samples, (S + 1, n, 3), m
+    distances: Array  # safe distances from the cores, (m + n,), m
+    shares: Array  # share of each avoidance inequality, (m + n,)
+    max_speed: float  # own speed limit, m/s
+    substeps: int  # control periods per stage
+    heading: float  # at the beginning, rad, of a unicycle
+    steering: Array  # numbers of its steering, (6,), see `model.plants.steering`
 
 
 def closed_loop(
@@ -157,16 +126,8 @@ def workspace(loop: ClosedLoop) -> Workspace:
     """Arrays for `advance`, uninitialised but for the heading."""
     count = len(loop.distances) + EDGES
     plane = np.array([1.0, 1.0, 0.0])
-    return Workspace(
-        plane,
-        np.empty(count, np.intp),
-        np.empty((count, 3)),
-        np.empty(count),
-        np.empty(count),
-        np.empty(3),
-        np.empty(3),
-        np.full(1, loop.heading),
-    )
+    which, normal, bound, retreat = np.empty(count, np.intp), np.empty((count, 3)), np.empty(count), np.empty(count)
+    return Workspace(plane, which, normal, bound, retreat, np.empty(3), np.empty(3), np.full(1, loop.heading))
 
 
 @njit(cache=True, inline="always")

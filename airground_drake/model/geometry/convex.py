@@ -90,37 +90,37 @@ def _from_corner(dx: float, dy: float, dz: float, away: Array) -> float:
 @njit(cache=True)
 def distances(rows: Array, position: Array, planar: bool) -> Array:
     """Signed distances of a position (3,), m, from the cores of outlines (m, W): (m,), m."""
-    found, away = np.empty(len(rows)), np.empty(3)
+    apart, away = np.empty(len(rows)), np.empty(3)
     for k in range(len(rows)):
-        found[k] = nearest(rows[k], position[0], position[1], position[2], planar, away, np.inf)
-    return found
+        apart[k] = nearest(rows[k], position[0], position[1], position[2], planar, away, np.inf)
+    return apart
 
 
 @njit(cache=True)
 def nearest_points(rows: Array, positions: Array) -> Array:
     """The points of cores (m, W) that are nearest to positions (N, 3) in the plane z = 0, m: (N, m, 3), m."""
     # Inside a core it is the nearest point of its boundary.
-    found, away = np.empty((len(positions), len(rows), 3)), np.empty(3)
+    points, away = np.empty((len(positions), len(rows), 3)), np.empty(3)
     for k in range(len(rows)):
         row = rows[k]
         for i in range(len(positions)):
             if row[COUNT] == 1.0:
                 z = min(max(positions[i, 2], row[BASE]), row[TOP])
-                found[i, k, 0], found[i, k, 1], found[i, k, 2] = row[CORNERS], row[CORNERS + 1], z
+                points[i, k, 0], points[i, k, 1], points[i, k, 2] = row[CORNERS], row[CORNERS + 1], z
                 continue
             apart = nearest(row, positions[i, 0], positions[i, 1], positions[i, 2], True, away, np.inf)
             for a in range(3):
-                found[i, k, a] = positions[i, a] - apart * away[a]
-    return found
+                points[i, k, a] = positions[i, a] - apart * away[a]
+    return points
 
 
 @njit(cache=True)
 def beside(rows: Array, start: Array, end: Array) -> Array:
     """Least distances of cores (m, W) from the segment between two places (3,), m, of one height: (m,), m."""
-    found = np.empty(len(rows))
+    clearance = np.empty(len(rows))
     for k in range(len(rows)):
-        found[k] = approach(rows[k], start, end, True)[0]
-    return found
+        clearance[k] = approach(rows[k], start, end, True)[0]
+    return clearance
 
 
 @njit(cache=True)
@@ -133,14 +133,12 @@ def may_be_within(rows: Array, k: int, x: float, y: float, reach: float) -> bool
 @njit(cache=True)
 def within(rows: Array, positions: Array, reach: float, planar: bool) -> npt.NDArray[np.bool_]:
     """Which outlines (m, W) have a core within `reach`, m, of each of n positions (n, 3), m: (n, m)."""
-    found, away = np.empty((len(positions), len(rows)), dtype=np.bool_), np.empty(3)
+    near, away = np.empty((len(positions), len(rows)), dtype=np.bool_), np.empty(3)
     for i in range(len(positions)):
         x, y, z = positions[i, 0], positions[i, 1], positions[i, 2]
         for k in range(len(rows)):
-            found[i, k] = (
-                may_be_within(rows, k, x, y, reach) and nearest(rows[k], x, y, z, planar, away, reach) <= reach
-            )
-    return found
+            near[i, k] = may_be_within(rows, k, x, y, reach) and nearest(rows[k], x, y, z, planar, away, reach) <= reach
+    return near
 
 
 @njit(cache=True)
@@ -191,12 +189,12 @@ def approach(row: Array, start: Array, end: Array, planar: bool) -> tuple[float,
         return least, at
     low, high = 0.0, 1.0
     for _ in range(90):
-        one, two = (2.0 * low + high) / 3.0, (low + 2.0 * high) / 3.0
-        d1 = nearest(row, start[0] + one * vx, start[1] + one * vy, start[2] + one * vz, planar, away, np.inf)
-        d2 = nearest(row, start[0] + two * vx, start[1] + two * vy, start[2] + two * vz, planar, away, np.inf)
+        early, late = (2.0 * low + high) / 3.0, (low + 2.0 * high) / 3.0
+        d1 = nearest(row, start[0] + early * vx, start[1] + early * vy, start[2] + early * vz, planar, away, np.inf)
+        d2 = nearest(row, start[0] + late * vx, start[1] + late * vy, start[2] + late * vz, planar, away, np.inf)
         if min(d1, d2) < least:
-            least, at = (d1, one) if d1 < d2 else (d2, two)
-        low, high = (low, two) if d1 < d2 else (one, high)
+            least, at = (d1, early) if d1 < d2 else (d2, late)
+        low, high = (low, late) if d1 < d2 else (early, high)
     return least, at
 
 
@@ -204,10 +202,10 @@ def approach(row: Array, start: Array, end: Array, planar: bool) -> tuple[float,
 def _breaks(row: Array, start: Array, vx: float, vy: float, vz: float) -> Array:
     """Shares of a straight motion between which the nearest point is on the same edge, corner or face: from 0 to 1."""
     count = int(row[COUNT])
-    found, n = np.empty(3 * count + 3), 1
-    found[0] = 0.0
+    breaks, n = np.empty(3 * count + 3), 1
+    breaks[0] = 0.0
     if vz != 0.0:
-        found[1], found[2] = (row[BASE] - start[2]) / vz, (row[TOP] - start[2]) / vz
+        breaks[1], breaks[2] = (row[BASE] - start[2]) / vz, (row[TOP] - start[2]) / vz
         n = 3
     for k in range(count if count > 1 else 0):
         i, j = CORNERS + 2 * k, CORNERS + 2 * ((k + 1) % count)
@@ -215,20 +213,20 @@ def _breaks(row: Array, start: Array, vx: float, vy: float, vz: float) -> Array:
         px, py = row[i] - start[0], row[i + 1] - start[1]
         along, across = vx * ex + vy * ey, vx * ey - vy * ex
         if along != 0.0:  # where it passes the ends of the edge
-            found[n] = (px * ex + py * ey) / along
-            found[n + 1] = found[n] + (ex * ex + ey * ey) / along
+            breaks[n] = (px * ex + py * ey) / along
+            breaks[n + 1] = breaks[n] + (ex * ex + ey * ey) / along
             n += 2
         if across != 0.0:  # where it crosses the line of the edge
-            found[n] = (px * ey - py * ex) / across
+            breaks[n] = (px * ey - py * ex) / across
             n += 1
     inner, size = np.empty(n + 1), 0
     for k in range(n):
-        if 0.0 <= found[k] < 1.0:
+        if 0.0 <= breaks[k] < 1.0:
             at = size
-            while at > 0 and inner[at - 1] > found[k]:
+            while at > 0 and inner[at - 1] > breaks[k]:
                 inner[at] = inner[at - 1]
                 at -= 1
-            inner[at] = found[k]
+            inner[at] = breaks[k]
             size += 1
     inner[size] = 1.0
     return inner[: size + 1]
@@ -237,10 +235,10 @@ def _breaks(row: Array, start: Array, vx: float, vy: float, vz: float) -> Array:
 @njit(cache=True)
 def approaches(row: Array, starts: Array, ends: Array, planar: bool) -> tuple[Array, Array]:
     """`approach` for straight motions from (T, 3) to (T, 3), m: distances, m, and shares, (T,)."""
-    found, shares = np.empty(len(starts)), np.empty(len(starts))
-    for k in range(len(found)):
-        found[k], shares[k] = approach(row, starts[k], ends[k], planar)
-    return found, shares
+    apart, shares = np.empty(len(starts)), np.empty(len(starts))
+    for k in range(len(apart)):
+        apart[k], shares[k] = approach(row, starts[k], ends[k], planar)
+    return apart, shares
 
 
 @njit(cache=True)
@@ -408,29 +406,29 @@ def clears(row: Array, reach: float, ax: float, ay: float, bx: float, by: float)
 @njit(cache=True)
 def ways_are_clear(begin: Array, end: Array, rows: Array, reach: Array) -> npt.NDArray[np.bool_]:
     """Which segments, from (K, 2) to (K, 2), m, in the plane z = 0 are `reach` (m,), m, from all cores (m, W): (K,)."""
-    found, last = np.ones(len(begin), np.bool_), 0
+    clear, last = np.ones(len(begin), np.bool_), 0
     for k in range(len(begin)):
         ax, ay, bx, by = begin[k, 0], begin[k, 1], end[k, 0], end[k, 1]
         if len(rows) > 0 and not clears(rows[last], reach[last], ax, ay, bx, by):  # what blocked the one before
-            found[k] = False
+            clear[k] = False
             continue
         for m in range(len(rows)):
             if not clears(rows[m], reach[m], ax, ay, bx, by):
-                found[k], last = False, m
+                clear[k], last = False, m
                 break
-    return found
+    return clear
 
 
 @njit(cache=True)
 def in_the_way(begin: Array, end: Array, more: Array, rows: Array, reach: Array) -> npt.NDArray[np.bool_]:
     """Which cores (m, W) are nearer than `reach` (m,), m, and `more` (K,), m, to one of K segments: (m,)."""
-    found = np.zeros(len(rows), np.bool_)
+    blocking = np.zeros(len(rows), np.bool_)
     for m in range(len(rows)):
         for k in range(len(begin)):
             if not clears(rows[m], reach[m] + more[k], begin[k, 0], begin[k, 1], end[k, 0], end[k, 1]):
-                found[m] = True
+                blocking[m] = True
                 break
-    return found
+    return blocking
 
 
 @njit(cache=True)
@@ -463,11 +461,11 @@ def arcs_are_covered(
         if not fill:
             count = np.cumsum(count)
             near = np.empty(count[-1], np.int64)
-    found = np.empty(len(centres), np.bool_)
+    covered = np.empty(len(centres), np.bool_)
     for k in range(len(centres)):  # by now, `count` has the index after the last outline near each circle
         some = near[count[k - 1] if k > 0 else 0 : count[k]]
-        found[k] = _is_covered(centres[k], radii[k], begin[k], sweep[k], rows, reach, some)
-    return found
+        covered[k] = _is_covered(centres[k], radii[k], begin[k], sweep[k], rows, reach, some)
+    return covered
 
 
 @njit(cache=True)

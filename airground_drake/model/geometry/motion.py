@@ -28,7 +28,6 @@ class Motion:
     _slopes: Array = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        """Check and freeze the arrays."""
         times, positions = read_only(self.times), read_only(self.positions)
         if times.ndim != 1 or len(times) == 0 or positions.shape != (len(times), 3):
             raise ValueError(f"a motion needs times (M,) and positions (M, 3), got {times.shape}, {positions.shape}")

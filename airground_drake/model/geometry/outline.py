@@ -38,51 +38,50 @@ NOWHERE_M = 1e150  # coordinates of an obstacle that is not there: beyond any ra
 def balls(centres: ArrayLike, radii: ArrayLike = 0.0, gap: float = 0.0) -> Array:
     """The outlines of balls about centres (m, 3), m; radii (m,), m, or one for all; with the default, points."""
     places = np.asarray(centres, dtype=np.float64).reshape(-1, 3)
-    found = np.zeros((len(places), CORNERS + 2))
-    found[:, GAP], found[:, RADIUS], found[:, COUNT] = gap, radii, 1.0
-    found[:, BASE] = found[:, TOP] = places[:, 2]
-    found[:, MIDDLE:EXTENT] = found[:, CORNERS:] = places[:, :2]
-    return found
+    rows = np.zeros((len(places), CORNERS + 2))
+    rows[:, GAP], rows[:, RADIUS], rows[:, COUNT] = gap, radii, 1.0
+    rows[:, BASE] = rows[:, TOP] = places[:, 2]
+    rows[:, MIDDLE:EXTENT] = rows[:, CORNERS:] = places[:, :2]
+    return rows
 
 
 def prism(corners: ArrayLike, *, base: float = 0.0, top: float = 0.0, radius: float = 0.0, gap: float = 0.0) -> Array:
     """The outline of the convex hull of corners (n, 2), m, from one height to another, m."""
     # corners: of a convex polygon, in order and counter-clockwise; two for a wall, one for a post.
     places = np.asarray(corners, dtype=np.float64).reshape(1, -1, 2)
-    found: Array = prisms(places, base=base, top=top, radius=radius, gap=gap)[0]
-    return found
+    return np.asarray(prisms(places, base=base, top=top, radius=radius, gap=gap)[0])
 
 
 def prisms(corners: Array, *, base: float = 0.0, top: float = 0.0, radius: float = 0.0, gap: float = 0.0) -> Array:
     """The outlines, (m, W), of the convex hulls of corners (m, n, 2), m; see `prism`."""
     number, count, _ = corners.shape
-    found = np.empty((number, CORNERS + 2 * count))
-    found[:, :MIDDLE] = gap, radius, 0.0, base, top, count
+    rows = np.empty((number, CORNERS + 2 * count))
+    rows[:, :MIDDLE] = gap, radius, 0.0, base, top, count
     middle = 0.5 * (corners.min(axis=1) + corners.max(axis=1))
-    found[:, MIDDLE:EXTENT] = middle
+    rows[:, MIDDLE:EXTENT] = middle
     apart = corners - middle[:, None]
-    found[:, EXTENT] = np.hypot(apart[..., 0], apart[..., 1]).max(axis=1) * (1.0 + 1e-15)
-    found[:, CORNERS:] = corners.reshape(number, 2 * corners.shape[1])
-    return found
+    rows[:, EXTENT] = np.hypot(apart[..., 0], apart[..., 1]).max(axis=1) * (1.0 + 1e-15)
+    rows[:, CORNERS:] = corners.reshape(number, 2 * corners.shape[1])
+    return rows
 
 
 def stacked(rows: Iterable[ArrayLike]) -> Array:
     """Outlines as one array (m, W), padded with zeros; m may be 0."""
     given = [np.asarray(row, dtype=np.float64) for row in rows]
-    found = np.zeros((len(given), max((len(row) for row in given), default=CORNERS + 2)))
-    for row, outline in zip(found, given, strict=True):
+    padded = np.zeros((len(given), max((len(row) for row in given), default=CORNERS + 2)))
+    for row, outline in zip(padded, given, strict=True):
         row[: len(outline)] = outline
-    return found
+    return padded
 
 
 def joined(*parts: Array) -> Array:
     """Arrays of outlines one after the other, padded to the same width."""
-    found = np.zeros((sum(map(len, parts)), max(part.shape[1] for part in parts)))
+    rows = np.zeros((sum(map(len, parts)), max(part.shape[1] for part in parts)))
     begin = 0
     for part in parts:
-        found[begin : begin + len(part), : part.shape[1]] = part
+        rows[begin : begin + len(part), : part.shape[1]] = part
         begin += len(part)
-    return found
+    return rows
 
 
 def as_tuple(row: Array) -> tuple[float, ...]:
@@ -92,17 +91,17 @@ def as_tuple(row: Array) -> tuple[float, ...]:
 
 def is_among(one: Array, other: Array) -> npt.NDArray[np.bool_]:
     """Whether each outline of one array, (m, W), has the same core as one of another, (k, V): (m,)."""
-    found = np.zeros(len(one), dtype=bool)
+    among = np.zeros(len(one), dtype=bool)
     if not (len(one) and len(other)):
-        return found
+        return among
     both = joined(one, other)[:, BASE:]
     mine, theirs = both[: len(one)], both[len(one) :]
     theirs = theirs[np.argsort(theirs[:, MIDDLE - BASE])]
     begin, end = np.searchsorted(theirs[:, MIDDLE - BASE], mine[:, MIDDLE - BASE] + [[-2.0 * SAME_M], [2.0 * SAME_M]])
     for index in np.flatnonzero(begin < end):
         some = theirs[begin[index] : end[index]]
-        found[index] = np.all(np.abs(some - mine[index]) <= SAME_M, axis=1).any()
-    return found
+        among[index] = np.all(np.abs(some - mine[index]) <= SAME_M, axis=1).any()
+    return among
 
 
 def are_outlines(rows: Array) -> npt.NDArray[np.bool_]:
@@ -110,28 +109,22 @@ def are_outlines(rows: Array) -> npt.NDArray[np.bool_]:
     if rows.ndim != 2 or rows.shape[1] < CORNERS + 2:
         return np.zeros(len(rows), dtype=bool)
     count = rows[:, COUNT]
-    found: npt.NDArray[np.bool_] = np.logical_and.reduce([
+    sound: npt.NDArray[np.bool_] = np.logical_and.reduce([
         np.isfinite(rows).all(axis=1), (rows[:, [GAP, RADIUS, SPEED, EXTENT]] >= 0.0).all(axis=1),
         rows[:, BASE] <= rows[:, TOP], count >= 1.0, count == np.floor(count), CORNERS + 2.0 * count <= rows.shape[1],
     ])  # fmt: skip
-    for number in np.unique(count[found]).astype(int):
-        some = np.flatnonzero(found & (count == number))
+    for number in np.unique(count[sound]).astype(int):
+        some = np.flatnonzero(sound & (count == number))
         corners = rows[some, CORNERS : CORNERS + 2 * number].reshape(len(some), number, 2)
         before, after = corners - np.roll(corners, 1, axis=1), np.roll(corners, -1, axis=1) - corners
         turns = before[..., 0] * after[..., 1] - before[..., 1] * after[..., 0]
         apart = corners - rows[some, None, MIDDLE:EXTENT]
         reach = np.hypot(apart[..., 0], apart[..., 1]).max(axis=1)
-        round_once = (number < 3) | (np.abs(_turned(before, after) - 2.0 * np.pi) < 1.0)
+        turned = np.arctan2(turns, (before * after).sum(axis=2)).sum(axis=1)
+        round_once = (number < 3) | (np.abs(turned - 2.0 * np.pi) < 1.0)
         distinct = (number == 1) | (np.linalg.norm(after, axis=2) > 0.0).all(axis=1)
-        found[some] = (turns >= 0.0).all(axis=1) & round_once & distinct & (reach <= rows[some, EXTENT])
-    return found
-
-
-def _turned(before: Array, after: Array) -> Array:
-    """By how much ways along edges (k, n, 2) turn left in all, (k,), rad."""
-    across = before[..., 0] * after[..., 1] - before[..., 1] * after[..., 0]
-    found: Array = np.arctan2(across, (before * after).sum(axis=2)).sum(axis=1)
-    return found
+        sound[some] = (turns >= 0.0).all(axis=1) & round_once & distinct & (reach <= rows[some, EXTENT])
+    return sound
 
 
 def corners_of(row: Array) -> Array:
@@ -141,8 +134,7 @@ def corners_of(row: Array) -> Array:
 
 def keep(rows: Array, radius: float) -> Array:
     """Distances that the centre of a robot with a radius, m, keeps from the cores of outlines (m, W): (m,), m."""
-    found: Array = rows[:, GAP] + (radius + rows[:, RADIUS])
-    return found
+    return np.asarray(rows[:, GAP] + (radius + rows[:, RADIUS]))
 
 
 def box(rows: Array) -> tuple[Array, Array]:
@@ -155,14 +147,14 @@ def box(rows: Array) -> tuple[Array, Array]:
 
 def moved(rows: Array, by: Array) -> Array:
     """Outlines (m, W), each moved by its vector, (m, 3) or one for all, m."""
-    found, shift = rows.copy(), np.broadcast_to(by, (len(rows), 3))
-    found[:, BASE] += shift[:, 2]
-    found[:, TOP] += shift[:, 2]
-    found[:, MIDDLE:EXTENT] += shift[:, :2]
+    shifted, shift = rows.copy(), np.broadcast_to(by, (len(rows), 3))
+    shifted[:, BASE] += shift[:, 2]
+    shifted[:, TOP] += shift[:, 2]
+    shifted[:, MIDDLE:EXTENT] += shift[:, :2]
     for k in range(int(rows[:, COUNT].max(initial=0.0))):
         there = rows[:, COUNT] > k
-        found[there, CORNERS + 2 * k : CORNERS + 2 * k + 2] += shift[there, :2]
-    return found
+        shifted[there, CORNERS + 2 * k : CORNERS + 2 * k + 2] += shift[there, :2]
+    return shifted
 
 
 def where(there: npt.NDArray[np.bool_], rows: Array) -> Array:
@@ -179,9 +171,9 @@ def sections(rows: Array, distance: Array | float, height: float) -> tuple[Array
     reach = np.broadcast_to(distance, len(rows))
     squared = np.square(reach) - np.square(above)
     near = squared > 0.0
-    found = rows[near]
-    found[:, BASE] = found[:, TOP] = 0.0
-    return found, np.sqrt(squared[near])
+    flat = rows[near]
+    flat[:, BASE] = flat[:, TOP] = 0.0
+    return flat, np.sqrt(squared[near])
 
 
 def rim(row: Array, distance: float, rays: int = 16) -> Array:
@@ -192,9 +184,9 @@ def rim(row: Array, distance: float, rays: int = 16) -> Array:
         return np.asarray(corners[0] + distance * np.column_stack([np.cos(turn), np.sin(turn)]))
     edges = np.roll(corners, -1, axis=0) - corners
     heading = np.arctan2(-edges[:, 0], edges[:, 1])  # of the outward normals
-    found = []
+    arcs = []
     for k, corner in enumerate(corners):
         sweep = (heading[k] - heading[k - 1]) % (2.0 * np.pi)
         turn = heading[k - 1] + sweep * np.linspace(0.0, 1.0, max(2, int(rays * sweep / np.pi)))
-        found.append(corner + distance * np.column_stack([np.cos(turn), np.sin(turn)]))
-    return np.concatenate(found)
+        arcs.append(corner + distance * np.column_stack([np.cos(turn), np.sin(turn)]))
+    return np.concatenate(arcs)

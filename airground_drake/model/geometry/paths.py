@@ -275,9 +275,9 @@ class _Obstacles:
 
 def _flat(rows: Array) -> Array:
     """Outlines (m, W) at height 0."""
-    found = rows.copy()
-    found[:, BASE] = found[:, TOP] = 0.0
-    return found
+    flat_rows = rows.copy()
+    flat_rows[:, BASE] = flat_rows[:, TOP] = 0.0
+    return flat_rows
 
 
 def _places(points: Points) -> Array:
@@ -373,9 +373,9 @@ def _escape(p: complex, around: _Obstacles) -> complex:
     reach = 2.0 * float(max(around.r.max(initial=0.0), around.keep.max(initial=0.0)))
     while True:  # as far as it reaches, the obstacles that do, too, are the union
         near = depth <= reach
-        found = _exit(p, around.some(near))
-        if abs(found - p) <= reach or near.all():
-            return found
+        free = _exit(p, around.some(near))
+        if abs(free - p) <= reach or near.all():
+            return free
         reach *= 2.0
 
 
@@ -403,7 +403,7 @@ def _tangents(c: Points, r: Array, ways: Points) -> tuple[Points, Points, NDArra
     # (2, m), lead to its other side.
     i, j = np.triu_indices(len(r), 1)
     apart = abs(c[j] - c[i])
-    found = []
+    tangents = []
     for side, turn in ((1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0)):  # side: 1 outer tangent, -1 inner
         k = r[i] - side * r[j]
         real = (apart >= abs(k) - _EPS) & (apart > 0.0)
@@ -416,8 +416,8 @@ def _tangents(c: Points, r: Array, ways: Points) -> tuple[Points, Points, NDArra
         inside = (normal * ways[:, f].conj()).real > _EPS, (side * normal * ways[:, g].conj()).real > _EPS
         out = ~(inside[0] | inside[1]).any(axis=0)
         f, g, normal = f[out], g[out], normal[out]
-        found.append((c[f] + r[f] * normal, c[g] + side * r[g] * normal, np.array((f, g))))
-    a, b, on = zip(*found, strict=True)
+        tangents.append((c[f] + r[f] * normal, c[g] + side * r[g] * normal, np.array((f, g))))
+    a, b, on = zip(*tangents, strict=True)
     return np.concatenate(a), np.concatenate(b), np.concatenate(on, axis=1)
 
 

@@ -55,13 +55,13 @@ def are_separated(p: Array, q: Array, rows: Array, keep: Array) -> bool:
 @njit(cache=True)
 def _inner_points(rows: Array) -> Array:
     """A point of each core, (m, 2), m."""
-    found = np.zeros((len(rows), 2))
+    points = np.zeros((len(rows), 2))
     for k in range(len(rows)):
         count = int(rows[k, COUNT])
         for c in range(count):
-            found[k, 0] += rows[k, CORNERS + 2 * c] / count
-            found[k, 1] += rows[k, CORNERS + 2 * c + 1] / count
-    return found
+            points[k, 0] += rows[k, CORNERS + 2 * c] / count
+            points[k, 1] += rows[k, CORNERS + 2 * c + 1] / count
+    return points
 
 
 @njit(cache=True)

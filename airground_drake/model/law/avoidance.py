@@ -91,15 +91,15 @@ class Avoidance:
     def half_spaces(self, positions: Array, near: Neighbours) -> HalfSpaces:
         """Constraints of k robots when all bodies that move are at positions (M, 3) m."""
         count = near.distance.shape[1]
-        found = HalfSpaces(np.zeros((len(near.members), count, 3)), np.full((len(near.members), count), -np.inf))
+        half_spaces = HalfSpaces(np.zeros((len(near.members), count, 3)), np.full((len(near.members), count), -np.inf))
         which, normal, (bound, retreat) = np.empty(count, dtype=np.intp), np.empty((count, 3)), np.empty((2, count))
         around = near.still, near.parts, near.carrier
         for i, member in enumerate(near.members):
             own = positions[member], near.mobility[i], *around, near.others[i], positions
             given = near.distance[i], near.share[i], self.layer, which, normal, bound, retreat
             k = kernels.fill_half_spaces(*own, *given)
-            found.normal[i, which[:k]], found.bound[i, which[:k]] = normal[:k], bound[:k]
-        return found
+            half_spaces.normal[i, which[:k]], half_spaces.bound[i, which[:k]] = normal[:k], bound[:k]
+        return half_spaces
 
     def apply(self, lower: Array, spaces: HalfSpaces) -> Array:
         """Put the avoidance tasks above lower-priority velocities: (n, 3) m/s to (n, 3) m/s."""

@@ -124,11 +124,11 @@ def avoid_one(lower: Array, normal: Array, bound: Array, composition: int) -> Ar
     else:
         return lower.copy()
     if composition == AUGMENTED:
-        found = _closest_feasible(lower, normal, bound)
-        speed = _dot(found, found)
-        found = _scale_back(found, normal, bound)
-        if _dot(found, found) >= 1e-6 * speed or speed < CONTRADICTION_M_S:
-            return found
+        velocity = _closest_feasible(lower, normal, bound)
+        speed = _dot(velocity, velocity)
+        velocity = _scale_back(velocity, normal, bound)
+        if _dot(velocity, velocity) >= 1e-6 * speed or speed < CONTRADICTION_M_S:
+            return velocity
         # between two bodies that it touches no margin fits: the exact bounds, which let it slide along
         touched = bound.copy()
         for k in range(len(bound)):
@@ -136,9 +136,9 @@ def avoid_one(lower: Array, normal: Array, bound: Array, composition: int) -> Ar
                 touched[k] = np.minimum(bound[k], 0.0)
         exactly, missed = _closest(lower, normal, touched, CONTRADICTION_M_S)
         if missed > 0.0:
-            return found
+            return velocity
         exactly = _scale_back(exactly, normal, bound)
-        return exactly if _dot(exactly, exactly) > _dot(found, found) else found
+        return exactly if _dot(exactly, exactly) > _dot(velocity, velocity) else velocity
     return _recursion(lower, normal, bound, composition == RECURSION_NEAREST)
 
 
@@ -153,9 +153,9 @@ def yielding(task: Array, normal: Array, retreat: Array, max_speed: float) -> Ar
     bound = np.empty(len(retreat))
     for k in range(len(retreat)):
         bound[k] = retreat[k] if retreat[k] > 0.0 else -np.inf
-    found = avoid_one(task, normal, bound, AUGMENTED)
-    limit_one(found, max_speed)
-    return found
+    velocity = avoid_one(task, normal, bound, AUGMENTED)
+    limit_one(velocity, max_speed)
+    return velocity
 
 
 @njit(cache=True)
@@ -328,7 +328,7 @@ def _squared(vectors: Array, k: int) -> float:
 @njit(cache=True)
 def _most_missed(velocity: Array, normal: Array, bound: Array, settled: npt.NDArray[np.bool_]) -> int:
     """Index of the constraint that is missed most, by more than rounding, among those not settled; -1 without one."""
-    found, worst = -1, 0.0
+    missed_most, worst = -1, 0.0
     for k in range(len(bound)):
         missed = _missed(velocity, normal, bound, k)
         if missed > worst and not settled[k]:
@@ -336,8 +336,8 @@ def _most_missed(velocity: Array, normal: Array, bound: Array, settled: npt.NDAr
             for a in range(len(velocity)):
                 terms += abs(normal[k, a] * velocity[a])
             if missed > ROUNDING * terms:
-                found, worst = k, missed
-    return found
+                missed_most, worst = k, missed
+    return missed_most
 
 
 @njit(cache=True)

@@ -114,10 +114,10 @@ class UgvLaw:
         count = len(target)
         executing, chosen = np.zeros(count, dtype=np.bool_), np.zeros((count, 3, 3))
         wanted, wanted_rate = np.zeros((2, count, 3))
-        for i, one in enumerate(asked):
-            if one is not None:
+        for i, motion in enumerate(asked):
+            if motion is not None:
                 executing[i] = True
-                wanted[i], wanted_rate[i], chosen[i] = one
+                wanted[i], wanted_rate[i], chosen[i] = motion
         every = AcceptedMotion(wanted, wanted_rate, chosen)
         headings, steering = (np.zeros(count), np.zeros((count, NUMBERS))) if steered is None else steered
         track = Tracking(target, rate)

@@ -49,7 +49,6 @@ class Trigger:
     dwell: float
 
     def __post_init__(self) -> None:
-        """Check the parameters."""
         if not (self.zeta > 0.0 and self.release <= self.zeta and self.dwell >= 0.0):
             raise ValueError(f"a trigger needs zeta > 0, release <= zeta and dwell >= 0, got {self}")
 

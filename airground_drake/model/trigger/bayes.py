@@ -11,22 +11,14 @@ import math
 
 
 def decision_time(zeta: float, drift: float, noise: float, deviation: float = 0.0) -> float:
-    """Mean time to reach +-zeta from `deviation`, (17), s.
-
-    Raises:
-        ValueError: if zeta, drift or noise is not positive, or |deviation| >= zeta.
-    """
+    """Mean time to reach +-zeta from `deviation`, (17), s; |deviation| < zeta, or ValueError."""
     _check(zeta, drift, noise, deviation)
     time = zeta / drift * math.tanh(zeta * drift / noise**2)
     return time + 2.0 * zeta / drift * _bias(zeta, drift, noise, deviation) - deviation / drift
 
 
 def error_rate(zeta: float, drift: float, noise: float, deviation: float = 0.0) -> float:
-    """Probability to reach -zeta first from `deviation`, (18).
-
-    Raises:
-        ValueError: if zeta, drift or noise is not positive, or |deviation| >= zeta.
-    """
+    """Probability to reach -zeta first from `deviation`, (18); |deviation| < zeta, or ValueError."""
     _check(zeta, drift, noise, deviation)
     unbiased = 0.5 * (1.0 - math.tanh(zeta * drift / noise**2))
     return unbiased - _bias(zeta, drift, noise, deviation)
@@ -38,11 +30,7 @@ def bayes_risk(zeta: float, drift: float, noise: float, c1: float, c2: float, de
 
 
 def optimal_threshold(drift: float, noise: float, c1: float, c2: float) -> float:
-    """Threshold, m, that minimises the Bayes risk without initial deviation: (19) with c2/c1 on the right.
-
-    Raises:
-        ValueError: if an argument is not positive and finite.
-    """
+    """Threshold, m, that minimises the Bayes risk without initial deviation: (19) with c2/c1 on the right."""
     for name, value in {"drift": drift, "noise": noise, "c1": c1, "c2": c2}.items():
         if not (math.isfinite(value) and value > 0.0):
             raise ValueError(f"{name} must be positive and finite, got {value!r}")

@@ -26,11 +26,11 @@ SUPERVISING, INTERVENING = 0, 1  # modes of `model.trigger.automaton.Mode`, as n
 def extremes(before: Array, after: Array, ends: Array) -> Array:
     """Least and largest x over a step, (2, n), m; `before` (n, 4), m."""
     # after: the same at its end, (n, 4); both are linear in between.
-    found = np.empty((2, len(before)))
+    extreme = np.empty((2, len(before)))
     for j in range(len(before)):
         x, y, z, n = before[j]
         dx, dy, dz, dn = after[j, 0] - x, after[j, 1] - y, after[j, 2] - z, after[j, 3] - n
-        found[0, j], found[1, j] = min(ends[0, j], ends[1, j]), max(ends[0, j], ends[1, j])
+        extreme[0, j], extreme[1, j] = min(ends[0, j], ends[1, j]), max(ends[0, j], ends[1, j])
         length = np.sqrt(dx * dx + dy * dy + dz * dz)
         if abs(dn) >= length:  # monotone, or at rest
             continue
@@ -41,8 +41,8 @@ def extremes(before: Array, after: Array, ends: Array) -> Array:
         aside = np.sqrt(cx * cx + cy * cy + cz * cz)
         travelled = -slope * aside / level - along
         if 0.0 < travelled < length:
-            found[0, j] = min(found[0, j], aside * level - slope * along + n)
-    return found
+            extreme[0, j] = min(extreme[0, j], aside * level - slope * along + n)
+    return extreme
 
 
 @njit(cache=True)
@@ -52,8 +52,8 @@ def norm(x: float, y: float, z: float) -> float:
     if not 0.0 < largest < np.inf:
         return largest
     square, low = 0.0, 0.0
-    for each in (x, y, z):
-        high, rest = _squared(each)
+    for component in (x, y, z):
+        high, rest = _squared(component)
         both = square + high
         part = both - square
         low += rest + ((square - (both - part)) + (high - part))

@@ -184,7 +184,7 @@ def _method_b(direct: Trace, gated: Trace) -> Item:
     """Item 23: method (b) with a gatekeeper, as in section 5.1, is method (c)."""
     answer, traces = gated.decisions.iloc[0], {"without": direct, "with": gated}
     nearest = {name: closest_obstacle(trace, "ugv1") for name, trace in traces.items()}
-    least = {name: round(found.value_m, 9) if found else None for name, found in nearest.items()}
+    least = {name: round(closest.value_m, 9) if closest else None for name, closest in nearest.items()}
     triggers = {name: MEASURES["trigger_time"](trace, "ugv1") for name, trace in traces.items()}
     return item(
         23, "section 5, Figures 6 and 10",

@@ -64,7 +64,7 @@ def _feed_forward(scenario: Scenario) -> Item:
         "(6) feeds forward the rate of the task itself, sigma_m, instead of the desired sigma_md. With J = I it reads "
         "v = v + B error. No velocity satisfies that unless the error is 0.",
         "v = J^+ (d(sigma_m)/dt + B error)", "v = J^+ (d(sigma_md)/dt + B error)",
-        solutions == [0.0] and [len(found) for found in velocities.values()] == [0, 1],
+        solutions == [0.0] and [len(values) for values in velocities.values()] == [0, 1],
         {
             "solutions_for_the_error": [f"{solution:g}" for solution in solutions], "error_m": error,
             "gain_1_s": gain, "desired_rate_m_s": rate, "velocities_m_s": velocities,

@@ -79,16 +79,15 @@ def literal_rule() -> Item:
         trace, predictions = simulate(scenario, "c_literal")
         literal[name], ours[name] = taken_back(trace), taken_back(simulate(scenario, "c")[0])
         settings[name] = scenario.runs["c_literal"].set
-        table |= {
-            f"{name}, {each.decision.t:.2f} s": variants(each.problem, each.loop) for each in _changes(predictions)
-        }
-    back = {name: each[0] for name, each in literal.items() if each}
+        for change in _changes(predictions):
+            table[f"{name}, {change.decision.t:.2f} s"] = variants(change.problem, change.loop)
+    back = {name: taken[0] for name, taken in literal.items() if taken}
     costs = "; ".join(
-        f"{name}: share {each['first_share']:.3f}, cost of accepting throughout {each['accept_throughout']:.2f}, of "
-        f"refusing {each['refuse_throughout']:.2f}" for name, each in back.items()
+        f"{name}: share {first['first_share']:.3f}, cost of accepting throughout {first['accept_throughout']:.2f}, of "
+        f"refusing {first['refuse_throughout']:.2f}" for name, first in back.items()
     )  # fmt: skip
     differ = {
-        variant: sum(found[variant]["answer"] != found[AS_RUN]["answer"] for found in table.values())
+        variant: sum(answers[variant]["answer"] != answers[AS_RUN]["answer"] for answers in table.values())
         for variant in (OTHER_START, AT_THE_PLAN)
     }
     return item(
@@ -102,12 +101,13 @@ def literal_rule() -> Item:
         "cheaper constant plan, and the velocities of (23) are those along the two constant plans. If the search "
         f"starts at the dearer one, {differ[OTHER_START]} of {len(table)} answers change; with velocities where the "
         f"plan leads, {differ[AT_THE_PLAN]}. The finding holds for our weights and speeds; the paper gives none.",
-        {"acceptances_taken_back": [len(each) for each in literal.values()]},
-        {"acceptances_taken_back": [len(each) for each in ours.values()]},
-        len(back) == len(literal) and not any(ours.values()) and all(each["lasts_s"] < 0.1 for each in back.values()),
+        {"acceptances_taken_back": [len(taken) for taken in literal.values()]},
+        {"acceptances_taken_back": [len(taken) for taken in ours.values()]},
+        len(back) == len(literal) and not any(ours.values()) and all(first["lasts_s"] < 0.1 for first in back.values()),
         {
             "answers_by_open_choice": {
-                f"{decision}, {variant}": told for decision, found in table.items() for variant, told in found.items()
+                f"{decision}, {variant}": answer
+                for decision, answers in table.items() for variant, answer in answers.items()
             }, "taken_back": back,
             "runs": "c_literal and c of case_a (18 s) and case_b (16 s)", "figures": "by reading", "literal": settings,
         },
@@ -118,32 +118,32 @@ def taken_back(trace: Trace) -> list[dict[str, Any]]:
     """Acceptances that were refused at the next sample, on the same proposal, with the costs (25) and what followed."""
     decisions = trace.decisions.sort_values("t_s", kind="stable")
     messages = trace.messages[trace.messages["kind"] == "withdrawal"]
-    found = []
+    taken = []
     for number, about in decisions.groupby("number"):
         rows = about.to_dict("records")
         for before, after in pairwise(rows):
             if (before["decision"], after["decision"]) != ("accept", "refuse"):
                 continue
             again = [row["t_s"] for row in rows if row["t_s"] > after["t_s"] and row["decision"] == "accept"]
-            found.append({
+            taken.append({
                 "t_s": after["t_s"], "first_share": after["relaxed_first_stage"],
                 "accept_throughout": after["accept_throughout"], "refuse_throughout": after["refuse_throughout"],
                 "lasts_s": min(again, default=np.inf) - after["t_s"],
                 "withdrawn_s": messages.loc[messages["about"] == number, "sent_s"].min(),
             })  # fmt: skip
-    return found
+    return taken
 
 
 def _changes(predictions: Sequence[Prediction]) -> list[Prediction]:
     """The first decision on each proposal, and those that change the answer, up to the first that takes one back."""
-    found = [*predictions[:1]]
-    for before, each in pairwise(predictions):
-        same = before.decision.proposal is each.decision.proposal
-        if not same or before.decision.accepted != each.decision.accepted:
-            found.append(each)
-        if same and before.decision.accepted and not each.decision.accepted:
+    changes = [*predictions[:1]]
+    for before, prediction in pairwise(predictions):
+        same = before.decision.proposal is prediction.decision.proposal
+        if not same or before.decision.accepted != prediction.decision.accepted:
+            changes.append(prediction)
+        if same and before.decision.accepted and not prediction.decision.accepted:
             break
-    return found
+    return changes
 
 
 def variants(problem: Problem, loop: ClosedLoop) -> dict[str, dict[str, Any]]:
@@ -153,14 +153,14 @@ def variants(problem: Problem, loop: ClosedLoop) -> dict[str, dict[str, Any]]:
     # - `velocities at the plan`: those of the closed loop where the plan leads; the search starts as in the run.
     plans, route = ConstantPlans.of(problem), NonlinearRoute()
     dearer = plans.refuse if plans.better is plans.accept else plans.accept
-    found: dict[str, dict[str, Any]] = {}
+    told: dict[str, dict[str, Any]] = {}
     for name, start in ((AS_RUN, plans.better), (OTHER_START, dearer)):
         omega, _ = route.relax(problem, start, Budget())
-        found[name] = {"answer": "the solver failed"}
+        told[name] = {"answer": "the solver failed"}
         if omega is not None:
-            found[name] = _told(omega, problem.evaluate(omega).objective)
+            told[name] = _told(omega, problem.evaluate(omega).objective)
     omega = at_the_plan(problem, loop, plans.better.omega)
-    return found | {AT_THE_PLAN: _told(omega, cost_at_the_plan(problem, loop, omega))}
+    return told | {AT_THE_PLAN: _told(omega, cost_at_the_plan(problem, loop, omega))}
 
 
 def _told(omega: Array, cost: float) -> dict[str, Any]:
@@ -170,11 +170,11 @@ def _told(omega: Array, cost: float) -> dict[str, Any]:
 
 def at_the_plan(problem: Problem, loop: ClosedLoop, start: Array) -> Array:
     """A local optimum (N,) of (27) with the velocities of (23) where the plan leads."""
-    found = minimize(
+    minimum = minimize(
         lambda omega: cost_at_the_plan(problem, loop, omega), start, method="SLSQP",
         bounds=[(0.0, 1.0)] * len(start), options={"maxiter": ITERATIONS},
     )  # fmt: skip
-    return np.asarray(found.x).clip(0.0, 1.0)
+    return np.asarray(minimum.x).clip(0.0, 1.0)
 
 
 def cost_at_the_plan(problem: Problem, loop: ClosedLoop, omega: Array) -> float:

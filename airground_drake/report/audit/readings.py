@@ -21,13 +21,13 @@ def _intervention_rate(scenario: Scenario) -> Item:
     """Item 19: with (13), (14) has a solution only if the error is 0, and then it has many."""
     gain, error = scenario.control.intervention_gain_1_s, 1.0
     tasks = {"J = I": np.eye(3), "J = one row": np.array([[0.0, 1.0, 0.0]])}
-    found = {}
+    by_task = {}
     for name, jacobian in tasks.items():
         inverse = np.linalg.pinv(jacobian)
         left = np.eye(3) - inverse @ jacobian  # v = J^+ (J v + gain e), so (I - J^+ J) v = gain J^+ e
         right = gain * inverse @ np.full(len(jacobian), error)
         best = np.linalg.lstsq(left, right, rcond=None)[0]
-        found[name] = {
+        by_task[name] = {
             "least_residual_m_s": float(np.linalg.norm(left @ best - right)),
             "free_dimensions_without_error": int(3 - np.linalg.matrix_rank(left)),
         }
@@ -38,8 +38,8 @@ def _intervention_rate(scenario: Scenario) -> Item:
         "along the task does. Besides, (12) makes the desired task a function of the UGV's own position, so the error "
         "is 0. The paper must mean a desired position with its own rate.",
         "v_int = J^+ (J v_int + gain error)", "v_int = J^+ (d(sigma_d)/dt + gain error)",
-        all(each["least_residual_m_s"] > 0.1 and each["free_dimensions_without_error"] > 0 for each in found.values()),
-        {"gain_1_s": gain, "error_m": error, "by_task": found, "(12)": "by reading"},
+        all(row["least_residual_m_s"] > 0.1 and row["free_dimensions_without_error"] > 0 for row in by_task.values()),
+        {"gain_1_s": gain, "error_m": error, "by_task": by_task, "(12)": "by reading"},
     )  # fmt: skip
 
 

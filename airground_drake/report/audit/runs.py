@@ -36,10 +36,10 @@ def _recursion(scenario: Scenario, traces: Mapping[str, Trace]) -> Item | None:
     evidence: dict[str, dict[str, Any]] = {}
     for name in compared:
         trace = traces[name]
-        found = [near for robot in trace.ugvs if (near := closest_obstacle(trace, robot))]
-        if not found:
+        nearest_of = [near for robot in trace.ugvs if (near := closest_obstacle(trace, robot))]
+        if not nearest_of:
             return None
-        nearest = min(found, key=lambda near: (near.value_m, near.t_s))
+        nearest = min(nearest_of, key=lambda near: (near.value_m, near.t_s))
         evidence[name] = {
             "composition": scenario.runs[name].composition,
             "robot": nearest.robot,

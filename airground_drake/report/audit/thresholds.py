@@ -38,11 +38,11 @@ def threshold_findings(scenario: Scenario, proofs: Mapping[str, Finding]) -> lis
 
 def _upside_down(proofs: Mapping[str, Finding]) -> Item:
     """Item 2: the minimiser of (16), found without any derivative, against both roots of (19)."""
-    found = minimize_scalar(lambda z: bayes_risk(z, DRIFT, NOISE, C1, C2), bounds=(1e-6, 5.0), options={"xatol": 1e-12})
+    least = minimize_scalar(lambda z: bayes_risk(z, DRIFT, NOISE, C1, C2), bounds=(1e-6, 5.0), options={"xatol": 1e-12})
     ours, printed = optimal_threshold(DRIFT, NOISE, C1, C2), optimal_threshold(DRIFT, NOISE, C2, C1)
     risk = {name: bayes_risk(z, DRIFT, NOISE, C1, C2) for name, z in (("ours", ours), ("printed", printed))}
     proof = status(proofs, rules.LEAST_RISK)
-    shown = abs(found.x - ours) < 1e-6 and risk["printed"] > risk["ours"] and proof == "proved"
+    shown = abs(least.x - ours) < 1e-6 and risk["printed"] > risk["ours"] and proof == "proved"
     return item(
         2, "(19)",
         "The right-hand side of (19) is inverted: the Bayes risk (16) is least where the left-hand side is c2/c1.",
@@ -51,7 +51,7 @@ def _upside_down(proofs: Mapping[str, Finding]) -> Item:
         shown,
         {
             "drift_m_s": DRIFT, "noise_m_sqrt_s": NOISE, "c1_1_s": C1, "c2": C2,
-            "minimiser_of_16_m": float(found.x), rules.LEAST_RISK: proof,
+            "minimiser_of_16_m": float(least.x), rules.LEAST_RISK: proof,
         },
     )  # fmt: skip
 
@@ -162,8 +162,8 @@ def _intensity(scenario: Scenario) -> Item:
 def _zeno(proofs: Mapping[str, Finding]) -> Item:
     """Item 9: the bare threshold's triggers under refinement of the noise, and the bound of ours."""
     refined = proofs[rules.REFINEMENT].to_json()["evidence"] if rules.REFINEMENT in proofs else {}
-    found = {name: status(proofs, name) for name in (rules.REFINEMENT, rules.DWELL)}
-    shown = found == {rules.REFINEMENT: "supported", rules.DWELL: "proved"}
+    statuses = {name: status(proofs, name) for name in (rules.REFINEMENT, rules.DWELL)}
+    shown = statuses == {rules.REFINEMENT: "supported", rules.DWELL: "proved"}
     return item(
         9, "(15), (20), section 6",
         "The paper leaves Zeno behaviour open. If the error is at the threshold, a bare threshold on (15) triggers "
@@ -172,7 +172,7 @@ def _zeno(proofs: Mapping[str, Finding]) -> Item:
         {"triggers": refined["bare"]["mean"] if shown else None},
         {"triggers": refined["automaton"]["mean"] if shown else None},
         shown,
-        {**found, "noise_step_s": refined.get("dt_s"), "exponents": refined.get("fit")},
+        {**statuses, "noise_step_s": refined.get("dt_s"), "exponents": refined.get("fit")},
     )  # fmt: skip
 
 
@@ -193,10 +193,10 @@ def _one_threshold() -> Item:
             "zeta_over_drift_s": zeta / drift,
         }  # fmt: skip
     shown = all(
-        math.isclose(one["time_of_two_thresholds_s"], one["time_17_s"], rel_tol=1e-4)
-        and math.isclose(one["time_of_one_threshold_s"], one["zeta_over_drift_s"], rel_tol=1e-4)
-        and one["time_17_s"] < 0.75 * one["zeta_over_drift_s"]
-        for one in table.values()
+        math.isclose(row["time_of_two_thresholds_s"], row["time_17_s"], rel_tol=1e-4)
+        and math.isclose(row["time_of_one_threshold_s"], row["zeta_over_drift_s"], rel_tol=1e-4)
+        and row["time_17_s"] < 0.75 * row["zeta_over_drift_s"]
+        for row in table.values()
     )
     ours = table[ASSUMED]
     return item(

@@ -108,9 +108,9 @@ FORMULAS: dict[int, tuple[tuple[str, ...], tuple[str, ...]]] = {
 
 def typeset(items: Iterable[Item]) -> list[dict[str, Any]]:
     """The items with their formulas (`latex`) and what a fault of the text conversion could explain (`conversion`)."""
-    found = []
+    typeset_items = []
     for item in items:
         paper, ours = FORMULAS.get(item["id"], ((), ()))
         latex = {"paper": list(paper), "ours": list(ours)}
-        found.append({**item, "latex": latex, "conversion": CONVERSION.get(item["id"], "")})
-    return found
+        typeset_items.append({**item, "latex": latex, "conversion": CONVERSION.get(item["id"], "")})
+    return typeset_items

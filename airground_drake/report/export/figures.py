@@ -79,11 +79,12 @@ def _environment(figure: Figure, names: Sequence[str], width: str, report: Repor
 def _established(claims: Sequence[str], report: Report) -> Iterator[str]:
     """A sentence per claim: what was proved, what holds in which runs, what is refuted."""
     for name in claims:
-        found: dict[str, list[str]] = {}
+        runs_by_status: dict[str, list[str]] = {}
         for claim in report.claims:
             status = outcome(claim.status, claim.exercised)
             if claim.id == name and status in (*PASSING, "refuted"):
-                found.setdefault(status, []).append(claim.run)
-        for status, runs in found.items():
-            where = f" in {'run' if len(runs) == 1 else 'runs'} {', '.join(runs)}" if any(runs) else ""
+                runs_by_status.setdefault(status, []).append(claim.run)
+        for status, runs in runs_by_status.items():
+            noun = "runs" if len(runs) > 1 else "run"
+            where = f" in {noun} {', '.join(runs)}" if any(runs) else ""
             yield f"{name} {status if status == 'holds' else f'is {status}'}{where}."

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from airground_drake.base.statuses import outcome
+from airground_drake.base.statuses import NOT_EXERCISED, outcome
 from airground_drake.report.model import Report
 
 _SPECIAL = {
     "\\": r"\textbackslash{}", "~": r"\textasciitilde{}", "^": r"\textasciicircum{}", "<": r"\textless{}",
-    ">": r"\textgreater{}", "|": r"\textbar{}", **{each: f"\\{each}" for each in "&%$#_{}"},
+    ">": r"\textgreater{}", "|": r"\textbar{}", **{character: f"\\{character}" for character in "&%$#_{}"},
     "○": r"$\circ$", "●": r"$\bullet$", "\N{MULTIPLICATION SIGN}": r"$\times$", "✖": r"$\times$", "□": r"$\square$",
     "◆": r"$\blacklozenge$", "▲": r"$\blacktriangle$", "▼": r"$\blacktriangledown$", "…": r"\ldots{}",
 }  # fmt: skip
@@ -18,18 +18,19 @@ _SPECIAL = {
 
 def escaped(text: str) -> str:
     """Text as LaTeX shows it, with the packages amssymb and booktabs; a line break becomes a space."""
-    return "".join(_SPECIAL.get(each, each) for each in " ".join(text.split()))
+    return "".join(_SPECIAL.get(character, character) for character in " ".join(text.split()))
 
 
 def verdicts(report: Report) -> str:
     """A table with a row per claim: its verdict about the model, or about each run."""
     # "not tested" stands for a verdict that nothing could have refuted.
-    found: dict[str, dict[str, str]] = {}
+    statuses_by_claim: dict[str, dict[str, str]] = {}
     for claim in report.claims:
         status = outcome(claim.status, claim.exercised)
-        found.setdefault(claim.id, {})[claim.run] = {"not_exercised": "not tested"}.get(status, status)
+        shown = "not tested" if status == NOT_EXERCISED else status
+        statuses_by_claim.setdefault(claim.id, {})[claim.run] = shown
     runs = list(report.runs)
-    rows = [[name, *(statuses.get(run, "") for run in ("", *runs))] for name, statuses in found.items()]
+    rows = [[name, *(statuses.get(run, "") for run in ("", *runs))] for name, statuses in statuses_by_claim.items()]
     return _table(["claim", "model", *runs], "l" * (2 + len(runs)), rows)
 
 

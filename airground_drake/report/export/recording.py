@@ -105,7 +105,8 @@ def _messages(trace: Trace, scenario: Scenario) -> Iterator[Message]:
     standing = stage_of(trace, scenario)
     yield Message(0.0, "/scene", "foxglove.SceneUpdate", {"deletions": [], "entities": list(_standing(standing))})
     looks = {robot: states(trace, robot, trace.t) for robot in trace.ugvs}
-    moved = [(each, trace.position(each.name) - each.way_m[0]) for each in standing.barriers if len(each.way_m)]
+    movers = [barrier for barrier in standing.barriers if len(barrier.way_m)]
+    moved = [(barrier, trace.position(barrier.name) - barrier.way_m[0]) for barrier in movers]
     for k, t in enumerate(trace.t.tolist()):
         entities = [_barrier(standing, barrier, t, by[k].tolist()) for barrier, by in moved]
         for robot in standing.robots:
@@ -124,15 +125,15 @@ def _messages(trace: Trace, scenario: Scenario) -> Iterator[Message]:
 
 def _signals(trace: Trace, robot: str, k: int) -> dict[str, Any]:
     """Signals of a robot in row k of the trace."""
-    found: dict[str, Any] = {
+    signals: dict[str, Any] = {
         "position_m": _vector(trace.body(robot)[k].tolist()),
         "command_m_s": _vector(trace.command(robot)[k].tolist()),
     }
     if robot in trace.ugvs:
         for name in ("decision_variable_m", "noise_m", "mode"):
-            found[name] = float(trace.column(f"{robot}.{name}")[k])
-        found["executing"] = float(trace.executing(robot)[k])
-    return found
+            signals[name] = float(trace.column(f"{robot}.{name}")[k])
+        signals["executing"] = float(trace.executing(robot)[k])
+    return signals
 
 
 def _standing(stage: Stage) -> Iterator[dict[str, Any]]:
@@ -141,7 +142,7 @@ def _standing(stage: Stage) -> Iterator[dict[str, Any]]:
     yield from (_barrier(stage, barrier, 0.0, [0.0] * 3) for barrier in stage.barriers)
     if stage.arena:
         colors = (OBSTACLE_COLOR, SAFE_COLOR)
-        yield _entity("arena", 0.0, lines=[_loop(*each) for each in zip(stage.arena, colors, strict=True)])
+        yield _entity("arena", 0.0, lines=[_loop(*outline) for outline in zip(stage.arena, colors, strict=True)])
     for k, phantom in enumerate(stage.phantoms_m.tolist()):
         yield _entity(f"phantom {k + 1}", 0.0, cylinders=[_cylinder(phantom, low, low, UNSEEN_COLOR, 0.5)])
 
@@ -181,13 +182,13 @@ def _cylinder(foot: list[float], radius: float, height: float, color: str, alpha
 
 
 def _triangles(mesh: Mesh, place: list[float], color: str, alpha: float = 1.0) -> dict[str, Any]:
-    points, indices = [_vector(each) for each in mesh.vertices.T.tolist()], mesh.faces.T.ravel().tolist()
+    points, indices = [_vector(vertex) for vertex in mesh.vertices.T.tolist()], mesh.faces.T.ravel().tolist()
     return {"pose": _pose(place), "points": points, "color": _rgba(color, alpha), "colors": [], "indices": indices}
 
 
 def _loop(corners: Array, color: str) -> dict[str, Any]:
     """A closed line on the ground through corners (K, 2), m, two pixels wide."""
-    points = [_vector([*each, 0.0]) for each in corners.tolist()]
+    points = [_vector([*corner, 0.0]) for corner in corners.tolist()]
     line = {"type": 1, "pose": _pose([0.0] * 3), "thickness": 2.0, "scale_invariant": True, "points": points}
     return line | {"color": _rgba(color), "colors": [], "indices": []}
 

@@ -78,7 +78,7 @@ def scene(trace: Trace, scenario: Scenario) -> Scene:
         run=trace.run,
         says=f"method ({method}), {method_of(method).says}",
         times_s=times,
-        moved_m={k: positions(each.name) - each.way_m[0] for k, each in enumerate(still.barriers) if len(each.way_m)},
+        moved_m={k: positions(wall.name) - wall.way_m[0] for k, wall in enumerate(still.barriers) if len(wall.way_m)},
         proposals=sent(trace),
         events=tuple(trace.events),
     )

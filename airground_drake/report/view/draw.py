@@ -123,7 +123,7 @@ def _wall(meshcat: Meshcat, path: str, wall: Barrier, height: float, highest: fl
     zone = prisms(wall.safe, height, lower=LOWER * height / len(wall.parts))
     meshcat.SetTriangleMesh(f"{path}/safe", zone.vertices, zone.faces, rgba(SAFE_COLOR, 0.2))
     if wall.rays == FINE:
-        start, end = (np.column_stack([each, np.full(len(each), height)]).T for each in wall.rim)
+        start, end = (np.column_stack([edge, np.full(len(edge), height)]).T for edge in wall.rim)
         meshcat.SetLineSegments(f"{path}/rim", start, end, 1.0, rgba(SAFE_COLOR))
 
 

@@ -52,7 +52,8 @@ def prisms(outlines: Sequence[Array], height: float, *, lower: float = 0.0) -> M
     """Prisms of a height, m, over convex polygons (K, 2), m, counter-clockwise; without their bottoms."""
     # Their tops come first, each lower than the one before it by `lower`, m. So what is transparent is drawn once where
     # several overlap, seen from above.
-    vertices, tops, walls, first = list[Array](), list[Array](), list[Array](), 0
+    vertices, tops, walls = list[Array](), list[Array](), list[Array]()
+    first = 0
     for k, outline in enumerate(outlines):
         n = len(outline)
         vertices += [np.column_stack([outline, np.full(n, z)]) for z in (height - k * lower, 0.0)]
@@ -66,15 +67,15 @@ def prisms(outlines: Sequence[Array], height: float, *, lower: float = 0.0) -> M
 def outer_edges(outlines: Sequence[Array], inside: Callable[[Array], npt.NDArray[np.bool_]], piece: float) -> Array:
     """The edges of polygons (K, 2), m, that are not inside of another one: ends of short segments, (2, S, 2), m."""
     # inside: (S, 2), m
-    found = list[Array]()
+    edges = list[Array]()
     for outline in outlines:
         closed = np.concatenate([outline, outline[:1]])
         for begin, end in pairwise(closed):
             count = max(1, math.ceil(float(np.linalg.norm(end - begin)) / piece))
             points = begin + np.linspace(0.0, 1.0, count + 1)[:, None] * (end - begin)
-            found.append(np.stack([points[:-1], points[1:]]))
-    every = np.concatenate(found, axis=1)
-    return np.asarray(every[:, ~inside(every.mean(axis=0))])
+            edges.append(np.stack([points[:-1], points[1:]]))
+    pieces = np.concatenate(edges, axis=1)
+    return np.asarray(pieces[:, ~inside(pieces.mean(axis=0))])
 
 
 def grid(low: Array, high: Array) -> tuple[Array, Array]:
@@ -85,8 +86,8 @@ def grid(low: Array, high: Array) -> tuple[Array, Array]:
     )  # fmt: skip
     (left, bottom), (right, top) = np.floor(low / spacing) * spacing, np.ceil(high / spacing) * spacing
     x, y = np.arange(left, right + spacing / 2, spacing), np.arange(bottom, top + spacing / 2, spacing)
-    start = [*((each, bottom, 0.0) for each in x), *((left, each, 0.0) for each in y)]
-    end = [*((each, top, 0.0) for each in x), *((right, each, 0.0) for each in y)]
+    start = [*((at, bottom, 0.0) for at in x), *((left, at, 0.0) for at in y)]
+    end = [*((at, top, 0.0) for at in x), *((right, at, 0.0) for at in y)]
     return np.array(start).T, np.array(end).T
 
 

@@ -54,7 +54,7 @@ class LiveView(LeafSystem):
         draw(meshcat, scene)
         rows = {body.name: row for row, body in enumerate(world.moving)}
         self._barriers = [
-            (k, rows[each.name], each.way_m[0]) for k, each in enumerate(scene.barriers) if len(each.way_m)
+            (k, rows[barrier.name], barrier.way_m[0]) for k, barrier in enumerate(scene.barriers) if len(barrier.way_m)
         ]
 
     def _place(self, signals: Array, positions: Array, headings: list[float]) -> None:
@@ -83,5 +83,5 @@ class LiveView(LeafSystem):
         for k, row, start in self._barriers:
             self._meshcat.SetTransform(barrier_path(k), RigidTransform(positions[row] - start), t)
         for k, state in enumerate(states_of(executing, modes)):
-            for each in range(len(STATES)):
-                self._meshcat.SetProperty(state_path(k, each), "visible", bool(each == state), t)
+            for mode in range(len(STATES)):
+                self._meshcat.SetProperty(state_path(k, mode), "visible", bool(mode == state), t)

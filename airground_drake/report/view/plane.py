@@ -60,11 +60,11 @@ def frame_of(scenario: Scenario, ways: Iterable[tuple[str, Array]]) -> Frame:
     low, high = travelled.min(axis=0), travelled.max(axis=0)
     around = float((high - low).max())  # a map may reach far beyond what robots can
     points += [
-        np.clip(each.corners, low - around, high + around) if each.name == MAP else np.array(each.corners)
-        for each in barriers_of(scenario)
+        np.clip(barrier.corners, low - around, high + around) if barrier.name == MAP else np.array(barrier.corners)
+        for barrier in barriers_of(scenario)
     ]
-    every = np.concatenate([*points, *arena_of(scenario)])
-    (left, bottom), (right, top) = every.min(axis=0) - 0.4, every.max(axis=0) + 0.4
+    shown = np.concatenate([*points, *arena_of(scenario)])
+    (left, bottom), (right, top) = shown.min(axis=0) - 0.4, shown.max(axis=0) + 0.4
     return Frame(left, right, bottom - 0.6, top + 0.8)
 
 
@@ -88,29 +88,29 @@ def draw_barriers(axes: Axes, scenario: Scenario, *, moving: bool = True) -> tup
     # Returns labels, the names of the barriers, unless they are many, and of phantoms; and lines (K, 2), m, that labels
     # should avoid: ways of what moves, the arena, and the edges of walls, unless they are many.
     _draw_arena(axes, arena_of(scenario))
-    every = [each for each in barriers_of(scenario) if moving or not len(each.way_m)]
-    for each in every:
-        if len(each.way_m):
-            axes.plot(*each.way_m[:, :2].T, color=INK, linestyle=_WAY_DOTS, linewidth=1.8, zorder=1.4)
-    walls, balls = ([each for each in every if each.is_round == of_balls] for of_balls in (False, True))
-    _fill(axes, [part for each in walls for part in each.safe], _SAFE, 0.9)
+    barriers = [barrier for barrier in barriers_of(scenario) if moving or not len(barrier.way_m)]
+    for barrier in barriers:
+        if len(barrier.way_m):
+            axes.plot(*barrier.way_m[:, :2].T, color=INK, linestyle=_WAY_DOTS, linewidth=1.8, zorder=1.4)
+    walls, balls = ([barrier for barrier in barriers if barrier.is_round == of_balls] for of_balls in (False, True))
+    _fill(axes, [part for wall in walls for part in wall.safe], _SAFE, 0.9)
     for known, appearance in ((True, _KNOWN), (False, _UNKNOWN)):
-        _fill(axes, [part for each in walls if each.known_to_uav == known for part in each.body], appearance, 1.5)
-    circles = [Circle((each.place_m[0], each.place_m[1]), each.safe_m[0]) for each in balls]
+        _fill(axes, [part for wall in walls if wall.known_to_uav == known for part in wall.body], appearance, 1.5)
+    circles = [Circle((ball.place_m[0], ball.place_m[1]), ball.safe_m[0]) for ball in balls]
     axes.add_collection(
         PatchCollection(circles, facecolor="#f3f3f3", edgecolor=MUTED, linestyle=(0, (2, 2)), linewidth=1.0, zorder=1.0)
     )
     hexagon: dict[str, Any] = {"linestyle": "none", "marker": "h", "markersize": 6, "color": INK, "zorder": 3}
-    for each in balls:
-        _disc(axes, each.place_m, each.radius_m[0], INK)
-        axes.plot(*each.place_m[:2], **hexagon, markerfacecolor=INK if each.known_to_uav else "white")
-    labels = [_name_of(each) for each in every] if len(every) <= MAX_NAMED_BARRIERS else []
+    for ball in balls:
+        _disc(axes, ball.place_m, ball.radius_m[0], INK)
+        axes.plot(*ball.place_m[:2], **hexagon, markerfacecolor=INK if ball.known_to_uav else "white")
+    labels = [_name_of(barrier) for barrier in barriers] if len(barriers) <= MAX_NAMED_BARRIERS else []
     for at in scenario.uav.phantoms_m:
         axes.plot(*at[:2], marker="x", markersize=6, color=MUTED, zorder=3)
         labels.append(Label(np.array(at), "(only on the UAV's map)", size_pt=7.5))
-    edges = [part for each in walls for part in each.body]
+    edges = [part for wall in walls for part in wall.body]
     rings = [*arena_of(scenario), *(edges if len(edges) <= MANY else [])]
-    ways = [each.way_m[:, :2] for each in every if len(each.way_m)]
+    ways = [barrier.way_m[:, :2] for barrier in barriers if len(barrier.way_m)]
     return labels, [*ways, *(np.concatenate([ring, ring[:1]]) for ring in rings)]
 
 

@@ -114,16 +114,16 @@ class Barrier:
     def _rims(self, reach: Array) -> list[Array]:
         """Outlines of all that is within distances (k,), m, of the cores of its parts."""
         return [
-            outline.rim(part, each, self.rays) if each else outline.corners_of(part)
-            for part, each in zip(self.parts, reach.tolist(), strict=True)
+            outline.rim(part, distance, self.rays) if distance else outline.corners_of(part)
+            for part, distance in zip(self.parts, reach.tolist(), strict=True)
         ]
 
     @property
     def corners(self) -> tuple[Array, Array]:
         """Corners (2,), m, of the least rectangle, along the axes, that contains `safe` wherever the barrier goes."""
         places = [outline.corners_of(part) for part in self.parts]
-        low = np.min([each.min(axis=0) - reach for each, reach in zip(places, self.safe_m, strict=True)], axis=0)
-        high = np.max([each.max(axis=0) + reach for each, reach in zip(places, self.safe_m, strict=True)], axis=0)
+        low = np.min([part.min(axis=0) - reach for part, reach in zip(places, self.safe_m, strict=True)], axis=0)
+        high = np.max([part.max(axis=0) + reach for part, reach in zip(places, self.safe_m, strict=True)], axis=0)
         goes = self.way_m[:, :2] - self.way_m[:1, :2] if len(self.way_m) else np.zeros((1, 2))
         return low + goes.min(axis=0), high + goes.max(axis=0)
 
@@ -155,11 +155,11 @@ def stage(scenario: Scenario, visited_m: Array | None = None) -> Stage:
     mark = min(max(SMALLEST * extent, OF_SAFE_DISTANCE * apart), LARGEST * extent)
     robots = tuple(
         Robot(
-            name,
-            "UGV" if name in scenario.ugvs else "UAV",
-            max(mark, spec.radius_m),
-            np.array(spec.target_m),
-            HEADING in plant_of(spec, scenario.control.period_s).signals,
+            name=name,
+            kind="UGV" if name in scenario.ugvs else "UAV",
+            radius_m=max(mark, spec.radius_m),
+            target_m=np.array(spec.target_m),
+            turns=HEADING in plant_of(spec, scenario.control.period_s).signals,
         )
         for name, spec in specs.items()
     )
@@ -174,14 +174,23 @@ def stage_of(trace: Trace, scenario: Scenario) -> Stage:
 
 def barriers_of(scenario: Scenario, mark: float = 0.0) -> tuple[Barrier, ...]:
     """All that stands about but the walls of the arena; points and thin walls are drawn with at least a mark, m."""
-    found = {name: each for name, each in scenario.barriers.items() if not name.startswith(ARENA)}
-    parts = {name: outlines_of(scenario, each) for name, each in found.items()}
-    rays, barriers = FINE if sum(map(len, parts.values())) <= MANY else COARSE, list[Barrier]()
-    for name, each in found.items():
-        way = np.array([[*place, 0.0][:3] for place in each.moves.waypoints_m]) if each.moves else np.empty((0, 3))
-        rows = outline.moved(parts[name], way[0]) if len(way) else parts[name]
-        until = each.disappears_s or np.inf
-        barriers.append(Barrier(name, rows, each.known_to_uav, each.appears_s, until, way, mark, rays))
+    specs = {name: spec for name, spec in scenario.barriers.items() if not name.startswith(ARENA)}
+    parts = {name: outlines_of(scenario, spec) for name, spec in specs.items()}
+    rays = FINE if sum(map(len, parts.values())) <= MANY else COARSE
+    barriers = []
+    for name, spec in specs.items():
+        way = np.array([[*place, 0.0][:3] for place in spec.moves.waypoints_m]) if spec.moves else np.empty((0, 3))
+        barrier = Barrier(
+            name=name,
+            parts=outline.moved(parts[name], way[0]) if len(way) else parts[name],
+            known_to_uav=spec.known_to_uav,
+            appears_s=spec.appears_s,
+            disappears_s=spec.disappears_s or np.inf,
+            way_m=way,
+            mark_m=mark,
+            rays=rays,
+        )
+        barriers.append(barrier)
     return tuple(barriers)
 
 
@@ -210,9 +219,9 @@ def _bounds(scenario: Scenario, visited_m: Array) -> tuple[Array, Array]:
     """Corners (3,), m, of a box around positions (M, 3), m, targets, arena, and barriers with their safe zones."""
     points = [visited_m, np.array([spec.target_m for spec in scenario.ugvs.values()])]
     highest = HIGHEST * visited_m[:, 2].max()
-    for each in barriers_of(scenario):
-        heights = each.parts[:, outline.BASE].min(), max(min(each.top_m, highest), each.place_m[2])
-        points.append(np.column_stack([each.corners, heights]))
+    for barrier in barriers_of(scenario):
+        heights = barrier.parts[:, outline.BASE].min(), max(min(barrier.top_m, highest), barrier.place_m[2])
+        points.append(np.column_stack([barrier.corners, heights]))
     points += [np.column_stack([ring, np.zeros(4)]) for ring in arena_of(scenario)]
-    every = np.concatenate([*points, visited_m[:1] * [1.0, 1.0, 0.0]])
-    return every.min(axis=0), np.maximum(every.max(axis=0), every.min(axis=0) + 1.0)
+    shown = np.concatenate([*points, visited_m[:1] * [1.0, 1.0, 0.0]])
+    return shown.min(axis=0), np.maximum(shown.max(axis=0), shown.min(axis=0) + 1.0)

@@ -67,11 +67,11 @@ def _drop(element: ET.Element) -> None:
 def _presentation(style: str) -> dict[str, str]:
     """The declarations of an inline style that SVG has attributes for."""
     declared = dict(part.strip().split(":", 1) for part in style.split(";") if ":" in part)
-    found = {name.strip(): value.strip() for name, value in declared.items() if _STYLED.fullmatch(name.strip())}
-    if shorthand := _FONT.fullmatch(found.pop("font", "")):
+    styles = {name.strip(): value.strip() for name, value in declared.items() if _STYLED.fullmatch(name.strip())}
+    if shorthand := _FONT.fullmatch(styles.pop("font", "")):
         given = zip(("font-weight", "font-size", "font-family"), shorthand.groups(), strict=True)
-        found |= {name: value for name, value in given if value}
-    return found
+        styles |= {name: value for name, value in given if value}
+    return styles
 
 
 def _references(value: str) -> list[str]:

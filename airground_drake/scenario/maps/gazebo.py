@@ -67,18 +67,18 @@ def world(text: str, source: str) -> Gazebo:
     # moves, models within models, included models, actors, populations, shapes other than `SHAPES`, and what does not
     # stand out of the ground.
     root = _parsed(text, source)
-    found = root.find("world") if root.tag == "sdf" else root if root.tag == "world" else None
-    if found is None:
+    world = root.find("world") if root.tag == "sdf" else root if root.tag == "world" else None
+    if world is None:
         raise ScenarioError(f"{source}:{root.get(LINE)}", root.tag, Fault("no world"), "wanted: <sdf> with a <world>")
     left_out = list[str]()
-    if root is not found:
-        root.remove(found)
+    if root is not world:
+        root.remove(world)
         left_out += _others(root)
-    left_out += _others(found, "model", "state")
-    left_out += [f"{each} in <state>" for state in found.iterfind("state") for each in _others(state, "model")]
-    states = {each.get("name"): each for each in found.iterfind("state/model")}
+    left_out += _others(world, "model", "state")
+    left_out += [f"{element} in <state>" for state in world.iterfind("state") for element in _others(state, "model")]
+    states = {state.get("name"): state for state in world.iterfind("state/model")}
     solids = list[Solid]()
-    for model in found.iterfind("model"):
+    for model in world.iterfind("model"):
         name = model.get("name") or "model"
         if model.find("plugin") is not None and _text(model, "static") not in ("1", "true"):
             left_out.append(f"{name}, which a plug-in moves")
@@ -107,7 +107,7 @@ class _Reader:
                         yield solid
                     else:
                         self.left_out.append(f"{self.name}, whose top is not above the ground")
-        within = [f"{each} within {self.name}" for each in _others(model, "link")]
+        within = [f"{element} within {self.name}" for element in _others(model, "link")]
         if not within and model.find("link/collision/geometry/*") is None:
             within = [f"{self.name}, which has no <collision>"]
         self.left_out += within
@@ -187,7 +187,8 @@ def _numbers(of: ElementTree.Element, count: int, source: str) -> tuple[float, .
     except ValueError:
         numbers = ()
     if len(numbers) != count or not all(abs(number) < 1e9 for number in numbers):
-        allowed = f"wanted: {count} number{'s' * (count > 1)} below 1e9 in size"
+        noun = "number" if count == 1 else "numbers"
+        allowed = f"wanted: {count} {noun} below 1e9 in size"
         raise ScenarioError(f"{source}:{of.get(LINE)}", f"<{of.tag}>", short((of.text or "").strip()), allowed)
     return numbers
 

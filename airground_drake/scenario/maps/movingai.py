@@ -48,7 +48,7 @@ def cells(text: str, source: str) -> Cells:
             raise ScenarioError(f"{source}:{number}", "map", fault, f"as many as width = {width} are wanted")
         if strange := set(row) - set(TERRAIN):
             raise ScenarioError(f"{source}:{number}", "map", min(strange), f"allowed: {' '.join(TERRAIN)}")
-    return np.array([[TERRAIN[each] for each in row] for row in rows[height - 1 :: -1]], bool)
+    return np.array([[TERRAIN[letter] for letter in row] for row in rows[height - 1 :: -1]], bool)
 
 
 def agents(text: str, source: str, in_the_way: Cells) -> list[Agent]:
@@ -57,7 +57,7 @@ def agents(text: str, source: str, in_the_way: Cells) -> list[Agent]:
     first, *lines = text.splitlines() or [""]
     if first.split()[:1] != ["version"]:
         raise ScenarioError(f"{source}:1", "version", Fault("missing"), "wanted: a scenario of MovingAI")
-    found = []
+    placed = []
     for number, line in enumerate(lines, 2):
         where, parts = f"{source}:{number}", line.split("\t") if "\t" in line else line.split()
         if not line.strip():
@@ -77,8 +77,8 @@ def agents(text: str, source: str, in_the_way: Cells) -> list[Agent]:
         for key, (column, row) in (("start", start), ("goal", goal)):
             if in_the_way[row, column]:
                 raise ScenarioError(where, key, Fault("in the way"), "wanted: a free cell of the map")
-        found.append(Agent(start, goal, number))
-    return found
+        placed.append(Agent(start, goal, number))
+    return placed
 
 
 def map_name(text: str) -> str:

@@ -53,13 +53,12 @@ def _extended(rectangles: Rectangles, sums: NDArray[np.int32]) -> Rectangles:
     for side, farthest in ((0, 0), (1, len(sums) - 1)):
         good, bad = rectangles.copy(), rectangles.copy()
         bad[:, side] = farthest + (1 if side else -1)
-        while np.any(open_ := np.abs(bad[:, side] - good[:, side]) > 1):
-            tried = good[open_]
-            tried[:, side] = (good[open_, side] + bad[open_, side]) // 2
+        while len(unsure := np.flatnonzero(np.abs(bad[:, side] - good[:, side]) > 1)):
+            tried = good[unsure]
+            tried[:, side] = (good[unsure, side] + bad[unsure, side]) // 2
             full = _counts(sums, tried) == _areas(tried)
-            where = np.flatnonzero(open_)
-            good[where[full]] = tried[full]
-            bad[where[~full]] = tried[~full]
+            good[unsure[full]] = tried[full]
+            bad[unsure[~full]] = tried[~full]
         rectangles = good
     return rectangles
 

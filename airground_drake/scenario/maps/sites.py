@@ -40,7 +40,7 @@ def ways(grid: Grid, clearance_m: float, count: int) -> tuple[Array, float]:
                 raise ValueError(f"there is room for {len(sites) // 2}, with {clearance_m:g} m around each")
         sites.append((int(site[0]), int(site[1])))
         steps = _steps(open_, sites[-1])
-        far, beside = (np.where(each >= 0, np.minimum(each, steps), -1) for each in (far, beside))
+        far, beside = (np.where(distances >= 0, np.minimum(distances, steps), -1) for distances in (far, beside))
     starts, free = sites[:count], sites[count:]
     pairs = []
     longest = 0

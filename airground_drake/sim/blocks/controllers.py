@@ -91,7 +91,6 @@ class UgvController(_Controller):
     """
 
     def __init__(self, world: World, law: UgvLaw) -> None:
-        """Declare ports, state and the periodic update."""
         super().__init__()
         n = len(world.names("ugv"))
         self.law, self.avoidance, self._world = law, law.avoidance, world
@@ -116,8 +115,8 @@ class UgvController(_Controller):
     def parameters(self, context: Context) -> dict[str, Any]:
         """What it runs with, see `read_back`, and whether it puts interventions on top of avoidance."""
         law: UgvLaw = self._in_force(context)
-        found = read_back(self, law.avoidance, self._near, len(self._world.robots))
-        return {**found, "composition": law.avoidance.composition, "intervention_on_top": law.intervention_on_top}
+        read = read_back(self, law.avoidance, self._near, len(self._world.robots))
+        return {**read, "composition": law.avoidance.composition, "intervention_on_top": law.intervention_on_top}
 
     def _with_gains(self, *gains: float) -> UgvLaw:
         return self.law.with_gains(*gains)

@@ -127,21 +127,23 @@ class DecisionBlock(LeafSystem):
         begun, now = context.get_discrete_state(0).value(), self.get_cache_entry(self._signals).Eval(context)
         if begun[0] == NOT_BEGUN:
             begun = now
-        found = self._spans(begun, now)
+        ranges = self._spans(begun, now)
         first = bisect_right(self._corner_times, begun[0])
         if first < len(self._corners) and self._corner_times[first] < now[0]:
             corners = self._corners[first : bisect_left(self._corner_times, now[0])]
-            self._look_into_corners(found, corners, begun, now)
-        output.SetFromVector(found.ravel())
+            self._look_into_corners(ranges, corners, begun, now)
+        output.SetFromVector(ranges.ravel())
 
     def _spans(self, begun: Array, now: Array) -> Array:
         """Smallest and largest x over a step without corners, (2, n), m, from the signals at its ends."""
         before, after = begun[1:].reshape(-1, 5), now[1:].reshape(-1, 5)
         return self.extremes(begun[0], before[:, :4], now[0], after[:, :4], np.stack([before[:, 4], after[:, 4]]))
 
-    def _look_into_corners(self, found: Array, corners: Sequence[tuple[float, int]], begun: Array, now: Array) -> None:
+    def _look_into_corners(
+        self, crossed: Array, corners: Sequence[tuple[float, int]], begun: Array, now: Array
+    ) -> None:
         """Replace the smallest and largest x of UGVs whose references have corners within a step; `corners` in s."""
-        # found: smallest and largest x, (2, n), m, changed in place.
+        # crossed: smallest and largest x, (2, n), m, changed in place.
         bent = {j for _, j in corners}
         times = np.array([begun[0], *(t for t, _ in corners), now[0]])
         shares = (times - times[0]) / (times[-1] - times[0])
@@ -156,7 +158,7 @@ class DecisionBlock(LeafSystem):
             [self.extremes(t0, p0, t1, p1, np.array([x0, x1])) for (t0, p0, x0), (t1, p1, x1) in stretches]
         )
         for j in bent:
-            found[:, j] = ranges[:, 0, j].min(), ranges[:, 1, j].max()
+            crossed[:, j] = ranges[:, 0, j].min(), ranges[:, 1, j].max()
 
     def _begin_step(self, context: Context, discrete: DiscreteValues) -> EventStatus:
         """Keep the signals of this instant: the end of a step, or the start of a simulator."""
@@ -264,7 +266,7 @@ class EventTrigger(LeafSystem):
             discrete.set_value(0, self._after(context, before, x, x, x))
         else:
             trigger = self.trigger(context)
-            discrete.set_value(0, _pack([trigger.start(t, each) for each in x.tolist()]))
+            discrete.set_value(0, _pack([trigger.start(t, value) for value in x.tolist()]))
             discrete.set_value(2, [t])
         discrete.set_value(1, [t])
         return EventStatus.Succeeded()
@@ -325,5 +327,5 @@ def _pack(states: Sequence[TriggerState]) -> Array:
 
 
 def _unpack(status: Array, index: int) -> TriggerState:
-    one = Status(status[FIELDS * index : FIELDS * (index + 1)])
-    return TriggerState(Mode(int(one.mode)), int(one.triggers), float(one.triggered_at_s), float(one.released_at_s))
+    own = Status(status[FIELDS * index : FIELDS * (index + 1)])
+    return TriggerState(Mode(int(own.mode)), int(own.triggers), float(own.triggered_at_s), float(own.released_at_s))

@@ -102,7 +102,6 @@ class DirectAcceptance(LeafSystem):
     """
 
     def __init__(self, count: int) -> None:
-        """Declare ports for `count` UGVs."""
         super().__init__()
         self._proposals = Messages(self, "proposals", count, Proposal)
         self.DeclareVectorOutputPort(

@@ -146,22 +146,22 @@ class Monitor(LeafSystem):
         return memory
 
     def _calc(self, context: Context, output: BasicVector) -> None:
-        found = self.violation(context)
-        output.SetFromVector(np.array([0.0, -1.0, -1.0, -1.0, -1.0] if found is None else [1.0, *map(float, found)]))
+        violation = self.violation(context)
+        output.SetFromVector([0.0, -1.0, -1.0, -1.0, -1.0] if violation is None else [1.0, *map(float, violation)])
 
     def _update(self, context: Context, state: State) -> EventStatus:
         memory = self._remembered(context)
         if memory.violation is not None:
             return EventStatus.DidNothing()
-        found = None if memory.sample is None else self._first(context, memory.sample)
+        violation = None if memory.sample is None else self._first(context, memory.sample)
         reference = self._reference.Eval(context).copy() if self._reference.HasValue(context) else None
         positions, commands = (port.Eval(context).reshape(-1, 3).copy() for port in (self._bodies, self._command))
         headings = None if self._headings is None else self._headings.Eval(context).copy()
         sample = Sample(context.get_time(), positions, reference, commands, headings)
-        state.get_mutable_abstract_state(int(self._memory)).set_value(Memory(sample, found))
-        if found is not None and self._terminate:
-            what = f"{self._robots[found.robot]} breaks {found.rule.name} by {found.amount_m_s:.3g} m/s"
-            return EventStatus.ReachedTermination(self, f"{what} at t = {found.t_s:.9g} s")
+        state.get_mutable_abstract_state(int(self._memory)).set_value(Memory(sample, violation))
+        if violation is not None and self._terminate:
+            what = f"{self._robots[violation.robot]} breaks {violation.rule.name} by {violation.amount_m_s:.3g} m/s"
+            return EventStatus.ReachedTermination(self, f"{what} at t = {violation.t_s:.9g} s")
         return EventStatus.Succeeded()
 
     def _first(self, context: Context, sample: Sample) -> Violation | None:

@@ -70,7 +70,6 @@ class SteeredBody(LeafSystem):
     """
 
     def __init__(self, plant: Plant, period_s: float) -> None:
-        """Declare ports, state and the periodic update."""
         super().__init__()
         self._plant, self._period_s = plant, period_s
         self._velocity = self.DeclareVectorInputPort("velocity", 3)
@@ -147,15 +146,15 @@ class OwnPlant(NamedTuple):
 def declared(scenario: Scenario, plants: Mapping[str, OwnPlant]) -> Scenario:
     """A valid scenario in which some robots have users' plants, by name."""
     changed = copy.deepcopy(scenario)
-    for robot, each in plants.items():
+    for robot, code in plants.items():
         if robot not in changed.robots:
             raise UnknownNameError("robot", robot, changed.robots)
-        made: Any = each
+        made: Any = code
         if not isinstance(made, OwnPlant) or not callable(made.make):
             wanted = "allowed: an OwnPlant, made by a class or a function"
             raise PluginError(f"the plant of {robot} is {short(repr(made))}; {wanted}")
         given = OwnKeys(
-            kind=each.name, drift_m_s=each.drift_m_s, cover_m=each.cover_m, parameters={**each.parameters}
+            kind=code.name, drift_m_s=code.drift_m_s, cover_m=code.cover_m, parameters={**code.parameters}
         )  # fmt: skip
         changed.robots[robot].plant = [given]
     return validated(changed)
@@ -170,13 +169,13 @@ class OwnCode(NamedTuple):
 
 def own_code(scenario: Scenario, plants: Mapping[str, OwnPlant]) -> dict[str, OwnCode]:
     """All users' plants in a scenario, by robot; `plants` are those of `declared`."""
-    named = {robot: each.kind for robot, given in scenario.robots.items() for each in given.plant if each.is_own}
-    found = {}
+    named = {robot: plant.kind for robot, given in scenario.robots.items() for plant in given.plant if plant.is_own}
+    codes = {}
     for robot, name in named.items():
         make = plants[robot].make if robot in plants else PLANTS.load(name, System)
         functions = filter(isfunction, vars(make).values()) if isinstance(make, type) else ()
-        found[robot] = OwnCode(name, next(iter(functions), make))
-    return found
+        codes[robot] = OwnCode(name, next(iter(functions), make))
+    return codes
 
 
 GROUND_M = 1e-6  # by so much a UGV's plant may be off the ground, by rounding, m: walls have no end in height for UGVs
@@ -261,8 +260,8 @@ def _steps(system: System) -> Iterator[float]:
     if isinstance(system, MultibodyPlant):  # whose steps are no discrete updates if its outputs are sampled
         yield from [system.time_step()] if system.time_step() else []
     elif isinstance(system, Diagram):
-        for each in system.GetSystems():
-            yield from _steps(each)
+        for part in system.GetSystems():
+            yield from _steps(part)
     elif (timing := system.GetUniquePeriodicDiscreteUpdateAttribute()) is not None:
         yield timing.period_sec()
 
@@ -292,19 +291,16 @@ def own_plant(body: Body, make: Callable[..., System] | None) -> Diagram:
     ports = [system.get_output_port(i) for i in range(system.num_output_ports())]
     outputs = {"position": ports[0]} if ports else {}
     outputs |= {port.get_name(): port for port in ports[1:] if port.get_name() in OUTPUTS}
-    if inputs[:1] != [3] or not outputs or any(port.size() != OUTPUTS[each] for each, port in outputs.items()):
-        found = {port.get_name(): port.size() for port in ports}
+    if inputs[:1] != [3] or not outputs or any(port.size() != OUTPUTS[name] for name, port in outputs.items()):
+        sizes = {port.get_name(): port.size() for port in ports}
         wanted = (
             "allowed: velocity (3) first among its inputs, position (3) first among its outputs, and outputs named "
             "body (3) and heading (1)"
         )
-        raise PluginError(f"{about} has inputs of sizes {inputs}, outputs of sizes {found}; {wanted}")
+        raise PluginError(f"{about} has inputs of sizes {inputs}, outputs of sizes {sizes}; {wanted}")
     try:
-        diagram = _checked(
-            system,
-            outputs,
-            OwnBody(about, turns="heading" in outputs, on_ground=body.kind == "ugv", step_s=step_of(system)),
-        )
+        own = OwnBody(about, turns="heading" in outputs, on_ground=body.kind == "ugv", step_s=step_of(system))
+        diagram = _checked(system, outputs, own)
     except RuntimeError as error:  # it is part of another diagram
         raise PluginError(f"{about}: {described(error)}") from error
     _begins_at(diagram, body.start_m, about)

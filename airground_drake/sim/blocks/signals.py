@@ -73,7 +73,6 @@ class Messages:
     # the messages themselves are checked: when a simulator is initialised, and whenever they are read.
 
     def __init__(self, system: LeafSystem, name: str, count: int, kind: type[Proposal] | type[Report]) -> None:
-        """Declare the port of a system."""
         self.port = system.DeclareAbstractInputPort(name, no_reports(count) if kind is Report else no_proposals(count))
         self._count = count
         self._kinds = (Report,) if kind is Report else (Proposal, type(None))
@@ -85,13 +84,13 @@ class Messages:
 
     def Eval(self, context: Context) -> Any:
         """The messages, one per UGV."""
-        found = self.port.Eval(context)
+        messages = self.port.Eval(context)
         if (
-            isinstance(found, tuple | list)
-            and len(found) == self._count
-            and all(isinstance(one, self._kinds) for one in found)
+            isinstance(messages, tuple | list)
+            and len(messages) == self._count
+            and all(isinstance(message, self._kinds) for message in messages)
         ):
-            return found
+            return messages
         wanted = " or ".join("None" if kind is type(None) else kind.__name__ for kind in self._kinds)
         told = f"port {self.port.get_name()} of {self.port.get_system().GetSystemPathname()}"
-        raise PluginError(f"{told} is given {short(repr(found))}; allowed: {self._count} messages, each {wanted}")
+        raise PluginError(f"{told} is given {short(repr(messages))}; allowed: {self._count} messages, each {wanted}")

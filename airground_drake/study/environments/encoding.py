@@ -54,7 +54,7 @@ class Encoding:
     @property
     def low(self) -> Numbers:
         """Least observation, (O,)."""
-        others = [*(-each for each in self._far), 0.0]
+        others = [*(-low for low in self._far), 0.0]
         return np.array([*[0.0] * (4 + self.rays), *others * self.bodies], dtype=np.float32)
 
     @property
@@ -90,8 +90,8 @@ class Encoding:
         others = np.zeros((self.bodies, 5))
         near = sorted(_others(seen, axes), key=lambda row: float(np.hypot(row[0], row[1])))[: self.bodies]
         others[: len(near)] = np.reshape(near, (-1, 5))
-        found = np.concatenate([[1.0, seen.t, seen.refusals, away], ways, others.ravel()]).astype(np.float32)
-        return np.clip(found, self.low, self.high)
+        observation = np.concatenate([[1.0, seen.t, seen.refusals, away], ways, others.ravel()]).astype(np.float32)
+        return np.clip(observation, self.low, self.high)
 
     def motion(self, action: npt.ArrayLike, seen: Observation, speed: float | None = None) -> Motion | None:
         """What an action proposes for a UGV.
@@ -136,14 +136,14 @@ def free_ways(rows: Array, keep: Array, position: Array, headings: Array, reach:
         return np.full(len(headings), reach)
     away = position[:2] - convex.nearest_points(rows, position[None])[0, :, :2]
     left = convex.distances(rows, position, True) - keep
-    found = np.full(len(headings), reach)
+    free_m = np.full(len(headings), reach)
     for k, heading in enumerate(headings):
         closing = away @ heading < 0.0  # signed distances are convex: one that does not shrink at first never does
         if (closing & (left <= TOUCHING_M)).any():
-            found[k] = 0.0
+            free_m[k] = 0.0
         elif closing.any():
-            found[k] = _first(rows[closing], keep[closing], position, np.append(heading, 0.0), reach)
-    return found
+            free_m[k] = _first(rows[closing], keep[closing], position, np.append(heading, 0.0), reach)
+    return free_m
 
 
 def _first(rows: Array, keep: Array, position: Array, heading: Array, reach: float) -> float:
@@ -164,12 +164,12 @@ def _others(seen: Observation, axes: Array) -> Iterator[Array]:
             follows = mate.proposal is not None and mate.answered == "accepted"
             velocity = mate.proposal.motion.at(seen.t)[1] if mate.proposal and follows else np.zeros(3)
             yield _row(mate.position - seen.position, velocity, seen.distance_to(mate), axes)
-    for each in seen.moving:
-        distances = each.distances(seen.radius)
-        apart = convex.distances(each.outlines, seen.position - each.position, True) - distances
-        nearest = convex.nearest_points(each.outlines, (seen.position - each.position)[None])[0]
+    for body in seen.moving:
+        distances = body.distances(seen.radius)
+        apart = convex.distances(body.outlines, seen.position - body.position, True) - distances
+        nearest = convex.nearest_points(body.outlines, (seen.position - body.position)[None])[0]
         k = int(np.argmin(apart))
-        yield _row(nearest[k] - (seen.position - each.position), each.velocity, float(distances[k]), axes)
+        yield _row(nearest[k] - (seen.position - body.position), body.velocity, float(distances[k]), axes)
 
 
 def _row(offset: Array, velocity: Array, keep: float, axes: Array) -> Array:

@@ -24,7 +24,7 @@ def with_agent(scenario: Scenario, run: str) -> Scenario:
     """A scenario of one run whose policies include `agent`; if they do not, it replaces them."""
     own_keys = own(scenario, run)
     policies = own_keys.intervention.policies
-    if AGENT not in (each.name for each in policies):
+    if AGENT not in (policy.name for policy in policies):
         policies = [Policy(AGENT)]
     return replace(
         own_keys,
@@ -52,8 +52,7 @@ class Stage:
         self.recorder = Recorder(scenario, run)
         policies = self.recorder.model.planner.database.policies
         self.agent: Agent = next(policy for _, policy in policies if isinstance(policy, Agent))
-        robots = scenario.robots.values()
-        self.targets = np.array([each.target_m for each in robots])
+        self.targets = np.array([robot.target_m for robot in scenario.robots.values()])
         self.ugvs = tuple(scenario.ugvs)
 
 
@@ -77,7 +76,9 @@ class Episode:
         Raises:
             SimulationError: if Drake or a system stops.
         """
-        self.stage, self.seed, self.ended = stage, stage.scenario.seed if seed is None else seed, False
+        self.stage = stage
+        self.seed = stage.scenario.seed if seed is None else seed
+        self.ended = False
         self.away_s = dict.fromkeys(stage.ugvs, 0.0)
         stage.agent.chosen, stage.agent.requests = {}, {}
         self._simulator: Simulator = stage.recorder.begin(self.seed)
@@ -97,8 +98,7 @@ class Episode:
 
     def distances_left(self) -> Array:
         """Distances of all robots from their targets, UAV last, (n + 1,), m."""
-        found: Array = np.linalg.norm(self.positions() - self.stage.targets, axis=1)
-        return found
+        return np.asarray(np.linalg.norm(self.positions() - self.stage.targets, axis=1))
 
     def requests(self) -> dict[str, Observation]:
         """The requests of the next planning instant that has any, by UGV; empty at the end of the run.

@@ -14,16 +14,15 @@ class Rewards:
     """
 
     def __init__(self, episode: Episode) -> None:
-        """Count from now on."""
         self._episode, self._before = episode, dict(episode.away_s)
 
     def since(self) -> dict[str, float]:
         """Rewards by UGV since the last call."""
         now, self._before = self._before, dict(self._episode.away_s)
-        found = {ugv: now[ugv] - away for ugv, away in self._before.items()}
+        reward = {ugv: now[ugv] - away for ugv, away in self._before.items()}
         if self._episode.ended:
             scenario = self._episode.stage.scenario
-            for ugv, left in zip(found, self._episode.distances_left().tolist(), strict=False):
+            for ugv, left in zip(reward, self._episode.distances_left().tolist(), strict=False):
                 if left > scenario.arrival_tolerance_m:
-                    found[ugv] -= left / scenario.ugvs[ugv].preset.speed_m_s
-        return found
+                    reward[ugv] -= left / scenario.ugvs[ugv].preset.speed_m_s
+        return reward

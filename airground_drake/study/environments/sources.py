@@ -147,7 +147,7 @@ class Episodes:
 
 def _chosen(scenario: Scenario, run: str | None) -> str:
     """The run, which must have interventions."""
-    having = [name for name, each in scenario.runs.items() if METHODS[each.method].intervenes]
+    having = [name for name, run in scenario.runs.items() if METHODS[run.method].intervenes]
     if run is None and having:
         return having[-1]
     if run is None:

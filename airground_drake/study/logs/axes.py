@@ -31,10 +31,10 @@ _IS_NED = re.compile(r"(?<![a-z])ned(?![a-z])|vehicle_local_position", re.IGNORE
 
 def parsed(text: str) -> list[tuple[int, float]]:
     """The column and sign of each axis: `x,-z,y`; ValueError for anything else."""
-    found = [("xyz".index(part[-1:]), -1.0 if part[0] == "-" else 1.0) for part in text.split(",") if _is_axis(part)]
-    if len(found) != len(text.split(",")) or sorted(axis for axis, _ in found) != [0, 1, 2]:
+    axes = [("xyz".index(part[-1:]), -1.0 if part[0] == "-" else 1.0) for part in text.split(",") if _is_axis(part)]
+    if len(axes) != len(text.split(",")) or sorted(axis for axis, _ in axes) != [0, 1, 2]:
         raise ValueError(text)
-    return found
+    return axes
 
 
 def _is_axis(part: str) -> bool:
@@ -60,15 +60,15 @@ def _turned(places: Array, axes: str) -> Array:
 
 def recognised(streams: Mapping[str, Stream], scenario: Json, without: Collection[str]) -> list[str]:
     """Turn positions that are named as NED and then begin where the scenario has them; remarks."""
-    robots = {name: each for name, each in streams.items() if name in robots_of(scenario) and name not in without}
-    robots = {name: each for name, each in robots.items() if len(each.whole)}
+    robots = {name: stream for name, stream in streams.items() if name in robots_of(scenario) and name not in without}
+    robots = {name: stream for name, stream in robots.items() if len(stream.whole)}
     if not robots or _fits(robots, scenario, PLAIN):
         _ask(robots, scenario, _below(robots, scenario), [NED, "x,-y,-z"])
         return []
-    named = {name: each for name, each in robots.items() if _is_named_ned(each)}
+    named = {name: stream for name, stream in robots.items() if _is_named_ned(stream)}
     if named and _fits(named, scenario, NED):
-        for each in named.values():
-            _turn(each, NED)
+        for turned in named.values():
+            _turn(turned, NED)
         names = ", ".join(named)
         return [f"positions of {names} are taken as NED, as the log calls them: x is north, y east, z down"]
     down, up = [NED, "x,-y,-z"], [axes for axes, says in OTHERS.items() if says.startswith("y is up")]
@@ -99,16 +99,18 @@ def _is_named_ned(stream: Stream) -> bool:
 def _fits(robots: Mapping[str, Stream], scenario: Json, axes: str) -> bool:
     """Whether robots begin where the scenario has them, some of them far enough from (0, 0) to tell axes apart."""
     starts = {name: np.array(robots_of(scenario)[name]["start_m"][:2], dtype=np.float64) for name in robots}
-    if max((float(np.linalg.norm(each)) for each in starts.values()), default=0.0) < APART_M:
+    if max((float(np.linalg.norm(start)) for start in starts.values()), default=0.0) < APART_M:
         return False
-    first = {name: _turned(each.places[:1], axes)[0, :2] / PER_M[each.length_unit] for name, each in robots.items()}
+    first = {
+        name: _turned(stream.places[:1], axes)[0, :2] / PER_M[stream.length_unit] for name, stream in robots.items()
+    }
     return all(float(np.linalg.norm(place - starts[name])) <= NEAR_M for name, place in first.items())
 
 
 def _below(robots: Mapping[str, Stream], scenario: Json) -> str:
     """What flies below the ground, in words; '' if nothing does."""
-    for name, each in robots.items():
-        heights = each.places[:, 2] / PER_M[each.length_unit]
+    for name, stream in robots.items():
+        heights = stream.places[:, 2] / PER_M[stream.length_unit]
         if name not in scenario["ugvs"] and np.isfinite(heights).any() and np.nanmedian(heights) < -BELOW_M:
             return f"{name} is at a height of {float(np.nanmedian(heights)):.3g} m, below the ground"
     return ""
@@ -116,12 +118,13 @@ def _below(robots: Mapping[str, Stream], scenario: Json) -> str:
 
 def _level(robots: Mapping[str, Stream], scenario: Json) -> str:
     """Why y may be the height of what drives on the ground, in words; '' if it is not."""
-    ugvs = [each.places[:, 1:] / PER_M[each.length_unit] for name, each in robots.items() if name in scenario["ugvs"]]
-    if not ugvs or not all(np.isfinite(each).all() for each in ugvs):
+    ugvs = [stream for name, stream in robots.items() if name in scenario["ugvs"]]
+    heights = [stream.places[:, 1:] / PER_M[stream.length_unit] for stream in ugvs]  # if y, or z, is the height
+    if not ugvs or not np.isfinite(np.concatenate(heights)).all():
         return ""
-    inner = [np.percentile(each, (2.0, 98.0), axis=0) for each in ugvs]  # a body that is lost is far away
-    varies = max(float(each[1, 0] - each[0, 0]) for each in inner)
-    spans = float(max(each[1, 1] for each in inner) - min(each[0, 1] for each in inner))
+    inner = [np.percentile(places, (2.0, 98.0), axis=0) for places in heights]  # a body that is lost is far away
+    varies = max(float(span[1, 0] - span[0, 0]) for span in inner)
+    spans = float(max(span[1, 1] for span in inner) - min(span[0, 1] for span in inner))
     if varies > LEVEL_M or spans < WIDE_M:
         return ""
     return f"y of what drives on the ground varies by {varies:.2g} m, and z spans {spans:.3g} m"

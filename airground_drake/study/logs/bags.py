@@ -104,8 +104,8 @@ def read_mcap(path: Path, bodies: Collection[str]) -> Log:
         except Exception as error:  # the package raises many kinds
             if not (is_cut and isinstance(error, (EndOfFile, struct.error)) and gathered.used):
                 raise LogError(f"it cannot be read as MCAP to its end: {described(error)}") from None
-    cut = ["cut off, and read up to there"] * is_cut
-    return Log(list(gathered.streams()), [f"{path.name}: {each}" for each in (*cut, *gathered.ignored())])
+    cut = ["cut off, and read up to there"] if is_cut else []
+    return Log(list(gathered.streams()), [f"{path.name}: {remark}" for remark in (*cut, *gathered.ignored())])
 
 
 def _opened(path: Path) -> BinaryIO:
@@ -128,14 +128,16 @@ def _of_mcap(file: BinaryIO) -> Iterator[Message]:
         if isinstance(record, Chunk):
             data = unpacker.unpacked(record.data, record.compression) if record.compression else record.data
             inner = breakup_chunk(replace(record, compression="", data=data))
-        for one in inner:
-            if isinstance(one, Schema):
-                schemas[one.id] = one
-            elif isinstance(one, McapChannel):
-                schema = schemas[one.schema_id] if one.schema_id else Schema(0, b"", "", "")
-                channels[one.id] = Channel(one.topic, schema.name, one.message_encoding, schema.encoding, schema.data)
-            elif isinstance(one, McapMessage):
-                yield channels[one.channel_id], one.log_time, one.data
+        for part in inner:
+            if isinstance(part, Schema):
+                schemas[part.id] = part
+            elif isinstance(part, McapChannel):
+                schema = schemas[part.schema_id] if part.schema_id else Schema(0, b"", "", "")
+                channels[part.id] = Channel(
+                    part.topic, schema.name, part.message_encoding, schema.encoding, schema.data
+                )
+            elif isinstance(part, McapMessage):
+                yield channels[part.channel_id], part.log_time, part.data
 
 
 def _gather(messages: Iterator[Message], gathered: Gathered, size: int) -> None:
@@ -220,7 +222,7 @@ def read_ros(path: Path, bodies: Collection[str], *, is_ros1: bool) -> Log:
         raise
     except Exception as error:  # the packages raise many kinds
         raise LogError(f"it cannot be read as a ROS bag: {described(error)}") from None
-    return Log(list(gathered.streams()), [f"{path.name}: {each}" for each in gathered.ignored()])
+    return Log(list(gathered.streams()), [f"{path.name}: {remark}" for remark in gathered.ignored()])
 
 
 def _of_ros1(path: Path, size: int) -> Iterator[Message]:
@@ -234,13 +236,15 @@ def _of_ros1(path: Path, size: int) -> Iterator[Message]:
 
         def read_chunk(self) -> Any:
             chunk = super().read_chunk()
-            how = next(name for name, each in reader.decompressors.items() if each is chunk.decompressor)
+            how = next(name for name, decompress in reader.decompressors.items() if decompress is chunk.decompressor)
             return chunk if how == "none" else chunk._replace(decompressor=lambda data: unpacker.unpacked(data, how))
 
     with Bounded(path) as bag:
         channels = {
-            each.id: Channel(each.topic, each.msgtype, "ros1", "ros1msg", each.msgdef.data.encode())
-            for each in bag.connections
+            connection.id: Channel(
+                connection.topic, connection.msgtype, "ros1", "ros1msg", connection.msgdef.data.encode()
+            )
+            for connection in bag.connections
         }
         for connection, received_ns, raw in bag.messages():
             yield channels[connection.id], received_ns, raw

@@ -116,17 +116,11 @@ def columns(labels: Sequence[str], chosen: Mapping[str, str], bodies: Collection
             raise LogError(f"two columns are called {label!r}; wanted: one, or --map-columns {axis}=NAME")
         axes[name][axis] = k, unit
     places = [
-        Place(
-            name,
-            each["x"][0],
-            each["y"][0],
-            each["z"][0] if "z" in each else None,
-            [each[axis][1] for axis in "xyz" if axis in each],
-        )
-        for name, each in axes.items()
-        if {"x", "y"} <= each.keys()
+        Place(name, of["x"][0], of["y"][0], of["z"][0] if "z" in of else None, [of[a][1] for a in "xyz" if a in of])
+        for name, of in axes.items()
+        if {"x", "y"} <= of.keys()
     ]
-    times = [each for each in _times(labels, {*axes, *bodies}) if "t" not in given or each.whole in mapped]
+    times = [time for time in _times(labels, {*axes, *bodies}) if "t" not in given or time.whole in mapped]
     body, frame = (
         _named([label if target not in given or k in mapped else "" for k, label in enumerate(labels)], names)
         for target, names in (("body", BODIES), ("frame", FRAMES))
@@ -136,30 +130,30 @@ def columns(labels: Sequence[str], chosen: Mapping[str, str], bodies: Collection
 
 def clock_of(place: Place, times: Sequence[Time], labels: Sequence[str]) -> Time:
     """The stamps of a place: its own; of several columns with one name, the last before it."""
-    own = next((each for each in times if each.is_of(place) or not place.name), None)
+    own = next((time for time in times if time.is_of(place) or not place.name), None)
     if own is None:
-        named = listed([labels[each.whole] for each in times])
+        named = listed([labels[time.whole] for time in times])
         raise LogError(f"{place.name} has no times of its own: there are {named}; wanted: --map-columns t=NAME")
-    alike = [each for each in times if labels[each.whole] == labels[own.whole] and each.whole < place.x]
-    return max(alike, key=lambda each: each.whole, default=own)
+    alike = [time for time in times if labels[time.whole] == labels[own.whole] and time.whole < place.x]
+    return max(alike, key=lambda time: time.whole, default=own)
 
 
 def _axis(base: str, bodies: Collection[str]) -> tuple[str, str]:
     """Name and axis of a column without its unit: `tb1.x`, `tb1_pos_x`, also `x_tb1` of a body; else ''."""
-    if (found := _AXIS_FIRST.fullmatch(base)) and found[2] in bodies:
-        return found[2], found[1].lower()
-    if found and found[2].lower() in _POSITIONS:
-        return found[2], found[1].lower()
-    found = _AXIS.fullmatch(base)
-    return ((found[1] or "").strip(), found[2].lower()) if found else ("", "")
+    if (match := _AXIS_FIRST.fullmatch(base)) and match[2] in bodies:
+        return match[2], match[1].lower()
+    if match and match[2].lower() in _POSITIONS:
+        return match[2], match[1].lower()
+    match = _AXIS.fullmatch(base)
+    return ((match[1] or "").strip(), match[2].lower()) if match else ("", "")
 
 
 def split_unit(label: str) -> tuple[str, str]:
     """A label without its unit, and the unit: `x_mm`, `x [mm]`, `Time (Seconds)`; '' if it names none."""
-    if found := _BRACKETS.fullmatch(label):
-        return found[1].rstrip("/"), WORDS.get(found[2].lower(), found[2].lower()) or "none"
-    if (found := _SUFFIX.fullmatch(label)) and not _AXIS.fullmatch(label):
-        return found[1], WORDS.get(found[2].lower(), found[2].lower())
+    if match := _BRACKETS.fullmatch(label):
+        return match[1].rstrip("/"), WORDS.get(match[2].lower(), match[2].lower()) or "none"
+    if (match := _SUFFIX.fullmatch(label)) and not _AXIS.fullmatch(label):
+        return match[1], WORDS.get(match[2].lower(), match[2].lower())
     return label, ""
 
 
@@ -170,17 +164,17 @@ def counts_frames(label: str) -> bool:
 
 def _mapped(labels: Sequence[str], chosen: Mapping[str, str]) -> tuple[list[str], dict[int, str]]:
     """The labels, with the usual ones where `--map-columns` names them, and what it says of these, by number."""
-    found, mapped = list(labels), dict[int, str]()
+    renamed, mapped = list(labels), dict[int, str]()
     for target, pattern in chosen.items():
-        names = [re.escape(each) for each in pattern.split("{body}")]
+        names = [re.escape(part) for part in pattern.split("{body}")]
         matching = re.compile(r"(?P<body>.+)".join(names[:2]) if len(names) > 1 else names[0])
         hits = [(k, hit) for k, label in enumerate(labels) if (hit := matching.fullmatch(label))]
         if not hits:
             raise LogError(f"--map-columns {target}={pattern}: there is no such column; there are {listed(labels)}")
         for k, hit in hits:
-            found[k] = f"{hit['body']}.{target}" if len(names) > 1 else target
+            renamed[k] = f"{hit['body']}.{target}" if len(names) > 1 else target
             mapped[k] = f"{target}={pattern}"
-    return found, mapped
+    return renamed, mapped
 
 
 def listed(names: Sequence[str], most: int = 12) -> str:
@@ -201,25 +195,26 @@ def _named(labels: Sequence[str], names: Sequence[str]) -> int | None:
 
 def _times(labels: Sequence[str], names: Collection[str]) -> list[Time]:
     """Stamps of headers, then others, dates, and times of receipt; `names` are those of places and bodies."""
-    found, rests = [], set[int]()
+    times, rests = [], set[int]()
     low = [label.lower() for label in labels]
     for k, label in enumerate(low):
         base, unit = split_unit(label)
         owner, last = _owner(labels[k], names)
         whole = _WHOLE.fullmatch(label)
-        if whole and (rest := [low.index(f"{whole[1]}{mark}{each}") for each in _REST for mark in ("", ".", "/", "_")
-                               if f"{whole[1]}{mark}{each}" in low]):  # fmt: skip
+        rests_of = [f"{whole[1]}{mark}{rest}" for rest in _REST for mark in ("", ".", "/", "_")] if whole else []
+        rest = next((low.index(name) for name in rests_of if name in low), None)
+        if whole and rest is not None:
             of_header = "header" in segments(whole[1]) or whole[1].endswith("stamp")
-            found.append(Time(k, rest[0], "s", 0 if of_header else 1, owner))
-            rests.add(rest[0])
+            times.append(Time(k, rest, "s", 0 if of_header else 1, owner))
+            rests.add(rest)
         elif last in STAMPS and (not unit or unit in PER_S):
             of_header = segments(base)[-2:] == ["header", "stamp"] or last in ("stamp", "header_stamp")
             rank = 0 if of_header else 2 if last in ("__time", "date") else 1
-            found.append(Time(k, None, unit, rank, owner))
+            times.append(Time(k, None, unit, rank, owner))
         elif base in RECEIPT or last in RECEIPT:
-            found.append(Time(k, None, unit, 3, ""))
-    used = (each for each in found if each.whole not in rests)
-    return sorted(used, key=lambda each: (each.rank, -len(each.owner)))
+            times.append(Time(k, None, unit, 3, ""))
+    used = (time for time in times if time.whole not in rests)
+    return sorted(used, key=lambda time: (time.rank, -len(time.owner)))
 
 
 def _owner(label: str, names: Collection[str]) -> tuple[str, str]:
@@ -228,9 +223,9 @@ def _owner(label: str, names: Collection[str]) -> tuple[str, str]:
     base = split_unit(label)[0]
     if re.search(r"header[/._]", label):
         return re.split(r"[/._]?header[/._]", label, maxsplit=1)[0], _last(label)
-    found = re.fullmatch(r"(.*)([/._\s:|-])(.*)", base)
-    if found and found[3].lower() in STAMPS:
-        before = found[1]
-        if any(name == before or name.startswith(f"{before}{found[2]}") for name in names):
-            return before, found[3].lower()
+    match = re.fullmatch(r"(.*)([/._\s:|-])(.*)", base)
+    if match and match[3].lower() in STAMPS:
+        before = match[1]
+        if any(name == before or name.startswith(f"{before}{match[2]}") for name in names):
+            return before, match[3].lower()
     return "", _last(label)

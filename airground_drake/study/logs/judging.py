@@ -94,11 +94,10 @@ class JudgedPair(NamedTuple):
     @property
     def hypotheses(self) -> dict[str, bool]:
         """Those of the theorem, and whether they held."""
-        found = {"starts at the distance or farther": self.starts_m >= self.safe_m - SMALL} if not self.passive else {}
-        found["obeys the avoidance law in every interval"] = self.missed_m <= SMALL
+        obeys = {"obeys the avoidance law in every interval": self.missed_m <= SMALL}
         if self.passive:
-            found["the obstacle keeps its declared speed"] = self.too_fast_m_s == 0.0
-        return found
+            return obeys | {"the obstacle keeps its declared speed": self.too_fast_m_s == 0.0}
+        return {"starts at the distance or farther": self.starts_m >= self.safe_m - SMALL} | obeys
 
     @property
     def passive(self) -> bool:
@@ -122,8 +121,8 @@ class Judged(NamedTuple):
     @property
     def status(self) -> str:
         """The worst of the pairs."""
-        found = {pair.status for pair in self.pairs}
-        return next((each for each in (BROKEN, OPEN) if each in found), KEPT)
+        statuses = {pair.status for pair in self.pairs}
+        return next((status for status in (BROKEN, OPEN) if status in statuses), KEPT)
 
     @property
     def covers_all(self) -> bool:
@@ -136,46 +135,56 @@ class Judged(NamedTuple):
 def judge(tracks: Tracks, scenario: Json, errors_m: Mapping[str, float] | None = None) -> Judged:
     # errors_m: by how much a body's recorded position may be wrong, by its name.
     bodies = tracks.bodies
-    errors = {name: each for name, each in (errors_m or {}).items() if name in bodies}
+    errors = {name: error_m for name, error_m in (errors_m or {}).items() if name in bodies}
     resting, barriers = places_of(scenario, np.zeros(1)), barriers_of(scenario)
-    begin = min(float(each.t_s[0]) for each in bodies.values())
-    end = max(float(each.t_s[-1]) for each in bodies.values())
-    if begin == end:
-        raise LogError(f"the log has positions at {begin:.6g} s only; wanted: at two times at least")
-    found = []
+    whole = _whole(bodies)
+    if whole.begin == whole.end:
+        raise LogError(f"the log has positions at {whole.begin:.6g} s only; wanted: at two times at least")
+    pairs = []
     for pair in _pairs(scenario, bodies):
-        own, other = _both(pair, bodies, scenario, resting, barriers, Span(begin, end))
-        if (one := _judged(pair, own, other, scenario, errors, Span(begin, end))) is not None:
-            found.append(one)
+        own, other = _both(pair, bodies, scenario, resting, barriers, whole)
+        if (judged := _judged(pair, own, other, scenario, errors, whole)) is not None:
+            pairs.append(judged)
     robots = {name: robot for name, robot in robots_of(scenario).items() if name in bodies}
     speeds = {name: (_speed(bodies[name]), float(robot["max_speed_m_s"])) for name, robot in robots.items()}
     away = {
         name: float(np.linalg.norm((bodies[name].places_m[0] - np.array(robot["start_m"]))[:2]))
         for name, robot in robots.items()
     }
-    longest = {name: _longest(each) for name, each in bodies.items()}
+    longest = {name: _longest(track) for name, track in bodies.items()}
     stray = max((0.5 * limit * longest[name] for name, (_, limit) in speeds.items()), default=0.0)
-    pairs = sorted(found, key=lambda one: one.margin_m)
-    lasts = float(scenario["duration_s"])
     if not pairs:
         raise LogError(f"no distance is left to judge: of {', '.join(bodies)} nothing else is in the log or scenario")
-    usual = max(each.usual_s for each in bodies.values())
-    return Judged(pairs, begin, end, lasts, max(longest.values()), usual, stray, speeds, away)
+    return Judged(
+        pairs=sorted(pairs, key=lambda pair: pair.margin_m),
+        begin_s=whole.begin,
+        end_s=whole.end,
+        duration_s=float(scenario["duration_s"]),
+        longest_s=max(longest.values()),
+        usual_s=max(track.usual_s for track in bodies.values()),
+        stray_m=stray,
+        speeds_m_s=speeds,
+        away_m=away,
+    )
+
+
+def _whole(bodies: Mapping[str, Track]) -> Span:
+    starts, ends = zip(*(track.t_s[[0, -1]].tolist() for track in bodies.values()), strict=True)
+    return Span(min(starts), max(ends))
 
 
 def courses(tracks: Tracks, scenario: Json) -> dict[tuple[str, str], list[tuple[Array, Array]]]:
     """Distances over time of each pair, between surfaces: times (m,), s, and distances (m,), m, of each stretch."""
-    bodies, found = tracks.bodies, {}
+    bodies, courses_m = tracks.bodies, {}
     resting, barriers = places_of(scenario, np.zeros(1)), barriers_of(scenario)
-    begin = min(float(each.t_s[0]) for each in bodies.values())
-    end = max(float(each.t_s[-1]) for each in bodies.values())
+    whole = _whole(bodies)
     for pair in _pairs(scenario, bodies):
-        own, other = _both(pair, bodies, scenario, resting, barriers, Span(begin, end))
+        own, other = _both(pair, bodies, scenario, resting, barriers, whole)
         times = [_knots(own, other, span) for span in _common(own, other)] if len(other.t_s) else []
-        found[pair.robot, pair.other] = [
+        courses_m[pair.robot, pair.other] = [
             (t_s, _signed(pair.shape, own.at(t_s) - other.at(t_s)) - pair.radii_m) for t_s in times
         ]
-    return found
+    return courses_m
 
 
 def _both(
@@ -197,14 +206,15 @@ def _both(
 def _pairs(scenario: Json, bodies: Mapping[str, Track]) -> list[Pair]:
     """The pairs of bodies that are in the log; further UAVs are as the scenario's own one."""
     uav = scenario["uav"]["name"]
-    found = pairs_of(scenario)
+    pairs = pairs_of(scenario)
     for name in bodies:
         if name not in robots_of(scenario) and name not in scenario["obstacles"]:
             alike = copy.deepcopy(scenario)
             alike["uav"]["name"] = name
-            found += [pair for pair in pairs_of(alike) if name in (pair.robot, pair.other)]
-    must_be = {*robots_of(scenario), uav, *bodies, *(n for n, each in scenario["obstacles"].items() if each["moves"])}
-    return [pair for pair in found if all(each in bodies or each not in must_be for each in (pair.robot, pair.other))]
+            pairs += [pair for pair in pairs_of(alike) if name in (pair.robot, pair.other)]
+    movers = (name for name, obstacle in scenario["obstacles"].items() if obstacle["moves"])
+    must_be = {*robots_of(scenario), uav, *bodies, *movers}
+    return [pair for pair in pairs if all(name in bodies or name not in must_be for name in (pair.robot, pair.other))]
 
 
 def _seen(track: Track, name: str, pair: Pair, scenario: Json) -> Track:
@@ -234,8 +244,8 @@ def _there(body: Json, whole: Span) -> Span:
 
 def _common(own: Track, other: Track) -> list[Span]:
     """Stretches in which both were recorded."""
-    both = (Span(max(one.begin, two.begin), min(one.end, two.end)) for one in own.spans for two in other.spans)
-    return [each for each in both if each.end >= each.begin]
+    both = (Span(max(a.begin, b.begin), min(a.end, b.end)) for a in own.spans for b in other.spans)
+    return [span for span in both if span.end >= span.begin]
 
 
 def _knots(own: Track, other: Track, span: Span) -> Array:
@@ -255,8 +265,9 @@ def _judged(
         times = (f"{n} {t.t_s[0]:.6g} to {t.t_s[-1]:.6g} s" for n, t in ((pair.robot, own), (pair.other, other)))
         wanted = f"wanted: logs of the same time, or --without {pair.robot}"
         raise LogError(one_line(f"{' and '.join(times)} are never recorded at the same time; {wanted}"))
-    least, at, below, law = np.inf, 0.0, list[Span](), _Law(pair, scenario)
-    stretch = spans[0]
+    least, at, stretch = np.inf, 0.0, spans[0]
+    below = list[Span]()
+    law = _Law(pair, scenario)
     for span in spans:
         t_s = _knots(own, other, span)
         own_m, other_m = own.at(t_s), other.at(t_s)
@@ -271,14 +282,29 @@ def _judged(
     too_fast = _too_fast(other, scenario, pair, errors_m.get(pair.other, 0.0))
     promised = pair.gap_m - law.deficit - eps
     return JudgedPair(
-        pair.robot, pair.other, pair.gap_m, least - pair.radii_m, at, eps, below,
-        sum(each.end - each.begin for each in spans), gaps, law.intervals, law.lacking, law.missed, law.missed_at,
-        law.missed_for, law.missed_by, law.starts - pair.radii_m, law.starts_s,
-        "Passive" if pair.moves_m_s else "Safety", too_fast,
-        promised if promised > 0.0 and not pair.moves_m_s else None,
-        eps + math.hypot(pair.safe_m, eps) - pair.radii_m,
-        _came(pair, own, other, Span(max(stretch.begin, at - LAST_S), at)),
-    )  # fmt: skip
+        first=pair.robot,
+        second=pair.other,
+        safe_m=pair.gap_m,
+        least_m=least - pair.radii_m,
+        at_s=at,
+        error_m=eps,
+        below_s=below,
+        covered_s=sum(span.end - span.begin for span in spans),
+        gaps_s=gaps,
+        intervals=law.intervals,
+        lacking=law.lacking,
+        missed_m=law.missed,
+        missed_at_s=law.missed_at,
+        missed_for_s=law.missed_for,
+        missed_by_m=law.missed_by,
+        starts_m=law.starts - pair.radii_m,
+        starts_s=law.starts_s,
+        theorem="Passive" if pair.moves_m_s else "Safety",
+        too_fast_m_s=too_fast,
+        promised_m=promised if promised > 0.0 and not pair.moves_m_s else None,
+        law_m=eps + math.hypot(pair.safe_m, eps) - pair.radii_m,
+        came_m=_came(pair, own, other, Span(max(stretch.begin, at - LAST_S), at)),
+    )
 
 
 class _Law:
@@ -302,20 +328,20 @@ class _Law:
         self.deficit = max(self.deficit, deficit)
         if not len(h):
             return
-        gains = [Fraction() if moves else min(self.gain * Fraction(each), Fraction(1)) for each in h.tolist()]
+        gains = [Fraction() if moves else min(self.gain * Fraction(step_s), Fraction(1)) for step_s in h.tolist()]
         safe = (pair.safe_m + pair.moves_m_s * h).tolist()
-        found = shortfalls_m(own_m, other_m, pair, safe, gains)
+        shortfalls = shortfalls_m(own_m, other_m, pair, safe, gains)
         self.intervals += len(h)
         for k, gain in enumerate(gains):
-            lacks = float(found[k].both) if k in found else 0.0
+            lacks = float(shortfalls[k].both) if k in shortfalls else 0.0
             deficit = (1.0 - float(gain)) * deficit + lacks
             self.deficit = max(self.deficit, deficit)
             self.lacking += lacks > SMALL
             if lacks > self.missed:
                 self.missed, self.missed_at, self.missed_for = lacks, float(t_s[k]), float(h[k])
-                self.missed_by = {pair.robot: float(found[k].own)}
+                self.missed_by = {pair.robot: float(shortfalls[k].own)}
                 if pair.share < 1.0:
-                    self.missed_by[pair.other] = float(found[k].other)
+                    self.missed_by[pair.other] = float(shortfalls[k].other)
 
 
 def _signed(shape: Shape, apart: Array) -> Array:
@@ -337,9 +363,9 @@ def _lowest(shape: Shape, start: Array, end: Array) -> float:
     """The share of a step at which it is nearest."""
     low, high = 0.0, 1.0
     for _ in range(HALVINGS):
-        one, two = (2.0 * low + high) / 3.0, (low + 2.0 * high) / 3.0
-        first, second = _signed(shape, start + np.array([[one], [two]]) * (end - start))
-        low, high = (low, two) if first < second else (one, high)
+        early, late = (2.0 * low + high) / 3.0, (low + 2.0 * high) / 3.0
+        first, second = _signed(shape, start + np.array([[early], [late]]) * (end - start))
+        low, high = (low, late) if first < second else (early, high)
     ends = np.array([low, 0.0, 1.0])
     return float(ends[_signed(shape, start + ends[:, None] * (end - start)).argmin()])
 
@@ -347,7 +373,7 @@ def _lowest(shape: Shape, start: Array, end: Array) -> float:
 def _below(shape: Shape, apart: Array, t_s: Array, need_m: float) -> list[Span]:
     """Stretches in which a distance is below a required one."""
     there, passes = shape.within(apart, need_m)
-    found: list[Span] = []
+    below_s: list[Span] = []
     for k in np.flatnonzero(passes).tolist():
         lowest = _lowest(shape, apart[k], apart[k + 1])
 
@@ -360,30 +386,30 @@ def _below(shape: Shape, apart: Array, t_s: Array, need_m: float) -> list[Span]:
 
         begin = t_s[k] + (0.0 if there[k] else crossing(0.0)) * (t_s[k + 1] - t_s[k])
         end = t_s[k] + (1.0 if there[k + 1] else crossing(1.0)) * (t_s[k + 1] - t_s[k])
-        if found and there[k] and found[-1].end >= begin:
-            found[-1] = Span(found[-1].begin, float(end))
+        if below_s and there[k] and below_s[-1].end >= begin:
+            below_s[-1] = Span(below_s[-1].begin, float(end))
         else:
-            found.append(Span(float(begin), float(end)))
+            below_s.append(Span(float(begin), float(end)))
     if len(apart) == 1 and there[0]:
-        found.append(Span(float(t_s[0]), float(t_s[0])))
-    return found
+        below_s.append(Span(float(t_s[0]), float(t_s[0])))
+    return below_s
 
 
 def _gaps(spans: list[Span], whole: Span, own: Track, other: Track) -> list[Span]:
     """Stretches between those in which both were recorded; at the ends only where one lacks more than is usual."""
     edges = [whole.begin, *(edge for span in spans for edge in span), whole.end]
-    found = [Span(*both) for both in zip(edges[::2], edges[1::2], strict=True)]
-    inner = [each for each in found[1:-1] if each.end > each.begin]
-    late = max(each.t_s[0] - whole.begin - each.gap_s * (1.0 + 1e-9) for each in (own, other))
-    early = max(whole.end - each.t_s[-1] - each.gap_s * (1.0 + 1e-9) for each in (own, other))
-    return sorted([*inner, *(gap for gap, lacks in ((found[0], late), (found[-1], early)) if lacks > 0.0)])
+    gaps = [Span(*both) for both in zip(edges[::2], edges[1::2], strict=True)]
+    inner = [gap for gap in gaps[1:-1] if gap.end > gap.begin]
+    late = max(track.t_s[0] - whole.begin - track.gap_s * (1.0 + 1e-9) for track in (own, other))
+    early = max(whole.end - track.t_s[-1] - track.gap_s * (1.0 + 1e-9) for track in (own, other))
+    return sorted([*inner, *(gap for gap, lacks in ((gaps[0], late), (gaps[-1], early)) if lacks > 0.0)])
 
 
 def _came(pair: Pair, own: Track, other: Track, span: Span) -> dict[str, float]:
     """By how much each of a pair came nearer to the other: the change of the distance, told apart by who moved."""
     t_s = np.linspace(span.begin, span.end, STEPS + 1)
-    one, two = own.at(t_s), other.at(t_s)
-    mixed = {(i, j): _signed(pair.shape, one[i : len(one) - 1 + i] - two[j : len(two) - 1 + j])
+    own_m, other_m = own.at(t_s), other.at(t_s)
+    mixed = {(i, j): _signed(pair.shape, own_m[i : len(own_m) - 1 + i] - other_m[j : len(other_m) - 1 + j])
              for i in (0, 1) for j in (0, 1)}  # fmt: skip
     by_own = 0.5 * (mixed[0, 0] - mixed[1, 0] + mixed[0, 1] - mixed[1, 1]).sum()
     by_other = 0.5 * (mixed[0, 0] - mixed[0, 1] + mixed[1, 0] - mixed[1, 1]).sum()
@@ -428,15 +454,15 @@ def as_json(judged: Judged, tracks: Tracks) -> dict[str, Any]:
     """All of it as strict JSON."""
     pairs = [
         {
-            **one._asdict(), "status": one.status, "margin_m": one.margin_m, "hypotheses": one.hypotheses,
-            "below_s": [list(each) for each in one.below_s], "gaps_s": [list(each) for each in one.gaps_s],
+            **pair._asdict(), "status": pair.status, "margin_m": pair.margin_m, "hypotheses": pair.hypotheses,
+            "below_s": [list(span) for span in pair.below_s], "gaps_s": [list(span) for span in pair.gaps_s],
         }
-        for one in judged.pairs
+        for pair in judged.pairs
     ]  # fmt: skip
     bodies = {
         name: {
             **track.told, "samples": len(track.t_s), "first_s": float(track.t_s[0]), "last_s": float(track.t_s[-1]),
-            "gap_s": track.gap_s, "recorded_s": [list(each) for each in track.spans],
+            "gap_s": track.gap_s, "recorded_s": [list(span) for span in track.spans],
         }
         for name, track in tracks.bodies.items()
     }  # fmt: skip

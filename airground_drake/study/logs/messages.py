@@ -44,29 +44,29 @@ def places(message: Any) -> Iterator[Place]:
                 yield Place(str(name), "", "", None, xyz)
         return
     several = _first(*(_of(message, name) for name in LISTS))
-    for one in [message] if several is None else several if isinstance(several, Sequence) else []:
-        if (place := _place(one)) is None:
+    for entry in [message] if several is None else several if isinstance(several, Sequence) else []:
+        if (place := _place(entry)) is None:
             continue
         if several is not None and not place.child:  # the header is that of the list
             head = _first(_of(message, "header"), {})
-            body = _first(*(_of(one, name) for name in NAMES), "")
+            body = _first(*(_of(entry, name) for name in NAMES), "")
             place = place._replace(body=str(body), frame=_frame(head), stamp_ns=_ns(_of(head, "stamp")))
         if several is None or place.child or place.body:
             yield place
 
 
-def _place(one: Any) -> Place | None:
-    head = _first(_of(one, "header"), one)
-    pose = _first(_of(one, "pose"), _of(one, "transform"), one)
+def _place(entry: Any) -> Place | None:
+    head = _first(_of(entry, "header"), entry)
+    pose = _first(_of(entry, "pose"), _of(entry, "transform"), entry)
     pose = _first(_of(pose, "pose"), pose)
     points = [_of(pose, name) for name in ("position", "translation", "point", "position_m")]
-    if _of(one, "theta") is not None:  # Pose2D
-        points.append({"x": _of(one, "x"), "y": _of(one, "y"), "z": math.nan})
-    xyz = next((found for point in points if (found := _xyz(point)) is not None), None)
+    if _of(entry, "theta") is not None:  # Pose2D
+        points.append({"x": _of(entry, "x"), "y": _of(entry, "y"), "z": math.nan})
+    xyz = next((position for point in points if (position := _xyz(point)) is not None), None)
     if xyz is None:
         return None
-    frame = _frame(head) or str(_first(_of(one, "parent_frame_id"), "")).strip("/")
-    child = _first(_of(one, "child_frame_id"), "")
+    frame = _frame(head) or str(_first(_of(entry, "parent_frame_id"), "")).strip("/")
+    child = _first(_of(entry, "child_frame_id"), "")
     stamp = _ns(_first(_of(head, "stamp"), _of(head, "timestamp")))
     return Place("", frame, str(child).strip("/"), stamp, xyz)
 
@@ -118,9 +118,8 @@ class Gathered:
     """Collects the places of messages, a stream for each topic, body, frame and child frame."""
 
     def __init__(self, source: str, bodies: tuple[str, ...]) -> None:
-        """Begin with nothing; `bodies` are those of the scenario."""
         self.source, self.bodies = source, bodies
-        self.found: dict[tuple[str, str, str, str], list[tuple[int, int | None, tuple[float, float, float]]]] = {}
+        self._rows: dict[tuple[str, str, str, str], list[tuple[int, int | None, tuple[float, float, float]]]] = {}
         self.unused: dict[str, str] = {}  # topics without places, with their types
         self.used: set[str] = set()
 
@@ -128,8 +127,8 @@ class Gathered:
         """Whether messages of a topic are worth decoding."""
         if topic in self.unused:
             return False
-        is_one = not kind.replace("/msg/", "/").startswith(NO_PLACES) and FIXED not in segments(topic)
-        if not is_one or is_elsewhere(topic, self.bodies):
+        has_places = not kind.replace("/msg/", "/").startswith(NO_PLACES) and FIXED not in segments(topic)
+        if not has_places or is_elsewhere(topic, self.bodies):
             self.unused[topic] = kind
         return topic not in self.unused
 
@@ -143,11 +142,11 @@ class Gathered:
             if (segments(place.child) or [""])[-1] in ROOTS:
                 continue
             key = topic, place.body, place.frame, place.child
-            self.found.setdefault(key, []).append((min(received_ns, LAST_NS), place.stamp_ns, place.xyz))
+            self._rows.setdefault(key, []).append((min(received_ns, LAST_NS), place.stamp_ns, place.xyz))
 
     def streams(self) -> Iterator[Stream]:
         """One stream per topic, body, frame and child frame."""
-        for (topic, body, frame, child), rows in self.found.items():
+        for (topic, body, frame, child), rows in self._rows.items():
             rows.sort(key=lambda row: row[0])  # by receipt: a file may have them in the order of its parts
             without = sum(stamp is None for _, stamp, _ in rows)
             stamped = without < 0.5 * len(rows)
@@ -155,10 +154,18 @@ class Gathered:
                 rows = [row for row in rows if row[1] is not None]
             times = [stamp if stamped and stamp is not None else received for received, stamp, _ in rows]
             xyz = np.array([place for _, _, place in rows], dtype=np.float64).reshape(-1, 3)
-            clock = HEADERS if stamped else RECEIPT
             whole = np.array(times, dtype=np.int64)
             stream = Stream(
-                self.source, body or topic, whole, np.zeros_like(whole), xyz, "ns", "m", frame, child, clock
+                source=self.source,
+                name=body or topic,
+                whole=whole,
+                nano=np.zeros_like(whole),
+                places=xyz,
+                time_unit="ns",
+                length_unit="m",
+                frame=frame,
+                child=child,
+                clock=HEADERS if stamped else RECEIPT,
             )
             if stamped and without:
                 stream.skipped["no stamp"] = without

@@ -18,12 +18,14 @@ ELSEWHERE = {
 
 def segments(name: str) -> list[str]:
     """The parts of a path: a topic, a frame, or the name of a column."""
-    return [each for each in re.split(r"[/.\s:|]+", name) if each]
+    return [segment for segment in re.split(r"[/.\s:|]+", name) if segment]
 
 
 def is_elsewhere(name: str, bodies: Collection[str]) -> bool:
     """Whether a name says that it is not about where a body is: a goal, a velocity. Names of bodies do not count."""
-    words = (word for each in segments(name) if each not in bodies for word in re.split(r"[^A-Za-z]+", each.lower()))
+    words = (
+        word for segment in segments(name) if segment not in bodies for word in re.split(r"[^A-Za-z]+", segment.lower())
+    )
     return not ELSEWHERE.isdisjoint(words)
 
 
@@ -31,15 +33,15 @@ def body_of(name: str, bodies: Collection[str], *, is_file: bool = False) -> str
     """The one body that a name names, or ''."""
     # It is a part of the path: `/tb3_0/odom`, `tb3_0_pose`. The stem of a file may contain it between other words:
     # `run2_tb3_0-odom`. Capitals count only if two bodies differ by them.
-    parts = {part for each in segments(name) for part in (each, AFTER.sub("", each))}
-    found = {body for body in bodies if body in parts}
-    if not found:
+    parts = {part for segment in segments(name) for part in (segment, AFTER.sub("", segment))}
+    named = {body for body in bodies if body in parts}
+    if not named:
         low = {part.lower() for part in parts}
-        found = {body for body in bodies if body.lower() in low}
-    if not found and is_file:
-        found = {body for body in bodies if re.search(rf"(?<![A-Za-z0-9]){re.escape(body)}(?![A-Za-z0-9])", name)}
-        found -= {body for body in found for other in found if body != other and body in other}
-    return found.pop() if len(found) == 1 else ""
+        named = {body for body in bodies if body.lower() in low}
+    if not named and is_file:
+        named = {body for body in bodies if re.search(rf"(?<![A-Za-z0-9]){re.escape(body)}(?![A-Za-z0-9])", name)}
+        named -= {body for body in named for other in named if body != other and body in other}
+    return named.pop() if len(named) == 1 else ""
 
 
 def renamed(names: Iterable[str], rename: Mapping[str, str]) -> str:

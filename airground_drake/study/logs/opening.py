@@ -41,13 +41,13 @@ def _files(path: Path, log: Log) -> list[Path]:
     """A file, or the regular files in a folder: a link may lead to somebody else's file, and a pipe may never end."""
     if not path.is_dir():
         return [path]
-    inside = sorted(each for each in path.iterdir() if not each.name.startswith("."))
-    regular = [each for each in inside if stat.S_ISREG(each.lstat().st_mode)]
-    others = [each for each in inside if each not in regular and (each.is_symlink() or not each.is_dir())]
-    if any(each.name == ABOUT for each in regular):
-        recordings = [each for each in regular if each.suffix in RECORDINGS]
-        regular = recordings or [each for each in regular if each.name != ABOUT]
-    log.ignored += [f"{each.name}: {'a link' if each.is_symlink() else 'no regular file'}" for each in others]
+    inside = sorted(entry for entry in path.iterdir() if not entry.name.startswith("."))
+    regular = [entry for entry in inside if stat.S_ISREG(entry.lstat().st_mode)]
+    others = [entry for entry in inside if entry not in regular and (entry.is_symlink() or not entry.is_dir())]
+    if any(entry.name == ABOUT for entry in regular):
+        recordings = [entry for entry in regular if entry.suffix in RECORDINGS]
+        regular = recordings or [entry for entry in regular if entry.name != ABOUT]
+    log.ignored += [f"{entry.name}: {'a link' if entry.is_symlink() else 'no regular file'}" for entry in others]
     if not regular:
         why = "; folders in it are not read" if inside else ""
         why = f": {', '.join(log.ignored[-len(others) :][:3])}; wanted: regular files" if others else why

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -58,7 +59,7 @@ def page(
         drawn = [_map(judged, tracks, scenario), *_distances(judged, tracks, resolved(scenario))]
     return render_beside(
         "judged.html.j2", judged=judged, tracks=tracks, scenario=scenario, logs=logs, replay=replay, words=words,
-        figures=drawn, errors={name: each for name, each in errors_m.items() if each}, most=MOST_ROWS,
+        figures=drawn, errors={name: error_m for name, error_m in errors_m.items() if error_m}, most=MOST_ROWS,
         mark={KEPT: "yes" if judged.covers_all else "partly", BROKEN: "no"}.get(judged.status, "open"),
         marks_of={KEPT: "yes", BROKEN: "no"}, remarks=[*tracks.said, *words.remarks(judged)],
     )  # fmt: skip
@@ -82,7 +83,7 @@ def _map(judged: Judged, tracks: Tracks, scenario: Scenario) -> Figure:
         axes.plot(*track.places_m[-1, :2], "s", markersize=5, color=appearance.color, zorder=4)
         labels += [Label(track.places_m[-1], short(name, 12), appearance.color, weight="bold")]
         ways += parts
-    for pair in [each for each in judged.pairs if each.status == BROKEN][: words.MOST_NAMED]:
+    for pair in [pair for pair in judged.pairs if pair.status == BROKEN][: words.MOST_NAMED]:
         both = [tracks.bodies[name].at(np.array([pair.at_s]))[0, :2] for name in _recorded(pair, tracks)]
         axes.plot(*np.transpose(both), "-X", color=ALARM, markersize=9, markeredgecolor="white", zorder=6)
         labels.append(Label(both[0], f"{pair.least_m:.3f} m at {pair.at_s:.2f} s", ALARM))
@@ -103,7 +104,7 @@ def _recorded(pair: JudgedPair, tracks: Tracks) -> list[str]:
 
 def _parts(track: Track) -> list[Array]:
     """Its way in each stretch, seen from above: (K, 2) each, m, with few enough points to draw."""
-    parts = [track.places_m[(track.t_s >= each.begin) & (track.t_s <= each.end), :2] for each in track.spans]
+    parts = [track.places_m[(track.t_s >= span.begin) & (track.t_s <= span.end), :2] for span in track.spans]
     return [part[canvas.thin(part)] for part in parts]
 
 
@@ -129,9 +130,9 @@ def _distances(judged: Judged, tracks: Tracks, scenario: Json) -> list[Figure]:
 
 
 def _distance(axes: Axes, pair: JudgedPair, course: Sequence[tuple[Array, Array]], judged: Judged) -> None:
-    every = np.concatenate([values for _, values in course])
+    distances_m = np.concatenate([values for _, values in course])
     bottom = min(0.0, pair.least_m)
-    top = max(min(float(every.max()), 4.0 * pair.safe_m), 1.3 * pair.safe_m)
+    top = max(min(float(distances_m.max()), 4.0 * pair.safe_m), 1.3 * pair.safe_m)
     axes.set_xlim(judged.begin_s, max(judged.end_s, judged.begin_s + 1e-6))
     axes.set_ylim(bottom, top)
     axes.axhspan(bottom, pair.safe_m, **_BAND)
@@ -149,7 +150,7 @@ def _distance(axes: Axes, pair: JudgedPair, course: Sequence[tuple[Array, Array]
 
 def _table(pair: JudgedPair, over_time: Mapping[tuple[str, str], Sequence[tuple[Array, Array]]]) -> Table:
     course = over_time[pair.first, pair.second]
-    t_s, values = (np.concatenate([each[k] for each in course]) for k in (0, 1))
+    t_s, values = (np.concatenate([stretch[k] for stretch in course]) for k in (0, 1))
     rows = np.unique(np.linspace(0, len(t_s) - 1, MAX_TABLE_ROWS).round().astype(int))
     cells = tuple((f"{t_s[k]:.2f}", f"{values[k]:.4f}") for k in rows)
     return Table(f"{pair.first}, {pair.second}: distance between surfaces", ("t, s", "distance, m"), cells)
@@ -185,11 +186,11 @@ def scene(judged: Judged, tracks: Tracks, scenario: Scenario, logs: Sequence[str
         for pair in judged.pairs if pair.status == BROKEN for span in pair.below_s
     ]  # fmt: skip
     events += [
-        {"t_s": one.end - judged.begin_s, "kind": "not recorded", "robot": f"{name}, for {two.begin - one.end:.2f} s"}
-        for name, track in tracks.bodies.items() for one, two in zip(track.spans, track.spans[1:], strict=False)
+        {"t_s": end - judged.begin_s, "kind": "not recorded", "robot": f"{name}, for {begin - end:.2f} s"}
+        for name, track in tracks.bodies.items() for (_, end), (begin, _) in pairwise(track.spans)
     ]  # fmt: skip
     return Scene(
-        **{**vars(still), "robots": tuple(bodies)}, scenario=scenario, run=", ".join(Path(each).name for each in logs),
+        **{**vars(still), "robots": tuple(bodies)}, scenario=scenario, run=", ".join(Path(log).name for log in logs),
         says="Recorded positions. Nothing is shown of a body where it was not recorded.", times_s=times, moved_m=moved,
         proposals=(), has_states=False,
         events=tuple(sorted(events, key=lambda event: float(str(event["t_s"])))),

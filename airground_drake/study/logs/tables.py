@@ -50,13 +50,15 @@ def read(path: Path, content: bytes, wanted: Wanted) -> Log:
     if not table.has_header and len(labels) == len(TUM) and no_words and not wanted.columns and _has_turns(table):
         table = table._replace(labels=(labels := TUM))
     if not table.has_header and not wanted.columns and _is_echo(table):
-        named = [*ECHO[:3], *["child_frame"] * (not text.is_number(table.cells[3][0])), *ECHO[3:]]
+        child = [] if text.is_number(table.cells[3][0]) else ["child_frame"]
+        named = [*ECHO[:3], *child, *ECHO[3:]]
         table = table._replace(labels=(labels := [*named, *labels[len(named) :]]))
     has = columns(labels, wanted.columns, wanted.bodies)
     if not has.times and (counter := _counter(table)) is not None:
         has = has._replace(times=[Time(counter, None, "", 1, "")])
     if not has.times or not has.places:
-        lacks = " and ".join(["a column of times"] * (not has.times) + ["columns x and y"] * (not has.places))
+        wants = {"a column of times": has.times, "columns x and y": has.places}
+        lacks = " and ".join(name for name, there in wants.items() if not there)
         raise LogError(
             f"it lacks {lacks}: its columns are {listed(labels)}; wanted: such as t_s, body, x_m, y_m, z_m, or "
             "--map-columns t=NAME,body=NAME,x=NAME,y=NAME,z=NAME"
@@ -99,7 +101,7 @@ def _counter(table: text.Table) -> int | None:
 def _frames(table: text.Table, has: Columns) -> pd.Series | None:
     """The coordinate frames of the rows; None without a column of them, or if that has the numbers of frames."""
     cells = table.cells[has.frame] if has.frame is not None else None
-    return None if cells is None or all(text.is_number(each) for each in cells.unique()[:100]) else cells
+    return None if cells is None or all(text.is_number(cell) for cell in cells.unique()[:100]) else cells
 
 
 def _parquet(content: bytes) -> text.Table:
@@ -161,7 +163,7 @@ def _one_place(places: list[Place]) -> list[Place]:
 
 def _streams(path: Path, table: text.Table, has: Columns, wanted: Wanted) -> Iterator[Stream]:
     """The streams of a table; of a long one, those of each body and frame."""
-    stated = next((found[1].lower() for line in table.above if (found := _UNITS.search(line))), "")
+    stated = next((match[1].lower() for line in table.above if (match := _UNITS.search(line))), "")
     length = WORDS.get(stated, stated) if WORDS.get(stated, stated) in PER_M else ""
     has = has._replace(times=[_dated(table, time) for time in has.times])
     whole = {time: _stamps(table, time) for time in has.times}
@@ -182,20 +184,21 @@ def _streams(path: Path, table: text.Table, has: Columns, wanted: Wanted) -> Ite
             name, frame = cast("tuple[str, str]", key)
             at = np.asarray(rows)
             is_file = has.body is None and alone and not wanted.body(place.name)
-            yield _stream(
-                Stream(
-                    str(path), _file_of(path, wanted) if is_file else str(name), stamps[at], nano[at], numbers[at],
-                    time.unit, place.units[0] or length, str(frame).strip("/"),
-                    clock=_clock(table, time), is_file=is_file, counts_frames=counts_frames(table.labels[time.whole]),
-                ),
-                why[at], [table.lines[k] for k in at],
-                is_sparse=has.body is None and len(has.places) > 1 and bool((why == "empty").mean() > 0.5),
-            )  # fmt: skip
-
-
-def _clock(table: text.Table, time: Time) -> str:
-    both = [table.labels[k] for k in (time.whole, time.rest) if k is not None]
-    return " and ".join(both)
+            stream = Stream(
+                source=str(path),
+                name=_file_of(path, wanted) if is_file else str(name),
+                whole=stamps[at],
+                nano=nano[at],
+                places=numbers[at],
+                time_unit=time.unit,
+                length_unit=place.units[0] or length,
+                frame=str(frame).strip("/"),
+                clock=" and ".join(table.labels[k] for k in (time.whole, time.rest) if k is not None),
+                is_file=is_file,
+                counts_frames=counts_frames(table.labels[time.whole]),
+            )
+            is_sparse = has.body is None and len(has.places) > 1 and bool((why == "empty").mean() > 0.5)
+            yield _stream(stream, why[at], [table.lines[k] for k in at], is_sparse=is_sparse)
 
 
 def _stream(raw: Stream, why: npt.NDArray[np.object_], lines: list[int], *, is_sparse: bool) -> Stream:
@@ -258,9 +261,9 @@ def _exactly(cells: list[str]) -> tuple[Whole, Whole, npt.NDArray[np.bool_]]:
     whole, nano = np.zeros(len(cells), dtype=np.int64), np.zeros(len(cells), dtype=np.int64)
     good = np.zeros(len(cells), dtype=bool)
     for k, cell in enumerate(cells):
-        if (found := _DECIMAL.fullmatch(cell)) and int(found[2]) < 2**63:
-            sign = -1 if found[1] == "-" else 1
-            whole[k], nano[k], good[k] = sign * int(found[2]), sign * int(f"{found[3] or ''}000000000"[:9]), True
+        if (match := _DECIMAL.fullmatch(cell)) and int(match[2]) < 2**63:
+            sign = -1 if match[1] == "-" else 1
+            whole[k], nano[k], good[k] = sign * int(match[2]), sign * int(f"{match[3] or ''}000000000"[:9]), True
             continue
         try:
             value = float(cell)

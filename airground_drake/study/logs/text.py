@@ -115,9 +115,9 @@ def _fields(line: str, delimiter: str) -> list[str]:
     if delimiter == " ":
         return line.split()
     if '"' not in line:
-        return [each.strip() for each in line.split(delimiter)]
+        return [field.strip() for field in line.split(delimiter)]
     try:
-        return [each.strip() for each in next(csv.reader([line], delimiter=delimiter), [])]
+        return [field.strip() for field in next(csv.reader([line], delimiter=delimiter), [])]
     except csv.Error:
         return []
 
@@ -150,14 +150,14 @@ def _decimal_comma(column: Sequence[str]) -> bool:
 
 def _is_data(row: Sequence[str], numeric: Sequence[bool]) -> bool:
     """Whether a line has numbers, or nothing, where most lines have numbers."""
-    cells = [cell for cell, is_one in zip(row, numeric, strict=False) if is_one]
+    cells = [cell for cell, is_numeric in zip(row, numeric, strict=False) if is_numeric]
     return len(row) == len(numeric) and all(map(is_number, cells)) and any(cells)
 
 
 def _header(lines: Sequence[str], delimiter: str, count: int, unnamed: int) -> tuple[list[str], set[int]]:
     """Names of the columns, and the numbers of the lines that they are from; a comment may be the header."""
     # A delimiter at the end of each row, or of the header, makes no column: the last `unnamed` columns are empty.
-    found: list[int] = []
+    header: list[int] = []
     rows: list[list[str]] = []
     for k in range(len(lines) - 1, -1, -1):
         is_comment = lines[k].lstrip().startswith("#")
@@ -172,11 +172,11 @@ def _header(lines: Sequence[str], delimiter: str, count: int, unnamed: int) -> t
         if len(row) != count or not any(row):
             break
         rows.insert(0, row)
-        found.append(k)
+        header.append(k)
         if is_comment:
             break
     for row in rows[:-1]:  # what stands above several columns is written once
         for c in range(1, count):
             row[c] = row[c] or row[c - 1]
     parts = [[row[c] for row in rows if row[c]] for c in range(count)]
-    return ["/".join(dict.fromkeys(each)) for each in parts] if rows else [], {*found}
+    return ["/".join(dict.fromkeys(words)) for words in parts] if rows else [], {*header}

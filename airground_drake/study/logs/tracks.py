@@ -98,7 +98,8 @@ class Choice(NamedTuple):
 
 def bodies_of(scenario: Json, uavs: Sequence[str] = ()) -> list[str]:
     """Names of the bodies that a log may have: robots, further UAVs, and obstacles that move or might."""
-    return [*robots_of(scenario), *uavs, *(name for name, each in scenario["obstacles"].items() if expected_m_s(each))]
+    movers = (name for name, obstacle in scenario["obstacles"].items() if expected_m_s(obstacle))
+    return [*robots_of(scenario), *uavs, *movers]
 
 
 def known(scenario: Json, choice: Choice, others: Sequence[str] = ()) -> None:
@@ -114,29 +115,32 @@ def known(scenario: Json, choice: Choice, others: Sequence[str] = ()) -> None:
 def joined(log: Log, scenario: Json, choice: Choice) -> Tracks:
     """The tracks of the bodies of a scenario."""
     bodies = [name for name in bodies_of(scenario, choice.uavs) if name not in choice.without]
-    found, ignored = _assigned(log, bodies, choice)
-    _in_one_frame({name: each.frame for name, each in found.items()}, choice.frames)
-    for name, stream in found.items():
+    streams, ignored = _assigned(log, bodies, choice)
+    _in_one_frame({name: stream.frame for name, stream in streams.items()}, choice.frames)
+    for name, stream in streams.items():
         if not (np.abs(np.nan_to_num(stream.places)) <= LARGEST * max(PER_M.values())).all():
             raise LogError(one_line(f"{name} has a value beyond {LARGEST:g}; wanted: seconds and metres"))
-    axes.chosen(found, choice.axes)
-    said = units.settle(found, scenario, choice.time_unit, choice.length_unit, choice.rate_hz)
-    said += [f"axes{f' of {name}' * bool(name)}: {each} are x, y, z, as chosen" for name, each in choice.axes.items()]
-    said += axes.recognised(found, scenario, found if "" in choice.axes else choice.axes)
-    for name in (*scenario["ugvs"], *choice.uavs, *(n for n, each in scenario["obstacles"].items() if each["moves"])):
-        if name not in found and name not in choice.without:
+    axes.chosen(streams, choice.axes)
+    said = units.settle(streams, scenario, choice.time_unit, choice.length_unit, choice.rate_hz)
+    for name, letters in choice.axes.items():
+        whose = f"axes of {name}" if name else "axes"
+        said.append(f"{whose}: {letters} are x, y, z, as chosen")
+    said += axes.recognised(streams, scenario, streams if "" in choice.axes else choice.axes)
+    movers = [name for name, obstacle in scenario["obstacles"].items() if obstacle["moves"]]
+    for name in (*scenario["ugvs"], *choice.uavs, *movers):
+        if name not in streams and name not in choice.without:
             for stream in log.streams:
                 if stream.skipped and not len(stream.whole) and _body_of(stream, bodies, choice.rename)[0] == name:
                     raise LogError(one_line(f"{name} has no usable rows: {_skipped(stream)}; wanted: {_USABLE}"))
             raise LogError(_not_there(name, log, choice))
-    if len(clocks := {each.clock for each in found.values() if each.clock in OF_MESSAGES}) > 1:
-        late = ", ".join(name for name, each in found.items() if each.clock == RECEIPT)
+    if len(clocks := {stream.clock for stream in streams.values() if stream.clock in OF_MESSAGES}) > 1:
+        late = ", ".join(name for name, stream in streams.items() if stream.clock == RECEIPT)
         said.append(f"clocks differ: {late} by {RECEIPT}, others by {(clocks - {RECEIPT}).pop()}")
-    stamps = {name: each.ns(each.time_unit) for name, each in found.items()}
-    first = min(int(each.min()) for each in stamps.values())
+    stamps = {name: stream.ns(stream.time_unit) for name, stream in streams.items()}
+    first = min(int(ns.min()) for ns in stamps.values())
     zero = first if first >= SINCE_1970_NS else 0
     tracks = {}
-    for name, stream in ((body, found[body]) for body in bodies if body in found):
+    for name, stream in ((body, streams[body]) for body in bodies if body in streams):
         ns, flat = stamps[name] - zero, np.isnan(stream.places[:, 2])
         if flat.any() and name not in scenario["ugvs"] and name not in scenario["obstacles"]:
             if flat.all():
@@ -146,12 +150,12 @@ def joined(log: Log, scenario: Json, choice: Choice) -> Tracks:
             stream.places, ns = stream.places[~flat], ns[~flat]
         tracks[name] = _track(name, stream, ns, choice.gap_s, _fastest(name, scenario), _start(name, scenario), said)
     uav = scenario["uav"]["name"]
-    if uav not in found and uav not in choice.without:
+    if uav not in streams and uav not in choice.without:
         said.append(f"{uav} is not in the log: its distances are not judged")
     if choice.uavs:
         said.append("distances between UAVs are not judged: the scenario promises none")
     for name in tracks:
-        if plants := [each["kind"] for each in robots_of(scenario).get(name, {}).get("plant", ())]:
+        if plants := [plant["kind"] for plant in robots_of(scenario).get(name, {}).get("plant", ())]:
             told = f"{name} is no point that goes where it is told ({', '.join(plants)})"
             said.append(f"{told}: what its body lacks of the law need be no fault of its controller")
     if not tracks:
@@ -163,12 +167,13 @@ def joined(log: Log, scenario: Json, choice: Choice) -> Tracks:
 
 def _not_there(name: str, log: Log, choice: Choice) -> str:
     """What is said where a body is missing."""
-    frames = sorted({each.frame for each in log.streams if each.frame})
+    frames = sorted({stream.frame for stream in log.streams if stream.frame})
     if choice.frames and frames and not {*frames} & {*choice.frames}:
         return one_line(f"--frame {choice.frames[0]}: the log has no such frame; it has {', '.join(frames)[:300]}")
-    there = ", ".join(dict.fromkeys(each.label for each in log.streams))
+    there = ", ".join(dict.fromkeys(stream.label for stream in log.streams))
     there = f"names there: {there[:300]}" if there else "no positions are there"
-    likely = [each for each in log.unusable if name in each] or log.unusable or (log.ignored if not log.streams else [])
+    of_it = [why for why in log.unusable if name in why]
+    likely = of_it or log.unusable or (log.ignored if not log.streams else [])
     lacks = f"; not usable: {', '.join(likely[:3])[:300]}" if likely else ""
     return one_line(f"{name} is not in the log; {there}{lacks}; wanted: --rename NAME={name}, or --without {name}")
 
@@ -188,23 +193,25 @@ def _assigned(log: Log, bodies: Collection[str], choice: Choice) -> tuple[dict[s
             ignored.append(f"{stream.label}: in frame {stream.frame}")
         else:
             candidates.setdefault(body, {}).setdefault(rank, []).append(stream)
-    found = {}
+    assigned = {}
     for body, by_rank in candidates.items():
         best = _links(by_rank.pop(min(by_rank)))
-        ignored += [f"{each.label}: {body} has a nearer name" for others in by_rank.values() for each in others]
-        of_one = {(each.name, each.child, each.frame): each for each in best}
+        ignored += [f"{stream.label}: {body} has a nearer name" for others in by_rank.values() for stream in others]
+        of_one = {(stream.name, stream.child, stream.frame): stream for stream in best}
         if len(of_one) > 1:
-            several = ", ".join(f"{each.label}{f' in frame {each.frame}' * bool(each.frame)}" for each in best)
-            name = best[0].name if len({each.name for each in best}) > 1 else best[0].child
-            frame = "--frame FRAME" if len({each.frame for each in best}) > 1 else ""
+            frames = [f"{stream.label} in frame {stream.frame}" if stream.frame else stream.label for stream in best]
+            name = best[0].name if len({stream.name for stream in best}) > 1 else best[0].child
+            frame = "--frame FRAME" if len({stream.frame for stream in best}) > 1 else ""
             wanted = ", or ".join(filter(None, [f"--rename {name}={body}" if name else "", frame]))
-            raise LogError(one_line(f"{body} is in the log more than once: {several[:400]}; wanted: {wanted}"))
-        found[body] = _merged(best)
-    return found, list(dict.fromkeys(ignored))
+            raise LogError(
+                one_line(f"{body} is in the log more than once: {', '.join(frames)[:400]}; wanted: {wanted}")
+            )
+        assigned[body] = _merged(best)
+    return assigned, list(dict.fromkeys(ignored))
 
 
 def _exist(rename: Mapping[str, str], log: Log, bodies: Collection[str]) -> None:
-    known = {name.strip("/") for each in log.streams for name in (each.name, each.child, each.label) if name}
+    known = {name.strip("/") for stream in log.streams for name in (stream.name, stream.child, stream.label) if name}
     for name, body in rename.items():
         if body not in bodies:
             raise LogError(one_line(f"--rename {name}={body}: the scenario has no {body}; it has {', '.join(bodies)}"))
@@ -230,8 +237,8 @@ def _body_of(stream: Stream, bodies: Collection[str], rename: Mapping[str, str])
 
 def _links(streams: list[Stream]) -> list[Stream]:
     """Streams without those of a robot's own parts: their frame is one that the robot carries."""
-    carried = {each.child for each in streams if each.child}
-    return [each for each in streams if each.frame not in carried or each.frame == each.child] or streams
+    carried = {stream.child for stream in streams if stream.child}
+    return [stream for stream in streams if stream.frame not in carried or stream.frame == stream.child] or streams
 
 
 def _merged(streams: list[Stream]) -> Stream:
@@ -266,11 +273,12 @@ def _in_one_frame(frames: Mapping[str, str], allowed: Collection[str]) -> None:
 
 def _skipped(stream: Stream) -> str:
     """Rows of a stream that cannot be used, in words."""
-    first = stream.first_skipped
-    return ", ".join(
-        f"{count} with {reason}{f', first in {first[reason]}' * bool(first.get(reason))}"
-        for reason, count in stream.skipped.items()
-    )
+    return ", ".join(f"{count} with {reason}{_where(stream, reason)}" for reason, count in stream.skipped.items())
+
+
+def _where(stream: Stream, reason: str) -> str:
+    first = stream.first_skipped.get(reason)
+    return f", first in {first}" if first else ""
 
 
 _USABLE = "seconds, or dates such as 2026-05-04T10:00:00.050Z, and numbers for x and y"
@@ -278,7 +286,7 @@ _USABLE = "seconds, or dates such as 2026-05-04T10:00:00.050Z, and numbers for x
 
 def _fastest(name: str, scenario: Json) -> float:
     """A speed that a body does not exceed by far: its limit; of an obstacle, that of the fastest body, m/s."""
-    limits = {each: float(robot["max_speed_m_s"]) for each, robot in robots_of(scenario).items()}
+    limits = {ugv: float(robot["max_speed_m_s"]) for ugv, robot in robots_of(scenario).items()}
     expected = expected_m_s(scenario["obstacles"][name]) if name in scenario["obstacles"] else 0.0
     return limits.get(name, max(expected, *limits.values()))
 
@@ -297,8 +305,7 @@ def _track(
     if not (np.abs(np.nan_to_num(places)) <= LARGEST).all():
         raise LogError(one_line(f"{name} has a value beyond {LARGEST:g}; wanted: seconds and metres"))
     for reason, count in stream.skipped.items():
-        where = f", first in {at}" if (at := stream.first_skipped.get(reason)) else ""
-        said.append(f"{name}: {count} rows skipped, {reason}{where}")
+        said.append(f"{name}: {count} rows skipped, {reason}{_where(stream, reason)}")
     _of_one_recording(name, ns, places, fastest_m_s)
     if disorder := int((np.diff(ns) < 0).sum()):
         said.append(f"{name}: rows are not in the order of time in {disorder} places; they were sorted")
@@ -343,13 +350,13 @@ def _track(
 def _of_one_recording(name: str, ns: Whole, places: Array, fastest_m_s: float) -> None:
     """Refuse rows of two recordings of the same time that contradict each other."""
     ends = [0, *(np.flatnonzero(np.diff(ns) < 0) + 1).tolist(), len(ns)]
-    longest = sorted(pairwise(ends), key=lambda each: each[0] - each[1])[:MOST_RECORDINGS]
-    for one, other in combinations([slice(*each) for each in longest if each[1] - each[0] >= FEW], 2):
-        t, t_other = ns[one], ns[other]
+    longest = sorted(pairwise(ends), key=lambda ends_of: ends_of[0] - ends_of[1])[:MOST_RECORDINGS]
+    for first, other in combinations([slice(*ends_of) for ends_of in longest if ends_of[1] - ends_of[0] >= FEW], 2):
+        t, t_other = ns[first], ns[other]
         there = (t_other >= t[0]) & (t_other <= t[-1])
         if there.sum() < FEW:
             continue
-        between = [np.interp(t_other[there], t, axis) for axis in places[one, :2].T]
+        between = [np.interp(t_other[there], t, axis) for axis in places[first, :2].T]
         apart = np.hypot(*(places[other, :2][there].T - between))
         step_s = float(np.median(np.diff(t))) / 1e9
         if np.median(apart) > LOST_M + step_s * fastest_m_s:

@@ -73,17 +73,19 @@ def settle(
         if stream.time_unit in ("ms", "us", "ns") and not stated[0]:
             why = "as chosen" if time_unit else "by their size, stamps since 1970"
             said[f"times are in {NAMES[stream.time_unit]}: {why}"] = None
-    open_time = [each for each in streams.values() if not each.time_unit]
-    open_length = [each for each in streams.values() if not each.length_unit]
+    open_time = [stream for stream in streams.values() if not stream.time_unit]
+    open_length = [stream for stream in streams.values() if not stream.length_unit]
     if open_time or open_length:
-        judged = {name: each for name, each in streams.items() if name in robots_of(scenario) and len(each.whole) > 1}
+        judged = {
+            name: stream for name, stream in streams.items() if name in robots_of(scenario) and len(stream.whole) > 1
+        }
         time, length, whys = _likely(judged, scenario)
         said |= dict.fromkeys(whys)
-        _alike({name: each for name, each in judged.items() if not each.length_unit}, length, scenario)
-        for each in open_time:
-            each.time_unit = time
-        for each in open_length:
-            each.length_unit = length
+        _alike({name: stream for name, stream in judged.items() if not stream.length_unit}, length, scenario)
+        for undecided in open_time:
+            undecided.time_unit = time
+        for undecided in open_length:
+            undecided.length_unit = length
     return list(said)
 
 
@@ -92,23 +94,23 @@ _WANTED = "wanted: --rate-hz with the frames per second, such as --rate-hz 25"
 
 def _of_frames(streams: Mapping[str, Stream], rate_hz: float) -> None:
     """Turn numbers of frames into nanoseconds."""
-    counted = [each for each in streams.values() if not each.time_unit and not each.nano.any()]
+    counted = [stream for stream in streams.values() if not stream.time_unit and not stream.nano.any()]
     if not counted:
         raise LogError("--rate-hz is for logs whose times are numbers of frames; this log has other times")
-    for each in counted:
-        if float(np.abs(each.whole / rate_hz).max(initial=0.0)) > 9e9:
-            raise LogError(one_line(f"{each.label} has numbers of frames beyond 9e9 s; wanted: another --rate-hz"))
-        each.whole, each.time_unit = np.round(each.whole * (1e9 / rate_hz)).astype(np.int64), "ns"
+    for numbered in counted:
+        if float(np.abs(numbered.whole / rate_hz).max(initial=0.0)) > 9e9:
+            raise LogError(one_line(f"{numbered.label} has numbers of frames beyond 9e9 s; wanted: another --rate-hz"))
+        numbered.whole, numbered.time_unit = np.round(numbered.whole * (1e9 / rate_hz)).astype(np.int64), "ns"
 
 
 def _alike(streams: Mapping[str, Stream], length: str, scenario: Json) -> None:
     """Refuse a stream that begins where its body starts if it is in metres, where all are taken as in another unit."""
-    for name, each in streams.items():
+    for name, stream in streams.items():
         start = np.array(robots_of(scenario)[name]["start_m"][:2])
-        off = {unit: float(np.linalg.norm(each.places[0, :2] / PER_M[unit] - start)) for unit in ("m", length)}
+        off = {unit: float(np.linalg.norm(stream.places[0, :2] / PER_M[unit] - start)) for unit in ("m", length)}
         if off["m"] <= NEAR_M and off[length] > 5.0 * NEAR_M:
             raise LogError(
-                one_line(f"lengths of {each.label} fit {name}'s start in metres, others only fit in {NAMES[length]}; "
+                one_line(f"lengths of {stream.label} fit {name}'s start in metres, others only fit in {NAMES[length]}; "
                          "wanted: one unit for all, or units in the names of columns (x_mm)")
             )  # fmt: skip
 
@@ -122,26 +124,26 @@ def _since_1970(stream: Stream, duration_s: float) -> str:
 
 def _is_seldom(streams: Mapping[str, Stream], lasting: float) -> bool:
     """Whether a log in seconds would be much longer than the scenario, with its samples seconds apart."""
-    steps = [np.diff(each.elapsed_s("s")) for each in streams.values() if not each.time_unit]
-    return lasting > LONG and min(float(np.median(each)) for each in steps) >= SELDOM_S
+    steps = [np.diff(stream.elapsed_s("s")) for stream in streams.values() if not stream.time_unit]
+    return lasting > LONG and min(float(np.median(step)) for step in steps) >= SELDOM_S
 
 
 def _likely(streams: Mapping[str, Stream], scenario: Json) -> tuple[str, str, list[str]]:
     """The units of time and length that are still open, and why they are not seconds and metres."""
     # Metres stand unless they are impossible: then robots would be too fast, whatever the unit of time, or far from the
     # scenario, and in another unit they start where the scenario has them, or move among what is in it.
-    times = [""] if all(each.time_unit for each in streams.values()) else [*PER_S]
-    lengths = [""] if all(each.length_unit for each in streams.values()) else [*PER_M]
+    times = [""] if all(stream.time_unit for stream in streams.values()) else [*PER_S]
+    lengths = [""] if all(stream.length_unit for stream in streams.values()) else [*PER_M]
     usual = times[0] or "s", lengths[0] or "m"
     if not streams:
         return *usual, []
     moving = {(time, length): _motion(streams, scenario, time, length) for time in times for length in lengths}
     time, length = _chosen(streams, scenario, moving, times, lengths)
     asked = moving[time, length]
-    if times[0] and not any(each.nano.any() for each in streams.values() if not each.time_unit):
+    if times[0] and not any(stream.nano.any() for stream in streams.values() if not stream.time_unit):
         long, slow = moving["s", length].lasting > LONG, asked.speed < SLOW
         if not asked.is_possible or (time == "s" and long and slow) or (time != "s" and asked.speed > FAST):
-            whole = next(each for each in streams.values() if not each.time_unit)
+            whole = next(stream for stream in streams.values() if not stream.time_unit)
             raise LogError(
                 one_line(f"the times of {whole.label} ({whole.clock}) are whole numbers that fit no unit: as seconds, "
                          f"the log would last {moving['s', length].lasts_s:.6g} s; {_WANTED}, if they are numbers of "
@@ -183,7 +185,7 @@ def _chosen(
     ]  # fmt: skip
     if others and (is_far or not possible):
         length = min(others, key=lambda both: moving[both].oddness)[1]
-        return _time([time for time, each in others if each == length], length, streams, moving), length
+        return _time([time for time, unit in others if unit == length], length, streams, moving), length
     return _time(possible or times[:1], usual, streams, moving), usual
 
 
@@ -200,12 +202,12 @@ def _time(
 def _fitting(streams: Mapping[str, Stream], scenario: Json, lengths: list[str]) -> list[str]:
     """The units in which all robots begin where the scenario has them; none if it has them all near (0, 0)."""
     starts = {name: np.array(robots_of(scenario)[name]["start_m"][:2]) for name in streams}
-    if max(float(np.linalg.norm(each)) for each in starts.values()) < 5.0 * NEAR_M:
+    if max(float(np.linalg.norm(start)) for start in starts.values()) < 5.0 * NEAR_M:
         return []
     return [
         unit for unit in lengths
-        if all(float(np.linalg.norm(each.places[0, :2] / PER_M[each.length_unit or unit] - starts[name])) <= NEAR_M
-               for name, each in streams.items())
+        if all(float(np.linalg.norm(stream.places[0, :2] / PER_M[stream.length_unit or unit] - starts[name])) <= NEAR_M
+               for name, stream in streams.items())
     ]  # fmt: skip
 
 
@@ -213,13 +215,13 @@ def _motion(streams: Mapping[str, Stream], scenario: Json, time: str, length: st
     """The motion of robots, if what they leave open is in these units."""
     robots = robots_of(scenario)
     starts = {name: np.array(robots[name]["start_m"][:2], dtype=np.float64) for name in streams}
-    goals = [np.array(each["target_m"][:2], dtype=np.float64) for each in scenario["ugvs"].values()]
+    goals = [np.array(ugv["target_m"][:2], dtype=np.float64) for ugv in scenario["ugvs"].values()]
     size_m = max(1.0, float(np.ptp([*goals, *starts.values()], axis=0).max()))
     lasts = speed = 0.0
     fastest, farthest = (0.0, ""), (0.0, "")
-    for name, each in streams.items():
-        t = each.elapsed_s(each.time_unit or time)
-        places = each.places[:, :2] / PER_M[each.length_unit or length]
+    for name, stream in streams.items():
+        t = stream.elapsed_s(stream.time_unit or time)
+        places = stream.places[:, :2] / PER_M[stream.length_unit or length]
         step_s, moved = np.diff(t), np.hypot(*np.diff(places, axis=0).T)
         moves = (step_s > 0.0) & (moved > 0.0)  # in a long log most robots stand most of the time
         lasts = max(lasts, float(np.ptp(t)))

@@ -57,7 +57,7 @@ def least(pair: JudgedPair) -> str:
 
 def spans(those: Sequence[Span]) -> str:
     """Stretches of time."""
-    told = [f"{each.begin:.3f} to {each.end:.3f} s" for each in those[:MOST_SPANS]]
+    told = [f"{span.begin:.3f} to {span.end:.3f} s" for span in those[:MOST_SPANS]]
     more = f" and {len(those) - MOST_SPANS} more" if len(those) > MOST_SPANS else ""
     return ", ".join(told) + more
 
@@ -80,7 +80,7 @@ def law(pair: JudgedPair) -> str:
     if pair.missed_m <= SMALL:
         held = f"the law held in all {pair.intervals} intervals"
     else:
-        who = ", ".join(f"{name} {each:.3g} m" for name, each in pair.missed_by_m.items() if each > SMALL)
+        who = ", ".join(f"{name} {missed_m:.3g} m" for name, missed_m in pair.missed_by_m.items() if missed_m > SMALL)
         by = f" ({who})" if len(pair.missed_by_m) > 1 and who else ""
         held = (
             f"the law was missed in {pair.lacking} of {pair.intervals} intervals, by up to e = {pair.missed_m:.3g} m, "
@@ -141,7 +141,7 @@ def lines(judged: Judged, tracks: Tracks) -> Iterator[str]:
     if tracks.origin:
         yield f"Time 0 is {tracks.origin}."
     told = [*tracks.said, *remarks(judged)]
-    yield from (f"Note: {each}" for each in told[:MOST_SAID])
+    yield from (f"Note: {remark}" for remark in told[:MOST_SAID])
     if len(told) > MOST_SAID:
         yield f"Note: {len(told) - MOST_SAID} more; --json has all"
     if tracks.ignored:
@@ -150,8 +150,8 @@ def lines(judged: Judged, tracks: Tracks) -> Iterator[str]:
     yield "Least margins first, distances between surfaces:"
     for pair in judged.pairs[:MOST_PAIRS]:
         part = f"; covered {pair.covered_s:.6g} s" if pair.gaps_s else ""
-        part += ", nearest at the edge of a gap" if any(pair.at_s in each for each in pair.gaps_s) else ""
+        part += ", nearest at the edge of a gap" if any(pair.at_s in span for span in pair.gaps_s) else ""
         yield f"  {pair.first}, {pair.second}: {pair.status}, {least(pair)}{part}; {law(pair)}"
     if len(judged.pairs) > MOST_PAIRS:
         yield f"  and {len(judged.pairs) - MOST_PAIRS} more pairs; --json has all"
-    yield from (f"Not judged: {each}." for each in not_judged(judged))
+    yield from (f"Not judged: {limit}." for limit in not_judged(judged))

@@ -58,9 +58,9 @@ JITTER = (0.0, 0.25, -0.25, 0.5, -0.5)  # offsets of a place from the middle of 
 KINDS = ("ball", "box", "wall", "polygon", "post")  # shapes of obstacles
 SIZES = (1.0, 2.0)  # how far shapes extend from their places at most, before they are rounded, m
 OWN_DISTANCES = (0.0, 0.5, 3.0)  # distances that an obstacle may have instead of the scenario's, m; 0: none
-HEADINGS = (0.0, 0.5, 1.5707963, -2.0)
-HEIGHTS = (0.0, 1.0, 50.0)
-APPEARANCES = (0.0, 1.5, 30.0)  # headings, rad, heights, m, and times of appearance, s, of obstacles
+HEADINGS = (0.0, 0.5, 1.5707963, -2.0)  # of obstacles, rad
+HEIGHTS = (0.0, 1.0, 50.0)  # of obstacles, m
+APPEARANCES = (0.0, 1.5, 30.0)  # times of appearance, s, of obstacles
 OBSTACLE_SPEEDS = (1.0, 0.5, 1.7)  # speeds of obstacles that move, m/s
 # Speeds at which obstacles promise to move at most, as shares of the true one; 0: no promise of their own.
 PROMISES = (1.0, 0.0, 0.5, 1.5)
@@ -222,17 +222,17 @@ def _obstacles(
     draw: DrawFn, kind: str, place: Vector, size: float, radii: SearchStrategy[float], own: float
 ) -> Obstacle:
     """An obstacle of a kind whose core extends at most `size`, m, from its place."""
-    found = Obstacle(place, draw(first_of(True, False)), draw(radii))
+    obstacle = Obstacle(place, draw(first_of(True, False)), draw(radii))
     if kind == "ball":
-        return found
-    found.height_m = 1.0 if kind == "post" else draw(first_of(*HEIGHTS))
-    found.distance_m, found.appears_s = draw(first_of(0.0, own)), draw(first_of(*APPEARANCES))
+        return obstacle
+    obstacle.height_m = 1.0 if kind == "post" else draw(first_of(*HEIGHTS))
+    obstacle.distance_m, obstacle.appears_s = draw(first_of(0.0, own)), draw(first_of(*APPEARANCES))
     if kind == "post":
-        return found
-    found.heading_rad = draw(first_of(*HEADINGS))
+        return obstacle
+    obstacle.heading_rad = draw(first_of(*HEADINGS))
     if kind == "box":
-        found.size_m = [size, size * draw(first_of(0.5, 1.5))]
-        return found
+        obstacle.size_m = [size, size * draw(first_of(0.5, 1.5))]
+        return obstacle
     corners = draw(st.integers(3, 7))  # at equal angles, so that edges do not cross
     rays = [size * draw(first_of(1.0, 0.3, 0.6)) for _ in range(corners)]
     around = [
@@ -240,10 +240,10 @@ def _obstacles(
         for k, ray in enumerate(rays)
     ]
     if kind == "wall":
-        found.segment_m = around[: draw(st.integers(2, corners))]
+        obstacle.segment_m = around[: draw(st.integers(2, corners))]
     else:
-        found.polygon_m = around
-    return found
+        obstacle.polygon_m = around
+    return obstacle
 
 
 def _move(draw: DrawFn, obstacle: Obstacle, cells: list[Cell], pitch: float) -> None:

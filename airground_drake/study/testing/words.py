@@ -23,32 +23,31 @@ _FOUND = {
 
 def told(verdict: Verdict, place: str) -> str:
     """A verdict in several lines: what was claimed, which robots, when, what was found and needed."""
-    claim, finding = verdict.claim, verdict
+    claim = verdict.claim
     lines = [f"{claim.id} {_found(verdict)}, {place}", f"  claim: {claim.statement}"]
-    seen = finding.counterexample or finding.where
+    seen = verdict.counterexample or verdict.where
     if names := [str(seen[key]) for key in WHO if key in seen]:
         lines.append(f"  who: {', '.join(names)}")
     if isinstance(seen.get("t_s"), int | float):
         lines.append(f"  when: t = {seen['t_s']:.6g} s")
-    if finding.margin is not None and finding.status not in PASSING:
-        of = finding.quantity or "margin"
-        lines.append(f"  value: {of}: {_amount(finding.margin, finding.unit)}; at least 0 is needed")
+    if verdict.margin is not None and verdict.status not in PASSING:
+        of = verdict.quantity or "margin"
+        lines.append(f"  value: {of}: {_amount(verdict.margin, verdict.unit)}; at least 0 is needed")
     told_already = {*WHO, "t_s", "margin", "margin_m", "unit", "exercised", "row"}
     if more := [_told(key, value) for key, value in seen.items() if key not in told_already]:
         lines.append(f"  seen: {'; '.join(more)}")
-    if finding.status not in ("refuted", *PASSING):
-        lines += [f"  why: {_told(key, value)}" for key, value in Finding.to_json(finding)["evidence"].items()][:5]
+    if verdict.status not in ("refuted", *PASSING):
+        lines += [f"  why: {_told(key, value)}" for key, value in Finding.to_json(verdict)["evidence"].items()][:5]
     return "\n".join(lines)
 
 
 def _found(verdict: Verdict) -> str:
-    finding = verdict
-    if finding.status not in PASSING:
-        return _FOUND[finding.status]
-    by = verdict.claim.exercised_by
-    if finding.exercised is None:
-        return f"{finding.status}, but does not count what tests it"
-    return f"{finding.status}, but nothing tested it ({finding.exercised} {by or 'things'})"
+    if verdict.status not in PASSING:
+        return _FOUND[verdict.status]
+    if verdict.exercised is None:
+        return f"{verdict.status}, but does not count what tests it"
+    what = verdict.claim.exercised_by or "things"
+    return f"{verdict.status}, but nothing tested it ({verdict.exercised} {what})"
 
 
 def _told(key: str, value: Any) -> str:
@@ -60,8 +59,8 @@ def _told(key: str, value: Any) -> str:
 
 def _amount(value: Any, unit: str) -> str:
     if isinstance(value, Mapping):
-        return ", ".join(f"{name} {_amount(each, unit)}" for name, each in value.items())
+        return ", ".join(f"{name} {_amount(number, unit)}" for name, number in value.items())
     if isinstance(value, list | tuple):
-        return f"({', '.join(_amount(each, '') for each in value)}) {unit}".rstrip()
+        return f"({', '.join(_amount(number, '') for number in value)}) {unit}".rstrip()
     number = f"{value:.6g}" if isinstance(value, float) else str(value)
     return f"{number} {unit}".rstrip()

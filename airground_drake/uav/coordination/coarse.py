@@ -70,7 +70,7 @@ def coarsened(movers: Sequence[Mover], width: float) -> Coarse:
     """The coarse roadmap of some robots with nodes at least `width`, m, apart by way; targets may be nearer."""
     # Starts have edges that lead away only. As ordinary nodes they would make corridors look wider than they are.
     # width: m.
-    spaces = sorted({mover.space.apart: mover.space for mover in movers}.values(), key=lambda each: -each.apart)
+    spaces = sorted({mover.space.apart: mover.space for mover in movers}.values(), key=lambda space: -space.apart)
     index = {space.apart: k for k, space in enumerate(spaces)}
     sizes = np.array([index[mover.space.apart] for mover in movers], dtype=np.int64)
     starts = np.array([mover.own.start for mover in movers], dtype=np.int64)
@@ -86,8 +86,8 @@ def coarsened(movers: Sequence[Mover], width: float) -> Coarse:
         _add_borders(edges, ways, space, places, seeds, size)
         own = np.flatnonzero(sizes == size)
         leaving += _from_starts(ways, space, places, seeds, own, starts, size, width)
-    every = [each for edge in edges.values() for each in (edge, _reversed(edge))]
-    every += [each._replace(tail=len(seeds) + each.tail) for each in leaving]
+    every = [directed for edge in edges.values() for directed in (edge, _reversed(edge))]
+    every += [edge._replace(tail=len(seeds) + edge.tail) for edge in leaving]
     graph, largest = _graph(np.concatenate([places[seeds], places[starts]]), every, len(spaces))
     usable = largest[None, :] <= sizes[:, None]
     return Coarse(graph, len(seeds) + np.arange(len(movers)), number[targets], usable, sizes)
@@ -95,7 +95,7 @@ def coarsened(movers: Sequence[Mover], width: float) -> Coarse:
 
 def _ways(movers: Sequence[Mover], sizes: Indices, size: int, space: Space) -> csr_array:
     """The roadmap for robots of one size: free nodes, and edges from their starts, which may be too near to things."""
-    roadmap = min(movers, key=lambda each: each.space.apart).roadmap
+    roadmap = min(movers, key=lambda mover: mover.space.apart).roadmap
     nodes, heads, lengths = roadmap.nodes, roadmap.heads, roadmap.lengths
     tails = np.repeat(np.arange(len(nodes)), np.diff(roadmap.first_edge))
     free = space.points_are_free(nodes, 0.0)
@@ -109,13 +109,13 @@ def _ways(movers: Sequence[Mover], sizes: Indices, size: int, space: Space) -> c
 
 def _nodes(graphs: Sequence[csr_array], places: Array, targets: Indices, sizes: Indices, width: float) -> Indices:
     """Nodes of the roadmap for the coarse one: the targets, then every node that is `width`, m, from all before it."""
-    found = np.zeros(0, dtype=np.int64)
+    chosen = np.zeros(0, dtype=np.int64)
     for size, ways in enumerate(graphs):
         wanted = np.unique(targets[sizes == size])
-        always = np.concatenate([found, wanted[~np.isin(wanted, found)]])
+        always = np.concatenate([chosen, wanted[~np.isin(wanted, chosen)]])
         free = np.diff(ways.indptr) > 0
-        found = _packed(places, ways.indptr, ways.indices, ways.data, always, free, width)
-    return found
+        chosen = _packed(places, ways.indptr, ways.indices, ways.data, always, free, width)
+    return chosen
 
 
 @njit(cache=True)
@@ -168,15 +168,15 @@ def _add_borders(
     border = (nearest[tails] != nearest[heads]) & (nearest[tails] >= 0) & (nearest[heads] >= 0)
     tails, heads = tails[border], heads[border]
     length = far[tails] + ways.data[border] + far[heads]
-    one, other = np.minimum(nearest[tails], nearest[heads]), np.maximum(nearest[tails], nearest[heads])
-    order = np.lexsort((length, other, one))
-    one, other, tails, heads, length = one[order], other[order], tails[order], heads[order], length[order]
-    new = np.append(True, (np.diff(one) != 0) | (np.diff(other) != 0))[: len(one)]
+    low, high = np.minimum(nearest[tails], nearest[heads]), np.maximum(nearest[tails], nearest[heads])
+    order = np.lexsort((length, high, low))
+    low, high, tails, heads, length = low[order], high[order], tails[order], heads[order], length[order]
+    new = np.append(True, (np.diff(low) != 0) | (np.diff(high) != 0))[: len(low)]
     number = np.full(len(places), -1, dtype=np.int64)
     number[seeds] = np.arange(len(seeds))
-    straight = space.segments_are_free(places[one[new]], places[other[new]])
+    straight = space.segments_are_free(places[low[new]], places[high[new]])
     for a, b, u, v, is_free in zip(
-        one[new].tolist(), other[new].tolist(), tails[new].tolist(), heads[new].tolist(), straight.tolist(), strict=True
+        low[new].tolist(), high[new].tolist(), tails[new].tolist(), heads[new].tolist(), straight.tolist(), strict=True
     ):
         if is_free:
             line = places[[a, b]]
@@ -196,23 +196,23 @@ def _from_starts(
 ) -> list[_Edge]:
     """Edges from the starts of robots, given by their indices `own`; the tails are these indices."""
     far, before = dijkstra(ways, indices=starts[own], return_predecessors=True, limit=FROM_START * width)
-    found = []
+    edges = []
     for k, i in enumerate(own.tolist()):
         near = np.flatnonzero(np.isfinite(far[k, seeds]))
         straight = space.segments_are_free(np.repeat(places[starts[i]][None], len(near), axis=0), places[seeds[near]])
         for s, is_free in zip(near.tolist(), straight.tolist(), strict=True):
             seed = int(seeds[s])
             line = places[[starts[i], seed]] if is_free else places[_back(before[k], seed)[::-1]]
-            found.append(_Edge(i, s, size, line))
-    return found
+            edges.append(_Edge(i, s, size, line))
+    return edges
 
 
 def _back(before: npt.NDArray[np.int32], node: int) -> list[int]:
     """The nodes on the way back from a node to where a search began."""
-    found = [node]
-    while before[found[-1]] >= 0:
-        found.append(int(before[found[-1]]))
-    return found
+    path = [node]
+    while before[path[-1]] >= 0:
+        path.append(int(before[path[-1]]))
+    return path
 
 
 def _reversed(edge: _Edge) -> _Edge:
@@ -232,7 +232,7 @@ def _graph(places: Array, edges: Sequence[_Edge], sizes: int) -> tuple[CoarseGra
     lines = [_as_motion(edge.line) for edge in every]
     begins = np.append(0, np.cumsum([len(line) for line in lines])).astype(np.int64)
     rows = np.concatenate(lines)
-    lows, highs = (each.reduceat(rows[:, 1:], begins[:-1]) for each in (np.minimum, np.maximum))
+    lows, highs = (extreme.reduceat(rows[:, 1:], begins[:-1]) for extreme in (np.minimum, np.maximum))
     circles = np.column_stack([0.5 * (lows + highs), 0.5 * np.hypot(*(highs - lows).T)])
     legs = np.append(0.0, np.cumsum(np.hypot(*np.diff(rows[:, 1:], axis=0).T)))
     lengths = legs[begins[1:] - 1] - legs[begins[:-1]]
@@ -243,9 +243,9 @@ def _graph(places: Array, edges: Sequence[_Edge], sizes: int) -> tuple[CoarseGra
 def _as_motion(line: Array) -> Array:
     """A polyline (K, 2), m, as a motion from 0 to 1 at constant speed; one row for a single place."""
     if len(line) == 2 and (line[0] != line[1]).any():
-        found = np.empty((2, 3))
-        found[:, 0], found[:, 1:] = (0.0, 1.0), line
-        return found
+        motion = np.empty((2, 3))
+        motion[:, 0], motion[:, 1:] = (0.0, 1.0), line
+        return motion
     along = np.append(0.0, np.cumsum(np.hypot(*np.diff(line, axis=0).T)))
     if along[-1] == 0.0:
         return np.append(0.0, line[-1])[None]

@@ -61,19 +61,19 @@ def first_plan(movers: Sequence[Mover], fixed: Sequence[OtherRobot], candidates:
     least = min(mover.space.apart for mover in movers)
     searches = [_Search(movers, fixed, share, share * least) for share in WIDTHS]
     spent, budget, turn = 0, FIRST * len(movers), 0
-    while spent < candidates and not all(each.exhausted for each in searches):
-        for each in searches:
-            if each.exhausted:
+    while spent < candidates and not all(search.exhausted for search in searches):
+        for tried in searches:
+            if tried.exhausted:
                 continue
-            found = each.run(min(budget, candidates - spent), turn)
-            spent += found.candidates
-            if found.status == "found":
-                ways, more = _best(each, found, searches[:2], candidates // AGAIN_SHARE)
+            result = tried.run(min(budget, candidates - spent), turn)
+            spent += result.candidates
+            if result.status == "found":
+                ways, more = _best(tried, result, searches[:2], candidates // AGAIN_SHARE)
                 return FirstPlan("found", ways, spent + more)
             if spent >= candidates:
                 break
         budget, turn = 2 * budget, turn + 1
-    done = all(each.exhausted for each in searches)
+    done = all(search.exhausted for search in searches)
     return FirstPlan("exhausted" if done else "effort spent", (), spent)
 
 
@@ -84,13 +84,13 @@ def _best(
     best, spent = found_on.timed(first.moves), 0
     again = list(dict.fromkeys([found_on, *others]))
     for turn in range(AGAIN // len(again)):
-        for each in again:
+        for search in again:
             if spent >= candidates:
                 break
-            found = each.run(int(min(AGAIN_AT_MOST * first.candidates, candidates - spent)), AGAIN + turn)
-            spent += found.candidates
-            if found.status == "found":
-                best = min(best, each.timed(found.moves), key=sum_of_times)
+            result = search.run(int(min(AGAIN_AT_MOST * first.candidates, candidates - spent)), AGAIN + turn)
+            spent += result.candidates
+            if result.status == "found":
+                best = min(best, search.timed(result.moves), key=sum_of_times)
     return tuple(best), spent
 
 
@@ -107,7 +107,7 @@ class _Search:
             coarse = coarsened(self._movers, self._width)
             step = _step(coarse, self._movers)
             shut = _shut(coarse, self._movers, self._fixed, step)
-            apart = np.array([[one.space.apart + other.task.body for other in self._movers] for one in self._movers])
+            apart = np.array([[own.space.apart + other.task.body for other in self._movers] for own in self._movers])
             to_go = _to_go(coarse, shut, WAITING * self._width)
             swaps = self._share >= SWAPS_FROM
             team = Team(coarse.targets, coarse.usable, coarse.sizes, shut, apart, to_go, swaps, 0.0)
@@ -118,17 +118,17 @@ class _Search:
         """Search within this effort; another turn shuffles the moves in another way."""
         coarse, team, _ = self._make()
         shuffled = team._replace(noise=NOISES[turn % len(NOISES)] * self._width)
-        found = lacam.search(coarse.graph, shuffled, coarse.starts, candidates, turn)
-        self.exhausted = found.status == "exhausted"
-        return found
+        result = lacam.search(coarse.graph, shuffled, coarse.starts, candidates, turn)
+        self.exhausted = result.status == "exhausted"
+        return result
 
     def timed(self, moves: Indices) -> list[Way]:
         coarse, team, step = self._make()
         short = network.without_loops(coarse.graph, team, moves)
-        found = network.motions(coarse.graph, team, short, [mover.speed for mover in self._movers])
-        if not self._keeps_from_fixed(found):
-            found = network.in_step(coarse.graph, moves, step)
-        return [_way(mover, motion) for mover, motion in zip(self._movers, found, strict=True)]
+        motions = network.motions(coarse.graph, team, short, [mover.speed for mover in self._movers])
+        if not self._keeps_from_fixed(motions):
+            motions = network.in_step(coarse.graph, moves, step)
+        return [_way(mover, motion) for mover, motion in zip(self._movers, motions, strict=True)]
 
     def _keeps_from_fixed(self, motions: Sequence[Array]) -> bool:
         """Whether the robots keep their distances from the known motions."""
@@ -162,12 +162,12 @@ def _shut(coarse: Coarse, movers: Sequence[Mover], fixed: Sequence[OtherRobot], 
     most = min(MOST_LAYERS, MOST_VALUES // (len(movers) * len(coarse.graph.places)))
     layers = 1 + min(most, math.ceil(last / step))
     sizes = int(coarse.sizes.max()) + 1
-    found = np.zeros((sizes, layers, len(coarse.graph.heads)), dtype=np.bool_)
+    shut = np.zeros((sizes, layers, len(coarse.graph.heads)), dtype=np.bool_)
     for size in range(sizes):
         mover = next(mover for mover, own in zip(movers, coarse.sizes, strict=True) if own == size)
         for other in fixed:
-            _shut_by(coarse.graph, other.motion, mover.space.apart + other.radius, step, found[size])
-    return found
+            _shut_by(coarse.graph, other.motion, mover.space.apart + other.radius, step, shut[size])
+    return shut
 
 
 @njit(cache=True)
@@ -206,16 +206,16 @@ def _to_go(coarse: Coarse, shut: npt.NDArray[np.bool_], waiting: float) -> Array
     graph = coarse.graph
     count, layers = len(graph.places), shut.shape[1]
     tails = np.repeat(np.arange(count), np.diff(graph.first))
-    found = np.empty((layers, len(coarse.targets), count))
+    to_go = np.empty((layers, len(coarse.targets), count))
     for i, target in enumerate(coarse.targets.tolist()):
         blocked = shut[coarse.sizes[i]]
         can = coarse.usable[i] & ~blocked[-1] & (tails != graph.heads)
-        found[-1, i] = _ways_to(target, count, tails[can], graph.heads[can], graph.lengths[can])
+        to_go[-1, i] = _ways_to(target, count, tails[can], graph.heads[can], graph.lengths[can])
         stays = ~blocked[-1][graph.first[:-1]]
-        found[-1, i, ~stays & (np.arange(count) == target)] = np.inf
+        to_go[-1, i, ~stays & (np.arange(count) == target)] = np.inf
         for k in range(layers - 2, -1, -1):
-            _step_back(graph, coarse.usable[i], blocked[k], target, waiting, found[k + 1, i], found[k, i])
-    return found
+            _step_back(graph, coarse.usable[i], blocked[k], target, waiting, to_go[k + 1, i], to_go[k, i])
+    return to_go
 
 
 def _ways_to(target: int, count: int, tails: Indices, heads: Indices, lengths: Array) -> Array:
@@ -224,8 +224,8 @@ def _ways_to(target: int, count: int, tails: Indices, heads: Indices, lengths: A
     tails, heads, lengths = tails[order], heads[order], np.maximum(lengths[order], ROUNDING_M)
     new = np.append(True, (np.diff(tails) != 0) | (np.diff(heads) != 0))[: len(tails)]
     back = csr_array((lengths[new], (heads[new], tails[new])), shape=(count, count))
-    found: Array = dijkstra(back, indices=target)
-    return found
+    to_target: Array = dijkstra(back, indices=target)
+    return to_target
 
 
 @njit(cache=True)
@@ -236,11 +236,11 @@ def _step_back(
     target: int,
     waiting: float,
     later: Array,
-    found: Array,
+    to_go: Array,
 ) -> None:
     """Ways from each node in one step, (N,), m, from those one step later."""
     first, heads, lengths = graph.first, graph.heads, graph.lengths
-    for node in range(len(found)):
+    for node in range(len(to_go)):
         best = np.inf
         for e in range(first[node], first[node + 1]):
             if shut[e] or not usable[e]:
@@ -249,4 +249,4 @@ def _step_back(
             if heads[e] == node:
                 cost = 0.0 if node == target and later[node] == 0.0 else waiting
             best = min(best, cost + later[heads[e]])
-        found[node] = best
+        to_go[node] = best

@@ -80,7 +80,7 @@ def nodes_near(grid: Grid, column: int, low: float, high: float) -> Indices:
 def blocked_times(motion: Array, grid: Grid, radii: Array) -> tuple[Indices, Array]:
     """When a timed motion is nearer to nodes than their radii; `motion` (M, 3); `radii` (N,), m."""
     # Returns nodes (B,) and begin and end of each blocked time, (B, 2), s.
-    found, times, count = np.empty(1024, np.int64), np.empty((1024, 2)), 0
+    nodes, times, count = np.empty(1024, np.int64), np.empty((1024, 2)), 0
     reach = radii.max()
     for k in range(len(motion)):
         begin, px, py = motion[k, 0], motion[k, 1], motion[k, 2]
@@ -94,11 +94,11 @@ def blocked_times(motion: Array, grid: Grid, radii: Array) -> tuple[Indices, Arr
                 entry, leave = time_within(px - grid.nodes[n, 0], py - grid.nodes[n, 1], vx, vy, radii[n], duration)
                 if entry >= leave:
                     continue
-                if count == len(found):
-                    found, times = np.append(found, found), np.concatenate((times, times))
-                found[count], times[count, 0], times[count, 1] = n, begin + entry, begin + leave
+                if count == len(nodes):
+                    nodes, times = np.append(nodes, nodes), np.concatenate((times, times))
+                nodes[count], times[count, 0], times[count, 1] = n, begin + entry, begin + leave
                 count += 1
-    return found[:count], times[:count]
+    return nodes[:count], times[:count]
 
 
 @njit(cache=True)

@@ -86,10 +86,10 @@ def plan(
     effort = effort or Effort()
     spaces = [space.of(task.body) for task in tasks]
     roadmap = build_roadmap(spaces, tasks, [other.motion[0, 1:] for other in fixed])
-    least = min(each.apart for each in spaces)
+    least = min(space.apart for space in spaces)
     movers = [
-        Mover.on(roadmap if each.apart == least else roadmap.within(each, own), each, task, speed, own)
-        for each, task, speed, own in zip(spaces, tasks, speeds, roadmap.robots, strict=True)
+        Mover.on(roadmap if space.apart == least else roadmap.within(space, own), space, task, speed, own)
+        for space, task, speed, own in zip(spaces, tasks, speeds, roadmap.robots, strict=True)
     ]
     search = _Search(movers, tuple(fixed), follow, effort)
     ways = search.complete()
@@ -108,14 +108,14 @@ def plan(
 
 def _separated(spaces: Sequence[Space], tasks: Sequence[RobotTask], ways: Sequence[Way | None]) -> tuple[int, ...]:
     """Robots that no way can lead to their targets, whatever the roadmap. Clearances do not count here."""
-    found = []
+    apart = []
     for i, (space, task, way) in enumerate(zip(spaces, tasks, ways, strict=True)):
         if way is None:
             try:
                 shortest_path(task.start, task.preset[-1, 1:], space.rows, space.keep)
             except NoPath:
-                found.append(i)
-    return tuple(found)
+                apart.append(i)
+    return tuple(apart)
 
 
 def _resting(task: RobotTask) -> OtherRobot:
@@ -145,12 +145,12 @@ class _Search:
         able = self._able()
         if failed is not None and len(able) > 1:
             ways, failed = self._in_other_orders(failed)
-        found = ways if failed is None else None
+        complete = ways if failed is None else None
         if len(able) > 1:
-            found = self._improved(found, able)
-        if found is not None:
+            complete = self._improved(complete, able)
+        if complete is not None:
             self.outcome = "exhausted" if self._without_way else "complete"
-        return found
+        return complete
 
     def _improved(self, ways: list[Way | None] | None, able: Sequence[int]) -> list[Way | None] | None:
         """A better plan than that of an order, or one by joint steps if no order has one; None without either."""
@@ -174,19 +174,19 @@ class _Search:
 
     def _alone(self) -> list[Way | None]:
         """The ways that the robots would have without each other; notes robots without a way."""
-        found: list[Way | None] = []
+        ways: list[Way | None] = []
         taken = self._taken()
         for i, mover in enumerate(self._movers):
             if i in self._without_way:
-                found.append(None)
+                ways.append(None)
                 continue
             budget = self._left()
             way, spent = find(mover, taken, self._follow, budget)
             self.spent += spent
-            found.append(way)
+            ways.append(way)
             if way is None and spent < budget:
                 self._without_way.append(i)
-        return found
+        return ways
 
     def _left(self) -> int:
         return max(0, self._limit - self.spent)
@@ -252,13 +252,13 @@ class _Search:
         movers = [self._movers[i] for i in able]
         if not all(mover.own.usable[-1] for mover in movers):
             return None  # a target is too near to an obstacle
-        found = first_plan(movers, self._taken(), candidates)
-        self.candidates += found.candidates
-        if found.outcome != "found":
-            self.outcome = found.outcome
+        first = first_plan(movers, self._taken(), candidates)
+        self.candidates += first.candidates
+        if first.outcome != "found":
+            self.outcome = first.outcome
             return None
         ways: list[Way | None] = [None] * len(self._movers)
-        for i, way in zip(able, found.ways, strict=True):
+        for i, way in zip(able, first.ways, strict=True):
             ways[i] = way
         return ways
 

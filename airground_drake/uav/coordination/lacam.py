@@ -152,7 +152,7 @@ def _search(
         priorities[0, i] = 0.9 * to_go[0, i, starts[i]] / far
     _by_priority(priorities[0], orders[0])
     table[_looked_up(table, nodes, layers, starts, 0)[1]] = 0
-    found, many, successors = -1, 1, 0
+    goal, many, successors = -1, 1, 0
     stack = [0]
     step = Step(
         np.empty(count, np.int64), np.empty(count, np.int64), np.empty(count, np.int64), np.zeros(5, np.int64),
@@ -162,9 +162,9 @@ def _search(
     choices, wanted = np.empty(count, np.int64), np.empty(count, np.int64)
     spent = 0
     if _have_arrived(team, starts, 0):
-        found = 0
+        goal = 0
     constraint = np.zeros(count + 1, np.int64)
-    while found < 0 and len(stack) > 0:
+    while goal < 0 and len(stack) > 0:
         here = stack[-1]
         if spent_up[here]:
             stack.pop()
@@ -200,16 +200,16 @@ def _search(
             priorities[many, i] = old - np.floor(old) if wanted[i] == targets[i] else old + 1.0
         _by_priority(priorities[many], orders[many])
         if _have_arrived(team, wanted, layer):
-            found = many
+            goal = many
         stack.append(many)
         many += 1
-    if found < 0:
+    if goal < 0:
         return (1 if len(stack) == 0 else 2), moves[:0], spent, successors
-    length, k = 0, found
+    length, k = 0, goal
     while before[k] >= 0:
         length, k = length + 1, before[k]
     path = np.empty((length, count), np.int64)
-    k = found
+    k = goal
     for row in range(length - 1, -1, -1):
         path[row] = moves[k]
         k = before[k]

@@ -30,7 +30,6 @@ class Refinement:
         fixed: Sequence[OtherRobot],
         follow: float,
     ) -> None:
-        """Begin with a plan. Nothing is searched yet."""
         # alone: the ways that the robots would have without each other.
         self._movers, self._alone, self._fixed, self._follow = movers, tuple(alone), tuple(fixed), follow
         self.ways = list(ways)  # one per robot; no robot is without a way
@@ -79,8 +78,8 @@ class Refinement:
 
     def _try(self, group: Sequence[int], expansions: int) -> None:
         """Plan for some robots anew, in this order, among all others; keep the ways if they are better."""
-        found = list(self.ways)
-        taken = [*self._fixed, *(self._body(j, self.ways[j]) for j in range(len(found)) if j not in group)]
+        changed = list(self.ways)
+        taken = [*self._fixed, *(self._body(j, self.ways[j]) for j in range(len(changed)) if j not in group)]
         gain = sum(self._late(i) for i in group)  # largest possible one
         for i in group:
             way, spent = find(self._movers[i], taken, self._follow, max(0, expansions - self.expansions))
@@ -91,9 +90,9 @@ class Refinement:
             gain -= way.joined - self._alone[i].joined
             if gain < GAIN_S:
                 return
-            found[i] = way
+            changed[i] = way
             taken.append(self._body(i, way))
-        self.ways = found
+        self.ways = changed
 
     def _body(self, i: int, way: Way) -> OtherRobot:
         return OtherRobot(way.motion, self._movers[i].task.body)

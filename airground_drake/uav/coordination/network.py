@@ -28,9 +28,9 @@ SHORTEST_S = 1e-6  # shortest duration of a move, s
 
 def without_loops(graph: CoarseGraph, team: Team, moves: Indices) -> Indices:
     """The moves (T, n), where robots that come back to a node stay there instead if nobody is in the way."""
-    found = moves.copy()
-    _cut_loops(graph, team.targets, team.apart, team.shut, team.sizes, found)
-    return found
+    shortened = moves.copy()
+    _cut_loops(graph, team.targets, team.apart, team.shut, team.sizes, shortened)
+    return shortened
 
 
 @njit(cache=True)

@@ -224,7 +224,7 @@ def must_go(graph: CoarseGraph, team: Team, step: Step, i: int, j: int) -> bool:
 
 
 @njit(cache=True)
-def turn_back(graph: CoarseGraph, team: Team, step: Step, i: int, partner: int, found: Indices) -> int:
+def turn_back(graph: CoarseGraph, team: Team, step: Step, i: int, partner: int, moves: Indices) -> int:
     """Sort the moves of robot i so that those come first that its partner can follow, and that lead farthest away."""
     # Moves that lead nearer to the target come last. If the partner already pushes robot i, they are left out: the
     # partner has to wait.
@@ -234,7 +234,7 @@ def turn_back(graph: CoarseGraph, team: Team, step: Step, i: int, partner: int, 
         if heads[edge] == at[i] and team.usable[partner, edge] and behind < 0:
             behind = edge
     pushed = step.moves[partner] >= 0 and heads[step.moves[partner]] == at[i]
-    reverse = found[::-1].copy()
+    reverse = moves[::-1].copy()
     many = 0
     for rank in range(2 if pushed else 3):
         for edge in reverse:
@@ -242,7 +242,7 @@ def turn_back(graph: CoarseGraph, team: Team, step: Step, i: int, partner: int, 
             if to_go[i, heads[edge]] >= to_go[i, at[i]]:
                 own = 1 if behind >= 0 and conflicts(graph, edge, behind, apart[i, partner], False) else 0
             if own == rank:
-                found[many] = edge
+                moves[many] = edge
                 many += 1
     return many
 
@@ -270,12 +270,12 @@ def follow(graph: CoarseGraph, team: Team, step: Step, j: int, there: int) -> No
 
 
 @njit(cache=True)
-def sort_moves(graph: CoarseGraph, team: Team, step: Step, i: int, found: Indices) -> int:
+def sort_moves(graph: CoarseGraph, team: Team, step: Step, i: int, moves: Indices) -> int:
     """Write the possible moves of robot i into `found`, those first that lead nearest to its target; their number."""
     first, heads, to_go = graph.first, graph.heads, team.to_go
     here, layer, number = step.at[i], step.counts[3], step.counts[4]
     later = min(layer + 1, len(to_go) - 1)
-    keys = np.empty(len(found))
+    keys = np.empty(len(moves))
     many = 0
     for edge in range(first[here], first[here + 1]):
         if not team.usable[i, edge] or team.shut[team.sizes[i], layer, edge]:
@@ -287,9 +287,9 @@ def sort_moves(graph: CoarseGraph, team: Team, step: Step, i: int, found: Indice
             key += team.noise * mixed(number, i, edge)
         k = many
         while k > 0 and keys[k - 1] > key:
-            keys[k], found[k] = keys[k - 1], found[k - 1]
+            keys[k], moves[k] = keys[k - 1], moves[k - 1]
             k -= 1
-        keys[k], found[k] = key, edge
+        keys[k], moves[k] = key, edge
         many += 1
     return many
 
@@ -328,14 +328,14 @@ def swap_partner(graph: CoarseGraph, team: Team, step: Step, i: int, best: int) 
 def standing_at(graph: CoarseGraph, team: Team, step: Step, i: int, node: int) -> int:
     """The robot nearest to a node that keeps robot i from it; else -1."""
     places, at, apart = graph.places, step.at, team.apart
-    found, least = -1, np.inf
+    nearest, least = -1, np.inf
     for j in range(len(at)):
         if j == i:
             continue
         far = np.hypot(places[at[j], 0] - places[node, 0], places[at[j], 1] - places[node, 1])
         if far < apart[i, j] and far < least:
-            found, least = j, far
-    return found
+            nearest, least = j, far
+    return nearest
 
 
 @njit(cache=True)

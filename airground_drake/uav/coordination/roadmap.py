@@ -56,8 +56,7 @@ class Space:
     @property
     def along(self) -> Array:
         """Distances that edges keep from the cores, (m,), m."""
-        found: Array = self.keep + CHORDS * self.clearance
-        return found
+        return np.asarray(self.keep + CHORDS * self.clearance)
 
     def segments_are_free(self, begin: Array, end: Array) -> npt.NDArray[np.bool_]:
         """Which segments, from begin (K, 2), m, to end (K, 2), m, keep the distance from every obstacle."""
@@ -99,8 +98,7 @@ class Roadmap:
     def distances_to(self, targets: Indices) -> Array:
         """Length of the shortest way from every node to the nearest target node, (N,), m; infinite without a way."""
         graph = csr_array((self.lengths, self.heads, self.first_edge), shape=(len(self.nodes),) * 2)
-        found: Array = dijkstra(graph, indices=targets, min_only=True)
-        return found
+        return np.asarray(dijkstra(graph, indices=targets, min_only=True))
 
     def within(self, space: Space, own: RobotNodes) -> Roadmap:
         """This roadmap with only those edges that a larger robot can use."""
@@ -124,7 +122,7 @@ class RobotTask:
 def build_roadmap(spaces: Sequence[Space], tasks: Sequence[RobotTask], others: Sequence[Array] = ()) -> Roadmap:
     """The roadmap of robots. Its edges are free for the smallest robot; `Roadmap.within` removes some for others."""
     # others: places of other robots, (2,) each, m; the lattice reaches beyond them.
-    by_size = sorted(spaces, key=lambda each: each.apart)
+    by_size = sorted(spaces, key=lambda space: space.apart)
     space = by_size[0]
     paths = [_shortest(own, task) for own, task in zip(spaces, tasks, strict=True)]
     low, high = _area(by_size[-1], tasks, others, paths)
@@ -134,15 +132,15 @@ def build_roadmap(spaces: Sequence[Space], tasks: Sequence[RobotTask], others: S
     lattice, pairs = _lattice(space, low, high, pitch)
     nodes, robots = [lattice], []
     for own, task, path in zip(spaces, tasks, paths, strict=True):
-        found, robot = _robot_nodes(own, task, path, sum(map(len, nodes)), pitch, far)
-        nodes.append(found)
+        places, robot = _robot_nodes(own, task, path, sum(map(len, nodes)), pitch, far)
+        nodes.append(places)
         robots.append(robot)
     points = np.concatenate(nodes)
     radii = np.full(len(points) - len(lattice), reach)
-    radii[np.array([[each.start, each.target] for each in robots]) - len(lattice)] = max(far, reach)
+    radii[np.array([[robot.start, robot.target] for robot in robots]) - len(lattice)] = max(far, reach)
     pairs = np.concatenate([pairs, _other_edges(points, radii)])
     pairs = pairs[~_is_short_cut(points, pairs, robots)]
-    shut = np.concatenate([each.preset[~each.usable] for each in robots])
+    shut = np.concatenate([robot.preset[~robot.usable] for robot in robots])
     pairs = pairs[~np.isin(pairs, shut).any(axis=1)]
     pairs = pairs[space.segments_are_free(points[pairs[:, 0]], points[pairs[:, 1]])]
     return Roadmap(_grid(points, low, reach), *_in_rows(points, pairs), reach, tuple(robots))
@@ -194,8 +192,8 @@ def _area(
     walls = space.rows[:, outline.COUNT] > 1.0
     if walls.any():
         ends = [path.pieces[:, :2] for path in paths if path is not None]
-        low = np.concatenate([low[None], *(each - room for each in ends)]).min(axis=0)
-        high = np.concatenate([high[None], *(each + room for each in ends)]).max(axis=0)
+        low = np.concatenate([low[None], *(end - room for end in ends)]).min(axis=0)
+        high = np.concatenate([high[None], *(end + room for end in ends)]).max(axis=0)
     near = ~walls & ((middles > low - extent) & (middles < high + extent)).all(axis=1)
     beyond = (space.keep[near] + space.clearance + space.apart + space.spacing)[:, None] + extent[near]
     boxes = [(low, high), *((middle - far, middle + far) for middle, far in zip(middles[near], beyond, strict=True))]
@@ -236,32 +234,32 @@ def _path_nodes(space: Space, path: Path, pitch: float) -> Array:
 
 def _lattice_edges(number: npt.NDArray[np.intp]) -> Indices:
     """Pairs of neighbours, (E, 2), in a lattice of node numbers; -1 marks a place without a node."""
-    found = []
+    pairs = []
     for dx, dy in ((1, 0), (0, 1), (1, 1), (1, -1)):
         tail = number[: len(number) - dx, max(0, -dy) : number.shape[1] - max(0, dy)]
         head = number[dx:, max(0, dy) : number.shape[1] - max(0, -dy)]
         both = (tail >= 0) & (head >= 0)
-        found.append(np.column_stack([tail[both], head[both]]))
-    return np.concatenate(found).astype(np.int64)
+        pairs.append(np.column_stack([tail[both], head[both]]))
+    return np.concatenate(pairs).astype(np.int64)
 
 
 def _other_edges(points: Array, radii: Array) -> Indices:
     """Pairs of a node outside the lattice and any node within its radius, each pair once, (E, 2); `radii` (R,), m."""
     others = np.arange(len(points) - len(radii), len(points))
     near = cKDTree(points).query_ball_point(points[others], radii, return_sorted=True)
-    tails = np.concatenate([np.zeros(0, dtype=np.int64), *(np.array(found, dtype=np.int64) for found in near)])
-    heads = np.repeat(others, [len(found) for found in near])
+    tails = np.concatenate([np.zeros(0, dtype=np.int64), *(np.array(indices, dtype=np.int64) for indices in near)])
+    heads = np.repeat(others, [len(indices) for indices in near])
     keys = (np.minimum(tails, heads) * len(points) + np.maximum(tails, heads))[tails != heads]
     return np.column_stack(np.divmod(np.unique(keys), len(points)))
 
 
 def _is_short_cut(points: Array, pairs: Indices, robots: Sequence[RobotNodes]) -> npt.NDArray[np.bool_]:
     """Which edges lead from a robot's start straight to its target. Other robots may be too near at both ends."""
-    found = np.zeros(len(pairs), dtype=bool)
+    short = np.zeros(len(pairs), dtype=bool)
     for own in robots:
         if np.hypot(*(points[own.start] - points[own.target])) > ROUNDING_M:
-            found |= np.isin(pairs, [own.start, own.target]).all(axis=1)
-    return found
+            short |= np.isin(pairs, [own.start, own.target]).all(axis=1)
+    return short
 
 
 def _fan(space: Space, start: Array, far: float) -> Array:

@@ -19,14 +19,14 @@ def smooth(
     """The ways with straight pieces where these are free."""
     # The times at which robots join their presets do not change.
     # ways: one per robot; None: the robot stays where it is.
-    found = list(ways)
+    smoothed = list(ways)
     for _ in range(ROUNDS):
-        for i, way in enumerate(found):
+        for i, way in enumerate(smoothed):
             if way is None:
                 continue
-            others = [*fixed, *(_moving(other, rests[j]) for j, other in enumerate(found) if j != i)]
-            found[i] = _straightened(spaces[i], way, others)
-    return found
+            others = [*fixed, *(_moving(other, rests[j]) for j, other in enumerate(smoothed) if j != i)]
+            smoothed[i] = _straightened(spaces[i], way, others)
+    return smoothed
 
 
 def _moving(way: Way | None, rest: OtherRobot) -> OtherRobot:

@@ -29,7 +29,7 @@ def _as_json(value: Any) -> dict[str, Any]:
     if isinstance(value, np.ndarray):
         numbers = np.ascontiguousarray(value, dtype=np.float64).tobytes()
         return {"@": "array", "shape": value.shape, "base64": base64.b64encode(numbers).decode("ascii")}
-    return {"@": type(value).__name__} | {each.name: getattr(value, each.name) for each in fields(value) if each.init}
+    return {"@": type(value).__name__} | {part.name: getattr(value, part.name) for part in fields(value) if part.init}
 
 
 def decoded(data: bytes, kinds: tuple[type, ...]) -> Any:

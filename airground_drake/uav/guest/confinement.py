@@ -95,7 +95,7 @@ def filter_calls() -> bool:
     """Give up for good the system calls that change other processes, see `OTHERS`."""
     if sys.platform != "linux" or platform.machine() not in ARCHITECTURES:
         return False
-    program = b"".join(struct.pack("=HBBI", *each) for each in _instructions(*ARCHITECTURES[platform.machine()]))
+    program = b"".join(struct.pack("=HBBI", *fields) for fields in _instructions(*ARCHITECTURES[platform.machine()]))
     libc, kept = ctypes.CDLL(None, use_errno=True), ctypes.create_string_buffer(program, len(program))
     described = ctypes.create_string_buffer(struct.pack("@HP", len(program) // 8, ctypes.addressof(kept)))
     address = ctypes.c_void_p(ctypes.addressof(described))

@@ -76,7 +76,8 @@ class GuestPolicy(Policy):
         except (PolicyError, PluginError, KeyError, TypeError, ValueError) as error:
             self._end()
             what = str(error) if isinstance(error, PolicyError | PluginError) else "its process sent no proposal"
-            raise PolicyError(what + "; not asked again in this run" * (self._used >= LIVES)) from None
+            after = "; not asked again in this run" if self._used >= LIVES else ""
+            raise PolicyError(what + after) from None
         told = answer.get("traceback")
         raise PolicyError(_words(answer["fault"]), printable(told) if isinstance(told, str) else "")
 
@@ -92,7 +93,7 @@ class GuestPolicy(Policy):
         self._used += 1
         self._channel, theirs = Pipe()
         reader, writer = Pipe(duplex=False)
-        path = json.dumps([each for each in sys.path if isinstance(each, str)])
+        path = json.dumps([entry for entry in sys.path if isinstance(entry, str)])
         handles = [theirs.fileno(), reader.fileno()]
         output = STDERR if os.environ.get(SHOWN) else subprocess.DEVNULL
         with theirs, reader:

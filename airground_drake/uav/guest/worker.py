@@ -42,9 +42,9 @@ def answer(policy: Policy, data: bytes) -> dict[str, Any]:
     # Returns `motions`, a list of names and motions, or a `fault` and its `traceback`.
     try:
         seen = decoded(data, KINDS)
-        found = {"motions": list(motions_of(policy.propose(seen), seen).items())}
-        if (size := len(encoded(found))) > LONGEST:
+        answered = {"motions": list(motions_of(policy.propose(seen), seen).items())}
+        if (size := len(encoded(answered))) > LONGEST:
             raise ValueError(f"a proposal of {size} bytes; at most {LONGEST} are allowed")
     except BaseException as error:  # any failure counts as no intervention
         return {"fault": described(error, type(policy).propose), "traceback": traceback_of(error)}
-    return found
+    return answered

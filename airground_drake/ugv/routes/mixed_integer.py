@@ -75,9 +75,9 @@ class MixedIntegerRoute:
         proof = search.along(normals, plans, bound)
         while proof.optimum is not None:
             optimum = proof.optimum.omega
-            if not any(np.array_equal(optimum, one.omega) for one in plans):
+            if not any(np.array_equal(optimum, candidate.omega) for candidate in plans):
                 plans += [proof.optimum, problem.evaluate(improve(problem.terms, binary.block, optimum, True)[0])]
-            plan = min(plans, key=lambda one: one.objective)
+            plan = min(plans, key=lambda candidate: candidate.objective)
             if plan.objective >= proof.bound * (1.0 - _AGREE):
                 break
             again = search.again(plan)
@@ -85,7 +85,7 @@ class MixedIntegerRoute:
                 proof = replace(proof, status=again.status if again else proof.status)
                 break
             proof = again
-        turned = [np.where(binary.block == 0, 1.0 - one.omega[0], one.omega) for one in plans]
+        turned = [np.where(binary.block == 0, 1.0 - candidate.omega[0], candidate.omega) for candidate in plans]
         return cheapest(
             problem,
             (constants.accept, constants.refuse, *plans, *map(problem.evaluate, turned)),
@@ -99,7 +99,6 @@ class _Searches:
     """Searches for the optimum of one problem along several half-planes, which share a budget."""
 
     def __init__(self, search: Minimiser, binary: BinaryProgram, problem: Problem, budget: Budget) -> None:
-        """With all of the budget left."""
         self._search, self._binary, self._problem, self._budget = search, binary, problem, budget
         self._iterations, self._until = budget.search_iterations, time.monotonic() + budget.search_s
 
@@ -112,12 +111,12 @@ class _Searches:
         seconds = min(self._until - time.monotonic(), self._budget.left_s())
         if seconds <= 0.0:
             return _Proof("budget_spent", relaxed, normals)
-        found = self._search.minimise(self._binary, self._binary.guess(problem, known[best], normals), seconds)
-        self._iterations -= found.iterations
-        status: Status = found.ended if self._iterations >= 0 else "budget_spent"
-        if found.omega is None or status != "optimal":
+        result = self._search.minimise(self._binary, self._binary.guess(problem, known[best], normals), seconds)
+        self._iterations -= result.iterations
+        status: Status = result.ended if self._iterations >= 0 else "budget_spent"
+        if result.omega is None or status != "optimal":
             return _Proof(status, relaxed, normals)
-        optimum = problem.evaluate(self._binary.plan(found.omega.round()))
+        optimum = problem.evaluate(self._binary.plan(result.omega.round()))
         cost = problem.evaluate_half_planes(optimum.positions, normals)
         if cost > costs[best] * (1.0 + _AGREE):  # the solver is wrong
             return _Proof("solver_failed", relaxed, normals)

@@ -89,15 +89,9 @@ def _options(budget: Budget) -> SolverOptions:
 
 
 def relaxation(problem: Problem, start: Evaluation) -> tuple[MathematicalProgram, Any, Array]:
-    """Multiple shooting in the task errors e = p - reference, (2N,), omega (N,), u (N,) and one r per pair.
-
-    Args:
-        problem: data of (26).
-        start: the plan whose states are the initial guess.
-
-    Returns:
-        The program, its variables omega (N,), and an initial guess for all of its variables.
-    """
+    """Multiple shooting in the task errors e = p - reference, (2N,), omega (N,), u (N,) and one r per pair."""
+    # `start` is the plan whose states are the initial guess. Returns the program, its variables omega (N,), and an
+    # initial guess for all of its variables.
     stages, dt = problem.stages, problem.dt
     size = _AXES * stages
     stage, point = np.nonzero(within_reach(problem))

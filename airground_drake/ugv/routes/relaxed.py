@@ -34,7 +34,6 @@ class RelaxedRoute:
     """
 
     def __init__(self) -> None:
-        """Start without any program."""
         self._programs = Programs()
 
     def solve(self, problem: Problem, budget: Budget = Budget()) -> Solution:  # noqa: B008 (immutable)
@@ -45,14 +44,14 @@ class RelaxedRoute:
         normals = normals_along(problem, constants.better.positions)
         program = self._programs.of(stages, stages)
         program.update(problem, normals)
-        found = relax(program, budget.left_s(), ACTIVE_SETS * budget.iterations)
-        if found.omega is None:
-            return without_optimum(problem, constants, budget, normals, ended=found.ended)
-        relaxed = found.omega.clip(0.0, 1.0)
+        result = relax(program, budget.left_s(), ACTIVE_SETS * budget.iterations)
+        if result.omega is None:
+            return without_optimum(problem, constants, budget, normals, ended=result.ended)
+        relaxed = result.omega.clip(0.0, 1.0)
         bound = dual_bound(problem, normals, relaxed)
-        if found.multipliers is not None and program.within.any():  # better where half-planes share the slack
+        if result.multipliers is not None and program.within.any():  # better where half-planes share the slack
             multipliers = np.zeros(program.within.shape)
-            multipliers[program.within] = found.multipliers.clip(0.0)
+            multipliers[program.within] = result.multipliers.clip(0.0)
             bound = max(bound, dual_bound(problem, normals, relaxed, multipliers))
         rounded = sum_up_rounding(relaxed)
         other = np.append(1.0 - rounded[0], rounded[1:])
