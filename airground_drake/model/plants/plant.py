@@ -18,7 +18,7 @@ import numpy as np
 
 from airground_drake.base.arrays import Array
 from airground_drake.model.plants.budget import Bounds
-from airground_drake.model.plants.steering import FORWARD, HALF_BASE, HAND, NUMBERS, TURN, WHEEL, along, chord
+from airground_drake.model.plants.steering import FORWARD, HALF_BASE, HAND, NUMBERS, TURN, WHEEL, along, turned
 
 if TYPE_CHECKING:
     from airground_drake.model.geometry.motion import Motion
@@ -164,9 +164,7 @@ class Unicycle(_Straight):
 
     def remembered(self, memory: Array, command: Array, elapsed_s: float) -> Array:
         """The heading after a turn."""
-        cos, sin = math.cos(memory[0]), math.sin(memory[0])
-        a, b = command[0] * cos + command[1] * sin, command[1] * cos - command[0] * sin
-        return memory + 2.0 * (0.5 * chord(a, b, self.hand_m, self.period_s)[1] * elapsed_s)
+        return np.array([turned(float(memory[0]), command, elapsed_s, self.hand_m, self.period_s)])
 
     def at(self, memory: Array, base: Array, command: Array, elapsed_s: float) -> Array:
         """Axle and heading, exact."""

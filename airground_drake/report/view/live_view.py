@@ -15,7 +15,8 @@ from airground_drake.report.view.stage import STATES, stage, states_of
 from airground_drake.scenario.schema import Scenario
 from airground_drake.scenario.world import make_world
 from airground_drake.sim.blocks.lifetime import weakly
-from airground_drake.sim.blocks.signals import FIELDS, declare_bodies
+from airground_drake.model.trigger.automaton import FIELDS
+from airground_drake.sim.blocks.signals import declare_bodies
 
 
 class LiveView(LeafSystem):
