@@ -15,7 +15,7 @@ from airground_drake.scenario.load import load
 from airground_drake.scenario.shipped import shipped
 from airground_drake.sim.simulation import simulate
 from airground_drake.verify import judge
-from airground_drake.verify.applications import without_news
+from airground_drake.verify.claims.live_gate import LiveGate
 
 
 def main() -> None:
@@ -30,7 +30,7 @@ def main() -> None:
         for run in scenario.runs:
             trace = simulate(scenario, run)
             (verdict,) = judge(trace, ["SAFE-HYP"])
-            evidence, (met, found) = verdict.evidence, without_news(trace)
+            evidence, (met, found) = verdict.evidence, LiveGate().seen_in(trace)
             applies_to, accepted = applies_to + met, accepted + found
             count = f"{met} of {found}" if found else ""
             row = "all pairs | their own | 0 | 0 | their own"

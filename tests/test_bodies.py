@@ -23,6 +23,7 @@ from airground_drake.report import attention, document
 from airground_drake.report.export import tables
 from airground_drake.report.figures.draw import draw
 from airground_drake.report.metrics import closest_obstacle, gap_m, of_run
+from airground_drake.report.model import of
 from airground_drake.report.page import page
 from airground_drake.report.screen import first_screen
 from airground_drake.report.view.stage import stage
@@ -116,11 +117,11 @@ def test_a_pair_has_one_distance_wherever_users_see_it(ends_at: float, gap_m: fl
         assert (distance, required) == (pytest.approx(gap_m, abs=1e-6), required_m)
     promised = next(each for each in evidence["SAFE-HYP"]["pairs"] if pair.items() <= each.items())
     assert (promised["safe_distance_m"], promised["guarantee_m"] <= gap_m + 1e-6) == (required_m, True)
-    words = [item.words for item in attention.items(report) if item.claim == "SAFE-TRACE"]
+    words = [item.words for item in attention.items(of(report)) if item.claim == "SAFE-TRACE"]
     assert words[0].startswith(f"ugv1 and rock at {told}, 1.25 m required")
-    first = first_screen(report).rows[0].safe.lines[1]
+    first = first_screen(of(report)).rows[0].safe.lines[1]
     assert first.startswith("ugv1\N{EN DASH}rock at" if gap_m < 0.0 else f"ugv1\N{EN DASH}rock {gap_m:.3f} < 1.25 m")
-    drawn = page(report, draw(given, traces), None)
+    drawn = page(of(report), draw(given, traces), None)
     assert f"{told.removesuffix(' (overlap)')}, not 1.25 m, from rock at" in drawn
     cells = (f'<td class="n">{gap_m:.4f}</td>', '<td class="n">1.25</td>')
     rows = [row for row in drawn.split("<tr") if "<td>ugv1</td><td>rock</td>" in row]
@@ -259,7 +260,7 @@ def test_the_page_says_that_it_appeared_there() -> None:
     metrics = of_run(trace)["min_distance_m"]["ugv1"]["rock"]
     assert metrics["appeared"] is True
     built = document.build(trace.scenario, {"d": trace}, judge(trace), {"package": "", "seed": 1, "started": ""})
-    (row,) = (row for row in first_screen(built).rows if row.run == "d")
+    (row,) = (row for row in first_screen(of(built)).rows if row.run == "d")
     assert row.safe.lines[1] == "ugv1\N{EN DASH}rock 0.800 < 2 m at 4.20 s"
     gap = gap_m(trace, "ugv1", "rock")
     np.testing.assert_array_equal(np.isnan(gap), np.arange(len(gap)) < trace.there_from("rock"))

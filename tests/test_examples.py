@@ -19,6 +19,7 @@ import numpy as np
 import pytest
 
 from airground_drake.report.__main__ import main
+from airground_drake.report.model import of
 from airground_drake.report.screen import first_screen
 from airground_drake.scenario.load import load
 from airground_drake.sim.simulation import simulate
@@ -127,7 +128,7 @@ def test_a_robot_on_wheels_holds_what_it_declares(tmp_path: Path) -> None:
     assert 0.1 < trace.sampled("tb.cover_m").max() < 0.105
     assert report["runs"]["d"]["events"][-1]["kind"] == "arrival"
     assert re.search(
-        r"tb showed 0\.0\d+ of 0\.1 m/s drift and 0\.101 of 0\.105 m cover", first_screen(report).beware[-1]
+        r"tb showed 0\.0\d+ of 0\.1 m/s drift and 0\.101 of 0\.105 m cover", first_screen(of(report)).beware[-1]
     )
 
 

@@ -9,6 +9,7 @@ from graphlib import TopologicalSorter
 from pathlib import Path
 
 import airground_drake
+from airground_drake.base.registry import MODEL_CLAIMS, RUN_CLAIMS
 
 PACKAGE = Path(airground_drake.__file__).parent
 ROOMS = ("base", "check", "model", "uav", "ugv", "scenario", "sim", "verify", "report", "study", "commands")
@@ -83,6 +84,24 @@ def folder(module: str) -> str:
     """The folder of a module inside its room; the module itself if it stands in the room."""
     parts = module.split(".")
     return ".".join(parts[:3]) if PACKAGE.joinpath(*parts[1:3]).is_dir() else module
+
+
+def test_claims_are_named_in_their_files_in_the_registry_and_in_the_rules_of_the_report() -> None:
+    """Elsewhere only in texts of users' files: scenarios that are written, and examples in docstrings and helps."""
+    named = re.compile("|".join((*RUN_CLAIMS.own, *MODEL_CLAIMS.own)))
+    users = {
+        "scenario/fleet.py", "scenario/imported.py", "commands/campaign.py", "study/campaign/spec.py",
+        "study/campaign/stopping.py", "study/testing/__init__.py", "study/testing/strategies.py",
+    }  # fmt: skip
+    files = {
+        str(path.relative_to(PACKAGE))
+        for room in ROOMS
+        if room not in ("check", "verify")
+        for kind in ("*.py", "*.j2")
+        for path in (PACKAGE / room).rglob(kind)
+        if named.search(path.read_text(encoding="utf-8"))
+    }
+    assert files == users | {"base/registry.py", "report/rules.py"}
 
 
 def test_only_the_command_line_knows_programs() -> None:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from pathlib import PurePath
 from traceback import extract_tb, format_list, walk_tb
 
@@ -146,6 +147,15 @@ def described(error: BaseException, function: object = None) -> str:
     except BaseException:  # its text is third-party code, too
         text = "an exception that cannot be put into words"
     return one_line(text)
+
+
+@contextmanager
+def raised_as(made: Callable[[BaseException], Exception]) -> Iterator[None]:
+    """Turn whatever third-party code raises in the body into an error that says so."""
+    try:
+        yield
+    except (Exception, SystemExit) as error:
+        raise made(error) from error
 
 
 def traceback_of(error: BaseException) -> str:

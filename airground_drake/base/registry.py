@@ -334,6 +334,8 @@ RUN_CLAIMS = Registry(
     },
 )
 
+ARRIVAL = "LIVE-GOAL"  # the claim that every robot ends where it is to end; a preset must lead there, or it may fail
+
 # Claims about the model, in the order of the report: subclasses of `verify.claim.ModelClaim`.
 MODEL_CLAIMS = Registry(
     "claim",

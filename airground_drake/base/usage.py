@@ -44,21 +44,6 @@ class Parser(argparse.ArgumentParser):
         raise SystemExit(refuse(f"{message}; see {self.prog} --help"))
 
 
-def overridable(parser: argparse.ArgumentParser) -> None:
-    """Add the option `--set`."""
-    parser.add_argument(
-        "--set", action="append", default=[], metavar="KEY=VALUE", help="override a key of the scenario"
-    )
-
-
-def parallel(parser: argparse.ArgumentParser) -> None:
-    """Add the options `--jobs` and `--quiet`."""
-    parser.add_argument(
-        "--jobs", type=whole(1, MOST_JOBS), metavar="N", help="processes (default: one for each processor)"
-    )
-    parser.add_argument("-q", "--quiet", action="store_true", help="no progress")
-
-
 def output_folder(text: str) -> Path:
     """Parse the path of an output; `new/../b` becomes `b`: else writing would create `new` on the way."""
     return Path(os.path.relpath(os.path.realpath(text)) if ".." in Path(text).parts else text)

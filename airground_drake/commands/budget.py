@@ -8,7 +8,8 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from airground_drake.base import files
-from airground_drake.base.usage import Parser, output_file, overridable
+from airground_drake.base.usage import output_file
+from airground_drake.scenario.options import option, parser_of
 
 if TYPE_CHECKING:
     from airground_drake.scenario.budget import PairBudget
@@ -17,17 +18,17 @@ MOST_NAMED = 6  # bodies that are named in a line at most
 
 
 def parser() -> argparse.ArgumentParser:
-    """Make the parser."""
-    parser = Parser(
-        prog="airground budget",
-        description="Print, for each kind of pair, the promised distance, the distance that the law keeps between "
-        "steered points, and what each term takes. Distances are between surfaces.",
+    return parser_of(
+        "budget",
+        "Print, for each kind of pair, the promised distance, the distance that the law keeps between steered points, "
+        "and what each term takes. Distances are between surfaces.",
+        {
+            "scenario": None,
+            "-o --output": option("draw the budget, too, as SVG", "FILE", output_file),
+            "--json": "print every kind of pair as JSON",
+            "--set": None,
+        },
     )
-    parser.add_argument("scenario", help="name of a shipped scenario, or path to a YAML file")
-    parser.add_argument("-o", "--output", type=output_file, metavar="FILE", help="draw the budget, too, as SVG")
-    parser.add_argument("--json", action="store_true", help="print every kind of pair as JSON")
-    overridable(parser)
-    return parser
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

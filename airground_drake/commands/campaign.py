@@ -10,12 +10,13 @@ from typing import TYPE_CHECKING, Any
 
 from airground_drake.base import files
 from airground_drake.base.errors import AirgroundError, one_line
+from airground_drake.base.limits import MAX_SEED
 from airground_drake.base.parallel import one_thread_each, processors
 from airground_drake.base.progress import progress_bar
-from airground_drake.base.usage import EXIT_TOOL, REFUSALS, Parser, output_folder, parallel, positive, refuse, whole
+from airground_drake.base.usage import EXIT_TOOL, REFUSALS, positive, refuse, whole
 from airground_drake.scenario import plugins
 from airground_drake.scenario.estimate import DEFAULT_LIMITS, Limits
-from airground_drake.scenario.limits import MAX_SEED
+from airground_drake.scenario.options import option, parser_of
 from airground_drake.scenario.shipped import argument
 from airground_drake.study.campaign.rows import UNFINISHED
 
@@ -26,40 +27,25 @@ EXIT_REFUTED, EXIT_UNDECIDED = 1, 3
 
 
 def parser() -> argparse.ArgumentParser:
-    """Make the parser."""
-    parser = Parser(
-        prog="airground campaign",
-        description="Simulate and judge many draws of a scenario, and bound how likely a violation is.",
-        epilog="exit codes: 0 every claim as expected in every draw, 1 one differs, 2 usage, bad spec or folder, "
-        "3 undecided, 4 tool error, 130 and 143 interrupted; what is finished is kept: --resume goes on with it",
-    )
-    parser.add_argument("spec", type=Path, help="YAML file: a scenario, and distributions over its keys")
-    parser.add_argument(
-        "-n", "--number", type=whole(1), metavar="N", help="draws (default: one, or all combinations of grids)"
-    )
-    parser.add_argument(
-        "-o", "--output", type=output_folder, metavar="DIR",
-        help="a new folder, or with --resume an old one (default: campaigns/<name>); with --only: the scenario's file",
-    )  # fmt: skip
-    parser.add_argument("--resume", action="store_true", help="go on with what the folder has")
-    parser.add_argument(
-        "--only", type=whole(0, MAX_SEED), metavar="INDEX", help="this draw alone; its scenario is written"
-    )
-    parallel(parser)
-    parser.add_argument("--scheduler", metavar="ADDRESS", help="of a Dask cluster, such as tcp://host:8786")
-    parser.add_argument(
-        "--stop-when", metavar="RULE", help="end when the anytime-valid bound meets RULE: 'SAFE-TRACE < 1e-2'"
-    )
-    parser.add_argument(
-        "--limit-steps", type=positive, default=DEFAULT_LIMITS.work, metavar="N",
-        help="a draw with more simulated steps, counted per robot, over all runs, is invalid (default: %(default).0g)",
-    )  # fmt: skip
-    parser.add_argument(
-        "--limit-time", type=positive, default=DEFAULT_LIMITS.time, metavar="S",
-        help="stop a draw that takes longer (default: %(default)g)",
-    )  # fmt: skip
-    parser.add_argument(plugins.OPTION, action="store_true", help=plugins.HELP)
-    return parser
+    return parser_of("campaign", "Simulate and judge many draws of a scenario, and bound how likely a violation is.", {
+        "spec": "YAML file: a scenario, and distributions over its keys",
+        "-n --number": "draws (default: one, or all combinations of grids)",
+        "-o --output": "a new folder, or with --resume an old one (default: campaigns/<name>); with --only: the "
+        "scenario's file",
+        "--resume": "go on with what the folder has",
+        "--only": option("this draw alone; its scenario is written", "INDEX", whole(0, MAX_SEED)),
+        "--engine": None,
+        "--jobs": None,
+        "-q --quiet": None,
+        "--scheduler": option("of a Dask cluster, such as tcp://host:8786", "ADDRESS"),
+        "--stop-when": option("end when the anytime-valid bound meets RULE: 'SAFE-TRACE < 1e-2'", "RULE"),
+        "--limit-steps": "a draw with more simulated steps, counted per robot, over all runs, is invalid "
+        "(default: %(default).0g)",
+        "--limit-time": option("stop a draw that takes longer (default: %(default)g)", "S", positive,
+                               default=DEFAULT_LIMITS.time),
+        plugins.OPTION: None,
+    }, "exit codes: 0 every claim as expected in every draw, 1 one differs, 2 usage, bad spec or folder, 3 undecided, "
+        "4 tool error, 130 and 143 interrupted; what is finished is kept: --resume goes on with it")  # fmt: skip
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -93,7 +79,7 @@ def _all(spec: Spec, options: argparse.Namespace) -> int:
     ):
         found = conduct(
             spec, folder, processes, options.number, resume=options.resume, stopping=stopping,
-            limits=_limits(options), progress=progress,
+            limits=_limits(options), engine=options.engine, progress=progress,
         )  # fmt: skip
     print(f"{_summary(found, looked=bool(options.stop_when or options.resume))}\n{one_line(str(folder))}")
     return _code(found)
@@ -116,7 +102,7 @@ def _only(spec: Spec, options: argparse.Namespace) -> int:
         if not (path.is_file() and files.read_bytes(path) == text.encode()):  # the same draw may be asked for again
             files.try_to_create(path)
             files.write_text(path, text)
-    rows = rows_of(spec, options.only, _limits(options))
+    rows = rows_of(spec, options.only, _limits(options), options.engine)
     for row in rows:
         margin = "" if math.isnan(row["margin"]) else f" {row['margin']:.6g} {row['unit']}"
         print(f"{row['run']:12} {row['claim'] or row['ended']:12} {row['status'] or row['what']}{margin}")

@@ -6,12 +6,16 @@ import argparse
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from airground_drake.base import files
 from airground_drake.base.errors import one_line, short
-from airground_drake.base.usage import Parser, output_file
+from airground_drake.base.usage import output_file
 from airground_drake.report import compare
+from airground_drake.scenario.options import option, parser_of
+
+if TYPE_CHECKING:
+    from airground_drake.report.model import Report
 
 EXIT_WORSE = 1
 PARTS = ("inputs", "overall", "verdicts", "margins", "exercised", "expectations", "reproduction", "audit", "events")
@@ -20,28 +24,30 @@ _ABOUT = ("claim", "id", "run", "robot", "kind", "n")
 
 
 def parser() -> argparse.ArgumentParser:
-    """Make the parser."""
-    parser = Parser(
-        prog="airground compare",
-        description="What differs between two reports: first what they were made from (keys of the scenario, "
-        "versions), then verdicts, margins, what was exercised, events. Changes by rounding are counted, not listed.",
-        epilog="verdicts from the best to the worst: "
+    return parser_of(
+        "compare",
+        "What differs between two reports: first what they were made from (keys of the scenario, versions), then "
+        "verdicts, margins, what was exercised, events. Changes by rounding are counted, not listed.",
+        {
+            "before": option("folder of a report", "BEFORE", Path),
+            "after": option("folder of another", "AFTER", Path),
+            "--json": None,
+            "--html": option("write a page", "FILE", output_file),
+            "--exact": "exit code 1 if any result differs, to the last digit",
+        },
+        "verdicts from the best to the worst: "
         + "; ".join(", ".join(alike) for alike in compare.ORDER).replace("_", " ")
         + ". One that was as expected and is no longer is worse, too. Exit codes: 0 nothing is worse than before, 1 "
         "something is (with --exact: any result differs), 2 usage, or a folder is not a report.",
     )
-    parser.add_argument("before", type=Path, metavar="BEFORE", help="folder of a report")
-    parser.add_argument("after", type=Path, metavar="AFTER", help="folder of another")
-    parser.add_argument("--json", action="store_true", help="print all of it as JSON")
-    parser.add_argument("--html", type=output_file, metavar="FILE", help="write a page")
-    parser.add_argument("--exact", action="store_true", help="exit code 1 if any result differs, to the last digit")
-    return parser
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Compare, and print what differs; the exit codes are in the help."""
     options = parser().parse_args(arguments)
-    before, after = compare.read(options.before), compare.read(options.after)
+    from airground_drake.report import model
+
+    before, after = model.read(options.before), model.read(options.after)
     found = compare.compared(before, after)
     if options.html is not None:
         page = _page((options.before, options.after), before, after, found)
@@ -95,9 +101,7 @@ def _side(value: Any) -> str:
     return f"{value:.9g}" if isinstance(value, float) else "none" if value is None else str(value)
 
 
-def _page(
-    folders: tuple[Path, Path], before: compare.Document, after: compare.Document, found: Mapping[str, Any]
-) -> str:
+def _page(folders: tuple[Path, Path], before: Report, after: Report, found: Mapping[str, Any]) -> str:
     """The comparison as a page."""
     from airground_drake.report.html import render_beside
 

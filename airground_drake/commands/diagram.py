@@ -9,27 +9,22 @@ from pathlib import Path
 from airground_drake.base import files
 from airground_drake.base.errors import UnknownNameError, one_line
 from airground_drake.base.registry import METHODS
-from airground_drake.base.usage import Parser, output_folder, overridable
 from airground_drake.scenario import plugins
+from airground_drake.scenario.options import option, parser_of
 
 FORMATS = ("dot", "svg", "pdf", "png")
 
 
 def parser() -> argparse.ArgumentParser:
-    """Make the parser."""
-    parser = Parser(prog="airground diagram", description="Draw the diagram of a scenario.")
-    parser.add_argument("scenario", help="name of a shipped scenario, or path to a YAML file")
-    parser.add_argument(
-        "--method", choices=tuple(METHODS), help="default: c, the paper's Figure 2, if it has such a run"
-    )
-    parser.add_argument("--part", metavar="NAME", help="only the layer of that name, with all ports")
-    parser.add_argument("--format", action="append", choices=FORMATS, help="may be repeated (default: dot and svg)")
-    parser.add_argument(
-        "-o", "--output", type=output_folder, default=Path(), metavar="DIR", help="default: this folder"
-    )
-    overridable(parser)
-    parser.add_argument(plugins.OPTION, action="store_true", help=plugins.HELP)
-    return parser
+    return parser_of("diagram", "Draw the diagram of a scenario.", {
+        "scenario": None,
+        "--method": option("default: c, the paper's Figure 2, if it has such a run", choices=tuple(METHODS)),
+        "--part": option("only the layer of that name, with all ports", "NAME"),
+        "--format": option("may be repeated (default: dot and svg)", action="append", choices=FORMATS),
+        "-o --output": {"default": Path()},
+        "--set": None,
+        plugins.OPTION: None,
+    })  # fmt: skip
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

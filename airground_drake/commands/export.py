@@ -8,21 +8,19 @@ from pathlib import Path
 
 from airground_drake.base import files
 from airground_drake.base.errors import one_line
-from airground_drake.base.usage import output_folder
-from airground_drake.commands.saved import outside_reports, parser_of, runs_of, trace_of
+from airground_drake.commands.saved import outside_reports, runs_of, trace_of
+from airground_drake.scenario.options import option, parser_of
 
 KINDS = ("csv", "mcap")
 
 
 def parser() -> argparse.ArgumentParser:
-    """Make the parser."""
-    parser = parser_of("export", "Write the runs of a report as CSV tables, or as MCAP files for Foxglove.")
-    parser.add_argument("run", nargs="?", metavar="RUN", help="default: all runs")
-    parser.add_argument("--to", choices=KINDS, required=True, help="kind of the files")
-    parser.add_argument(
-        "-o", "--output", type=output_folder, default=Path(), metavar="FOLDER", help="default: this folder"
-    )
-    return parser
+    return parser_of("export", "Write the runs of a report as CSV tables, or as MCAP files for Foxglove.", {
+        "folder": None,
+        "run": None,
+        "--to": option("kind of the files", choices=KINDS, required=True),
+        "-o --output": {"metavar": "FOLDER", "default": Path()},
+    })  # fmt: skip
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -1,4 +1,4 @@
-"""`airground falsify SPEC --claim SAFE-TRACE`: search for a scenario that violates a claim, and shrink it."""
+"""`airground falsify SPEC --claim ID`: search for a scenario that violates a claim, and shrink it."""
 
 from __future__ import annotations
 
@@ -15,10 +15,12 @@ from airground_drake.base.errors import AirgroundError, Fault, PluginError, Scen
 from airground_drake.base.parallel import one_thread_each, processors
 from airground_drake.base.progress import progress_bar
 from airground_drake.base.registry import RUN_CLAIMS, SAMPLERS, is_plugin
-from airground_drake.base.usage import EXIT_TOOL, REFUSALS, Parser, output_file, parallel, positive, refuse, whole
+from airground_drake.base.usage import EXIT_TOOL, REFUSALS, output_file, positive, refuse, whole
+from airground_drake.report.rules import DISTANCES
 from airground_drake.scenario import plugins
 from airground_drake.scenario.estimate import DEFAULT_LIMITS
 from airground_drake.scenario.hints import plugin_path
+from airground_drake.scenario.options import option, parser_of
 from airground_drake.scenario.shipped import argument
 from airground_drake.study.campaign.rows import COLUMNS
 
@@ -33,35 +35,22 @@ TIMES = tuple(name for name in COLUMNS if name.endswith("_s") and name not in ("
 
 
 def parser() -> argparse.ArgumentParser:
-    """Make the parser."""
-    parser = Parser(
-        prog="airground falsify",
-        description="Search the space of a campaign for a scenario that violates a claim, and shrink it.",
-        epilog="exit codes: 0 no counterexample, 1 one was found, 2 usage, bad spec or output, 3 nothing was judged, "
-        "4 tool error, 130 and 143 interrupted",
-    )
-    parser.add_argument("spec", type=Path, help="YAML file of a campaign")
-    parser.add_argument("--claim", default="SAFE-TRACE", metavar="ID", help="claim about runs (default: %(default)s)")
-    parser.add_argument("--most", choices=TIMES, help="maximise this time instead of minimising a margin")
-    parser.add_argument("--limit", type=positive, metavar="S", help="with --most: a longer time is a counterexample")
-    parser.add_argument(
-        "--sampler", default="cma", metavar="NAME", help=f"{', '.join(SAMPLERS.allowed)} (default: %(default)s)"
-    )
-    parser.add_argument(
-        "-n", "--number", type=whole(1), default=200, metavar="N", help="scenarios to try (default: %(default)s)"
-    )
-    parser.add_argument(
-        "--shrink", type=whole(0), default=300, metavar="N",
-        help="runs for shrinking a counterexample (default: %(default)s)",
-    )  # fmt: skip
-    parser.add_argument(
-        "-o", "--output", type=output_file, metavar="FILE",
-        help="new; without a counterexample, the scenario nearest to one (default: <name>_<sampler>.yaml, written only "
-        "for a counterexample)",
-    )  # fmt: skip
-    parallel(parser)
-    parser.add_argument(plugins.OPTION, action="store_true", help=plugins.HELP)
-    return parser
+    return parser_of("falsify", "Search the space of a campaign for a scenario that violates a claim, and shrink it.", {
+        "spec": None,
+        "--claim": option("claim about runs (default: %(default)s)", "ID", default=DISTANCES),
+        "--most": option("maximise this time instead of minimising a margin", choices=TIMES),
+        "--limit": option("with --most: a longer time is a counterexample", "S", positive),
+        "--sampler": option(f"{', '.join(SAMPLERS.allowed)} (default: %(default)s)", "NAME", default="cma"),
+        "-n --number": {"help": "scenarios to try (default: %(default)s)", "default": 200},
+        "--shrink": option("runs for shrinking a counterexample (default: %(default)s)", "N", whole(0), default=300),
+        "-o --output": option("new; without a counterexample, the scenario nearest to one (default: "
+                              "<name>_<sampler>.yaml, written only for a counterexample)", "FILE", output_file),
+        "--engine": None,
+        "--jobs": None,
+        "-q --quiet": None,
+        plugins.OPTION: None,
+    }, "exit codes: 0 no counterexample, 1 one was found, 2 usage, bad spec or output, 3 nothing was judged, 4 tool "
+        "error, 130 and 143 interrupted")  # fmt: skip
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -109,7 +98,7 @@ def _run(spec: Spec, options: argparse.Namespace) -> int:
     files.try_to_create(path)
     files.try_to_create(_small(path))
     limits = DEFAULT_LIMITS._replace(plugins=options.allow_plugins)
-    search = Search(replace(spec, claims=(options.claim,)), objective, limits)
+    search = Search(replace(spec, claims=(options.claim,)), objective, limits, options.engine)
     jobs = min(options.jobs or processors(), options.number)
     with progress_bar(quiet=options.quiet) as progress, pool.local(jobs) as processes:
         _try(search, processes)
@@ -133,7 +122,7 @@ def _try(search: Search, pool: Pool) -> None:
     from airground_drake.study.campaign.work import rows_of
 
     spec = search.spec
-    for _, rows in pool(partial(rows_of, spec, limits=search.limits), [0]):
+    for _, rows in pool(partial(rows_of, spec, limits=search.limits, engine=search.engine), [0]):
         if rows and all(row["ended"] == JUDGED and not row["claim"] for row in rows):
             raise ScenarioError("--claim", "", spec.claims[0], f"wanted: one that applies to a run of {spec.source}")
 
@@ -145,8 +134,8 @@ def _small(path: Path) -> Path:
 
 def _save(search: Search, best: Best, path: Path, tests: int) -> None:
     """Write the scenario of the best point; beside it a small one, if it is a counterexample."""
+    from airground_drake.base.limits import MAX_NAME
     from airground_drake.scenario.document import text_of
-    from airground_drake.scenario.limits import MAX_NAME
     from airground_drake.scenario.load import resolved
     from airground_drake.study.campaign.shrink import shrink
 

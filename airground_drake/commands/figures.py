@@ -7,27 +7,23 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from airground_drake.base.errors import one_line
-from airground_drake.base.usage import formats_of, output_folder
-from airground_drake.commands.saved import outside_reports, parser_of, runs_of, trace_of
+from airground_drake.base.usage import formats_of
+from airground_drake.commands.saved import outside_reports, runs_of, trace_of
+from airground_drake.scenario.options import option, parser_of
 
 # Copies of those of `export.figures`, which takes seconds to import.
 FORMATS, STYLES = ("pdf", "png", "svg"), ("ieee", "thesis")
 
 
 def parser() -> argparse.ArgumentParser:
-    """Make the parser."""
-    parser = parser_of(
-        "figures", "Write the figures of a report as files, figures.tex with captions, and tables in LaTeX."
-    )
-    parser.add_argument("--style", choices=STYLES, default="ieee", help="type and width (default: ieee)")
-    parser.add_argument(
-        "--format", type=formats_of(FORMATS), default=("pdf",), help=f"comma-separated: {','.join(FORMATS)} "
-        "(default: pdf)",
-    )  # fmt: skip
-    parser.add_argument(
-        "-o", "--output", type=output_folder, default=Path("figures"), metavar="FOLDER", help="default: figures"
-    )
-    return parser
+    says = "Write the figures of a report as files, figures.tex with captions, and tables in LaTeX."
+    return parser_of("figures", says, {
+        "folder": None,
+        "--style": option("type and width (default: ieee)", choices=STYLES, default="ieee"),
+        "--format": option(f"comma-separated: {','.join(FORMATS)} (default: pdf)", kind=formats_of(FORMATS),
+                           default=("pdf",)),
+        "-o --output": {"help": "default: figures", "metavar": "FOLDER", "default": Path("figures")},
+    })  # fmt: skip
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -35,13 +31,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = parser().parse_args(arguments)
     runs = runs_of(options.folder)
     outside_reports(options.output, "the figures")
-    from airground_drake.report.compare import read
+    from airground_drake.report import model
     from airground_drake.report.export import figures
 
     saved = {name: trace_of(options.folder, name) for name in runs}
-    document = read(options.folder)
-    traces = {name: saved[name][0] for name in document["runs"] if name in saved}
+    report = model.read(options.folder)
+    traces = {name: saved[name][0] for name in report.runs if name in saved}
     scenario = saved[next(iter(traces))][1]
-    for path in figures.write(document, scenario, traces, options.output, options.style, options.format):
+    for path in figures.write(report, scenario, traces, options.output, options.style, options.format):
         print(one_line(str(path)))
     return 0

@@ -11,8 +11,9 @@ from typing import TYPE_CHECKING
 
 from airground_drake.base import files
 from airground_drake.base.errors import ScenarioError, one_line
-from airground_drake.base.usage import Parser, between, output_file, refuse, whole
-from airground_drake.scenario.limits import MAX_NAME, MAX_UGVS
+from airground_drake.base.limits import MAX_NAME, MAX_UGVS
+from airground_drake.base.usage import between, output_file, refuse, whole
+from airground_drake.scenario.options import option, parser_of
 from airground_drake.scenario.shipped import argument
 
 if TYPE_CHECKING:
@@ -31,59 +32,40 @@ SIZES = (0.001, 100.0)  # least and greatest radius and distance, m
 
 
 def parser() -> argparse.ArgumentParser:
-    """Make the parser."""
-    parser = Parser(
-        prog="airground import",
-        description="Make a scenario of a Gazebo world of cylinders and boxes such as BARN's, of a ROS map, or of a "
-        "benchmark of MovingAI with its map.",
-    )
-    parser.add_argument("format", choices=tuple(FORMATS), help="what FILE is")
-    parser.add_argument(
-        "file", type=Path, metavar="FILE", help="barn: NAME.world; ros-map: the map's YAML file; mapf: NAME.scen"
-    )
-    parser.add_argument(
-        "-o", "--output", type=output_file, default=Path("scenario.yaml"), metavar="YAML", help="default: %(default)s"
-    )
-    parser.add_argument(
-        "--ugv", type=_ugv, action="append", metavar="NAME:X,Y:X,Y",
-        help="barn, ros-map: a UGV with its start and target in m; may be repeated (default for barn: the challenge's)",
+    size = between(*SIZES)
+    radii = ", ".join(f"{kind} {radius:g}" for kind, radius in RADII_M.items())
+    return parser_of(
+        "import",
+        "Make a scenario of a Gazebo world of cylinders and boxes such as BARN's, of a ROS map, or of a benchmark of "
+        "MovingAI with its map.",
+        {
+            "format": option("what FILE is", choices=tuple(FORMATS)),
+            "file": option("barn: NAME.world; ros-map: the map's YAML file; mapf: NAME.scen", "FILE", Path),
+            "-o --output": option("default: %(default)s", "YAML", output_file, default=Path("scenario.yaml")),
+            "--ugv": option("barn, ros-map: a UGV with its start and target in m; may be repeated (default for barn: "
+                            "the challenge's)", "NAME:X,Y:X,Y", _ugv, action="append"),
+            "--ugvs": option(f"ros-map: UGVs to find room for (default: {UGVS})", "N", whole(1, MAX_UGVS)),
+            "--radius-m": option(f"barn, ros-map: radius of UGVs (default: {radii})", "R", size),
+            "--distance-m": option("barn, ros-map: what UGVs keep from obstacles and from one another (default: "
+                                   f"{DISTANCE_M:g})", "D", size),
+            "--max-speed-m-s": option("largest speed of UGVs; presets have two thirds of it (default: 1.5, less for "
+                                      "the smallest UGVs)", "V", between(0.01, 50.0)),
+            "--height-m": option("barn: height of UGVs; shapes that begin above it are left out (default: "
+                                 f"{HEIGHT_M:g})", "H", size),
+            "--agents": option(f"mapf: the first N agents (default: {AGENTS})", "N", whole(1, MAX_UGVS)),
+            "--map": option("mapf: the map (default: as FILE says, beside it)", "FILE", Path),
+            "--cell-m": option(f"mapf: side of a cell (default: {CELL_M:g})", "M", between(0.1, 100.0)),
+        },
     )  # fmt: skip
-    parser.add_argument(
-        "--ugvs", type=whole(1, MAX_UGVS), metavar="N", help=f"ros-map: UGVs to find room for (default: {UGVS})"
-    )
-    parser.add_argument(
-        "--radius-m", type=between(*SIZES), metavar="R",
-        help="barn, ros-map: radius of UGVs (default: " + ", ".join(f"{k} {v:g}" for k, v in RADII_M.items()) + ")",
-    )  # fmt: skip
-    parser.add_argument(
-        "--distance-m", type=between(*SIZES), metavar="D",
-        help=f"barn, ros-map: what UGVs keep from obstacles and from one another (default: {DISTANCE_M:g})",
-    )  # fmt: skip
-    parser.add_argument(
-        "--max-speed-m-s", type=between(0.01, 50.0), metavar="V",
-        help="largest speed of UGVs; presets have two thirds of it (default: 1.5, less for the smallest UGVs)",
-    )  # fmt: skip
-    parser.add_argument(
-        "--height-m", type=between(*SIZES), metavar="H",
-        help=f"barn: height of UGVs; shapes that begin above it are left out (default: {HEIGHT_M:g})",
-    )  # fmt: skip
-    parser.add_argument(
-        "--agents", type=whole(1, MAX_UGVS), metavar="N", help=f"mapf: the first N agents (default: {AGENTS})"
-    )
-    parser.add_argument("--map", type=Path, metavar="FILE", help="mapf: the map (default: as FILE says, beside it)")
-    parser.add_argument(
-        "--cell-m", type=between(0.1, 100.0), metavar="M", help=f"mapf: side of a cell (default: {CELL_M:g})"
-    )
-    return parser
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Write the scenario, with a map's files where it needs some; existing files are left alone."""
     options = parser().parse_args(arguments)
-    for option in ("ugv", "ugvs", "radius_m", "distance_m", "agents", "map", "cell_m", "max_speed_m_s", "height_m"):
-        if getattr(options, option) is not None and option not in FORMATS[options.format]:
-            fitting = " and ".join(each for each, theirs in FORMATS.items() if option in theirs)
-            return refuse(f"--{option.replace('_', '-')} is for {fitting}")
+    for key in dict.fromkeys(key for theirs in FORMATS.values() for key in theirs):
+        if getattr(options, key) is not None and key not in FORMATS[options.format]:
+            fitting = " and ".join(kind for kind, theirs in FORMATS.items() if key in theirs)
+            return refuse(f"--{key.replace('_', '-')} is for {fitting}")
     if options.ugv and options.ugvs:
         return refuse("--ugvs finds room for UGVs, --ugv names them: use one of the two")
     files.try_to_create(options.output)

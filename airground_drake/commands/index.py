@@ -4,28 +4,27 @@ from __future__ import annotations
 
 import argparse
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 from urllib.parse import quote
 
 from airground_drake.base import files
 from airground_drake.base.errors import FolderError, ReportError, TraceError, one_line
-from airground_drake.base.usage import Parser
-from airground_drake.report import compare, folder, screen
+from airground_drake.report import folder
 from airground_drake.report.sentences import Line
+from airground_drake.scenario.options import parser_of
+
+if TYPE_CHECKING:
+    from airground_drake.report.model import Report
 
 PAGE = "index.html"
 MARK = "airground_drake index"  # text in every page that this command has written
 
 
 def parser() -> argparse.ArgumentParser:
-    """Make the parser."""
-    parser = Parser(
-        prog="airground index", description=f"Write DIR/{PAGE}, which lists the reports below DIR and leads to them."
-    )
-    parser.add_argument("folder", type=Path, metavar="DIR", help="folder with folders of reports in it")
-    return parser
+    says = f"Write DIR/{PAGE}, which lists the reports below DIR and leads to them."
+    return parser_of("index", says, {"folder": "folder with folders of reports in it"})
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -52,7 +51,7 @@ def _write(place: Path) -> Path:
     if not entries:
         why = f": {problems[0]}" if problems else ""
         raise FolderError(f"there are no reports in the folders below {place}{why}")
-    entries.sort(key=lambda entry: (entry["scenario"]["name"], entry["provenance"].get("started", ""), entry["place"]))
+    entries.sort(key=lambda entry: (entry["scenario"].name, str(entry["provenance"].get("started")), entry["place"]))
     name = place.resolve().name
     files.write_text(page, render_beside("index.html.j2", entries=entries, problems=problems, name=name, mark=MARK))
     return page
@@ -60,33 +59,36 @@ def _write(place: Path) -> Path:
 
 def _entry(report: Path, place: Path, prefix: str) -> dict[str, Any]:
     """Return the values that the page shows of a report; ReportError or FolderError if it cannot be used."""
-    document = compare.read(report)
+    from airground_drake.report import model
+
+    found = model.read(report)
     files.refuse_links(report)
     leads_to = report / (folder.PAGES["html"] if (report / folder.PAGES["html"]).is_file() else folder.PAGES["json"])
     where = report.relative_to(place).as_posix()
     link = quote(os.fsencode(leads_to.relative_to(place)))
-    kept = {part: document[part] for part in ("scenario", "overall", "provenance")}
     return {
-        **kept, "place": where, "link": link, "headline": _headline(document),
-        "thumbnail": _thumbnail(report, document, prefix),
+        "scenario": found.scenario, "overall": found.overall, "provenance": found.provenance, "place": where,
+        "link": link, "headline": _headline(found), "thumbnail": _thumbnail(report, found, prefix),
     }  # fmt: skip
 
 
-def _headline(document: Mapping[str, Any]) -> list[Line]:
-    """The report in one or two lines; none if it lacks something that only its first screen needs."""
+def _headline(report: Report) -> list[Line]:
+    """The report in one or two lines; none if its evidence lacks something that only its first screen needs."""
+    from airground_drake.report import screen
+
     try:
-        return screen.headline(document)
+        return screen.headline(report)
     except (LookupError, TypeError, ValueError, AttributeError):
         return []
 
 
-def _thumbnail(report: Path, document: Mapping[str, Any], prefix: str) -> str:
+def _thumbnail(folder: Path, report: Report, prefix: str) -> str:
     """The last run as a picture; '' if it has no trace that can be used."""
     from airground_drake.report.view.plane import thumbnail_of
     from airground_drake.sim import trace
 
-    runs = [run for run in document["runs"] if run.isidentifier()]
+    runs = [run for run in report.runs if run.isidentifier()]
     try:
-        return thumbnail_of(trace.load(report / "trace" / runs[-1]), prefix)
+        return thumbnail_of(trace.load(folder / "trace" / runs[-1]), prefix)
     except (TraceError, OSError, LookupError, ValueError):
         return ""

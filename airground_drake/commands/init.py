@@ -9,9 +9,10 @@ from pathlib import Path
 
 from airground_drake.base import files
 from airground_drake.base.errors import one_line
-from airground_drake.base.usage import Parser, output_file, refuse, whole
+from airground_drake.base.limits import MAX_NAME, MAX_SEED, MAX_UGVS
+from airground_drake.base.usage import output_file, refuse, whole
 from airground_drake.scenario.fleet import fleet
-from airground_drake.scenario.limits import MAX_NAME, MAX_SEED, MAX_UGVS
+from airground_drake.scenario.options import option, parser_of
 from airground_drake.scenario.shipped import argument, json_schema_file, shipped_files
 
 MOST_OBSTACLES = 2000 - MAX_UGVS  # with the largest number of UGVs, as many bodies as the checker accepts
@@ -19,20 +20,13 @@ MODEL = "minimal"  # the shipped scenario that is copied by default
 
 
 def parser() -> argparse.ArgumentParser:
-    """Make the parser."""
-    parser = Parser(
-        prog="airground init", description="Write a small scenario that runs: a UGV, an obstacle in its way, a UAV."
-    )
-    parser.add_argument("file", type=output_file, nargs="?", default=Path("scenario.yaml"), help="default: %(default)s")
-    parser.add_argument("--like", choices=shipped_files(), metavar="NAME", help="copy this shipped scenario instead")
-    parser.add_argument(
-        "--fleet", type=whole(1, MAX_UGVS), metavar="N", help="N UGVs that cross a field of obstacles instead"
-    )
-    parser.add_argument(
-        "--obstacles", type=whole(1, MOST_OBSTACLES), metavar="M", help="with --fleet: obstacles (default: 5 a UGV)"
-    )
-    parser.add_argument("--seed", type=whole(0, MAX_SEED), metavar="S", help="with --fleet: seed (default: 1)")
-    return parser
+    return parser_of("init", "Write a small scenario that runs: a UGV, an obstacle in its way, a UAV.", {
+        "file": option("default: %(default)s", kind=output_file, nargs="?", default=Path("scenario.yaml")),
+        "--like": option("copy this shipped scenario instead", "NAME", choices=shipped_files()),
+        "--fleet": option("N UGVs that cross a field of obstacles instead", "N", whole(1, MAX_UGVS)),
+        "--obstacles": option("with --fleet: obstacles (default: 5 a UGV)", "M", whole(1, MOST_OBSTACLES)),
+        "--seed": option("with --fleet: seed (default: 1)", "S", whole(0, MAX_SEED)),
+    })  # fmt: skip
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -7,9 +7,11 @@ import json
 import math
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 from airground_drake.base.errors import one_line
-from airground_drake.base.usage import Parser, between, output_folder, overridable, refuse
+from airground_drake.base.usage import between, refuse
+from airground_drake.scenario.options import option, parser_of
 
 MOST_GAP_S, MOST_ERROR_M = 1e6, 1e6
 EPILOG = """\
@@ -38,62 +40,39 @@ broken, or the position error decides, 2 usage, or a log that cannot be used
 
 
 def parser() -> argparse.ArgumentParser:
-    """Make the parser."""
-    parser = Parser(
-        prog="airground judge",
-        description="Judge the log of an experiment: which distances were kept, by which margin, whose doing an "
-        "approach was, and which hypotheses of the safety theorem held.",
-        epilog=EPILOG,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
-    parser.add_argument("logs", type=Path, nargs="+", metavar="LOG", help="a file or folder; several are one log")
-    parser.add_argument(
-        "--scenario", required=True, metavar="NAME", help="name of a shipped scenario, or path to a YAML file"
-    )
-    overridable(parser)
-    parser.add_argument(
-        "--rename", type=_named, action="append", default=[], metavar="NAME=BODY",
-        help="a topic, frame, column or value in the log, and the body of the scenario that it is about",
+    several: dict[str, Any] = {"action": "append", "default": []}
+    return parser_of(
+        "judge",
+        "Judge the log of an experiment: which distances were kept, by which margin, whose doing an approach was, and "
+        "which hypotheses of the safety theorem held.",
+        {
+            "logs": option("a file or folder; several are one log", "LOG", Path, nargs="+"),
+            "--scenario": option("name of a shipped scenario, or path to a YAML file", "NAME", required=True),
+            "--set": None,
+            "--rename": option("a topic, frame, column or value in the log, and the body of the scenario that it is "
+                               "about", "NAME=BODY", _named, **several),
+            "--map-columns": option("names of the columns t, body, frame, x, y, z of a table, with a unit where needed "
+                                    "(x_mm=NAME); {body} in a NAME stands for a body's name", "t=NAME,...", _mapped,
+                                    default={}),
+            "--frame": option("use positions in this frame only; several FRAMEs are taken as one", "FRAME", **several),
+            "--time-unit": option("of times without a unit", choices=("s", "ms", "us", "ns"), default=""),
+            "--length-unit": option("of lengths without a unit", choices=("m", "cm", "mm"), default=""),
+            "--rate-hz": option("frames per second of times that are numbers of frames", "HZ", between(1e-3, 1e6),
+                                default=0.0),
+            "--axes": option("which axes of the log are x, y and z (up) of the scenario: y,x,-z for NED, such as "
+                             "x,-z,y if y is up (default: x,y,z; asked for if they seem to be others)", "[BODY=]AXES",
+                             _axes, **several),
+            "--gap": option("nothing is claimed between two positions of a body that are farther apart than this "
+                            "(default: 2.5 times the body's usual time between two); closer ones are joined by a "
+                            "straight line", "S", between(0.0, MOST_GAP_S), default=0.0),
+            "--position-error": option("by how much recorded positions may be wrong", "[BODY=]M", _error, **several),
+            "--uav": option("one more UAV, like the scenario's", "NAME", **several),
+            "--without": option("a body of the scenario that is not to be judged", "BODY", **several),
+            "-o --output": "also write a page with maps, judged.html, and a replay, replay.html",
+            "--json": None,
+        },
+        EPILOG,
     )  # fmt: skip
-    parser.add_argument(
-        "--map-columns", type=_mapped, default={}, metavar="t=NAME,...",
-        help="names of the columns t, body, frame, x, y, z of a table, with a unit where needed (x_mm=NAME); "
-        "{body} in a NAME stands for a body's name",
-    )  # fmt: skip
-    parser.add_argument(
-        "--frame", action="append", default=[], metavar="FRAME",
-        help="use positions in this frame only; several FRAMEs are taken as one",
-    )  # fmt: skip
-    parser.add_argument("--time-unit", choices=("s", "ms", "us", "ns"), default="", help="of times without a unit")
-    parser.add_argument("--length-unit", choices=("m", "cm", "mm"), default="", help="of lengths without a unit")
-    parser.add_argument(
-        "--rate-hz", type=between(1e-3, 1e6), default=0.0, metavar="HZ",
-        help="frames per second of times that are numbers of frames",
-    )  # fmt: skip
-    parser.add_argument(
-        "--axes", type=_axes, action="append", default=[], metavar="[BODY=]AXES",
-        help="which axes of the log are x, y and z (up) of the scenario: y,x,-z for NED, such as x,-z,y if y is up "
-        "(default: x,y,z; asked for if they seem to be others)",
-    )  # fmt: skip
-    parser.add_argument(
-        "--gap", type=between(0.0, MOST_GAP_S), default=0.0, metavar="S",
-        help="nothing is claimed between two positions of a body that are farther apart than this (default: 2.5 times "
-        "the body's usual time between two); closer ones are joined by a straight line",
-    )  # fmt: skip
-    parser.add_argument(
-        "--position-error", type=_error, action="append", default=[], metavar="[BODY=]M",
-        help="by how much recorded positions may be wrong",
-    )  # fmt: skip
-    parser.add_argument("--uav", action="append", default=[], metavar="NAME", help="one more UAV, like the scenario's")
-    parser.add_argument(
-        "--without", action="append", default=[], metavar="BODY", help="a body of the scenario that is not to be judged"
-    )
-    parser.add_argument(
-        "-o", "--output", type=output_folder, metavar="DIR",
-        help="also write a page with maps, judged.html, and a replay, replay.html",
-    )  # fmt: skip
-    parser.add_argument("--json", action="store_true", help="print all of it as JSON")
-    return parser
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -20,19 +20,18 @@ from airground_drake.base.registry import (
     Registry,
     parameters,
 )
-from airground_drake.base.usage import Parser
+from airground_drake.scenario.options import option, parser_of
 from airground_drake.scenario.shipped import shipped, title
 
 Lines = Iterator[tuple[str, str]]  # names and their descriptions
 
 
 def parser() -> argparse.ArgumentParser:
-    """Make the parser."""
-    parser = Parser(prog="airground list", description=f"List {__doc__.partition(': ')[2]}")
-    parser.add_argument("kind", nargs="?", choices=(*KINDS, KEYS), help="default: all of them but the keys")
-    parser.add_argument("name", nargs="?", metavar="NAME", help="a name, or the beginning of a key: all about it")
-    parser.add_argument("--schema", action="store_true", help="the JSON Schema of scenario files instead, for editors")
-    return parser
+    return parser_of("list", f"List {__doc__.partition(': ')[2]}", {
+        "kind": option("default: all of them but the keys", nargs="?", choices=(*KINDS, KEYS)),
+        "name": option("a name, or the beginning of a key: all about it", "NAME", nargs="?"),
+        "--schema": "the JSON Schema of scenario files instead, for editors",
+    })  # fmt: skip
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -7,7 +7,9 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from airground_drake.base.usage import Parser, positive, refuse
+from airground_drake.base.usage import positive, refuse
+from airground_drake.report.rules import DISTANCES
+from airground_drake.scenario.options import option, parser_of
 
 if TYPE_CHECKING:
     from airground_drake.verify.proofs.runs import Proved
@@ -16,25 +18,21 @@ EXIT_UNPROVED = 1
 
 
 def parser() -> argparse.ArgumentParser:
-    """Make the parser."""
-    parser = Parser(
-        prog="airground prove",
-        description="Have the proof checker Coq check the package's theorems (without DIR), or prove for the runs of a "
-        "report that they keep their distances (with DIR).",
-        epilog="Exit codes: 0 proved (with DIR: each run that is named, or whose distances the scenario expects to be "
-        "kept); 1 something is not proved, or differs from its record; 2 usage, Coq is not installed, or a file cannot "
-        "be read.",
-    )
-    parser.add_argument("report", type=Path, metavar="DIR", nargs="?", help="folder of a report")
-    parser.add_argument(
-        "--run", action="append", default=[], metavar="NAME",
-        help="prove only this run of DIR, even if the scenario does not expect it to pass; may be repeated",
+    return parser_of(
+        "prove",
+        "Have the proof checker Coq check the package's theorems (without DIR), or prove for the runs of a report that "
+        "they keep their distances (with DIR).",
+        {
+            "report": option("folder of a report", "DIR", Path, nargs="?"),
+            "--run": option("prove only this run of DIR, even if the scenario does not expect it to pass; may be "
+                            "repeated", "NAME", action="append", default=[]),
+            "--limit": option("seconds for one call of Coq (default: %(default)g)", "S", positive, default=600.0),
+            "--record": "without DIR: write the record of this check",
+        },
+        "Exit codes: 0 proved (with DIR: each run that is named, or whose distances the scenario expects to be kept); "
+        "1 something is not proved, or differs from its record; 2 usage, Coq is not installed, or a file cannot be "
+        "read.",
     )  # fmt: skip
-    parser.add_argument(
-        "--limit", type=positive, default=600.0, metavar="S", help="seconds for one call of Coq (default: %(default)g)"
-    )
-    parser.add_argument("--record", action="store_true", help="without DIR: write the record of this check")
-    return parser
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -86,7 +84,7 @@ def _runs(options: argparse.Namespace) -> int:
         if (found.expected or options.run) and not found.distances.proved:
             code = EXIT_UNPROVED
     if proved.write(options.report):
-        print(f"{options.report / 'report.html'} says so beside {proved.CLAIM}")
+        print(f"{options.report / 'report.html'} says so beside {DISTANCES}")
     return code
 
 
@@ -104,5 +102,5 @@ def _lines(found: Proved) -> list[str]:
         else:
             lines.append(f"run {found.run}: {what}: not proved: {answer.why}")
     if not found.expected:
-        lines.append(f"run {found.run}: the scenario does not ask for it: it does not expect SAFE-TRACE to hold")
+        lines.append(f"run {found.run}: the scenario does not ask for it: it does not expect {DISTANCES} to hold")
     return lines

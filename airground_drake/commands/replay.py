@@ -8,27 +8,24 @@ from pathlib import Path
 
 from airground_drake.base import files
 from airground_drake.base.errors import FolderError, one_line
-from airground_drake.base.usage import between, output_file, output_folder, refuse
-from airground_drake.commands.saved import outside_reports, parser_of, runs_of, trace_of
+from airground_drake.base.usage import between, output_file, refuse
+from airground_drake.commands.saved import outside_reports, runs_of, trace_of
+from airground_drake.scenario.options import option, parser_of
 
 SLOWEST, SPEED, FASTEST = 0.1, 4.0, 100.0  # limits and default of a video's speed
 
 
 def parser() -> argparse.ArgumentParser:
-    """Make the parser."""
-    parser = parser_of("replay", "Write replay_RUN.html for the runs of a report: one file each, which works offline.")
-    parser.add_argument("run", nargs="?", metavar="RUN", help="default: all runs, a file each")
-    to = parser.add_mutually_exclusive_group()
-    to.add_argument(
-        "-o", "--output", type=output_folder, default=Path(), metavar="PLACE",
-        help="folder for the pages, or a name.html for RUN (default: .)",
-    )  # fmt: skip
-    to.add_argument("--live", action="store_true", help="write nothing; serve the pages on this machine")
-    to.add_argument("--video", type=output_file, metavar="FILE", help="write RUN as a video instead: .webp or .mp4")
-    parser.add_argument(
-        "--speed", type=between(SLOWEST, FASTEST), metavar="X", help=f"with --video: its speed (default: {SPEED:g})"
-    )
-    return parser
+    says = "Write replay_RUN.html for the runs of a report: one file each, which works offline."
+    return parser_of("replay", says, {
+        "folder": None,
+        "run": "default: all runs, a file each",
+        "-o --output": {"help": "folder for the pages, or a name.html for RUN (default: .)", "metavar": "PLACE",
+                        "default": Path()},
+        "--live": "write nothing; serve the pages on this machine",
+        "--video": option("write RUN as a video instead: .webp or .mp4", "FILE", output_file),
+        "--speed": option(f"with --video: its speed (default: {SPEED:g})", "X", between(SLOWEST, FASTEST)),
+    }, exclusive=("-o --output", "--live", "--video"))  # fmt: skip
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -12,9 +12,10 @@ from typing import TYPE_CHECKING
 from airground_drake.base import files
 from airground_drake.base.errors import UnknownNameError
 from airground_drake.base.registry import METHODS
-from airground_drake.base.usage import Parser, output_folder, overridable, positive, refuse
+from airground_drake.base.usage import positive, refuse
 from airground_drake.scenario import plugins
 from airground_drake.scenario.estimate import estimate
+from airground_drake.scenario.options import option, parser_of
 
 if TYPE_CHECKING:
     from airground_drake.sim.trace import Trace
@@ -23,18 +24,17 @@ SPEED = 1.0  # default speed in Meshcat, simulated seconds per second
 
 
 def parser() -> argparse.ArgumentParser:
-    """Make the parser."""
-    parser = Parser(prog="airground run", description="Simulate one run of a scenario and print its events.")
-    parser.add_argument("scenario", help="name of a shipped scenario, or path to a YAML file")
-    parser.add_argument("run", nargs="?", metavar="RUN", help="default: the run with the most complete method")
-    parser.add_argument("--meshcat", action="store_true", help="show the robots in a browser while they move")
-    parser.add_argument("--speed", type=positive, metavar="X", help=f"with --meshcat: its speed (default: {SPEED:g})")
-    parser.add_argument("-o", "--output", type=output_folder, metavar="DIR", help="save the trace in this folder, too")
-    overridable(parser)
-    parser.add_argument("--seed", type=int, metavar="N", help="seed of the decision noise")
-    parser.add_argument(plugins.OPTION, action="store_true", help=plugins.HELP)
-    parser.add_argument(plugins.SHOW, action="store_true", help=plugins.SHOW_HELP)
-    return parser
+    return parser_of("run", "Simulate one run of a scenario and print its events.", {
+        "scenario": None,
+        "run": "default: the run with the most complete method",
+        "--meshcat": "show the robots in a browser while they move",
+        "--speed": option(f"with --meshcat: its speed (default: {SPEED:g})", "X", positive),
+        "-o --output": "save the trace in this folder, too",
+        "--set": None,
+        "--seed": None,
+        plugins.OPTION: None,
+        plugins.SHOW: None,
+    })  # fmt: skip
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

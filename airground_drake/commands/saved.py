@@ -2,26 +2,17 @@
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from airground_drake.base import files
 from airground_drake.base.errors import FolderError, UnknownNameError, one_line
-from airground_drake.base.usage import Parser
 from airground_drake.report.folder import is_report
 
 if TYPE_CHECKING:
     from airground_drake.scenario.schema import Scenario
     from airground_drake.sim.trace import Trace
-
-
-def parser_of(name: str, description: str) -> argparse.ArgumentParser:
-    """Make the parser of a command that takes a report."""
-    parser = Parser(prog=f"airground {name}", description=description)
-    parser.add_argument("folder", type=Path, metavar="DIR", help="folder of a report")
-    return parser
 
 
 def runs_of(folder: Path, run: str | None = None) -> Sequence[str]:

@@ -26,19 +26,11 @@ from airground_drake.base.errors import (
     one_line,
 )
 from airground_drake.base.progress import Progress, progress_bar
-from airground_drake.base.usage import (
-    EXIT_TOOL,
-    Parser,
-    formats_of,
-    output_folder,
-    overridable,
-    positive,
-    refuse,
-    whole,
-)
+from airground_drake.base.usage import EXIT_TOOL, formats_of, positive, refuse, whole
 from airground_drake.report import folder
 from airground_drake.scenario import plugins
 from airground_drake.scenario.estimate import DEFAULT_LIMITS, GIB, Limits, estimate
+from airground_drake.scenario.options import option, parser_of
 from airground_drake.scenario.shipped import AUDIT, shipped
 
 if TYPE_CHECKING:  # slow to import
@@ -87,7 +79,7 @@ def _reported(options: argparse.Namespace, command: str) -> int:
     scenario = load(AUDITED if audited else options.scenario, overrides)
     if audited:
         scenario.name, scenario.title, scenario.description = AUDIT, AUDIT_TITLE, AUDIT_DESCRIPTION
-    from airground_drake.report import attention, make, terminal  # slow to import: only for a valid scenario
+    from airground_drake.report import attention, make, model, terminal  # slow to import: only for a valid scenario
     from airground_drake.verify.cache import cache_folder
 
     kept = None if options.no_cache else cache_folder()
@@ -106,19 +98,19 @@ def _reported(options: argparse.Namespace, command: str) -> int:
     ):
         findings = partial(_findings, progress, audited=audited)
         wanted = make.Wanted(options.format, command, kept, findings, audited, limits, options.seeds)
-        report = make.write_report(scenario, output, wanted, progress)
-    overall = report["overall"]
-    for line in attention.failures({name: run["faults"] for name, run in report["runs"].items()}):
+        report = model.of(make.write_report(scenario, output, wanted, progress))
+    overall = report.overall
+    for line in attention.failures({name: run.faults for name, run in report.runs.items()}):
         print(line, file=sys.stderr)
     if not options.quiet:
         for item in attention.beforehand(report):
             print(f"{item.words}{f', run {item.run}' if item.run else ''}")
         print(terminal.text(report))
-        print(f"{scenario.name}: {overall['status'].replace('_', ' ')}. {overall['why']}")
+        print(f"{scenario.name}: {overall.status.replace('_', ' ')}. {overall.why}")
         print(one_line(str(output)))
     if options.open and "html" in options.format:
         webbrowser.open((output / "report.html").resolve().as_uri())
-    return int(overall["exit_code"])
+    return overall.exit_code
 
 
 def _findings(
@@ -139,45 +131,28 @@ def _findings(
 
 
 def parser() -> argparse.ArgumentParser:
-    """What the command line takes."""
-    parser = Parser(
-        prog="airground report",
-        description="Simulate all runs of a scenario, check the claims on them, and write the report.",
-        epilog="exit codes: 0 as expected, 1 a claim differs, 2 usage or bad scenario, 3 inconclusive, 4 tool error, "
-        "130 interrupted (SIGINT), 143 terminated (SIGTERM)",
-    )
-    parser.add_argument("scenario", nargs="?", help="name of a shipped scenario, path to a YAML file, or audit")
-    parser.add_argument(
-        "-o", "--output", type=output_folder, metavar="DIR", help=f"default: reports/<scenario>; {folder.RULE}"
-    )
-    parser.add_argument(
-        "--format", type=formats_of(FORMATS), default=FORMATS, help="comma-separated: html,json,junit (default: all)"
-    )
-    overridable(parser)
-    parser.add_argument("--seed", type=int, metavar="N", help="seed of the decision noise")
-    parser.add_argument(
-        "--seeds", type=whole(1), default=0, metavar="N",
-        help="also simulate every run with the seeds 1 to N, and say how many keep all distances and bring all home",
-    )  # fmt: skip
-    parser.add_argument(
-        "--no-cache", action="store_true", help="repeat ZENO-REFINE and THR-DDM instead of reusing earlier results"
-    )
-    parser.add_argument(plugins.OPTION, action="store_true", help=plugins.HELP)
-    parser.add_argument(plugins.SHOW, action="store_true", help=plugins.SHOW_HELP)
-    parser.add_argument(
-        "--limit-steps", type=positive, default=DEFAULT_LIMITS.work, metavar="N",
-        help="refuse a scenario with more simulated steps, counted per robot, over all runs (default: %(default).0g)",
-    )  # fmt: skip
-    parser.add_argument(
-        "--limit-memory", type=positive, default=DEFAULT_LIMITS.memory / GIB, metavar="GIB",
-        help="refuse a scenario that needs more memory (default: %(default)g)",
-    )  # fmt: skip
-    parser.add_argument("--open", action="store_true", help="open the report in a browser")
-    parser.add_argument("--list", action="store_true", help="list the shipped scenarios")
-    loudness = parser.add_mutually_exclusive_group()
-    loudness.add_argument("-q", "--quiet", action="store_true", help="print only errors")
-    loudness.add_argument("-v", "--verbose", action="store_true", help="print how long each step took")
-    return parser
+    return parser_of("report", "Simulate all runs of a scenario, check the claims on them, and write the report.", {
+        "scenario": {"nargs": "?", "help": "name of a shipped scenario, path to a YAML file, or audit"},
+        "-o --output": f"default: reports/<scenario>; {folder.RULE}",
+        "--format": option("comma-separated: html,json,junit (default: all)", kind=formats_of(FORMATS),
+                           default=FORMATS),
+        "--set": None,
+        "--seed": None,
+        "--seeds": option("also simulate every run with the seeds 1 to N, and say how many keep all distances and "
+                          "bring all home", "N", whole(1), default=0),
+        "--no-cache": "repeat experiments about the model instead of reusing earlier results",
+        plugins.OPTION: None,
+        plugins.SHOW: None,
+        "--limit-steps": "refuse a scenario with more simulated steps, counted per robot, over all runs (default: "
+        "%(default).0g)",
+        "--limit-memory": option("refuse a scenario that needs more memory (default: %(default)g)", "GIB", positive,
+                                 default=DEFAULT_LIMITS.memory / GIB),
+        "--open": "open the report in a browser",
+        "--list": "list the shipped scenarios",
+        "-q --quiet": "print only errors",
+        "-v --verbose": "print how long each step took",
+    }, "exit codes: 0 as expected, 1 a claim differs, 2 usage or bad scenario, 3 inconclusive, 4 tool error, 130 "
+        "interrupted (SIGINT), 143 terminated (SIGTERM)", exclusive=("-q --quiet", "-v --verbose"))  # fmt: skip
 
 
 if __name__ == "__main__":

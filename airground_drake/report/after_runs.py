@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 from airground_drake.base import files
 from airground_drake.base.parallel import start_in_process
 from airground_drake.base.progress import Progress
-from airground_drake.report import document, folder, junit, metrics
+from airground_drake.report import document, folder, junit, metrics, model
 from airground_drake.report.figures.draw import draw
 from airground_drake.report.figures.panels import Figure
 from airground_drake.report.folder import PAGES
@@ -85,10 +85,11 @@ def write(
         scenario, traces, judged.verdicts, provenance,
         audit=judged.findings, audited=audited, required=required, seeds=judged.seeds,
     )  # fmt: skip
+    told = model.of(report)
     if "junit" in formats:
-        pages[PAGES["junit"]] = junit.render(report)
+        pages[PAGES["junit"]] = junit.render(told)
     if "html" in formats:
-        pages[PAGES["html"]] = page(report, judged.figures, pages["diagram.svg"])
+        pages[PAGES["html"]] = page(told, judged.figures, pages["diagram.svg"])
     folder.clear(output)
     written = [*pages]
     for name, of_run in traces.items():

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 from airground_drake.base.errors import one_line
 from airground_drake.base.statuses import UNDECIDED, outcome
-from airground_drake.report.outcomes import no_way
+from airground_drake.report.model import Claim, Report, Run
 from airground_drake.report.phrases import bodies_of, found_no_way, in_words, place_of
 from airground_drake.report.sentences import MAX_NAMES, counted, grouped
 from airground_drake.scenario.validate import preset_s
@@ -28,43 +28,43 @@ class Item(NamedTuple):
     anchor: str = "claims"  # where in the page there is more about it
 
 
-def items(document: Mapping[str, Any]) -> list[Item]:
+def items(report: Report) -> list[Item]:
     """All of a report: what may explain the rest first, then refuted claims, then undecided and missing ones."""
-    unexpected = [claim for claim in document["claims"] if claim["as_expected"] is False]
-    unexpected.sort(key=lambda claim: claim["status"] in UNDECIDED)
+    unexpected = [claim for claim in report.claims if claim.as_expected is False]
+    unexpected.sort(key=lambda claim: claim.status in UNDECIDED)
     return [
-        *beforehand(document),
-        *(_of_claim(claim, document["runs"].get(claim["run"], {})) for claim in unexpected),
+        *beforehand(report),
+        *(_of_claim(claim, report.runs.get(claim.run)) for claim in unexpected),
         *(
-            Item("not_as_expected", f"{each['found']} {each['id']}", run=each["run"],
-                 about=f"expected: at least {each['least']}", anchor="happened")
-            for each in document["overall"]["numbers"] if not each["as_expected"]
+            Item("not_as_expected", f"{number.found} {number.id}", run=number.run,
+                 about=f"expected: at least {number.least}", anchor="happened")
+            for number in report.overall.numbers if not number.as_expected
         ),
-        *(Item("not_run", each["why"], each["id"], each["run"]) for each in document["overall"]["missing"]),
+        *(Item("not_run", missing.why, missing.id, missing.run) for missing in report.overall.missing),
         *(
             Item("not_demonstrated", f"finding {number} about the paper", anchor="audit")
-            for number in document["overall"]["undemonstrated"]
+            for number in report.overall.undemonstrated
         ),
     ]  # fmt: skip
 
 
-def _of_claim(claim: Mapping[str, Any], run: Mapping[str, Any]) -> Item:
+def _of_claim(claim: Claim, run: Run | None) -> Item:
     words = in_words(claim)
     if "condition" in place_of(claim) and run and (bodies := bodies_of(claim)):
         words += _refused(run, bodies[0])
     return Item(
-        outcome(claim["status"], claim["exercised"]),
+        outcome(claim.status, claim.exercised),
         words,
-        claim["id"],
-        claim["run"],
-        about=f"expected: {str(claim['expected']).replace('_', ' ')}",
-        anchor=f"claim-{claim['id']}",
+        claim.id,
+        claim.run,
+        about=f"expected: {str(claim.expected).replace('_', ' ')}",
+        anchor=f"claim-{claim.id}",
     )
 
 
-def _refused(run: Mapping[str, Any], robot: str) -> str:
+def _refused(run: Run, robot: str) -> str:
     """How often and why a robot that did not get where it must refused proposals."""
-    reasons: Mapping[str, int] = (run["metrics"]["gatekeeper"] or {}).get("refusals", {}).get(robot, {})
+    reasons = run.metrics.gatekeeper.refusals.get(robot, {}) if run.metrics.gatekeeper else {}
     if not reasons:
         return ""
     often = sorted(reasons.items(), key=lambda item: -item[1])
@@ -72,21 +72,21 @@ def _refused(run: Mapping[str, Any], robot: str) -> str:
     return f"; refused {counted(sum(reasons.values()), 'time')}: {why}"
 
 
-def beforehand(document: Mapping[str, Any]) -> Iterator[Item]:
+def beforehand(report: Report) -> Iterator[Item]:
     """Shown first, also on the terminal: faults of policies and solvers, no way found, and runs that end too early."""
-    yield from _of_faults(document["runs"])
-    for name, run in document["runs"].items():
-        why: Mapping[str, str] = run["metrics"].get("no_way_reasons", {})
-        for reason, lost in grouped((why.get(ugv, ""), ugv) for ugv in no_way(run)).items():
+    yield from _of_faults(report.runs)
+    for name, run in report.runs.items():
+        why = run.metrics.no_way_reasons
+        for reason, lost in grouped((why.get(ugv, ""), ugv) for ugv in run.no_way).items():
             words = found_no_way(lost) + (f": {reason}" if reason else "")
             yield Item("no_way", words, run=name, anchor="happened")
-    scenario = document["scenario"]["resolved"]
-    longer = {name: preset_s(**ugv["preset"]) for name, ugv in scenario["ugvs"].items()}
-    longer = {name: time_s for name, time_s in longer.items() if time_s > scenario["duration_s"]}
+    scenario = report.scenario.resolved
+    longer = {name: preset_s(ugv.preset.waypoints_m, ugv.preset.speed_m_s) for name, ugv in scenario.ugvs.items()}
+    longer = {name: time_s for name, time_s in longer.items() if time_s > scenario.duration_s}
     if longer:
         names = list(longer)
         who = ", ".join(names[:MAX_NAMES]) + f" and {len(names) - MAX_NAMES} more" * (len(names) > MAX_NAMES)
-        ends = f"duration_s = {scenario['duration_s']:g} ends the runs before the presets of {who} do"
+        ends = f"duration_s = {scenario.duration_s:g} ends the runs before the presets of {who} do"
         yield Item("inconclusive", f"{ends} ({max(longer.values()):.3g} s): they cannot be expected to arrive")
 
 
@@ -103,9 +103,9 @@ def failures(faults: Mapping[str, Sequence[Mapping[str, Any]]]) -> Iterator[str]
                 yield traceback
 
 
-def _of_faults(runs: Mapping[str, Mapping[str, Any]]) -> Iterator[Item]:
+def _of_faults(runs: Mapping[str, Run]) -> Iterator[Item]:
     for name, run in runs.items():
-        kinds = faults_together(run["faults"])
+        kinds = faults_together(run.faults)
         for kind in kinds[:MAX_FAULTS]:
             count, first_s = kind["count"], kind["first_s"]
             often = f"{count} times, first at {first_s:.2f} s" if count > 1 else f"once, at {first_s:.2f} s"

@@ -16,14 +16,13 @@ from airground_drake.base.files import sha256
 from airground_drake.base.registry import method_of
 from airground_drake.base.statuses import COUNTS, NOT_EXERCISED, STATUSES, UNDECIDED, outcome
 from airground_drake.report import metrics, reproduction
+from airground_drake.report.model import SCHEMA
 from airground_drake.report.sentences import counted
 from airground_drake.scenario.document import place_of
 from airground_drake.scenario.plugins import OPTION
 from airground_drake.scenario.schema import Scenario
 from airground_drake.sim.trace import Trace
 from airground_drake.verify.claim import Verdict
-
-SCHEMA = "airground_drake.report/4"
 
 MOST_LISTED = 4  # maximum number of checks that a sentence names
 EXIT_CODES = {"as_expected": 0, "not_as_expected": 1, "inconclusive": 3}

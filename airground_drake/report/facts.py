@@ -3,21 +3,20 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator
 from functools import cached_property
 from math import dist
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from airground_drake.base.registry import METHODS
 from airground_drake.base.statuses import PASSING
 from airground_drake.report import rules
-from airground_drake.report.outcomes import Document, Near, claims, named, no_way, pairs
+from airground_drake.report.model import Claim, OnTheWay, Report
+from airground_drake.report.outcomes import Near, named, pairs
 from airground_drake.sim.collisions import first_collisions
 
 # What is known of a claim that was not judged.
-UNJUDGED: Mapping[str, Any] = {
-    "status": "", "expected": "", "as_expected": None, "exercised": None, "evidence": {}, "inputs": {},
-}  # fmt: skip
+UNJUDGED = Claim(id="", run="", status="not_run", as_expected=None, exercised=None, evidence={}, inputs={})
 
 
 class Breach(NamedTuple):
@@ -32,26 +31,20 @@ class Breach(NamedTuple):
 class RunFacts:
     """What came of a run that the scenario names, and that was run."""
 
-    def __init__(self, document: Document, name: str) -> None:
-        """The facts of the run with this name."""
-        resolved = document["scenario"]["resolved"]
-        # name: of the run.
-        # run: its entry in report.json.
-        spec, self.name, self.run = resolved["runs"][name], name, document["runs"][name]
-        self._resolved, self._metrics = resolved, self.run["metrics"]
-        self._claims = {each["id"]: each for run in ("", name) for each in claims(document, run=run)}
-        # method: its identifier.
-        self.method, self._plain = str(spec["method"]), spec["composition"] == "augmented"
-        obstacles = resolved.get("obstacles", {})
+    def __init__(self, report: Report, name: str) -> None:
+        self.name, self.run, self._scenario = name, report.runs[name], report.scenario.resolved
+        self._spec, self._metrics = self._scenario.runs[name], self.run.metrics
+        about = sorted((claim for claim in report.claims if claim.run in ("", name)), key=lambda claim: claim.run)
+        self._claims = {claim.id: claim for claim in about}
+        self.method = self._spec.method
         # Obstacles that may move.
-        self.movers: list[str] = [each for each, of in obstacles.items() if of.get("moves") or of.get("max_speed_m_s")]
-        self._off_the_map = {each for each, of in obstacles.items() if not of.get("known_to_uav", True)}
+        self.movers = [name for name, obstacle in self._scenario.obstacles.items() if obstacle.expected_speed_m_s]
         unique = {frozenset((near.robot, near.other)): near for near in reversed([*pairs(self.run)])}
         self.near = sorted(unique.values())  # the least distance of each pair, those of least margin first
         # The first collision of each robot that collided, an event. What these robots do later does not count.
-        self.hits = first_collisions(self.run["events"])
+        self.hits = first_collisions(event.model_dump() for event in self.run.events if event.kind == "collision")
 
-    def claim(self, name: str) -> Mapping[str, Any]:
+    def claim(self, name: str) -> Claim:
         """The verdict on a claim about this run or about the model."""
         return self._claims.get(name, UNJUDGED)
 
@@ -74,26 +67,26 @@ class RunFacts:
     @property
     def is_broken(self) -> bool:
         """Whether a distance was not kept."""
-        return any(near.is_short for near in self.near) or self.claim(rules.DISTANCES)["status"] == "refuted"
+        return any(near.is_short for near in self.near) or self.claim(rules.DISTANCES).status == "refuted"
 
     @property
     def distances_pass(self) -> bool:
         """Whether all distances were checked, and kept."""
-        return self.claim(rules.DISTANCES)["status"] in PASSING
+        return self.claim(rules.DISTANCES).status in PASSING
 
     @property
     def untested(self) -> bool:
         """Whether no pair came so near that it had to be kept apart."""
-        return self.claim(rules.DISTANCES)["exercised"] == 0
+        return self.claim(rules.DISTANCES).exercised == 0
 
     @property
     def is_proved(self) -> bool:
         """Whether theorems keep the distances from bodies at rest and between robots, and their conditions held."""
-        robots = (*self._resolved["ugvs"].values(), self._resolved["uav"])
-        first_order = all(plant["kind"] == "first_order" for robot in robots for plant in robot.get("plant", ()))
+        robots = self._scenario.robots.values()
+        first_order = all(plant.kind == "first_order" for robot in robots for plant in robot.plant)
         needed = (*rules.PROOFS, *[rules.PROOF_OF_PLANTS][: not first_order])
-        met = self.claim(rules.CONDITIONS)["status"] in PASSING
-        return self.method == "d" and self._plain and met and all(self.claim(n)["status"] == "proved" for n in needed)
+        met = self.claim(rules.CONDITIONS).status in PASSING and self._spec.composition == "augmented"
+        return self.method == "d" and met and all(self.claim(name).status == "proved" for name in needed)
 
     @cached_property
     def breaches(self) -> list[Breach]:
@@ -109,7 +102,7 @@ class RunFacts:
         ]
         found = found or [Breach(near.robot, near.other, near.line) for near in self.near if near.is_short]
         met = {frozenset((one["first"], one["second"])): one["doing"]
-               for one in self.claim(rules.DISTANCES)["evidence"].get("encounters", ())}  # fmt: skip
+               for one in self.claim(rules.DISTANCES).evidence.get("encounters", ())}  # fmt: skip
         found = [breach._replace(doing=met.get(frozenset(breach[:2]), "")) for breach in found]
         return sorted(found, key=lambda breach: breach.doing not in rules.OURS)
 
@@ -134,7 +127,7 @@ class RunFacts:
         if not doings or "" in doings:
             return ""
         if not ours:
-            return "not the robots' doing" * (self.claim(rules.OWN_DOING)["status"] != "refuted")
+            return "not the robots' doing" * (self.claim(rules.OWN_DOING).status != "refuted")
         if len(ours) < len(doings):
             return f"{len(ours)} of {len(doings)} the robots' doing"
         return "the robots' doing" + ", by commands already under way" * ({*ours} == {"under way"})
@@ -149,20 +142,20 @@ class RunFacts:
     @property
     def faster(self) -> list[str]:
         """Obstacles that moved faster than declared."""
-        beside = self.claim(rules.CONDITIONS)["evidence"].get("beside_moving", ())
+        beside = self.claim(rules.CONDITIONS).evidence.get("beside_moving", ())
         return sorted({each["second"] for each in beside if each["too_fast_s"] is not None})
 
     @property
     def unmapped(self) -> list[str]:
         """Obstacles that a robot met which obeys the UAV, and that are not on the UAV's map."""
-        met = (breach.second for breach in self.breaches if self._obeys)
-        return list(dict.fromkeys(name for name in met if name in self._off_the_map))
+        off_the_map = {name for name, obstacle in self._scenario.obstacles.items() if not obstacle.known_to_uav}
+        met = dict.fromkeys(breach.second for breach in self.breaches if self._obeys)
+        return [name for name in met if name in off_the_map]
 
     def approaches(self) -> Iterator[Near]:
         """The nearest approach after the start, and that of a mover if it is another one; else the least distance."""
-        came = self._metrics["came_near"]
-        yield from map(Near.of, came)
-        if not came:
+        yield from map(Near.of, self._metrics.came_near)
+        if not self._metrics.came_near:
             yield from self.near[:1]
 
     # Arrived?
@@ -170,31 +163,28 @@ class RunFacts:
     @cached_property
     def home(self) -> set[str]:
         """Robots that ended at their targets, or were there before they collided."""
-        ugvs, uav = self._resolved["ugvs"], self._resolved["uav"]
-        targets = {name: ugv["target_m"] for name, ugv in ugvs.items()} | {uav["name"]: uav["target_m"]}
-        ends, within = self._metrics["final_position_m"], self._resolved["arrival_tolerance_m"]
-        arrived = {robot for robot, at in targets.items() if dist(ends[robot], at) <= within}
+        ends, within = self._metrics.final_position_m, self._scenario.arrival_tolerance_m
+        arrived = {name for name, robot in self._scenario.robots.items() if dist(ends[name], robot.target_m) <= within}
         before = {robot for robot, hit in self.hits.items() if self.arrived_s.get(robot, hit["t_s"]) < hit["t_s"]}
         return (arrived - self.hits.keys()) | before
 
     @cached_property
     def arrived_s(self) -> dict[str, float]:
         """When each robot arrived first, s."""
-        events = [event for event in self.run["events"] if event["kind"] == "arrival"]
-        return {event["robot"]: event["t_s"] for event in reversed(events)}
+        return {event.robot: event.t_s for event in reversed(self.run.events) if event.kind == "arrival"}
 
     @property
     def ugvs(self) -> list[str]:
-        return [*self._resolved["ugvs"]]
+        return [*self._scenario.ugvs]
 
     @property
     def uav(self) -> str:
-        return str(self._resolved["uav"]["name"])
+        return self._scenario.uav.name
 
     @property
     def ends_too_early(self) -> bool:
         """Whether all UGVs that did not arrive were coming nearer to their targets when the run ended."""
-        return all(self.way(ugv).get("left_s") is not None for ugv in self.ugvs if ugv not in self.home)
+        return all(self.way(ugv).left_s is not None for ugv in self.ugvs if ugv not in self.home)
 
     @property
     def there(self) -> int:
@@ -204,24 +194,23 @@ class RunFacts:
     @property
     def failed(self) -> set[str]:
         """UGVs for which a policy failed."""
-        return {fault["robot"] for fault in self.run["faults"]}
+        return {fault["robot"] for fault in self.run.faults}
 
     @property
     def lost(self) -> list[str]:
         """UGVs that the UAV was called for and found no way for."""
-        return no_way(self.run)
+        return self.run.no_way
 
-    def way(self, robot: str) -> Mapping[str, Any]:
-        """How far a UGV had come that neither arrived nor collided, see `metrics.on_the_way`."""
-        found: Mapping[str, Any] = self._metrics["on_the_way"].get(robot, {})
-        return found
+    def way(self, robot: str) -> OnTheWay:
+        """How far a UGV had come that neither arrived nor collided."""
+        return self._metrics.on_the_way.get(robot, OnTheWay())
 
     def holders(self, robot: str) -> list[str]:
         """The bodies that hold a UGV at the end of the run, with the place of the map."""
-        ends = (stall for stall in self._metrics["stalls"] if stall["robot"] == robot)
-        last = [stall for stall in ends if stall["until_s"] >= self._metrics["duration_s"]]
-        at_m = self.way(robot).get("at_m")
-        return [named(name, at_m if name == "map" else None) for stall in last for name in stall["held_by"]]
+        ends = (stall for stall in self._metrics.stalls if stall.robot == robot)
+        last = [stall for stall in ends if stall.until_s >= self._metrics.duration_s]
+        at_m = self.way(robot).at_m
+        return [named(name, at_m if name == "map" else None) for stall in last for name in stall.held_by]
 
     def refused_all(self, robot: str) -> bool:
         """Whether a UGV got proposals and refused every one."""
@@ -233,8 +222,8 @@ class RunFacts:
             bodies = (hit["robot"], hit.get("other") or named(hit["obstacle"], hit.get("at_m")))
             return f"collided with {next(body for body in bodies if body != robot)}"
         way = self.way(robot)
-        state = "stopped" if way.get("stands") else "hardly moving" if way.get("creeps") else "still driving"
-        known = {"by": way.get("kept_away", {}).get("by"), "left_s": way.get("left_s"),
+        state = "stopped" if way.stands else "hardly moving" if way.creeps else "still driving"
+        known = {"by": way.kept_away and way.kept_away.by, "left_s": way.left_s,
                  "held_by": " and ".join(self.holders(robot)[:2])}  # fmt: skip
         causes = (words.format(**known) for applies, words in rules.CAUSES if applies(self, robot))
         return ", ".join([state, *list(causes)[:1]])
@@ -243,10 +232,10 @@ class RunFacts:
 
     def _fates(self) -> Iterator[tuple[str, str]]:
         """The UGV of each proposal, and the class of what became of it."""
-        for sent in self._metrics["interventions"]:
-            accepted = sent["accepted_s"] is not None
-            fate = rules.CLASSES.get((accepted, sent["ended"]["how"]), rules.OPEN[accepted])
-            yield sent["robot"], rules.OBEYED.get(fate, fate) if self._obeys else fate
+        for sent in self._metrics.interventions:
+            accepted = sent.accepted_s is not None
+            fate = rules.CLASSES.get((accepted, sent.ended.how), rules.OPEN[accepted])
+            yield sent.robot, rules.OBEYED.get(fate, fate) if self._obeys else fate
 
     @property
     def fates(self) -> Counter[str]:
@@ -256,21 +245,10 @@ class RunFacts:
     @property
     def refusals(self) -> Counter[str]:
         """How many proposals were refused for each reason."""
-        ends = (sent["ended"] for sent in self._metrics["interventions"] if sent["accepted_s"] is None)
-        return Counter(end["reason"] for end in ends if end["how"] == "refused")
+        ends = (sent.ended for sent in self._metrics.interventions if sent.accepted_s is None)
+        return Counter(end.reason for end in ends if end.how == "refused")
 
     @property
     def triggers(self) -> int:
         """How often the UAV was called."""
-        return sum(event["kind"] == "trigger" for event in self.run["events"])
-
-    @property
-    def messages(self) -> Mapping[str, Any]:
-        """The numbers of messages, see `interventions.messages`; {} without a UAV that intervenes."""
-        return self._metrics["messages"] or {}
-
-    @property
-    def above_at_start(self) -> Sequence[str]:
-        """UGVs whose decision variable was at the threshold or above from the start."""
-        found: Sequence[str] = self._metrics["above_at_start"]
-        return found
+        return sum(event.kind == "trigger" for event in self.run.events)

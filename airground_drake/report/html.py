@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from base64 import b64encode
 from collections.abc import Mapping, Sequence
+from dataclasses import asdict
 from functools import cache, partial
 from hashlib import sha256
 from importlib import resources
@@ -18,9 +19,10 @@ from jinja2 import Environment
 from markupsafe import Markup
 
 from airground_drake.base.statuses import PASSING, outcome
-from airground_drake.report import attention, evidence
+from airground_drake.report import attention, evidence, rules
 from airground_drake.report.figures.panels import Figure, Table
 from airground_drake.report.mathml import mathml
+from airground_drake.report.model import Claim, Report
 from airground_drake.report.outcomes import pairs
 from airground_drake.report.proved import place
 from airground_drake.report.reproduction import YES_NO
@@ -57,7 +59,7 @@ SECTIONS = {
 # What the first screen calls the sections that it leads to.
 LINKS = {"claims": "proof", "intervened": "timing, choice", "reproduction": "all numbers"}
 # Sections of the figures; the others are maps of what happened.
-PLACES = {"distances": "safe", **dict.fromkeys(("timelines", "threshold-choice"), "intervened")}
+PLACES = {"distances": "safe", "timelines": "intervened"}
 
 # How a status is shown: icon, word, class (which sets the colour): never by colour alone.
 CHIPS = {
@@ -84,36 +86,35 @@ CHIPS = {
 }
 
 
-def render(document: Mapping[str, Any], figures: Sequence[Figure], diagram_svg: str | None = None) -> str:
+def render(report: Report, figures: Sequence[Figure], diagram_svg: str | None = None) -> str:
     """The page."""
     # figures: as drawn by `figures.draw` and the like, in the order of the page.
     # diagram_svg: the block diagram; left out if it is no SVG or too large to inline.
-    runs, claims = document["runs"], document["claims"]
-    distances = [(name, pair) for name, run in runs.items() for pair in pairs(run)]
+    distances = [(name, pair) for name, run in report.runs.items() for pair in pairs(run)]
     distances.sort(key=lambda found: found[1].margin_m)
-    plates = grouped((PLACES.get(figure.id, "happened"), figure) for figure in figures if not figure.beside)
-    diagram = _diagram(diagram_svg, str(document["scenario"]["name"]))
+    plates = grouped((figure.beside or PLACES.get(figure.id, "happened"), figure) for figure in figures)
+    diagram = _diagram(diagram_svg, report.scenario.name)
     sections = {
-        "happened": bool(runs),
+        "happened": bool(report.runs),
         "safe": bool(distances),
-        "intervened": "intervened" in plates or any(run["metrics"]["messages"] for run in runs.values()),
-        "reproduction": bool(document["reproduction"]),
-        "choices": bool(document["choices"]),
-        "audit": bool(document["audit"]),
+        "intervened": "intervened" in plates or any(run.metrics.messages for run in report.runs.values()),
+        "reproduction": bool(report.reproduction),
+        "choices": bool(report.choices),
+        "audit": bool(report.audit),
         "diagram": bool(diagram),
     }
     return environment().get_template("report.html.j2").render(
-        report=document,
-        first=first_screen(document),
+        report=report,
+        resolved=asdict(report.scenario.resolved),
+        first=first_screen(report),
         linked={name: words for name, words in LINKS.items() if sections.get(name, True)},
         sections=[(name, title) for name, title in SECTIONS.items() if sections.get(name, True)],
         plates=plates,
-        beside=grouped((figure.beside, figure) for figure in figures if figure.beside),
         diagram=diagram,
-        groups=_by_claim(claims),
-        outcomes=list(dict.fromkeys(map(_shown, claims))),
-        attention=attention.items(document),
-        assumptions=_assumptions(claims),
+        groups=_by_claim(report.claims),
+        outcomes=list(dict.fromkeys(map(_shown, report.claims))),
+        attention=attention.items(report),
+        assumptions=_assumptions(report.claims),
         distances=distances[:MAX_DISTANCE_ROWS],
         left_out=max(0, len(distances) - MAX_DISTANCE_ROWS),
     )  # fmt: skip
@@ -138,16 +139,16 @@ def environment() -> Environment:
     )  # fmt: skip
     environment.globals.update(
         chips=CHIPS, shown=_shown, reasons=WORDS, max_faults=MAX_FAULTS, max_interventions=MAX_INTERVENTIONS,
-        marks=MARKS,
+        marks=MARKS, rules=rules,
         policy=Markup(security_policy(style, script)), style=Markup(style), script=Markup(script),
     )  # fmt: skip
     return environment
 
 
-def _shown(claim: Mapping[str, Any]) -> str:
+def _shown(claim: Claim) -> str:
     """What is shown of a claim, a key of `CHIPS`: its outcome, or the kind of its evidence."""
-    kind = claim["evidence"].get("kind")
-    return kind if kind in KINDS and claim["status"] in PASSING else outcome(claim["status"], claim["exercised"])
+    kind = claim.evidence.get("kind")
+    return kind if kind in KINDS and claim.status in PASSING else outcome(claim.status, claim.exercised)
 
 
 def stylesheet() -> str:
@@ -182,12 +183,12 @@ def _in_the_dark() -> str:
     return f"@media screen and (prefers-color-scheme: dark) {{\n{rules}\n{text}\n}}\n"
 
 
-def evidence_tables(claim: Mapping[str, Any]) -> list[Table]:
+def evidence_tables(claim: Claim) -> list[Table]:
     """Counterexample and evidence of a claim as tables."""
-    on = f", run {claim['run']}" if claim["run"] else ""
+    on = f", run {claim.run}" if claim.run else ""
     return [
-        *evidence.tables(claim["counterexample"] or {}, f"{claim['id']}, counterexample{on}", number),
-        *evidence.tables(claim["evidence"], f"{claim['id']}, evidence{on}", number),
+        *evidence.tables(claim.counterexample or {}, f"{claim.id}, counterexample{on}", number),
+        *evidence.tables(claim.evidence, f"{claim.id}, evidence{on}", number),
     ]
 
 
@@ -243,30 +244,30 @@ def _diagram(source: str | None, name: str) -> str | None:
         return None
 
 
-def _by_claim(claims: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
+def _by_claim(claims: Sequence[Claim]) -> list[dict[str, Any]]:
     """Claims of the same identifier together, those with a deviation first."""
     groups = [
         {
             "id": name,
             "claims": members,
-            "fine": all(claim["as_expected"] is not False for claim in members),
-            "settled": all(c["as_expected"] and c["status"] in PASSING and not c["run"] for c in members),
+            "fine": all(claim.as_expected is not False for claim in members),
+            "settled": all(claim.as_expected and claim.status in PASSING and not claim.run for claim in members),
             "verdicts": _together(members),
         }
-        for name, members in grouped((claim["id"], claim) for claim in claims).items()
+        for name, members in grouped((claim.id, claim) for claim in claims).items()
     ]
     return sorted(groups, key=lambda group: bool(group["fine"]))
 
 
-def _together(members: Sequence[Mapping[str, Any]]) -> list[tuple[Mapping[str, Any], str]]:
+def _together(members: Sequence[Claim]) -> list[tuple[Claim, str]]:
     """Verdicts of a claim that are shown alike, each with its runs; "all 3" if three runs have the same."""
-    runs = sum(bool(claim["run"]) for claim in members)
-    alike = grouped(((_shown(claim), claim["as_expected"] or claim["expected"]), claim) for claim in members)
-    names = [(those[0], [claim["run"] for claim in those if claim["run"]]) for those in alike.values()]
+    runs = sum(bool(claim.run) for claim in members)
+    alike = grouped(((_shown(claim), claim.as_expected or claim.expected), claim) for claim in members)
+    names = [(those[0], [claim.run for claim in those if claim.run]) for those in alike.values()]
     return [(claim, f"all {runs}" if len(where) == runs > 1 else ", ".join(where)) for claim, where in names]
 
 
-def _assumptions(claims: Sequence[Mapping[str, Any]]) -> dict[str, list[str]]:
+def _assumptions(claims: Sequence[Claim]) -> dict[str, list[str]]:
     """Assumptions and the claims that make them; those of many claims first."""
-    resting = grouped(dict.fromkeys((assumed, claim["id"]) for claim in claims for assumed in claim["assumptions"]))
+    resting = grouped(dict.fromkeys((assumed, claim.id) for claim in claims for assumed in claim.assumptions))
     return dict(sorted(resting.items(), key=lambda item: -len(item[1])))

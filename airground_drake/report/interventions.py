@@ -23,18 +23,7 @@ BINDING_M_S = 1e-9  # an avoidance inequality binds where a command has less to 
 
 
 def interventions(trace: Trace) -> list[dict[str, Any]]:
-    """Every proposal of a run, by time, and what became of it.
-
-    Returns:
-        `number`, `robot`, `policy`, `cause` (the UGV whose trigger it was sent for), `sent_s`, `accepted_s` (None: it
-        was never accepted), `begun_s` (when the UGV began to execute it; None: never), `ended` and `tries` (how many
-        the UGV had used; None if it does not count them). [] if the proposals are malformed, which claims report.
-
-        `ended` has `t_s`, `how` and `reason`, that of the UGV's gatekeeper if it refused ('' if not). `how` is, if the
-        UGV executed it, `over` (its motion was), `given up` (the UGV refused it after all), `replaced`, `withdrawn`,
-        `released` (nobody was intervened on any more) or `end of the run`; else `refused`, `lost` (never delivered),
-        `withdrawn first` or `end of the run`.
-    """
+    """Every proposal of a run, by time, and what became of it; [] if they are malformed, which claims report."""
     try:
         sent = proposals_of(trace)
     except (LookupError, TraceError, TypeError, ValueError):
@@ -107,9 +96,6 @@ def _executed(trace: Trace, sent: ProposalRecord, answers: Any, ended_s: float |
 
 def messages(trace: Trace) -> dict[str, Any] | None:
     """How many messages a run took, and how many an always-on scheme takes; None without a UAV that intervenes."""
-    # Returns `proposals`, `withdrawals` of proposals, `answers` (each is a decision of the gatekeeper), as often as
-    # they were delivered, `always_on` (proposals and answers, if every UGV got a proposal in every planning period and
-    # decided in every period of the gatekeeper), `robots` (the three by UGV).
     method, scenario, ugvs = method_of(trace.meta["method"]), trace.scenario, trace.ugvs
     if not method.intervenes:
         return None

@@ -5,40 +5,38 @@ from __future__ import annotations
 import json
 import re
 import xml.etree.ElementTree as ET
-from collections.abc import Mapping
-from typing import Any
 
 from airground_drake.base.statuses import NOT_EXERCISED, outcome
+from airground_drake.report.model import Claim, Report
 
 # Characters that XML 1.0 cannot hold, not even escaped.
 _NOT_XML = re.compile("[^\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 
 
-def render(document: Mapping[str, Any]) -> str:
+def render(report: Report) -> str:
     """JUnit XML of report.json: a suite per run, with a case per claim and per expected number."""
     # A claim whose status is the expected one passes; it is skipped, with the reason, if nothing put it to the test.
     # Otherwise it fails; an `error` is an error and a `not_run` is skipped. A run without a trace and a claim that
     # nobody checked are errors.
-    name = document["scenario"]["name"]
+    name, missing = report.scenario.name, report.overall.missing
     root = ET.Element("testsuites", {"name": _text(f"airground_drake.{name}")})
-    missing = document["overall"]["missing"]
-    runs = list(dict.fromkeys([*document["runs"], *(item["run"] for item in [*document["claims"], *missing])]))
+    runs = list(dict.fromkeys([*report.runs, *(claim.run for claim in report.claims), *(item.run for item in missing)]))
     for run in runs:
         suite = ET.SubElement(root, "testsuite", {"name": _text(f"{name}.{run}")})
-        for claim in document["claims"]:
-            if claim["run"] == run:
-                _outcome(_case(suite, name, run, claim["id"]), claim)
-        for each in document["overall"]["numbers"]:
-            if each["run"] == run:
-                case = _case(suite, name, run, each["id"])
-                if not each["as_expected"]:
-                    message = f"{each['found']} {each['id']}, expected at least {each['least']}"
+        for claim in report.claims:
+            if claim.run == run:
+                _outcome(_case(suite, name, run, claim.id), claim)
+        for number in report.overall.numbers:
+            if number.run == run:
+                case = _case(suite, name, run, number.id)
+                if not number.as_expected:
+                    message = f"{number.found} {number.id}, expected at least {number.least}"
                     ET.SubElement(case, "failure", {"message": message, "type": "number"})
         for item in missing:
-            if item["run"] == run:
-                case = _case(suite, name, run, item["id"] or "run")
-                ET.SubElement(case, "error", {"message": _text(item["why"]), "type": "missing"})
-        seconds = (document["runs"].get(run) or {"metrics": {}})["metrics"].get("wall_s")
+            if item.run == run:
+                case = _case(suite, name, run, item.id or "run")
+                ET.SubElement(case, "error", {"message": _text(item.why), "type": "missing"})
+        seconds = report.runs[run].metrics.wall_s if run in report.runs else None
         _count(suite, [suite], seconds or 0.0)
     _count(root, list(root), sum(float(suite.get("time", 0.0)) for suite in root))
     ET.indent(root)
@@ -50,25 +48,26 @@ def _case(suite: ET.Element, scenario: str, run: str, claim: str) -> ET.Element:
     return ET.SubElement(suite, "testcase", {key: _text(value) for key, value in attributes.items()})
 
 
-def _outcome(case: ET.Element, claim: Mapping[str, Any]) -> None:
+def _outcome(case: ET.Element, claim: Claim) -> None:
     """Add to a test case what came of its claim."""
-    idle = outcome(claim["status"], claim["exercised"]) == NOT_EXERCISED
-    found = f"{claim['status']}, nothing to check (0 {claim['exercised_by']})" if idle else claim["status"]
-    if claim["as_expected"] is not False:
-        told = f"{found}, nothing promised" if claim["as_expected"] is None else found if idle else ""
+    idle = outcome(claim.status, claim.exercised) == NOT_EXERCISED
+    found = f"{claim.status}, nothing to check (0 {claim.exercised_by})" if idle else claim.status
+    if claim.as_expected is not False:
+        told = f"{found}, nothing promised" if claim.as_expected is None else found if idle else ""
         if told:
-            ET.SubElement(case, "skipped", {"message": _text(f"{told}: {claim['statement']}")})
+            ET.SubElement(case, "skipped", {"message": _text(f"{told}: {claim.statement}")})
         return
-    margin = "" if claim["margin"] is None else f", margin {claim['margin']:.4g} {claim['unit']}".rstrip()
-    if margin and claim["quantity"]:
-        margin += f" ({claim['quantity']})"
-    message = _text(f"{found}, expected {claim['expected']}{margin}: {claim['statement']}")
-    if claim["status"] == "not_run":
+    margin = "" if claim.margin is None else f", margin {claim.margin:.4g} {claim.unit}".rstrip()
+    if margin and claim.quantity:
+        margin += f" ({claim.quantity})"
+    message = _text(f"{found}, expected {claim.expected}{margin}: {claim.statement}")
+    if claim.status == "not_run":
         ET.SubElement(case, "skipped", {"message": message})
         return
-    kind = "error" if claim["status"] == "error" else "failure"
-    element = ET.SubElement(case, kind, {"message": message, "type": claim["status"]})
-    details = {key: claim[key] for key in ("where", "counterexample", "evidence") if claim[key]}
+    kind = "error" if claim.status == "error" else "failure"
+    element = ET.SubElement(case, kind, {"message": message, "type": claim.status})
+    parts = {"where": claim.where, "counterexample": claim.counterexample, "evidence": claim.evidence}
+    details = {name: part for name, part in parts.items() if part}
     element.text = _text(json.dumps(details, indent=1, ensure_ascii=False))
 
 

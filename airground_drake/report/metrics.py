@@ -55,16 +55,7 @@ class Nearby(NamedTuple):
 
 
 def of_run(trace: Trace) -> dict[str, Any]:
-    """Metrics of one run."""
-    # Returns `min_distance_m` (robot -> obstacle -> value, t_s, safe_distance_m; gaps between surfaces, exact in
-    # continuous time; at most `MOST_OBSTACLES`, those of least margin), `min_robot_distance_m` (the same for the other
-    # robot of least margin), `final_position_m`, `duration_s`, `wall_s` and `realtime_factor` (None if not measured),
-    # `came_near` (see `came_near`), `event_counts` (robot -> kind -> count), `gatekeeper` (see `gatekeeper`),
-    # `on_the_way` (see `on_the_way`), `stalls` (see `report.stalls`), `above_at_start` (UGVs whose decision variable is
-    # at the threshold or above when the run begins), `interventions`, `messages` and `avoidance` (see
-    # `report.interventions`), `without_proposals` (UGVs that were intervened on for long enough and got no proposal),
-    # `lost_at_the_end` (UGVs for which the UAV found no way when it last looked for one), `no_way_reasons` (why, where
-    # the policy says so) and `without_decisions` (those that got one and did not decide).
+    """Metrics of one run, as `model.Metrics` has them."""
     method, wall_s = method_of(trace.meta["method"]), trace.timings.get("wall_s")
     duration_s = float(trace.t[-1] - trace.t[0])
     counts = {robot: Counter(e["kind"] for e in trace.events if e["robot"] == robot) for robot in trace.robots}
@@ -99,8 +90,7 @@ def of_run(trace: Trace) -> dict[str, Any]:
 
 def came_near(trace: Trace) -> list[dict[str, Any]]:
     """The pair of least margin among those that came nearer than they were when both were first there."""
-    # Returns at most two entries: of all pairs; and of those of an obstacle that may move, if that is another pair.
-    # `first`, `second`, `value` (the gap, m), `safe_distance_m`, `t_s`, and `at_m` and `moves` as in `min_distance_m`.
+    # Two entries at most: of all pairs; and of those of an obstacle that may move, if that is another pair.
     pairs, bounds = pairs_of(trace), apart_of(trace) - [pair.safe_m for pair in pairs_of(trace)]
     order = np.argsort(bounds, kind="stable").tolist()
     moving = [k for k in order if kind_of(trace.scenario, pairs[k].first, pairs[k].second) == MOVING]
@@ -143,10 +133,6 @@ CREEPING = 0.1
 
 def on_the_way(trace: Trace) -> dict[str, dict[str, Any]]:
     """UGVs that neither arrived nor collided, and how far they had come when the run ended."""
-    # Returns by UGV `stands` (it did not move in the last second), `creeps` (it hardly did), `left_m` (the way to its
-    # target along its preset) and `left_s` (how long that takes if it comes nearer as fast as in the last second; None
-    # if it does not, or creeps). Where it stands because an obstacle that moves is at its target: `kept_away`, see
-    # `_kept_away`. Where it stands as near to the map as it may: `at_m`, the nearest place of the map, [x, y], m.
     done = {event["robot"] for event in trace.events if event["kind"] == "arrival"} | {*first_collisions(trace.events)}
     return {ugv: _on_the_way(trace, ugv) for ugv in trace.ugvs if ugv not in done}
 
@@ -177,8 +163,6 @@ def _is_at_map(trace: Trace, ugv: str) -> bool:
 
 def _kept_away(trace: Trace, ugv: str) -> dict[str, Any]:
     """The obstacle that moves and at the end keeps a UGV away from its target; {} without one."""
-    # Returns `by` (its name), `on` (whether it covers the target, or is only near it), `since_s` (from when on the UGV
-    # has stood) and `off_m` (how far from its target).
     own = trace.scenario.ugvs[ugv]
     for pair in passive_pairs(trace):
         if pair.first == ugv and pair.last in (None, len(trace.t) - 1):
@@ -212,10 +196,7 @@ def _way_left_m(trace: Trace, ugv: str, time_s: float) -> float:
 
 
 def outcome(trace: Trace) -> dict[str, Any]:
-    """What came of a run."""
-    # Returns `run`, `seed`, `kept` (whether every pair kept its distance), `home` (whether every robot arrived), and
-    # the pair of least margin: `first`, `second`, `min_distance_m` (the gap between their surfaces), `safe_distance_m`,
-    # `t_s`.
+    """What came of a run, as `model.Seed` has it."""
     pairs = pairs_of(trace)
     bounds = apart_of(trace) - [pair.safe_m for pair in pairs]
     (k,) = least_of(bounds, 1, lambda k: least_gap(trace, pairs[k]).margin_m)
@@ -235,13 +216,6 @@ def outcome(trace: Trace) -> dict[str, Any]:
 
 def gatekeeper(trace: Trace) -> dict[str, Any] | None:
     """Summary of the gatekeeper's decisions, None if it made none."""
-    # Returns `calls`, `decisions` (decision -> count), `solver_failures` (decisions that rest on the best plan known
-    # because the solver failed), `budget_spent` (the same because the budget was spent), `refusals` (robot -> reason ->
-    # proposals refused at the first answer), `reasons` (reason -> decisions), `farthest_from_prediction` (see
-    # `report.interventions`), `max_gap` (largest optimality gap), `gaps` (decisions with no gap, up to 1 %, and more),
-    # `period_s` of the gatekeeper, `time_s` (CPU times: p50, p99, max, as order statistics), `late` (decisions that
-    # took a period or longer; simulated time waits for them) and `closest_call` (the decision at which the costs of
-    # accepting and refusing were closest, relative to the smaller one). None where not recorded.
     table = trace.decisions
     if not len(table):
         return None
@@ -357,8 +331,6 @@ def _least(trace: Trace, robot: str, among: Sequence[str], most: int) -> dict[st
 
 def _listed(trace: Trace, found: dict[str, Gap]) -> dict[str, dict[str, Any]]:
     """Smallest gaps as report.json lists them."""
-    # `at_m`: the place of the map that was nearest, [x, y], m. `appeared`: the gap was smallest at the instant at which
-    # the obstacle appeared. `moves`: the obstacle may move, so that no theorem keeps its distance.
     return {
         other: {
             "value": least.gap_m, "t_s": least.t_s, "safe_distance_m": least.pair.required_m,

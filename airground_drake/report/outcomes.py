@@ -1,20 +1,17 @@
-"""Entries of report.json that several parts of a report read: distances of pairs, in words too, and claims."""
+"""Distances of pairs, in words too."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from typing import Any, NamedTuple
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
 
-SLACK_M = 1e-9  # a distance counts as kept if it falls short of the required one by less, as in SAFE-TRACE
+from airground_drake.report.model import Approach, Distance, Run
 
-Document = Mapping[str, Any]
+SLACK_M = 1e-9  # a distance counts as kept if it falls short of the required one by less, as verdicts have it
 
 
 class Near(NamedTuple):
     """The smallest distance of a pair: the gap between the surfaces, below 0 if they overlap."""
-
-    # `appeared`: at the instant at which the other one appeared. `moves`: the other one may move, and no theorem keeps
-    # its distance. `at_m`: the place of the map that was nearest, m, if the other one is the map.
 
     margin_m: float
     robot: str
@@ -22,16 +19,16 @@ class Near(NamedTuple):
     value_m: float
     required_m: float
     t_s: float
-    appeared: bool = False
-    moves: bool = False
-    at_m: Sequence[float] | None = None
+    at_m: Sequence[float] | None = None  # the place of the map that was nearest, if the other one is the map
 
     @classmethod
-    def of(cls, entry: Mapping[str, Any]) -> Near:
-        """That of an entry of report.json with `first` and `second`."""
-        value, required = float(entry.get("value", entry.get("min_distance_m"))), float(entry["safe_distance_m"])
-        about = (value - required, entry["first"], entry["second"], value, required, entry["t_s"])
-        return cls(*about, moves=bool(entry.get("moves")), at_m=entry.get("at_m"))
+    def of(cls, pair: Approach) -> Near:
+        return cls.between(pair.first, pair.second, pair)
+
+    @classmethod
+    def between(cls, robot: str, other: str, at: Distance) -> Near:
+        margin_m = at.value - at.safe_distance_m
+        return cls(margin_m, robot, other, at.value, at.safe_distance_m, at.t_s, at.at_m)
 
     @property
     def whom(self) -> str:
@@ -55,26 +52,11 @@ class Near(NamedTuple):
         return f"{self.robot}\N{EN DASH}{self.whom} {apart} at {f'{self.t_s:.2f} s' if self.t_s > 0.0 else 'the start'}"
 
 
-def no_way(run: Mapping[str, Any]) -> list[str]:
-    """UGVs that the UAV was called for and found no way for in a run, ever or at the end, though no policy failed."""
-    failed = {fault["robot"] for fault in run["faults"]}
-    lost = [*run["metrics"]["without_proposals"], *run["metrics"]["lost_at_the_end"]]
-    return [ugv for ugv in dict.fromkeys(lost) if ugv not in failed]
-
-
-def pairs(run: Mapping[str, Any]) -> Iterator[Near]:
-    """The smallest distances of a run, an entry of report.json; two robots may be there twice."""
-    for kind in ("min_distance_m", "min_robot_distance_m"):
-        for robot, others in run["metrics"][kind].items():
-            for other, found in others.items():
-                value, required = found["value"], found["safe_distance_m"]
-                flags = bool(found.get("appeared")), bool(found.get("moves"))
-                yield Near(value - required, robot, other, value, required, found["t_s"], *flags, found.get("at_m"))
-
-
-def claims(document: Document, *names: str, run: str | None = None) -> list[Mapping[str, Any]]:
-    """The claims with these names, all if none is given; `run`: only those about this run, '' for the model."""
-    return [each for each in document["claims"] if each["id"] in (names or [each["id"]]) and run in (None, each["run"])]
+def pairs(run: Run) -> Iterator[Near]:
+    """The smallest distances of a run; two robots may be there twice."""
+    for nearest in (run.metrics.min_distance_m, run.metrics.min_robot_distance_m):
+        for robot, others in nearest.items():
+            yield from (Near.between(robot, other, at) for other, at in others.items())
 
 
 def named(body: str, at_m: Sequence[float] | None = None) -> str:

@@ -2,24 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
-from typing import Any
+from collections.abc import Iterator, Sequence
 
-from airground_drake.report import html
-from airground_drake.report.figures import findings, model
+from airground_drake.report import html, rules
+from airground_drake.report.figures import findings
+from airground_drake.report.figures.lines import of_chart
 from airground_drake.report.figures.panels import Figure
+from airground_drake.report.model import Report
+from airground_drake.report.view import canvas
+from airground_drake.verify.finding import Chart
 
-BESIDE = 9  # finding about the paper beside which the figure of ZENO-REFINE is shown, if it is in the report
+
+def page(report: Report, figures: Sequence[Figure], diagram_svg: str | None) -> str:
+    found = findings.draw([finding.model_dump() for finding in report.audit])
+    return html.render(report, [*figures, *_of_claims(report), *found], diagram_svg)
 
 
-def page(report: Mapping[str, Any], figures: Sequence[Figure], diagram_svg: str | None) -> str:
-    claims = {claim["id"]: claim for claim in report["claims"] if not claim["run"]}
-    plates = [*figures]
-    if "ZENO-REFINE" in claims and (refined := model.refinement(claims["ZENO-REFINE"]["evidence"])):
-        audited = any(item["id"] == BESIDE for item in report["audit"])
-        plates.append(replace(refined, beside=f"audit-{BESIDE}") if audited else refined)
-    if "THR-CHOICE" in claims:
-        chosen = model.bayes_risks(claims["THR-CHOICE"]["inputs"], claims["THR-CHOICE"]["evidence"])
-        plates += [chosen] if chosen else []
-    return html.render(report, [*plates, *findings.draw(report["audit"])], diagram_svg)
+def _of_claims(report: Report) -> Iterator[Figure]:
+    """The charts of claims, where `rules.CHARTS` puts them, or else beside the claim."""
+    places = {*html.SECTIONS, *(f"audit-{finding.id}" for finding in report.audit)}
+    with canvas.style():
+        for claim in report.claims:
+            if claim.figure:
+                place = rules.CHARTS.get(claim.id)
+                beside = place if place in places else claim.id
+                name, heading = "-".join(("chart", claim.id, claim.run)), claim.run and f"Run {claim.run}"
+                yield of_chart(Chart(**claim.figure), name, heading, beside)

@@ -1,4 +1,4 @@
-"""Puts what `airground prove DIR` found into the page of that report: a line beside SAFE-TRACE of each run.
+"""Puts what `airground prove DIR` found into the page of that report: a line beside the distances of each run.
 
 The page is written before anything is proved, with an empty place for each line; `write` fills these places.
 """
@@ -16,16 +16,21 @@ from markupsafe import Markup
 from airground_drake.base import files
 from airground_drake.base.errors import ReportError, one_line
 from airground_drake.report.folder import PAGES
+from airground_drake.report.model import Claim
 from airground_drake.report.outcomes import distance
+from airground_drake.report.rules import DISTANCES
 
-CLAIM = "SAFE-TRACE"  # the claim that Coq proves of a run: every pair keeps its distance at all times
 _PLACE = "<!--Coq on {run}-->{line}<!--end-->"
 _PLACES = re.compile(r"<!--Coq on (\w+)-->.*?<!--end-->", re.DOTALL)
 
 
-def place(claim: Mapping[str, Any], line: str = "") -> Markup:
-    """The place of Coq's line about a claim, an entry of report.json; '' if Coq is not asked about that claim."""
-    return Markup(_PLACE).format(run=claim["run"], line=line) if claim["id"] == CLAIM else Markup("")
+def place(claim: Claim) -> Markup:
+    """The place of Coq's line about a claim; '' if Coq is not asked about that claim."""
+    return _place(claim.run) if claim.id == DISTANCES else Markup("")
+
+
+def _place(run: str, line: str = "") -> Markup:
+    return Markup(_PLACE).format(run=run, line=line)
 
 
 def write(folder: Path) -> bool:
@@ -55,7 +60,7 @@ def write(folder: Path) -> bool:
 def filled(page: str, found: Mapping[str, Any]) -> str:
     """A page with its places filled from proofs.json; places of other runs are emptied."""
     runs = {run: _line(entry, found["coq"]) for run, entry in found["runs"].items()}
-    return _PLACES.sub(lambda at: place({"id": CLAIM, "run": at[1]}, runs.get(at[1], Markup())), page)
+    return _PLACES.sub(lambda at: _place(at[1], runs.get(at[1], Markup())), page)
 
 
 def _line(entry: Mapping[str, Any], coq: str) -> Markup:

@@ -216,12 +216,12 @@ def _map(folder: Path, scenario: Any) -> Iterator[Line]:
 
 def _pages(folder: Path, report: Mapping[str, Any], scenario: Any, traces: Mapping[str, Any]) -> Iterator[Line]:
     """The files that follow from report.json and the traces: pages, and what `airground prove` has added."""
-    from airground_drake.report import junit, proved
+    from airground_drake.report import junit, model, proved
     from airground_drake.report.figures.draw import draw
     from airground_drake.report.page import page
     from airground_drake.verify.proofs.compare import broken_rules
 
-    made = {**report, "files": {}}
+    made = model.of(report)
     found: Any = None
     if (folder / "proofs").is_dir():
         try:

@@ -222,9 +222,6 @@ def collision_position(trace: Trace, robot: str) -> list[float]:
 
 def rows(scenario: Scenario, traces: Mapping[str, Trace]) -> list[dict[str, Any]]:
     """The reproduction table, in the scenario's order: one JSON object per row."""
-    # Returns for each row `id`, `quantity`, `measure`, `run`, `robot`, `paper` and `ours` (scalars if of one component;
-    # `ours` is None without a value), `difference` (largest over the components), `unit`, `tolerance`, `status`
-    # (reproduced, calibrated, by_construction, ambiguous or not_reproduced) and `why`.
     return [_row(row, traces) for row in scenario.reproduction]
 
 

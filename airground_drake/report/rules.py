@@ -1,6 +1,6 @@
 """The rules of a report's first screen, as tables: what is asked of the claims, and the words of each cell.
 
-No other file of the screen names a claim. A cell takes the first row of its table that applies.
+No other file of a report names a claim. A cell takes the first row of its table that applies.
 """
 
 from __future__ import annotations
@@ -8,27 +8,32 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
+from airground_drake.base import registry
 from airground_drake.base.statuses import PASSING
 
 RunFacts = Any  # `facts.RunFacts`, which reads the names of claims here
 
 # Claims about a run: its distances, the conditions of the proof, what the robots did themselves, where they ended.
-DISTANCES, CONDITIONS, OWN_DOING, ARRIVAL = "SAFE-TRACE", "SAFE-HYP", "SAFE-OWN", "LIVE-GOAL"
+DISTANCES, CONDITIONS, OWN_DOING, ARRIVAL = "SAFE-TRACE", "SAFE-HYP", "SAFE-OWN", registry.ARRIVAL
 # Claims that prove the distances of method (d); the other one joins them for bodies off their steered points.
 PROOFS, PROOF_OF_PLANTS = ("SAFE-INV", "SAFE-GATE"), "SAFE-BUDGET"
-DWELL, TRIGGER_GAPS = "ZENO-PROOF", "ZENO-TRACE"
+# Claims about the gaps between triggers: that they have a bound, those of a run, and those under finer noise.
+DWELL, TRIGGER_GAPS, REFINEMENT = "ZENO-PROOF", "ZENO-TRACE", "ZENO-REFINE"
 # Claims about triggers: that they follow the decision variable, and how they compare with the error without noise.
 CROSSINGS, TIMING = "THR-TRIG", "THR-QUALITY"
-# What a claim is about, in words; a claim that is not here goes by its identifier.
-SUBJECTS = {
-    "SAFE-TRACE": "distances", "SAFE-HYP": "conditions of the proof", "SAFE-OWN": "the robots' own doing",
-    "SAFE-INV": "proof of distances", "SAFE-GATE": "proof of distances", "SAFE-BUDGET": "distance for lag and delay",
-    "LIVE-GOAL": "arrival", "ZENO-TRACE": "gaps between triggers", "ZENO-PROOF": "proof of gaps between triggers",
-    "THR-TRIG": "triggers", "THR-QUALITY": "timing of triggers", "THR-CHOICE": "choice of the threshold",
-    "GATE-PLAN": "plans of the gatekeeper",
-}  # fmt: skip
+# Claims about the threshold: that the one in force is right, that the root of (19) is best, and that (17)-(18) are so.
+CHOICE, LEAST_RISK, DECISIONS = "THR-CHOICE", "THR-OPT", "THR-DDM"
+PLANS, FOLLOWED = "GATE-PLAN", "LIVE-HYP"  # claims about the gatekeeper's plans, and about following the UAV
+# Where the chart of a claim stands, if that is in a report: a section, or a finding about the paper.
+CHARTS = {CHOICE: "intervened", REFINEMENT: "audit-9"}
+# What captions of exported figures say is established, by figure.
+CAPTIONS = {
+    "trajectories": (ARRIVAL,),
+    "distances": (DISTANCES, "SAFE-GATE"),
+    "timelines": (CROSSINGS, CHOICE, FOLLOWED, TRIGGER_GAPS, DWELL),
+}
 # Verdicts that are not those declared, in words.
-CAME_OUT = {
+CAME_OUT: Mapping[str, str] = {
     "refuted": "failed", "inconclusive": "undecided", "error": "could not be checked", "not_run": "not checked",
     **dict.fromkeys(PASSING, "passed"),
 }  # fmt: skip
@@ -56,10 +61,10 @@ SAFE = (
 
 # Why a UGV did not arrive.
 CAUSES: tuple[tuple[Callable[[RunFacts, str], object], str], ...] = (
-    (lambda run, robot: run.way(robot).get("kept_away"), "{by} is at its target"),
+    (lambda run, robot: run.way(robot).kept_away, "{by} is at its target"),
     (lambda run, robot: robot in run.failed, "the policy failed"),
     (lambda run, robot: robot in run.lost, "no way found"),
-    (lambda run, robot: run.way(robot).get("left_s") is not None, "{left_s:.2g} s to go"),
+    (lambda run, robot: run.way(robot).left_s is not None, "{left_s:.2g} s to go"),
     (lambda run, robot: run.holders(robot), "held by {held_by}"),
     (lambda run, robot: run.refused_all(robot), "refused all proposals"),
 )

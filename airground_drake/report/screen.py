@@ -6,20 +6,21 @@ Each cell is a mark and short lines; each line is one fact and needs no other li
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from airground_drake.base.statuses import PASSING
 from airground_drake.report import rules
 from airground_drake.report.facts import RunFacts
-from airground_drake.report.outcomes import Document, Near, claims
+from airground_drake.report.model import Claim, Report
+from airground_drake.report.outcomes import Near
 from airground_drake.report.sentences import Line, counted, grouped
+from airground_drake.scenario.schema import Run
 from airground_drake.ugv.reasons import refusal
 
 # Maximum number of endings of UGVs in a cell, of names in a line, and of lines of what not to conclude.
 MOST_ENDINGS, MOST_NAMES, MOST_WARNINGS = 4, 2, 3
-Claims = Sequence[Mapping[str, Any]]
 
 
 class Cell(NamedTuple):
@@ -87,23 +88,21 @@ class FirstScreen(NamedTuple):
     declared: Cell  # whether the verdicts are those that the scenario declares: nothing about safety
 
 
-def first_screen(document: Document) -> FirstScreen:
-    """The first screen of a report, from report.json."""
-    rows, resolved = _rows(document), document["scenario"]["resolved"]
-    checks = [*_seeds(document), *_zeno(document), *_threshold(document, rows), *_paper(document)]
-    within = f"within {resolved['arrival_tolerance_m']:g} m"
-    return FirstScreen(_headline(rows), rows, within, checks, _beware(document, rows), declared(document))
+def first_screen(report: Report) -> FirstScreen:
+    """The first screen of a report."""
+    rows = _rows(report)
+    checks = [*_seeds(report), *_zeno(report), *_threshold(report, rows), *_paper(report)]
+    within = f"within {report.scenario.resolved.arrival_tolerance_m:g} m"
+    return FirstScreen(_headline(rows), rows, within, checks, _beware(report, rows), declared(report))
 
 
-def headline(document: Document) -> list[Line]:
+def headline(report: Report) -> list[Line]:
     """One or two lines: what came of the best runs, and of the worst of the others."""
-    return _headline(_rows(document))
+    return _headline(_rows(report))
 
 
 def _headline(rows: Sequence[Row]) -> list[Line]:
     main = sorted([row for row in rows if row.plain] or rows, key=lambda row: row.rank)
-    if not main:
-        return [Line("open", "Nothing was run.")]
     collided = [row for row in rows if not row.plain and row.facts and row.facts.collided]
     rest = sorted((row for row in [*main, *collided] if row.clause != main[0].clause), key=lambda row: row.rank)
     told = []
@@ -119,29 +118,25 @@ def _who(alike: Sequence[Row]) -> str:
     return "With or without the UAV" if len(helped) != 1 else "With the UAV" if True in helped else "Without the UAV"
 
 
-def _rows(document: Document) -> list[Row]:
+def _rows(report: Report) -> list[Row]:
     found = []
-    for name, spec in document["scenario"]["resolved"]["runs"].items():
-        row = Row(name, _says(spec), spec["composition"] == "augmented")
-        if name in document["runs"]:
-            row.facts = run = RunFacts(document, name)
+    for name, spec in report.scenario.resolved.runs.items():
+        row = Row(name, _says(spec), spec.composition == "augmented")
+        if name in report.runs:
+            row.facts = run = RunFacts(report, name)
             rule = next(rule for rule in rules.SAFE if rule.applies(run))
             row.kept, row.what = rule.kept, _what(run)
             row.safe, row.arrived, row.uav = _safe(run, rule), _arrived(run), _uav(run)
-            row.bad_seeds = sum(each["run"] == name and not each["kept"] for each in document["seeds"])
+            row.bad_seeds = sum(seed.run == name and not seed.kept for seed in report.seeds)
         found.append(row)
     return found
 
 
-def _says(spec: Mapping[str, Any]) -> str:
+def _says(spec: Run) -> str:
     """What a run is: its method, or the method's identifier and what the run sets differently."""
-    says = [
-        rules.SETTINGS.get((key, str(value)), f"{key.split('.')[-1]} {value}")
-        for key, value in (spec["set"] or {}).items()
-    ]
-    says += [rules.PRINTED] * (spec["composition"] != "augmented")
-    method = str(spec["method"])
-    return f"({method}) with {', '.join(says)}" if says else rules.RUNS.get(method, method)
+    says = [rules.SETTINGS.get((key, str(value)), f"{key.split('.')[-1]} {value}") for key, value in spec.set.items()]
+    says += [rules.PRINTED] * (spec.composition != "augmented")
+    return f"({spec.method}) with {', '.join(says)}" if says else rules.RUNS.get(spec.method, spec.method)
 
 
 def _safe(run: RunFacts, rule: rules.Rule) -> Cell:
@@ -151,8 +146,10 @@ def _safe(run: RunFacts, rule: rules.Rule) -> Cell:
         near = [each.line for each in run.approaches() if not each.is_short]
         return Cell(rule.mark, [rule.words, *(near[:MOST_NAMES] or ["nobody else is there"]), *faster])
     if rule.mark == "open":
-        return Cell(rule.mark, [rule.words, f"the check: {(judged['status'] or 'not made').replace('_', ' ')}"])
-    as_declared = " (as declared)" * (judged["status"] == "refuted" and judged["as_expected"] is True)
+        return Cell(
+            rule.mark, [rule.words, f"the check: {(judged.status if judged.id else 'not made').replace('_', ' ')}"]
+        )
+    as_declared = " (as declared)" * (judged.status == "refuted" and judged.as_expected is True)
     lines = [rule.words + as_declared, *(breach.told for breach in run.breaches[:1])]
     lines += [counted(len(run.breaches) - 1, "more collision")] * (run.collided and len(run.breaches) > 1)
     lines += [f"{counted(run.others_too_close, 'more pair')} too close"] * (run.others_too_close > 0)
@@ -180,7 +177,7 @@ def _arrived(run: RunFacts) -> Cell:
         uav = ["the UAV did not"] * (run.uav not in run.home)
         return Cell("partly" if uav else "yes", [f"{count}, by {last:.1f} s", *uav])
     goal = run.claim(rules.ARRIVAL)
-    as_declared = " (as declared)" * (goal["as_expected"] is True)
+    as_declared = " (as declared)" * (goal.as_expected is True)
     ends = [*grouped((run.ending(ugv), ugv) for ugv in away).items()]
     told = [f"{_named(who)} {how}" for how, who in ends]
     rest = sum(len(who) for _, who in ends[MOST_ENDINGS:])
@@ -206,20 +203,20 @@ def _uav(run: RunFacts) -> Cell:
     if run.refusals:
         (reason, _), *others = run.refusals.most_common()
         lines.append(f"{'mostly' if others else 'why'} refused: {refusal(reason)}")
-    if failed := len(run.run["faults"]):
+    if failed := len(run.run.faults):
         lines.append(f"policy failed {counted(failed, 'time')}")
-    took = sum(run.messages.get(kind, 0) for kind in ("proposals", "withdrawals", "answers"))
-    if took:
-        lines.append(f"{counted(took, 'message')} (always-on {sum(run.messages['always_on'].values())})")
+    messages = run.run.metrics.messages
+    if messages and (took := messages.proposals + messages.withdrawals + messages.answers):
+        lines.append(f"{counted(took, 'message')} (always-on {sum(messages.always_on.values())})")
     return Cell("", lines)
 
 
-def _seeds(document: Document) -> Iterator[Check]:
-    resolved, of_runs = document["scenario"]["resolved"], grouped((each["run"], each) for each in document["seeds"])
-    noise = [run["set"].get("decision.noise_m_sqrt_s", resolved["decision"]["noise_m_sqrt_s"])
-             for run in resolved["runs"].values()]  # fmt: skip
+def _seeds(report: Report) -> Iterator[Check]:
+    scenario, of_runs = report.scenario.resolved, grouped((seed.run, seed) for seed in report.seeds)
+    ours = scenario.decision.noise_m_sqrt_s
+    noise = [run.set.get("decision.noise_m_sqrt_s", ours) for run in scenario.runs.values()]
     told = grouped(
-        ((sum(each["kept"] for each in those), sum(each["home"] for each in those), len(those)), run)
+        ((sum(seed.kept for seed in those), sum(seed.home for seed in those), len(those)), run)
         for run, those in of_runs.items()
     )
     for (kept, home, count), names in told.items():
@@ -227,34 +224,30 @@ def _seeds(document: Document) -> Iterator[Check]:
         says = f"{', '.join(names)}: distances kept in {kept} of {count}, all home in {home}"
         yield Check("Other seeds?", mark, says)
         if kept < count:
-            worst = min(
-                (each for name in names for each in of_runs[name]),
-                key=lambda each: float(each["min_distance_m"] - each["safe_distance_m"]),
-            )
-            yield Check(
-                "Other seeds?", "", f"the worst: {Near.of(worst).line}, run {worst['run']}, seed {worst['seed']}"
-            )
+            worst = min((seed for name in names for seed in of_runs[name]), key=lambda seed: Near.of(seed).margin_m)
+            yield Check("Other seeds?", "", f"the worst: {Near.of(worst).line}, run {worst.run}, seed {worst.seed}")
     if of_runs and not any(each > 0.0 for each in noise):
         yield Check("Other seeds?", "none", "without decision noise a seed changes nothing")
 
 
-def _zeno(document: Document) -> Iterator[Check]:
+def _zeno(report: Report) -> Iterator[Check]:
     """A line for each bound on the gaps between triggers, with the runs that have it."""
-    own = {each["run"] for each in claims(document, rules.DWELL)}
+    bounds = report.about(rules.DWELL)
+    own = {bound.run for bound in bounds}
     told = grouped(
-        ((each["status"], each["inputs"].get("dwell_s", 0.0)), name)
-        for each in claims(document, rules.DWELL)
-        for name in ([each["run"]] if each["run"] else [name for name in document["runs"] if name not in own])
+        ((bound.status, bound.inputs.get("dwell_s", 0.0)), name)
+        for bound in bounds
+        for name in ([bound.run] if bound.run else [name for name in report.runs if name not in own])
     )
     for (status, dwell_s), names in told.items():
-        traces = [each for each in claims(document, rules.TRIGGER_GAPS) if each["run"] in names]
-        gaps = [each["evidence"]["smallest_gap"]["gap_s"] for each in traces if "smallest_gap" in each["evidence"]]
-        short = dwell_s < document["scenario"]["resolved"]["control"]["period_s"]
+        traces = [claim for claim in report.about(rules.TRIGGER_GAPS) if claim.run in names]
+        gaps = [claim.evidence["smallest_gap"]["gap_s"] for claim in traces if "smallest_gap" in claim.evidence]
+        short = dwell_s < report.scenario.resolved.control.period_s
         says, mark = f"at least {dwell_s:g} s between two triggers, proved", "partly" if short else "yes"
         says += ": less than a control period" * short
         if status != "proved":
             says, mark = "no least time between two triggers is proved", "no" if status == "refuted" else "open"
-        if bad := [each["run"] for each in traces if each["status"] == "refuted"]:
+        if bad := [claim.run for claim in traces if claim.status == "refuted"]:
             says, mark = f"two triggers too close in {', '.join(bad)}", "no"
         seen = f"; {min(gaps):.3g} s seen" if gaps else ""
         seen = seen or "; no robot triggered twice" * (_verdict(traces) == "yes")
@@ -263,43 +256,43 @@ def _zeno(document: Document) -> Iterator[Check]:
         yield Check("Zeno-free?", "open", "not checked", "claims")
 
 
-def _threshold(document: Document, rows: Sequence[Row]) -> Iterator[Check]:
+def _threshold(report: Report, rows: Sequence[Row]) -> Iterator[Check]:
     """A line for each threshold: what came of the triggers of its runs. Its choice has a section of its own."""
-    resolved = document["scenario"]["resolved"]
-    ours = resolved["decision"]["threshold"]["rule"]
+    scenario = report.scenario.resolved
+    ours = scenario.decision.threshold.rule
     of = grouped(
-        ((run.run["zeta_m"], resolved["runs"][run.name]["set"].get("decision.threshold.rule", ours)), run)
+        ((run.run.zeta_m, scenario.runs[run.name].set.get("decision.threshold.rule", ours)), run)
         for run in (row.facts for row in rows)
         if run
     )
     for (zeta, rule), runs in of.items():
         exact, timing = ([run.claim(each) for run in runs] for each in (rules.CROSSINGS, rules.TIMING))
-        found = [each["evidence"] for each in timing if "counts" in each["evidence"]]
+        found = [claim.evidence for claim in timing if "counts" in claim.evidence]
         mark, fired = _verdict([*exact, *timing]), sum(run.triggers for run in runs)
         says = [f"{counted(fired, 'trigger')} at {zeta:.3g} m ({rules.THRESHOLDS.get(rule, rule)})"]
         if not fired:
-            most = [ugv["largest_decision_variable_m"] for each in exact for ugv in each["evidence"].get("ugvs", ())]
+            most = [ugv["largest_decision_variable_m"] for claim in exact for ugv in claim.evidence.get("ugvs", ())]
             says += [f"{value:.3g} m reached" for value in sorted(most)[-1:]]
             mark = "none" if mark == "yes" else mark
         says += [f"{sum(each['counts'][kind] for each in found)} {kind}" for kind in ("false", "missed") if found]
         off_s = [abs(each[kind]["late_s"]) for each in found for kind in ("latest", "earliest") if each[kind]]
         says += [f"at most {max(off_s, default=0.0):.2f} s off"] * bool(found and fired)
-        above = list(dict.fromkeys(ugv for run in runs for ugv in run.above_at_start))
+        above = list(dict.fromkeys(ugv for run in runs for ugv in run.run.metrics.above_at_start))
         says += [f"{_named(above)} above it from the start"] * bool(above)
-        wrong = [run.name for run, each in zip(runs, exact, strict=True) if each["status"] == "refuted"]
+        wrong = [run.name for run, claim in zip(runs, exact, strict=True) if claim.status == "refuted"]
         says += [f"{', '.join(wrong)}: not when the decision variable says"] * bool(wrong)
         says += ["not known whether all are in time"] * (mark == "open")
         yield Check("Threshold correct?", mark, ", ".join(says), "intervened")
 
 
-def _verdict(those: Iterable[Mapping[str, Any]]) -> str:
+def _verdict(those: Iterable[Claim]) -> str:
     """The mark of some claims together."""
-    statuses = {each["status"] for each in those}
+    statuses = {claim.status for claim in those}
     return "no" if "refuted" in statuses else "yes" if statuses and statuses <= {*PASSING} else "open"
 
 
-def _paper(document: Document) -> Iterator[Check]:
-    count = Counter(row["status"] for row in document["reproduction"])
+def _paper(report: Report) -> Iterator[Check]:
+    count = Counter[str](row.status for row in report.reproduction)
     match = sum(count[status] for status in rules.MATCHES)
     told = [f"{count[status]} {says}" for status, says in {**rules.MATCHES, **rules.REST}.items() if count[status]]
     if not count:
@@ -310,7 +303,7 @@ def _paper(document: Document) -> Iterator[Check]:
     yield Check("Paper reproduced?", mark, says, "reproduction")
 
 
-def _beware(document: Document, rows: Sequence[Row]) -> list[str]:
+def _beware(report: Report, rows: Sequence[Row]) -> list[str]:
     """At most `MOST_WARNINGS` clauses; the last one always applies."""
     ran = [(row, row.facts) for row in rows if row.facts]
     movers = list(dict.fromkeys(name for _, run in ran for name in run.movers))
@@ -323,12 +316,12 @@ def _beware(document: Document, rows: Sequence[Row]) -> list[str]:
         f"distances are kept elsewhere, too ({', '.join(seen)}): this is not proved": bool(seen),
     }
     told = [says for says, applies in warnings.items() if applies]
-    return [*told[: MOST_WARNINGS - 1], _real(document)]
+    return [*told[: MOST_WARNINGS - 1], _real(report)]
 
 
-def _real(document: Document) -> str:
+def _real(report: Report) -> str:
     """That real robots and other starts may differ; with what a user's plant showed of what it declares."""
-    own = [each for claim in claims(document, rules.CONDITIONS) for each in claim["evidence"].get("own_plants", ())]
+    own = [each for claim in report.about(rules.CONDITIONS) for each in claim.evidence.get("own_plants", ())]
     if not own:
         return "other starts or real robots end so, too: arrival is only seen, and sensing is perfect here"
     most = max(own, key=lambda each: float(each["cover_m"]))
@@ -338,18 +331,19 @@ def _real(document: Document) -> str:
     ).format_map(most)
 
 
-def declared(document: Document) -> Cell:
+def declared(report: Report) -> Cell:
     """Whether the verdicts are those that the scenario declares: a statement about the scenario, not about safety."""
-    overall, every = document["overall"], document["claims"]
-    refuted = sum(each["status"] == "refuted" and each["as_expected"] is True for each in every)
-    told = [f"{overall['as_expected']} of {counted(overall['checks'], 'check')} came out as the scenario declares"]
+    overall = report.overall
+    refuted = sum(claim.status == "refuted" and claim.as_expected is True for claim in report.claims)
+    told = [f"{overall.as_expected} of {counted(overall.checks, 'check')} came out as the scenario declares"]
     told[0] += f" (failures among them: {refuted})" * bool(refuted)
-    wrong = [*overall["differs"], *overall["undecided"], *overall["missing"]]
-    names = [f"{each['run'] or 'model'}: {rules.SUBJECTS.get(each['id'], each['id']) or 'run'} "
-             f"{rules.CAME_OUT.get(each.get('status', 'not_run'), each.get('status'))}" for each in wrong]  # fmt: skip
-    names += [f"finding {number} about the paper not demonstrated" for number in overall["undemonstrated"]]
+    wrong = [*overall.differs, *overall.undecided, *overall.missing]
+    subjects = {claim.id: claim.subject for claim in report.claims}
+    names = [f"{each.run or 'model'}: {subjects.get(each.id) or each.id or 'run'} "
+             f"{rules.CAME_OUT.get(each.status, each.status)}" for each in wrong]  # fmt: skip
+    names += [f"finding {number} about the paper not demonstrated" for number in overall.undemonstrated]
     told += [f"{', '.join(names[:3])}{f' and {len(names) - 3} more' * (len(names) > 3)}"] * bool(names)
-    more = len(overall["unpromised"])
+    more = len(overall.unpromised)
     told += [f"{counted(more, 'more check')}: nothing is promised"] * (more > 0)
-    mark = {"as_expected": "yes", "not_as_expected": "no"}.get(overall["status"], "open")
+    mark = {"as_expected": "yes", "not_as_expected": "no"}.get(overall.status, "open")
     return Cell(mark, told)

@@ -31,8 +31,7 @@ from airground_drake.sim.diagram import build_diagram, method_drawn
 from airground_drake.sim.runs import simulate_all
 from airground_drake.sim.tables import TABLES
 from airground_drake.sim.trace import Trace
-from airground_drake.verify import judge, judge_model
-from airground_drake.verify.registry import model_claims, run_claims
+from airground_drake.verify import judge_all
 
 Difference = tuple[str, Any, Any]  # where two things differ, what is recorded, and what was made here
 
@@ -128,11 +127,8 @@ def _first(recorded: Any, made: Any, path: str = "") -> Difference | None:
 def _third_party(
     claims: Sequence[Mapping[str, Any]], scenario: Scenario, traces: Mapping[str, Trace], note: str
 ) -> Iterator[Line]:
-    """The verdicts of the claims that the scenario adds, judged on the recorded runs."""
-    about_runs = {each.id for each in run_claims(added=scenario.claims)} & {*scenario.claims}
-    about_model = {each.id for each in model_claims(added=scenario.claims)} & {*scenario.claims}
-    verdicts = [verdict for run in traces.values() for verdict in judge(run, about_runs)] if about_runs else []
-    verdicts += judge_model(scenario, claims=about_model) if about_model else []
+    """The verdicts of the claims that the scenario adds, judged again."""
+    verdicts = judge_all(scenario, traces.values(), claims=scenario.claims)
     made = {(each.claim.id, each.run): json.loads(json.dumps(each.to_json())) for each in verdicts}
     recorded = {(each["id"], each["run"]): dict(each) for each in claims if each["id"] in scenario.claims}
     for key in {**recorded, **made}:

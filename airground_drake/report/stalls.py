@@ -26,9 +26,7 @@ HELD_M_S = AT_REST_M / AT_REST_S
 
 def stalls(trace: Trace) -> list[dict[str, Any]]:
     """Where UGVs stood for `AT_REST_S` or longer short of their targets, by time; before a UGV's first collision."""
-    # Returns `robot`, `from_s`, `until_s` (at most the end of the run), `position_m` and `held_by`: names of the bodies
-    # that stop its wish to move, half way through the stall, or at the end of the run if it lasts until then. Nobody
-    # holds a UGV that waits as its proposal asks.
+    # Nobody holds a UGV that waits as its proposal asks.
     found = list[dict[str, Any]]()
     for ugv in trace.ugvs:
         if standing := _standing(trace, ugv):

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from textwrap import wrap
 
 from airground_drake.base.errors import one_line
-from airground_drake.report.outcomes import Document
+from airground_drake.report.model import Report
 from airground_drake.report.screen import Cell, first_screen
 from airground_drake.report.sentences import MARKS, unbroken
 
@@ -15,9 +15,9 @@ WIDTH = 100  # characters of a line
 COLUMNS, ANSWERS = (20, 29, 23, 22), (18, 80)
 
 
-def text(document: Document) -> str:
+def text(report: Report) -> str:
     """The first screen."""
-    screen = first_screen(document)
+    screen = first_screen(report)
     lines = []
     for mark, told in screen.headline:
         lines += wrap(one_line(f"[{MARKS[mark].icon}] {told}"), WIDTH, subsequent_indent="    ")

@@ -14,9 +14,9 @@ import numpy as np
 
 from airground_drake.base import files
 from airground_drake.base.errors import Fault, ScenarioError, one_line
+from airground_drake.base.limits import MAX_NAME
 from airground_drake.scenario import map_file
 from airground_drake.scenario.document import text_of
-from airground_drake.scenario.limits import MAX_NAME
 from airground_drake.scenario.maps import gazebo, movingai, sites
 from airground_drake.scenario.maps.rectangles import Cells
 from airground_drake.scenario.rounding import Rounding

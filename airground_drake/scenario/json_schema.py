@@ -14,11 +14,12 @@ from typing import Any
 
 from pydantic import TypeAdapter
 
+from airground_drake.base.limits import MAX_NAME, MAX_SEED, MAX_TEXT
 from airground_drake.base.registry import RUN_CLAIMS, Registry
 from airground_drake.base.statuses import COUNTS, EXPECTATIONS, NOTHING
+from airground_drake.base.values import NAME_PATTERN, WANTED
 from airground_drake.scenario import schema
-from airground_drake.scenario.kinds import CLAIM_PATTERN, EXPECTED, NAME_PATTERN, WANTED, unit_of
-from airground_drake.scenario.limits import MAX_NAME, MAX_SEED, MAX_TEXT
+from airground_drake.scenario.kinds import CLAIM_PATTERN, EXPECTED, unit_of
 
 Schema = dict[str, Any]
 

@@ -1,8 +1,6 @@
 """Kinds of values in a scenario file: pydantic's annotations for the dataclasses of `schema.py`."""
 
-import math
 import re
-import unicodedata
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from importlib import import_module
@@ -10,32 +8,26 @@ from typing import Annotated, Any
 
 from pydantic import (
     AfterValidator,
-    BeforeValidator,
     Field,
     GetCoreSchemaHandler,
     GetJsonSchemaHandler,
     ValidationInfo,
 )
-from pydantic_core import CoreSchema, PydanticCustomError, core_schema
+from pydantic_core import CoreSchema, core_schema
 
-from airground_drake.base.arrays import LARGEST
+from airground_drake.base.limits import MAX_CORNERS, MAX_NAME, MAX_SEED
 from airground_drake.base.registry import MODEL_CLAIMS, PLUGIN, PLUGIN_PATTERN, RUN_CLAIMS, Registry, is_plugin
 from airground_drake.base.statuses import COUNTS, EXPECTATIONS, NOTHING, alternatives, declared
+from airground_drake.base.values import Positive, Real, refused, visible
 from airground_drake.scenario.hints import plugin_path
-from airground_drake.scenario.limits import MAX_CORNERS, MAX_NAME, MAX_SEED, MAX_TEXT
 from airground_drake.scenario.maps.rectangles import MOST_CELLS
 
-SMALLEST = 1e-9  # of a positive number
-NAME_PATTERN = "^[A-Za-z_][A-Za-z0-9_]*$"  # of a UGV, an obstacle, a run, a parameter
 CLAIM_PATTERN = f"^[A-Z][A-Z0-9-]{{0,{MAX_NAME - 1}}}$"
 
 PLUG_IN = {"type": "string", "pattern": PLUGIN_PATTERN}
 # Key for a registry of claims; `json_schema.py` replaces it by the claims and their expected verdicts.
 EXPECTED = "x-expected"
 RECORDED = "recorded"  # pydantic's context for the scenario in a run's metadata: its rules are not checked again
-# Key for the words in which messages describe an allowed value, where its type and bounds do not say it.
-WANTED = "x-wanted"
-
 # Unit by the suffix of a key, the longest suffix first.
 _UNITS = {"rad": "rad", "rad_s": "rad/s", "m_sqrt_s": "m/sqrt(s)", "1_m2_s": "1/(m^2 s)", "m_s": "m/s", "1_s": "1/s",
           "m": "m", "s": "s"}  # fmt: skip
@@ -44,35 +36,6 @@ _UNITS = {"rad": "rad", "rad_s": "rad/s", "m_sqrt_s": "m/sqrt(s)", "1_m2_s": "1/
 def unit_of(name: str, before: str = "") -> str:
     """Unit in the suffix of a key, with words before it; '' without a unit."""
     return next((before + unit for suffix, unit in _UNITS.items() if name.endswith(f"_{suffix}")), "")
-
-
-def refused(value: object, allowed: str, *at: str) -> PydanticCustomError:
-    """The error of a value that breaks a rule; `allowed` states the rule, `at` the place within the checked value."""
-    return PydanticCustomError("rule", "{allowed}", {"value": value, "allowed": allowed, "at": at})
-
-
-def wanted(words: str, **bounds: Any) -> Any:
-    """The bounds of a key's value, and what messages say is wanted."""
-    return Field(json_schema_extra={WANTED: words}, **bounds)
-
-
-def as_float(value: object) -> object:
-    """A whole number as a floating-point number; infinite if it is too large."""
-    if type(value) is not int:
-        return value
-    return float(value) if abs(value) < 1e300 else math.inf
-
-
-def _visible(text: str) -> str:
-    """Refuse text with characters that could disguise it where it is shown."""
-    if hidden := next(filter(_is_hidden, text), None):
-        raise refused(hidden, "text without control characters and without marks that turn the direction of writing")
-    return text
-
-
-def _is_hidden(character: str) -> bool:
-    """Whether a character is invisible and changes how others are shown; line breaks, tabs and joiners are allowed."""
-    return character not in "\n\t\u200c\u200d" and unicodedata.category(character) in ("Cc", "Cf", "Cs", "Zl", "Zp")
 
 
 def _on_the_ground(point: list[float]) -> list[float]:
@@ -109,16 +72,6 @@ def _two_or_none(value: list[Any]) -> list[Any]:
     return value
 
 
-Words = Annotated[str, Field(strict=True, max_length=MAX_TEXT), AfterValidator(_visible)]
-Name = Annotated[str, Field(strict=True, max_length=MAX_NAME, pattern=NAME_PATTERN)]
-YesNo = Annotated[bool, Field(strict=True)]
-Count = Annotated[int, Field(strict=True, ge=1, le=MAX_SEED)]
-CountFromZero = Annotated[int, Field(strict=True, ge=0, le=MAX_SEED)]
-Number = Annotated[float, Field(strict=True, allow_inf_nan=False, le=LARGEST)]
-Real = Annotated[Number, Field(ge=-LARGEST), BeforeValidator(as_float)]
-Positive = Annotated[Number, Field(ge=SMALLEST), BeforeValidator(as_float)]
-Share = Annotated[Number, Field(ge=SMALLEST, le=1.0), BeforeValidator(as_float)]
-NotNegative = Annotated[Number, Field(ge=0.0), BeforeValidator(as_float)]
 Point = Annotated[list[Real], Field(strict=True, min_length=3, max_length=3)]  # no set, which has no order
 GroundPoint = Annotated[Point, AfterValidator(_on_the_ground)]
 AirPoint = Annotated[Point, AfterValidator(_in_the_air)]
@@ -229,7 +182,7 @@ def expected_of(claims: Registry) -> ValueRule:
 def _one_value(value: object) -> object:
     if not isinstance(value, bool | int | float | str):
         raise refused(value, "one value: a number, a text, true or false")
-    return _visible(value) if isinstance(value, str) else value
+    return visible(value) if isinstance(value, str) else value
 
 
 OneValue = Annotated[Any, ValueRule(_one_value, lambda: {"type": ["number", "string", "boolean"]})]

@@ -11,10 +11,10 @@ from pydantic import BeforeValidator, ConfigDict
 
 from airground_drake.base import files
 from airground_drake.base.errors import Fault, ScenarioError
+from airground_drake.base.limits import MAX_RECTANGLES
+from airground_drake.base.values import Real, Words, as_float, wanted
 from airground_drake.scenario.document import MAX_BYTES, parsed
 from airground_drake.scenario.filled import filled
-from airground_drake.scenario.kinds import Real, Words, as_float, wanted
-from airground_drake.scenario.limits import MAX_RECTANGLES
 from airground_drake.scenario.maps.grid import Frame, Grid
 from airground_drake.scenario.maps.images import Occupancy, occupancy
 from airground_drake.scenario.maps.rectangles import covering

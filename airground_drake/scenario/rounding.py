@@ -1,6 +1,6 @@
 """A bound of the distance that rounding (binary64) may take from a safe distance.
 
-A scenario is accepted only if the bound stays below `TOLERANCE_M`. SAFE-HYP measures what a run lost.
+A scenario is accepted only if the bound stays below `TOLERANCE_M`. Reports measure what a run lost.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ import numpy as np
 
 from airground_drake.base.arrays import ROUNDOFF, Array
 
-TOLERANCE_M = 1e-9  # largest shortfall of a safe distance that SAFE-TRACE tolerates, m
+TOLERANCE_M = 1e-9  # largest shortfall of a safe distance that reports tolerate, m
 STEPS_PER_PERIOD = 64  # largest number of integration steps in a control period, which events cut; the most seen is 13
 SLACK = 1.01  # factor on the first-order bounds, for products of roundings and for rounding in this formula
 

@@ -14,7 +14,9 @@ from typing import Annotated, Any, ClassVar
 from pydantic import ConfigDict, Field
 
 from airground_drake.base.files import sha256
+from airground_drake.base.limits import MAX_CORNERS, MAX_RECTANGLES, MAX_STAGES, MAX_UGVS
 from airground_drake.base.registry import METHODS, MODEL_CLAIMS, PLANTS, POLICIES, ROUTES, RUN_CLAIMS, UAV_TASKS
+from airground_drake.base.values import Count, CountFromZero, Name, NotNegative, Positive, Real, Share, Words, YesNo
 from airground_drake.scenario.kinds import (
     CLAIMS,
     AirPoint,
@@ -22,29 +24,19 @@ from airground_drake.scenario.kinds import (
     CellRectangle,
     Corner,
     CornersOrNone,
-    Count,
-    CountFromZero,
     GroundPoint,
-    Name,
-    NotNegative,
     OneOrList,
     OneValue,
     Place,
     PlaceOrNone,
     Point,
-    Positive,
-    Real,
-    Share,
     SizeOrNone,
     TwoCornersOrNone,
-    Words,
-    YesNo,
     expected_of,
     one_of,
     registered,
     settings_of,
 )
-from airground_drake.scenario.limits import MAX_CORNERS, MAX_RECTANGLES, MAX_STAGES, MAX_UGVS
 
 Vector = list[float]
 

@@ -20,7 +20,7 @@ import numpy as np
 from airground_drake.base.arrays import Array
 from airground_drake.base.errors import Fault, ScenarioError
 from airground_drake.base.exact import decimal
-from airground_drake.base.registry import MODEL_CLAIMS, ROUTES, RUN_CLAIMS
+from airground_drake.base.registry import ARRIVAL, MODEL_CLAIMS, ROUTES, RUN_CLAIMS
 from airground_drake.base.statuses import COUNTS, NOTHING, alternatives
 from airground_drake.model.geometry import convex, outline
 from airground_drake.model.trigger.bayes import COMPUTED
@@ -33,7 +33,6 @@ from airground_drake.scenario.schema import ABOUT, ARENA, MAP, SHAPES, Obstacle,
 from airground_drake.scenario.shapes import crossing, near_edge
 
 GAINS = ("avoidance_gain_1_s", "motion_gain_1_s", "formation_gain_1_s", "intervention_gain_1_s")
-ARRIVES = "LIVE-GOAL"  # the claim that every UGV ends where it is to end
 TOLERANCE = 1e-9  # m between points; relative between periods
 _SHORT = 1.0 - 1e-5  # of a limit that is printed with six digits, so that what a message allows is allowed
 
@@ -289,12 +288,12 @@ def _ends(scenario: Scenario) -> Problems:
     for name, ugv in scenario.ugvs.items():
         away, end = math.dist(ugv.preset.waypoints_m[-1], ugv.target_m), len(ugv.preset.waypoints_m) - 1
         for run, spec in scenario.runs.items():
-            admitted = alternatives(spec.expected.get(ARRIVES, "holds"))
+            admitted = alternatives(spec.expected.get(ARRIVAL, "holds"))
             arrives = name not in spec.stalls_m and {"refuted", NOTHING}.isdisjoint(admitted)
             if arrives and away > scenario.arrival_tolerance_m + TOLERANCE:
                 allowed = (
                     f"at most arrival_tolerance_m = {scenario.arrival_tolerance_m:.9g} m from {name}'s target_m, where "
-                    f"run {run} expects it, not {away:.9g} m (or runs.{run}.expected.{ARRIVES}: refuted)"
+                    f"run {run} expects it, not {away:.9g} m (or runs.{run}.expected.{ARRIVAL}: refuted)"
                 )
                 yield f"ugvs.{name}.preset.waypoints_m.{end}", ugv.preset.waypoints_m[end], allowed
 
@@ -435,8 +434,8 @@ def _sensing(scenario: Scenario) -> Problems:
 
 
 def _extent(scenario: Scenario) -> Problems:
-    """Rounding must not take more from a safe distance than SAFE-TRACE tolerates."""
-    # With the gain A = 0 the law restores no lost distance, and no bound applies; SAFE-HYP says what a run lost.
+    """Rounding must not take more from a safe distance than reports tolerate."""
+    # With the gain A = 0 the law restores no lost distance, and no bound applies; reports say what a run lost.
     control, duration = scenario.control, scenario.duration_s
     if control.avoidance_gain_1_s == 0.0:
         return

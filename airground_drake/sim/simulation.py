@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import AbstractContextManager, suppress
 from functools import cache
 from typing import Any, Literal
 
@@ -14,7 +14,7 @@ from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorC
 from pydrake.systems.framework import Context, DiagramBuilder, LeafSystem
 from pydrake.systems.primitives import LogVectorOutput, Multiplexer
 
-from airground_drake.base.errors import SimulationError, UnknownNameError, described
+from airground_drake.base.errors import SimulationError, UnknownNameError, described, raised_as
 from airground_drake.model.bodies.world import Body, World
 from airground_drake.model.geometry import convex, outline
 from airground_drake.model.geometry.motion import Motion
@@ -23,7 +23,7 @@ from airground_drake.model.law.ugv_law import UgvLaw
 from airground_drake.model.plants.plant import FirstOrder
 from airground_drake.scenario.load import own, validated
 from airground_drake.scenario.schema import Scenario
-from airground_drake.sim.batch.run import Batch, LeftToDrake
+from airground_drake.sim.batch.run import Batch, LeftToDrakeError
 from airground_drake.sim.blocks.decision import ACCURACY, DecisionVariable
 from airground_drake.sim.blocks.lifetime import untie
 from airground_drake.sim.blocks.plant import OwnPlant, declared, own_code
@@ -149,13 +149,9 @@ class Recorder:
         with self._reported(simulator.get_context()):
             simulator.AdvanceTo(until)
 
-    @contextmanager
-    def _reported(self, context: Context) -> Iterator[None]:
-        """Errors of Drake or a system in the body as SimulationError."""
-        try:
-            yield
-        except (Exception, SystemExit) as error:  # Drake raises many kinds
-            raise SimulationError(self._name, context.get_time(), self._what(error)) from error
+    def _reported(self, context: Context) -> AbstractContextManager[None]:
+        """Errors of Drake, which raises many kinds, or a system in the body as SimulationError."""
+        return raised_as(lambda error: SimulationError(self._name, context.get_time(), self._what(error)))
 
     def _what(self, error: BaseException) -> str:
         """An error in words, with the place in the file of a user's plant, and such plants by name."""
@@ -237,7 +233,7 @@ def simulate(
         scenario: from a file or made in Python.
         run: name of one of its runs.
         seed: of the decision noise, in place of the scenario's.
-        watch: is told the time, s, at every step.
+        watch: is told the time, s, at every step, by the loop at the end only.
         decision_block: makes the block that drives the trigger; see `build_diagram`.
         observers: systems that watch the run, such as `report.view.live_view.LiveView`: their input ports have the
             names of the model's output ports, and each has a name of its own. The run does not see them.
@@ -258,6 +254,9 @@ def simulate(
         scenario = validated(scenario, {"seed": seed})
     valid = declared(scenario, plants)
     if engine == "batch" and run in valid.runs and decision_block is DecisionVariable and not (observers or speed):
-        with suppress(LeftToDrake):
-            return Batch(valid, run).simulate()
+        with suppress(LeftToDrakeError):
+            trace = Batch(valid, run).simulate()
+            if watch is not None:
+                watch(valid.duration_s)
+            return trace
     return Recorder(valid, run, decision_block, observers, plants=plants).simulate(watch=watch, speed=speed)

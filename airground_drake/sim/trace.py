@@ -53,8 +53,8 @@ import pandas as pd
 from airground_drake.base import files
 from airground_drake.base.arrays import Array, read_only
 from airground_drake.base.errors import TraceError, one_line
+from airground_drake.base.values import NAME_PATTERN
 from airground_drake.model.bodies.motion import SAME_S
-from airground_drake.scenario.kinds import NAME_PATTERN
 from airground_drake.scenario.recorded import of_run
 from airground_drake.scenario.schema import Scenario
 from airground_drake.sim.collisions import first_collisions

@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from airground_drake.base.arrays import Array
-from airground_drake.base.errors import PluginError, described, one_line, short
+from airground_drake.base.errors import PluginError, described, one_line, raised_as, short
 from airground_drake.model.bodies.world import World
 from airground_drake.model.geometry import convex, outline
 from airground_drake.model.geometry.motion import Motion
@@ -230,10 +230,8 @@ class PaperGatekeepers(Gatekeepers):
     def _solved(self, problem: Problem, budget: Budget) -> Solution:
         """The route's solution; the route gets a `Problem` of its own, so that it cannot change what is recorded."""
         kind = type(self._route)
-        try:
+        with raised_as(lambda error: PluginError(f"route {kind.__qualname__} raised {described(error, kind.solve)}")):
             found: object = self._route.solve(replace(problem), budget)
-        except (Exception, SystemExit) as error:
-            raise PluginError(f"route {kind.__qualname__} raised {described(error, kind.solve)}") from error
         if not isinstance(found, Solution):
             returned = f"{short(repr(found))}, of type {type(found).__qualname__}"
             allowed = f"{Solution.__module__}.{Solution.__qualname__}"

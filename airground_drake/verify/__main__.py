@@ -17,8 +17,9 @@ from typing import TYPE_CHECKING
 from airground_drake.base.errors import AirgroundError, UnknownNameError
 from airground_drake.base.progress import Progress, progress_bar
 from airground_drake.base.statuses import NOT_EXERCISED, outcome
-from airground_drake.base.usage import Parser, refuse
+from airground_drake.base.usage import refuse
 from airground_drake.scenario import plugins
+from airground_drake.scenario.options import option, parser_of
 
 if TYPE_CHECKING:
     from airground_drake.verify.claim import Verdict
@@ -27,19 +28,19 @@ EXIT_DIFFERS = 1
 
 
 def parser() -> argparse.ArgumentParser:
-    """What the command line takes."""
-    parser = Parser(
-        prog="airground verify",
-        description="Judge claims anew, on a saved run or about a scenario's model; nothing is taken from a cache.",
-        epilog="exit codes: 0 all as the scenario expects, 1 one is not (or is undecided), 2 usage, or a run or "
-        "scenario that cannot be used, 4 tool error, 130 and 143 interrupted",
+    return parser_of(
+        "verify",
+        "Judge claims anew, on a saved run or about a scenario's model; nothing is taken from a cache.",
+        {
+            "target": "folder of a saved run (DIR/trace/RUN), or a scenario, shipped or a YAML file",
+            "claims": option("identifiers (default: all that apply)", "CLAIM", nargs="*"),
+            "--json": "print the whole verdicts as JSON",
+            "-v --verbose": "say how long each claim took",
+            plugins.OPTION: None,
+        },
+        "exit codes: 0 all as the scenario expects, 1 one is not (or is undecided), 2 usage, or a run or scenario that "
+        "cannot be used, 4 tool error, 130 and 143 interrupted",
     )
-    parser.add_argument("target", help="folder of a saved run (DIR/trace/RUN), or a scenario, shipped or a YAML file")
-    parser.add_argument("claims", nargs="*", metavar="CLAIM", help="identifiers (default: all that apply)")
-    parser.add_argument("--json", action="store_true", help="print the whole verdicts as JSON")
-    parser.add_argument("-v", "--verbose", action="store_true", help="say how long each claim took")
-    parser.add_argument(plugins.OPTION, action="store_true", help=plugins.HELP)
-    return parser
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

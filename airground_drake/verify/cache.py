@@ -21,19 +21,19 @@ from typing import Any
 from pydantic import TypeAdapter
 
 from airground_drake.base import files
+from airground_drake.base.registry import MODEL_CLAIMS
 from airground_drake.base.statuses import PASSING
 from airground_drake.verify.claim import ModelClaim
-from airground_drake.verify.finding import Finding
+from airground_drake.verify.finding import Chart, Finding
 
 SCHEMA = "airground_drake.finding/2"
 LARGEST_BYTES = 16_000_000  # a larger entry is not read
-KEPT = ("ZENO-REFINE", "THR-DDM")  # the claims whose findings are kept: experiments that take seconds
 ENGINES = ("numpy", "scipy", "numba")  # packages whose versions are part of a finding's key
 
 
 def cached_finding(claim: ModelClaim, inputs: dict[str, Any], folder: Path | None = None) -> Finding:
-    # folder: where findings of `KEPT` are kept; None: computed anew and not kept.
-    if folder is None or claim.id not in KEPT:
+    # folder: where findings are kept; None: computed anew. Third-party code is not part of the key, so never kept.
+    if folder is None or not claim.kept or claim.id not in MODEL_CLAIMS.own:
         return claim.judge(inputs)
     path = folder / f"{key(claim, inputs)}.json"
     if (kept := _read(path, claim, inputs)) is not None:
@@ -93,7 +93,8 @@ def _read(path: Path, claim: ModelClaim, inputs: Mapping[str, Any]) -> Finding |
         sound = digest == _digest(made) and made["status"] in PASSING
         about = json.dumps(entry, sort_keys=True) == json.dumps(content(claim, inputs), sort_keys=True)
         evidence = TypeAdapter(claim.record).validate_python(made["evidence"])
-        finding = Finding(**made | {"evidence": evidence, "from_cache": True})
+        figure = Chart(**made["figure"]) if made["figure"] else None
+        finding = Finding(**made | {"evidence": evidence, "figure": figure, "from_cache": True})
     except (OSError, ValueError, TypeError, AttributeError, KeyError, RecursionError):
         return None
     return finding if sound and about else None

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import abc
 import json
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, fields, replace
 from math import ceil, isfinite
 from numbers import Integral, Real
@@ -18,7 +19,7 @@ from airground_drake.scenario.schema import Scenario
 from airground_drake.sim.trace import Trace
 from airground_drake.verify.engines.bodies import following_m_s, unicycle_m
 from airground_drake.verify.engines.geometry import MERGE_S, interpolate
-from airground_drake.verify.finding import Evidence, Failure, Finding
+from airground_drake.verify.finding import Chart, Evidence, Failure, Finding
 
 __all__ = [
     "Claim",
@@ -46,6 +47,7 @@ class Claim(abc.ABC):
 
     Attributes (all of the class):
         id: stable identifier.
+        subject: what it is about, in a few words, for a report's first screen; '' for the identifier.
         summary: one plain sentence for a reader who knows no formula; '' if the statement is plain enough.
         statement: the claim in words, precisely.
         formula: the claim as a formula, in plain text; '' if it is typeset.
@@ -66,9 +68,30 @@ class Claim(abc.ABC):
     does_not_establish: str
     expected: Status
     exercised_by: str = ""
+    subject: str = ""
     summary: str = ""
     formula: str = ""
     latex: tuple[str, ...] = ()
+
+    def applies(self, about: Any) -> bool:
+        """Whether the claim says anything about this trace, or scenario if it is about the model; else left out."""
+        return True
+
+    def may_apply(self, about: Any) -> bool:
+        """`applies`; a claim that cannot say is judged, which turns the exception into the status `error`."""
+        try:
+            return self.applies(about)
+        except (Exception, SystemExit):
+            return True
+
+    def decided(self, find: Callable[[], Finding]) -> Finding:
+        """What `find` returns, well formed; after an exception the status `error`: the claim was not decided."""
+        try:
+            finding = well_formed(self, find())
+            json.dumps(finding.to_json(), allow_nan=False)  # a margin that is not a number must not pass
+        except (Exception, SystemExit) as error:
+            return Finding("error", evidence=Failure(described(error)))
+        return finding
 
 
 class ModelClaim(Claim):
@@ -78,21 +101,12 @@ class ModelClaim(Claim):
 
     Attributes (all of the class):
         record: type of the evidence; the cache needs it to read a finding back.
+        kept: whether the cache keeps its findings, as of an experiment that takes seconds; only of this package's.
     """
 
     expected: Status = "proved"
     record: type[Evidence] = Evidence
-
-    def applies_to(self, scenario: Scenario) -> bool:
-        """Whether the claim says anything about a scenario; if not, it is left out."""
-        return True
-
-    def may_apply(self, scenario: Scenario) -> bool:
-        """`applies_to`; a claim that cannot say is asked for inputs, which turns the exception into an error."""
-        try:
-            return self.applies_to(scenario)
-        except (Exception, SystemExit):
-            return True
+    kept = False
 
     @abc.abstractmethod
     def inputs(self, scenario: Scenario) -> dict[str, Any]:
@@ -105,10 +119,17 @@ class ModelClaim(Claim):
         Called through `judge`, which turns an exception into `error`.
         """
 
+    def seen_in(self, trace: Trace) -> Any:
+        """What a run shows of the claim, for `with_runs`; None, or an exception: nothing."""
+
+    def with_runs(self, finding: Finding, seen: Sequence[Any]) -> Finding:
+        """The finding on the constants of some runs, with what `seen_in` returned for these runs, if not None."""
+        return finding
+
     def judge_inputs(self, scenario: Scenario) -> dict[str, Any]:
-        """`inputs`; an exception, also of `applies_to`, becomes inputs that `judge` turns into the status `error`."""
+        """`inputs`; an exception, also of `applies`, becomes inputs that `judge` turns into the status `error`."""
         try:
-            self.applies_to(scenario)
+            self.applies(scenario)
             return self.inputs(scenario)
         except (Exception, SystemExit) as error:
             return {"error": described(error)}
@@ -117,13 +138,18 @@ class ModelClaim(Claim):
         """`check`, with exceptions turned into the status `error`."""
         if set(inputs) == {"error"}:
             return Finding("error", evidence=Failure(inputs["error"]))
+        return self.decided(lambda: self.check(inputs))
+
+    def judge_run(self, trace: Trace) -> Any:
+        """`seen_in`; None after an exception: records are missing or wrong, which claims about the run report."""
         try:
-            finding = self.check(inputs)
-            finding = well_formed(self, finding)
-            json.dumps(finding.to_json(), allow_nan=False)
-        except (Exception, SystemExit) as error:  # whatever went wrong, the claim was not decided
-            return Finding("error", evidence=Failure(described(error)))
-        return finding
+            return self.seen_in(trace)
+        except (Exception, SystemExit):
+            return None
+
+    def judge_runs(self, finding: Finding, seen: Sequence[Any]) -> Finding:
+        """`with_runs`, from what `judge_run` returned, with exceptions turned into the status `error`."""
+        return self.decided(lambda: self.with_runs(finding, [each for each in seen if each is not None]))
 
 
 class TraceClaim(Claim):
@@ -138,30 +164,18 @@ class TraceClaim(Claim):
         Called through `judge`, which turns an exception into `error`.
         """
 
-    def applies(self, trace: Trace) -> bool:
-        """Whether the claim says anything about a run of this method; if not, it is left out."""
-        return True
-
-    def may_apply(self, trace: Trace) -> bool:
-        """`applies`; a claim that cannot say is judged, which turns the exception into the status `error`."""
-        try:
-            return self.applies(trace)
-        except (Exception, SystemExit):
-            return True
-
     def judge(self, trace: Trace) -> Finding:
         """`check`; a malformed trace, an exception (also of `applies`) or a pass on half a run is `error`."""
-        try:
+
+        def find() -> Finding:
             require_motion(trace)
             self.applies(trace)
             finding = self.check(trace)
             if finding.status in PASSING:
                 require_whole_run(trace)
-            finding = well_formed(self, finding)
-            json.dumps(finding.to_json(), allow_nan=False)  # a margin that is not a number must not pass
-        except (Exception, SystemExit) as error:  # whatever went wrong, the claim was not decided
-            return Finding("error", evidence=Failure(described(error)))
-        return finding
+            return finding
+
+        return self.decided(find)
 
 
 @dataclass(frozen=True, repr=False, kw_only=True)
@@ -203,7 +217,10 @@ class Verdict(Finding):
 
     def to_json(self) -> dict[str, Any]:
         """The entry of `claims` in report.json."""
-        words = "id", "summary", "statement", "formula", "method", "equations", "does_not_establish", "exercised_by"
+        words = (
+            "id", "subject", "summary", "statement", "formula", "method", "equations", "does_not_establish",
+            "exercised_by",
+        )  # fmt: skip
         return {
             **{name: getattr(self.claim, name) for name in words},
             "assumptions": list(self.claim.assumptions),
@@ -228,6 +245,8 @@ def well_formed(claim: Claim, finding: Finding) -> Finding:
         raise ValueError(
             f"{claim.id} found {finding.status!r} with the margin {margin!r}; allowed: one from 0, or None"
         )
+    if not (finding.figure is None or isinstance(finding.figure, Chart)):
+        raise ValueError(f"{claim.id} found the figure {type(finding.figure).__name__}; allowed: a Chart, or None")
     if count is None and claim.exercised_by and finding.status in PASSING:
         raise ValueError(f"{claim.id} passes without a count of {claim.exercised_by}")
     if count is None:

@@ -1,12 +1,15 @@
-"""What a check found: a status, a margin, the evidence."""
+"""What a check found: a status, a margin, the evidence, a chart."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields, is_dataclass
 from typing import Any
 
+import numpy as np
+
+from airground_drake.base.arrays import Array
 from airground_drake.base.statuses import Status
 
 PLAIN_NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]{0,99}")
@@ -29,6 +32,39 @@ class Failure(Evidence):
 
 
 @dataclass(frozen=True)
+class Chart:
+    """Lines and marked points, drawn in a report beside the claim that it is about.
+
+    Attributes:
+        title: of the picture.
+        x: name of the axis across, with its unit.
+        y: name of the axis up, with its unit.
+        lines: by name, numbers across and as many up.
+        marks: points by name.
+        log: the axes that are logarithmic, among "xy"; numbers there are above 0.
+        caption: what to see.
+    """
+
+    title: str
+    x: str
+    y: str
+    lines: Mapping[str, tuple[Sequence[float] | Array, Sequence[float] | Array]]
+    marks: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    log: str = ""
+    caption: str = ""
+
+    def __post_init__(self) -> None:
+        """Refuse lines and points that cannot be drawn."""
+        for name, (x, y) in self.lines.items():
+            if not len(x) == len(y) > 0:
+                raise ValueError(f"line {name!r} has {len(x)} numbers across and {len(y)} up; wanted: as many, not 0")
+        for axis in self.log:
+            numbers = np.hstack([at["xy".index(axis)] for at in (*self.lines.values(), *self.marks.values())])
+            if not (numbers > 0.0).all():
+                raise ValueError(f"{numbers.min():g} on the logarithmic axis {axis}; allowed: numbers above 0")
+
+
+@dataclass(frozen=True)
 class Finding:
     """What a check found.
 
@@ -43,6 +79,7 @@ class Finding:
         quantity: what the margin is of, in a few words.
         exercised: how often the claim was put to the test, in what its `exercised_by` counts; 0: nothing could have
             refuted it; None: not counted.
+        figure: drawn beside the claim; None: there is none.
         from_cache: whether it was made by an earlier report, with the same inputs, code and engines, and kept.
     """
 
@@ -54,6 +91,7 @@ class Finding:
     evidence: Any = Evidence()
     quantity: str = ""
     exercised: int | None = None
+    figure: Chart | None = None
     from_cache: bool = False
 
     def to_json(self) -> dict[str, Any]:
@@ -67,4 +105,6 @@ def _in_json(value: Any) -> Any:
         return {each.name: _in_json(one) for each, one in pairs if one is not None or each.default is not None}
     if isinstance(value, Mapping):
         return {key: _in_json(one) for key, one in value.items()}
+    if isinstance(value, np.ndarray):
+        return value.tolist()
     return [_in_json(one) for one in value] if isinstance(value, (list, tuple)) else value

@@ -15,16 +15,6 @@ from airground_drake.base.progress import SILENT, Progress
 from airground_drake.scenario.load import own
 from airground_drake.scenario.schema import Scenario
 from airground_drake.sim.trace import Trace
-from airground_drake.verify.applications import (
-    Count,
-    Retreats,
-    counts,
-    measured,
-    retreats,
-    with_counts,
-    with_retreats,
-    with_runs,
-)
 from airground_drake.verify.cache import cached_finding
 from airground_drake.verify.claim import ModelClaim, TraceClaim, Verdict
 from airground_drake.verify.finding import Finding
@@ -109,45 +99,53 @@ def judge_model(
 
 
 def judge_all(
-    scenario: Scenario, traces: Iterable[Trace], *, kept: Path | None = None, progress: Progress = SILENT
+    scenario: Scenario,
+    traces: Iterable[Trace],
+    *,
+    kept: Path | None = None,
+    claims: Collection[str] | None = None,
+    progress: Progress = SILENT,
 ) -> list[Verdict]:
-    """Judge every claim: on runs of a scenario, and then about its model.
+    """Judge claims on runs of a scenario, and then about its model, with what the runs show of them.
 
-    The same as `judge` and `judge_model`, in parallel processes.
+    Like `judge` and `judge_model`, in parallel processes.
 
     Args:
         scenario: its constants.
         traces: its runs.
         kept: see `judge_model`.
+        claims: identifiers of the claims to judge, about runs or the model; default: all.
         progress: is told of each claim about the model and of the claims about each run.
 
     Raises:
         PluginError: if a claim of the scenario cannot be made.
         AirgroundError: if a process dies.
     """
-    asked = _asked(scenario)
-    of_runs = [(replace(trace), _applicable(trace)) for trace in traces]  # as in `judge`
+    asked = [each for each in _asked(scenario) if claims is None or each.claim.id in claims]
+    about_model = {each.claim.id: each.claim for each in asked}.values()
+    of_runs = [
+        (replace(trace), [claim for claim in _applicable(trace) if claims is None or claim.id in claims])
+        for trace in traces
+    ]  # as in `judge`
     pieces: list[Callable[[], Any]] = [partial(cached_finding, each.claim, each.inputs, kept) for each in asked]
-    pieces += [partial(_Judged.of, trace, claims) for trace, claims in of_runs]
+    pieces += [partial(_Judged.of, trace, about_run, about_model) for trace, about_run in of_runs]
     names = [*(each.name for each in asked), *(f"claims about run {trace.run}" for trace, _ in of_runs)]
     progress.stage("judging", len(pieces), "claims about the model or a run")
     done = run_parallel(pieces, names=names, progress=progress)
-    about_runs: list[_Judged] = done[len(asked) :]
+    judged: list[_Judged] = done[len(asked) :]
     verdicts = [
         verdict
-        for (trace, claims), found in zip(of_runs, about_runs, strict=True)
-        for verdict in _verdicts(trace, claims, found.findings)
+        for (trace, about_run), of_run in zip(of_runs, judged, strict=True)
+        for verdict in _verdicts(trace, about_run, of_run.findings)
     ]
     apart = {(each.claim.id, each.run) for each in asked if each.run}
     for each, finding in zip(asked, done, strict=False):
-        concerned = [
-            about
-            for (trace, _), about in zip(of_runs, about_runs, strict=True)
+        seen = [
+            of_run.seen[each.claim.id]
+            for (trace, _), of_run in zip(of_runs, judged, strict=True)
             if each.run == (trace.run if (each.claim.id, trace.run) in apart else "")
         ]
-        counted = with_counts(each.claim.id, finding, [about.counts for about in concerned])
-        found = with_retreats(counted, [about.retreats for about in concerned])
-        verdicts.append(each.verdict(scenario, with_runs(found, [about.measured for about in concerned])))
+        verdicts.append(each.verdict(scenario, each.claim.judge_runs(finding, seen)))
     return verdicts
 
 
@@ -183,13 +181,12 @@ def _asked(scenario: Scenario, claims: Collection[str] | None = None) -> list[_A
 
 
 class _Judged(NamedTuple):
-    """What the claims found about a run, how often it met the premises of theorems, what it measured, and retreats."""
+    """What the claims found about a run, and what it shows of claims about the model, by their identifiers."""
 
     findings: list[Finding]
-    counts: dict[str, Count]
-    measured: dict[str, Any]
-    retreats: Retreats
+    seen: dict[str, Any]
 
     @classmethod
-    def of(cls, trace: Trace, claims: Sequence[TraceClaim]) -> _Judged:
-        return cls([claim.judge(trace) for claim in claims], counts(trace), measured(trace), retreats(trace))
+    def of(cls, trace: Trace, claims: Sequence[TraceClaim], about_model: Collection[ModelClaim]) -> _Judged:
+        seen = {claim.id: claim.judge_run(trace) for claim in about_model}
+        return cls([claim.judge(trace) for claim in claims], seen)

@@ -54,6 +54,7 @@ from airground_drake.check.line import AGREES, RECORDED
 from airground_drake.report import junit, proved, rebuild, simulated
 from airground_drake.report.__main__ import main as write_report
 from airground_drake.report.figures.draw import draw
+from airground_drake.report.model import of
 from airground_drake.report.page import page
 from airground_drake.scenario.load import from_data
 from airground_drake.scenario.plugins import OPTION
@@ -89,7 +90,7 @@ def made_again(*edits: Edit) -> Edit:
                     about["events"] = of_run.meta["events"]
             traces = {run: load(trace(folder, run)) for run in scenario.runs}
             document |= rebuild.document_again(document, scenario, traces, judged)
-            made = {**document, "files": {}}
+            made = of(document)
             write(folder / "junit.xml", junit.render(made).encode())
             text = page(made, draw(scenario, traces), (folder / "diagram.svg").read_text(encoding="utf-8"))
             write(folder / "report.html", text.encode())

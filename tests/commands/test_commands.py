@@ -16,10 +16,10 @@ from pathlib import Path
 import pytest
 from commands.conftest import Airground
 
+from airground_drake.base.limits import MAX_UGVS
 from airground_drake.base.registry import METHODS, MODEL_CLAIMS, POLICIES, ROUTES, RUN_CLAIMS, SAMPLERS, UAV_TASKS
 from airground_drake.commands import COMMANDS
 from airground_drake.commands.listing import KINDS
-from airground_drake.scenario.limits import MAX_UGVS
 from airground_drake.scenario.load import load, resolved, shipped
 
 AIRGROUND = (sys.executable, "-m", "airground_drake")

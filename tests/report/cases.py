@@ -85,6 +85,7 @@ def make_trace(
 
 class Kept(TraceClaim):
     id = "SAFE-TRACE"
+    subject = "distances"
     statement = "Every robot keeps its distance"
     formula = "D >= d"
     method = "geometry"

@@ -10,10 +10,16 @@ from hypothesis import strategies as st
 from report.cases import FINE, built, verdict
 
 from airground_drake.report import attention, phrases
+from airground_drake.report.model import of
 from airground_drake.scenario.load import load
 from airground_drake.scenario.schema import Scenario
 from airground_drake.sim.simulation import simulate
 from airground_drake.sim.trace import Trace
+
+
+def items(report: dict[str, Any]) -> list[attention.Item]:
+    return attention.items(of(report))
+
 
 AT = {"first": "ugv1", "second": "obstacle_1", "t_s": 7.717}
 TOO_NEAR = {"min_distance_m": 0.0, "safe_distance_m": 2.0, "margin_m": -2.0}
@@ -44,7 +50,7 @@ AVOIDANCE = {"hypothesis": "avoidance", "margin": -0.5}
 def test_in_words(
     scenario: Scenario, traces: dict[str, Trace], status: Any, finding: dict[str, Any], words: str
 ) -> None:
-    (item,) = attention.items(built(scenario, traces, [*FINE[1:], verdict("a", status, **finding)]))
+    (item,) = items(built(scenario, traces, [*FINE[1:], verdict("a", status, **finding)]))
     assert (item.words, item.claim, item.run, item.anchor) == (words, "SAFE-TRACE", "a", "claim-SAFE-TRACE")
 
 
@@ -52,7 +58,7 @@ def test_why_a_robot_was_not_helped(scenario: Scenario, traces: dict[str, Trace]
     report = built(scenario, traces, [FINE[0], verdict("c", "refuted", counterexample=END), FINE[2]])
     refusals = report["runs"]["c"]["metrics"]["gatekeeper"]["refusals"]
     refusals["ugv1"] = {"not_cheaper": 1, "a_new_one": 2}
-    (item,) = attention.items(report)
+    (item,) = items(report)
     assert item.words.endswith("; refused 3 times: a new one (2); the UGV's own task looked as good (1)")
 
 
@@ -60,12 +66,12 @@ def test_what_is_missing_or_faulty_or_ends_too_early(scenario: Scenario, traces:
     def faults(*said: tuple[str, float]) -> list[dict[str, Any]]:
         return [{"t_s": t_s, "robot": "ugv1", "policy": "mine", "what": what} for what, t_s in said]
 
-    assert not attention.items(built(scenario, traces, FINE))
+    assert not items(built(scenario, traces, FINE))
     report = built(scenario, traces, FINE[:2])
     report["runs"]["c"]["faults"] = faults(*[("boom.py:5 ValueError: no", 6.05)] * 14, ("late", 9.0))
     report["overall"] |= {"undemonstrated": [7]}
     report["scenario"]["resolved"]["duration_s"] = 15.0
-    first, second, early, *rest = attention.items(report)
+    first, second, early, *rest = items(report)
     assert first.words == "policy mine: boom.py:5 ValueError: no (14 times, first at 6.05 s)"
     assert second.words == "policy mine: late (once, at 9.00 s)"
     assert early.words.startswith("duration_s = 15 ends the runs before the presets of ugv1, ugv2 do (2")
@@ -73,17 +79,17 @@ def test_what_is_missing_or_faulty_or_ends_too_early(scenario: Scenario, traces:
         ("no claim was checked on the run", "claims"), ("finding 7 about the paper", "audit"),
     ]  # fmt: skip
     report["runs"]["c"]["faults"] = faults(*((f"ValueError: {k}", 1.0) for k in range(100)))
-    assert attention.items(report)[3].words == "97 more kinds of faults"
+    assert items(report)[3].words == "97 more kinds of faults"
 
 
 def test_for_whom_the_uav_found_no_way(scenario: Scenario, traces: dict[str, Trace]) -> None:
     """A policy that failed has found nothing either: that is said apart."""
     report = built(scenario, traces, FINE)
     report["runs"]["c"]["metrics"]["without_proposals"] = ["ugv1", "ugv2"]
-    (item,) = attention.items(report)
+    (item,) = items(report)
     assert (item.words, item.run) == ("the UAV found no way for ugv1 and ugv2", "c")
     report["runs"]["c"]["faults"] = [{"t_s": 1.0, "robot": "ugv1", "policy": "mine", "what": "no"}]
-    assert [item.words for item in attention.items(report)][1:] == ["the UAV found no way for ugv2"]
+    assert [item.words for item in items(report)][1:] == ["the UAV found no way for ugv2"]
 
 
 def test_for_whom_the_uav_finds_no_way_any_more() -> None:
@@ -103,7 +109,7 @@ def test_for_whom_the_uav_finds_no_way_any_more() -> None:
         },
     )
     trace = simulate(scenario, "d")
-    found = [item.words for item in attention.items(built(scenario, {"d": trace}, [verdict("d", "holds")]))]
+    found = [item.words for item in items(built(scenario, {"d": trace}, [verdict("d", "holds")]))]
     assert len(trace.proposals) == 1
     assert "the UAV found no way for ugv1: no plan exists: on the UAV's map, ugv1 cannot come to the target" in found
 
@@ -118,4 +124,4 @@ def test_whatever_a_third_party_claim_found_is_told(
     scenario: Scenario, traces: dict[str, Trace], found: dict[str, Any], margin: float | None
 ) -> None:
     report = built(scenario, {"c": traces["c"]}, [verdict("c", "refuted", margin=margin, counterexample=found)])
-    assert attention.items(report)[0].words
+    assert items(report)[0].words

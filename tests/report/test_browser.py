@@ -18,6 +18,7 @@ from report.cases import FINE, built, verdict
 from airground_drake.commands import index
 from airground_drake.report import audit, document, html
 from airground_drake.report.figures import draw
+from airground_drake.report.model import of
 from airground_drake.scenario.schema import Scenario
 from airground_drake.sim.trace import Trace
 
@@ -49,7 +50,7 @@ def page_file(scenario: Scenario, traces: dict[str, Trace], tmp_path_factory: py
         cut = [replace(panel, table=replace(panel.table, rows=panel.table.rows[:4])) for panel in figure.panels]
         figures[k] = replace(figure, panels=tuple(cut))
     path = tmp_path_factory.mktemp("page") / "report.html"
-    path.write_text(html.render(report, figures), "utf-8")
+    path.write_text(html.render(of(report), figures), "utf-8")
     return path
 
 

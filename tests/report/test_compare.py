@@ -14,7 +14,8 @@ from report.cases import FINE, built, make_scenario, make_traces, verdict
 
 from airground_drake import commands
 from airground_drake.base.statuses import NOT_EXERCISED, STATUSES
-from airground_drake.report import compare, document
+from airground_drake.report import compare
+from airground_drake.report.model import of
 
 Json = dict[str, Any]
 
@@ -38,12 +39,11 @@ def before() -> Json:
     scenario = make_scenario()
     counted = [*FINE, verdict("", "proved", "proved", exercised=3, margin=0.5)]
     found = built(scenario, make_traces(scenario), counted)
-    found["audit"] = [{"id": "P1", "demonstrated": True, "paper": 1, "ours": 2}]
+    found["audit"] = [{"id": 1, "demonstrated": True, "paper": 1, "ours": 2}]
     return json.loads(json.dumps(found))
 
 
 def test_every_verdict_has_a_place_in_the_order() -> None:
-    assert document.SCHEMA == compare.REPORT
     assert sorted(name for alike in compare.ORDER for name in alike) == sorted([*STATUSES, NOT_EXERCISED, "gone"])
 
 
@@ -91,7 +91,7 @@ def test_only_what_is_worse_is_a_regression_and_the_page_has_every_change(
     found = json.loads(capsys.readouterr().out)
     assert (found["schema"], found["regressions"] > 0) == (compare.SCHEMA, bool(code))
     text = page.read_text(encoding="utf-8")
-    for part in compare.compared(before, after).keys() - {"regressions", "overall"}:
+    for part in compare.compared(of(before), of(after)).keys() - {"regressions", "overall"}:
         assert text.count(f'<h2 id="{part}">') == bool(found[part])
         for each in found[part]:
             about = str(each.get("claim") or each.get("id") or each["robot"])
@@ -132,9 +132,9 @@ def test_inputs_that_differ_come_first_and_rounding_is_only_counted(
 
 def test_an_empty_value_is_said_to_be_empty(before: Json, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     after = copy.deepcopy(before)
-    after["scenario"]["resolved"]["choices"] = [{"key": "seed", "paper": ""}]
+    after["scenario"]["resolved"]["choices"] = [{"key": "seed", "source": "ours", "paper": "", "reason": ""}]
     was = copy.deepcopy(before)
-    was["scenario"]["resolved"]["choices"] = [{"key": "seed", "paper": "3"}]
+    was["scenario"]["resolved"]["choices"] = [{"key": "seed", "source": "ours", "paper": "3", "reason": ""}]
     main([str(save(tmp_path / "before", was)), str(save(tmp_path / "after", after))])
     assert "  choices.0.paper: 3 -> empty\n" in capsys.readouterr().out
 
@@ -143,7 +143,7 @@ def test_margins_have_their_relative_change_unless_it_is_too_large_for_a_number(
     was, now = copy.deepcopy(before), copy.deepcopy(before)
     for pair, relative in (((0.5, 0.4), pytest.approx(-0.2)), ((1e-308, 1e308), None)):
         claim(was, "")["margin"], claim(now, "")["margin"] = pair
-        assert [each["relative"] for each in compare.compared(was, now)["margins"]] == [relative]
+        assert [each["relative"] for each in compare.compared(of(was), of(now))["margins"]] == [relative]
 
 
 @pytest.mark.parametrize(

@@ -13,6 +13,7 @@ from report.cases import FINE, GOING_ROUND, STALL, Kept, built, make_trace, verd
 
 from airground_drake.report import attention, document, junit, screen
 from airground_drake.report.audit import of_runs
+from airground_drake.report.model import of
 from airground_drake.scenario.schema import Scenario
 from airground_drake.sim.trace import Trace
 from airground_drake.verify.claim import Verdict
@@ -78,10 +79,10 @@ def test_too_few_interventions_or_messages_are_not_as_declared(scenario: Scenari
     why = "1 of 5 checks differs from what the scenario declares: interventions on run c (0, expected at least 1)."
     assert overall["why"] == why
     assert overall["missing"] == []
-    assert screen.declared(report).lines[1] == "c: interventions 0"
-    (item,) = (each for each in attention.items(report) if each.run == "c" and each.chip == "not_as_expected")
+    assert screen.declared(of(report)).lines[1] == "c: interventions 0"
+    (item,) = (each for each in attention.items(of(report)) if each.run == "c" and each.chip == "not_as_expected")
     assert (item.words, item.about) == ("0 interventions", "expected: at least 1")
-    failed = ET.fromstring(junit.render(report)).find("*/*[@name='interventions']/failure")
+    failed = ET.fromstring(junit.render(of(report))).find("*/*[@name='interventions']/failure")
     assert failed is not None
     assert failed.get("message") == "0 interventions, expected at least 1"
 

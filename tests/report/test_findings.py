@@ -11,10 +11,11 @@ from airground_drake.report.audit.formulas import formula_findings
 from airground_drake.report.audit.runs import findings as findings_of_runs
 from airground_drake.report.audit.thresholds import threshold_findings
 from airground_drake.report.figures import findings
-from airground_drake.report.figures.lines import Lines
+from airground_drake.report.figures.lines import of_finding
 from airground_drake.report.view import canvas
 from airground_drake.scenario.load import load
 from airground_drake.study.testing.plugin import Simulations
+from airground_drake.verify.finding import Chart
 
 
 def test_what_is_computed_is_drawn_with_its_marks() -> None:
@@ -76,6 +77,6 @@ def test_logarithmic_axes_show_the_values_themselves_and_points_without_extent_c
     x, still = np.array([0.1, 1000.0]), np.ones(2)
     for at, shown in ((x, {"0.1", "10", "1000", "x, m", "y, s", "line", "mark"}), (still, {"line", "mark"})):
         with canvas.style():
-            figure = Lines("Powers", "x, m", "y, s", {"line": (at, at)}, {"mark": (1.0, 1.0)}, log="xy").figure(1)
+            figure = of_finding(Chart("Powers", "x, m", "y, s", {"line": (at, at)}, {"mark": (1.0, 1.0)}, log="xy"), 1)
         texts = ET.fromstring(figure.panels[0].svg).iter("{http://www.w3.org/2000/svg}text")
         assert shown <= {"".join(each.itertext()).strip() for each in texts}

@@ -9,9 +9,9 @@ from pathlib import Path
 import pytest
 
 from airground_drake.base.errors import FolderError
-from airground_drake.report import document, folder
+from airground_drake.report import folder, model
 
-OURS = f'{{\n "schema": "{document.SCHEMA}",\n "scenario": {{}}}}'
+OURS = f'{{\n "schema": "{model.SCHEMA}",\n "scenario": {{}}}}'
 
 
 def fill(folder: Path, files: dict[str, str]) -> None:

@@ -7,6 +7,7 @@ import xml.etree.ElementTree as ET
 from report.cases import FINE, built, verdict
 
 from airground_drake.report import junit
+from airground_drake.report.model import of
 from airground_drake.scenario.schema import Scenario
 from airground_drake.sim.trace import Trace
 
@@ -15,7 +16,7 @@ def test_junit_counts(scenario: Scenario, traces: dict[str, Trace]) -> None:
     bad = verdict("a", "refuted", margin=-1.0, unit="m", counterexample={"bad": "\x00\x1b"})
     idle = [verdict("a", exercised=0), verdict("a", "holds", "exercised", exercised=0)]
     undecided = [verdict("a", status) for status in ("error", "not_run", "inconclusive")]
-    root = ET.fromstring(junit.render(built(scenario, traces, [FINE[0], FINE[2], bad, *idle, *undecided])))
+    root = ET.fromstring(junit.render(of(built(scenario, traces, [FINE[0], FINE[2], bad, *idle, *undecided]))))
     counts = {
         suite.get("name"): [suite.get(key) for key in ("tests", "failures", "errors", "skipped")] for suite in root
     }

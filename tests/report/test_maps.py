@@ -12,7 +12,7 @@ import pytest
 
 from airground_drake.report import document
 from airground_drake.report.facts import RunFacts
-from airground_drake.report.outcomes import Document
+from airground_drake.report.model import Report, of
 from airground_drake.report.phrases import bodies_of
 from airground_drake.report.screen import Row, first_screen
 from airground_drake.scenario.load import from_data
@@ -41,9 +41,10 @@ def trace() -> Trace:
     return simulate(from_data(data, str(MAPS / "scenario.yaml")), "a")
 
 
-def screen_of(trace: Trace) -> tuple[Document, Row]:
+def screen_of(trace: Trace) -> tuple[Report, Row]:
     made = document.build(trace.scenario, {"a": trace}, judge(trace), {"package": "0.1.0", "seed": 1, "started": "now"})
-    return made, first_screen(made).rows[0]
+    report = of(made)
+    return report, first_screen(report).rows[0]
 
 
 def in_the_map(trace: Trace, place: list[float]) -> float:
@@ -63,12 +64,12 @@ def test_a_report_names_the_place_of_the_map_that_was_nearest(trace: Trace) -> N
     assert in_the_map(trace, near.at_m) <= 1e-9
     place = f"the map at ({near.at_m[0]:.2f}, {near.at_m[1]:.2f})"
     assert row.safe.lines[1].startswith(f"ugv1\N{EN DASH}{place} 0.100 ≥ 0.1 m at")
-    assert place in bodies_of(next(claim for claim in made["claims"] if claim["id"] == "SAFE-TRACE"))
+    assert place in bodies_of(made.about("SAFE-TRACE")[0])
 
 
 def test_a_report_says_where_on_the_map_a_robot_stands(trace: Trace) -> None:
     made, row = screen_of(trace)
-    x, y = made["runs"]["a"]["metrics"]["on_the_way"]["ugv1"]["at_m"]
+    x, y = made.runs["a"].metrics.on_the_way["ugv1"].at_m or ()
     assert math.dist((x, y), trace.position("ugv1")[-1][:2]) < 0.11
     assert row.arrived.lines[1] == f"ugv1 stopped, held by the map at ({x:.2f}, {y:.2f})"
 

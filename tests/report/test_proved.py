@@ -14,6 +14,7 @@ from airground_drake.base.errors import ReportError
 from airground_drake.check.files import names_in
 from airground_drake.check.report import check_files
 from airground_drake.report import document, html, proved
+from airground_drake.report.model import of
 from airground_drake.scenario.schema import Scenario
 from airground_drake.sim import trace
 from airground_drake.sim.trace import Trace
@@ -41,7 +42,7 @@ def report(tmp_path: Path, scenario: Scenario, traces: dict[str, Trace]) -> Path
         f"trace/{name}/{file}" for name, of in traces.items() for file in trace.save(of, folder / "trace" / name)
     ]
     found = built(scenario, traces, FINE)
-    files.write_text(folder / "report.html", html.render(found, ()))
+    files.write_text(folder / "report.html", html.render(of(found), ()))
     files.write_json(folder / "report.json", document.sealed(found, folder, [*written, "report.html"]))
     return folder
 

@@ -31,7 +31,7 @@ class Counting(ModelClaim):
     """A claim that counts how often it is decided."""
 
     id, statement, formula, method, equations = "THR-DDM", "s", "f", "m", "e"
-    assumptions, does_not_establish, record = (), "n", Noted
+    assumptions, does_not_establish, record, kept = (), "n", Noted, True
 
     def __init__(self, found: Finding | Exception = FOUND) -> None:
         self.found, self.calls = found, 0

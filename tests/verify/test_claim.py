@@ -102,10 +102,10 @@ def test_a_claim_that_cannot_say_whether_it_applies_is_an_error(monkeypatch: pyt
 def test_a_claim_about_the_model_that_cannot_say_whether_it_applies_is_an_error(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    def applies_to(self: Any, scenario: Scenario) -> bool:
+    def applies(self: Any, scenario: Scenario) -> bool:
         raise ValueError("applies")
 
-    monkeypatch.setattr(SafeBudget, "applies_to", applies_to)
+    monkeypatch.setattr(SafeBudget, "applies", applies)
     (verdict,) = judge_model(run_of("d").scenario, claims=["SAFE-BUDGET"])
     assert (verdict.status, verdict.evidence.error) == ("error", "ValueError: applies")
 

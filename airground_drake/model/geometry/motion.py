@@ -85,7 +85,7 @@ class Motion:
 @njit(cache=True)
 def at(times: Array, positions: Array, slopes: Array, t: float, place: Array, rate: Array) -> None:
     """Write where a motion is at a time, s, and its velocity, (3,) each: see `Motion`."""
-    k = np.searchsorted(times, t, side="right") - 1
+    k = int(np.searchsorted(times, t, side="right")) - 1
     inside = 0 <= k < len(times) - 1
     for a in range(3):
         place[a] = positions[k, a] + (t - times[k]) * slopes[k, a] if inside else positions[max(k, 0), a]

@@ -53,7 +53,8 @@ class FormationTask(PositionTask):
 
     def __init__(self, ugv_positions: Array, ugv_velocities: Array, altitude: float, gain: float) -> None:
         """Fly `altitude` m over the centroid of UGVs at (n, 3) m moving at (n, 3) m/s."""
-        super().__init__(*over_centroid(ugv_positions, ugv_velocities, altitude), gain)
+        target, rate = over_centroid(ugv_positions, ugv_velocities, altitude)
+        super().__init__(target, rate, gain)
 
 
 @njit(cache=True)

@@ -132,8 +132,8 @@ def spans(begun: Array, now: Array) -> Array:
 def bends(corners: Corners, begin: float, end: float) -> tuple[int, int]:
     """The first corner within a step, in s, and the one after the last."""
     times = corners.times
-    first = np.searchsorted(times, begin, side="right")
-    return first, max(first, np.searchsorted(times, end, side="left"))
+    first = int(np.searchsorted(times, begin, side="right"))
+    return first, max(first, int(np.searchsorted(times, end, side="left")))
 
 
 @njit(cache=True)

@@ -11,6 +11,7 @@ from scipy.optimize import brentq, minimize_scalar
 from scipy.stats import norm
 
 from airground_drake.model.trigger.bayes import bayes_risk, decision_time, error_rate, optimal_threshold
+from airground_drake.report import rules
 from airground_drake.report.audit.item import Item, item, status
 from airground_drake.scenario.schema import Scenario, Threshold
 from airground_drake.verify import Finding
@@ -40,7 +41,8 @@ def _upside_down(proofs: Mapping[str, Finding]) -> Item:
     found = minimize_scalar(lambda z: bayes_risk(z, DRIFT, NOISE, C1, C2), bounds=(1e-6, 5.0), options={"xatol": 1e-12})
     ours, printed = optimal_threshold(DRIFT, NOISE, C1, C2), optimal_threshold(DRIFT, NOISE, C2, C1)
     risk = {name: bayes_risk(z, DRIFT, NOISE, C1, C2) for name, z in (("ours", ours), ("printed", printed))}
-    shown = abs(found.x - ours) < 1e-6 and risk["printed"] > risk["ours"] and status(proofs, "THR-OPT") == "proved"
+    proof = status(proofs, rules.LEAST_RISK)
+    shown = abs(found.x - ours) < 1e-6 and risk["printed"] > risk["ours"] and proof == "proved"
     return item(
         2, "(19)",
         "The right-hand side of (19) is inverted: the Bayes risk (16) is least where the left-hand side is c2/c1.",
@@ -49,7 +51,7 @@ def _upside_down(proofs: Mapping[str, Finding]) -> Item:
         shown,
         {
             "drift_m_s": DRIFT, "noise_m_sqrt_s": NOISE, "c1_1_s": C1, "c2": C2,
-            "minimiser_of_16_m": float(found.x), "THR-OPT": status(proofs, "THR-OPT"),
+            "minimiser_of_16_m": float(found.x), rules.LEAST_RISK: proof,
         },
     )  # fmt: skip
 
@@ -75,7 +77,7 @@ def _seconds(proofs: Mapping[str, Finding]) -> Item:
         {
             "drift_m_s": drift, "noise_m_sqrt_s": noise, "zeta_m": zeta, "deviation_m": deviation,
             "exact_mean_exit_time_s": exact, "minimiser_with_deviation_m": float(biased.x), "root_of_19_m": unbiased,
-            "THR-DDM": status(proofs, "THR-DDM"),
+            rules.DECISIONS: status(proofs, rules.DECISIONS),
         },
     )  # fmt: skip
 
@@ -159,9 +161,9 @@ def _intensity(scenario: Scenario) -> Item:
 
 def _zeno(proofs: Mapping[str, Finding]) -> Item:
     """Item 9: the bare threshold's triggers under refinement of the noise, and the bound of ours."""
-    refined = proofs["ZENO-REFINE"].to_json()["evidence"] if "ZENO-REFINE" in proofs else {}
-    found = {name: status(proofs, name) for name in ("ZENO-REFINE", "ZENO-PROOF")}
-    shown = found == {"ZENO-REFINE": "supported", "ZENO-PROOF": "proved"}
+    refined = proofs[rules.REFINEMENT].to_json()["evidence"] if rules.REFINEMENT in proofs else {}
+    found = {name: status(proofs, name) for name in (rules.REFINEMENT, rules.DWELL)}
+    shown = found == {rules.REFINEMENT: "supported", rules.DWELL: "proved"}
     return item(
         9, "(15), (20), section 6",
         "The paper leaves Zeno behaviour open. If the error is at the threshold, a bare threshold on (15) triggers "

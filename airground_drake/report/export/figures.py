@@ -9,9 +9,11 @@ from typing import Any
 
 from airground_drake.base import files
 from airground_drake.base.statuses import PASSING, outcome
+from airground_drake.report import rules
 from airground_drake.report.export import latex
 from airground_drake.report.figures import draw
 from airground_drake.report.figures.panels import Figure
+from airground_drake.report.model import Report
 from airground_drake.report.view import canvas
 from airground_drake.scenario.schema import Scenario
 from airground_drake.sim.trace import Trace
@@ -24,20 +26,13 @@ STYLES: dict[str, dict[str, Any]] = {
 }
 WIDTHS = {"ieee": r"\columnwidth", "thesis": r"0.7\linewidth"}  # width of a figure in the text
 
-# Claims that a figure is about, by its identifier.
-SHOWN = {
-    "trajectories": ("LIVE-GOAL",),
-    "distances": ("SAFE-TRACE", "SAFE-GATE"),
-    "timelines": ("THR-TRIG", "THR-CHOICE", "LIVE-HYP", "ZENO-TRACE", "ZENO-PROOF"),
-}
-
 # Metadata without a date, by format, so that the same run gives the same file.
 UNDATED: dict[str, dict[str, None]] = {"pdf": {"CreationDate": None}, "svg": {"Date": None}}
 _COMMON = {"savefig.dpi": 300, "pdf.fonttype": 42}
 
 
 def write(
-    report: Mapping[str, Any],
+    report: Report,
     scenario: Scenario,
     traces: Mapping[str, Trace],
     folder: Path,
@@ -59,18 +54,18 @@ def write(
                 yield folder / f"{names[-1]}.{kind}"
         texts.append(_environment(figure, names, WIDTHS[style], report))
     tables = {"verdicts.tex": latex.verdicts(report)}
-    if report["reproduction"]:
+    if report.reproduction:
         tables["reproduction.tex"] = latex.reproduction(report)
     for name, text in {"figures.tex": "\n".join(texts), **tables}.items():
         files.write_text(folder / name, text)
         yield folder / name
 
 
-def _environment(figure: Figure, names: Sequence[str], width: str, report: Mapping[str, Any]) -> str:
+def _environment(figure: Figure, names: Sequence[str], width: str, report: Report) -> str:
     """A figure in LaTeX: its panels, narrow ones side by side, and a caption that says what is established."""
     across, width = ("figure*", r"\textwidth") if figure.look == "wide" else ("figure", width)
     panels = [rf"  \includegraphics[width={width}]{{{name}}}\\" for name in names]
-    caption = latex.escaped(" ".join([figure.caption, *_established(SHOWN.get(figure.id, ()), report)]))
+    caption = latex.escaped(" ".join([figure.caption, *_established(rules.CAPTIONS.get(figure.id, ()), report)]))
     lines = [
         rf"\begin{{{across}}}",
         r"  \centering",
@@ -81,14 +76,14 @@ def _environment(figure: Figure, names: Sequence[str], width: str, report: Mappi
     return "\n".join([*lines, rf"\end{{{across}}}", ""])
 
 
-def _established(claims: Sequence[str], report: Mapping[str, Any]) -> Iterator[str]:
+def _established(claims: Sequence[str], report: Report) -> Iterator[str]:
     """A sentence per claim: what was proved, what holds in which runs, what is refuted."""
     for name in claims:
         found: dict[str, list[str]] = {}
-        for claim in report["claims"]:
-            status = outcome(claim["status"], claim["exercised"])
-            if claim["id"] == name and status in (*PASSING, "refuted"):
-                found.setdefault(status, []).append(claim["run"])
+        for claim in report.claims:
+            status = outcome(claim.status, claim.exercised)
+            if claim.id == name and status in (*PASSING, "refuted"):
+                found.setdefault(status, []).append(claim.run)
         for status, runs in found.items():
-            where = f" in run{'s' * (len(runs) > 1)} {', '.join(runs)}" if any(runs) else ""
+            where = f" in {'run' if len(runs) == 1 else 'runs'} {', '.join(runs)}" if any(runs) else ""
             yield f"{name} {status if status == 'holds' else f'is {status}'}{where}."

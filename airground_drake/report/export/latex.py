@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 from airground_drake.base.statuses import outcome
+from airground_drake.report.model import Report
 
 _SPECIAL = {
     "\\": r"\textbackslash{}", "~": r"\textasciitilde{}", "^": r"\textasciicircum{}", "<": r"\textless{}",
@@ -20,30 +21,29 @@ def escaped(text: str) -> str:
     return "".join(_SPECIAL.get(each, each) for each in " ".join(text.split()))
 
 
-def verdicts(report: Mapping[str, Any]) -> str:
+def verdicts(report: Report) -> str:
     """A table with a row per claim: its verdict about the model, or about each run."""
     # "not tested" stands for a verdict that nothing could have refuted.
     found: dict[str, dict[str, str]] = {}
-    for claim in report["claims"]:
-        status = outcome(claim["status"], claim["exercised"])
-        found.setdefault(claim["id"], {})[claim["run"]] = {"not_exercised": "not tested"}.get(status, status)
-    runs = list(report["runs"])
+    for claim in report.claims:
+        status = outcome(claim.status, claim.exercised)
+        found.setdefault(claim.id, {})[claim.run] = {"not_exercised": "not tested"}.get(status, status)
+    runs = list(report.runs)
     rows = [[name, *(statuses.get(run, "") for run in ("", *runs))] for name, statuses in found.items()]
     return _table(["claim", "model", *runs], "l" * (2 + len(runs)), rows)
 
 
-def reproduction(report: Mapping[str, Any]) -> str:
+def reproduction(report: Report) -> str:
     """A table with a row per result of the paper: its value there, here, and whether it was reproduced."""
     rows = [
-        [row["id"], row["quantity"], _value(row, "paper"), _value(row, "ours"), row["status"].replace("_", " ")]
-        for row in report["reproduction"]
+        [row.id, row.quantity, _value(row.paper, row.unit), _value(row.ours, row.unit), row.status.replace("_", " ")]
+        for row in report.reproduction
     ]
     return _table(["", "quantity", "paper", "ours", ""], r"lp{0.45\linewidth}lll", rows)
 
 
-def _value(row: Mapping[str, Any], key: str) -> str:
-    """A value of a row of the reproduction with its unit."""
-    value, unit = row[key], row["unit"]
+def _value(value: Any, unit: str) -> str:
+    """A value of the reproduction with its unit."""
     if value is None:
         return "none"
     if unit == "yes/no":

@@ -9,9 +9,10 @@ import numpy as np
 
 from airground_drake.base.arrays import Array
 from airground_drake.model.trigger.bayes import decision_time, optimal_threshold
-from airground_drake.report.figures.lines import Lines
+from airground_drake.report.figures.lines import of_finding
 from airground_drake.report.figures.panels import Figure
 from airground_drake.report.view import canvas
+from airground_drake.verify.finding import Chart
 
 POINTS = 200
 
@@ -19,15 +20,15 @@ POINTS = 200
 def draw(items: Sequence[Mapping[str, Any]]) -> list[Figure]:
     """A figure beside each finding that has a picture of its own."""
     with canvas.style():
-        return [PICTURES[item["id"]](item).figure(item["id"]) for item in items if item["id"] in PICTURES]
+        return [of_finding(PICTURES[item["id"]](item), item["id"]) for item in items if item["id"] in PICTURES]
 
 
-def time(item: Mapping[str, Any]) -> Lines:
+def time(item: Mapping[str, Any]) -> Chart:
     """Item 3: mean decision time over the initial deviation, as printed and corrected."""
     known = item["evidence"]
     zeta, drift, noise = known["zeta_m"], known["drift_m_s"], known["noise_m_sqrt_s"]
     deviation = np.linspace(-0.99, 0.99, POINTS) * zeta / max(drift, 1.0)
-    return Lines(
+    return Chart(
         "Mean decision time (17) over the initial deviation", "initial deviation, m", "time, s",
         {
             "corrected, metres": _curve(lambda y: decision_time(zeta, drift, noise, y), deviation),
@@ -37,13 +38,13 @@ def time(item: Mapping[str, Any]) -> Lines:
     )  # fmt: skip
 
 
-def optimum(item: Mapping[str, Any]) -> Lines:
+def optimum(item: Mapping[str, Any]) -> Chart:
     """Item 4: the threshold over the drift, Bayes-optimal and by (19) as printed, and Table 1's."""
     known, zeta = item["evidence"], item["paper"]["zeta_m"]
     right, printed = item["ours"]["drift_m_s"], item["paper"]["drift_m_s"]
     noise, c1, c2 = known["noise_m_sqrt_s"], known["c1_1_s"], known["c2"]
     drift = np.geomspace(0.3, 3.0 * max(right, default=10.0), POINTS)
-    return Lines(
+    return Chart(
         "Threshold over the drift, Bayes-optimal and by (19) as printed", "drift, m/s", "threshold, m",
         {
             "Bayes-optimal": _curve(lambda a: optimal_threshold(a, noise, c1, c2), drift),
@@ -54,11 +55,11 @@ def optimum(item: Mapping[str, Any]) -> Lines:
     )  # fmt: skip
 
 
-def first_passage(item: Mapping[str, Any]) -> Lines:
+def first_passage(item: Mapping[str, Any]) -> Chart:
     """Item 5: when noise alone reaches either threshold, over its intensity, and the paper's trigger."""
     known, at = item["evidence"], item["evidence"]["noise_m_sqrt_s"]
     noise = np.geomspace(0.05 * at, 2.0 * at, POINTS)
-    return Lines(
+    return Chart(
         "Mean time in which noise alone reaches either threshold", "noise intensity, m/√s", "time, s",
         {
             "noise alone": (noise, (known["zeta_m"] / noise) ** 2),
@@ -68,14 +69,14 @@ def first_passage(item: Mapping[str, Any]) -> Lines:
     )  # fmt: skip
 
 
-def due(item: Mapping[str, Any]) -> Lines:
+def due(item: Mapping[str, Any]) -> Chart:
     """Item 6: how far the reference is from the stalled UGV, at the printed and at the scenario's speed."""
     known = item["evidence"]
     travelled, distance = (np.array(known["reference"][key]) for key in ("travelled_m", "distance_m"))
     zeta, due_s = known["zeta_m"], known["trigger_at_printed_speed_s"]
     speeds = known["reference_travelled_m"] / due_s, known["scenario_speed_m_s"]
     last = travelled[-1] / min(speeds)
-    return Lines(
+    return Chart(
         "Distance of the reference from the stalled UGV", "time, s", "distance, m",
         {f"at {speed:g} m/s": (travelled / speed, distance) for speed in speeds}
         | {"threshold": (np.array([0.0, last]), np.array([zeta, zeta]))},
@@ -83,55 +84,55 @@ def due(item: Mapping[str, Any]) -> Lines:
     )  # fmt: skip
 
 
-def sides(item: Mapping[str, Any]) -> Lines:
+def sides(item: Mapping[str, Any]) -> Chart:
     """Item 7: the ways of UGV2 with either sign of its preset."""
     ways = {f"x = {known['preset_x_m']:g} m": np.array(known["way_m"]) for known in item["evidence"].values()}
-    return Lines(
+    return Chart(
         "Ways of UGV2", "y, m", "x, m",
         {f"preset {name}": (way[:, 1], way[:, 0]) for name, way in ways.items()},
         {f"end, {name}": (way[-1, 1], way[-1, 0]) for name, way in ways.items()},
     )  # fmt: skip
 
 
-def intrusion(item: Mapping[str, Any]) -> Lines:
+def intrusion(item: Mapping[str, Any]) -> Chart:
     """Item 10: distance to the nearest obstacle under either gatekeeper."""
     known, safe = item["evidence"]["distance_to_the_nearest_obstacle"], item["evidence"]["safe_distance_m"]
     t = np.array(known["t_s"])
     gaps = {name.removesuffix("_m"): np.array(gap) for name, gap in known.items() if name != "t_s"}
-    return Lines(
+    return Chart(
         "Distance to the nearest obstacle", "time, s", "distance, m",
         {name: (t, gap) for name, gap in gaps.items()} | {"safe distance": (t, np.full(len(t), safe))},
         {f"closest, {name}": (float(t[gap.argmin()]), float(gap.min())) for name, gap in gaps.items()},
     )  # fmt: skip
 
 
-def task_error(item: Mapping[str, Any]) -> Lines:
+def task_error(item: Mapping[str, Any]) -> Chart:
     """Item 11: the task error that (26) counts along the horizon, without and with the kinematics."""
     known = item["evidence"]["task_error"]
     names = {"printed_m": "as printed, either", "accept_m": "with (23), accept", "refuse_m": "with (23), refuse"}
     lines = {name: (np.array(known["t_s"]), np.array(known[key])) for key, name in names.items()}
-    return Lines("Task error along the horizon", "time from the decision, s", "task error, m", lines)
+    return Chart("Task error along the horizon", "time from the decision, s", "task error, m", lines)
 
 
-def speeds(item: Mapping[str, Any]) -> Lines:
+def speeds(item: Mapping[str, Any]) -> Chart:
     """Item 17: when the trigger is due over the reference's speed, and what the paper reports."""
     travelled, printed, ours = item["evidence"]["reference_travelled_at_the_trigger_m"], item["paper"], item["ours"]
     speed = np.linspace(0.8 * min(ours["speed_m_s"].values()), 1.2 * printed["speed_m_s"], 100)
     reported = {f"reported, {name}": (ours["speed_m_s"][name], at) for name, at in printed["trigger_s"].items()}
-    return Lines(
+    return Chart(
         "Trigger over the reference's speed", "speed, m/s", "trigger, s",
         {f"after {travelled:.4g} m": (speed, travelled / speed)},
         reported | {"Table 1's speed": (printed["speed_m_s"], travelled / printed["speed_m_s"])},
     )  # fmt: skip
 
 
-def one_or_two(item: Mapping[str, Any]) -> Lines:
+def one_or_two(item: Mapping[str, Any]) -> Chart:
     """Item 18: mean decision time over the drift, with two thresholds and with the trigger's single one."""
     known = item["evidence"]["Table 1, drift assumed"]
     zeta, noise, at = known["zeta_m"], known["noise_m_sqrt_s"], known["drift_m_s"]
     drift = np.geomspace(0.1 * at, 10.0 * at, POINTS)
     two = _curve(lambda a: decision_time(zeta, a, noise), drift)
-    return Lines(
+    return Chart(
         "Mean decision time over the drift, with one threshold and with two", "drift, m/s", "time, s",
         {"one threshold": (drift, zeta / drift), "two thresholds, (17)": two},
         {f"{name}, finite differences": (at, known[f"time_of_{key}_s"])
@@ -143,7 +144,7 @@ def _curve(value: Callable[[float], float], x: Array) -> tuple[Array, Array]:
     return x, np.array([value(each) for each in x])
 
 
-# By number of the finding. Those of 1, 2 and 9 are drawn from runs, from THR-CHOICE and from ZENO-REFINE.
-PICTURES: dict[int, Callable[[Mapping[str, Any]], Lines]] = {
+# By number of the finding. Those of 1 are drawn from runs; those of 2 and 9 are charts of claims.
+PICTURES: dict[int, Callable[[Mapping[str, Any]], Chart]] = {
     3: time, 4: optimum, 5: first_passage, 6: due, 7: sides, 10: intrusion, 11: task_error, 17: speeds, 18: one_or_two,
 }  # fmt: skip

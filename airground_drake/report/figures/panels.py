@@ -42,7 +42,7 @@ class Figure:
     title: str  # its heading
     caption: str  # what to see
     panels: tuple[Panel, ...]  # its drawings
-    beside: str = ""  # place in the page: a claim's identifier or `audit-<item>`; '' for the section of figures
+    beside: str = ""  # place in the page: a section, a claim's identifier or `audit-<item>`; '': `html.PLACES`
     look: str = ""  # "wide" for a panel on the whole width
 
 

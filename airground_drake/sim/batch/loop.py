@@ -91,7 +91,7 @@ class State(NamedTuple):
     """What changes."""
 
     time: Array  # now; when the trigger's step began; number of short steps in a row, (3,)
-    count: Ints  # next tick, rows written, samples of noise used, what is due now, 1 after Python's update, (5,)
+    counts: Ints  # next tick, rows written, samples of noise used, what is due now, 1 after Python's update, (5,)
     talking: Bools  # whether a negotiation is open; whether a UGV has something to answer, (2,)
     place: Array  # of all bodies that move, (M, 3), m
     noise: Array  # (n,), m
@@ -166,7 +166,7 @@ def advance(team: Team, around: Around, accepted: Accepted, state: State, log: L
     period, shortest, isolation, gain, leak, sensing = numbers
     ugvs, uav = around
     on, number, chosen, row_of, motion_t, motion_p, motion_v = accepted
-    time, count, talking, place, noise, drawn, command, executing, share, heading = state[:10]
+    time, counts, talking, place, noise, drawn, command, executing, share, heading = state[:10]
     sampled, status, halts, held_begun, held_now, reference, known = state[10:]
     log_t, log_bodies, log_command, log_reference, log_noise = log[:5]
     log_x, log_status, log_executing, log_signals, log_share = log[5:]
@@ -175,7 +175,7 @@ def advance(team: Team, around: Around, accepted: Accepted, state: State, log: L
     still, flat, track = ugvs.still, place.reshape(-1), reference.reshape(2, n, 3)
     wanted, wanted_rate, lower = np.zeros((n, 3)), np.zeros((n, 3)), np.empty((1, 3))
     began, noise_began, script_rate = np.empty((r, 3)), np.empty(n), np.empty(3)
-    t, tick, rows, mask, resumed = time[0], count[0], count[1], count[3], count[4] == 1
+    t, tick, rows, mask, resumed = time[0], counts[0], counts[1], counts[3], counts[4] == 1
     begun, now, code = held_begun.copy(), held_now.copy(), -1
     if first:
         hold(breaks, holds, t, reference[: 3 * n], reference[3 * n :])
@@ -225,8 +225,8 @@ def advance(team: Team, around: Around, accepted: Accepted, state: State, log: L
                 break
         resumed = False
         if mask & NOISE:
-            drawn[:] = draws[count[2]]
-            count[2] += 1
+            drawn[:] = draws[counts[2]]
+            counts[2] += 1
         if np.isnan(span).any():  # discrete updates
             code = NOT_A_NUMBER
             break
@@ -294,6 +294,6 @@ def advance(team: Team, around: Around, accepted: Accepted, state: State, log: L
         if whole and upcoming <= until:
             mask = due[tick]
             tick += 1
-    time[0], count[0], count[1], count[3], count[4] = t, tick, rows, mask, 0
+    time[0], counts[0], counts[1], counts[3], counts[4] = t, tick, rows, mask, 0
     held_begun[:], held_now[:] = begun, now
     return code

@@ -11,7 +11,6 @@ import numpy as np
 from airground_drake.base.arrays import Array
 from airground_drake.base.errors import SimulationError, described
 from airground_drake.base.registry import UAV_TASKS, method_of
-from airground_drake.model.bodies.world import Neighbours
 from airground_drake.model.law.task import Task
 from airground_drake.model.law.tasks import FormationTask
 from airground_drake.model.plants.plant import FirstOrder, Scripted, Unicycle
@@ -32,18 +31,18 @@ from airground_drake.sim.blocks.ticks import Ticks
 from airground_drake.sim.recording import Done, trace_of
 from airground_drake.sim.trace import Trace
 from airground_drake.uav.halts import NOT_WATCHED, room, standing, watched
-from airground_drake.uav.messages import ACCEPT, NOTHING, SILENT, Report, accepted_proposals, sightings
+from airground_drake.uav.messages import ACCEPT, NOTHING, SILENT, accepted_proposals, sightings
 from airground_drake.uav.planner import PlannerState, sent_after
 from airground_drake.uav.policy import Proposal
 from airground_drake.ugv.mpc_gatekeeper import Gatekeepers, GatekeeperState, Inputs
 
 
-class LeftToDrake(Exception):
+class LeftToDrakeError(Exception):
     """The loop cannot make this run, or it ends in an error, which Drake then tells; the message says why."""
 
 
 class Batch:
-    """A run of a valid scenario; raises LeftToDrake at once where the loop cannot make it."""
+    """A run of a valid scenario; raises LeftToDrakeError at once where the loop cannot make it."""
 
     # Left to Drake: users' plants, lags and delays, and tasks of the UAV that are not the package's; monitors,
     # observers, decision blocks and disturbances are no part of a scenario.
@@ -57,9 +56,9 @@ class Batch:
         n, r = len(world.names("ugv")), len(world.robots)
         for body in world.moving:
             if not isinstance(body.plant, FirstOrder | Unicycle | Scripted):
-                raise LeftToDrake(f"the plant of {body.name}")
+                raise LeftToDrakeError(f"the plant of {body.name}")
         if UAV_TASKS.load(given.uav.task, of=Task) is not FormationTask:
-            raise LeftToDrake(f"the task {given.uav.task} of the UAV")
+            raise LeftToDrakeError(f"the task {given.uav.task} of the UAV")
         presets = components.make_presets(given)
         self._law = components.make_law(given, method, run.composition)  # type: ignore[arg-type]
         self._planner = components.make_planner(given, method)
@@ -119,7 +118,7 @@ class Batch:
 
         Raises:
             SimulationError: if planner or gatekeeper stop the run; names it and the time.
-            LeftToDrake: if the run ends in another error.
+            LeftToDrakeError: if the run ends in another error.
         """
         started, seed = time.perf_counter(), self._scenario.seed if seed is None else seed
         try:
@@ -158,7 +157,7 @@ class Batch:
                 self._rows *= 2
                 return self._simulated(seed)
             if code != loop.PYTHON:
-                raise LeftToDrake("the run ends in an error")
+                raise LeftToDrakeError("the run ends in an error")
             t = float(state.time[0])
             if team.watchful:
                 around = Around(*(self._world.at(near, t) for near in self._near))
@@ -173,15 +172,15 @@ class Batch:
             now = accepted_proposals(proposals, np.array(answers))
             if any(one is not other for one, other in zip(now, executed, strict=True)):
                 executed, accepted = now, _accepted(now)
-            state.count[4] = 1
-        rows = int(state.count[1])
+            state.counts[4] = 1
+        rows = int(state.counts[1])
         return Log(*(column[:rows] for column in log)), memory, answering
 
     def _updated(
         self, t: float, state: State, memory: PlannerState, answering: GatekeeperState
     ) -> tuple[PlannerState, GatekeeperState]:
         """Planner and gatekeepers after the updates of an instant, which see what both remembered before."""
-        due, places, world = int(state.count[3]), state.place.copy(), self._world
+        due, places, world = int(state.counts[3]), state.place.copy(), self._world
         planned, judged = memory, answering
         if due & loop.PLAN:
             intervening = [mode == INTERVENING for mode in state.status[::FIELDS].tolist()]
@@ -193,13 +192,12 @@ class Batch:
                     sightings(world, t, places),
                 )  # fmt: skip
                 planned = sent_after(memory, planned, t)
-        if due & loop.GATE and self._gatekeepers is not None:
-            if not self._gatekeepers.idle(t, memory.proposals, places, answering):
-                period = float(self._team.numbers[0])
-                headings = loop.headings_at(t, state, self._team.steering, period) if self._team.turns else None
-                velocities = world.velocities(t, state.command.copy())
-                now = Inputs(t, memory.proposals, places, velocities, self._law, headings)
-                judged = self._gatekeepers.sample(now, answering)
+        gate = self._gatekeepers if due & loop.GATE else None
+        if gate is not None and not gate.idle(t, memory.proposals, places, answering):
+            period = float(self._team.numbers[0])
+            headings = loop.headings_at(t, state, self._team.steering, period) if self._team.turns else None
+            velocities = world.velocities(t, state.command.copy())
+            judged = gate.sample(Inputs(t, memory.proposals, places, velocities, self._law, headings), answering)
         return planned, judged
 
     def _answers(self, memory: PlannerState, answering: GatekeeperState) -> Sequence[float]:
@@ -213,7 +211,7 @@ class Batch:
         due = int(self._team.due[0])
         return State(
             time=np.zeros(3),
-            count=np.array([1, 0, 0, due, 0], dtype=np.int64),
+            counts=np.array([1, 0, 0, due, 0], dtype=np.int64),
             talking=np.zeros(2, dtype=np.bool_),
             place=self._world.starts.copy(),
             noise=np.zeros(n),

@@ -25,7 +25,7 @@ from pydrake.systems.framework import (
 )
 
 from airground_drake.base.arrays import Array, read_only
-from airground_drake.base.errors import PluginError, described, short
+from airground_drake.base.errors import PluginError, described, raised_as, short
 from airground_drake.model.bodies.world import Neighbours, World
 from airground_drake.model.geometry import outline
 from airground_drake.model.law.avoidance import Avoidance
@@ -244,12 +244,10 @@ class UavController(_Controller):
         if self._task is FormationTask:
             return FormationTask(ugvs, ugv_commands, self._altitude, gain).velocity(own)
         name = getattr(self._task, "__name__", type(self._task).__name__)
-        try:
+        place = getattr(self._task, "__init__", None)
+        with raised_as(lambda error: PluginError(f"the UAV's task {name} raised {described(error, place)}")):
             task = self._task(read_only(ugvs), read_only(ugv_commands), self._altitude, gain)
             asked: object = task.velocity(read_only(own))
-        except (Exception, SystemExit) as error:
-            place = getattr(self._task, "__init__", None)
-            raise PluginError(f"the UAV's task {name} raised {described(error, place)}") from error
         return _velocity_of(name, asked, own)
 
 

@@ -21,7 +21,7 @@ from airground_drake.uav.messages import accepted_proposals
 from airground_drake.uav.policy import Proposal
 
 INEQUALITY_TOLERANCE_M_S = 1e-9
-"""Tolerance of inequalities and limits, m/s, as in SAFE-HYP: rounding errors are about 1e-13 m/s."""
+"""Tolerance of inequalities and limits, m/s, as in reports: rounding errors are about 1e-13 m/s."""
 LAW_TOLERANCE_M_S = 1e-6
 """Tolerance of the difference between a command and the law, m/s: rounding of two algorithms at the same
 positions."""
@@ -91,7 +91,7 @@ class Laws:
 
 
 class Monitor(LeafSystem):
-    """Finds the first command that violates SAFE-HYP or the control law (6)-(11), (14), (20), in any diagram.
+    """Finds the first command of a diagram that violates the safety theorem's hypotheses or (6)-(11), (14), (20).
 
     It checks the avoidance inequalities, speed limits and planar motion of all robots. Given laws, it also compares the
     commands with them, as far as their inputs are connected.

@@ -353,7 +353,7 @@ def plant_system(body: Body, period_s: float, own: Mapping[str, OwnPlant] = Mapp
 
 
 class VelocityDisturbance(LeafSystem):
-    """Adds a disturbance w to the command v of each robot, p_dot = v + w, as in SAFE-DIST.
+    """Adds a disturbance w to the command v of each robot, p_dot = v + w.
 
     Ports (r robots, world frame):
         in  `command` (3r) m/s; `disturbance_<robot>` (3) m/s for every robot, 0 where not connected.

@@ -10,9 +10,9 @@ import numpy as np
 from pydantic import BeforeValidator, ConfigDict, Field, PlainValidator, WithJsonSchema
 
 from airground_drake.base.arrays import Array
+from airground_drake.base.limits import MAX_UGVS
+from airground_drake.base.values import Number, Positive, as_float, refused
 from airground_drake.model.geometry import convex, outline
-from airground_drake.scenario.kinds import Number, Positive, as_float, refused
-from airground_drake.scenario.limits import MAX_UGVS
 from airground_drake.scenario.schema import Obstacle
 from airground_drake.scenario.shapes import convex_parts
 

@@ -12,7 +12,7 @@ import numpy as np
 from scipy.stats import qmc, truncnorm
 
 from airground_drake.base.arrays import Array
-from airground_drake.scenario.limits import MAX_SEED
+from airground_drake.base.limits import MAX_SEED
 
 # Kinds with values that depend on the number of the draw, so that draws are not independent.
 HALTON, GRID = "halton", "grid"

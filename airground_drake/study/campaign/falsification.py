@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
@@ -11,10 +10,11 @@ from typing import Any
 import numpy as np
 
 from airground_drake.base.arrays import Array
-from airground_drake.base.errors import PluginError, ScenarioError, described, one_line
+from airground_drake.base.errors import PluginError, ScenarioError, described, one_line, raised_as
 from airground_drake.base.progress import SILENT, Progress
 from airground_drake.scenario.estimate import Limits
 from airground_drake.scenario.load import from_data
+from airground_drake.sim.simulation import Engine
 from airground_drake.study.campaign.distributions import dimensions, values_at
 from airground_drake.study.campaign.objective import Objective
 from airground_drake.study.campaign.pool import Pool
@@ -31,6 +31,7 @@ class Search:
     spec: Spec  # of the scenarios; a course is that of draw 0
     objective: Objective  # is minimised
     limits: Limits  # largest scenario and longest time
+    engine: Engine = "batch"  # who makes the runs
 
     def values(self, point: Array) -> dict[str, Any]:
         """By dotted key, at a point of the unit cube."""
@@ -38,7 +39,7 @@ class Search:
 
     def at(self, points: Array, k: int) -> tuple[float, bool]:
         """The objective at one of some points (., n), and whether it is a counterexample."""
-        return self._judge(rows_at(self.spec, self.values(points[k]), 0, self.limits))
+        return self._judge(rows_at(self.spec, self.values(points[k]), 0, self.limits, self.engine))
 
     def fails(self, data: dict[str, Any]) -> bool:
         """Whether a scenario, as nested dicts and lists, is valid and a counterexample."""
@@ -46,7 +47,7 @@ class Search:
             scenario = from_data(data, "smaller scenario")
         except ScenarioError:
             return False
-        return self._judge(rows_of_scenario(self.spec, scenario, self.limits))[1]
+        return self._judge(rows_of_scenario(self.spec, scenario, self.limits, engine=self.engine))[1]
 
     def _judge(self, rows: list[Row]) -> tuple[float, bool]:
         return self.objective.value(rows), self.objective.found(rows)
@@ -98,13 +99,9 @@ def _asked(sampler: Sampler, n: int) -> Array:
     return points
 
 
-@contextmanager
-def _guarded(sampler: Sampler, what: str) -> Iterator[None]:
+def _guarded(sampler: Sampler, what: str) -> AbstractContextManager[None]:
     """Turn an exception of a sampler's method into a `PluginError` that names the method."""
-    try:
-        yield
-    except (Exception, SystemExit) as error:
-        raise PluginError(f"{what} of sampler {_name(sampler)}: {described(error)}") from error
+    return raised_as(lambda error: PluginError(f"{what} of sampler {_name(sampler)}: {described(error)}"))
 
 
 def _name(sampler: Sampler) -> str:

@@ -25,12 +25,12 @@ from pydantic import BeforeValidator, ConfigDict, PlainValidator, WithJsonSchema
 
 from airground_drake.base import files
 from airground_drake.base.errors import Fault, ScenarioError
+from airground_drake.base.limits import MAX_NAME
 from airground_drake.base.registry import RUN_CLAIMS
+from airground_drake.base.values import Real, Words, refused, wanted
 from airground_drake.scenario import plugins
 from airground_drake.scenario.document import UNKNOWN_KEY, Document, read, suggestion
 from airground_drake.scenario.filled import filled
-from airground_drake.scenario.kinds import Real, Words, refused, wanted
-from airground_drake.scenario.limits import MAX_NAME
 from airground_drake.scenario.load import from_data, load, shipped
 from airground_drake.scenario.schema import Scenario
 from airground_drake.study.campaign.course import REPLACES, Course

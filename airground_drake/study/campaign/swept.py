@@ -13,6 +13,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from airground_drake.base.statuses import NOT_EXERCISED, UNDECIDED, outcome
+from airground_drake.report import rules
 from airground_drake.report.view import canvas, svg
 from airground_drake.study.campaign.rows import JUDGED
 
@@ -20,7 +21,7 @@ from airground_drake.study.campaign.rows import JUDGED
 OF_A_RUN = ("ended", "what", "ugvs", "arrived", "arrival_s", "triggers", "first_trigger_s", "intervened_s")
 MARGIN = " margin"
 # Claims whose margins are drawn, if they were judged: the first of them.
-DRAWN = ("SAFE-TRACE", "SAFE-OWN", "LIVE-GOAL")
+DRAWN = (rules.DISTANCES, rules.OWN_DOING, rules.ARRIVAL)
 MOST_RUNS = len(canvas.LOOKS)
 SHARE = "share of UGVs that arrived"
 SAME = 1e-6  # relative difference of values that are drawn as one

@@ -11,8 +11,8 @@ from typing import Any, NoReturn
 import numpy as np
 
 from airground_drake.base.errors import ScenarioError, UnknownNameError
+from airground_drake.base.limits import MAX_SEED
 from airground_drake.base.registry import METHODS
-from airground_drake.scenario.limits import MAX_SEED
 from airground_drake.scenario.load import load, validated
 from airground_drake.scenario.schema import Scenario
 from airground_drake.sim.trace import Trace

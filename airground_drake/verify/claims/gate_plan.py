@@ -82,6 +82,7 @@ class GatePlan(GateClaim):
     """GATE-PLAN."""
 
     id = "GATE-PLAN"
+    subject = "plans of the gatekeeper"
     summary = "Every decision rests on a plan that is feasible and costs what was recorded."
     statement = (
         "Under method (c) the plan of every decision satisfies (26b)-(26e) at its recorded cost, no step of it is "

@@ -5,8 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
+from airground_drake.sim.trace import Trace
 from airground_drake.verify.claims.live_wait import LiveWait
 from airground_drake.verify.model.theorem import Proof
+from airground_drake.verify.runs.acceptances import Acceptance, acceptances
+from airground_drake.verify.runs.passive import beside
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -53,3 +56,19 @@ class LiveGate(LiveWait):
     def evidence(self, inputs: dict[str, Any], **proof: Any) -> Proof:
         """Add the longest that an accepted intervention may last."""
         return LatestEnd(over_after_s=float(inputs["longest_s"] + inputs["period_s"]), **proof)
+
+    def seen_in(self, trace: Trace) -> tuple[int, int]:
+        """The acceptances during which no obstacle was new and none in range may move, and all."""
+        accepted = [acceptance for of_ugv in acceptances(trace).values() for acceptance in of_ugv]
+        return sum(not each.news_s and not _beside_a_mover(trace, each) for each in accepted), len(accepted)
+
+
+def _beside_a_mover(trace: Trace, acceptance: Acceptance) -> bool:
+    """Whether an obstacle that may move was within sensing range of the UGV while it executed the proposal."""
+    for periods in beside(trace):
+        t_s = trace.t[periods.row]
+        meanwhile = (t_s >= acceptance.t_s) & (t_s <= acceptance.end_s)
+        in_range = periods.apart_m <= trace.scenario.control.sensing_range_m
+        if periods.pair.first == acceptance.on.ugv and (meanwhile & in_range).any():
+            return True
+    return False

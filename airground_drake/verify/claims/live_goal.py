@@ -25,6 +25,7 @@ class LiveGoal(TraceClaim):
     """LIVE-GOAL."""
 
     id = "LIVE-GOAL"
+    subject = "arrival"
     summary = "Every robot ended where it must: at its target, or where the scenario says that it stalls."
     statement = (
         "Every robot ended the run at its target, or standing where the scenario declares that it stalls. For a robot "

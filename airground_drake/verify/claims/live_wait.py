@@ -7,7 +7,9 @@ from typing import Any
 
 from airground_drake.base.exact import decimal
 from airground_drake.scenario.schema import Scenario
+from airground_drake.sim.trace import Trace
 from airground_drake.verify.model.theorem import Hypothesis, Proof, TheoremClaim
+from airground_drake.verify.runs.acceptances import below_avoidance
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -70,3 +72,7 @@ class LiveWait(TheoremClaim):
         """Add the bound."""
         bound = inputs["tries"] * (decimal(inputs["longest_s"]) + decimal(inputs["period_s"]))
         return Bound(bound_s=float(bound), **proof)
+
+    def seen_in(self, trace: Trace) -> tuple[int, int]:
+        """The executed interventions below avoidance, and all."""
+        return below_avoidance(trace)

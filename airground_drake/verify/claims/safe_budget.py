@@ -35,6 +35,7 @@ class SafeBudget(TheoremClaim):
     """SAFE-BUDGET."""
 
     id = "SAFE-BUDGET"
+    subject = "distance for lag and delay"
     summary = (
         "The law keeps the safe distance plus what turning, lags and delays cost, so bodies keep the safe distance."
     )
@@ -72,7 +73,7 @@ class SafeBudget(TheoremClaim):
     theorems: tuple[str, ...] = ()
     margin_of = "distance in the law less what the plants take"
 
-    def applies_to(self, scenario: Scenario) -> bool:
+    def applies(self, scenario: Scenario) -> bool:
         """Only a scenario with robots that are not where the law steers them."""
         return takes_room(scenario)
 

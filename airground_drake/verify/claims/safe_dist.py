@@ -6,16 +6,20 @@ an obstacle, 2 w between robots. Other symbols are those of `safe_inv.py`.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from math import inf
 from typing import Any
 
 from airground_drake.base.exact import decimal
 from airground_drake.scenario.schema import Scenario
+from airground_drake.sim.trace import Trace
 from airground_drake.verify.claims.safe_inv import stable
+from airground_drake.verify.finding import Finding
 from airground_drake.verify.model.pair_kinds import PairKind, constants, kinds_of
 from airground_drake.verify.model.theorem import Hypothesis, Proof, TheoremClaim
+from airground_drake.verify.runs.passive import beside
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -119,6 +123,27 @@ class SafeDist(TheoremClaim):
         for pair in kinds_of(inputs):
             least[pair.kind] = min(float(left_m(inputs, pair)), least.get(pair.kind, inf))
         return LeastDistances(least_distances_m=least, **proof)
+
+    def seen_in(self, trace: Trace) -> tuple[int, int, int]:
+        """Periods too near to an obstacle that may move, and those of them with a retreat at w, and at w + V."""
+        w = self.inputs(trace.scenario)["disturbance_m_s"]
+        passive = once = kept = 0
+        for periods in beside(trace):
+            away_m_s = periods.away_m_s[periods.passive]
+            passive += len(away_m_s)
+            once += int((away_m_s >= w).sum())
+            kept += int((away_m_s >= w + periods.pair.speed_m_s).sum())
+        return passive, once, kept
+
+    def with_runs(self, finding: Finding, seen: Sequence[tuple[int, ...]]) -> Finding:
+        """Add these periods, if there are any."""
+        passive, once, kept = (sum(column) for column in zip(*seen, (0, 0, 0), strict=True))
+        if not passive or not isinstance(finding.evidence, LeastDistances):
+            return finding
+        evidence = replace(
+            finding.evidence, passive_periods=passive, passive_periods_w_h_once=once, passive_periods_kept=kept
+        )
+        return replace(finding, evidence=evidence)
 
 
 def left_m(inputs: dict[str, Any], pair: PairKind) -> Fraction:

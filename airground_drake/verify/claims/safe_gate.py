@@ -7,14 +7,17 @@ from typing import Any
 
 from airground_drake.base.registry import METHODS
 from airground_drake.scenario.schema import Scenario
+from airground_drake.sim.trace import Trace
 from airground_drake.verify.claims.safe_inv import SafeInv
 from airground_drake.verify.model.theorem import Hypothesis
+from airground_drake.verify.runs.acceptances import below_avoidance
 
 
 class SafeGate(SafeInv):
     """SAFE-GATE; its hypotheses are those of SAFE-INV and one more."""
 
     id = "SAFE-GATE"
+    subject = "proof of distances"
     summary = "Under method (d) nothing that the UAV asks for makes a robot bring itself closer than the safe distance."
     statement = (
         "Under method (d) no intervention, accepted or not, leaves the safe set. The avoidance layer comes last, and "
@@ -55,3 +58,7 @@ class SafeGate(SafeInv):
         on_top = Fraction(inputs["intervention_on_top"])
         order = Hypothesis.of("order of priorities", "method (d) has avoidance above the intervention", -on_top)
         return [*super().hypotheses(inputs), order]
+
+    def seen_in(self, trace: Trace) -> tuple[int, int]:
+        """The executed interventions below avoidance, and all."""
+        return below_avoidance(trace)

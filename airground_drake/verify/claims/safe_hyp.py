@@ -122,6 +122,7 @@ class SafeHyp(TraceClaim):
     """SAFE-HYP."""
 
     id = "SAFE-HYP"
+    subject = "conditions of the proof"
     summary = "Every step of the run met the conditions under which the safety theorem (SAFE-INV) holds."
     statement = (
         "At every control sample of the run the hypotheses of the safety theorem held, up to e per pair of bodies: so "

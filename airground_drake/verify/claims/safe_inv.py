@@ -12,6 +12,8 @@ from typing import Any
 
 from airground_drake.base.exact import decimal
 from airground_drake.scenario.schema import Scenario
+from airground_drake.sim.trace import Trace
+from airground_drake.verify.claims.safe_hyp import guarantees
 from airground_drake.verify.model.pair_kinds import SHARES, constants, kinds_of
 from airground_drake.verify.model.theorem import Hypothesis, TheoremClaim
 
@@ -20,6 +22,7 @@ class SafeInv(TheoremClaim):
     """SAFE-INV."""
 
     id = "SAFE-INV"
+    subject = "proof of distances"
     summary = "A robot that obeys the avoidance inequalities and starts at a safe distance keeps it."
     statement = (
         "Any number of robots and obstacles at rest whose pairs start at their safe distances keep them at all times, "
@@ -107,6 +110,11 @@ class SafeInv(TheoremClaim):
             for each in pairs
         ]
         return [*stable(gain, h), *shares, *apart, *ranges]
+
+    def seen_in(self, trace: Trace) -> tuple[int, int]:
+        """The pairs that met every inequality, and those within reach of each other."""
+        margins_m = [promised.margin_m for promised in guarantees(trace)]
+        return margins_m.count(0.0), len(margins_m)
 
 
 def stable(gain: Fraction, h: Fraction) -> list[Hypothesis]:

@@ -22,6 +22,7 @@ class SafeOwn(TraceClaim):
     """SAFE-OWN."""
 
     id = "SAFE-OWN"
+    subject = "the robots' own doing"
     summary = "No robot itself brought a distance below the required one, whatever the obstacles that move did."
     statement = (
         "In every control period, with the other body held where it was at the control sample, no robot came nearer to "

@@ -30,6 +30,7 @@ class SafeTrace(TraceClaim):
     """SAFE-TRACE."""
 
     id = "SAFE-TRACE"
+    subject = "distances"
     summary = "No robot came closer to an obstacle or to another robot than the safe distance."
     statement = "During the whole run every robot kept the safe distance from every obstacle and every other robot."
     latex = (

@@ -2,20 +2,28 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, replace
 from typing import Any
+
+import numpy as np
 
 from airground_drake.base.statuses import Status
 from airground_drake.model.trigger.bayes import bayes_risk, optimal_threshold, printed_threshold
 from airground_drake.scenario.schema import Scenario, Threshold
+from airground_drake.sim.trace import Trace
 from airground_drake.verify.claim import ModelClaim
+from airground_drake.verify.claims.thr_quality import drift_of
 from airground_drake.verify.claims.thr_root import ThrRoot, rule_of
-from airground_drake.verify.finding import Evidence, Finding
+from airground_drake.verify.finding import Chart, Evidence, Finding
 from airground_drake.verify.model.levels import NUMBERS
+from airground_drake.verify.runs.triggers import task_error
 
 # A threshold is the optimum if it differs by this share at most: it then costs less than 1e-11 of the risk.
 EQUAL = 1e-6
 
+POINTS = 200  # of the chart
+BEYOND = 1.6  # length of its axis, relative to the largest mark
 DIGITS = 12  # decimals of a difference of risks: it is rounded in floating point
 
 
@@ -52,6 +60,7 @@ class ThrChoice(ModelClaim):
     """THR-CHOICE."""
 
     id = "THR-CHOICE"
+    subject = "choice of the threshold"
     summary = "The threshold in force is the best one for the scenario's own numbers, or it is declared by the user."
     statement = (
         "The threshold in force minimises the Bayes risk for the scenario's own c1, c2, drift and noise, or somebody "
@@ -97,8 +106,9 @@ class ThrChoice(ModelClaim):
             extra_risk=max(round(risk - least, DIGITS), 0.0),
         )
         shown = {key: value for key, value in asdict(evidence).items() if value is not None}
+        chart = _chart(evidence, numbers)
         if not optimal and inputs["rule"] != "bayes":
-            return Finding("holds", evidence=evidence, exercised=0)
+            return Finding("holds", evidence=evidence, exercised=0, figure=chart)
         return Finding(
             "holds" if optimal else "refuted",
             margin=EQUAL * optimum - off,
@@ -107,7 +117,45 @@ class ThrChoice(ModelClaim):
             counterexample=None if optimal else shown,
             evidence=evidence,
             exercised=1,
+            figure=chart,
         )
+
+    def seen_in(self, trace: Trace) -> dict[str, Measured]:
+        """What the drift and the noise of UGVs say whose task error grew to the threshold, by `run UGV`."""
+        decision, zeta = trace.scenario.decision, float(trace.meta["zeta_m"])
+        drifts = {ugv: drift_of(task_error(trace, ugv), zeta) for ugv in trace.ugvs}
+        return {
+            f"{trace.run} {ugv}": measured(zeta, drift, decision.noise_m_sqrt_s, decision.threshold)
+            for ugv, drift in drifts.items()
+            if drift is not None
+        }
+
+    def with_runs(self, finding: Finding, seen: Sequence[dict[str, Measured]]) -> Finding:
+        """Add these UGVs."""
+        if not isinstance(finding.evidence, ThresholdChoice):
+            return finding
+        runs = {name: row for of_run in seen for name, row in of_run.items()}
+        return replace(finding, evidence=replace(finding.evidence, runs=runs))
+
+
+def _chart(evidence: ThresholdChoice, numbers: Sequence[float]) -> Chart:
+    """The Bayes risk over the threshold; the threshold in force, the optimal one, and that by (19) as printed."""
+    places = {
+        "in force": evidence.threshold_in_force_m,
+        "optimal": evidence.optimal_threshold_m,
+        "(19) as printed": evidence.threshold_as_printed_in_19_m,
+    }
+    zeta = np.linspace(0.0, BEYOND * max(places.values()), POINTS + 1)[1:]
+    drift, noise, *_ = numbers
+    return Chart(
+        "Bayes risk (16) over the threshold",
+        "threshold, m",
+        "Bayes risk",
+        {"risk (16)": (zeta, np.array([bayes_risk(at, *numbers) for at in zeta]))},
+        {name: (at, float(bayes_risk(at, *numbers))) for name, at in places.items()},
+        caption=f"The threshold in force is {evidence.threshold_in_force_m:.4g} m ({evidence.kind}). The curve assumes "
+        f"a drift of {drift:g} m/s and a noise of {noise:g} m/√s.",
+    )
 
 
 def measured(zeta: float, drift: float, noise: float, rule: Threshold) -> Measured:

@@ -88,6 +88,7 @@ class ThrDdm(ModelClaim):
     )
     expected = "supported"
     record = Comparisons
+    kept = True
     exercised_by = "simulated paths"
 
     def inputs(self, scenario: Scenario) -> dict[str, Any]:

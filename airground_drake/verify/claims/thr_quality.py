@@ -79,6 +79,7 @@ class ThrQuality(TraceClaim):
     """THR-QUALITY."""
 
     id = "THR-QUALITY"
+    subject = "timing of triggers"
     summary = "The UAV stepped in when the real task error, without noise, was about at the threshold."
     statement = (
         "At every trigger, and while the UAV watched without one, the task error without noise agreed with the "
@@ -126,7 +127,7 @@ class ThrQuality(TraceClaim):
             own = list(judge.decisions(recorded_events(trace, ugv), dwell))
             decisions += own
             drift = drift_of(e, zeta)
-            if drift is not None and drift > 0.0:
+            if drift is not None:
                 ddm[ugv] = _ddm(own, zeta, drift, trace.scenario.decision.noise_m_sqrt_s)
         counts = Counter(one.kind for one in decisions)
         timed = [(one.late_s, k) for k, one in enumerate(decisions) if one.late_s is not None and one.kind != "missed"]
@@ -245,12 +246,13 @@ class Judge:
 
 
 def drift_of(e: NormSignal, zeta: float) -> float | None:
-    """Growth of e over `BEFORE_S` before it first reaches zeta, m/s; None if it does not, or is there at the start."""
+    """Growth of e over `BEFORE_S` before it first reaches zeta, m/s; None without growth, or if e starts there."""
     reached = e.reaches(zeta, float(e.t[0]), above=True)
     if reached is None or e.x[0] >= zeta:
         return None
     begin = max(reached - BEFORE_S, float(e.t[0]))
-    return float(e.at(reached) - e.at(begin)) / (reached - begin)
+    grown = float(e.at(reached) - e.at(begin))
+    return grown / (reached - begin) if grown > 0.0 else None
 
 
 def _ddm(decisions: Sequence[Decided], zeta: float, drift: float, noise: float) -> Ddm:

@@ -58,6 +58,7 @@ class ThrTrig(TraceClaim):
     """THR-TRIG."""
 
     id = "THR-TRIG"
+    subject = "triggers"
     summary = "The UAV stepped in exactly when the error reached the threshold: never late, never without cause."
     statement = (
         "The UAV triggered exactly when the decision variable reached the threshold, none missing and none spurious; "

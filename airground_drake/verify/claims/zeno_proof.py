@@ -26,6 +26,7 @@ class ZenoProof(TheoremClaim):
     """ZENO-PROOF."""
 
     id = "ZENO-PROOF"
+    subject = "proof of gaps between triggers"
     summary = "Triggers never pile up: two are at least the minimum inter-event time apart, whatever the noise."
     statement = (
         "Triggers i < j of a UGV are at least (j - i) times the minimum inter-event time apart, whatever the decision "

@@ -26,7 +26,7 @@ from airground_drake.base.arrays import Array
 from airground_drake.base.statuses import Status
 from airground_drake.scenario.schema import Scenario
 from airground_drake.verify.claim import ModelClaim
-from airground_drake.verify.finding import Evidence, Finding
+from airground_drake.verify.finding import Chart, Evidence, Finding
 from airground_drake.verify.model.levels import levels_of
 from airground_drake.verify.model.refined_paths import (
     HALVINGS,
@@ -44,6 +44,7 @@ RESAMPLES = 4000
 DIVERGES_BELOW = -0.25
 FLAT_WITHIN = 0.1
 STANDARD_ERRORS = 5.0
+FEWEST = 0.05  # smaller mean counts are drawn as this one: the axis is logarithmic
 ROUNDING = 1e-9  # exponents are equal within this: the fit to equal counts gives about 1e-15
 
 
@@ -129,6 +130,7 @@ class ZenoRefine(ModelClaim):
     )
 
     record = Series
+    kept = True
     exercised_by = "simulated paths, each at every noise step"
 
     def inputs(self, scenario: Scenario) -> dict[str, Any]:
@@ -224,7 +226,37 @@ def judge_experiment(setting: Refinement) -> Finding:
         broken |= {"dt_s": evidence.dt_s, "mean": counted.mean}
     elif (off > STANDARD_ERRORS * np.array(evidence.bare.standard_error)).any():
         status = "inconclusive"
-    quantity = "what the confidence interval of an exponent, or a count, leaves of the condition"
     return Finding(
-        status, slack[condition], "", {"condition": condition}, broken, evidence, quantity=quantity, exercised=PATHS
+        status,
+        margin=slack[condition],
+        where={"condition": condition},
+        counterexample=broken,
+        evidence=evidence,
+        quantity="what the confidence interval of an exponent, or a count, leaves of the condition",
+        exercised=PATHS,
+        figure=_chart(evidence),
+    )
+
+
+def _chart(evidence: Series) -> Chart:
+    """Triggers against the noise step, of the bare threshold and of the automaton."""
+    counts = {
+        "bare threshold": evidence.bare.mean,
+        "bare, theory": evidence.expected_bare,
+        "automaton": evidence.automaton.mean,
+    }
+    exponents = (
+        f"{name}: exponent {fit.exponent:.3f}, {100 * evidence.level:g} % interval "
+        f"[{fit.interval[0]:.3f}, {fit.interval[1]:.3f}]"
+        for name, fit in (("Bare threshold", evidence.fit["bare"]), ("automaton", evidence.fit["automaton"]))
+    )
+    return Chart(
+        "Triggers under refinement of the noise step",
+        "noise step, s",
+        "triggers per path",
+        {name: (evidence.dt_s, np.maximum(count, FEWEST)) for name, count in counts.items()},
+        log="xy",
+        caption=f"The task error stays at the threshold; means of {evidence.paths} paths of {evidence.duration_s:.3g} "
+        "s. With finer noise the bare threshold triggers without bound, like one over the square root of the step; the "
+        f"automaton does not. {'; '.join(exponents)}.",
     )

@@ -43,6 +43,7 @@ class ZenoTrace(TraceClaim):
     """ZENO-TRACE."""
 
     id = "ZENO-TRACE"
+    subject = "gaps between triggers"
     summary = "No UGV was triggered twice within the minimum inter-event time."
     statement = "In this run no UGV was triggered twice within the minimum inter-event time."
     latex = (r"t_{k+1} - t_k \ge \tau_{\min} - 10^{-9} \text{ s} \quad \text{for consecutive triggers of each UGV}",)

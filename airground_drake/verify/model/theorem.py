@@ -93,6 +93,13 @@ class TheoremClaim(ModelClaim):
         """The proof, with the numbers that follow for these constants."""
         return Proof(**proof)
 
+    def with_runs(self, finding: Finding, seen: Sequence[tuple[int, int]]) -> Finding:
+        """Add how often the runs met the premise, of how many times: a theorem that never applies protects nothing."""
+        if not seen or not isinstance(finding.evidence, Proof):
+            return finding
+        met, cases = (sum(column) for column in zip(*seen, strict=True))
+        return replace(finding, evidence=replace(finding.evidence, applies_to=met, of=cases))
+
     def counterexample(self, inputs: dict[str, Any], broken: Hypothesis) -> dict[str, Any] | None:
         """A case that refutes the claim if this hypothesis fails; None: the claim is only left open."""
         return None

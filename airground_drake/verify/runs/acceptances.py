@@ -28,6 +28,12 @@ def acceptances(trace: Trace) -> dict[str, list[Acceptance]]:
     return {ugv: _of_ugv(trace, ugv) for ugv in trace.ugvs} if trace.meta["method"] == METHOD else {}
 
 
+def below_avoidance(trace: Trace) -> tuple[int, int]:
+    """How many executed interventions were below avoidance, as method (d) has them, and how many there were."""
+    count = sum(len({*trace.sampled(f"{ugv}.executing").tolist()} - {-1.0}) for ugv in trace.ugvs)
+    return (count if trace.meta["method"] == METHOD else 0), count
+
+
 def _of_ugv(trace: Trace, ugv: str) -> list[Acceptance]:
     gate, found, table = trace.scenario.gatekeeper, list[Acceptance](), trace.decisions
     mine = table[table["robot"] == ugv].sort_values("t_s", kind="stable")

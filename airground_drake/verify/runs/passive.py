@@ -72,9 +72,14 @@ class Periods(NamedTuple):
         return self.passive & (np.linalg.norm(self.velocity, axis=1) <= STANDING_M_S)
 
     @property
+    def away_m_s(self) -> Array:
+        """How fast the robot's command leads away from the obstacle, (K,), m/s."""
+        return np.asarray(np.einsum("ka,ka->k", self.normal, self.velocity))
+
+    @property
     def retreated(self) -> Flags:
         """Where it was passive and went away from the obstacle as fast as that may come."""
-        return self.passive & (np.einsum("ka,ka->k", self.normal, self.velocity) >= self.pair.speed_m_s - AT_LIMIT_M_S)
+        return self.passive & (self.away_m_s >= self.pair.speed_m_s - AT_LIMIT_M_S)
 
 
 def periods_of(trace: Trace, pair: Pair) -> Periods:

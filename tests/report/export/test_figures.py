@@ -12,16 +12,18 @@ from report.cases import GOING_ROUND, SUCCESS, make_scenario, make_trace
 
 from airground_drake.commands.figures import FORMATS, STYLES
 from airground_drake.report.export import figures
+from airground_drake.report.model import Claim, Report
 
-REPORT: dict[str, Any] = {
-    "runs": {"c": {}},
-    "claims": [
-        {"id": "SAFE-TRACE", "run": "c", "status": "holds", "exercised": 7},
-        {"id": "SAFE-GATE", "run": "", "status": "proved", "exercised": None},
-        {"id": "LIVE-GOAL", "run": "c", "status": "holds", "exercised": 0},
+NO: dict[str, Any] = {"as_expected": None, "evidence": {}, "inputs": {}}
+REPORT = Report.model_construct(
+    runs={"c": None},
+    claims=[
+        Claim(id="SAFE-TRACE", run="c", status="holds", exercised=7, **NO),
+        Claim(id="SAFE-GATE", run="", status="proved", exercised=None, **NO),
+        Claim(id="LIVE-GOAL", run="c", status="holds", exercised=0, **NO),
     ],
-    "reproduction": [],
-}
+    reproduction=[],
+)
 
 
 def written(folder: Path, style: str, formats: Sequence[str]) -> dict[str, bytes]:

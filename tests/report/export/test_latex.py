@@ -9,22 +9,24 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from airground_drake.report.export import latex
+from airground_drake.report.model import Claim, Report, Row
 
-REPORT: dict[str, Any] = {
-    "runs": {"a": {}, "d_2": {}},
-    "claims": [
-        {"id": "SAFE-INV", "run": "", "status": "proved", "exercised": None},
-        {"id": "ZENO-TRACE", "run": "a", "status": "holds", "exercised": 0},
-        {"id": "ZENO-TRACE", "run": "d_2", "status": "holds", "exercised": 3},
-        {"id": "SAFE-TRACE", "run": "a", "status": "refuted", "exercised": 4},
+NO: dict[str, Any] = {"as_expected": None, "evidence": {}, "inputs": {}}
+REPORT = Report.model_construct(
+    runs={"a": None, "d_2": None},
+    claims=[
+        Claim(id="SAFE-INV", run="", status="proved", exercised=None, **NO),
+        Claim(id="ZENO-TRACE", run="a", status="holds", exercised=0, **NO),
+        Claim(id="ZENO-TRACE", run="d_2", status="holds", exercised=3, **NO),
+        Claim(id="SAFE-TRACE", run="a", status="refuted", exercised=4, **NO),
     ],
-    "reproduction": [
-        {"id": "A1", "quantity": "stall & 5 %", "paper": [3.3, 5.1], "ours": [3.36889, 5.10219], "unit": "m",
-         "status": "not_reproduced"},
-        {"id": "A3", "quantity": "grows", "paper": 1.0, "ours": 0.0, "unit": "yes/no", "status": "calibrated"},
-        {"id": "A5", "quantity": "trigger", "paper": 14.45, "ours": None, "unit": "s", "status": "not_reproduced"},
+    reproduction=[
+        Row(id="A1", quantity="stall & 5 %", paper=[3.3, 5.1], ours=[3.36889, 5.10219], unit="m",
+            status="not_reproduced"),
+        Row(id="A3", quantity="grows", paper=1.0, ours=0.0, unit="yes/no", status="calibrated"),
+        Row(id="A5", quantity="trigger", paper=14.45, ours=None, unit="s", status="not_reproduced"),
     ],
-}  # fmt: skip
+)  # fmt: skip
 
 
 def rows(table: str) -> list[list[str]]:

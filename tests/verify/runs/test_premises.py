@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 
 from airground_drake.sim.trace import Trace
-from airground_drake.verify.applications import counts, with_counts, without_news
-from airground_drake.verify.finding import Finding
+from airground_drake.verify import MODEL_CLAIMS, Finding
+from airground_drake.verify.claims.live_gate import LiveGate
 from airground_drake.verify.model.theorem import Proof
 
 Run = Callable[[str, str], Trace]
@@ -24,7 +24,7 @@ Run = Callable[[str, str], Trace]
 def test_what_is_accepted_where_all_obstacles_are_known_meets_the_premise(
     run: Run, scenario: str, run_name: str, met: int
 ) -> None:
-    assert without_news(run(scenario, run_name)) == (met, met)
+    assert LiveGate().seen_in(run(scenario, run_name)) == (met, met)
 
 
 def test_an_obstacle_that_is_sensed_later_is_no_part_of_the_premise(run: Run) -> None:
@@ -32,21 +32,22 @@ def test_an_obstacle_that_is_sensed_later_is_no_part_of_the_premise(run: Run) ->
     later = len(trace.decisions) // 2
     assert trace.decisions["decision"][later] == "accept"
     news = [[0] if k == later else [] for k in range(len(trace.decisions))]
-    assert without_news(replace(trace, decisions=trace.decisions.assign(new=news))) == (0, 1)
+    assert LiveGate().seen_in(replace(trace, decisions=trace.decisions.assign(new=news))) == (0, 1)
 
 
 def test_counts_of_several_runs_are_added() -> None:
-    runs: list[dict[str, tuple[int, int]]] = [{"A": (1, 2)}, {}, {"A": (0, 3), "B": (1, 1)}]
     proof = Proof(proof="checked", theorems={}, hypotheses=[])
-    assert with_counts("A", Finding("proved", evidence=proof), runs).evidence == replace(proof, applies_to=1, of=5)
-    assert with_counts("C", Finding("proved", evidence=proof), runs).evidence is proof
+    found = Finding("proved", evidence=proof, exercised=1)
+    assert LiveGate().judge_runs(found, [(1, 2), None, (0, 3)]).evidence == replace(proof, applies_to=1, of=5)
+    assert LiveGate().judge_runs(found, [None]).evidence is proof
 
 
 def test_a_run_whose_records_are_wrong_is_not_counted(run: Run) -> None:
     trace = run("case_a", "d")
-    assert set(counts(trace)) == {"SAFE-INV", "SAFE-GATE", "LIVE-GATE", "LIVE-WAIT"}
+    showing = {"SAFE-INV", "SAFE-GATE", "SAFE-DIST", "LIVE-GATE", "LIVE-WAIT", "THR-CHOICE"}
+    assert {claim.id for claim in MODEL_CLAIMS if claim.judge_run(trace) is not None} == showing
     bare = Trace(trace.meta, trace.states, trace.samples, trace.decisions)
-    assert set(counts(bare)) == {"SAFE-INV", "SAFE-GATE", "LIVE-WAIT"}
+    assert {claim.id for claim in MODEL_CLAIMS if claim.judge_run(bare) is not None} == showing - {"LIVE-GATE"}
 
 
 def test_theorems_say_how_often_their_premise_was_met(report: Callable[[str], Path]) -> None:

@@ -12,11 +12,9 @@ from verify.model.threshold.cases import INPUTS, TABLE_1
 
 from airground_drake.model.trigger.bayes import optimal_threshold
 from airground_drake.report import html
-from airground_drake.report.figures import model
 from airground_drake.scenario.load import load
 from airground_drake.sim.trace import Trace
 from airground_drake.verify import judge_all, judge_model
-from airground_drake.verify.applications import measured
 from airground_drake.verify.claims.thr_choice import ThrChoice
 
 
@@ -61,12 +59,12 @@ def test_shipped_scenarios(scenario: str, run: str, rule: str, in_force: float, 
 
 
 def test_runs_show_the_drift_and_the_noise_that_they_had(run: Callable[[str, str], Trace]) -> None:
-    found = measured(run("case_a", "b"))["b ugv1"]
+    found = ThrChoice().seen_in(run("case_a", "b"))["b ugv1"]
     assert found.drift_m_s == pytest.approx(0.5606, abs=5e-4)
     assert found.noise_m_sqrt_s == 0.004
     assert found.optimum_m == pytest.approx(0.00016, abs=5e-6)
     assert found.extra_risk == pytest.approx(0.5 * 3.0 / 0.5606, rel=1e-2)  # c1 times the time to reach 3 m
-    quiet = measured(with_scenario(run_of("d"), decision__noise_m_sqrt_s=0.0))["d ugv1"]
+    quiet = ThrChoice().seen_in(with_scenario(run_of("d"), decision__noise_m_sqrt_s=0.0))["d ugv1"]
     assert quiet.optimum_m == 0.0
     assert quiet.extra_risk == pytest.approx(0.5 * 3.0 / quiet.drift_m_s)
 
@@ -84,11 +82,10 @@ def test_a_report_has_the_runs_beside_the_numbers_of_the_rule(run: Callable[[str
 
 
 def test_the_figure_marks_three_thresholds() -> None:
-    figure = model.bayes_risks(TABLE_1, ThrChoice().judge(TABLE_1).to_json()["evidence"])
-    assert figure is not None
-    rows = {row[0]: row[1:] for row in figure.panels[0].table.rows[-3:]}
-    assert rows == {"in force": ("3", "0.4547"), "optimal": ("2.992", "0.4547"), "(19) as printed": ("0.7557", "0.48")}
-    assert model.bayes_risks(TABLE_1, {"error": "failed"}) is None
+    chart = ThrChoice().judge(TABLE_1).figure
+    assert chart is not None
+    marks = {name: tuple(f"{number:.4g}" for number in at) for name, at in chart.marks.items()}
+    assert marks == {"in force": ("3", "0.4547"), "optimal": ("2.992", "0.4547"), "(19) as printed": ("0.7557", "0.48")}
 
 
 @pytest.mark.parametrize(("kind", "shown"), [("declared", "declared"), ("optimal", "holds")])

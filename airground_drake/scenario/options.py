@@ -1,0 +1,61 @@
+"""What commands take: a table of the options that several of them have, and how a command lists its own."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable, Collection, Mapping
+from pathlib import Path
+from typing import Any
+
+from airground_drake.base.usage import MOST_JOBS, Parser, output_folder, positive, whole
+from airground_drake.scenario import plugins
+from airground_drake.scenario.estimate import DEFAULT_LIMITS
+
+Option = dict[str, Any]  # what argparse is told of an option or argument
+
+
+def option(says: str, metavar: str | None = None, kind: Callable[[str], Any] | None = None, **more: Any) -> Option:
+    """What an option means, how its value is called, and what reads the value; without these two it is a flag."""
+    return {"help": says, **{key: value for key, value in (("metavar", metavar), ("type", kind)) if value}, **more}
+
+
+# By all its names. A command may give another help, or other values.
+OPTIONS: dict[str, Option] = {
+    "scenario": option("name of a shipped scenario, or path to a YAML file"),
+    "folder": option("folder of a report", "DIR", Path),
+    "spec": option("YAML file of a campaign", kind=Path),
+    "run": option("default: all runs", "RUN", nargs="?"),
+    "-n --number": option("", "N", whole(1)),
+    "-o --output": option("default: this folder", "DIR", output_folder),
+    "-q --quiet": option("no progress"),
+    "--engine": option("who makes the runs: a compiled loop, which Drake checks, or Drake alone (default: %(default)s)",
+                       choices=("batch", "drake"), default="batch"),
+    "--jobs": option("processes (default: one for each processor)", "N", whole(1, MOST_JOBS)),
+    "--json": option("print all of it as JSON"),
+    "--limit-steps": option("", "N", positive, default=DEFAULT_LIMITS.work),
+    "--seed": option("seed of the decision noise", "N", int),
+    "--set": option("override a key of the scenario", "KEY=VALUE", action="append", default=[]),
+    plugins.OPTION: option(plugins.HELP),
+    plugins.SHOW: option(plugins.SHOW_HELP),
+}  # fmt: skip
+
+
+def parser_of(
+    name: str,
+    description: str,
+    takes: Mapping[str, Option | str | None],
+    epilog: str | None = None,
+    exclusive: Collection[str] = (),
+) -> Parser:
+    """The parser of a command."""
+    # takes: its options and arguments, each with what it has otherwise than the table, None if nothing.
+    # exclusive: options of which at most one may be given.
+    form = argparse.RawDescriptionHelpFormatter if "\n" in (epilog or "") else argparse.HelpFormatter
+    parser = Parser(prog=f"airground {name}", description=description, epilog=epilog, formatter_class=form)
+    group = parser.add_mutually_exclusive_group() if exclusive else parser
+    for names, own in takes.items():
+        told = OPTIONS.get(names, {}) | ({"help": own} if isinstance(own, str) else own or {})
+        if names.startswith("-") and not told.keys() & {"metavar", "type", "choices", "action"}:
+            told["action"] = "store_true"
+        (group if names in exclusive else parser).add_argument(*names.split(), **told)
+    return parser
