@@ -15,8 +15,8 @@ from pydrake.systems.framework import Context, Diagram
 from airground_drake.report.view.draw import robot_path, served
 from airground_drake.report.view.live_view import LiveView
 from airground_drake.scenario.load import load
-from airground_drake.sim.diagram import RECORDED, Model, build_model
 from airground_drake.sim.blocks.decision import ACCURACY
+from airground_drake.sim.diagram import RECORDED, Model, build_model
 from airground_drake.sim.simulation import Recorder
 
 HALF_S, END_S = 15.0, 18.0

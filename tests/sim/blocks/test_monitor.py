@@ -16,8 +16,8 @@ from airground_drake.scenario.schema import Scenario
 from airground_drake.scenario.world import make_world
 from airground_drake.sim import components
 from airground_drake.sim.blocks import Monitor, Rule, Violation
-from airground_drake.sim.diagram import build_diagram, make_monitor
 from airground_drake.sim.blocks.decision import ACCURACY
+from airground_drake.sim.diagram import build_diagram, make_monitor
 from airground_drake.sim.trace import Trace
 from airground_drake.verify import judge
 
