@@ -7,8 +7,10 @@ import time
 import weakref
 from contextlib import suppress
 
+import numpy as np
 import pytest
 
+from airground_drake.base.compiling import njit
 from airground_drake.uav.guest.time_limit import OutOfTime, time_limit
 
 
@@ -47,3 +49,20 @@ def test_a_limit_that_python_ignores_in_a_callback_comes_again() -> None:
     with pytest.raises(OutOfTime), time_limit(0.05):
         forget_and_wait()
     assert reference() is None
+
+
+def test_compilation_does_not_count() -> None:
+    """Else a slow machine would interrupt it each time, and never have the compiled function."""
+
+    def total(numbers: np.ndarray) -> float:
+        return float(np.sort(numbers).cumsum()[-1])
+
+    with time_limit(0.01):
+        assert njit(cache=False)(total)(np.ones(3)) == 3.0
+    with pytest.raises(OutOfTime), time_limit(0.01):
+        _waits_for_ever(njit(cache=False)(total)(np.ones(4)))
+
+
+def _waits_for_ever(_: float) -> None:
+    while True:
+        time.sleep(1.0)

@@ -20,7 +20,7 @@ class OutOfTime(BaseException):
 
 @contextmanager
 def time_limit(seconds: float, error: type[BaseException] = OutOfTime) -> Iterator[None]:
-    """Raise an error in the body after so many seconds of wall-clock time."""
+    """Raise an error in the body after so many seconds of wall-clock time; time in which numba compiles is free."""
     # The limit works in the main thread only. Compiled code is interrupted when it returns to the interpreter. Limits
     # can be nested: an inner limit lasts no longer than the rest of the outer one, which then raises its own error.
     if threading.current_thread() is not threading.main_thread():
@@ -28,6 +28,9 @@ def time_limit(seconds: float, error: type[BaseException] = OutOfTime) -> Iterat
         return
 
     def interrupt(number: int, frame: FrameType | None) -> None:
+        if _compiles(frame):  # once for ever, and from the beginning if it is interrupted: it does not count
+            signal.setitimer(signal.ITIMER_REAL, min(seconds, _LONGEST_S), _AGAIN_S)
+            return
         raise error(f"not done after {seconds:g} s")
 
     outer, started = signal.getitimer(signal.ITIMER_REAL)[0], time.monotonic()
@@ -40,3 +43,12 @@ def time_limit(seconds: float, error: type[BaseException] = OutOfTime) -> Iterat
         signal.signal(signal.SIGALRM, before)
         if outer:
             signal.setitimer(signal.ITIMER_REAL, max(outer - (time.monotonic() - started), _AT_ONCE_S), _AGAIN_S)
+
+
+def _compiles(frame: FrameType | None) -> bool:
+    """Whether numba compiles a function in this frame."""
+    while frame is not None:
+        if frame.f_code.co_name == "_compile_for_args":
+            return True
+        frame = frame.f_back
+    return False
