@@ -90,9 +90,11 @@ class Accepted(NamedTuple):
 class State(NamedTuple):
     """What changes."""
 
-    time: Array  # now; when the trigger's step began; number of short steps in a row, (3,)
+    # Now; when the trigger's step began; number of short steps in a row; until when the planner sleeps, (4,).
+    time: Array
     counts: Ints  # next tick, rows written, samples of noise used, what is due now, 1 after Python's update, (5,)
-    talking: Bools  # whether a negotiation is open; whether a UGV has something to answer, (2,)
+    called: Bools  # which UGVs were triggered when the planner fell asleep, (n,)
+    answers: Bools  # whether a UGV has something to answer, (1,)
     place: Array  # of all bodies that move, (M, 3), m
     noise: Array  # (n,), m
     drawn: Array  # the sample in force, (n,)
@@ -166,8 +168,8 @@ def advance(team: Team, around: Around, accepted: Accepted, state: State, log: L
     period, shortest, isolation, gain, leak, sensing = numbers
     ugvs, uav = around
     on, number, chosen, row_of, motion_t, motion_p, motion_v = accepted
-    time, counts, talking, place, noise, drawn, command, executing, share, heading = state[:10]
-    sampled, status, halts, held_begun, held_now, reference, known = state[10:]
+    time, counts, called, answers, place, noise, drawn, command, executing, share, heading = state[:11]
+    sampled, status, halts, held_begun, held_now, reference, known = state[11:]
     log_t, log_bodies, log_command, log_reference, log_noise = log[:5]
     log_x, log_status, log_executing, log_signals, log_share = log[5:]
 
@@ -213,11 +215,11 @@ def advance(team: Team, around: Around, accepted: Accepted, state: State, log: L
         if not resumed:  # unrestricted updates
             awake = False
             if mask & PLAN:
-                awake = talking[0]
+                awake = t >= time[3]
                 for j in range(n):
-                    awake = awake or status[FIELDS * j] == INTERVENING
+                    awake = awake or (status[FIELDS * j] == INTERVENING) != called[j]
             if mask & GATE and gated and not awake:
-                awake = talking[1] or watchful
+                awake = answers[0] or watchful
                 if remembers and not awake:
                     awake = known.shape != (n, len(still)) or news_within(still, place[:n], sensing, True, known)
             if awake:

@@ -167,8 +167,9 @@ class Batch:
                 raise SimulationError(self._name, t, described(error)) from error
             proposals, answers = memory.proposals, self._answers(memory, answering)
             state = state._replace(known=answering.sensed) if answering.sensed is not state.known else state
-            state.talking[0] = memory.talks != self._planner.start().talks
-            state.talking[1] = team.gated and (any(proposals) or any(answers[::2]))
+            state.called[:] = state.status[::FIELDS] == INTERVENING
+            state.time[3] = self._planner.asleep_until(memory, state.called.tolist())
+            state.answers[0] = team.gated and (any(proposals) or any(answers[::2]))
             now = accepted_proposals(proposals, np.array(answers))
             if any(one is not other for one, other in zip(now, executed, strict=True)):
                 executed, accepted = now, _accepted(now)
@@ -183,8 +184,8 @@ class Batch:
         due, places, world = int(state.counts[3]), state.place.copy(), self._world
         planned, judged = memory, answering
         if due & loop.PLAN:
-            intervening = [mode == INTERVENING for mode in state.status[::FIELDS].tolist()]
-            if not self._planner.idle(memory, intervening):
+            intervening = (state.status[::FIELDS] == INTERVENING).tolist()
+            if t >= self._planner.asleep_until(memory, intervening):
                 stands = standing(watched(state.halts, t, places.reshape(-1), self._team.room), t).tolist()
                 answers = np.array(self._answers(memory, answering))
                 planned = self._planner.plan(
@@ -210,9 +211,10 @@ class Batch:
         n, r, m = len(self._headings), len(self._world.robots), len(self._near.ugvs.still)
         due = int(self._team.due[0])
         return State(
-            time=np.zeros(3),
+            time=np.array([0.0, 0.0, 0.0, np.inf]),
             counts=np.array([1, 0, 0, due, 0], dtype=np.int64),
-            talking=np.zeros(2, dtype=np.bool_),
+            called=np.zeros(n, dtype=np.bool_),
+            answers=np.zeros(1, dtype=np.bool_),
             place=self._world.starts.copy(),
             noise=np.zeros(n),
             drawn=np.zeros(n),

@@ -115,7 +115,7 @@ class InterventionPlanner(LeafSystem):
             return None
         before = self.memory(context)
         intervening = [mode == INTERVENING for mode in self._status.Eval(context)[::FIELDS].tolist()]
-        if self._planner.idle(before, intervening):
+        if t < self._planner.asleep_until(before, intervening):
             return None
         bodies = self._bodies.Eval(context).reshape(-1, 3)
         answers, reports = self._answers.Eval(context), self._reports.Eval(context)

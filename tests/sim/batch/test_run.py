@@ -42,8 +42,7 @@ ODD = {
     "leak": ["decision.leak_1_s=0.3", "decision.noise_period_s=0.01"],
     "periods that are multiples up to rounding": ["gatekeeper.period_s=0.15", "intervention.period_s=0.3"],
     "appears and goes": ["obstacles.obstacle_1.appears_s=2.0", "obstacles.obstacle_2.disappears_s=9.0"],
-    "moves": ["obstacles.obstacle_2.moves.waypoints_m=[[12, 3], [12, 9]]", "obstacles.obstacle_2.moves.speed_m_s=0.4"],
-    "a hand point": ["ugvs.ugv1.plant={kind: unicycle, hand_point_m: 0.2, max_turn_rad_s: 2.0}"],
+    "moves": ["obstacles.obstacle_3={moves: {waypoints_m: [[12, 3, 0], [12, 9, 0]], speed_m_s: 0.4}}"],
 }
 
 
