@@ -65,7 +65,7 @@ class Team(NamedTuple):
     draws: Array  # the noise, (.., n)
     gated: bool  # whether UGVs judge proposals
     remembers: bool  # whether they remember what they sensed
-    watchful: bool  # whether what is around changes: then the gatekeepers look at every tick of theirs
+    watchful: bool  # whether what is around changes: then Python looks at every control sample
 
 
 class Around(NamedTuple):
@@ -213,13 +213,13 @@ def advance(team: Team, around: Around, accepted: Accepted, state: State, log: L
             first = False
         ended = True
         if not resumed:  # unrestricted updates
-            awake = False
+            awake = watchful and mask & CONTROL != 0
             if mask & PLAN:
-                awake = t >= time[3]
+                awake = awake or t >= time[3]
                 for j in range(n):
                     awake = awake or (status[FIELDS * j] == INTERVENING) != called[j]
             if mask & GATE and gated and not awake:
-                awake = answers[0] or watchful
+                awake = answers[0]
                 if remembers and not awake:
                     awake = known.shape != (n, len(still)) or news_within(still, place[:n], sensing, True, known)
             if awake:
