@@ -34,6 +34,7 @@ def parser() -> Parser:
         "scenario's file",
         "--resume": "go on with what the folder has",
         "--only": option("this draw alone; its scenario is written", "INDEX", whole(0, MAX_SEED)),
+        "--engine": None,
         "--jobs": None,
         "-q --quiet": None,
         "--scheduler": option("of a Dask cluster, such as tcp://host:8786", "ADDRESS"),
@@ -78,7 +79,7 @@ def _all(spec: Spec, options: argparse.Namespace) -> int:
     ):
         found = conduct(
             spec, folder, processes, options.number, resume=options.resume, stopping=stopping,
-            limits=_limits(options), progress=progress,
+            limits=_limits(options), engine=options.engine, progress=progress,
         )  # fmt: skip
     print(f"{_summary(found, looked=bool(options.stop_when or options.resume))}\n{one_line(str(folder))}")
     return _code(found)
@@ -101,7 +102,7 @@ def _only(spec: Spec, options: argparse.Namespace) -> int:
         if not (path.is_file() and files.read_bytes(path) == text.encode()):  # the same draw may be asked for again
             files.try_to_create(path)
             files.write_text(path, text)
-    rows = rows_of(spec, options.only, _limits(options))
+    rows = rows_of(spec, options.only, _limits(options), options.engine)
     for row in rows:
         margin = "" if math.isnan(row["margin"]) else f" {row['margin']:.6g} {row['unit']}"
         print(f"{row['run']:12} {row['claim'] or row['ended']:12} {row['status'] or row['what']}{margin}")

@@ -45,6 +45,7 @@ def parser() -> Parser:
         "--shrink": option("runs for shrinking a counterexample (default: %(default)s)", "N", whole(0), default=300),
         "-o --output": option("new; without a counterexample, the scenario nearest to one (default: "
                               "<name>_<sampler>.yaml, written only for a counterexample)", "FILE", output_file),
+        "--engine": None,
         "--jobs": None,
         "-q --quiet": None,
         plugins.OPTION: None,
@@ -97,7 +98,7 @@ def _run(spec: Spec, options: argparse.Namespace) -> int:
     files.try_to_create(path)
     files.try_to_create(_small(path))
     limits = DEFAULT_LIMITS._replace(plugins=options.allow_plugins)
-    search = Search(replace(spec, claims=(options.claim,)), objective, limits)
+    search = Search(replace(spec, claims=(options.claim,)), objective, limits, options.engine)
     jobs = min(options.jobs or processors(), options.number)
     with progress_bar(quiet=options.quiet) as progress, pool.local(jobs) as processes:
         _try(search, processes)
@@ -121,7 +122,7 @@ def _try(search: Search, pool: Pool) -> None:
     from airground_drake.study.campaign.work import rows_of
 
     spec = search.spec
-    for _, rows in pool(partial(rows_of, spec, limits=search.limits), [0]):
+    for _, rows in pool(partial(rows_of, spec, limits=search.limits, engine=search.engine), [0]):
         if rows and all(row["ended"] == JUDGED and not row["claim"] for row in rows):
             raise ScenarioError("--claim", "", spec.claims[0], f"wanted: one that applies to a run of {spec.source}")
 

@@ -44,6 +44,8 @@ OPTIONS: dict[str, Option] = {
     "-n --number": option("", "N", whole(1)),
     "-o --output": option("default: this folder", "DIR", output_folder),
     "-q --quiet": option("no progress"),
+    "--engine": option("who makes the runs: a compiled loop, which Drake checks, or Drake alone (default: %(default)s)",
+                       choices=("batch", "drake"), default="batch"),
     "--jobs": option("processes (default: one for each processor)", "N", whole(1, MOST_JOBS)),
     "--json": option("print all of it as JSON"),
     "--limit-steps": option("", "N", positive, default=DEFAULT_LIMITS.work),

@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 from pydrake.common import RandomDistribution
 from pydrake.systems.primitives import AffineSystem, RandomSource
-from pydrake.trajectories import PiecewisePolynomial
 
 from airground_drake.base.arrays import Array
 from airground_drake.base.errors import ScenarioError
@@ -208,15 +207,14 @@ def positions(rows: Sequence[Sequence[float]]) -> Array:
     return np.array(rows, dtype=np.float64).reshape(-1, 3)
 
 
-def stack_presets(presets: list[Motion]) -> PiecewisePolynomial:
-    """All presets as one trajectory of 3n components over the union of their vertices."""
+def stack_presets(presets: list[Motion]) -> tuple[Array, Array]:
+    """Times (K,), s, of the vertices of all presets together, and where all presets are then, (K, 3n), m."""
     # Vertices that only rounding keeps apart are merged: a velocity over so short a time would be a rounding error.
     times = np.unique(np.concatenate([preset.times for preset in presets]))
     kept = np.append(np.diff(times) > SAME_TIME * np.maximum(1.0, times[1:]), True)
     kept[0] = True
     times = times[kept]
-    samples = np.concatenate([preset.sample(times) for preset in presets], axis=1)
-    return PiecewisePolynomial.FirstOrderHold(times, samples.T)
+    return times, np.concatenate([preset.sample(times) for preset in presets], axis=1)
 
 
 def make_noise(count: int, given: Decision) -> tuple[RandomSource, AffineSystem]:

@@ -12,6 +12,7 @@ from types import MappingProxyType
 
 from pydrake.systems.framework import Diagram, DiagramBuilder, InputPort, OutputPort, System
 from pydrake.systems.primitives import ConstantVectorSource, Demultiplexer, Multiplexer, TrajectorySource
+from pydrake.trajectories import PiecewisePolynomial
 
 from airground_drake.base.errors import PluginError, UnknownNameError, short
 from airground_drake.base.registry import METHODS, UAV_TASKS, Method, method_of
@@ -203,7 +204,8 @@ def _task_planning(
     presets: Sequence[Motion], planner: InterventionPlanner, ugvs: UgvController, uav: UavController
 ) -> Diagram:
     """The task planning layer: preset trajectories, planner, controllers."""
-    reference = TrajectorySource(components.stack_presets(list(presets)), output_derivative_order=1)
+    times, places = components.stack_presets(list(presets))
+    reference = TrajectorySource(PiecewisePolynomial.FirstOrderHold(times, places.T), output_derivative_order=1)
     systems = {
         "reference": reference, "intervention_planner": planner, "ugv_controller": ugvs, "uav_controller": uav,
     }  # fmt: skip

@@ -3,15 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from typing import Any
+from dataclasses import replace
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 import pandas as pd
 
 from airground_drake.base.arrays import Array
+from airground_drake.model.bodies.world import World
 from airground_drake.model.geometry import outline
-from airground_drake.sim.blocks.signals import FIELDS, Status
+from airground_drake.model.trigger.automaton import FIELDS
+from airground_drake.scenario.load import own, resolved
+from airground_drake.scenario.schema import Scenario
+from airground_drake.sim.blocks.signals import Status
+from airground_drake.sim.events import extract
 from airground_drake.sim.tables import (
     DECISION_COLUMNS,
     DECISION_LISTS,
@@ -20,6 +26,7 @@ from airground_drake.sim.tables import (
     PROBLEM_ARRAYS,
     PROBLEM_SCALARS,
     PROPOSAL_COLUMNS,
+    SCHEMA,
     typed,
 )
 from airground_drake.sim.trace import Trace
@@ -28,8 +35,59 @@ from airground_drake.uav.planner import PlannerState
 from airground_drake.uav.policy import Proposal
 from airground_drake.ugv.answer import GatekeeperDecision
 
+
+class Done(NamedTuple):
+    """What a run leaves; T rows were logged."""
+
+    t: Array  # times, (T,), s
+    logged: Mapping[str, Array]  # the signals of a trace by name, see `sim.diagram`, (k, T)
+    memory: PlannerState
+    decided: Sequence[GatekeeperDecision]
+    seed: int
+    until_s: float
+    wall_s: float  # duration by the clock
+    meta: Mapping[str, Any]  # what only the simulation knows
+
+
 MERGE_S = 1e-9  # rows closer than this are merged, s: periods that are not binary fractions give steps of about 1e-17 s
 SAME_S = 1e-6  # a row this near to a multiple of the control period is at that control sample, s
+
+
+def trace_of(
+    scenario: Scenario, name: str, world: World, done: Done, signals: Sequence[str], own_plants: Iterable[str] = ()
+) -> Trace:
+    """The trace of a run of a scenario; `signals` as of `states`, `own_plants` are robots with users' plants."""
+    run, ugvs, uav = scenario.runs[name], world.names("ugv"), world.names("uav")[0]
+    keep = distinct(done.t, done.logged["team_command"])
+    t, logged = done.t[keep], {port: rows[:, keep] for port, rows in done.logged.items()}
+    rows = states(t, logged, ugvs, [body.name for body in world.moving], signals)
+    sampled = samples(t, scenario.control.period_s, logged, ugvs, world.robots)
+    meta: dict[str, Any] = {
+        "schema": SCHEMA,
+        "run": name,
+        "method": run.method,
+        "composition": run.composition,
+        "seed": done.seed,
+        "robots": list(world.robots),
+        "ugvs": list(ugvs),
+        "scenario": resolved(scenario) | {"duration_s": done.until_s},
+        "events": [],
+        **done.meta,
+        "faults": faults(done.memory.asked),
+    }
+    trace = Trace(
+        meta,
+        states=rows,
+        samples=sampled.assign(**measured(rows, sampled, own_plants)),
+        decisions=decisions(done.decided, ugvs, own(scenario, name).gatekeeper.route),
+        timings={"wall_s": done.wall_s, "decision_times_s": [decision.cpu_s for decision in done.decided]},
+        problems=problems(done.decided),
+        proposals=proposals(ugvs, done.memory.sent),
+        plans=plans(done.memory.asked, done.memory.sent, ugvs, uav),
+    )
+    trace = replace(trace, messages=messages(done.memory, trace, uav))
+    meta["events"] = extract(trace)
+    return trace
 
 
 def distinct(t: Array, command: Array) -> npt.NDArray[np.intp]:

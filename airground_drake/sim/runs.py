@@ -30,7 +30,7 @@ from airground_drake.model.law import kernels
 from airground_drake.scenario.load import validated
 from airground_drake.scenario.schema import Scenario
 from airground_drake.sim import trace
-from airground_drake.sim.simulation import simulate, warm_up
+from airground_drake.sim.simulation import Engine, simulate, warm_up
 from airground_drake.sim.trace import Trace
 from airground_drake.uav.guest.process import end_all
 
@@ -44,13 +44,13 @@ STANDSTILL_S = 600.0
 class _Process:
     """A run in a process of its own."""
 
-    def __init__(self, scenario: Scenario, name: str, folder: Path) -> None:
+    def __init__(self, scenario: Scenario, name: str, folder: Path, engine: Engine) -> None:
         """Start it; it leaves its trace in `folder`, or a note on why there is no trace."""
         context = multiprocessing.get_context("fork") if forks() else multiprocessing.get_context("spawn")
         self._name, self._folder, self._what = name, folder, f"run {name} of {scenario.name}, seed {scenario.seed}"
         self._clock = context.RawValue("d")  # simulated time, s
         self._before, self._since = 0.0, time.monotonic()
-        self.process = context.Process(target=_simulate, args=(scenario, name, folder, self._clock))
+        self.process = context.Process(target=_simulate, args=(scenario, name, folder, self._clock, engine))
         self.process.start()
 
     def advanced(self) -> float:
@@ -105,10 +105,10 @@ def simulate_all(
 def simulate_seeds(
     scenario: Scenario, seeds: Iterable[int], jobs: int | None = None, progress: Progress = SILENT
 ) -> Iterator[Trace]:
-    """Simulate every run of a scenario with each of some seeds, and yield each trace when it is there."""
+    """Simulate every run of a scenario with each of some seeds, by the loop, and yield each trace when it is there."""
     several = [validated(replace(scenario, seed=seed)) for seed in seeds]
     work = [(scenario, name) for scenario in several for name in scenario.runs]
-    return _simulated(work, f"{len(several)} more seeds", jobs, progress)
+    return _simulated(work, f"{len(several)} more seeds", jobs, progress, engine="batch")
 
 
 def _simulated(
@@ -117,6 +117,7 @@ def _simulated(
     jobs: int | None,
     progress: Progress,
     meanwhile: Callable[[], object] | None = None,
+    engine: Engine = "drake",
 ) -> Iterator[Trace]:
     """Simulate runs of validated scenarios, each in a process of its own; arguments as of `simulate_all`."""
     most = processors() if jobs is None else max(1, jobs)
@@ -132,7 +133,7 @@ def _simulated(
             while waiting or running:
                 while waiting and len(running) < most:
                     number, (scenario, name) = waiting.popleft()
-                    running[number] = _Process(scenario, name, made / str(number))
+                    running[number] = _Process(scenario, name, made / str(number), engine)
                 if meanwhile is not None:
                     meanwhile()
                     meanwhile = None
@@ -145,14 +146,14 @@ def _simulated(
             _stop([worker.process for worker in running.values()])
 
 
-def _simulate(scenario: Scenario, run: str, folder: Path, clock: Any) -> None:
+def _simulate(scenario: Scenario, run: str, folder: Path, clock: Any, engine: Engine) -> None:
     """Simulate a run in this process and save its trace, or a note on its failure; `clock` shows simulated time."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent reacts to it
     signal.signal(signal.SIGTERM, _end)
     interruption.end_with_parent()  # by SIGKILL: code that never returns to the interpreter ignores other signals
     folder.mkdir()
     try:
-        trace.save(simulate(scenario, run, watch=partial(setattr, clock, "value")), folder)
+        trace.save(simulate(scenario, run, watch=partial(setattr, clock, "value"), engine=engine), folder)
     except BaseException as error:
         stopped = None
         if isinstance(error, SimulationError):

@@ -6,6 +6,7 @@ or no longer needed. Then it asks the behaviour database for a proposal to every
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -139,9 +140,18 @@ class Planner:
         """The memory at the beginning of a run."""
         return PlannerState((Negotiation(),) * len(self.ugvs))
 
-    def idle(self, memory: PlannerState, intervening: Sequence[bool]) -> bool:
-        """Whether a planning instant changes nothing: no UGV is triggered, and no negotiation is open."""
-        return not any(intervening) and memory.talks == self.start().talks
+    def asleep_until(self, memory: PlannerState, intervening: Sequence[bool]) -> float:
+        """Until when planning changes nothing, s, while the same UGVs are triggered; -inf: it may do so at once."""
+        # Without a proposal in force no answer is read. Then a negotiation changes only when its rest is over, or when
+        # neither its UGV nor its cause is triggered any more.
+        called = {name for name, triggered in zip(self.ugvs, intervening, strict=True) if triggered}
+        until = math.inf
+        for name, talk in zip(self.ugvs, memory.talks, strict=True):
+            if talk.proposal is not None or (talk != Negotiation() and called.isdisjoint((name, talk.cause))):
+                return -math.inf
+            if name in called:
+                until = min(until, talk.retry_at)
+        return until
 
     def plan(
         self,

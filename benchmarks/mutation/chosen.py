@@ -149,9 +149,9 @@ LAW = (
     Mutant(
         "presets end with a jump to the target",
         "model/geometry/motion.py",
-        "Motion.at",
-        "return self.positions[max(k, 0)], np.zeros(3)",
-        "return self.positions[-1], np.zeros(3)",
+        "at",
+        "else positions[max(k, 0), a]",
+        "else positions[len(positions) - 1, a]",
         tests=("tests/model/geometry/test_motion.py",),
     ),
 )
@@ -161,17 +161,17 @@ TRIGGERS = (
     Mutant(
         "the dwell is 10 % short",
         "model/trigger/automaton.py",
-        "Trigger.dwell_end",
-        "state.triggered_at + self.dwell if",
-        "state.triggered_at + 0.9 * self.dwell if",
+        "step",
+        "status[TRIGGERED] + dwell if",
+        "status[TRIGGERED] + 0.9 * dwell if",
         tests=TRIGGER,
     ),
     Mutant(
         "releases at the threshold",
         "model/trigger/automaton.py",
-        "Trigger.step",
-        "x <= self.release and x < self.zeta:",
-        "x <= self.zeta and x < self.zeta:",
+        "step",
+        "if x <= release and x < zeta:",
+        "if x <= zeta and x < zeta:",
         tests=TRIGGER,
     ),
     Mutant(
@@ -184,10 +184,10 @@ TRIGGERS = (
     ),
     Mutant(
         "corners of presets are not looked at",
-        "sim/blocks/decision.py",
-        "DecisionBlock._calc_range",
-        "self._corner_times[first] < now[0]:",
-        "self._corner_times[first] < begun[0]:",
+        "model/trigger/excursion.py",
+        "ranges",
+        "if last > first:",
+        "if last < first:",
         tests=TRIGGER,
     ),
     Mutant(

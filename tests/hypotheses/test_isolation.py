@@ -11,10 +11,9 @@ import pytest
 from builders.worlds import world
 
 from airground_drake.base.arrays import Array
-from airground_drake.model.trigger.automaton import Mode, Trigger
+from airground_drake.model.trigger.automaton import FIELDS, Mode, Trigger
 from airground_drake.model.trigger.excursion import extremes
 from airground_drake.sim.blocks.decision import DecisionBlock, DecisionVariable, EventTrigger
-from airground_drake.sim.blocks.signals import FIELDS
 
 UGVS = 400
 """Steps compared at a time."""

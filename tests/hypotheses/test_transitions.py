@@ -7,11 +7,14 @@ from __future__ import annotations
 
 import itertools
 import math
+from dataclasses import replace
 from fractions import Fraction
 from typing import Any
 
+import numpy as np
 import pytest
 
+from airground_drake.base.arrays import Array
 from airground_drake.model.trigger.automaton import Mode, Trigger, TriggerState
 from airground_drake.ugv.patience import Commitment, Patience
 
@@ -71,23 +74,41 @@ def test_the_trigger_makes_the_transitions_of_the_theorem() -> None:
     assert differing(Trigger) == []
 
 
-def forgets(self: Trigger, state: TriggerState, t: float) -> TriggerState:
-    found = Trigger.fall(self, state, t)
-    return TriggerState(found.mode, 0, -1.0, found.released_at)
+class Late(Trigger):
+    """Triggers are noted too late."""
+
+    def step(self, state: TriggerState, t: float, x: float) -> TriggerState:
+        after = super().step(state, t, x)
+        return replace(after, triggered_at=t + 1e-9) if after.triggers > state.triggers else after
 
 
-@pytest.mark.parametrize(
-    ("method", "wrong"),
-    [
-        ("rise", lambda self, state, t: Trigger.rise(self, state, t + 1e-9)),
-        ("dwell_end", lambda _, state: state.triggered_at),
-        ("fall", forgets),
-        ("fall", lambda _, state, t: TriggerState(SUPERVISING, state.triggers, state.triggered_at, t)),
-    ],
-    ids=["late", "no dwell", "forgets", "the dwell is always over"],
-)
-def test_a_trigger_that_differs_is_noticed(method: str, wrong: Any) -> None:
-    assert differing(type("Wrong", (Trigger,), {method: wrong}))
+class Impatient(Trigger):
+    """The dwell is over at once."""
+
+    @property
+    def levels(self) -> Array:
+        return np.array([self.zeta, self.release, 0.0])
+
+
+class Forgetful(Trigger):
+    """A release forgets the triggers."""
+
+    def step(self, state: TriggerState, t: float, x: float) -> TriggerState:
+        after = super().step(state, t, x)
+        return TriggerState(after.mode, 0, -1.0, after.released_at) if after.released_at == t else after
+
+
+class Free(Trigger):
+    """A release is free at once, whatever is left of the dwell."""
+
+    def step(self, state: TriggerState, t: float, x: float) -> TriggerState:
+        after = super().step(state, t, x)
+        return replace(after, mode=SUPERVISING) if state.mode is INTERVENING is not after.mode else after
+
+
+@pytest.mark.parametrize("wrong", [Late, Impatient, Forgetful, Free])
+def test_a_trigger_that_differs_is_noticed(wrong: type[Trigger]) -> None:
+    assert differing(wrong)
 
 
 TIMES = (2, 5.0, 3.0)

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from bisect import bisect_right
 from dataclasses import dataclass, field
 from typing import Any, Self
 
 import numpy as np
 
 from airground_drake.base.arrays import Array, read_only
+from airground_drake.base.compiling import njit
 
 
 @dataclass(frozen=True, eq=False)
@@ -20,12 +20,12 @@ class Motion:
     Attributes:
         times: (M,), s, strictly increasing.
         positions: (M, 3), m, world frame.
+        slopes: velocities from each vertex to the next, (M - 1, 3), m/s.
     """
 
     times: Array
     positions: Array
-    _times: list[float] = field(init=False, repr=False)
-    _slopes: Array = field(init=False, repr=False)
+    slopes: Array = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         times, positions = read_only(self.times), read_only(self.positions)
@@ -41,8 +41,7 @@ class Motion:
         slopes.setflags(write=False)
         object.__setattr__(self, "times", times)
         object.__setattr__(self, "positions", positions)
-        object.__setattr__(self, "_times", times.tolist())
-        object.__setattr__(self, "_slopes", slopes)
+        object.__setattr__(self, "slopes", slopes)
 
     def __deepcopy__(self, memo: dict[int, Any]) -> Self:
         """Immutable: the copy is the object itself."""
@@ -69,16 +68,24 @@ class Motion:
     @property
     def max_speed(self) -> float:
         """Largest speed, m/s."""
-        return float(np.linalg.norm(self._slopes, axis=1).max(initial=0.0))
+        return float(np.linalg.norm(self.slopes, axis=1).max(initial=0.0))
 
     def at(self, t: float) -> tuple[Array, Array]:
         """Position (3,) m and velocity (3,) m/s at time t (at a vertex: the velocity after it)."""
-        k = bisect_right(self._times, t) - 1
-        if k < 0 or k >= len(self._times) - 1:
-            return self.positions[max(k, 0)], np.zeros(3)
-        slope: Array = self._slopes[k]
-        return self.positions[k] + (t - self._times[k]) * slope, slope
+        place, rate = np.empty(3), np.empty(3)
+        at(self.times, self.positions, self.slopes, t, place, rate)
+        return place, rate
 
     def sample(self, t: Array) -> Array:
         """Positions at times (k,): (k, 3) m."""
         return np.column_stack([np.interp(t, self.times, self.positions[:, axis]) for axis in range(3)])
+
+
+@njit(cache=True)
+def at(times: Array, positions: Array, slopes: Array, t: float, place: Array, rate: Array) -> None:
+    """Write where a motion is at a time, s, and its velocity, (3,) each: see `Motion`."""
+    k = int(np.searchsorted(times, t, side="right")) - 1
+    inside = 0 <= k < len(times) - 1
+    for a in range(3):
+        place[a] = positions[k, a] + (t - times[k]) * slopes[k, a] if inside else positions[max(k, 0), a]
+        rate[a] = slopes[k, a] if inside else 0.0

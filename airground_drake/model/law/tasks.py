@@ -6,11 +6,10 @@ written out: distances (7)-(8) as inequalities (`kernels.py`), tracking (6) and 
 
 from __future__ import annotations
 
-from functools import cache
-
 import numpy as np
 
-from airground_drake.base.arrays import Array, read_only
+from airground_drake.base.arrays import Array
+from airground_drake.base.compiling import njit
 from airground_drake.model.law.task import Task
 
 
@@ -54,11 +53,18 @@ class FormationTask(PositionTask):
 
     def __init__(self, ugv_positions: Array, ugv_velocities: Array, altitude: float, gain: float) -> None:
         """Fly `altitude` m over the centroid of UGVs at (n, 3) m moving at (n, 3) m/s."""
-        share = _share(len(ugv_positions))
-        super().__init__(share @ ugv_positions + np.array([0.0, 0.0, altitude]), share @ ugv_velocities, gain)
+        target, rate = over_centroid(ugv_positions, ugv_velocities, altitude)
+        super().__init__(target, rate, gain)
 
 
-@cache
-def _share(count: int) -> Array:
-    """Weight of each of `count` robots in their centroid, (1, count)."""
-    return read_only(np.full((1, count), 1.0 / count))
+@njit(cache=True)
+def over_centroid(positions: Array, velocities: Array, altitude: float) -> tuple[Array, Array]:
+    """The place `altitude`, m, above the centroid of n points, (n, 3), m, and its velocity, (1, 3) each."""
+    # Summed in order, without BLAS, whose sums depend on the processor.
+    target, rate, weight = np.zeros((1, 3)), np.zeros((1, 3)), 1.0 / len(positions)
+    for j in range(len(positions)):
+        for a in range(3):
+            target[0, a] += weight * positions[j, a]
+            rate[0, a] += weight * velocities[j, a]
+    target[0, 2] += altitude
+    return target, rate

@@ -121,7 +121,7 @@ class UgvLaw:
         every = AcceptedMotion(wanted, wanted_rate, chosen)
         headings, steering = (np.zeros(count), np.zeros((count, NUMBERS))) if steered is None else steered
         track = Tracking(target, rate)
-        velocity: Array = _commands(self.numbers, near, positions, track, every, executing, headings, steering)
+        velocity: Array = commands(self.numbers, near, positions, track, every, executing, headings, steering)
         return velocity
 
 
@@ -171,7 +171,7 @@ def command(
 
 
 @njit(cache=True)
-def _commands(
+def commands(
     law: Numbers,
     near: Neighbours,
     positions: Array,

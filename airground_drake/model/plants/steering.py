@@ -152,3 +152,11 @@ def along(base: Array, velocity: Array, heading: float, elapsed: float, hand: fl
     found[2] = base[2] - elapsed * velocity[2]
     found[3] = heading + 2.0 * half
     return found
+
+
+@njit(cache=True)
+def heading_after(heading: float, velocity: Array, elapsed: float, hand: float, period: float) -> float:
+    """The heading, rad, after a command (3,), m/s, of a time, s, in all a period; arguments as of `along`."""
+    cos, sin = math.cos(heading), math.sin(heading)
+    a, b = velocity[0] * cos + velocity[1] * sin, velocity[1] * cos - velocity[0] * sin
+    return heading + 2.0 * (0.5 * chord(a, b, hand, period)[1] * elapsed)

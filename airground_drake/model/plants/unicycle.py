@@ -14,7 +14,7 @@ from airground_drake.base.exact import decimal
 from airground_drake.base.values import SMALLEST, Heading, NotNegative, Number, YesNo, as_float, wanted
 from airground_drake.model.plants.budget import Bounds
 from airground_drake.model.plants.plant import HEADING, PLACE, Keys, Need, Plant, Premise, Recorded, Setting
-from airground_drake.model.plants.steering import FORWARD, HALF_BASE, HAND, NUMBERS, TURN, WHEEL, along, chord
+from airground_drake.model.plants.steering import FORWARD, HALF_BASE, HAND, NUMBERS, TURN, WHEEL, along, heading_after
 
 _AHEAD = wanted("more than 0 m: the law steers a point ahead of the axle", ge=SMALLEST)
 Ahead = Annotated[Number, _AHEAD, BeforeValidator(as_float)]
@@ -134,9 +134,7 @@ class Unicycle(Plant):
 
     def remembered(self, memory: Array, command: Array, elapsed_s: float) -> Array:
         """The heading after a turn."""
-        cos, sin = math.cos(memory[0]), math.sin(memory[0])
-        a, b = command[0] * cos + command[1] * sin, command[1] * cos - command[0] * sin
-        return memory + 2.0 * (0.5 * chord(a, b, self.hand_m, self.period_s)[1] * elapsed_s)
+        return np.array([heading_after(float(memory[0]), command, elapsed_s, self.hand_m, self.period_s)])
 
     def at(self, memory: Array, base: Array, command: Array, elapsed_s: float) -> Array:
         """Axle and heading, exact."""

@@ -13,13 +13,37 @@ straight between them.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import NamedTuple
+
 import numpy as np
 import numpy.typing as npt
 
 from airground_drake.base.arrays import Array
 from airground_drake.base.compiling import njit
+from airground_drake.model.geometry.motion import Motion
 
-SUPERVISING, INTERVENING = 0, 1  # modes of `model.trigger.automaton.Mode`, as numba takes them; the third is REFRACTORY
+
+class Corners(NamedTuple):
+    """Where the references of n UGVs bend: the vertices of their presets, which are straight in between."""
+
+    times: Array  # of all vertices, in order, (C,), s
+    ugvs: npt.NDArray[np.int64]  # whose they are, (C,)
+    first: npt.NDArray[np.int64]  # rows of each UGV's own vertices: from `first[j]` to before `first[j + 1]`, (n + 1,)
+    own_times: Array  # their times, (C,), s
+    places: Array  # and places, (C, 3), m
+
+    @classmethod
+    def of(cls, presets: Sequence[Motion]) -> Corners:
+        """Of presets; without presets no reference bends."""
+        order = sorted((t, j) for j, preset in enumerate(presets) for t in preset.times.tolist())
+        return cls(
+            np.array([t for t, _ in order], dtype=np.float64),
+            np.array([j for _, j in order], dtype=np.int64),
+            np.cumsum([0, *(len(preset.times) for preset in presets)], dtype=np.int64),
+            np.concatenate([np.zeros(0), *(preset.times for preset in presets)]),
+            np.concatenate([np.zeros((0, 3)), *(preset.positions for preset in presets)]),
+        )
 
 
 @njit(cache=True)
@@ -106,24 +130,59 @@ def spans(begun: Array, now: Array) -> Array:
 
 
 @njit(cache=True)
-def transitions_due(status: Array, t: float, least: Array, most: Array, levels: Array) -> npt.NDArray[np.bool_]:
-    """For which UGVs a transition of the trigger is due, (n,); `status` (4n,), s; `t` in s; `least`, `most` (n,), m."""
-    # levels: zeta, m, release, m, and dwell, s, of the trigger, (3,).
-    zeta, release, dwell = levels[0], levels[1], levels[2]
-    due = np.zeros(len(least), dtype=np.bool_)
-    for j in range(len(least)):
-        mode, triggers, triggered_at = status[4 * j], status[4 * j + 1], status[4 * j + 2]
-        if mode == SUPERVISING:
-            due[j] = most[j] >= zeta
-        elif mode == INTERVENING:
-            due[j] = least[j] <= release and least[j] < zeta
-        else:
-            due[j] = t >= (triggered_at + dwell if triggers else 0.0)
-    return due
+def bends(corners: Corners, begin: float, end: float) -> tuple[int, int]:
+    """The first corner within a step, in s, and the one after the last."""
+    times = corners.times
+    first = int(np.searchsorted(times, begin, side="right"))
+    return first, max(first, int(np.searchsorted(times, end, side="left")))
 
 
 @njit(cache=True)
-def anything_due(status: Array, t: float, spans: Array, levels: Array) -> bool:
-    """Whether a transition is due for any UGV, see `transitions_due`; `spans`: least x, then largest x, (2n,), m."""
-    n = len(spans) // 2
-    return bool(transitions_due(status, t, spans[:n], spans[n:], levels).any())
+def stretches(begun: Array, now: Array, corners: Corners) -> tuple[Array, Array, npt.NDArray[np.bool_]]:
+    """A step cut at its corners: times (s,), s, task errors and noise then, (s, n, 4), m, and which UGVs bend, (n,)."""
+    # Of a UGV whose reference bends, the error is that of the straight step, plus what the reference leaves it by.
+    first, last = bends(corners, begun[0], now[0])
+    before, after = begun[1:].reshape(-1, 5), now[1:].reshape(-1, 5)
+    n, stops = len(before), last - first + 2
+    times, bent = np.empty(stops), np.zeros(n, dtype=np.bool_)
+    times[0], times[stops - 1] = begun[0], now[0]
+    times[1 : stops - 1] = corners.times[first:last]
+    for corner in range(first, last):
+        bent[corners.ugvs[corner]] = True
+    parts = np.empty((stops, n, 4))
+    for k in range(stops):
+        share = (times[k] - times[0]) / (times[stops - 1] - times[0])
+        for j in range(n):
+            for a in range(4):
+                parts[k, j, a] = before[j, a] + share * (after[j, a] - before[j, a])
+    for j in range(n):
+        if not bent[j]:
+            continue
+        rows = slice(corners.first[j], corners.first[j + 1])
+        for a in range(3):
+            place = np.interp(times, corners.own_times[rows], corners.places[rows, a])
+            for k in range(stops):
+                share = (times[k] - times[0]) / (times[stops - 1] - times[0])
+                parts[k, j, a] += place[k] - place[0] - share * (place[stops - 1] - place[0])
+    return times, parts, bent
+
+
+@njit(cache=True)
+def ranges(begun: Array, now: Array, corners: Corners) -> Array:
+    """Least x of (15) since a step began, then the largest, (2n,), m, from its signals as `gathered` gives them."""
+    found = spans(begun, now)
+    first, last = bends(corners, begun[0], now[0])
+    if last > first:
+        times, parts, bent = stretches(begun, now, corners)
+        n = len(bent)
+        x, least, most = np.empty((len(times), n)), np.full(n, np.inf), np.full(n, -np.inf)
+        for k in range(len(times)):
+            x[k] = variables(parts[k])
+        for k in range(len(times) - 1):
+            piece = extremes(parts[k], parts[k + 1], x[k : k + 2])
+            for j in range(n):
+                least[j], most[j] = min(least[j], piece[0, j]), max(most[j], piece[1, j])
+        for j in range(n):
+            if bent[j]:
+                found[0, j], found[1, j] = least[j], most[j]
+    return found.ravel()

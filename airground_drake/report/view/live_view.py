@@ -10,12 +10,13 @@ from pydrake.systems.framework import Context, LeafSystem, ValueProducer
 from airground_drake.base.arrays import Array
 from airground_drake.model.bodies.world import ROBOTS
 from airground_drake.model.plants.plant import PLACE
+from airground_drake.model.trigger.automaton import FIELDS
 from airground_drake.report.view.draw import barrier_path, draw, robot_path, shadow_path, state_path
 from airground_drake.report.view.stage import STATES, stage, states_of
 from airground_drake.scenario.schema import Scenario
 from airground_drake.scenario.world import make_world
 from airground_drake.sim.blocks.lifetime import weakly
-from airground_drake.sim.blocks.signals import FIELDS, declare_bodies
+from airground_drake.sim.blocks.signals import declare_bodies
 
 
 class LiveView(LeafSystem):

@@ -114,9 +114,7 @@ class UgvController(_Controller):
 
     def parameters(self, context: Context) -> dict[str, Any]:
         """What it runs with, see `read_back`, and whether it puts interventions on top of avoidance."""
-        law: UgvLaw = self._in_force(context)
-        read = read_back(self, law.avoidance, self._near, len(self._world.robots))
-        return {**read, "composition": law.avoidance.composition, "intervention_on_top": law.intervention_on_top}
+        return of_ugvs(self._near, self._in_force(context), len(self._world.robots), sampling_of(self))
 
     def _with_gains(self, *gains: float) -> UgvLaw:
         return self.law.with_gains(*gains)
@@ -212,8 +210,7 @@ class UavController(_Controller):
 
     def parameters(self, context: Context) -> dict[str, Any]:
         """What it runs with, see `read_back`."""
-        avoidance, _ = self._in_force(context)
-        return read_back(self, avoidance, self._near, len(self._world.robots))
+        return read_back(self._near, self._in_force(context)[0], len(self._world.robots), sampling_of(self))
 
     def _with_gains(self, *gains: float) -> tuple[Avoidance, float]:
         return replace(self.avoidance, gain=gains[0]), gains[1]
@@ -253,7 +250,19 @@ class UavController(_Controller):
         return _velocity_of(name, asked, own)
 
 
-def read_back(system: LeafSystem, avoidance: Avoidance, near: Neighbours, robots: int) -> dict[str, Any]:
+def sampling_of(system: LeafSystem) -> list[float]:
+    """Period and offset of a sampled system, s."""
+    timing = system.GetUniquePeriodicDiscreteUpdateAttribute()
+    return [timing.period_sec(), timing.offset_sec()]
+
+
+def of_ugvs(near: Neighbours, law: UgvLaw, robots: int, sampling_s: list[float]) -> dict[str, Any]:
+    """What the UGVs' controller runs with, see `read_back`, and whether it puts interventions on top of avoidance."""
+    found = read_back(near, law.avoidance, robots, sampling_s)
+    return {**found, "composition": law.avoidance.composition, "intervention_on_top": law.intervention_on_top}
+
+
+def read_back(near: Neighbours, avoidance: Avoidance, robots: int, sampling_s: list[float]) -> dict[str, Any]:
     """The parameters with which a controller's avoidance runs, strict JSON, for the trace; `robots` move."""
     # Returns for its k robots: `members`, their indices in the order of the world; `outlines` of the m convex parts at
     # rest, without padding, one after the other; `moving_outlines`, those of obstacles that move, about their origins,
@@ -261,7 +270,6 @@ def read_back(system: LeafSystem, avoidance: Avoidance, near: Neighbours, robots
     # `safe_m` and `share` beside the parts at rest, then beside the others, (k, m + n); `mobility` (k, 3);
     # `max_speed_m_s` (k,). For the layer: `sampling_s`, period and offset; `gain_1_s`, `period_s`, `sensing_range_m`.
     # Arrays are flat, in C order; `safe_m` and `share` are lists of [value, number of repetitions].
-    timing = system.GetUniquePeriodicDiscreteUpdateAttribute()
     moving = [number for row in near.parts[robots:] for number in outline.as_tuple(row)]
     return ({"moving_outlines": moving} if moving else {}) | {
         "members": near.members.tolist(),
@@ -271,7 +279,7 @@ def read_back(system: LeafSystem, avoidance: Avoidance, near: Neighbours, robots
         "share": _in_runs(near.share),
         "mobility": near.mobility.ravel().tolist(),
         "max_speed_m_s": near.max_speed.tolist(),
-        "sampling_s": [timing.period_sec(), timing.offset_sec()],
+        "sampling_s": sampling_s,
         "gain_1_s": avoidance.gain,
         "period_s": avoidance.period,
         "sensing_range_m": avoidance.sensing_range,

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from bisect import bisect_left, bisect_right
 from collections.abc import Sequence
 from contextlib import suppress
 from itertools import pairwise
@@ -26,20 +25,22 @@ from airground_drake.base.arrays import Array
 from airground_drake.base.errors import PluginError, short
 from airground_drake.model.bodies.world import World
 from airground_drake.model.geometry.motion import Motion
-from airground_drake.model.trigger.automaton import Mode, Trigger, TriggerState
-from airground_drake.model.trigger.excursion import anything_due, extremes, gathered, spans, transitions_due, variables
-from airground_drake.sim.blocks.lifetime import weakly
-from airground_drake.sim.blocks.signals import (
-    FIELDS,
-    Status,
-    TriggerLevels,
-    components_of,
-    declare_bodies,
-    laid_out,
+from airground_drake.model.trigger.automaton import NEW, Trigger, advance, anything_due, begin
+from airground_drake.model.trigger.excursion import (
+    Corners,
+    bends,
+    extremes,
+    gathered,
+    ranges,
+    stretches,
+    variables,
 )
+from airground_drake.sim.blocks.lifetime import weakly
+from airground_drake.sim.blocks.signals import TriggerLevels, components_of, declare_bodies
 
 NOT_BEGUN = -1.0  # stands for the beginning of a run or a step, s, before the first one
 
+ACCURACY = 1e-6  # of the Context of a run: events are isolated to this, relative to the time scale of 1 s
 # Events are not isolated within steps shorter than this, s; they happen at the step's end. Ticks of different periods
 # can be one unit in the last place apart, and Drake stops when it must isolate an event in such a step.
 SHORTEST_S = 1e-9
@@ -70,9 +71,7 @@ class DecisionBlock(LeafSystem):
         super().__init__()
         count = len(world.names("ugv"))
         self._ugvs = components_of(world, "ugv")
-        self._presets = tuple(presets)
-        self._corners = sorted((t, j) for j, preset in enumerate(self._presets) for t in preset.times.tolist())
-        self._corner_times = [t for t, _ in self._corners]
+        self._corners = Corners.of(presets)
         self._bodies = declare_bodies(self, world)
         self._reference = self.DeclareVectorInputPort("reference", 6 * count)
         self._noise = self.DeclareVectorInputPort("noise", count)
@@ -127,38 +126,23 @@ class DecisionBlock(LeafSystem):
         begun, now = context.get_discrete_state(0).value(), self.get_cache_entry(self._signals).Eval(context)
         if begun[0] == NOT_BEGUN:
             begun = now
-        ranges = self._spans(begun, now)
-        first = bisect_right(self._corner_times, begun[0])
-        if first < len(self._corners) and self._corner_times[first] < now[0]:
-            corners = self._corners[first : bisect_left(self._corner_times, now[0])]
-            self._look_into_corners(ranges, corners, begun, now)
-        output.SetFromVector(ranges.ravel())
+        output.SetFromVector(self._ranges(begun, now))
 
-    def _spans(self, begun: Array, now: Array) -> Array:
-        """Smallest and largest x over a step without corners, (2, n), m, from the signals at its ends."""
+    def _ranges(self, begun: Array, now: Array) -> Array:
+        """Smallest x over a step, then the largest, (2n,), m, from the signals at its ends."""
         before, after = begun[1:].reshape(-1, 5), now[1:].reshape(-1, 5)
-        return self.extremes(begun[0], before[:, :4], now[0], after[:, :4], np.stack([before[:, 4], after[:, 4]]))
-
-    def _look_into_corners(
-        self, crossed: Array, corners: Sequence[tuple[float, int]], begun: Array, now: Array
-    ) -> None:
-        """Replace the smallest and largest x of UGVs whose references have corners within a step; `corners` in s."""
-        # crossed: smallest and largest x, (2, n), m, changed in place.
-        bent = {j for _, j in corners}
-        times = np.array([begun[0], *(t for t, _ in corners), now[0]])
-        shares = (times - times[0]) / (times[-1] - times[0])
-        before, after = begun[1:].reshape(-1, 5)[:, :4], now[1:].reshape(-1, 5)[:, :4]
-        parts = before + shares[:, None, None] * (after - before)
-        for j in bent:
-            reference = self._presets[j].sample(times)
-            parts[:, j, :3] += reference - reference[0] - shares[:, None] * (reference[-1] - reference[0])
-        x = [self._valued(t, part) for t, part in zip(times, parts, strict=True)]
-        stretches = pairwise(zip(times, parts, x, strict=True))
-        ranges = np.array(
-            [self.extremes(t0, p0, t1, p1, np.array([x0, x1])) for (t0, p0, x0), (t1, p1, x1) in stretches]
-        )
-        for j in bent:
-            crossed[:, j] = ranges[:, 0, j].min(), ranges[:, 1, j].max()
+        ends = np.stack([before[:, 4], after[:, 4]])
+        found = self.extremes(begun[0], before[:, :4], now[0], after[:, :4], ends)
+        first, last = bends(self._corners, begun[0], now[0])
+        if last > first:
+            times, parts, bent = stretches(begun, now, self._corners)
+            x = [self._valued(t, part) for t, part in zip(times, parts, strict=True)]
+            pieces = pairwise(zip(times, parts, x, strict=True))
+            found_in = np.array(
+                [self.extremes(t0, p0, t1, p1, np.array([x0, x1])) for (t0, p0, x0), (t1, p1, x1) in pieces]
+            )
+            found = np.where(bent, [found_in[:, 0].min(axis=0), found_in[:, 1].max(axis=0)], found)
+        return found.ravel()
 
     def _begin_step(self, context: Context, discrete: DiscreteValues) -> EventStatus:
         """Keep the signals of this instant: the end of a step, or the start of a simulator."""
@@ -184,10 +168,9 @@ class DecisionVariable(DecisionBlock):
         """Signals have this x already, unless a subclass defines another."""
         return signals if type(self).value is DecisionVariable.value else super()._with_variable(signals)
 
-    def _spans(self, begun: Array, now: Array) -> Array:
-        if type(self).extremes is DecisionVariable.extremes:
-            return spans(begun, now)
-        return super()._spans(begun, now)
+    def _ranges(self, begun: Array, now: Array) -> Array:
+        own = type(self).value is not DecisionVariable.value or type(self).extremes is not DecisionVariable.extremes
+        return super()._ranges(begun, now) if own else ranges(begun, now, self._corners)
 
 
 class EventTrigger(LeafSystem):
@@ -228,10 +211,10 @@ class EventTrigger(LeafSystem):
         """
         super().__init__()
         self._count, self._short = count, SHORT * period
-        self.DeclareNumericParameter(BasicVector([trigger.zeta, trigger.release, trigger.dwell]))
+        self.DeclareNumericParameter(BasicVector(trigger.levels))
         self._variable = self.DeclareVectorInputPort("decision_variable", count)
         self._range = self.DeclareVectorInputPort("decision_range", 2 * count)
-        status = self.DeclareDiscreteState(_pack([TriggerState()] * count))
+        status = self.DeclareDiscreteState(np.tile(NEW, count))
         self.DeclareDiscreteState([NOT_BEGUN])
         self.DeclareDiscreteState([NOT_BEGUN])
         self.DeclareDiscreteState([0.0])
@@ -250,10 +233,6 @@ class EventTrigger(LeafSystem):
         """A view of the levels in force; assigning to it changes them in this Context."""
         return TriggerLevels(context.get_mutable_numeric_parameter(0).get_mutable_value())
 
-    def trigger(self, context: Context) -> Trigger:
-        """The automaton with the levels in force."""
-        return Trigger(*context.get_numeric_parameter(0).value().tolist())
-
     def DoGetWitnessFunctions(self, context: Context) -> list[WitnessFunction]:
         return [self._witness]
 
@@ -261,13 +240,16 @@ class EventTrigger(LeafSystem):
         if context.get_accuracy() is None:
             raise RuntimeError("the Context has no accuracy, so no event can be isolated; call SetAccuracy(1e-6) on it")
         discrete, t, x = state.get_mutable_discrete_state(), context.get_time(), self._variable.Eval(context)
-        before, begun, run_begun = (discrete.value(k) for k in range(3))
+        begun, run_begun = discrete.value(1), discrete.value(2)
+        levels = context.get_numeric_parameter(0).value()
         if run_begun[0] < begun[0] <= t:  # another simulator goes on with a run
-            discrete.set_value(0, self._after(context, before, x, x, x))
+            status = discrete.value(0).copy()
+            advance(status, t, x, np.tile(x, 2), levels)
         else:
-            trigger = self.trigger(context)
-            discrete.set_value(0, _pack([trigger.start(t, value) for value in x.tolist()]))
+            status = np.tile(NEW, self._count)
+            begin(status, t, x, levels)
             discrete.set_value(2, [t])
+        discrete.set_value(0, status)
         discrete.set_value(1, [t])
         return EventStatus.Succeeded()
 
@@ -287,8 +269,9 @@ class EventTrigger(LeafSystem):
             told = "from a decision block, a plant or a disturbance"
             raise PluginError(f"decision_range is not a number, {told}: {short(repr(spans.tolist()))}")
         if anything_due(before, t, spans, levels):
-            least, most = spans[: self._count], spans[self._count :]
-            discrete.set_value(0, self._after(context, before, self._variable.Eval(context), least, most))
+            status = before.copy()
+            advance(status, t, self._variable.Eval(context), spans, levels)
+            discrete.set_value(0, status)
             discrete.set_value(3, [0.0])
         else:
             self._count_short(t - context.get_discrete_state(1)[0], discrete)
@@ -304,28 +287,3 @@ class EventTrigger(LeafSystem):
                 "coordinates nearer to the origin"
             )
         discrete.set_value(3, [short])
-
-    def _after(self, context: Context, before: Array, x: Array, least: Array, most: Array) -> Array:
-        """Status after the transitions that became due in a step."""
-        t, trigger, status = context.get_time(), self.trigger(context), before.reshape(-1, FIELDS).copy()
-        levels = context.get_numeric_parameter(0).value()
-        for j in np.flatnonzero(transitions_due(before, t, least, most, levels)):
-            state = _unpack(before, int(j))
-            status[j] = _pack([_moved(trigger, state, t, float(x[j]), float(least[j]), float(most[j]))])
-        return status.ravel()
-
-
-def _moved(trigger: Trigger, before: TriggerState, t: float, x: float, least: float, most: float) -> TriggerState:
-    """State at the end of a step in which a transition became due, from x now and its range in the step, m."""
-    seen = {Mode.SUPERVISING: most, Mode.INTERVENING: least, Mode.REFRACTORY: x}[before.mode]
-    after = trigger.step(before, t, seen)
-    return after if after.mode is before.mode else trigger.step(after, t, x)  # x may have crossed back already
-
-
-def _pack(states: Sequence[TriggerState]) -> Array:
-    return laid_out(Status, [[s.mode, s.triggers, s.triggered_at, s.released_at] for s in states])
-
-
-def _unpack(status: Array, index: int) -> TriggerState:
-    own = Status(status[FIELDS * index : FIELDS * (index + 1)])
-    return TriggerState(Mode(int(own.mode)), int(own.triggers), float(own.triggered_at_s), float(own.released_at_s))

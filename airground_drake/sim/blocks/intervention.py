@@ -8,9 +8,9 @@ from pydrake.systems.framework import Context, DiscreteValues, EventStatus, Leaf
 
 from airground_drake.base.arrays import Array
 from airground_drake.model.bodies.world import ROBOTS, World
-from airground_drake.model.trigger.excursion import INTERVENING
+from airground_drake.model.trigger.automaton import FIELDS, INTERVENING
 from airground_drake.sim.blocks.lifetime import weakly
-from airground_drake.sim.blocks.signals import FIELDS, Messages, components_of, declare_bodies, no_proposals
+from airground_drake.sim.blocks.signals import Messages, components_of, declare_bodies, no_proposals
 from airground_drake.sim.blocks.ticks import Ticks
 from airground_drake.uav.database import BehaviourDatabase
 from airground_drake.uav.halts import NOT_WATCHED, room, standing, watched
@@ -115,7 +115,7 @@ class InterventionPlanner(LeafSystem):
             return None
         before = self.memory(context)
         intervening = [mode == INTERVENING for mode in self._status.Eval(context)[::FIELDS].tolist()]
-        if self._planner.idle(before, intervening):
+        if t < self._planner.asleep_until(before, intervening):
             return None
         bodies = self._bodies.Eval(context).reshape(-1, 3)
         answers, reports = self._answers.Eval(context), self._reports.Eval(context)

@@ -52,11 +52,17 @@ def first_order_plant(robot: str, start: Array) -> LinearSystem:
 
 def scripted_plant(body: Body) -> TrajectorySource:
     """The position of a body with a script, (3,), m, world frame; it has no input."""
+    times, places = vertices_of(body)
+    return TrajectorySource(PiecewisePolynomial.FirstOrderHold(times, places.T))
+
+
+def vertices_of(body: Body) -> tuple[Array, Array]:
+    """Times, (K,), s, and places, (K, 3), m, of the vertices of a script, at least two."""
     assert isinstance(body.plant, Scripted)
     times, places = body.plant.script.times, body.plant.script.positions
     if len(times) == 1:
         times, places = np.append(times, times[0] + 1.0), np.repeat(places, 2, axis=0)
-    return TrajectorySource(PiecewisePolynomial.FirstOrderHold(times, places.T))
+    return times, places
 
 
 class SteeredBody(LeafSystem):

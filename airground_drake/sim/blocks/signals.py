@@ -28,8 +28,6 @@ UavGains = namedview("UavGains", ["avoidance_gain_1_s", "formation_gain_1_s"])
 # Parameters of `EventTrigger`: see `model.trigger.automaton.Trigger`.
 TriggerLevels = namedview("TriggerLevels", ["zeta_m", "release_m", "dwell_s"])
 
-FIELDS = len(Status.get_fields())  # length of a `Status`
-
 
 def declare_bodies(system: LeafSystem, world: World) -> InputPort:
     """Declare the input port `bodies`: positions of all bodies of a world that move, (3 M,), m, in their order."""

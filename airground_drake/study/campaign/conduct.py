@@ -15,6 +15,7 @@ from airground_drake.base.errors import FolderError, LimitError, one_line
 from airground_drake.base.progress import SILENT, Progress
 from airground_drake.base.registry import RUN_CLAIMS
 from airground_drake.scenario.estimate import DEFAULT_LIMITS, MOST_ROWS, Limits
+from airground_drake.sim.simulation import Engine
 from airground_drake.study.campaign.evidence import evidence
 from airground_drake.study.campaign.page import page
 from airground_drake.study.campaign.pool import Pool
@@ -36,6 +37,7 @@ def conduct(
     resume: bool = False,
     stopping: Stopping | None = None,
     limits: Limits = DEFAULT_LIMITS,
+    engine: Engine = "batch",
     progress: Progress = SILENT,
 ) -> dict[str, Any]:
     """Finish a campaign, and write the evidence and its page."""
@@ -60,7 +62,7 @@ def conduct(
         left = [] if met else [index for index in wanted if index not in store.finished]
         progress.stage(spec.name, len(left), "draws")
         refuted = Counter[str]()
-        for index, judged in pool(partial(rows_of, spec, limits=limits), left):
+        for index, judged in pool(partial(rows_of, spec, limits=limits, engine=engine), left):
             rows = died(index) if judged is None else judged
             store.add(rows)
             refuted.update(row["claim"] for row in rows if row["status"] == "refuted")

@@ -72,6 +72,7 @@ def evidence(table: pd.DataFrame, marks: Mapping[str, float] | None = None, depe
         "ended": {str(name): int(count) for name, count in ended.value_counts().items()},
         "not_judged": failed[["index", "run", "ended", "what"]].head(50).to_dict("records"),
         "runs": len(runs),
+        "engines": {str(name): int(count) for name, count in runs["engine"].value_counts().items() if name},
         "simulated_s": float(runs["duration_s"].sum()),
         "claims": sorted(
             (

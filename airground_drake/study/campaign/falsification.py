@@ -14,6 +14,7 @@ from airground_drake.base.errors import PluginError, ScenarioError, described, o
 from airground_drake.base.progress import SILENT, Progress
 from airground_drake.scenario.estimate import Limits
 from airground_drake.scenario.load import from_data
+from airground_drake.sim.simulation import Engine
 from airground_drake.study.campaign.distributions import dimensions, values_at
 from airground_drake.study.campaign.objective import Objective
 from airground_drake.study.campaign.pool import Pool
@@ -30,6 +31,7 @@ class Search:
     spec: Spec  # of the scenarios; a course is that of draw 0
     objective: Objective  # is minimised
     limits: Limits  # largest scenario and longest time
+    engine: Engine = "batch"  # who makes the runs
 
     def values(self, point: Array) -> dict[str, Any]:
         """By dotted key, at a point of the unit cube."""
@@ -37,7 +39,7 @@ class Search:
 
     def at(self, points: Array, k: int) -> tuple[float, bool]:
         """The objective at one of some points (., n), and whether it is a counterexample."""
-        return self._judge(rows_at(self.spec, self.values(points[k]), 0, self.limits))
+        return self._judge(rows_at(self.spec, self.values(points[k]), 0, self.limits, self.engine))
 
     def fails(self, data: dict[str, Any]) -> bool:
         """Whether a scenario, as nested dicts and lists, is valid and a counterexample."""
@@ -45,7 +47,7 @@ class Search:
             scenario = from_data(data, "smaller scenario")
         except ScenarioError:
             return False
-        return self._judge(rows_of_scenario(self.spec, scenario, self.limits))[1]
+        return self._judge(rows_of_scenario(self.spec, scenario, self.limits, engine=self.engine))[1]
 
     def _judge(self, rows: list[Row]) -> tuple[float, bool]:
         return self.objective.value(rows), self.objective.found(rows)

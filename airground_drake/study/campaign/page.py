@@ -19,7 +19,7 @@ from airground_drake.report.sentences import MARKS, Line
 from airground_drake.report.templating import environment_of
 from airground_drake.report.view import canvas, svg
 from airground_drake.study.campaign import swept
-from airground_drake.study.campaign.rows import JUDGED
+from airground_drake.study.campaign.rows import BATCH, BOTH, CLOCK, DRAKE, JUDGED
 
 BARS = 40
 MOST_TOLD = 8  # sentences about claims on the first screen; the others are folded
@@ -37,7 +37,8 @@ def page(found: dict[str, Any], table: pd.DataFrame) -> str:
     """Render the page."""
     template = _environment().get_template("campaign.html.j2")
     return template.render(
-        found=found, told=told(found), separated=_separated(found), figures=_figures(found, table),
+        found=found, told=told(found), engines=made_by(found["engines"]), separated=_separated(found),
+        figures=_figures(found, table),
         sweeps=[
             (each["key"], each["entries"], swept.drawing(each["entries"], each["key"], f"swept{k}"))
             for k, each in enumerate(found.get("swept", ())) if each["entries"]
@@ -67,6 +68,19 @@ def told(found: Mapping[str, Any]) -> list[Line]:
         else:
             lines.append(Line("none", f"{what}: not tested."))
     return sorted(lines, key=lambda line: ("no", "open", "yes", "none").index(line.mark))
+
+
+def made_by(engines: Mapping[str, int]) -> str:
+    """Who made the runs, in words."""
+    compared, clock = engines.get(BOTH, 0), engines.get(CLOCK, 0)
+    loop = engines.get(BATCH, 0) + compared + clock
+    said = [f"Drake made {engines[DRAKE]} of these runs"] if engines.get(DRAKE) else []
+    if loop:
+        said.append(f"the compiled loop made {loop}, and Drake {compared} of them again, bit by bit the same")
+    if clock:
+        said.append(f"{clock} are not compared, because a policy met its limit of time by the clock")
+    told = "; ".join(said)
+    return f"{told[:1].upper()}{told[1:]}." if told else ""
 
 
 class Separation(NamedTuple):

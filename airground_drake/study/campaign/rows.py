@@ -10,16 +10,19 @@ from airground_drake.base.statuses import NOT_EXERCISED, outcome
 #
 # `ended` is `judged`, or the reason why not, explained in `what`: `invalid` (no valid scenario), `stopped` (the
 # simulation), `died` (its process). Such a row has no claim, and neither has the row of a run without claims. `drawn`
-# is strict JSON: values by key. `digest` is the digest of all rows of a draw (see `store`).
+# is strict JSON: values by key. `engine` is who made a run: the compiled loop, Drake, or both, bit by bit the same; or
+# both, not compared, because a policy met its limit of time by the clock. `digest` is the digest of all rows of a draw
+# (see `store`).
 COLUMNS: dict[str, str] = {
     "index": "int64", "run": "str", "method": "str", "ended": "str", "what": "str", "claim": "str", "status": "str",
     "as_expected": "bool", "margin": "float64", "unit": "str", "exercised": "float64", "ugvs": "int64",
     "triggers": "int64", "first_trigger_s": "float64", "arrived": "int64", "arrival_s": "float64",
     "decisions": "int64", "accepted": "int64", "faults": "int64", "duration_s": "float64",
     "intervened_s": "float64", "wall_s": "float64",
-    "drawn": "str", "digest": "str",
+    "engine": "str", "drawn": "str", "digest": "str",
 }  # fmt: skip
 
+BATCH, DRAKE, BOTH, CLOCK = "batch", "drake", "both", "clock"
 JUDGED, INVALID, STOPPED, DIED = "judged", "invalid", "stopped", "died"
 UNFINISHED = (STOPPED, DIED)  # every claim of such a run is undecided; if the row names no run, every claim of the draw
 

@@ -27,7 +27,7 @@ from airground_drake.base import files
 from airground_drake.base.errors import FolderError, one_line
 from airground_drake.study.campaign.rows import COLUMNS, Row
 
-SCHEMA = "airground_drake.campaign/2"
+SCHEMA = "airground_drake.campaign/3"
 MANIFEST, JOURNAL, PARTS = "campaign.json", "journal.jsonl", "parts"
 DRAWS_IN_A_PART = 500
 _KINDS: dict[str, type] = {"int64": int, "float64": float, "str": str, "bool": bool}

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import gc
+import hashlib
 import json
 import time
-from collections.abc import Collection, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from functools import cache
 from typing import Any
 
@@ -14,24 +15,44 @@ import numpy as np
 
 from airground_drake.base import files
 from airground_drake.base.errors import AirgroundError, ScenarioError, described, one_line
+from airground_drake.base.statuses import PASSING
 from airground_drake.scenario import plugins
 from airground_drake.scenario.estimate import Limits, within
 from airground_drake.scenario.schema import Scenario
-from airground_drake.sim.simulation import simulate
+from airground_drake.sim.batch.run import Batch, LeftToDrakeError
+from airground_drake.sim.simulation import Engine, simulate
 from airground_drake.sim.trace import Trace
-from airground_drake.study.campaign.rows import DIED, INVALID, JUDGED, STOPPED, Row, blank
+from airground_drake.study.campaign.rows import (
+    BATCH,
+    BOTH,
+    CLOCK,
+    DIED,
+    DRAKE,
+    INVALID,
+    JUDGED,
+    STOPPED,
+    Row,
+    blank,
+)
 from airground_drake.study.campaign.spec import Spec
-from airground_drake.uav.guest.time_limit import time_limit
+from airground_drake.uav.guest.time_limit import OutOfTime, time_limit
 from airground_drake.verify import Verdict, judge
+
+# Drake makes again, of the runs that the loop made, this share, and those with a margin nearer to 0.
+SHARE, NARROW = 0.005, 1e-6
 
 
 class DrawOutOfTime(BaseException):
     """A draw took too long. An Exception or an OutOfTime would count as a fault of a policy, so it is neither."""
 
 
-def rows_of(spec: Spec, index: int, limits: Limits) -> list[Row]:
+class EnginesDifferError(AirgroundError):
+    """Drake and the compiled loop made different runs of one draw; it ends a campaign."""
+
+
+def rows_of(spec: Spec, index: int, limits: Limits, engine: Engine = "batch") -> list[Row]:
     """Simulate and judge one draw. Returns a row for each run and claim, with the columns of `rows.COLUMNS`."""
-    return rows_at(spec, spec.values(index), index, limits)
+    return rows_at(spec, spec.values(index), index, limits, engine)
 
 
 @cache
@@ -41,22 +62,26 @@ def _keep_what_is_loaded() -> None:
     gc.freeze()
 
 
-def rows_at(spec: Spec, values: Mapping[str, Any], index: int, limits: Limits) -> list[Row]:
+def rows_at(spec: Spec, values: Mapping[str, Any], index: int, limits: Limits, engine: Engine = "batch") -> list[Row]:
     """Simulate and judge any values by dotted key, on the course of a draw."""
     common = blank() | {"index": index, "drawn": json.dumps(files.strict(values, str), allow_nan=False)}
     try:
         scenario = spec.scenario_of(values, index)
     except ScenarioError as error:
         return [common | {"ended": INVALID, "what": one_line(str(error))}]
-    return rows_of_scenario(spec, scenario, limits, common)
+    return rows_of_scenario(spec, scenario, limits, common, engine)
 
 
-def rows_of_scenario(spec: Spec, scenario: Scenario, limits: Limits, common: Row | None = None) -> list[Row]:
+def rows_of_scenario(
+    spec: Spec, scenario: Scenario, limits: Limits, common: Row | None = None, engine: Engine = "batch"
+) -> list[Row]:
     """Simulate a scenario and judge it by the claims of a campaign; every row begins with `common`."""
     common = blank() if common is None else common
     try:
         with _within(spec, scenario, limits):
-            return [row for run in scenario.runs for row in _rows_of_run(scenario, run, spec.claims, common)]
+            return [row for run in scenario.runs for row in _rows_of_run(scenario, run, spec.claims, common, engine)]
+    except EnginesDifferError:
+        raise
     except AirgroundError as error:
         return [common | {"ended": INVALID, "what": one_line(str(error))}]
     except DrawOutOfTime as error:
@@ -78,16 +103,54 @@ def _within(spec: Spec, scenario: Scenario, limits: Limits) -> Iterator[None]:
         yield
 
 
-def _rows_of_run(scenario: Scenario, run: str, claims: Collection[str], common: Row) -> list[Row]:
+def _rows_of_run(scenario: Scenario, run: str, claims: Collection[str], common: Row, engine: Engine) -> list[Row]:
     common = common | {"run": run, "method": scenario.runs[run].method, "duration_s": scenario.duration_s}
     started = time.perf_counter()
     try:
-        trace = simulate(scenario, run)
+        trace, made_by = _made(scenario, run, engine)
         verdicts = judge(trace, claims=claims or None)
+        if made_by == BATCH and _is_for_drake(common["index"], run, verdicts):
+            made_by = _compared(trace, simulate(scenario, run))
+    except EnginesDifferError:
+        raise
     except (Exception, SystemExit) as error:
         return [common | {"ended": STOPPED, "what": described(error)}]
-    common |= {"ended": JUDGED, "wall_s": time.perf_counter() - started, **_happened(trace)}
+    common |= {"ended": JUDGED, "engine": made_by, "wall_s": time.perf_counter() - started, **_happened(trace)}
     return [common | _of_claim(verdict) for verdict in verdicts] or [common | {"what": "no claim is about this run"}]
+
+
+def _made(scenario: Scenario, run: str, engine: Engine) -> tuple[Trace, str]:
+    """The trace of a run, and who made it: the loop, if it can and may."""
+    if engine == BATCH:
+        with suppress(LeftToDrakeError):
+            return Batch(scenario, run).simulate(), BATCH
+    return simulate(scenario, run), DRAKE
+
+
+def _is_for_drake(index: int, run: str, verdicts: Sequence[Verdict]) -> bool:
+    """Whether Drake makes a run of the loop again: what fails or nearly does, and a share of all, chosen by hash."""
+    told = hashlib.sha256(f"{index} {run}".encode()).digest()
+    return int.from_bytes(told[:8]) < SHARE * 2**64 or any(
+        verdict.status not in PASSING or (verdict.margin is not None and abs(verdict.margin) < NARROW)
+        for verdict in verdicts
+        if verdict.status != "not_run"
+    )
+
+
+def _compared(trace: Trace, by_drake: Trace) -> str:
+    """Who made a run, after a comparison bit by bit; raises EnginesDifferError."""
+    from airground_drake.report.simulated import first_difference  # slow to import, and rarely needed
+
+    both = trace.meta["faults"] + by_drake.meta["faults"]
+    if any(OutOfTime.__name__ in fault["what"] for fault in both):
+        return CLOCK  # a policy's limit is in time by the clock, and need not fall at the same plan
+    if (found := first_difference(by_drake, trace)) is not None:
+        about, drakes, ours = found
+        told = f"run {trace.run} of {trace.meta['scenario']['name']}, seed {trace.meta['seed']}: {about} is"
+        raise EnginesDifferError(
+            one_line(f"{told} {drakes!r} by Drake and {ours!r} by the loop; --engine drake does without")
+        )
+    return BOTH
 
 
 def died(index: int) -> list[Row]:

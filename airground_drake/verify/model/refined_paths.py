@@ -92,7 +92,7 @@ def triggers(trigger: Trigger, x: Array, dt: float) -> list[float]:
                 return times
             segment = min(int(t / dt), len(x) - 2)
             now = x[segment] + (x[segment + 1] - x[segment]) * (t / dt - segment)
-            state = trigger.recover(state, t, float(now))
+            state = trigger.step(state, t, float(now))
         else:
             supervising = state.mode is Mode.SUPERVISING
             ends, height = (rises, above) if supervising else (falls, below)
@@ -101,7 +101,7 @@ def triggers(trigger: Trigger, x: Array, dt: float) -> list[float]:
                 return times
             segment = int(ends[i])
             t = max(t, _crossing(height, segment, dt))
-            state = trigger.rise(state, t) if supervising else trigger.fall(state, t)
+            state = trigger.step(state, t, trigger.zeta if supervising else -math.inf)
         if state.triggers > len(times):
             times.append(t)
 

@@ -15,8 +15,9 @@ from pydrake.systems.framework import Context, Diagram
 from airground_drake.report.view.draw import robot_path, served
 from airground_drake.report.view.live_view import LiveView
 from airground_drake.scenario.load import load
+from airground_drake.sim.blocks.decision import ACCURACY
 from airground_drake.sim.diagram import RECORDED, Model, build_model
-from airground_drake.sim.simulation import EVENT_ACCURACY, Recorder
+from airground_drake.sim.simulation import Recorder
 
 HALF_S, END_S = 15.0, 18.0
 """Case A triggers at 14.48 s: at half time a proposal is being executed and watched."""
@@ -25,7 +26,7 @@ HALF_S, END_S = 15.0, 18.0
 def begun(diagram: Diagram, seed: int) -> Context:
     context = diagram.CreateDefaultContext()
     diagram.SetRandomContext(context, RandomGenerator(seed))
-    context.SetAccuracy(EVENT_ACCURACY)
+    context.SetAccuracy(ACCURACY)
     return context
 
 

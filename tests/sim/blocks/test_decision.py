@@ -32,10 +32,9 @@ from verify.judging import decided
 from airground_drake.base.arrays import Array
 from airground_drake.base.errors import PluginError, SimulationError
 from airground_drake.model.geometry.motion import Motion
-from airground_drake.model.trigger.automaton import Trigger
+from airground_drake.model.trigger.automaton import FIELDS, Trigger
 from airground_drake.scenario.load import from_data, load
 from airground_drake.sim.blocks.decision import DecisionBlock, DecisionVariable, EventTrigger
-from airground_drake.sim.blocks.signals import FIELDS
 from airground_drake.sim.components import integrated_noise
 from airground_drake.sim.diagram import build_diagram
 from airground_drake.sim.simulation import simulate

@@ -16,8 +16,8 @@ from airground_drake.scenario.schema import Scenario
 from airground_drake.scenario.world import make_world
 from airground_drake.sim import components
 from airground_drake.sim.blocks import Monitor, Rule, Violation
+from airground_drake.sim.blocks.decision import ACCURACY
 from airground_drake.sim.diagram import build_diagram, make_monitor
-from airground_drake.sim.simulation import EVENT_ACCURACY
 from airground_drake.sim.trace import Trace
 from airground_drake.verify import judge
 
@@ -30,7 +30,7 @@ def watched(
     diagram = build_diagram(scenario, method, monitor=monitor)
     context = diagram.CreateDefaultContext()
     diagram.SetRandomContext(context, RandomGenerator(scenario.seed))
-    context.SetAccuracy(EVENT_ACCURACY)
+    context.SetAccuracy(ACCURACY)
     simulator = Simulator(diagram, context)
     simulator.Initialize()
     status = simulator.AdvanceTo(scenario.duration_s)

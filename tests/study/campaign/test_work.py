@@ -12,8 +12,10 @@ import pytest
 
 from airground_drake.base.errors import SimulationError
 from airground_drake.scenario.estimate import DEFAULT_LIMITS, Limits
+from airground_drake.sim.batch.run import Batch
+from airground_drake.sim.trace import Trace
 from airground_drake.study.campaign import work
-from airground_drake.study.campaign.rows import COLUMNS, INVALID, JUDGED, STOPPED
+from airground_drake.study.campaign.rows import BATCH, BOTH, COLUMNS, DRAKE, INVALID, JUDGED, STOPPED
 from airground_drake.study.campaign.spec import Spec, load_spec
 
 TEXT = """
@@ -79,7 +81,7 @@ def test_a_run_that_stops_is_a_row(spec: Spec, monkeypatch: pytest.MonkeyPatch) 
         raise SimulationError("d", 1.5, "t0 < ti")
 
     monkeypatch.setattr(work, "simulate", stop)
-    rows = work.rows_of(spec, 5, DEFAULT_LIMITS)
+    rows = work.rows_of(spec, 5, DEFAULT_LIMITS, "drake")
     assert [row["ended"] for row in rows] == [STOPPED] * len(spec.draw(5).runs)
     assert "t0 < ti" in rows[0]["what"]
 
@@ -101,3 +103,34 @@ def test_a_scenario_that_is_made_small_is_simulated_with_code_beside_the_spec(sp
     own = replace(spec, fixed={"intervention.policies": [{"name": "idle.py:Policy"}]})
     rows = (work.rows_of_scenario(own, own.draw(0), limits) for limits in (Limits(plugins=True), DEFAULT_LIMITS))
     assert [{row["ended"] for row in each} for each in rows] == [{JUDGED}, {INVALID}]
+
+
+def test_drake_makes_a_share_of_the_loops_runs_again(spec: Spec, monkeypatch: pytest.MonkeyPatch) -> None:
+    quiet = replace(spec, claims=("ZENO-TRACE",))
+    monkeypatch.setattr(work, "SHARE", 0.0)
+    assert {row["engine"] for row in work.rows_of(quiet, 5, DEFAULT_LIMITS)} == {BATCH}
+    assert {row["engine"] for row in work.rows_of(quiet, 5, DEFAULT_LIMITS, "drake")} == {DRAKE}
+    late = replace(quiet, fixed={"ugvs.ugv1.plant": [{"kind": "delay", "delay_s": 0.1}]})
+    assert {row["engine"] for row in work.rows_of(late, 5, DEFAULT_LIMITS)} == {DRAKE}
+    monkeypatch.setattr(work, "SHARE", 1.0)
+    assert {row["engine"] for row in work.rows_of(quiet, 5, DEFAULT_LIMITS)} == {BOTH}
+
+
+def test_drake_makes_what_fails_again(spec: Spec, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(work, "SHARE", 0.0)
+    rows = work.rows_of(replace(spec, claims=("LIVE-GOAL",)), 5, DEFAULT_LIMITS)
+    assert {(row["status"], row["engine"]) for row in rows} == {("refuted", BOTH)}
+
+
+def test_one_difference_ends_a_campaign(spec: Spec, monkeypatch: pytest.MonkeyPatch) -> None:
+    made = Batch.simulate
+
+    def wrong(self: Batch, seed: int | None = None) -> Trace:
+        trace = made(self, seed)
+        trace.states.loc[len(trace.states) - 1, "ugv1.x_m"] += 1e-15
+        return trace
+
+    monkeypatch.setattr(Batch, "simulate", wrong)
+    monkeypatch.setattr(work, "SHARE", 1.0)
+    with pytest.raises(work.EnginesDifferError, match=r"ugv1.x_m is .* by Drake and .* by the loop"):
+        work.rows_of(spec, 5, DEFAULT_LIMITS)

@@ -1,0 +1,143 @@
+"""Runs by the compiled loop: the same traces as Drake's, bit by bit, and what is left to Drake."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from airground_drake.base.errors import SimulationError
+from airground_drake.model.geometry.motion import Motion
+from airground_drake.model.trigger import excursion
+from airground_drake.model.trigger.excursion import Corners
+from airground_drake.report.simulated import first_difference
+from airground_drake.scenario.load import from_data, load, resolved
+from airground_drake.scenario.schema import Scenario
+from airground_drake.scenario.shipped import shipped_files
+from airground_drake.sim.batch import noise
+from airground_drake.sim.batch.run import Batch, LeftToDrakeError
+from airground_drake.sim.simulation import Recorder, simulate
+from airground_drake.study.testing.strategies import scenarios
+
+
+def differences(scenario: Scenario, run: str, seeds: range = range(1)) -> list[object]:
+    """The first difference of each seed's traces by Drake and by the loop, which are built once."""
+    drake, loop = Recorder(scenario, run), Batch(scenario, run)
+    pairs = [(drake.simulate(seed), loop.simulate(seed)) for seed in seeds]
+    return [found for pair in pairs if (found := first_difference(*pair)) is not None]
+
+
+@pytest.mark.parametrize("run", ["a", "b", "c", "d"])
+def test_a_run_is_drakes_bit_by_bit(run: str) -> None:
+    """All tables, events and parameters; proposals, answers and a release are among them."""
+    short = load("case_a", ["duration_s=17.33", "reproduction=[]"])  # no multiple of any period
+    assert differences(short, run) == []
+
+
+ODD = {
+    "bare and noisy": ["decision.trigger=bare", "decision.noise_m_sqrt_s=0.5"],
+    "leak": ["decision.leak_1_s=0.3", "decision.noise_period_s=0.01"],
+    "periods that are multiples up to rounding": ["gatekeeper.period_s=0.15", "intervention.period_s=0.3"],
+    "appears and goes": ["obstacles.obstacle_1.appears_s=2.0", "obstacles.obstacle_2.disappears_s=9.0"],
+    "moves": ["obstacles.obstacle_3={moves: {waypoints_m: [[12, 3, 0], [12, 9, 0]], speed_m_s: 0.4}}"],
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("changes", ODD.values(), ids=ODD)
+@pytest.mark.parametrize("run", ["a", "d"])
+def test_odd_settings(changes: list[str], run: str) -> None:
+    assert differences(load("case_a", ["reproduction=[]", *changes]), run, range(2)) == []
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", sorted(shipped_files()))
+def test_shipped_scenarios(name: str) -> None:
+    scenario = load(name)
+    for run in scenario.runs:
+        try:
+            found = differences(scenario, run)
+        except LeftToDrakeError:
+            assert any(plant.kind in ("lag", "delay") for robot in scenario.robots.values() for plant in robot.plant)
+        else:
+            assert found == [], run
+
+
+@pytest.mark.slow
+@given(scenarios())
+@settings(max_examples=15)
+def test_drawn_scenarios(scenario: Scenario) -> None:
+    for run in scenario.runs:
+        assert differences(scenario, run) == []
+
+
+@given(st.integers(0, 2**32 - 1), st.integers(1, 7), st.integers(1, 40))
+@settings(max_examples=20)
+def test_the_noise_is_drakes(seed: int, count: int, sets: int) -> None:
+    assert np.array_equal(noise._made(seed, count, sets), noise._of_drake(seed, count, sets))
+
+
+def test_with_another_standard_library_drake_draws_the_noise(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(noise, "_made", lambda seed, count, sets: np.zeros((sets, count)))
+    noise._is_drakes.cache_clear()
+    try:
+        assert noise.gaussians(3, 2, 5).any()
+    finally:
+        noise._is_drakes.cache_clear()
+
+
+POINT = st.tuples(st.floats(-5.0, 5.0), st.floats(-5.0, 5.0))
+
+
+@given(st.lists(POINT, min_size=2, max_size=5, unique=True), st.lists(POINT, min_size=2, max_size=4, unique=True))
+def test_a_step_over_corners_misses_nothing(
+    first: list[tuple[float, float]], second: list[tuple[float, float]]
+) -> None:
+    """Two robots stand still while their references go round corners; beside many places in between."""
+    presets = [
+        Motion(np.linspace(0.2, 0.7, len(way)), np.column_stack([way, np.zeros(len(way))])) for way in (first, second)
+    ]
+    times = np.linspace(0.0, 1.0, 501)
+    errors = np.stack([preset.sample(times) for preset in presets], axis=1)
+    signals = [
+        np.concatenate([[t], np.column_stack([error, np.zeros(2), np.linalg.norm(error, axis=1)]).ravel()])
+        for t, error in ((0.0, errors[0]), (1.0, errors[-1]))
+    ]
+    found = excursion.ranges(*signals, Corners.of(presets)).reshape(2, 2)
+    seen = np.linalg.norm(errors, axis=2)
+    assert (found[0] <= seen.min(axis=0) + 1e-12).all()
+    assert (found[0] >= seen.min(axis=0) - 0.2).all()
+    assert (found[1] >= seen.max(axis=0) - 1e-12).all()
+    assert (found[1] <= seen.max(axis=0) + 0.2).all()
+
+
+@pytest.mark.parametrize(
+    ("changes", "why"),
+    [
+        (["ugvs.ugv1.plant=[{kind: delay, delay_s: 0.1}]"], "the plant of ugv1"),
+        (["ugvs.ugv1.plant={kind: lag, time_constant_s: 0.2}"], "the plant of ugv1"),
+    ],
+)
+def test_what_is_left_to_drake(changes: list[str], why: str) -> None:
+    scenario = load("minimal", ["duration_s=1.0", *changes])
+    with pytest.raises(LeftToDrakeError, match=why):
+        Batch(scenario, "d")
+    assert first_difference(simulate(scenario, "d"), simulate(scenario, "d", engine="batch")) is None
+
+
+def test_errors_are_in_drakes_words(tmp_path: Path) -> None:
+    (tmp_path / "route.py").write_text(
+        "class Route:\n    def solve(self, problem, budget):\n        raise KeyError('lost')\n", encoding="utf-8"
+    )
+    data = resolved(load("case_a", ["duration_s=12.0", "reproduction=[]"]))
+    data["gatekeeper"]["route"] = f"{tmp_path}/route.py:Route"
+    scenario = from_data(data, "own")
+    told = []
+    for engine in ("drake", "batch"):
+        with pytest.raises(SimulationError) as raised:
+            simulate(scenario, "c", engine=engine)  # type: ignore[arg-type]
+        told.append(str(raised.value))
+    assert told[0] == told[1]
