@@ -14,7 +14,7 @@ from scenario.cases import SMALL_DATA, edit
 
 from airground_drake.base.errors import LimitError
 from airground_drake.scenario.estimate import DEFAULT_LIMITS, PROGRAM, Limits, estimate, within
-from airground_drake.scenario.load import from_data, load, shipped
+from airground_drake.scenario.load import from_data, load
 from airground_drake.scenario.schema import Obstacle, Run, Scenario
 from airground_drake.sim.trace import Trace
 
@@ -25,13 +25,6 @@ EVENTS = 1.25
 def small(method: str = "d") -> Scenario:
     scenario = from_data(SMALL_DATA, "small")
     return replace(scenario, runs={"one": Run(method=method)}, reproduction=[], choices=[])
-
-
-@pytest.mark.parametrize("name", shipped())
-def test_shipped_scenarios_are_well_within_the_default_limits(name: str) -> None:
-    asked = within(load(name), DEFAULT_LIMITS)
-    assert asked.work < DEFAULT_LIMITS.work / 10.0
-    assert asked.memory < DEFAULT_LIMITS.memory / 2.0
 
 
 @pytest.mark.parametrize(("name", "run_name"), [("case_a", "a"), ("case_a", "c"), ("case_b", "d"), ("contact", "d")])

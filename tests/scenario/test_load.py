@@ -12,16 +12,8 @@ from scenario.cases import SMALL, SMALL_DATA, Write, case_a, edit, message
 from airground_drake.base.errors import ScenarioError
 from airground_drake.scenario import plugins
 from airground_drake.scenario.document import text_of
-from airground_drake.scenario.load import load, own, resolved, shipped, validated
+from airground_drake.scenario.load import load, own, resolved, validated
 from airground_drake.scenario.schema import Obstacle, Uav
-from airground_drake.scenario.shipped import shipped_files
-
-
-@pytest.mark.parametrize("name", shipped())
-def test_shipped_scenarios_load(name: str) -> None:
-    scenario = load(name)
-    assert scenario.name == name
-    assert scenario.digest == load(str(shipped_files()[name])).digest
 
 
 @pytest.mark.parametrize(

@@ -12,7 +12,9 @@ import pytest
 
 from airground_drake.base.registry import MODEL_CLAIMS, RUN_CLAIMS
 from airground_drake.report.interventions import avoidance
+from airground_drake.scenario.estimate import DEFAULT_LIMITS, within
 from airground_drake.scenario.load import load, shipped
+from airground_drake.scenario.shipped import shipped_files
 from airground_drake.sim.trace import Trace
 from airground_drake.verify import judge, judge_model
 from airground_drake.verify.claim import Verdict
@@ -69,7 +71,11 @@ def test_accepted_proposals_are_executed_where_inequalities_bind_and_where_none_
     assert all(0 < found[ugv]["both"] < found[ugv]["executing"] for ugv in ("ugv1", "ugv2")), found
 
 
-@pytest.mark.parametrize("scenario", shipped())
-def test_every_shipped_scenario_says_what_it_is_meant_to_put_to_the_test(scenario: str) -> None:
-    runs = load(scenario).runs
-    assert any("exercised" in str(expected) for expected in runs["d"].expected.values())
+@pytest.mark.parametrize("name", shipped())
+def test_every_shipped_scenario_is_small_and_says_what_it_is_meant_to_put_to_the_test(name: str) -> None:
+    scenario = load(name)
+    assert (scenario.name, scenario.digest) == (name, load(str(shipped_files()[name])).digest)
+    assert any("exercised" in str(expected) for expected in scenario.runs["d"].expected.values())
+    asked = within(scenario, DEFAULT_LIMITS)
+    assert asked.work < DEFAULT_LIMITS.work / 10.0
+    assert asked.memory < DEFAULT_LIMITS.memory / 2.0
