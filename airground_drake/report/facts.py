@@ -8,11 +8,10 @@ from functools import cached_property
 from math import dist
 from typing import Any, NamedTuple
 
-from airground_drake.base.registry import METHODS
+from airground_drake.base.registry import AS_TOLD, METHODS
 from airground_drake.base.statuses import PASSING
 from airground_drake.report import rules
 from airground_drake.report.outcomes import Document, Near, claims, named, no_way, pairs
-from airground_drake.scenario.plants import DEFAULT
 from airground_drake.sim.collisions import first_collisions
 
 # What is known of a claim that was not judged.
@@ -91,7 +90,7 @@ class RunFacts:
     def is_proved(self) -> bool:
         """Whether theorems keep the distances from bodies at rest and between robots, and their conditions held."""
         robots = (*self._resolved["ugvs"].values(), self._resolved["uav"])
-        as_told = all(plant["kind"] == DEFAULT for robot in robots for plant in robot.get("plant", ()))
+        as_told = all(plant["kind"] == AS_TOLD for robot in robots for plant in robot.get("plant", ()))
         needed = (*rules.PROOFS, *[rules.PROOF_OF_PLANTS][: not as_told])
         met = self.claim(rules.CONDITIONS)["status"] in PASSING
         return self.method == "d" and self._plain and met and all(self.claim(n)["status"] == "proved" for n in needed)

@@ -140,8 +140,8 @@ def declared_pairs(trace: Trace) -> Iterator[Pair]:
 
 def bounds_of(trace: Trace) -> dict[str, Bounds]:
     """How far the bodies of the robots may be from where the law steers them, by name."""
-    robots = trace.scenario.robots
-    return trace.derived("bounds", lambda: {name: trace.plant(name).bounds(robots[name].max_speed_m_s) for name in robots})
+    robots = trace.scenario.robots.items()
+    return trace.derived("bounds", lambda: {name: trace.plant(name).bounds(of.max_speed_m_s) for name, of in robots})
 
 
 class Parts(NamedTuple):
