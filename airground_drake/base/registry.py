@@ -301,7 +301,7 @@ ROUTES = Registry(
 UAV_TASKS = Registry("task", "uav_tasks", {"formation": "airground_drake.model.law.tasks:FormationTask"})
 
 # Plants of robots: keys of a scenario in a file of that name, subclasses of `model.plants.plant.Keys`; and subclasses
-# of Drake's System. The first is the default.
+# of Drake's System.
 PLANTS = Registry(
     "plant",
     "plants",
@@ -316,6 +316,8 @@ PLANTS = Registry(
         )
     },
 )
+
+AS_TOLD = PLANTS.own[0]  # the default: it moves as it is told
 
 # Samplers of points in the search for violations: classes that meet `study.campaign.search.Sampler`.
 SAMPLERS = Registry(

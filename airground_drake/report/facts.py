@@ -8,12 +8,11 @@ from functools import cached_property
 from math import dist
 from typing import NamedTuple
 
-from airground_drake.base.registry import METHODS
+from airground_drake.base.registry import AS_TOLD, METHODS
 from airground_drake.base.statuses import PASSING
 from airground_drake.report import rules
 from airground_drake.report.model import Claim, OnTheWay, Report
 from airground_drake.report.outcomes import Near, named, pairs
-from airground_drake.scenario.plants import DEFAULT
 from airground_drake.sim.collisions import first_collisions
 
 # What is known of a claim that was not judged.
@@ -84,7 +83,7 @@ class RunFacts:
     def is_proved(self) -> bool:
         """Whether theorems keep the distances from bodies at rest and between robots, and their conditions held."""
         robots = self._scenario.robots.values()
-        as_told = all(plant.kind == DEFAULT for robot in robots for plant in robot.plant)
+        as_told = all(plant.kind == AS_TOLD for robot in robots for plant in robot.plant)
         needed = (*rules.PROOFS, *[rules.PROOF_OF_PLANTS][: not as_told])
         met = self.claim(rules.CONDITIONS).status in PASSING and self._spec.composition == "augmented"
         return self.method == "d" and met and all(self.claim(name).status == "proved" for name in needed)

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Protocol, Union
 
 from pydantic import BeforeValidator, Discriminator, Field, Tag, TypeAdapter, ValidationInfo
 
-from airground_drake.base.registry import PLANTS
+from airground_drake.base.registry import AS_TOLD, PLANTS
 from airground_drake.base.values import RECORDED, refused
 from airground_drake.model.plants.first_order import FirstOrder
 from airground_drake.model.plants.own import OwnKeys
@@ -17,19 +17,18 @@ from airground_drake.scenario.kinds import OneOrList
 # The classes of keys, by kind; `OWN` stands for the user's plants.
 OWN = "a plant of your own"
 KEYS: dict[str, type[Keys]] = {name: PLANTS.load(name, of=Keys) for name in PLANTS.own} | {OWN: OwnKeys}
-DEFAULT = next(iter(KEYS))  # the kind of a plant that moves as it is told
 NO_THEOREM = "no theorem covers another combination"
 
 
 def tag_of(given: Any) -> str:
     """The class that a plant's keys belong to, by its name in `KEYS`; the default's for what is no mapping."""
-    kind = given.get("kind", DEFAULT) if isinstance(given, dict) else getattr(given, "kind", DEFAULT)
+    kind = given.get("kind", AS_TOLD) if isinstance(given, dict) else getattr(given, "kind", AS_TOLD)
     return kind if kind in PLANTS.own else OWN
 
 
 def _known(given: Any, info: ValidationInfo) -> Any:
     """Refuse a kind that is no name of a plant, whatever the other keys are."""
-    kind = given.get("kind", DEFAULT) if isinstance(given, dict) else DEFAULT
+    kind = given.get("kind", AS_TOLD) if isinstance(given, dict) else AS_TOLD
     if isinstance(kind, str) and info.context != RECORDED and not PLANTS.accepts(kind):
         raise refused(kind, f"one of {', '.join(PLANTS.allowed)}{plugin_path(kind)}", "kind")
     return given
