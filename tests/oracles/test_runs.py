@@ -122,6 +122,7 @@ def test_a_ugv_forgets_what_it_sees_to_be_gone() -> None:
     assert not faults_of(trace)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", "bcd")
 def test_proposals_that_concern_one_direction(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     one_direction(monkeypatch)
@@ -201,9 +202,8 @@ def test_the_nearest_obstacles_of_an_endless_map_count() -> None:
     assert not faults_of(trace)
 
 
-@pytest.mark.parametrize(
-    ("name", "safe_m", "duration_s"), [("d", 1e-6, 1.2), pytest.param("c", 1e-3, 1.6, marks=pytest.mark.slow)]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize(("name", "safe_m", "duration_s"), [("d", 1e-6, 1.2), ("c", 1e-3, 1.6)])
 def test_a_prediction_that_depends_on_rounding_is_not_compared(
     name: str, safe_m: float, duration_s: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
