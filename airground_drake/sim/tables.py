@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+import numpy as np
 import pandas as pd
 
 SCHEMA = "airground_drake.trace/9"
@@ -123,4 +124,9 @@ TABLES = ("states", "samples", "seen", "messages", "proposals", "plans", "decisi
 
 def typed(rows: Sequence[Mapping[str, Any]], kinds: Mapping[str, str], *lists: str) -> pd.DataFrame:
     """A table of rows with columns of some kinds, and columns whose cells are lists."""
-    return pd.DataFrame(list(rows), columns=[*kinds, *lists]).astype(dict(kinds))
+    # Each column is made with its type: `astype` for all of them takes three times as long.
+    columns: dict[str, Any] = {}
+    for name, kind in {**kinds, **dict.fromkeys(lists, "object")}.items():
+        cells = [row[name] for row in rows]
+        columns[name] = np.array(cells, kind) if kind not in ("str", "object") else pd.Series(cells, dtype=kind)
+    return pd.DataFrame(columns)

@@ -20,12 +20,19 @@ from airground_drake.sim.trace import Trace
 from airground_drake.verify import judge
 
 FORWARDS = [f"ugvs.{name}.plant.backwards=false" for name in ("burger", "waffle", "tb4")]
-RUNS = (("turtlebots", 12.0), ("lagging", 9.0), ("case_a_unicycle", 10.0), ("turtlebots forwards", 12.0))
+CAR = ["ugvs.burger.plant={kind: ackermann, hand_point_m: 0.1, wheelbase_m: 0.1, max_steering_rad: 0.8}"]
+RUNS = (
+    ("turtlebots car", 12.0),
+    ("turtlebots", 12.0),
+    ("lagging", 9.0),
+    ("case_a_unicycle", 10.0),
+    ("turtlebots forwards", 12.0),
+)
 
 
 def given(name: str) -> Scenario:
-    scenario, _, forwards = name.partition(" ")
-    return load(scenario, FORWARDS if forwards else [])
+    scenario, _, otherwise = name.partition(" ")
+    return load(scenario, {"": [], "forwards": FORWARDS, "car": CAR}[otherwise])
 
 
 def run_of(name: str, duration_s: float) -> tuple[Trace, Run]:
@@ -84,6 +91,13 @@ def test_an_axle_that_begins_too_near_or_rolls_back_is_found() -> None:
     states, heading = trace.states.copy(), trace.states["burger.heading_rad"][20]
     states.loc[20, place] -= 0.1 * np.array([np.cos(heading), np.sin(heading)])
     assert refuted_for(trace, states) == "never backwards"
+
+
+def test_a_car_that_turns_more_sharply_than_it_can_is_found() -> None:
+    trace, _ = run_of("turtlebots car", 2.0)
+    states = trace.states.copy()
+    states.loc[20:, "burger.heading_rad"] += 0.5
+    assert refuted_for(trace, states) == "least turning radius"
 
 
 def refuted_for(trace: Trace, states: pd.DataFrame) -> str:

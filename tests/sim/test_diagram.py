@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 import pytest
+from pydrake.trajectories import PiecewisePolynomial
 
 from airground_drake.model.bodies.world import World
 from airground_drake.model.geometry.motion import Motion
@@ -24,7 +25,8 @@ def test_corners_of_two_presets_that_rounding_keeps_apart_are_one() -> None:
     """At 24 s, between the ends of the two, a velocity over four units in the last place would be one of rounding."""
     ends = [24.0, 24.0 - 4e-15, 24.0 + 4e-15]
     presets = [Motion(np.array([0.0, end]), np.array([[9.7, 7.0, 0.0], [-9.7, -7.1, 0.0]])) for end in ends]
-    together = stack_presets(presets)
+    times, places = stack_presets(presets)
+    together = PiecewisePolynomial.FirstOrderHold(times, places.T)
     rates = together.EvalDerivative(24.0, 1).reshape(-1, 3)
     assert all(min(np.abs(rate - side).max() for side in (presets[0].at(1.0)[1], 0.0)) < 1e-9 for rate in rates)
     assert together.value(24.0).ravel() == pytest.approx(np.tile([-9.7, -7.1, 0.0], 3), abs=1e-12)

@@ -33,7 +33,7 @@ class Motion:
             raise ValueError(f"a motion needs times (M,) and positions (M, 3), got {times.shape}, {positions.shape}")
         if not (np.isfinite(times).all() and np.isfinite(positions).all()):
             raise ValueError("a motion needs finite times and positions")
-        with np.errstate(all="raise"):
+        with np.errstate(all="raise", under="ignore"):
             steps = times[1:] - times[:-1]  # `np.diff` takes ten times as long, and motions are made by the thousand
             if not (steps > 0.0).all():
                 raise ValueError("the times of a motion must increase strictly")

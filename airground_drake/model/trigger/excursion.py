@@ -83,6 +83,8 @@ def norm(x: float, y: float, z: float) -> float:
         low += rest + ((square - (both - part)) + (high - part))
         square = both
     root = np.sqrt(square + low)
+    if root == 0.0:  # squares of such numbers are no numbers any more
+        return largest
     high, rest = _squared(root)
     return float(root + (((square - high) - rest) + low) / (2.0 * root))
 

@@ -233,6 +233,10 @@ class EventTrigger(LeafSystem):
         """A view of the levels in force; assigning to it changes them in this Context."""
         return TriggerLevels(context.get_mutable_numeric_parameter(0).get_mutable_value())
 
+    def _checked_levels(self, context: Context) -> Array:
+        """The levels in force, (3,); ValueError if no trigger can have them."""
+        return Trigger(*context.get_numeric_parameter(0).value().tolist()).levels
+
     def DoGetWitnessFunctions(self, context: Context) -> list[WitnessFunction]:
         return [self._witness]
 
@@ -241,7 +245,7 @@ class EventTrigger(LeafSystem):
             raise RuntimeError("the Context has no accuracy, so no event can be isolated; call SetAccuracy(1e-6) on it")
         discrete, t, x = state.get_mutable_discrete_state(), context.get_time(), self._variable.Eval(context)
         begun, run_begun = discrete.value(1), discrete.value(2)
-        levels = context.get_numeric_parameter(0).value()
+        levels = self._checked_levels(context)
         if run_begun[0] < begun[0] <= t:  # another simulator goes on with a run
             status = discrete.value(0).copy()
             advance(status, t, x, np.tile(x, 2), levels)
@@ -270,7 +274,7 @@ class EventTrigger(LeafSystem):
             raise PluginError(f"decision_range is not a number, {told}: {short(repr(spans.tolist()))}")
         if anything_due(before, t, spans, levels):
             status = before.copy()
-            advance(status, t, self._variable.Eval(context), spans, levels)
+            advance(status, t, self._variable.Eval(context), spans, self._checked_levels(context))
             discrete.set_value(0, status)
             discrete.set_value(3, [0.0])
         else:

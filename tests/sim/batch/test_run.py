@@ -114,26 +114,22 @@ def test_a_step_over_corners_misses_nothing(
     assert (found[1] <= seen.max(axis=0) + 0.2).all()
 
 
-@pytest.mark.parametrize(
-    ("changes", "why"),
-    [
-        (["ugvs.ugv1.plant=[{kind: delay, delay_s: 0.1}]"], "the plant of ugv1"),
-        (["ugvs.ugv1.plant={kind: lag, time_constant_s: 0.2}"], "the plant of ugv1"),
-    ],
-)
-def test_what_is_left_to_drake(changes: list[str], why: str) -> None:
-    scenario = load("minimal", ["duration_s=1.0", *changes])
-    with pytest.raises(LeftToDrakeError, match=why):
+def test_what_is_left_to_drake() -> None:
+    scenario = load("lagging", ["duration_s=1.0"])
+    with pytest.raises(LeftToDrakeError, match="the plant of cart1"):
         Batch(scenario, "d")
     assert first_difference(simulate(scenario, "d"), simulate(scenario, "d", engine="batch")) is None
 
 
-def test_errors_are_in_drakes_words(tmp_path: Path) -> None:
-    (tmp_path / "route.py").write_text(
+def test_errors_are_in_drakes_words(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "lost_route.py").write_text(
         "class Route:\n    def solve(self, problem, budget):\n        raise KeyError('lost')\n", encoding="utf-8"
     )
-    data = resolved(load("case_a", ["duration_s=12.0", "reproduction=[]"]))
-    data["gatekeeper"]["route"] = f"{tmp_path}/route.py:Route"
+    data = resolved(
+        load("case_a", ["duration_s=4.0", "reproduction=[]", "decision.threshold.zeta_m=0.5", "decision.release_m=0.2"])
+    )
+    monkeypatch.syspath_prepend(tmp_path)
+    data["gatekeeper"]["route"] = "lost_route:Route"
     scenario = from_data(data, "own")
     told = []
     for engine in ("drake", "batch"):
