@@ -45,7 +45,7 @@ def as_float(value: object) -> object:
 
 def visible(text: str) -> str:
     """Refuse text with characters that could disguise it where it is shown."""
-    if hidden := next(filter(_is_hidden, text), None):
+    if not text.isprintable() and (hidden := next(filter(_is_hidden, text), None)):
         raise refused(hidden, "text without control characters and without marks that turn the direction of writing")
     return text
 

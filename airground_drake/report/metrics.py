@@ -211,6 +211,7 @@ def gatekeeper(trace: Trace) -> dict[str, Any] | None:
     gaps = table["gap"].to_numpy(dtype=np.float64)
     known = gaps[gaps >= 0.0]
     times = np.asarray(trace.timings.get("decision_times_s", []), dtype=np.float64)
+    times = times[times > 0.0]  # without answers that were only kept
     period = float(trace.scenario.gatekeeper.period_s)
     levels = {"p50": 0.5, "p99": 0.99, "max": 1.0}
     time_s = {name: float(np.quantile(times, at, method="higher")) for name, at in levels.items() if times.size}

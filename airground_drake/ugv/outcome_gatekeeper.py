@@ -76,12 +76,11 @@ class OutcomeGatekeepers(Gatekeepers):
             if held[i].executing and standing != ACCEPT:  # withdrawn
                 held[i] = self._patience.stop(held[i], now.t)
             held[i] = self._patience.rested(held[i], now.t)
-        judged: list[GatekeeperDecision] = []
-        for i, proposal in enumerate(now.proposals):
-            if proposal is not None:
-                started = thread_time()
-                decision = self._decide(now, known, before, i, proposal, said[i], held[i])
-                judged.append(replace(decision, cpu_s=thread_time() - started))
+        judged = [
+            self._decide(now, known, before, i, proposal, said[i], held[i])
+            for i, proposal in enumerate(now.proposals)
+            if proposal is not None
+        ]
         answers, reports = [SILENT, -1.0] * len(said), [Report()] * len(said)
         decisions: list[GatekeeperDecision] = []
         for decision in _jointly(judged, said):
@@ -131,19 +130,24 @@ class OutcomeGatekeepers(Gatekeepers):
         """Judge a new proposal, watch over an accepted one, keep to a refusal."""
         reason: Reason = "kept"
         refuse = accept = None
+        cpu_s = 0.0  # of what is foreseen: to look at the clock takes as long as to keep to an answer
         basis, new = Basis(), self._discovered(known.sensed, before, i, proposal)
         if standing == ACCEPT and self._patience.over(held, now.t):
             reason = "over"
         elif standing == SILENT and self._patience.exhausted(held):
             reason = "exhausted"
         elif standing == SILENT or (standing == ACCEPT and new):
+            started = thread_time()
             seen, basis = self._view_of(now, known, i, proposal)
             basis = basis._replace(new=new)
             refuse, accept = self.foresee(seen, now.law, proposal)
+            cpu_s = thread_time() - started
             favour = proposal.cause in self._ugvs and proposal.cause != self._ugvs[i]
             reason = reason_of(refuse, accept, favour=favour)
         accepted = reason in ACCEPTING or (reason == "kept" and standing == ACCEPT)
-        return GatekeeperDecision(now.t, i, proposal, accepted, reason, refuse=refuse, accept=accept, basis=basis)
+        return GatekeeperDecision(
+            now.t, i, proposal, accepted, reason, refuse=refuse, accept=accept, basis=basis, cpu_s=cpu_s
+        )
 
     def _after(self, held: Commitment, decision: GatekeeperDecision, standing: float) -> Commitment:
         """A UGV's commitment after a decision, when its answer so far is `standing`."""

@@ -118,7 +118,7 @@ def printed(found: Document) -> None:
 
 
 def lagging(found: Document) -> None:
-    found["scenario"]["resolved"]["ugvs"]["r1"]["plant"] = [{"kind": "lag"}]
+    found["scenario"]["resolved"]["ugvs"]["r1"]["plant"] = [{"kind": "lag", "time_constant_s": 0.2}]
 
 
 def fault(found: Document) -> None:
