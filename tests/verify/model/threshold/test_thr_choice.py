@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -90,6 +91,6 @@ def test_the_figure_marks_three_thresholds() -> None:
 
 @pytest.mark.parametrize(("kind", "shown"), [("declared", "declared"), ("optimal", "holds")])
 def test_a_declared_threshold_never_looks_proved(kind: str, shown: str) -> None:
-    claim = {"status": "holds", "exercised": 1, "evidence": {"kind": kind}}
-    assert html._shown(claim) == shown
-    assert html._shown({**claim, "status": "refuted"}) == "refuted"
+    for status, told in (("holds", shown), ("refuted", "refuted")):
+        claim = SimpleNamespace(status=status, exercised=1, evidence={"kind": kind})
+        assert html._shown(claim) == told
