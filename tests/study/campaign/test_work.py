@@ -118,8 +118,10 @@ def test_drake_makes_a_share_of_the_loops_runs_again(spec: Spec, monkeypatch: py
 
 def test_drake_makes_what_fails_again(spec: Spec, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(work, "SHARE", 0.0)
-    rows = work.rows_of(replace(spec, claims=("LIVE-GOAL",)), 5, DEFAULT_LIMITS)
-    assert {(row["status"], row["engine"]) for row in rows} == {("refuted", BOTH)}
+    for expected, engine in ({}, BOTH), ({"LIVE-GOAL": "refuted"}, BATCH):
+        runs = {"a": {"method": "a", "expected": expected}}
+        rows = work.rows_of(replace(spec, claims=("LIVE-GOAL",), fixed={"runs": runs}), 5, DEFAULT_LIMITS)
+        assert {(row["status"], row["engine"]) for row in rows} == {("refuted", engine)}
 
 
 def test_one_difference_ends_a_campaign(spec: Spec, monkeypatch: pytest.MonkeyPatch) -> None:
