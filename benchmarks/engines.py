@@ -18,7 +18,7 @@ os.environ |= dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1")
 
 import numpy as np
 
-from airground_drake.report.simulated import first_difference
+from airground_drake.report.difference import first_difference
 from airground_drake.scenario.load import load
 from airground_drake.sim.batch.run import Batch, LeftToDrakeError
 from airground_drake.sim.simulation import Recorder

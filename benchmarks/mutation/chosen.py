@@ -149,9 +149,9 @@ LAW = (
     Mutant(
         "presets end with a jump to the target",
         "model/geometry/motion.py",
-        "at",
-        "else positions[max(k, 0), a]",
-        "else positions[len(positions) - 1, a]",
+        "Motion.at",
+        "return self.positions[max(k, 0)], np.zeros(3)",
+        "return self.positions[-1], np.zeros(3)",
         tests=("tests/model/geometry/test_motion.py",),
     ),
 )

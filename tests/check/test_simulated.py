@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from airground_drake.report.simulated import first_difference
+from airground_drake.report.difference import first_difference
 from airground_drake.sim.tables import TABLES
 from airground_drake.sim.trace import Trace
 

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from dataclasses import dataclass, field
 from typing import Any, Self
 
 import numpy as np
 
 from airground_drake.base.arrays import Array, read_only
-from airground_drake.base.compiling import njit
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,6 +26,7 @@ class Motion:
     times: Array
     positions: Array
     slopes: Array = field(init=False, repr=False)
+    _times: list[float] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         times, positions = read_only(self.times), read_only(self.positions)
@@ -42,6 +43,7 @@ class Motion:
         object.__setattr__(self, "times", times)
         object.__setattr__(self, "positions", positions)
         object.__setattr__(self, "slopes", slopes)
+        object.__setattr__(self, "_times", times.tolist())
 
     def __deepcopy__(self, memo: dict[int, Any]) -> Self:
         """Immutable: the copy is the object itself."""
@@ -72,20 +74,12 @@ class Motion:
 
     def at(self, t: float) -> tuple[Array, Array]:
         """Position (3,) m and velocity (3,) m/s at time t (at a vertex: the velocity after it)."""
-        place, rate = np.empty(3), np.empty(3)
-        at(self.times, self.positions, self.slopes, t, place, rate)
-        return place, rate
+        k = bisect_right(self._times, t) - 1
+        if k < 0 or k >= len(self._times) - 1:
+            return self.positions[max(k, 0)], np.zeros(3)
+        slope: Array = self.slopes[k]
+        return self.positions[k] + (t - self._times[k]) * slope, slope
 
     def sample(self, t: Array) -> Array:
         """Positions at times (k,): (k, 3) m."""
         return np.column_stack([np.interp(t, self.times, self.positions[:, axis]) for axis in range(3)])
-
-
-@njit(cache=True)
-def at(times: Array, positions: Array, slopes: Array, t: float, place: Array, rate: Array) -> None:
-    """Write where a motion is at a time, s, and its velocity, (3,) each: see `Motion`."""
-    k = int(np.searchsorted(times, t, side="right")) - 1
-    inside = 0 <= k < len(times) - 1
-    for a in range(3):
-        place[a] = positions[k, a] + (t - times[k]) * slopes[k, a] if inside else positions[max(k, 0), a]
-        rate[a] = slopes[k, a] if inside else 0.0

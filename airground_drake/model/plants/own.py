@@ -51,7 +51,7 @@ class Own(Plant):
     signals: ClassVar[tuple[str, ...]] = PLACE
     measured: ClassVar[tuple[str, ...]] = ("drift_m_s", "cover_m")
     theorems: ClassVar[tuple[str, ...]] = ("Mixed.drifting", "Mixed.entry_keeps")
-    unproved: ClassVar[str] = "SAFE-BUDGET says what is proved of it"
+    unproved: ClassVar[str] = "its drift and cover are declared: the distance budget says what is proved of it"
 
     def trails(self, speed_m_s: float) -> bool:
         return True

@@ -20,7 +20,7 @@ import numpy.typing as npt
 from airground_drake.base.arrays import Array
 from airground_drake.base.compiling import njit
 from airground_drake.model.bodies.world import Neighbours
-from airground_drake.model.geometry import motion
+from airground_drake.model.geometry import moving
 from airground_drake.model.geometry.convex import news_within
 from airground_drake.model.law import ugv_law
 from airground_drake.model.law.kernels import Layer, commands
@@ -250,7 +250,7 @@ def advance(team: Team, around: Around, accepted: Accepted, state: State, log: L
             for j in range(n):
                 if on[j]:
                     own = slice(row_of[j], row_of[j + 1])
-                    motion.at(motion_t[own], motion_p[own], motion_v[own], t, wanted[j], wanted_rate[j])
+                    wanted[j], wanted_rate[j] = moving.at(motion_t[own], motion_p[own], motion_v[own], t)
             headings = headings_at(t, state, steering, period)
             asked = AcceptedMotion(wanted, wanted_rate, chosen)
             task = Tracking(track[0], track[1])

@@ -27,7 +27,7 @@ from pydrake.systems.framework import (
 from airground_drake.base.arrays import Array, read_only
 from airground_drake.base.errors import PluginError, described, raised_as, short
 from airground_drake.model.bodies.world import Neighbours, World
-from airground_drake.model.geometry import outline
+from airground_drake.model.geometry import moving, outline
 from airground_drake.model.law.avoidance import Avoidance
 from airground_drake.model.law.task import Task
 from airground_drake.model.law.tasks import FormationTask
@@ -156,10 +156,17 @@ class UgvController(_Controller):
         # t: s; positions: (M, 3), m; reference: (n, 3), m; rate: (n, 3), m/s; headings: (n,), rad
         # law: default: the one with the default gains.
         law = self.law if law is None else law
-        asked = [None if p is None else AcceptedMotion(*p.motion.at(t), p.chosen) for p in accepted]
+        asked = [None if p is None else _asked(p, t) for p in accepted]
         steering = self._world.steering
         steered = None if steering is None or headings is None else (headings, steering)
         return law.velocity(positions, self._world.at(self._near, t), reference, rate, asked, steered)
+
+
+def _asked(proposal: Proposal, t: float) -> AcceptedMotion:
+    """What an accepted proposal asks for at time t, s."""
+    motion = proposal.motion
+    wanted, rate = moving.at(motion.times, motion.positions, motion.slopes, t)
+    return AcceptedMotion(wanted, rate, proposal.chosen)
 
 
 class UavController(_Controller):

@@ -140,7 +140,7 @@ def _is_for_drake(index: int, run: str, verdicts: Sequence[Verdict]) -> bool:
 
 def _compared(trace: Trace, by_drake: Trace) -> str:
     """Who made a run, after a comparison bit by bit; raises EnginesDifferError."""
-    from airground_drake.report.simulated import first_difference  # slow to import, and rarely needed
+    from airground_drake.report.difference import first_difference  # slow to import, and rarely needed
 
     both = trace.meta["faults"] + by_drake.meta["faults"]
     if any(OutOfTime.__name__ in fault["what"] for fault in both):

@@ -13,7 +13,7 @@ from airground_drake.base.errors import SimulationError
 from airground_drake.model.geometry.motion import Motion
 from airground_drake.model.trigger import excursion
 from airground_drake.model.trigger.excursion import Corners
-from airground_drake.report.simulated import first_difference
+from airground_drake.report.difference import first_difference
 from airground_drake.scenario.load import from_data, load, resolved
 from airground_drake.scenario.schema import Scenario
 from airground_drake.scenario.shipped import shipped_files
