@@ -146,7 +146,7 @@ def _simulated(
             _stop([worker.process for worker in running.values()])
 
 
-def _simulate(scenario: Scenario, run: str, folder: Path, clock: Any, engine: Engine) -> None:
+def _simulate(scenario: Scenario, run: str, folder: Path, clock: Any, engine: Engine = "drake") -> None:
     """Simulate a run in this process and save its trace, or a note on its failure; `clock` shows simulated time."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent reacts to it
     signal.signal(signal.SIGTERM, _end)
